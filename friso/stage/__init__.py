@@ -1,0 +1,25 @@
+"""The stage file: a positioning stage, its controller and its motion, with units, checked."""
+
+from friso.quantities import Number, Quantity, StageError, Value
+from friso.stage.files import load, loads, parse_set, save
+from friso.stage.section import Rule, Section
+from friso.stage.stage import Stage, fields, violations
+from friso.stage.tables import FrictionSection, register_friction
+
+__all__ = [
+    "FrictionSection",
+    "Number",
+    "Quantity",
+    "Rule",
+    "Section",
+    "Stage",
+    "StageError",
+    "Value",
+    "fields",
+    "load",
+    "loads",
+    "parse_set",
+    "register_friction",
+    "save",
+    "violations",
+]

@@ -1,0 +1,78 @@
+"""Stage files: reading, writing, and the KEY=VALUE of the command line."""
+
+import os
+import tomllib
+from pathlib import Path
+from typing import Any
+
+from friso.quantities import StageError, quoted
+from friso.stage.stage import Stage
+
+_EXAMPLE = 'stiffness = "2.4 N/mm"'
+
+
+def load(path: str | os.PathLike[str]) -> Stage:
+    """The stage of a TOML file. Raises StageError."""
+    return loads(_text(Path(path)), origin=str(path))
+
+
+def loads(text: str, origin: str = "stage file") -> Stage:
+    """The stage of a TOML text; `origin` names it in errors. Raises StageError."""
+    try:
+        return Stage(**_parsed(text))
+    except StageError as error:
+        raise error.found_in(origin) from None
+
+
+def save(stage: Stage, path: str | os.PathLike[str], overwrite: bool = False) -> None:
+    """Write a stage file, all of it or nothing. Raises StageError where a file is already and may not be replaced."""
+    path = Path(path)
+    if path.exists() and not overwrite:
+        raise StageError(
+            "", "a file that exists already", "a new file, or leave to overwrite", origin=str(path)
+        )
+    draft = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        draft.write_text(stage.to_toml(), encoding="utf-8", newline="\n")
+        draft.replace(path)
+    except OSError as error:
+        raise StageError("", _reason(error), "a place that can be written to", origin=str(path)) from error
+    finally:
+        draft.unlink(missing_ok=True)
+
+
+def parse_set(text: str) -> tuple[str, Any]:
+    """Key and value of a command line's KEY=VALUE; a value that is no TOML is a plain text. Raises StageError."""
+    key, equals, value = text.partition("=")
+    if not equals or not key.strip():
+        raise StageError("", quoted(text), "KEY=VALUE", 'controller.crossover="12 Hz"', origin="--set")
+    try:
+        parsed = tomllib.loads(f"line = {{ value = {value} }}")["line"]
+    except (ValueError, RecursionError):
+        parsed = {}
+    return key.strip(), parsed["value"] if [*parsed] == ["value"] else value.strip()
+
+
+def _text(path: Path) -> str:
+    try:
+        return path.read_bytes().decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        given = f"byte {error.start + 1} is not UTF-8"
+        raise StageError("", given, "a text file saved as UTF-8", origin=str(path)) from None
+    except (OSError, ValueError) as error:
+        given = "a folder" if path.is_dir() else _reason(error)
+        raise StageError("", given, "a stage file", "examples/thesis_rig.toml", str(path)) from None
+
+
+def _reason(error: OSError | ValueError) -> str:
+    return str(getattr(error, "strerror", None) or error).lower()
+
+
+def _parsed(text: str) -> dict[str, Any]:
+    if not text.strip():
+        raise StageError("", "an empty file", "a stage file; friso init writes one to start from")
+    try:
+        return tomllib.loads(text)
+    except (ValueError, RecursionError) as error:
+        given = "tables nested too deeply" if isinstance(error, RecursionError) else f"not TOML: {error}"
+        raise StageError("", given, "lines such as in the example", _EXAMPLE) from None

@@ -1,0 +1,142 @@
+"""What all tables of a stage file share: strict keys, readable errors, rules between keys, variants by a tag."""
+
+import difflib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar, TypeVar, get_args
+
+from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, ValidationError
+from pydantic_core import CoreSchema, core_schema
+
+from friso.quantities import Number, Quantity, StageError, as_toml, quoted
+
+
+@dataclass(frozen=True)
+class Rule:
+    """A condition between keys. `holds` gets the flat SI mapping (see `Stage.flat`) and broadcasts over arrays."""
+
+    keys: tuple[str, ...]
+    holds: Callable[[Mapping[str, Any]], Any]
+    expected: str
+    example: str
+
+
+class Section(BaseModel):
+    """A table of the stage file: frozen, strict, no unknown keys. Raises StageError when made from wrong data."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
+
+    rules: ClassVar[tuple[Rule, ...]] = ()
+
+    def __init__(self, /, **data: Any) -> None:
+        try:
+            super().__init__(**data)
+        except ValidationError as error:
+            raise _first_problem(type(self), error) from None
+
+    def given(self) -> dict[str, Any]:
+        """The keys as the user gave them, in the order of the class."""
+        fields = (
+            (key, getattr(self, key)) for key in type(self).model_fields if key in self.model_fields_set
+        )
+        return {key: getattr(value, "text", value) for key, value in fields}
+
+
+SectionClass = TypeVar("SectionClass", bound=type[Section])
+
+
+@dataclass(frozen=True)
+class Table:
+    """A field that takes a table: `pick` chooses the section class for it, `example` shows one."""
+
+    pick: Callable[[dict[str, Any]], type[Section]]
+    example: str
+
+    def read(self, given: Any) -> Any:
+        """The section for a table; a section is left as it is. Raises StageError."""
+        if isinstance(given, Section):
+            return given
+        if not isinstance(given, dict):
+            raise StageError("", quoted(given), "a table of keys", self.example)
+        return self.pick(given)(**given)
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return core_schema.no_info_before_validator_function(self.read, handler(source))
+
+
+class Variants:
+    """Sections told apart by one of their keys, the tag: `kind` of [motion], `model` of [friction]."""
+
+    def __init__(self, tag: str) -> None:
+        self.tag = tag
+        self.classes: dict[str, type[Section]] = {}
+
+    def register(self, cls: SectionClass) -> SectionClass:
+        """Class decorator: add a variant, named by its tag, `kind: Literal["step"]`."""
+        self.classes[get_args(cls.model_fields[self.tag].annotation)[0]] = cls
+        return cls
+
+    def pick(self, table: dict[str, Any]) -> type[Section]:
+        """The class for a table. Raises StageError when the tag is missing or unknown."""
+        name = table.get(self.tag)
+        if isinstance(name, str) and name in self.classes:
+            return self.classes[name]
+        near = nearest(name, self.classes) or next(iter(self.classes), "")
+        expected = f"one of {', '.join(map(as_toml, self.classes))}"
+        raise StageError(self.tag, quoted(name), expected, f"{self.tag} = {as_toml(near)}")
+
+
+def numeric_fields(cls: type[Section]) -> dict[str, Quantity | Number]:
+    """Unit, bound and example of each numeric key of a table."""
+    found = ((key, item) for key, field in cls.model_fields.items() for item in field.metadata)
+    return {key: item for key, item in found if isinstance(item, Quantity | Number)}
+
+
+def nearest(name: Any, known: Mapping[str, Any] | list[str]) -> str | None:
+    """The known name most like `name`, if any is."""
+    return next(iter(difflib.get_close_matches(str(name).lower(), list(known), n=1, cutoff=0.7)), None)
+
+
+def _first_problem(cls: type[Section], error: ValidationError) -> StageError:
+    """One StageError from pydantic's list: an unknown key first, since it often explains a missing one."""
+    problems = sorted(
+        error.errors(include_url=False), key=lambda problem: problem["type"] != "extra_forbidden"
+    )
+    problem = problems[0]
+    key = ".".join(map(str, problem["loc"]))
+    cause = problem.get("ctx", {}).get("error")
+    if isinstance(cause, StageError):
+        return _with_example(cause.under(key), key)
+    if problem["type"] == "extra_forbidden":
+        return _unknown_key(cls, key)
+    given = "nothing" if problem["type"] == "missing" else quoted(problem["input"])
+    return StageError(key, given, *_described(cls, key))
+
+
+def _with_example(error: StageError, key: str) -> StageError:
+    """Put the key before an example that is a mere value."""
+    if error.key != key or "=" in error.example:
+        return error
+    return StageError(key, error.given, error.expected, f"{key} = {error.example}")
+
+
+def _unknown_key(cls: type[Section], key: str) -> StageError:
+    near = nearest(key, cls.model_fields)
+    hint = f"did you mean {near}?" if near else "unknown key"
+    return StageError(key, f"{key} ({hint})", f"one of {', '.join(cls.model_fields)}")
+
+
+def _described(cls: type[Section], key: str) -> tuple[str, str]:
+    """What a field takes and an example of it."""
+    field = cls.model_fields[key]
+    for item in field.metadata:
+        if isinstance(item, Table):
+            return f"a table [{key}]", item.example
+        if isinstance(item, Quantity | Number):
+            return item.expected, f"{key} = {item.written_example}"
+    if field.annotation is bool:
+        return "true or false", f"{key} = true"
+    if field.annotation is str:
+        return "a text in quotes", f'{key} = "Thesis rig"'
+    choices = [as_toml(choice) for choice in get_args(field.annotation)]
+    return f"one of {', '.join(choices)}", f"{key} = {choices[0]}"
