@@ -1,0 +1,136 @@
+"""A figure as plain data, before anybody draws it.
+
+An analysis answers with a `Figure`; a renderer draws it. All data stand in the unit named on their axis, an
+SI unit when the figure is made; `friso.views.drawable` picks the prefix and thins the lines, once for both
+renderers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+Array = npt.NDArray[np.float64]
+Dash = Literal["solid", "dashed", "dotted"]
+Symbol = Literal["circle", "triangle", "cross"]
+
+# Okabe & Ito, "Color universal design" (2008): told apart with any colour vision.
+BLUE, VERMILLION, GREEN = "#0072B2", "#D55E00", "#009E73"
+SKY, ORANGE, PINK = "#56B4E9", "#E69F00", "#CC79A7"
+INK, GREY, LIGHT = "#222222", "#767676", "#c9c9c9"
+
+
+@dataclass(frozen=True)
+class Axis:
+    """One axis: `quantity` and `unit` make its label, `limits` [unit] its range (None: from the data)."""
+
+    quantity: str
+    unit: str
+    limits: tuple[float, float] | None = None
+    log: bool = False
+
+    @property
+    def label(self) -> str:
+        """What is written at the axis, e.g. "Time [s]"."""
+        return f"{self.quantity} [{self.unit}]" if self.unit else self.quantity
+
+
+@dataclass(frozen=True)
+class Series:
+    """A line through the points x, y, both of shape (n,); NaN breaks it."""
+
+    x: Array
+    y: Array
+    label: str
+    colour: str
+    dash: Dash = "solid"
+    width: float = 1.4
+
+    def __post_init__(self) -> None:
+        _same_length(self.label, self.x, self.y)
+
+
+@dataclass(frozen=True)
+class Markers:
+    """Single points x, y, both of shape (n,), never thinned (counted peaks, an evaluation point)."""
+
+    x: Array
+    y: Array
+    label: str
+    colour: str
+    symbol: Symbol = "circle"
+
+    def __post_init__(self) -> None:
+        _same_length(self.label, self.x, self.y)
+
+
+@dataclass(frozen=True)
+class Limit:
+    """Horizontal lines at `values` [unit of the y axis] across the panel, under one label."""
+
+    values: tuple[float, ...]
+    label: str
+    colour: str = GREY
+    dash: Dash = "dashed"
+
+
+@dataclass(frozen=True)
+class Map:
+    """A field z of shape (len(y), len(x)) over cell centres x and y; NaN cells stay empty."""
+
+    x: Array
+    y: Array
+    z: Array
+    quantity: str
+    unit: str
+
+    def __post_init__(self) -> None:
+        if np.shape(self.z) != (len(self.y), len(self.x)):
+            raise ValueError(
+                f"map of {self.quantity}: z has the shape {np.shape(self.z)}, expected "
+                f"(len(y), len(x)) = {(len(self.y), len(self.x))}"
+            )
+
+    @property
+    def label(self) -> str:
+        """What is written at the colour bar."""
+        return f"{self.quantity} [{self.unit}]" if self.unit else self.quantity
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One pair of axes with what is drawn in it: maps lowest, then limits, lines and markers."""
+
+    title: str
+    x: Axis
+    y: Axis
+    series: tuple[Series, ...] = ()
+    markers: tuple[Markers, ...] = ()
+    limits: tuple[Limit, ...] = ()
+    maps: tuple[Map, ...] = ()
+
+
+@dataclass(frozen=True)
+class Figure:
+    """Panels in `columns` columns, row by row. `name` serves as file name, `subject` is the stage."""
+
+    name: str
+    title: str
+    caption: str
+    panels: tuple[Panel, ...]
+    columns: int = 1
+    subject: str = ""
+
+    @property
+    def rows(self) -> int:
+        """Number of rows of panels."""
+        return -(-len(self.panels) // self.columns)
+
+
+def _same_length(label: str, x: Sequence[float] | Array, y: Sequence[float] | Array) -> None:
+    if np.ndim(x) != 1 or np.shape(x) != np.shape(y):
+        raise ValueError(f"{label}: x has the shape {np.shape(x)}, y {np.shape(y)}; expected one length")

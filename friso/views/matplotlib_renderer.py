@@ -1,0 +1,174 @@
+"""Figures on paper: PNG, SVG and PDF through matplotlib, the same bytes on every run.
+
+The user's matplotlibrc does not matter: everything is drawn under matplotlib's defaults and the style below.
+Texts are drawn as they stand: a dollar sign in a stage's name starts no formula.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure as Canvas
+from matplotlib.lines import Line2D
+from matplotlib.ticker import LogFormatterMathtext, LogLocator, MaxNLocator, NullFormatter, ScalarFormatter
+
+from friso.views.drawable import drawable
+from friso.views.figure import GREY, INK, Figure, Panel
+
+FORMATS = ("png", "svg", "pdf")
+WIDTH = 9.0  # [inch]
+ROW_HEIGHT = 2.7  # [inch] axes, labels, title and legend of one row of panels
+HEADER_HEIGHT = 0.35  # [inch] the figure's own title
+
+# No dates and no version numbers in the files, so that a rerun gives the same bytes.
+_METADATA = {
+    "png": {"Software": None},
+    "svg": {"Date": None, "Creator": None},
+    "pdf": {"CreationDate": None, "Creator": None, "Producer": None},
+}
+_STYLE = {
+    "font.family": "DejaVu Sans",  # comes with matplotlib
+    "font.size": 9,
+    "axes.titlesize": 9.5,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.labelsize": 9,
+    "axes.labelcolor": INK,
+    "axes.edgecolor": GREY,
+    "axes.linewidth": 0.8,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "axes.xmargin": 0.01,
+    "axes.ymargin": 0.06,
+    "grid.color": "#e3e3e3",
+    "grid.linewidth": 0.7,
+    "xtick.color": GREY,
+    "ytick.color": GREY,
+    "xtick.labelcolor": INK,
+    "ytick.labelcolor": INK,
+    "legend.frameon": False,
+    "legend.fontsize": 8.5,
+    "lines.solid_joinstyle": "round",
+    "savefig.dpi": 150,
+    "svg.hashsalt": "friso",
+    "svg.fonttype": "path",
+    "pdf.fonttype": 42,
+}
+_DASHES = {"solid": "-", "dashed": (0, (5, 2.5)), "dotted": (0, (1.2, 1.6))}
+_SYMBOLS = {"circle": "o", "triangle": "v", "cross": "x"}
+
+
+def render(figure: Figure) -> Canvas:
+    """The figure on a matplotlib canvas; its lines carry the arrays of `drawable(figure)`, in its order."""
+    with _style():
+        prepared = drawable(figure)
+        size = (WIDTH, ROW_HEIGHT * prepared.rows + HEADER_HEIGHT)
+        canvas = Canvas(figsize=size, layout="constrained", facecolor="white")
+        canvas.get_layout_engine().set(w_pad=0.08, h_pad=0.08)  # type: ignore[union-attr]
+        heading = f"{prepared.subject}: {prepared.title}" if prepared.subject else prepared.title
+        canvas.suptitle(heading, x=0.01, ha="left", fontsize=11.5, fontweight="bold", parse_math=False)
+        for number, panel in enumerate(prepared.panels):
+            axes = canvas.add_subplot(prepared.rows, prepared.columns, number + 1)
+            _draw(axes, panel, WIDTH / prepared.columns)
+        return canvas
+
+
+def image(figure: Figure, form: str) -> bytes:
+    """The figure as the bytes of a file; `form` is one of FORMATS (ValueError otherwise)."""
+    if form not in FORMATS:
+        raise ValueError(f"figure format: got {form!r}, expected one of {', '.join(FORMATS)}, e.g. 'png'")
+    canvas = render(figure)
+    stream = io.BytesIO()
+    with _style():
+        canvas.savefig(stream, format=form, metadata=_METADATA[form])
+    return stream.getvalue()
+
+
+def save(figure: Figure, path: Path) -> None:
+    """Write the figure to `path`, in the format of its suffix (ValueError for others than FORMATS)."""
+    path.write_bytes(image(figure, path.suffix.removeprefix(".").lower()))
+
+
+@contextmanager
+def _style() -> Iterator[None]:
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        mpl.rcParams.update(_STYLE)
+        yield
+
+
+def _draw(axes: Axes, panel: Panel, width: float) -> None:
+    """Everything of one panel, which is `width` [inch] wide."""
+    _scale(axes, panel)
+    for field in panel.maps:
+        mesh = axes.pcolormesh(
+            field.x, field.y, np.ma.masked_invalid(field.z), cmap="viridis", shading="nearest"
+        )
+        bar = axes.get_figure().colorbar(mesh, ax=axes)  # type: ignore[union-attr]
+        bar.set_label(field.label, parse_math=False)
+        axes.grid(visible=False)
+    handles: list[Line2D] = []
+    for line in panel.series:
+        style = {"color": line.colour, "linestyle": _DASHES[line.dash], "linewidth": line.width}
+        handles += axes.plot(line.x, line.y, **style)
+    for marker in panel.markers:
+        style = {"color": marker.colour, "marker": _SYMBOLS[marker.symbol], "markersize": 6, "zorder": 3}
+        handles += axes.plot(marker.x, marker.y, linestyle="none", **style)
+    if panel.x.limits:
+        axes.set_xlim(panel.x.limits)
+    if panel.y.limits:
+        axes.set_ylim(panel.y.limits)
+    _annotate(axes, panel, handles, width)
+
+
+def _scale(axes: Axes, panel: Panel) -> None:
+    """Scales and ticks: plain numbers, never a factor or an offset beside the axis."""
+    axes.set_xscale("log" if panel.x.log else "linear")
+    axes.set_yscale("log" if panel.y.log else "linear")
+    if panel.markers and panel.x.limits is None:
+        axes.margins(x=0.03)
+    bins = (9, [1, 2, 5, 10]), (6, [1, 2, 2.5, 5, 10])
+    for axis, declared, (most, steps) in zip((axes.xaxis, axes.yaxis), (panel.x, panel.y), bins, strict=True):
+        if declared.log:
+            axis.set_major_locator(LogLocator(numticks=8))
+            axis.set_major_formatter(LogFormatterMathtext())
+            axis.set_minor_formatter(NullFormatter())
+        else:
+            plain = ScalarFormatter(useOffset=False)
+            plain.set_scientific(False)
+            axis.set_major_formatter(plain)
+            axis.set_major_locator(MaxNLocator(nbins=most, steps=steps))
+
+
+def _annotate(axes: Axes, panel: Panel, handles: list[Line2D], width: float) -> None:
+    """Labels, and title over legend above the axes, where the legend covers no data."""
+    axes.set_xlabel(panel.x.label, parse_math=False)
+    axes.set_ylabel(panel.y.label, parse_math=False)
+    labels = [item.label for item in (*panel.series, *panel.markers)]
+    rows = 0
+    if len(labels) > 1:
+        columns = _legend_columns(labels, width)
+        rows = -(-len(labels) // columns)
+        place = {"loc": "lower left", "bbox_to_anchor": (0, 1), "borderaxespad": 0.1, "borderpad": 0.2}
+        legend = axes.legend(handles, labels, ncols=columns, columnspacing=1.4, labelspacing=0.25, **place)
+        for text in legend.get_texts():
+            text.set_parse_math(False)
+    axes.set_title(panel.title, pad=5 + 13 * rows, parse_math=False)
+
+
+def _legend_columns(labels: list[str], width: float) -> int:
+    """As many columns as fit into `width` [inch]: 12 letters to the inch, 7 of them for line and gap."""
+    room = 12 * (width - 0.9)
+    for columns in range(len(labels), 1, -1):
+        rows = -(-len(labels) // columns)
+        if sum(max(map(len, labels[i : i + rows])) + 7 for i in range(0, len(labels), rows)) <= room:
+            return columns
+    return 1

@@ -1,0 +1,183 @@
+"""Figures on a page: interactive HTML through plotly, readable without a network.
+
+A page holds plotly's script once (`script()`) and any number of fragments (`fragment(figure)`), whose
+elements are named after the figure, so that the same figures give the same bytes.
+"""
+
+from __future__ import annotations
+
+import html
+import math
+from typing import Any
+
+import plotly.graph_objects as go
+from plotly.offline import get_plotlyjs
+
+from friso.views.drawable import drawable
+from friso.views.figure import GREY, INK, Axis, Figure, Map, Markers, Panel, Series
+
+HEADER = 62  # [px] title and legend above the axes
+PLOT = 230  # [px] height of the axes
+FOOTER = 54  # [px] tick labels and axis label
+LEFT, RIGHT = 72, 14  # [px]
+GAP = 0.09  # between two panels of a row, as a fraction of the width
+
+_DASHES = {"solid": "solid", "dashed": "6px,4px", "dotted": "2px,3px"}
+_SYMBOLS = {"circle": "circle", "triangle": "triangle-down", "cross": "x-thin-open"}
+_CONFIG = {"displaylogo": False, "responsive": True, "modeBarButtonsToRemove": ["select2d", "lasso2d"]}
+
+
+def script() -> str:
+    """plotly.js of the installed package, to stand once in a page inside a script element."""
+    return get_plotlyjs()
+
+
+def fragment(figure: Figure) -> str:
+    """The figure as one HTML element and the script that fills it; the page holds `script()` before it."""
+    return render(figure).to_html(
+        full_html=False, include_plotlyjs=False, div_id=f"figure-{figure.name}", config=_CONFIG
+    )
+
+
+def render(figure: Figure) -> go.Figure:
+    """The figure for plotly; its traces carry the arrays of `drawable(figure)`, in the same order."""
+    prepared = drawable(figure)
+    row = HEADER + PLOT + FOOTER
+    height = row * prepared.rows
+    layout: dict[str, Any] = {
+        "template": "none",
+        "height": height,
+        "margin": {"l": LEFT, "r": RIGHT, "t": 0, "b": 0},
+        "font": {"family": "system-ui, sans-serif", "size": 12, "color": INK},
+        "hovermode": "closest",
+        "annotations": [],
+    }
+    traces: list[Any] = []
+    links: dict[Axis, str] = {}
+    for number, panel in enumerate(prepared.panels):
+        top = height - (number // prepared.columns) * row
+        y_domain = ((top - HEADER - PLOT) / height, (top - HEADER) / height)
+        x_domain = _columns(number % prepared.columns, prepared.columns)
+        _add_panel(layout, panel, number, x_domain, y_domain, HEADER / height, links)
+        traces += _traces(panel, number, x_domain, y_domain)
+    return go.Figure(data=traces, layout=layout)
+
+
+def _columns(column: int, columns: int) -> tuple[float, float]:
+    """Left and right end of a column, as fractions of the width."""
+    width = (1 - GAP * (columns - 1)) / columns
+    left = column * (width + GAP)
+    return left, min(1.0, left + width)
+
+
+def _add_panel(
+    layout: dict[str, Any],
+    panel: Panel,
+    number: int,
+    x_domain: tuple[float, float],
+    y_domain: tuple[float, float],
+    header: float,
+    links: dict[Axis, str],
+) -> None:
+    """Axes, legend and title of one panel; panels with equal x axes are zoomed together."""
+    suffix = _suffix(number)
+    x_axis = _axis(panel.x) | {"domain": x_domain, "anchor": f"y{suffix}"}
+    if panel.x in links:
+        x_axis["matches"] = links[panel.x]
+    links.setdefault(panel.x, f"x{suffix}")
+    layout[f"xaxis{suffix}"] = x_axis
+    layout[f"yaxis{suffix}"] = _axis(panel.y) | {"domain": y_domain, "anchor": f"x{suffix}"}
+    layout[f"legend{suffix}"] = {
+        "orientation": "h",
+        "x": x_domain[0],
+        "xanchor": "left",
+        "y": y_domain[1],
+        "yanchor": "bottom",
+        "bgcolor": "rgba(0,0,0,0)",
+    }
+    layout["annotations"].append(
+        {
+            "text": f"<b>{html.escape(panel.title)}</b>",
+            "x": x_domain[0],
+            "xref": "paper",
+            "xanchor": "left",
+            "y": y_domain[1] + header * 0.62,
+            "yref": "paper",
+            "yanchor": "bottom",
+            "showarrow": False,
+            "font": {"size": 13},
+        }
+    )
+
+
+def _axis(axis: Axis) -> dict[str, Any]:
+    settings: dict[str, Any] = {
+        "title": {"text": html.escape(axis.label), "standoff": 8},
+        "type": "log" if axis.log else "linear",
+        "exponentformat": "power" if axis.log else "none",
+        "gridcolor": "#e3e3e3",
+        "zeroline": False,
+        "showline": True,
+        "linecolor": GREY,
+        "ticks": "outside",
+        "tickcolor": GREY,
+    }
+    if axis.log:
+        settings["dtick"] = 1
+    if axis.limits:
+        settings["range"] = [math.log10(limit) for limit in axis.limits] if axis.log else list(axis.limits)
+    return settings
+
+
+def _traces(
+    panel: Panel, number: int, x_domain: tuple[float, float], y_domain: tuple[float, float]
+) -> list[Any]:
+    """What is drawn in a panel, maps first, in the order of `drawable`."""
+    suffix = _suffix(number)
+    place = {"xaxis": f"x{suffix}", "yaxis": f"y{suffix}"}
+    count = len(panel.series) + len(panel.markers)
+    named = place | {"legend": f"legend{suffix}", "showlegend": count > 1}
+    return [
+        *(_map(field, place, x_domain, y_domain) for field in panel.maps),
+        *(_line(line, panel, named) for line in panel.series),
+        *(_points(marker, panel, named) for marker in panel.markers),
+    ]
+
+
+def _line(line: Series, panel: Panel, place: dict[str, Any]) -> go.Scatter:
+    style = {"color": line.colour, "width": line.width, "dash": _DASHES[line.dash]}
+    return go.Scatter(
+        x=line.x, y=line.y, mode="lines", line=style, connectgaps=False, **_text(line.label, panel), **place
+    )
+
+
+def _points(marker: Markers, panel: Panel, place: dict[str, Any]) -> go.Scatter:
+    style = {"color": marker.colour, "symbol": _SYMBOLS[marker.symbol], "size": 9}
+    return go.Scatter(
+        x=marker.x, y=marker.y, mode="markers", marker=style, **_text(marker.label, panel), **place
+    )
+
+
+def _map(
+    field: Map, place: dict[str, Any], x_domain: tuple[float, float], y_domain: tuple[float, float]
+) -> go.Heatmap:
+    bar = {
+        "title": {"text": html.escape(field.label), "side": "right"},
+        "x": x_domain[1],
+        "y": sum(y_domain) / 2,
+        "len": y_domain[1] - y_domain[0],
+        "thickness": 14,
+    }
+    return go.Heatmap(x=field.x, y=field.y, z=field.z, colorscale="Viridis", colorbar=bar, **place)
+
+
+def _text(label: str, panel: Panel) -> dict[str, Any]:
+    """Name and hover text; plotly reads both as HTML."""
+    x_unit, y_unit = html.escape(panel.x.unit), html.escape(panel.y.unit)
+    hover = f"%{{x:.5~g}} {x_unit}, %{{y:.5~g}} {y_unit}"
+    return {"name": html.escape(label), "hovertemplate": hover}
+
+
+def _suffix(number: int) -> str:
+    """plotly counts axes x, x2, x3, ..."""
+    return "" if number == 0 else str(number + 1)

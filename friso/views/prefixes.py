@@ -1,0 +1,62 @@
+"""The SI prefix that makes the numbers at an axis readable."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from friso.views.figure import Array
+
+# Prefixes by exponent of ten. Lengths beyond metres and times beyond seconds are read best as they are.
+_PREFIXES = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
+_LARGEST = {"m": 0, "s": 0, "N": 9, "Hz": 9}
+_SMALLEST = -9
+_SIGNS = str.maketrans({"*": "·"})
+_POWERS = {"^2": "²", "^3": "³", "**2": "²", "**3": "³"}
+
+
+def choose(values: Array, unit: str, *, log: bool = False) -> tuple[float, str]:
+    """Factor and unit with prefix for `values` [unit]: prefixed value = factor * value.
+
+    The largest magnitude falls between 1 and 1000 where a prefix allows it; on a logarithmic axis the middle of
+    the range does. Units without prefix (kg, rad, m^2) keep the factor 1. Only finite values count.
+    """
+    symbol = unit.replace("**", "^").replace("/", "*").split("*")[0]
+    text = pretty(unit)
+    magnitudes = np.abs(values[np.isfinite(values) & (values != 0)])
+    if symbol not in _LARGEST or magnitudes.size == 0:
+        return 1.0, text
+    size = float(np.max(magnitudes))
+    if log:
+        size = math.sqrt(size) * math.sqrt(float(np.min(magnitudes)))
+    # 1e-9 of slack: a largest value of 0.001 m is 1 mm although 0.001 * 1000 may fall short of 1
+    exponent = 3 * math.floor((math.log10(size) + 1e-9) / 3)
+    exponent = min(max(exponent, _SMALLEST), _LARGEST[symbol])
+    return 10.0**-exponent, _PREFIXES[exponent] + text
+
+
+def pretty(unit: str) -> str:
+    """A unit as it is printed: "N*s/m^2" becomes "N·s/m²"."""
+    for plain, raised in _POWERS.items():
+        unit = unit.replace(plain, raised)
+    return unit.translate(_SIGNS)
+
+
+def with_unit(value: float | None, unit: str, digits: int = 3) -> str:
+    """A value [unit] for a table or a sentence, e.g. "0.52 mm"; a dash where there is none."""
+    if value is None or not math.isfinite(value):
+        return "–"
+    factor, text = choose(np.array([value]), unit)
+    number = value * factor
+    if number == 0 or 1e-3 <= abs(number) < 1e5:
+        return f"{_rounded(number, digits)} {text}"
+    return f"{number:.{digits - 1}e} {text}"
+
+
+def _rounded(number: float, digits: int) -> str:
+    """`digits` significant digits without an exponent: 1234.5 stays 1234 rather than become 1.23e+03."""
+    if number == 0:
+        return "0"
+    decimals = max(0, digits - 1 - math.floor(math.log10(abs(number)) + 1e-12))
+    return f"{number:.{decimals}f}"
