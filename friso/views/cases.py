@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from friso.hunting import Case
 
 COLOURS = {"given": BLUE, "locked": VERMILLION, "free": GREEN}
-LABELS = {"given": "As given", "locked": "Joint locked", "free": "Joint free"}
+LABELS = {"given": "As given", "locked": "Locked", "free": "Free"}
 BANDS = {1e-6: "1 µm", 1e-5: "10 µm"}  # [m] the settling bands of the check
 
 

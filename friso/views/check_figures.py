@@ -85,14 +85,21 @@ def _settled(shown: list[Shown]) -> Figure:
                 Markers(item.case.peak_times, item.case.peak_heights, label, item.colour, "triangle")
             )
     limits = (Limit((COUNTED_ABOVE,), "peaks count above", GREY, "dotted"),) if peaks else ()
-    title = f"From {start:g} s on: deviation from the reference"
+    # A stage that stays within the finest band shows as a line, not as a screenful of solver noise.
+    view = _common([line.y for line in lines], least=2 * min(BANDS))
     zoom = Panel(
-        title, Axis("Time", "s", (start, end)), Axis("Deviation", "m"), tuple(lines), tuple(peaks), limits
+        f"From {start:g} s on: deviation from the reference",
+        Axis("Time", "s", (start, end)),
+        Axis("Deviation", "m", view),
+        tuple(lines),
+        tuple(peaks),
+        limits,
     )
     caption = (
         "Hunting shows as a deviation that keeps coming back. Peaks are counted as in the thesis "
-        "(Sec. 3.2.2): after 10 s, higher than 0.1 mm, 0.5 s apart. Below: the size of the deviation over the "
-        "whole run, on a logarithmic scale that ends at 1 nm; a stage that hunts never stays under the lines."
+        "(Sec. 3.2.2): after 10 s, higher than 0.1 mm, 0.5 s apart. Below: the size of the deviation over "
+        "the whole run, on a logarithmic scale that ends at 1 nm; a stage that hunts never stays under the "
+        "lines."
     )
     return Figure("settled", "Does it hunt?", caption, (zoom, _settling(shown)), subject=_subject(shown))
 
@@ -167,7 +174,7 @@ def _shares(shown: list[Shown]) -> Figure:
 
 
 def _joint(shown: list[Shown]) -> Figure:
-    """Joint deflection with its limits, over the whole run and after it, of the case with a free joint."""
+    """Joint deflection with its limits, over the whole run and its settled part, where the joint is free."""
     start, end = _window(shown)
     panels = []
     for item in shown:
@@ -260,14 +267,15 @@ def _cut(item: Shown, values: Array, start: float, end: float) -> tuple[Array, A
     return time[inside], values[inside]
 
 
-def _common(arrays: list[Array]) -> tuple[float, float] | None:
-    """A range that holds all finite data with a margin; None where there are none or all are equal."""
+def _common(arrays: list[Array], least: float = 0.0) -> tuple[float, float] | None:
+    """A range of at least `least` that holds all finite data with a margin; None where it would be empty."""
     values = np.concatenate([np.empty(0), *arrays])
-    span = _span(values)
-    if span == 0:
+    finite = values[np.isfinite(values)]
+    if finite.size == 0 or max(np.ptp(finite), least) == 0:
         return None
-    values, margin = values[np.isfinite(values)], 0.06 * span
-    return float(values.min()) - margin, float(values.max()) + margin
+    low, high = float(finite.min()), float(finite.max())
+    margin = max(0.06 * (high - low), (least - (high - low)) / 2)
+    return low - margin, high + margin
 
 
 def _span(values: Array) -> float:

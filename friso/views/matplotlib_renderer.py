@@ -70,11 +70,12 @@ def render(figure: Figure) -> Canvas:
     """The figure on a matplotlib canvas; its lines carry the arrays of `drawable(figure)`, in its order."""
     with _style():
         prepared = drawable(figure)
-        size = (WIDTH, ROW_HEIGHT * prepared.rows + HEADER_HEIGHT)
+        heading = ": ".join(text for text in (prepared.subject, prepared.title) if text)
+        size = (WIDTH, ROW_HEIGHT * prepared.rows + (HEADER_HEIGHT if heading else 0))
         canvas = Canvas(figsize=size, layout="constrained", facecolor="white")
         canvas.get_layout_engine().set(w_pad=0.08, h_pad=0.08)  # type: ignore[union-attr]
-        heading = f"{prepared.subject}: {prepared.title}" if prepared.subject else prepared.title
-        canvas.suptitle(heading, x=0.01, ha="left", fontsize=11.5, fontweight="bold", parse_math=False)
+        if heading:
+            canvas.suptitle(heading, x=0.01, ha="left", fontsize=11.5, fontweight="bold", parse_math=False)
         for number, panel in enumerate(prepared.panels):
             axes = canvas.add_subplot(prepared.rows, prepared.columns, number + 1)
             _draw(axes, panel, WIDTH / prepared.columns)

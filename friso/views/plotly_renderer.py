@@ -16,15 +16,23 @@ from plotly.offline import get_plotlyjs
 from friso.views.drawable import drawable
 from friso.views.figure import GREY, INK, Axis, Figure, Map, Markers, Panel, Series
 
-HEADER = 62  # [px] title and legend above the axes
+HEADER = 54  # [px] title and legend above the axes
 PLOT = 230  # [px] height of the axes
 FOOTER = 54  # [px] tick labels and axis label
-LEFT, RIGHT = 72, 14  # [px]
+LEFT, RIGHT, TOP = 72, 14, 26  # [px]; the buttons stand in the top margin
 GAP = 0.09  # between two panels of a row, as a fraction of the width
 
 _DASHES = {"solid": "solid", "dashed": "6px,4px", "dotted": "2px,3px"}
 _SYMBOLS = {"circle": "circle", "triangle": "triangle-down", "cross": "x-thin-open"}
-_CONFIG = {"displaylogo": False, "responsive": True, "modeBarButtonsToRemove": ["select2d", "lasso2d"]}
+# The buttons are listed, since plotly's own choice has one that sends the data to a server.
+_BUTTONS = [["toImage"], ["zoom2d", "pan2d"], ["zoomIn2d", "zoomOut2d", "resetScale2d"]]
+_CONFIG = {
+    "displaylogo": False,
+    "responsive": True,
+    "modeBarButtons": _BUTTONS,
+    "showSendToCloud": False,
+    "plotlyServerURL": "",
+}
 
 
 def script() -> str:
@@ -46,8 +54,8 @@ def render(figure: Figure) -> go.Figure:
     height = row * prepared.rows
     layout: dict[str, Any] = {
         "template": "none",
-        "height": height,
-        "margin": {"l": LEFT, "r": RIGHT, "t": 0, "b": 0},
+        "height": height + TOP,
+        "margin": {"l": LEFT, "r": RIGHT, "t": TOP, "b": 0},
         "font": {"family": "system-ui, sans-serif", "size": 12, "color": INK},
         "hovermode": "closest",
         "annotations": [],

@@ -19,8 +19,8 @@ _POWERS = {"^2": "²", "^3": "³", "**2": "²", "**3": "³"}
 def choose(values: Array, unit: str, *, log: bool = False) -> tuple[float, str]:
     """Factor and unit with prefix for `values` [unit]: prefixed value = factor * value.
 
-    The largest magnitude falls between 1 and 1000 where a prefix allows it; on a logarithmic axis the middle of
-    the range does. Units without prefix (kg, rad, m^2) keep the factor 1. Only finite values count.
+    The largest magnitude falls between 1 and 1000 where a prefix allows it; on a logarithmic axis the middle
+    of the range does. Units without prefix (kg, rad, m^2) keep the factor 1. Only finite values count.
     """
     symbol = unit.replace("**", "^").replace("/", "*").split("*")[0]
     text = pretty(unit)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import math
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -30,7 +31,7 @@ def write_report(cases: Mapping[str, Case], path: Path) -> None:
 
 
 def report_html(cases: Mapping[str, Case]) -> str:
-    """The whole page for the cases "given" and, with a joint, "locked" and "free"; their traces may be missing."""
+    """The whole page for the cases "given" and, with a joint, "locked" and "free"; traces may be missing."""
     shown = shown_cases(cases)
     stage = shown[0].case.stage if "given" not in cases else cases["given"].stage
     figures = check_figures(cases)
@@ -57,7 +58,7 @@ def report_html(cases: Mapping[str, Case]) -> str:
 def verdict_sentence(item: Shown) -> str:
     """What the case does, in a sentence for the engineer who decides."""
     case = item.case
-    size = f"{with_unit(case.peak_to_peak, 'm')} peak to peak"
+    size = f"{_amplitude(case)} peak to peak"
     if case.verdict == "hunts":
         every = f" every {with_unit(case.period, 's')}" if case.period and math.isfinite(case.period) else ""
         counted = f" ({case.peaks} peaks counted)" if case.peaks else ""
@@ -89,12 +90,12 @@ def conclusion(cases: Mapping[str, Case]) -> str | None:
 def _settling(item: Shown, size: str) -> str:
     times = item.case.settling_time
     fine, coarse = times.get(_MICRON), times.get(_TEN_MICRON)
-    after = "after the last corner of the reference"
     if fine is not None:
-        return f"settles, within {BANDS[_MICRON]} {with_unit(fine, 's')} {after}."
+        return f"settles to within {BANDS[_MICRON]} in {with_unit(fine, 's')}."
     if coarse is not None:
-        return f"settles, within {BANDS[_TEN_MICRON]} {with_unit(coarse, 's')} {after}, but not within {BANDS[_MICRON]}."
-    return f"settles by the peak count, but does not come within {BANDS[_TEN_MICRON]} ({size} at the end)."
+        within = f"settles to within {BANDS[_TEN_MICRON]} in {with_unit(coarse, 's')}"
+        return f"{within}, but does not stay within {BANDS[_MICRON]}."
+    return f"settles by the peak count, but does not stay within {BANDS[_TEN_MICRON]} ({size} at the end)."
 
 
 def _rows(shown: tuple[Shown, ...]) -> list[tuple[str, list[str]]]:
@@ -102,14 +103,19 @@ def _rows(shown: tuple[Shown, ...]) -> list[tuple[str, list[str]]]:
     columns: dict[str, Callable[[Case], str]] = {
         "Verdict": lambda case: case.verdict,
         "Counted peaks": lambda case: str(case.peaks),
-        "Peak to peak, last quarter": lambda case: with_unit(case.peak_to_peak, "m"),
+        "Peak to peak, last quarter": _amplitude,
         "Period, last quarter": lambda case: with_unit(case.period, "s"),
         **{f"Settling time into {text}": _settled_within(band) for band, text in BANDS.items()},
         "Largest actuator force": lambda case: with_unit(case.largest_force, "N"),
-        "Solver": lambda case: case.solver.status,
+        "Solver status": lambda case: case.solver.status,
         "Steps (rejected)": lambda case: f"{case.solver.steps} ({case.solver.rejected})",
     }
     return [(name, [text(item.case) for item in shown]) for name, text in columns.items()]
+
+
+def _amplitude(case: Case) -> str:
+    """Peak to peak; below a nanometre the digits would be those of the solver, not of the stage."""
+    return "< 1 nm" if case.peak_to_peak < 1e-9 else with_unit(case.peak_to_peak, "m")
 
 
 def _settled_within(band: float) -> Callable[[Case], str]:
@@ -122,6 +128,5 @@ def _settled_within(band: float) -> Callable[[Case], str]:
 
 def _print_image(figure: Figure) -> str:
     """The figure as an SVG data address: what is printed, and what is seen without scripts."""
-    return "data:image/svg+xml;base64," + base64.b64encode(matplotlib_renderer.image(figure, "svg")).decode(
-        "ascii"
-    )
+    svg = matplotlib_renderer.image(replace(figure, title="", subject=""), "svg")
+    return "data:image/svg+xml;base64," + base64.b64encode(svg).decode("ascii")

@@ -17,9 +17,9 @@ def thin(x: Array, y: Array, buckets: int = BUCKETS) -> tuple[Array, Array]:
 
     x, y: shape (n,), any unit, NaN where the line is broken. Lines of up to KEPT * buckets samples come back
     as they are. Of a longer one are kept: its first and last sample and, in each bucket of neighbouring
-    samples, those with the smallest and largest y and x and the first gap. Buckets hold equally many samples; where x
-    runs to and fro (a loop) they are equally long pieces of the path instead, so that a state that rests for
-    seconds takes no samples from one that moves.
+    samples, those with the smallest and largest y and x and the first gap. Buckets hold equally many samples;
+    where x runs to and fro (a loop) they are equally long pieces of the path instead, so that a state that
+    rests for seconds takes no samples from one that moves.
     """
     if len(x) <= KEPT * buckets:
         return x, y
