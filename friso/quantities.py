@@ -1,11 +1,12 @@
-"""Numbers with units: what a user writes, checked and turned into SI.
+"""Numbers with units: what a user writes, checked and turned into SI. Every refusal is a `StageError`.
 
-A dimensioned value is a text, number and unit ("2.4 N/mm"); `pint` knows the units. Every refusal is a `StageError`.
+A dimensioned value is a text, number and unit ("2.4 N/mm"); `pint` knows the units.
 """
 
 import json
 import math
 import re
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from fractions import Fraction
@@ -17,7 +18,7 @@ from pydantic_core import CoreSchema, core_schema
 
 
 class StageError(ValueError):
-    """A wrong input: which key, what was given, what was expected, and an example of what is right."""
+    """A wrong input: which key, what was given, what was expected, a correct example, and which file."""
 
     def __init__(self, key: str, given: str, expected: str, example: str = "", origin: str = "") -> None:
         super().__init__(key, given, expected, example, origin)
@@ -25,52 +26,50 @@ class StageError(ValueError):
 
     def __str__(self) -> str:
         head = ": ".join(part for part in (self.origin, self.key) if part)
-        rows = {"given": self.given, "expected": self.expected, "example": self.example}
-        return "\n".join(
-            [head, *(f"  {f'{name}:':<9} {text}" for name, text in rows.items() if text)]
-        ).strip()
+        rows = {"given:": self.given, "expected:": self.expected, "example:": self.example}
+        return "\n".join([head, *(f"  {name:<9} {text}" for name, text in rows.items() if text)]).lstrip("\n")
 
     def under(self, table: str) -> "StageError":
         """The same error, its key seen from one level further out."""
-        return StageError(".".join(filter(None, (table, self.key))), *self.args[1:])
+        key = ".".join(part for part in (table, self.key) if part)
+        return StageError(key, self.given, self.expected, self.example, self.origin)
 
     def found_in(self, origin: str) -> "StageError":
         """The same error, saying which file or option it comes from."""
-        return StageError(*self.args[:4], origin)
+        return StageError(self.key, self.given, self.expected, self.example, origin)
 
 
 def as_toml(given: Any) -> str:
-    """How a scalar is written in TOML; tables, arrays and the like are named, not written out."""
+    """How a scalar is written in TOML; anything else is named, not written out."""
     if isinstance(given, bool):
         return "true" if given else "false"
     if isinstance(given, str):
         return json.dumps(given, ensure_ascii=False).replace("\x7f", "\\u007f")
-    if isinstance(given, int | float):
-        return repr(given)
+    if isinstance(given, float):
+        return repr(float(given))  # float(): numpy's own repr is no TOML
+    if isinstance(given, int):
+        return str(given) if abs(given) < 10**60 else "a huge integer"
     names = {dict: "a table", list: "an array", type(None): "nothing"}
     return names.get(type(given), f"{given} (a {type(given).__name__})")
 
 
 def quoted(given: Any, hint: str = "") -> str:
-    """What was given, for an error message: printable, one line, at most some 60 characters long."""
-    try:
-        text = as_toml(given).encode(errors="backslashreplace").decode()
-    except ValueError:  # an integer of more digits than Python agrees to print
-        text = "a huge integer"
+    """What was given, for an error message: printable, one line, not long; and what is wrong with it."""
+    text = as_toml(given).encode(errors="backslashreplace").decode()
     text = text if len(text) <= 60 else f"{text[:57]}..."
     return f"{text} ({hint})" if hint else text
 
 
 @dataclass(frozen=True)
 class Bound:
-    """What values are allowed; `holds` broadcasts over arrays. Infinity and NaN never are."""
+    """Which finite numbers are allowed: in words, and as a test that broadcasts over arrays."""
 
     text: str
     test: Callable[[Any], Any]
 
     def holds(self, value: Any) -> Any:
         """True where `value`, a number or an array, is finite and allowed."""
-        return (abs(value) < math.inf) & self.test(value)
+        return (abs(value) <= sys.float_info.max) & self.test(value)
 
 
 positive = Bound("greater than 0", lambda value: value > 0)
@@ -90,19 +89,15 @@ class Value(float):
         value.text = text
         return value
 
-    def __getnewargs__(self) -> tuple[float, str]:
-        return float(self), self.text
-
-
-class _Refused(Exception):
-    """Why a text is no value of the unit; becomes the hint of a StageError."""
+    def __reduce__(self) -> tuple[type[Self], tuple[float, str]]:
+        return type(self), (float(self), self.text)
 
 
 @dataclass(frozen=True)
 class Quantity:
-    """A field that takes number and unit: `Annotated[Value, Quantity("N/m", positive, example="2.4 N/mm")]`.
+    """A key that takes number and unit: `stiffness: Annotated[Value, Quantity("N/m", positive, "2.4 N/mm")]`.
 
-    `unit` is the SI unit values are held in. Where it is "Hz", an angle per time (rad/s, rpm) is divided by 2 pi.
+    `unit` is the SI unit of the values. Where it is "Hz", angle per time (rad/s, rpm) is divided by 2 pi.
     """
 
     unit: str
@@ -111,9 +106,9 @@ class Quantity:
 
     @property
     def expected(self) -> str:
-        """What the field takes, in words."""
-        also = "Hz, rad/s or rpm" if self.unit == "Hz" else self.unit
-        return f"a text with number and unit, convertible to {also}; {self.bound.text}"
+        """What the key takes, in words."""
+        units = "Hz, rad/s or rpm" if self.unit == "Hz" else self.unit
+        return f"number and unit in quotes, convertible to {units}, {self.bound.text}"
 
     @property
     def written_example(self) -> str:
@@ -121,24 +116,22 @@ class Quantity:
         return as_toml(self.example)
 
     def factor(self, unit: str) -> float:
-        """SI value of 1 `unit`, to convert arrays with. Raises StageError if the unit is of another kind."""
+        """SI value of 1 `unit`, to convert arrays with. Raises StageError for a unit of another kind."""
         try:
-            return _factor(unit, self.unit)
+            return _factor(_checked_unit(unit), self.unit)
         except _Refused as refused:
             raise StageError("", quoted(unit, str(refused)), f"a unit convertible to {self.unit}") from None
 
     def read(self, given: Any) -> Value:
-        """The SI value of what was given. Raises StageError."""
+        """The SI value of a text (or of the text of a Value). Raises StageError."""
+        text = getattr(given, "text", given)
         try:
-            value = given if isinstance(given, Value) else _read(given, self.unit)
+            value = _read(text, self.unit)
         except _Refused as refused:
-            raise self._error(given, str(refused)) from None
+            raise StageError("", quoted(text, str(refused)), self.expected, self.written_example) from None
         if not self.bound.holds(value):
-            raise self._error(given, "")
+            raise StageError("", quoted(text), self.expected, self.written_example)
         return value
-
-    def _error(self, given: Any, hint: str) -> StageError:
-        return StageError("", quoted(given, hint), self.expected, self.written_example)
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         return core_schema.no_info_plain_validator_function(self.read)
@@ -146,27 +139,27 @@ class Quantity:
 
 @dataclass(frozen=True)
 class Number:
-    """A field that takes a bare, dimensionless number: `Annotated[float, Number(inside_0_1, example=0.1)]`."""
+    """A key that takes a bare, dimensionless number: `alpha: Annotated[float, Number(inside_0_1, "0.1")]`."""
 
     bound: Bound
-    example: float
+    example: str
 
     unit = ""
 
     @property
     def expected(self) -> str:
-        """What the field takes, in words."""
-        return f"a bare number without unit, {self.bound.text}"
+        """What the key takes, in words."""
+        return f"a bare number, {self.bound.text}"
 
     @property
     def written_example(self) -> str:
         """The example as it stands in a file."""
-        return as_toml(self.example)
+        return self.example
 
     def read(self, given: Any) -> float:
         """What was given, checked. Raises StageError."""
         is_number = isinstance(given, int | float) and not isinstance(given, bool)
-        if not is_number or not abs(given) < 1e300 or not self.bound.holds(given):
+        if not is_number or not self.bound.holds(given):
             raise StageError("", quoted(given), self.expected, self.written_example)
         return given
 
@@ -174,92 +167,107 @@ class Number:
         return core_schema.no_info_plain_validator_function(self.read)
 
 
-_NUMBER = re.compile(r"\s*([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?)\s*")
-_UNIT = re.compile(r"[^\W\d_][\w\s·²³⁴⁻¹*/^().-]{0,60}")
+class _Refused(Exception):
+    """Why a text is no value of a unit; becomes the hint of a StageError."""
 
 
-def _read(given: Any, unit: str) -> Value:
-    """Number times factor, in exact arithmetic, so that "30 ms" is the float 0.03 and nothing next to it."""
+# A strict grammar before pint sees anything: its parser would compute "m^(9^9^9)" and take "N;N" for N^2.
+_NUMBER = re.compile(r"[+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?")
+_FACTOR = r"[^\W\d_]\w*(?: ?(?:\^|\*\*) ?-?[0-9]|⁻?[¹²³⁴])?"
+_GROUP = rf"(?:{_FACTOR}|\({_FACTOR}(?: ?[*/·. ] ?{_FACTOR})*\))"
+_UNIT = re.compile(rf"(?:1 ?/ ?)?{_GROUP}(?: ?[*/·. ] ?{_GROUP})*")
+_LONGEST = 100
+
+
+def _read(given: Any, si_unit: str) -> Value:
+    """Number times factor, in exact arithmetic: "30 ms" is the float 0.03. Raises _Refused."""
     if isinstance(given, int | float) and not isinstance(given, bool):
-        raise _Refused("a bare number; its unit is missing")
+        raise _Refused("a bare number, its unit is missing")
     if not isinstance(given, str):
         raise _Refused("not a text")
-    number, unit_text = _split(given)
-    if not math.isfinite(float(number)):
+    number, unit = _split(given)
+    factor = _factor(unit, si_unit)
+    bare = float(number)
+    if math.isinf(bare):
         raise _Refused("too large")
-    is_zero = not re.search("[1-9]", re.split("[eE]", number)[0])
     try:
-        factor = Fraction(f"{_factor(unit_text, unit):.15g}")
-        value = 0.0 if is_zero or float(number) == 0 else float(Fraction(number) * factor)
+        value = float(Fraction(number) * Fraction(repr(factor))) if bare else 0.0
     except OverflowError:
         raise _Refused("too large") from None
-    if value == 0 and not is_zero:
-        raise _Refused("too small: it would become 0")
+    if value == 0 and re.search("[1-9]", re.split("[eE]", number)[0]):
+        raise _Refused("too small, it would become 0")
     return Value(value, given)
 
 
 def _split(given: str) -> tuple[str, str]:
     """Number and unit of a text. Raises _Refused."""
-    match = _NUMBER.match(given)
+    text = " ".join(given.split())
+    if len(text) > _LONGEST:
+        raise _Refused("too long")
+    match = _NUMBER.match(text)
     if match is None:
-        raise _Refused(_why_no_number(given))
-    rest = given[match.end() :].strip()
+        raise _Refused(_why_no_number(text.lower()))
+    rest = text[match.end() :].strip()
     if not rest:
         raise _Refused("its unit is missing")
-    if re.match(r",\s*[0-9]", rest):
-        raise _Refused("a decimal comma; write a point")
-    if not _UNIT.fullmatch(rest):
-        raise _Refused(f"{quoted(rest)} is not a unit")
-    return match[1], " ".join(rest.split())
+    if re.match(", ?[0-9]", rest):
+        raise _Refused("a decimal comma, write a point")
+    return match[0], _checked_unit(rest)
 
 
-def _why_no_number(given: str) -> str:
-    text = given.strip().lower()
+def _why_no_number(text: str) -> str:
     if not text:
         return "empty"
     if text[0] in "−–—":
-        return "a typographic minus; write -"
+        return "a typographic minus, write -"
     if re.match(r"[+-]?(nan|inf)", text):
         return "not a finite number"
-    return "it does not begin with a number"
+    return "does not begin with a number"
+
+
+def _checked_unit(text: str) -> str:
+    if len(text) > _LONGEST or not _UNIT.fullmatch(text):
+        raise _Refused(f"{quoted(text)} is not a unit")
+    return text
 
 
 @cache
 def _registry() -> Any:
-    """pint's registry: about 0.2 s to import and build, so only when the first unit is met."""
+    """pint's registry: 0.2 s to import and build, so not before the first unit is met."""
     import pint
 
     return pint.UnitRegistry()
 
 
 @lru_cache(maxsize=1024)
-def _root(unit: str) -> tuple[float, dict[str, float], dict[str, float]]:
-    """Factor to pint's root units, those units, and the units as written. Raises _Refused."""
+def _root(unit: str) -> tuple[float, dict[str, float], list[str]]:
+    """Factor to pint's root units, those with their powers, and the names in the unit. Raises _Refused."""
     try:
         units = _registry().parse_units(unit)
+        factor, root = _registry().get_root_units(units)
     except Exception as error:  # pint lets through whatever Python's tokenizer and its own arithmetic raise
         raise _Refused(f"{quoted(unit)} is not a known unit") from error
-    factor, root = _registry().get_root_units(units)
-    return float(factor), dict(root._units), dict(units._units)
+    return float(factor), dict(root._units), [*units._units]
 
 
 @lru_cache(maxsize=1024)
 def _factor(unit: str, si_unit: str) -> float:
-    """SI value of one `unit`. Raises _Refused if it is not of the kind of `si_unit`."""
-    factor, root, written = _root(unit)
+    """SI value of 1 `unit`. Raises _Refused if it is not of the kind of `si_unit`."""
+    factor, root, names = _root(unit)
     if si_unit == "Hz":
-        return _to_hertz(factor, root, written)
+        return _hertz(factor, root, names)
     si_factor, si_root, _ = _root(si_unit)
     if root != si_root:
-        raise _Refused(f"{unit} cannot be converted to {si_unit}")
-    return factor / si_factor
+        raise _Refused(f"{unit} is not convertible to {si_unit}")
+    return float(f"{factor / si_factor:.15g}")  # unit factors are short decimals: drop pint's rounding errors
 
 
-def _to_hertz(factor: float, root: dict[str, float], written: dict[str, float]) -> float:
-    """pint takes 1 Hz for 1 rad/s, so tell them apart here; a plain 1/s could be either and is refused."""
+def _hertz(factor: float, root: dict[str, float], names: list[str]) -> float:
+    """pint takes 1 Hz for 1 rad/s; they are told apart here. A plain 1/s could be either and is refused."""
     if root == {"radian": 1, "second": -1}:
         return factor / (2 * math.pi)
-    if len(written) == 1 and next(iter(written)).endswith("hertz") and root == {"second": -1}:
-        return factor
-    hint = "could mean Hz or rad/s" if root == {"second": -1} else "not a frequency"
-    raise _Refused(hint)
+    if root != {"second": -1}:
+        raise _Refused("not a frequency")
+    if len(names) != 1 or not names[0].endswith("hertz"):
+        raise _Refused("could mean Hz or rad/s")
+    return float(f"{factor:.15g}")

@@ -3,7 +3,7 @@
 from friso.quantities import Number, Quantity, StageError, Value
 from friso.stage.files import load, loads, parse_set, save
 from friso.stage.section import Rule, Section
-from friso.stage.stage import Stage, fields, violations
+from friso.stage.stage import Stage, numeric_keys, violations
 from friso.stage.tables import FrictionSection, register_friction
 
 __all__ = [
@@ -15,9 +15,9 @@ __all__ = [
     "Stage",
     "StageError",
     "Value",
-    "fields",
     "load",
     "loads",
+    "numeric_keys",
     "parse_set",
     "register_friction",
     "save",

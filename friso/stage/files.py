@@ -25,7 +25,10 @@ def loads(text: str, origin: str = "stage file") -> Stage:
 
 
 def save(stage: Stage, path: str | os.PathLike[str], overwrite: bool = False) -> None:
-    """Write a stage file, all of it or nothing. Raises StageError where a file is already and may not be replaced."""
+    """Write a stage file, all of it or nothing.
+
+    Raises StageError where there is a file already (unless `overwrite`) or the place cannot be written to.
+    """
     path = Path(path)
     if path.exists() and not overwrite:
         raise StageError(
@@ -42,15 +45,21 @@ def save(stage: Stage, path: str | os.PathLike[str], overwrite: bool = False) ->
 
 
 def parse_set(text: str) -> tuple[str, Any]:
-    """Key and value of a command line's KEY=VALUE; a value that is no TOML is a plain text. Raises StageError."""
+    """Key and value of a command line's KEY=VALUE; a value that is no TOML is a text. Raises StageError."""
     key, equals, value = text.partition("=")
     if not equals or not key.strip():
         raise StageError("", quoted(text), "KEY=VALUE", 'controller.crossover="12 Hz"', origin="--set")
+    return key.strip(), _value(value.strip())
+
+
+def _value(text: str) -> Any:
+    """A TOML value, or the text itself; an inline table holds neither comments nor a second line."""
     try:
-        parsed = tomllib.loads(f"line = {{ value = {value} }}")["line"]
+        document = tomllib.loads(f"line = {{ value = {text} }}")
     except (ValueError, RecursionError):
-        parsed = {}
-    return key.strip(), parsed["value"] if [*parsed] == ["value"] else value.strip()
+        return text
+    is_one_value = [*document] == ["line"] and [*document["line"]] == ["value"]
+    return document["line"]["value"] if is_one_value else text
 
 
 def _text(path: Path) -> str:

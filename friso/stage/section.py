@@ -1,7 +1,7 @@
-"""What all tables of a stage file share: strict keys, readable errors, rules between keys, variants by a tag."""
+"""What all tables of a stage file share: strict keys, readable errors, rules, variants by a tag."""
 
 import difflib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, TypeVar, get_args
 
@@ -13,7 +13,7 @@ from friso.quantities import Number, Quantity, StageError, as_toml, quoted
 
 @dataclass(frozen=True)
 class Rule:
-    """A condition between keys. `holds` gets the flat SI mapping (see `Stage.flat`) and broadcasts over arrays."""
+    """A condition between keys; `holds` gets the flat SI mapping of `Stage.flat`, arrays allowed."""
 
     keys: tuple[str, ...]
     holds: Callable[[Mapping[str, Any]], Any]
@@ -22,7 +22,7 @@ class Rule:
 
 
 class Section(BaseModel):
-    """A table of the stage file: frozen, strict, no unknown keys. Raises StageError when made from wrong data."""
+    """A table of the stage file. Raises StageError when it is made from wrong data."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
 
@@ -35,11 +35,9 @@ class Section(BaseModel):
             raise _first_problem(type(self), error) from None
 
     def given(self) -> dict[str, Any]:
-        """The keys as the user gave them, in the order of the class."""
-        fields = (
-            (key, getattr(self, key)) for key in type(self).model_fields if key in self.model_fields_set
-        )
-        return {key: getattr(value, "text", value) for key, value in fields}
+        """The keys that the user gave, with the values as written."""
+        keys = [key for key in type(self).model_fields if key in self.model_fields_set]
+        return {key: getattr(value, "text", value) for key in keys for value in [getattr(self, key)]}
 
 
 SectionClass = TypeVar("SectionClass", bound=type[Section])
@@ -47,7 +45,7 @@ SectionClass = TypeVar("SectionClass", bound=type[Section])
 
 @dataclass(frozen=True)
 class Table:
-    """A field that takes a table: `pick` chooses the section class for it, `example` shows one."""
+    """A key that takes a table: `pick` chooses the section class for it, `example` shows one."""
 
     pick: Callable[[dict[str, Any]], type[Section]]
     example: str
@@ -72,7 +70,7 @@ class Variants:
         self.classes: dict[str, type[Section]] = {}
 
     def register(self, cls: SectionClass) -> SectionClass:
-        """Class decorator: add a variant, named by its tag, `kind: Literal["step"]`."""
+        """Class decorator: add a variant, which declares its name as `kind: Literal["step"]`."""
         self.classes[get_args(cls.model_fields[self.tag].annotation)[0]] = cls
         return cls
 
@@ -81,20 +79,29 @@ class Variants:
         name = table.get(self.tag)
         if isinstance(name, str) and name in self.classes:
             return self.classes[name]
-        near = nearest(name, self.classes) or next(iter(self.classes), "")
+        example = nearest(name, self.classes) or next(iter(self.classes))
         expected = f"one of {', '.join(map(as_toml, self.classes))}"
-        raise StageError(self.tag, quoted(name), expected, f"{self.tag} = {as_toml(near)}")
+        raise StageError(self.tag, quoted(name), expected, f"{self.tag} = {as_toml(example)}")
 
 
 def numeric_fields(cls: type[Section]) -> dict[str, Quantity | Number]:
     """Unit, bound and example of each numeric key of a table."""
-    found = ((key, item) for key, field in cls.model_fields.items() for item in field.metadata)
+    found = (
+        (key, item) for key, field in cls.model_fields.items() for item in (*field.metadata, field.annotation)
+    )
     return {key: item for key, item in found if isinstance(item, Quantity | Number)}
 
 
-def nearest(name: Any, known: Mapping[str, Any] | list[str]) -> str | None:
-    """The known name most like `name`, if any is."""
-    return next(iter(difflib.get_close_matches(str(name).lower(), list(known), n=1, cutoff=0.7)), None)
+def nearest(name: Any, known: Iterable[str]) -> str | None:
+    """The known name most like `name`, if one is like it."""
+    return next(iter(difflib.get_close_matches(str(name).lower(), [*known], n=1, cutoff=0.7)), None)
+
+
+def unknown_key(key: str, known: Iterable[str], example: str = "") -> StageError:
+    """The error for a key that does not exist, naming the nearest that does."""
+    near = nearest(key, known)
+    hint = f"an unknown key; did you mean {near}?" if near else "an unknown key"
+    return StageError(key, hint, f"one of {', '.join(known)}", example)
 
 
 def _first_problem(cls: type[Section], error: ValidationError) -> StageError:
@@ -106,30 +113,25 @@ def _first_problem(cls: type[Section], error: ValidationError) -> StageError:
     key = ".".join(map(str, problem["loc"]))
     cause = problem.get("ctx", {}).get("error")
     if isinstance(cause, StageError):
-        return _with_example(cause.under(key), key)
+        return _complete(cause, key)
     if problem["type"] == "extra_forbidden":
-        return _unknown_key(cls, key)
+        near = nearest(key, cls.model_fields) or next(iter(cls.model_fields))
+        return unknown_key(key, cls.model_fields, _described(cls, near)[1])
     given = "nothing" if problem["type"] == "missing" else quoted(problem["input"])
     return StageError(key, given, *_described(cls, key))
 
 
-def _with_example(error: StageError, key: str) -> StageError:
-    """Put the key before an example that is a mere value."""
-    if error.key != key or "=" in error.example:
-        return error
-    return StageError(key, error.given, error.expected, f"{key} = {error.example}")
-
-
-def _unknown_key(cls: type[Section], key: str) -> StageError:
-    near = nearest(key, cls.model_fields)
-    hint = f"did you mean {near}?" if near else "unknown key"
-    return StageError(key, f"{key} ({hint})", f"one of {', '.join(cls.model_fields)}")
+def _complete(error: StageError, key: str) -> StageError:
+    """The error seen from the table: below `key`, which also goes before an example that is a mere value."""
+    is_value = not error.key and error.example and "=" not in error.example
+    example = f"{key} = {error.example}" if is_value else error.example
+    return StageError(error.key, error.given, error.expected, example).under(key)
 
 
 def _described(cls: type[Section], key: str) -> tuple[str, str]:
-    """What a field takes and an example of it."""
+    """What a key takes, and an example of it."""
     field = cls.model_fields[key]
-    for item in field.metadata:
+    for item in (*field.metadata, field.annotation):
         if isinstance(item, Table):
             return f"a table [{key}]", item.example
         if isinstance(item, Quantity | Number):
@@ -138,5 +140,5 @@ def _described(cls: type[Section], key: str) -> tuple[str, str]:
         return "true or false", f"{key} = true"
     if field.annotation is str:
         return "a text in quotes", f'{key} = "Thesis rig"'
-    choices = [as_toml(choice) for choice in get_args(field.annotation)]
+    choices = [as_toml(choice) for choice in get_args(field.annotation) if choice]
     return f"one of {', '.join(choices)}", f"{key} = {choices[0]}"

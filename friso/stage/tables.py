@@ -19,13 +19,13 @@ from friso.stage.section import Rule, Section, Variants
 
 
 class Masses(Section):
-    """What moves. With both and no joint they are one rigid mass."""
+    """What moves; with both masses and no joint they move as one rigid mass."""
 
     cart: Annotated[Value | None, Quantity("kg", positive, "1.2 kg")] = None
     stage: Annotated[Value | None, Quantity("kg", positive, "0.5 kg")] = None
 
     @model_validator(mode="after")
-    def _any(self) -> Self:
+    def _is_not_empty(self) -> Self:
         if self.cart is None and self.stage is None:
             raise StageError(
                 "", "neither cart nor stage", "at least one of the two masses", 'cart = "1.2 kg"'
@@ -34,9 +34,9 @@ class Masses(Section):
 
 
 class FrictionSection(Section):
-    """Base of the friction laws' tables; each law declares its own and registers it."""
+    """Base of the friction laws, each of which declares its keys and `model: Literal["name"]`."""
 
-    model: str
+    model: Any
 
 
 FRICTION = Variants("model")
@@ -44,7 +44,7 @@ register_friction = FRICTION.register
 
 
 class Joint(Section):
-    """The compliant joint between cart and stage, with its stroke limiter in parallel when touched."""
+    """The compliant joint between cart and stage; its limiter acts in parallel when touched."""
 
     locked: bool = False
     stiffness: Annotated[Value | None, Quantity("N/m", positive, "2.4 N/mm")] = None
@@ -57,17 +57,17 @@ class Joint(Section):
     def _free_joint_is_complete(self) -> Self:
         for key, example in (("stiffness", "2.4 N/mm"), ("damping", "0.5 N*s/m"), ("stroke", "1 mm")):
             if not self.locked and getattr(self, key) is None:
-                expected = "a value, since the joint is not locked (or locked = true)"
+                expected = f"the {key} of the joint; only a joint with locked = true can do without"
                 raise StageError(key, "nothing", expected, f'{key} = "{example}"')
         return self
 
 
 class Parasitic(Section):
-    """First internal mode of the joint: part of the stage mass on its own spring."""
+    """First internal mode of the joint: part of the stage mass on a spring of its own."""
 
     frequency: Annotated[Value, Quantity("Hz", positive, "300 Hz")]
     mass: Annotated[Value, Quantity("kg", positive, "0.25 kg")]
-    damping_ratio: Annotated[float, Number(non_negative, 0.01)]
+    damping_ratio: Annotated[float, Number(non_negative, "0.01")]
 
 
 class Controller(Section):
@@ -79,30 +79,30 @@ class Controller(Section):
     anti_windup: Literal["clamp"] | None = None
 
     @model_validator(mode="after")
-    def _windup_needs_a_limit(self) -> Self:
+    def _anti_windup_has_a_limit(self) -> Self:
         if self.anti_windup and self.force_limit is None:
             raise StageError("anti_windup", '"clamp"', "a force_limit beside it", 'force_limit = "200 N"')
         return self
 
 
 class TunedController(Controller):
-    """PID tuned by van Dijk's rules."""
+    """PID by van Dijk's tuning rules (thesis, Eq. 7, 8)."""
 
     crossover: Annotated[Value, Quantity("Hz", positive, "8 Hz")]
-    alpha: Annotated[float, Number(inside_0_1, 0.1)]
-    beta: Annotated[float, Number(at_least_1, 2)]
+    alpha: Annotated[float, Number(inside_0_1, "0.1")]
+    beta: Annotated[float, Number(at_least_1, "2")]
     tuned_mass: Annotated[Value | None, Quantity("kg", positive, "1.7 kg")] = None
 
 
 class GainsController(Controller):
-    """PID by its gains."""
+    """PID by its gains (thesis, Eq. 6); a gain left out is 0."""
 
     kp: Annotated[Value, Quantity("N/m", non_negative, "3 N/m")] = Value(0, "0 N/m")
     ki: Annotated[Value, Quantity("N/(m*s)", non_negative, "4 N/(m*s)")] = Value(0, "0 N/(m*s)")
     kd: Annotated[Value, Quantity("N*s/m", non_negative, "6 N*s/m")] = Value(0, "0 N*s/m")
     tau: Annotated[Value, Quantity("s", non_negative, "1 ms")] = Value(0, "0 s")
 
-    rules: ClassVar = (
+    rules: ClassVar[tuple[Rule, ...]] = (
         Rule(
             ("controller.derivative_on", "controller.kd", "controller.tau"),
             lambda f: (
@@ -110,59 +110,61 @@ class GainsController(Controller):
                 | (f["controller.kd"] == 0)
                 | (f["controller.tau"] > 0)
             ),
-            "a derivative filter (tau > 0) for a derivative of the error, or a derivative of the measurement",
+            "a filter (tau > 0) for the derivative of the error, or the derivative of the measurement",
             'tau = "1 ms", or derivative_on = "measurement"',
         ),
     )
 
 
+_EITHER_FORM = 'crossover = "8 Hz", alpha = 0.1, beta = 2 or kp = "3 N/m", ki = "4 N/(m*s)", kd = "6 N*s/m"'
+
+
 def controller_form(table: dict[str, Any]) -> type[Section]:
     """The class for a [controller] table: by rules or by gains. Raises StageError for both or neither."""
-    shared = Controller.model_fields
-    by_rules = [key for key in TunedController.model_fields if key in table and key not in shared]
-    by_gains = [key for key in GainsController.model_fields if key in table and key not in shared]
-    if by_rules and by_gains:
-        given = f"{', '.join(by_rules)} of van Dijk's rules together with {', '.join(by_gains)} of the gains"
-        raise StageError("", given, "either form, not both", _FORMS)
-    if not by_rules and not {"kp", "ki", "kd"}.intersection(by_gains):
-        given = "neither crossover nor any of kp, ki, kd"
-        raise StageError("", given, "van Dijk's rules (crossover, alpha, beta) or gains", _FORMS)
-    return TunedController if by_rules else GainsController
-
-
-_FORMS = 'crossover = "8 Hz", alpha = 0.1, beta = 2, or kp = "3 N/m", ki = "4 N/(m*s)", kd = "6 N*s/m"'
-
-MOTION = Variants("kind")
-Duration = Annotated[Value, Quantity("s", positive, "20 s")]
+    rules = [
+        key for key in TunedController.model_fields if key in table and key not in Controller.model_fields
+    ]
+    gains = [
+        key for key in GainsController.model_fields if key in table and key not in Controller.model_fields
+    ]
+    if rules and gains:
+        given = f"{', '.join(rules)} (van Dijk's rules) together with {', '.join(gains)} (gains)"
+        raise StageError("", given, "one form, not both", _EITHER_FORM)
+    if not rules and not {"kp", "ki", "kd"} & {*gains}:
+        raise StageError("", "neither crossover nor any of kp, ki, kd", "one of the two forms", _EITHER_FORM)
+    return TunedController if rules else GainsController
 
 
 class Motion(Section):
-    """Base of the motions."""
+    """Base of the motions: what the reference does."""
 
-    kind: str
+    kind: Any
+    duration: Annotated[Value, Quantity("s", positive, "20 s")]
+
+
+MOTION = Variants("kind")
 
 
 @MOTION.register
 class ThereAndBack(Motion):
-    """Two equal steps, forth and back, each accelerating for acceleration_time and braking likewise."""
+    """Two equal steps, there and back, each accelerating for acceleration_time and braking likewise."""
 
     kind: Literal["there_and_back"]
     acceleration: Annotated[Value, Quantity("m/s^2", non_negative, "100 m/s^2")]
     acceleration_time: Annotated[Value, Quantity("s", non_negative, "30 ms")]
     return_at: Annotated[Value, Quantity("s", non_negative, "5 s")]
-    duration: Duration
 
-    rules: ClassVar = (
+    rules: ClassVar[tuple[Rule, ...]] = (
         Rule(
             ("motion.acceleration_time", "motion.return_at"),
             lambda f: 2 * f["motion.acceleration_time"] <= f["motion.return_at"],
-            "the way there over (2 acceleration_time) before return_at",
+            "the way there (2 acceleration_time) over before return_at",
             'acceleration_time = "30 ms", return_at = "5 s"',
         ),
         Rule(
             ("motion.acceleration_time", "motion.return_at", "motion.duration"),
             lambda f: f["motion.return_at"] + 2 * f["motion.acceleration_time"] <= f["motion.duration"],
-            "the way back over (return_at + 2 acceleration_time) within the duration",
+            "the way back (return_at + 2 acceleration_time) over within the duration",
             'acceleration_time = "30 ms", return_at = "5 s", duration = "20 s"',
         ),
     )
@@ -174,7 +176,6 @@ class Release(Motion):
 
     kind: Literal["release"]
     displacement: Annotated[Value, Quantity("m", any_sign, "2 mm")]
-    duration: Duration
 
 
 @MOTION.register
@@ -183,7 +184,6 @@ class Step(Motion):
 
     kind: Literal["step"]
     size: Annotated[Value, Quantity("m", any_sign, "1 mm")]
-    duration: Duration
 
 
 @MOTION.register
@@ -192,7 +192,6 @@ class Ramp(Motion):
 
     kind: Literal["ramp"]
     velocity: Annotated[Value, Quantity("m/s", any_sign, "0.1 m/s")]
-    duration: Duration
 
 
 @MOTION.register
@@ -200,4 +199,3 @@ class Hold(Motion):
     """The reference stays 0."""
 
     kind: Literal["hold"]
-    duration: Duration

@@ -1,0 +1,327 @@
+"""Stage files that are right: values, defaults, round trip, changes, sweeps."""
+
+import copy
+import math
+import pickle
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import friso.equations.friction  # noqa: F401  the friction laws register themselves
+from friso.quantities import Quantity, StageError, Value, any_sign, positive
+from friso.stage import Stage, load, loads, numeric_keys, parse_set, save, violations
+
+ROOT = Path(__file__).parents[1]
+EXAMPLES = sorted((ROOT / "examples").glob("*.toml"))
+TEMPLATE = ROOT / "friso" / "templates" / "stage.toml"
+THESIS_RIG = ROOT / "examples" / "thesis_rig.toml"
+
+RIGID = """
+[masses]
+stage = "2 kg"
+[controller]
+kind = "pid"
+kp = "3 N/m"
+[motion]
+kind = "hold"
+duration = "1 s"
+"""
+
+
+@pytest.fixture(scope="module")
+def rig() -> Stage:
+    return load(THESIS_RIG)
+
+
+def test_thesis_rig_in_si(rig: Stage) -> None:
+    assert rig.flat() == {
+        "masses.cart": 1.2,
+        "masses.stage": 0.5,
+        "friction.model": "lugre",
+        "friction.static": 3.0,
+        "friction.coulomb": 1.0,
+        "friction.stribeck_velocity": 0.0016,
+        "friction.stribeck_exponent": 2.0,
+        "friction.bristle_stiffness": 1e5,
+        "friction.bristle_damping": 316.2277660168379,
+        "friction.viscous": 0.5,
+        "joint.locked": False,
+        "joint.stiffness": 2400.0,
+        "joint.damping": 0.5,
+        "joint.stroke": 0.001,
+        "joint.limiter_stiffness": 2e7,
+        "joint.limiter_damping": 100.0,
+        "parasitic.frequency": 300.0,
+        "parasitic.mass": 0.25,
+        "parasitic.damping_ratio": 0.01,
+        "controller.kind": "pid",
+        "controller.derivative_on": "error",
+        "controller.crossover": 8.0,
+        "controller.alpha": 0.1,
+        "controller.beta": 2.0,
+        "controller.tuned_mass": 1.7,
+        "motion.kind": "there_and_back",
+        "motion.acceleration": 100.0,
+        "motion.acceleration_time": 0.03,
+        "motion.return_at": 5.0,
+        "motion.duration": 20.0,
+    }
+
+
+def test_flat_holds_plain_python_values(rig: Stage) -> None:
+    assert {type(value) for value in rig.flat().values()} == {float, bool, str}
+
+
+def test_defaults_of_a_rigid_mass_without_friction() -> None:
+    assert loads(RIGID).flat() == {
+        "masses.stage": 2.0,
+        "friction.model": "none",
+        "controller.kind": "pid",
+        "controller.derivative_on": "error",
+        "controller.kp": 3.0,
+        "controller.ki": 0.0,
+        "controller.kd": 0.0,
+        "controller.tau": 0.0,
+        "motion.kind": "hold",
+        "motion.duration": 1.0,
+    }
+
+
+def test_emps_gains_follow_from_the_recorded_loop() -> None:
+    flat = load(ROOT / "examples" / "emps_axis.toml").flat()
+    gtau, kp, kv = 35.1507, 160.18, 243.45  # N/V, 1/s, V s/m: data/README of the record
+    assert flat["controller.kp"] == pytest.approx(gtau * kv * kp, rel=1e-12)
+    assert flat["controller.kd"] == pytest.approx(gtau * kv, rel=1e-12)
+    assert flat["controller.force_limit"] == pytest.approx(10 * gtau, rel=1e-12)
+    assert flat["controller.anti_windup"] == "clamp"
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "si"),
+    [
+        ("2.4 N/mm", "N/m", 2400.0),
+        ("2.4N/mm", "N/m", 2400.0),
+        ("  2.4   N / mm ", "N/m", 2400.0),
+        ("+.5e1 kN/m", "N/m", 5000.0),
+        ("30 ms", "s", 0.03),
+        ("3 um", "m", 3e-6),
+        ("3 µm", "m", 3e-6),
+        ("3 μm", "m", 3e-6),
+        ("0.5 min", "s", 30.0),
+        ("-0 mm", "m", 0.0),
+        ("0e999 mm", "m", 0.0),
+        ("1 inch", "m", 0.0254),
+        ("2 lbf", "N", 8.896443230521),
+        ("9.81 m/s²", "m/s^2", 9.81),
+        ("9.81 m/s**2", "m/s^2", 9.81),
+        ("9.81 m s^-2", "m/s^2", 9.81),
+        ("9.81 m·s⁻²", "m/s^2", 9.81),
+        ("4 N/(m*s)", "N/(m*s)", 4.0),
+        ("4 N/(mm s)", "N/(m*s)", 4000.0),
+        ("5 kg/s", "N*s/m", 5.0),
+        ("8 Hz", "Hz", 8.0),
+        ("0.3 kHz", "Hz", 300.0),
+        ("50 rad/s", "Hz", 7.957747154594768),
+        ("480 rpm", "Hz", 8.0),
+        ("8 turn/s", "Hz", 8.0),
+        ("2880 deg/s", "Hz", 8.0),
+    ],
+)
+def test_units(text: str, unit: str, si: float) -> None:
+    value = Quantity(unit, any_sign, "").read(text)
+    assert value == si
+    assert value.text == text
+
+
+def test_unit_factor_converts_arrays() -> None:
+    assert Quantity("m", positive, "1 mm").factor("mm") == 1e-3
+    assert Quantity("Hz", positive, "8 Hz").factor("rad/s") == 1 / (2 * math.pi)
+    with pytest.raises(StageError, match="kg is not convertible to m"):
+        Quantity("m", positive, "1 mm").factor("kg")
+
+
+@pytest.mark.parametrize("path", [*EXAMPLES, TEMPLATE], ids=lambda path: path.stem)
+def test_round_trip(path: Path, tmp_path: Path) -> None:
+    stage = load(path)
+    save(stage, tmp_path / "again.toml")
+    again = load(tmp_path / "again.toml")
+    assert again == stage
+    assert again.flat() == stage.flat()
+    assert again.given() == stage.given()
+    assert again.to_toml() == stage.to_toml()
+    assert stage.source
+
+
+def test_template_with_its_optional_lines_loads() -> None:
+    text = TEMPLATE.read_text(encoding="utf-8")
+    keys = ("parasitic]", "frequency", "mass =", "damping_ratio", "tuned_mass", "force_limit", "anti_windup")
+    for key in keys:
+        text = text.replace(f"# [{key}", f"[{key}").replace(f"# {key}", key)
+    assert load(TEMPLATE).flat().keys() < loads(text).flat().keys()
+    assert "parasitic.damping_ratio" in loads(text).flat()
+
+
+def test_texts_survive_saving(rig: Stage) -> None:
+    awkward = 'tab\t quote" back\\slash \x00\x7f\x85 newline\n µ 漢 🙂 \u2028'
+    stage = rig.replace({"name": awkward, "joint.stroke": "1000 um"})
+    assert loads(stage.to_toml()).name == awkward
+    assert 'stroke = "1000 um"' in stage.to_toml()
+
+
+def test_byte_order_mark_and_windows_line_ends(tmp_path: Path, rig: Stage) -> None:
+    path = tmp_path / "windows.toml"
+    path.write_bytes(b"\xef\xbb\xbf" + THESIS_RIG.read_bytes().replace(b"\n", b"\r\n"))
+    assert load(path) == rig
+
+
+def test_save_keeps_an_existing_file(tmp_path: Path, rig: Stage) -> None:
+    path = tmp_path / "rig.toml"
+    path.write_text("precious", encoding="utf-8")
+    with pytest.raises(StageError, match=r"rig\.toml\n.*a file that exists"):
+        save(rig, path)
+    assert path.read_text(encoding="utf-8") == "precious"
+    save(rig, path, overwrite=True)
+    assert load(path) == rig
+    assert [*tmp_path.iterdir()] == [path]
+
+
+def test_save_into_nowhere(tmp_path: Path, rig: Stage) -> None:
+    with pytest.raises(StageError, match="no such file"):
+        save(rig, tmp_path / "missing" / "rig.toml")
+
+
+def test_replace(rig: Stage) -> None:
+    changed = rig.replace({"controller.crossover": "12 Hz", "joint.locked": True, "name": "Other"})
+    assert (changed.flat()["controller.crossover"], changed.flat()["joint.locked"]) == (12.0, True)
+    assert changed.name == "Other"
+    assert rig.flat()["controller.crossover"] == 8.0
+
+
+def test_replace_removes_with_none(rig: Stage) -> None:
+    rigid = rig.replace({"joint": None, "parasitic": None, "friction": None})
+    assert rigid.joint is None
+    assert rigid.flat()["friction.model"] == "none"
+    locked = rig.replace(
+        {"joint.locked": True, "joint.stiffness": None, "joint.damping": None, "joint.stroke": None}
+    )
+    assert "joint.stiffness" not in locked.flat()
+
+
+def test_replace_changes_the_form_of_the_controller(rig: Stage) -> None:
+    rules = dict.fromkeys(
+        ["controller.crossover", "controller.alpha", "controller.beta", "controller.tuned_mass"]
+    )
+    assert rig.replace({**rules, "controller.kp": "3 N/m"}).flat()["controller.kp"] == 3.0
+    whole = rig.replace({"controller": {"kind": "pid", "kp": "3 N/m"}})
+    assert whole.flat()["controller.kp"] == 3.0
+
+
+def test_replace_takes_values_of_another_stage(rig: Stage) -> None:
+    assert rig.replace({"joint.limiter_stiffness": rig.joint and rig.joint.stiffness}).flat()[
+        "joint.limiter_stiffness"
+    ] == pytest.approx(2400)
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("controller.crossover=12 Hz", ("controller.crossover", "12 Hz")),
+        ('controller.crossover="12 Hz"', ("controller.crossover", "12 Hz")),
+        (" controller.alpha = 0.2 ", ("controller.alpha", 0.2)),
+        ("joint.locked=true", ("joint.locked", True)),
+        ("joint.locked=True", ("joint.locked", "True")),
+        ("controller.beta=2", ("controller.beta", 2)),
+        ("name=a=b", ("name", "a=b")),
+        ("name=", ("name", "")),
+        ("name=3 # no comment", ("name", "3 # no comment")),
+        ("name=1}\nx={y=2", ("name", "1}\nx={y=2")),
+        ("name=1, other = 2", ("name", "1, other = 2")),
+        ("name=" + "[" * 5000, ("name", "[" * 5000)),
+    ],
+)
+def test_parse_set(text: str, expected: tuple[str, object]) -> None:
+    assert parse_set(text) == expected
+
+
+def test_swept_values_move_the_defaults_that_follow_them(rig: Stage) -> None:
+    cart = np.array([1.0, 2.0])
+    stage = rig.replace({"controller.tuned_mass": None})
+    np.testing.assert_array_equal(stage.flat({"masses.cart": cart})["controller.tuned_mass"], cart + 0.5)
+    assert rig.flat({"masses.cart": cart})["controller.tuned_mass"] == 1.7
+    with pytest.raises(StageError, match=r"controller\.crossovr\n.*did you mean controller\.crossover\?"):
+        rig.flat({"controller.crossovr": cart})
+
+
+def test_violations_tell_cells_apart(rig: Stage) -> None:
+    assert violations(rig.flat()) == []
+    swept = {
+        "masses.cart": np.array([1.0, 0.0, 1.0, np.nan]),
+        "friction.coulomb": np.array([1.0, 1.0, 4.0, 1.0]),
+        "parasitic.mass": 0.5,
+    }
+    found = {why: np.broadcast_to(where, 4).tolist() for where, why in violations(rig.flat(swept))}
+    assert found == {
+        "masses.cart has to be greater than 0": [False, True, False, True],
+        "friction.coulomb, friction.static: expected Coulomb friction no larger than static friction": [
+            False,
+            False,
+            True,
+            False,
+        ],
+        "parasitic.mass, masses.stage: expected a parasitic mass smaller than the stage mass, "
+        "out of which it is taken": [True] * 4,
+    }
+
+
+def test_numeric_keys_have_units(rig: Stage) -> None:
+    units = {key: field.unit for key, field in numeric_keys(rig.flat()).items()}
+    assert units["controller.crossover"] == "Hz"
+    assert units["friction.static"] == "N"
+    assert units["controller.alpha"] == ""
+    assert units["controller.force_limit"] == "N"  # absent from the file, but may be swept
+    assert "joint.locked" not in units
+
+
+def test_stages_copy_and_pickle(rig: Stage) -> None:
+    assert pickle.loads(pickle.dumps(rig)).to_toml() == rig.to_toml()
+    assert copy.deepcopy(Value(0.03, "30 ms")).text == "30 ms"
+    error = pickle.loads(pickle.dumps(StageError("key", "given", "expected", "example", "origin")))
+    assert str(error) == "origin: key\n  given:    given\n  expected: expected\n  example:  example"
+
+
+def test_stages_are_frozen_and_hashable(rig: Stage) -> None:
+    with pytest.raises(ValueError, match="frozen"):
+        rig.name = "other"
+    assert hash(rig) == hash(load(THESIS_RIG))
+
+
+@pytest.mark.parametrize(
+    ("table", "keys"),
+    [
+        ({"model": "none"}, set()),
+        (
+            {"model": "dahl", "coulomb": "1 N", "bristle_stiffness": "1e5 N/m", "viscous": "0 N*s/m"},
+            {"coulomb"},
+        ),
+    ],
+)
+def test_friction_laws_are_told_apart_by_model(rig: Stage, table: dict[str, str], keys: set[str]) -> None:
+    flat = rig.replace({"friction": table}).flat()
+    assert flat["friction.model"] == table["model"]
+    assert {f"friction.{key}" for key in keys} <= flat.keys()
+
+
+@pytest.mark.parametrize("key", ["displacement", "size", "velocity"])
+def test_other_motions(rig: Stage, key: str) -> None:
+    kind, value = {
+        "displacement": ("release", "-2 mm"),
+        "size": ("step", "1 m"),
+        "velocity": ("ramp", "0.1 m/s"),
+    }[key]
+    flat = rig.replace({"motion": {"kind": kind, key: value, "duration": "1 s"}}).flat()
+    assert flat[f"motion.{key}"] == Quantity({"velocity": "m/s"}.get(key, "m"), any_sign, "").read(value)
+
+
+def test_zero_stroke_is_legal(rig: Stage) -> None:
+    assert rig.replace({"joint.stroke": "0 mm"}).flat()["joint.stroke"] == 0.0
