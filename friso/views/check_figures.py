@@ -117,33 +117,42 @@ def _settling(shown: list[Shown]) -> Panel:
     bands = tuple(
         Limit((band,), text, INK, dash) for (band, text), dash in zip(BANDS.items(), dashes, strict=True)
     )
-    axis = Axis("|Deviation|", "m", (_FLOOR, max(2 * largest, 1e-4)), log=True)
+    axis = Axis("|Deviation|", "m", (_FLOOR, max(2 * largest, 1e-3)), log=True)
     return Panel("Whole run: size of the deviation", _TIME, axis, tuple(lines), limits=bands)
 
 
 def _overview(shown: list[Shown]) -> Figure:
     """Reference and position, and the actuator force, over the whole run, the cases side by side."""
-    titles = {"position": "reference and position", "force": "actuator force"}
-    limits = {name: _common([_values(_trace(item), name) for item in shown]) for name in titles}
+    view = _common([_values(_trace(item), "position") for item in shown], least=2 * min(BANDS))
     panels = []
-    for name, title in titles.items():
-        for item in shown:
-            time, values = _values(_trace(item), "time"), _values(_trace(item), name)
-            series = (Series(time, values, "position" if name == "position" else "force", item.colour),)
-            if name == "position":
-                reference = _values(_trace(item), "reference")
-                series = (Series(time, reference, "reference", LIGHT, width=4.0), *series)
-            axis = Axis(name.capitalize(), str(_trace(item)[name].attrs["units"]), limits[name])
-            bounds = _force_limit(item) if name == "force" else ()
-            panels.append(Panel(f"{item.label}: {title}", _TIME, axis, series, limits=bounds))
+    for item in shown:
+        time = _values(_trace(item), "time")
+        series = (
+            Series(time, _values(_trace(item), "reference"), "reference", LIGHT, width=4.0),
+            Series(time, _values(_trace(item), "position"), "position", item.colour),
+        )
+        panels.append(
+            Panel(f"{item.label}: reference and position", _TIME, Axis("Position", "m", view), series)
+        )
+    bounds = _force_limit(shown)
+    arrays = [_values(_trace(item), "force") for item in shown]
+    view = _common([*arrays, *(np.array(bound.values) for bound in bounds)])
+    for item, force in zip(shown, arrays, strict=True):
+        series = (Series(_values(_trace(item), "time"), force, "force", item.colour),)
+        title = f"{item.label}: actuator force"
+        panels.append(Panel(title, _TIME, Axis("Force", "N", view), series, limits=bounds))
     caption = "The whole run. On this scale cases that differ by millimetres may look alike."
     return Figure("overview", "The motion", caption, tuple(panels), len(shown), _subject(shown))
 
 
-def _force_limit(item: Shown) -> tuple[Limit, ...]:
-    controller = getattr(item.case.stage, "controller", None)
+def _force_limit(shown: list[Shown]) -> tuple[Limit, ...]:
+    """The force limit of the controller, where a case comes near it: a distant one would flatten all."""
+    controller = getattr(shown[0].case.stage, "controller", None)
     bound = getattr(controller, "force_limit", None)
-    return () if bound is None else (Limit((-float(bound), float(bound)), "force limit"),)
+    forces = np.abs(np.concatenate([_values(_trace(item), "force") for item in shown]))
+    if bound is None or not np.any(forces[np.isfinite(forces)] > bound / 2):
+        return ()
+    return (Limit((-float(bound), float(bound)), "force limit"),)
 
 
 def _shares(shown: list[Shown]) -> Figure:
@@ -227,7 +236,7 @@ def _friction(shown: list[Shown]) -> Figure:
 def _loops(title: str, x: Axis, y: Axis, lines: list[Series]) -> Panel:
     """The lines, those that hardly move beside the others as the point at which they rest."""
     spans = [_span(line.x) for line in lines]
-    rest = [span < 0.01 * max(spans) for span in spans]
+    rest = [span <= 0.01 * max(spans) for span in spans]
     points = [
         Markers(line.x[-1:], line.y[-1:], f"{line.label}: at rest", line.colour)
         for line, resting in zip(lines, rest, strict=True)
