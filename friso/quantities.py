@@ -149,7 +149,7 @@ class Number:
     @property
     def expected(self) -> str:
         """What the key takes, in words."""
-        return f"a bare number, {self.bound.text}"
+        return f"a bare number without quotes, {self.bound.text}"
 
     @property
     def written_example(self) -> str:

@@ -46,6 +46,7 @@ STIFFNESS = 'stiffness = "2.4 N/mm"'
         ('"2.4 dB"', '"2.4 dB" (dB is not convertible to N/m)'),
         ('"2.4 N/m/rad"', '"2.4 N/m/rad" (N/m/rad is not convertible to N/m)'),
         ('"2.4 flurbs/mm"', '"2.4 flurbs/mm" ("flurbs/mm" is not a known unit)'),
+        ('"2.4 Ns/m"', '"2.4 Ns/m" ("Ns/m" is not a known unit)'),
         ('"2.4 n/MM"', '"2.4 n/MM" ("n/MM" is not a known unit)'),
         ('"-2.4 N/mm"', '"-2.4 N/mm"'),
         ('"0 N/mm"', '"0 N/mm"'),
@@ -96,7 +97,12 @@ FREQUENCY = "number and unit in quotes, convertible to Hz, rad/s or rpm, greater
         (
             '"8 Hz"',
             "8",
-            ("controller.crossover", "8 (a bare number, its unit is missing)", FREQUENCY, '= "8 Hz"'),
+            (
+                "controller.crossover",
+                "8 (a bare number, its unit is missing)",
+                FREQUENCY,
+                '= "8 Hz"',
+            ),
         ),
         (
             '"8 Hz"',
@@ -124,21 +130,34 @@ FREQUENCY = "number and unit in quotes, convertible to Hz, rad/s or rpm, greater
         (
             "alpha = 0.1",
             "alpha = nan",
-            ("controller.alpha", "nan", "a bare number, between 0 and 1", "alpha = 0.1"),
+            ("controller.alpha", "nan", "a bare number without quotes, between 0 and 1", "alpha = 0.1"),
         ),
         ("alpha = 0.1", 'alpha = "0.1"', ("controller.alpha", '"0.1"', "a bare number", "alpha = 0.1")),
         ("alpha = 0.1", "alpha = true", ("controller.alpha", "true", "a bare number", "alpha = 0.1")),
-        ("beta = 2", "beta = 0.99", ("controller.beta", "0.99", "a bare number, 1 or greater", "beta = 2")),
-        ("beta = 2", "beta = inf", ("controller.beta", "inf", "a bare number, 1 or greater", "beta = 2")),
+        (
+            "beta = 2",
+            "beta = 0.99",
+            ("controller.beta", "0.99", "a bare number without quotes, 1 or greater", "beta = 2"),
+        ),
+        (
+            "beta = 2",
+            "beta = inf",
+            ("controller.beta", "inf", "a bare number without quotes, 1 or greater", "beta = 2"),
+        ),
         (
             "beta = 2",
             f"beta = 1{'0' * 400}",
-            ("controller.beta", "a huge integer", "a bare number, 1 or greater", "beta = 2"),
+            ("controller.beta", "a huge integer", "a bare number without quotes, 1 or greater", "beta = 2"),
         ),
         (
             "damping_ratio = 0.01",
             "damping_ratio = -0.01",
-            ("parasitic.damping_ratio", "-0.01", "a bare number, 0 or greater", "damping_ratio = 0.01"),
+            (
+                "parasitic.damping_ratio",
+                "-0.01",
+                "a bare number without quotes, 0 or greater",
+                "damping_ratio = 0.01",
+            ),
         ),
         # masses
         (
@@ -304,7 +323,7 @@ FREQUENCY = "number and unit in quotes, convertible to Hz, rad/s or rpm, greater
         (
             "alpha = 0.1",
             "",
-            ("controller.alpha", "nothing", "a bare number, between 0 and 1", "alpha = 0.1"),
+            ("controller.alpha", "nothing", "a bare number without quotes, between 0 and 1", "alpha = 0.1"),
         ),
     ],
     ids=lambda item: item if isinstance(item, str) else "",

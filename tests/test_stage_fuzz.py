@@ -57,7 +57,7 @@ def check(text: str) -> None:
         elif isinstance(value, str) and key in units:
             assert flat[key] == pytest.approx(si_value(value, units[key]), rel=1e-12, abs=5e-324)
         else:
-            assert flat[key] == value
+            assert flat[key] == (value if isinstance(value, bool | str) else float(value))
             assert isinstance(flat[key], bool) == isinstance(value, bool)
     assert loads(stage.to_toml()).flat() == flat
     assert flattened(tomllib.loads(stage.to_toml())) == flattened(file)
@@ -134,6 +134,18 @@ unit_names = st.sampled_from(
         "N·s/m",
     ]
 )
+KINDS = {
+    "kg": "kg g lb t N*s^2/m",
+    "N": "N mN kN lbf kg*m/s^2 J/m",
+    "m": "m mm um µm inch N/(N/m)",
+    "s": "s ms min h 1/(1/s)",
+    "m/s": "m/s mm/s km/h m·s^-1",
+    "m/s^2": "m/s^2 mm/s² m/s/s N/kg",
+    "N/m": "N/m N/mm N/um kg/s^2 lbf/inch",
+    "N*s/m": "N*s/m N/(m/s) kg/s N·s/mm",
+    "N/(m*s)": "N/(m*s) N/m/s kg/s^3",
+    "Hz": "Hz kHz rad/s rpm deg/s turn/min",
+}
 quantities = st.builds("{}{}{}".format, numbers, st.sampled_from([" ", "", "  ", "\t", "\u00a0"]), unit_names)
 scalars = st.one_of(
     quantities,
@@ -159,10 +171,19 @@ def test_text_mutations(text: str, edits: list[tuple[float, int, str]]) -> None:
     check(text)
 
 
-@settings(max_examples=500, deadline=None)
-@given(st.sampled_from(KEYS), scalars)
-def test_value_mutations(place: tuple[str, str, str], value: object) -> None:
+def values_for(place: tuple[str, str, str]) -> st.SearchStrategy[tuple[tuple[str, str, str], object]]:
+    """A place with a value for it: half of them with a unit that the key takes."""
     text, table, key = place
+    field = numeric_keys(loads(text).flat()).get(f"{table}.{key}")
+    units = KINDS.get(field.unit, "1") if field else "1"
+    fitting = st.builds("{} {}".format, numbers, st.sampled_from(units.split()))
+    return st.tuples(st.just(place), fitting | scalars)
+
+
+@settings(max_examples=500, deadline=None)
+@given(st.sampled_from(KEYS).flatmap(values_for))
+def test_value_mutations(case: tuple[tuple[str, str, str], object]) -> None:
+    (text, table, key), value = case
     tables = {**tomllib.loads(text), table: {**tomllib.loads(text)[table], key: value}}
     check(written(tables))
 

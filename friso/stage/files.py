@@ -8,7 +8,8 @@ from typing import Any
 from friso.quantities import StageError, quoted
 from friso.stage.stage import Stage
 
-_EXAMPLE = 'stiffness = "2.4 N/mm"'
+_EXPECTED = "a stage file; friso init writes one to start from"
+_EXAMPLE = '[masses] and, on the next line, cart = "1.2 kg"'
 
 
 def load(path: str | os.PathLike[str]) -> Stage:
@@ -67,10 +68,10 @@ def _text(path: Path) -> str:
         return path.read_bytes().decode("utf-8-sig")
     except UnicodeDecodeError as error:
         given = f"byte {error.start + 1} is not UTF-8"
-        raise StageError("", given, "a text file saved as UTF-8", origin=str(path)) from None
+        raise StageError("", given, "a text file saved as UTF-8", _EXAMPLE, str(path)) from None
     except (OSError, ValueError) as error:
         given = "a folder" if path.is_dir() else _reason(error)
-        raise StageError("", given, "a stage file", "examples/thesis_rig.toml", str(path)) from None
+        raise StageError("", given, _EXPECTED, _EXAMPLE, str(path)) from None
 
 
 def _reason(error: OSError | ValueError) -> str:
@@ -79,9 +80,10 @@ def _reason(error: OSError | ValueError) -> str:
 
 def _parsed(text: str) -> dict[str, Any]:
     if not text.strip():
-        raise StageError("", "an empty file", "a stage file; friso init writes one to start from")
+        raise StageError("", "an empty file", _EXPECTED, _EXAMPLE)
     try:
         return tomllib.loads(text)
-    except (ValueError, RecursionError) as error:
-        given = "tables nested too deeply" if isinstance(error, RecursionError) else f"not TOML: {error}"
-        raise StageError("", given, "lines such as in the example", _EXAMPLE) from None
+    except RecursionError:
+        raise StageError("", "tables nested too deeply", _EXPECTED, _EXAMPLE) from None
+    except ValueError as error:  # TOMLDecodeError, and Python's own for integers of thousands of digits
+        raise StageError("", f"not TOML: {error}", "tables in brackets, then key = value", _EXAMPLE) from None

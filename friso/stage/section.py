@@ -86,9 +86,7 @@ class Variants:
 
 def numeric_fields(cls: type[Section]) -> dict[str, Quantity | Number]:
     """Unit, bound and example of each numeric key of a table."""
-    found = (
-        (key, item) for key, field in cls.model_fields.items() for item in (*field.metadata, field.annotation)
-    )
+    found = ((key, item) for key, field in cls.model_fields.items() for item in field.metadata)
     return {key: item for key, item in found if isinstance(item, Quantity | Number)}
 
 
@@ -131,7 +129,7 @@ def _complete(error: StageError, key: str) -> StageError:
 def _described(cls: type[Section], key: str) -> tuple[str, str]:
     """What a key takes, and an example of it."""
     field = cls.model_fields[key]
-    for item in (*field.metadata, field.annotation):
+    for item in field.metadata:
         if isinstance(item, Table):
             return f"a table [{key}]", item.example
         if isinstance(item, Quantity | Number):
