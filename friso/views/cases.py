@@ -36,6 +36,6 @@ def shown_cases(cases: Mapping[str, Case]) -> tuple[Shown, ...]:
 
 def _twin(cases: Mapping[str, Case]) -> str | None:
     """The key of the case that "given" repeats, if any."""
-    joint = getattr(cases["given"].stage, "joint", None) if "given" in cases else None
+    joint = cases["given"].stage.joint if "given" in cases else None
     key = None if joint is None else ("locked" if joint.locked else "free")
     return key if key in cases else None

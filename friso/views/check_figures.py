@@ -147,8 +147,7 @@ def _overview(shown: list[Shown]) -> Figure:
 
 def _force_limit(shown: list[Shown]) -> tuple[Limit, ...]:
     """The force limit of the controller, where a case comes near it: a distant one would flatten all."""
-    controller = getattr(shown[0].case.stage, "controller", None)
-    bound = getattr(controller, "force_limit", None)
+    bound = shown[0].case.stage.controller.force_limit
     forces = np.abs(np.concatenate([_values(_trace(item), "force") for item in shown]))
     if bound is None or not np.any(forces[np.isfinite(forces)] > bound / 2):
         return ()
@@ -187,7 +186,7 @@ def _joint(shown: list[Shown]) -> Figure:
     start, end = _window(shown)
     panels = []
     for item in shown:
-        joint = getattr(item.case.stage, "joint", None)
+        joint = item.case.stage.joint
         if joint is None or joint.locked or "joint_deflection" not in _trace(item):
             continue
         stroke, deflection = float(joint.stroke), _values(_trace(item), "joint_deflection")
