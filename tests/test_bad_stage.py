@@ -346,7 +346,7 @@ def test_keys(old: str, new: str, lines: tuple[str, str, str, str]) -> None:
             GAINS,
             [
                 "controller.derivative_on, controller.kd, controller.tau",
-                'kd = "6 N*s/m", tau = 0.0',
+                'kd = "6 N*s/m", tau = "0 s"',
                 "measurement",
             ],
         ),

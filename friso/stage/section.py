@@ -36,8 +36,8 @@ class Section(BaseModel):
 
     def given(self) -> dict[str, Any]:
         """The keys that the user gave, with the values as written."""
-        keys = [key for key in type(self).model_fields if key in self.model_fields_set]
-        return {key: getattr(value, "text", value) for key in keys for value in [getattr(self, key)]}
+        values = {key: getattr(self, key) for key in type(self).model_fields if key in self.model_fields_set}
+        return {key: getattr(value, "text", value) for key, value in values.items()}
 
 
 SectionClass = TypeVar("SectionClass", bound=type[Section])

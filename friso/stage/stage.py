@@ -72,11 +72,9 @@ class Stage(Section):
 
     def _written(self, rule: Rule) -> str:
         """The values that a rule is about, as the user wrote them."""
-        given, flat = self.given(), self.flat()
-        pairs = [(key, *key.split(".")) for key in rule.keys]
-        return ", ".join(
-            f"{name} = {quoted(given[table].get(name, flat[key]))}" for key, table, name in pairs
-        )
+        pairs = [key.split(".") for key in rule.keys]
+        values = [(name, getattr(getattr(self, table), name)) for table, name in pairs]
+        return ", ".join(f"{name} = {quoted(getattr(value, 'text', value))}" for name, value in values)
 
     def given(self) -> dict[str, Any]:
         """The stage file as nested tables: the keys that the user gave, with the values as written."""
