@@ -1,0 +1,85 @@
+"""What goes into a kernel and what comes out: arrays with one row per run."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+from typing import NamedTuple
+
+import numpy as np
+
+
+class Batch(NamedTuple):
+    """Runs of one model: constants (n, constants), start states, absolute tolerances (n, states), modes (n, kinks),
+    first steps [s] (n,) and pieces of the reference (n, pieces + 1, 4), of which the last one only ends the run."""
+
+    constants: np.ndarray
+    starts: np.ndarray
+    tolerances: np.ndarray
+    modes: np.ndarray
+    first_steps: np.ndarray
+    segments: np.ndarray
+
+
+class Settings(NamedTuple):
+    """What all runs share: relative tolerance, longest step [s], step budget, the two bands of settling [m], the piece
+    of the reference from which extremes are taken, the time [s] from which turning points are recorded, and the
+    sampling interval [s]."""
+
+    rtol: float
+    longest: float
+    budget: float
+    inner: float
+    outer: float
+    window: int
+    record_from: float
+    interval: float
+
+
+class Results(NamedTuple):
+    """What the runs leave: statistics (n, len(STATISTICS)), status (n,), turning points (n, capacity) with their
+    count (n,), and sampled states (n, samples, states)."""
+
+    statistics: np.ndarray
+    statuses: np.ndarray
+    turn_times: np.ndarray
+    turn_values: np.ndarray
+    turn_counts: np.ndarray
+    samples: np.ndarray
+
+
+STATISTICS = (
+    "force_peak",
+    "deviation_max",
+    "deviation_min",
+    "inner_exit",
+    "outer_exit",
+    "attempted",
+    "rejected",
+    "ended",
+)
+"""Largest force [N], extremes of the deviation in the window [m], when it last was outside the two bands [s], steps
+attempted and rejected, and the time reached [s]."""
+
+
+class Status(IntEnum):
+    """How a run ended."""
+
+    NOT_RUN = 0
+    DONE = 1
+    BUDGET = 2
+    UNDERFLOW = 3
+    FULL = 4
+
+    @property
+    def text(self) -> str:
+        return _TEXTS[self]
+
+
+_TEXTS = {
+    Status.NOT_RUN: "not run: the computation was interrupted",
+    Status.DONE: "done",
+    Status.BUDGET: "step budget used up: loosen rtol, shorten the motion, or look for contact that chatters",
+    Status.UNDERFLOW: "step size too small or state not finite: the loop is unstable or rtol is below rounding; "
+    "check the controller's gains, or loosen rtol",
+    Status.FULL: "more turning points than can be kept: shorten the motion",
+}

@@ -1,0 +1,235 @@
+"""Keeps all lanes busy: loads runs, answers the lanes that want attention, refills a lane as its run ends.
+
+This file is the second half of every generated kernel module: its functions are copied there, compiled, with the
+names below the line `GENERATED` bound to those of the model at hand. It is never run from here.
+"""
+
+
+# GENERATED: np, LANES, STATES, KINKS, CONSTANTS, DENSE, ROWS, row numbers such as X, OLD, TIME, and step
+
+
+def between(B, lane, i, theta):
+    """State i of a lane at the fraction theta of the step last tried."""
+    inner = 0.0
+    for m in range(DENSE - 1, -1, -1):
+        inner = B[(D0 + m * STATES + i) * LANES + lane] + theta * inner
+    x, end = B[(OLD + i) * LANES + lane], B[(END + i) * LANES + lane]
+    return x + theta * (end - x + (1.0 - theta) * inner)
+
+
+def deviation(B, lane, theta):
+    """Position minus reference [m] at the fraction theta of the step last tried."""
+    t = B[OLD_TIME * LANES + lane] + theta * B[TAKEN * LANES + lane]
+    r, v, a = B[REF * LANES + lane], B[(REF + 1) * LANES + lane], B[(REF + 2) * LANES + lane]
+    return between(B, lane, POSITION, theta) - (r + t * (v + 0.5 * a * t))
+
+
+def deviation_rate(B, lane, theta):
+    """Velocity minus that of the reference [m/s] at the fraction theta of the step last tried."""
+    t = B[OLD_TIME * LANES + lane] + theta * B[TAKEN * LANES + lane]
+    v, a = B[(REF + 1) * LANES + lane], B[(REF + 2) * LANES + lane]
+    return between(B, lane, VELOCITY, theta) - (v + a * t)
+
+
+def find_turn(B, lane, high):
+    """The fraction in (0, high) at which the deviation turns: bisection sped up by the secant (Illinois)."""
+    low, f_low, f_high = 0.0, deviation_rate(B, lane, 0.0), deviation_rate(B, lane, high)
+    theta, side = high, 0
+    for _ in range(30):
+        if f_low == f_high:
+            break
+        theta = (low * f_high - high * f_low) / (f_high - f_low)
+        f = deviation_rate(B, lane, theta)
+        if f == 0.0 or high - low < 1e-10:
+            break
+        if (f > 0.0) == (f_high > 0.0):
+            high, f_high = theta, f
+            f_low, side = (f_low * 0.5 if side == 1 else f_low), 1
+        else:
+            low, f_low = theta, f
+            f_high, side = (f_high * 0.5 if side == -1 else f_high), -1
+    return theta
+
+
+def find_entry(B, lane, high, band):
+    """The fraction of the step at which the deviation enters the band, by bisection."""
+    low = 0.0
+    for _ in range(40):
+        middle = 0.5 * (low + high)
+        if abs(deviation(B, lane, middle)) > band:
+            low = middle
+        else:
+            high = middle
+    return high
+
+
+def note_entry(B, lane, row, fraction, band):
+    """Refine the moment at which the deviation last left the band (row), where it came back in this step."""
+    if abs(deviation(B, lane, 0.0)) > band and abs(deviation(B, lane, fraction)) <= band:
+        theta = find_entry(B, lane, fraction, band)
+        B[row * LANES + lane] = moment(B, lane, theta)
+
+
+def moment(B, lane, theta):
+    """Time since the start of the run [s] at the fraction theta of the step last tried."""
+    return B[START * LANES + lane] + B[OLD_TIME * LANES + lane] + theta * B[TAKEN * LANES + lane]
+
+
+def note_turn(B, lane, fraction, settings, times, values, count):
+    """Record the turning point of the deviation inside the step, if there is one; the new count."""
+    before, after = deviation_rate(B, lane, 0.0), deviation_rate(B, lane, fraction)
+    if not ((before > 0.0 and after <= 0.0) or (before < 0.0 and after >= 0.0)):
+        return count
+    theta = find_turn(B, lane, fraction)
+    time, value = moment(B, lane, theta), deviation(B, lane, theta)
+    B[DEVIATION_MAX * LANES + lane] = max(B[DEVIATION_MAX * LANES + lane], value)
+    B[DEVIATION_MIN * LANES + lane] = min(B[DEVIATION_MIN * LANES + lane], value)
+    if abs(value) > settings.inner:
+        B[INNER_EXIT * LANES + lane] = max(B[INNER_EXIT * LANES + lane], time)
+    if abs(value) > settings.outer:
+        B[OUTER_EXIT * LANES + lane] = max(B[OUTER_EXIT * LANES + lane], time)
+    if time < B[RECORD_FROM * LANES + lane]:
+        return count
+    if count < times.size:
+        times[count], values[count] = time, value
+    return count + 1
+
+
+def note_samples(B, lane, fraction, interval, samples):
+    """Write the states at the sampling instants inside the step, from the dense output."""
+    start, h = moment(B, lane, 0.0), B[TAKEN * LANES + lane]
+    end = moment(B, lane, fraction)
+    last = samples.shape[0] - 1
+    k = int(B[NEXT_SAMPLE * LANES + lane] / interval + 0.5)
+    while k <= last and k * interval <= end + 1e-12 * end:
+        theta = min((k * interval - start) / h, 1.0)
+        for i in range(STATES):
+            samples[k, i] = between(B, lane, i, theta)
+        k += 1
+    B[NEXT_SAMPLE * LANES + lane] = k * interval if k <= last else np.inf
+
+
+def enter_segment(B, lane, segments, segment, window, first_step):
+    """Start the next segment of the reference that lasts; its number, or the number of segments at the end.
+
+    Segment `window` begins the window over which the extremes of the deviation are taken.
+    """
+    count = segments.shape[0] - 1
+    while segment < count and segments[segment + 1, 0] - segments[segment, 0] <= 0.0:
+        segment += 1
+    if segment >= count:
+        return count
+    B[START * LANES + lane] = segments[segment, 0]
+    B[STOP * LANES + lane] = segments[segment + 1, 0] - segments[segment, 0]
+    B[TIME * LANES + lane] = 0.0
+    for i in range(3):
+        B[(REF + i) * LANES + lane] = segments[segment, 1 + i]
+    if segment == window:
+        away = B[(X + POSITION) * LANES + lane] - segments[segment, 1]
+        B[DEVIATION_MAX * LANES + lane] = away
+        B[DEVIATION_MIN * LANES + lane] = away
+    else:
+        B[TRIAL * LANES + lane] = min(B[TRIAL * LANES + lane], first_step)
+    return segment
+
+
+def load_run(B, lane, j, batch, settings):
+    """Put run j at its start into a lane; the segment of the reference it starts in."""
+    for row in range(ROWS):
+        B[row * LANES + lane] = 0.0
+    for i in range(CONSTANTS):
+        B[(CONSTANT + i) * LANES + lane] = batch.constants[j, i]
+    for i in range(STATES):
+        B[(X + i) * LANES + lane] = batch.starts[j, i]
+        B[(TOLERANCE + i) * LANES + lane] = batch.tolerances[j, i]
+    for k in range(KINKS):
+        B[(MODE + k) * LANES + lane] = batch.modes[j, k]
+    B[TRIAL * LANES + lane] = batch.first_steps[j]
+    B[RECORD_FROM * LANES + lane] = settings.record_from
+    return enter_segment(B, lane, batch.segments[j], 0, settings.window, batch.first_steps[j])
+
+
+def start_run(B, lane, j, batch, settings, results):
+    """Load run j and write its first sample; the segment it starts in."""
+    segment = load_run(B, lane, j, batch, settings)
+    B[NEXT_SAMPLE * LANES + lane] = np.inf
+    if results.samples.shape[1] > 0:
+        for i in range(STATES):
+            results.samples[j, 0, i] = batch.starts[j, i]
+        B[NEXT_SAMPLE * LANES + lane] = settings.interval
+    return segment
+
+
+def idle(B, lane):
+    """Let a lane without a run stand still beside the others."""
+    B[STOP * LANES + lane] = np.inf
+    B[RECORD_FROM * LANES + lane] = np.inf
+    B[NEXT_SAMPLE * LANES + lane] = np.inf
+    for i in range(STATES):
+        B[(X + i) * LANES + lane] = 0.0
+
+
+def answer(B, lane, j, segment, batch, settings, results):
+    """Record what happened in the lane's last step; the segment of the reference that comes next."""
+    fraction = B[FRACTION * LANES + lane]
+    if fraction == 0.0:
+        return segment
+    note_entry(B, lane, INNER_EXIT, fraction, settings.inner)
+    note_entry(B, lane, OUTER_EXIT, fraction, settings.outer)
+    times, values = results.turn_times[j], results.turn_values[j]
+    count = note_turn(B, lane, fraction, settings, times, values, results.turn_counts[j])
+    results.turn_counts[j] = count
+    if moment(B, lane, fraction) >= B[NEXT_SAMPLE * LANES + lane]:
+        note_samples(B, lane, fraction, settings.interval, results.samples[j])
+    if B[TIME * LANES + lane] < B[STOP * LANES + lane]:
+        return segment
+    return enter_segment(B, lane, batch.segments[j], segment + 1, settings.window, batch.first_steps[j])
+
+
+def finish(B, lane, j, segment, batch, settings, results):
+    """Hand over what run j has gathered, if it has ended; whether it has."""
+    if segment >= batch.segments.shape[1] - 1:
+        results.statuses[j] = DONE
+    elif B[ATTEMPTED * LANES + lane] >= settings.budget:
+        results.statuses[j] = BUDGET
+    elif B[FRACTION * LANES + lane] == 0.0:
+        results.statuses[j] = UNDERFLOW
+    else:
+        return False
+    statistics = results.statistics[j]
+    for i in range(5):
+        statistics[i] = B[(FORCE_PEAK + i) * LANES + lane]
+    statistics[5] = B[ATTEMPTED * LANES + lane]
+    statistics[6] = B[REJECTED * LANES + lane]
+    statistics[7] = B[START * LANES + lane] + B[TIME * LANES + lane]
+    return True
+
+
+def run(first, last, batch, settings, results):
+    """Run the runs first to last - 1 of the batch, each in a lane of its own, and write the results."""
+    B = np.zeros(ROWS * LANES)
+    who = np.full(LANES, -1)
+    segment = np.zeros(LANES, np.int64)
+    upcoming, busy = first, 0
+    for lane in range(LANES):
+        if upcoming < last:
+            segment[lane] = start_run(B, lane, upcoming, batch, settings, results)
+            who[lane], upcoming, busy = upcoming, upcoming + 1, busy + 1
+        else:
+            load_run(B, lane, first, batch, settings)
+            idle(B, lane)
+    while busy > 0:
+        step(B, settings.rtol, settings.longest, settings.inner, settings.outer, settings.budget)
+        for lane in range(LANES):
+            j = who[lane]
+            if B[EVENT * LANES + lane] == 0.0 or j < 0:
+                continue
+            segment[lane] = answer(B, lane, j, segment[lane], batch, settings, results)
+            if not finish(B, lane, j, segment[lane], batch, settings, results):
+                continue
+            who[lane], busy = -1, busy - 1
+            if upcoming < last:
+                segment[lane] = start_run(B, lane, upcoming, batch, settings, results)
+                who[lane], upcoming, busy = upcoming, upcoming + 1, busy + 1
+            else:
+                idle(B, lane)

@@ -1,0 +1,59 @@
+"""Where the lanes keep their numbers: one flat float64 buffer, row by row, with the lanes of a row side by side."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+LANES = 8
+"""Runs side by side: one 512-bit register of float64, or two of 256 bits."""
+
+SCALARS = (
+    "time",
+    "old_time",
+    "stop",
+    "start",
+    "trial",
+    "taken",
+    "fraction",
+    "rejected_last",
+    "attempted",
+    "rejected",
+    "event",
+    "next_sample",
+    "record_from",
+    "force_peak",
+    "deviation_max",
+    "deviation_min",
+    "inner_exit",
+    "outer_exit",
+)
+"""Rows of one number per lane. time, old_time, stop: now, before the step
+and at its next corner, all since the last corner of the reference, which was at start; trial, taken: step to try next and step last tried; fraction: the part of it that was accepted; event: the lane wants attention."""
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Row numbers of the buffer for a model of the given size; the first row of each block."""
+
+    states: int
+    dense: int
+    constants: int
+    kinks: int
+
+    @property
+    def blocks(self) -> dict[str, int]:
+        sizes = {
+            "x": self.states,
+            "old": self.states,
+            "end": self.states,
+            "dense": self.dense * self.states,
+            "tolerance": self.states,
+            "constant": self.constants,
+            "mode": self.kinks,
+            "reference": 3,
+        } | dict.fromkeys(SCALARS, 1)
+        rows, row = {}, 0
+        for name, size in sizes.items():
+            rows[name] = row
+            row += size
+        return rows | {"rows": row}

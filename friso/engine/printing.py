@@ -1,0 +1,109 @@
+"""SymPy expressions as straight-line Python for the kernels and as NumPy for everything else."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+
+import sympy as sp
+from sympy.printing.numpy import NumPyPrinter
+from sympy.printing.pycode import PythonCodePrinter
+
+Rename = Callable[[sp.Symbol], str]
+
+
+class reciprocal(sp.Function):  # noqa: N801 (a function's name in SymPy)
+    """1/x, kept apart from powers so that x^-1 and x^-2 share one division."""
+
+
+def reciprocals(expr: sp.Expr) -> sp.Expr:
+    """`expr` with every negative whole power written as a power of a reciprocal."""
+    return expr.replace(
+        lambda e: e.is_Pow and e.exp.is_Integer and e.exp < 0, lambda e: reciprocal(e.base) ** -e.exp
+    )
+
+
+class _KernelPrinter(PythonCodePrinter):
+    """Scalar code without library calls other than those of `friso.engine.simd_math`."""
+
+    def __init__(self, rename: Rename) -> None:
+        super().__init__({"fully_qualified_modules": False})
+        self._rename = rename
+
+    def _print_Symbol(self, expr: sp.Symbol) -> str:
+        return self._rename(expr)
+
+    def _print_Rational(self, expr: sp.Rational) -> str:
+        return repr(float(expr))
+
+    _print_Integer = _print_Rational
+    _print_NumberSymbol = _print_Rational
+
+    def _print_exp(self, expr: sp.exp) -> str:
+        return f"exp({self._print(expr.args[0])})"
+
+    def _print_tanh(self, expr: sp.tanh) -> str:
+        return f"tanh({self._print(expr.args[0])})"
+
+    def _print_reciprocal(self, expr: sp.Expr) -> str:
+        return f"(1.0 / ({self._print(expr.args[0])}))"
+
+    def _print_Pow(self, expr: sp.Pow, rational: bool = False, sqrt: str = "") -> str:
+        base, exponent = expr.base, expr.exp
+        text = f"({self._print(base)})"
+        if exponent.is_Integer:
+            return "(" + " * ".join([text] * int(exponent)) + ")"
+        return f"power({text}, {self._print(exponent)})"
+
+    def _print_Mul(self, expr: sp.Mul) -> str:
+        return "(" + " * ".join(f"({self._print(factor)})" for factor in expr.args) + ")"
+
+
+def print_scalar(expr: sp.Expr, rename: Rename) -> str:
+    """One expression as kernel code."""
+    return _KernelPrinter(rename).doprint(expr)
+
+
+class _Renamed(NumPyPrinter):
+    def __init__(self, rename: Rename) -> None:
+        super().__init__({"fully_qualified_modules": False})
+        self._rename = rename
+
+    def _print_Symbol(self, expr: sp.Symbol) -> str:
+        return self._rename(expr)
+
+    def _module_format(self, fqn: str, register: bool = True) -> str:
+        return fqn.replace("numpy.", "np.")
+
+
+def print_numpy(expr: sp.Expr, rename: Rename) -> str:
+    """One expression as NumPy code that broadcasts."""
+    return _Renamed(rename).doprint(expr)
+
+
+class Constants:
+    """Collects the subexpressions that a whole run shares, so that a kernel finds them computed."""
+
+    def __init__(self, parameters: Iterable[sp.Symbol]) -> None:
+        self._parameters = frozenset(parameters)
+        self._symbols: dict[sp.Expr, sp.Symbol] = {}
+
+    @property
+    def expressions(self) -> Sequence[sp.Expr]:
+        return list(self._symbols)
+
+    @property
+    def index(self) -> Mapping[sp.Symbol, int]:
+        return {symbol: i for i, symbol in enumerate(self._symbols.values())}
+
+    def hoist(self, expr: sp.Expr) -> sp.Expr:
+        """`expr` with every largest subexpression in parameters alone replaced by a constant's symbol."""
+        if expr.is_number or not expr.free_symbols & self._parameters:
+            return expr
+        if expr.free_symbols <= self._parameters:
+            return self._symbols.setdefault(expr, sp.Symbol(f"c{len(self._symbols)}", real=True))
+        if isinstance(expr, sp.Add | sp.Mul):
+            shared = [a for a in expr.args if a.free_symbols <= self._parameters]
+            if any(a.free_symbols for a in shared):
+                rest = [self.hoist(a) for a in expr.args if a not in shared]
+                return expr.func(self.hoist(expr.func(*shared)), *rest)
+        return expr.func(*(self.hoist(a) for a in expr.args))

@@ -1,0 +1,292 @@
+"""Writes the step of a model: one Rosenbrock step for all lanes, as straight-line code that vectorises.
+
+What the vectoriser needs: one flat buffer, unsigned indices (no wrap-around), a constant lane count, selects instead
+of branches, no library call. Modes (on which side of each kink) are held during a step, so that the right-hand side is
+smooth; where a kink is crossed the step is accepted up to the crossing alone, which the dense output locates.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+import sympy as sp
+
+from friso.engine.elimination import eliminate
+from friso.engine.layout import SCALARS, Layout
+from friso.engine.printing import Constants, Rename, print_scalar, reciprocals
+from friso.engine.tableaus.tableau import Tableau
+from friso.equations.component import TIME
+from friso.equations.model import REFERENCE, Model
+
+THIRDS = (1 / 3, 2 / 3)
+"""Where inside a step the kinks are looked at; with both ends they fix a cubic."""
+
+
+HYSTERESIS = 1e-2
+"""A kink counts as crossed this share of the tolerance beyond it, so that a lane that has just crossed it stands
+clear of it, and rounding noise about it crosses nothing."""
+
+
+class Block:
+    """Expressions that are evaluated together, with what they share computed once."""
+
+    def __init__(self, named: Mapping[str, sp.Expr], constants: Constants) -> None:
+        hoisted = [reciprocals(constants.hoist(sp.sympify(e))) for e in named.values()]
+        self._shared, reduced = sp.cse(hoisted, symbols=sp.numbered_symbols("w_"), order="none")
+        self._named = dict(zip(named, reduced, strict=True))
+
+    def code(self, suffix: str, rename: Rename) -> list[str]:
+        """Assignments to the names, each followed by the suffix."""
+        inner = {symbol: f"{symbol}{suffix}" for symbol, _ in self._shared}
+
+        def named(symbol: sp.Symbol) -> str:
+            return inner.get(symbol) or rename(symbol)
+
+        lines = [f"{inner[symbol]} = {print_scalar(expr, named)}" for symbol, expr in self._shared]
+        return lines + [f"{name}{suffix} = {print_scalar(e, named)}" for name, e in self._named.items()]
+
+
+class StepWriter:
+    """Code of one model's step by one method."""
+
+    def __init__(self, model: Model, tableau: Tableau) -> None:
+        self.model, self.tableau = model, tableau
+        self.size, self.kinks = len(model.states), len(model.kinks)
+        self.constants = Constants(model.parameters)
+        self._index = {symbol: i for i, symbol in enumerate(model.symbols)}
+        self._fixed = {kink.beyond: f"mode{k}" for k, kink in enumerate(model.kinks)}
+        self._fixed |= dict(zip(REFERENCE, ("r_x", "r_v", "r_a"), strict=True))
+        self._jacobian = self._nonzero_jacobian()
+        self._drift = {
+            i: d for i, f in enumerate(model.rhs) if (d := sp.diff(f, TIME)) != 0
+        }
+        force = model.outputs["force"].expression if "force" in model.outputs else sp.S.Zero
+        rates = {f"f{i}_": f for i, f in enumerate(model.rhs)}
+        surfaces = {f"g{k}_": kink.surface for k, kink in enumerate(model.kinks)}
+        follow = {"deviation": model.deviation, "turning": model.deviation_rate}
+        entries = {f"j_{i}_{j}_": e for (i, j), e in self._jacobian.items()}
+        drifts = {f"drift{i}_": e for i, e in self._drift.items()}
+        sizes = {f"size{k}_": self._size(kink.surface) for k, kink in enumerate(model.kinks)}
+        watched = surfaces | {"force": force}
+        self._start = Block(rates | entries | drifts | watched | sizes | follow, self.constants)
+        self._rates = Block(rates, self.constants)
+        self._watched = Block(watched, self.constants)
+        self._followed = Block(follow, self.constants)
+        free = set().union(*(sp.sympify(e).free_symbols for e in watched.values()))
+        self._watched_states = sorted(self._index[s] for s in free & set(self._index))
+        self.layout = Layout(self.size, len(tableau.dense), len(self.constants.index), self.kinks)
+
+    def _size(self, surface: sp.Expr) -> sp.Expr:
+        """Magnitude of a surface that corresponds to the scales of the states."""
+        return sum(sp.Abs(sp.diff(surface, state.symbol)) * state.scale for state in self.model.states)
+
+    def _nonzero_jacobian(self) -> dict[tuple[int, int], sp.Expr]:
+        entries = {}
+        for i, f in enumerate(self.model.rhs):
+            for j, x in enumerate(self.model.symbols):
+                entry = sp.diff(f, x)
+                if entry != 0:
+                    entries[i, j] = entry
+        return entries
+
+    def _rename(self, states: str, time: str) -> Rename:
+        def name(symbol: sp.Symbol) -> str:
+            if symbol in self._index:
+                return f"{states}{self._index[symbol]}"
+            return time if symbol == TIME else self._fixed.get(symbol, str(symbol))
+
+        return name
+
+    def source(self) -> str:
+        """The function `step(B, rtol, longest, inner, outer, budget)` over the lanes' buffer."""
+        body = [
+            *self._load(),
+            *self._choose_step(),
+            *self._start.code("_s", self._rename("x", "t")),
+            *self._stages(),
+            *self._error(),
+            *self._dense(),
+            *self._crossings(),
+            *self._accept(),
+            *self._statistics(),
+            *self._store(),
+        ]
+        head = "def step(B, rtol, longest, inner, outer, budget):\n    for l in range(U(LANES)):\n"
+        return head + "".join(f"        {line}\n" for line in body)
+
+    def _row(self, block: str, i: int = 0) -> str:
+        return f"B[l + U({self.layout.blocks[block] + i} * LANES)]"
+
+    def _load(self) -> list[str]:
+        named = {
+            "x": [f"x{i}" for i in range(self.size)],
+            "tolerance": [f"tol{i}" for i in range(self.size)],
+            "constant": [str(c) for c in self.constants.index],
+            "mode": [f"mode{k}" for k in range(self.kinks)],
+            "reference": ["r_x", "r_v", "r_a"],
+        }
+        lines = [f"{name} = {self._row(b, i)}" for b, names in named.items() for i, name in enumerate(names)]
+        return lines + [f"{'t' if name == 'time' else name} = {self._row(name)}" for name in SCALARS]
+
+    def _choose_step(self) -> list[str]:
+        """The next step, at most to the corner of the reference; the last two before it are made equal."""
+        return [
+            "rest = stop - t",
+            "wanted = min(trial, longest)",
+            "last = wanted >= rest * 0.999999999",
+            "half = 0.5 * rest",
+            "h = rest if last else (half if wanted > half else wanted)",
+            "per_h = 1.0 / h",
+        ]
+
+    def _stages(self) -> list[str]:
+        method = self.tableau
+        lines = [f"diagonal, inverse = {1 / method.gamma!r} * per_h, {method.gamma!r} * h"]
+        for i in range(self.size):
+            own = f" - j_{i}_{i}__s" if (i, i) in self._jacobian else ""
+            lines.append(f"A_{i}_{i} = diagonal{own}")
+        lines += [f"A_{i}_{j} = -j_{i}_{j}__s" for i, j in self._jacobian if i != j]
+        own = {i for i, j in self._jacobian if i == j}
+        elimination = eliminate(self.size, set(self._jacobian), own, method.stages)
+        lines += elimination.code
+        for stage in range(method.stages):
+            lines += self._stage_rates(stage)
+            for i in range(self.size):
+                terms = [f"f{i}__{stage}" if stage else f"f{i}__s"]
+                if method.rate[stage] and i in self._drift:
+                    terms.append(f"{method.rate[stage]!r} * h * drift{i}__s")
+                if stage:
+                    terms.append(f"per_h * ({self._sum(method.c[stage - 1], i)})")
+                lines.append(f"k{stage}_{i} = {' + '.join(terms)}")
+            lines += elimination.solve(f"k{stage}_")
+        return lines
+
+    def _stage_rates(self, stage: int) -> list[str]:
+        """Stage `stage`: where it stands, and the right-hand side there."""
+        if stage == 0:
+            return []
+        row, before = self.tableau.a[stage - 1], self.tableau.a[stage - 2] if stage > 1 else ()
+        if row[:-1] == before and row[-1] == 1.0:
+            lines = [f"y{i} = y{i} + k{stage - 1}_{i}" for i in range(self.size)]
+        else:
+            lines = [f"y{i} = x{i} + {self._sum(row, i)}" for i in range(self.size)]
+        lines.append(f"t{stage} = t + {self.tableau.time[stage]!r} * h")
+        return lines + self._rates.code(f"_{stage}", self._rename("y", f"t{stage}"))
+
+    @staticmethod
+    def _sum(weights: Iterable[float], i: int) -> str:
+        return " + ".join(f"{w!r} * k{j}_{i}" for j, w in enumerate(weights) if w)
+
+    def _error(self) -> list[str]:
+        """End of the step, and the mean square of its error against the tolerance."""
+        last = self.tableau.stages - 1
+        lines = ["square = 0.0"]
+        for i in range(self.size):
+            lines += [
+                f"end{i} = y{i} + k{last}_{i}",
+                f"ratio = k{last}_{i} / (tol{i} + rtol * max(abs(x{i}), abs(end{i})))",
+                "square = square + ratio * ratio",
+            ]
+        return [*lines, f"square = square * {1 / self.size!r}"]
+
+    def _dense(self) -> list[str]:
+        rows = enumerate(self.tableau.dense)
+        return [f"d{m}_{i} = {self._sum(row, i)}" for m, row in rows for i in range(self.size)]
+
+    def _between(self, i: int, theta: str) -> str:
+        """State i at the fraction theta of the step."""
+        inner = f"d{len(self.tableau.dense) - 1}_{i}"
+        for m in range(len(self.tableau.dense) - 2, -1, -1):
+            inner = f"d{m}_{i} + {theta} * ({inner})"
+        return f"x{i} + {theta} * (end{i} - x{i} + (1.0 - {theta}) * ({inner}))"
+
+    def _crossings(self) -> list[str]:
+        """For every kink where in the step it is first crossed; `fraction` is the earliest."""
+        lines = []
+        for point, theta in enumerate(THIRDS):
+            states = [f"p{point}_{i} = {self._between(i, repr(theta))}" for i in self._watched_states]
+            lines += [*states, f"t_p{point} = t + {theta!r} * h"]
+            lines += self._watched.code(f"_p{point}", self._rename(f"p{point}_", f"t_p{point}"))
+        lines += ["t_e = t + h", *self._watched.code("_e", self._rename("end", "t_e"))]
+        lines += ["fraction = 1.0", "astray = False"]
+        for k in range(self.kinks):
+            points = zip(("near", "third", "far", "end"), ("s", "p0", "p1", "e"), strict=True)
+            lines.append(f"side{k} = 2.0 * mode{k} - 1.0")
+            lines.append(f"band{k} = {HYSTERESIS!r} * rtol * size{k}__s")
+            lines += [f"{name}{k}_ = side{k} * g{k}__{where} + band{k}" for name, where in points]
+            lines += [
+                f"astray{k} = near{k}_ < 0.0",
+                f"astray = astray | astray{k}",
+                f"root{k} = first_crossing(near{k}_, third{k}_, far{k}_, end{k}_)",
+                f"fraction = min(fraction, root{k})",
+            ]
+        return lines
+
+    def _accept(self) -> list[str]:
+        """Accept or reject, the new state and modes, and the next step."""
+        n = self.size
+        lines = [
+            "precise = square <= 1.0",
+            "good = precise & (not astray)",
+            "cut = fraction < 1.0",
+        ]
+        for i in range(n):
+            lines.append(f"cut{i} = {self._between(i, 'fraction')}")
+            lines.append(f"n{i} = (cut{i} if cut else end{i}) if good else x{i}")
+        for k in range(self.kinks):
+            lines += [
+                f"there{k} = cubic(near{k}_, third{k}_, far{k}_, end{k}_, fraction)",
+                f"beyond{k} = (root{k} <= fraction) | (there{k} < 0.0)",
+                f"flip{k} = astray{k} | (good & cut & beyond{k})",
+                f"mode{k} = 1.0 - mode{k} if flip{k} else mode{k}",
+            ]
+        return [
+            *lines,
+            "arrived = good & last & (not cut)",
+            "t_n = stop if arrived else (t + fraction * h if good else t)",
+            "factor = 0.9 / sqrt(sqrt(sqrt(square + 1e-20)))",
+            "factor = factor if factor > 0.2 else 0.2",
+            "factor = factor if factor < 6.0 else 6.0",
+            "factor = min(factor, 1.0) if rejected_last > 0.0 else factor",
+            "proposed = h * factor",
+            "proposed = h if precise & astray else proposed",
+            "trial = max(proposed, trial) if good & (factor >= 1.0) else proposed",
+        ]
+
+    def _statistics(self) -> list[str]:
+        """Largest force, extremes of the deviation, when it last left the two bands, and what wants attention."""
+        rename = self._rename("n", "t_n")
+        lines = [*self._followed.code("_n", rename), "now = start + t_n"]
+        lines.append("force_peak = max(force_peak, abs(force_s))")
+        for where, theta in zip(("p0", "p1", "e"), (*THIRDS, 1.0), strict=True):
+            reached = f"good & (fraction >= {theta!r})"
+            lines.append(f"force_peak = max(force_peak, abs(force_{where})) if {reached} else force_peak")
+        return [
+            *lines,
+            "deviation_max = max(deviation_max, deviation_n)",
+            "deviation_min = min(deviation_min, deviation_n)",
+            "was, off = abs(deviation_s), abs(deviation_n)",
+            "inner_exit = now if off > inner else inner_exit",
+            "outer_exit = now if off > outer else outer_exit",
+            "entered = ((was > inner) & (off <= inner)) | ((was > outer) & (off <= outer))",
+            "turned = ((turning_s > 0.0) & (turning_n <= 0.0)) | ((turning_s < 0.0) & (turning_n >= 0.0))",
+            "turned = turned & (now >= record_from)",
+            "attempted = attempted + 1.0",
+            "rejected_last = 0.0 if good else 1.0",
+            "rejected = rejected + rejected_last",
+            "happened = good & (entered | turned | (t_n >= stop) | (now >= next_sample))",
+            "failed = (attempted >= budget) | ((not good) & (trial < 1e-15))",
+            "event = 1.0 if happened | failed else 0.0",
+            "fraction = fraction if good else 0.0",
+        ]
+
+    def _store(self) -> list[str]:
+        lines = [f"{self._row('old', i)} = x{i}" for i in range(self.size)]
+        lines += [f"{self._row('end', i)} = end{i}" for i in range(self.size)]
+        for m in range(len(self.tableau.dense)):
+            lines += [f"{self._row('dense', m * self.size + i)} = d{m}_{i}" for i in range(self.size)]
+        lines += [f"{self._row('x', i)} = n{i}" for i in range(self.size)]
+        lines += [f"{self._row('mode', k)} = mode{k}" for k in range(self.kinks)]
+        lines += ["time, old_time, taken = t_n, t, h"]
+        changed = [name for name in SCALARS if name not in ("stop", "start", "next_sample", "record_from")]
+        return lines + [f"{self._row(name)} = {name}" for name in changed]

@@ -1,0 +1,1 @@
+"""Linearly implicit methods, one file each, as coefficients."""

@@ -1,0 +1,75 @@
+"""What every part of the model is made of: states, kinks and outputs, written in SymPy symbols.
+
+A parameter is a symbol that bears its stage-file key as its name, so that the value of a parameter is looked up
+in the flat stage and a derivative with respect to it is a sensitivity to that key.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import sympy as sp
+
+
+def key(name: str) -> sp.Symbol:
+    """The parameter with the stage-file key `name`, such as ``masses.cart`` [SI]."""
+    return sp.Symbol(name, real=True)
+
+
+def state(name: str) -> sp.Symbol:
+    """The state called `name` [SI]."""
+    return sp.Symbol(name, real=True)
+
+
+TIME = sp.Symbol("time", real=True)
+"""Time since the last corner of the reference [s]."""
+
+
+@dataclass(frozen=True)
+class State:
+    """A state, its time derivative, unit, and the magnitude below which it does not matter."""
+
+    symbol: sp.Symbol
+    derivative: sp.Expr
+    unit: str
+    scale: sp.Expr
+
+
+@dataclass(frozen=True)
+class Kink:
+    """A surface in state space on which a derivative of the right-hand side jumps.
+
+    `beyond` is the symbol that is 1 where `surface` > 0 and 0 where it is < 0; the right-hand side contains
+    it instead of an absolute value or a condition, and so is smooth while it is held.
+    """
+
+    name: str
+    surface: sp.Expr
+
+    @property
+    def beyond(self) -> sp.Symbol:
+        return sp.Symbol(f"beyond_{self.name}", real=True)
+
+    @property
+    def sign(self) -> sp.Expr:
+        """+1 beyond the surface, -1 before it."""
+        return 2 * self.beyond - 1
+
+
+@dataclass(frozen=True)
+class Output:
+    """A quantity to look at: expression in states, time and parameters, its unit and its name in plots."""
+
+    expression: sp.Expr
+    unit: str
+    label: str
+
+
+@dataclass(frozen=True)
+class Component:
+    """A part of the model: what it adds to the states, kinks and outputs."""
+
+    states: tuple[State, ...] = ()
+    kinks: tuple[Kink, ...] = ()
+    outputs: Mapping[str, Output] = field(default_factory=dict)

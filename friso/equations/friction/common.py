@@ -1,0 +1,52 @@
+"""What several friction laws share: their keys, and the steady friction level of Eq. 4."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from friso.stage import Rule
+
+if TYPE_CHECKING:
+    import sympy as sp
+
+    from friso.equations.component import Component
+
+COULOMB_BELOW_STATIC = Rule(
+    ("friction.coulomb", "friction.static"),
+    lambda flat: flat["friction.coulomb"] <= flat["friction.static"],
+    expected="Coulomb friction no larger than static friction",
+    example='static = "3 N", coulomb = "1 N"',
+)
+
+
+class Friction:
+    """A declared friction law: force [N] that opposes the velocity, its component and its scales.
+
+    `breakaway` [N] is the largest force at rest, from which the solver takes its length scale.
+    """
+
+    def __init__(self, force: sp.Expr, breakaway: sp.Expr, component: Component) -> None:
+        self.force, self.breakaway, self.component = force, breakaway, component
+
+
+def whole_exponent(flat: Mapping[str, Any]) -> int | None:
+    """The Stribeck exponent where it is a small whole number (then it is written out as products), else None."""
+    exponent = float(flat["friction.stribeck_exponent"])
+    return int(exponent) if exponent in (1.0, 2.0, 3.0, 4.0) else None
+
+
+def stribeck_level(velocity: sp.Expr, sign: sp.Expr, exponent: int | None) -> sp.Expr:
+    """g(v) of Eq. 4 [N]: F_c + (F_s - F_c) exp(-abs(v/v_s)^j), smooth in v while the sign is held."""
+    from sympy import exp
+
+    from friso.equations.component import key
+
+    static, coulomb = key("friction.static"), key("friction.coulomb")
+    ratio = velocity / key("friction.stribeck_velocity")
+    if exponent is None:
+        tiny = 1e-60  # keeps the power differentiable at rest
+        power = (ratio**2 + tiny) ** (key("friction.stribeck_exponent") / 2)
+    else:
+        power = ratio**exponent if exponent % 2 == 0 else (sign * ratio) ** exponent
+    return coulomb + (static - coulomb) * exp(-power)

@@ -1,0 +1,41 @@
+"""Dahl friction: Dahl 1968 (Aerospace Corp. TOR-0158(3107-18)-1); LuGre without Stribeck effect and bristle damping."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from friso.equations.friction.common import Friction
+from friso.quantities import Quantity, Value, non_negative, positive
+from friso.stage import FrictionSection, register_friction
+
+if TYPE_CHECKING:
+    import sympy as sp
+
+
+@register_friction
+class Dahl(FrictionSection):
+    """A spring that slips: z' = v - sigma_0 abs(v)/F_c z, F = sigma_0 z + sigma_2 v."""
+
+    model: Literal["dahl"]
+    coulomb: Annotated[Value, Quantity("N", positive, "1 N")]
+    bristle_stiffness: Annotated[Value, Quantity("N/m", positive, "1e5 N/m")]
+    viscous: Annotated[Value, Quantity("N*s/m", non_negative, "0.5 N*s/m")]
+
+    @staticmethod
+    def variant(flat: Mapping[str, Any]) -> None:
+        return None
+
+    @staticmethod
+    def declare(velocity: sp.Symbol, variant: None) -> Friction:
+        """Friction on a body moving at `velocity` [m/s]."""
+        from friso.equations.component import Component, Kink, Output, State, key, state
+
+        forward = Kink("forward", velocity)
+        deflection, stiffness = state("bristle_deflection"), key("friction.bristle_stiffness")
+        coulomb = key("friction.coulomb")
+        rate = velocity - stiffness * forward.sign * velocity / coulomb * deflection
+        bristles = State(deflection, rate, "m", scale=coulomb / stiffness)
+        outputs = {"bristle_deflection": Output(deflection, "m", "bristle deflection z")}
+        force = stiffness * deflection + key("friction.viscous") * velocity
+        return Friction(force, coulomb, Component((bristles,), (forward,), outputs))

@@ -1,0 +1,51 @@
+"""LuGre friction: Canudas de Wit, Olsson, Astrom, Lischinsky 1995, doi:10.1109/9.376053 (thesis, Eq. 3 to 5)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+
+from friso.equations.friction.common import COULOMB_BELOW_STATIC, Friction, stribeck_level, whole_exponent
+from friso.quantities import Number, Quantity, Value, non_negative, positive
+from friso.stage import FrictionSection, Rule, register_friction
+
+if TYPE_CHECKING:
+    import sympy as sp
+
+
+@register_friction
+class LuGre(FrictionSection):
+    """Bristles that deflect by z: z' = v - sigma_0 abs(v)/g(v) z, F = sigma_0 z + sigma_1 z' + sigma_2 v."""
+
+    model: Literal["lugre"]
+    static: Annotated[Value, Quantity("N", positive, "3 N")]
+    coulomb: Annotated[Value, Quantity("N", positive, "1 N")]
+    stribeck_velocity: Annotated[Value, Quantity("m/s", positive, "1.6 mm/s")]
+    stribeck_exponent: Annotated[float, Number(positive, "2")]
+    bristle_stiffness: Annotated[Value, Quantity("N/m", positive, "1e5 N/m")]
+    bristle_damping: Annotated[Value, Quantity("N*s/m", non_negative, "316 N*s/m")]
+    viscous: Annotated[Value, Quantity("N*s/m", non_negative, "0.5 N*s/m")]
+    rules: ClassVar[tuple[Rule, ...]] = (COULOMB_BELOW_STATIC,)
+
+    @staticmethod
+    def variant(flat: Mapping[str, Any]) -> int | None:
+        return whole_exponent(flat)
+
+    @staticmethod
+    def declare(velocity: sp.Symbol, variant: int | None) -> Friction:
+        """Friction on a body moving at `velocity` [m/s]."""
+        from friso.equations.component import Component, Kink, Output, State, key, state
+
+        forward = Kink("forward", velocity)
+        deflection, stiffness = state("bristle_deflection"), key("friction.bristle_stiffness")
+        level = stribeck_level(velocity, forward.sign, variant)
+        rate = velocity - stiffness * forward.sign * velocity / level * deflection
+        force = (
+            stiffness * deflection
+            + key("friction.bristle_damping") * rate
+            + key("friction.viscous") * velocity
+        )
+        static = key("friction.static")
+        bristles = State(deflection, rate, "m", scale=static / stiffness)
+        outputs = {"bristle_deflection": Output(deflection, "m", "bristle deflection z")}
+        return Friction(force, static, Component((bristles,), (forward,), outputs))

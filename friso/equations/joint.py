@@ -1,0 +1,42 @@
+"""The compliant joint between cart and stage, with its stroke limiter in parallel when touched (thesis, Fig. 3).
+
+Table 1 of the thesis prints a series formula for the touched limiter; a limiter that touches carries its force
+beside the leaf springs, so stiffness and damping add up here.
+"""
+
+from __future__ import annotations
+
+import sympy as sp
+
+from friso.equations.component import Component, Kink, Output, key
+from friso.equations.structure import JointForm
+
+
+def joint(form: JointForm, deflection: sp.Expr, rate: sp.Expr) -> tuple[sp.Expr, Component]:
+    """Force of the joint on the cart [N] for a deflection [m] of the stage against it, and its kinks.
+
+    "locked": cart and stage meet through the limiter alone. "touching": the stroke is zero, so that the limiter
+    always touches. "free": the limiter touches where abs(deflection) exceeds the stroke.
+    """
+    contact = key("joint.limiter_stiffness") * deflection + key("joint.limiter_damping") * rate
+    leaves = key("joint.stiffness") * deflection + key("joint.damping") * rate
+    kinks: tuple[Kink, ...] = ()
+    if form == "locked":
+        force = contact
+    elif form == "touching":
+        force = leaves + contact
+    else:
+        stroke = key("joint.stroke")
+        ahead = Kink("stroke_ahead", deflection - stroke)
+        behind = Kink("stroke_behind", -deflection - stroke)
+        kinks = (ahead, behind)
+        force = (
+            leaves
+            + (ahead.beyond + behind.beyond) * contact
+            + (behind.beyond - ahead.beyond) * key("joint.limiter_stiffness") * stroke
+        )
+    outputs = {
+        "joint_deflection": Output(deflection, "m", "joint deflection"),
+        "joint_force": Output(force, "N", "joint force"),
+    }
+    return force, Component(kinks=kinks, outputs=outputs)

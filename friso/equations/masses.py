@@ -1,0 +1,52 @@
+"""Masses in a chain: cart - joint - stage - parasitic mass; or one rigid mass (thesis, Fig. 3 and 4)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import sympy as sp
+
+from friso.equations.component import Component, Output, State, key, state
+
+
+@dataclass(frozen=True)
+class Body:
+    """A moving mass: its mass [kg], position [m] and velocity [m/s]."""
+
+    mass: sp.Expr
+    position: sp.Symbol
+    velocity: sp.Symbol
+
+    @classmethod
+    def named(cls, prefix: str, mass: sp.Expr) -> Body:
+        return cls(mass, state(f"{prefix}position"), state(f"{prefix}velocity"))
+
+    def under(self, force: sp.Expr, length: sp.Expr, rate: sp.Expr) -> tuple[State, State]:
+        """Newton's second law for the sum of forces [N]."""
+        return (
+            State(self.position, self.velocity, "m", scale=length),
+            State(self.velocity, force / self.mass, "m/s", scale=length * rate),
+        )
+
+
+def parasitic_force(parasitic: Body, stage: Body) -> sp.Expr:
+    """Force of the stage on the parasitic mass [N]: spring and damper of the first internal mode.
+
+    `parasitic.frequency` is that of the two halves of the stage against each other (design.md, section 1).
+    """
+    reduced = parasitic.mass * stage.mass / (parasitic.mass + stage.mass)
+    omega = 2 * sp.pi * key("parasitic.frequency")
+    damping = 2 * key("parasitic.damping_ratio") * omega * reduced
+    return omega**2 * reduced * (stage.position - parasitic.position) + damping * (
+        stage.velocity - parasitic.velocity
+    )
+
+
+def position_outputs(prefix: str, name: str, body: Body) -> Component:
+    """Position and velocity of a body as outputs."""
+    return Component(
+        outputs={
+            f"{prefix}position": Output(body.position, "m", f"{name} position"),
+            f"{prefix}velocity": Output(body.velocity, "m/s", f"{name} velocity"),
+        }
+    )

@@ -1,0 +1,137 @@
+"""A stage's equations, assembled from their parts: states, right-hand side, kinks and outputs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import sympy as sp
+
+from friso.equations.component import TIME, Component, Kink, Output, State, key
+from friso.equations.friction.common import Friction
+from friso.equations.joint import joint
+from friso.equations.masses import Body, parasitic_force, position_outputs
+from friso.equations.pid import Controller, Loop, controller, loop_stiffness
+from friso.equations.structure import Structure
+from friso.stage.tables import FRICTION
+
+REFERENCE = tuple(key(f"reference.{name}") for name in ("position", "velocity", "acceleration"))
+"""Position, velocity and acceleration of the reference at its last corner."""
+
+MOTION_SIZE = key("motion.size")
+"""Length of the motion [m]; infinite where nothing moves, so that it bounds nothing."""
+
+
+@dataclass(frozen=True)
+class Model:
+    """The equations of a stage.
+
+    The right-hand side is smooth while the kinks' `beyond` symbols are held; `TIME` counts from the last corner
+    of the reference. `deviation` [m] is position minus reference, `length` [m] and `rate` [1/s] the scales of
+    the motion from which the solver takes its absolute tolerances.
+    """
+
+    states: tuple[State, ...]
+    kinks: tuple[Kink, ...]
+    outputs: Mapping[str, Output]
+    deviation: sp.Expr
+    deviation_rate: sp.Expr
+    length: sp.Expr
+    rate: sp.Expr
+
+    @property
+    def symbols(self) -> tuple[sp.Symbol, ...]:
+        return tuple(each.symbol for each in self.states)
+
+    @property
+    def rhs(self) -> tuple[sp.Expr, ...]:
+        return tuple(each.derivative for each in self.states)
+
+    @property
+    def parameters(self) -> tuple[sp.Symbol, ...]:
+        """The stage-file keys (and the length of the motion) that the equations contain, sorted by name."""
+        expressions = [*self.rhs, *(k.surface for k in self.kinks), *(o.expression for o in self.outputs.values())]
+        expressions += [each.scale for each in self.states]
+        others = {*self.symbols, *(k.beyond for k in self.kinks), *REFERENCE, TIME}
+        free = set().union(*(e.free_symbols for e in expressions)) - others
+        return tuple(sorted(free, key=str))
+
+
+def assemble(structure: Structure) -> Model:
+    """The equations of every stage with this structure."""
+    cart, stage, parasitic = _bodies(structure)
+    friction = FRICTION.classes[structure.friction].declare(cart.velocity, structure.friction_variant)
+    position, velocity, acceleration = REFERENCE
+    reference = position + velocity * TIME + acceleration * TIME**2 / 2
+    reference_velocity = velocity + acceleration * TIME
+    moving = cart.mass + (stage.mass if stage is not cart else 0) + (parasitic.mass if parasitic else 0)
+    length, rate = _scales(structure, friction, moving)
+    loop = Loop(reference - stage.position, stage.position, stage.velocity, reference_velocity)
+    control = controller(structure.controller, loop, length, rate) if structure.controller else None
+    bodies, parts = _mechanics(structure, (cart, stage, parasitic), friction, control, (length, rate))
+    outputs = {
+        "reference": Output(reference, "m", "reference"),
+        "error": Output(loop.error, "m", "error"),
+    }
+    for part in parts:
+        outputs |= part.outputs
+    return Model(
+        states=(*bodies, *(each for part in parts for each in part.states)),
+        kinks=tuple(kink for part in parts for kink in part.kinks),
+        outputs=outputs,
+        deviation=stage.position - reference,
+        deviation_rate=stage.velocity - reference_velocity,
+        length=length,
+        rate=rate,
+    )
+
+
+def _bodies(structure: Structure) -> tuple[Body, Body, Body | None]:
+    """Cart, stage (the same body when rigid) and parasitic mass."""
+    if structure.joint == "rigid":
+        rigid = Body.named("", sum((key(f"masses.{name}") for name in structure.masses), start=sp.S.Zero))
+        return rigid, rigid, None
+    cart = Body.named("cart_", key("masses.cart"))
+    if not structure.parasitic:
+        return cart, Body.named("", key("masses.stage")), None
+    part = key("parasitic.mass")
+    return cart, Body.named("", key("masses.stage") - part), Body.named("parasitic_", part)
+
+
+def _scales(structure: Structure, friction: Friction | None, mass: sp.Expr) -> tuple[sp.Expr, sp.Expr]:
+    """Length [m] by which the break-away force deflects the control loop (at most the motion itself), and the
+    natural frequency of mass and loop [1/s]: a hunting cycle is a few of the one in size and period."""
+    stiffness = loop_stiffness(structure.controller)
+    length = MOTION_SIZE if friction is None else sp.Min(MOTION_SIZE, friction.breakaway / stiffness)
+    return length, sp.Max(sp.sqrt(stiffness / mass), 1 / key("motion.duration"))
+
+
+def _mechanics(
+    structure: Structure,
+    bodies: tuple[Body, Body, Body | None],
+    friction: Friction | None,
+    control: Controller | None,
+    scales: tuple[sp.Expr, sp.Expr],
+) -> tuple[list[State], list[Component]]:
+    """Newton's law for every body, and the components that bring the forces."""
+    cart, stage, parasitic = bodies
+    drag = friction.force if friction else sp.S.Zero
+    on_stage = control.force if control else sp.S.Zero
+    parts = [position_outputs("", "stage", stage), position_outputs("cart_", "cart", cart)]
+    states: list[State] = []
+    if parasitic:
+        inner = parasitic_force(parasitic, stage)
+        on_stage -= inner
+        states += parasitic.under(inner, *scales)
+    if structure.joint == "rigid":
+        states[:0] = stage.under(on_stage - drag, *scales)
+    else:
+        on_cart, part = joint(structure.joint, stage.position - cart.position, stage.velocity - cart.velocity)
+        states[:0] = [*stage.under(on_stage - on_cart, *scales), *cart.under(on_cart - drag, *scales)]
+        parts.append(part)
+    if friction:
+        force = Component(outputs={"friction_force": Output(friction.force, "N", "friction force")})
+        parts += [friction.component, force]
+    if control:
+        parts.append(control.component)
+    return states, parts

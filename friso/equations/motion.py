@@ -1,0 +1,72 @@
+"""The five kinds of motion as pieces of parabola: within a piece, r = r_0 + v_0 t + a_0 t^2/2, t from its start."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+Piece = tuple[Any, Any, Any, Any]
+"""Start time [s], and position [m], velocity [m/s] and acceleration [m/s^2] there."""
+
+
+def _there_and_back(flat: Mapping[str, Any]) -> list[Piece]:
+    a, ramp, back = (
+        flat[f"motion.{name}"] for name in ("acceleration", "acceleration_time", "return_at")
+    )
+    size, top = a * ramp**2, a * ramp
+    return [
+        (0.0, 0.0, 0.0, a),
+        (ramp, size / 2, top, -a),
+        (2 * ramp, size, 0.0, 0.0),
+        (back, size, 0.0, -a),
+        (back + ramp, size / 2, -top, a),
+        (back + 2 * ramp, 0.0, 0.0, 0.0),
+    ]
+
+
+def _constant(position: Any, velocity: Any) -> list[Piece]:
+    return [(0.0, position, velocity, 0.0)]
+
+
+_PIECES: dict[str, Callable[[Mapping[str, Any]], list[Piece]]] = {
+    "there_and_back": _there_and_back,
+    "release": lambda flat: _constant(0.0, 0.0),
+    "step": lambda flat: _constant(flat["motion.size"], 0.0),
+    "ramp": lambda flat: _constant(0.0, flat["motion.velocity"]),
+    "hold": lambda flat: _constant(0.0, 0.0),
+}
+
+_SIZES: dict[str, Callable[[Mapping[str, Any]], Any]] = {
+    "there_and_back": lambda flat: flat["motion.acceleration"] * flat["motion.acceleration_time"] ** 2,
+    "release": lambda flat: flat["motion.displacement"],
+    "step": lambda flat: flat["motion.size"],
+    "ramp": lambda flat: flat["motion.velocity"] * flat["motion.duration"],
+    "hold": lambda flat: 0.0,
+}
+
+
+def pieces(flat: Mapping[str, Any], runs: int) -> np.ndarray:
+    """The reference of each run, shape (runs, pieces, 4): start [s], position [m], velocity, acceleration."""
+    rows = [np.broadcast_arrays(*piece, np.empty(runs))[:4] for piece in _PIECES[flat["motion.kind"]](flat)]
+    return np.ascontiguousarray(np.moveaxis(np.array(rows, dtype=float), 2, 0))
+
+
+def reference(flat: Mapping[str, Any], time: np.ndarray) -> np.ndarray:
+    """Reference position [m] at the times [s], of one run."""
+    rows = pieces(flat, 1)[0]
+    row = rows[np.searchsorted(rows[:, 0], time, side="right") - 1]
+    since = time - row[:, 0]
+    return row[:, 1] + row[:, 2] * since + row[:, 3] * since**2 / 2
+
+
+def size(flat: Mapping[str, Any]) -> Any:
+    """Length of the motion [m]; infinite where nothing moves, so that it bounds no other length."""
+    length = np.abs(_SIZES[flat["motion.kind"]](flat))
+    return np.where(length > 0, length, np.inf)
+
+
+def initial_displacement(flat: Mapping[str, Any]) -> Any:
+    """Position of all masses at the start [m]."""
+    return flat["motion.displacement"] if flat["motion.kind"] == "release" else 0.0

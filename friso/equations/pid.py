@@ -1,0 +1,134 @@
+"""The PID controller: van Dijk's form (thesis, Eq. 7 and 8) or plain gains (Eq. 6), with optional force limit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import sympy as sp
+
+from friso.equations.component import Component, Kink, Output, State, key, state
+from friso.equations.structure import ControllerForm
+
+UNWINDING_BAND = sp.Rational(1, 1000)
+"""Share of the force limit over which the integrator is brought to rest.
+
+An integrator that stops dead at the limit makes the right-hand side jump, and the solution slides along the limit
+switching for ever; over this narrow band the stop is continuous and the slide is an ordinary, stiff, motion."""
+
+
+@dataclass(frozen=True)
+class Loop:
+    """What the controller sees: error [m], position [m], its rate and that of the reference [m/s]."""
+
+    error: sp.Expr
+    position: sp.Expr
+    velocity: sp.Expr
+    reference_velocity: sp.Expr
+
+
+@dataclass(frozen=True)
+class Controller:
+    """Actuator force [N] and its component."""
+
+    force: sp.Expr
+    component: Component
+
+
+def controller(form: ControllerForm, loop: Loop, length: sp.Expr, rate: sp.Expr) -> Controller:
+    """The controller of the given form; `length` [m] and `rate` [1/s] are the scales of its states."""
+    terms = _van_dijk if form.tuned else _gains
+    shares, integrand, states = terms(form, loop, length)
+    demand = shares["p"] + shares["i"] + shares["d"]
+    force, rest, kinks = _limit(demand, integrand) if form.limited else (demand, sp.S.One, ())
+    if form.integral:
+        integral = State(state("integral"), integrand * rest, "m*s", scale=length / rate)
+        states = (*states, integral)
+    outputs = {"force": Output(force, "N", "actuator force")}
+    names = {"p": "proportional", "i": "integral", "d": "derivative"}
+    outputs |= {f"force_{term}": Output(shares[term], "N", f"{name} share") for term, name in names.items()}
+    return Controller(force, Component(states, kinks, outputs))
+
+
+def loop_stiffness(form: ControllerForm | None) -> sp.Expr:
+    """Proportional stiffness of the loop [N/m]; 0 without a controller."""
+    if form is None:
+        return sp.S.Zero
+    return van_dijk_gains()["k_p"] if form.tuned else key("controller.kp")
+
+
+Terms = tuple[dict[str, sp.Expr], sp.Expr, tuple[State, ...]]
+
+
+def van_dijk_gains() -> dict[str, sp.Expr]:
+    """Eq. 8: time constants tau_z, tau_i, tau_p [s] and gain k_p [N/m] from crossover, alpha, beta and mass."""
+    omega = 2 * sp.pi * key("controller.crossover")
+    root = sp.sqrt(1 / key("controller.alpha"))
+    tau_z = root / omega
+    return {
+        "tau_z": tau_z,
+        "tau_i": key("controller.beta") * tau_z,
+        "tau_p": 1 / (omega * root),
+        "k_p": key("controller.tuned_mass") * omega**2 / root,
+    }
+
+
+def _van_dijk(form: ControllerForm, loop: Loop, length: sp.Expr) -> Terms:
+    """Eq. 7: the low-pass of time constant tau_p comes first, and the three terms act on what it lets through."""
+    gains = van_dijk_gains()
+    k_p, tau_z, tau_i, tau_p = gains["k_p"], gains["tau_z"], gains["tau_i"], gains["tau_p"]
+    filtered = state("filtered_error")
+    rate = (loop.error - filtered) / tau_p
+    shares = {
+        "p": k_p * (1 + tau_z / tau_i) * filtered,
+        "i": k_p / tau_i * state("integral"),
+        "d": k_p * tau_z / tau_p * (loop.error - filtered),
+    }
+    return shares, filtered, (State(filtered, rate, "m", scale=length),)
+
+
+def _gains(form: ControllerForm, loop: Loop, length: sp.Expr) -> Terms:
+    """Eq. 6: the filter of time constant tau acts on the derivative alone."""
+    kp, ki, kd, tau = (key(f"controller.{name}") for name in ("kp", "ki", "kd", "tau"))
+    derivative, states = _derivative(form, loop, tau, length)
+    shares = {
+        "p": kp * loop.error,
+        "i": ki * state("integral") if form.integral else sp.S.Zero,
+        "d": kd * derivative,
+    }
+    return shares, loop.error, states
+
+
+def _derivative(
+    form: ControllerForm, loop: Loop, tau: sp.Expr, length: sp.Expr
+) -> tuple[sp.Expr, tuple[State, ...]]:
+    """What the derivative gain acts on [m/s], and the state of its filter."""
+    if form.derivative_on == "none":
+        return sp.S.Zero, ()
+    on_error = form.derivative_on == "error"
+    signal = loop.error if on_error else -loop.position
+    if not form.filtered:
+        return (loop.reference_velocity if on_error else 0) - loop.velocity, ()
+    name = "filtered_error" if on_error else "filtered_position"
+    low_passed = state(name) if on_error else -state(name)
+    rate = (signal - low_passed) / tau
+    return rate, (State(state(name), rate if on_error else -rate, "m", scale=length),)
+
+
+def _limit(demand: sp.Expr, integrand: sp.Expr) -> tuple[sp.Expr, sp.Expr, tuple[Kink, ...]]:
+    """The force clamped to its limit, the share at which the integrator runs, and the kinks of both.
+
+    The integrator rests while the demanded force is beyond the limit and the error would drive it further.
+    """
+    limit = key("controller.force_limit")
+    band = UNWINDING_BAND * limit
+    upper = Kink("force_upper", demand - limit)
+    lower = Kink("force_lower", -demand - limit)
+    upper_rest = Kink("rest_upper", demand - limit - band)
+    lower_rest = Kink("rest_lower", -demand - limit - band)
+    winding = Kink("winding_up", integrand)
+    force = demand + upper.beyond * (limit - demand) - lower.beyond * (limit + demand)
+    rest = 1
+    for kink, far, inwards in ((upper, upper_rest, winding.beyond), (lower, lower_rest, 1 - winding.beyond)):
+        held = kink.beyond * (1 - far.beyond) * kink.surface / band + far.beyond
+        rest -= inwards * held
+    return force, rest, (upper, lower, upper_rest, lower_rest, winding)
