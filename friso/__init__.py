@@ -1,0 +1,40 @@
+"""friso: friction-induced hunting of positioning stages, and the friction isolator that stops it."""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+import friso.equations.friction  # noqa: F401 (registers the friction laws with the stage file)
+from friso.stage import Stage, StageError, load, loads, save
+from friso.version import VERSION as __version__
+
+if TYPE_CHECKING:
+    from friso.engine.simulate import simulate
+    from friso.hunting.check import Case, check
+    from friso.studies.sweep import sweep
+
+_LAZY = {
+    "simulate": "friso.engine.simulate",
+    "check": "friso.hunting.check",
+    "Case": "friso.hunting.check",
+    "sweep": "friso.studies.sweep",
+}
+
+__all__ = [
+    "Case",
+    "Stage",
+    "StageError",
+    "__version__",
+    "check",
+    "load",
+    "loads",
+    "save",
+    "simulate",
+    "sweep",
+]
+
+
+def __getattr__(name: str) -> Any:
+    """The numerical functions are imported when first used: Numba and xarray take most of a second."""
+    if name not in _LAZY:
+        raise AttributeError(f"module 'friso' has no attribute {name!r}")
+    return getattr(import_module(_LAZY[name]), name)

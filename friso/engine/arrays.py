@@ -10,7 +10,8 @@ import numpy as np
 
 class Batch(NamedTuple):
     """Runs of one model: constants (n, constants), start states, absolute tolerances (n, states), modes (n, kinks),
-    first steps [s] (n,) and pieces of the reference (n, pieces + 1, 4), of which the last one only ends the run."""
+    first steps [s] (n,), pieces of the reference (n, pieces + 1, 4), of which the last one only ends the run, and the
+    number of the piece that begins the window in which extremes are taken (n,)."""
 
     constants: np.ndarray
     starts: np.ndarray
@@ -18,19 +19,18 @@ class Batch(NamedTuple):
     modes: np.ndarray
     first_steps: np.ndarray
     segments: np.ndarray
+    windows: np.ndarray
 
 
 class Settings(NamedTuple):
-    """What all runs share: relative tolerance, longest step [s], step budget, the two bands of settling [m], the piece
-    of the reference from which extremes are taken, the time [s] from which turning points are recorded, and the
-    sampling interval [s]."""
+    """What all runs share: relative tolerance, longest step [s], step budget, the two bands of settling [m], the time
+    [s] from which turning points are recorded, and the sampling interval [s]."""
 
     rtol: float
     longest: float
     budget: float
     inner: float
     outer: float
-    window: int
     record_from: float
     interval: float
 

@@ -146,7 +146,7 @@ def load_run(B, lane, j, batch, settings):
         B[(MODE + k) * LANES + lane] = batch.modes[j, k]
     B[TRIAL * LANES + lane] = batch.first_steps[j]
     B[RECORD_FROM * LANES + lane] = settings.record_from
-    return enter_segment(B, lane, batch.segments[j], 0, settings.window, batch.first_steps[j])
+    return enter_segment(B, lane, batch.segments[j], 0, batch.windows[j], batch.first_steps[j])
 
 
 def start_run(B, lane, j, batch, settings, results):
@@ -183,7 +183,7 @@ def answer(B, lane, j, segment, batch, settings, results):
         note_samples(B, lane, fraction, settings.interval, results.samples[j])
     if B[TIME * LANES + lane] < B[STOP * LANES + lane]:
         return segment
-    return enter_segment(B, lane, batch.segments[j], segment + 1, settings.window, batch.first_steps[j])
+    return enter_segment(B, lane, batch.segments[j], segment + 1, batch.windows[j], batch.first_steps[j])
 
 
 def finish(B, lane, j, segment, batch, settings, results):

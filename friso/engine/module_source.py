@@ -32,7 +32,7 @@ from friso.engine.arrays import Status
 from friso.engine.roots import cubic, first_crossing
 from friso.engine.simd_math import exp, power, tanh
 
-OPTIONS = {{"cache": True, "nogil": True, "error_model": "numpy", "fastmath": {{"contract", "nsz", "arcp"}}}}
+OPTIONS = {{"nogil": True, "error_model": "numpy", "fastmath": {{"contract", "nsz", "arcp"}}}}
 DONE, BUDGET, UNDERFLOW = int(Status.DONE), int(Status.BUDGET), int(Status.UNDERFLOW)
 '''
 
@@ -90,4 +90,5 @@ def _function(head: str, expressions: Iterable[sp.Expr], rename: Rename) -> str:
 def _driver() -> str:
     """The driver's functions, each compiled."""
     source = inspect.getsource(driver)
-    return re.sub(r"^def ", "@njit(**OPTIONS)\ndef ", source[source.index("\ndef ") + 1 :], flags=re.MULTILINE)
+    inner = re.sub(r"^def ", "@njit(**OPTIONS)\ndef ", source[source.index("\ndef ") + 1 :], flags=re.MULTILINE)
+    return inner.replace("@njit(**OPTIONS)\ndef run(", "@njit(cache=True, **OPTIONS)\ndef run(")

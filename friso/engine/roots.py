@@ -21,7 +21,7 @@ def first_crossing(p0, p1, p2, p3):
     """Where the cubic first falls below zero from p0 > 0; 2 where it does not.
 
     A third in which the sign changes brackets the zero; a secant and three Newton steps find it, halving the
-    bracket where a step would leave it.
+    bracket where a step would leave it; what has not converged then is taken at the bracket's far end.
     """
     c1 = -5.5 * p0 + 9.0 * p1 - 4.5 * p2 + p3
     c2 = 9.0 * p0 - 22.5 * p1 + 18.0 * p2 - 4.5 * p3
@@ -40,5 +40,6 @@ def first_crossing(p0, p1, p2, p3):
         high = high if value > 0.0 else theta
         newton = theta - value / slope
         theta = newton if (newton > low) & (newton < high) else 0.5 * (low + high)
+    found = p0 + theta * (c1 + theta * (c2 + theta * c3)) <= 0.01 * p0
     crossed = early | middle | (p3 < 0.0)
-    return theta if crossed else 2.0
+    return (theta if found else high) if crossed else 2.0

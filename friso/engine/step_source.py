@@ -22,9 +22,16 @@ THIRDS = (1 / 3, 2 / 3)
 """Where inside a step the kinks are looked at; with both ends they fix a cubic."""
 
 
-HYSTERESIS = 1e-2
+HYSTERESIS = 3e-3
 """A kink counts as crossed this share of the tolerance beyond it, so that a lane that has just crossed it stands
 clear of it, and rounding noise about it crosses nothing."""
+
+
+SAFETY = 0.77
+"""Share of the step that the error estimate would allow: larger values reject more steps than they save."""
+
+AFTER_KINK = 0.25
+"""Share of the proposed step that is tried after a kink, behind which the motion may be much quicker."""
 
 
 class Block:
@@ -244,14 +251,22 @@ class StepWriter:
             *lines,
             "arrived = good & last & (not cut)",
             "t_n = stop if arrived else (t + fraction * h if good else t)",
-            "factor = 0.9 / sqrt(sqrt(sqrt(square + 1e-20)))",
+            *self._step_factor(),
             "factor = factor if factor > 0.2 else 0.2",
             "factor = factor if factor < 6.0 else 6.0",
             "factor = min(factor, 1.0) if rejected_last > 0.0 else factor",
             "proposed = h * factor",
-            "proposed = h if precise & astray else proposed",
+            "proposed = min(proposed, 0.5 * h) if astray else proposed",
+            f"proposed = {AFTER_KINK!r} * proposed if good & cut else proposed",
             "trial = max(proposed, trial) if good & (factor >= 1.0) else proposed",
         ]
+
+    def _step_factor(self) -> list[str]:
+        """SAFETY / error^(1/order), from the mean square error by roots alone: 3/32 of it stands for 1/10."""
+        lines = ["root8 = sqrt(sqrt(sqrt(square + 1e-20)))"]
+        if self.tableau.order == 4:
+            return [*lines, f"factor = {SAFETY!r} / root8"]
+        return [*lines, "root16 = sqrt(root8)", f"factor = {SAFETY!r} / (root16 * sqrt(root16))"]
 
     def _statistics(self) -> list[str]:
         """Largest force, extremes of the deviation, when it last left the two bands, and what wants attention."""

@@ -1,1 +1,6 @@
 """Linearly implicit methods, one file each, as coefficients."""
+
+from friso.engine.tableaus.rodas4 import RODAS4
+from friso.engine.tableaus.rodas5p import RODAS5P
+
+TABLEAUS = {tableau.name: tableau for tableau in (RODAS4, RODAS5P)}

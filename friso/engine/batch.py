@@ -1,0 +1,175 @@
+"""Many runs of one structure: prepared in NumPy, run in lanes and threads, handed over chunk by chunk."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from friso.engine.arrays import STATISTICS, Batch, Results, Settings, Status
+from friso.engine.kernel import Kernel, empty_results
+from friso.equations import motion
+
+LONGEST_SHARE = 1 / 200
+"""Longest step as share of the run: what the step does not look at, it may not pass over."""
+
+FIRST_STEP = 1e-3
+"""First step, and first after a corner of the reference, in units of 1/(natural frequency of mass and loop)."""
+
+CAPACITY = 512
+"""Turning points a run has room for at first; runs with more are run again with more room."""
+
+MOST_TURNS = 1 << 20
+"""Turning points no run may exceed."""
+
+
+@dataclass(frozen=True)
+class Options:
+    """How to run: relative tolerance, bands of settling [m], start of the window for extremes as a share of the run,
+    time [s] from which turning points are kept, sampling interval [s] (None: no samples), step budget, threads."""
+
+    rtol: float = 1e-6
+    bands: tuple[float, float] = (1e-6, 1e-5)
+    window: float = 0.75
+    record_from: float = 0.0
+    interval: float | None = None
+    budget: int = 2_000_000
+    threads: int | None = None
+    chunk: int = 4096
+
+
+@dataclass(frozen=True)
+class Runs:
+    """Results of a chunk of runs, `first` being the number of its first."""
+
+    first: int
+    results: Results
+
+    def statistic(self, name: str) -> np.ndarray:
+        """One column of `STATISTICS`, shape (runs,)."""
+        return self.results.statistics[:, STATISTICS.index(name)]
+
+
+def run_chunks(kernel: Kernel, flat: Mapping[str, Any], runs: int, options: Options) -> Iterator[Runs]:
+    """Run `runs` stages of one structure, given as flat keys to SI numbers or arrays of shape (runs,).
+
+    Results do not depend on lanes, threads or chunks. A failed run has a status; the others go on.
+    """
+    for first in range(0, runs, options.chunk):
+        last = min(first + options.chunk, runs)
+        part = {key: value[first:last] if np.ndim(value) else value for key, value in flat.items()}
+        batch = prepare(kernel, part, last - first, options)
+        yield Runs(first, _run_with_room(kernel, batch, part, options))
+
+
+def prepare(kernel: Kernel, flat: Mapping[str, Any], runs: int, options: Options) -> Batch:
+    """The kernel's input for the runs of one chunk."""
+    values = kernel.values({**flat, "motion.size": motion.size(flat)}, runs)
+
+    def columns(rows: list[Any]) -> np.ndarray:
+        full = [np.broadcast_to(np.asarray(row, dtype=float), (runs,)) for row in rows]
+        return np.ascontiguousarray(np.array(full).reshape(len(rows), runs).T)
+
+    with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
+        constants = columns(kernel.module.constants(values))
+        scales = columns(kernel.module.scales(values))
+        rates = columns(kernel.module.rate(values))[:, 0]
+    scales[~((scales > 0) & np.isfinite(scales))] = 1.0  # nothing moves: any tolerance will do
+    segments, windows = _segments(flat, runs, options.window)
+    starts = _starts(kernel, flat, runs)
+    surfaces = kernel.module.surfaces(starts.T, 0.0, segments[:, 0, 1:].T, values)
+    modes = (columns(surfaces) > 0).astype(float)
+    first_steps = np.ascontiguousarray(FIRST_STEP / rates)
+    return Batch(constants, starts, options.rtol * scales, modes, first_steps, segments, windows)
+
+
+def _starts(kernel: Kernel, flat: Mapping[str, Any], runs: int) -> np.ndarray:
+    """Everything at rest, the masses displaced as the motion says."""
+    starts = np.zeros((runs, len(kernel.states)))
+    for i, name in enumerate(kernel.states):
+        if name in ("position", "cart_position", "parasitic_position"):
+            starts[:, i] = motion.initial_displacement(flat)
+    return starts
+
+
+def _segments(flat: Mapping[str, Any], runs: int, window: float) -> tuple[np.ndarray, np.ndarray]:
+    """Pieces of the reference with the window's start and the end of the run among them, and the window's place."""
+    pieces = motion.pieces(flat, runs)
+    end = np.broadcast_to(np.asarray(flat["motion.duration"], dtype=float), (runs,))
+    start = window * end
+    every = np.arange(runs)
+    windows = (pieces[:, :, 0] <= start[:, None]).sum(axis=1)
+    r0 = pieces[every, windows - 1]
+    since = start - r0[:, 0]
+    position = r0[:, 1] + since * (r0[:, 2] + since * r0[:, 3] / 2)
+    at_window = np.stack([start, position, r0[:, 2] + since * r0[:, 3], r0[:, 3]], axis=1)
+    segments = np.zeros((runs, pieces.shape[1] + 2, 4))
+    places = np.arange(pieces.shape[1])
+    shifted = places[None, :] + (places[None, :] >= windows[:, None])
+    segments[every[:, None], shifted] = pieces
+    segments[every, windows] = at_window
+    segments[:, -1, 0] = end
+    return segments, windows.astype(np.int64)
+
+
+def _run_with_room(kernel: Kernel, batch: Batch, flat: Mapping[str, Any], options: Options) -> Results:
+    """Run a chunk; runs with more turning points than there is room for again, with more."""
+    runs = len(batch.starts)
+    longest = float(np.min(flat["motion.duration"])) * LONGEST_SHARE
+    settings = Settings(
+        options.rtol, longest, options.budget, *options.bands, options.record_from, options.interval or np.inf
+    )
+    samples = 0
+    if options.interval is not None:
+        samples = int(np.max(flat["motion.duration"]) / options.interval * (1 + 1e-12)) + 1
+    results = empty_results(runs, CAPACITY, samples, len(kernel.states))
+    _run(kernel, batch, settings, results, options.threads)
+    while np.any(crowded := _crowded(results)):
+        room = min(4 * results.turn_times.shape[1], MOST_TURNS)
+        again = empty_results(int(crowded.sum()), room, samples, len(kernel.states))
+        _run(kernel, Batch(*(array[crowded] for array in batch)), settings, again, options.threads)
+        results = _merged(results, again, crowded)
+    return results
+
+
+def _crowded(results: Results) -> np.ndarray:
+    """Which runs had more turning points than room; those with more than any may have get their status."""
+    room = results.turn_times.shape[1]
+    crowded = results.turn_counts > room
+    if room < MOST_TURNS:
+        return crowded
+    results.statuses[crowded] = Status.FULL
+    results.turn_counts[crowded] = room
+    return np.zeros_like(crowded)
+
+
+def _merged(results: Results, again: Results, which: np.ndarray) -> Results:
+    """`results` with the runs `which` replaced, all with the larger room for turning points."""
+    merged = empty_results(len(which), again.turn_times.shape[1], 0, 0)
+    merged = merged._replace(samples=results.samples)
+    for target, old, new in zip(merged, results, again, strict=True):
+        if target is not old:
+            target[..., : old.shape[1] if old.ndim > 1 else None] = old
+        target[which] = new
+    return merged
+
+
+def _run(kernel: Kernel, batch: Batch, settings: Settings, results: Results, threads: int | None) -> None:
+    """Spread the runs of a chunk over threads; the kernel runs without the interpreter's lock."""
+    runs = len(batch.starts)
+    workers = threads or len(os.sched_getaffinity(0))
+    share = max(8, min(256, -(-runs // (8 * workers))))
+    pool = ThreadPoolExecutor(workers)
+    try:
+        jobs = [
+            pool.submit(kernel.module.run, first, min(first + share, runs), batch, settings, results)
+            for first in range(0, runs, share)
+        ]
+        for job in jobs:
+            job.result()
+    finally:
+        pool.shutdown(wait=True, cancel_futures=True)

@@ -1,0 +1,121 @@
+"""Compiled kernels on disk, private to the user.
+
+An entry is a folder with the generated module, the machine code that Numba puts beside it, and a manifest of
+checksums, written last. Whatever does not match its manifest is built anew; a lock per entry keeps processes that
+build at the same time out of each other's way.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+import json
+import logging
+import os
+import shutil
+import stat
+import sys
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import cache
+from pathlib import Path
+from types import ModuleType
+
+import llvmlite
+import llvmlite.binding as llvm
+import numba
+import numpy as np
+from filelock import FileLock
+from platformdirs import user_cache_dir
+
+from friso.version import VERSION
+
+logger = logging.getLogger("friso")
+
+FOLDER_VARIABLE = "FRISO_CACHE_DIR"
+
+
+@cache
+def cache_folder() -> Path:
+    """The folder of the kernels, mode 0700; a temporary one, with a warning, where that cannot be had."""
+    folder = Path(os.environ.get(FOLDER_VARIABLE) or user_cache_dir("friso")) / "kernels"
+    try:
+        folder.mkdir(parents=True, exist_ok=True, mode=0o700)
+        if folder.stat().st_uid != os.geteuid():
+            raise PermissionError(f"{folder} belongs to another user")
+        if stat.S_IMODE(folder.stat().st_mode) != 0o700:
+            folder.chmod(0o700)
+        with tempfile.TemporaryFile(dir=folder):
+            return folder
+    except OSError as error:
+        logger.warning("kernels are compiled into a temporary folder and not kept: %s", error)
+        return Path(tempfile.mkdtemp(prefix="friso-kernels-"))
+
+
+@cache
+def environment() -> str:
+    """What a kernel depends on besides its equations: friso's own code, the compilers and the processor."""
+    package = Path(__file__).parent.parent
+    code = hashlib.sha256()
+    for folder in ("equations", "engine"):
+        for file in sorted((package / folder).rglob("*.py")):
+            code.update(file.read_bytes())
+    versions = (VERSION, sys.version, np.__version__, numba.__version__, llvmlite.__version__)
+    return repr((code.hexdigest(), versions, llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()))
+
+
+def load_or_build(name: str, write: Callable[[], str], compile_module: Callable[[ModuleType], None]) -> ModuleType:
+    """The module called `name`: from the cache, or written by `write`, compiled and kept.
+
+    Raises OSError where the cache folder cannot be written.
+    """
+    key = hashlib.sha256(f"{name} {environment()}".encode()).hexdigest()[:24]
+    entry = cache_folder() / key
+    with FileLock(cache_folder() / f"{key}.lock", mode=0o600), _numba_cache_beside_the_module():
+        if not _intact(entry):
+            logger.warning("compiling a kernel for these equations; the next run finds it compiled")
+            shutil.rmtree(entry, ignore_errors=True)
+            entry.mkdir(mode=0o700)
+            (entry / "kernel.py").write_text(write())
+            module = _import(entry, key)
+            compile_module(module)
+            (entry / "manifest.json").write_text(json.dumps(_checksums(entry)))
+            return module
+        module = _import(entry, key)
+        compile_module(module)
+        return module
+
+
+def _checksums(entry: Path) -> dict[str, str]:
+    files = sorted(entry.rglob("*.py")) + sorted(entry.rglob("*.nb[ci]"))
+    return {str(file.relative_to(entry)): hashlib.sha256(file.read_bytes()).hexdigest() for file in files}
+
+
+def _intact(entry: Path) -> bool:
+    """Whether the entry is there, whole and unchanged."""
+    try:
+        return json.loads((entry / "manifest.json").read_text()) == _checksums(entry)
+    except (OSError, ValueError):
+        return False
+
+
+def _import(entry: Path, key: str) -> ModuleType:
+    spec = importlib.util.spec_from_file_location(f"friso_kernel_{key}", entry / "kernel.py")
+    if spec is None or spec.loader is None:
+        raise ImportError(f"no module can be made of {entry / 'kernel.py'}")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[spec.name] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+@contextmanager
+def _numba_cache_beside_the_module() -> Iterator[None]:
+    """Keep Numba's files in the entry, where the manifest covers them, whatever NUMBA_CACHE_DIR says."""
+    elsewhere = numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = ""
+    try:
+        yield
+    finally:
+        numba.config.CACHE_DIR = elsewhere

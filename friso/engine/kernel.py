@@ -1,0 +1,79 @@
+"""The kernel of a structure: compiled on first use, from the cache afterwards."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from types import ModuleType
+from typing import Any
+
+import numba
+import numpy as np
+
+from friso.engine.arrays import STATISTICS, Batch, Results, Settings
+from friso.engine.cache import load_or_build
+from friso.engine.layout import LANES
+from friso.equations.structure import Structure
+
+
+@dataclass(frozen=True)
+class Kernel:
+    """A generated module with its names: states, parameters and outputs."""
+
+    module: ModuleType
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        return self.module.STATE_NAMES
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        return self.module.PARAMETERS
+
+    @property
+    def kinks(self) -> tuple[str, ...]:
+        return self.module.KINK_NAMES
+
+    @property
+    def outputs(self) -> dict[str, tuple[str, str]]:
+        """Unit and label of each output."""
+        return self.module.OUTPUTS
+
+    def values(self, flat: dict[str, Any], runs: int) -> list[np.ndarray]:
+        """The parameters of each run [SI], each of shape (runs,), from flat keys to numbers or arrays."""
+        return [np.broadcast_to(np.asarray(flat[name], dtype=float), (runs,)) for name in self.parameters]
+
+
+@cache
+def kernel(structure: Structure, method: str = "Rodas5P", lanes: int = LANES) -> Kernel:
+    """The kernel for stages of this structure, stepping by the named method in so many lanes."""
+
+    def write() -> str:
+        from friso.engine.module_source import write_module
+        from friso.engine.tableaus import TABLEAUS
+        from friso.equations.model import assemble
+
+        return write_module(assemble(structure), TABLEAUS[method], repr(structure), lanes)
+
+    return Kernel(load_or_build(f"{structure!r} {method} {lanes}", write, _compile))
+
+
+def empty_results(runs: int, capacity: int, samples: int, states: int) -> Results:
+    """Room for the results of so many runs, turning points and samples each."""
+    return Results(
+        statistics=np.zeros((runs, len(STATISTICS))),
+        statuses=np.zeros(runs, np.int64),
+        turn_times=np.zeros((runs, capacity)),
+        turn_values=np.zeros((runs, capacity)),
+        turn_counts=np.zeros(runs, np.int64),
+        samples=np.full((runs, samples, states), np.nan),
+    )
+
+
+def _compile(module: ModuleType) -> None:
+    """Compile (or load from Numba's cache) the driver for the types it is called with."""
+    flat, square = np.zeros(1), np.zeros((1, 1))
+    batch = Batch(square, square, square, square, flat, np.zeros((1, 1, 4)), np.zeros(1, np.int64))
+    settings = Settings(1.0, 1.0, 1.0, 1.0, 1.0, 0.0, 1.0)
+    arguments = (0, 0, batch, settings, empty_results(1, 1, 1, 1))
+    module.run.compile(tuple(numba.typeof(argument) for argument in arguments))

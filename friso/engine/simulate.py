@@ -1,0 +1,98 @@
+"""One run of a stage as a time response: `simulate`."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from friso.engine.arrays import Status
+from friso.engine.batch import Options, Runs, run_chunks
+from friso.engine.kernel import Kernel, kernel
+from friso.equations import motion
+from friso.equations.structure import structure
+from friso.stage import Stage
+from friso.version import VERSION
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+SAMPLES = 20_000
+"""Sampling intervals in a run, where none is asked for."""
+
+
+def simulate(stage: Stage, rtol: float = 1e-6, sample_time: float | None = None) -> xr.Dataset:
+    """Time response of a stage to its motion.
+
+    Variables over `time` [s], each with `units` and `long_name`: reference, position, velocity, error, force and
+    its shares, cart position and velocity, joint deflection and force, friction force and bristle deflection, as far
+    as the stage has them; and the extrema of position minus reference over `turning_point`. `attrs` hold the stage
+    as TOML text, rtol, status, steps and rejected steps. `sample_time` [s] defaults to a 20 000th of the duration;
+    samples are taken from the method's dense output. A run that fails has NaN from there on, and the reason in
+    `status`. Raises ValueError for a tolerance or sample time that is not usable.
+    """
+    flat = stage.flat()
+    duration = flat["motion.duration"]
+    interval = duration / SAMPLES if sample_time is None else sample_time
+    if not 0 < interval <= duration:
+        raise ValueError(f"sample_time: given {interval} s, expected more than 0 and at most {duration} s")
+    shape = kernel(structure(flat))
+    (runs,) = run_chunks(shape, flat, 1, Options(rtol=checked_rtol(rtol), interval=interval))
+    time = np.arange(runs.results.samples.shape[1]) * interval
+    return _dataset(stage, shape, flat, runs, time, rtol)
+
+
+def checked_rtol(rtol: float) -> float:
+    """`rtol` if the solver can hold it. Raises ValueError otherwise."""
+    if not 1e-12 <= rtol <= 1e-2:
+        raise ValueError(f"rtol: given {rtol:g}, expected a number from 1e-12 to 1e-2, such as 1e-6")
+    return rtol
+
+
+def sampled_outputs(shape: Kernel, flat: dict[str, Any], states: np.ndarray, time: np.ndarray) -> list[np.ndarray]:
+    """The model's outputs from its states, shape (states, samples), at the times [s]."""
+    parameters = [v[0] for v in shape.values({**flat, "motion.size": motion.size(flat)}, 1)]
+    rows = motion.pieces(flat, 1)[0]
+    active = rows[np.searchsorted(rows[:, 0], time, side="right") - 1]
+    since, reference = time - active[:, 0], active[:, 1:].T
+    modes = [s > 0 for s in shape.module.surfaces(states, since, reference, parameters)]
+    outputs = shape.module.outputs(states, np.array(modes, dtype=float), since, reference, parameters)
+    return [np.broadcast_to(np.asarray(each, dtype=float), time.shape) for each in outputs]
+
+
+def _dataset(
+    stage: Stage, shape: Kernel, flat: dict[str, Any], runs: Runs, time: np.ndarray, rtol: float
+) -> xr.Dataset:
+    import xarray as xr
+
+    results = runs.results
+    arrays = sampled_outputs(shape, flat, results.samples[0].T, time)
+    variables: dict[str, Any] = {
+        name: ("time", array, {"units": unit, "long_name": label})
+        for (name, (unit, label)), array in zip(shape.outputs.items(), arrays, strict=True)
+    }
+    turns = slice(0, int(results.turn_counts[0]))
+    label = "turning points of position - reference"
+    variables["turning_time"] = (
+        "turning_point",
+        results.turn_times[0, turns],
+        {"units": "s", "long_name": f"times of the {label}"},
+    )
+    variables["turning_deviation"] = (
+        "turning_point",
+        results.turn_values[0, turns],
+        {"units": "m", "long_name": label},
+    )
+    return xr.Dataset(
+        variables,
+        coords={"time": ("time", time, {"units": "s", "long_name": "time"})},
+        attrs={
+            "name": stage.name,
+            "stage": stage.to_toml(),
+            "friso": VERSION,
+            "rtol": rtol,
+            "status": Status(int(results.statuses[0])).text,
+            "steps": int(runs.statistic("attempted")[0]),
+            "rejected": int(runs.statistic("rejected")[0]),
+        },
+    )
