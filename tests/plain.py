@@ -1,0 +1,141 @@
+"""The equations of a stage written by hand, with live absolute values and conditions, to test the declared ones.
+
+Thesis: Fig. 3 and 4 (masses, joint, limiter in parallel), Eq. 3 to 5 (LuGre), Eq. 6 to 8 (PID); design.md, section 1.
+Nothing here is shared with friso but the names of states and of the keys of the stage file.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from math import exp, pi, sqrt, tanh
+from typing import Any
+
+Flat = Mapping[str, Any]
+State = Mapping[str, float]
+
+
+def reference(flat: Flat, t: float) -> tuple[float, float]:
+    """Position [m] and velocity [m/s] of the reference."""
+    kind = flat["motion.kind"]
+    if kind == "step":
+        return flat["motion.size"], 0.0
+    if kind == "ramp":
+        return flat["motion.velocity"] * t, flat["motion.velocity"]
+    if kind in ("hold", "release"):
+        return 0.0, 0.0
+    a, ramp, back = (flat[f"motion.{name}"] for name in ("acceleration", "acceleration_time", "return_at"))
+    there, here = _stroke(a, ramp, t), _stroke(a, ramp, t - back)
+    return there[0] - here[0], there[1] - here[1]
+
+
+def _stroke(a: float, ramp: float, t: float) -> tuple[float, float]:
+    """Accelerate at a for the time `ramp`, brake likewise, stay."""
+    if t <= 0:
+        return 0.0, 0.0
+    if t < ramp:
+        return a * t * t / 2, a * t
+    if t < 2 * ramp:
+        left = 2 * ramp - t
+        return a * ramp * ramp - a * left * left / 2, a * left
+    return a * ramp * ramp, 0.0
+
+
+def stribeck_level(flat: Flat, v: float) -> float:
+    ratio = abs(v / flat["friction.stribeck_velocity"]) ** flat["friction.stribeck_exponent"]
+    gap = flat["friction.static"] - flat["friction.coulomb"]
+    return flat["friction.coulomb"] + gap * exp(-ratio)
+
+
+def friction(flat: Flat, v: float, z: float) -> tuple[float, float]:
+    """Friction force [N] against the velocity v, and the rate of the bristles [m/s]."""
+    law = flat["friction.model"]
+    if law == "none":
+        return 0.0, 0.0
+    viscous = flat["friction.viscous"] * v
+    if law == "stribeck":
+        return stribeck_level(flat, v) * tanh(v / flat["friction.regularisation_velocity"]) + viscous, 0.0
+    sigma_0 = flat["friction.bristle_stiffness"]
+    if law == "dahl":
+        return sigma_0 * z + viscous, v - sigma_0 * abs(v) / flat["friction.coulomb"] * z
+    z_rate = v - sigma_0 * abs(v) / stribeck_level(flat, v) * z
+    return sigma_0 * z + flat["friction.bristle_damping"] * z_rate + viscous, z_rate
+
+
+def control(flat: Flat, s: State, y: float, v: float, r: float, r_rate: float) -> tuple[float, dict[str, float]]:
+    """Actuator force [N] and the rates of the controller's states."""
+    error = r - y
+    if "controller.crossover" in flat:
+        omega = 2 * pi * flat["controller.crossover"]
+        alpha = flat["controller.alpha"]
+        tau_z = sqrt(1 / alpha) / omega
+        tau_i = flat["controller.beta"] * tau_z
+        tau_p = 1 / (omega * sqrt(1 / alpha))
+        k_p = flat["controller.tuned_mass"] * omega**2 / sqrt(1 / alpha)
+        filtered = s["filtered_error"]
+        slope = (error - filtered) / tau_p
+        demand = k_p * ((1 + tau_z / tau_i) * filtered + s["integral"] / tau_i + tau_z * slope)
+        rates, winding = {"filtered_error": slope}, filtered
+    else:
+        kp, ki, kd, tau = (flat[f"controller.{name}"] for name in ("kp", "ki", "kd", "tau"))
+        rates = {}
+        if flat["controller.derivative_on"] == "error":
+            slope = (error - s["filtered_error"]) / tau if "filtered_error" in s else 0.0
+            rates["filtered_error"] = slope
+        else:
+            slope = -(y - s["filtered_position"]) / tau if "filtered_position" in s else -v
+            rates["filtered_position"] = -slope
+        demand = kp * error + ki * s.get("integral", 0.0) + kd * slope
+        winding = error
+    rates["integral"] = winding
+    if "controller.force_limit" not in flat:
+        return demand, rates
+    bound = flat["controller.force_limit"]
+    if winding * demand > 0:  # it would wind up further: the integrator rests beyond the limit and a 1000th of it
+        rates["integral"] = winding * (1 - min(max((abs(demand) - bound) / (bound / 1000), 0.0), 1.0))
+    return min(max(demand, -bound), bound), rates
+
+
+def joint(flat: Flat, deflection: float, rate: float) -> float:
+    """Force [N] of the joint on the cart; the limiter works beside the leaf springs once it touches."""
+    stiff, damp = flat["joint.limiter_stiffness"], flat["joint.limiter_damping"]
+    if flat["joint.locked"]:
+        return stiff * deflection + damp * rate
+    force = flat["joint.stiffness"] * deflection + flat["joint.damping"] * rate
+    stroke = flat["joint.stroke"]
+    if deflection > stroke:
+        return force + stiff * (deflection - stroke) + damp * rate
+    if deflection < -stroke:
+        return force + stiff * (deflection + stroke) + damp * rate
+    if stroke == 0:
+        return force + damp * rate
+    return force
+
+
+def rates(flat: Flat, names: Sequence[str]) -> Callable[[float, Sequence[float]], list[float]]:
+    """dx/dt as a function of time [s] and the states called `names`."""
+
+    def right_hand_side(t: float, x: Sequence[float]) -> list[float]:
+        s = dict(zip(names, x, strict=True))
+        y, v = s["position"], s["velocity"]
+        force, rate = control(flat, s, y, v, *reference(flat, t))
+        rate |= {"position": v}
+        cart_velocity = s.get("cart_velocity", v)
+        drag, rate["bristle_deflection"] = friction(flat, cart_velocity, s.get("bristle_deflection", 0.0))
+        if "joint.limiter_stiffness" not in flat:
+            rate["velocity"] = (force - drag) / (flat.get("masses.cart", 0.0) + flat.get("masses.stage", 0.0))
+            return [rate[name] for name in names]
+        mass = flat["masses.stage"]
+        inner = 0.0
+        if "parasitic.frequency" in flat:
+            part = flat["parasitic.mass"]
+            mass -= part
+            reduced = 1 / (1 / part + 1 / mass)
+            omega = 2 * pi * flat["parasitic.frequency"]
+            stretch, opening = y - s["parasitic_position"], v - s["parasitic_velocity"]
+            inner = reduced * (omega**2 * stretch + 2 * flat["parasitic.damping_ratio"] * omega * opening)
+            rate |= {"parasitic_position": s["parasitic_velocity"], "parasitic_velocity": inner / part}
+        pull = joint(flat, y - s["cart_position"], v - cart_velocity)
+        rate["velocity"] = (force - pull - inner) / mass
+        rate["cart_position"] = cart_velocity
+        rate["cart_velocity"] = (pull - drag) / flat["masses.cart"]
+        return [rate[name] for name in names]
+
+    return right_hand_side

@@ -1,0 +1,172 @@
+"""Every kind of stage the equations distinguish, as stage files, for the tests that must hold for all of them."""
+
+import importlib.util
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import friso
+from friso.engine.module_source import write_module
+from friso.engine.tableaus import TABLEAUS
+from friso.equations.model import assemble
+from friso.equations.structure import structure
+from friso.stage import Stage
+
+MASSES = {
+    "both": 'cart = "1.2 kg"\nstage = "0.5 kg"',
+    "cart": 'cart = "1 kg"',
+    "stage": 'stage = "1.7 kg"',
+}
+
+
+def lugre(exponent: float, static: str = "3 N", viscous: str = "0.5 N*s/m") -> str:
+    return f"""model = "lugre"
+static = "{static}"
+coulomb = "1 N"
+stribeck_velocity = "1.6 mm/s"
+stribeck_exponent = {exponent}
+bristle_stiffness = "1e5 N/m"
+bristle_damping = "316.2277660168379 N*s/m"
+viscous = "{viscous}"
+"""
+
+
+def stribeck(exponent: float) -> str:
+    return f"""model = "stribeck"
+static = "3 N"
+coulomb = "1 N"
+stribeck_velocity = "5 mm/s"
+stribeck_exponent = {exponent}
+viscous = "0.5 N*s/m"
+regularisation_velocity = "1 mm/s"
+"""
+
+
+DAHL = 'model = "dahl"\ncoulomb = "1 N"\nbristle_stiffness = "1e5 N/m"\nviscous = "0.5 N*s/m"'
+NO_FRICTION = 'model = "none"'
+
+LOCKED = 'locked = true\nlimiter_stiffness = "2e7 N/m"\nlimiter_damping = "100 N*s/m"'
+PARASITIC = 'frequency = "300 Hz"\nmass = "0.25 kg"\ndamping_ratio = 0.01'
+
+
+def free(stroke: str = "1 mm") -> str:
+    leaves = f'stiffness = "2.4 N/mm"\ndamping = "0.5 N*s/m"\nstroke = "{stroke}"'
+    return f'{leaves}\nlimiter_stiffness = "2e7 N/m"\nlimiter_damping = "100 N*s/m"'
+
+
+TOUCHING = free("0 mm")
+
+
+def van_dijk(crossover: str = "8 Hz", extra: str = "") -> str:
+    return f'kind = "pid"\ncrossover = "{crossover}"\nalpha = 0.1\nbeta = 2\ntuned_mass = "1.7 kg"\n{extra}'
+
+
+def gains(kp: float = 1000, ki: float = 0, kd: float = 0, tau: float = 0, extra: str = "") -> str:
+    terms = {"kp": f"{kp!r} N/m", "ki": f"{ki!r} N/(m*s)", "kd": f"{kd!r} N*s/m", "tau": f"{tau!r} s"}
+    lines = [f'{name} = "{value}"' for name, value in terms.items()]
+    return "\n".join(['kind = "pid"', *lines, extra])
+
+
+MEASURED = 'derivative_on = "measurement"\n'
+
+
+def limit(force: str) -> str:
+    return f'force_limit = "{force}"\n'
+
+
+def there_and_back(duration: str = "20 s", back: str = "5 s", acceleration: str = "100 m/s^2") -> str:
+    ramp = f'acceleration = "{acceleration}"\nacceleration_time = "30 ms"\nreturn_at = "{back}"'
+    return f'kind = "there_and_back"\n{ramp}\nduration = "{duration}"'
+
+
+def release(displacement: str = "2 mm", duration: str = "1 s") -> str:
+    return f'kind = "release"\ndisplacement = "{displacement}"\nduration = "{duration}"'
+
+
+def step(size: str = "1 mm", duration: str = "1 s") -> str:
+    return f'kind = "step"\nsize = "{size}"\nduration = "{duration}"'
+
+
+def ramp(velocity: str = "0.1 m/s", duration: str = "1 s") -> str:
+    return f'kind = "ramp"\nvelocity = "{velocity}"\nduration = "{duration}"'
+
+
+HOLD = 'kind = "hold"\nduration = "1 s"'
+
+
+def stage(
+    motion: str, masses: str = "both", friction: str = "", joint: str = "", parasitic: str = "", controller: str = ""
+) -> Stage:
+    """The stage with these sections; an empty one is left out."""
+    sections = {"masses": MASSES[masses], "friction": friction, "joint": joint, "parasitic": parasitic}
+    sections |= {"controller": controller, "motion": motion}
+    return friso.loads("\n".join(f"[{name}]\n{body}\n" for name, body in sections.items() if body))
+
+
+FULL = {"kp": 3000, "ki": 2000, "kd": 60}
+
+VARIANTS: dict[str, Stage] = {
+    "rigid": stage(release(), friction=lugre(2), controller=van_dijk("4 Hz")),
+    "rigid cart, P": stage(ramp(), "cart", lugre(2, "1.5 N", "0.4 N*s/m"), controller=gains(2)),
+    "rigid stage, PI": stage(step(), "stage", lugre(1), controller=gains(1000, 500)),
+    "rigid, no friction, PID": stage(
+        step(), friction=NO_FRICTION, controller=gains(kp=1000, ki=2000, kd=50, tau=2e-3)
+    ),
+    "rigid, no friction section": stage(there_and_back(), controller=van_dijk("20 Hz")),
+    "rigid, LuGre 3, P": stage(release(), friction=lugre(3), controller=gains(1000)),
+    "rigid, Stribeck 1.5, PD measured": stage(
+        there_and_back(), friction=stribeck(1.5), controller=gains(kp=1000, kd=20, extra=MEASURED)
+    ),
+    "rigid, Stribeck 2, PI, limit": stage(
+        ramp(), friction=stribeck(2), controller=gains(1000, 500, extra=limit("4 N"))
+    ),
+    "rigid, Stribeck 3": stage(HOLD, friction=stribeck(3), controller=gains(1000)),
+    "rigid, Dahl, PD limit": stage(
+        there_and_back(), "cart", DAHL, controller=gains(kp=1000, kd=20, extra=MEASURED + limit("4 N"))
+    ),
+    "rigid, LuGre 0.7, PID measured": stage(
+        step(), friction=lugre(0.7), controller=gains(**FULL, tau=1e-3, extra=MEASURED)
+    ),
+    "rigid, van Dijk, limit": stage(
+        step("10 mm"), friction=lugre(2), controller=van_dijk("8 Hz", limit("6 N"))
+    ),
+    "locked": stage(there_and_back(), friction=lugre(2), joint=LOCKED, controller=van_dijk()),
+    "locked, parasitic": stage(
+        there_and_back(), friction=lugre(2), joint=LOCKED, parasitic=PARASITIC, controller=van_dijk()
+    ),
+    "locked, Stribeck 1": stage(
+        ramp(), friction=stribeck(1), joint=LOCKED, controller=gains(**FULL, tau=1e-3)
+    ),
+    "free": stage(there_and_back(), friction=lugre(4), joint=free(), controller=van_dijk()),
+    "free, parasitic": stage(
+        there_and_back(), friction=lugre(2), joint=free(), parasitic=PARASITIC, controller=van_dijk()
+    ),
+    "free, no friction, limit": stage(
+        step("5 mm"), joint=free("0.3 mm"), controller=gains(**FULL, extra=MEASURED + limit("20 N"))
+    ),
+    "free, parasitic, Dahl, PD": stage(
+        release(), friction=DAHL, joint=free(), parasitic=PARASITIC, controller=gains(3000, kd=60, tau=1e-3)
+    ),
+    "free, LuGre 2.5, P": stage(
+        release(), friction=lugre(2.5), joint=free(), controller=gains(1000)
+    ),
+    "touching": stage(step(), friction=DAHL, joint=TOUCHING, controller=gains(**FULL, tau=1e-3)),
+    "touching, parasitic": stage(
+        HOLD, friction=stribeck(2.5), joint=TOUCHING, parasitic=PARASITIC, controller=van_dijk()
+    ),
+}
+
+
+def plain_module(chosen: Stage, folder: Path, method: str = "Rodas5P") -> ModuleType:
+    """The generated module of a stage, not compiled: `module.step.py_func` runs it line by line."""
+    file = folder / "plain_kernel.py"
+    form = structure(chosen.flat())
+    file.write_text(write_module(assemble(form), TABLEAUS[method], repr(form)))
+    name = f"plain_kernel_{abs(hash((form, method)))}"
+    spec = importlib.util.spec_from_file_location(name, file)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    spec.loader.exec_module(module)
+    return module
