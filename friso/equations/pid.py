@@ -39,8 +39,10 @@ def controller(form: ControllerForm, loop: Loop, length: sp.Expr, rate: sp.Expr)
     terms = _van_dijk if form.tuned else _gains
     shares, integrand, states = terms(form, loop, length)
     demand = shares["p"] + shares["i"] + shares["d"]
-    force, rest, kinks = _limit(demand, integrand) if form.limited else (demand, sp.S.One, ())
+    force, kinks = _limit(demand) if form.limited else (demand, ())
     if form.integral:
+        rest, resting = _rest(demand, integrand, kinks) if form.limited else (sp.S.One, ())
+        kinks = (*kinks, *resting)
         integral = State(state("integral"), integrand * rest, "m*s", scale=length / rate)
         states = (*states, integral)
     outputs = {"force": Output(force, "N", "actuator force")}
@@ -114,21 +116,26 @@ def _derivative(
     return rate, (State(state(name), rate if on_error else -rate, "m", scale=length),)
 
 
-def _limit(demand: sp.Expr, integrand: sp.Expr) -> tuple[sp.Expr, sp.Expr, tuple[Kink, ...]]:
-    """The force clamped to its limit, the share at which the integrator runs, and the kinks of both.
+def _limit(demand: sp.Expr) -> tuple[sp.Expr, tuple[Kink, ...]]:
+    """The force clamped to its limit, and the kinks at the upper and the lower limit."""
+    limit = key("controller.force_limit")
+    upper = Kink("force_upper", demand - limit)
+    lower = Kink("force_lower", -demand - limit)
+    return demand + upper.beyond * (limit - demand) - lower.beyond * (limit + demand), (upper, lower)
+
+
+def _rest(demand: sp.Expr, integrand: sp.Expr, limits: tuple[Kink, ...]) -> tuple[sp.Expr, tuple[Kink, ...]]:
+    """The share at which the integrator runs, and its kinks.
 
     The integrator rests while the demanded force is beyond the limit and the error would drive it further.
     """
-    limit = key("controller.force_limit")
-    band = UNWINDING_BAND * limit
-    upper = Kink("force_upper", demand - limit)
-    lower = Kink("force_lower", -demand - limit)
-    upper_rest = Kink("rest_upper", demand - limit - band)
-    lower_rest = Kink("rest_lower", -demand - limit - band)
+    upper, lower = limits
+    band = UNWINDING_BAND * key("controller.force_limit")
+    upper_rest = Kink("rest_upper", upper.surface - band)
+    lower_rest = Kink("rest_lower", lower.surface - band)
     winding = Kink("winding_up", integrand)
-    force = demand + upper.beyond * (limit - demand) - lower.beyond * (limit + demand)
-    rest = 1
+    rest = sp.S.One
     for kink, far, inwards in ((upper, upper_rest, winding.beyond), (lower, lower_rest, 1 - winding.beyond)):
         held = kink.beyond * (1 - far.beyond) * kink.surface / band + far.beyond
         rest -= inwards * held
-    return force, rest, (upper, lower, upper_rest, lower_rest, winding)
+    return rest, (upper_rest, lower_rest, winding)
