@@ -11,11 +11,12 @@ Real = np.longdouble
 
 
 class Step(NamedTuple):
-    """State at the end, error estimate (both (n,)), and the coefficients of the dense output (m, n)."""
+    """State at the end, error estimate (both (n,)), coefficients of the dense output (m, n), and the stages (s, n)."""
 
     end: np.ndarray
     error: np.ndarray
     dense: np.ndarray
+    k: np.ndarray
 
 
 def solve(matrix: np.ndarray, right: np.ndarray) -> np.ndarray:
@@ -54,9 +55,10 @@ def step(
         pull = sum((Real(w) / h * kj for w, kj in zip(c, k, strict=True)), start=np.zeros(x.size, Real))
         right = f(place, t + Real(method.time[i]) * h) + h * Real(method.rate[i]) * drift + pull
         k.append(solve(matrix, right))
-    end = x + sum((Real(w) * kj for w, kj in zip((*method.a[-1], 1.0), k, strict=True)), start=np.zeros(x.size, Real))
+    last = (*method.a[-1], 1.0)
+    end = x + sum((Real(w) * kj for w, kj in zip(last, k, strict=True)), start=np.zeros(x.size, Real))
     dense = [sum(Real(w) * kj for w, kj in zip(row, k, strict=False)) for row in method.dense]
-    return Step(end, k[-1], np.array(dense))
+    return Step(end, k[-1], np.array(dense), np.array(k))
 
 
 def between(x: np.ndarray, taken: Step, theta: float) -> np.ndarray:

@@ -70,3 +70,8 @@ def size(flat: Mapping[str, Any]) -> Any:
 def initial_displacement(flat: Mapping[str, Any]) -> Any:
     """Position of all masses at the start [m]."""
     return flat["motion.displacement"] if flat["motion.kind"] == "release" else 0.0
+
+
+def last_corner(flat: Mapping[str, Any]) -> Any:
+    """Time of the last corner of the reference [s]: from then on it stays as it is."""
+    return _PIECES[flat["motion.kind"]](flat)[-1][0]

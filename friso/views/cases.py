@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from friso.hunting import BANDS as SETTLING_BANDS
 from friso.views.figure import BLUE, GREEN, VERMILLION
 
 if TYPE_CHECKING:
@@ -13,7 +14,7 @@ if TYPE_CHECKING:
 
 COLOURS = {"given": BLUE, "locked": VERMILLION, "free": GREEN}
 LABELS = {"given": "As given", "locked": "Locked", "free": "Free"}
-BANDS = {1e-6: "1 µm", 1e-5: "10 µm"}  # [m] the settling bands of the check
+BANDS = dict(zip(SETTLING_BANDS, ("1 µm", "10 µm"), strict=True))
 
 
 @dataclass(frozen=True)

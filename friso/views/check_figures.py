@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from friso.hunting import COUNTED_ABOVE, COUNTED_AFTER
 from friso.views.cases import BANDS, Shown, shown_cases
 from friso.views.figure import (
     BLUE,
@@ -33,9 +34,6 @@ if TYPE_CHECKING:
 
 SHARES = {"force_p": ("P", SKY), "force_i": ("I", ORANGE), "force_d": ("D", PINK)}
 
-# The thesis's hunting metric (Sec. 3.2.2): peaks after 10 s, higher than 0.1 mm.
-COUNTED_AFTER = 10.0  # [s]
-COUNTED_ABOVE = 1e-4  # [m]
 _FLOOR = 1e-9  # [m] lower end of the logarithmic settling panel: below any sensor of such a stage
 _PERIODS = 4  # hunting periods shown of the force shares
 

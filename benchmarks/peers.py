@@ -1,0 +1,197 @@
+"""The peers: SciPy's stiff solvers and SUNDIALS CVODE, with compiled right-hand side and Jacobian.
+
+Each is tried in two ways, over the whole run at once and piece by piece between the corners of the reference, and the
+faster one counts. Each is also run without sampling, which no one would use here but which shows its own steps.
+"""
+
+from __future__ import annotations
+
+import signal
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from scipy.integrate import odeint, solve_ivp
+
+from benchmarks.compiled import Compiled
+from benchmarks.rigs import Rig
+
+TIME_OUT = 120.0
+"""Wall time after which a peer's run is given up [s]."""
+
+MANY = 10_000_000
+
+
+@dataclass(frozen=True)
+class Task:
+    """A stretch to integrate: rig, equations, rtol, the reference's rows, times [s] to report, start state."""
+
+    rig: Rig
+    equations: Compiled
+    rtol: float
+    rows: np.ndarray
+    times: np.ndarray
+    start: np.ndarray
+    corners: np.ndarray = field(default_factory=lambda: np.empty(0))
+
+
+Solve = Callable[[Task], tuple[np.ndarray, int]]
+"""States (times, states) at the times of the task, the first included, and steps (-1: unknown).
+With two times, the states at the solver's own steps where it can give them."""
+
+
+def _solve_ivp(method: str) -> Solve:
+    def solve(task: Task) -> tuple[np.ndarray, int]:
+        f, j, rows = task.equations.rate, task.equations.jacobian, task.rows
+        found = solve_ivp(
+            lambda t, x: f(t, x, rows),
+            (task.times[0], task.times[-1]),
+            task.start,
+            method,
+            t_eval=task.times if len(task.times) > 2 else None,
+            rtol=task.rtol,
+            atol=task.rtol * task.rig.scales,
+            jac=lambda t, x: j(t, x, rows),
+        )
+        if not found.success:
+            raise RuntimeError(found.message)
+        return found.y.T, len(found.t) - 1 if len(task.times) <= 2 else -1
+
+    return solve
+
+
+def _odeint(task: Task) -> tuple[np.ndarray, int]:
+    """LSODA with its loop in compiled code; corners of the reference are its critical times."""
+    f, j, rows = task.equations.rate, task.equations.jacobian, task.rows
+    states, info = odeint(
+        lambda t, x: f(t, x, rows),
+        task.start,
+        task.times,
+        Dfun=lambda t, x: j(t, x, rows),
+        rtol=task.rtol,
+        atol=task.rtol * task.rig.scales,
+        tcrit=task.corners if len(task.corners) else None,
+        mxstep=MANY,
+        tfirst=True,
+        full_output=True,
+    )
+    if info["message"] != "Integration successful.":
+        raise RuntimeError(info["message"])
+    return states, int(info["nst"][-1])
+
+
+def _cvode(task: Task) -> tuple[np.ndarray, int]:
+    from sksundae.cvode import CVODE
+
+    f, j, rows = task.equations.fill_rate, task.equations.fill_jacobian, task.rows
+    solver = CVODE(
+        lambda t, x, out: f(t, x, rows, out),
+        jacfn=lambda t, x, rate, out: j(t, x, rows, out),
+        rtol=task.rtol,
+        atol=task.rtol * task.rig.scales,
+        max_num_steps=MANY,
+    )
+    found = solver.solve(task.times, task.start)
+    if not found.success:
+        raise RuntimeError(found.message)
+    return found.y, len(found.t) - 1 if len(task.times) <= 2 else -1
+
+
+PEERS: dict[str, Solve] = {
+    "SciPy Radau": _solve_ivp("Radau"),
+    "SciPy BDF": _solve_ivp("BDF"),
+    "SciPy LSODA": _solve_ivp("LSODA"),
+    "SciPy odeint (LSODA)": _odeint,
+    "SUNDIALS CVODE": _cvode,
+}
+
+
+def whole(solve: Solve, rig: Rig, equations: Compiled, rtol: float, sampled: bool) -> tuple[np.ndarray, int]:
+    """States over the whole run in one call; steps."""
+    times = rig.grid if sampled else rig.grid[[0, -1]]
+    return solve(Task(rig, equations, rtol, rig.pieces, times, np.zeros(len(rig.scales))))
+
+
+def piecewise(
+    solve: Solve, rig: Rig, equations: Compiled, rtol: float, sampled: bool
+) -> tuple[np.ndarray, int]:
+    """States over the run, each piece of the reference by itself; steps."""
+    start = np.zeros(len(rig.scales))
+    if solve is _odeint:
+        times = rig.grid if sampled else rig.grid[[0, -1]]
+        return solve(Task(rig, equations, rtol, rig.pieces, times, start, rig.pieces[1:, 0]))
+    ends = np.append(rig.pieces[1:, 0], rig.duration)
+    parts, steps, grid = [start[None, :]], 0, rig.grid
+    for row, end in zip(rig.pieces, ends, strict=True):
+        inner = grid[(grid > row[0]) & (grid < end)] if sampled else np.empty(0)
+        times = np.array([row[0], *inner, end])
+        states, taken = solve(Task(rig, equations, rtol, row[None, :], times, start))
+        start = states[-1].copy()
+        parts.append(states[1:])
+        steps += taken
+    return np.concatenate(parts), steps
+
+
+@dataclass
+class Run:
+    """What a peer did: the better way, its wall times [s], its positions on the grid, steps, and unsampled time [s]."""
+
+    way: str
+    seconds: list[float]
+    position: np.ndarray | None
+    steps: int
+    unsampled: float
+    note: str = ""
+
+
+WAYS: dict[str, Any] = {"whole": whole, "pieces": piecewise}
+
+
+def race(solve: Solve, rig: Rig, equations: Compiled, rtol: float, repetitions: int) -> Run:
+    """Time a peer both ways, repeat the faster; a run beyond the time-out counts as that long."""
+    runs = [_try(way, solve, rig, equations, rtol) for way in WAYS]
+    best = min(runs, key=lambda run: run.seconds[0])
+    if best.position is None:
+        return best
+    if best.seconds[0] < 5:
+        for _ in range(repetitions - 1):
+            best.seconds.append(_timed(best.way, solve, rig, equations, rtol, True)[0])
+    best.unsampled, (_, steps) = _timed(best.way, solve, rig, equations, rtol, False)
+    best.steps = steps
+    return best
+
+
+def _try(way: str, solve: Solve, rig: Rig, equations: Compiled, rtol: float) -> Run:
+    try:
+        with time_out(TIME_OUT):
+            seconds, (states, steps) = _timed(way, solve, rig, equations, rtol, True)
+    except TimeoutError:
+        return Run(way, [TIME_OUT], None, -1, np.nan, f"stopped after {TIME_OUT:g} s")
+    except RuntimeError as error:
+        return Run(way, [np.inf], None, -1, np.nan, f"failed: {error}")
+    return Run(way, [seconds], states[:, rig.kernel.states.index("position")], steps, np.nan)
+
+
+def _timed(way: str, *arguments: Any) -> tuple[float, Any]:
+    start = time.perf_counter()
+    result = WAYS[way](*arguments)
+    return time.perf_counter() - start, result
+
+
+@contextmanager
+def time_out(seconds: float) -> Iterator[None]:
+    """Raise TimeoutError in the block after so many seconds; acts where Python code is called back."""
+
+    def stop(*_: object) -> None:
+        raise TimeoutError
+
+    before = signal.signal(signal.SIGALRM, stop)
+    signal.setitimer(signal.ITIMER_REAL, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(signal.SIGALRM, before)

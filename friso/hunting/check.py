@@ -1,0 +1,99 @@
+"""The verdict on a stage: as given and, if it has a joint, with the joint locked and free."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from friso.engine.arrays import Status
+from friso.engine.batch import run_chunks
+from friso.engine.kernel import kernel
+from friso.engine.simulate import checked_rtol, simulate
+from friso.equations.structure import structure
+from friso.hunting.measures import BANDS, measure, options
+from friso.stage import Stage
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+@dataclass(frozen=True)
+class Solver:
+    """How a run went: status in words, steps attempted and rejected, relative tolerance."""
+
+    status: str
+    steps: int
+    rejected: int
+    rtol: float
+
+    @property
+    def done(self) -> bool:
+        return self.status == Status.DONE.text
+
+
+@dataclass(frozen=True)
+class Case:
+    """A stage and what became of it.
+
+    `verdict` is "hunts", "settles" or "failed"; `peaks` counts the thesis's peaks, at `peak_times` [s] and of
+    `peak_heights` [m] above the reference; `peak_to_peak` [m] and `period` [s] (None: no cycle) are of the last
+    quarter; `settling_time` maps each band [m] to the time after the last corner of the reference [s] (None: never);
+    `largest_force` [N] is the actuator's. `trace` holds the time response if asked for.
+    """
+
+    stage: Stage
+    verdict: str
+    peaks: int
+    peak_times: np.ndarray
+    peak_heights: np.ndarray
+    peak_to_peak: float
+    period: float | None
+    settling_time: dict[float, float | None]
+    largest_force: float
+    solver: Solver
+    trace: xr.Dataset | None = None
+
+
+def check(stage: Stage, rtol: float = 1e-6, traces: bool = False) -> dict[str, Case]:
+    """The cases "given" and, for a stage with a joint, "locked" and "free" (if the file tells its stiffness).
+
+    With `traces`, each case has its time response. Raises ValueError for a tolerance that is not usable.
+    """
+    checked_rtol(rtol)
+    variants = {"given": stage}
+    if stage.joint:
+        variants["locked"] = stage.replace({"joint.locked": True})
+        if stage.joint.stiffness is not None:
+            variants["free"] = stage.replace({"joint.locked": False})
+    cases: dict[str, Case] = {}
+    for name, variant in variants.items():
+        same = next((case for case in cases.values() if case.stage == variant), None)
+        cases[name] = same or _case(variant, rtol, traces)
+    return cases
+
+
+def _case(stage: Stage, rtol: float, traces: bool) -> Case:
+    flat = stage.flat()
+    (runs,) = run_chunks(kernel(structure(flat)), flat, 1, options(flat, rtol))
+    found = measure(flat, runs)
+    room = found.turns.shape[1]
+    status = Status(int(found.status[0]))
+    return Case(
+        stage=stage,
+        verdict=str(found.verdict[0]),
+        peaks=int(found.peaks[0]),
+        peak_times=runs.results.turn_times[0, :room][found.turns[0]],
+        peak_heights=runs.results.turn_values[0, :room][found.turns[0]],
+        peak_to_peak=float(found.peak_to_peak[0]),
+        period=_known(found.period[0]),
+        settling_time={band: _known(time[0]) for band, time in zip(BANDS, found.settling_time, strict=True)},
+        largest_force=float(found.largest_force[0]),
+        solver=Solver(status.text, int(found.steps[0]), int(found.rejected[0]), rtol),
+        trace=simulate(stage, rtol) if traces else None,
+    )
+
+
+def _known(value: float) -> float | None:
+    return float(value) if np.isfinite(value) else None

@@ -1,0 +1,148 @@
+"""The generated step against a Rosenbrock step in plain Python, on every variant; compiled against not compiled."""
+
+import zlib
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+import pytest
+import rosenbrock
+import sympy as sp
+from variants import VARIANTS, plain_module
+
+from friso.engine.kernel import kernel
+from friso.engine.tableaus import TABLEAUS
+from friso.equations import motion
+from friso.equations.component import TIME
+from friso.equations.model import REFERENCE, assemble
+from friso.equations.structure import structure
+
+EVERY = [(name, "Rodas5P") for name in VARIANTS]
+EVERY += [("free, parasitic", "Rodas4"), ("rigid, LuGre 0.7, PID measured", "Rodas4")]
+COMPILED = ("rigid", "free, parasitic")
+Real = np.longdouble
+RTOL = 1e-6
+
+
+class Lanes:
+    """A lane buffer with a different state, step and moment in each lane."""
+
+    def __init__(self, name: str, module: ModuleType) -> None:
+        rng = np.random.default_rng(zlib.crc32(name.encode()))
+        flat = VARIANTS[name].flat()
+        flat |= {"motion.size": float(motion.size(flat))}
+        self.module, self.count = module, module.LANES
+        self.values = [float(flat[key]) for key in module.PARAMETERS]
+        scales = np.array(module.scales(self.values), dtype=float)
+        scales[~np.isfinite(scales)] = 1e-3
+        shape = (self.count, scales.size)
+        self.x = scales * rng.normal(size=shape) * 10.0 ** rng.uniform(-2, 1, size=(self.count, 1))
+        for body in ("cart_position", "parasitic_position"):
+            if body in module.STATE_NAMES:
+                apart = flat.get("joint.stroke", 1e-6) * rng.normal(size=self.count)
+                self.x[:, module.STATE_NAMES.index(body)] = self.x[:, 0] + apart
+        self.h = 10.0 ** rng.uniform(-6, -3, size=self.count)
+        self.t = rng.uniform(0, 0.02, size=self.count)
+        pieces = motion.pieces(flat, 1)[0]
+        self.r = pieces[rng.integers(len(pieces), size=self.count), 1:]
+        sides = [module.surfaces(x, t, r, self.values) for x, t, r in zip(self.x, self.t, self.r, strict=True)]
+        self.modes = (np.array(sides, dtype=float).reshape(self.count, -1) > 0).astype(float)
+        self.buffer = np.zeros(module.ROWS * self.count)
+        self._fill(scales)
+
+    def row(self, first: int, rows: int) -> np.ndarray:
+        """A block of the buffer as a view, shape (rows, lanes)."""
+        return self.buffer[first * self.count : (first + rows) * self.count].reshape(rows, self.count)
+
+    def _fill(self, scales: np.ndarray) -> None:
+        m = self.module
+        constants = np.array(m.constants(self.values), dtype=float)
+        self.row(m.X, m.STATES)[:] = self.x.T
+        self.row(m.TOLERANCE, m.STATES)[:] = RTOL * scales[:, None]
+        self.row(m.CONSTANT, m.CONSTANTS)[:] = constants[:, None]
+        self.row(m.MODE, m.KINKS)[:] = self.modes.T
+        self.row(m.REF, 3)[:] = self.r.T
+        self.row(m.TIME, 1)[:] = self.t
+        self.row(m.STOP, 1)[:] = 1e3
+        self.row(m.TRIAL, 1)[:] = self.h
+
+    def step(self, compiled: bool) -> None:
+        run = self.module.step if compiled else self.module.step.py_func
+        with np.errstate(all="ignore"):  # selects compute both of their sides
+            run(self.buffer, RTOL, 1.0, 1e-6, 1e-5, 1e6)
+
+
+class Twin:
+    """A variant's step in plain Python and extended precision."""
+
+    def __init__(self, name: str, method: str) -> None:
+        self.model, self.tableau = assemble(structure(VARIANTS[name].flat())), TABLEAUS[method]
+        rates = sp.Matrix(self.model.rhs)
+        self._rates = self._function(list(rates))
+        self._jacobian = self._function(rates.jacobian(sp.Matrix(self.model.symbols)).tolist())
+        self._drift = self._function(list(rates.diff(TIME)))
+
+    def _function(self, expressions: list[Any]) -> Callable[..., list[Any]]:
+        m = self.model
+        symbols = [m.symbols, TIME, [kink.beyond for kink in m.kinks], REFERENCE, m.parameters]
+        return sp.lambdify(symbols, expressions, modules="numpy", cse=True)
+
+    def step(self, lanes: Lanes, lane: int, x: np.ndarray) -> rosenbrock.Step:
+        """Raises FloatingPointError where the step goes so far astray that a power overflows."""
+        t, rest = lanes.t[lane], (lanes.modes[lane], lanes.r[lane], lanes.values)
+
+        def numbers(function: Callable[..., list[Any]], x: np.ndarray, t: float) -> np.ndarray:
+            return np.array(function(x, t, *rest), dtype=Real)
+
+        with np.errstate(over="raise"):
+            return rosenbrock.step(
+                self.tableau,
+                lambda x, t: numbers(self._rates, x, t),
+                numbers(self._jacobian, x, t),
+                numbers(self._drift, x, t),
+                x,
+                t,
+                lanes.h[lane],
+            )
+
+
+@pytest.mark.parametrize(("name", "method"), EVERY)
+def test_step_against_plain_python(name: str, method: str, tmp_path: Path) -> None:
+    """End of the step and dense output agree to what rounding of the state and of the stages may change in them."""
+    module = plain_module(VARIANTS[name], tmp_path, method)
+    twin, lanes = Twin(name, method), Lanes(name, module)
+    lanes.step(compiled=False)
+    compared = 0
+    for lane in range(lanes.count):
+        x = lanes.x[lane].astype(Real)
+        try:
+            expected = twin.step(lanes, lane, x)
+            nudged = twin.step(lanes, lane, x * (1 + Real(1e-15) * np.cos(np.arange(x.size))))
+        except FloatingPointError:
+            continue
+        sizes = np.abs(expected.k)
+        end = lanes.row(module.END, module.STATES)[:, lane]
+        rounding = 4 * np.abs(nudged.end - expected.end) + 1e-14 * (np.abs(x) + sizes.sum(axis=0))
+        assert np.all(np.abs(end - expected.end) <= rounding)
+        dense = lanes.row(module.D0, module.DENSE * module.STATES)[:, lane].reshape(module.DENSE, -1)
+        weights = np.abs(np.array([row + (0.0,) * (len(sizes) - len(row)) for row in twin.tableau.dense]))
+        rounding = 4 * np.abs(nudged.dense - expected.dense) + 1e-14 * (weights @ sizes)
+        assert np.all(np.abs(dense - expected.dense) <= rounding)
+        compared += 1
+    assert compared >= lanes.count / 2
+
+
+@pytest.mark.parametrize("name", COMPILED)
+def test_compiled_step_against_the_same_code_line_by_line(name: str) -> None:
+    """Compiling (with fused multiply-adds and selects) changes nothing but rounding, nor which lanes want attention."""
+    module = kernel(structure(VARIANTS[name].flat())).module
+    slow, fast = Lanes(name, module), Lanes(name, module)
+    slow.step(compiled=False)
+    fast.step(compiled=True)
+    rows = fast.row(module.END, module.STATES), slow.row(module.END, module.STATES)
+    k = np.abs(slow.row(module.D0, module.DENSE * module.STATES)).reshape(module.DENSE, module.STATES, -1).sum(axis=0)
+    assert np.all(np.abs(rows[0] - rows[1]) <= 1e-10 * (np.abs(slow.x.T) + k))
+    for row in (module.MODE, module.EVENT):
+        assert np.array_equal(fast.row(row, 1), slow.row(row, 1))
