@@ -1,0 +1,40 @@
+"""Turning points of a run, and the return map of a hunting cycle."""
+
+import numpy as np
+
+from friso.engine.arrays import Status
+from friso.engine.batch import Options, run_chunks
+from friso.engine.kernel import kernel
+from friso.equations.structure import structure
+from friso.stage import Stage
+
+
+def turning_points(stage: Stage, rtol: float) -> tuple[np.ndarray, np.ndarray]:
+    """Times [s] and values [m] of all extrema of position minus reference."""
+    flat = stage.flat()
+    (runs,) = run_chunks(kernel(structure(flat)), flat, 1, Options(rtol=rtol))
+    assert runs.results.statuses[0] == Status.DONE
+    count = int(runs.results.turn_counts[0])
+    return runs.results.turn_times[0, :count], runs.results.turn_values[0, :count]
+
+
+def swings(stage: Stage, rtol: float) -> tuple[np.ndarray, np.ndarray]:
+    """Time [s] and height [m] of the farthest point of every swing to one side.
+
+    Stopping, a mass rings on its bristles: most turning points are of that ringing, and not of the cycle.
+    """
+    times, values = turning_points(stage, rtol)
+    starts = np.flatnonzero(np.diff(np.sign(values), prepend=0))
+    parts = zip(np.split(times, starts[1:]), np.split(np.abs(values), starts[1:]), strict=True)
+    farthest = [(t[np.argmax(v)], np.max(v)) for t, v in parts]
+    return np.array([t for t, _ in farthest]), np.array([v for _, v in farthest])
+
+
+def return_map(heights: np.ndarray, near: float = 0.03) -> tuple[float, float]:
+    """Fixed point [m] and slope of the map from one swing to the next, from a straight line through those near it."""
+    guess = np.median(heights[-10:])
+    at = np.abs(heights / guess - 1)
+    use = (at[:-1] < near) & (at[:-1] > 1e-4) & (at[1:] < near)
+    assert np.count_nonzero(use) >= 5
+    slope, offset = np.polyfit(heights[:-1][use], heights[1:][use], 1)
+    return float(offset / (1 - slope)), float(slope)
