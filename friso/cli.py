@@ -112,7 +112,7 @@ def check(
     Example: friso check examples/thesis_rig.toml --set controller.crossover="12 Hz" --out report
     """
     stage = _stage(stage_file, overrides)
-    folder = _folder(out)
+    folder = None if out is None else _folder(out)
     from friso.hunting import check as check_stage
 
     cases = check_stage(stage, rtol=rtol, traces=folder is not None)
@@ -134,9 +134,7 @@ def simulate(
     stage_file: StageFile,
     overrides: Overrides = None,
     rtol: Tolerance = 1e-6,
-    sample_time: Annotated[
-        str | None, typer.Option(metavar="TIME", help='Sampling interval, such as "1 ms".')
-    ] = None,
+    sample_time: Annotated[str | None, typer.Option(metavar="TIME", help='Sampling interval, such as "1 ms".')] = None,
     out: OutFolder = None,
     as_json: AsJson = False,
 ) -> None:
@@ -175,14 +173,13 @@ def _stage(path: Path, overrides: list[str] | None) -> Stage:
     return stage.replace(changes) if changes else stage
 
 
-def _folder(path: Path | None) -> Path | None:
+def _folder(path: Path) -> Path:
     """The folder, made if it is not there. Raises StageError."""
-    if path is None:
-        return None
     try:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise StageError("--out", str(path), f"a folder that can be written ({error.strerror})", "--out report")
+        expected = f"a folder that can be written ({error.strerror})"
+        raise StageError("--out", str(path), expected, "--out report") from None
     return path
 
 

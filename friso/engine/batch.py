@@ -121,7 +121,13 @@ def _run_with_room(kernel: Kernel, batch: Batch, flat: Mapping[str, Any], option
     runs = len(batch.starts)
     longest = float(np.min(flat["motion.duration"])) * LONGEST_SHARE
     settings = Settings(
-        options.rtol, longest, options.budget, *options.bands, options.record_from, options.interval or np.inf
+        rtol=float(options.rtol),
+        longest=longest,
+        budget=float(options.budget),
+        inner=float(options.bands[0]),
+        outer=float(options.bands[1]),
+        record_from=float(options.record_from),
+        interval=float(options.interval or np.inf),
     )
     samples = 0
     if options.interval is not None:

@@ -25,6 +25,7 @@ from types import ModuleType
 import llvmlite
 import llvmlite.binding as llvm
 import numba
+import numba.core.config as numba_config
 import numpy as np
 from filelock import FileLock
 from platformdirs import user_cache_dir
@@ -113,9 +114,9 @@ def _import(entry: Path, key: str) -> ModuleType:
 @contextmanager
 def _numba_cache_beside_the_module() -> Iterator[None]:
     """Keep Numba's files in the entry, where the manifest covers them, whatever NUMBA_CACHE_DIR says."""
-    elsewhere = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = ""
+    elsewhere = getattr(numba_config, "CACHE_DIR")  # noqa: B009 (set at import, unknown to type checkers)
+    setattr(numba_config, "CACHE_DIR", "")  # noqa: B010
     try:
         yield
     finally:
-        numba.config.CACHE_DIR = elsewhere
+        setattr(numba_config, "CACHE_DIR", elsewhere)  # noqa: B010

@@ -71,9 +71,10 @@ def empty_results(runs: int, capacity: int, samples: int, states: int) -> Result
 
 
 def _compile(module: ModuleType) -> None:
-    """Compile (or load from Numba's cache) the driver for the types it is called with."""
+    """Compile (or load from Numba's cache) the driver for the types it is called with, and for no others."""
     flat, square = np.zeros(1), np.zeros((1, 1))
     batch = Batch(square, square, square, square, flat, np.zeros((1, 1, 4)), np.zeros(1, np.int64))
     settings = Settings(1.0, 1.0, 1.0, 1.0, 1.0, 0.0, 1.0)
     arguments = (0, 0, batch, settings, empty_results(1, 1, 1, 1))
     module.run.compile(tuple(numba.typeof(argument) for argument in arguments))
+    module.run.disable_compile()

@@ -27,8 +27,9 @@ SCALARS = (
     "inner_exit",
     "outer_exit",
 )
-"""Rows of one number per lane. time, old_time, stop: now, before the step
-and at its next corner, all since the last corner of the reference, which was at start; trial, taken: step to try next and step last tried; fraction: the part of it that was accepted; event: the lane wants attention."""
+"""Rows of one number per lane. time, old_time, stop: now, before the step and at its next corner, all since the last
+corner of the reference, which was at start; trial, taken: step to try next and step last tried; fraction: the part of
+it that was accepted; event: the lane wants attention."""
 
 
 @dataclass(frozen=True)

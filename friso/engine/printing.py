@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any
 
 import sympy as sp
 from sympy.printing.numpy import NumPyPrinter
@@ -11,15 +12,17 @@ from sympy.printing.pycode import PythonCodePrinter
 Rename = Callable[[sp.Symbol], str]
 
 
-class reciprocal(sp.Function):  # noqa: N801 (a function's name in SymPy)
+class reciprocal(sp.Function):
     """1/x, kept apart from powers so that x^-1 and x^-2 share one division."""
 
 
-def reciprocals(expr: sp.Expr) -> sp.Expr:
+def reciprocals(expr: Any) -> Any:
     """`expr` with every negative whole power written as a power of a reciprocal."""
-    return expr.replace(
-        lambda e: e.is_Pow and e.exp.is_Integer and e.exp < 0, lambda e: reciprocal(e.base) ** -e.exp
-    )
+
+    def negative_power(e: Any) -> bool:
+        return e.is_Pow and e.exp.is_Integer and e.exp < 0
+
+    return expr.replace(negative_power, lambda e: reciprocal(e.base) ** -e.exp)
 
 
 class _KernelPrinter(PythonCodePrinter):
@@ -58,9 +61,9 @@ class _KernelPrinter(PythonCodePrinter):
         return "(" + " * ".join(f"({self._print(factor)})" for factor in expr.args) + ")"
 
 
-def print_scalar(expr: sp.Expr, rename: Rename) -> str:
+def print_scalar(expr: Any, rename: Rename) -> str:
     """One expression as kernel code."""
-    return _KernelPrinter(rename).doprint(expr)
+    return str(_KernelPrinter(rename).doprint(expr))
 
 
 class _Renamed(NumPyPrinter):
@@ -77,7 +80,7 @@ class _Renamed(NumPyPrinter):
 
 def print_numpy(expr: sp.Expr, rename: Rename) -> str:
     """One expression as NumPy code that broadcasts."""
-    return _Renamed(rename).doprint(expr)
+    return str(_Renamed(rename).doprint(expr))
 
 
 class Constants:
@@ -95,7 +98,7 @@ class Constants:
     def index(self) -> Mapping[sp.Symbol, int]:
         return {symbol: i for i, symbol in enumerate(self._symbols.values())}
 
-    def hoist(self, expr: sp.Expr) -> sp.Expr:
+    def hoist(self, expr: Any) -> Any:
         """`expr` with every largest subexpression in parameters alone replaced by a constant's symbol."""
         if expr.is_number or not expr.free_symbols & self._parameters:
             return expr

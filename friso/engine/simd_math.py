@@ -23,20 +23,22 @@ _TWO52 = 4503599627370496.0
 _TWO52_BITS = 4841369599423283200
 
 
-@intrinsic
-def _bits(typingctx: Any, value: Any) -> Any:
+def _as_bits(typingctx: Any, value: Any) -> Any:
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         return builder.bitcast(args[0], ir.IntType(64))
 
     return types.int64(types.float64), codegen
 
 
-@intrinsic
-def _number(typingctx: Any, bits: Any) -> Any:
+def _as_number(typingctx: Any, bits: Any) -> Any:
     def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         return builder.bitcast(args[0], ir.DoubleType())
 
     return types.float64(types.int64), codegen
+
+
+_bits: Any = intrinsic(_as_bits)
+_number: Any = intrinsic(_as_number)
 
 
 @njit(**OPTIONS)

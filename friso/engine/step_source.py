@@ -8,6 +8,7 @@ smooth; where a kink is crossed the step is accepted up to the crossing alone, w
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from typing import Any
 
 import sympy as sp
 
@@ -37,7 +38,7 @@ AFTER_KINK = 0.25
 class Block:
     """Expressions that are evaluated together, with what they share computed once."""
 
-    def __init__(self, named: Mapping[str, sp.Expr], constants: Constants) -> None:
+    def __init__(self, named: Mapping[str, Any], constants: Constants) -> None:
         hoisted = [reciprocals(constants.hoist(sp.sympify(e))) for e in named.values()]
         self._shared, reduced = sp.cse(hoisted, symbols=sp.numbered_symbols("w_"), order="none")
         self._named = dict(zip(named, reduced, strict=True))
@@ -64,9 +65,7 @@ class StepWriter:
         self._fixed = {kink.beyond: f"mode{k}" for k, kink in enumerate(model.kinks)}
         self._fixed |= dict(zip(REFERENCE, ("r_x", "r_v", "r_a"), strict=True))
         self._jacobian = self._nonzero_jacobian()
-        self._drift = {
-            i: d for i, f in enumerate(model.rhs) if (d := sp.diff(f, TIME)) != 0
-        }
+        self._drift = {i: d for i, f in enumerate(model.rhs) if (d := sp.diff(f, TIME)) != 0}
         force = model.outputs["force"].expression if "force" in model.outputs else sp.S.Zero
         rates = {f"f{i}_": f for i, f in enumerate(model.rhs)}
         surfaces = {f"g{k}_": kink.surface for k, kink in enumerate(model.kinks)}
@@ -74,18 +73,19 @@ class StepWriter:
         entries = {f"j_{i}_{j}_": e for (i, j), e in self._jacobian.items()}
         drifts = {f"drift{i}_": e for i, e in self._drift.items()}
         sizes = {f"size{k}_": self._size(kink.surface) for k, kink in enumerate(model.kinks)}
-        watched = surfaces | {"force": force}
+        watched: dict[str, Any] = surfaces | {"force": force}
         self._start = Block(rates | entries | drifts | watched | sizes | follow, self.constants)
         self._rates = Block(rates, self.constants)
         self._watched = Block(watched, self.constants)
         self._followed = Block(follow, self.constants)
-        free = set().union(*(sp.sympify(e).free_symbols for e in watched.values()))
+        free: set[Any] = set().union(*(sp.sympify(e).free_symbols for e in watched.values()))
         self._watched_states = sorted(self._index[s] for s in free & set(self._index))
         self.layout = Layout(self.size, len(tableau.dense), len(self.constants.index), self.kinks)
 
     def _size(self, surface: sp.Expr) -> sp.Expr:
         """Magnitude of a surface that corresponds to the scales of the states."""
-        return sum(sp.Abs(sp.diff(surface, state.symbol)) * state.scale for state in self.model.states)
+        sizes = (sp.Abs(sp.diff(surface, state.symbol)) * state.scale for state in self.model.states)
+        return sum(sizes, start=sp.S.Zero)
 
     def _nonzero_jacobian(self) -> dict[tuple[int, int], sp.Expr]:
         entries = {}

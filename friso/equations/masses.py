@@ -37,9 +37,7 @@ def parasitic_force(parasitic: Body, stage: Body) -> sp.Expr:
     reduced = parasitic.mass * stage.mass / (parasitic.mass + stage.mass)
     omega = 2 * sp.pi * key("parasitic.frequency")
     damping = 2 * key("parasitic.damping_ratio") * omega * reduced
-    return omega**2 * reduced * (stage.position - parasitic.position) + damping * (
-        stage.velocity - parasitic.velocity
-    )
+    return omega**2 * reduced * (stage.position - parasitic.position) + damping * (stage.velocity - parasitic.velocity)
 
 
 def position_outputs(prefix: str, name: str, body: Body) -> Component:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import sympy as sp
 
@@ -13,7 +14,7 @@ from friso.equations.joint import joint
 from friso.equations.masses import Body, parasitic_force, position_outputs
 from friso.equations.pid import Controller, Loop, controller, loop_stiffness
 from friso.equations.structure import Structure
-from friso.stage.tables import FRICTION
+from friso.stage.tables import friction_law
 
 REFERENCE = tuple(key(f"reference.{name}") for name in ("position", "velocity", "acceleration"))
 """Position, velocity and acceleration of the reference at its last corner."""
@@ -53,14 +54,14 @@ class Model:
         expressions = [*self.rhs, *(k.surface for k in self.kinks), *(o.expression for o in self.outputs.values())]
         expressions += [each.scale for each in self.states]
         others = {*self.symbols, *(k.beyond for k in self.kinks), *REFERENCE, TIME}
-        free = set().union(*(e.free_symbols for e in expressions)) - others
+        free: set[Any] = set().union(*(e.free_symbols for e in expressions)) - others
         return tuple(sorted(free, key=str))
 
 
 def assemble(structure: Structure) -> Model:
     """The equations of every stage with this structure."""
     cart, stage, parasitic = _bodies(structure)
-    friction = FRICTION.classes[structure.friction].declare(cart.velocity, structure.friction_variant)
+    friction = friction_law(structure.friction).declare(cart.velocity, structure.friction_variant)
     position, velocity, acceleration = REFERENCE
     reference = position + velocity * TIME + acceleration * TIME**2 / 2
     reference_velocity = velocity + acceleration * TIME

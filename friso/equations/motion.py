@@ -12,9 +12,7 @@ Piece = tuple[Any, Any, Any, Any]
 
 
 def _there_and_back(flat: Mapping[str, Any]) -> list[Piece]:
-    a, ramp, back = (
-        flat[f"motion.{name}"] for name in ("acceleration", "acceleration_time", "return_at")
-    )
+    a, ramp, back = (flat[f"motion.{name}"] for name in ("acceleration", "acceleration_time", "return_at"))
     size, top = a * ramp**2, a * ramp
     return [
         (0.0, 0.0, 0.0, a),

@@ -100,9 +100,7 @@ def _gains(form: ControllerForm, loop: Loop, length: sp.Expr) -> Terms:
     return shares, loop.error, states
 
 
-def _derivative(
-    form: ControllerForm, loop: Loop, tau: sp.Expr, length: sp.Expr
-) -> tuple[sp.Expr, tuple[State, ...]]:
+def _derivative(form: ControllerForm, loop: Loop, tau: sp.Expr, length: sp.Expr) -> tuple[sp.Expr, tuple[State, ...]]:
     """What the derivative gain acts on [m/s], and the state of its filter."""
     if form.derivative_on == "none":
         return sp.S.Zero, ()

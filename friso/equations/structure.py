@@ -6,7 +6,7 @@ from collections.abc import Hashable, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from friso.stage.tables import FRICTION
+from friso.stage.tables import friction_law
 
 JointForm = Literal["rigid", "locked", "free", "touching"]
 
@@ -46,7 +46,7 @@ def structure(flat: Mapping[str, Any]) -> Structure:
         joint=_joint_form(flat),
         parasitic="parasitic.frequency" in flat,
         friction=law,
-        friction_variant=FRICTION.classes[law].variant(flat),
+        friction_variant=friction_law(law).variant(flat),
         controller=_controller_form(flat) if "controller.kind" in flat else None,
     )
 

@@ -41,7 +41,7 @@ class Measures:
 
     @property
     def verdict(self) -> np.ndarray:
-        """"hunts" or "settles" by the peak count, "failed" where the run was not completed."""
+        """ "hunts" or "settles" by the peak count, "failed" where the run was not completed."""
         words = np.where(self.peaks > 0, "hunts", "settles")
         return np.where(self.status == Status.DONE, words, "failed")
 
@@ -49,9 +49,7 @@ class Measures:
 def options(flat: Mapping[str, Any], rtol: float, threads: int | None = None) -> Options:
     """How to run for these measures, keeping no turning points that none of them needs."""
     half = float(np.min(flat["motion.duration"])) / 2
-    return Options(
-        rtol=rtol, bands=BANDS, window=WINDOW, record_from=min(COUNTED_AFTER, half), threads=threads
-    )
+    return Options(rtol=rtol, bands=BANDS, window=WINDOW, record_from=min(COUNTED_AFTER, half), threads=threads)
 
 
 def measure(flat: Mapping[str, Any], runs: Runs) -> Measures:

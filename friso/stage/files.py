@@ -32,9 +32,7 @@ def save(stage: Stage, path: str | os.PathLike[str], overwrite: bool = False) ->
     """
     path = Path(path)
     if path.exists() and not overwrite:
-        raise StageError(
-            "", "a file that exists already", "a new file, or leave to overwrite", origin=str(path)
-        )
+        raise StageError("", "a file that exists already", "a new file, or leave to overwrite", origin=str(path))
     draft = path.with_name(f".{path.name}.{os.getpid()}")
     try:
         draft.write_text(stage.to_toml(), encoding="utf-8", newline="\n")

@@ -104,9 +104,7 @@ def unknown_key(key: str, known: Iterable[str], example: str = "") -> StageError
 
 def _first_problem(cls: type[Section], error: ValidationError) -> StageError:
     """One StageError from pydantic's list: an unknown key first, since it often explains a missing one."""
-    problems = sorted(
-        error.errors(include_url=False), key=lambda problem: problem["type"] != "extra_forbidden"
-    )
+    problems = sorted(error.errors(include_url=False), key=lambda problem: problem["type"] != "extra_forbidden")
     problem = problems[0]
     key = ".".join(map(str, problem["loc"]))
     cause = problem.get("ctx", {}).get("error")

@@ -62,9 +62,7 @@ class Stage(Section):
             given = "a [joint], but a single mass"
             raise StageError("masses", given, "both masses", 'cart = "1.2 kg", stage = "0.5 kg"')
         if self.parasitic and not self.joint:
-            raise StageError(
-                "parasitic", "a parasitic mode, but no [joint]", "both or neither", _JOINT.example
-            )
+            raise StageError("parasitic", "a parasitic mode, but no [joint]", "both or neither", _JOINT.example)
         for rule, broken in _broken_rules(self.flat()):
             if broken:
                 raise StageError(", ".join(rule.keys), self._written(rule), rule.expected, rule.example)
@@ -128,9 +126,7 @@ def violations(flat: Mapping[str, Any]) -> list[tuple[Any, str]]:
         for key, field in numeric_keys(flat).items()
         if key in flat
     ]
-    rules = [
-        (broken, f"{', '.join(rule.keys)}: expected {rule.expected}") for rule, broken in _broken_rules(flat)
-    ]
+    rules = [(broken, f"{', '.join(rule.keys)}: expected {rule.expected}") for rule, broken in _broken_rules(flat)]
     return [(broken, why) for broken, why in bounds + rules if np.any(broken)]
 
 

@@ -1,6 +1,7 @@
 """The tables of a stage file: masses, friction, joint, parasitic mode, controller, motion."""
 
-from typing import Annotated, Any, ClassVar, Literal, Self
+from collections.abc import Hashable, Mapping
+from typing import Annotated, Any, ClassVar, Literal, Self, cast
 
 from pydantic import model_validator
 
@@ -27,20 +28,33 @@ class Masses(Section):
     @model_validator(mode="after")
     def _is_not_empty(self) -> Self:
         if self.cart is None and self.stage is None:
-            raise StageError(
-                "", "neither cart nor stage", "at least one of the two masses", 'cart = "1.2 kg"'
-            )
+            raise StageError("", "neither cart nor stage", "at least one of the two masses", 'cart = "1.2 kg"')
         return self
 
 
 class FrictionSection(Section):
-    """Base of the friction laws, each of which declares its keys and `model: Literal["name"]`."""
+    """Base of the friction laws, each of which declares its keys, `model: Literal["name"]`, and its equations."""
 
     model: Any
+
+    @staticmethod
+    def variant(flat: Mapping[str, Any]) -> Hashable:
+        """What else than the law's name its equations depend on, such as a whole exponent."""
+        return None
+
+    @staticmethod
+    def declare(velocity: Any, variant: Any) -> Any:
+        """The equations of the law for a body moving at `velocity`, or None if there is no force."""
+        return None
 
 
 FRICTION = Variants("model")
 register_friction = FRICTION.register
+
+
+def friction_law(name: str) -> type[FrictionSection]:
+    """The class of the registered law called `name`."""
+    return cast(type[FrictionSection], FRICTION.classes[name])
 
 
 class Joint(Section):
@@ -106,9 +120,7 @@ class GainsController(Controller):
         Rule(
             ("controller.derivative_on", "controller.kd", "controller.tau"),
             lambda f: (
-                (f["controller.derivative_on"] != "error")
-                | (f["controller.kd"] == 0)
-                | (f["controller.tau"] > 0)
+                (f["controller.derivative_on"] != "error") | (f["controller.kd"] == 0) | (f["controller.tau"] > 0)
             ),
             "a filter (tau > 0) for the derivative of the error, or the derivative of the measurement",
             'tau = "1 ms", or derivative_on = "measurement"',
@@ -121,12 +133,8 @@ _EITHER_FORM = 'crossover = "8 Hz", alpha = 0.1, beta = 2 or kp = "3 N/m", ki = 
 
 def controller_form(table: dict[str, Any]) -> type[Section]:
     """The class for a [controller] table: by rules or by gains. Raises StageError for both or neither."""
-    rules = [
-        key for key in TunedController.model_fields if key in table and key not in Controller.model_fields
-    ]
-    gains = [
-        key for key in GainsController.model_fields if key in table and key not in Controller.model_fields
-    ]
+    rules = [key for key in TunedController.model_fields if key in table and key not in Controller.model_fields]
+    gains = [key for key in GainsController.model_fields if key in table and key not in Controller.model_fields]
     if rules and gains:
         given = f"{', '.join(rules)} (van Dijk's rules) together with {', '.join(gains)} (gains)"
         raise StageError("", given, "one form, not both", _EITHER_FORM)

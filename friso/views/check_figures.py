@@ -62,9 +62,7 @@ def response_figure(trace: xr.Dataset) -> Figure:
             line = Series(time, _values(trace, name), title.lower(), BLUE)
             panels.append(Panel(title, _TIME, Axis(title, str(trace[name].attrs["units"])), (line,)))
     caption = "The whole run; the error is the reference minus the position."
-    return Figure(
-        "response", "time response", caption, tuple(panels), subject=str(trace.attrs.get("name", ""))
-    )
+    return Figure("response", "time response", caption, tuple(panels), subject=str(trace.attrs.get("name", "")))
 
 
 _TIME = Axis("Time", "s")
@@ -79,9 +77,7 @@ def _settled(shown: list[Shown]) -> Figure:
         lines.append(Series(time, deviation, item.label, item.colour))
         if len(item.case.peak_times):
             label = f"counted peaks, {item.label.lower()}: {item.case.peaks}"
-            peaks.append(
-                Markers(item.case.peak_times, item.case.peak_heights, label, item.colour, "triangle")
-            )
+            peaks.append(Markers(item.case.peak_times, item.case.peak_heights, label, item.colour, "triangle"))
     limits = (Limit((COUNTED_ABOVE,), "peaks count above", GREY, "dotted"),) if peaks else ()
     # A stage that stays within the finest band shows as a line, not as a screenful of solver noise.
     view = _common([line.y for line in lines], least=2 * min(BANDS))
@@ -108,13 +104,9 @@ def _settling(shown: list[Shown]) -> Panel:
     for item in shown:
         size = np.maximum(np.abs(_deviation(item)), _FLOOR)
         lines.append(Series(_values(_trace(item), "time"), size, item.label, item.colour))
-    largest = max(
-        (float(np.max(line.y[np.isfinite(line.y)], initial=_FLOOR)) for line in lines), default=_FLOOR
-    )
+    largest = max((float(np.max(line.y[np.isfinite(line.y)], initial=_FLOOR)) for line in lines), default=_FLOOR)
     dashes: tuple[Dash, ...] = ("dotted", "dashed")
-    bands = tuple(
-        Limit((band,), text, INK, dash) for (band, text), dash in zip(BANDS.items(), dashes, strict=True)
-    )
+    bands = tuple(Limit((band,), text, INK, dash) for (band, text), dash in zip(BANDS.items(), dashes, strict=True))
     axis = Axis("|Deviation|", "m", (_FLOOR, max(2 * largest, 1e-3)), log=True)
     return Panel("Whole run: size of the deviation", _TIME, axis, tuple(lines), limits=bands)
 
@@ -129,9 +121,7 @@ def _overview(shown: list[Shown]) -> Figure:
             Series(time, _values(_trace(item), "reference"), "reference", LIGHT, width=4.0),
             Series(time, _values(_trace(item), "position"), "position", item.colour),
         )
-        panels.append(
-            Panel(f"{item.label}: reference and position", _TIME, Axis("Position", "m", view), series)
-        )
+        panels.append(Panel(f"{item.label}: reference and position", _TIME, Axis("Position", "m", view), series))
     bounds = _force_limit(shown)
     arrays = [_values(_trace(item), "force") for item in shown]
     view = _common([*arrays, *(np.array(bound.values) for bound in bounds)])
@@ -160,9 +150,7 @@ def _shares(shown: list[Shown]) -> Figure:
         start = max(start, end - _PERIODS * max(periods))
     panels = []
     for item in shown:
-        named = [
-            (name, *SHARES[name]) for name in SHARES if name in _trace(item) and _any(_trace(item), name)
-        ]
+        named = [(name, *SHARES[name]) for name in SHARES if name in _trace(item) and _any(_trace(item), name)]
         lines = [(*share, 1.8) for share in named] + ([("force", "total", INK, 0.9)] if named else [])
         series = tuple(
             Series(*_cut(item, _values(_trace(item), name), start, end), label, colour, width=width)
@@ -185,7 +173,7 @@ def _joint(shown: list[Shown]) -> Figure:
     panels = []
     for item in shown:
         joint = item.case.stage.joint
-        if joint is None or joint.locked or "joint_deflection" not in _trace(item):
+        if joint is None or joint.stroke is None or joint.locked or "joint_deflection" not in _trace(item):
             continue
         stroke, deflection = float(joint.stroke), _values(_trace(item), "joint_deflection")
         limits = (Limit((-stroke, stroke), "limiter touches"),)
@@ -197,9 +185,7 @@ def _joint(shown: list[Shown]) -> Figure:
             Panel("Whole run", _TIME, axis, (whole,), limits=limits),
             Panel(f"From {start:g} s on", Axis("Time", "s", (start, end)), axis, (after,), limits=limits),
         ]
-    caption = (
-        "Deflection of the stage against the cart. Beyond the dashed lines the stroke limiter carries load."
-    )
+    caption = "Deflection of the stage against the cart. Beyond the dashed lines the stroke limiter carries load."
     return Figure("joint", "The joint", caption, tuple(panels), columns=2, subject=_subject(shown))
 
 
@@ -209,9 +195,7 @@ def _friction(shown: list[Shown]) -> Figure:
     hunting = any(item.case.peaks for item in cases)
     start, end = _window(shown) if hunting else (-np.inf, np.inf)
     part = f"From {start:g} s on." if hunting else "The whole run."
-    caption = (
-        f"{part} The friction force opposes the velocity of the cart. A case that rests is a single point."
-    )
+    caption = f"{part} The friction force opposes the velocity of the cart. A case that rests is a single point."
     along = "Cart position from the target" if hunting else "Cart position"
     panels = []
     for title, quantity, unit, name in (

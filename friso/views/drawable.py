@@ -25,9 +25,7 @@ def _panel(panel: Panel) -> Panel:
     xs = _gather(panel.x, [item.x for item in (*panel.series, *panel.markers, *panel.maps)])
     ys = _gather(panel.y, [item.y for item in (*panel.series, *panel.markers, *panel.maps)])
     x_factor, x_unit = choose(xs, panel.x.unit, log=panel.x.log)
-    y_factor, y_unit = choose(
-        ys if panel.y.limits else np.concatenate((ys, limits)), panel.y.unit, log=panel.y.log
-    )
+    y_factor, y_unit = choose(ys if panel.y.limits else np.concatenate((ys, limits)), panel.y.unit, log=panel.y.log)
     extent = (float(xs.min()), float(xs.max())) if xs.size else (0.0, 1.0)
     lines = [_thinned(line) for line in panel.series] + [_limit(limit, extent) for limit in panel.limits]
     return Panel(

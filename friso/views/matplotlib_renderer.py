@@ -111,9 +111,7 @@ def _draw(axes: Axes, panel: Panel, width: float) -> None:
     """Everything of one panel, which is `width` [inch] wide."""
     _scale(axes, panel)
     for field in panel.maps:
-        mesh = axes.pcolormesh(
-            field.x, field.y, np.ma.masked_invalid(field.z), cmap="viridis", shading="nearest"
-        )
+        mesh = axes.pcolormesh(field.x, field.y, np.ma.masked_invalid(field.z), cmap="viridis", shading="nearest")
         bar = axes.get_figure().colorbar(mesh, ax=axes)  # type: ignore[union-attr]
         bar.set_label(field.label, parse_math=False)
         axes.grid(visible=False)

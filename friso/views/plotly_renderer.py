@@ -137,9 +137,7 @@ def _axis(axis: Axis) -> dict[str, Any]:
     return settings
 
 
-def _traces(
-    panel: Panel, number: int, x_domain: tuple[float, float], y_domain: tuple[float, float]
-) -> list[Any]:
+def _traces(panel: Panel, number: int, x_domain: tuple[float, float], y_domain: tuple[float, float]) -> list[Any]:
     """What is drawn in a panel, maps first, in the order of `drawable`."""
     suffix = _suffix(number)
     place = {"xaxis": f"x{suffix}", "yaxis": f"y{suffix}"}
@@ -161,14 +159,10 @@ def _line(line: Series, panel: Panel, place: dict[str, Any]) -> go.Scatter:
 
 def _points(marker: Markers, panel: Panel, place: dict[str, Any]) -> go.Scatter:
     style = {"color": marker.colour, "symbol": _SYMBOLS[marker.symbol], "size": 9}
-    return go.Scatter(
-        x=marker.x, y=marker.y, mode="markers", marker=style, **_text(marker.label, panel), **place
-    )
+    return go.Scatter(x=marker.x, y=marker.y, mode="markers", marker=style, **_text(marker.label, panel), **place)
 
 
-def _map(
-    field: Map, place: dict[str, Any], x_domain: tuple[float, float], y_domain: tuple[float, float]
-) -> go.Heatmap:
+def _map(field: Map, place: dict[str, Any], x_domain: tuple[float, float], y_domain: tuple[float, float]) -> go.Heatmap:
     bar = {
         "title": {"text": html.escape(field.label), "side": "right"},
         "x": x_domain[1],

@@ -42,9 +42,7 @@ def report_html(cases: Mapping[str, Case]) -> str:
         sentences=[(item, verdict_sentence(item)) for item in shown],
         conclusion=conclusion(cases),
         rows=rows(shown),
-        figures=[
-            (figure, Markup(plotly_renderer.fragment(figure)), _print_image(figure)) for figure in figures
-        ],
+        figures=[(figure, Markup(plotly_renderer.fragment(figure)), _print_image(figure)) for figure in figures],
         plotly=Markup(plotly_renderer.script()) if figures else None,
         stage_file=stage.to_toml(),
         version=VERSION,

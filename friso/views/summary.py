@@ -39,11 +39,7 @@ def conclusion(cases: Mapping[str, Case]) -> str | None:
     if len(hunts) < 2 or not known:
         return None
     if hunts["locked"]:
-        return (
-            "The free joint does not stop the hunting."
-            if hunts["free"]
-            else "The free joint stops the hunting."
-        )
+        return "The free joint does not stop the hunting." if hunts["free"] else "The free joint stops the hunting."
     return "The stage hunts only with its joint free." if hunts["free"] else None
 
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from friso.equations.friction.common import Friction
 from friso.quantities import Quantity, Value, non_negative, positive
@@ -21,10 +20,6 @@ class Dahl(FrictionSection):
     coulomb: Annotated[Value, Quantity("N", positive, "1 N")]
     bristle_stiffness: Annotated[Value, Quantity("N/m", positive, "1e5 N/m")]
     viscous: Annotated[Value, Quantity("N*s/m", non_negative, "0.5 N*s/m")]
-
-    @staticmethod
-    def variant(flat: Mapping[str, Any]) -> None:
-        return None
 
     @staticmethod
     def declare(velocity: sp.Symbol, variant: None) -> Friction:

@@ -40,11 +40,7 @@ class LuGre(FrictionSection):
         deflection, stiffness = state("bristle_deflection"), key("friction.bristle_stiffness")
         level = stribeck_level(velocity, forward.sign, variant)
         rate = velocity - stiffness * forward.sign * velocity / level * deflection
-        force = (
-            stiffness * deflection
-            + key("friction.bristle_damping") * rate
-            + key("friction.viscous") * velocity
-        )
+        force = stiffness * deflection + key("friction.bristle_damping") * rate + key("friction.viscous") * velocity
         static = key("friction.static")
         bristles = State(deflection, rate, "m", scale=static / stiffness)
         outputs = {"bristle_deflection": Output(deflection, "m", "bristle deflection z")}

@@ -1,0 +1,133 @@
+"""Published cases, and numbers computed with SciPy Radau for the purpose (references.md, sections 1 and 2).
+
+LuGre: Canudas de Wit, Olsson, Astrom, Lischinsky 1995, doi:10.1109/9.376053. Hunting: Fix, Univ. of Twente.
+"""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from cycles import return_map, swings
+from variants import LOCKED, PARASITIC, VARIANTS, free, lugre, release, stage, van_dijk
+
+import friso
+from friso.stage import Stage
+
+STICK_SLIP = friso.load(Path(__file__).parents[1] / "examples" / "lugre_stick_slip.toml")
+CART = pytest.mark.xdist_group("cart")
+RIGID = pytest.mark.xdist_group("rigid")
+LOCKED_RIG = pytest.mark.xdist_group("locked")
+FREE_RIG = pytest.mark.xdist_group("free")
+
+
+def simulated(chosen: Stage, sample_time: float) -> xr.Dataset:
+    response = friso.simulate(chosen, rtol=1e-9, sample_time=sample_time)
+    assert response.attrs["status"] == "done"
+    return response
+
+
+def crossings(response: xr.Dataset, speed: float) -> np.ndarray:
+    """Times [s] at which the velocity rises through `speed`."""
+    v, t = response.velocity.to_numpy(), response.time.to_numpy()
+    at = np.flatnonzero((v[:-1] < speed) & (v[1:] >= speed))
+    return t[at] + (speed - v[at]) / (v[at + 1] - v[at]) * (t[at + 1] - t[at])
+
+
+@pytest.fixture(scope="module")
+def stick_slip() -> xr.Dataset:
+    return simulated(STICK_SLIP, 1e-4)
+
+
+@CART
+def test_stick_slip(stick_slip: xr.Dataset) -> None:
+    rising = crossings(stick_slip, 0.05)
+    assert rising[0] == pytest.approx(7.54040, abs=0.6e-5)
+    assert np.diff(rising)[-1] == pytest.approx(6.36272, abs=0.6e-5)
+    assert float(stick_slip.velocity.max()) == pytest.approx(0.369816, abs=0.6e-6)
+    assert float(stick_slip.friction_force.max()) == pytest.approx(1.476573, abs=0.6e-6)
+
+
+@CART
+def test_stick_slip_plateaus(stick_slip: xr.Dataset) -> None:
+    """Where it sticks, it still creeps by some micrometres: the numbers hold at these times."""
+    plateaus = stick_slip.position.sel(time=[12, 18, 25], method="nearest")
+    assert plateaus.to_numpy() == pytest.approx([0.636293, 1.272562, 1.908839], abs=0.6e-6)
+    assert stick_slip.velocity.sel(time=[12, 18, 25], method="nearest").to_numpy() == pytest.approx(0, abs=1e-5)
+
+
+@CART
+@pytest.mark.parametrize(("stiffness", "period"), [("1e5 N/m", 7.494), ("1e6 N/m", 7.655)])
+def test_limit_without_bristles(stiffness: str, period: float) -> None:
+    """Period and top speed without bristles and viscous friction, in closed form; with bristles near it."""
+    k, v_p, gap, mass = 2.0, 0.1, 0.5, 1.0
+    delta, w = gap / k, np.sqrt(k / mass)
+    theta = np.arctan(v_p / (w * delta))
+    closed_period = 2 * delta / v_p + (np.pi + 2 * theta) / w
+    closed_speed = v_p + np.hypot(v_p, w * delta)
+    assert closed_period == pytest.approx(7.6113, abs=0.6e-4)
+    assert closed_speed == pytest.approx(0.4674, abs=0.6e-4)
+    changes = {"friction.viscous": "0 N*s/m", "friction.bristle_stiffness": stiffness, "motion.duration": "40 s"}
+    response = simulated(STICK_SLIP.replace(changes), 1e-3)
+    observed = np.diff(crossings(response, 0.05))[-1]
+    assert observed == pytest.approx(period, abs=0.6e-3)
+    assert observed == pytest.approx(closed_period, rel=0.03)
+    assert float(response.velocity.max()) == pytest.approx(closed_speed, rel=0.03)
+
+
+@CART
+@pytest.mark.parametrize(("rate", "force"), [(1, 1.42), (10, 1.21), (20, 1.09), (35, 1.0), (50, 1.0)])
+def test_break_away_force_falls_with_the_rate_of_force(rate: float, force: float) -> None:
+    """The largest force of the bristles while a mass of 1 kg is pushed by a ramp of force [N/s] (3 %: off a figure)."""
+    push = {"controller.kp": "1 N/m", "motion.velocity": f"{rate} m/s", "motion.duration": f"{3 / rate!r} s"}
+    response = simulated(STICK_SLIP.replace(push), 1e-4 / rate)
+    assert 1e5 * float(response.bristle_deflection.max()) == pytest.approx(force, rel=0.03)
+
+
+@RIGID
+def test_cycle_of_a_rigid_mass_at_4_hz() -> None:
+    """T 3.15031069 s, A 2.0166608 mm, half-period multiplier -0.8172509 (shooting at rtol 1e-12)."""
+    times, heights = swings(VARIANTS["rigid"].replace({"motion.duration": "300 s"}), rtol=1e-10)
+    assert (times[-1] - times[-21]) / 10 == pytest.approx(3.15031069, abs=0.6e-8)
+    assert heights[-4:] == pytest.approx(2.0166608e-3, abs=0.6e-10)
+    amplitude, multiplier = return_map(heights)
+    assert amplitude == pytest.approx(2.01666e-3, abs=1e-8)
+    assert multiplier == pytest.approx(-0.8172509, rel=0.01)
+
+
+def rig(crossover: float, displacement: float, joint: str = LOCKED) -> Stage:
+    """The thesis's rig, released."""
+    motion, control = release(f"{displacement} mm", "100 s"), van_dijk(f"{crossover} Hz")
+    return stage(motion, friction=lugre(2), joint=joint, parasitic=PARASITIC, controller=control)
+
+
+@LOCKED_RIG
+@pytest.mark.parametrize(
+    ("crossover", "displacement", "amplitude", "multiplier"),
+    [(4, 2, 2.016e-3, -0.82), (6, 0.89, 0.904e-3, -0.875), (8, 1.9, 0.520e-3, -0.935)],
+)
+def test_cycles_of_the_locked_rig(crossover: float, displacement: float, amplitude: float, multiplier: float) -> None:
+    """Amplitudes and multipliers that were fitted in the same way elsewhere (about 1 %)."""
+    _, heights = swings(rig(crossover, displacement), rtol=1e-8)
+    fixed_point, slope = return_map(heights)
+    assert fixed_point == pytest.approx(amplitude, abs=1e-6)
+    assert slope == pytest.approx(multiplier, rel=0.01)
+
+
+@LOCKED_RIG
+@pytest.mark.parametrize(("crossover", "dies", "hunts"), [(4, 0.27, 0.31), (8, 1.7, 1.9)])
+def test_release_that_starts_hunting(crossover: float, dies: float, hunts: float) -> None:
+    """Bistable: it takes about 0.29 mm at 4 Hz and 1.8 mm at 8 Hz to start hunting from rest."""
+    assert swings(rig(crossover, dies), rtol=1e-8)[0][-1] < 50
+    assert swings(rig(crossover, hunts), rtol=1e-8)[0][-1] > 95
+
+
+@FREE_RIG
+@pytest.mark.parametrize(
+    ("crossover", "displacement", "amplitude", "multiplier"), [(3, 4.3, 4.28e-3, -0.82), (5, 2, 1.99e-3, -0.96)]
+)
+def test_cycles_of_the_free_rig(crossover: float, displacement: float, amplitude: float, multiplier: float) -> None:
+    _, heights = swings(rig(crossover, displacement, free()), rtol=1e-8)
+    fixed_point, slope = return_map(heights)
+    assert fixed_point == pytest.approx(amplitude, abs=1e-5)
+    assert slope == pytest.approx(multiplier, rel=0.01)
