@@ -1,0 +1,92 @@
+"""What the user waits for and needs: wall time of `friso check`, cold and warm, and the memory of a large sweep."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+from benchmarks.report import Goal, clock, print_table, spread
+from benchmarks.rigs import FILE
+
+START = "from friso.cli import main; main()"
+SWEPT = 100_000
+
+_SWEEP = f"""
+import resource, time
+import numpy as np
+import friso
+from benchmarks.rigs import rig
+from friso.engine.batch import run_chunks
+from friso.hunting.measures import measure, options
+
+rig = rig(locked=False)
+n = {SWEPT}
+flat = dict(rig.flat)
+flat["controller.crossover"] = np.random.default_rng(1).uniform(1, 16, n)
+flat["joint.stroke"] = np.random.default_rng(2).uniform(1e-6, 1e-3, n)
+before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+start, hunting = time.perf_counter(), 0
+for runs in run_chunks(rig.kernel, flat, n, options(flat, 1e-4)):
+    here = slice(runs.first, runs.first + len(runs.results.statuses))
+    part = {{key: value[here] if np.ndim(value) else value for key, value in flat.items()}}
+    hunting += int((measure(part, runs).peaks > 0).sum())
+peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+print(before / 1024, peak / 1024, time.perf_counter() - start, hunting)
+"""
+
+
+def _check(cache: Path, *options: str) -> tuple[float, str]:
+    """Wall time [s] of one `friso check` and its standard error."""
+    kept: list[subprocess.CompletedProcess[str]] = []
+    command = [sys.executable, *options, "-c", START, "check", str(FILE)]
+    environment = {**os.environ, "FRISO_CACHE_DIR": str(cache)}
+    seconds = clock(
+        lambda: kept.append(
+            subprocess.run(command, env=environment, capture_output=True, text=True, cwd=cache)
+        )
+    )
+    if kept[0].returncode:
+        raise RuntimeError(f"friso check ended with status {kept[0].returncode}: {kept[0].stderr[-500:]}")
+    return seconds, kept[0].stderr
+
+
+def _import_seconds(cache: Path) -> float:
+    """Time spent in imports during one `friso check`, by -X importtime (which itself adds a little) [s]."""
+    _, errors = _check(cache, "-X", "importtime")
+    return sum(int(us) for us in re.findall(r"^import time:\s+(\d+) \|", errors, re.MULTILINE)) * 1e-6
+
+
+def run_check(repetitions: int) -> list[Goal]:
+    """Time `friso check examples/thesis_rig.toml`."""
+    with tempfile.TemporaryDirectory(prefix="friso-bench-") as folder:
+        cache = Path(folder)
+        cold, _ = _check(cache)
+        warm = [_check(cache)[0] for _ in range(max(3, 2 * repetitions))]
+        imports = [_import_seconds(cache) for _ in range(3)]
+    print("\nfriso check examples/thesis_rig.toml, wall time [s]")
+    rows = [("cold (empty cache)", f"{cold:.2f}"), ("warm, min / median", spread(warm, digits=2))]
+    print_table(("", "s"), [*rows, ("imports of it, min / median", spread(imports, digits=2))])
+    return [
+        Goal("friso check, warm", "< 3 s", f"{min(warm):.2f} s", min(warm) < 3),
+        Goal("friso check, warm, imports", "< 1 s", f"{min(imports):.2f} s", min(imports) < 1),
+        Goal("friso check, cold", "< 30 s", f"{cold:.1f} s", cold < 30),
+    ]
+
+
+def run_memory() -> list[Goal]:
+    """Peak memory of a sweep of 1e5 runs without traces, in a process of its own."""
+    done = subprocess.run(
+        [sys.executable, "-c", _SWEEP], capture_output=True, text=True, cwd=Path(__file__).parents[1]
+    )
+    if done.returncode:
+        raise RuntimeError(done.stderr[-800:])
+    before, peak, seconds, hunting = (float(word) for word in done.stdout.split())
+    print(
+        f"\nSweep of {SWEPT} runs (free rig, crossover x stroke, rtol 1e-4): {seconds:.1f} s, {hunting:.0f} hunt,"
+    )
+    print(f"  peak memory {peak:.0f} MB, {before:.0f} MB of it before the sweep")
+    return [Goal(f"memory of a sweep of {SWEPT} runs", "< 500 MB", f"{peak:.0f} MB", peak < 500)]

@@ -1,0 +1,120 @@
+"""Benchmarks of the engine (issue 2, section 6), by ``python -m benchmarks.engine``; ``--help`` lists the options.
+
+Sections: race (friso, prototype and peers on one rig), precision (work against precision), maps, check, memory.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+import time
+from pathlib import Path
+from types import ModuleType
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from benchmarks.race import Field
+    from benchmarks.rigs import Rig
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # read when NumPy is loaded; 9 x 9 systems gain nothing
+
+SECTIONS = ("race", "precision", "maps", "check", "memory")
+
+
+def main() -> None:
+    """Run the benchmarks and print what was measured, then the goals."""
+    from benchmarks import command, maps, prototype
+    from benchmarks.precision import work_precision
+    from benchmarks.race import run_race
+    from benchmarks.report import Goal, print_goals
+    from benchmarks.rigs import rig
+
+    wanted = _arguments()
+    chosen = (wanted.only,) if wanted.only else SECTIONS
+    repetitions = 1 if wanted.quick else 3
+    print(_machine())
+    start = time.perf_counter()
+    goals: list[Goal] = []
+    rigs = [rig(locked=True), rig(locked=False)]
+    lanes = prototype.load() if {"race", "maps"} & set(chosen) else None
+    if {"race", "precision"} & set(chosen):
+        places = _places(rigs, lanes, repetitions, wanted.quick)
+        if "race" in chosen:
+            goals += [goal for place in places for goal in run_race(place)]
+        if "precision" in chosen:
+            work_precision(places, wanted.out, wanted.quick)
+    if "maps" in chosen:
+        goals += maps.run_maps(maps.both_maps(*rigs), lanes, repetitions)
+    if "check" in chosen:
+        goals += command.run_check(repetitions)
+    if "memory" in chosen:
+        goals += command.run_memory()
+    print_goals(goals)
+    print(
+        f"\n  measured in {time.perf_counter() - start:.0f} s; load of the machine now {os.getloadavg()[0]:.1f}"
+    )
+
+
+def _places(rigs: list[Rig], lanes: ModuleType | None, repetitions: int, quick: bool) -> list[Field]:
+    """The two races with their reference traces."""
+    import numpy as np
+
+    from benchmarks.compiled import compile_equations
+    from benchmarks.metrics import distance
+    from benchmarks.peers import peers
+    from benchmarks.race import REFERENCE_RTOL, Field, friso_trace, reference_trace
+
+    places = []
+    solvers = peers()
+    for each in rigs:
+        equations = compile_equations(each)
+        state = np.zeros(len(each.scales))
+        equations.rate(0.0, state, each.pieces)
+        equations.jacobian(0.0, state, each.pieces)
+        own = friso_trace(each, REFERENCE_RTOL)[0]
+        if quick:
+            reference = friso_trace(each, REFERENCE_RTOL / 10)[0]
+        else:
+            reference = reference_trace(each, equations, solvers["SciPy Radau"])
+        apart = distance(each.grid, own, reference)
+        print(
+            f"  {each.name}: reference by {'friso at 1e-12 (--quick)' if quick else 'SciPy Radau at 1e-11'}; ",
+            end="",
+        )
+        print(
+            f"friso at 1e-11 is off by {apart.early:.1e} m in 0.1 s, {apart.largest:.1e} m at most, ", end=""
+        )
+        print(f"{apart.rms:.1e} m rms, {apart.late:.1e} m rms after 10 s")
+        places.append(Field(each, equations, solvers, lanes, reference, repetitions))
+    return places
+
+
+def _machine() -> str:
+    import numba
+    import numpy
+    import scipy
+
+    import friso
+
+    names = [line.split(":")[1].strip() for line in _cpu_lines() if line.startswith("model name")]
+    versions = ", ".join(f"{module.__name__} {module.__version__}" for module in (friso, numba, numpy, scipy))
+    cores, load = len(os.sched_getaffinity(0)), os.getloadavg()[0]
+    return f"{versions}; {names[0] if names else 'unknown processor'}, {cores} cores, load before {load:.1f}"
+
+
+def _cpu_lines() -> list[str]:
+    file = Path("/proc/cpuinfo")
+    return file.read_text().splitlines() if file.exists() else []
+
+
+def _arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.engine", description=__doc__)
+    parser.add_argument("--quick", action="store_true", help="fewer repetitions, friso's own reference trace")
+    parser.add_argument("--only", choices=SECTIONS, help="one section alone")
+    parser.add_argument("--out", type=Path, default=Path("benchmark_results"), help="folder for the plot")
+    return parser.parse_args()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,55 @@
+"""Printing: tables of text, and the goals of issue 2 with what was measured."""
+
+from __future__ import annotations
+
+import statistics
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Goal:
+    """A goal: what it is about, what is wanted, what was measured, and whether that reaches it (None: information)."""
+
+    about: str
+    wanted: str
+    measured: str
+    reached: bool | None
+
+
+def print_table(head: Sequence[str], rows: Sequence[Sequence[Any]]) -> None:
+    """Print aligned columns, the first to the left."""
+    cells = [list(head), *([str(cell) for cell in row] for row in rows)]
+    widths = [max(len(row[i]) for row in cells) for i in range(len(head))]
+    for k, row in enumerate(cells):
+        first = row[0].ljust(widths[0])
+        print(
+            "  "
+            + "  ".join([first, *(c.rjust(w) for c, w in zip(row[1:], widths[1:], strict=True))]).rstrip()
+        )
+        if k == 0:
+            print("  " + "  ".join("-" * w for w in widths))
+
+
+def print_goals(goals: Sequence[Goal]) -> None:
+    """Print all goals, reached or not."""
+    words = {True: "yes", False: "NO", None: "-"}
+    print("\nGoals of issue 2, section 6")
+    print_table(
+        ("goal", "wanted", "measured", "reached?"),
+        [(g.about, g.wanted, g.measured, words[g.reached]) for g in goals],
+    )
+
+
+def clock(job: Callable[[], Any]) -> float:
+    """Wall time of a job [s]."""
+    start = time.perf_counter()
+    job()
+    return time.perf_counter() - start
+
+
+def spread(seconds: Sequence[float], scale: float = 1.0, digits: int = 1) -> str:
+    """Least and median of some times, times `scale`."""
+    return f"{min(seconds) * scale:.{digits}f} / {statistics.median(seconds) * scale:.{digits}f}"
