@@ -44,13 +44,13 @@ class Compiled:
 def compile_equations(rig: Rig) -> Compiled:
     """The equations of a rig, compiled."""
     model = assemble(structure(rig.flat))
-    values = {sp.Symbol(name, real=True): value for name, value in rig.parameters.items()}
+    values = {sp.Symbol(name, real=True): sp.Float(value) for name, value in rig.parameters.items()}
     names = {symbol: sp.Symbol(f"x{i}", real=True) for i, symbol in enumerate(model.symbols)}
     names |= {kink.beyond: sp.Symbol(f"beyond{k}", real=True) for k, kink in enumerate(model.kinks)}
     names |= dict(zip((*REFERENCE, TIME), sp.symbols("r0 r1 r2 since", real=True), strict=True))
 
     def plain(expression: sp.Expr) -> sp.Expr:
-        return sp.sympify(expression).subs(values).xreplace(names).evalf(20)
+        return sp.sympify(expression).xreplace(values).xreplace(names).evalf(20)
 
     surfaces = [plain(kink.surface) for kink in model.kinks]
     rates = {f"out[{i}]": plain(f) for i, f in enumerate(model.rhs)}

@@ -10,9 +10,12 @@ COUNTED_AFTER, COUNTED_ABOVE, APART = 10.0, 1e-4, 0.5
 """The thesis's hunting metric: maxima after 10 s, above 0.1 mm, 0.5 s apart, the tallest kept first."""
 
 
-def maxima(times: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Times [s] and heights [m] of the counted maxima among turning points, in order of time."""
-    inner = np.pad(values, 1, constant_values=-np.inf)
+def maxima(times: np.ndarray, values: np.ndarray, beyond: float = -np.inf) -> tuple[np.ndarray, np.ndarray]:
+    """Times [s] and heights [m] of the counted maxima among turning points, in order of time.
+
+    `beyond` stands before the first and after the last value: -inf lets the ends count, inf does not.
+    """
+    inner = np.pad(values, 1, constant_values=beyond)
     top = (inner[1:-1] > inner[:-2]) & (inner[1:-1] >= inner[2:])
     kept: list[int] = []
     for i in np.argsort(-values):
@@ -25,7 +28,7 @@ def maxima(times: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarra
 
 def sampled_maxima(times: np.ndarray, position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The counted maxima of a sampled trace, each refined by the parabola through three samples."""
-    found, _ = maxima(times, position)
+    found, _ = maxima(times, position, np.inf)
     at = np.clip(np.searchsorted(times, found), 1, len(times) - 2)
     y0, y1, y2 = position[at - 1], position[at], position[at + 1]
     bend = y0 - 2 * y1 + y2

@@ -12,7 +12,7 @@ from benchmarks.peers import time_out, whole
 from benchmarks.race import RUNS, Field, friso_seconds, friso_trace
 from benchmarks.report import clock, print_table
 
-LIMIT = 20.0
+LIMIT = 8.0
 """Wall time of a run beyond which a method's tighter tolerances are left out [s]."""
 
 Curve = list[tuple[float, float, float, float]]

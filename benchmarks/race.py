@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from types import ModuleType
 from typing import Any
 
@@ -88,21 +90,16 @@ def _lanes(place: Field, rtol: float) -> list[Entry]:
     """friso and the prototype, timed in turns."""
     rig, module = place.rig, place.prototype
     times: dict[str, list[float]] = {}
+    jobs: dict[str, Callable[[], float]] = {}
     found = None
-    thread_counts = sorted({1, CORES})
-    jobs = {
-        f"friso, {n} thread{'s' * (n > 1)}": lambda n=n: friso_seconds(rig, rtol, RUNS, n)
-        for n in thread_counts
-    }
-    jobs["friso, crossovers +-5 %"] = lambda: friso_seconds(rig, rtol, RUNS, 1, 0.05)
+    for n in sorted({1, CORES}):
+        jobs[f"friso, {n} thread{'s' * (n > 1)}"] = partial(friso_seconds, rig, rtol, RUNS, n)
+    jobs["friso, crossovers +-5 %"] = partial(friso_seconds, rig, rtol, RUNS, 1, 0.05)
     if module is not None:
         rows = np.array([module.parameters(crossover=8.0, locked=rig.name == "locked")] * RUNS)
-        run_prototype(module, rows[:1], rtol)
-        for n in thread_counts:
-            jobs[f"prototype, {n} thread{'s' * (n > 1)}"] = lambda n=n: _prototype_seconds(
-                module, rows, rtol, n
-            )
         found = run_prototype(module, rows[:1], rtol)
+        for n in sorted({1, CORES}):
+            jobs[f"prototype, {n} thread{'s' * (n > 1)}"] = partial(_prototype_seconds, module, rows, rtol, n)
     for _ in range(max(5, 2 * place.repetitions)):
         for name, job in jobs.items():
             times.setdefault(name, []).append(job())
@@ -137,9 +134,11 @@ def _peers(place: Field, rtol: float) -> list[Entry]:
     entries = []
     for name, solve in place.peers.items():
         run = race(solve, place.rig, place.equations, rtol, place.repetitions)
-        entry = Entry(name, run.seconds, remark=run.note or f"{run.way}; unsampled {run.unsampled:.3f} s")
+        entry = Entry(name, run.seconds, remark=run.note or run.way)
+        if np.isfinite(run.unsampled):
+            entry.remark += f"; unsampled {run.unsampled:.3f} s"
         if run.position is not None:
-            entry.steps = str(run.steps)
+            entry.steps = str(run.steps) if run.steps > 0 else ""
             entry.cycle = cycle(sampled_maxima(place.rig.grid, run.position))
             entry.distance = distance(place.rig.grid, run.position, place.reference)
         entries.append(entry)
