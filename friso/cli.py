@@ -29,7 +29,9 @@ StageFile = Annotated[Path, typer.Argument(metavar="STAGE.toml", help="The stage
 Overrides = Annotated[
     list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help='Override a key: controller.crossover="12 Hz".')
 ]
-Tolerance = Annotated[float, typer.Option(help="Relative tolerance of the solver, 1e-12 to 1e-2.")]
+Tolerance = Annotated[
+    str, typer.Option("--rtol", metavar="NUMBER", help="Relative tolerance of the solver, 1e-12 to 1e-2.")
+]
 AsJson = Annotated[bool, typer.Option("--json", help="One JSON document on standard output, nothing else.")]
 OutFolder = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder for the files written.")]
 
@@ -103,7 +105,7 @@ def init(
 def check(
     stage_file: StageFile,
     overrides: Overrides = None,
-    rtol: Tolerance = 1e-6,
+    rtol: Tolerance = "1e-6",
     out: OutFolder = None,
     as_json: AsJson = False,
 ) -> None:
@@ -111,11 +113,11 @@ def check(
 
     Example: friso check examples/thesis_rig.toml --set controller.crossover="12 Hz" --out report
     """
-    stage = _stage(stage_file, overrides)
+    stage, tolerance = _stage(stage_file, overrides), _tolerance(rtol)
     folder = None if out is None else _folder(out)
     from friso.hunting import check as check_stage
 
-    cases = check_stage(stage, rtol=rtol, traces=folder is not None)
+    cases = check_stage(stage, rtol=tolerance, traces=folder is not None)
     if folder is not None:
         from friso.views.report import write_report
 
@@ -133,7 +135,7 @@ def check(
 def simulate(
     stage_file: StageFile,
     overrides: Overrides = None,
-    rtol: Tolerance = 1e-6,
+    rtol: Tolerance = "1e-6",
     sample_time: Annotated[str | None, typer.Option(metavar="TIME", help='Sampling interval, such as "1 ms".')] = None,
     out: OutFolder = None,
     as_json: AsJson = False,
@@ -142,18 +144,18 @@ def simulate(
 
     Example: friso simulate examples/lugre_stick_slip.toml --sample-time "1 ms" --out response
     """
-    stage = _stage(stage_file, overrides)
+    stage, tolerance = _stage(stage_file, overrides), _tolerance(rtol)
     interval = None if sample_time is None else _sample_time(sample_time)
     folder = _folder(out or Path("."))
     from friso.engine.simulate import simulate as simulate_stage
 
-    response = simulate_stage(stage, rtol=rtol, sample_time=interval)
+    response = simulate_stage(stage, rtol=tolerance, sample_time=interval)
     written = _write_response(response, folder / f"{stage_file.stem}_response")
     status = response.attrs["status"]
     if as_json:
         solver = {"status": status, "steps": response.attrs["steps"], "rejected": response.attrs["rejected"]}
         document = {"stage": stage.name, "files": [str(path) for path in written]}
-        print(json.dumps(document | {"solver": solver | {"rtol": rtol}}))
+        print(json.dumps(document | {"solver": solver | {"rtol": tolerance}}))
     else:
         print(f"{stage.name or stage_file.stem}: {status} ({response.attrs['steps']} steps)")
         print("\n".join(f"wrote {path}" for path in written))
@@ -181,6 +183,15 @@ def _folder(path: Path) -> Path:
         expected = f"a folder that can be written ({error.strerror})"
         raise StageError("--out", str(path), expected, "--out report") from None
     return path
+
+
+def _tolerance(text: str) -> float:
+    from friso.engine.tolerance import checked_rtol
+
+    try:
+        return checked_rtol(float(text))
+    except ValueError:
+        raise StageError("--rtol", text, "a number from 1e-12 to 1e-2", "--rtol 1e-6") from None
 
 
 def _sample_time(text: str) -> float:

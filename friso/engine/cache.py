@@ -14,10 +14,10 @@ import logging
 import os
 import shutil
 import stat
+import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from types import ModuleType
@@ -66,26 +66,36 @@ def environment() -> str:
     return repr((code.hexdigest(), versions, llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()))
 
 
-def load_or_build(name: str, write: Callable[[], str], compile_module: Callable[[ModuleType], None]) -> ModuleType:
-    """The module called `name`: from the cache, or written by `write`, compiled and kept.
+def load_or_build(name: str, builder: str, task: bytes, load: Callable[[ModuleType], None]) -> ModuleType:
+    """The module called `name` from the cache, built there first if need be, and prepared by `load`.
 
-    Raises OSError where the cache folder cannot be written.
+    `builder` is a module that, run as a program with the entry's folder as argument and `task` on standard input,
+    fills the entry. It is a process of its own so that what runs is always what is kept: code that is compiled and
+    run in one process may round differently from the same code loaded. Raises RuntimeError with the builder's
+    message if it fails, OSError where the cache folder cannot be written.
     """
     key = hashlib.sha256(f"{name} {environment()}".encode()).hexdigest()[:24]
     entry = cache_folder() / key
-    with FileLock(cache_folder() / f"{key}.lock", mode=0o600), _numba_cache_beside_the_module():
+    with FileLock(cache_folder() / f"{key}.lock", mode=0o600):
         if not _intact(entry):
             logger.warning("compiling a kernel for these equations; the next run finds it compiled")
             shutil.rmtree(entry, ignore_errors=True)
             entry.mkdir(mode=0o700)
-            (entry / "kernel.py").write_text(write())
-            module = _import(entry, key)
-            compile_module(module)
+            _build(builder, entry, task)
             (entry / "manifest.json").write_text(json.dumps(_checksums(entry)))
-            return module
-        module = _import(entry, key)
-        compile_module(module)
+        module = import_entry(entry)
+        load(module)
         return module
+
+
+def _build(builder: str, entry: Path, task: bytes) -> None:
+    paths = os.pathsep.join(path or os.getcwd() for path in sys.path)
+    environ = {**os.environ, "PYTHONPATH": paths}
+    done = subprocess.run(
+        [sys.executable, "-m", builder, str(entry)], input=task, capture_output=True, env=environ, check=False
+    )
+    if done.returncode:
+        raise RuntimeError(f"the kernel could not be compiled:\n{done.stderr.decode(errors='replace')}")
 
 
 def _checksums(entry: Path) -> dict[str, str]:
@@ -101,22 +111,17 @@ def _intact(entry: Path) -> bool:
         return False
 
 
-def _import(entry: Path, key: str) -> ModuleType:
-    spec = importlib.util.spec_from_file_location(f"friso_kernel_{key}", entry / "kernel.py")
+def import_entry(entry: Path) -> ModuleType:
+    """The module of an entry; Numba finds its machine code beside it, whatever NUMBA_CACHE_DIR says."""
+    spec = importlib.util.spec_from_file_location(f"friso_kernel_{entry.name}", entry / "kernel.py")
     if spec is None or spec.loader is None:
         raise ImportError(f"no module can be made of {entry / 'kernel.py'}")
     module = importlib.util.module_from_spec(spec)
     sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
-    return module
-
-
-@contextmanager
-def _numba_cache_beside_the_module() -> Iterator[None]:
-    """Keep Numba's files in the entry, where the manifest covers them, whatever NUMBA_CACHE_DIR says."""
     elsewhere = getattr(numba_config, "CACHE_DIR")  # noqa: B009 (set at import, unknown to type checkers)
     setattr(numba_config, "CACHE_DIR", "")  # noqa: B010
     try:
-        yield
+        spec.loader.exec_module(module)
     finally:
         setattr(numba_config, "CACHE_DIR", elsewhere)  # noqa: B010
+    return module

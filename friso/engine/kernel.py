@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import pickle
+from collections.abc import Iterable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cache
 from types import ModuleType
@@ -47,15 +50,15 @@ class Kernel:
 @cache
 def kernel(structure: Structure, method: str = "Rodas5P", lanes: int = LANES) -> Kernel:
     """The kernel for stages of this structure, stepping by the named method in so many lanes."""
+    task = pickle.dumps((structure, method, lanes))
+    name = f"{structure!r} {method} {lanes}"
+    return Kernel(load_or_build(name, "friso.engine.build", task, compile_driver))
 
-    def write() -> str:
-        from friso.engine.module_source import write_module
-        from friso.engine.tableaus import TABLEAUS
-        from friso.equations.model import assemble
 
-        return write_module(assemble(structure), TABLEAUS[method], repr(structure), lanes)
-
-    return Kernel(load_or_build(f"{structure!r} {method} {lanes}", write, _compile))
+def kernels(structures: Iterable[Structure]) -> list[Kernel]:
+    """The kernels of several structures; what has to be compiled is compiled side by side."""
+    with ThreadPoolExecutor() as pool:
+        return list(pool.map(kernel, structures))
 
 
 def empty_results(runs: int, capacity: int, samples: int, states: int) -> Results:
@@ -70,7 +73,7 @@ def empty_results(runs: int, capacity: int, samples: int, states: int) -> Result
     )
 
 
-def _compile(module: ModuleType) -> None:
+def compile_driver(module: ModuleType) -> None:
     """Compile (or load from Numba's cache) the driver for the types it is called with, and for no others."""
     flat, square = np.zeros(1), np.zeros((1, 1))
     batch = Batch(square, square, square, square, flat, np.zeros((1, 1, 4)), np.zeros(1, np.int64))

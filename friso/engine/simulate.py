@@ -9,6 +9,7 @@ import numpy as np
 from friso.engine.arrays import Status
 from friso.engine.batch import Options, Runs, run_chunks
 from friso.engine.kernel import Kernel, kernel
+from friso.engine.tolerance import checked_rtol
 from friso.equations import motion
 from friso.equations.structure import structure
 from friso.stage import Stage
@@ -40,13 +41,6 @@ def simulate(stage: Stage, rtol: float = 1e-6, sample_time: float | None = None)
     (runs,) = run_chunks(shape, flat, 1, Options(rtol=checked_rtol(rtol), interval=interval))
     time = np.arange(runs.results.samples.shape[1]) * interval
     return _dataset(stage, shape, flat, runs, time, rtol)
-
-
-def checked_rtol(rtol: float) -> float:
-    """`rtol` if the solver can hold it. Raises ValueError otherwise."""
-    if not 1e-12 <= rtol <= 1e-2:
-        raise ValueError(f"rtol: given {rtol:g}, expected a number from 1e-12 to 1e-2, such as 1e-6")
-    return rtol
 
 
 def sampled_outputs(shape: Kernel, flat: dict[str, Any], states: np.ndarray, time: np.ndarray) -> list[np.ndarray]:

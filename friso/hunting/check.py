@@ -9,8 +9,9 @@ import numpy as np
 
 from friso.engine.arrays import Status
 from friso.engine.batch import run_chunks
-from friso.engine.kernel import kernel
-from friso.engine.simulate import checked_rtol, simulate
+from friso.engine.kernel import kernel, kernels
+from friso.engine.simulate import simulate
+from friso.engine.tolerance import checked_rtol
 from friso.equations.structure import structure
 from friso.hunting.measures import BANDS, measure, options
 from friso.stage import Stage
@@ -67,6 +68,7 @@ def check(stage: Stage, rtol: float = 1e-6, traces: bool = False) -> dict[str, C
         variants["locked"] = stage.replace({"joint.locked": True})
         if stage.joint.stiffness is not None:
             variants["free"] = stage.replace({"joint.locked": False})
+    kernels({structure(variant.flat()) for variant in variants.values()})
     cases: dict[str, Case] = {}
     for name, variant in variants.items():
         same = next((case for case in cases.values() if case.stage == variant), None)

@@ -12,7 +12,7 @@ import numpy as np
 from friso.engine.arrays import Status
 from friso.engine.batch import Runs, run_chunks
 from friso.engine.kernel import kernel
-from friso.engine.simulate import checked_rtol
+from friso.engine.tolerance import checked_rtol
 from friso.equations.structure import Structure, structure
 from friso.hunting.measures import BANDS, Measures, measure, options
 from friso.quantities import Number, Quantity, StageError

@@ -1,0 +1,27 @@
+"""The program that fills a cache entry: writes a kernel's module, and compiles it so that Numba keeps the machine code.
+
+Run by `friso.engine.cache` as ``python -m friso.engine.build FOLDER``, with the task pickled on standard input.
+"""
+
+from __future__ import annotations
+
+import pickle
+import sys
+from pathlib import Path
+
+from friso.engine.cache import import_entry
+from friso.engine.kernel import compile_driver
+from friso.engine.module_source import write_module
+from friso.engine.tableaus import TABLEAUS
+from friso.equations.model import assemble
+
+
+def main(entry: Path, task: bytes) -> None:
+    structure, method, lanes = pickle.loads(task)
+    source = write_module(assemble(structure), TABLEAUS[method], repr(structure), lanes)
+    (entry / "kernel.py").write_text(source)
+    compile_driver(import_entry(entry))
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]), sys.stdin.buffer.read())

@@ -1,0 +1,128 @@
+"""The command line, run as a user runs it: what it prints, its exit status, what it writes."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import xarray as xr
+
+import friso
+
+ROOT = Path(__file__).parent.parent
+RIG, STICK_SLIP = ROOT / "examples" / "thesis_rig.toml", ROOT / "examples" / "lugre_stick_slip.toml"
+
+pytestmark = pytest.mark.xdist_group("rig")
+
+
+def run(*arguments: object, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "friso.cli", *map(str, arguments)]
+    return subprocess.run(
+        command, capture_output=True, text=True, cwd=cwd or ROOT, env={**os.environ, "COLUMNS": "120"}, check=False
+    )
+
+
+def test_check_prints_the_verdict() -> None:
+    done = run("check", RIG)
+    assert done.returncode == 0
+    assert "Locked: hunts, 1.05 mm peak to peak every 1.6" in done.stdout
+    assert "The free joint stops the hunting." in done.stdout
+
+
+def test_check_json_is_one_document_with_the_agreed_keys() -> None:
+    document = json.loads(run("check", RIG, "--json").stdout)
+    assert document["stage"] == "Thesis rig"
+    locked = document["cases"]["locked"]
+    agreed = {"verdict", "peaks", "peak_to_peak_m", "period_s", "settling_time_s", "cycle", "solver"}
+    assert agreed <= locked.keys()
+    assert locked["solver"].keys() == {"status", "steps", "rejected", "rtol"}
+    assert (locked["verdict"], locked["peaks"], locked["cycle"]) == ("hunts", 6, None)
+    assert document["cases"]["given"] == document["cases"]["free"]
+
+
+def test_set_overrides_any_key() -> None:
+    document = json.loads(
+        run("check", RIG, "--set", "joint.locked=true", "--set", "controller.crossover=30 Hz", "--json").stdout
+    )
+    assert document["cases"]["given"] == document["cases"]["locked"]
+    assert document["cases"]["locked"]["verdict"] == "settles"
+
+
+def test_check_writes_a_report(tmp_path: Path) -> None:
+    done = run("check", RIG, "--out", tmp_path / "a" / "b")
+    assert done.returncode == 0
+    assert "hunts" in (tmp_path / "a" / "b" / "report.html").read_text(encoding="utf-8")
+
+
+def test_simulate_writes_what_python_returns(tmp_path: Path) -> None:
+    done = run("simulate", STICK_SLIP, "--sample-time", "10 ms", "--out", tmp_path)
+    assert done.returncode == 0
+    assert sorted(path.suffix for path in tmp_path.iterdir()) == [".csv", ".nc", ".png"]
+    with xr.open_dataset(tmp_path / "lugre_stick_slip_response.nc", engine="scipy") as written:
+        expected = friso.simulate(friso.load(STICK_SLIP), sample_time=0.01)
+        assert (written.position.values == expected.position.values).all()
+        assert written.attrs["status"] == "done"
+        assert friso.loads(written.attrs["stage"]) == friso.load(STICK_SLIP)
+    header = (tmp_path / "lugre_stick_slip_response.csv").read_text().splitlines()[0]
+    assert header.startswith("time [s],reference [m],")
+
+
+def test_init_writes_a_stage_that_checks_and_overwrites_nothing(tmp_path: Path) -> None:
+    assert run("init", "stage.toml", cwd=tmp_path).returncode == 0
+    before = (tmp_path / "stage.toml").read_text()
+    friso.loads(before)
+    again = run("init", "stage.toml", cwd=tmp_path)
+    assert again.returncode == 2
+    assert "nothing was overwritten" in again.stderr
+    assert (tmp_path / "stage.toml").read_text() == before
+
+
+def test_version() -> None:
+    assert run("--version").stdout == f"friso {friso.__version__}\n"
+
+
+@pytest.mark.parametrize("command", ["check", "simulate", "init"])
+def test_help_has_an_example(command: str) -> None:
+    assert f"Example: friso {command}" in run(command, "--help").stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["check", "nowhere.toml"], "no such file"),
+        (["check", ROOT / "examples"], "folder"),
+        (["check"], "STAGE.toml"),
+        (["chek", RIG], "check"),
+        (["check", RIG, "--rtol", "0"], "rtol"),
+        (["check", RIG, "--rtol", "fine"], "fine"),
+        (["check", RIG, "--set", "controller.crosover=8 Hz"], "did you mean crossover"),
+        (["check", RIG, "--set", "controller.crossover"], "controller.crossover"),
+        (["check", RIG, "--set", "controller.crossover=8"], "8 Hz"),
+        (["check", RIG, "--out", RIG], "--out"),
+        (["simulate", RIG, "--sample-time", "1"], "--sample-time"),
+        (["simulate", RIG, "--sample-time", "100 s"], "sample_time"),
+        (["simulate", RIG, "--sample-time", "1 mm"], "--sample-time"),
+    ],
+)
+def test_wrong_input_ends_in_one_message_and_status_2(arguments: list, message: str, tmp_path: Path) -> None:
+    done = run(*arguments, cwd=tmp_path)
+    assert done.returncode == 2
+    assert message in done.stderr
+    assert "Traceback" not in done.stderr
+    assert not done.stdout
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_run_that_fails_says_so_and_keeps_what_it_has(tmp_path: Path) -> None:
+    """An unstable loop diverges past what numbers hold: status 1, and the response up to there is written."""
+    wild = ["--set", "controller.ki=1e9 N/(m*s)"]
+    done = run("simulate", STICK_SLIP, "--out", tmp_path, *wild)
+    assert done.returncode == 1
+    assert "the loop is unstable" in done.stdout
+    with xr.open_dataset(tmp_path / "lugre_stick_slip_response.nc", engine="scipy") as written:
+        assert 0 < written.position.notnull().sum() < written.time.size
+    document = json.loads(run("check", STICK_SLIP, "--json", *wild).stdout)
+    assert document["cases"]["given"]["verdict"] == "failed"
+    assert document["cases"]["given"]["peak_to_peak_m"] is None

@@ -1,0 +1,167 @@
+"""Whole runs against exact solutions, against SciPy Radau with live kinks, and against themselves at tighter rtol."""
+
+from typing import Any
+
+import numpy as np
+import plain
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.linalg import expm
+from scipy.optimize import brentq
+from variants import VARIANTS
+
+from friso.engine.arrays import Results, Settings, Status
+from friso.engine.batch import Options, prepare, run_chunks
+from friso.engine.kernel import empty_results, kernel
+from friso.equations import motion
+from friso.equations.structure import structure
+
+LINEAR = VARIANTS["rigid, no friction section"]
+MOVE = {"motion.return_at": 0.1, "motion.duration": 0.3}
+ALONE = pytest.mark.xdist_group("linear")
+
+
+def exact(flat: dict[str, Any], names: tuple[str, ...], times: np.ndarray) -> np.ndarray:
+    """States of the linear stage at the times, shape (times, states), by matrix exponentials from corner to corner."""
+    still = plain.rates(flat | {"motion.kind": "hold"}, names)
+    held = plain.rates(flat | {"motion.kind": "step", "motion.size": 1.0}, names)
+    n = len(names)
+    system = np.zeros((n + 3, n + 3))
+    system[:n, :n] = np.array([still(0, row) for row in np.eye(n)]).T
+    system[:n, n] = held(0, [0.0] * n)
+    system[n, n + 1] = system[n + 1, n + 2] = 1.0
+    rows = motion.pieces(flat, 1)[0]
+    x, found = np.zeros(n), np.zeros((times.size, n))
+    for start, end, r in zip(rows[:, 0], [*rows[1:, 0], np.inf], rows[:, 1:], strict=True):
+        full = np.concatenate([x, r])
+        for i in np.flatnonzero((times >= start) & (times < end)):
+            found[i] = (expm(system * (times[i] - start)) @ full)[:n]
+        if end < np.inf:
+            x = (expm(system * (end - start)) @ full)[:n]
+    return found
+
+
+def fixed_steps(h: float, interval: float, changes: dict[str, Any]) -> tuple[Results, np.ndarray, np.ndarray]:
+    """The linear stage in steps of h (shorter to a corner): results, sampled states, exact states."""
+    flat = LINEAR.flat() | changes
+    shape = kernel(structure(LINEAR.flat()))
+    options = Options(rtol=1e-2, interval=interval)
+    batch = prepare(shape, flat, 1, options)
+    batch.first_steps[:] = h
+    batch.tolerances[:] = 1e9
+    samples = int(flat["motion.duration"] / interval * (1 + 1e-12)) + 1
+    results = empty_results(1, 512, samples, len(shape.states))
+    settings = Settings(1e-2, h, 1e6, 1e-6, 1e-5, 0.0, interval)
+    shape.module.run(0, 1, batch, settings, results)
+    assert results.statuses[0] == Status.DONE
+    assert results.statistics[0, 6] == 0
+    times = np.arange(samples) * interval
+    return results, results.samples[0], exact(flat, shape.states, times)
+
+
+@ALONE
+@pytest.mark.parametrize("interval", [0.3 / 24, 0.3 / 731], ids=["few samples", "samples inside all steps"])
+def test_order_of_the_compiled_kernel_over_corners(interval: float) -> None:
+    """Order 5 over corners that no step length divides: they are stepped onto; and inside the steps as well."""
+    errors = []
+    for h in (1.3e-3, 0.65e-3):
+        _, states, expected = fixed_steps(h, interval, MOVE)
+        errors.append(np.max(np.abs(states - expected), axis=0))
+    orders = np.log2(errors[0] / errors[1])
+    assert orders[:3] == pytest.approx(5, abs=0.1)
+
+
+@ALONE
+def test_every_corner_is_a_step() -> None:
+    """With the reference known, corner times and nothing else decide the number of steps."""
+    results, _, _ = fixed_steps(1.0, 0.3, MOVE)
+    corners = {0.0, 0.03, 0.06, 0.1, 0.13, 0.16, 0.225, 0.3}  # 0.225: start of the window for extremes
+    assert results.statistics[0, 5] == len(corners) - 1
+    assert results.statistics[0, 7] == 0.3
+
+
+@ALONE
+@pytest.mark.parametrize("rtol", [1e-4, 1e-6, 1e-8])
+def test_samples_and_turning_points_are_as_good_as_the_steps(rtol: float) -> None:
+    """Everywhere within some rtol of the size of the motion; a straight line between steps would miss by far."""
+    flat = LINEAR.flat() | MOVE
+    shape = kernel(structure(LINEAR.flat()))
+    (runs,) = run_chunks(shape, flat, 1, Options(rtol=rtol, interval=1e-4))
+    times = np.arange(runs.results.samples.shape[1]) * 1e-4
+    expected = exact(flat, shape.states, times)
+    sizes = np.max(np.abs(expected), axis=0)
+    assert np.all(np.abs(runs.results.samples[0] - expected) <= 20 * rtol * sizes)
+    count = int(runs.results.turn_counts[0])
+    assert count >= 5
+    turns = true_turns(flat, shape.states, times)
+    assert runs.results.turn_times[0, :count] == pytest.approx(turns, abs=20 * rtol * 0.03)
+    at = exact(flat, shape.states, np.array(turns))[:, 0] - motion.reference(flat, np.array(turns))
+    assert runs.results.turn_values[0, :count] == pytest.approx(at, abs=20 * rtol * sizes[0])
+
+
+def true_turns(flat: dict[str, Any], names: tuple[str, ...], times: np.ndarray) -> list[float]:
+    """Times at which the exact position turns against the reference."""
+
+    def rate(t: float) -> float:
+        return exact(flat, names, np.array([t]))[0, 1] - plain.reference(flat, t)[1]
+
+    rates = np.array([rate(t) for t in times])
+    at = np.flatnonzero(rates[1:-1] * rates[2:] < 0) + 1
+    return [brentq(rate, times[i], times[i + 1], xtol=1e-13) for i in at]
+
+
+def radau(flat: dict[str, Any], names: tuple[str, ...], scales: np.ndarray, times: np.ndarray) -> np.ndarray:
+    """States by SciPy Radau from the equations written by hand, from corner to corner."""
+    x = np.array([motion.initial_displacement(flat) if name.endswith("position") and "filter" not in name else 0.0
+                  for name in names])
+    corners = [*(c for c in motion.pieces(flat, 1)[0][:, 0] if c < times[-1]), times[-1]]
+    found = np.zeros((times.size, len(names)))
+    rates = plain.rates(flat, names)
+    for start, end in zip(corners[:-1], corners[1:], strict=True):
+        inside = (times >= start) & (times <= end)
+        solution = solve_ivp(
+            lambda t, x: rates(t, x), (start, end), x, "Radau", times[inside], rtol=1e-10, atol=1e-12 * scales,
+            dense_output=True, max_step=(end - start) / 20,
+        )
+        assert solution.success
+        found[inside], x = solution.y.T, solution.sol(end)
+    return found
+
+
+@pytest.mark.parametrize(
+    ("name", "changes"),
+    [
+        pytest.param("rigid", {"motion.duration": 3.5}, marks=pytest.mark.xdist_group("rigid")),
+        pytest.param("free, parasitic", {"motion.duration": 0.12}, marks=pytest.mark.xdist_group("free")),
+        pytest.param("rigid, van Dijk, limit", {"motion.duration": 0.5}, marks=pytest.mark.xdist_group("limit")),
+        pytest.param("rigid, Stribeck 1.5, PD measured", {"motion.duration": 0.4}, marks=pytest.mark.xdist_group("st")),
+        pytest.param("touching", {"motion.duration": 0.2}, marks=pytest.mark.xdist_group("touching")),
+    ],
+)
+def test_runs_against_radau(name: str, changes: dict[str, Any]) -> None:
+    """Short stretches with stops, reversals, contacts and a force at its limit."""
+    flat = VARIANTS[name].flat() | changes
+    if "motion.return_at" in flat:
+        flat["motion.return_at"] = flat["motion.duration"] / 2
+    shape = kernel(structure(VARIANTS[name].flat()))
+    interval = flat["motion.duration"] / 100
+    (runs,) = run_chunks(shape, flat, 1, Options(rtol=1e-9, interval=interval))
+    assert runs.results.statuses[0] == Status.DONE
+    times = np.arange(runs.results.samples.shape[1]) * interval
+    ours = runs.results.samples[0]
+    scales = np.max(np.abs(ours), axis=0)
+    theirs = radau(flat, shape.states, scales, times)
+    assert np.max(np.abs(ours - theirs) / scales) < 1e-6
+
+
+@pytest.mark.xdist_group("rigid")
+def test_turning_points_against_a_tighter_run() -> None:
+    """On a stretch with stops: at rtol 1e-6 they are within some 1e-6 of those at 1e-11."""
+    flat = VARIANTS["rigid"].flat() | {"motion.duration": 8.0}
+    shape = kernel(structure(flat))
+    rough, fine = (next(iter(run_chunks(shape, flat, 1, Options(rtol=rtol)))).results for rtol in (1e-6, 1e-11))
+    count = int(fine.turn_counts[0])
+    assert count > 10
+    assert rough.turn_counts[0] == count
+    assert rough.turn_times[0, :count] == pytest.approx(fine.turn_times[0, :count], abs=2e-4)
+    assert rough.turn_values[0, :count] == pytest.approx(fine.turn_values[0, :count], abs=2e-8)

@@ -1,0 +1,174 @@
+"""Lanes, threads, chunks and order of the runs change nothing, bit for bit; a failing run harms no other."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from variants import VARIANTS, gains, lugre, release, stage
+
+from friso.engine.arrays import Results, Status
+from friso.engine.batch import Options, run_chunks
+from friso.engine.kernel import Kernel, kernel
+from friso.equations.structure import structure
+
+pytestmark = pytest.mark.xdist_group("rigid")
+
+RUNS = 83
+BASE = Options(rtol=1e-5, interval=5e-3)
+Flat = dict[str, Any]
+
+
+@pytest.fixture(scope="module")
+def flat() -> Flat:
+    """Runs that differ in crossover, friction and move, and so in steps: lanes are refilled at all times."""
+    rng = np.random.default_rng(1)
+    flat = VARIANTS["rigid"].flat()
+    return flat | {
+        "controller.crossover": rng.uniform(2, 20, RUNS),
+        "friction.static": rng.uniform(1, 4, RUNS),
+        "motion.displacement": rng.normal(size=RUNS) * 2e-3,
+        "motion.duration": 3.0,
+    }
+
+
+@pytest.fixture(scope="module")
+def eight() -> Kernel:
+    return kernel(structure(VARIANTS["rigid"].flat()))
+
+
+def run(shape: Kernel, flat: Flat, options: Options, runs: int = RUNS) -> Results:
+    """The results of all chunks in one piece. Turning points and samples that are not there are NaN."""
+    parts = [chunk.results for chunk in run_chunks(shape, flat, runs, options)]
+    columns = []
+    for arrays in zip(*parts, strict=True):
+        width = max(array.shape[1] if array.ndim > 1 else 0 for array in arrays)
+        columns.append(np.concatenate([widened(array, width) for array in arrays]))
+    results = Results(*columns)
+    for j, count in enumerate(results.turn_counts):
+        results.turn_times[j, count:] = results.turn_values[j, count:] = np.nan
+    return results
+
+
+def widened(array: np.ndarray, width: int) -> np.ndarray:
+    if array.ndim == 1 or array.dtype != float:
+        return array
+    padding = [(0, 0), (0, width - array.shape[1])] + [(0, 0)] * (array.ndim - 2)
+    return np.pad(array, padding, constant_values=np.nan)
+
+
+def assert_identical(one: Results, other: Results, which: Any = slice(None)) -> None:
+    for name, a, b in zip(Results._fields, one, other, strict=True):
+        width = max(array.shape[1] if array.ndim > 1 else 0 for array in (a, b))
+        assert np.array_equal(widened(a, width)[which], widened(b, width)[which], equal_nan=True), name
+
+
+@pytest.fixture(scope="module")
+def reference(eight: Kernel, flat: Flat) -> Results:
+    results = run(eight, flat, BASE)
+    assert np.all(results.statuses == Status.DONE)
+    assert np.all(results.turn_counts > 0)
+    assert len({tuple(row) for row in results.statistics}) == RUNS
+    return results
+
+
+@pytest.mark.parametrize(("threads", "chunk"), [(1, 4096), (2, 4096), (5, 4096), (2, 1), (1, 7), (3, 32)])
+def test_any_number_of_threads_and_chunks(
+    eight: Kernel, flat: Flat, reference: Results, threads: int, chunk: int
+) -> None:
+    assert_identical(run(eight, flat, Options(1e-5, interval=5e-3, threads=threads, chunk=chunk)), reference)
+
+
+def test_alone_or_in_company(eight: Kernel, flat: Flat, reference: Results) -> None:
+    for j in range(0, RUNS, 9):
+        alone = {key: value[j] if np.ndim(value) else value for key, value in flat.items()}
+        one = run(eight, alone, BASE, 1)
+        samples = one.samples.shape[1]
+        assert np.array_equal(one.samples[0], reference.samples[j, :samples])
+        count = one.turn_counts[0]
+        assert count == reference.turn_counts[j]
+        assert np.array_equal(one.turn_times[0, :count], reference.turn_times[j, :count])
+        assert np.array_equal(one.turn_values[0, :count], reference.turn_values[j, :count])
+        assert np.array_equal(one.statistics[0], reference.statistics[j])
+
+
+def test_any_order(eight: Kernel, flat: Flat, reference: Results) -> None:
+    order = np.random.default_rng(2).permutation(RUNS)
+    shuffled = {key: value[order] if np.ndim(value) else value for key, value in flat.items()}
+    results = run(eight, shuffled, BASE)
+    assert_identical(results, Results(*(array[order] for array in reference)))
+
+
+def test_one_lane_or_eight(eight: Kernel, flat: Flat, reference: Results) -> None:
+    single = kernel(structure(VARIANTS["rigid"].flat()), lanes=1)
+    assert single.module.LANES == 1
+    assert eight.module.LANES == 8
+    assert_identical(run(single, flat, BASE), reference)
+
+
+def test_again(eight: Kernel, flat: Flat, reference: Results) -> None:
+    assert_identical(run(eight, flat, BASE), reference)
+
+
+def test_a_run_out_of_steps_harms_no_other(eight: Kernel, flat: Flat, reference: Results) -> None:
+    attempted = reference.statistics[:, 5]
+    budget = int(np.median(attempted))
+    results = run(eight, flat, Options(1e-5, interval=5e-3, budget=budget))
+    short = results.statuses == Status.BUDGET
+    assert np.array_equal(short, attempted > budget)
+    assert 0 < np.count_nonzero(short) < RUNS
+    assert np.all(results.statistics[short, 5] == budget)
+    assert np.all(results.statistics[short, 7] < flat["motion.duration"])
+    assert_identical(results, reference, ~short)
+    for j in np.flatnonzero(short):  # as far as it came, it is the same run, and NaN from there on
+        reached = int(results.statistics[j, 7] / 5e-3)
+        assert np.array_equal(results.samples[j, : reached + 1], reference.samples[j, : reached + 1])
+        assert np.all(np.isnan(results.samples[j, reached + 2 :]))
+
+
+def test_an_unstable_run_harms_no_other(eight: Kernel, flat: Flat, reference: Results) -> None:
+    """An integrator far too strong (beta 1e-3): its states grow beyond all numbers."""
+    bad = np.arange(RUNS) % 11 == 3
+    results = run(eight, flat | {"controller.beta": np.where(bad, 1e-3, flat["controller.beta"])}, BASE)
+    assert np.all(results.statuses[bad] == Status.UNDERFLOW)
+    assert np.all(results.statistics[bad, 7] < 3.0)
+    assert_identical(results, reference, ~bad)
+
+
+def test_a_run_that_is_not_a_number_ends_at_once(eight: Kernel, flat: Flat, reference: Results) -> None:
+    bad = np.arange(RUNS) % 11 == 3
+    mass = np.where(bad, np.nan, flat["masses.cart"])
+    results = run(eight, flat | {"masses.cart": mass}, Options(1e-5, interval=5e-3, budget=20_000))
+    assert np.all(results.statuses[bad] == Status.UNDERFLOW)
+    assert_identical(results, reference, ~bad)
+
+
+def test_runs_of_different_length(eight: Kernel, flat: Flat) -> None:
+    """Neither does the length of the others change a run."""
+    lengths = np.random.default_rng(3).uniform(0.2, 3, RUNS)
+    together = run(eight, flat | {"motion.duration": lengths}, BASE)
+    assert_identical(run(eight, flat | {"motion.duration": lengths}, Options(1e-5, interval=5e-3, chunk=7)), together)
+
+
+@pytest.mark.parametrize(
+    ("status", "remedy"),
+    [
+        (Status.BUDGET, "loosen rtol"),
+        (Status.UNDERFLOW, "check the controller's gains"),
+        (Status.FULL, "shorten the motion"),
+        (Status.NOT_RUN, "interrupted"),
+    ],
+)
+def test_the_text_of_a_failure_names_the_remedy(status: Status, remedy: str) -> None:
+    assert remedy in status.text
+
+
+def test_many_turning_points_get_room() -> None:
+    """An undamped mass on a spring turns 2000 times in 100 s: more often than there is room for at first."""
+    spring = stage(release("1 mm", "100 s"), "cart", lugre(2), controller=gains(4e3))
+    changes = {"friction.static": 1e-9, "friction.coulomb": 1e-9, "friction.viscous": 0.0}
+    flat = spring.flat() | changes | {"friction.bristle_stiffness": 1e-3, "friction.bristle_damping": 0.0}
+    (runs,) = run_chunks(kernel(structure(spring.flat())), flat, 1, Options(rtol=1e-6))
+    assert runs.results.statuses[0] == Status.DONE
+    expected = 100 * np.sqrt(4e3) / np.pi
+    assert runs.results.turn_counts[0] == pytest.approx(expected, abs=1)
+    assert np.all(np.diff(runs.results.turn_times[0, : runs.results.turn_counts[0]]) > 0)

@@ -1,0 +1,71 @@
+"""Peak count and period on turning points made by hand: what they count, and what they leave out."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from friso.hunting.measures import periods
+from friso.hunting.peaks import APART, COUNTED_ABOVE, COUNTED_AFTER, counted_peaks
+
+
+def peaks(turns: list[tuple[float, float]]) -> list[float]:
+    """Times of the counted peaks among the (time, value) turning points of one run."""
+    times, values = (np.array([column]) for column in zip(*turns, strict=True))
+    return times[counted_peaks(times, values, np.array([len(turns)]))].tolist()
+
+
+def test_only_late_and_tall_maxima_count() -> None:
+    turns = [(9.0, 2e-4), (9.5, -2e-4), (11.0, 2e-4), (12.0, -2e-4), (13.0, 0.9e-4), (14.0, -2e-4), (15.0, 3e-4)]
+    assert peaks(turns) == [11.0, 15.0]
+
+
+def test_of_close_peaks_the_tallest_stays() -> None:
+    turns = [(11.0, 2e-4), (11.1, 1e-4), (11.2, 5e-4), (11.3, 1e-4), (11.6, 4e-4), (11.65, 0.0), (11.75, 3e-4)]
+    assert peaks(turns) == [11.2, 11.75]
+
+
+def test_runs_of_a_batch_do_not_mix() -> None:
+    times = np.array([[11.0, 11.5, 12.0], [11.0, 11.5, 12.0]])
+    values = np.array([[1e-3, -1e-3, 1e-3], [1e-3, -1e-3, 1e-3]])
+    assert counted_peaks(times, values, np.array([3, 1])).sum(axis=1).tolist() == [2, 1]
+
+
+@given(st.lists(st.tuples(st.floats(0.01, 0.4), st.floats(-1e-3, 1e-3)), min_size=1, max_size=60))
+def test_agrees_with_the_definition_done_slowly(gaps: list[tuple[float, float]]) -> None:
+    """The slow twin: sort by height, keep what is far from all kept before."""
+    times = 9.0 + np.cumsum([gap for gap, _ in gaps])
+    values = np.array([value for _, value in gaps])
+    inner = np.concatenate([[-np.inf], values, [-np.inf]])
+    candidates = [
+        k
+        for k in range(len(values))
+        if inner[k] < values[k] > inner[k + 2] and times[k] >= COUNTED_AFTER and values[k] > COUNTED_ABOVE
+    ]
+    kept: list[int] = []
+    for k in sorted(candidates, key=lambda k: -values[k]):
+        if all(abs(times[k] - times[other]) >= APART for other in kept):
+            kept.append(k)
+    assert peaks(list(zip(times.tolist(), values.tolist(), strict=True))) == times[sorted(kept)].tolist()
+
+
+def test_period_of_a_cycle_with_ringing_on_top() -> None:
+    """A 2 s cycle of 1 mm on which a 0.05 s ringing of 0.1 mm makes turning points of its own."""
+    time = np.linspace(0.0, 20.0, 200_001)
+    wave = np.sin(np.pi * time) + 0.1 * np.sin(40 * np.pi * time)
+    turns = np.flatnonzero(np.diff(np.sign(np.diff(wave)))) + 1
+    found = periods(
+        time[None, turns], 1e-3 * wave[None, turns], np.array([turns.size]), np.array([2.2e-3]), np.array([20.0])
+    )
+    assert found[0] == pytest.approx(2.0, rel=1e-3)
+
+
+def test_no_period_without_a_cycle() -> None:
+    still = periods(np.array([[16.0, 18.0]]), np.zeros((1, 2)), np.array([2]), np.array([1e-9]), np.array([20.0]))
+    assert np.isnan(still[0])
+
+
+def test_a_period_longer_than_the_last_quarter_is_taken_from_the_last_half() -> None:
+    times, values = np.array([[10.5, 13.5, 16.5, 19.5]]), 1e-3 * np.array([[1.0, -1.0, 1.0, -1.0]])
+    found = periods(times, values, np.array([4]), np.array([2e-3]), np.array([20.0]))
+    assert np.isnan(found[0]) or found[0] == pytest.approx(6.0)
