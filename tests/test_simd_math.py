@@ -1,0 +1,136 @@
+"""The vectorisable functions against NumPy, and whether the compiler did vectorise them and the steps."""
+
+import re
+from collections.abc import Callable
+
+import llvmlite.binding as llvm
+import numpy as np
+import pytest
+from numba import njit
+from variants import VARIANTS
+
+from friso.engine import roots, simd_math
+from friso.engine.kernel import kernel
+from friso.equations.structure import structure
+
+FEATURES = llvm.get_host_cpu_features()
+WIDE = "zmm|ymm" if FEATURES.get("avx512f") else "ymm"
+VECTORS = pytest.mark.skipif(not FEATURES.get("avx2"), reason="this processor has no 256-bit arithmetic")
+
+
+@pytest.fixture(scope="module")
+def rng() -> np.random.Generator:
+    return np.random.default_rng(0)
+
+
+
+
+@njit(error_model="numpy")
+def exps(x, out):
+    for i in range(np.uint64(x.size)):
+        out[i] = simd_math.exp(x[i])
+
+
+@njit(error_model="numpy")
+def logs(x, out):
+    for i in range(np.uint64(x.size)):
+        out[i] = simd_math.log(x[i])
+
+
+@njit(error_model="numpy")
+def tanhs(x, out):
+    for i in range(np.uint64(x.size)):
+        out[i] = simd_math.tanh(x[i])
+
+
+@njit(error_model="numpy")
+def powers(x, out):
+    for i in range(np.uint64(x.size)):
+        out[i] = simd_math.power(x[i], 1.7)
+
+
+def values(function: Callable[..., None], x: np.ndarray) -> np.ndarray:
+    out = np.empty_like(x)
+    function(x, out)
+    return out
+
+
+def test_exp(rng: np.random.Generator) -> None:
+    x = np.concatenate([rng.uniform(-700, 700, 20_000), rng.uniform(-1, 1, 20_000), [0.0, 1e-300, -1e-300]])
+    assert values(exps, x) == pytest.approx(np.exp(x.astype(np.longdouble)).astype(float), rel=1e-15)
+
+
+def test_exp_beyond_its_range() -> None:
+    assert values(exps, np.array([-1e300, -np.inf])) == pytest.approx(np.exp(-700), rel=1e-15)
+    assert values(exps, np.array([1e300, np.inf])) == pytest.approx(np.exp(700), rel=1e-15)
+
+
+def test_log(rng: np.random.Generator) -> None:
+    """Near 1 the result is small; there too the error is relative to it."""
+    x = np.concatenate([10.0 ** rng.uniform(-300, 300, 20_000), 1 + rng.uniform(-0.3, 0.5, 20_000), [1.0]])
+    exact = np.log(x.astype(np.longdouble))
+    assert np.all(np.abs(values(logs, x) - exact) <= 1e-15 * np.abs(exact))
+
+
+def test_tanh(rng: np.random.Generator) -> None:
+    x = np.concatenate([rng.uniform(-30, 30, 20_000), rng.uniform(-1, 1, 20_000), [0.0, 1e6, -1e6]])
+    assert values(tanhs, x) == pytest.approx(np.tanh(x), abs=1e-15, rel=0)
+
+
+def test_power(rng: np.random.Generator) -> None:
+    """The relative error grows with the exponent of the result."""
+    x = 10.0 ** rng.uniform(-60, 60, 20_000)
+    exact = x.astype(np.longdouble) ** np.longdouble(1.7)
+    size = 1 + np.abs(1.7 * np.log(x))
+    assert np.all(np.abs(values(powers, x) - exact) <= 1e-15 * size * exact)
+
+
+def packed(function: Callable[..., None]) -> int:
+    """Instructions that do arithmetic on whole registers, in the compiled function."""
+    assembly = "\n".join(function.inspect_asm().values())  # type: ignore[attr-defined]
+    operation = rf"\bv(?:f[n]?m(?:add|sub)\d+|mul|add|sub|div)pd\b[^\n]*(?:{WIDE})"
+    return len(re.findall(operation, assembly))
+
+
+@VECTORS
+@pytest.mark.parametrize("function", [exps, logs, tanhs, powers], ids=["exp", "log", "tanh", "power"])
+def test_loops_are_vectorised(function: Callable[..., None]) -> None:
+    values(function, np.ones(16))
+    assert packed(function) > 10
+
+
+@VECTORS
+@pytest.mark.xdist_group("rigid")
+def test_steps_are_vectorised() -> None:
+    """The step of a kernel works on whole registers; hardly anything is done lane by lane."""
+    module = kernel(structure(VARIANTS["rigid"].flat())).module
+    module.step(np.zeros(module.ROWS * module.LANES), 1e-6, 1.0, 1e-6, 1e-5, 1e6)
+    assembly = "\n".join(module.step.inspect_asm().values())
+    scalar = len(re.findall(r"\bv(?:f[n]?m(?:add|sub)\d+|mul|add|sub|div)sd\b", assembly))
+    assert packed(module.step) > 500
+    assert scalar < packed(module.step) / 10
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_first_crossing_of_a_cubic(seed: int) -> None:
+    """The first zero, as the roots of the polynomial have it; 2 where the thirds show none."""
+    rng = np.random.default_rng(seed)
+    thirds = np.array([0, 1, 2, 3]) / 3
+    seen = 0
+    for _ in range(400):
+        p = rng.normal(size=4)
+        p[0] = abs(p[0])
+        found = roots.first_crossing(*p)
+        coefficients = np.polyfit(thirds, p, 3)
+        if np.all(p[1:] > 0):
+            assert found == 2.0
+            continue
+        zeros = np.roots(coefficients)
+        real = np.sort(zeros[np.abs(zeros.imag) < 1e-12].real)
+        third = np.argmax(p < 0)
+        inside = real[(real >= (third - 1) / 3 - 1e-9) & (real <= third / 3 + 1e-9)]
+        assert roots.cubic(*p, found) <= 0.01 * p[0] + 1e-12
+        if inside.size == 1:
+            seen += 1
+            assert found >= inside[0] - 1e-2 * p[0]
+    assert seen > 100
