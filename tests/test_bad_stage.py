@@ -183,16 +183,6 @@ FREQUENCY = "number and unit in quotes, convertible to Hz, rad/s or rpm, greater
         ('kind = "pid"', "", ("controller.kind", "nothing", 'one of "pid"', 'kind = "pid"')),
         (
             'kind = "pid"',
-            'kind = "pid"\nderivative_on = "velocity"',
-            (
-                "controller.derivative_on",
-                '"velocity"',
-                'one of "error", "measurement"',
-                'derivative_on = "error"',
-            ),
-        ),
-        (
-            'kind = "pid"',
             'kind = "pid"\nanti_windup = "clamp"',
             ("controller.anti_windup", '"clamp"', "a force_limit beside it", 'force_limit = "200 N"'),
         ),
@@ -354,6 +344,11 @@ def test_keys(old: str, new: str, lines: tuple[str, str, str, str]) -> None:
         ('kind = "pid"\ntau = "1 ms"', ["neither crossover nor any of kp, ki, kd"]),
         (GAINS.replace("3 N/m", "-3 N/m"), ["controller.kp", '"-3 N/m"', "0 or greater"]),
         ('kind = "pid"\nkpp = "3 N/m"', ["controller", "neither crossover nor any of kp"]),
+        (f'{GAINS}\nderivative_on = "velocity"', ["controller.derivative_on", '"velocity"', '"error", "measurement"']),
+        (
+            'kind = "pid"\ncrossover = "8 Hz"\nalpha = 0.1\nbeta = 2\nderivative_on = "error"',
+            ["crossover, alpha, beta (van Dijk's rules) together with derivative_on (gains)", "one form, not both"],
+        ),
     ],
 )
 def test_gains(controller: str, fragments: list[str]) -> None:

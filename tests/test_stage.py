@@ -56,7 +56,6 @@ def test_thesis_rig_in_si(rig: Stage) -> None:
         "parasitic.mass": 0.25,
         "parasitic.damping_ratio": 0.01,
         "controller.kind": "pid",
-        "controller.derivative_on": "error",
         "controller.crossover": 8.0,
         "controller.alpha": 0.1,
         "controller.beta": 2.0,

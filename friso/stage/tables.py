@@ -88,7 +88,6 @@ class Controller(Section):
     """What both forms of the controller share."""
 
     kind: Literal["pid"]
-    derivative_on: Literal["error", "measurement"] = "error"
     force_limit: Annotated[Value | None, Quantity("N", positive, "200 N")] = None
     anti_windup: Literal["clamp"] | None = None
 
@@ -115,6 +114,7 @@ class GainsController(Controller):
     ki: Annotated[Value, Quantity("N/(m*s)", non_negative, "4 N/(m*s)")] = Value(0, "0 N/(m*s)")
     kd: Annotated[Value, Quantity("N*s/m", non_negative, "6 N*s/m")] = Value(0, "0 N*s/m")
     tau: Annotated[Value, Quantity("s", non_negative, "1 ms")] = Value(0, "0 s")
+    derivative_on: Literal["error", "measurement"] = "error"
 
     rules: ClassVar[tuple[Rule, ...]] = (
         Rule(
