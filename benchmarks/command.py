@@ -34,7 +34,7 @@ for runs in run_chunks(rig.kernel, flat, n, options(flat, 1e-4)):
     here = slice(runs.first, runs.first + len(runs.results.statuses))
     part = {{key: value[here] if np.ndim(value) else value for key, value in flat.items()}}
     hunting += int((measure(part, runs).peaks > 0).sum())
-peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+peak = max(resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
 print(before / 1024, peak / 1024, time.perf_counter() - start, hunting)
 """
 
@@ -79,14 +79,25 @@ def run_check(repetitions: int) -> list[Goal]:
 
 def run_memory() -> list[Goal]:
     """Peak memory of a sweep of 1e5 runs without traces, in a process of its own."""
-    done = subprocess.run(
-        [sys.executable, "-c", _SWEEP], capture_output=True, text=True, cwd=Path(__file__).parents[1]
-    )
-    if done.returncode:
-        raise RuntimeError(done.stderr[-800:])
-    before, peak, seconds, hunting = (float(word) for word in done.stdout.split())
+    root = Path(__file__).parents[1]
+    with tempfile.TemporaryDirectory(prefix="friso-bench-") as cache:
+        environment = {**os.environ, "FRISO_CACHE_DIR": cache}
+        command = [sys.executable, "-c", _SWEEP]
+        found = [
+            subprocess.run(command, env=environment, capture_output=True, text=True, cwd=root)
+            for _ in range(2)
+        ]
+    for done in found:
+        if done.returncode:
+            raise RuntimeError(done.stderr[-800:])
+    (_, cold, *_), (before, peak, seconds, hunting) = (map(float, done.stdout.split()) for done in found)
     print(
         f"\nSweep of {SWEPT} runs (free rig, crossover x stroke, rtol 1e-4): {seconds:.1f} s, {hunting:.0f} hunt,"
     )
-    print(f"  peak memory {peak:.0f} MB, {before:.0f} MB of it before the sweep")
-    return [Goal(f"memory of a sweep of {SWEPT} runs", "< 500 MB", f"{peak:.0f} MB", peak < 500)]
+    print(f"  peak memory {peak:.0f} MB, {before:.0f} MB of it before the sweep; ", end="")
+    print(f"{cold:.0f} MB, of this process or the compiling one, where the kernel is compiled first")
+    about = f"memory of a sweep of {SWEPT} runs, "
+    return [
+        Goal(about + "kernel in the cache", "< 500 MB", f"{peak:.0f} MB", peak < 500),
+        Goal(about + "kernel compiled first", "< 500 MB", f"{cold:.0f} MB", cold < 500),
+    ]

@@ -50,7 +50,7 @@ def compile_equations(rig: Rig) -> Compiled:
     names |= dict(zip((*REFERENCE, TIME), sp.symbols("r0 r1 r2 since", real=True), strict=True))
 
     def plain(expression: sp.Expr) -> sp.Expr:
-        return sp.sympify(expression).xreplace(values).xreplace(names).evalf(20)
+        return sp.N(sp.sympify(expression).xreplace(values).xreplace(names), 20)
 
     surfaces = [plain(kink.surface) for kink in model.kinks]
     rates = {f"out[{i}]": plain(f) for i, f in enumerate(model.rhs)}
