@@ -60,11 +60,11 @@ def fixed_steps(h: float, interval: float, changes: dict[str, Any]) -> tuple[Res
 
 
 @ALONE
-@pytest.mark.parametrize("interval", [0.3 / 24, 0.3 / 731], ids=["few samples", "samples inside all steps"])
+@pytest.mark.parametrize("interval", [0.3 / 25, 0.3 / 731], ids=["few samples", "samples inside all steps"])
 def test_order_of_the_compiled_kernel_over_corners(interval: float) -> None:
     """Order 5 at the ends of the steps and inside them (both lengths divide the times between corners)."""
     errors = []
-    for h in (5e-4, 2.5e-4):
+    for h in (2.5e-4, 1.25e-4):
         _, states, expected = fixed_steps(h, interval, MOVE)
         errors.append(np.max(np.abs(states - expected), axis=0))
     orders = np.log2(errors[0] / errors[1])
@@ -148,13 +148,24 @@ def test_runs_against_radau(name: str, changes: dict[str, Any]) -> None:
         flat["motion.return_at"] = 0.6 * flat["motion.duration"]
     shape = kernel(structure(VARIANTS[name].flat()))
     interval = flat["motion.duration"] / 100
-    (runs,) = run_chunks(shape, flat, 1, Options(rtol=1e-9, interval=interval))
+    (runs,) = run_chunks(shape, flat, 1, Options(rtol=1e-11, interval=interval))
     assert runs.results.statuses[0] == Status.DONE
     times = np.arange(runs.results.samples.shape[1]) * interval
     ours = runs.results.samples[0]
     scales = np.max(np.abs(ours), axis=0)
     theirs = radau(flat, shape.states, scales, times)
-    assert np.max(np.abs(ours - theirs) / scales) < 1e-6
+    sensitive = 50 if "joint.stroke" in flat else 1  # contacts and the 300 Hz mode multiply small differences
+    assert np.max(np.abs(ours - theirs) / scales) < 1e-6 * sensitive
+
+
+@ALONE
+@pytest.mark.parametrize("duration", [0.33, 0.43, 0.46])
+def test_the_last_sample_is_taken(duration: float) -> None:
+    """Where rounding puts the end of the run an ulp before the last instant, too."""
+    flat = LINEAR.flat() | MOVE | {"motion.duration": duration}
+    (runs,) = run_chunks(kernel(structure(LINEAR.flat())), flat, 1, Options(rtol=1e-6, interval=duration / 24))
+    assert runs.results.samples.shape[1] == 25
+    assert np.all(np.isfinite(runs.results.samples))
 
 
 @pytest.mark.xdist_group("rigid")

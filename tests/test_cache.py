@@ -1,0 +1,151 @@
+"""The kernels on disk: private, rebuilt when damaged, and safe from each other's processes.
+
+A stand-in of a few lines takes a kernel's place, so that compiling it takes a fraction of a second.
+"""
+
+import os
+import stat
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+BUILDER = """
+import sys
+from pathlib import Path
+
+entry = Path(sys.argv[1])
+source = "from numba import njit\\n\\n@njit(cache=True)\\ndef run(x):\\n    return 2.0 * x\\n"
+(entry / "kernel.py").write_text(source)
+sys.stdin.buffer.read()
+
+from friso.engine.cache import import_entry
+from numba import types
+
+import_entry(entry).run.compile((types.float64,))
+"""
+
+SCRIPT = """
+import sys
+from friso.engine import cache
+from numba import types
+
+module = cache.load_or_build(sys.argv[1], "stand_in_builder", b"task", lambda m: m.run.compile((types.float64,)))
+assert module.run(21.0) == 42.0
+stats = module.run.stats
+print(sum(stats.cache_hits.values()), sum(stats.cache_misses.values()))
+"""
+
+COMPILING = "compiling a kernel"
+
+
+@pytest.fixture(autouse=True)
+def builder(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A builder that makes the stand-in, where the processes find it."""
+    folder = tmp_path_factory.mktemp("builder")
+    (folder / "stand_in_builder.py").write_text(BUILDER)
+    monkeypatch.setenv("PYTHONPATH", str(folder))
+
+
+def start(folder: Path, name: str = "stand-in", **more: str) -> subprocess.Popen[str]:
+    environment = os.environ | {"FRISO_CACHE_DIR": str(folder)} | more
+    command = [sys.executable, "-c", SCRIPT, name]
+    return subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+
+
+def finished(process: subprocess.Popen[str]) -> tuple[bool, str]:
+    """Whether the process built the entry (what runs is loaded from it in any case), and what it logged."""
+    out, err = process.communicate(timeout=120)
+    assert process.returncode == 0, err
+    assert out.split() == ["1", "0"]  # Numba's cache: a hit, no miss
+    return COMPILING in err, err
+
+
+def built(folder: Path, **more: str) -> bool:
+    return finished(start(folder, **more))[0]
+
+
+def mode(path: Path) -> int:
+    return stat.S_IMODE(path.stat().st_mode)
+
+
+def entry(folder: Path) -> Path:
+    (found,) = [path for path in (folder / "kernels").iterdir() if path.is_dir()]
+    return found
+
+
+def test_the_folder_is_private_and_the_second_process_does_not_compile(tmp_path: Path) -> None:
+    first, log = finished(start(tmp_path / "cache"))
+    assert first
+    assert "next run finds it compiled" in log
+    assert mode(tmp_path / "cache" / "kernels") == 0o700
+    assert mode(entry(tmp_path / "cache")) == 0o700
+    second, log = finished(start(tmp_path / "cache"))
+    assert not second
+    assert log == ""
+
+
+def test_permissions_are_mended(tmp_path: Path) -> None:
+    assert built(tmp_path)
+    (tmp_path / "kernels").chmod(0o755)
+    assert not built(tmp_path)
+    assert mode(tmp_path / "kernels") == 0o700
+
+
+@pytest.mark.parametrize("damage", ["truncate", "alter", "remove"])
+@pytest.mark.parametrize("pattern", ["kernel.py", "manifest.json", "**/*.nbi", "**/*.nbc"])
+def test_a_damaged_entry_is_rebuilt(tmp_path: Path, pattern: str, damage: str) -> None:
+    assert built(tmp_path)
+    (file,) = entry(tmp_path).glob(pattern)
+    content = file.read_bytes()
+    if damage == "remove":
+        file.unlink()
+    else:
+        middle = len(content) // 2
+        changed = content[:middle] + (b"" if damage == "truncate" else bytes([content[middle] ^ 1]) + content[middle + 1 :])
+        file.write_bytes(changed)
+    assert built(tmp_path)
+    assert not built(tmp_path)
+
+
+def test_a_file_that_does_not_belong_is_not_run(tmp_path: Path) -> None:
+    """One more file of machine code beside the others is an altered entry too."""
+    assert built(tmp_path)
+    (file,) = entry(tmp_path).glob("**/*.nbc")
+    file.with_name("other.nbc").write_bytes(b"anything")
+    assert built(tmp_path)
+
+
+def test_an_interrupted_build_is_built_again(tmp_path: Path) -> None:
+    """Without a manifest, which is written last."""
+    assert built(tmp_path)
+    (entry(tmp_path) / "manifest.json").unlink()
+    assert built(tmp_path)
+
+
+def test_processes_at_the_same_time_build_once(tmp_path: Path) -> None:
+    processes = [start(tmp_path) for _ in range(4)]
+    assert sorted(finished(each)[0] for each in processes) == [False, False, False, True]
+    assert not built(tmp_path)
+
+
+def test_different_kernels_do_not_mix(tmp_path: Path) -> None:
+    processes = [start(tmp_path, name) for name in ("one", "two")]
+    assert [finished(each)[0] for each in processes] == [True, True]
+
+
+def test_numba_may_have_a_folder_of_its_own(tmp_path: Path) -> None:
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    assert built(tmp_path / "cache", NUMBA_CACHE_DIR=str(elsewhere))
+    assert list(elsewhere.iterdir()) == []
+    assert not built(tmp_path / "cache")
+
+
+def test_without_a_folder_kernels_are_compiled_and_not_kept(tmp_path: Path) -> None:
+    file = tmp_path / "no folder"
+    file.write_text("")
+    made, log = finished(start(file))
+    assert made
+    assert "temporary folder" in log
