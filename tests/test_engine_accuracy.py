@@ -60,15 +60,13 @@ def fixed_steps(h: float, interval: float, changes: dict[str, Any]) -> tuple[Res
 
 
 @ALONE
-@pytest.mark.parametrize("interval", [0.3 / 25, 0.3 / 731], ids=["few samples", "samples inside all steps"])
-def test_order_of_the_compiled_kernel_over_corners(interval: float) -> None:
-    """Order 5 at the ends of the steps and inside them (both lengths divide the times between corners)."""
+def test_order_of_the_compiled_kernel() -> None:
+    """Order 5 everywhere in the steps, over a move with corners (both step lengths divide the times between them)."""
     errors = []
-    for h in (2.5e-4, 1.25e-4):
-        _, states, expected = fixed_steps(h, interval, MOVE)
+    for h in (1e-3, 5e-4):
+        _, states, expected = fixed_steps(h, 0.3 / 731, MOVE | {"controller.crossover": 5.0})
         errors.append(np.max(np.abs(states - expected), axis=0))
-    orders = np.log2(errors[0] / errors[1])
-    assert orders[:3] == pytest.approx(5, abs=0.1)
+    assert np.log2(errors[0] / errors[1]) == pytest.approx(5, abs=0.1)
 
 
 @ALONE
@@ -86,14 +84,14 @@ def test_samples_and_turning_points_are_as_good_as_the_steps(rtol: float) -> Non
     """Everywhere within some rtol of the size of the motion; a straight line between steps would miss by far."""
     flat = LINEAR.flat() | MOVE
     shape = kernel(structure(LINEAR.flat()))
-    (runs,) = run_chunks(shape, flat, 1, Options(rtol=rtol, interval=1e-4))
-    times = np.arange(runs.results.samples.shape[1]) * 1e-4
+    (runs,) = run_chunks(shape, flat, 1, Options(rtol=rtol, interval=7e-4))
+    times = np.arange(runs.results.samples.shape[1]) * 7e-4
     expected = exact(flat, shape.states, times)
     sizes = np.max(np.abs(expected), axis=0)
     assert np.all(np.abs(runs.results.samples[0] - expected) <= 20 * rtol * sizes)
     count = int(runs.results.turn_counts[0])
     assert count >= 5
-    turns = true_turns(flat, shape.states, times[::25])
+    turns = true_turns(flat, shape.states, times[::4])
     assert runs.results.turn_times[0, :count] == pytest.approx(turns, abs=20 * rtol * 0.03)
     at = exact(flat, shape.states, np.array(turns))[:, 0] - motion.reference(flat, np.array(turns))
     assert runs.results.turn_values[0, :count] == pytest.approx(at, abs=20 * rtol * sizes[0])
