@@ -1,5 +1,6 @@
 """Whole runs against exact solutions, against SciPy Radau with live kinks, and against themselves at tighter rtol."""
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -120,7 +121,7 @@ def radau(flat: dict[str, Any], names: tuple[str, ...], scales: np.ndarray, time
         columns = [np.subtract(rates(t, x + nudge), rates(t, x - nudge)) for nudge in nudges]
         return np.array(columns).T / (2e-7 * scales)
 
-    for start, end in zip(corners[:-1], corners[1:], strict=True):
+    for start, end in pairwise(corners):
         inside = (times >= start) & (times <= end)
         options = {"rtol": 1e-10, "atol": 1e-12 * scales, "max_step": (end - start) / 20, "first_step": 1e-7}
         solution = solve_ivp(rates, (start, end), x, "Radau", dense_output=True, jac=jacobian, **options)

@@ -102,7 +102,8 @@ def test_the_thesis_values_are_not_passive() -> None:
 def swing_heights(results: Results) -> np.ndarray:
     """Turning points that stand out: those of the ringing at a stop are left out."""
     values = results.turn_values[0, : results.turn_counts[0]]
-    farthest = [part[np.argmax(np.abs(part))] for part in np.split(values, np.flatnonzero(np.diff(np.sign(values))) + 1)]
+    sides = np.split(values, np.flatnonzero(np.diff(np.sign(values))) + 1)
+    farthest = [part[np.argmax(np.abs(part))] for part in sides]
     return np.array([value for value in farthest if abs(value) > 1e-2 * np.max(np.abs(values))])
 
 
