@@ -99,12 +99,13 @@ def test_a_damaged_entry_is_rebuilt(tmp_path: Path, pattern: str, damage: str) -
     assert built(tmp_path)
     (file,) = entry(tmp_path).glob(pattern)
     content = file.read_bytes()
+    middle = len(content) // 2
     if damage == "remove":
         file.unlink()
+    elif damage == "truncate":
+        file.write_bytes(content[:middle])
     else:
-        middle = len(content) // 2
-        changed = content[:middle] + (b"" if damage == "truncate" else bytes([content[middle] ^ 1]) + content[middle + 1 :])
-        file.write_bytes(changed)
+        file.write_bytes(content[:middle] + bytes([content[middle] ^ 1]) + content[middle + 1 :])
     assert built(tmp_path)
     assert not built(tmp_path)
 
