@@ -5,8 +5,10 @@ Exit status: 0 done, 1 the computation could not be completed, 2 the input is wr
 
 from __future__ import annotations
 
+import io
 import json
 import logging
+import math
 import sys
 from importlib.resources import files
 from pathlib import Path
@@ -23,7 +25,12 @@ if TYPE_CHECKING:
 
     from friso.hunting import Case
 
-app = typer.Typer(no_args_is_help=True, add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False)
+app = typer.Typer(
+    add_completion=False,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
 
 StageFile = Annotated[Path, typer.Argument(metavar="STAGE.toml", help="The stage file.")]
 Overrides = Annotated[
@@ -38,6 +45,11 @@ OutFolder = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Fo
 
 def main() -> NoReturn:
     """Run the command line; wrong input ends in one message and status 2, never in a traceback."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")  # a terminal that knows no dash still gets its answer
+    if len(sys.argv) == 1:
+        sys.argv.append("--help")
     logging.basicConfig(format="friso: %(message)s", level=logging.WARNING, stream=sys.stderr)
     try:
         sys.exit(app(standalone_mode=False) or 0)
@@ -49,15 +61,18 @@ def main() -> NoReturn:
     except BrokenPipeError:
         sys.stderr.close()
         sys.exit(1)
-    except (StageError, ValueError, OSError) as error:
+    except StageError as error:
         _say(str(error))
         sys.exit(2)
     except Exception as error:
         usage = getattr(error, "format_message", None)
-        if usage is None:
-            raise
-        _say(f"{usage()}\n  try: friso --help")
-        sys.exit(2)
+        if usage is not None:
+            _say(f"{usage()}\n  try: friso --help")
+            sys.exit(2)
+        if isinstance(error, RuntimeError | OSError | MemoryError):
+            _say(f"the computation could not be completed: {error}")
+            sys.exit(1)
+        raise
 
 
 def _say(message: str) -> None:
@@ -94,10 +109,9 @@ def init(
     try:
         with path.open("x", encoding="utf-8") as file:
             file.write(template)
-    except FileExistsError:
-        raise StageError(
-            str(path), "a file that exists", "a new file; nothing was overwritten", "friso init new.toml"
-        ) from None
+    except OSError as error:
+        expected = f"a new file in a folder that can be written ({error.strerror}); nothing was overwritten"
+        raise StageError("STAGE.toml", str(path), expected, "friso init new.toml") from None
     print(f"wrote {path}; edit it, then: friso check {path}")
 
 
@@ -222,15 +236,14 @@ def _check_document(stage: Stage, cases: dict[str, Case]) -> dict[str, Any]:
 
 def _case_document(case: Case) -> dict[str, Any]:
     into_1um, into_10um = case.settling_time.values()
-    finite = case.peak_to_peak == case.peak_to_peak
     return {
         "verdict": case.verdict,
         "peaks": case.peaks,
-        "peak_to_peak_m": case.peak_to_peak if finite else None,
+        "peak_to_peak_m": _finite(case.peak_to_peak),
         "period_s": case.period,
         "settling_time_s": into_1um,
         "settling_time_10um_s": into_10um,
-        "largest_force_n": case.largest_force,
+        "largest_force_n": _finite(case.largest_force),
         "cycle": None,
         "solver": {
             "status": case.solver.status,
@@ -239,6 +252,10 @@ def _case_document(case: Case) -> dict[str, Any]:
             "rtol": case.solver.rtol,
         },
     }
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
 
 
 def _print_cases(stage: Stage, cases: dict[str, Case]) -> None:

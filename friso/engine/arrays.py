@@ -10,24 +10,24 @@ import numpy as np
 
 class Batch(NamedTuple):
     """Runs of one model: constants (n, constants), start states, absolute tolerances (n, states), modes (n, kinks),
-    first steps [s] (n,), pieces of the reference (n, pieces + 1, 4), of which the last one only ends the run, and the
-    number of the piece that begins the window in which extremes are taken (n,)."""
+    first and longest steps [s] (n,), pieces of the reference (n, pieces + 1, 4), of which the last one only ends the
+    run, and the number of the piece that begins the window in which extremes are taken (n,)."""
 
     constants: np.ndarray
     starts: np.ndarray
     tolerances: np.ndarray
     modes: np.ndarray
     first_steps: np.ndarray
+    longest: np.ndarray
     segments: np.ndarray
     windows: np.ndarray
 
 
 class Settings(NamedTuple):
-    """What all runs share: relative tolerance, longest step [s], step budget, the two bands of settling [m], the time
+    """What all runs share: relative tolerance, step budget, the two bands of settling [m], the time
     [s] from which turning points are recorded, and the sampling interval [s]."""
 
     rtol: float
-    longest: float
     budget: float
     inner: float
     outer: float
@@ -69,6 +69,7 @@ class Status(IntEnum):
     BUDGET = 2
     UNDERFLOW = 3
     FULL = 4
+    DIVERGED = 5
 
     @property
     def text(self) -> str:
@@ -81,5 +82,6 @@ _TEXTS = {
     Status.BUDGET: "step budget used up: loosen rtol, shorten the motion, or look for contact that chatters",
     Status.UNDERFLOW: "step size too small or state not finite: the loop is unstable or rtol is below rounding; "
     "check the controller's gains, or loosen rtol",
+    Status.DIVERGED: "the stage runs away from its reference: the loop is unstable; check the controller's gains",
     Status.FULL: "more turning points than can be kept: shorten the motion",
 }

@@ -39,7 +39,7 @@ class Options:
     interval: float | None = None
     budget: int = 2_000_000
     threads: int | None = None
-    chunk: int = 4096
+    chunk: int = 2048
 
 
 @dataclass(frozen=True)
@@ -84,14 +84,15 @@ def prepare(kernel: Kernel, flat: Mapping[str, Any], runs: int, options: Options
     surfaces = kernel.module.surfaces(starts.T, 0.0, segments[:, 0, 1:].T, values)
     modes = (columns(surfaces) > 0).astype(float)
     first_steps = np.ascontiguousarray(FIRST_STEP / rates)
-    return Batch(constants, starts, options.rtol * scales, modes, first_steps, segments, windows)
+    longest = LONGEST_SHARE * segments[:, -1, 0]
+    return Batch(constants, starts, options.rtol * scales, modes, first_steps, longest, segments, windows)
 
 
 def _starts(kernel: Kernel, flat: Mapping[str, Any], runs: int) -> np.ndarray:
-    """Everything at rest, the masses displaced as the motion says."""
+    """Everything at rest, the masses (and what has been measured of them) displaced as the motion says."""
     starts = np.zeros((runs, len(kernel.states)))
     for i, name in enumerate(kernel.states):
-        if name in ("position", "cart_position", "parasitic_position"):
+        if name in ("position", "cart_position", "parasitic_position", "filtered_position"):
             starts[:, i] = motion.initial_displacement(flat)
     return starts
 
@@ -119,10 +120,8 @@ def _segments(flat: Mapping[str, Any], runs: int, window: float) -> tuple[np.nda
 def _run_with_room(kernel: Kernel, batch: Batch, flat: Mapping[str, Any], options: Options) -> Results:
     """Run a chunk; runs with more turning points than there is room for again, with more."""
     runs = len(batch.starts)
-    longest = float(np.min(flat["motion.duration"])) * LONGEST_SHARE
     settings = Settings(
         rtol=float(options.rtol),
-        longest=longest,
         budget=float(options.budget),
         inner=float(options.bands[0]),
         outer=float(options.bands[1]),

@@ -7,6 +7,7 @@ build at the same time out of each other's way.
 
 from __future__ import annotations
 
+import atexit
 import hashlib
 import importlib.util
 import json
@@ -17,8 +18,10 @@ import stat
 import subprocess
 import sys
 import tempfile
+import threading
 from collections.abc import Callable
 from functools import cache
+from importlib.metadata import version
 from pathlib import Path
 from types import ModuleType
 
@@ -36,6 +39,9 @@ logger = logging.getLogger("friso")
 
 FOLDER_VARIABLE = "FRISO_CACHE_DIR"
 
+_numba_folder = threading.Lock()
+_building: set[subprocess.Popen[bytes]] = set()
+
 
 @cache
 def cache_folder() -> Path:
@@ -51,7 +57,9 @@ def cache_folder() -> Path:
             return folder
     except OSError as error:
         logger.warning("kernels are compiled into a temporary folder and not kept: %s", error)
-        return Path(tempfile.mkdtemp(prefix="friso-kernels-"))
+        passing = Path(tempfile.mkdtemp(prefix="friso-kernels-"))
+        atexit.register(shutil.rmtree, passing, ignore_errors=True)
+        return passing
 
 
 @cache
@@ -62,8 +70,13 @@ def environment() -> str:
     for folder in ("equations", "engine"):
         for file in sorted((package / folder).rglob("*.py")):
             code.update(file.read_bytes())
-    versions = (VERSION, sys.version, np.__version__, numba.__version__, llvmlite.__version__)
-    return repr((code.hexdigest(), versions, llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()))
+    compilers = (numba.__version__, llvmlite.__version__, version("sympy"))
+    versions = (VERSION, sys.version, np.__version__, *compilers)
+    processor = (llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten())
+    settings = sorted(
+        (name, value) for name, value in os.environ.items() if name.startswith("NUMBA_") and name != "NUMBA_CACHE_DIR"
+    )
+    return repr((code.hexdigest(), versions, processor, settings))
 
 
 def load_or_build(name: str, builder: str, task: bytes, load: Callable[[ModuleType], None]) -> ModuleType:
@@ -78,24 +91,41 @@ def load_or_build(name: str, builder: str, task: bytes, load: Callable[[ModuleTy
     entry = cache_folder() / key
     with FileLock(cache_folder() / f"{key}.lock", mode=0o600):
         if not _intact(entry):
-            logger.warning("compiling a kernel for these equations; the next run finds it compiled")
-            shutil.rmtree(entry, ignore_errors=True)
-            entry.mkdir(mode=0o700)
             _build(builder, entry, task)
-            (entry / "manifest.json").write_text(json.dumps(_checksums(entry)))
         module = import_entry(entry)
         load(module)
+        if module.run.stats.cache_misses:  # Numba did not take the machine code: the files were copied, for one
+            _build(builder, entry, task)
+            module = import_entry(entry)
+            load(module)
         return module
 
 
 def _build(builder: str, entry: Path, task: bytes) -> None:
-    paths = os.pathsep.join(path or os.getcwd() for path in sys.path)
-    environ = {**os.environ, "PYTHONPATH": paths}
-    done = subprocess.run(
-        [sys.executable, "-m", builder, str(entry)], input=task, capture_output=True, env=environ, check=False
-    )
-    if done.returncode:
-        raise RuntimeError(f"the kernel could not be compiled:\n{done.stderr.decode(errors='replace')}")
+    logger.warning("compiling a kernel for these equations; the next run finds it compiled")
+    shutil.rmtree(entry, ignore_errors=True)
+    entry.mkdir(mode=0o700)
+    environ = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
+    command = [sys.executable, "-P", "-m", builder, str(entry)]
+    pipe = subprocess.PIPE
+    with subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, env=environ) as process:
+        _building.add(process)
+        try:
+            _, message = process.communicate(task)
+        except BaseException:
+            process.kill()
+            raise
+        finally:
+            _building.discard(process)
+    if process.returncode:
+        raise RuntimeError(f"the kernel could not be compiled:\n{message.decode(errors='replace')}")
+    (entry / "manifest.json").write_text(json.dumps(_checksums(entry)))
+
+
+def stop_building() -> None:
+    """End what other threads are building."""
+    for process in list(_building):
+        process.kill()
 
 
 def _checksums(entry: Path) -> dict[str, str]:
@@ -118,10 +148,11 @@ def import_entry(entry: Path) -> ModuleType:
         raise ImportError(f"no module can be made of {entry / 'kernel.py'}")
     module = importlib.util.module_from_spec(spec)
     sys.modules[spec.name] = module
-    elsewhere = getattr(numba_config, "CACHE_DIR")  # noqa: B009 (set at import, unknown to type checkers)
-    setattr(numba_config, "CACHE_DIR", "")  # noqa: B010
-    try:
-        spec.loader.exec_module(module)
-    finally:
-        setattr(numba_config, "CACHE_DIR", elsewhere)  # noqa: B010
+    with _numba_folder:
+        elsewhere = getattr(numba_config, "CACHE_DIR")  # noqa: B009 (set at import, unknown to type checkers)
+        setattr(numba_config, "CACHE_DIR", "")  # noqa: B010
+        try:
+            spec.loader.exec_module(module)
+        finally:
+            setattr(numba_config, "CACHE_DIR", elsewhere)  # noqa: B010
     return module

@@ -97,6 +97,8 @@ def note_turn(B, lane, fraction, settings, times, values, count):
 
 def note_samples(B, lane, fraction, interval, samples):
     """Write the states at the sampling instants inside the step, from the dense output."""
+    if B[NEXT_SAMPLE * LANES + lane] == np.inf:
+        return
     start, h = moment(B, lane, 0.0), B[TAKEN * LANES + lane]
     end = moment(B, lane, fraction)
     last = samples.shape[0] - 1
@@ -115,7 +117,7 @@ def enter_segment(B, lane, segments, segment, window, first_step):
     Segment `window` begins the window over which the extremes of the deviation are taken.
     """
     count = segments.shape[0] - 1
-    while segment < count and segments[segment + 1, 0] - segments[segment, 0] <= 0.0:
+    while segment < count and segments[segment + 1, 0] - segments[segment, 0] <= 1e-15 * segments[count, 0]:
         segment += 1
     if segment >= count:
         return count
@@ -145,6 +147,7 @@ def load_run(B, lane, j, batch, settings):
     for k in range(KINKS):
         B[(MODE + k) * LANES + lane] = batch.modes[j, k]
     B[TRIAL * LANES + lane] = batch.first_steps[j]
+    B[LONGEST * LANES + lane] = batch.longest[j]
     B[RECORD_FROM * LANES + lane] = settings.record_from
     return enter_segment(B, lane, batch.segments[j], 0, batch.windows[j], batch.first_steps[j])
 
@@ -158,6 +161,13 @@ def start_run(B, lane, j, batch, settings, results):
             results.samples[j, 0, i] = batch.starts[j, i]
         B[NEXT_SAMPLE * LANES + lane] = settings.interval
     return segment
+
+
+def aligned_buffer():
+    """Room for all rows, on a boundary of 64 bytes: a register that straddles two cache lines takes twice as long."""
+    room = np.zeros(ROWS * LANES + 8)
+    first = (64 - room.ctypes.data % 64) % 64 // 8
+    return room[first : first + ROWS * LANES]
 
 
 def idle(B, lane):
@@ -179,9 +189,10 @@ def answer(B, lane, j, segment, batch, settings, results):
     times, values = results.turn_times[j], results.turn_values[j]
     count = note_turn(B, lane, fraction, settings, times, values, results.turn_counts[j])
     results.turn_counts[j] = count
-    if moment(B, lane, fraction) >= B[NEXT_SAMPLE * LANES + lane]:
+    at_stop = B[TIME * LANES + lane] >= B[STOP * LANES + lane]
+    if at_stop or moment(B, lane, fraction) >= B[NEXT_SAMPLE * LANES + lane]:
         note_samples(B, lane, fraction, settings.interval, results.samples[j])
-    if B[TIME * LANES + lane] < B[STOP * LANES + lane]:
+    if not at_stop:
         return segment
     return enter_segment(B, lane, batch.segments[j], segment + 1, batch.windows[j], batch.first_steps[j])
 
@@ -192,6 +203,8 @@ def finish(B, lane, j, segment, batch, settings, results):
         results.statuses[j] = DONE
     elif B[ATTEMPTED * LANES + lane] >= settings.budget:
         results.statuses[j] = BUDGET
+    elif B[EVENT * LANES + lane] == 2.0:
+        results.statuses[j] = DIVERGED
     elif B[FRACTION * LANES + lane] == 0.0:
         results.statuses[j] = UNDERFLOW
     else:
@@ -207,7 +220,7 @@ def finish(B, lane, j, segment, batch, settings, results):
 
 def run(first, last, batch, settings, results):
     """Run the runs first to last - 1 of the batch, each in a lane of its own, and write the results."""
-    B = np.zeros(ROWS * LANES)
+    B = aligned_buffer()
     who = np.full(LANES, -1)
     segment = np.zeros(LANES, np.int64)
     upcoming, busy = first, 0
@@ -219,7 +232,7 @@ def run(first, last, batch, settings, results):
             load_run(B, lane, first, batch, settings)
             idle(B, lane)
     while busy > 0:
-        step(B, settings.rtol, settings.longest, settings.inner, settings.outer, settings.budget)
+        step(B, settings.rtol, settings.inner, settings.outer, settings.budget)
         for lane in range(LANES):
             j = who[lane]
             if B[EVENT * LANES + lane] == 0.0 or j < 0:

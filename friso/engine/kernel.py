@@ -14,7 +14,7 @@ import numba
 import numpy as np
 
 from friso.engine.arrays import STATISTICS, Batch, Results, Settings
-from friso.engine.cache import load_or_build
+from friso.engine.cache import load_or_build, stop_building
 from friso.engine.layout import LANES
 from friso.equations.structure import Structure
 
@@ -58,7 +58,11 @@ def kernel(structure: Structure, method: str = "Rodas5P", lanes: int = LANES) ->
 def kernels(structures: Iterable[Structure]) -> list[Kernel]:
     """The kernels of several structures; what has to be compiled is compiled side by side."""
     with ThreadPoolExecutor() as pool:
-        return list(pool.map(kernel, structures))
+        try:
+            return list(pool.map(kernel, structures))
+        except BaseException:
+            stop_building()
+            raise
 
 
 def empty_results(runs: int, capacity: int, samples: int, states: int) -> Results:
@@ -76,8 +80,8 @@ def empty_results(runs: int, capacity: int, samples: int, states: int) -> Result
 def compile_driver(module: ModuleType) -> None:
     """Compile (or load from Numba's cache) the driver for the types it is called with, and for no others."""
     flat, square = np.zeros(1), np.zeros((1, 1))
-    batch = Batch(square, square, square, square, flat, np.zeros((1, 1, 4)), np.zeros(1, np.int64))
-    settings = Settings(1.0, 1.0, 1.0, 1.0, 1.0, 0.0, 1.0)
+    batch = Batch(square, square, square, square, flat, flat, np.zeros((1, 1, 4)), np.zeros(1, np.int64))
+    settings = Settings(1.0, 1.0, 1.0, 1.0, 0.0, 1.0)
     arguments = (0, 0, batch, settings, empty_results(1, 1, 1, 1))
     module.run.compile(tuple(numba.typeof(argument) for argument in arguments))
     module.run.disable_compile()

@@ -13,6 +13,7 @@ SCALARS = (
     "stop",
     "start",
     "trial",
+    "longest",
     "taken",
     "fraction",
     "rejected_last",
@@ -28,7 +29,8 @@ SCALARS = (
     "outer_exit",
 )
 """Rows of one number per lane. time, old_time, stop: now, before the step and at its next corner, all since the last
-corner of the reference, which was at start; trial, taken: step to try next and step last tried; fraction: the part of
+corner of the reference, which was at start; trial, longest, taken: step to try next, its limit, and
+step last tried; fraction: the part of
 it that was accepted; event: the lane wants attention."""
 
 

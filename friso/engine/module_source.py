@@ -29,11 +29,12 @@ from numba import njit
 from numpy import uint64 as U
 
 from friso.engine.arrays import Status
-from friso.engine.roots import cubic, first_crossing
-from friso.engine.simd_math import exp, power, tanh
+from friso.engine.roots import crossing, cubic, first_guess
+from friso.engine.simd_math import align_stack, exp, power, tanh
 
 OPTIONS = {{"nogil": True, "error_model": "numpy", "fastmath": {{"contract", "nsz", "arcp"}}}}
-DONE, BUDGET, UNDERFLOW = int(Status.DONE), int(Status.BUDGET), int(Status.UNDERFLOW)
+DONE, BUDGET = int(Status.DONE), int(Status.BUDGET)
+UNDERFLOW, DIVERGED = int(Status.UNDERFLOW), int(Status.DIVERGED)
 '''
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import sqrt
+
 from numba import njit
 
 from friso.engine.simd_math import OPTIONS
@@ -17,22 +19,46 @@ def cubic(p0, p1, p2, p3, theta):
 
 
 @njit(**OPTIONS)
-def first_crossing(p0, p1, p2, p3):
-    """Where the cubic first falls below zero from p0 > 0; 2 where it does not.
+def bracket(p0, p1, p2, p3):
+    """Where the cubic first is below zero: the ends of an interval with its first zero, and the cubic there.
 
-    A third in which the sign changes brackets the zero; a secant and three Newton steps find it, halving the
-    bracket where a step would leave it; what has not converged then is taken at the bracket's far end.
+    It is looked at in the thirds, at the end, and where it is least; the upper end is 2 where it is nowhere below zero.
     """
     c1 = -5.5 * p0 + 9.0 * p1 - 4.5 * p2 + p3
     c2 = 9.0 * p0 - 22.5 * p1 + 18.0 * p2 - 4.5 * p3
     c3 = -4.5 * p0 + 13.5 * p1 - 13.5 * p2 + 4.5 * p3
-    early = p1 < 0.0
-    middle = p2 < 0.0
-    low = 0.0 if early else (1.0 / 3.0 if middle else 2.0 / 3.0)
-    high = low + 1.0 / 3.0
-    above = p0 if early else (p1 if middle else p2)
-    below = p1 if early else (p2 if middle else p3)
-    theta = low + above / (3.0 * (above - below))
+    dip = -c1 / (c2 + sqrt(max(c2 * c2 - 3.0 * c1 * c3, 0.0)))
+    least = p0 + dip * (c1 + dip * (c2 + dip * c3))
+    high = 1.0 / 3.0 if p1 < 0.0 else (2.0 / 3.0 if p2 < 0.0 else (1.0 if p3 < 0.0 else 2.0))
+    below = p1 if p1 < 0.0 else (p2 if p2 < 0.0 else p3)
+    dips = (dip > 0.0) & (dip < min(high, 1.0)) & (least < 0.0)
+    high = dip if dips else high
+    below = least if dips else below
+    low = 2.0 / 3.0 if high > 2.0 / 3.0 else (1.0 / 3.0 if high > 1.0 / 3.0 else 0.0)
+    above = p2 if high > 2.0 / 3.0 else (p1 if high > 1.0 / 3.0 else p0)
+    return low, high, above, below
+
+
+@njit(**OPTIONS)
+def first_guess(p0, p1, p2, p3):
+    """About where the cubic first falls below zero from p0 > 0, by a secant; 2 where it does not."""
+    low, high, above, below = bracket(p0, p1, p2, p3)
+    guess = low + (high - low) * above / (above - below)
+    return guess if high < 2.0 else 2.0
+
+
+@njit(**OPTIONS)
+def crossing(p0, p1, p2, p3, guess):
+    """Where the cubic first falls below zero, from `first_guess`.
+
+    Three Newton steps find it, halving the bracket where a step would leave it; what has not converged then is taken
+    at the bracket's far end.
+    """
+    c1 = -5.5 * p0 + 9.0 * p1 - 4.5 * p2 + p3
+    c2 = 9.0 * p0 - 22.5 * p1 + 18.0 * p2 - 4.5 * p3
+    c3 = -4.5 * p0 + 13.5 * p1 - 13.5 * p2 + 4.5 * p3
+    low, high, _, _ = bracket(p0, p1, p2, p3)
+    theta = guess
     for _ in range(3):
         value = p0 + theta * (c1 + theta * (c2 + theta * c3))
         slope = c1 + theta * (2.0 * c2 + theta * 3.0 * c3)
@@ -41,5 +67,4 @@ def first_crossing(p0, p1, p2, p3):
         newton = theta - value / slope
         theta = newton if (newton > low) & (newton < high) else 0.5 * (low + high)
     found = p0 + theta * (c1 + theta * (c2 + theta * c3)) <= 0.01 * p0
-    crossed = early | middle | (p3 < 0.0)
-    return (theta if found else high) if crossed else 2.0
+    return theta if found else high

@@ -23,6 +23,9 @@ THIRDS = (1 / 3, 2 / 3)
 """Where inside a step the kinks are looked at; with both ends they fix a cubic."""
 
 
+POINTS = ("near", "third", "far", "last")
+"""Names of a kink's surface at the start, the thirds and the end of a step."""
+
 HYSTERESIS = 3e-3
 """A kink counts as crossed this share of the tolerance beyond it, so that a lane that has just crossed it stands
 clear of it, and rounding noise about it crosses nothing."""
@@ -33,6 +36,13 @@ SAFETY = 0.77
 
 AFTER_KINK = 0.25
 """Share of the proposed step that is tried after a kink, behind which the motion may be much quicker."""
+
+
+ROUNDING = 2e-15
+"""The hysteresis is no less than this share of the terms of a surface, nine units in their last place."""
+
+DIVERGED = 1e6
+"""A run ends when its deviation is so many times the length scale of the motion."""
 
 
 class Block:
@@ -73,6 +83,7 @@ class StepWriter:
         entries = {f"j_{i}_{j}_": e for (i, j), e in self._jacobian.items()}
         drifts = {f"drift{i}_": e for i, e in self._drift.items()}
         sizes = {f"size{k}_": self._size(kink.surface) for k, kink in enumerate(model.kinks)}
+        sizes |= {f"terms{k}_": self._rounding(kink.surface) for k, kink in enumerate(model.kinks)}
         watched: dict[str, Any] = surfaces | {"force": force}
         self._start = Block(rates | entries | drifts | watched | sizes | follow, self.constants)
         self._rates = Block(rates, self.constants)
@@ -86,6 +97,11 @@ class StepWriter:
         """Magnitude of a surface that corresponds to the scales of the states."""
         sizes = (sp.Abs(sp.diff(surface, state.symbol)) * state.scale for state in self.model.states)
         return sum(sizes, start=sp.S.Zero)
+
+    def _rounding(self, surface: sp.Expr) -> sp.Expr:
+        """Magnitude of the terms of a surface, on which its rounding error depends."""
+        terms = (sp.Abs(sp.diff(surface, x)) * sp.Abs(x) for x in self.model.symbols)
+        return sum(terms, start=sp.S.Zero)
 
     def _nonzero_jacobian(self) -> dict[tuple[int, int], sp.Expr]:
         entries = {}
@@ -105,7 +121,7 @@ class StepWriter:
         return name
 
     def source(self) -> str:
-        """The function `step(B, rtol, longest, inner, outer, budget)` over the lanes' buffer."""
+        """The function `step(B, rtol, inner, outer, budget)` over the lanes' buffer."""
         body = [
             *self._load(),
             *self._choose_step(),
@@ -118,7 +134,7 @@ class StepWriter:
             *self._statistics(),
             *self._store(),
         ]
-        head = "def step(B, rtol, longest, inner, outer, budget):\n    for l in range(U(LANES)):\n"
+        head = "def step(B, rtol, inner, outer, budget):\n    align_stack()\n    for l in range(U(LANES)):\n"
         return head + "".join(f"        {line}\n" for line in body)
 
     def _row(self, block: str, i: int = 0) -> str:
@@ -208,26 +224,36 @@ class StepWriter:
         return f"x{i} + {theta} * (end{i} - x{i} + (1.0 - {theta}) * ({inner}))"
 
     def _crossings(self) -> list[str]:
-        """For every kink where in the step it is first crossed; `fraction` is the earliest."""
+        """Where in the step the first kink is crossed: `fraction`, 1 if none is; `astray`: a kink's mode is wrong."""
         lines = []
         for point, theta in enumerate(THIRDS):
             states = [f"p{point}_{i} = {self._between(i, repr(theta))}" for i in self._watched_states]
             lines += [*states, f"t_p{point} = t + {theta!r} * h"]
             lines += self._watched.code(f"_p{point}", self._rename(f"p{point}_", f"t_p{point}"))
         lines += ["t_e = t + h", *self._watched.code("_e", self._rename("end", "t_e"))]
-        lines += ["fraction = 1.0", "astray = False"]
+        lines += ["earliest = 1.0", "astray = False"]
         for k in range(self.kinks):
-            points = zip(("near", "third", "far", "end"), ("s", "p0", "p1", "e"), strict=True)
-            lines.append(f"side{k} = 2.0 * mode{k} - 1.0")
-            lines.append(f"band{k} = {HYSTERESIS!r} * rtol * size{k}__s")
-            lines += [f"{name}{k}_ = side{k} * g{k}__{where} + band{k}" for name, where in points]
+            points = zip(POINTS, ("s", "p0", "p1", "e"), strict=True)
             lines += [
-                f"astray{k} = near{k}_ < 0.0",
-                f"astray = astray | astray{k}",
-                f"root{k} = first_crossing(near{k}_, third{k}_, far{k}_, end{k}_)",
-                f"fraction = min(fraction, root{k})",
+                f"side{k} = 2.0 * mode{k} - 1.0",
+                f"band{k} = {HYSTERESIS!r} * rtol * size{k}__s + {ROUNDING!r} * terms{k}__s",
             ]
-        return lines
+            lines += [f"{point}{k} = side{k} * g{k}__{where} + band{k}" for point, where in points]
+            lines += [
+                f"astray{k} = near{k} < 0.0",
+                f"astray = astray | astray{k}",
+                f"guess{k} = first_guess({', '.join(f'{point}{k}' for point in POINTS)})",
+                f"earliest = min(earliest, guess{k})",
+            ]
+        if not self.kinks:
+            return [*lines, "fraction = 1.0"]
+        for point in POINTS:
+            lines.append(f"first_{point} = {point}0")
+            lines += [
+                f"first_{point} = {point}{k} if guess{k} <= earliest else first_{point}" for k in range(1, self.kinks)
+            ]
+        found = f"crossing({', '.join(f'first_{point}' for point in POINTS)}, earliest)"
+        return [*lines, f"fraction = {found}", "fraction = fraction if earliest < 1.0 else 1.0"]
 
     def _accept(self) -> list[str]:
         """Accept or reject, the new state and modes, and the next step."""
@@ -242,8 +268,8 @@ class StepWriter:
             lines.append(f"n{i} = (cut{i} if cut else end{i}) if good else x{i}")
         for k in range(self.kinks):
             lines += [
-                f"there{k} = cubic(near{k}_, third{k}_, far{k}_, end{k}_, fraction)",
-                f"beyond{k} = (root{k} <= fraction) | (there{k} < 0.0)",
+                f"there{k} = cubic({', '.join(f'{point}{k}' for point in POINTS)}, fraction)",
+                f"beyond{k} = (guess{k} <= earliest) | (there{k} < 0.0)",
                 f"flip{k} = astray{k} | (good & cut & beyond{k})",
                 f"mode{k} = 1.0 - mode{k} if flip{k} else mode{k}",
             ]
@@ -285,13 +311,13 @@ class StepWriter:
             "outer_exit = now if off > outer else outer_exit",
             "entered = ((was > inner) & (off <= inner)) | ((was > outer) & (off <= outer))",
             "turned = ((turning_s > 0.0) & (turning_n <= 0.0)) | ((turning_s < 0.0) & (turning_n >= 0.0))",
-            "turned = turned & (now >= record_from)",
             "attempted = attempted + 1.0",
             "rejected_last = 0.0 if good else 1.0",
             "rejected = rejected + rejected_last",
             "happened = good & (entered | turned | (t_n >= stop) | (now >= next_sample))",
-            "failed = (attempted >= budget) | ((not good) & (trial < 1e-15))",
-            "event = 1.0 if happened | failed else 0.0",
+            "failed = (attempted >= budget) | ((not good) & (not (trial >= 1e-15)))",
+            f"diverged = abs(deviation_n) * rtol > {DIVERGED!r} * tol{self._index[sp.Symbol('position', real=True)]}",
+            "event = 2.0 if diverged else (1.0 if happened | failed else 0.0)",
             "fraction = fraction if good else 0.0",
         ]
 
@@ -303,5 +329,5 @@ class StepWriter:
         lines += [f"{self._row('x', i)} = n{i}" for i in range(self.size)]
         lines += [f"{self._row('mode', k)} = mode{k}" for k in range(self.kinks)]
         lines += ["time, old_time, taken = t_n, t, h"]
-        changed = [name for name in SCALARS if name not in ("stop", "start", "next_sample", "record_from")]
+        changed = [name for name in SCALARS if name not in ("stop", "start", "longest", "next_sample", "record_from")]
         return lines + [f"{self._row(name)} = {name}" for name in changed]

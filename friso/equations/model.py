@@ -23,6 +23,10 @@ MOTION_SIZE = key("motion.size")
 """Length of the motion [m]; infinite where nothing moves, so that it bounds nothing."""
 
 
+SMALLEST_LENGTH = sp.Rational(1, 10**4)
+"""Share of the motion below which its length scale does not fall, however little friction there is."""
+
+
 @dataclass(frozen=True)
 class Model:
     """The equations of a stage.
@@ -103,7 +107,9 @@ def _scales(structure: Structure, friction: Friction | None, mass: sp.Expr) -> t
     """Length [m] by which the break-away force deflects the control loop (at most the motion itself), and the
     natural frequency of mass and loop [1/s]: a hunting cycle is a few of the one in size and period."""
     stiffness = loop_stiffness(structure.controller)
-    length = MOTION_SIZE if friction is None else sp.Min(MOTION_SIZE, friction.breakaway / stiffness)
+    length = MOTION_SIZE
+    if friction is not None:
+        length = sp.Max(sp.Min(MOTION_SIZE, friction.breakaway / stiffness), SMALLEST_LENGTH * MOTION_SIZE)
     return length, sp.Max(sp.sqrt(stiffness / mass), 1 / key("motion.duration"))
 
 

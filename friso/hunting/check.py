@@ -38,7 +38,8 @@ class Solver:
 class Case:
     """A stage and what became of it.
 
-    `verdict` is "hunts", "settles" or "failed"; `peaks` counts the thesis's peaks, at `peak_times` [s] and of
+    `verdict` is "hunts", "settles", "transient" or "failed" (see `Measures.verdict`);
+    `peaks` counts the thesis's peaks, at `peak_times` [s] and of
     `peak_heights` [m] above the reference; `peak_to_peak` [m] and `period` [s] (None: no cycle) are of the last
     quarter; `settling_time` maps each band [m] to the time after the last corner of the reference [s] (None: never);
     `largest_force` [N] is the actuator's. `trace` holds the time response if asked for.
@@ -78,7 +79,7 @@ def check(stage: Stage, rtol: float = 1e-6, traces: bool = False) -> dict[str, C
 
 def _case(stage: Stage, rtol: float, traces: bool) -> Case:
     flat = stage.flat()
-    (runs,) = run_chunks(kernel(structure(flat)), flat, 1, options(flat, rtol))
+    (runs,) = run_chunks(kernel(structure(flat)), flat, 1, options(rtol))
     found = measure(flat, runs)
     room = found.turns.shape[1]
     status = Status(int(found.status[0]))

@@ -11,7 +11,7 @@ import numpy as np
 from friso.engine.arrays import Status
 from friso.engine.batch import Options, Runs
 from friso.equations.motion import last_corner
-from friso.hunting.peaks import COUNTED_ABOVE, COUNTED_AFTER, counted_peaks
+from friso.hunting.peaks import COUNTED_ABOVE, COUNTED_AFTER, counted_peaks, swings
 
 __all__ = ["BANDS", "COUNTED_ABOVE", "COUNTED_AFTER", "WINDOW", "Measures", "measure", "options", "periods"]
 
@@ -46,10 +46,9 @@ class Measures:
         return np.where(self.status == Status.DONE, words, "failed")
 
 
-def options(flat: Mapping[str, Any], rtol: float, threads: int | None = None) -> Options:
-    """How to run for these measures, keeping no turning points that none of them needs."""
-    half = float(np.min(flat["motion.duration"])) / 2
-    return Options(rtol=rtol, bands=BANDS, window=WINDOW, record_from=min(COUNTED_AFTER, half), threads=threads)
+def options(rtol: float, threads: int | None = None) -> Options:
+    """How to run for these measures."""
+    return Options(rtol=rtol, bands=BANDS, window=WINDOW, threads=threads)
 
 
 def measure(flat: Mapping[str, Any], runs: Runs) -> Measures:
@@ -70,11 +69,11 @@ def measure(flat: Mapping[str, Any], runs: Runs) -> Measures:
         return np.where(done, array, np.nan)
 
     return Measures(
-        peaks=turns.sum(axis=1),
+        peaks=np.where(done, turns.sum(axis=1), 0),
         peak_to_peak=finished(amplitude),
         period=finished(periods(times, values, results.turn_counts, amplitude, ended)),
         settling_time=(finished(inner), finished(outer)),
-        largest_force=runs.statistic("force_peak"),
+        largest_force=finished(runs.statistic("force_peak")),
         status=results.statuses,
         steps=runs.statistic("attempted").astype(np.int64),
         rejected=runs.statistic("rejected").astype(np.int64),
@@ -93,26 +92,13 @@ def periods(
     """
     found = np.full(len(counts), np.nan)
     for j in np.flatnonzero(amplitude > BANDS[0]):
-        time, value = times[j, : counts[j]], values[j, : counts[j]]
+        time = times[j, : counts[j]]
+        kinds = swings(values[j, : counts[j]], amplitude[j] / 2)
+        last = max((kind[-1] for kind in kinds if kind), default=-1)  # its swing is not over yet
         for share in (WINDOW, 0.5):
-            late = time >= share * ended[j]
-            found[j] = _mean_spacing(time[late], value[late], amplitude[j] / 2)
-            if np.isfinite(found[j]):
+            late = [[time[k] for k in kind if k != last and time[k] >= share * ended[j]] for kind in kinds]
+            spaced = next((kind for kind in late if len(kind) > 1), None)
+            if spaced:
+                found[j] = np.diff(spaced).mean()
                 break
     return found
-
-
-def _mean_spacing(times: np.ndarray, values: np.ndarray, swing: float) -> float:
-    """Mean spacing of the maxima, or else the minima, of a zigzag whose legs are at least `swing` [m]."""
-    extrema: dict[int, list[float]] = {1: [], -1: []}
-    way, best = 0, 0
-    for k in range(1, len(values)):
-        leg = values[k] - values[best]
-        if way != 0 and leg * way > 0:
-            best = k
-        elif abs(leg) >= swing:
-            if way != 0:
-                extrema[way].append(times[best])
-            way, best = int(np.sign(leg)), k
-    spaced = next((each for each in extrema.values() if len(each) > 1), None)
-    return float(np.diff(spaced).mean()) if spaced else float("nan")

@@ -143,6 +143,10 @@ def controller_form(table: dict[str, Any]) -> type[Section]:
     return TunedController if rules else GainsController
 
 
+ROUNDING = 1e-12
+"""Relative slack of the limits on times, which are sums of decimal numbers."""
+
+
 class Motion(Section):
     """Base of the motions: what the reference does."""
 
@@ -165,13 +169,15 @@ class ThereAndBack(Motion):
     rules: ClassVar[tuple[Rule, ...]] = (
         Rule(
             ("motion.acceleration_time", "motion.return_at"),
-            lambda f: 2 * f["motion.acceleration_time"] <= f["motion.return_at"],
+            lambda f: 2 * f["motion.acceleration_time"] <= f["motion.return_at"] * (1 + ROUNDING),
             "the way there (2 acceleration_time) over before return_at",
             'acceleration_time = "30 ms", return_at = "5 s"',
         ),
         Rule(
             ("motion.acceleration_time", "motion.return_at", "motion.duration"),
-            lambda f: f["motion.return_at"] + 2 * f["motion.acceleration_time"] <= f["motion.duration"],
+            lambda f: (
+                f["motion.return_at"] + 2 * f["motion.acceleration_time"] <= f["motion.duration"] * (1 + ROUNDING)
+            ),
             "the way back (return_at + 2 acceleration_time) over within the duration",
             'acceleration_time = "30 ms", return_at = "5 s", duration = "20 s"',
         ),

@@ -54,10 +54,15 @@ def sweep(stage: Stage, axes: Mapping[str, Values], rtol: float = 1e-4, threads:
     texts with units, ``["0.1 mm", "0.3 mm"]``, or bare numbers, words and booleans where the key takes these. The
     result has one dimension per axis with SI coordinates, and the variables peaks, verdict, peak_to_peak [m], period
     [s], settling_time [s] into 1 um, settling_time_10um [s], largest_force [N], steps, rejected and status; a cell
-    that no stage may have is "invalid", with the reason in its status. Raises StageError for an unknown key, a value
+    that no stage may have is "invalid", with the reason in its status. A verdict is as good as its tolerance: near a
+    boundary, or with very stiff bristles, compare with a run at a tighter `rtol`. Raises StageError for an unknown key, a value
     of the wrong kind or an empty axis, ValueError for a tolerance that is not usable.
     """
     checked_rtol(rtol)
+    if not axes:
+        raise StageError(
+            "axes", "none", "at least one key with its values", '{"controller.crossover": ["4 Hz", "8 Hz"]}'
+        )
     read = [_axis(stage, key, values) for key, values in axes.items()]
     table = _Table(tuple(len(axis.values) for axis in read))
     for part, flat, cells in _numeric_parts(stage, read):
@@ -174,7 +179,7 @@ class _Table:
     ) -> None:
         """Run the cells `members` of a part and write their measures."""
         own = {key: value[members] if np.ndim(value) else value for key, value in flat.items()}
-        for runs in run_chunks(kernel(shape), own, len(members), options(own, rtol, threads)):
+        for runs in run_chunks(kernel(shape), own, len(members), options(rtol, threads)):
             here = slice(runs.first, runs.first + len(runs.results.statuses))
             part = {key: value[here] if np.ndim(value) else value for key, value in own.items()}
             self.write(cells[members[here]], measure(part, runs), runs)

@@ -26,7 +26,7 @@ def verdict_sentence(item: Shown) -> str:
     if case.verdict == "bistable":
         return "settles after this move, but another move or a push can start hunting."
     if case.verdict == "transient":
-        return f"does not keep hunting, but is not settled at the end of the run (still {size})."
+        return f"has no counted peaks, but is not settled at the end of the run (still {size})."
     if case.verdict == "settles":
         return _settling(item, size)
     return f"{case.verdict} (solver: {case.solver.status})."
