@@ -64,3 +64,68 @@ def test_locked_without_stiffness_has_no_free_case(rig: Stage) -> None:
 def test_unusable_tolerance(rig: Stage) -> None:
     with pytest.raises(ValueError, match=r"rtol: given 1, expected .* such as 1e-6"):
         friso.check(rig, rtol=1.0)
+
+
+SPRING = """
+masses.stage = "1 kg"
+controller = {{ kind = "pid", kp = "{kp} N/m", kd = "{kd} N*s/m", derivative_on = "measurement" }}
+motion = {{ kind = "step", size = "1 mm", duration = "20 s" }}
+"""
+
+
+@pytest.mark.parametrize(("kp", "kd"), [(1000.0, 15.0), (40.0, 3.0), (300.0, 2.0)])
+def test_settling_time_of_a_damped_spring(kp: float, kd: float) -> None:
+    """Closed form: the last time at which the free oscillation leaves the band, between or beyond its extrema."""
+    case = friso.check(friso.loads(SPRING.format(kp=kp, kd=kd)), rtol=1e-9)["given"]
+    decay, omega = kd / 2, np.sqrt(kp - kd**2 / 4)
+    time = np.arange(0, 20, 1e-5)
+    off = 1e-3 * np.exp(-decay * time) * np.abs(np.cos(omega * time) + decay / omega * np.sin(omega * time))
+    for band, settled in case.settling_time.items():
+        assert settled == pytest.approx(time[off > band].max(), abs=3e-5)
+
+
+STUCK = """
+masses.stage = "1.7 kg"
+friction = { model = "lugre", static = "3 N", coulomb = "1 N", stribeck_velocity = "1.6 mm/s", stribeck_exponent = 2, \
+bristle_stiffness = "1e5 N/m", bristle_damping = "316 N*s/m", viscous = "0.5 N*s/m" }
+controller = { kind = "pid", kp = "2000 N/m", kd = "20 N*s/m", derivative_on = "measurement" }
+motion = { kind = "release", displacement = "0.5 mm", duration = "20 s" }
+"""
+
+
+@pytest.mark.parametrize("rtol", [1e-4, 1e-6])
+@pytest.mark.parametrize("displacement", ["0.5 mm", "1 mm", "-1 mm"])
+def test_a_stage_stuck_off_its_reference_does_not_hunt(rtol: float, displacement: str) -> None:
+    """Without integral action it sticks where it is; rounding noise about there is no peak."""
+    stage = friso.loads(STUCK.replace("\\\n", "")).replace({"motion.displacement": displacement})
+    case = friso.check(stage, rtol=rtol)["given"]
+    assert (case.verdict, case.peaks) == ("settles", 0)
+    assert case.settling_time[1e-5] is None
+
+
+def test_a_run_too_short_for_the_peak_count_is_not_called_settled(rig: Stage) -> None:
+    case = friso.check(rig.replace({"motion.duration": "9.9 s"}))["locked"]
+    assert case.peak_to_peak > 1e-3
+    assert case.verdict == "transient"
+
+
+@pytest.mark.parametrize("share", [0.99, 0.999, 0.9999])
+@pytest.mark.parametrize("rtol", [1e-4, 1e-6])
+def test_a_short_touch_of_the_limiter_is_not_missed(rig: Stage, share: float, rtol: float) -> None:
+    """A stroke a little less than the largest deflection: the limiter touches for a moment, however long the steps."""
+    smooth = rig.replace({
+        "friction": None, "parasitic": None, "controller.crossover": "4 Hz", "motion.acceleration": "10 m/s^2",
+        "motion.acceleration_time": "0.1 s", "motion.duration": "5.5 s", "joint.stroke": "1 m",
+    })  # fmt: skip
+    largest = np.abs(friso.simulate(smooth, rtol=1e-10).joint_deflection).max().item()
+    near = smooth.replace({"joint.stroke": f"{share * largest:.12f} m"})
+    coarse, fine = friso.simulate(near, rtol=rtol), friso.simulate(near, rtol=1e-11)
+    error = np.abs(coarse.position - fine.position)[fine.time < 1].max().item()
+    assert error < 20 * rtol * 0.1
+
+
+def test_a_sweep_over_the_duration_leaves_its_cells_alone(rig: Stage) -> None:
+    runs = friso.sweep(rig, {"motion.duration": ["10.5 s", "20 s", "60 s"]}, rtol=1e-6)
+    alone = friso.check(rig)["given"]
+    assert runs.settling_time.values[1] == alone.settling_time[1e-6]
+    assert runs.steps.values[1] == alone.solver.steps

@@ -49,10 +49,11 @@ def fixed_steps(h: float, interval: float, changes: dict[str, Any]) -> tuple[Res
     options = Options(rtol=1e-2, interval=interval)
     batch = prepare(shape, flat, 1, options)
     batch.first_steps[:] = h
+    batch.longest[:] = h
     batch.tolerances[:] = 1e9
     samples = int(flat["motion.duration"] / interval * (1 + 1e-12)) + 1
     results = empty_results(1, 512, samples, len(shape.states))
-    settings = Settings(1e-2, h, 1e6, 1e-6, 1e-5, 0.0, interval)
+    settings = Settings(1e-2, 1e6, 1e-6, 1e-5, 0.0, interval)
     shape.module.run(0, 1, batch, settings, results)
     assert results.statuses[0] == Status.DONE
     assert results.statistics[0, 6] == 0

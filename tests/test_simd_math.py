@@ -23,8 +23,6 @@ def rng() -> np.random.Generator:
     return np.random.default_rng(0)
 
 
-
-
 @njit(error_model="numpy")
 def exps(x, out):
     for i in range(np.uint64(x.size)):
@@ -56,12 +54,12 @@ def values(function: Callable[..., None], x: np.ndarray) -> np.ndarray:
 
 
 def test_exp(rng: np.random.Generator) -> None:
-    x = np.concatenate([rng.uniform(-700, 700, 20_000), rng.uniform(-1, 1, 20_000), [0.0, 1e-300, -1e-300]])
+    x = np.concatenate([rng.uniform(-300, 700, 20_000), rng.uniform(-1, 1, 20_000), [0.0, 1e-300, -1e-300]])
     assert values(exps, x) == pytest.approx(np.exp(x.astype(np.longdouble)).astype(float), rel=1e-15)
 
 
 def test_exp_beyond_its_range() -> None:
-    assert values(exps, np.array([-1e300, -np.inf])) == pytest.approx(np.exp(-700), rel=1e-15)
+    assert values(exps, np.array([-1e300, -np.inf])) == pytest.approx(np.exp(-300), rel=1e-15)
     assert values(exps, np.array([1e300, np.inf])) == pytest.approx(np.exp(700), rel=1e-15)
 
 
@@ -104,7 +102,7 @@ def test_loops_are_vectorised(function: Callable[..., None]) -> None:
 def test_steps_are_vectorised() -> None:
     """The step of a kernel works on whole registers; hardly anything is done lane by lane."""
     module = kernel(structure(VARIANTS["rigid"].flat())).module
-    module.step(np.zeros(module.ROWS * module.LANES), 1e-6, 1.0, 1e-6, 1e-5, 1e6)
+    module.step(np.zeros(module.ROWS * module.LANES), 1e-6, 1e-6, 1e-5, 1e6)
     assembly = "\n".join(module.step.inspect_asm().values())
     scalar = len(re.findall(r"\bv(?:f[n]?m(?:add|sub)\d+|mul|add|sub|div)sd\b", assembly))
     assert packed(module.step) > 500
@@ -113,24 +111,20 @@ def test_steps_are_vectorised() -> None:
 
 @pytest.mark.parametrize("seed", range(5))
 def test_first_crossing_of_a_cubic(seed: int) -> None:
-    """The first zero, as the roots of the polynomial have it; 2 where the thirds show none."""
+    """Found exactly where the polynomial's roots say there is one, also in a dip between the thirds; and never before
+    the first of them."""
     rng = np.random.default_rng(seed)
-    thirds = np.array([0, 1, 2, 3]) / 3
-    seen = 0
-    for _ in range(400):
-        p = rng.normal(size=4)
+    dips = 0
+    for _ in range(2000):
+        p = rng.normal(size=4) + rng.choice([0.0, 0.3, 1.0])
         p[0] = abs(p[0])
-        found = roots.first_crossing(*p)
-        coefficients = np.polyfit(thirds, p, 3)
-        if np.all(p[1:] > 0):
-            assert found == 2.0
-            continue
-        zeros = np.roots(coefficients)
-        real = np.sort(zeros[np.abs(zeros.imag) < 1e-12].real)
-        third = np.argmax(p < 0)
-        inside = real[(real >= (third - 1) / 3 - 1e-9) & (real <= third / 3 + 1e-9)]
-        assert roots.cubic(*p, found) <= 0.01 * p[0] + 1e-12
-        if inside.size == 1:
-            seen += 1
-            assert found >= inside[0] - 1e-2 * p[0]
-    assert seen > 100
+        zeros = np.roots(np.polyfit(np.array([0, 1, 2, 3]) / 3, p, 3))
+        inside = np.sort([z.real for z in zeros if abs(z.imag) < 1e-12 and 1e-9 < z.real < 1 - 1e-9])
+        guess = roots.first_guess(*p)
+        assert (guess < 2.0) == bool(inside.size)
+        if inside.size:
+            dips += bool(np.all(p > 0))
+            found = roots.crossing(*p, guess)
+            assert roots.cubic(*p, found) <= 0.01 * p[0] + 1e-12
+            assert inside[0] - 0.02 <= found <= 1.0 or roots.cubic(*p, found) > 0
+    assert dips > 20

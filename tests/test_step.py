@@ -67,11 +67,12 @@ class Lanes:
         self.row(m.TIME, 1)[:] = self.t
         self.row(m.STOP, 1)[:] = 1e3
         self.row(m.TRIAL, 1)[:] = self.h
+        self.row(m.LONGEST, 1)[:] = 1.0
 
     def step(self, compiled: bool) -> None:
         run = self.module.step if compiled else self.module.step.py_func
         with np.errstate(all="ignore"):  # selects compute both of their sides
-            run(self.buffer, RTOL, 1.0, 1e-6, 1e-5, 1e6)
+            run(self.buffer, RTOL, 1e-6, 1e-5, 1e6)
 
 
 class Twin:

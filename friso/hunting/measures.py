@@ -62,7 +62,9 @@ def measure(flat: Mapping[str, Any], runs: Runs) -> Measures:
     amplitude = runs.statistic("deviation_max") - runs.statistic("deviation_min")
     turns = counted_peaks(times, values, results.turn_counts)
     exits = (runs.statistic("inner_exit"), runs.statistic("outer_exit"))
-    inner, outer = (np.where(e < ended, np.maximum(e - corner, 0.0), np.nan) for e in exits)
+    period = periods(times, values, results.turn_counts, amplitude, ended)
+    passing = np.nan_to_num(period) / 2  # a cycle that crosses the reference as the run ends has not settled
+    inner, outer = (np.where(e + passing < ended, np.maximum(e - corner, 0.0), np.nan) for e in exits)
     done = results.statuses == Status.DONE
 
     def finished(array: np.ndarray) -> np.ndarray:
@@ -71,7 +73,7 @@ def measure(flat: Mapping[str, Any], runs: Runs) -> Measures:
     return Measures(
         peaks=np.where(done, turns.sum(axis=1), 0),
         peak_to_peak=finished(amplitude),
-        period=finished(periods(times, values, results.turn_counts, amplitude, ended)),
+        period=finished(period),
         settling_time=(finished(inner), finished(outer)),
         largest_force=finished(runs.statistic("force_peak")),
         status=results.statuses,

@@ -55,8 +55,8 @@ def sweep(stage: Stage, axes: Mapping[str, Values], rtol: float = 1e-4, threads:
     result has one dimension per axis with SI coordinates, and the variables peaks, verdict, peak_to_peak [m], period
     [s], settling_time [s] into 1 um, settling_time_10um [s], largest_force [N], steps, rejected and status; a cell
     that no stage may have is "invalid", with the reason in its status. A verdict is as good as its tolerance: near a
-    boundary, or with very stiff bristles, compare with a run at a tighter `rtol`. Raises StageError for an unknown key, a value
-    of the wrong kind or an empty axis, ValueError for a tolerance that is not usable.
+    boundary, or with very stiff bristles, compare with a run at a tighter `rtol`. Raises StageError for an unknown
+    key, a value of the wrong kind or an empty axis, ValueError for a tolerance that is not usable.
     """
     checked_rtol(rtol)
     if not axes:
