@@ -50,9 +50,7 @@ def _check(cache: Path, *options: str) -> tuple[float, str]:
     command = [sys.executable, *options, "-c", START, "check", str(FILE)]
     environment = {**os.environ, "FRISO_CACHE_DIR": str(cache)}
     seconds = clock(
-        lambda: kept.append(
-            subprocess.run(command, env=environment, capture_output=True, text=True, cwd=cache)
-        )
+        lambda: kept.append(subprocess.run(command, env=environment, capture_output=True, text=True, cwd=cache))
     )
     if kept[0].returncode:
         raise RuntimeError(f"friso check ended with status {kept[0].returncode}: {kept[0].stderr[-500:]}")
@@ -88,17 +86,12 @@ def run_memory() -> list[Goal]:
     with tempfile.TemporaryDirectory(prefix="friso-bench-") as cache:
         environment = {**os.environ, "FRISO_CACHE_DIR": cache}
         command = [sys.executable, "-c", _SWEEP]
-        found = [
-            subprocess.run(command, env=environment, capture_output=True, text=True, cwd=root)
-            for _ in range(2)
-        ]
+        found = [subprocess.run(command, env=environment, capture_output=True, text=True, cwd=root) for _ in range(2)]
     for done in found:
         if done.returncode:
             raise RuntimeError(done.stderr[-800:])
     (_, cold, *_), (before, peak, seconds, hunting) = (map(float, done.stdout.split()) for done in found)
-    print(
-        f"\nSweep of {SWEPT} runs (free rig, crossover x stroke, rtol 1e-4): {seconds:.1f} s, {hunting:.0f} hunt,"
-    )
+    print(f"\nSweep of {SWEPT} runs (free rig, crossover x stroke, rtol 1e-4): {seconds:.1f} s, {hunting:.0f} hunt,")
     print(f"  peak memory {peak:.0f} MB, {before:.0f} MB of it before the sweep; ", end="")
     print(f"{cold:.0f} MB, of this process or the compiling one, where the kernel is compiled first")
     about = f"memory of a sweep of {SWEPT} runs, "

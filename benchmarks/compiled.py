@@ -55,9 +55,7 @@ def compile_equations(rig: Rig) -> Compiled:
     surfaces = [plain(kink.surface) for kink in model.kinks]
     rates = {f"out[{i}]": plain(f) for i, f in enumerate(model.rhs)}
     entries = {
-        f"out[{i}, {j}]": plain(sp.diff(f, x))
-        for i, f in enumerate(model.rhs)
-        for j, x in enumerate(model.symbols)
+        f"out[{i}, {j}]": plain(sp.diff(f, x)) for i, f in enumerate(model.rhs) for j, x in enumerate(model.symbols)
     }
     n = len(model.symbols)
     fill_rate = _function("fill_rate", n, surfaces, rates)

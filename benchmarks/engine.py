@@ -51,9 +51,7 @@ def main() -> None:
     if "memory" in chosen:
         goals += command.run_memory()
     print_goals(goals)
-    print(
-        f"\n  measured in {time.perf_counter() - start:.0f} s; load of the machine now {os.getloadavg()[0]:.1f}"
-    )
+    print(f"\n  measured in {time.perf_counter() - start:.0f} s; load of the machine now {os.getloadavg()[0]:.1f}")
 
 
 def _places(rigs: list[Rig], lanes: ModuleType | None, repetitions: int, quick: bool) -> list[Field]:
@@ -82,9 +80,7 @@ def _places(rigs: list[Rig], lanes: ModuleType | None, repetitions: int, quick: 
             f"  {each.name}: reference by {'friso at 1e-12 (--quick)' if quick else 'SciPy Radau at 1e-11'}; ",
             end="",
         )
-        print(
-            f"friso at 1e-11 is off by {apart.early:.1e} m in 0.1 s, {apart.largest:.1e} m at most, ", end=""
-        )
+        print(f"friso at 1e-11 is off by {apart.early:.1e} m in 0.1 s, {apart.largest:.1e} m at most, ", end="")
         print(f"{apart.rms:.1e} m rms, {apart.late:.1e} m rms after 10 s")
         places.append(Field(each, equations, solvers, lanes, reference, repetitions))
     return places

@@ -35,9 +35,7 @@ class Map:
 
 def both_maps(locked: Rig, free: Rig) -> list[Map]:
     """Locked, crossover 1 to 40 Hz x total mass 0.1 to 5.1 kg; free, crossover 1 to 16 Hz x stroke 1e-6 to 1e-3 m."""
-    mass, crossover = (
-        v.ravel() for v in np.meshgrid(np.linspace(0.1, 5.1, 41), np.linspace(1, 40, 41), indexing="ij")
-    )
+    mass, crossover = (v.ravel() for v in np.meshgrid(np.linspace(0.1, 5.1, 41), np.linspace(1, 40, 41), indexing="ij"))
     by_mass = {
         **locked.flat,
         "controller.crossover": crossover,
@@ -62,9 +60,7 @@ def friso_map(each: Map, rtol: float) -> tuple[np.ndarray, float]:
     settings = Options(rtol=rtol, record_from=COUNTED_AFTER)
     chunks = list(run_chunks(each.rig.kernel, each.flat, len(each.prototype), settings))
     peaks = np.concatenate([_count(chunk) for chunk in chunks])
-    attempted, rejected = (
-        sum(float(c.statistic(name).sum()) for c in chunks) for name in ("attempted", "rejected")
-    )
+    attempted, rejected = (sum(float(c.statistic(name).sum()) for c in chunks) for name in ("attempted", "rejected"))
     failed = sum(int((chunk.results.statuses != 1).sum()) for chunk in chunks)
     if failed:
         print(f"  {each.name}, rtol {rtol:g}: {failed} cells failed")
@@ -74,9 +70,7 @@ def friso_map(each: Map, rtol: float) -> tuple[np.ndarray, float]:
 def _count(chunk: Runs) -> np.ndarray:
     results = chunk.results
     room = max(1, int(results.turn_counts.max(initial=0)))
-    return counted_peaks(
-        results.turn_times[:, :room], results.turn_values[:, :room], results.turn_counts
-    ).sum(axis=1)
+    return counted_peaks(results.turn_times[:, :room], results.turn_values[:, :room], results.turn_counts).sum(axis=1)
 
 
 def _measured_map(each: Map, rtol: float) -> None:
@@ -110,13 +104,9 @@ def run_maps(maps: list[Map], prototype: ModuleType | None, repetitions: int) ->
                 goals.append(Goal(about, "<= 1", f"{ratio:.2f} (min), {middle:.2f} (median)", ratio <= 1))
             rows[-1] += [*other, f"{rejected:.1%}", f"{agreement:.2%}"]
             about = f"map {each.name}, rtol {rtol:g}: "
-            goals.append(
-                Goal(about + "rejected steps", "< 15 %", f"{rejected:.1%}", rejected < MOST_REJECTED)
-            )
+            goals.append(Goal(about + "rejected steps", "< 15 %", f"{rejected:.1%}", rejected < MOST_REJECTED))
             wanted = f">= {each.agreement:.1%}"
-            goals.append(
-                Goal(about + "verdicts as at 1e-9", wanted, f"{agreement:.2%}", agreement >= each.agreement)
-            )
+            goals.append(Goal(about + "verdicts as at 1e-9", wanted, f"{agreement:.2%}", agreement >= each.agreement))
     print("\nMaps, 41 x 41 runs of 20 s, all threads, wall time min / median [s]")
     head = ("map, rtol", "friso", "with all measures", "prototype", "friso/prototype min / median")
     print_table((*head, "prototype rejected, agrees", "rejected", "agrees with 1e-9"), rows)

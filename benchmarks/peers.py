@@ -139,9 +139,7 @@ def whole(solve: Solve, rig: Rig, equations: Compiled, rtol: float, sampled: boo
     return solve(Task(rig, equations, rtol, rig.pieces, times, np.zeros(len(rig.scales))))
 
 
-def piecewise(
-    solve: Solve, rig: Rig, equations: Compiled, rtol: float, sampled: bool
-) -> tuple[np.ndarray, int]:
+def piecewise(solve: Solve, rig: Rig, equations: Compiled, rtol: float, sampled: bool) -> tuple[np.ndarray, int]:
     """States over the run, each piece of the reference by itself; steps."""
     start = np.zeros(len(rig.scales))
     ends = np.append(rig.pieces[1:, 0], rig.duration)

@@ -43,9 +43,7 @@ def _curves(place: Field, rtols: list[float]) -> dict[str, Curve]:
         def run(rtol: float, solve=solve) -> tuple[float, np.ndarray]:
             traces: list[np.ndarray] = []
             with time_out(LIMIT):
-                seconds = clock(
-                    lambda: traces.append(whole(solve, place.rig, place.equations, rtol, True)[0])
-                )
+                seconds = clock(lambda: traces.append(whole(solve, place.rig, place.equations, rtol, True)[0]))
             return seconds, traces[0][:, place.rig.kernel.states.index("position")]
 
         curves[name] = _curve(place, rtols, truth, run)
@@ -57,9 +55,7 @@ def _friso(place: Field, rtol: float) -> tuple[float, np.ndarray]:
     return min(friso_seconds(place.rig, rtol, runs, 1) for _ in range(3)), friso_trace(place.rig, rtol)[0]
 
 
-def _curve(
-    place: Field, rtols: list[float], truth: Cycle, run: Callable[[float], tuple[float, np.ndarray]]
-) -> Curve:
+def _curve(place: Field, rtols: list[float], truth: Cycle, run: Callable[[float], tuple[float, np.ndarray]]) -> Curve:
     curve: Curve = []
     for rtol in rtols:
         try:
@@ -97,9 +93,7 @@ def _draw(curves: dict[str, dict[str, Curve]], file: Path) -> None:
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
 
-    figure, axes = plt.subplots(
-        1, len(curves), figsize=(6.5 * len(curves), 5), squeeze=False, layout="constrained"
-    )
+    figure, axes = plt.subplots(1, len(curves), figsize=(6.5 * len(curves), 5), squeeze=False, layout="constrained")
     for axis, (name, methods) in zip(axes[0], curves.items(), strict=True):
         for method, curve in methods.items():
             marker = "o-" if method == "friso" else "s--"

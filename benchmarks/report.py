@@ -25,10 +25,7 @@ def print_table(head: Sequence[str], rows: Sequence[Sequence[Any]]) -> None:
     widths = [max(len(row[i]) for row in cells) for i in range(len(head))]
     for k, row in enumerate(cells):
         first = row[0].ljust(widths[0])
-        print(
-            "  "
-            + "  ".join([first, *(c.rjust(w) for c, w in zip(row[1:], widths[1:], strict=True))]).rstrip()
-        )
+        print("  " + "  ".join([first, *(c.rjust(w) for c, w in zip(row[1:], widths[1:], strict=True))]).rstrip())
         if k == 0:
             print("  " + "  ".join("-" * w for w in widths))
 

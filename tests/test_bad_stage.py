@@ -82,8 +82,7 @@ STIFFNESS = 'stiffness = "2.4 N/mm"'
 )
 def test_values(value: str, given: str) -> None:
     assert message(edited('stiffness = "2.4 N/mm"', f"stiffness = {value}")) == (
-        "rig.toml: joint.stiffness\n"
-        f"  given:    {given}\n  expected: {NUMBER_AND_UNIT}\n  example:  {STIFFNESS}"
+        f"rig.toml: joint.stiffness\n  given:    {given}\n  expected: {NUMBER_AND_UNIT}\n  example:  {STIFFNESS}"
     )
 
 
@@ -460,9 +459,7 @@ def test_changes(changes: dict[str, object], fragments: list[str]) -> None:
 
 @pytest.mark.parametrize("text", ["controller.crossover", "=12 Hz", "", " = 3"])
 def test_set_without_key_or_value(text: str) -> None:
-    with pytest.raises(
-        StageError, match=r"--set\n  given: .*\n  expected: KEY=VALUE\n  example:  controller"
-    ):
+    with pytest.raises(StageError, match=r"--set\n  given: .*\n  expected: KEY=VALUE\n  example:  controller"):
         parse_set(text)
 
 

@@ -58,9 +58,7 @@ def test_bristles_never_deflect_further_than_static_friction(
     static: float, share: float, speed: float, damping: float, crossover: float, displacement: float
 ) -> None:
     """abs(z) <= F_s / sigma_0, once inside."""
-    keys = friction_keys(
-        static=static, coulomb=share * static, stribeck_velocity=speed, bristle_damping=damping
-    )
+    keys = friction_keys(static=static, coulomb=share * static, stribeck_velocity=speed, bristle_damping=damping)
     move = {"controller.crossover": crossover, "motion.displacement": displacement * 1e-3, "motion.duration": 2.0}
     z = run(keys | move).samples[0, :, 2]
     assert np.max(np.abs(z)) <= static / 1e5 * (1 + 1e-6)

@@ -201,16 +201,12 @@ def test_replace_removes_with_none(rig: Stage) -> None:
     rigid = rig.replace({"joint": None, "parasitic": None, "friction": None})
     assert rigid.joint is None
     assert rigid.flat()["friction.model"] == "none"
-    locked = rig.replace(
-        {"joint.locked": True, "joint.stiffness": None, "joint.damping": None, "joint.stroke": None}
-    )
+    locked = rig.replace({"joint.locked": True, "joint.stiffness": None, "joint.damping": None, "joint.stroke": None})
     assert "joint.stiffness" not in locked.flat()
 
 
 def test_replace_changes_the_form_of_the_controller(rig: Stage) -> None:
-    rules = dict.fromkeys(
-        ["controller.crossover", "controller.alpha", "controller.beta", "controller.tuned_mass"]
-    )
+    rules = dict.fromkeys(["controller.crossover", "controller.alpha", "controller.beta", "controller.tuned_mass"])
     assert rig.replace({**rules, "controller.kp": "3 N/m"}).flat()["controller.kp"] == 3.0
     whole = rig.replace({"controller": {"kind": "pid", "kp": "3 N/m"}})
     assert whole.flat()["controller.kp"] == 3.0

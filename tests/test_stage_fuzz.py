@@ -65,10 +65,7 @@ def check(text: str) -> None:
 
 def flattened(file: dict[str, Any]) -> dict[str, Any]:
     tables = {
-        f"{name}.{key}": item
-        for name, table in file.items()
-        if isinstance(table, dict)
-        for key, item in table.items()
+        f"{name}.{key}": item for name, table in file.items() if isinstance(table, dict) for key, item in table.items()
     }
     return tables | {key: value for key, value in file.items() if not isinstance(value, dict)}
 
@@ -83,9 +80,7 @@ numbers = st.one_of(
     st.floats(1e-3, 1e6).map(repr),
     st.integers(-(10**6), 10**20).map(str),
     st.floats().map(repr),
-    st.sampled_from(
-        ["0", "1e400", "1e-400", "+.5", "5.", "1,5", "1_0", "−2", "٣", "0x1F", "1e", "--1", "", "1 000"]
-    ),
+    st.sampled_from(["0", "1e400", "1e-400", "+.5", "5.", "1,5", "1_0", "−2", "٣", "0x1F", "1e", "--1", "", "1 000"]),
 )
 unit_names = st.sampled_from(
     [
@@ -153,9 +148,7 @@ scalars = st.one_of(
     st.integers(),
     st.floats(),
     st.text(),
-    st.sampled_from(
-        ["lugre", "none", "dahl", "stribeck", "pid", "error", "measurement", "clamp", "ramp", "hold"]
-    ),
+    st.sampled_from(["lugre", "none", "dahl", "stribeck", "pid", "error", "measurement", "clamp", "ramp", "hold"]),
 )
 
 

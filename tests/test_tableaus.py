@@ -75,6 +75,7 @@ def test_order_of_the_dense_output(method: Tableau, theta: float) -> None:
 def test_l_stability(method: Tableau) -> None:
     """On x' = -lambda x an infinitely fast decay is gone after one step, and no step grows on the imaginary axis
     or left of it."""
+
     def growth(z: complex) -> float:
         """abs(R(z)) through the real 2 x 2 system with eigenvalue z."""
         matrix = np.array([[z.real, -z.imag], [z.imag, z.real]], dtype=Real)

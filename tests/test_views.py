@@ -112,17 +112,11 @@ def fake_trace(
         "joint_deflection": 0.5 * deviation,
         "friction_force": np.tanh(1e3 * velocity),
     }
-    variables = {
-        name: ("time", np.asarray(array, float), {"units": UNITS[name]}) for name, array in values.items()
-    }
-    return xr.Dataset(
-        variables, coords={"time": ("time", time, {"units": "s"})}, attrs={"name": "Thesis rig"}
-    )
+    variables = {name: ("time", np.asarray(array, float), {"units": UNITS[name]}) for name, array in values.items()}
+    return xr.Dataset(variables, coords={"time": ("time", time, {"units": "s"})}, attrs={"name": "Thesis rig"})
 
 
-def fake_case(
-    hunting: bool = False, stage: Any = None, kind: str = "there_and_back", drop: Any = ()
-) -> FakeCase:
+def fake_case(hunting: bool = False, stage: Any = None, kind: str = "there_and_back", drop: Any = ()) -> FakeCase:
     trace = fake_trace(kind, hunting).drop_vars(list(drop))
     case = FakeCase(stage or fake_stage(), trace)
     if not hunting:
@@ -171,9 +165,7 @@ def small_figure() -> Figure:
 def test_arrays_of_different_length_are_refused():
     with pytest.raises(ValueError, match=r"wave: x has the shape \(3,\), y \(2,\); expected one length"):
         Series(np.zeros(3), np.zeros(2), "wave", "#000000")
-    with pytest.raises(
-        ValueError, match=r"z has the shape \(2, 3\), expected \(len\(y\), len\(x\)\) = \(3, 2\)"
-    ):
+    with pytest.raises(ValueError, match=r"z has the shape \(2, 3\), expected \(len\(y\), len\(x\)\) = \(3, 2\)"):
         Map(np.zeros(2), np.zeros(3), np.zeros((2, 3)), "peaks", "")
 
 
@@ -303,9 +295,7 @@ def same(left: list[list[np.ndarray]], right: list[list[np.ndarray]]) -> bool:
     )
 
 
-@pytest.mark.parametrize(
-    "figure", [small_figure(), *check_figures(both_joints(samples=20001))], ids=lambda f: f.name
-)
+@pytest.mark.parametrize("figure", [small_figure(), *check_figures(both_joints(samples=20001))], ids=lambda f: f.name)
 def test_both_renderers_draw_the_same_arrays(figure):
     on_paper, on_page = mpl_arrays(figure), plotly_arrays(figure)
     assert sum(len(panel) for panel in on_paper) > 0
@@ -329,9 +319,7 @@ def test_both_renderers_write_the_same_labels_and_ranges():
 
 def test_no_axis_of_any_figure_has_an_offset_text():
     far = np.linspace(0, 1, 50)
-    narrow = Panel(
-        "Far", Axis("Time", "s"), Axis("Position", "m"), (Series(far, 100 + 1e-7 * far, "y", "#000000"),)
-    )
+    narrow = Panel("Far", Axis("Time", "s"), Axis("Position", "m"), (Series(far, 100 + 1e-7 * far, "y", "#000000"),))
     for figure in (Figure("far", "Far", "", (narrow,)), *check_figures(both_joints())):
         canvas = matplotlib_renderer.render(figure)
         canvas.draw_without_rendering()
@@ -358,9 +346,7 @@ def test_unknown_format_is_refused(tmp_path):
 
 def test_dollars_and_markup_in_names_are_text():
     figure = replace(small_figure(), subject=r"$\frac{1}$ <b>&", title="_x$")
-    panel = replace(
-        figure.panels[0], title="<script>$", series=(replace(figure.panels[0].series[0], label="_$a"),)
-    )
+    panel = replace(figure.panels[0], title="<script>$", series=(replace(figure.panels[0].series[0], label="_$a"),))
     figure = replace(figure, panels=(panel,))
     assert matplotlib_renderer.image(figure, "png").startswith(b"\x89PNG")
     legend = matplotlib_renderer.render(figure).axes[0].get_legend()
@@ -555,13 +541,7 @@ def test_report_says_the_verdict_first(page):
     text = " ".join(" ".join(Page(page).words).split())
     locked = text.index("Locked: hunts, 1.04 mm peak to peak every 1.63 s (6 peaks counted).")
     free = text.index("Free (as given): settles to within 1 µm in 823 ms.")
-    assert (
-        locked
-        < free
-        < text.index("Counted peaks")
-        < text.index("Does it hunt?")
-        < text.index("The stage file")
-    )
+    assert locked < free < text.index("Counted peaks") < text.index("Does it hunt?") < text.index("The stage file")
     assert "The free joint stops the hunting." in text
     assert f"friso {VERSION}, relative tolerance 1e-06" in text
     assert 'name = "Thesis rig"' in text
@@ -614,14 +594,9 @@ def sentence(**changes: Any) -> str:
 def test_verdict_sentences():
     assert sentence() == "settles to within 1 µm in 823 ms."
     only_coarse = {1e-6: None, 1e-5: 1.5}
-    assert (
-        sentence(settling_time=only_coarse)
-        == "settles to within 10 µm in 1.50 s, but does not stay within 1 µm."
-    )
+    assert sentence(settling_time=only_coarse) == "settles to within 10 µm in 1.50 s, but does not stay within 1 µm."
     never = {1e-6: None, 1e-5: None}
-    assert "does not stay within 10 µm (70.0 µm peak to peak" in sentence(
-        settling_time=never, peak_to_peak=7e-5
-    )
+    assert "does not stay within 10 µm (70.0 µm peak to peak" in sentence(settling_time=never, peak_to_peak=7e-5)
     assert sentence(verdict="hunts", peak_to_peak=1e-3, period=None) == "hunts, 1.00 mm peak to peak."
     assert "another move" in sentence(verdict="bistable")
     assert "not settled" in sentence(verdict="transient")

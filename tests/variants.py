@@ -109,9 +109,7 @@ VARIANTS: dict[str, Stage] = {
     "rigid": stage(release(), friction=lugre(2), controller=van_dijk("4 Hz")),
     "rigid cart, P": stage(ramp(), "cart", lugre(2, "1.5 N", "0.4 N*s/m"), controller=gains(2)),
     "rigid stage, PI": stage(step(), "stage", lugre(1), controller=gains(1000, 500)),
-    "rigid, no friction, PID": stage(
-        step(), friction=NO_FRICTION, controller=gains(kp=1000, ki=2000, kd=50, tau=2e-3)
-    ),
+    "rigid, no friction, PID": stage(step(), friction=NO_FRICTION, controller=gains(kp=1000, ki=2000, kd=50, tau=2e-3)),
     "rigid, no friction section": stage(there_and_back(), controller=van_dijk("20 Hz")),
     "rigid, LuGre 3, P": stage(release(), friction=lugre(3), controller=gains(1000)),
     "rigid, Stribeck 1.5, PD measured": stage(
@@ -127,16 +125,12 @@ VARIANTS: dict[str, Stage] = {
     "rigid, LuGre 0.7, PID measured": stage(
         step(), friction=lugre(0.7), controller=gains(**FULL, tau=1e-3, extra=MEASURED)
     ),
-    "rigid, van Dijk, limit": stage(
-        step("10 mm"), friction=lugre(2), controller=van_dijk("8 Hz", limit("6 N"))
-    ),
+    "rigid, van Dijk, limit": stage(step("10 mm"), friction=lugre(2), controller=van_dijk("8 Hz", limit("6 N"))),
     "locked": stage(there_and_back(), friction=lugre(2), joint=LOCKED, controller=van_dijk()),
     "locked, parasitic": stage(
         there_and_back(), friction=lugre(2), joint=LOCKED, parasitic=PARASITIC, controller=van_dijk()
     ),
-    "locked, Stribeck 1": stage(
-        ramp(), friction=stribeck(1), joint=LOCKED, controller=gains(**FULL, tau=1e-3)
-    ),
+    "locked, Stribeck 1": stage(ramp(), friction=stribeck(1), joint=LOCKED, controller=gains(**FULL, tau=1e-3)),
     "free": stage(there_and_back(), friction=lugre(4), joint=free(), controller=van_dijk()),
     "free, parasitic": stage(
         there_and_back(), friction=lugre(2), joint=free(), parasitic=PARASITIC, controller=van_dijk()
@@ -147,9 +141,7 @@ VARIANTS: dict[str, Stage] = {
     "free, parasitic, Dahl, PD": stage(
         release(), friction=DAHL, joint=free(), parasitic=PARASITIC, controller=gains(3000, kd=60, tau=1e-3)
     ),
-    "free, LuGre 2.5, P": stage(
-        release(), friction=lugre(2.5), joint=free(), controller=gains(1000)
-    ),
+    "free, LuGre 2.5, P": stage(release(), friction=lugre(2.5), joint=free(), controller=gains(1000)),
     "touching": stage(step(), friction=DAHL, joint=TOUCHING, controller=gains(**FULL, tau=1e-3)),
     "touching, parasitic": stage(
         HOLD, friction=stribeck(2.5), joint=TOUCHING, parasitic=PARASITIC, controller=van_dijk()

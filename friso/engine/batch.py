@@ -30,7 +30,8 @@ MOST_TURNS = 1 << 20
 @dataclass(frozen=True)
 class Options:
     """How to run: relative tolerance, bands of settling [m], start of the window for extremes as a share of the run,
-    time [s] from which turning points are kept, sampling interval [s] (None: no samples), step budget, threads."""
+    time [s] from which turning points are kept (at most half
+    of the run), sampling interval [s] (None: no samples), step budget, threads."""
 
     rtol: float = 1e-6
     bands: tuple[float, float] = (1e-6, 1e-5)

@@ -148,7 +148,7 @@ def load_run(B, lane, j, batch, settings):
         B[(MODE + k) * LANES + lane] = batch.modes[j, k]
     B[TRIAL * LANES + lane] = batch.first_steps[j]
     B[LONGEST * LANES + lane] = batch.longest[j]
-    B[RECORD_FROM * LANES + lane] = settings.record_from
+    B[RECORD_FROM * LANES + lane] = min(settings.record_from, 0.5 * batch.segments[j, -1, 0])
     return enter_segment(B, lane, batch.segments[j], 0, batch.windows[j], batch.first_steps[j])
 
 

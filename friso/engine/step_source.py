@@ -311,6 +311,7 @@ class StepWriter:
             "outer_exit = now if off > outer else outer_exit",
             "entered = ((was > inner) & (off <= inner)) | ((was > outer) & (off <= outer))",
             "turned = ((turning_s > 0.0) & (turning_n <= 0.0)) | ((turning_s < 0.0) & (turning_n >= 0.0))",
+            "turned = turned & ((now >= record_from) | (off <= outer))",  # others change no result
             "attempted = attempted + 1.0",
             "rejected_last = 0.0 if good else 1.0",
             "rejected = rejected + rejected_last",

@@ -41,14 +41,16 @@ class Measures:
 
     @property
     def verdict(self) -> np.ndarray:
-        """ "hunts" or "settles" by the peak count, "failed" where the run was not completed."""
-        words = np.where(self.peaks > 0, "hunts", "settles")
+        """By the peak count "hunts", else "settles", or "transient" if the deviation still swings at the end (a run
+        too short for the count, or a reference that moves); "failed" where the run was not completed."""
+        swinging = np.isnan(self.settling_time[1]) & (self.peak_to_peak > COUNTED_ABOVE)
+        words = np.where(self.peaks > 0, "hunts", np.where(swinging, "transient", "settles"))
         return np.where(self.status == Status.DONE, words, "failed")
 
 
 def options(rtol: float, threads: int | None = None) -> Options:
-    """How to run for these measures."""
-    return Options(rtol=rtol, bands=BANDS, window=WINDOW, threads=threads)
+    """How to run for these measures; turning points are kept from a little before the first that may count."""
+    return Options(rtol=rtol, bands=BANDS, window=WINDOW, record_from=0.8 * COUNTED_AFTER, threads=threads)
 
 
 def measure(flat: Mapping[str, Any], runs: Runs) -> Measures:
@@ -89,8 +91,8 @@ def periods(
     """Mean time between the cycle's maxima (or minima) in the last quarter [s], NaN where there is no cycle.
 
     An extremum belongs to the cycle if the deviation swings by half the peak-to-peak `amplitude` [m] before the next
-    one of the other kind, so that ringing on top of a cycle does not count. A cycle longer than the last quarter is
-    looked for in the last half. `ended` [s] is the end of each run.
+    one of the other kind, so that ringing on top of a cycle does not count. Of a cycle longer than the last quarter
+    the last two extrema are taken from the last half. `ended` [s] is the end of each run.
     """
     found = np.full(len(counts), np.nan)
     for j in np.flatnonzero(amplitude > BANDS[0]):
@@ -101,6 +103,6 @@ def periods(
             late = [[time[k] for k in kind if k != last and time[k] >= share * ended[j]] for kind in kinds]
             spaced = next((kind for kind in late if len(kind) > 1), None)
             if spaced:
-                found[j] = np.diff(spaced).mean()
+                found[j] = np.diff(spaced if share == WINDOW else spaced[-2:]).mean()
                 break
     return found
