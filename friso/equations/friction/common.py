@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
-from friso.stage import Rule
+from friso.quantities import Number, Quantity, Value, non_negative, positive
+from friso.stage import FrictionSection, Rule
 
 if TYPE_CHECKING:
     import sympy as sp
@@ -30,10 +31,21 @@ class Friction:
         self.force, self.breakaway, self.component = force, breakaway, component
 
 
-def whole_exponent(flat: Mapping[str, Any]) -> int | None:
-    """The Stribeck exponent where it is a small whole number (then it is written out as products), else None."""
-    exponent = float(flat["friction.stribeck_exponent"])
-    return int(exponent) if exponent in (1.0, 2.0, 3.0, 4.0) else None
+class StribeckSection(FrictionSection):
+    """The keys of the laws with a Stribeck curve."""
+
+    static: Annotated[Value, Quantity("N", positive, "3 N")]
+    coulomb: Annotated[Value, Quantity("N", positive, "1 N")]
+    stribeck_velocity: Annotated[Value, Quantity("m/s", positive, "1.6 mm/s")]
+    stribeck_exponent: Annotated[float, Number(positive, "2")]
+    viscous: Annotated[Value, Quantity("N*s/m", non_negative, "0.5 N*s/m")]
+    rules: ClassVar[tuple[Rule, ...]] = (COULOMB_BELOW_STATIC,)
+
+    @staticmethod
+    def variant(flat: Mapping[str, Any]) -> int | None:
+        """The exponent where it is a small whole number (then it is written out as products), else None."""
+        exponent = float(flat["friction.stribeck_exponent"])
+        return int(exponent) if exponent in (1.0, 2.0, 3.0, 4.0) else None
 
 
 def stribeck_level(velocity: sp.Expr, sign: sp.Expr, exponent: int | None) -> sp.Expr:

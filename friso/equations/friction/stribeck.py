@@ -3,33 +3,22 @@ doi:10.1016/0005-1098(94)90209-7."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
-from friso.equations.friction.common import COULOMB_BELOW_STATIC, Friction, stribeck_level, whole_exponent
-from friso.quantities import Number, Quantity, Value, non_negative, positive
-from friso.stage import FrictionSection, Rule, register_friction
+from friso.equations.friction.common import Friction, StribeckSection, stribeck_level
+from friso.quantities import Quantity, Value, positive
+from friso.stage import register_friction
 
 if TYPE_CHECKING:
     import sympy as sp
 
 
 @register_friction
-class Stribeck(FrictionSection):
+class Stribeck(StribeckSection):
     """A curve of force against velocity: F = g(v) tanh(v/v_r) + sigma_2 v; at rest it creeps instead of sticking."""
 
     model: Literal["stribeck"]
-    static: Annotated[Value, Quantity("N", positive, "3 N")]
-    coulomb: Annotated[Value, Quantity("N", positive, "1 N")]
-    stribeck_velocity: Annotated[Value, Quantity("m/s", positive, "1.6 mm/s")]
-    stribeck_exponent: Annotated[float, Number(positive, "2")]
-    viscous: Annotated[Value, Quantity("N*s/m", non_negative, "0.5 N*s/m")]
     regularisation_velocity: Annotated[Value, Quantity("m/s", positive, "10 um/s")]
-    rules: ClassVar[tuple[Rule, ...]] = (COULOMB_BELOW_STATIC,)
-
-    @staticmethod
-    def variant(flat: Mapping[str, Any]) -> int | None:
-        return whole_exponent(flat)
 
     @staticmethod
     def declare(velocity: sp.Symbol, variant: int | None) -> Friction:
