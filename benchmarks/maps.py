@@ -57,7 +57,7 @@ def both_maps(locked: Rig, free: Rig) -> list[Map]:
 
 def friso_map(each: Map, rtol: float) -> tuple[np.ndarray, float]:
     """Peak counts of all cells, and the rejected share of steps: the work that the prototype does."""
-    settings = Options(rtol=rtol, record_from=COUNTED_AFTER)
+    settings = Options(rtol=rtol, record_from=0.8 * COUNTED_AFTER)
     chunks = list(run_chunks(each.rig.kernel, each.flat, len(each.prototype), settings))
     peaks = np.concatenate([_count(chunk) for chunk in chunks])
     attempted, rejected = (sum(float(c.statistic(name).sum()) for c in chunks) for name in ("attempted", "rejected"))

@@ -18,6 +18,7 @@ from benchmarks.prototype import run as run_prototype
 from benchmarks.report import Goal, clock, print_table, spread
 from benchmarks.rigs import RTOLS, SAMPLE, Rig
 from friso.engine.batch import Options, run_chunks
+from friso.hunting import measures
 
 RUNS = 512
 REFERENCE_RTOL = 1e-11
@@ -71,7 +72,7 @@ def friso_seconds(rig: Rig, rtol: float, runs: int, threads: int, spread_share: 
         flat["controller.crossover"] = flat["controller.crossover"] * np.linspace(
             1 - spread_share, 1 + spread_share, runs
         )
-    options = Options(rtol=rtol, threads=threads)
+    options = measures.options(rtol, threads)  # as a sweep runs it
     return clock(lambda: list(run_chunks(rig.kernel, flat, runs, options))) * threads / runs
 
 
