@@ -35,7 +35,7 @@ def high_water():  # ru_maxrss of a started process begins with that of the one 
 
 before = high_water()
 start, hunting = time.perf_counter(), 0
-for runs in run_chunks(rig.kernel, flat, n, options(flat, 1e-4)):
+for runs in run_chunks(rig.kernel, flat, n, options(1e-4)):
     here = slice(runs.first, runs.first + len(runs.results.statuses))
     part = {{key: value[here] if np.ndim(value) else value for key, value in flat.items()}}
     hunting += int((measure(part, runs).peaks > 0).sum())

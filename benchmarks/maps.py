@@ -75,7 +75,7 @@ def _count(chunk: Runs) -> np.ndarray:
 
 def _measured_map(each: Map, rtol: float) -> None:
     """The same with all measures that `friso.sweep` reports."""
-    for chunk in run_chunks(each.rig.kernel, each.flat, len(each.prototype), options(each.flat, rtol)):
+    for chunk in run_chunks(each.rig.kernel, each.flat, len(each.prototype), options(rtol)):
         measure(each.flat, chunk)
 
 
