@@ -32,6 +32,8 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
+INTERRUPTED = 130
+
 StageFile = Annotated[Path, typer.Argument(metavar="STAGE.toml", help="The stage file.")]
 Overrides = Annotated[
     list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help='Override a key: controller.crossover="12 Hz".')
@@ -52,12 +54,15 @@ def main() -> NoReturn:
         sys.argv.append("--help")
     logging.basicConfig(format="friso: %(message)s", level=logging.WARNING, stream=sys.stderr)
     try:
-        sys.exit(app(standalone_mode=False) or 0)
+        status = app(standalone_mode=False) or 0
+        if status == INTERRUPTED:  # typer's word for Ctrl-C
+            _say("interrupted")
+        sys.exit(status)
     except typer.Exit as leave:
         sys.exit(leave.exit_code)
     except (typer.Abort, KeyboardInterrupt):
-        _say("interrupted; nothing was written")
-        sys.exit(130)
+        _say("interrupted")
+        sys.exit(INTERRUPTED)
     except BrokenPipeError:
         sys.stderr.close()
         sys.exit(1)
