@@ -41,8 +41,8 @@ AFTER_KINK = 0.25
 ROUNDING = 2e-15
 """The hysteresis is no less than this share of the terms of a surface, nine units in their last place."""
 
-NO_SWING = 1e-3
-"""A turning point about which the deviation moves by less than this share of the tolerance is rounding noise."""
+NO_SWING = 1e-6
+"""A deviation whose rate stays below this share of the velocity's tolerance turns by rounding noise alone."""
 
 DIVERGED = 1e6
 """A run ends when its deviation is so many times the length scale of the motion."""
@@ -75,7 +75,8 @@ class StepWriter:
         self.size, self.kinks = len(model.states), len(model.kinks)
         self.constants = Constants(model.parameters)
         self._index = {symbol: i for i, symbol in enumerate(model.symbols)}
-        self._position = [str(symbol) for symbol in model.symbols].index("position")
+        names = [str(symbol) for symbol in model.symbols]
+        self._position, self._velocity = names.index("position"), names.index("velocity")
         self._fixed = {kink.beyond: f"mode{k}" for k, kink in enumerate(model.kinks)}
         self._fixed |= dict(zip(REFERENCE, ("r_x", "r_v", "r_a"), strict=True))
         self._jacobian = self._nonzero_jacobian()
@@ -315,7 +316,7 @@ class StepWriter:
             "outer_exit = now if off > outer else outer_exit",
             "entered = ((was > inner) & (off <= inner)) | ((was > outer) & (off <= outer))",
             "turned = ((turning_s > 0.0) & (turning_n <= 0.0)) | ((turning_s < 0.0) & (turning_n >= 0.0))",
-            f"swing = max(abs(turning_s), abs(turning_n)) * h > {NO_SWING!r} * tol{self._position}",
+            f"swing = max(abs(turning_s), abs(turning_n)) > {NO_SWING!r} * tol{self._velocity}",
             "turned = turned & swing & ((now >= record_from) | (off <= outer))",  # others change no result
             "attempted = attempted + 1.0",
             "rejected_last = 0.0 if good else 1.0",
