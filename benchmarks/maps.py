@@ -14,7 +14,7 @@ from benchmarks.report import Goal, clock, print_table, spread
 from benchmarks.rigs import RTOLS, Rig
 from friso.engine.batch import Options, Runs, run_chunks
 from friso.hunting.measures import measure, options
-from friso.hunting.peaks import COUNTED_AFTER, counted_peaks
+from friso.hunting.peaks import COUNTED_AFTER, scan
 
 STRICT = 1e-9
 """rtol whose verdicts the others are compared with."""
@@ -70,7 +70,9 @@ def friso_map(each: Map, rtol: float) -> tuple[np.ndarray, float]:
 def _count(chunk: Runs) -> np.ndarray:
     results = chunk.results
     room = max(1, int(results.turn_counts.max(initial=0)))
-    return counted_peaks(results.turn_times[:, :room], results.turn_values[:, :room], results.turn_counts).sum(axis=1)
+    times, values = results.turn_times[:, :room], results.turn_values[:, :room]
+    nothing = np.zeros(len(results.turn_counts))
+    return scan(times, values, results.turn_counts, nothing, nothing)[0].sum(axis=1)
 
 
 def _measured_map(each: Map, rtol: float) -> None:

@@ -6,14 +6,23 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.signal import find_peaks
 
-from friso.hunting.measures import periods
-from friso.hunting.peaks import APART, COUNTED_ABOVE, COUNTED_AFTER, counted_peaks
+from friso.hunting import peaks as scanning
+from friso.hunting.peaks import COUNTED_ABOVE, COUNTED_AFTER, scan
+from friso.hunting.turning import APART
 
 
 def peaks(turns: list[tuple[float, float]]) -> list[float]:
     """Times of the counted peaks among the (time, value) turning points of one run."""
     times, values = (np.array([column]) for column in zip(*turns, strict=True))
-    return times[counted_peaks(times, values, np.array([len(turns)]))].tolist()
+    return times[scan(times, values, np.array([len(turns)]), NOTHING, NOTHING)[0]].tolist()
+
+
+def periods(times: np.ndarray, values: np.ndarray, counts: np.ndarray, amplitude: np.ndarray) -> np.ndarray:
+    """Periods of the cycles [s] in runs of 20 s."""
+    return scan(times, values, counts, amplitude, np.full(len(counts), 20.0))[1]
+
+
+NOTHING = np.zeros(1)
 
 
 def test_only_late_and_tall_maxima_count() -> None:
@@ -29,7 +38,7 @@ def test_of_close_peaks_the_tallest_stays() -> None:
 def test_runs_of_a_batch_do_not_mix() -> None:
     times = np.array([[11.0, 11.5, 12.0], [11.0, 11.5, 12.0]])
     values = np.array([[1e-3, -1e-3, 1e-3], [1e-3, -1e-3, 1e-3]])
-    assert counted_peaks(times, values, np.array([3, 1])).sum(axis=1).tolist() == [2, 0]
+    assert scan(times, values, np.array([3, 1]), np.zeros(2), np.zeros(2))[0].sum(axis=1).tolist() == [2, 0]
 
 
 @given(st.lists(st.tuples(st.floats(0.01, 0.4), st.integers(-500, 500)), min_size=2, max_size=60))
@@ -53,20 +62,18 @@ def test_period_of_a_cycle_with_ringing_on_top() -> None:
     time = np.linspace(0.0, 20.0, 200_001)
     wave = np.sin(np.pi * time) + 0.1 * np.sin(40 * np.pi * time)
     turns = np.flatnonzero(np.diff(np.sign(np.diff(wave)))) + 1
-    found = periods(
-        time[None, turns], 1e-3 * wave[None, turns], np.array([turns.size]), np.array([2.2e-3]), np.array([20.0])
-    )
+    found = periods(time[None, turns], 1e-3 * wave[None, turns], np.array([turns.size]), np.array([2.2e-3]))
     assert found[0] == pytest.approx(2.0, rel=1e-3)
 
 
 def test_no_period_without_a_cycle() -> None:
-    still = periods(np.array([[16.0, 18.0]]), np.zeros((1, 2)), np.array([2]), np.array([1e-9]), np.array([20.0]))
+    still = periods(np.array([[16.0, 18.0]]), np.zeros((1, 2)), np.array([2]), np.array([1e-9]))
     assert np.isnan(still[0])
 
 
 def test_a_period_longer_than_the_last_quarter_is_taken_from_the_last_half() -> None:
     times, values = np.array([[10.5, 13.5, 16.5, 19.5]]), 1e-3 * np.array([[1.0, -1.0, 1.0, -1.0]])
-    found = periods(times, values, np.array([4]), np.array([2e-3]), np.array([20.0]))
+    found = periods(times, values, np.array([4]), np.array([2e-3]))
     assert found[0] == pytest.approx(6.0)
 
 
@@ -78,3 +85,16 @@ def test_rounding_noise_is_no_peak() -> None:
 def test_ringing_on_a_peak_does_not_hide_it() -> None:
     turns = [(11.0, -3e-4), (12.0, 3e-4), (12.1, 3e-4 - 1e-9), (12.2, 3e-4 - 1e-10), (13.0, -3e-4)]
     assert peaks(turns) == [12.0]
+
+
+def test_compiled_loops_do_what_the_plain_ones_do(monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(1)
+    times = np.sort(rng.uniform(8, 20, (300, 40)), axis=1)
+    values = rng.normal(0, 3e-4, (300, 40)) * (-1.0) ** np.arange(40)
+    counts, amplitude = rng.integers(0, 41, 300), rng.uniform(0, 1e-3, 300)
+    compiled = scan(times, values, counts, amplitude, np.full(300, 20.0))
+    monkeypatch.setattr(scanning, "MANY", np.inf)
+    plain = scan(times, values, counts, amplitude, np.full(300, 20.0))
+    assert np.array_equal(compiled[0], plain[0])
+    assert np.array_equal(compiled[1], plain[1], equal_nan=True)
+    assert 0 < np.isnan(plain[1]).sum() < 300

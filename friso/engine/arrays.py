@@ -25,7 +25,8 @@ class Batch(NamedTuple):
 
 class Settings(NamedTuple):
     """What all runs share: relative tolerance, step budget, the two bands of settling [m], the time
-    [s] from which turning points are recorded, and the sampling interval [s]."""
+    [s] from which turning points are recorded, the sampling interval [s], and a flag, shape (1,), that is set to
+    have no further run begun."""
 
     rtol: float
     budget: float
@@ -33,6 +34,7 @@ class Settings(NamedTuple):
     outer: float
     record_from: float
     interval: float
+    cancel: np.ndarray
 
 
 class Results(NamedTuple):

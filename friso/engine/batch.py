@@ -31,7 +31,8 @@ MOST_TURNS = 1 << 20
 class Options:
     """How to run: relative tolerance, bands of settling [m], start of the window for extremes as a share of the run,
     time [s] from which turning points are kept (at most half
-    of the run), sampling interval [s] (None: no samples), step budget, threads."""
+    of the run), sampling interval [s] (None: no samples), step budget, threads, and a flag, shape (1,): once it is
+    set from another thread, no further run begins."""
 
     rtol: float = 1e-6
     bands: tuple[float, float] = (1e-6, 1e-5)
@@ -41,6 +42,7 @@ class Options:
     budget: int = 2_000_000
     threads: int | None = None
     chunk: int = 2048
+    cancel: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
@@ -128,6 +130,7 @@ def _run_with_room(kernel: Kernel, batch: Batch, flat: Mapping[str, Any], option
         outer=float(options.bands[1]),
         record_from=float(options.record_from),
         interval=float(options.interval or np.inf),
+        cancel=np.zeros(1, np.int64) if options.cancel is None else options.cancel,
     )
     samples = 0
     if options.interval is not None:
@@ -168,6 +171,9 @@ def _run(kernel: Kernel, batch: Batch, settings: Settings, results: Results, thr
     """Spread the runs of a chunk over threads; the kernel runs without the interpreter's lock."""
     runs = len(batch.starts)
     workers = threads or len(os.sched_getaffinity(0))
+    if workers == 1:
+        kernel.module.run(0, runs, batch, settings, results)
+        return
     share = max(8, min(256, -(-runs // (8 * workers))))
     pool = ThreadPoolExecutor(workers)
     try:

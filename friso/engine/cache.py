@@ -63,20 +63,25 @@ def cache_folder() -> Path:
 
 
 @cache
+def code_digest(*folders: str) -> str:
+    """A digest of the sources in these folders of the package."""
+    code = hashlib.sha256()
+    for folder in folders:
+        for file in sorted((Path(__file__).parent.parent / folder).rglob("*.py")):
+            code.update(file.read_bytes())
+    return code.hexdigest()
+
+
+@cache
 def environment() -> str:
     """What a kernel depends on besides its equations: friso's own code, the compilers and the processor."""
-    package = Path(__file__).parent.parent
-    code = hashlib.sha256()
-    for folder in ("equations", "engine"):
-        for file in sorted((package / folder).rglob("*.py")):
-            code.update(file.read_bytes())
     compilers = (numba.__version__, llvmlite.__version__, version("sympy"))
     versions = (VERSION, sys.version, np.__version__, *compilers)
     processor = (llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten())
     settings = sorted(
         (name, value) for name, value in os.environ.items() if name.startswith("NUMBA_") and name != "NUMBA_CACHE_DIR"
     )
-    return repr((code.hexdigest(), versions, processor, settings))
+    return repr((code_digest("equations", "engine"), versions, processor, settings))
 
 
 def load_or_build(name: str, builder: str, task: bytes, load: Callable[[ModuleType], None]) -> ModuleType:

@@ -241,7 +241,7 @@ def run(first, last, batch, settings, results):
             if not finish(B, lane, j, segment[lane], batch, settings, results):
                 continue
             who[lane], busy = -1, busy - 1
-            if upcoming < last:
+            if upcoming < last and settings.cancel[0] == 0:
                 segment[lane] = start_run(B, lane, upcoming, batch, settings, results)
                 who[lane], upcoming, busy = upcoming, upcoming + 1, busy + 1
             else:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import pickle
+from collections import defaultdict
 from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cache
+from threading import Lock
 from types import ModuleType
 from typing import Any
 
@@ -47,9 +49,20 @@ class Kernel:
         return [np.broadcast_to(np.asarray(flat[name], dtype=float), (runs,)) for name in self.parameters]
 
 
-@cache
 def kernel(structure: Structure, method: str = "Rodas5P", lanes: int = LANES) -> Kernel:
-    """The kernel for stages of this structure, stepping by the named method in so many lanes."""
+    """The kernel for stages of this structure, stepping by the named method in so many lanes.
+
+    Threads that ask for one kernel at the same time get it from the one that is first.
+    """
+    with _loading[structure, method, lanes]:
+        return _loaded(structure, method, lanes)
+
+
+_loading: defaultdict[tuple[Structure, str, int], Lock] = defaultdict(Lock)
+
+
+@cache
+def _loaded(structure: Structure, method: str, lanes: int) -> Kernel:
     task = pickle.dumps((structure, method, lanes))
     name = f"{structure!r} {method} {lanes}"
     return Kernel(load_or_build(name, "friso.engine.build", task, compile_driver))
@@ -81,7 +94,7 @@ def compile_driver(module: ModuleType) -> None:
     """Compile (or load from Numba's cache) the driver for the types it is called with, and for no others."""
     flat, square = np.zeros(1), np.zeros((1, 1))
     batch = Batch(square, square, square, square, flat, flat, np.zeros((1, 1, 4)), np.zeros(1, np.int64))
-    settings = Settings(1.0, 1.0, 1.0, 1.0, 0.0, 1.0)
+    settings = Settings(1.0, 1.0, 1.0, 1.0, 0.0, 1.0, np.zeros(1, np.int64))
     arguments = (0, 0, batch, settings, empty_results(1, 1, 1, 1))
     module.run.compile(tuple(numba.typeof(argument) for argument in arguments))
     module.run.disable_compile()

@@ -11,15 +11,12 @@ import numpy as np
 from friso.engine.arrays import Status
 from friso.engine.batch import Options, Runs
 from friso.equations.motion import last_corner
-from friso.hunting.peaks import COUNTED_ABOVE, COUNTED_AFTER, counted_peaks, swings
+from friso.hunting.peaks import COUNTED_ABOVE, COUNTED_AFTER, WINDOW, scan
 
-__all__ = ["BANDS", "COUNTED_ABOVE", "COUNTED_AFTER", "WINDOW", "Measures", "measure", "options", "periods"]
+__all__ = ["BANDS", "COUNTED_ABOVE", "COUNTED_AFTER", "WINDOW", "Measures", "measure", "options"]
 
 BANDS = (1e-6, 1e-5)
 """Bands about the reference into which a stage settles [m]."""
-
-WINDOW = 0.75
-"""Share of the run after which amplitude and period are taken."""
 
 
 @dataclass(frozen=True)
@@ -48,9 +45,11 @@ class Measures:
         return np.where(self.status == Status.DONE, words, "failed")
 
 
-def options(rtol: float, threads: int | None = None) -> Options:
+def options(rtol: float, threads: int | None = None, cancel: np.ndarray | None = None) -> Options:
     """How to run for these measures; turning points are kept from a little before the first that may count."""
-    return Options(rtol=rtol, bands=BANDS, window=WINDOW, record_from=0.8 * COUNTED_AFTER, threads=threads)
+    return Options(
+        rtol=rtol, bands=BANDS, window=WINDOW, record_from=0.8 * COUNTED_AFTER, threads=threads, cancel=cancel
+    )
 
 
 def measure(flat: Mapping[str, Any], runs: Runs) -> Measures:
@@ -62,9 +61,8 @@ def measure(flat: Mapping[str, Any], runs: Runs) -> Measures:
     ended = runs.statistic("ended")
     corner = np.broadcast_to(last_corner(flat), (count,))
     amplitude = runs.statistic("deviation_max") - runs.statistic("deviation_min")
-    turns = counted_peaks(times, values, results.turn_counts)
+    turns, period = scan(times, values, results.turn_counts, amplitude, ended)
     exits = (runs.statistic("inner_exit"), runs.statistic("outer_exit"))
-    period = periods(times, values, results.turn_counts, amplitude, ended)
     passing = np.nan_to_num(period) / 2  # a cycle that crosses the reference as the run ends has not settled
     inner, outer = (np.where(e + passing < ended, np.maximum(e - corner, 0.0), np.nan) for e in exits)
     done = results.statuses == Status.DONE
@@ -83,26 +81,3 @@ def measure(flat: Mapping[str, Any], runs: Runs) -> Measures:
         rejected=runs.statistic("rejected").astype(np.int64),
         turns=turns,
     )
-
-
-def periods(
-    times: np.ndarray, values: np.ndarray, counts: np.ndarray, amplitude: np.ndarray, ended: np.ndarray
-) -> np.ndarray:
-    """Mean time between the cycle's maxima (or minima) in the last quarter [s], NaN where there is no cycle.
-
-    An extremum belongs to the cycle if the deviation swings by half the peak-to-peak `amplitude` [m] before the next
-    one of the other kind, so that ringing on top of a cycle does not count. Of a cycle longer than the last quarter
-    the last two extrema are taken from the last half. `ended` [s] is the end of each run.
-    """
-    found = np.full(len(counts), np.nan)
-    for j in np.flatnonzero(amplitude > BANDS[0]):
-        time = times[j, : counts[j]]
-        kinds = swings(values[j, : counts[j]], amplitude[j] / 2)
-        last = max((kind[-1] for kind in kinds if kind), default=-1)  # its swing is not over yet
-        for share in (WINDOW, 0.5):
-            late = [[time[k] for k in kind if k != last and time[k] >= share * ended[j]] for kind in kinds]
-            spaced = next((kind for kind in late if len(kind) > 1), None)
-            if spaced:
-                found[j] = np.diff(spaced if share == WINDOW else spaced[-2:]).mean()
-                break
-    return found

@@ -1,60 +1,43 @@
-"""The thesis's hunting metric (Sec. 3.2.2): maxima of the stage position late in the run, tall and well apart."""
+"""The thesis's hunting metric (Sec. 3.2.2), and the period of a cycle, from the turning points of many runs."""
 
 from __future__ import annotations
 
+from functools import cache
+from types import ModuleType
+
 import numpy as np
 
-COUNTED_AFTER = 10.0
-"""Time after which peaks count [s] (thesis, Sec. 3.2.2)."""
+from friso.engine.cache import code_digest, load_or_build
+from friso.hunting import turning
+from friso.hunting.turning import COUNTED_ABOVE, COUNTED_AFTER, WINDOW
 
-COUNTED_ABOVE = 1e-4
-"""Height above the reference from which peaks count [m] (thesis, Sec. 3.2.2)."""
+__all__ = ["COUNTED_ABOVE", "COUNTED_AFTER", "WINDOW", "scan"]
 
-APART = 0.5
-"""Time by which peaks are apart [s] (thesis, Sec. 3.2.2)."""
-
-SWING = 1e-6
-"""Swing below which a turning point is none [m]: a stage stuck off its reference turns by rounding alone."""
+MANY = 100
+"""Turning points, of all runs together, from which on the compiled loops are loaded; they take as long as so many."""
 
 
-def swings(values: np.ndarray, least: float) -> tuple[list[int], list[int]]:
-    """Indices of the maxima and of the minima of a zigzag through turning points `values` whose legs are at least
-    `least`; a first and last turning point that end such a leg are among them."""
-    extrema: tuple[list[int], list[int]] = ([], [])
-    way, high, low = 0, 0, 0
-    for k in range(1, len(values)):
-        if values[k] > values[high]:
-            high = k
-        if values[k] < values[low]:
-            low = k
-        if way >= 0 and values[high] - values[k] >= least:
-            extrema[0].append(high)
-            way, low = -1, k
-        elif way <= 0 and values[k] - values[low] >= least:
-            extrema[1].append(low)
-            way, high = 1, k
-    if way > 0:
-        extrema[0].append(high)
-    elif way < 0:
-        extrema[1].append(low)
-    return extrema
-
-
-def counted_peaks(times: np.ndarray, values: np.ndarray, counts: np.ndarray) -> np.ndarray:
-    """Which turning points are peaks: maxima later and higher than the limits, the tallest kept first.
+def scan(
+    times: np.ndarray, values: np.ndarray, counts: np.ndarray, amplitude: np.ndarray, ended: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Which turning points are counted peaks, shape (runs, room), and the period of each run [s], shape (runs,).
 
     `times` [s] and `values` [m], of position minus reference, have shape (runs, room) and are valid up to `counts`
-    (runs,). The result has their shape; its row sums are the peak counts. Of peaks less than `APART` from each
-    other the tallest stays (as MATLAB's findpeaks does with MinPeakDistance).
+    (runs,). Row sums of the first result are the peak counts: maxima after 10 s, above 0.1 mm, 0.5 s apart, the
+    tallest kept first. The period, NaN where there is no cycle, is the mean time between the maxima (or minima) of
+    the last quarter between which the deviation swings by half the peak-to-peak `amplitude` [m] (runs,), so that
+    ringing on top of a cycle does not count; of a cycle longer than that the last two extrema of the last half are
+    taken. `ended` [s] is the end of each run.
     """
-    there = np.arange(times.shape[1]) < counts[:, None]
-    tall = there & (times >= COUNTED_AFTER) & (values > COUNTED_ABOVE)
-    peaks = np.zeros_like(tall)
-    for j in np.flatnonzero(tall.any(axis=1)):
-        maxima, _ = swings(values[j, : counts[j]], SWING)
-        left = np.array([k for k in maxima if tall[j, k]], dtype=int)
-        while left.size:
-            tallest = left[np.argmax(values[j, left])]
-            peaks[j, tallest] = True
-            left = left[np.abs(times[j, left] - times[j, tallest]) >= APART]
-    return peaks
+    peaks = np.zeros(times.shape, np.bool_)
+    period = np.empty(len(counts))
+    loops = turning if counts.sum() < MANY else _compiled()
+    loops.run(times, values, counts, amplitude, ended, peaks, period)
+    return peaks, period
+
+
+@cache
+def _compiled() -> ModuleType:
+    from friso.hunting.build import compile_run
+
+    return load_or_build(f"turning points {code_digest('hunting')}", "friso.hunting.build", b"", compile_run)

@@ -1,0 +1,39 @@
+"""The program that fills the cache entry of the compiled `friso.hunting.turning` (see `friso.engine.build`)."""
+
+from __future__ import annotations
+
+import inspect
+import re
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import numba
+import numpy as np
+
+from friso.engine.cache import import_entry
+from friso.hunting import turning
+
+_JIT = 'error_model="numpy", nogil=True'
+
+
+def compile_run(module: ModuleType) -> None:
+    """Compile (or load from Numba's cache) `run` for the arrays it is called with."""
+    whole = np.zeros((2, 2))
+    square, flat = whole[:, :1], whole[:, 0]  # as parts of larger arrays, for which whole ones can stand in
+    arguments = (square, square, np.zeros(1, np.int64), flat, flat, np.zeros((1, 1), np.bool_), np.zeros(1))
+    module.run.compile(tuple(numba.typeof(argument) for argument in arguments))
+    module.run.disable_compile()
+
+
+def main(entry: Path) -> None:
+    source = re.sub(r"^def ", f"@njit({_JIT})\ndef ", inspect.getsource(turning), flags=re.MULTILINE)
+    source = source.replace(f"@njit({_JIT})\ndef run(", f"@njit(cache=True, {_JIT})\ndef run(")
+    (entry / "kernel.py").write_text(
+        source.replace("import numpy as np\n", "import numpy as np\nfrom numba import njit\n")
+    )
+    compile_run(import_entry(entry))
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))

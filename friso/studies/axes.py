@@ -1,0 +1,182 @@
+"""Axes of a study: what was given (texts, ranges, arrays with a unit) read into SI values."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Literal, cast
+
+import numpy as np
+
+from friso.quantities import Number, Quantity, StageError, any_sign, quoted
+from friso.stage import Stage, numeric_keys, parse_set
+
+Values = str | Sequence[Any] | np.ndarray | tuple[Any, str]
+Scale = Literal["linear", "log"]
+
+RANGE_EXAMPLE = '"1 Hz..40 Hz:41", "10 um..1 cm:41:log" or "4 Hz, 8 Hz, 16 Hz"'
+
+_SCALE = r"\s*(?P<scale>linear|log)\s*"
+_RANGE = re.compile(rf"(?P<first>[^:]*?)\.\.(?P<last>[^:]*?)(?::(?!\s*(?:linear|log))(?P<count>[^:]*))?(?::{_SCALE})?")
+
+
+@dataclass(frozen=True)
+class Axis:
+    """A swept key or a free name that links use: SI values (or words and booleans), their unit, and their scale."""
+
+    name: str
+    values: np.ndarray
+    unit: str = ""
+    scale: Scale = "linear"
+    numeric: bool = True
+
+
+@dataclass(frozen=True)
+class Range:
+    """The ends of a range [SI unit], how many points it has (None: not said) and how they are spaced."""
+
+    name: str
+    first: float
+    last: float
+    unit: str
+    count: int | None
+    scale: Scale
+
+    def at(self, share: np.ndarray) -> np.ndarray:
+        """The values at shares of the way from the first to the last, each from 0 to 1."""
+        if self.scale == "log":
+            return np.exp(np.log(self.first) + share * (np.log(self.last) - np.log(self.first)))
+        return self.first + share * (self.last - self.first)
+
+    def axis(self) -> Axis:
+        """The axis with `count` points, both ends exactly as given."""
+        space = np.geomspace if self.scale == "log" else np.linspace
+        return Axis(self.name, space(self.first, self.last, cast(int, self.count)), self.unit, self.scale)
+
+
+def read_axis(stage: Stage, name: str, values: Values, free: bool, log: bool = False) -> Axis | Range:
+    """An axis of a stage from a text, a list or an array with a unit; a range stays a `Range`.
+
+    `free` tells that links use the name, so that it needs to be no key. With `log` a range that does not say how
+    it is spaced is logarithmic. Raises StageError.
+    """
+    field = numeric_keys(stage.flat()).get(name)
+    if field is None and not free:
+        return _words(stage, name, values)
+    reader = _Reader(field)
+    try:
+        if isinstance(values, str) and ".." in values:
+            return _range(name, values, reader, log)
+        return _listed(name, values, reader)
+    except StageError as error:
+        raise error.under(name) from None
+
+
+class _Reader:
+    """Reads the numbers of an axis, of any sign: a value that no stage may have makes its cells invalid, not the axis.
+
+    A free name (`field` None) takes the SI unit of the first key of the same kind that it meets.
+    """
+
+    def __init__(self, field: Quantity | Number | None) -> None:
+        self.field = None if field is None else replace(field, bound=any_sign)
+
+    @property
+    def unit(self) -> str:
+        return "" if self.field is None else self.field.unit
+
+    def text(self, given: Any) -> float:
+        """The SI value of a text such as "8 Hz" or, without unit, "0.1"."""
+        given = given.strip() if isinstance(given, str) else given
+        bare = _number(given)
+        if self.field is None:
+            self.field = Number(any_sign, "0.1") if bare is not None else self._natural(str(given))
+        return float(self.field.read(bare if isinstance(self.field, Number) and bare is not None else given))
+
+    def factor(self, unit: str) -> float:
+        """SI value of 1 `unit`."""
+        if self.field is None and unit:
+            self.field = self._natural(f"1 {unit}")
+        if isinstance(self.field, Quantity):
+            return self.field.factor(unit)
+        if unit:
+            raise StageError("", f"the unit {unit}", "bare numbers, since the key has no unit", "[0.1, 0.2, 0.3]")
+        return 1.0
+
+    @staticmethod
+    def _natural(given: str) -> Quantity:
+        for unit in ("kg", "N", "m", "s", "Hz", "m/s", "m/s^2", "N/m", "N*s/m", "N/(m*s)"):
+            try:
+                Quantity(unit, any_sign, "").read(given)
+            except StageError:
+                continue
+            return Quantity(unit, any_sign, f"1 {unit}")
+        raise StageError("", quoted(given), "a number with a unit that some key of the stage file has", '"1.7 kg"')
+
+
+def _number(given: Any) -> float | None:
+    """The bare number that was given, None if it is none."""
+    if isinstance(given, int | float | np.number) and not isinstance(given, bool):
+        return float(given)
+    try:
+        return float(given) if isinstance(given, str) else None
+    except ValueError:
+        return None
+
+
+def _range(name: str, text: str, reader: _Reader, log: bool) -> Range:
+    match = _RANGE.fullmatch(text)
+    if match is None:
+        raise StageError("", quoted(text), "FIRST..LAST:POINTS, with :log behind it if so wanted", RANGE_EXAMPLE)
+    first, last = reader.text(match["first"]), reader.text(match["last"])
+    if not first < last:
+        order = "empty" if first == last else "reversed"
+        raise StageError("", quoted(text, f"{order} range"), "a range that rises", RANGE_EXAMPLE)
+    scale: Scale = cast(Scale, match["scale"] or ("log" if log else "linear"))
+    if scale == "log" and first <= 0:
+        given = quoted(text, "a logarithmic axis never reaches 0")
+        raise StageError("", given, "a logarithmic range that begins above 0", '"10 um..1 cm:41:log"')
+    return Range(name, first, last, reader.unit, _count(text, match["count"]), scale)
+
+
+def _count(text: str, digits: str | None) -> int | None:
+    if digits is None:
+        return None
+    count = int(digits) if digits.strip().isascii() and digits.strip().isdigit() else 0
+    if count < 2:
+        raise StageError("", quoted(text, f"{digits.strip()} points"), "2 points or more", RANGE_EXAMPLE)
+    return count
+
+
+def _listed(name: str, values: Values, reader: _Reader) -> Axis:
+    if isinstance(values, tuple) and len(values) == 2 and isinstance(values[1], str) and np.ndim(values[0]):
+        si = np.asarray(values[0], dtype=float) * reader.factor(values[1])
+    elif isinstance(values, str):
+        si = np.array([reader.text(value) for value in values.split(",")])
+        if len(si) < 2:
+            raise StageError("", quoted(values, "one point"), "a range or a list of 2 points or more", RANGE_EXAMPLE)
+    else:
+        si = np.array([reader.text(value) for value in values], dtype=float)
+    if si.ndim != 1 or not si.size:
+        raise StageError("", "no values", "a list or one-dimensional array of values", '["4 Hz", "8 Hz"]')
+    if not np.all(np.isfinite(si)):
+        raise StageError("", "values that are not finite", "finite numbers", '(np.linspace(1, 40, 41), "Hz")')
+    return Axis(name, si, reader.unit)
+
+
+def _words(stage: Stage, key: str, values: Values) -> Axis:
+    """An axis of words or booleans, each of which the stage takes."""
+    options = [parse_set(f"{key}={word}")[1] for word in values.split(",")] if isinstance(values, str) else list(values)
+    for value in options:
+        stage.replace({key: value})
+    if not options:
+        raise StageError(key, "no values", "a list of values", "[true, false]")
+    return Axis(key, np.array(options), numeric=False)
+
+
+def read_axes(
+    stage: Stage, axes: Mapping[str, Values], free: frozenset[str], log: bool = False
+) -> tuple[Axis | Range, ...]:
+    """All axes, as `read_axis` reads them. Raises StageError."""
+    return tuple(read_axis(stage, name, values, name in free, log) for name, values in axes.items())

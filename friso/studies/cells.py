@@ -1,0 +1,149 @@
+"""Runs of cells: stages that differ from one another in some keys, from columns of values to columns of measures."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from friso.engine.arrays import Status
+from friso.engine.batch import Runs, run_chunks
+from friso.engine.kernel import kernel
+from friso.equations.structure import Structure, structure
+from friso.hunting.measures import BANDS, Measures, measure, options
+from friso.stage import Stage, numeric_keys, violations
+from friso.studies.links import linked
+
+Columns = dict[str, np.ndarray]
+"""Names to arrays of shape (cells,)."""
+
+UNITS = {
+    "peaks": "1",
+    "peak_to_peak": "m",
+    "period": "s",
+    "settling_time": "s",
+    "settling_time_10um": "s",
+    "largest_force": "N",
+    "steps": "1",
+    "rejected": "1",
+}
+"""The numeric measures of a cell and their units."""
+
+WORDS = {"verdict": "<U9", "status": "<U160"}
+"""The measures that are words, and how they are stored; a status longer than that is cut."""
+
+METRICS = (*UNITS, *WORDS)
+"""Everything that is known of a cell."""
+
+INFERRED = "inferred"
+"""How the status of a cell begins that was not run, but lies among cells that agree."""
+
+
+def attributes_of(metric: str) -> dict[str, Any]:
+    """The attributes of the variable of a metric."""
+    attributes: dict[str, Any] = {"units": UNITS[metric]} if metric in UNITS else {}
+    bands = dict(zip(("settling_time", "settling_time_10um"), BANDS, strict=True))
+    return attributes | ({"band_m": bands[metric]} if metric in bands else {})
+
+
+def run_cells(
+    stage: Stage,
+    links: Mapping[str, str],
+    columns: Mapping[str, np.ndarray],
+    rtol: float,
+    threads: int | None = 1,
+    cancel: np.ndarray | None = None,
+) -> Columns:
+    """Run one stage per entry of the columns: axis names to SI values, words or booleans, each of shape (cells,).
+
+    The result holds `METRICS`, each of shape (cells,). A cell that no stage may have has the verdict "invalid" and the
+    reason in its status; one that a run did not complete for has "failed". Setting cancel[0] from another thread
+    ends the work early: cells not run by then keep the verdict "".
+    """
+    table = _Table(len(next(iter(columns.values()))))
+    for part, cells in _by_words(stage, columns):
+        flat = flat_cells(part, links, {name: column[cells] for name, column in columns.items()})
+        table.invalidate(cells, flat)
+        for shape, members in _by_structure(flat, table.valid(cells), len(cells)):
+            own = _taken(flat, members)
+            for runs in run_chunks(kernel(shape), own, len(members), options(rtol, threads, cancel)):
+                here = slice(runs.first, runs.first + len(runs.results.statuses))
+                table.write(cells[members[here]], measure(_taken(own, here), runs), runs)
+    return table.columns
+
+
+def flat_cells(stage: Stage, links: Mapping[str, str], columns: Mapping[str, np.ndarray]) -> dict[str, Any]:
+    """The flat SI form of all cells, links followed; numeric columns only."""
+    known = numeric_keys(stage.flat())
+    keys = {name: column for name, column in columns.items() if name in known}
+    if not links:
+        return stage.flat(keys)
+    return stage.flat(keys | linked(links, stage.flat(keys) | dict(columns)))
+
+
+def _taken(flat: Mapping[str, Any], which: Any) -> dict[str, Any]:
+    return {key: value[which] if np.ndim(value) else value for key, value in flat.items()}
+
+
+def _by_words(stage: Stage, columns: Mapping[str, np.ndarray]) -> Iterator[tuple[Stage, np.ndarray]]:
+    """For each combination of words and booleans among the columns: the stage and the numbers of its cells."""
+    words = {name: column for name, column in columns.items() if column.dtype.kind in "bU"}
+    count = len(next(iter(columns.values())))
+    if not words:
+        yield stage, np.arange(count)
+        return
+    codes = np.stack([np.unique(column, return_inverse=True)[1] for column in words.values()], axis=1)
+    kinds, which = np.unique(codes, axis=0, return_inverse=True)
+    for k in range(len(kinds)):
+        cells = np.flatnonzero(which.ravel() == k)
+        yield stage.replace({name: column[cells[0]].item() for name, column in words.items()}), cells
+
+
+def _by_structure(flat: Mapping[str, Any], valid: np.ndarray, count: int) -> Iterator[tuple[Structure, np.ndarray]]:
+    """The places of the valid cells, grouped by the equations they need.
+
+    Only a few keys decide on the structure, and only by being zero or a whole number; cells are told apart by those.
+    """
+    decisive = [
+        key
+        for key in ("joint.stroke", "controller.ki", "controller.kd", "controller.tau", "friction.stribeck_exponent")
+        if np.ndim(flat.get(key, 0.0))
+    ]
+    groups: dict[Structure, list[np.ndarray]] = {}
+    columns = np.stack([flat[key] for key in decisive], axis=1) if decisive else np.zeros((count, 1))
+    kinds, which = np.unique(columns, axis=0, return_inverse=True)
+    for k in range(len(kinds)):
+        members = np.flatnonzero((which.ravel() == k) & valid)
+        if members.size:
+            one = {**flat, **{key: kinds[k][i] for i, key in enumerate(decisive)}}
+            groups.setdefault(structure(one), []).append(members)
+    for shape, members in groups.items():
+        yield shape, np.sort(np.concatenate(members))
+
+
+class _Table:
+    """The growing measures, one entry per cell."""
+
+    def __init__(self, count: int) -> None:
+        self.columns: Columns = {name: np.full(count, np.nan) for name in UNITS}
+        self.columns |= {name: np.full(count, "", dtype=kind) for name, kind in WORDS.items()}
+
+    def invalidate(self, cells: np.ndarray, flat: Mapping[str, Any]) -> None:
+        """Mark the cells that no stage may have, each with the first reason found."""
+        for broken, why in violations(flat):
+            which = cells[np.broadcast_to(broken, cells.shape) & self.valid(cells)]
+            self.columns["verdict"][which], self.columns["status"][which] = "invalid", f"invalid: {why}"
+
+    def valid(self, cells: np.ndarray) -> np.ndarray:
+        return self.columns["verdict"][cells] != "invalid"
+
+    def write(self, which: np.ndarray, found: Measures, runs: Runs) -> None:
+        """Write the measures of the cells that were run."""
+        ran = runs.results.statuses != Status.NOT_RUN
+        inner, outer = found.settling_time
+        numbers = (found.peaks, found.peak_to_peak, found.period, inner, outer, found.largest_force)
+        texts = np.array([status.text for status in Status])
+        words = (found.verdict, texts[found.status])
+        for name, column in zip(METRICS, (*numbers, found.steps, found.rejected, *words), strict=True):
+            self.columns[name][which[ran]] = column[ran]

@@ -1,0 +1,100 @@
+"""Studies beyond one process: the blocks go to the workers of a Dask cluster, one task each."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from friso.quantities import StageError
+from friso.stage import Stage
+from friso.studies.cells import Columns, run_cells
+from friso.studies.execute import Crew
+from friso.studies.study import equations_version
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+PATIENCE = 10.0
+"""How long a scheduler may take to answer [s]."""
+
+
+@contextmanager
+def local_cluster(workers: int) -> Iterator[Crew]:
+    """A crew of worker processes on this machine, one thread each."""
+    from distributed import LocalCluster
+
+    with (
+        LocalCluster(
+            n_workers=workers,
+            threads_per_worker=1,
+            processes=True,
+            dashboard_address=None,
+            silence_logs=logging.CRITICAL,
+        ) as cluster,
+        connected(cluster.scheduler_address) as crew,
+    ):
+        yield crew
+
+
+@contextmanager
+def connected(scheduler: str) -> Iterator[Crew]:
+    """A crew made of the workers of the scheduler at an address such as "tcp://10.0.0.1:8786".
+
+    Every thread of a worker computes one block at a time, in that thread alone. Raises StageError if the scheduler
+    does not answer, has no workers, or one with another version of friso.
+    """
+    from distributed import Client
+
+    try:
+        asyncio.run(_answers(scheduler))
+        client = Client(scheduler, timeout=PATIENCE, set_as_default=False)
+    except (OSError, ValueError) as error:
+        expected = f"the address of a Dask scheduler that answers ({error})"
+        raise StageError("--scheduler", scheduler, expected, "--scheduler tcp://10.0.0.1:8786") from None
+    with client:
+        _refuse_strangers(client)
+        threads = sum(client.nthreads().values())
+        arguments = {"expected": equations_version(), "pure": False}
+        yield Crew(client.get_executor(), threads, run_checked, arguments)
+
+
+async def _answers(scheduler: str) -> None:
+    """Raises OSError or ValueError if there is nothing at the address: a client that fails lingers for long."""
+    from distributed.comm import connect
+
+    comm = await connect(scheduler, timeout=PATIENCE)
+    await comm.close()
+
+
+def run_checked(
+    stage: Stage, links: Mapping[str, str], columns: Mapping[str, np.ndarray], rtol: float, expected: str
+) -> Columns:
+    """`run_cells` on a worker whose friso has to be the expected one: one that joined later was not asked before."""
+    if equations_version() != expected:
+        raise _stranger("a worker", equations_version())
+    return run_cells(stage, links, columns, rtol)
+
+
+def _refuse_strangers(client: Client) -> None:
+    """Raises StageError unless every worker has the same friso as this process."""
+    if not client.nthreads():
+        raise StageError("--scheduler", "a scheduler without workers", "workers: dask worker tcp://...")
+    versions: dict[str, Any] = client.run(_version)
+    for address, version in versions.items():
+        if version != equations_version():
+            raise _stranger(f"the worker {address}", version)
+
+
+def _version() -> str:
+    """What a worker says of its friso; it has one, or it could not be asked this."""
+    return equations_version()
+
+
+def _stranger(who: str, version: str) -> StageError:
+    given = f"{who} has friso {version}"
+    return StageError("--scheduler", given, f"friso {equations_version()}, as here, on every worker")

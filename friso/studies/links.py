@@ -1,0 +1,102 @@
+"""Links: stage keys that follow the axes of a study by an expression in SI numbers, such as "0.7 * mass"."""
+
+from __future__ import annotations
+
+import ast
+import operator
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from friso.quantities import StageError, quoted
+from friso.stage import Stage, numeric_keys
+
+EXAMPLE = 'masses.stage = "0.3 * mass" or friction.static = "max(friction.static, friction.coulomb)"'
+
+_OPERATORS: dict[type, Any] = {
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: operator.truediv,
+    ast.Pow: operator.pow,
+    ast.USub: operator.neg,
+    ast.UAdd: operator.pos,
+}
+_FUNCTIONS: dict[str, Any] = {"min": np.minimum, "max": np.maximum, "sqrt": np.sqrt, "abs": np.abs}
+_ARGUMENTS = {"min": 2, "max": 2, "sqrt": 1, "abs": 1}
+
+
+def names(links: Mapping[str, str]) -> frozenset[str]:
+    """Every name that the expressions use. Raises StageError."""
+    trees = [_parsed(key, text) for key, text in links.items()]
+    called = {id(node.func) for tree in trees for node in ast.walk(tree) if isinstance(node, ast.Call)}
+    found = set()
+    for tree in trees:
+        inner = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Attribute)}
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Name | ast.Attribute) and id(node) not in called | inner:
+                found.add(ast.unparse(node))
+    return frozenset(found)
+
+
+def check_links(stage: Stage, links: Mapping[str, str], axes: frozenset[str]) -> None:
+    """Refuse links to no key, and expressions with names that are neither keys nor `axes`. Raises StageError."""
+    known = numeric_keys(stage.flat())
+    for key in links:
+        if key not in known:
+            stage.flat({key: 0.0})  # raises, and names the nearest key
+    for name in sorted(names(links) - axes):
+        if name not in stage.flat():
+            raise StageError("link", f"the name {name}", "axes and numeric keys that the stage has", EXAMPLE)
+
+
+def linked(links: Mapping[str, str], values: Mapping[str, Any]) -> dict[str, Any]:
+    """The SI values of the linked keys from those of keys and axes (numbers or arrays); a link sees those before it."""
+    known = dict(values)
+    for key, text in links.items():
+        with np.errstate(all="ignore"):  # what comes out as no number makes the cell invalid
+            known[key] = _value(_parsed(key, text), known)
+    return {key: known[key] for key in links}
+
+
+def _parsed(key: str, text: str) -> ast.expr:
+    try:
+        tree = ast.parse(text.strip(), mode="eval").body
+        _check(tree)
+    except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
+        raise StageError(key, quoted(text), "numbers, names, + - * / **, min, max, sqrt, abs", EXAMPLE) from error
+    return tree
+
+
+def _check(node: ast.expr) -> None:
+    """Raises ValueError for anything but arithmetic."""
+    match node:
+        case ast.BinOp(left, op, right) if type(op) in _OPERATORS:
+            _check(left)
+            _check(right)
+        case ast.UnaryOp(op, operand) if type(op) in _OPERATORS:
+            _check(operand)
+        case ast.Call(ast.Name(name), arguments, []) if _ARGUMENTS.get(name) == len(arguments):
+            for argument in arguments:
+                _check(argument)
+        case ast.Attribute(ast.Name(), _) | ast.Name():
+            pass
+        case ast.Constant(value) if type(value) in (int, float):
+            pass
+        case _:
+            raise ValueError(ast.unparse(node))
+
+
+def _value(node: ast.expr, known: Mapping[str, Any]) -> Any:
+    match node:
+        case ast.BinOp(left, op, right):
+            return _OPERATORS[type(op)](_value(left, known), _value(right, known))
+        case ast.UnaryOp(op, operand):
+            return _OPERATORS[type(op)](_value(operand, known))
+        case ast.Call(ast.Name(name), arguments):
+            return _FUNCTIONS[name](*(_value(argument, known) for argument in arguments))
+        case ast.Constant(value):
+            return np.float64(value)
+        case _:
+            return np.asarray(known[ast.unparse(node)], dtype=float)[()]

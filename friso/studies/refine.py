@@ -1,0 +1,144 @@
+"""Adaptive sampling: the verdicts of a grid four times finer per axis for a fifth of its runs.
+
+A coarse lattice is run first. Wherever neighbouring cells differ, both have to be run, until every change of verdict
+has been seen from both sides; so a boundary that was met once is followed to its end. The runs that are left are
+spent where the next surprise is likely: far from any run, near boundaries, and where runs settle late.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from scipy.ndimage import distance_transform_edt
+
+from friso.quantities import StageError
+from friso.studies.axes import Axis
+from friso.studies.cells import INFERRED, METRICS, UNITS, Columns
+from friso.studies.samples import SAMPLE
+from friso.studies.study import Dimension, Study
+
+FINER = 4
+"""Cells of the fine grid per cell of the given one, along each axis."""
+
+SHARE = 0.2
+"""Share of the fine grid's cells that are run at most."""
+
+LATTICE = 8
+"""Every how manieth cell of the fine grid is run first."""
+
+BATCHES = 100
+"""Into how many batches the runs are split: each is chosen after the last one's results."""
+
+LATE = 10.0
+"""Time of settling [s] from which on a run counts as much as one that hunts: the thesis counts peaks after it."""
+
+Ask = Callable[[np.ndarray], Columns]
+"""Gives the measures of the cells with these numbers."""
+
+
+def finer(study: Study) -> Study:
+    """The study on the fine grid. Raises StageError where there is no such grid."""
+    if len(study.shape) > 3 or not all(axis.numeric for axis in study.axes) or SAMPLE in study.names:
+        expected = "one to three axes of numbers on a grid"
+        raise StageError("--refine", f"axes: {', '.join(study.names)}", expected)
+    dimensions = tuple(Dimension(each.name, (_finer(each.axes[0]),)) for each in study.dimensions)
+    return replace(study, dimensions=dimensions, refined=True)
+
+
+def _finer(axis: Axis) -> Axis:
+    """The axis with cells between its own: those of a range as if it had been given so many points."""
+    log = axis.scale == "log"
+    space, ends = np.geomspace if log else np.linspace, (axis.values[0], axis.values[-1])
+    if np.array_equal(space(*ends, len(axis.values)), axis.values):
+        return replace(axis, values=space(*ends, FINER * (len(axis.values) - 1) + 1))
+    values = np.log(axis.values) if log else axis.values
+    places = np.arange(FINER * (len(values) - 1) + 1) / FINER
+    between = np.interp(places, np.arange(len(values)), values)
+    between = np.exp(between) if log else between
+    between[::FINER] = axis.values
+    return replace(axis, values=between)
+
+
+def refine(study: Study, ask: Ask) -> Columns:
+    """The measures of a fine study, each of shape (cells,), from the cells asked for.
+
+    A cell that was not asked for has the verdict of the nearest one that was, a status that says so, and no numbers.
+    """
+    known = _Known(study)
+    known.learn(_lattice(study.shape), ask)
+    while (left := known.budget - known.runs) > 0:
+        cells = known.unseen_changes()
+        if not cells.size:
+            batch = max(1, known.budget // BATCHES)
+            cells = known.likely_surprises(min(left - batch, batch))  # one batch is kept to follow what it finds
+        if not cells.size:
+            break
+        known.learn(cells[:left], ask)
+    return known.filled()
+
+
+def _lattice(shape: tuple[int, ...]) -> np.ndarray:
+    """Numbers of the cells of the coarse lattice, the ends of the axes among them."""
+    lines = [np.unique(np.append(np.arange(0, size, LATTICE), size - 1)) for size in shape]
+    return np.ravel_multi_index(np.meshgrid(*lines, indexing="ij"), shape).ravel()
+
+
+class _Known:
+    """What is known of the cells of a study."""
+
+    def __init__(self, study: Study) -> None:
+        self.shape, self.budget = study.shape, int(SHARE * study.cells)
+        self.columns: Columns = {}
+        self.asked = np.zeros(study.shape, bool)
+        self.runs = 0
+
+    def learn(self, cells: np.ndarray, ask: Ask) -> None:
+        """Ask for cells; those that no stage may have cost no run."""
+        found = ask(cells)
+        for name in METRICS:
+            empty = np.full(self.asked.size, np.nan) if name in UNITS else np.full(self.asked.size, "", dtype=object)
+            self.columns.setdefault(name, empty)[cells] = found[name]
+        self.asked.flat[cells] = True
+        self.runs += int(np.sum(found["verdict"] != "invalid"))
+
+    def _nearest(self) -> tuple[np.ndarray, np.ndarray]:
+        """Distance to the nearest cell asked for, and its number, both of the study's shape."""
+        distance, places = distance_transform_edt(~self.asked, return_indices=True)
+        return distance, np.ravel_multi_index(tuple(places), self.shape)
+
+    def _changes(self, nearest: np.ndarray) -> np.ndarray:
+        """Which cells have a neighbour of another verdict, where each has that of the nearest cell asked for."""
+        verdicts = np.unique(self.columns["verdict"].astype(str), return_inverse=True)[1].ravel()[nearest]
+        changes = np.zeros(self.shape, bool)
+        for axis in range(changes.ndim):
+            along, beside = np.moveaxis(verdicts, axis, 0), np.moveaxis(changes, axis, 0)
+            differ = along[1:] != along[:-1]
+            beside[1:] |= differ
+            beside[:-1] |= differ
+        return changes
+
+    def unseen_changes(self) -> np.ndarray:
+        """Numbers of the cells at a change of verdict that were not yet asked for."""
+        _, nearest = self._nearest()
+        return np.flatnonzero(self._changes(nearest) & ~self.asked)
+
+    def likely_surprises(self, count: int) -> np.ndarray:
+        """Numbers of up to `count` cells that are most worth a run."""
+        distance, nearest = self._nearest()
+        changes = self._changes(nearest)
+        from_change = distance_transform_edt(~changes) if changes.any() else np.ones(self.shape)
+        settling = np.nan_to_num(self.columns["settling_time_10um"], nan=LATE)
+        late = np.where(self.columns["verdict"] == "hunts", 1.0, np.minimum(settling / LATE, 1.0))
+        worth = np.where(self.asked, 0.0, distance * late[nearest] / np.cbrt(np.maximum(from_change, 1.0)))
+        best = np.argsort(-worth, axis=None, kind="stable")[: max(count, 0)]
+        return best[worth.flat[best] > 0]
+
+    def filled(self) -> Columns:
+        """The measures of all cells, those not asked for inferred."""
+        _, nearest = self._nearest()
+        guessed = ~self.asked.ravel()
+        verdicts = self.columns["verdict"][nearest.ravel()]
+        status = np.where(guessed, f"{INFERRED} from the nearest cell that was run", self.columns["status"])
+        return self.columns | {"verdict": verdicts, "status": status}

@@ -1,0 +1,211 @@
+"""A study on disk: a Zarr store that is written block by block and resumed where it was left.
+
+The store is made whole, without results, under another name and then moved into place; a block's verdicts are
+written after its other variables, and Zarr moves each file into place. So a block whose verdicts are there is done,
+whenever the process was killed.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import warnings
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from itertools import count
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from filelock import FileLock, Timeout
+
+from friso.quantities import StageError
+from friso.studies.cells import UNITS, WORDS, Columns, attributes_of
+from friso.studies.refine import Ask
+from friso.studies.study import Block, Study, study_of
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+BLOCK = 1024
+"""Cells of a block at most; a store has the same blocks on every machine."""
+
+LEAST_BLOCKS = 8
+"""Blocks of a small study, so that an interruption loses a part of it only."""
+
+_ANSWERS = ".answers"
+
+_FORMAT = 2
+"""Version of the Zarr format: the one that every reader knows, and in which fixed-length texts are specified."""
+
+
+class Store:
+    """The results of a study in a folder, locked by this process while it is open."""
+
+    def __init__(self, path: Path, study: Study) -> None:
+        self.path, self.study = path, study
+        self.blocks = study.block_shape(max(16, min(BLOCK, study.cells // LEAST_BLOCKS)))
+
+    @classmethod
+    @contextmanager
+    def opened(cls, path: Path, study: Study) -> Iterator[Store]:
+        """The store of a study, made if it is not there.
+
+        Raises StageError if the folder holds anything else, another study, or is in use by another process.
+        """
+        store = cls(path, study)
+        if not path.exists():
+            store._make()
+        _refuse_foreign(path)
+        with _locked(path):
+            _refuse_other(path, study)
+            for leftover in path.rglob("*.partial"):  # of a file that was being written when its process was killed
+                leftover.unlink(missing_ok=True)
+            yield store
+
+    def _make(self) -> None:
+        import dask.array as da
+        import xarray as xr
+
+        study = self.study
+        kinds = {name: WORDS.get(name, "f8") for name in study.metrics}
+        # One lazy chunk stands for the whole array, whatever its size; none of it is ever computed.
+        empty = {
+            name: da.full(study.shape, "" if name in WORDS else np.nan, chunks=-1, dtype=kind)
+            for name, kind in kinds.items()
+        }
+        variables = {name: (study.names, array, attributes_of(name)) for name, array in empty.items()}
+        encoding: dict[str, dict[str, Any]] = {name: {"chunks": self.blocks} for name in study.metrics}
+        for name in UNITS:
+            if name in encoding:
+                encoding[name]["_FillValue"] = np.nan
+        template = xr.Dataset(variables, coords=study.coordinates(), attrs=study.attributes())
+        draft = self.path.with_name(f".{self.path.name}.{os.getpid()}")
+        try:
+            template.to_zarr(draft, compute=False, encoding=encoding, zarr_format=_FORMAT, consolidated=True)
+            draft.rename(self.path)
+        except OSError as error:
+            if self.path.exists():
+                return  # another process was quicker; whose study it is will be seen
+            expected = f"a folder that can be written ({error.strerror or error})"
+            raise StageError("--out", str(self.path), expected, "--out study.zarr") from None
+        finally:
+            shutil.rmtree(draft, ignore_errors=True)
+
+    def missing(self) -> Iterator[Block]:
+        """The blocks not yet done."""
+        verdicts = self.read()["verdict"]
+        for block in self.study.blocks(self.blocks):
+            if np.any(verdicts[block].values == ""):
+                yield block
+
+    def write(self, block: Block, found: Mapping[str, np.ndarray]) -> None:
+        """Write the measures of a block, its verdicts last. Raises OSError where the disk is full."""
+        shape = tuple(part.stop - part.start for part in block)
+        region = dict(zip(self.study.names, block, strict=True))
+        self._write([name for name in self.study.metrics if name != "verdict"], found, shape, region)
+        self._write(["verdict"], found, shape, region)
+
+    def _write(
+        self, names: list[str], found: Mapping[str, np.ndarray], shape: tuple[int, ...], region: dict[str, slice]
+    ) -> None:
+        import xarray as xr
+
+        arrays = {name: found[name].astype(WORDS.get(name, "f8")).reshape(shape) for name in names}
+        part = xr.Dataset({name: (self.study.names, array) for name, array in arrays.items()})
+        part.to_zarr(self.path, region=region, zarr_format=_FORMAT, consolidated=True)
+
+    def keeping(self, ask: Ask) -> Ask:
+        """`ask` with its answers kept in the store: asked the same questions again, they need no runs."""
+        folder = self.path / _ANSWERS
+        folder.mkdir(exist_ok=True)
+        number = count()
+
+        def answer(cells: np.ndarray) -> Columns:
+            file = folder / f"{next(number)}.npz"
+            if file.exists():
+                with np.load(file) as kept:
+                    return {name: kept[name] for name in kept.files}
+            found = ask(cells)
+            draft = file.with_suffix(".partial")
+            with draft.open("wb") as stream:
+                np.savez_compressed(stream, **found)
+            draft.rename(file)
+            return found
+
+        return answer
+
+    def forget_answers(self) -> None:
+        """Remove what `keeping` kept: the blocks hold it by now."""
+        shutil.rmtree(self.path / _ANSWERS, ignore_errors=True)
+
+    def annotate(self, attributes: Mapping[str, Any]) -> None:
+        """Add attributes to the store."""
+        import zarr
+
+        group = zarr.open_group(self.path, mode="r+", zarr_format=_FORMAT)
+        group.attrs.update(dict(attributes))
+        with warnings.catch_warnings():  # about the lock, which is no part of the Zarr hierarchy
+            warnings.filterwarnings("ignore", "Object at", UserWarning)
+            zarr.consolidate_metadata(group.store, zarr_format=_FORMAT)
+
+    def read(self) -> xr.Dataset:
+        """The store as a dataset whose values are read when they are looked at."""
+        return read_store(self.path)
+
+
+def read_store(path: str | os.PathLike[str]) -> xr.Dataset:
+    """The study in a store, finished or not, as a dataset whose values are read when they are looked at.
+
+    Raises StageError if there is none.
+    """
+    import xarray as xr
+
+    _refuse_foreign(Path(path))
+    return xr.open_zarr(path, chunks=None, zarr_format=_FORMAT)
+
+
+def _refuse_foreign(path: Path) -> None:
+    """Raises StageError for anything but a store that friso has made."""
+    import xarray as xr
+
+    expected = "a store made by friso map, or a new name"
+    if not path.exists():
+        raise StageError("", "nothing there", expected, "friso map STAGE.toml ... --out study.zarr", str(path))
+    try:
+        with xr.open_zarr(path, chunks=None, zarr_format=_FORMAT) as found:
+            if "verdict" in found and "equations" in found.attrs:
+                return
+    except (OSError, ValueError, KeyError):
+        pass
+    given = "a folder with other things in it" if path.is_dir() else "a file"
+    raise StageError("", f"{given}; nothing was overwritten", expected, "--out study.zarr", str(path))
+
+
+def _refuse_other(path: Path, study: Study) -> None:
+    """Raises StageError if the store holds another study than this."""
+    with read_store(path) as found:
+        differences = study.differences(study_of(found), found.attrs["equations"])
+    if differences:
+        given = "a store of another study:\n            " + "\n            ".join(differences)
+        expected = "the same study to go on with, or another --out; nothing was overwritten"
+        raise StageError("", given, expected, origin=str(path))
+
+
+@contextmanager
+def _locked(path: Path) -> Iterator[None]:
+    """Keep other processes out. Raises StageError if one is in."""
+    lock = FileLock(path / ".friso.lock")
+    try:
+        lock.acquire(timeout=0)
+    except Timeout:
+        raise StageError(
+            "", "a store that another friso is writing to", "to wait, or another --out", origin=str(path)
+        ) from None
+    except OSError as error:
+        expected = f"a store that can be written to ({error.strerror})"
+        raise StageError("", "a store that cannot be written to", expected, origin=str(path)) from None
+    try:
+        yield
+    finally:
+        lock.release()

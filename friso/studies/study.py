@@ -1,0 +1,257 @@
+"""A study as data: a stage, what is varied in it, and how exactly; its cells and its blocks of cells."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from friso.engine.cache import code_digest
+from friso.engine.tolerance import checked_rtol
+from friso.quantities import StageError
+from friso.stage import Stage, loads, numeric_keys
+from friso.studies import links as linking
+from friso.studies.axes import Axis, Range, Values, read_axes
+from friso.studies.cells import METRICS, UNITS, flat_cells
+from friso.studies.samples import SAMPLE, Samples, sampled
+from friso.version import VERSION
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Block = tuple[slice, ...]
+"""A rectangle of cells, one slice per dimension."""
+
+
+@dataclass(frozen=True)
+class Dimension:
+    """A dimension of the result: one axis, or several that run side by side (samples)."""
+
+    name: str
+    axes: tuple[Axis, ...]
+
+    def __len__(self) -> int:
+        return len(self.axes[0].values)
+
+
+@dataclass(frozen=True)
+class Study:
+    """All that decides on the result: cells are the combinations of the dimensions' values, in C order."""
+
+    stage: Stage
+    dimensions: tuple[Dimension, ...]
+    links: Mapping[str, str]
+    metrics: tuple[str, ...]
+    rtol: float
+    refined: bool = False
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        return tuple(len(dimension) for dimension in self.dimensions)
+
+    @property
+    def cells(self) -> int:
+        return math.prod(self.shape)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the dimensions."""
+        return tuple(dimension.name for dimension in self.dimensions)
+
+    @property
+    def axes(self) -> tuple[Axis, ...]:
+        """The axes of all dimensions."""
+        return tuple(axis for dimension in self.dimensions for axis in dimension.axes)
+
+    def columns(self, cells: np.ndarray) -> dict[str, np.ndarray]:
+        """The value of every axis at the cells with these numbers."""
+        places = np.unravel_index(cells, self.shape)
+        return {
+            axis.name: axis.values[place]
+            for dimension, place in zip(self.dimensions, places, strict=True)
+            for axis in dimension.axes
+        }
+
+    def block_columns(self, block: Block) -> dict[str, np.ndarray]:
+        """The value of every axis at the cells of a block, in C order."""
+        picked = [np.arange(len(dimension))[part] for dimension, part in zip(self.dimensions, block, strict=True)]
+        places = [place.ravel() for place in np.meshgrid(*picked, indexing="ij")]
+        return {
+            axis.name: axis.values[place]
+            for dimension, place in zip(self.dimensions, places, strict=True)
+            for axis in dimension.axes
+        }
+
+    def block_shape(self, target: int) -> tuple[int, ...]:
+        """The shape of blocks of about `target` cells: whole trailing dimensions, an equal share of the one before."""
+        shape = [1] * len(self.shape)
+        for i in reversed(range(len(shape))):
+            room = max(1, target // math.prod(shape))
+            shape[i] = math.ceil(self.shape[i] / math.ceil(self.shape[i] / room))
+            if shape[i] < self.shape[i]:
+                break
+        return tuple(shape)
+
+    def blocks(self, shape: Sequence[int]) -> Iterator[Block]:
+        """All blocks of a shape, those at the ends cut to fit."""
+        starts = (range(0, size, step) for size, step in zip(self.shape, shape, strict=True))
+        for corner in product(*starts):
+            yield tuple(slice(k, min(k + step, size)) for k, step, size in zip(corner, shape, self.shape, strict=True))
+
+    def cell_stage(self, index: Sequence[int]) -> Stage:
+        """The stage of one cell, which run alone gives the same numbers. Raises StageError for an invalid cell."""
+        columns = self.columns(np.array([np.ravel_multi_index(tuple(index), self.shape)]))
+        numeric = {axis.name: axis for axis in self.axes if axis.numeric}
+        words = {name: column[0].item() for name, column in columns.items() if name not in numeric}
+        stage = self.stage.replace(words)
+        flat = flat_cells(stage, self.links, {name: columns[name] for name in numeric})
+        changed = {key for key in (*numeric, *self.links) if key in flat}
+        return stage.replace({key: _written(stage, key, float(flat[key][0])) for key in sorted(changed)})
+
+    def at(self, cells: np.ndarray) -> Study:
+        """A study of just these cells, side by side."""
+        columns = self.columns(cells)
+        axes = tuple(Axis(axis.name, columns[axis.name], axis.unit, axis.scale, axis.numeric) for axis in self.axes)
+        return replace(self, dimensions=(Dimension(SAMPLE, axes),), refined=False)
+
+    def coordinates(self) -> dict[str, Any]:
+        """Coordinates for xarray: SI values with units and scale."""
+        coordinates: dict[str, Any] = {}
+        for dimension in self.dimensions:
+            if dimension.name == SAMPLE:
+                coordinates[SAMPLE] = (SAMPLE, np.arange(len(dimension)))
+            for axis in dimension.axes:
+                coordinates[axis.name] = (dimension.name, axis.values, {"units": axis.unit, "scale": axis.scale})
+        return coordinates
+
+    def attributes(self) -> dict[str, Any]:
+        """What is kept beside the numbers, so that any cell can be run again alone."""
+        return {
+            "name": self.stage.name,
+            "stage": self.stage.to_toml(),
+            "friso": VERSION,
+            "equations": equations_version(),
+            "rtol": self.rtol,
+            "links": json.dumps(dict(self.links)),
+            "refined": int(self.refined),
+        }
+
+    def differences(self, other: Study, its_equations: str) -> list[str]:
+        """What tells a stored study (`other`, made by `its_equations`) from this one, in words; empty if nothing."""
+        found = _stage_differences(self.stage, other.stage)
+        if its_equations != equations_version():
+            found.append(f"version of the equations: {its_equations} there, {equations_version()} here")
+        if self.names != other.names:
+            found.append(f"axes: {', '.join(other.names)} there, {', '.join(self.names)} here")
+        else:
+            found += [
+                f"axis {mine.name}: {_described(its)} there, {_described(mine)} here"
+                for mine, its in zip(self.axes, other.axes, strict=False)
+                if _described(mine) != _described(its)
+            ]
+        for what in ("links", "metrics", "rtol", "refined"):
+            if getattr(self, what) != getattr(other, what):
+                found.append(f"{what}: {getattr(other, what)} there, {getattr(self, what)} here")
+        return found
+
+
+def cells_of(block: Block) -> int:
+    """The number of cells of a block."""
+    return math.prod(part.stop - part.start for part in block)
+
+
+def equations_version() -> str:
+    """A digest of friso's own code that decides on the numbers of a cell."""
+    return f"{VERSION} ({code_digest('equations', 'engine', 'hunting')[:12]})"
+
+
+def make_study(
+    stage: Stage,
+    axes: Mapping[str, Values],
+    samples: Samples | None = None,
+    links: Mapping[str, str] | None = None,
+    metrics: Sequence[str] | None = None,
+    rtol: float = 1e-4,
+    log: bool = False,
+) -> Study:
+    """Read what a user gave into a study. Raises StageError, and ValueError for a tolerance that is not usable."""
+    checked_rtol(rtol)
+    links = dict(links or {})
+    free = linking.names(links)
+    read = read_axes(stage, axes, free, log)
+    if not read and samples is None:
+        example = '{"controller.crossover": ["4 Hz", "8 Hz"]}'
+        raise StageError("axes", "none", "at least one key with its values", example)
+    dimensions = [Dimension(axis.name, (_gridded(axis),)) for axis in read]
+    if samples is not None:
+        dimensions.append(Dimension(SAMPLE, sampled(stage, samples, free, log)))
+    names = [axis.name for dimension in dimensions for axis in dimension.axes]
+    for name in names:
+        if names.count(name) > 1 or name in (*METRICS, SAMPLE):
+            raise StageError(name, "a name that is taken", "every axis once, under a name of its own")
+    linking.check_links(stage, links, frozenset(names))
+    return Study(stage, tuple(dimensions), links, _checked_metrics(metrics), rtol)
+
+
+def study_of(runs: xr.Dataset) -> Study:
+    """The study that a dataset or an opened store holds the results of."""
+    dimensions = []
+    for name in runs["verdict"].dims:
+        own = [coordinate for coordinate in runs.coords.values() if coordinate.dims == (name,)]
+        axes = tuple(_stored_axis(coordinate) for coordinate in own if coordinate.name != SAMPLE)
+        dimensions.append(Dimension(str(name), axes))
+    stage = loads(runs.attrs["stage"])
+    metrics = tuple(name for name in METRICS if name in runs)
+    links, rtol = json.loads(runs.attrs["links"]), float(runs.attrs["rtol"])
+    return Study(stage, tuple(dimensions), links, metrics, rtol, bool(runs.attrs["refined"]))
+
+
+def _stored_axis(coordinate: xr.DataArray) -> Axis:
+    values = coordinate.values
+    attributes = coordinate.attrs
+    return Axis(str(coordinate.name), values, attributes["units"], attributes["scale"], values.dtype.kind not in "bUT")
+
+
+def _gridded(axis: Axis | Range) -> Axis:
+    if isinstance(axis, Axis):
+        if len(np.unique(axis.values)) < len(axis.values):
+            raise StageError(axis.name, "values that occur twice", "every value once", '["4 Hz", "8 Hz"]')
+        return axis
+    if axis.count is None:
+        given = f"{axis.first:g}..{axis.last:g} {axis.unit}, without a number of points"
+        raise StageError(axis.name, given, "FIRST..LAST:POINTS", '"1 Hz..40 Hz:41"')
+    return axis.axis()
+
+
+def _checked_metrics(metrics: Sequence[str] | None) -> tuple[str, ...]:
+    """The metrics asked for, with verdict and status, in their usual order."""
+    for name in metrics or ():
+        if name not in METRICS:
+            raise StageError("metrics", name, f"some of {', '.join(METRICS)}", '["peaks", "period"]')
+    return tuple(name for name in METRICS if not metrics or name in metrics or name not in UNITS)
+
+
+def _written(stage: Stage, key: str, value: float) -> Any:
+    """An SI value as a stage file has it; read again it is the same number."""
+    unit = numeric_keys(stage.flat())[key].unit
+    return f"{value!r} {unit}" if unit else value
+
+
+def _described(axis: Axis) -> str:
+    """An axis in short; equal texts mean equal values."""
+    digest = hashlib.sha256(np.ascontiguousarray(axis.values).tobytes()).hexdigest()[:8]
+    first, last = axis.values[0], axis.values[-1]
+    ends = f"{first:g}..{last:g} {axis.unit}" if axis.numeric else f"{first}..{last}"
+    return f"{ends} in {len(axis.values)} ({digest})"
+
+
+def _stage_differences(mine: Stage, its: Stage) -> list[str]:
+    a, b = mine.flat(), its.flat()
+    keys = sorted(key for key in a.keys() | b.keys() if a.get(key) != b.get(key))
+    return [f"{key}: {b.get(key, 'absent')} there, {a.get(key, 'absent')} here" for key in keys]
