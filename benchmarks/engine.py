@@ -24,7 +24,7 @@ SECTIONS = ("race", "precision", "maps", "check", "memory")
 
 def main() -> None:
     """Run the benchmarks and print what was measured, then the goals."""
-    from benchmarks import command, maps, prototype
+    from benchmarks import command, prototype, two_maps
     from benchmarks.precision import work_precision
     from benchmarks.race import run_race
     from benchmarks.report import Goal, print_goals
@@ -45,12 +45,12 @@ def main() -> None:
         if "precision" in chosen:
             work_precision(places, wanted.out, wanted.quick)
     if "maps" in chosen:
-        goals += maps.run_maps(maps.both_maps(*rigs), lanes, repetitions)
+        goals += two_maps.run_maps(two_maps.both_maps(*rigs), lanes, repetitions)
     if "check" in chosen:
         goals += command.run_check(repetitions)
     if "memory" in chosen:
         goals += command.run_memory()
-    print_goals(goals)
+    print_goals(goals, "Goals of issue 2, section 6")
     print(f"\n  measured in {time.perf_counter() - start:.0f} s; load of the machine now {os.getloadavg()[0]:.1f}")
 
 

@@ -1,132 +1,194 @@
-"""The two 41 x 41 maps of the prototype, timed for friso and the prototype in turns."""
+"""Parameter studies at scale: `python -m benchmarks.maps [--only maps|large|growth|peer]`.
+
+All of the thesis's maps, a study of 10^6 runs, the cost per run from 10^3 to 10^6 runs, and the same cells by SciPy's
+Radau with compiled functions on a process pool, extrapolated from a sample.
+"""
 
 from __future__ import annotations
 
+import argparse
+import os
+import re
 import statistics
-from collections.abc import Mapping
-from dataclasses import dataclass
-from types import ModuleType
+import tempfile
+import time
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from benchmarks.report import Goal, clock, print_table, spread
-from benchmarks.rigs import RTOLS, Rig
-from friso.engine.batch import Options, Runs, run_chunks
-from friso.hunting.measures import measure, options
-from friso.hunting.peaks import COUNTED_AFTER, scan
+from benchmarks.compiled import compile_equations
+from benchmarks.peers import peers, piecewise
+from benchmarks.report import Goal, clock, print_goals, print_table, spread
+from benchmarks.rigs import rig_of
+from friso.stage import Stage
+from friso.studies.execute import Crew, local_crew
+from friso.studies.samples import Samples
+from friso.studies.study import Study, make_study
+from friso.studies.sweep import run_in_memory, run_in_store
+from friso.studies.thesis.studies import STUDIES, rig
 
-STRICT = 1e-9
-"""rtol whose verdicts the others are compared with."""
+RTOLS = (1e-4, 1e-6)
+WANTED = {1e-4: 1.5, 1e-6: 5.0}
+"""Wall time of all maps [s], by tolerance."""
 
-MOST_REJECTED = 0.15
-
-
-@dataclass(frozen=True)
-class Map:
-    """A map: name, rig with the equations, friso's flat form of all cells, the prototype's, wanted agreement."""
-
-    name: str
-    rig: Rig
-    flat: Mapping[str, Any]
-    prototype: list[dict[str, Any]]
-    agreement: float
-
-
-def both_maps(locked: Rig, free: Rig) -> list[Map]:
-    """Locked, crossover 1 to 40 Hz x total mass 0.1 to 5.1 kg; free, crossover 1 to 16 Hz x stroke 1e-6 to 1e-3 m."""
-    mass, crossover = (v.ravel() for v in np.meshgrid(np.linspace(0.1, 5.1, 41), np.linspace(1, 40, 41), indexing="ij"))
-    by_mass = {
-        **locked.flat,
-        "controller.crossover": crossover,
-        "controller.tuned_mass": mass,
-        "masses.cart": 0.7 * mass,
-        "masses.stage": 0.3 * mass,
-        "parasitic.mass": 0.15 * mass,
-    }
-    cells = zip(crossover, mass, strict=True)
-    rows = [{"crossover": w, "stage": 0.3 * m, "cart": 0.7 * m, "locked": True} for w, m in cells]
-    first = Map("locked, crossover x mass", locked, by_mass, rows, 0.995)
-    stroke, crossover = (
-        v.ravel() for v in np.meshgrid(np.linspace(1e-6, 1e-3, 41), np.linspace(1, 16, 41), indexing="ij")
-    )
-    by_stroke = {**free.flat, "controller.crossover": crossover, "joint.stroke": stroke}
-    rows = [{"crossover": w, "stroke": s} for w, s in zip(crossover, stroke, strict=True)]
-    return [first, Map("free, crossover x stroke", free, by_stroke, rows, 0.97)]
+EIGHT = {
+    "controller.crossover": "1 Hz..16 Hz",
+    "controller.alpha": "0.1..0.3",
+    "controller.beta": "1..3",
+    "joint.stroke": "0.01 mm..1 mm",
+    "joint.stiffness": "0.5 N/mm..15 N/mm",
+    "friction.static": "1.5 N..4.9 N",
+    "friction.coulomb": "0.1 N..1.5 N",
+    "masses.cart": "0.5 kg..3 kg",
+}
+"""Ranges of the eight parameters of the large study, after the thesis's Table 3."""
 
 
-def friso_map(each: Map, rtol: float) -> tuple[np.ndarray, float]:
-    """Peak counts of all cells, and the rejected share of steps: the work that the prototype does."""
-    settings = Options(rtol=rtol, record_from=0.8 * COUNTED_AFTER)
-    chunks = list(run_chunks(each.rig.kernel, each.flat, len(each.prototype), settings))
-    peaks = np.concatenate([_count(chunk) for chunk in chunks])
-    attempted, rejected = (sum(float(c.statistic(name).sum()) for c in chunks) for name in ("attempted", "rejected"))
-    failed = sum(int((chunk.results.statuses != 1).sum()) for chunk in chunks)
-    if failed:
-        print(f"  {each.name}, rtol {rtol:g}: {failed} cells failed")
-    return peaks, rejected / attempted
+def thesis_studies(rtol: float, points: int = 41) -> list[Study]:
+    """All maps of the thesis."""
+    return [make_study(s.stage(), s.axes(points), links=s.links, rtol=rtol) for s in STUDIES.values()]
 
 
-def _count(chunk: Runs) -> np.ndarray:
-    results = chunk.results
-    room = max(1, int(results.turn_counts.max(initial=0)))
-    times, values = results.turn_times[:, :room], results.turn_values[:, :room]
-    nothing = np.zeros(len(results.turn_counts))
-    return scan(times, values, results.turn_counts, nothing, nothing)[0].sum(axis=1)
+def large_study(count: int, rtol: float) -> Study:
+    """The free rig over a Sobol sample of eight parameters."""
+    return make_study(_untuned(rig()), {}, Samples(EIGHT, count), rtol=rtol)
 
 
-def _measured_map(each: Map, rtol: float) -> None:
-    """The same with all measures that `friso.sweep` reports."""
-    for chunk in run_chunks(each.rig.kernel, each.flat, len(each.prototype), options(rtol)):
-        measure(each.flat, chunk)
+def _untuned(stage: Stage) -> Stage:
+    """The stage with its controller tuned for cart and stage, whatever they weigh."""
+    return stage.replace({"controller.tuned_mass": None})
 
 
-def run_maps(maps: list[Map], prototype: ModuleType | None, repetitions: int) -> list[Goal]:
-    """Time both maps at both tolerances; prints a table, returns the goals."""
-    goals: list[Goal] = []
-    rows = []
-    for each in maps:
-        strict = friso_map(each, STRICT)[0] > 0
-        lanes = [prototype.parameters(**row) for row in each.prototype] if prototype else []
+def run_maps(repetitions: int) -> list[Goal]:
+    """Wall time of all maps at once, kernels warm."""
+    rows, goals = [], []
+    with local_crew() as crew:
         for rtol in RTOLS:
-            times = _times(each, prototype, lanes, rtol, repetitions)
-            peaks, rejected = friso_map(each, rtol)
-            agreement = float(np.mean((peaks > 0) == strict))
-            rows.append([f"{each.name}, {rtol:g}", spread(times["friso"], digits=3)])
-            rows[-1].append(spread(times["measured"], digits=3))
-            ratio, other = np.nan, ["absent"] * 3
-            if prototype:
-                ratio = min(times["friso"]) / min(times["prototype"])
-                middle = statistics.median(times["friso"]) / statistics.median(times["prototype"])
-                counts, steps = prototype.sweep(lanes, rtol=rtol)
-                share = float(np.mean((counts > 0) == strict))
-                other = [spread(times["prototype"], digits=3), f"{ratio:.2f} / {middle:.2f}"]
-                other.append(f"{1 - steps[1] / steps[0]:.1%}, {share:.2%}")
-                about = f"map {each.name}, rtol {rtol:g}: wall time over the prototype's"
-                goals.append(Goal(about, "<= 1", f"{ratio:.2f} (min), {middle:.2f} (median)", ratio <= 1))
-            rows[-1] += [*other, f"{rejected:.1%}", f"{agreement:.2%}"]
-            about = f"map {each.name}, rtol {rtol:g}: "
-            goals.append(Goal(about + "rejected steps", "< 15 %", f"{rejected:.1%}", rejected < MOST_REJECTED))
-            wanted = f">= {each.agreement:.1%}"
-            goals.append(Goal(about + "verdicts as at 1e-9", wanted, f"{agreement:.2%}", agreement >= each.agreement))
-    print("\nMaps, 41 x 41 runs of 20 s, all threads, wall time min / median [s]")
-    head = ("map, rtol", "friso", "with all measures", "prototype", "friso/prototype min / median")
-    print_table((*head, "prototype rejected, agrees", "rejected", "agrees with 1e-9"), rows)
+            studies = thesis_studies(rtol)
+            runs = sum(study.cells for study in studies)
+            run_in_memory(studies, crew)
+            times = [clock(lambda: run_in_memory(studies, crew)) for _ in range(repetitions)]  # noqa: B023
+            rows.append([f"{rtol:g}", runs, spread(times, digits=2), f"{min(times) / runs * 1e6:.0f}"])
+            reached = min(times) < WANTED[rtol]
+            goals.append(Goal(f"all ten maps, rtol {rtol:g}", f"< {WANTED[rtol]} s", f"{min(times):.2f} s", reached))
+    print(f"\nAll maps of the thesis, 41 x 41 runs of 20 s each, {crew.size} threads")
+    print_table(("rtol", "runs", "wall time min / median [s]", "per run [us]"), rows)
     return goals
 
 
-def _times(
-    each: Map, prototype: ModuleType | None, lanes: list[Any], rtol: float, repetitions: int
-) -> dict[str, list[float]]:
-    """Wall times [s] of friso, friso with all measures, and the prototype, taken in turns."""
-    jobs: dict[str, Any] = {
-        "friso": lambda: friso_map(each, rtol),
-        "measured": lambda: _measured_map(each, rtol),
+def run_large(count: int, rtol: float) -> list[Goal]:
+    """A large Sobol study into a store: time, rate and peak memory."""
+    with tempfile.TemporaryDirectory(prefix="friso-bench-") as folder, local_crew() as crew:
+        run_in_memory([large_study(64, rtol)], crew)
+        store = Path(folder) / "large.zarr"
+        seconds = clock(lambda: run_in_store(large_study(count, rtol), store, crew))
+        size = sum(file.stat().st_size for file in store.rglob("*") if file.is_file())
+    peak = int(re.search(r"VmHWM:\s+(\d+)", Path("/proc/self/status").read_text())[1]) / 1024  # type: ignore[index]
+    print(f"\n{count} runs of the free rig, 8 parameters, rtol {rtol:g}, into a store: {seconds:.1f} s, ", end="")
+    print(f"{count / seconds:.0f} runs/s on {crew.size} threads; peak memory {peak:.0f} MB, store {size / 1e6:.0f} MB")
+    return [
+        Goal(f"{count} runs", "< 240 s", f"{seconds:.1f} s", seconds < 240),
+        Goal(f"{count} runs, peak memory", "< 1000 MB", f"{peak:.0f} MB", peak < 1000),
+    ]
+
+
+def run_growth(largest: int, rtol: float, repetitions: int) -> list[Goal]:
+    """Cost per run of ever larger studies, in memory; the small ones repeated."""
+    rows, costs = [], []
+    with local_crew() as crew:
+        run_in_memory([large_study(64, rtol)], crew)
+        for count in (1000, 10_000, 100_000, 1_000_000):
+            if count > largest:
+                break
+            study = large_study(count, rtol)
+            times = [clock(lambda: run_in_memory([study], crew)) for _ in range(_often(count, repetitions))]  # noqa: B023
+            costs.append(statistics.median(times) / count)
+            rows.append([count, spread(times, digits=2), f"{costs[-1] * 1e6:.1f}"])
+    print(f"\nCost per run, the same eight parameters, rtol {rtol:g}")
+    print_table(("runs", "wall time min / median [s]", "per run [us]"), rows)
+    ratio = max(costs) / min(costs)
+    return [Goal("cost per run, largest over smallest", "<= 1.1", f"{ratio:.2f}", ratio <= 1.1)]
+
+
+def _often(count: int, repetitions: int) -> int:
+    return max(1, min(5 * repetitions, 100_000 // count))
+
+
+def run_peer(cells_per_map: int) -> list[Goal]:
+    """A sample of the cells of all maps by SciPy's Radau on a process pool, extrapolated to all of them."""
+    rtol = RTOLS[0]
+    jobs = [job for study in thesis_studies(rtol) for job in _sampled(study, cells_per_map)]
+    with ProcessPoolExecutor() as pool:
+        list(pool.map(_by_radau, jobs[:: len(jobs) // 4]))
+        start = time.perf_counter()
+        compile_seconds = sum(pool.map(_by_radau, jobs))
+        wall = time.perf_counter() - start
+    workers = len(os.sched_getaffinity(0))
+    cells = sum(study.cells for study in thesis_studies(rtol))
+    whole = (wall - compile_seconds / workers) / len(jobs) * cells
+    with local_crew() as crew:
+        own = _own(crew, rtol)
+    print(
+        f"\nSciPy Radau, compiled functions, {workers} processes, rtol {rtol:g}: {len(jobs)} of {cells} cells in ",
+        end="",
+    )
+    print(f"{wall:.1f} s ({compile_seconds / workers:.1f} s of it compiling); all cells, extrapolated: {whole:.0f} s")
+    return [
+        Goal("all ten maps against SciPy Radau", "-", f"{own:.2f} s against {whole:.0f} s: {whole / own:.0f}x", None)
+    ]
+
+
+def _own(crew: Crew, rtol: float) -> float:
+    studies = thesis_studies(rtol)
+    run_in_memory(studies, crew)
+    return min(clock(lambda: run_in_memory(studies, crew)) for _ in range(3))
+
+
+def _sampled(study: Study, count: int) -> list[tuple[Stage, float]]:
+    """Stages of some cells that a stage may have."""
+    found: list[tuple[Stage, float]] = []
+    for number in np.random.default_rng(0).permutation(study.cells):
+        try:
+            found.append((study.cell_stage(np.unravel_index(number, study.shape)), study.rtol))  # type: ignore[arg-type]
+        except ValueError:
+            continue
+        if len(found) == count:
+            break
+    return found
+
+
+def _by_radau(job: tuple[Stage, float]) -> float:
+    """Run one cell by Radau; the time its compilation took [s], which a real study would share among its cells."""
+    stage, rtol = job
+    each = rig_of(stage)
+    start = time.perf_counter()
+    compiled = compile_equations(each)
+    compiled.rate(0.0, np.zeros(len(each.scales)), each.pieces)
+    compiled.jacobian(0.0, np.zeros(len(each.scales)), each.pieces)
+    seconds = time.perf_counter() - start
+    piecewise(peers()["SciPy Radau"], each, compiled, rtol, sampled=False)
+    return seconds
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--only", choices=("maps", "large", "growth", "peer"))
+    parser.add_argument("--runs", type=int, default=1_000_000, help="runs of the large study")
+    parser.add_argument("--rtol", type=float, default=1e-4, help="tolerance of the large studies")
+    parser.add_argument("--repetitions", type=int, default=5)
+    parser.add_argument("--sample", type=int, default=6, help="cells per map that SciPy runs")
+    options = parser.parse_args()
+    sections: dict[str, Any] = {
+        "maps": lambda: run_maps(options.repetitions),
+        "large": lambda: run_large(options.runs, options.rtol),
+        "growth": lambda: run_growth(options.runs, options.rtol, options.repetitions),
+        "peer": lambda: run_peer(options.sample),
     }
-    if prototype:
-        jobs["prototype"] = lambda: prototype.sweep(lanes, rtol=rtol)
-    times: dict[str, list[float]] = {name: [] for name in jobs}
-    for _ in range(max(3, 2 * repetitions)):
-        for name, job in jobs.items():
-            times[name].append(clock(job))
-    return times
+    goals = [goal for name, run in sections.items() if options.only in (None, name) for goal in run()]
+    print_goals(goals, "Goals of issue 3, section 6")
+
+
+if __name__ == "__main__":
+    main()

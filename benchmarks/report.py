@@ -1,4 +1,4 @@
-"""Printing: tables of text, and the goals of issue 2 with what was measured."""
+"""Printing: tables of text, and the goals with what was measured."""
 
 from __future__ import annotations
 
@@ -30,10 +30,10 @@ def print_table(head: Sequence[str], rows: Sequence[Sequence[Any]]) -> None:
             print("  " + "  ".join("-" * w for w in widths))
 
 
-def print_goals(goals: Sequence[Goal]) -> None:
+def print_goals(goals: Sequence[Goal], title: str) -> None:
     """Print all goals, reached or not."""
     words = {True: "yes", False: "NO", None: "-"}
-    print("\nGoals of issue 2, section 6")
+    print(f"\n{title}")
     print_table(
         ("goal", "wanted", "measured", "reached?"),
         [(g.about, g.wanted, g.measured, words[g.reached]) for g in goals],

@@ -13,6 +13,7 @@ import friso
 from friso.engine.kernel import Kernel, kernel
 from friso.equations import motion
 from friso.equations.structure import structure
+from friso.stage import Stage
 
 FILE = Path(__file__).parents[1] / "examples" / "thesis_rig.toml"
 RTOLS = (1e-4, 1e-6)
@@ -58,8 +59,14 @@ class Rig:
 
 def rig(locked: bool) -> Rig:
     """The thesis rig, locked or free."""
-    flat = friso.load(FILE).replace({"joint.locked": locked, "controller.crossover": "8 Hz"}).flat()
+    stage = friso.load(FILE).replace({"joint.locked": locked, "controller.crossover": "8 Hz"})
+    return rig_of(stage, "locked" if locked else "free")
+
+
+def rig_of(stage: Stage, name: str = "") -> Rig:
+    """The rig that a stage describes."""
+    flat = stage.flat()
     shape = kernel(structure(flat))
     values = shape.values({**flat, "motion.size": motion.size(flat)}, 1)
     scales = np.array([float(np.ravel(each)[0]) for each in shape.module.scales(values)])
-    return Rig("locked" if locked else "free", flat, shape, scales, motion.pieces(flat, 1)[0])
+    return Rig(name, flat, shape, scales, motion.pieces(flat, 1)[0])

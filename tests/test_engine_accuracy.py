@@ -14,6 +14,7 @@ from variants import VARIANTS
 from friso.engine.arrays import Results, Settings, Status
 from friso.engine.batch import Options, prepare, run_chunks
 from friso.engine.kernel import empty_results, kernel
+from friso.engine.shared_queue import new_queue
 from friso.equations import motion
 from friso.equations.structure import structure
 
@@ -53,8 +54,8 @@ def fixed_steps(h: float, interval: float, changes: dict[str, Any]) -> tuple[Res
     batch.tolerances[:] = 1e9
     samples = int(flat["motion.duration"] / interval * (1 + 1e-12)) + 1
     results = empty_results(1, 512, samples, len(shape.states))
-    settings = Settings(1e-2, 1e6, 1e-6, 1e-5, 0.0, interval)
-    shape.module.run(0, 1, batch, settings, results)
+    settings = Settings(1e-2, 1e6, 1e-6, 1e-5, 0.0, 0.0, interval, np.zeros(1, np.int64))
+    shape.module.run(new_queue(), batch, settings, results)
     assert results.statuses[0] == Status.DONE
     assert results.statistics[0, 6] == 0
     times = np.arange(samples) * interval

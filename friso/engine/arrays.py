@@ -24,15 +24,16 @@ class Batch(NamedTuple):
 
 
 class Settings(NamedTuple):
-    """What all runs share: relative tolerance, step budget, the two bands of settling [m], the time
-    [s] from which turning points are recorded, the sampling interval [s], and a flag, shape (1,), that is set to
-    have no further run begun."""
+    """What all runs share: relative tolerance, step budget, the two bands of settling [m], the time [s] from which
+    turning points are kept, the least swing [m] between two of them, the sampling interval [s], and a flag, shape
+    (1,), that is set to have no further run begun."""
 
     rtol: float
     budget: float
     inner: float
     outer: float
     record_from: float
+    least_swing: float
     interval: float
     cancel: np.ndarray
 

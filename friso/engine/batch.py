@@ -12,6 +12,8 @@ import numpy as np
 
 from friso.engine.arrays import STATISTICS, Batch, Results, Settings, Status
 from friso.engine.kernel import Kernel, empty_results
+from friso.engine.layout import LANES
+from friso.engine.shared_queue import new_queue
 from friso.equations import motion
 
 LONGEST_SHARE = 1 / 200
@@ -30,14 +32,15 @@ MOST_TURNS = 1 << 20
 @dataclass(frozen=True)
 class Options:
     """How to run: relative tolerance, bands of settling [m], start of the window for extremes as a share of the run,
-    time [s] from which turning points are kept (at most half
-    of the run), sampling interval [s] (None: no samples), step budget, threads, and a flag, shape (1,): once it is
-    set from another thread, no further run begins."""
+    time [s] from which turning points are kept (at most half of the run), the least swing [m] between two of them
+    (the smaller ones of a zigzag are passed over), sampling interval [s] (None: no samples), step budget, threads,
+    and a flag, shape (1,): once it is set from another thread, no further run begins."""
 
     rtol: float = 1e-6
     bands: tuple[float, float] = (1e-6, 1e-5)
     window: float = 0.75
     record_from: float = 0.0
+    least_swing: float = 0.0
     interval: float | None = None
     budget: int = 2_000_000
     threads: int | None = None
@@ -74,8 +77,10 @@ def prepare(kernel: Kernel, flat: Mapping[str, Any], runs: int, options: Options
     values = kernel.values({**flat, "motion.size": motion.size(flat)}, runs)
 
     def columns(rows: list[Any]) -> np.ndarray:
-        full = [np.broadcast_to(np.asarray(row, dtype=float), (runs,)) for row in rows]
-        return np.ascontiguousarray(np.array(full).reshape(len(rows), runs).T)
+        full = np.empty((runs, len(rows)))
+        for i, row in enumerate(rows):
+            full[:, i] = row
+        return full
 
     with np.errstate(divide="ignore", over="ignore", invalid="ignore"):
         constants = columns(kernel.module.constants(values))
@@ -129,6 +134,7 @@ def _run_with_room(kernel: Kernel, batch: Batch, flat: Mapping[str, Any], option
         inner=float(options.bands[0]),
         outer=float(options.bands[1]),
         record_from=float(options.record_from),
+        least_swing=float(options.least_swing),
         interval=float(options.interval or np.inf),
         cancel=np.zeros(1, np.int64) if options.cancel is None else options.cancel,
     )
@@ -168,20 +174,16 @@ def _merged(results: Results, again: Results, which: np.ndarray) -> Results:
 
 
 def _run(kernel: Kernel, batch: Batch, settings: Settings, results: Results, threads: int | None) -> None:
-    """Spread the runs of a chunk over threads; the kernel runs without the interpreter's lock."""
-    runs = len(batch.starts)
-    workers = threads or len(os.sched_getaffinity(0))
+    """Have threads take the runs of a chunk from a queue; the kernel runs without the interpreter's lock."""
+    workers = min(threads or len(os.sched_getaffinity(0)), -(-len(batch.starts) // LANES))
+    arguments = (new_queue(), batch, settings, results)
     if workers == 1:
-        kernel.module.run(0, runs, batch, settings, results)
+        kernel.module.run(*arguments)
         return
-    share = max(8, min(256, -(-runs // (8 * workers))))
-    pool = ThreadPoolExecutor(workers)
-    try:
-        jobs = [
-            pool.submit(kernel.module.run, first, min(first + share, runs), batch, settings, results)
-            for first in range(0, runs, share)
-        ]
-        for job in jobs:
-            job.result()
-    finally:
-        pool.shutdown(wait=True, cancel_futures=True)
+    with ThreadPoolExecutor(workers) as pool:
+        try:
+            for job in [pool.submit(kernel.module.run, *arguments) for _ in range(workers)]:
+                job.result()
+        except BaseException:
+            settings.cancel[0] = 1
+            raise

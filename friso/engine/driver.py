@@ -38,9 +38,9 @@ def find_turn(B, lane, high):
     for _ in range(30):
         if f_low == f_high:
             break
-        theta = (low * f_high - high * f_low) / (f_high - f_low)
+        before, theta = theta, (low * f_high - high * f_low) / (f_high - f_low)
         f = deviation_rate(B, lane, theta)
-        if f == 0.0 or high - low < 1e-10:
+        if f == 0.0 or abs(theta - before) < 1e-9:  # off by less than rounding in the value, which is flat here
             break
         if (f > 0.0) == (f_high > 0.0):
             high, f_high = theta, f
@@ -49,6 +49,12 @@ def find_turn(B, lane, high):
             low, f_low = theta, f
             f_high, side = (f_high * 0.5 if side == -1 else f_high), -1
     return theta
+
+
+def vertex(B, lane, high, before, after):
+    """The deviation where it turns in (0, high), as the vertex of the parabola with these rates at the ends."""
+    theta = high * before / (before - after)
+    return deviation(B, lane, 0.0) + 0.5 * theta * before * B[TAKEN * LANES + lane]
 
 
 def find_entry(B, lane, high, band):
@@ -63,9 +69,9 @@ def find_entry(B, lane, high, band):
     return high
 
 
-def note_entry(B, lane, row, fraction, band):
-    """Refine the moment at which the deviation last left the band (row), where it came back in this step."""
-    if abs(deviation(B, lane, 0.0)) > band and abs(deviation(B, lane, fraction)) <= band:
+def note_entry(B, lane, row, fraction, start, end, band):
+    """Refine the moment at which the deviation last left the band (row), where it came back between start and end."""
+    if abs(start) > band and abs(end) <= band:
         theta = find_entry(B, lane, fraction, band)
         B[row * LANES + lane] = moment(B, lane, theta)
 
@@ -76,12 +82,18 @@ def moment(B, lane, theta):
 
 
 def note_turn(B, lane, fraction, settings, times, values, count):
-    """Record the turning point of the deviation inside the step, if there is one; the new count."""
+    """Look at the turning point of the deviation inside the step, if there is one; the new count of those kept."""
     before, after = deviation_rate(B, lane, 0.0), deviation_rate(B, lane, fraction)
     if not ((before > 0.0 and after <= 0.0) or (before < 0.0 and after >= 0.0)):
         return count
-    theta = find_turn(B, lane, fraction)
-    time, value = moment(B, lane, theta), deviation(B, lane, theta)
+    kind = 1.0 if before > 0.0 else -1.0
+    likely = vertex(B, lane, fraction, before, after)
+    if is_ringing(B, lane, kind, likely, settings, values, count):
+        theta, value = fraction * before / (before - after), likely
+    else:
+        theta = find_turn(B, lane, fraction)
+        value = deviation(B, lane, theta)
+    time = moment(B, lane, theta)
     B[DEVIATION_MAX * LANES + lane] = max(B[DEVIATION_MAX * LANES + lane], value)
     B[DEVIATION_MIN * LANES + lane] = min(B[DEVIATION_MIN * LANES + lane], value)
     if abs(value) > settings.inner:
@@ -90,8 +102,34 @@ def note_turn(B, lane, fraction, settings, times, values, count):
         B[OUTER_EXIT * LANES + lane] = max(B[OUTER_EXIT * LANES + lane], time)
     if time < B[RECORD_FROM * LANES + lane]:
         return count
+    return keep_turn(B, lane, kind, time, value, settings.least_swing, times, values, count)
+
+
+def is_ringing(B, lane, kind, value, settings, values, count):
+    """Whether a turning point at about this value is far from being kept: its exact place then matters to nobody."""
+    if count == 0 or count > values.size:
+        return False
+    swing = kind * (value - values[count - 1])
+    if B[LAST_KIND * LANES + lane] == kind:
+        return swing < -0.5 * settings.least_swing
+    return swing < 0.5 * settings.least_swing
+
+
+def keep_turn(B, lane, kind, time, value, least, times, values, count):
+    """Keep a maximum (kind 1) or minimum (-1) of a zigzag whose legs are at least `least`; the new count.
+
+    One that follows another of its kind, smaller swings between them not being kept, replaces it if it goes beyond.
+    """
+    last = count - 1
+    if count > 0 and B[LAST_KIND * LANES + lane] == kind:
+        if last < times.size and kind * (value - values[last]) > 0.0:
+            times[last], values[last] = time, value
+        return count
+    if count > 0 and last < times.size and kind * (value - values[last]) < least:
+        return count
     if count < times.size:
         times[count], values[count] = time, value
+    B[LAST_KIND * LANES + lane] = kind
     return count + 1
 
 
@@ -184,11 +222,12 @@ def answer(B, lane, j, segment, batch, settings, results):
     fraction = B[FRACTION * LANES + lane]
     if fraction == 0.0:
         return segment
-    note_entry(B, lane, INNER_EXIT, fraction, settings.inner)
-    note_entry(B, lane, OUTER_EXIT, fraction, settings.outer)
+    start, end = deviation(B, lane, 0.0), deviation(B, lane, fraction)
+    note_entry(B, lane, INNER_EXIT, fraction, start, end, settings.inner)
+    note_entry(B, lane, OUTER_EXIT, fraction, start, end, settings.outer)
     times, values = results.turn_times[j], results.turn_values[j]
-    count = note_turn(B, lane, fraction, settings, times, values, results.turn_counts[j])
-    results.turn_counts[j] = count
+    count = note_turn(B, lane, fraction, settings, times, values, int(B[TURNS * LANES + lane]))
+    B[TURNS * LANES + lane] = count
     at_stop = B[TIME * LANES + lane] >= B[STOP * LANES + lane]
     if at_stop or moment(B, lane, fraction) >= B[NEXT_SAMPLE * LANES + lane]:
         note_samples(B, lane, fraction, settings.interval, results.samples[j])
@@ -209,6 +248,7 @@ def finish(B, lane, j, segment, batch, settings, results):
         results.statuses[j] = UNDERFLOW
     else:
         return False
+    results.turn_counts[j] = int(B[TURNS * LANES + lane])
     statistics = results.statistics[j]
     for i in range(5):
         statistics[i] = B[(FORCE_PEAK + i) * LANES + lane]
@@ -218,18 +258,20 @@ def finish(B, lane, j, segment, batch, settings, results):
     return True
 
 
-def run(first, last, batch, settings, results):
-    """Run the runs first to last - 1 of the batch, each in a lane of its own, and write the results."""
+def run(queue, batch, settings, results):
+    """Run the runs of the batch that this thread gets from the queue, each in a lane of its own; write the results."""
     B = aligned_buffer()
+    last = batch.starts.shape[0]
     who = np.full(LANES, -1)
     segment = np.zeros(LANES, np.int64)
-    upcoming, busy = first, 0
+    busy = 0
     for lane in range(LANES):
-        if upcoming < last:
-            segment[lane] = start_run(B, lane, upcoming, batch, settings, results)
-            who[lane], upcoming, busy = upcoming, upcoming + 1, busy + 1
+        j = take_next(queue)
+        if j < last:
+            segment[lane] = start_run(B, lane, j, batch, settings, results)
+            who[lane], busy = j, busy + 1
         else:
-            load_run(B, lane, first, batch, settings)
+            load_run(B, lane, 0, batch, settings)
             idle(B, lane)
     while busy > 0:
         step(B, settings.rtol, settings.inner, settings.outer, settings.budget)
@@ -240,9 +282,10 @@ def run(first, last, batch, settings, results):
             segment[lane] = answer(B, lane, j, segment[lane], batch, settings, results)
             if not finish(B, lane, j, segment[lane], batch, settings, results):
                 continue
-            who[lane], busy = -1, busy - 1
-            if upcoming < last and settings.cancel[0] == 0:
-                segment[lane] = start_run(B, lane, upcoming, batch, settings, results)
-                who[lane], upcoming, busy = upcoming, upcoming + 1, busy + 1
+            j = take_next(queue) if settings.cancel[0] == 0 else last
+            if j < last:
+                segment[lane] = start_run(B, lane, j, batch, settings, results)
+                who[lane] = j
             else:
                 idle(B, lane)
+                who[lane], busy = -1, busy - 1

@@ -18,6 +18,7 @@ import numpy as np
 from friso.engine.arrays import STATISTICS, Batch, Results, Settings
 from friso.engine.cache import load_or_build, stop_building
 from friso.engine.layout import LANES
+from friso.engine.shared_queue import new_queue
 from friso.equations.structure import Structure
 
 
@@ -94,7 +95,7 @@ def compile_driver(module: ModuleType) -> None:
     """Compile (or load from Numba's cache) the driver for the types it is called with, and for no others."""
     flat, square = np.zeros(1), np.zeros((1, 1))
     batch = Batch(square, square, square, square, flat, flat, np.zeros((1, 1, 4)), np.zeros(1, np.int64))
-    settings = Settings(1.0, 1.0, 1.0, 1.0, 0.0, 1.0, np.zeros(1, np.int64))
-    arguments = (0, 0, batch, settings, empty_results(1, 1, 1, 1))
+    settings = Settings(1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 1.0, np.zeros(1, np.int64))
+    arguments = (new_queue(), batch, settings, empty_results(1, 1, 1, 1))
     module.run.compile(tuple(numba.typeof(argument) for argument in arguments))
     module.run.disable_compile()

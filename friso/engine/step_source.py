@@ -41,6 +41,9 @@ AFTER_KINK = 0.25
 ROUNDING = 2e-15
 """The hysteresis is no less than this share of the terms of a surface, nine units in their last place."""
 
+UNCHANGED = ("stop", "start", "longest", "next_sample", "record_from", "turns", "last_kind")
+"""Rows that the step leaves as they are."""
+
 NO_SWING = 1e-6
 """A deviation whose rate stays below this share of the velocity's tolerance turns by rounding noise alone."""
 
@@ -316,8 +319,11 @@ class StepWriter:
             "outer_exit = now if off > outer else outer_exit",
             "entered = ((was > inner) & (off <= inner)) | ((was > outer) & (off <= outer))",
             "turned = ((turning_s > 0.0) & (turning_n <= 0.0)) | ((turning_s < 0.0) & (turning_n >= 0.0))",
-            f"swing = max(abs(turning_s), abs(turning_n)) > {NO_SWING!r} * tol{self._velocity}",
-            "turned = turned & swing & ((now >= record_from) | (off <= outer))",  # others change no result
+            "rate = max(abs(turning_s), abs(turning_n))",
+            "reach = off + rate * h",
+            "pokes_out = ((off <= inner) & (reach > inner)) | ((off <= outer) & (reach > outer))",
+            f"turned = turned & (rate > {NO_SWING!r} * tol{self._velocity})",
+            "turned = turned & ((now >= record_from) | pokes_out)",  # others change no result
             "attempted = attempted + 1.0",
             "rejected_last = 0.0 if good else 1.0",
             "rejected = rejected + rejected_last",
@@ -336,5 +342,5 @@ class StepWriter:
         lines += [f"{self._row('x', i)} = n{i}" for i in range(self.size)]
         lines += [f"{self._row('mode', k)} = mode{k}" for k in range(self.kinks)]
         lines += ["time, old_time, taken = t_n, t, h"]
-        changed = [name for name in SCALARS if name not in ("stop", "start", "longest", "next_sample", "record_from")]
+        changed = [name for name in SCALARS if name not in UNCHANGED]
         return lines + [f"{self._row(name)} = {name}" for name in changed]

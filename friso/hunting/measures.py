@@ -11,7 +11,7 @@ import numpy as np
 from friso.engine.arrays import Status
 from friso.engine.batch import Options, Runs
 from friso.equations.motion import last_corner
-from friso.hunting.peaks import COUNTED_ABOVE, COUNTED_AFTER, WINDOW, scan
+from friso.hunting.peaks import COUNTED_ABOVE, COUNTED_AFTER, SWING, WINDOW, scan
 
 __all__ = ["BANDS", "COUNTED_ABOVE", "COUNTED_AFTER", "WINDOW", "Measures", "measure", "options"]
 
@@ -48,7 +48,13 @@ class Measures:
 def options(rtol: float, threads: int | None = None, cancel: np.ndarray | None = None) -> Options:
     """How to run for these measures; turning points are kept from a little before the first that may count."""
     return Options(
-        rtol=rtol, bands=BANDS, window=WINDOW, record_from=0.8 * COUNTED_AFTER, threads=threads, cancel=cancel
+        rtol=rtol,
+        bands=BANDS,
+        window=WINDOW,
+        record_from=0.8 * COUNTED_AFTER,
+        least_swing=SWING / 4,  # peaks and periods look at larger ones only
+        threads=threads,
+        cancel=cancel,
     )
 
 

@@ -9,9 +9,9 @@ import numpy as np
 
 from friso.engine.cache import code_digest, load_or_build
 from friso.hunting import turning
-from friso.hunting.turning import COUNTED_ABOVE, COUNTED_AFTER, WINDOW
+from friso.hunting.turning import COUNTED_ABOVE, COUNTED_AFTER, SWING, WINDOW
 
-__all__ = ["COUNTED_ABOVE", "COUNTED_AFTER", "WINDOW", "scan"]
+__all__ = ["COUNTED_ABOVE", "COUNTED_AFTER", "SWING", "WINDOW", "scan"]
 
 MANY = 100
 """Turning points, of all runs together, from which on the compiled loops are loaded; they take as long as so many."""

@@ -168,6 +168,9 @@ def _listed(name: str, values: Values, reader: _Reader) -> Axis:
 def _words(stage: Stage, key: str, values: Values) -> Axis:
     """An axis of words or booleans, each of which the stage takes."""
     options = [parse_set(f"{key}={word}")[1] for word in values.split(",")] if isinstance(values, str) else list(values)
+    if key.partition(".")[0] not in type(stage).model_fields:
+        expected = "a key of the stage file, or a name that a link uses"
+        raise StageError(key, "a name that nothing depends on", expected, 'with the link masses.cart = "0.7 * mass"')
     for value in options:
         stage.replace({key: value})
     if not options:

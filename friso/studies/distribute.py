@@ -33,7 +33,7 @@ def local_cluster(workers: int) -> Iterator[Crew]:
             n_workers=workers,
             threads_per_worker=1,
             processes=True,
-            dashboard_address=None,
+            dashboard_address=":0",
             silence_logs=logging.CRITICAL,
         ) as cluster,
         connected(cluster.scheduler_address) as crew,
@@ -60,7 +60,7 @@ def connected(scheduler: str) -> Iterator[Crew]:
         _refuse_strangers(client)
         threads = sum(client.nthreads().values())
         arguments = {"expected": equations_version(), "pure": False}
-        yield Crew(client.get_executor(), threads, run_checked, arguments)
+        yield Crew(client.get_executor(), threads, 4 * threads, run_checked, arguments)
 
 
 async def _answers(scheduler: str) -> None:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass, field
 from typing import Any, Self
@@ -13,8 +12,8 @@ import numpy as np
 from friso.studies.cells import Columns, run_cells
 from friso.studies.study import Block, Study
 
-LARGEST_BLOCK, LEAST_BLOCK = 1024, 64
-"""Cells of a block: enough that its lanes are busy nearly to the end, few enough that little is lost with it."""
+LARGEST_BLOCK = 2048
+"""Cells of a block in memory: enough that all lanes are busy nearly to its end."""
 
 Progress = Callable[[int], None]
 """Called with the number of cells just done."""
@@ -22,10 +21,12 @@ Progress = Callable[[int], None]
 
 @dataclass
 class Crew:
-    """An executor, how many blocks are computed side by side, and how to have those in flight end early."""
+    """An executor, how many blocks are computed side by side, how many a study needs at least for all to have work,
+    and how to have those in flight end early."""
 
     executor: Executor
     size: int
+    shares: int
     task: Callable[..., Columns] = run_cells
     arguments: dict[str, Any] = field(default_factory=dict)
     cancel: Callable[[], None] = lambda: None
@@ -59,9 +60,11 @@ class Crew:
                 self.cancel()
                 wait(flying)
 
-    def block_shape(self, study: Study) -> tuple[int, ...]:
-        """The shape of blocks small enough that a small study keeps the whole crew busy."""
-        return study.block_shape(max(LEAST_BLOCK, min(LARGEST_BLOCK, study.cells // (4 * self.size))))
+    def jobs(self, studies: Sequence[Study]) -> Iterator[tuple[Study, Block]]:
+        """The blocks of studies, as large as memory allows, but enough of them for the whole crew."""
+        for study in studies:
+            shape = study.block_shape(max(1, min(LARGEST_BLOCK, study.cells // self.shares)))
+            yield from ((study, block) for block in study.blocks(shape))
 
     def _submit(self, study: Study, block: Block) -> Future[Columns]:
         columns = study.block_columns(block)
@@ -69,13 +72,16 @@ class Crew:
 
 
 def local_crew(threads: int | None = None) -> Crew:
-    """The threads of this process, as many as it has processors unless told: one block each."""
-    size = threads or len(os.sched_getaffinity(0))
+    """The threads of this process, as many as it has processors unless told; all of them work on one block.
+
+    A second block is prepared, or its results written, while they do.
+    """
     stop = np.zeros(1, np.int64)
     return Crew(
-        ThreadPoolExecutor(size, thread_name_prefix="friso"),
-        size,
-        arguments={"cancel": stop},
+        ThreadPoolExecutor(2, thread_name_prefix="friso"),
+        size=1,
+        shares=1,
+        arguments={"threads": threads, "cancel": stop},
         cancel=lambda: stop.fill(1),
     )
 
@@ -84,6 +90,6 @@ def run_scattered(study: Study, cells: np.ndarray, crew: Crew) -> Columns:
     """The measures of single cells, by their numbers in C order."""
     picked = study.at(cells)
     parts: dict[int, Columns] = {}
-    for _, block, found in crew.compute((picked, block) for block in picked.blocks(crew.block_shape(picked))):
+    for _, block, found in crew.compute(crew.jobs([picked])):
         parts[block[0].start] = found
     return {name: np.concatenate([parts[start][name] for start in sorted(parts)]) for name in study.metrics}

@@ -177,7 +177,7 @@ def make_study(
     samples: Samples | None = None,
     links: Mapping[str, str] | None = None,
     metrics: Sequence[str] | None = None,
-    rtol: float = 1e-4,
+    rtol: float = 1e-6,
     log: bool = False,
 ) -> Study:
     """Read what a user gave into a study. Raises StageError, and ValueError for a tolerance that is not usable."""
@@ -197,6 +197,41 @@ def make_study(
             raise StageError(name, "a name that is taken", "every axis once, under a name of its own")
     linking.check_links(stage, links, frozenset(names))
     return Study(stage, tuple(dimensions), links, _checked_metrics(metrics), rtol)
+
+
+TRIED = 512
+"""Cells of a trial."""
+
+
+def study_size(
+    stage: Stage, axes: Mapping[str, Values], samples: Samples | None, links: Mapping[str, str], log: bool
+) -> int:
+    """The number of cells of a study, without any array being made. Raises StageError as `make_study` does."""
+    sizes = [_points(axis) for axis in read_axes(stage, axes, linking.names(links), log)]
+    return math.prod(sizes) * (1 if samples is None or samples.count is None else samples.count)
+
+
+def trial_study(
+    stage: Stage, axes: Mapping[str, Values], samples: Samples | None, links: Mapping[str, str], log: bool
+) -> Study:
+    """A few cells drawn evenly from a study that is too large to be made."""
+    given = {**axes, **(samples.ranges if samples else {})}
+    rng = np.random.default_rng(0)
+    drawn = []
+    for axis in read_axes(stage, given, linking.names(links), log):
+        if isinstance(axis, Range):
+            drawn.append(Axis(axis.name, axis.at(rng.random(TRIED)), axis.unit, axis.scale))
+        else:
+            drawn.append(replace(axis, values=rng.choice(axis.values, TRIED)))
+    return Study(stage, (Dimension(SAMPLE, tuple(drawn)),), dict(links), METRICS, 1e-6)
+
+
+def _points(axis: Axis | Range) -> int:
+    count = len(axis.values) if isinstance(axis, Axis) else axis.count
+    if count is None:
+        given = f"{axis.first:g}..{axis.last:g} {axis.unit}, without a number of points"
+        raise StageError(axis.name, given, "FIRST..LAST:POINTS", '"1 Hz..40 Hz:41"')
+    return count
 
 
 def study_of(runs: xr.Dataset) -> Study:
@@ -223,9 +258,7 @@ def _gridded(axis: Axis | Range) -> Axis:
         if len(np.unique(axis.values)) < len(axis.values):
             raise StageError(axis.name, "values that occur twice", "every value once", '["4 Hz", "8 Hz"]')
         return axis
-    if axis.count is None:
-        given = f"{axis.first:g}..{axis.last:g} {axis.unit}, without a number of points"
-        raise StageError(axis.name, given, "FIRST..LAST:POINTS", '"1 Hz..40 Hz:41"')
+    _points(axis)
     return axis.axis()
 
 

@@ -71,8 +71,7 @@ def run_in_memory(
     refined = {id(study): _refined(study, crew, progress) for study in studies if study.refined}
     columns = [refined.get(id(study)) or _room(study) for study in studies]
     number = {id(study): k for k, study in enumerate(studies)}
-    jobs = ((study, block) for study in studies if not study.refined for block in study.blocks(crew.block_shape(study)))
-    for study, block, found in crew.compute(jobs):
+    for study, block, found in crew.compute(crew.jobs([study for study in studies if not study.refined])):
         for name in study.metrics:
             target = columns[number[id(study)]][name][block]
             target[...] = found[name].reshape(target.shape)

@@ -7,12 +7,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 
-from friso.views.figure import Array, Axis, Figure, Limit, Map, Markers, Panel, Series
+from friso.views.figure import Array, Axis, Coloured, Figure, Kind, Limit, Markers, Panel, Series
 from friso.views.prefixes import choose
 from friso.views.thinning import thin
+
+Field = TypeVar("Field", bound=Coloured)
 
 
 def drawable(figure: Figure) -> Figure:
@@ -20,10 +23,47 @@ def drawable(figure: Figure) -> Figure:
     return replace(figure, panels=tuple(_panel(panel) for panel in figure.panels))
 
 
+def cell_edges(centres: Array, *, log: bool = False) -> Array:
+    """Edges, shape (n + 1,), of the cells around ascending centres, shape (n,): halfway, on a logarithmic axis by
+    ratio. A single cell reaches half its value (or 0.5) to both sides, a logarithmic one a factor of two."""
+    if log:
+        return np.exp(cell_edges(np.log(centres))) if len(centres) > 1 else np.array([centres[0] / 2, centres[0] * 2])
+    if len(centres) == 1:
+        half = abs(centres[0]) / 2 or 0.5
+        return np.array([centres[0] - half, centres[0] + half])
+    inner = (centres[1:] + centres[:-1]) / 2
+    return np.concatenate(([2 * centres[0] - inner[0]], inner, [2 * centres[-1] - inner[-1]]))
+
+
+def colour_prefix(field: Coloured) -> tuple[float, str]:
+    """Factor and unit with prefix for the numbers of a map or cloud: its limits decide, or all its numbers."""
+    return choose(field.z if field.limits is None else np.array(field.limits), field.unit, log=field.log)
+
+
+def colour_key(figure: Figure) -> tuple[list[Kind], list[Markers]]:
+    """The kinds that occur, and the markers, of all panels with maps or clouds: each once, for one common legend."""
+    panels = [panel for panel in figure.panels if panel.coloured]
+    kinds = [
+        field.kinds[int(code)]
+        for panel in panels
+        for field in panel.coloured
+        for code in np.unique(_finite(np.empty(0) if field.codes is None else field.codes.ravel()))
+    ]
+    markers = {(item.label, item.colour, item.symbol): item for panel in panels for item in panel.markers}
+    order = [kind for panel in panels for field in panel.coloured for kind in field.kinds]
+    return sorted(dict.fromkeys(kinds), key=order.index), list(markers.values())
+
+
+def word_ticks(axis: Axis, most: int = 12) -> tuple[list[int], list[str]]:
+    """Positions and words written at an axis of words: all, or every second, third, ... so that `most` do."""
+    positions = list(range(0, len(axis.words), -(-len(axis.words) // most)))
+    return positions, [axis.words[position] for position in positions]
+
+
 def _panel(panel: Panel) -> Panel:
     limits = _finite([value for limit in panel.limits for value in limit.values])
-    xs = _gather(panel.x, [item.x for item in (*panel.series, *panel.markers, *panel.maps)])
-    ys = _gather(panel.y, [item.y for item in (*panel.series, *panel.markers, *panel.maps)])
+    xs = _gather(panel.x, [item.x for item in (*panel.series, *panel.markers, *panel.coloured)])
+    ys = _gather(panel.y, [item.y for item in (*panel.series, *panel.markers, *panel.coloured)])
     x_factor, x_unit = choose(xs, panel.x.unit, log=panel.x.log)
     y_factor, y_unit = choose(ys if panel.y.limits else np.concatenate((ys, limits)), panel.y.unit, log=panel.y.log)
     extent = (float(xs.min()), float(xs.max())) if xs.size else (0.0, 1.0)
@@ -34,7 +74,8 @@ def _panel(panel: Panel) -> Panel:
         y=_axis(panel.y, y_factor, y_unit),
         series=tuple(replace(line, x=line.x * x_factor, y=line.y * y_factor) for line in lines),
         markers=tuple(_markers(marker, x_factor, y_factor) for marker in panel.markers),
-        maps=tuple(_map(field, x_factor, y_factor) for field in panel.maps),
+        maps=tuple(_coloured(field, x_factor, y_factor) for field in panel.maps),
+        clouds=tuple(_coloured(cloud, x_factor, y_factor) for cloud in panel.clouds),
     )
 
 
@@ -76,7 +117,8 @@ def _markers(markers: Markers, x_factor: float, y_factor: float) -> Markers:
     return replace(markers, x=markers.x[shown] * x_factor, y=markers.y[shown] * y_factor)
 
 
-def _map(field: Map, x_factor: float, y_factor: float) -> Map:
+def _coloured(field: Field, x_factor: float, y_factor: float) -> Field:
     z = np.where(np.isfinite(field.z), field.z, np.nan)
-    factor, unit = choose(z, field.unit)
-    return replace(field, x=field.x * x_factor, y=field.y * y_factor, z=z * factor, unit=unit)
+    factor, unit = colour_prefix(field)
+    limits = None if field.limits is None else (field.limits[0] * factor, field.limits[1] * factor)
+    return replace(field, x=field.x * x_factor, y=field.y * y_factor, z=z * factor, unit=unit, limits=limits)

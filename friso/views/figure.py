@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
 Dash = Literal["solid", "dashed", "dotted"]
-Symbol = Literal["circle", "triangle", "cross"]
+Symbol = Literal["circle", "triangle", "cross", "target", "patch"]
 
 # Okabe & Ito, "Color universal design" (2008): told apart with any colour vision.
 BLUE, VERMILLION, GREEN = "#0072B2", "#D55E00", "#009E73"
@@ -26,12 +26,16 @@ INK, GREY, LIGHT = "#222222", "#767676", "#c9c9c9"
 
 @dataclass(frozen=True)
 class Axis:
-    """One axis: `quantity` and `unit` make its label, `limits` [unit] its range (None: from the data)."""
+    """One axis: `quantity` and `unit` make its label, `limits` [unit] its range (None: from the data).
+
+    An axis of words has the positions 0, 1, 2, ..., named by `words`, and no unit.
+    """
 
     quantity: str
     unit: str
     limits: tuple[float, float] | None = None
     log: bool = False
+    words: tuple[str, ...] = ()
 
     @property
     def label(self) -> str:
@@ -79,20 +83,38 @@ class Limit:
 
 
 @dataclass(frozen=True)
-class Map:
-    """A field z of shape (len(y), len(x)) over cell centres x and y; NaN cells stay empty."""
+class Kind:
+    """What has a word instead of a number (a verdict, or the reason why there is no number): one flat colour."""
+
+    label: str
+    colour: str
+
+
+@dataclass(frozen=True)
+class Coloured:
+    """Places x, y whose colour tells the number z [unit], or, where there is one, their kind.
+
+    `limits` [unit] is the range of the colours (None: from z), on a logarithmic scale if `log`; `colours`, if given,
+    are those of the whole numbers 0, 1, 2, ... instead. `codes`, of the shape of z, numbers the `kinds`; it is NaN
+    where z counts.
+    """
 
     x: Array
     y: Array
     z: Array
     quantity: str
     unit: str
+    limits: tuple[float, float] | None = None
+    log: bool = False
+    colours: tuple[str, ...] = ()
+    kinds: tuple[Kind, ...] = ()
+    codes: Array | None = None
 
     def __post_init__(self) -> None:
-        if np.shape(self.z) != (len(self.y), len(self.x)):
+        if self.codes is not None and np.shape(self.codes) != np.shape(self.z):
             raise ValueError(
-                f"map of {self.quantity}: z has the shape {np.shape(self.z)}, expected "
-                f"(len(y), len(x)) = {(len(self.y), len(self.x))}"
+                f"map of {self.quantity}: codes have the shape {np.shape(self.codes)}, expected that of z, "
+                f"{np.shape(self.z)}"
             )
 
     @property
@@ -100,10 +122,38 @@ class Map:
         """What is written at the colour bar."""
         return f"{self.quantity} [{self.unit}]" if self.unit else self.quantity
 
+    @property
+    def has_numbers(self) -> bool:
+        """Whether any colour tells a number: without one there is no colour bar."""
+        return bool(np.isfinite(self.z).any())
+
+
+@dataclass(frozen=True)
+class Map(Coloured):
+    """A field z of shape (len(y), len(x)) over cell centres x and y, ascending; NaN cells of no kind stay empty."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if np.shape(self.z) != (len(self.y), len(self.x)):
+            raise ValueError(
+                f"map of {self.quantity}: z has the shape {np.shape(self.z)}, expected "
+                f"(len(y), len(x)) = {(len(self.y), len(self.x))}"
+            )
+
+
+@dataclass(frozen=True)
+class Cloud(Coloured):
+    """Single places x, y with their z, all of shape (n,)."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        _same_length(self.quantity, self.x, self.y)
+        _same_length(self.quantity, self.x, self.z)
+
 
 @dataclass(frozen=True)
 class Panel:
-    """One pair of axes with what is drawn in it: maps lowest, then limits, lines and markers."""
+    """One pair of axes with what is drawn in it: maps and clouds lowest, then limits, lines and markers."""
 
     title: str
     x: Axis
@@ -112,11 +162,20 @@ class Panel:
     markers: tuple[Markers, ...] = ()
     limits: tuple[Limit, ...] = ()
     maps: tuple[Map, ...] = ()
+    clouds: tuple[Cloud, ...] = ()
+
+    @property
+    def coloured(self) -> tuple[Coloured, ...]:
+        """Maps and clouds: what needs a colour bar or a legend of colours."""
+        return (*self.maps, *self.clouds)
 
 
 @dataclass(frozen=True)
 class Figure:
-    """Panels in `columns` columns, row by row. `name` serves as file name, `subject` is the stage."""
+    """Panels in `columns` columns, row by row. `name` serves as file name, `subject` is the stage.
+
+    The caption stands beside the figure, where there is a page; the note stands in it, wherever it goes.
+    """
 
     name: str
     title: str
@@ -124,6 +183,7 @@ class Figure:
     panels: tuple[Panel, ...]
     columns: int = 1
     subject: str = ""
+    note: str = ""
 
     @property
     def rows(self) -> int:

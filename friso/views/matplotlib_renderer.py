@@ -13,18 +13,19 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
-import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
 from matplotlib.lines import Line2D
 from matplotlib.ticker import LogFormatterMathtext, LogLocator, MaxNLocator, NullFormatter, ScalarFormatter
 
-from friso.views.drawable import drawable
+from friso.views.drawable import drawable, word_ticks
 from friso.views.figure import GREY, INK, Figure, Panel
+from friso.views.matplotlib_maps import add_colour_bars, add_footer, draw_coloured, footer_height
 
 FORMATS = ("png", "svg", "pdf")
 WIDTH = 9.0  # [inch]
 ROW_HEIGHT = 2.7  # [inch] axes, labels, title and legend of one row of panels
+MAP_HEIGHTS = {1: 4.9, 2: 3.7}  # [inch] the same of one or two columns of maps: their two axes matter alike
 HEADER_HEIGHT = 0.35  # [inch] the figure's own title
 
 # No dates and no version numbers in the files, so that a rerun gives the same bytes.
@@ -64,7 +65,13 @@ _STYLE: dict[Any, Any] = {
     "pdf.fonttype": 42,
 }
 _DASHES = {"solid": "-", "dashed": (0, (5, 2.5)), "dotted": (0, (1.2, 1.6))}
-_SYMBOLS = {"circle": "o", "triangle": "v", "cross": "x"}
+_SYMBOLS: dict[str, dict[str, Any]] = {
+    "circle": {"marker": "o", "markersize": 6},
+    "triangle": {"marker": "v", "markersize": 6},
+    "cross": {"marker": "x", "markersize": 6},
+    "target": {"marker": "o", "markersize": 9, "markeredgecolor": "white", "markeredgewidth": 1.6},
+    "patch": {"marker": "s", "markersize": 6, "markeredgecolor": GREY, "markeredgewidth": 0.6},
+}
 
 
 def render(figure: Figure) -> Canvas:
@@ -72,14 +79,18 @@ def render(figure: Figure) -> Canvas:
     with _style():
         prepared = drawable(figure)
         heading = ": ".join(text for text in (prepared.subject, prepared.title) if text)
-        size = (WIDTH, ROW_HEIGHT * prepared.rows + (HEADER_HEIGHT if heading else 0))
-        canvas = Canvas(figsize=size, layout="constrained", facecolor="white")
-        canvas.get_layout_engine().set(w_pad=0.08, h_pad=0.08)  # type: ignore[union-attr]
+        footer = footer_height(prepared, WIDTH)
+        height = _row_height(prepared) * prepared.rows + (HEADER_HEIGHT if heading else 0) + footer
+        canvas = Canvas(figsize=(WIDTH, height), layout="constrained", facecolor="white")
+        area = (0, footer / height, 1, 1 - footer / height)
+        canvas.get_layout_engine().set(w_pad=0.08, h_pad=0.08, rect=area)  # type: ignore[union-attr]
         if heading:
             canvas.suptitle(heading, x=0.01, ha="left", fontsize=11.5, fontweight="bold", parse_math=False)
         for number, panel in enumerate(prepared.panels):
             axes = canvas.add_subplot(prepared.rows, prepared.columns, number + 1)
             _draw(axes, panel, WIDTH / prepared.columns)
+        add_colour_bars(canvas, list(canvas.axes), prepared.panels)
+        add_footer(canvas, prepared, _SYMBOLS, WIDTH)
         return canvas
 
 
@@ -107,21 +118,22 @@ def _style() -> Iterator[None]:
         yield
 
 
+def _row_height(figure: Figure) -> float:
+    mapped = any(panel.coloured for panel in figure.panels)
+    return MAP_HEIGHTS.get(figure.columns, ROW_HEIGHT) if mapped else ROW_HEIGHT
+
+
 def _draw(axes: Axes, panel: Panel, width: float) -> None:
     """Everything of one panel, which is `width` [inch] wide."""
     _scale(axes, panel)
-    for field in panel.maps:
-        mesh = axes.pcolormesh(field.x, field.y, np.ma.masked_invalid(field.z), cmap="viridis", shading="nearest")
-        bar = axes.get_figure().colorbar(mesh, ax=axes)  # type: ignore[union-attr]
-        bar.set_label(field.label, parse_math=False)
-        axes.grid(visible=False)
+    draw_coloured(axes, panel)
     handles: list[Line2D] = []
     for line in panel.series:
         style = {"color": line.colour, "linestyle": _DASHES[line.dash], "linewidth": line.width}
         handles += axes.plot(line.x, line.y, **style)
     for marker in panel.markers:
-        style = {"color": marker.colour, "marker": _SYMBOLS[marker.symbol], "markersize": 6, "zorder": 3}
-        handles += axes.plot(marker.x, marker.y, linestyle="none", **style)
+        style = {"color": marker.colour, "linestyle": "none", "zorder": 3, **_SYMBOLS[marker.symbol]}
+        handles += axes.plot(marker.x, marker.y, **style)
     if panel.x.limits:
         axes.set_xlim(panel.x.limits)
     if panel.y.limits:
@@ -137,7 +149,10 @@ def _scale(axes: Axes, panel: Panel) -> None:
         axes.margins(x=0.03)
     bins = (9, [1, 2, 5, 10]), (6, [1, 2, 2.5, 5, 10])
     for axis, declared, (most, steps) in zip((axes.xaxis, axes.yaxis), (panel.x, panel.y), bins, strict=True):
-        if declared.log:
+        if declared.words:
+            positions, words = word_ticks(declared)
+            axis.set_ticks(positions, words, parse_math=False)
+        elif declared.log:
             axis.set_major_locator(LogLocator(numticks=8))
             axis.set_major_formatter(LogFormatterMathtext())
             axis.set_minor_formatter(NullFormatter())
@@ -153,8 +168,10 @@ def _annotate(axes: Axes, panel: Panel, handles: list[Line2D], width: float) -> 
     axes.set_xlabel(panel.x.label, parse_math=False)
     axes.set_ylabel(panel.y.label, parse_math=False)
     labels = [item.label for item in (*panel.series, *panel.markers)]
+    handles = [handle for handle, label in zip(handles, labels, strict=True) if label]
+    labels = [label for label in labels if label]
     rows = 0
-    if len(labels) > 1:
+    if len(labels) > 1 and not panel.coloured:
         columns = _legend_columns(labels, width)
         rows = -(-len(labels) // columns)
         place = {"loc": "lower left", "bbox_to_anchor": (0, 1), "borderaxespad": 0.1, "borderpad": 0.2}

@@ -13,17 +13,18 @@ from typing import Any
 import plotly.graph_objects as go
 from plotly.offline import get_plotlyjs
 
-from friso.views.drawable import drawable
-from friso.views.figure import GREY, INK, Axis, Figure, Map, Markers, Panel, Series
+from friso.views.drawable import drawable, word_ticks
+from friso.views.figure import GREY, INK, Axis, Figure, Markers, Panel, Series
+from friso.views.plotly_maps import BAR, SYMBOLS, bar_panels, coloured_traces, footer, key_traces
 
 HEADER = 54  # [px] title and legend above the axes
 PLOT = 230  # [px] height of the axes
+MAP_PLOTS = {1: 430, 2: 320}  # [px] the same of one or two columns of maps: their two axes matter alike
 FOOTER = 54  # [px] tick labels and axis label
 LEFT, RIGHT, TOP = 72, 14, 26  # [px]; the buttons stand in the top margin
 GAP = 0.09  # between two panels of a row, as a fraction of the width
 
 _DASHES = {"solid": "solid", "dashed": "6px,4px", "dotted": "2px,3px"}
-_SYMBOLS = {"circle": "circle", "triangle": "triangle-down", "cross": "x-thin-open"}
 # The buttons are listed, since plotly's own choice has one that sends the data to a server.
 _BUTTONS = [["toImage"], ["zoom2d", "pan2d"], ["zoomIn2d", "zoomOut2d", "resetScale2d"]]
 _CONFIG = {
@@ -50,25 +51,37 @@ def fragment(figure: Figure) -> str:
 def render(figure: Figure) -> go.Figure:
     """The figure for plotly; its traces carry the arrays of `drawable(figure)`, in the same order."""
     prepared = drawable(figure)
-    row = HEADER + PLOT + FOOTER
+    mapped = any(panel.coloured for panel in prepared.panels)
+    plot = MAP_PLOTS.get(prepared.columns, PLOT) if mapped else PLOT
+    row = HEADER + plot + FOOTER
     height = row * prepared.rows
+    key = f"legend{len(prepared.panels) + 1}"  # the panels have the numbers before
+    below, legend, note = footer(prepared, key)
     layout: dict[str, Any] = {
         "template": "none",
-        "height": height + TOP,
-        "margin": {"l": LEFT, "r": RIGHT, "t": TOP, "b": 0},
+        "height": height + TOP + below,
+        "margin": {"l": LEFT, "r": RIGHT, "t": TOP, "b": below},
         "font": {"family": "system-ui, sans-serif", "size": 12, "color": INK},
         "hovermode": "closest",
-        "annotations": [],
+        "annotations": note,
+        **legend,
     }
     traces: list[Any] = []
     links: dict[Axis, str] = {}
+    with_bar, shared_bar = bar_panels(prepared.panels)
     for number, panel in enumerate(prepared.panels):
         top = height - (number // prepared.columns) * row
-        y_domain = ((top - HEADER - PLOT) / height, (top - HEADER) / height)
+        y_domain = ((top - HEADER - plot) / height, (top - HEADER) / height)
         x_domain = _columns(number % prepared.columns, prepared.columns)
+        bar = None
+        if shared_bar and number in with_bar:
+            bar = {"x": 1.0, "y": (FOOTER + height - HEADER) / 2 / height, "len": 1 - (FOOTER + HEADER) / height}
+        elif number in with_bar:
+            x_domain = (x_domain[0], x_domain[1] - BAR)
+            bar = {"x": x_domain[1], "y": sum(y_domain) / 2, "len": y_domain[1] - y_domain[0]}
         _add_panel(layout, panel, number, x_domain, y_domain, HEADER / height, links)
-        traces += _traces(panel, number, x_domain, y_domain)
-    return go.Figure(data=traces, layout=layout)
+        traces += _traces(panel, number, bar)
+    return go.Figure(data=traces + key_traces(prepared, key), layout=layout)
 
 
 def _columns(column: int, columns: int) -> tuple[float, float]:
@@ -130,6 +143,9 @@ def _axis(axis: Axis) -> dict[str, Any]:
         "ticks": "outside",
         "tickcolor": GREY,
     }
+    if axis.words:
+        positions, words = word_ticks(axis)
+        settings |= {"tickmode": "array", "tickvals": positions, "ticktext": [html.escape(word) for word in words]}
     if axis.log:
         settings["dtick"] = 1
     if axis.limits:
@@ -137,16 +153,17 @@ def _axis(axis: Axis) -> dict[str, Any]:
     return settings
 
 
-def _traces(panel: Panel, number: int, x_domain: tuple[float, float], y_domain: tuple[float, float]) -> list[Any]:
+def _traces(panel: Panel, number: int, bar: dict[str, Any] | None) -> list[Any]:
     """What is drawn in a panel, maps first, in the order of `drawable`."""
     suffix = _suffix(number)
     place = {"xaxis": f"x{suffix}", "yaxis": f"y{suffix}"}
-    count = len(panel.series) + len(panel.markers)
-    named = place | {"legend": f"legend{suffix}", "showlegend": count > 1}
+    count = sum(bool(item.label) for item in (*panel.series, *panel.markers))
+    key = count > 1 and not panel.coloured
+    named = place | {"legend": f"legend{suffix}"}
     return [
-        *(_map(field, place, x_domain, y_domain) for field in panel.maps),
-        *(_line(line, panel, named) for line in panel.series),
-        *(_points(marker, panel, named) for marker in panel.markers),
+        *coloured_traces(panel, place, bar),
+        *(_line(line, panel, named | {"showlegend": key and bool(line.label)}) for line in panel.series),
+        *(_points(marker, panel, named | {"showlegend": key and bool(marker.label)}) for marker in panel.markers),
     ]
 
 
@@ -158,19 +175,8 @@ def _line(line: Series, panel: Panel, place: dict[str, Any]) -> go.Scatter:
 
 
 def _points(marker: Markers, panel: Panel, place: dict[str, Any]) -> go.Scatter:
-    style = {"color": marker.colour, "symbol": _SYMBOLS[marker.symbol], "size": 9}
+    style = {"color": marker.colour, **SYMBOLS[marker.symbol]}
     return go.Scatter(x=marker.x, y=marker.y, mode="markers", marker=style, **_text(marker.label, panel), **place)
-
-
-def _map(field: Map, place: dict[str, Any], x_domain: tuple[float, float], y_domain: tuple[float, float]) -> go.Heatmap:
-    bar = {
-        "title": {"text": html.escape(field.label), "side": "right"},
-        "x": x_domain[1],
-        "y": sum(y_domain) / 2,
-        "len": y_domain[1] - y_domain[0],
-        "thickness": 14,
-    }
-    return go.Heatmap(x=field.x, y=field.y, z=field.z, colorscale="Viridis", colorbar=bar, **place)
 
 
 def _text(label: str, panel: Panel) -> dict[str, Any]:

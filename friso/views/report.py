@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import base64
 from collections.abc import Mapping
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from friso.version import VERSION
-from friso.views import matplotlib_renderer, plotly_renderer
+from friso.views import plotly_renderer
 from friso.views.cases import shown_cases
 from friso.views.check_figures import check_figures
-from friso.views.figure import Figure
+from friso.views.pages import environment, print_image
 from friso.views.summary import conclusion, rows, verdict_sentence
 
 if TYPE_CHECKING:
@@ -32,25 +29,20 @@ def report_html(cases: Mapping[str, Case]) -> str:
     shown = shown_cases(cases)
     stage = shown[0].case.stage if "given" not in cases else cases["given"].stage
     figures = check_figures(cases)
-    environment = Environment(
-        loader=PackageLoader("friso.views"), autoescape=True, undefined=StrictUndefined, trim_blocks=True
+    return (
+        environment()
+        .get_template("report.html")
+        .render(
+            name=stage.name or "Unnamed stage",
+            source=stage.source,
+            shown=shown,
+            sentences=[(item, verdict_sentence(item)) for item in shown],
+            conclusion=conclusion(cases),
+            rows=rows(shown),
+            figures=[(figure, Markup(plotly_renderer.fragment(figure)), print_image(figure)) for figure in figures],
+            plotly=Markup(plotly_renderer.script()) if figures else None,
+            stage_file=stage.to_toml(),
+            version=VERSION,
+            rtol=", ".join(sorted({f"{item.case.solver.rtol:g}" for item in shown})),
+        )
     )
-    return environment.get_template("report.html").render(
-        name=stage.name or "Unnamed stage",
-        source=stage.source,
-        shown=shown,
-        sentences=[(item, verdict_sentence(item)) for item in shown],
-        conclusion=conclusion(cases),
-        rows=rows(shown),
-        figures=[(figure, Markup(plotly_renderer.fragment(figure)), _print_image(figure)) for figure in figures],
-        plotly=Markup(plotly_renderer.script()) if figures else None,
-        stage_file=stage.to_toml(),
-        version=VERSION,
-        rtol=", ".join(sorted({f"{item.case.solver.rtol:g}" for item in shown})),
-    )
-
-
-def _print_image(figure: Figure) -> str:
-    """The figure as an SVG data address: what is printed, and what is seen without scripts."""
-    svg = matplotlib_renderer.image(replace(figure, title="", subject=""), "svg")
-    return "data:image/svg+xml;base64," + base64.b64encode(svg).decode("ascii")

@@ -1,0 +1,3 @@
+from friso.cli.app import main
+
+main()

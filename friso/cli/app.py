@@ -1,0 +1,91 @@
+"""The command line: `friso COMMAND STAGE.toml`. Reads what the analyses return and prints or draws it.
+
+Exit status: 0 done, 1 the computation could not be completed, 2 the input is wrong, 130 interrupted.
+"""
+
+from __future__ import annotations
+
+import io
+import logging
+import sys
+from typing import Annotated, NoReturn
+
+import typer
+
+from friso.cli.check import check
+from friso.cli.common import INTERRUPTED, say
+from friso.cli.init import init
+from friso.cli.map import map_cells
+from friso.cli.reproduce import reproduce
+from friso.cli.simulate import simulate
+from friso.quantities import StageError
+from friso.version import VERSION
+
+app = typer.Typer(
+    add_completion=False,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+for name, command in (
+    ("init", init),
+    ("check", check),
+    ("simulate", simulate),
+    ("map", map_cells),
+    ("reproduce", reproduce),
+):
+    app.command(name)(command)
+
+
+def main() -> NoReturn:
+    """Run the command line; wrong input ends in one message and status 2, never in a traceback."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")  # a terminal that knows no dash still gets its answer
+    if len(sys.argv) == 1:
+        sys.argv.append("--help")
+    logging.basicConfig(format="friso: %(message)s", level=logging.WARNING, stream=sys.stderr)
+    try:
+        status = app(standalone_mode=False) or 0
+        if status == INTERRUPTED:  # typer's word for Ctrl-C
+            say("interrupted")
+        sys.exit(status)
+    except typer.Exit as leave:
+        sys.exit(leave.exit_code)
+    except (typer.Abort, KeyboardInterrupt):
+        say("interrupted")
+        sys.exit(INTERRUPTED)
+    except BrokenPipeError:
+        sys.stderr.close()
+        sys.exit(1)
+    except StageError as error:
+        say(str(error))
+        sys.exit(2)
+    except Exception as error:
+        usage = getattr(error, "format_message", None)
+        if usage is not None:
+            say(f"{usage()}\n  try: friso --help")
+            sys.exit(2)
+        if isinstance(error, RuntimeError | OSError | MemoryError):
+            say(f"the computation could not be completed: {error}")
+            sys.exit(1)
+        raise
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        print(f"friso {VERSION}")
+        raise typer.Exit
+
+
+@app.callback()
+def friso(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")
+    ] = False,
+) -> None:
+    """Does a positioning stage on contact bearings hunt, why, and what stops it?
+
+    Start with: friso init stage.toml && friso check stage.toml
+    """

@@ -1,0 +1,101 @@
+"""`friso check`: the verdict."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import TYPE_CHECKING, Any
+
+from friso.cli.common import (
+    AsJson,
+    OutFolder,
+    Overrides,
+    StageFile,
+    Tolerance,
+    leave,
+    made_folder,
+    read_stage,
+    read_tolerance,
+)
+from friso.stage import Stage
+
+if TYPE_CHECKING:
+    from friso.hunting import Case
+
+
+def check(
+    stage_file: StageFile,
+    overrides: Overrides = None,
+    rtol: Tolerance = "1e-6",
+    out: OutFolder = None,
+    as_json: AsJson = False,
+) -> None:
+    """Does the stage hunt: as given, and with its joint locked and free.
+
+    Example: friso check examples/thesis_rig.toml --set controller.crossover="12 Hz" --out report
+    """
+    stage, tolerance = read_stage(stage_file, overrides), read_tolerance(rtol)
+    folder = None if out is None else made_folder(out)
+    from friso.hunting import check as check_stage
+
+    cases = check_stage(stage, rtol=tolerance, traces=folder is not None)
+    if folder is not None:
+        from friso.views.report import write_report
+
+        write_report(cases, folder / "report.html")
+    if as_json:
+        print(json.dumps(_check_document(stage, cases), allow_nan=False))
+    else:
+        _print_cases(stage, cases)
+        if folder is not None:
+            print(f"report: {folder / 'report.html'}")
+    leave(all(case.solver.done for case in cases.values()))
+
+
+def _check_document(stage: Stage, cases: dict[str, Case]) -> dict[str, Any]:
+    """The JSON document of `check` (design.md, section 3)."""
+    return {"stage": stage.name, "cases": {name: _case_document(case) for name, case in cases.items()}}
+
+
+def _case_document(case: Case) -> dict[str, Any]:
+    into_1um, into_10um = case.settling_time.values()
+    return {
+        "verdict": case.verdict,
+        "peaks": case.peaks,
+        "peak_to_peak_m": _finite(case.peak_to_peak),
+        "period_s": case.period,
+        "settling_time_s": into_1um,
+        "settling_time_10um_s": into_10um,
+        "largest_force_n": _finite(case.largest_force),
+        "cycle": None,
+        "solver": {
+            "status": case.solver.status,
+            "steps": case.solver.steps,
+            "rejected": case.solver.rejected,
+            "rtol": case.solver.rtol,
+        },
+    }
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def _print_cases(stage: Stage, cases: dict[str, Case]) -> None:
+    """A sentence per case, and the short table of `check`."""
+    from rich.console import Console
+    from rich.table import Table
+
+    from friso.views.cases import shown_cases
+    from friso.views.summary import conclusion, rows, verdict_sentence
+
+    shown = shown_cases(cases)
+    console = Console(highlight=False, markup=False)
+    table = Table("", *(item.label for item in shown), title=stage.name or None, title_justify="left")
+    for label, texts in rows(shown):
+        table.add_row(label, *texts)
+    console.print(table)
+    for sentence in [f"{item.label}: {verdict_sentence(item)}" for item in shown]:
+        console.print(sentence)
+    if found := conclusion(cases):
+        console.print(found)

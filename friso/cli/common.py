@@ -1,0 +1,70 @@
+"""What the commands share: their options, reading stages, and how mistakes are answered."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from friso.quantities import Quantity, StageError, positive
+from friso.stage import Stage, load, parse_set
+
+INTERRUPTED = 130
+
+StageFile = Annotated[Path, typer.Argument(metavar="STAGE.toml", help="The stage file.")]
+Overrides = Annotated[
+    list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help='Override a key: controller.crossover="12 Hz".')
+]
+RTOL_HELP = "Relative tolerance of the solver, 1e-12 to 1e-2."
+Tolerance = Annotated[str, typer.Option("--rtol", metavar="NUMBER", help=RTOL_HELP)]
+AsJson = Annotated[bool, typer.Option("--json", help="One JSON document on standard output, nothing else.")]
+OutFolder = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder for the files written.")]
+
+
+def say(message: str) -> None:
+    print(f"friso: {message}", file=sys.stderr)
+
+
+def leave(done: bool) -> None:
+    if not done:
+        say("the computation could not be completed; see the status above")
+        raise typer.Exit(1)
+
+
+def read_stage(path: Path, overrides: list[str] | None) -> Stage:
+    """The stage of the file with the overrides. Raises StageError."""
+    return with_overrides(load(path), overrides)
+
+
+def with_overrides(stage: Stage, overrides: list[str] | None) -> Stage:
+    """The stage with the KEY=VALUE of --set. Raises StageError."""
+    changes = dict(parse_set(text) for text in overrides or [])
+    return stage.replace(changes) if changes else stage
+
+
+def made_folder(path: Path) -> Path:
+    """The folder, made if it is not there. Raises StageError."""
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        expected = f"a folder that can be written ({error.strerror})"
+        raise StageError("--out", str(path), expected, "--out report") from None
+    return path
+
+
+def read_tolerance(text: str) -> float:
+    from friso.engine.tolerance import checked_rtol
+
+    try:
+        return checked_rtol(float(text))
+    except ValueError:
+        raise StageError("--rtol", text, "a number from 1e-12 to 1e-2", "--rtol 1e-6") from None
+
+
+def read_sample_time(text: str) -> float:
+    try:
+        return Quantity("s", positive, "1 ms").read(text)
+    except StageError as error:
+        raise error.under("--sample-time") from None

@@ -1,0 +1,178 @@
+"""`friso map`: parameters swept, results in a store, a figure and a page."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from friso.cli.common import AsJson, Overrides, read_stage, read_tolerance, say
+from friso.cli.progress import progress_bar
+from friso.quantities import StageError
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from friso.studies.execute import Crew
+    from friso.studies.study import Study
+
+LARGE = 10_000_000
+"""Cells from which on a study has to be confirmed: minutes of computation and a gigabyte."""
+
+AXIS = 'KEY="FIRST..LAST:POINTS"'
+
+
+def map_cells(
+    source: Annotated[Path, typer.Argument(metavar="STAGE.toml|STORE", help="A stage file, or a study to go on with.")],
+    x: Annotated[str | None, typer.Option(metavar=AXIS, help='Horizontal axis; a list also: KEY="4 Hz, 8 Hz".')] = None,
+    y: Annotated[str | None, typer.Option(metavar=AXIS, help="Vertical axis.")] = None,
+    axis: Annotated[list[str] | None, typer.Option(metavar=AXIS, help="A further axis; as often as wanted.")] = None,
+    link: Annotated[
+        list[str] | None, typer.Option(metavar="KEY=EXPRESSION", help='A key that follows: masses.cart="0.7 * mass".')
+    ] = None,
+    samples: Annotated[
+        int | None, typer.Option(metavar="NUMBER", help="So many Sobol points of the ranges FIRST..LAST, no grid.")
+    ] = None,
+    latin: Annotated[bool, typer.Option("--latin", help="Samples by a Latin hypercube.")] = False,
+    log: Annotated[bool, typer.Option("--log", help="All ranges logarithmic; for one alone, :log behind it.")] = False,
+    overrides: Overrides = None,
+    metric: Annotated[str, typer.Option(metavar="NAME", help="What colours the map.")] = "peaks",
+    rtol: Annotated[
+        str, typer.Option(metavar="NUMBER|auto", help="Relative tolerance; auto: the loosest safe one.")
+    ] = "1e-6",
+    verify: Annotated[float, typer.Option(metavar="SHARE", help="Share of the cells run again at rtol/100.")] = 0.05,
+    refine: Annotated[
+        bool, typer.Option("--refine", help="A grid 4 times finer, run along its boundaries only.")
+    ] = False,
+    workers: Annotated[
+        int | None, typer.Option(metavar="N", help="Run in N processes of a local Dask cluster.")
+    ] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="Run on the workers of a Dask scheduler.")
+    ] = None,
+    export: Annotated[list[Path] | None, typer.Option(metavar="FILE", help="Also write a .nc or .csv file.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(metavar="STORE", help="Folder of the results, resumed if it is there.")
+    ] = None,
+    yes: Annotated[bool, typer.Option("--yes", help="Do run a study of more than ten million cells.")] = False,
+    as_json: AsJson = False,
+) -> None:
+    """Sweep two (or more) keys: results in a Zarr store, a figure, and a page whose cells can be clicked.
+
+    Example: friso map rig.toml --x controller.crossover="1 Hz..16 Hz:41" --y joint.stroke="0 m..1 mm:41"
+    A study that was interrupted goes on: friso map thesis_rig_map.zarr
+    """
+    from friso.cli.map_study import Request, study_for, write_exports, write_views
+
+    exports = _checked_exports(export)
+    request = Request(x, y, tuple(axis or ()), tuple(link or ()), samples, latin, log)
+    with _crew(workers, scheduler) as crew:
+        if source.is_dir():
+            store, study = source, _stored(source, request, overrides)
+        else:
+            stage = read_stage(source, overrides)
+            store = out or Path(f"{source.stem}_map.zarr")
+            study = study_for(stage, request, metric, refine, None if yes else LARGE, crew)
+            study = replace(study, rtol=_chosen_rtol(rtol, study, crew))
+        runs = _run(study, store, crew, _share(verify), as_json)
+    files = [*write_views(runs, store, metric), *write_exports(runs, exports)]
+    _report(runs, study, store, files, as_json)
+
+
+def _chosen_rtol(text: str, study: Study, crew: Crew) -> float:
+    """The tolerance asked for; "auto" is chosen on a sample of the cells, and said."""
+    if text != "auto":
+        return read_tolerance(text)
+    from friso.studies.verify import WANTED, loosest_rtol
+
+    rtol, shares = loosest_rtol(study, crew)
+    found = ", ".join(f"{each:g}: {share:.1%}" for each, share in shares.items())
+    if shares[rtol] >= WANTED:
+        say(f"rtol {rtol:g} is the loosest at which {WANTED:.0%} of the verdicts survive ({found})")
+    else:
+        say(f"at no tolerance do {WANTED:.0%} of the verdicts survive ({found}); rtol {rtol:g} is used")
+    return rtol
+
+
+@contextmanager
+def _crew(workers: int | None, scheduler: str | None) -> Iterator[Crew]:
+    if workers is not None and scheduler is not None:
+        raise StageError("--workers", "--workers and --scheduler", "one of the two", "--workers 4")
+    if workers is not None and workers < 1:
+        raise StageError("--workers", str(workers), "1 worker or more", "--workers 4")
+    if scheduler is not None:
+        from friso.studies.distribute import connected
+
+        with connected(scheduler) as crew:
+            yield crew
+    elif workers is not None:
+        from friso.studies.distribute import local_cluster
+
+        with local_cluster(workers) as crew:
+            yield crew
+    else:
+        from friso.studies.execute import local_crew
+
+        with local_crew() as crew:
+            yield crew
+
+
+def _stored(store: Path, request: Any, overrides: list[str] | None) -> Study:
+    """The study of a store that is gone on with. Raises StageError."""
+    from friso.studies.store import read_store
+    from friso.studies.study import study_of
+
+    if request.axes or request.links or overrides:
+        given = "a store together with axes, links or --set"
+        raise StageError(str(store), given, "a store alone: it knows its study", f"friso map {store}")
+    with read_store(store) as runs:
+        return study_of(runs)
+
+
+def _run(study: Study, store: Path, crew: Crew, share: float, quiet: bool) -> xr.Dataset:
+    """Run what the store lacks. Whatever ends it early, the message says where the rest is."""
+    from friso.studies.sweep import run_in_store
+
+    done = 0
+    with progress_bar(store.name, study.cells) as advance:
+
+        def count(cells: int) -> None:
+            nonlocal done
+            done += cells
+            advance(cells)
+
+        try:
+            return run_in_store(study, store, crew, share, count)
+        except (KeyboardInterrupt, OSError):
+            if store.exists():
+                say(f"{done} of {study.cells} cells are kept; to go on: friso map {store}")
+            raise
+
+
+def _share(verify: float) -> float:
+    if not 0 <= verify <= 1:
+        raise StageError("--verify", str(verify), "a share of the cells, from 0 to 1", "--verify 0.05")
+    return verify
+
+
+def _checked_exports(export: list[Path] | None) -> list[Path]:
+    for path in export or []:
+        if path.suffix not in (".nc", ".csv"):
+            raise StageError("--export", str(path), "a file that ends in .nc or .csv", "--export map.nc")
+        if not path.parent.is_dir():
+            raise StageError("--export", str(path), "a file in a folder that is there", "--export map.nc")
+    return list(export or [])
+
+
+def _report(runs: xr.Dataset, study: Study, store: Path, files: list[Path], as_json: bool) -> None:
+    from friso.cli.map_study import document, sentences
+
+    if as_json:
+        print(json.dumps(document(runs, study, store, files), allow_nan=False))
+    else:
+        print("\n".join([*sentences(runs, study), f"store: {store}", *(f"wrote {file}" for file in files)]))

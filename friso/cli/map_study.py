@@ -1,0 +1,162 @@
+"""What `friso map` is asked for and answers: the study, what it would cost, files, sentences, the JSON document."""
+
+from __future__ import annotations
+
+import math
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from friso.quantities import StageError
+from friso.stage import Stage
+from friso.studies.execute import Crew
+from friso.studies.refine import FINER, SHARE, finer
+from friso.studies.samples import Samples
+from friso.studies.study import Study, make_study, study_size, trial_study
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+AXIS_EXAMPLE = '--x controller.crossover="1 Hz..40 Hz:41"'
+
+BYTES = 8
+"""Bytes of a number in a store, before they are compressed."""
+
+
+@dataclass(frozen=True)
+class Request:
+    """The options that say what is varied, as they were given."""
+
+    x: str | None
+    y: str | None
+    more: tuple[str, ...]
+    links: tuple[str, ...]
+    samples: int | None
+    latin: bool
+    log: bool
+
+    @property
+    def axes(self) -> dict[str, str]:
+        """Name to range of every axis. Raises StageError."""
+        named = {"--x": self.x, "--y": self.y} | {f"--axis {k + 1}": text for k, text in enumerate(self.more)}
+        return _pairs([(option, text) for option, text in named.items() if text is not None], AXIS_EXAMPLE)
+
+    @property
+    def linked(self) -> dict[str, str]:
+        """Key to expression of every link. Raises StageError."""
+        return _pairs([("--link", text) for text in self.links], '--link masses.cart="0.7 * mass"')
+
+
+def _pairs(given: list[tuple[str, str]], example: str) -> dict[str, str]:
+    pairs: dict[str, str] = {}
+    for option, text in given:
+        key, equals, value = text.partition("=")
+        key = key.strip()
+        if not (equals and key and value.strip()):
+            raise StageError(option, text, "KEY=VALUE", example)
+        if key in pairs:
+            raise StageError(option, f"{key} a second time", "every key once", example)
+        pairs[key] = value.strip()
+    return pairs
+
+
+def study_for(stage: Stage, request: Request, metric: str, refine: bool, most: int | None, crew: Crew) -> Study:
+    """The study asked for. Raises StageError, also if it has more than `most` cells: then with what it would cost."""
+    axes, links = request.axes, request.linked
+    if not axes:
+        raise StageError("--x", "no axis", "one axis or more", AXIS_EXAMPLE)
+    samples = None
+    if request.samples is not None:
+        axes, samples = {}, Samples(axes, request.samples, "latin" if request.latin else "sobol")
+    elif request.latin:
+        raise StageError("--latin", "no --samples beside it", "how many samples", "--samples 1024 --latin")
+    given = (stage, axes, samples, links)
+    cells = study_size(*given, request.log)
+    runs = int(cells * (SHARE * FINER ** len(axes) if refine else 1))
+    if most is not None and runs > most:
+        raise _too_large(runs, trial_study(*given, request.log), crew)
+    study = make_study(*given, log=request.log)
+    if metric not in study.metrics or metric == "status":
+        expected = f"one of {', '.join(name for name in study.metrics if name != 'status')}"
+        raise StageError("--metric", metric, expected, "--metric peak_to_peak")
+    return finer(study) if refine else study
+
+
+def _too_large(runs: int, trial: Study, crew: Crew) -> StageError:
+    """What a study of so many runs would cost, by a trial of a few of its cells."""
+    from friso.studies.execute import run_scattered
+
+    run_scattered(trial, np.arange(crew.size), crew)  # has the kernels compiled
+    start = time.perf_counter()
+    run_scattered(trial, np.arange(trial.cells), crew)
+    hours = (time.perf_counter() - start) / trial.cells * runs / 3600
+    gigabytes = BYTES * len(trial.metrics) * runs / 1e9
+    given = f"{runs:.3g} runs: about {hours:.2g} hours on this machine, and up to {gigabytes:.2g} GB of disk"
+    return StageError("--yes", given, "--yes, or fewer points; nothing was run", "--yes")
+
+
+def write_views(runs: xr.Dataset, store: Path, metric: str) -> list[Path]:
+    """The figure and the page of a map, beside its store."""
+    from friso.views.map_figures import map_figure
+    from friso.views.map_page import write_map_page
+    from friso.views.matplotlib_renderer import FORMATS, save
+
+    stem = store.with_suffix("") if store.suffix == ".zarr" else store
+    figure = map_figure(runs, metric)
+    paths = [stem.with_name(f"{stem.name}.{form}") for form in (*FORMATS, "html")]
+    for path in paths[:-1]:
+        save(figure, path)
+    write_map_page(runs, paths[-1], metric, f"friso simulate --cell {store} {{indices}}")
+    return paths
+
+
+def write_exports(runs: xr.Dataset, paths: list[Path]) -> list[Path]:
+    """The study as NetCDF or CSV, by the suffix."""
+    from friso.studies.export import export
+
+    for path in paths:
+        export(runs, path)
+    return paths
+
+
+def sentences(runs: xr.Dataset, study: Study) -> list[str]:
+    """What was found, for the terminal."""
+    from friso.views.map_words import verdict_counts, verification
+
+    counts = verdict_counts(runs)
+    found = ", ".join(f"{count} {verdict}" for verdict, count in counts.items())
+    size = " x ".join(map(str, study.shape))
+    return [f"{study.stage.name or 'stage'}: {size} cells at rtol {study.rtol:g}: {found}", verification(runs)]
+
+
+def document(runs: xr.Dataset, study: Study, store: Path, files: list[Path]) -> dict[str, Any]:
+    """The JSON document of `map`."""
+    from friso.views.map_words import verdict_counts
+
+    verified = {name: runs.attrs[f"verified_{name}"] for name in ("cells", "surviving", "rtol") if _verified(runs)}
+    return {
+        "stage": study.stage.name,
+        "store": str(store),
+        "axes": {
+            axis.name: {"points": len(axis.values), "unit": axis.unit, "first": _plain(axis.values[0])}
+            | {"last": _plain(axis.values[-1])}
+            for axis in study.axes
+        },
+        "cells": study.cells,
+        "rtol": study.rtol,
+        "verdicts": verdict_counts(runs),
+        "verified": verified or None,
+        "files": [str(path) for path in files],
+    }
+
+
+def _verified(runs: xr.Dataset) -> bool:
+    return "verified_cells" in runs.attrs
+
+
+def _plain(value: Any) -> Any:
+    plain = value.item()
+    return plain if not isinstance(plain, float) or math.isfinite(plain) else None

@@ -1,0 +1,49 @@
+"""Studies for other programs: NetCDF and CSV."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from friso.studies.cells import WORDS
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+ROWS = 100_000
+"""Cells that are written to a CSV file at a time."""
+
+
+def export(runs: xr.Dataset, path: Path) -> None:
+    """Write a study as NetCDF (".nc") or as CSV with one row per cell (".csv"); ValueError for another suffix.
+
+    Columns of a CSV file are named with their units.
+    """
+    if path.suffix == ".nc":
+        flat = runs.assign({name: runs[name].astype(kind) for name, kind in WORDS.items() if name in runs})
+        flat.to_netcdf(path, engine="scipy")
+    elif path.suffix == ".csv":
+        _write_csv(runs, path)
+    else:
+        raise ValueError(f"export: given {path.suffix}, expected .nc or .csv")
+
+
+def _write_csv(runs: xr.Dataset, path: Path) -> None:
+    import pandas as pd
+
+    dims = [str(dim) for dim in runs["verdict"].dims]
+    shape = runs["verdict"].shape
+    rows = max(1, ROWS // max(1, int(np.prod(shape[1:]))))
+    with path.open("w", encoding="utf-8", newline="") as file:
+        for first in range(0, shape[0], rows):
+            part = runs.isel({dims[0]: slice(first, first + rows)})
+            frame: pd.DataFrame = part.to_dataframe(dim_order=dims).reset_index()
+            named = {name: _with_unit(runs, str(name)) for name in frame.columns}
+            frame.rename(columns=named).to_csv(file, index=False, header=first == 0)
+
+
+def _with_unit(runs: xr.Dataset, name: str) -> str:
+    unit = runs[name].attrs.get("units", "")
+    return f"{name} [{unit}]" if unit not in ("", "1") else name

@@ -1,0 +1,23 @@
+"""The thesis's studies, claims and their reproduction."""
+
+from friso.studies.thesis.claims import CONVENTIONS, Claim, Evidence, Finding, Part, Response, claims, judges
+from friso.studies.thesis.reproduce import Reproduction, reproduce
+from friso.studies.thesis.studies import STUDIES, ThesisStudy, rig
+from friso.studies.thesis.verdicts import Verdict
+
+__all__ = [
+    "CONVENTIONS",
+    "STUDIES",
+    "Claim",
+    "Evidence",
+    "Finding",
+    "Part",
+    "Reproduction",
+    "Response",
+    "ThesisStudy",
+    "Verdict",
+    "claims",
+    "judges",
+    "reproduce",
+    "rig",
+]

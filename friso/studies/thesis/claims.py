@@ -1,0 +1,135 @@
+"""The claims of the thesis and what is found of them: parts that hold or not, by a criterion stated in words."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+from typing import TYPE_CHECKING, Literal
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+Judgement = Literal["holds", "holds in part", "differs", "not yet covered"]
+
+ABOUT = 1.5
+"""Factor within which a number is "about" another."""
+
+ORDER = 10**0.5
+"""Factor within which a number is "of the order of" another, and beyond which it is "far below" it."""
+
+FEW = 0.05
+"""Share of a map's cells up to which they are "few"."""
+
+TREND = 0.5
+"""Rank correlation (Spearman) from which there is a "trend"."""
+
+CONVENTIONS = (
+    f"Words are read alike in all claims: “about” is within a factor of {ABOUT:g}, “of the order of” within a factor "
+    f"of {ORDER:.2g} (half a decade) and “far” beyond it, “few” cells are at most {FEW:.0%} of a map, a “trend” is a "
+    f"rank correlation of at least {TREND:g}. A “limit” lies halfway from the last cell that hunts to the next, with "
+    "none hunting beyond it."
+)
+"""How the criteria read the words of the claims: one reading for all."""
+
+
+@dataclass(frozen=True)
+class Claim:
+    """One row of the table of claims."""
+
+    id: str
+    where: str
+    text: str
+
+
+@cache
+def claims() -> tuple[Claim, ...]:
+    """All claims of the thesis, in its order."""
+    text = files("friso.studies.thesis").joinpath("claims.toml").read_text(encoding="utf-8")
+    return tuple(Claim(**row) for row in tomllib.loads(text)["claim"])
+
+
+@dataclass(frozen=True)
+class Part:
+    """One testable statement of a claim: the criterion in words, whether it is met, and the number found.
+
+    `why` is the reason found where it is not met.
+    """
+
+    criterion: str
+    holds: bool
+    number: str
+    why: str = ""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What was found of a claim."""
+
+    parts: tuple[Part, ...]
+
+    @property
+    def pattern(self) -> tuple[bool, ...]:
+        """Which parts hold."""
+        return tuple(part.holds for part in self.parts)
+
+    @property
+    def judgement(self) -> Judgement:
+        """ "holds" if all parts are met, "differs" if none is, else "holds in part"."""
+        met = sum(part.holds for part in self.parts)
+        return "holds" if met == len(self.parts) else "holds in part" if met else "differs"
+
+
+@dataclass(frozen=True)
+class Response:
+    """One run: `cell`, the scalars of a sweep (peaks, peak_to_peak [m], period [s], verdict); `trace`, its time
+    response as `friso.simulate` gives it."""
+
+    cell: xr.Dataset
+    trace: xr.Dataset
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What a judge may look at: maps by study name and responses by name."""
+
+    maps: Mapping[str, xr.Dataset]
+    responses: Mapping[str, Response]
+
+
+Judge = Callable[[Evidence], Finding]
+
+
+@dataclass(frozen=True)
+class Registered:
+    """A judge, the figure (or equation) that shows its evidence, and the names of the maps and responses it needs."""
+
+    judge: Judge
+    figure: str
+    needs: frozenset[str]
+
+
+_JUDGES: dict[str, Registered] = {}
+
+
+def judges(claim: str, figure: str, needs: tuple[str, ...] = ()) -> Callable[[Judge], Judge]:
+    """Register the decorated function as judge of a claim. Raises ValueError for an unknown or taken claim."""
+    if claim not in {each.id for each in claims()}:
+        raise ValueError(f"judge of {claim!r}: expected a claim of claims.toml, such as 'F11A'")
+    if claim in _JUDGES:
+        raise ValueError(f"judge of {claim!r}: the claim has one already, {_JUDGES[claim].judge.__qualname__}")
+
+    def register(judge: Judge) -> Judge:
+        _JUDGES[claim] = Registered(judge, figure, frozenset(needs))
+        return judge
+
+    return register
+
+
+def registered() -> Mapping[str, Registered]:
+    """The judges by claim, those that stand in `friso.studies.thesis.judges` and any registered later."""
+    import friso.studies.thesis.judges  # noqa: F401 (registers them)
+
+    return dict(_JUDGES)

@@ -1,0 +1,27 @@
+"""The judges of the claims, by figure; importing a module registers those in it.
+
+A judge of a later claim is one more module here (or a function decorated with `judges` anywhere): the page lists
+its finding without a change.
+"""
+
+from friso.studies.thesis.judges import (
+    control_and_friction,
+    crossover,
+    masses,
+    path_and_system,
+    response,
+    series_stiffness,
+    shares,
+    stiffness_and_damping,
+)
+
+__all__ = [
+    "control_and_friction",
+    "crossover",
+    "masses",
+    "path_and_system",
+    "response",
+    "series_stiffness",
+    "shares",
+    "stiffness_and_damping",
+]

@@ -1,0 +1,83 @@
+"""Fig. 12: friction forces, and alpha and beta, of the locked rig."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from friso.studies.thesis.claims import ABOUT, FEW, TREND, Evidence, Finding, Part, judges
+from friso.studies.thesis.maps import counts, free_square, share, table, trend
+
+_GAP = 1.0
+"""Gap between static and Coulomb friction from which hunting was seen [N] (claim F12A)."""
+
+
+@judges("F12A", figure="12A", needs=("friction",))
+def gap_makes_hunting(evidence: Evidence) -> Finding:
+    """The smallest gap that hunts, and how the count goes with the gap."""
+    axes = ("friction.static", "friction.coulomb")
+    static, coulomb, hunts, _ = table(evidence.maps["friction"], *axes)
+    peaks = counts(evidence.maps["friction"], *axes)
+    gap = static[:, None] - coulomb[None, :]
+    smallest = float(gap[hunts].min()) if hunts.any() else np.nan
+    rises = trend(gap[hunts], peaks[hunts])
+    at_static = _along(gap, peaks, hunts)
+    at_coulomb = _along(gap.T, peaks.T, hunts.T)
+    falling = f"at fixed F_c the count falls again as F_s grows (mean rank correlation {at_coulomb:.2f})"
+    return Finding(
+        (
+            Part(
+                f"the smallest gap F_s - F_c that hunts is about {_GAP:g} N (from {_GAP / ABOUT:.2g} to "
+                f"{_GAP * ABOUT:.2g} N)",
+                bool(_GAP / ABOUT <= smallest <= _GAP * ABOUT),
+                f"smallest gap {smallest:.2g} N",
+            ),
+            Part(
+                f"over the cells that hunt, the count rises with the gap (rank correlation at least {TREND:g})",
+                rises >= TREND,
+                f"rank correlation {rises:.2f}; at fixed F_s {at_static:.2f}, at fixed F_c {at_coulomb:.2f}",
+                why=falling if at_coulomb < TREND else "",
+            ),
+        )
+    )
+
+
+@judges("F12B", figure="12B", needs=("control",))
+def control_is_no_cure(evidence: Evidence) -> Finding:
+    """How the count goes with alpha and beta, and whether either ends hunting."""
+    axes = ("controller.alpha", "controller.beta")
+    alpha, beta, hunts, valid = table(evidence.maps["control"], *axes)
+    peaks = counts(evidence.maps["control"], *axes)
+    ones = np.ones(hunts.shape)
+    with_beta = _along(beta[None, :] * ones, peaks, hunts)
+    with_alpha = _along((alpha[:, None] * ones).T, peaks.T, hunts.T)
+    free_lines = int((~hunts.any(axis=0)).sum() + (~hunts.any(axis=1)).sum())
+    square = free_square(hunts, valid)
+    return Finding(
+        (
+            Part(
+                "at fixed alpha the count of the cells that hunt falls with beta (mean rank correlation at most "
+                f"{-TREND:g})",
+                with_beta <= -TREND,
+                f"mean rank correlation with beta {with_beta:.2f}",
+            ),
+            Part(
+                "at fixed beta the count of the cells that hunt rises with alpha (mean rank correlation at least "
+                f"{TREND:g})",
+                with_alpha >= TREND,
+                f"with alpha {with_alpha:.2f}",
+            ),
+            Part(
+                "every alpha and every beta hunts somewhere, and the largest square without hunting covers few cells "
+                f"(at most {FEW:.0%})",
+                free_lines == 0 and square <= FEW,
+                f"{share(hunts, valid):.0%} of the cells hunt; {free_lines} lines and a square of {square:.1%} are "
+                "free of hunting",
+            ),
+        )
+    )
+
+
+def _along(x: np.ndarray, y: np.ndarray, hunts: np.ndarray) -> float:
+    """Mean over the rows of the rank correlation of x and y, all of one shape, over the cells that hunt."""
+    found = np.array([trend(*pair) for pair in ((a[h], b[h]) for a, b, h in zip(x, y, hunts, strict=True))])
+    return float(found[np.isfinite(found)].mean()) if np.isfinite(found).any() else np.nan

@@ -1,0 +1,64 @@
+"""Fig. 16: crossover and stroke of the isolated rig, at both stiffnesses of the joint."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from friso.studies.thesis.claims import ABOUT, Evidence, Finding, Part, judges
+from friso.studies.thesis.maps import ends, share, table
+
+_AXES = ("controller.crossover", "joint.stroke")
+
+_SAME = 0.15
+"""Share by which a limit that "no longer depends" on the stroke may still change."""
+
+
+@judges("F16A", figure="16A", needs=("isolator-crossover",))
+def isolated_rig_needs_crossover(evidence: Evidence) -> Finding:
+    """The crossover below which the isolated rig hunts, at each stroke."""
+    crossover, stroke, hunts, valid = table(evidence.maps["isolator-crossover"], *_AXES)
+    found = ends(crossover, hunts)
+    long, longest = stroke >= stroke[-1] / 2, stroke >= 0.75 * stroke[-1]
+    third, fourth = found[long & ~longest].mean(), found[longest].mean()
+    below = (crossover[:, None] < found[None, :]) & long[None, :] & valid
+    return Finding(
+        (
+            Part(
+                "at every stroke of the upper half of the range it hunts at some crossover, and at none from a higher "
+                "one on",
+                bool(hunts[:, long].any(axis=0).all() and not hunts[-1, long].any()),
+                f"mean limit {found[long].mean():.3g} Hz ({found[long].min():.3g} to {found[long].max():.3g} Hz); "
+                f"{share(hunts, below):.0%} of the cells below it hunt",
+            ),
+            Part(
+                "the mean limits over the third and over the fourth quarter of the strokes differ by at most "
+                f"{_SAME:.0%}, and the limit of stroke 0 is higher than both by a factor of {ABOUT:g} at least",
+                bool(abs(third - fourth) <= _SAME * third and found[0] >= ABOUT * max(third, fourth)),
+                f"{third:.3g} Hz over the third and {fourth:.3g} Hz over the fourth quarter; {found[0]:.3g} Hz at "
+                "stroke 0",
+            ),
+        )
+    )
+
+
+@judges("F16B", figure="16B", needs=("isolator-crossover", "isolator-crossover-soft"))
+def softer_joint_lowers_the_limit(evidence: Evidence) -> Finding:
+    """The limits of both stiffnesses, stroke by stroke."""
+    names = ("isolator-crossover", "isolator-crossover-soft")
+    maps = [table(evidence.maps[name], *_AXES) for name in names]
+    stiff, soft = (ends(crossover, hunts) for crossover, _, hunts, _ in maps)
+    stroke = maps[0][1]
+    long = stroke >= stroke[-1] / 2
+    drop = (stiff - soft)[long]
+    error = float(drop.std(ddof=1) / np.sqrt(drop.size))
+    return Finding(
+        (
+            Part(
+                "over the strokes of the upper half of the range, the mean limit at 1e3 N/m is lower than at 2.4e3 N/m "
+                "by more than twice the standard error of the mean difference",
+                bool(drop.mean() > 2 * error and drop.mean() > 0),
+                f"{soft[long].mean():.3g} against {stiff[long].mean():.3g} Hz: lower by {drop.mean():.2g} ± "
+                f"{error:.2g} Hz",
+            ),
+        )
+    )

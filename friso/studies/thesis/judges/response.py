@@ -1,0 +1,35 @@
+"""Fig. 5: the response of the locked rig."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from friso.hunting import BANDS
+from friso.studies.thesis.claims import ORDER, Evidence, Finding, Part, judges
+
+
+@judges("F5", figure="5", needs=("locked",))
+def locked_rig_hunts(evidence: Evidence) -> Finding:
+    """Counted peaks, period and amplitude of the locked rig."""
+    cell = evidence.responses["locked"].cell
+    peaks, period, amplitude = int(cell["peaks"]), float(cell["period"]), float(cell["peak_to_peak"]) / 2
+    size = f"amplitude {amplitude * 1e3:.3g} mm" if amplitude > BANDS[0] else "no amplitude"
+    return Finding(
+        (
+            Part(
+                "at least two peaks are counted after 10 s (one alone makes no cycle)",
+                peaks >= 2,
+                f"{peaks} peaks",
+            ),
+            Part(
+                f"the period lies between {1 / ORDER:.2g} s and 10 s",
+                1 / ORDER <= period <= 10,
+                f"period {period:.3g} s" if np.isfinite(period) else "no period",
+            ),
+            Part(
+                f"the amplitude (half of peak to peak) lies between {1 / ORDER:.2g} and {ORDER:.2g} mm",
+                1e-3 / ORDER <= amplitude <= 1e-3 * ORDER,
+                size,
+            ),
+        )
+    )

@@ -1,0 +1,98 @@
+"""Fig. 14: stiffness of the joint, damping of its limiter, and stroke."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from friso.studies.thesis.claims import ABOUT, ORDER, TREND, Evidence, Finding, Part, Response, judges
+from friso.studies.thesis.maps import begins, ends, table, trend
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+_NEEDED = 1e-4
+"""Stroke that the isolator needs with large damping of its limiter [m] (Sec. 4.1)."""
+
+_LARGE_DAMPING = 1e2
+"""Limiter damping from which it is called large [N s/m]: the upper two of the six decades studied."""
+
+
+@judges("F14A", figure="14A", needs=("isolator-stiffness", "locked"))
+def stiffness_has_a_limit(evidence: Evidence) -> Finding:
+    """The stiffness above which the isolated rig hunts, at each stroke."""
+    runs = evidence.maps["isolator-stiffness"]
+    stiffness, stroke, hunts, _ = table(runs, "joint.stiffness", "joint.stroke")
+    found = begins(stiffness, hunts)
+    works = ~hunts[0]  # strokes at which the softest joint of the range settles
+    rises = trend(stroke[works], found[works])
+    shortest = stroke[works][0] * 1e3 if works.any() else np.nan
+    span = f"{found[works][0]:.3g} N/m at {shortest:.2g} mm, {found[-1]:.3g} N/m at {stroke[-1] * 1e3:.2g} mm"
+    force = found[works] * stroke[works]
+    why = (
+        f"idealisation: below {shortest:.2g} mm even the softest joint of the range hunts, and at the limit the joint "
+        f"carries {force.min():.2g} to {force.max():.2g} N at its stroke, with a static friction of 3 N: the force at "
+        "full stroke, from which the thesis argues, does not set the limit"
+        if works.any()
+        else ""
+    )
+    return Finding(
+        (
+            Part(
+                "at the largest stroke the softest joint settles and the stiffest hunts",
+                bool(not hunts[0, -1] and hunts[-1, -1]),
+                f"limit {found[-1]:.3g} N/m" if hunts[:, -1].any() else "no stiffness of the range hunts",
+            ),
+            Part(
+                "the limit rises as the stroke gets smaller, over the strokes at which the softest joint settles "
+                f"(rank correlation with the stroke at most {-TREND:g})",
+                rises <= -TREND,
+                f"rank correlation {rises:.2f}: {span}" if works.any() else "the softest joint settles nowhere",
+                why if rises >= TREND else "",
+            ),
+            _locked_at_no_stroke(runs, evidence.responses["locked"]),
+        )
+    )
+
+
+def _locked_at_no_stroke(runs: xr.Dataset, locked: Response) -> Part:
+    """The cells of stroke 0 beside the locked rig."""
+    none = runs.sel({"joint.stroke": 0.0})
+    peaks, same = int(locked.cell["peaks"]), none["verdict"].values == locked.cell["verdict"].item()
+    counted = none["peaks"].values
+    return Part(
+        "at stroke 0 every cell has the verdict of the locked rig and its count within one",
+        bool(same.all() and np.all(np.abs(counted - peaks) <= 1)),
+        f"{same.sum()} of {same.size} cells have its verdict; counts {counted.min():g} to {counted.max():g} against "
+        f"{peaks}",
+    )
+
+
+@judges("F14B", figure="14B", needs=("isolator-damping", "locked"))
+def damped_limiter_needs_stroke(evidence: Evidence) -> Finding:
+    """The stroke that ends hunting where the limiter is damped much, and beside the hunting amplitude."""
+    damping, stroke, hunts, _ = table(evidence.maps["isolator-damping"], "joint.limiter_damping", "joint.stroke")
+    needed = np.exp(ends(np.log(stroke), hunts.T))
+    large, small = needed[damping >= _LARGE_DAMPING], needed[damping < 1]
+    at_large = float(np.median(large))
+    locked = evidence.responses["locked"].cell
+    amplitude = float(locked["peak_to_peak"]) / 2
+    ratio = at_large / amplitude if locked["verdict"] == "hunts" else np.nan
+    return Finding(
+        (
+            Part(
+                f"with limiter damping of {_LARGE_DAMPING:g} N s/m and more, the median stroke that ends hunting is "
+                f"about {_NEEDED * 1e3:g} mm (from {_NEEDED / ABOUT * 1e3:.2g} to {_NEEDED * ABOUT * 1e3:.2g} mm)",
+                bool(_NEEDED / ABOUT <= at_large <= _NEEDED * ABOUT),
+                f"stroke needed {at_large * 1e3:.2g} mm; with damping below 1 N s/m {np.median(small) * 1e3:.2g} mm",
+            ),
+            Part(
+                f"that stroke is far below the amplitude of the locked rig's cycle (at most {1 / ORDER:.2g} of it)",
+                ratio <= 1 / ORDER,
+                f"{ratio:.2g} of the amplitude of {amplitude * 1e3:.2g} mm"
+                if np.isfinite(ratio)
+                else "the locked rig does not hunt",
+            ),
+        )
+    )

@@ -1,0 +1,63 @@
+"""What judges read off a map: where it hunts, limits, trends, blocks without hunting."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.stats import rankdata
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+def table(runs: xr.Dataset, rows: str, columns: str) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Coordinates of rows and columns [SI], hunting (bool) and valid (bool), both of shape (rows, columns)."""
+    verdict = runs["verdict"].transpose(rows, columns).values
+    valid = (verdict != "invalid") & (verdict != "failed")
+    return runs[rows].values, runs[columns].values, verdict == "hunts", valid
+
+
+def counts(runs: xr.Dataset, rows: str, columns: str) -> np.ndarray:
+    """Peak counts, shape (rows, columns)."""
+    return runs["peaks"].transpose(rows, columns).values
+
+
+def ends(values: np.ndarray, hunts: np.ndarray) -> np.ndarray:
+    """For each column of `hunts`, shape (n, columns), the value beyond which it hunts no more.
+
+    `values` ascend, shape (n,). The limit lies halfway from the last that hunts to the next. Where it is outside the
+    range, the end of the range stands for it.
+    """
+    steps = np.concatenate((values[:1], (values[:-1] + values[1:]) / 2, values[-1:]))
+    return np.array([steps[np.flatnonzero(column)[-1] + 1] if column.any() else steps[0] for column in hunts.T])
+
+
+def begins(values: np.ndarray, hunts: np.ndarray) -> np.ndarray:
+    """As `ends`, but the value below which it does not hunt yet."""
+    return -ends(-values[::-1], hunts[::-1])
+
+
+def trend(x: np.ndarray, y: np.ndarray) -> float:
+    """Spearman's rank correlation of the known pairs; NaN for fewer than three or where one of them is constant."""
+    known = ~(np.isnan(x) | np.isnan(y))
+    ranks = [rankdata(each[known]) for each in (x, y)]
+    if known.sum() < 3 or any(np.ptp(rank) == 0 for rank in ranks):
+        return np.nan
+    return float(np.corrcoef(*ranks)[0, 1])
+
+
+def free_square(hunts: np.ndarray, valid: np.ndarray) -> float:
+    """Share of the valid cells that the largest square of valid cells without hunting covers."""
+    free = valid & ~hunts
+    side = free.astype(int)  # of the largest free square whose last corner is the cell
+    for i in range(1, side.shape[0]):
+        for j in range(1, side.shape[1]):
+            if free[i, j]:
+                side[i, j] = 1 + min(side[i - 1, j], side[i, j - 1], side[i - 1, j - 1])
+    return float(side.max(initial=0) ** 2 / max(1, valid.sum()))
+
+
+def share(part: np.ndarray, whole: np.ndarray) -> float:
+    """Share of the cells of `whole` that are in `part` too; NaN of an empty whole."""
+    return float((part & whole).sum() / whole.sum()) if whole.any() else np.nan

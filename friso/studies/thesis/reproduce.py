@@ -1,0 +1,178 @@
+"""The reproduction of the thesis: every study and response, every claim judged, and what each judgement hangs on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from friso.engine.simulate import simulate
+from friso.hunting import COUNTED_ABOVE
+from friso.stage import StageError
+from friso.studies.sweep import sweep
+from friso.studies.thesis.claims import Claim, Evidence, Response, claims, registered
+from friso.studies.thesis.judges.shares import NARROW, WIDE
+from friso.studies.thesis.open_parameters import METHOD, OPEN, RTOL, Variant
+from friso.studies.thesis.studies import LOCKED, NOTHING, STUDIES, ThesisStudy, rig
+from friso.studies.thesis.verdicts import Verdict, not_covered, verdict
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+POINTS = 41
+"""Values per axis: 0.4 Hz apart in Fig. 16."""
+
+COARSE = 21
+"""Values per axis at which what the thesis leaves open is varied."""
+
+VERIFIED = 0.05
+"""Share of the cells of a shown map that are run again at a tighter tolerance."""
+
+TIGHT = 1e-8
+"""Relative tolerance beside the thesis's own for Fig. 14B."""
+
+RESPONSES: Mapping[str, Mapping[str, object]] = {
+    "locked": LOCKED,
+    WIDE: {**LOCKED, "friction.static": "4 N", "friction.coulomb": "0.5 N"},
+    NARROW: {**LOCKED, "friction.static": "4 N", "friction.coulomb": "1.5 N"},
+}
+"""The runs shown in time, Fig. 5 and 13: what each changes in the rig."""
+
+Progress = Callable[[int, int, str], None]
+
+
+@dataclass(frozen=True)
+class Reproduction:
+    """All that was found: maps by study name and responses by name; the map of Fig. 14B by relative tolerance
+    and the share of its cells whose verdict differs between them (NaN if not computed); a verdict per claim; values
+    per axis of the maps (`points`) and of those with the open parameters varied (`coarse`)."""
+
+    maps: Mapping[str, xr.Dataset]
+    responses: Mapping[str, Response]
+    tolerances: Mapping[float, xr.Dataset]
+    changed: float
+    verdicts: tuple[Verdict, ...]
+    points: int
+    coarse: int
+    rtol: float
+
+
+def reproduce(
+    names: Iterable[str] | None = None, points: int = POINTS, rtol: float = 1e-6, progress: Progress | None = None
+) -> Reproduction:
+    """Run the studies `names` (default: all of Table 3), `points` values per axis, and judge the claims.
+
+    A claim that needs a study left out is "not yet covered". `progress` is called with steps done, steps in all
+    and what comes next. Raises StageError for an unknown study or too few points, ValueError for an unusable rtol.
+    """
+    studies = _chosen(names)
+    if points < 3:
+        raise StageError("points", str(points), "3 or more values per axis", "41")
+    coarse, variants = min(points, COARSE), (*OPEN, *METHOD)
+    tell = _Teller(progress, 3 + len(variants) + 1)
+    tell("maps")
+    baseline = _evidence(studies, points, rtol, VERIFIED)
+    tell("Fig. 14B at two tolerances")
+    tolerances = {each: _map(s, NOTHING, points, each) for s in studies if s.panel == "14B" for each in (RTOL, TIGHT)}
+    tell("coarse maps")
+    plain = baseline if coarse == points else _evidence(studies, coarse, rtol)
+    varied: list[tuple[Variant, Evidence]] = []
+    for variant in variants:
+        tell(f"{variant.parameter} {variant.value}")
+        of_grid = variant.kind == "unknown parameter"
+        near = (coarse, plain) if of_grid else (points, baseline)
+        varied.append((variant, _varied(studies, near[0], rtol, variant, near[1])))
+    tell("done")
+    verdicts = tuple(_judged(claim, baseline, plain, varied) for claim in claims())
+    return Reproduction(
+        baseline.maps, baseline.responses, tolerances, _changed(tolerances), verdicts, points, coarse, rtol
+    )
+
+
+def _chosen(names: Iterable[str] | None) -> tuple[ThesisStudy, ...]:
+    if names is None:
+        return tuple(STUDIES.values())
+    chosen = list(names)
+    for name in chosen:
+        if name not in STUDIES:
+            raise StageError("study", repr(name), f"one of {', '.join(STUDIES)}", "path")
+    return tuple(study for name, study in STUDIES.items() if name in chosen)
+
+
+class _Teller:
+    """Counts the steps for a progress callback, which may be missing."""
+
+    def __init__(self, progress: Progress | None, total: int) -> None:
+        self.progress, self.total, self.done = progress, total, 0
+
+    def __call__(self, what: str) -> None:
+        if self.progress:
+            self.progress(self.done, self.total, what)
+        self.done += 1
+
+
+def _evidence(studies: Iterable[ThesisStudy], points: int, rtol: float, verify: float = 0.0) -> Evidence:
+    """The baseline."""
+    return Evidence(
+        {study.name: _map(study, NOTHING, points, rtol, verify) for study in studies},
+        {name: _response(changes, NOTHING, rtol) for name, changes in RESPONSES.items()},
+    )
+
+
+def _varied(studies: Iterable[ThesisStudy], points: int, rtol: float, variant: Variant, plain: Evidence) -> Evidence:
+    """The evidence with one variant; maps that it does not touch are the baseline's."""
+    tolerance, changes = variant.rtol or rtol, variant.changes
+    maps = {
+        study.name: _map(study, changes, points, tolerance) if variant.touches(study) else plain.maps[study.name]
+        for study in studies
+    }
+    responses = {name: _response(each, changes, tolerance) for name, each in RESPONSES.items()}
+    if variant.kind == "metric":
+        maps = {name: lasting(runs) for name, runs in maps.items()}
+        responses = {name: Response(lasting(each.cell), each.trace) for name, each in responses.items()}
+    return Evidence(maps, responses)
+
+
+def _map(
+    study: ThesisStudy, changes: Mapping[str, object], points: int, rtol: float, verify: float = 0.0
+) -> xr.Dataset:
+    return sweep(study.stage(changes), study.axes(points), links=dict(study.links), rtol=rtol, verify=verify)
+
+
+def _response(own: Mapping[str, object], changes: Mapping[str, object], rtol: float) -> Response:
+    """One run in time; a variant's changes come before the run's own, which tell it apart from the others."""
+    stage = rig().replace(dict(changes)).replace(dict(own))
+    cell = sweep(stage, {"joint.locked": [stage.flat()["joint.locked"]]}, rtol=rtol).isel({"joint.locked": 0})
+    return Response(cell, simulate(stage, rtol))
+
+
+def lasting(runs: xr.Dataset) -> xr.Dataset:
+    """The runs with a verdict by what is left at their end: "hunts" where the last quarter still swings by twice the
+    height from which peaks count, else "settles", with no peaks; invalid and failed cells stay."""
+    swings = runs["peak_to_peak"] > 2 * COUNTED_ABOVE
+    judged = runs["verdict"].isin(["hunts", "settles", "transient"])
+    words = np.where(swings, "hunts", "settles")
+    verdict = runs["verdict"].copy(data=np.where(judged, words, runs["verdict"]))
+    peaks = runs["peaks"].where(swings | ~judged, 0.0)
+    return runs.assign(verdict=verdict, peaks=peaks)
+
+
+def _changed(tolerances: Mapping[float, xr.Dataset]) -> float:
+    """Share of cells whose verdict differs between the two tolerances."""
+    if not tolerances:
+        return np.nan
+    loose, tight = (runs["verdict"].values for runs in tolerances.values())
+    return float((loose != tight).mean())
+
+
+def _judged(claim: Claim, baseline: Evidence, plain: Evidence, varied: Iterable[tuple[Variant, Evidence]]) -> Verdict:
+    entry = registered().get(claim.id)
+    if entry is None:
+        return not_covered(claim, "work of a later step")
+    missing = sorted(entry.needs - baseline.maps.keys() - baseline.responses.keys())
+    if missing:
+        return not_covered(claim, f"not computed in this run: {', '.join(missing)}")
+    findings = [(variant, entry.judge(evidence)) for variant, evidence in varied]
+    return verdict(claim, entry.figure, entry.judge(baseline), entry.judge(plain), findings)

@@ -1,0 +1,108 @@
+"""From findings to the verdict on a claim: the judgement, the reason found, and what it depends on."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from friso.studies.thesis.claims import Claim, Finding, Judgement
+from friso.studies.thesis.open_parameters import Variant
+
+_ORDER: dict[Judgement, int] = {"differs": 0, "holds in part": 1, "holds": 2}
+
+
+@dataclass(frozen=True)
+class Dependence:
+    """A variant under which other parts hold: its judgement, and the numbers of the parts that turned."""
+
+    variant: Variant
+    judgement: Judgement
+    numbers: tuple[str, ...]
+
+    def __str__(self) -> str:
+        turned = "; ".join(self.numbers)
+        return f"{self.variant.parameter} {self.variant.value}: {self.judgement} ({turned})"
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What stands beside a claim; `finding` is None for one that is not covered.
+
+    `depends_on` are the open parameters at which other parts hold than in the baseline, `hangs_on` the same for
+    tolerance and metric; `grid` says what a coarser grid does to it, empty for nothing.
+    """
+
+    claim: Claim
+    judgement: Judgement
+    figure: str
+    finding: Finding | None
+    reason: str
+    depends_on: tuple[Dependence, ...] = ()
+    hangs_on: tuple[Dependence, ...] = ()
+    grid: str = ""
+
+    @property
+    def dependence(self) -> str:
+        """One sentence on the open parameters, and one on tolerance and metric where they matter."""
+        if self.finding is None:
+            return ""
+        opened = "Does not depend on the open parameters."
+        if self.depends_on:
+            opened = f"Depends on {_listed(self.depends_on)}."
+        return f"{opened} Turns with {_listed(self.hangs_on)}." if self.hangs_on else opened
+
+
+def _listed(dependences: Iterable[Dependence]) -> str:
+    """Each parameter once, with what is judged at which value."""
+    by_name: dict[str, list[str]] = {}
+    for each in dependences:
+        by_name.setdefault(each.variant.parameter, []).append(f"{each.variant.value}: {each.judgement}")
+    return "; ".join(f"{name} ({', '.join(values)})" for name, values in by_name.items())
+
+
+def not_covered(claim: Claim, reason: str) -> Verdict:
+    """A claim with no judge, or without what its judge needs."""
+    return Verdict(claim, "not yet covered", "", None, reason)
+
+
+def verdict(
+    claim: Claim, figure: str, baseline: Finding, plain: Finding, varied: Iterable[tuple[Variant, Finding]]
+) -> Verdict:
+    """The baseline's judgement, and the variants under which other parts hold.
+
+    Open parameters are varied on a coarser grid, on which `plain` is the baseline: what turns on it already is
+    the grid's doing and no dependence.
+    """
+    usual = {baseline.pattern, plain.pattern}
+    depends, hangs = [], []
+    for variant, finding in varied:
+        of_grid = variant.kind == "unknown parameter"
+        if finding.pattern not in (usual if of_grid else {baseline.pattern}):
+            numbers = _turned(plain if of_grid else baseline, finding)
+            (depends if of_grid else hangs).append(Dependence(variant, finding.judgement, numbers))
+    grid = ""
+    if plain.pattern != baseline.pattern:
+        grid = f"on the coarser grid: {plain.judgement} ({'; '.join(_turned(baseline, plain))})"
+    reason = _reason(baseline, [*depends, *hangs], grid)
+    return Verdict(claim, baseline.judgement, figure, baseline, reason, tuple(depends), tuple(hangs), grid)
+
+
+def _turned(one: Finding, other: Finding) -> tuple[str, ...]:
+    """The numbers of the other's parts that hold where the first's do not, or the reverse."""
+    pairs = zip(one.parts, other.parts, strict=True)
+    return tuple(after.number for before, after in pairs if before.holds != after.holds)
+
+
+def _reason(baseline: Finding, other: Sequence[Dependence], grid: str) -> str:
+    """Why a claim does not hold: the variants under which it holds better, by kind, and what the judge found itself."""
+    if baseline.judgement == "holds":
+        return ""
+    better: dict[str, list[str]] = {}
+    for each in other:
+        if _ORDER[each.judgement] > _ORDER[baseline.judgement]:
+            kind = f"{each.variant.kind} ({each.judgement} with"
+            better.setdefault(kind, []).append(f"{each.variant.parameter} {each.variant.value}")
+    named = [f"{kind} {', '.join(values)})" for kind, values in better.items()]
+    own = dict.fromkeys(part.why for part in baseline.parts if not part.holds and part.why)
+    found = "; ".join((*named, *own, *([grid] if grid else [])))
+    return found or "no variant of what the thesis leaves open makes it hold"

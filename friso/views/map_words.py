@@ -1,0 +1,181 @@
+"""What the axes, variables and cells of a map are called, and what is said about the whole of it."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Iterable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from friso.views.figure import GREY, INK, ORANGE, PINK, VERMILLION, Kind
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+_QUANTITIES = {
+    "controller.alpha": "Controller α",
+    "controller.beta": "Controller β",
+    "controller.crossover": "Crossover",
+    "controller.force_limit": "Force limit",
+    "controller.tuned_mass": "Tuned mass",
+    "friction.bristle_damping": "Bristle damping",
+    "friction.bristle_stiffness": "Bristle stiffness",
+    "friction.coulomb": "Coulomb friction",
+    "friction.static": "Static friction",
+    "friction.stribeck_exponent": "Stribeck exponent",
+    "friction.stribeck_velocity": "Stribeck velocity",
+    "friction.viscous": "Viscous friction",
+    "joint.limiter_damping": "Limiter damping",
+    "joint.limiter_stiffness": "Limiter stiffness",
+    "joint.locked": "Joint",
+    "masses.cart": "Cart mass",
+    "masses.stage": "Stage mass",
+    "motion.acceleration": "Acceleration",
+    "motion.acceleration_time": "Acceleration time",
+}
+_VARIABLES = {
+    "peaks": "Counted peaks",
+    "verdict": "Verdict",
+    "status": "Status",
+    "peak_to_peak": "Peak to peak, last quarter",
+    "period": "Period",
+    "settling_time": "Settling time into 1 µm",
+    "settling_time_10um": "Settling time into 10 µm",
+    "largest_force": "Largest actuator force",
+    "steps": "Solver steps",
+    "rejected": "Rejected solver steps",
+}
+
+QUIET = "#d3e6f3"  # no hunting: a pale blue, far from every colour of hunting and from white and grey
+INVALID = Kind("invalid", "#b4b4b4")
+FAILED = Kind("failed", INK)
+NOT_RUN = Kind("not run", "#ffffff")
+VERDICTS = {
+    "hunts": Kind("hunts", VERMILLION),
+    "bistable": Kind("bistable", PINK),
+    "transient": Kind("transient", ORANGE),
+    "settles": Kind("settles", QUIET),
+    "failed": FAILED,
+    "invalid": INVALID,
+    "": NOT_RUN,
+}
+"""The verdicts a cell can have, the worst first, in the colours of every map."""
+# Cells without numbers of their own: paler than the verdict they are said to have, so that both can stand in a map.
+INFERRED = {
+    "hunts": Kind("hunts (inferred)", "#f3c39e"),
+    "bistable": Kind("bistable (inferred)", "#ecd3e0"),
+    "transient": Kind("transient (inferred)", "#f7dfa8"),
+    "settles": Kind("settles (inferred)", "#e4efe0"),
+}
+_NO_NUMBER = "#e8dcc6"
+
+
+def quantity(key: Hashable) -> str:
+    """An axis in words: "joint.stroke" is "Joint stroke", a free name is itself."""
+    name = str(key)
+    if name in _QUANTITIES:
+        return _QUANTITIES[name]
+    words = name.removeprefix("controller.").removeprefix("motion.").replace("_", " ").replace(".", " ")
+    return words[:1].upper() + words[1:]
+
+
+def variable(name: Hashable) -> str:
+    """A variable in words: "period" is "Period"."""
+    return _VARIABLES.get(str(name)) or quantity(name)
+
+
+def verdict_kind(word: str) -> Kind:
+    """Label and colour of a verdict; one that is not known here is grey, under its own name."""
+    return VERDICTS.get(word) or Kind(word, GREY)
+
+
+def no_number(name: str) -> Kind:
+    """What it means that a run that was completed has no such number."""
+    if name.startswith("settling_time"):
+        band = variable(name).removeprefix("Settling time into ")
+        return Kind(f"never settles into {band}", _NO_NUMBER)
+    return Kind("no period" if name == "period" else "no value", _NO_NUMBER)
+
+
+def grouped(number: int) -> str:
+    """A count in groups of three digits: 1 000 000."""
+    return f"{number:,}".replace(",", " ")
+
+
+def in_order(kinds: Iterable[Kind]) -> tuple[Kind, ...]:
+    """Each kind once, in the order of every legend: verdicts, the worst first, then what has no verdict."""
+    order = [*VERDICTS.values(), *INFERRED.values()]
+    return tuple(sorted(dict.fromkeys(kinds), key=lambda kind: order.index(kind) if kind in order else len(order)))
+
+
+def unit_of(array: xr.DataArray) -> str:
+    """SI unit of a variable or coordinate; none for counts and words."""
+    unit = str(array.attrs.get("units", ""))
+    return "" if unit == "1" else unit
+
+
+def words_of(runs: xr.Dataset, name: str) -> tuple[np.ndarray, list[str]]:
+    """The texts of a variable: their numbers, of its shape, and each text once (by its first place)."""
+    import pandas as pd
+
+    values = runs[name].values
+    codes, words = pd.factorize(values.astype(object).ravel())
+    return codes.reshape(values.shape), [str(word) for word in words]
+
+
+def counts(runs: xr.Dataset, name: str) -> dict[str, int]:
+    """How many cells have each text of a variable, the most frequent first; none where there is no such variable."""
+    if name not in runs:
+        return {}
+    codes, words = words_of(runs, name)
+    numbers = np.bincount(codes.ravel(), minlength=len(words))
+    return {words[i]: int(numbers[i]) for i in np.argsort(-numbers, kind="stable")}
+
+
+def failures(runs: xr.Dataset) -> dict[str, int]:
+    """How many cells have no result, by the reason in their status."""
+    return {
+        reason: number
+        for reason, number in counts(runs, "status").items()
+        if reason != "done" and not reason.startswith("inferred")
+    }
+
+
+def verdict_counts(runs: xr.Dataset) -> dict[str, int]:
+    """How many cells have each verdict, in the order of the legend."""
+    found = {verdict_kind(word): number for word, number in counts(runs, "verdict").items()}
+    return {kind.label: found[kind] for kind in in_order(found)}
+
+
+def verification(runs: xr.Dataset) -> str:
+    """How many of the verdicts checked survive a tighter tolerance, with Wilson's 95 % confidence interval."""
+    checked = int(runs.attrs.get("verified_cells", 0))
+    if not checked:
+        return "Not verified: no verdict was checked at a tighter tolerance."
+    from scipy.stats import binomtest
+
+    surviving = int(runs.attrs["verified_surviving"])
+    interval = binomtest(surviving, checked).proportion_ci(0.95, method="wilson")
+    rtol = float(runs.attrs["verified_rtol"])
+    return (
+        f"{100 * surviving / checked:.1f} % of {grouped(checked)} verdicts checked survive rtol {rtol:g} "
+        f"(95 % confidence: {100 * interval.low:.1f} to {100 * interval.high:.1f} %)."
+    )
+
+
+def statement(runs: xr.Dataset) -> str:
+    """What stands on every figure of a map: its verification, its tolerance and its number of runs."""
+    return f"{verification(runs)}\n{_extent(runs)}"
+
+
+def _extent(runs: xr.Dataset) -> str:
+    cells = int(np.prod(list(runs.sizes.values())))
+    status = counts(runs, "status")
+    inferred = sum(number for reason, number in status.items() if reason.startswith("inferred"))
+    verdicts = verdict_counts(runs)
+    idle = sum(verdicts.get(kind.label, 0) for kind in (INVALID, NOT_RUN))
+    runs_text = f"{grouped(cells - idle - inferred)} runs at rtol {float(runs.attrs['rtol']):g}"
+    if inferred:
+        runs_text += f", {grouped(inferred)} cells inferred from their neighbours"
+    listed = ", ".join(f"{label} {grouped(number)}" for label, number in verdicts.items())
+    return f"{runs_text}: {listed}." if listed else f"{runs_text}."

@@ -1,0 +1,291 @@
+"use strict";
+(() => {
+  const data = JSON.parse(document.getElementById("data").textContent);
+  const NONE = 255; // no kind: the number counts
+  const GREY = "#767676", INK = "#222222";
+  const plot = document.getElementById("plot");
+
+  const bytes = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
+  for (const item of data.variables) {
+    item.codes = bytes(item.codes);
+    item.numbers = new Float32Array(bytes(item.numbers).buffer);
+  }
+  for (const item of data.texts) item.codes = new Uint32Array(bytes(item.codes).buffer);
+
+  // Axes: of a map two, then those with a control; points (samples, or a single axis) stand by themselves.
+  const points = data.sampled || data.axes.length === 1;
+  const [across, up, ...further] = data.order;
+  const sizes = data.indices.map((places) => places.length);
+  const at = sizes.map(() => 0); // the slice, and where the selected cell is
+  let selected = false;
+  let shown = data.variables.find((item) => item.name === data.metric);
+
+  const cellOf = (where) => where.reduce((cell, place, i) => cell * sizes[i] + place, 0);
+  const escaped = (text) => text.replace(/&/g, "&amp;").replace(/</g, "&lt;").replace(/>/g, "&gt;");
+  const labelled = (item) => (item.unit ? `${item.label} [${item.unit}]` : item.label);
+  const six = (value) => String(Number(value.toPrecision(6)));
+  const withUnit = (value, unit) => (unit ? `${six(value)} ${unit}` : six(value));
+  const valueAt = (axis, place) =>
+    axis.words.length ? axis.words[axis.values[place]] : withUnit(axis.values[place], axis.unit);
+
+  function element(name, parent, text = "") {
+    const made = document.createElement(name);
+    made.textContent = text;
+    parent.append(made);
+    return made;
+  }
+
+  // ------------------------------------------------------------------ drawing
+
+  function plotAxis(axis) {
+    const style = { title: { text: escaped(labelled(axis)), standoff: 8 }, showline: true, linecolor: GREY,
+      ticks: "outside", tickcolor: GREY, zeroline: false, showgrid: points, gridcolor: "#e3e3e3",
+      type: axis.log ? "log" : "linear", exponentformat: axis.log ? "power" : "none" };
+    if (axis.log) style.dtick = 1;
+    if (axis.words.length) {
+      const every = Math.ceil(axis.words.length / 12);
+      const ticks = axis.words.map((_, i) => i).filter((i) => i % every === 0);
+      Object.assign(style, { tickmode: "array", tickvals: ticks, ticktext: ticks.map((i) => escaped(axis.words[i])) });
+    }
+    return style;
+  }
+
+  // plotly finds the edges between cell centres itself, but makes a single cell one unit wide
+  function cells(axis) {
+    const values = axis.values;
+    if (values.length > 1) return values;
+    const half = Math.abs(values[0]) / 2 || 0.5;
+    return axis.log ? [values[0] / 2, values[0] * 2] : [values[0] - half, values[0] + half];
+  }
+
+  function scaled(item) {
+    const bar = { thickness: 14, outlinewidth: 0, title: { text: escaped(labelled(item)), side: "right" } };
+    if (item.ticks.length) Object.assign(bar, { tickmode: "array", tickvals: item.ticks, ticktext: item.texts });
+    return { colorscale: item.stops, low: item.low, high: item.high, bar };
+  }
+
+  function kindScale(item) {
+    const count = item.kinds.length;
+    const stops = item.kinds.flatMap((kind, i) => [[i / count, kind.colour], [(i + 1) / count, kind.colour]]);
+    return { colorscale: stops, low: -0.5, high: count - 0.5 };
+  }
+
+  const drawn = (item, value) => (item.log ? Math.max(Math.log10(value), item.low) : value);
+
+  function mapTraces() {
+    const [x, y] = [data.axes[across], data.axes[up]];
+    const where = at.slice();
+    const grid = (tell) => y.values.map((_, row) => x.values.map((_, column) => {
+      where[across] = column;
+      where[up] = row;
+      return tell(cellOf(where));
+    }));
+    const counts = (cell) => shown.codes[cell] === NONE;
+    const kind = (cell) => (counts(cell) ? "" : escaped(shown.kinds[shown.codes[cell]].label));
+    const spots = `${place("x", x)}, ${place("y", y)}`;
+    const layer = (scale, z, customdata) => ({ type: "heatmap", x: cells(x), y: cells(y), z, customdata,
+      colorscale: scale.colorscale, zmin: scale.low, zmax: scale.high, showscale: Boolean(scale.bar),
+      colorbar: scale.bar, hoverongaps: false, hovertemplate: `${spots}: %{customdata}<extra></extra>` });
+    const traces = [];
+    if (shown.codes.includes(NONE)) {
+      traces.push(layer(scaled(shown), grid((cell) => (counts(cell) ? drawn(shown, shown.numbers[cell]) : null)),
+        grid((cell) => escaped(withUnit(shown.numbers[cell], shown.unit)))));
+    }
+    if (shown.kinds.length) {
+      traces.push(layer(kindScale(shown), grid((cell) => (counts(cell) ? null : shown.codes[cell])), grid(kind)));
+    }
+    return traces;
+  }
+
+  const place = (name, axis) => (axis.words.length ? `%{${name}}` : `%{${name}:.5~g} ${escaped(axis.unit)}`);
+
+  // Points: samples over their first two keys, or one variable over a single axis; kinds stand under the numbers.
+  function pointTraces() {
+    const x = data.axes[across].values;
+    const numbers = Array.from(shown.numbers);
+    const finite = numbers.filter((value, cell) => shown.codes[cell] === NONE);
+    const [low, high] = finite.length ? finite.reduce(([a, b], v) => [Math.min(a, v), Math.max(b, v)], [Infinity, -Infinity]) : [0, 0];
+    const under = shown.log ? low / 2 : low - 0.08 * (high - low || Math.abs(high) || 1);
+    const height = (cell) => {
+      if (data.sampled) return data.axes[up].values[cell];
+      if (!finite.length) return shown.codes[cell];
+      return shown.codes[cell] === NONE ? numbers[cell] : under;
+    };
+    const layer = (members, marker, tell, mode) => ({ type: "scatter", mode, x: members.map((cell) => x[cell]),
+      y: members.map(height), customdata: members, text: members.map(tell), marker, showlegend: false,
+      line: { color: "#0072B2", width: 1.4 }, hovertemplate: "%{text}<extra></extra>" });
+    const spot = (cell) => (data.sampled ? [across, up] : [across])
+      .map((number) => escaped(valueAt(data.axes[number], cell))).join(", ");
+    const all = numbers.map((_, cell) => cell);
+    const traces = [];
+    const run = all.filter((cell) => shown.codes[cell] === NONE);
+    if (run.length) {
+      const scale = scaled(shown);
+      const marker = data.sampled
+        ? { color: run.map((cell) => drawn(shown, numbers[cell])), colorscale: scale.colorscale, cmin: scale.low,
+            cmax: scale.high, showscale: true, colorbar: scale.bar, size: 8, line: { color: GREY, width: 0.6 } }
+        : { color: "#0072B2", size: 7 };
+      const gaps = data.sampled ? run : all;
+      const trace = layer(gaps, marker, (cell) => `${spot(cell)}: ${withUnit(numbers[cell], shown.unit)}`, data.sampled ? "markers" : "lines+markers");
+      if (!data.sampled) trace.y = gaps.map((cell) => (shown.codes[cell] === NONE ? numbers[cell] : null));
+      traces.push(trace);
+    }
+    shown.kinds.forEach((kind, code) => {
+      const members = all.filter((cell) => shown.codes[cell] === code);
+      const marker = { color: kind.colour, symbol: "square", size: 9, line: { color: GREY, width: 1 } };
+      if (members.length) traces.push(layer(members, marker, (cell) => `${spot(cell)}: ${escaped(kind.label)}`, "markers"));
+    });
+    return [traces, height];
+  }
+
+  function draw() {
+    let traces, height;
+    if (points) [traces, height] = pointTraces();
+    else traces = mapTraces();
+    const layout = { template: "none", margin: { l: 72, r: 14, t: 30, b: 54 }, hovermode: "closest",
+      font: { family: "system-ui, sans-serif", size: 12, color: INK }, showlegend: false, hoverlabel: { bgcolor: "#444444", font: { color: "white" } },
+      xaxis: plotAxis(data.axes[across]), yaxis: plotAxis(yAxis()), uirevision: "kept" };
+    if (selected) traces.push(ring(height));
+    const config = { displaylogo: false, responsive: true, showSendToCloud: false, plotlyServerURL: "",
+      modeBarButtons: [["toImage"], ["zoom2d", "pan2d"], ["zoomIn2d", "zoomOut2d", "resetScale2d"]] };
+    Plotly.react(plot, traces, layout, config);
+    drawKey();
+  }
+
+  function yAxis() {
+    if (data.sampled || !points) return data.axes[up];
+    const numbers = shown.codes.includes(NONE);
+    return { label: shown.label, unit: shown.unit, log: shown.log && numbers,
+      words: numbers ? [] : shown.kinds.map((kind) => kind.label) };
+  }
+
+  function ring(height) {
+    const cell = data.sampled ? at[0] : cellOf(at);
+    const x = data.axes[across].values[data.sampled ? cell : at[across]];
+    const y = points ? height(cell) : data.axes[up].values[at[up]];
+    const marker = { symbol: "circle", size: 11, color: "white", line: { color: INK, width: 3 } };
+    return { type: "scatter", mode: "markers", x: [x], y: [y], marker, hoverinfo: "skip", showlegend: false };
+  }
+
+  function drawKey() {
+    const key = document.getElementById("key");
+    key.replaceChildren();
+    shown.kinds.forEach((kind, code) => {
+      if (!shown.codes.includes(code)) return;
+      const entry = element("li", key);
+      const swatch = element("span", entry);
+      swatch.className = "swatch";
+      swatch.style.background = kind.colour;
+      entry.append(kind.label);
+    });
+  }
+
+  // ------------------------------------------------------------------ the selected cell
+
+  function describe() {
+    const section = document.getElementById("cell");
+    section.replaceChildren();
+    const cell = data.sampled ? at[0] : cellOf(at);
+    const indices = data.indices.map((places, i) => places[at[i]]);
+    element("h2", section, data.sampled ? `Sample ${indices[0]}` : `Cell ${indices.join(" ")}`);
+    const body = element("tbody", element("table", section));
+    const row = (name, text) => {
+      const line = element("tr", body);
+      element("th", line, name).scope = "row";
+      element("td", line, text);
+    };
+    data.axes.forEach((axis, i) => row(axis.label, valueAt(axis, data.sampled ? cell : at[i])));
+    for (const item of data.texts) row(item.label, item.words[item.codes[cell]] || "–");
+    for (const item of data.variables) {
+      if (item.name === "verdict") continue;
+      const value = item.numbers[cell];
+      const kind = item.codes[cell] === NONE ? "" : item.kinds[item.codes[cell]].label;
+      row(item.label, Number.isFinite(value) ? withUnit(value, item.unit) : kind);
+    }
+    showRerun(section, data.rerun.split("{indices}").join(indices.join(" ")));
+  }
+
+  function showRerun(section, command) {
+    const line = element("p", section);
+    line.className = "rerun";
+    const code = element("code", line, command);
+    const button = element("button", line, "Copy");
+    button.type = "button";
+    button.addEventListener("click", () => {
+      const marked = () => {
+        getSelection().selectAllChildren(code);
+        button.textContent = document.execCommand("copy") ? "Copied" : "Press Ctrl+C";
+      };
+      if (!navigator.clipboard) return marked();
+      navigator.clipboard.writeText(command).then(() => { button.textContent = "Copied"; }, marked);
+    });
+  }
+
+  function select() {
+    selected = true;
+    describe();
+    draw();
+  }
+
+  function clicked(event) {
+    const hit = event.points[0];
+    if (points && hit.customdata === undefined) return;
+    if (points) at[0] = hit.customdata;
+    else [at[up], at[across]] = hit.pointIndex;
+    select();
+  }
+
+  function moved(event) {
+    const steps = { ArrowLeft: [across, -1], ArrowRight: [across, 1], ArrowDown: [up, -1], ArrowUp: [up, 1] };
+    const step = steps[event.key];
+    if (!step || event.target !== plot) return;
+    const axis = points ? 0 : step[0];
+    if (selected) at[axis] = Math.min(Math.max(at[axis] + step[1], 0), sizes[axis] - 1);
+    event.preventDefault();
+    select();
+  }
+
+  // ------------------------------------------------------------------ controls
+
+  function choice(controls, title, options, chosen, act) {
+    const menu = element("select", element("label", controls, title));
+    options.forEach((text, i) => { element("option", menu, text).value = i; });
+    menu.value = chosen;
+    menu.addEventListener("change", () => act(Number(menu.value)));
+  }
+
+  function slider(controls, axis, act) {
+    const label = element("label", controls, axis.label);
+    const input = element("input", label);
+    const told = element("output", label, valueAt(axis, 0));
+    Object.assign(input, { type: "range", min: 0, max: axis.values.length - 1, step: 1, value: 0 });
+    input.addEventListener("input", () => {
+      told.textContent = valueAt(axis, Number(input.value));
+      act(Number(input.value));
+    });
+  }
+
+  function addControls() {
+    const controls = document.getElementById("controls");
+    const names = data.variables.map((item) => item.label);
+    choice(controls, "Shown", names, data.variables.indexOf(shown), (i) => {
+      shown = data.variables[i];
+      draw();
+    });
+    for (const number of points ? [] : further) {
+      const axis = data.axes[number];
+      const act = (place) => {
+        at[number] = place;
+        if (selected) describe();
+        draw();
+      };
+      if (axis.words.length) choice(controls, axis.label, axis.values.map((_, i) => valueAt(axis, i)), 0, act);
+      else slider(controls, axis, act);
+    }
+  }
+
+  addControls();
+  draw();
+  plot.on("plotly_click", clicked);
+  plot.addEventListener("keydown", moved);
+})();

@@ -1,0 +1,161 @@
+"""Studies on a Dask cluster of separate processes: the same bits, workers that die, workers that do not fit."""
+
+import os
+import signal
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+import xarray as xr
+from distributed import LocalCluster
+
+import friso
+from friso.stage import Stage, StageError
+from friso.studies import distribute
+from friso.studies.distribute import connected, local_cluster
+from friso.studies.store import Store
+from friso.studies.study import make_study
+from friso.studies.sweep import run_in_memory, run_in_store
+
+EXAMPLES = Path(__file__).parent.parent / "examples"
+AXES = {"controller.crossover": "2 Hz..16 Hz:12", "joint.stroke": "0.1 mm..1 mm:16"}
+
+pytestmark = [
+    pytest.mark.xdist_group("rig"),
+    # distributed's own: sockets that are closed by the garbage collector
+    pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::pytest.PytestUnraisableExceptionWarning"),
+]
+
+
+@pytest.fixture(scope="module")
+def rig() -> Stage:
+    return friso.load(EXAMPLES / "thesis_rig.toml")
+
+
+@pytest.fixture(scope="module")
+def cluster() -> Iterator[LocalCluster]:
+    with LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=":0") as cluster:
+        yield cluster
+
+
+def test_the_same_bits_as_in_one_process(rig: Stage, cluster: LocalCluster) -> None:
+    with connected(cluster.scheduler_address) as crew:
+        assert crew.size == 2
+        (found,) = run_in_memory([make_study(rig, AXES)], crew)
+    xr.testing.assert_identical(found, friso.sweep(rig, AXES))
+
+
+def test_a_local_cluster_of_its_own_verifies_too(rig: Stage) -> None:
+    with local_cluster(1) as crew:
+        (found,) = run_in_memory([make_study(rig, AXES)], crew, verify=0.05)
+    xr.testing.assert_identical(found, friso.sweep(rig, AXES, verify=0.05))
+
+
+def test_a_worker_uses_no_more_threads_than_it_was_given(rig: Stage, cluster: LocalCluster) -> None:
+    """A kernel that took all processors of the machine would show as more running threads than the worker has."""
+    with connected(cluster.scheduler_address) as crew:
+        study = make_study(rig, {"controller.crossover": "2 Hz..16 Hz:300"}, rtol=1e-8)
+        counts: list[int] = []
+        pids = list(crew.executor._client.run(os.getpid).values())
+        stop = threading.Event()
+
+        def count() -> None:
+            while not stop.is_set():
+                for pid in pids:
+                    names = [
+                        (Path(entry) / "stat").read_text().rsplit(")", 1)[1].split()[0]
+                        for entry in Path(f"/proc/{pid}/task").iterdir()
+                    ]
+                    counts.append(names.count("R"))
+                time.sleep(0.002)
+
+        watcher = threading.Thread(target=count)
+        watcher.start()
+        run_in_memory([study], crew)
+        stop.set()
+        watcher.join()
+    busy = [n for n in counts if n]
+    assert busy
+    assert sum(n > 2 for n in busy) < 0.05 * len(busy)  # the computing thread, and now and then the one that talks
+
+
+def test_a_killed_worker_costs_only_its_blocks(rig: Stage, tmp_path: Path) -> None:
+    study, path = make_study(rig, AXES, rtol=1e-9), tmp_path / "a.zarr"
+    computed: list[int] = []
+    with (
+        LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=":0") as cluster,
+        connected(cluster.scheduler_address) as crew,
+    ):
+        pids = list(crew.executor._client.run(os.getpid).values())
+
+        def kill_after_two(cells: int) -> None:
+            computed.append(cells)
+            if len(computed) == 3:
+                os.kill(pids[0], signal.SIGKILL)
+
+        run_in_store(study, path, crew, 0.0, kill_after_two)
+    with Store.opened(path, study) as store:
+        assert list(store.missing()) == []
+        found = store.read().load()
+    assert sum(computed) == study.cells  # every block was handed over once
+    whole = friso.sweep(rig, AXES, rtol=1e-9)
+    for name in ("verdict", "status"):
+        found[name] = found[name].astype(object)
+    xr.testing.assert_identical(found, whole)
+
+
+def test_a_worker_with_another_friso_is_refused(cluster: LocalCluster, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(distribute, "equations_version", lambda: "9.9.9 (0123456789ab)")
+    with pytest.raises(StageError, match=r"has friso 0\.1\.0 .*") as error, connected(cluster.scheduler_address):
+        pass
+    assert "9.9.9 (0123456789ab)" in str(error.value)
+
+
+def test_a_worker_that_joins_later_with_another_friso_is_refused(rig: Stage, cluster: LocalCluster) -> None:
+    with connected(cluster.scheduler_address) as crew:
+        crew.arguments["expected"] = "9.9.9 (0123456789ab)"
+        with pytest.raises(StageError, match="a worker has friso"):
+            run_in_memory([make_study(rig, AXES)], crew)
+
+
+def test_kernels_are_compiled_once_per_worker(rig: Stage, cluster: LocalCluster) -> None:
+    def loaded() -> int:
+        from friso.engine.kernel import _loaded
+
+        return _loaded.cache_info().misses
+
+    with connected(cluster.scheduler_address) as crew:
+        run_in_memory([make_study(rig, AXES)], crew)
+        before = crew.executor._client.run(loaded)
+        run_in_memory([make_study(rig, AXES)], crew)
+        assert crew.executor._client.run(loaded) == before
+        assert all(count == 1 for count in before.values())
+
+
+def test_a_scheduler_that_does_not_answer(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(distribute, "PATIENCE", 0.3)
+    for address in ("tcp://127.0.0.1:9", "nonsense", "tcp://no.such.host.invalid:8786"):
+        with pytest.raises(StageError, match="a Dask scheduler that answers"), connected(address):
+            pass
+
+
+def test_a_scheduler_without_workers() -> None:
+    with (
+        LocalCluster(n_workers=0, dashboard_address=":0") as empty,
+        pytest.raises(StageError, match="without workers"),
+        connected(empty.scheduler_address),
+    ):
+        pass
+
+
+def test_ctrl_c_leaves_no_task_behind(rig: Stage, cluster: LocalCluster) -> None:
+    def interrupt(cells: int) -> None:
+        raise KeyboardInterrupt
+
+    with connected(cluster.scheduler_address) as crew:
+        with pytest.raises(KeyboardInterrupt):
+            run_in_memory([make_study(rig, AXES, rtol=1e-8)], crew, 0.0, interrupt)
+        (found,) = run_in_memory([make_study(rig, AXES)], crew)
+    assert (found.verdict != "").all()

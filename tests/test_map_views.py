@@ -1,0 +1,565 @@
+"""Figures and pages of maps, on runs made up here: looking at maps needs no engine."""
+
+from __future__ import annotations
+
+import base64
+import hashlib
+import json
+import math
+import re
+import subprocess
+import sys
+from dataclasses import replace
+from html.parser import HTMLParser
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+from matplotlib.colors import to_hex
+
+from friso.views import matplotlib_renderer, plotly_renderer
+from friso.views.colours import painted, ramp, scale
+from friso.views.drawable import cell_edges, colour_key, drawable
+from friso.views.figure import Cloud, Figure, Kind, Map
+from friso.views.map_cells import axes_of, look, pick
+from friso.views.map_data import MOST, NONE
+from friso.views.map_figures import SLICES, map_figure, map_panel
+from friso.views.map_page import map_html, write_map_page
+from friso.views.map_words import FAILED, INFERRED, INVALID, NOT_RUN, QUIET, VERDICTS, quantity, statement, verification
+
+CROSSOVER, STROKE, DAMPING, LOCKED = (
+    "controller.crossover",
+    "joint.stroke",
+    "joint.limiter_damping",
+    "joint.locked",
+)
+UNITS = {CROSSOVER: "Hz", STROKE: "m", DAMPING: "N*s/m", LOCKED: ""}
+RERUN = "friso simulate --cell map.zarr {indices}"
+
+
+def made_up(axes: dict[str, Any], log: tuple[str, ...] = (), **attrs: Any) -> xr.Dataset:
+    """Runs over these axes whose every cell has its own numbers; the verdict follows the count of peaks."""
+    dims = tuple(axes)
+    shape = tuple(len(values) for values in axes.values())
+    cell = np.arange(math.prod(shape), dtype=float).reshape(shape)
+    peaks = cell % 4
+    numbers = {
+        "peaks": (peaks, "1"),
+        "peak_to_peak": (1e-4 + 1e-6 * cell, "m"),
+        "period": (np.where(peaks > 0, 1 + cell / 7, np.nan), "s"),
+        "settling_time_10um": (np.where(peaks > 0, np.nan, 0.3 + cell / 9), "s"),
+    }
+    variables: dict[str, Any] = {name: (dims, array, {"units": unit}) for name, (array, unit) in numbers.items()}
+    variables["verdict"] = (dims, np.where(peaks > 0, "hunts", "settles").astype("<U9"))
+    variables["status"] = (dims, np.full(shape, "done", dtype="<U60"))
+    coords = {key: (key, values, {"units": UNITS.get(key, "")}) for key, values in axes.items()}
+    runs = xr.Dataset(variables, coords, {"name": "Rig", "stage": 'name = "Rig"\n', "friso": "1", "rtol": 1e-4} | attrs)
+    for key in log:
+        runs[key].attrs["scale"] = "log"
+    return runs
+
+
+def plain(**attrs: Any) -> xr.Dataset:
+    return made_up({CROSSOVER: np.linspace(1, 16, 4), STROKE: np.linspace(0, 1e-3, 5)}, **attrs)
+
+
+def troubled() -> xr.Dataset:
+    """Row by row along the crossover: an invalid, a failed, a missing and two inferred cells; the others ran."""
+    runs = plain()
+    cells = [("invalid", "invalid: x"), ("failed", "step budget used up"), ("", "not run: interrupted")]
+    cells += [("hunts", "inferred: neighbours agree"), ("settles", "inferred: neighbours agree")]
+    for i, (verdict, status) in enumerate(cells):
+        runs["verdict"][0, i], runs["status"][0, i] = verdict, status
+        for name in ("peaks", "peak_to_peak", "period", "settling_time_10um"):
+            runs[name][0, i] = np.nan
+    runs["peaks"][0, 1] = 3.0  # counted before the run failed: not to be trusted
+    return runs
+
+
+def only_map(figure: Figure) -> Map:
+    assert len(figure.panels) == 1
+    return figure.panels[0].maps[0]
+
+
+def kinds_shown(field: Map | Cloud) -> list[list[Kind | None]]:
+    assert field.codes is not None
+    return [[None if np.isnan(code) else field.kinds[int(code)] for code in row] for row in np.atleast_2d(field.codes)]
+
+
+# ---------------------------------------------------------------- words
+
+
+def test_axes_are_written_in_the_words_of_an_engineer():
+    runs = made_up({DAMPING: np.geomspace(0.1, 1e3, 5), STROKE: np.linspace(0, 1e-3, 3)}, log=(DAMPING,))
+    panel = drawable(map_figure(runs)).panels[0]
+    assert (panel.x.label, panel.y.label) == ("Limiter damping [N·s/m]", "Joint stroke [mm]")
+    assert (panel.x.log, panel.y.log) == (True, False)
+    assert [quantity(key) for key in (CROSSOVER, "mass", "joint.stiffness", "controller.kp", "motion.duration")] == [
+        "Crossover",
+        "Mass",
+        "Joint stiffness",
+        "Kp",
+        "Duration",
+    ]
+
+
+def test_the_verification_stands_on_the_figure():
+    figure = map_figure(plain(verified_cells=84, verified_surviving=81, verified_rtol=1e-6))
+    share, z = 81 / 84, 1.959963984540054
+    middle = (share + z**2 / 168) / (1 + z**2 / 84)
+    half = z * math.sqrt(share * (1 - share) / 84 + z**2 / (4 * 84**2)) / (1 + z**2 / 84)  # Wilson (1927)
+    said = (
+        "96.4 % of 84 verdicts checked survive rtol 1e-06 "
+        f"(95 % confidence: {100 * (middle - half):.1f} to {100 * (middle + half):.1f} %)."
+    )
+    assert figure.note.splitlines() == [said, "20 runs at rtol 0.0001: hunts 15, settles 5."]
+    on_paper = " ".join(text.get_text() for text in matplotlib_renderer.render(figure).texts)
+    assert said in on_paper
+    assert said in plotly_renderer.render(figure).layout.annotations[0].text
+    assert verification(plain()) == "Not verified: no verdict was checked at a tighter tolerance."
+
+
+def test_runs_that_were_not_made_are_not_counted():
+    assert statement(troubled()).splitlines()[1] == (
+        "16 runs at rtol 0.0001, 2 cells inferred from their neighbours: "
+        "hunts 13, settles 4, failed 1, invalid 1, not run 1."
+    )
+
+
+# ---------------------------------------------------------------- cells
+
+
+def test_cells_without_number_are_told_apart_and_never_zero():
+    field = only_map(map_figure(troubled(), "peaks"))
+    column = [row[0] for row in kinds_shown(field)]
+    assert column == [INVALID, FAILED, NOT_RUN, INFERRED["hunts"], INFERRED["settles"]]
+    assert np.isnan(field.z[:, 0]).all()
+    assert np.array_equal(field.z[:, 1:], troubled().peaks.values[1:].T)
+    assert all(kind is None for row in kinds_shown(field) for kind in row[1:])
+    everything = [
+        QUIET,
+        *ramp(11),
+        *(kind.colour for kind in {*field.kinds, *VERDICTS.values()} if kind.label != "settles"),
+    ]
+    assert len(set(everything)) == len(everything)
+
+
+def test_a_number_that_a_run_does_not_have_is_named():
+    never = only_map(map_figure(troubled(), "settling_time_10um"))
+    assert kinds_shown(never)[1][1] == Kind("never settles into 10 µm", never.kinds[-1].colour)
+    assert kinds_shown(only_map(map_figure(plain(), "period")))[0][0].label == "no period"
+
+
+def test_verdicts_have_their_own_colours_in_the_order_of_severity():
+    runs = troubled()
+    runs["verdict"][3, 0] = "strange"
+    field = only_map(map_figure(runs, "verdict"))
+    names = [kind.label for kind in field.kinds]
+    assert names == ["hunts", "settles", "failed", "invalid", "not run", "strange"]
+    shown = [[kind.label for kind in row] for row in kinds_shown(field)]
+    expected = np.where(runs.verdict.values == "", "not run", runs.verdict.values).T
+    assert shown == expected.tolist()
+    kinds, _ = colour_key(map_figure(runs, "verdict"))
+    assert [kind.label for kind in kinds] == names
+    assert not field.has_numbers
+
+
+def test_peaks_have_one_colour_per_count():
+    runs = plain()
+    runs["peaks"][0, 0] = 30
+    drawn = scale(only_map(map_figure(runs)))
+    assert (drawn.low, drawn.high, len(drawn.colours)) == (-0.5, 30.5, 31)
+    assert drawn.colours[0] == QUIET
+    assert len(set(drawn.colours)) == 31
+    mesh = matplotlib_renderer.render(map_figure(plain())).axes[0].collections[0]
+    assert [to_hex(mesh.to_rgba(float(count))) for count in range(4)] == [QUIET, *ramp(3)]
+
+
+def test_amplitudes_over_many_decades_are_logarithmic_and_end_above_the_noise():
+    runs = plain()
+    runs["peak_to_peak"][:, 0] = 1e-13
+    field = only_map(drawable(map_figure(runs, "peak_to_peak")))
+    drawn = scale(field)
+    assert field.log
+    assert drawn.texts[0].startswith("≤ ")
+    assert painted(field).min() == drawn.low == pytest.approx(math.log10(field.z.max()) - 6)
+    assert not only_map(map_figure(plain(), "peak_to_peak")).log
+
+
+def test_variables_may_be_missing():
+    runs = plain()[["peak_to_peak"]]
+    runs["peak_to_peak"][1, 1] = np.nan
+    assert kinds_shown(only_map(map_figure(runs, "peak_to_peak")))[1][1].label == "no value"
+    assert "20 runs" in statement(runs)
+    by_status = troubled().drop_vars("verdict")
+    assert kinds_shown(only_map(map_figure(by_status)))[1][0] is FAILED
+    with pytest.raises(ValueError, match=r"metric: got 'peaks', expected one of peak_to_peak"):
+        map_figure(runs, "peaks")
+
+
+# ---------------------------------------------------------------- axes
+
+
+def test_logarithmic_cells_are_centred_by_ratio():
+    values = np.geomspace(0.1, 1000, 5)
+    assert cell_edges(values, log=True) == pytest.approx(np.geomspace(0.1, 1000, 5)[0] * 10 ** np.arange(-0.5, 5))
+    assert cell_edges(np.array([0.0, 1.0, 4.0])) == pytest.approx([-0.5, 0.5, 2.5, 5.5])
+    assert cell_edges(np.array([0.0])) == pytest.approx([-0.5, 0.5])
+    assert cell_edges(np.array([8.0]), log=True) == pytest.approx([4.0, 16.0])
+    figure = map_figure(made_up({DAMPING: values, STROKE: [0.0, 1e-3]}, log=(DAMPING,)))
+    axes = matplotlib_renderer.render(figure).axes[0]
+    corners = np.asarray(axes.collections[0].get_coordinates())
+    assert corners[0, :, 0] == pytest.approx(cell_edges(values, log=True))
+    assert corners[:, 0, 1] == pytest.approx([-0.5, 0.5, 1.5])
+    assert axes.get_xlim() == pytest.approx((corners[0, 0, 0], corners[0, -1, 0]))
+    assert plotly_renderer.render(figure).layout.xaxis.type == "log"
+
+
+def test_unsorted_axes_are_drawn_in_order():
+    runs = made_up({CROSSOVER: np.array([8.0, 2.0, 4.0]), STROKE: np.array([2e-3, 1e-3])})
+    field = only_map(map_figure(runs, "peak_to_peak"))
+    assert field.x.tolist() == [2.0, 4.0, 8.0]
+    assert np.array_equal(field.z, runs.peak_to_peak.sortby([CROSSOVER, STROKE]).values.T)
+
+
+def test_words_and_a_logarithm_of_zero_become_named_cells():
+    figure = map_figure(made_up({LOCKED: [True, False], DAMPING: [0.0, 1.0, 10.0]}, log=(DAMPING,)))
+    panel = figure.panels[0]
+    assert panel.x.words == ("locked", "free")
+    assert panel.y.words == ("0 N·s/m", "1 N·s/m", "10 N·s/m")
+    assert not panel.y.log
+    paper = matplotlib_renderer.render(figure).axes[0]
+    assert [text.get_text() for text in paper.get_xticklabels()] == ["locked", "free"]
+    assert plotly_renderer.render(figure).layout.yaxis.ticktext == panel.y.words
+
+
+def test_the_evaluation_point_is_marked():
+    figure = map_figure(plain(), marker={CROSSOVER: 8.0, STROKE: 3e-4, "masses.cart": 1.2})
+    point = drawable(figure).panels[0].markers[0]
+    assert (point.x.tolist(), point.y.tolist()) == ([8.0], [pytest.approx(0.3)])
+    assert [marker.label for marker in colour_key(figure)[1]] == ["evaluation point"]
+    outside = map_figure(plain(), marker={CROSSOVER: 40.0, STROKE: 3e-4}).panels[0]
+    assert outside.x.limits == pytest.approx((-1.5, 40.0))
+    with pytest.raises(ValueError, match=r"marker: got joint.stroke, expected a value of controller.crossover too"):
+        map_figure(plain(), marker={STROKE: 1e-3})
+    words = map_panel(made_up({LOCKED: [True, False], STROKE: [0.0, 1e-3]}), marker={LOCKED: False, STROKE: 0.0})
+    assert words.markers[0].x.tolist() == [1.0]
+    with pytest.raises(ValueError, match=r"joint.locked: got 'maybe', expected one of locked, free"):
+        map_panel(made_up({LOCKED: [True, False], STROKE: [0.0]}), marker={LOCKED: "maybe", STROKE: 0.0})  # type: ignore[dict-item]
+
+
+def test_a_slice_says_where_it_was_cut():
+    runs = made_up({CROSSOVER: np.linspace(1, 16, 4), STROKE: np.linspace(0, 1e-3, 5), LOCKED: [True, False]})
+    cut = runs.isel({LOCKED: 1})
+    assert map_panel(cut).title == "Counted peaks, Joint free"
+    assert map_panel(cut, title="A").title == "A"
+    assert np.array_equal(map_panel(cut).maps[0].z, cut.peaks.values.T)
+    with pytest.raises(ValueError, match=r"map_panel: got runs over .*joint.locked, expected two axes"):
+        map_panel(runs)
+
+
+def test_two_maps_side_by_side_keep_their_own_scales():
+    other = plain()
+    other["peaks"][0, 0] = 9
+    panels = tuple(map_panel(runs, title=title) for runs, title in ((plain(), "A"), (other, "B")))
+    figure = Figure("both", "Both", "", panels, columns=2)
+    bars = [
+        trace.colorbar.x for trace in plotly_renderer.render(figure).data if trace.type == "heatmap" and trace.showscale
+    ]
+    assert len(bars) == 2
+    assert sum(axes.get_label() == "<colorbar>" for axes in matplotlib_renderer.render(figure).axes) == 2
+
+
+# ---------------------------------------------------------------- more and fewer axes
+
+
+def test_further_axes_become_slices_on_one_scale():
+    axes = {
+        CROSSOVER: np.linspace(1, 16, 4),
+        LOCKED: [True, False],
+        STROKE: np.linspace(0, 1e-3, 3),
+        "mass": np.arange(1.0, 8),
+    }
+    runs = made_up(axes)
+    figure = map_figure(runs, marker={CROSSOVER: 6.0, STROKE: 0.0, LOCKED: False})
+    assert len(figure.panels) == 8 <= SLICES
+    titles = [panel.title for panel in figure.panels]
+    assert titles[:2] == ["Joint locked, Mass 1", "Joint locked, Mass 3"]
+    assert figure.caption == "Not shown: Mass 2, 4, 6."
+    assert figure.caption in figure.note
+    assert [bool(panel.markers) for panel in figure.panels] == [False] * 4 + [True] * 4
+    second = runs.isel({LOCKED: 0, "mass": 2})
+    assert np.array_equal(figure.panels[1].maps[0].z, second.peaks.transpose(STROKE, CROSSOVER).values)
+    assert sum(axes.get_label() == "<colorbar>" for axes in matplotlib_renderer.render(figure).axes) == 1
+    assert sum(bool(trace.showscale) for trace in plotly_renderer.render(figure).data if trace.type == "heatmap") == 1
+
+
+def test_a_panel_without_numbers_leaves_the_colour_bar_to_another():
+    runs = made_up({CROSSOVER: [1.0, 2.0], STROKE: [0.0, 1e-3], LOCKED: [True, False]})
+    runs["verdict"][:, :, 0], runs["peaks"][:, :, 0] = "invalid", np.nan
+    traces = plotly_renderer.render(map_figure(runs)).data
+    assert [trace.xaxis for trace in traces if trace.type == "heatmap" and trace.showscale] == ["x2"]
+
+
+@pytest.mark.parametrize(("sizes", "most"), [((5, 5), 9), ((10, 2), 9), ((2, 2, 2, 2), 9), ((1000, 1000, 2), 250_000)])
+def test_picks_are_spread_evenly_and_no_more_than_fit(sizes, most):
+    picked = pick(sizes, most)
+    kept = [len(indices) for indices in picked]
+    assert most / 2.1 < math.prod(kept) <= most
+    for indices, size in zip(picked, sizes, strict=True):
+        assert len(set(indices.tolist())) == len(indices)
+        assert 0 <= indices.min() <= indices.max() < size
+        assert len(indices) < 2 or np.ptp(np.diff(indices)) <= 1
+
+
+def test_a_single_axis_is_a_line_with_what_has_no_number_under_it():
+    runs = troubled().isel({CROSSOVER: 0})
+    runs["peaks"][3], runs["status"][3] = 5.0, "done"
+    runs["peaks"][4], runs["status"][4] = 2.0, "done"
+    panel = map_figure(runs).panels[0]
+    assert panel.series[0].y == pytest.approx([np.nan, np.nan, np.nan, 5, 2], nan_ok=True)
+    under = {marker.label: marker for marker in panel.markers[1:]}
+    assert list(under) == ["failed", "invalid", "not run"]
+    assert under["failed"].x.tolist() == [0.25e-3]
+    assert all(marker.y.max() < 2.0 for marker in under.values())
+    verdicts = map_figure(runs, "verdict").panels[0]
+    assert verdicts.y.words == ("hunts", "settles", "failed", "invalid", "not run")
+    assert [marker.x.tolist() for marker in verdicts.markers[:2]] == [[pytest.approx(0.75e-3)], [1e-3]]
+
+
+def sampled(**attrs: Any) -> xr.Dataset:
+    runs = made_up({"sample": np.arange(12)}, **attrs).drop_vars("sample")
+    keys = {"mass": (1.0 + np.arange(12), "kg"), STROKE: (1e-3 / (1 + np.arange(12)), "m"), "x": (np.ones(12), "")}
+    runs = runs.assign_coords({key: ("sample", values, {"units": unit}) for key, (values, unit) in keys.items()})
+    runs["verdict"][3], runs["peaks"][3] = "invalid", np.nan
+    return runs
+
+
+def test_samples_are_points_over_the_first_two_keys():
+    figure = map_figure(sampled(), marker={"mass": 2.0, STROKE: 5e-4})
+    panel = drawable(figure).panels[0]
+    assert (panel.x.label, panel.y.label) == ("Mass [kg]", "Joint stroke [mm]")
+    cloud = panel.clouds[0]
+    assert cloud.x.tolist() == sampled().mass.values.tolist()
+    assert kinds_shown(cloud)[0][3] is INVALID
+    assert figure.caption == "Sampled as well: X."
+    assert len(panel.markers) == 1
+    assert [axis.key for axis in axes_of(sampled())] == ["mass", STROKE, "x"]
+
+
+# ---------------------------------------------------------------- renderers
+
+
+EVERY = {
+    "troubled": map_figure(troubled(), marker={CROSSOVER: 8.0, STROKE: 3e-4}),
+    "verdict": map_figure(troubled(), "verdict"),
+    "slices": map_figure(made_up({CROSSOVER: [1.0, 2.0], STROKE: [0.0, 1e-3], LOCKED: [True, False]})),
+    "line": map_figure(plain().isel({CROSSOVER: 0}), "settling_time_10um"),
+    "rows": map_figure(plain().isel({CROSSOVER: 0}), "verdict"),
+    "samples": map_figure(sampled()),
+    "one cell": map_figure(plain().isel({CROSSOVER: [1], STROKE: [0]}), "peak_to_peak"),
+}
+
+
+@pytest.mark.parametrize("figure", EVERY.values(), ids=EVERY)
+def test_both_renderers_draw_the_same(figure):
+    canvas = matplotlib_renderer.render(figure)
+    page = plotly_renderer.render(figure)
+    colours = [
+        np.asarray(layer.get_array().filled(np.nan), float).ravel()
+        for axes in canvas.axes
+        if axes.get_label() != "<colorbar>"
+        for layer in axes.collections
+    ]
+    drawn = [
+        np.asarray(trace.z if trace.type == "heatmap" else trace.marker.color, float).ravel()
+        for trace in page.data
+        if trace.type == "heatmap" or trace.marker.colorscale is not None
+    ]
+    assert len(colours) == len(drawn)
+    assert all(np.array_equal(a, b, equal_nan=True) for a, b in zip(colours, drawn, strict=True))
+    in_key = [text.get_text() for legend in canvas.legends for text in legend.get_texts()]
+    assert in_key == [trace.name for trace in page.data if trace.x is not None and list(trace.x) == [None]]
+    for form in matplotlib_renderer.FORMATS:
+        assert len(matplotlib_renderer.image(figure, form)) > 1000
+
+
+def test_a_large_map_is_a_picture_inside_a_vector_file():
+    runs = made_up({CROSSOVER: np.linspace(1, 16, 150), STROKE: np.linspace(0, 1e-3, 150)})
+    assert b"data:image/png" in matplotlib_renderer.image(map_figure(runs), "svg")
+    assert b"data:image/png" not in matplotlib_renderer.image(map_figure(plain()), "svg")
+
+
+# ---------------------------------------------------------------- page
+
+
+def page_data(page: str) -> dict[str, Any]:
+    found = re.search(r'<script type="application/json" id="data">(.*?)</script>', page, re.DOTALL)
+    assert found
+    return json.loads(found[1])
+
+
+def unpacked(text: str, kind: str) -> np.ndarray:
+    return np.frombuffer(base64.b64decode(text), dtype=kind)
+
+
+class Page(HTMLParser):
+    """Tags, addresses that a browser would load, and the text outside scripts and styles."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.tags: list[str] = []
+        self.loads: list[str] = []
+        self.words = ""
+        self.feed(text.replace(plotly_renderer.script(), ""))
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append(tag)
+        self.loads += [value or "" for name, value in attrs if name in ("src", "href", "srcset", "data")]
+
+    def handle_data(self, data: str) -> None:
+        if self.tags[-1:] not in (["script"], ["style"]):
+            self.words += data
+
+
+def test_a_click_finds_every_value_of_its_cell():
+    runs = troubled().isel({CROSSOVER: [2, 0, 3, 1]})
+    data = page_data(map_html(runs, "peaks", RERUN))
+    assert (data["metric"], data["rerun"], data["sampled"], data["order"]) == ("peaks", RERUN, False, [0, 1])
+    assert data["indices"] == [[1, 3, 0, 2], [0, 1, 2, 3, 4]]
+    places = np.ix_(*data["indices"])
+    crossover, stroke = data["axes"]
+    assert (crossover["label"], crossover["unit"], stroke["unit"]) == ("Crossover", "Hz", "mm")
+    assert crossover["values"] == [1.0, 6.0, 11.0, 16.0]
+    assert stroke["values"] == pytest.approx([0, 0.25, 0.5, 0.75, 1.0])
+    shown = {item["name"]: item for item in data["variables"]}
+    assert list(shown) == ["peaks", "peak_to_peak", "period", "settling_time_10um", "verdict"]
+    factors = {"peak_to_peak": 1e6}
+    for name in list(shown)[:-1]:
+        expected = runs[name].values[places].ravel() * factors.get(name, 1.0)
+        assert unpacked(shown[name]["numbers"], "<f4") == pytest.approx(expected, rel=1e-5, nan_ok=True)
+    assert (shown["peak_to_peak"]["unit"], shown["peak_to_peak"]["label"]) == ("µm", "Peak to peak, last quarter")
+    texts = {item["name"]: item for item in data["texts"]}
+    for name in ("verdict", "status"):
+        words = np.array(texts[name]["words"])[unpacked(texts[name]["codes"], "<u4")]
+        assert words.tolist() == runs[name].values[places].ravel().tolist()
+
+
+def test_the_page_colours_cells_as_the_figure_does():
+    runs = troubled()
+    for name in ("peaks", "verdict", "settling_time_10um"):
+        shown = look(runs, name)
+        item = {item["name"]: item for item in page_data(map_html(runs, name, RERUN))["variables"]}[name]
+        codes = unpacked(item["codes"], "u1").astype(float)
+        assert np.array_equal(np.where(codes == NONE, np.nan, codes), shown.codes.values.ravel(), equal_nan=True)
+        assert item["kinds"] == [{"label": kind.label, "colour": kind.colour} for kind in shown.kinds]
+        drawn = scale(only_map(drawable(map_figure(runs, name))))
+        assert (item["low"], item["high"]) == pytest.approx((drawn.low, drawn.high))
+        assert [colour for _, colour in item["stops"]] == [colour for _, colour in drawn.stops]
+
+
+def test_the_page_opens_offline_and_says_what_it_shows():
+    page = map_html(
+        troubled().assign_attrs(verified_cells=10, verified_surviving=9, verified_rtol=1e-7), "peaks", RERUN
+    )
+    parsed = Page(page)
+    assert page.count(plotly_renderer.script()) == 1
+    assert all(address.startswith("data:image/svg+xml;base64,") for address in parsed.loads)
+    assert "default-src 'none'" in page
+    assert not re.findall(r"https?://[^\"'<> ]*", page.replace(plotly_renderer.script(), ""))
+    for text in (
+        "90.0 % of 10 verdicts checked survive rtol 1e-07",
+        "1 to 16 Hz, 4 values (controller.crossover)",
+        "0 to 1 mm, 5 values (joint.stroke)",
+        "hunts 13, settles 4, failed 1, invalid 1, not run 1",
+        "step budget used up",
+        "relative tolerance 0.0001",
+        'name = "Rig"',
+    ):
+        assert text in parsed.words
+    assert "In this page" not in parsed.words
+
+
+def test_a_page_of_samples_names_their_numbers():
+    data = page_data(map_html(sampled(), "verdict", RERUN))
+    assert (data["sampled"], data["order"], data["indices"]) == (True, [0, 1, 2], [list(range(12))])
+    assert [len(axis["values"]) for axis in data["axes"]] == [12, 12, 12]
+    single = page_data(map_html(plain().isel({CROSSOVER: 0}), "peaks", RERUN))
+    assert (single["order"], single["indices"]) == ([0], [[0, 1, 2, 3, 4]])
+
+
+def test_a_page_too_large_is_thinned_and_says_so():
+    runs = made_up({CROSSOVER: np.linspace(1, 16, 1000), STROKE: np.linspace(0, 1e-3, 400)})[["peaks", "verdict"]]
+    page = map_html(runs, "peaks", RERUN)
+    data = page_data(page)
+    rows, columns = (np.array(indices) for indices in data["indices"])
+    assert 0.9 * MOST < len(rows) * len(columns) <= MOST
+    assert f"{len(rows)} of the 1000 values of Crossover" in Page(page).words
+    peaks = unpacked(data["variables"][0]["numbers"], "<f4")
+    assert np.array_equal(peaks, runs.peaks.values[np.ix_(rows, columns)].ravel())
+    assert data["axes"][0]["values"] == pytest.approx(np.linspace(1, 16, 1000)[rows], rel=1e-5)
+
+
+EVIL = '</script><script>alert("x")</script><img src=x onerror=alert(1)>$&'
+
+
+def test_names_states_and_words_cannot_inject_markup():
+    def runs(word: str) -> xr.Dataset:
+        table = made_up({CROSSOVER: [1.0, 2.0], word: ["a", word]}, name=word, stage=word)
+        table["verdict"][0, 0], table["status"] = "failed", table.status.astype("<U99")
+        table["status"][0, 0] = word
+        table["peaks"].attrs["units"] = word
+        table[CROSSOVER].attrs["units"] = word
+        return table
+
+    plain_page, page = map_html(runs("word"), "peaks", RERUN), map_html(runs(EVIL), "peaks", EVIL + "{indices}")
+    assert sorted(Page(page).tags) == sorted(Page(plain_page).tags)
+    assert EVIL in Page(page).words
+    data = page_data(page)
+    assert data["rerun"] == EVIL + "{indices}"
+    assert EVIL in data["axes"][1]["words"]
+    assert "alert" not in page.replace(plotly_renderer.script(), "").replace("\\u003cscript\\u003ealert", "").replace(
+        "&lt;script&gt;alert", ""
+    ).replace("onerror=alert", "")
+    figure = map_figure(runs(EVIL), "peaks")
+    assert "<img src=x" not in plotly_renderer.fragment(figure)
+    assert matplotlib_renderer.image(figure, "png").startswith(b"\x89PNG")
+
+
+def test_a_command_without_indices_is_refused():
+    with pytest.raises(ValueError, match=r"rerun: got 'friso simulate', expected \{indices\} in it"):
+        map_html(plain(), "peaks", "friso simulate")
+
+
+SCRIPT = """
+import hashlib, sys
+sys.path.insert(0, {tests!r})
+import test_map_views as t
+for figure in t.EVERY.values():
+    print(hashlib.sha256(t.matplotlib_renderer.image(figure, "svg")).hexdigest())
+print(hashlib.sha256(t.map_html(t.troubled(), "peaks", t.RERUN).encode()).hexdigest())
+"""
+
+
+def test_files_are_the_same_bytes_in_every_process(request, tmp_path):
+    done = subprocess.run(
+        [sys.executable, "-c", SCRIPT.format(tests=str(request.path.parent))],
+        env={"PYTHONHASHSEED": "7", "HOME": str(tmp_path), "PYTHONPATH": str(request.config.rootpath)},
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=300,
+    )
+    here = [matplotlib_renderer.image(figure, "svg") for figure in EVERY.values()]
+    write_map_page(troubled(), tmp_path / "map.html", "peaks", RERUN)
+    here.append((tmp_path / "map.html").read_bytes())
+    assert done.stdout.split() == [hashlib.sha256(content).hexdigest() for content in here]
+
+
+def test_arrays_of_different_shape_are_refused():
+    field = only_map(map_figure(plain()))
+    with pytest.raises(ValueError, match=r"codes have the shape \(2,\), expected that of z, \(5, 4\)"):
+        replace(field, codes=np.zeros(2))
+    with pytest.raises(ValueError, match=r"expected one length"):
+        Cloud(np.zeros(2), np.zeros(2), np.zeros(3), "Peaks", "")

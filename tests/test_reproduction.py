@@ -1,0 +1,412 @@
+"""The reproduction of the thesis: its studies as data, its judges on maps made to hold and to fail, its page."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import sympy as sp
+import xarray as xr
+
+import friso
+from friso.studies.thesis import STUDIES, Evidence, Finding, Part, Reproduction, Response, claims, reproduce, rig
+from friso.studies.thesis.claims import _JUDGES, judges, registered
+from friso.studies.thesis.judges import series_stiffness
+from friso.studies.thesis.judges.shares import NARROW, WIDE
+from friso.studies.thesis.maps import begins, ends, free_square, trend
+from friso.studies.thesis.open_parameters import METHOD, OPEN
+from friso.studies.thesis.reproduce import lasting
+from friso.studies.thesis.verdicts import not_covered, verdict
+from friso.views.reproduction import claims_document, reproduction_html, write_reproduction
+
+ROOT = Path(__file__).parent.parent
+POINTS = 21
+
+pytestmark = pytest.mark.xdist_group("reproduction")
+
+TABLE_3 = {
+    "path": {"motion.acceleration": (0, 150), "motion.acceleration_time": (0, 0.15)},
+    "system": {"controller.crossover": (1, 40), "mass": (0.1, 5.1)},
+    "friction": {"friction.static": (0, 4.9), "friction.coulomb": (0, 4.9)},
+    "control": {"controller.alpha": (0.1, 0.3), "controller.beta": (1, 3)},
+    "isolator-stiffness": {"joint.stiffness": (0.5e3, 15e3), "joint.stroke": (0, 1e-3)},
+    "isolator-damping": {"joint.limiter_damping": (1e-2, 1e4), "joint.stroke": (1e-5, 1e-2)},
+    "isolator-masses": {"masses.cart": (0.5, 3), "masses.stage": (0.1, 1)},
+    "isolator-friction": {"friction.static": (0, 4.9), "friction.coulomb": (0, 4.9)},
+    "isolator-crossover": {"controller.crossover": (1, 16), "joint.stroke": (0, 1e-3)},
+    "isolator-crossover-soft": {"controller.crossover": (1, 16), "joint.stroke": (0, 1e-3)},
+}
+"""Typed from the thesis's Table 3, in SI units (crossovers in Hz)."""
+
+
+@pytest.fixture(scope="module")
+def small() -> Reproduction:
+    """Everything, on maps of 5 x 5 cells: what it judges means little, but all of it is there."""
+    return reproduce(points=5)
+
+
+# --- the data ---------------------------------------------------------------------------------------------------------
+
+
+def test_the_studies_have_the_ranges_of_table_3() -> None:
+    assert {
+        name: {span.key: (span.low, span.high) for span in study.spans} for name, study in STUDIES.items()
+    } == TABLE_3
+    logarithmic = {name for name, study in STUDIES.items() if all(span.log for span in study.spans)}
+    assert logarithmic == {"isolator-damping"}
+    assert not any(span.log for name in STUDIES.keys() - logarithmic for span in STUDIES[name].spans)
+
+
+def test_stiffness_and_lock_of_the_studies() -> None:
+    stiffness = {name: study.stage().flat()["joint.stiffness"] for name, study in STUDIES.items()}
+    assert {name for name, value in stiffness.items() if value == 1e3} == {"isolator-crossover-soft"}
+    locked = {name for name, study in STUDIES.items() if study.stage().flat()["joint.locked"]}
+    assert locked == {"path", "system", "friction", "control"}
+
+
+def test_the_markers_are_the_rig() -> None:
+    for study in STUDIES.values():
+        flat = {**study.stage().flat(), "mass": 1.7}
+        assert set(study.marker) == {span.key for span in study.spans}
+        for key, value in study.marker.items():
+            assert flat[key] == pytest.approx(value, rel=1e-12)
+
+
+def test_the_packaged_rig_is_the_example() -> None:
+    assert rig() == friso.load(ROOT / "examples" / "thesis_rig.toml")
+    packaged = files("friso.studies.thesis").joinpath("rig.toml").read_text(encoding="utf-8")
+    assert packaged == (ROOT / "examples" / "thesis_rig.toml").read_text(encoding="utf-8")
+
+
+def test_every_claim_is_in_the_table() -> None:
+    source = ROOT.parent / "shared" / "claims.md"
+    if not source.exists():
+        pytest.skip("the list of claims is not at hand")
+    rows = [line.strip().strip("|").split("|") for line in source.read_text(encoding="utf-8").splitlines()]
+    printed = [[cell.strip() for cell in row] for row in rows if len(row) == 3][2:]
+    assert [(claim.id, claim.text) for claim in claims()] == [(row[0], row[2]) for row in printed]
+    assert all(claim.where for claim in claims())
+
+
+def test_what_simulation_alone_decides_has_a_judge() -> None:
+    needed = {"F5", "F11A", "F11B", "F12A", "F12B", "F13", "F14A", "F14B", "F15A", "F15B", "F16A", "F16B", "E1"}
+    assert needed <= registered().keys()
+    known = STUDIES.keys() | {"locked", WIDE, NARROW}
+    assert all(entry.needs <= known for entry in registered().values())
+
+
+@pytest.mark.parametrize("variant", [*OPEN, *METHOD], ids=lambda v: f"{v.parameter} {v.value}")
+def test_every_variant_is_a_stage(variant: Any) -> None:
+    for study in STUDIES.values():
+        study.stage(variant.changes)
+    assert variant.reason
+    assert variant.changes or variant.rtol
+    assert any(variant.touches(study) for study in STUDIES.values())
+
+
+# --- reading maps -----------------------------------------------------------------------------------------------------
+
+
+def test_limits() -> None:
+    values = np.array([1.0, 2.0, 3.0, 4.0])
+    hunts = np.array([[1, 1, 0, 0], [1, 0, 0, 1], [0, 1, 0, 0], [0, 0, 0, 1]], dtype=bool)
+    assert ends(values, hunts).tolist() == [2.5, 3.5, 1.0, 4.0]
+    assert begins(values, hunts).tolist() == [1.0, 1.0, 4.0, 1.5]
+
+
+def test_trend() -> None:
+    x = np.arange(5.0)
+    assert trend(x, x**3) == pytest.approx(1)
+    assert trend(x, -x) == pytest.approx(-1)
+    assert np.isnan(trend(x, np.ones(5)))
+    assert np.isnan(trend(x[:2], x[:2]))
+
+
+def test_free_square() -> None:
+    hunts = np.ones((10, 10), dtype=bool)
+    hunts[2:5, 3:6] = False
+    assert free_square(hunts, np.ones_like(hunts)) == pytest.approx(0.09)
+    invalid = np.ones_like(hunts)
+    invalid[3, 4] = False
+    assert free_square(hunts, invalid) == pytest.approx(1 / 99)
+
+
+# --- judges on made maps ----------------------------------------------------------------------------------------------
+
+
+def made(name: str, count: Callable[[np.ndarray, np.ndarray], Any], points: int = POINTS) -> xr.Dataset:
+    """A map of the study `name` whose peak counts are a function of both coordinates; negative is invalid."""
+    spans = STUDIES[name].spans
+    x, y = (np.geomspace(s.low, s.high, points) if s.log else np.linspace(s.low, s.high, points) for s in spans)
+    peaks = np.broadcast_to(np.asarray(count(x[:, None], y[None, :]), dtype=float), (points, points))
+    words = np.where(peaks < 0, "invalid", np.where(peaks > 0, "hunts", "settles"))
+    dims = tuple(span.key for span in spans)
+    return xr.Dataset(
+        {"peaks": (dims, np.where(peaks < 0, np.nan, peaks)), "verdict": (dims, words)},
+        coords={dims[0]: x, dims[1]: y},
+    )
+
+
+def cell(peaks: int = 6, amplitude: float = 0.5e-3, period: float = 1.6) -> Response:
+    values = {"peaks": peaks, "peak_to_peak": 2 * amplitude, "period": period}
+    return Response(xr.Dataset({**values, "verdict": "hunts" if peaks else "settles"}), xr.Dataset())
+
+
+def sticks(time: float, integral: float) -> Response:
+    """Sticks of `time` [s] between slips of 0.1 s, in turn to both sides, the integral's share as given."""
+    t = np.arange(0, 20, 1e-3)
+    phase = t % (time + 0.1)
+    way = np.where((t // (time + 0.1)) % 2 == 0, 1.0, -1.0)
+    slow = phase < time
+    force = way * np.where(slow, phase / time * 4, 1.0)
+    trace = {"cart_velocity": np.where(slow, 1e-4, 0.1) * way, "force": force, "friction_force": force}
+    variables = {name: ("time", values) for name, values in {**trace, "force_i": integral * force}.items()}
+    return Response(cell().cell, xr.Dataset(variables, coords={"time": t}))
+
+
+def friction_map(inner: Callable[[np.ndarray, np.ndarray], Any]) -> Callable[[np.ndarray, np.ndarray], Any]:
+    """Invalid where the thesis's model is none, else `inner` of static and Coulomb friction."""
+    return lambda s, c: np.where((c > s) | (c == 0) | (s == 0), -1, inner(s, c))
+
+
+def crossover_pair(stiff: float, soft: float, name: str = "isolator-crossover") -> dict[str, xr.Dataset]:
+    """Limits that fall to the given ones [Hz] up to a stroke of 0.2 mm and stay there."""
+
+    def below(limit: float) -> Callable[[np.ndarray, np.ndarray], Any]:
+        return lambda f, s: 3 * (f < np.maximum(limit, 12 - (12 - limit) * s / 2e-4))
+
+    return {name: made(name, below(stiff)), f"{name}-soft": made(f"{name}-soft", below(soft))}
+
+
+ALTERNATING = [0, 3]
+HOLDS: Mapping[str, tuple[dict[str, xr.Dataset], dict[str, Response]]] = {
+    "F5": ({}, {"locked": cell()}),
+    "F11A": (
+        {
+            "path": made(
+                "path",
+                lambda a, t: (
+                    6
+                    * ((a * t > 0) & ((a * t > 3) | ((np.round(a / 7.5) + np.round(t / 7.5e-3)).astype(int) % 2 == 0)))
+                ),
+            )
+        },
+        {},
+    ),
+    "F11B": ({"system": made("system", lambda f, m: 4 * (f < 20 / np.sqrt(m / 0.1) + 2))}, {}),
+    "F12A": (
+        {"friction": made("friction", friction_map(lambda s, c: np.where(s - c > 0.9, np.round(3 * (s - c)), 0)))},
+        {},
+    ),
+    "F12B": ({"control": made("control", lambda a, b: np.round(40 * a + 12 / b))}, {}),
+    "F13": ({}, {WIDE: sticks(0.6, 0.5), NARROW: sticks(0.9, 0.7)}),
+    "F14A": (
+        {"isolator-stiffness": made("isolator-stiffness", lambda k, s: 6 * ((k * s > 5) | (k > 13e3) | (s == 0)))},
+        {"locked": cell()},
+    ),
+    "F14B": (
+        {"isolator-damping": made("isolator-damping", lambda d, s: 6 * (s < np.where(d > 10, 1e-4, 3e-5)))},
+        {"locked": cell()},
+    ),
+    "F15A": ({"isolator-masses": made("isolator-masses", lambda c, s: 3 * ((c < 0.6) & (s < 0.15)))}, {}),
+    "F15B": (
+        {
+            "isolator-friction": made("isolator-friction", friction_map(lambda s, c: 0 * s * c)),
+            "friction": made("friction", friction_map(lambda s, c: 6 * (s - c > 1))),
+        },
+        {},
+    ),
+    "F16A": (crossover_pair(6, 5), {}),
+    "F16B": (crossover_pair(6, 4.5), {}),
+}
+
+FAILS: Mapping[str, tuple[dict[str, xr.Dataset], dict[str, Response]]] = {
+    "F5": ({}, {"locked": cell(0, 1e-9, np.nan)}),
+    "F11A": ({"path": made("path", lambda a, t: 6 * ((a < 40) & (t < 0.05)))}, {}),
+    "F11B": ({"system": made("system", lambda f, m: 4 * (f < 5 + 7 * m))}, {}),
+    "F12A": (
+        {"friction": made("friction", friction_map(lambda s, c: np.where(s > 0.2, np.round(20 - 3 * (s - c)), 0)))},
+        {},
+    ),
+    "F12B": ({"control": made("control", lambda a, b: np.where(a < 0.2, np.round(10 - 20 * a + b), 0))}, {}),
+    "F13": ({}, {WIDE: sticks(0.9, 0.7), NARROW: sticks(0.6, 0.5)}),
+    "F14A": (
+        {"isolator-stiffness": made("isolator-stiffness", lambda k, s: 2 * (k > 20e6 * s))},
+        {"locked": cell()},
+    ),
+    "F14B": ({"isolator-damping": made("isolator-damping", lambda d, s: 6 * (s < 1e-3))}, {"locked": cell()}),
+    "F15A": ({"isolator-masses": made("isolator-masses", lambda c, s: 3 * (c / s > 4))}, {}),
+    "F15B": (
+        {name: made(name, friction_map(lambda s, c: 6 * (s - c > 1))) for name in ("isolator-friction", "friction")},
+        {},
+    ),
+    "F16A": ({"isolator-crossover": made("isolator-crossover", lambda f, s: 3 * (f < 20 * (1 - s / 1.2e-3)))}, {}),
+    "F16B": (crossover_pair(6, 7.5), {}),
+}
+
+
+@pytest.mark.parametrize("claim", HOLDS)
+def test_judges_recognise_what_holds(claim: str) -> None:
+    finding = registered()[claim].judge(Evidence(*HOLDS[claim]))
+    assert finding.judgement == "holds", finding
+
+
+@pytest.mark.parametrize("claim", FAILS)
+def test_judges_recognise_what_does_not(claim: str) -> None:
+    finding = registered()[claim].judge(Evidence(*FAILS[claim]))
+    assert finding.judgement in ("differs", "holds in part"), finding
+    assert len([part for part in finding.parts if not part.holds]) >= min(2, len(finding.parts) - 1), finding
+
+
+def test_every_judge_of_maps_is_tried_both_ways() -> None:
+    assert HOLDS.keys() == FAILS.keys() == registered().keys() - {"E1"}
+
+
+def test_printed_formulas() -> None:
+    assert registered()["E1"].judge(Evidence({}, {})).judgement == "holds"
+    stiffness, printed = series_stiffness.PRINTED_STIFFNESS, series_stiffness.PRINTED_SENSITIVITY
+    assert series_stiffness.compare(stiffness, sp.sqrt(printed)).judgement == "holds in part"
+    assert not series_stiffness.compare(2 * stiffness, printed).parts[0].holds
+
+
+# --- verdicts ---------------------------------------------------------------------------------------------------------
+
+
+def finding(*holds: bool) -> Finding:
+    return Finding(tuple(Part(f"criterion {i}", each, f"number {i}") for i, each in enumerate(holds)))
+
+
+def test_judgements_of_parts() -> None:
+    assert [finding(*each).judgement for each in ((True, True), (True, False), (False, False))] == [
+        "holds",
+        "holds in part",
+        "differs",
+    ]
+
+
+def test_what_a_judgement_depends_on() -> None:
+    claim = claims()[0]
+    found = verdict(
+        claim,
+        "5",
+        finding(True, False),
+        finding(True, False),
+        [(OPEN[0], finding(True, True)), (OPEN[1], finding(True, False))],
+    )
+    assert [str(each) for each in found.depends_on] == ["alpha 0.2: holds (number 1)"]
+    assert "unknown parameter (holds with alpha 0.2)" in found.reason
+    assert found.dependence == "Depends on alpha (0.2: holds)."
+    untouched = verdict(claim, "5", finding(True), finding(True), [(OPEN[0], finding(True))])
+    assert untouched.dependence == "Does not depend on the open parameters."
+
+
+def test_what_the_coarse_grid_turns_is_no_dependence() -> None:
+    found = verdict(claims()[0], "5", finding(False), finding(True), [(OPEN[0], finding(True))])
+    assert found.depends_on == ()
+    assert "coarser grid: holds" in found.reason
+
+
+# --- the whole --------------------------------------------------------------------------------------------------------
+
+
+def test_zero_rows_have_their_meaning() -> None:
+    found = reproduce(["path", "friction", "isolator-stiffness"], points=3).maps
+    still = found["path"]
+    for key in ("motion.acceleration", "motion.acceleration_time"):
+        assert still[key].values[0] == 0
+        assert set(still.verdict.sel({key: 0.0}).values) == {"settles"}
+        assert (still.largest_force.sel({key: 0.0}) == 0).all()
+    friction = found["friction"]
+    for key in ("friction.static", "friction.coulomb"):
+        assert set(friction.verdict.sel({key: 0.0}).values) == {"invalid"}
+    assert all(
+        "friction." in text for text in friction.status.where(friction.verdict == "invalid", "friction.").values.flat
+    )
+    assert np.isnan(friction.peaks.sel({"friction.coulomb": 0.0})).all()
+    none = found["isolator-stiffness"].sel({"joint.stroke": 0.0})
+    assert set(none.verdict.values) == {"hunts"}
+
+
+def test_lasting_hunting() -> None:
+    runs = xr.Dataset(
+        {
+            "peaks": ("x", [5.0, 3.0, 0.0, np.nan]),
+            "peak_to_peak": ("x", [1e-3, 1e-6, 1e-3, np.nan]),
+            "verdict": ("x", ["hunts", "hunts", "transient", "invalid"]),
+        }
+    )
+    judged = lasting(runs)
+    assert judged.verdict.values.tolist() == ["hunts", "settles", "hunts", "invalid"]
+    assert judged.peaks.values[:3].tolist() == [5.0, 0.0, 0.0]
+
+
+def test_a_part_of_the_studies_covers_its_claims_only() -> None:
+    steps: list[tuple[int, int, str]] = []
+    found = reproduce(["control"], points=3, progress=lambda *step: steps.append(step))
+    judged = {each.claim.id for each in found.verdicts if each.finding}
+    assert judged == {"F5", "F12B", "F13", "E1"}
+    assert {each.reason for each in found.verdicts if each.claim.id == "F11A"} == {"not computed in this run: path"}
+    assert [step[0] for step in steps] == list(range(len(steps)))
+    assert steps[-1][0] < steps[-1][1] <= len(steps)
+
+
+@pytest.mark.parametrize(("names", "points", "message"), [(["paths"], 11, "isolator-damping"), (None, 2, "3 or more")])
+def test_wrong_orders_are_refused(names: list[str] | None, points: int, message: str) -> None:
+    with pytest.raises(friso.StageError, match=message):
+        reproduce(names, points=points)
+
+
+def test_document_and_page_have_every_claim(small: Reproduction, tmp_path: Path) -> None:
+    document = claims_document(small)
+    assert [entry["id"] for entry in document["claims"]] == [claim.id for claim in claims()]
+    for entry in document["claims"]:
+        covered = entry["judgement"] != "not yet covered"
+        assert bool(entry["figure"] and entry["number"] and entry["criterion"]) == covered
+        assert entry["reason"] or entry["judgement"] == "holds"
+    page = reproduction_html(small)
+    for claim in claims():
+        assert f">{claim.id}<" in page
+    for number in ("5", "11", "12", "13", "14", "15", "16"):
+        assert f'id="figure-figure-{number}"' in page
+    assert "default-src 'none'" in page
+    paths = write_reproduction(small, tmp_path / "new" / "folder")
+    assert all(path.stat().st_size > 1000 for path in paths)
+    assert {path.suffix for path in paths} == {".html", ".json", ".png", ".svg"}
+
+
+def test_fig_14b_at_both_tolerances(small: Reproduction) -> None:
+    assert [runs.attrs["rtol"] for runs in small.tolerances.values()] == [1e-4, 1e-8]
+    loose, tight = small.tolerances.values()
+    assert small.changed == pytest.approx(float((loose.verdict != tight.verdict).mean()))
+
+
+def test_a_new_judge_needs_no_change_of_the_page(small: Reproduction) -> None:
+    """The way in for later work: a decorated function, and its finding stands in page and document, escaped."""
+    assert "F7" not in registered()
+    try:
+
+        @judges("F7", figure="7")
+        def limit_cases(evidence: Evidence) -> Finding:
+            return Finding((Part("<b>criterion</b> & more", False, "10.5 <i>Hz</i>", "<script>alert(1)</script>"),))
+
+        with pytest.raises(ValueError, match="one already"):
+            judges("F7", figure="7")
+        found = reproduce([], points=3)
+    finally:
+        _JUDGES.pop("F7", None)
+    (entry,) = (each for each in claims_document(found)["claims"] if each["id"] == "F7")
+    assert (entry["judgement"], entry["number"]) == ("differs", "10.5 <i>Hz</i>")
+    page = reproduction_html(replace(small, verdicts=found.verdicts))
+    assert "Figure 7" in page
+    assert "&lt;b&gt;criterion&lt;/b&gt; &amp; more" in page
+    assert "<script>alert(1)" not in page
+    assert "10.5 <i>" not in page
+
+
+def test_a_judge_of_no_claim_is_refused() -> None:
+    with pytest.raises(ValueError, match="expected a claim"):
+        judges("F99", figure="99")
+    assert not_covered(claims()[0], "reason").judgement == "not yet covered"
