@@ -1,4 +1,4 @@
-"""Parameter studies at scale: `python -m benchmarks.maps [--only maps|large|growth|peer]`.
+"""Parameter studies at scale: `python -m benchmarks.maps [--only maps|large|growth|overhead|peer]`.
 
 All of the thesis's maps, a study of 10^6 runs, the cost per run from 10^3 to 10^6 runs, and the same cells by SciPy's
 Radau with compiled functions on a process pool, extrapolated from a sample.
@@ -23,6 +23,7 @@ from benchmarks.peers import peers, piecewise
 from benchmarks.report import Goal, clock, print_goals, print_table, spread
 from benchmarks.rigs import rig_of
 from friso.stage import Stage
+from friso.studies.distribute import local_cluster
 from friso.studies.execute import Crew, local_crew
 from friso.studies.samples import Samples
 from friso.studies.study import Study, make_study
@@ -73,7 +74,7 @@ def run_maps(repetitions: int) -> list[Goal]:
             rows.append([f"{rtol:g}", runs, spread(times, digits=2), f"{min(times) / runs * 1e6:.0f}"])
             reached = min(times) < WANTED[rtol]
             goals.append(Goal(f"all ten maps, rtol {rtol:g}", f"< {WANTED[rtol]} s", f"{min(times):.2f} s", reached))
-    print(f"\nAll maps of the thesis, 41 x 41 runs of 20 s each, {crew.size} threads")
+    print(f"\nAll maps of the thesis, 41 x 41 runs of 20 s each, {_processors()} threads")
     print_table(("rtol", "runs", "wall time min / median [s]", "per run [us]"), rows)
     return goals
 
@@ -87,7 +88,9 @@ def run_large(count: int, rtol: float) -> list[Goal]:
         size = sum(file.stat().st_size for file in store.rglob("*") if file.is_file())
     peak = int(re.search(r"VmHWM:\s+(\d+)", Path("/proc/self/status").read_text())[1]) / 1024  # type: ignore[index]
     print(f"\n{count} runs of the free rig, 8 parameters, rtol {rtol:g}, into a store: {seconds:.1f} s, ", end="")
-    print(f"{count / seconds:.0f} runs/s on {crew.size} threads; peak memory {peak:.0f} MB, store {size / 1e6:.0f} MB")
+    print(
+        f"{count / seconds:.0f} runs/s on {_processors()} threads; peak memory {peak:.0f} MB, store {size / 1e6:.0f} MB"
+    )
     return [
         Goal(f"{count} runs", "< 240 s", f"{seconds:.1f} s", seconds < 240),
         Goal(f"{count} runs, peak memory", "< 1000 MB", f"{peak:.0f} MB", peak < 1000),
@@ -112,8 +115,30 @@ def run_growth(largest: int, rtol: float, repetitions: int) -> list[Goal]:
     return [Goal("cost per run, largest over smallest", "<= 1.1", f"{ratio:.2f}", ratio <= 1.1)]
 
 
+def _processors() -> int:
+    return len(os.sched_getaffinity(0))
+
+
 def _often(count: int, repetitions: int) -> int:
     return max(1, min(5 * repetitions, 100_000 // count))
+
+
+def run_overhead(blocks: int) -> list[Goal]:
+    """What a block costs besides its runs: blocks of cells that no stage may have, which need none."""
+    rows = []
+    axes = {"friction.coulomb": f"3.5 N..4 N:{blocks}", "controller.crossover": "1 Hz..16 Hz:1024"}
+    study = make_study(rig(), axes)
+    with tempfile.TemporaryDirectory(prefix="friso-bench-") as folder:
+        for name, crew_of in (("threads of this process", local_crew), ("Dask, 2 processes", lambda: local_cluster(2))):
+            with crew_of() as crew:
+                run_in_memory([study.at(np.arange(4096))], crew)
+                memory = clock(lambda: run_in_memory([study], crew))  # noqa: B023
+                stored = clock(lambda: run_in_store(study, Path(folder) / name, crew))  # noqa: B023
+            blocks_in_memory = sum(1 for _ in crew.jobs([study]))
+            rows.append([name, f"{memory / blocks_in_memory * 1e3:.1f}", f"{stored / blocks * 1e3:.1f}"])
+    print(f"\nOverhead per block: {blocks} blocks of 1024 cells without runs (in memory blocks are larger)")
+    print_table(("where", "in memory [ms]", "into a store [ms]"), rows)
+    return []
 
 
 def run_peer(cells_per_map: int) -> list[Goal]:
@@ -125,7 +150,7 @@ def run_peer(cells_per_map: int) -> list[Goal]:
         start = time.perf_counter()
         compile_seconds = sum(pool.map(_by_radau, jobs))
         wall = time.perf_counter() - start
-    workers = len(os.sched_getaffinity(0))
+    workers = _processors()
     cells = sum(study.cells for study in thesis_studies(rtol))
     whole = (wall - compile_seconds / workers) / len(jobs) * cells
     with local_crew() as crew:
@@ -174,7 +199,7 @@ def _by_radau(job: tuple[Stage, float]) -> float:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--only", choices=("maps", "large", "growth", "peer"))
+    parser.add_argument("--only", choices=("maps", "large", "growth", "overhead", "peer"))
     parser.add_argument("--runs", type=int, default=1_000_000, help="runs of the large study")
     parser.add_argument("--rtol", type=float, default=1e-4, help="tolerance of the large studies")
     parser.add_argument("--repetitions", type=int, default=5)
@@ -184,6 +209,7 @@ def main() -> None:
         "maps": lambda: run_maps(options.repetitions),
         "large": lambda: run_large(options.runs, options.rtol),
         "growth": lambda: run_growth(options.runs, options.rtol, options.repetitions),
+        "overhead": lambda: run_overhead(200),
         "peer": lambda: run_peer(options.sample),
     }
     goals = [goal for name, run in sections.items() if options.only in (None, name) for goal in run()]

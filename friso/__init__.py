@@ -10,6 +10,8 @@ from friso.version import VERSION as __version__
 if TYPE_CHECKING:
     from friso.engine.simulate import simulate
     from friso.hunting.check import Case, check
+    from friso.studies.samples import Samples
+    from friso.studies.store import read_store
     from friso.studies.sweep import sweep
 
 _LAZY = {
@@ -17,16 +19,20 @@ _LAZY = {
     "check": "friso.hunting.check",
     "Case": "friso.hunting.check",
     "sweep": "friso.studies.sweep",
+    "Samples": "friso.studies.samples",
+    "read_store": "friso.studies.store",
 }
 
 __all__ = [
     "Case",
+    "Samples",
     "Stage",
     "StageError",
     "__version__",
     "check",
     "load",
     "loads",
+    "read_store",
     "save",
     "simulate",
     "sweep",

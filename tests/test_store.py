@@ -231,7 +231,7 @@ def test_a_store_is_there_whole_or_not_at_all(rig: Stage, tmp_path: Path, monkey
 def test_a_large_study_takes_no_room_before_it_is_run(rig: Stage, tmp_path: Path) -> None:
     study = make_study(rig, {"controller.crossover": "1 Hz..40 Hz:100000", "joint.stroke": "0 m..1 mm:10000"})
     store = Store(tmp_path / "large.zarr", study)
-    assert np.prod(store.blocks) <= storing.BLOCK
+    assert np.prod(store.blocks) <= storing.LARGEST_BLOCK
     with Store.opened(tmp_path / "large.zarr", study):
         size = sum(file.stat().st_size for file in (tmp_path / "large.zarr").rglob("*") if file.is_file())
     assert size < 3e6  # the axes themselves

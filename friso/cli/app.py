@@ -45,7 +45,9 @@ def main() -> NoReturn:
             stream.reconfigure(errors="replace")  # a terminal that knows no dash still gets its answer
     if len(sys.argv) == 1:
         sys.argv.append("--help")
-    logging.basicConfig(format="friso: %(message)s", level=logging.WARNING, stream=sys.stderr)
+    messages = logging.StreamHandler(sys.stderr)
+    messages.setFormatter(logging.Formatter("friso: %(message)s"))
+    logging.getLogger("friso").addHandler(messages)
     try:
         status = app(standalone_mode=False) or 0
         if status == INTERRUPTED:  # typer's word for Ctrl-C

@@ -31,10 +31,9 @@ SCALARS = (
     "last_kind",
 )
 """Rows of one number per lane. time, old_time, stop: now, before the step and at its next corner, all since the last
-corner of the reference, which was at start; trial, longest, taken: step to try next, its limit, and
-step last tried; fraction: the part of
-it that was accepted; event: the lane wants attention; turns: number of turning points kept; last_kind: of the last turning point kept, 1 for a maximum, -1
-for a minimum."""
+corner of the reference, which was at start; trial, longest, taken: step to try next, its limit, and step last tried;
+fraction: the part of it that was accepted; event: the lane wants attention; turns: number of turning points kept;
+last_kind: of the last one kept, 1 for a maximum, -1 for a minimum."""
 
 
 @dataclass(frozen=True)

@@ -122,12 +122,15 @@ def _by_structure(flat: Mapping[str, Any], valid: np.ndarray, count: int) -> Ite
         yield shape, np.sort(np.concatenate(members))
 
 
+_STATUS = np.array([status.text for status in Status], dtype=object)
+
+
 class _Table:
     """The growing measures, one entry per cell."""
 
     def __init__(self, count: int) -> None:
         self.columns: Columns = {name: np.full(count, np.nan) for name in UNITS}
-        self.columns |= {name: np.full(count, "", dtype=kind) for name, kind in WORDS.items()}
+        self.columns |= {name: np.full(count, "", dtype=object) for name in WORDS}
 
     def invalidate(self, cells: np.ndarray, flat: Mapping[str, Any]) -> None:
         """Mark the cells that no stage may have, each with the first reason found."""
@@ -143,7 +146,6 @@ class _Table:
         ran = runs.results.statuses != Status.NOT_RUN
         inner, outer = found.settling_time
         numbers = (found.peaks, found.peak_to_peak, found.period, inner, outer, found.largest_force)
-        texts = np.array([status.text for status in Status])
-        words = (found.verdict, texts[found.status])
+        words = (found.verdict, _STATUS[found.status])
         for name, column in zip(METRICS, (*numbers, found.steps, found.rejected, *words), strict=True):
             self.columns[name][which[ran]] = column[ran]

@@ -27,11 +27,10 @@ from friso.studies.study import Block, Study, study_of
 if TYPE_CHECKING:
     import xarray as xr
 
-BLOCK = 1024
-"""Cells of a block at most; a store has the same blocks on every machine."""
-
-LEAST_BLOCKS = 8
-"""Blocks of a small study, so that an interruption loses a part of it only."""
+LEAST_BLOCKS, BLOCK, BLOCKS, LARGEST_BLOCK = 8, 1024, 1000, 16384
+"""A study has at least `LEAST_BLOCKS` blocks, so that an interruption loses a part of it only; `BLOCK` cells in each,
+more from `BLOCKS` blocks on, so that writing does not hold up the workers, and `LARGEST_BLOCK` at most. A store has
+the same blocks on every machine."""
 
 _ANSWERS = ".answers"
 
@@ -44,7 +43,8 @@ class Store:
 
     def __init__(self, path: Path, study: Study) -> None:
         self.path, self.study = path, study
-        self.blocks = study.block_shape(max(16, min(BLOCK, study.cells // LEAST_BLOCKS)))
+        large = min(LARGEST_BLOCK, study.cells // BLOCKS)
+        self.blocks = study.block_shape(max(16, min(BLOCK, study.cells // LEAST_BLOCKS), large))
 
     @classmethod
     @contextmanager
@@ -129,7 +129,7 @@ class Store:
             found = ask(cells)
             draft = file.with_suffix(".partial")
             with draft.open("wb") as stream:
-                np.savez_compressed(stream, **found)
+                np.savez_compressed(stream, **{name: found[name].astype(WORDS.get(name, "f8")) for name in found})
             draft.rename(file)
             return found
 

@@ -138,6 +138,7 @@ class Study:
             "friso": VERSION,
             "equations": equations_version(),
             "rtol": self.rtol,
+            "axes": json.dumps([axis.name for axis in self.axes]),
             "links": json.dumps(dict(self.links)),
             "refined": int(self.refined),
         }
@@ -236,10 +237,9 @@ def _points(axis: Axis | Range) -> int:
 
 def study_of(runs: xr.Dataset) -> Study:
     """The study that a dataset or an opened store holds the results of."""
-    dimensions = []
+    dimensions, order = [], json.loads(runs.attrs["axes"])
     for name in runs["verdict"].dims:
-        own = [coordinate for coordinate in runs.coords.values() if coordinate.dims == (name,)]
-        axes = tuple(_stored_axis(coordinate) for coordinate in own if coordinate.name != SAMPLE)
+        axes = tuple(_stored_axis(runs[axis]) for axis in order if runs[axis].dims == (name,))
         dimensions.append(Dimension(str(name), axes))
     stage = loads(runs.attrs["stage"])
     metrics = tuple(name for name in METRICS if name in runs)

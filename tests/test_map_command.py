@@ -1,0 +1,175 @@
+"""`friso map`, `friso simulate --cell` and `friso reproduce` as a user runs them."""
+
+import json
+import os
+import pty
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+import xarray as xr
+
+RIG = Path(__file__).parent.parent / "examples" / "thesis_rig.toml"
+SMALL = ("--x", "controller.crossover=4 Hz..12 Hz:5", "--y", "joint.stroke=0 m..1 mm:4")
+
+pytestmark = pytest.mark.xdist_group("rig")
+
+
+def friso(folder: Path, *arguments: object) -> subprocess.CompletedProcess[str]:
+    """Run the command line in a folder."""
+    command = [sys.executable, "-m", "friso.cli", *map(str, arguments)]
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=300)
+
+
+@pytest.fixture(scope="module")
+def mapped(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict]:
+    """A folder with a map, and what its command printed."""
+    folder = tmp_path_factory.mktemp("map")
+    done = friso(folder, "map", RIG, *SMALL, "--out", "a.zarr", "--export", "a.csv", "--export", "a.nc", "--json")
+    assert done.returncode == 0, done.stderr
+    return folder, json.loads(done.stdout)
+
+
+def test_files_and_document(mapped: tuple[Path, dict]) -> None:
+    folder, document = mapped
+    assert {Path(file).name for file in document["files"]} == {
+        *("a.png", "a.svg", "a.pdf", "a.html", "a.csv", "a.nc"),
+    }
+    assert all((folder / file).stat().st_size > 1000 for file in document["files"])
+    runs = xr.open_zarr(folder / "a.zarr")
+    assert runs.peaks.dims == ("controller.crossover", "joint.stroke")
+    assert document["cells"] == 20
+    assert document["verdicts"]["hunts"] == int((runs.verdict == "hunts").sum())
+    assert document["verified"]["cells"] == 20
+    assert 0 < document["verified"]["surviving"] <= 20
+    assert document["axes"]["joint.stroke"] == {"points": 4, "unit": "m", "first": 0.0, "last": 1e-3}
+
+
+def test_a_cell_is_run_again_alone(mapped: tuple[Path, dict]) -> None:
+    folder, _ = mapped
+    done = friso(folder, "simulate", "--cell", "a.zarr", 2, 1, "--json")
+    assert done.returncode == 0, done.stderr
+    runs = xr.open_zarr(folder / "a.zarr")
+    assert json.loads(done.stdout)["solver"]["steps"] == runs.steps.values[2, 1]
+    assert "a_cell_2_1.toml" in done.stdout
+    again = friso(folder, "check", "a_cell_2_1.toml", "--json")
+    assert json.loads(again.stdout)["cases"]["given"]["verdict"] == runs.verdict.values[2, 1]
+
+
+def test_a_finished_map_is_drawn_again_from_its_store_alone(mapped: tuple[Path, dict]) -> None:
+    folder, document = mapped
+    done = friso(folder, "map", "a.zarr", "--metric", "verdict", "--json")
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["verdicts"] == document["verdicts"]
+
+
+def test_ctrl_c_says_how_to_go_on(tmp_path: Path) -> None:
+    """Interrupted on a terminal in the middle of its bar; resumed by the store alone."""
+    command = [sys.executable, "-m", "friso.cli", "map", str(RIG), "--x", "controller.crossover=4 Hz..12 Hz:300"]
+    command += ["--y", "joint.stroke=0.1 mm..1 mm:40", "--rtol", "1e-7", "--out", "a.zarr", "--verify", "0"]
+    terminal, other = pty.openpty()
+    with subprocess.Popen(
+        command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=other, text=True, preexec_fn=_interruptible
+    ) as process:
+        os.close(other)
+        seen = b""
+        while b"/12000" not in seen.replace(b" ", b"") or b"cells/s" not in seen:
+            seen += os.read(terminal, 65536)
+        time.sleep(0.5)
+        process.send_signal(signal.SIGINT)
+        start = time.monotonic()
+        try:
+            while chunk := os.read(terminal, 65536):
+                seen += chunk
+        except OSError:  # the terminal ends with its process
+            pass
+        assert process.wait(30) == 130
+    assert time.monotonic() - start < 20
+    assert b"to go on: friso map a.zarr" in seen
+    with xr.open_zarr(tmp_path / "a.zarr") as found:
+        kept = int((found.verdict != "").sum())
+    assert 0 < kept < 12000
+
+
+def _interruptible() -> None:
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ((), "--x"),
+        (("--x", "controller.crossover"), "KEY=VALUE"),
+        (("--x", "controller.crosover=1 Hz..2 Hz:3"), "did you mean crossover"),
+        (("--x", "controller.crossover=1 N..2 N:3"), "not a frequency"),
+        (("--x", "controller.crossover=2 Hz..1 Hz:3"), "reversed"),
+        (("--x", "controller.crossover=1 Hz..2 Hz:1"), "2 points or more"),
+        (("--x", "joint.stroke=0 m..1 mm:3", "--log"), "never reaches 0"),
+        (("--x", "joint.stroke=0 m..1 mm:3", "--y", "joint.stroke=0 m..1 mm:3"), "a second time"),
+        (("--x", "controller.crossover=1 Hz..2 Hz:100000", "--y", "joint.stroke=0 m..1 mm:10000"), "hours"),
+        (("--x", "controller.crossover=1 Hz..2 Hz:1000000000"), "nothing was run"),
+        ((*SMALL, "--out", RIG), "nothing was overwritten"),
+        ((*SMALL, "--out", RIG / "below.zarr"), "can be written"),
+        ((*SMALL, "--metric", "amplitude"), "peak_to_peak"),
+        ((*SMALL, "--rtol", "loose"), "1e-12 to 1e-2"),
+        ((*SMALL, "--verify", "5"), "0 to 1"),
+        ((*SMALL, "--export", "a.xls"), ".nc or .csv"),
+        ((*SMALL, "--export", "absent/a.csv"), "a folder that is there"),
+        ((*SMALL, "--link", "masses.cart=0.7 * mas"), "the name mas"),
+        ((*SMALL, "--samples", "8"), "FIRST..LAST alone"),
+        ((*SMALL, "--latin"), "--samples"),
+        ((*SMALL, "--workers", "0"), "1 worker or more"),
+        ((*SMALL, "--workers", "1", "--scheduler", "tcp://127.0.0.1:9"), "one of the two"),
+    ],
+)
+def test_wrong_input_ends_in_one_message_and_status_2(tmp_path: Path, arguments: tuple, message: str) -> None:
+    before = RIG.read_bytes()
+    done = friso(tmp_path, "map", RIG, *arguments)
+    assert done.returncode == 2
+    assert message in done.stderr
+    assert "Traceback" not in done.stderr
+    assert done.stdout == ""
+    assert list(tmp_path.iterdir()) == []
+    assert RIG.read_bytes() == before
+
+
+@pytest.mark.parametrize("numbers", [("5", "0"), ("0",), ("a", "b"), ("-1", "0"), ("0", "0", "0")])
+def test_a_cell_that_is_not_there(mapped: tuple[Path, dict], numbers: tuple[str, ...]) -> None:
+    done = friso(mapped[0], "simulate", "--cell", "a.zarr", "--", *numbers)
+    assert done.returncode == 2
+    assert "controller.crossover 0 to 4, joint.stroke 0 to 3" in done.stderr
+
+
+def test_an_invalid_cell_gives_its_reason(tmp_path: Path) -> None:
+    axes = ("--x", "friction.coulomb=1 N, 4 N", "--out", "a.zarr", "--verify", "0")
+    assert friso(tmp_path, "map", RIG, *axes).returncode == 0
+    done = friso(tmp_path, "simulate", "--cell", "a.zarr", 1)
+    assert done.returncode == 2
+    assert "Coulomb friction no larger than static friction" in done.stderr
+
+
+def test_samples_links_and_a_local_cluster(tmp_path: Path) -> None:
+    options = ("--x", "mass=1 kg..3 kg", "--y", "controller.crossover=4 Hz..12 Hz", "--samples", "16", "--latin")
+    links = ("--link", "masses.cart=0.7 * mass", "--link", "masses.stage=0.3 * mass", "--set", "parasitic.mass=0.1 kg")
+    done = friso(tmp_path, "map", RIG, *options, *links, "--workers", "2", "--out", "a.zarr", "--json")
+    assert done.returncode == 0, done.stderr
+    with xr.open_zarr(tmp_path / "a.zarr") as found:
+        assert found["mass"].dims == ("sample",)
+        assert found.verdict.shape == (16,)
+    again = friso(tmp_path, "map", RIG, *options, *links, "--out", "b.zarr", "--json")
+    assert json.loads(again.stdout)["verdicts"] == json.loads(done.stdout)["verdicts"]
+
+
+def test_reproduce_writes_its_page_and_claims(tmp_path: Path) -> None:
+    done = friso(tmp_path, "reproduce", "masses", "--points", "5")
+    assert done.returncode == 2
+    assert "isolator-masses" in done.stderr
+    done = friso(tmp_path, "reproduce", "isolator-masses", "--points", "5", "--out", "rep")
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "rep" / "reproduction.html").stat().st_size > 10_000
+    claims = {claim["id"]: claim for claim in json.loads((tmp_path / "rep" / "claims.json").read_text())["claims"]}
+    assert claims["F15A"]["judgement"] in ("holds", "holds in part", "differs")
+    assert claims["F28"]["judgement"] == "not yet covered"

@@ -1,0 +1,170 @@
+"""How far maps can be trusted: verification, the automatic tolerance, and adaptive sampling against full grids."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.ndimage import binary_fill_holes, distance_transform_edt, label
+
+import friso
+from friso.stage import Stage, StageError
+from friso.studies import verify
+from friso.studies.cells import METRICS, UNITS, Columns
+from friso.studies.execute import local_crew
+from friso.studies.refine import FINER, SHARE, finer, refine
+from friso.studies.study import Study, make_study
+from friso.studies.verify import drawn, loosest_rtol
+
+EXAMPLES = Path(__file__).parent.parent / "examples"
+MASS = {"masses.cart": "0.7 * mass", "masses.stage": "0.3 * mass", "parasitic.mass": "0.15 * mass"}
+
+pytestmark = pytest.mark.xdist_group("rig")
+
+
+@pytest.fixture(scope="module")
+def rig() -> Stage:
+    return friso.load(EXAMPLES / "thesis_rig.toml")
+
+
+def test_verification_tells_what_a_tighter_sweep_would(rig: Stage) -> None:
+    """All cells checked: the share that survives is that of two sweeps compared."""
+    axes = {"controller.crossover": "2 Hz..8 Hz:12", "joint.stroke": "0.1 mm..1 mm:12"}
+    runs = friso.sweep(rig, axes, rtol=1e-2, verify=1.0)
+    tighter = friso.sweep(rig, axes, rtol=1e-4)
+    same = int((runs.verdict == tighter.verdict).sum())
+    assert runs.attrs["verified_cells"] == 144
+    assert runs.attrs["verified_rtol"] == pytest.approx(1e-4)
+    assert runs.attrs["verified_surviving"] == same < 144
+
+
+def test_only_cells_that_were_run_are_verified(rig: Stage) -> None:
+    axes = {"friction.static": "0 N..4 N:6", "friction.coulomb": "0 N..4 N:6"}
+    runs = friso.sweep(rig, axes, rtol=1e-4, verify=1.0)
+    assert runs.attrs["verified_cells"] == int((runs.verdict != "invalid").sum()) == 15
+    nothing = friso.sweep(rig, {"friction.coulomb": "4 N..5 N:3"}, verify=1.0)
+    assert "verified_cells" not in nothing.attrs
+
+
+@given(count=st.integers(1, 40), points=st.integers(2, 400), modulus=st.integers(1, 4))
+@settings(deadline=None, max_examples=30)
+def test_cells_are_drawn_evenly_once_and_always_the_same(count: int, points: int, modulus: int) -> None:
+    stage = friso.load(EXAMPLES / "thesis_rig.toml")
+    study = make_study(stage, {"controller.crossover": (np.linspace(1, 2, points), "Hz")})
+    picked = drawn(study, count, lambda cells: cells % modulus == 0)
+    assert np.array_equal(picked, np.unique(picked))
+    assert np.all(picked % modulus == 0)
+    assert len(picked) <= count
+    if points <= 8 * count:
+        assert len(picked) == min(count, -(-points // modulus))
+    assert np.array_equal(picked, drawn(study, count, lambda cells: cells % modulus == 0))
+
+
+def test_the_loosest_safe_tolerance_is_chosen(rig: Stage, monkeypatch: pytest.MonkeyPatch) -> None:
+    study = make_study(rig, {"controller.crossover": "1 Hz..16 Hz:400"})
+    right = np.where(np.arange(400) < 200, "hunts", "settles")
+
+    def pretended(study: Study, cells: np.ndarray, crew: object) -> Columns:
+        """Wrong in 2 % of the cells down to 1e-5, right from there on."""
+        verdicts = right.copy()
+        if study.rtol > 1.5e-5:
+            verdicts[:8] = "settles"
+        return {"verdict": verdicts}
+
+    monkeypatch.setattr(verify, "run_scattered", pretended)
+    with local_crew(1) as crew:
+        rtol, shares = loosest_rtol(study, crew)
+        assert rtol == 1e-5
+        assert shares == {1e-3: 0.98, 1e-4: 0.98, 1e-5: 1.0}
+        rng = np.random.default_rng(1)
+        monkeypatch.setattr(
+            verify, "run_scattered", lambda *_: {"verdict": np.where(rng.random(400) < 0.5, "hunts", "settles")}
+        )
+        rtol, shares = loosest_rtol(study, crew)
+    assert len(shares) == 6
+    assert max(shares.values()) == shares[rtol] < 0.9
+
+
+def boundary(hunts: np.ndarray) -> np.ndarray:
+    """The cells at which the verdict changes."""
+    cells = np.zeros_like(hunts)
+    for axis in (0, 1):
+        along, mark = np.moveaxis(hunts, axis, 0), np.moveaxis(cells, axis, 0)
+        change = along[1:] != along[:-1]
+        mark[1:] |= change
+        mark[:-1] |= change
+    return cells
+
+
+def hausdorff(a: np.ndarray, b: np.ndarray) -> float:
+    """Distance between the boundaries of two maps, in cells."""
+    first, second = boundary(a), boundary(b)
+    return max(distance_transform_edt(~first)[second].max(), distance_transform_edt(~second)[first].max())
+
+
+def asked(study: Study, verdict: np.ndarray, settling: np.ndarray | None = None) -> tuple[Columns, int]:
+    """The refined map of verdicts that are already known, and how many cells it asked for."""
+    count = 0
+
+    def ask(cells: np.ndarray) -> Columns:
+        nonlocal count
+        count += len(cells)
+        columns: Columns = {name: np.zeros(len(cells)) for name in UNITS}
+        if settling is not None:
+            columns["settling_time_10um"] = settling.flat[cells]
+        return columns | {"verdict": verdict.flat[cells], "status": np.full(len(cells), "done")}
+
+    return refine(study, ask), count
+
+
+def test_a_smooth_boundary_is_found_as_on_the_full_grid(rig: Stage) -> None:
+    study = finer(make_study(rig, {"controller.crossover": "1 Hz..40 Hz:41", "joint.stroke": "0 m..1 mm:41"}))
+    assert study.shape == (161, 161)
+    assert study.axes[0].values[::FINER] == pytest.approx(np.linspace(1, 40, 41))
+    x, y = np.meshgrid(np.linspace(0, 1, 161), np.linspace(0, 1, 161), indexing="ij")
+    hunts = (x - 0.3) ** 2 + (y - 0.4) ** 2 < 0.06 + 0.02 * np.sin(9 * x)
+    found, count = asked(study, np.where(hunts, "hunts", "settles"))
+    assert count <= SHARE * study.cells
+    assert np.array_equal(found["verdict"].reshape(study.shape) == "hunts", hunts)
+    guessed = np.char.startswith(found["status"].astype(str), "inferred")
+    assert guessed.sum() == study.cells - count
+    assert np.isnan(found["peaks"][guessed]).all()
+
+
+def test_the_boundary_of_the_locked_rig(rig: Stage) -> None:
+    """Crossover x mass: the outline of hunting as on a grid four times finer, for a fifth of its runs.
+
+    The many single cells inside it that settle, windows of this one move, cannot all be found by so few runs.
+    """
+    locked = rig.replace({"joint.locked": True, "controller.tuned_mass": None})
+    axes = {"controller.crossover": "1 Hz..40 Hz:41", "mass": "0.1 kg..5.1 kg:41"}
+    refined = friso.sweep(locked, axes, links=MASS, refine=True)
+    fine = {"controller.crossover": "1 Hz..40 Hz:161", "mass": "0.1 kg..5.1 kg:161"}
+    full = friso.sweep(locked, fine, links=MASS)
+    assert np.array_equal(refined["mass"], full["mass"])
+    ran = np.isfinite(refined.peaks.values)
+    assert ran.sum() <= full.peaks.size / 5
+    for name in METRICS:
+        assert np.array_equal(
+            refined[name].values[ran],
+            full[name].values[ran],
+            **({} if name in ("verdict", "status") else {"equal_nan": True}),
+        )
+    a, b = (runs.verdict.values == "hunts" for runs in (refined, full))
+    assert (a == b).mean() > 0.995
+
+    def outline(hunts: np.ndarray) -> np.ndarray:
+        regions, _ = label(hunts)
+        return binary_fill_holes(regions == np.argmax(np.bincount(regions.ravel())[1:]) + 1)
+
+    assert hausdorff(outline(a), outline(b)) < 1
+
+
+def test_what_cannot_be_refined_is_refused(rig: Stage) -> None:
+    for axes in ({"joint.locked": [True, False]}, {}):
+        samples = None if axes else friso.Samples({"joint.stroke": "0 m..1 mm"}, 8)
+        with pytest.raises(StageError, match="one to three axes of numbers"):
+            friso.sweep(rig, axes, samples, refine=True)
+    assert replace(make_study(rig, {"joint.stroke": "0 m..1 mm:3"}), refined=True).refined
