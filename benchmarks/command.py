@@ -36,9 +36,7 @@ def high_water():  # ru_maxrss of a started process begins with that of the one 
 before = high_water()
 start, hunting = time.perf_counter(), 0
 for runs in run_chunks(rig.kernel, flat, n, options(1e-4)):
-    here = slice(runs.first, runs.first + len(runs.results.statuses))
-    part = {{key: value[here] if np.ndim(value) else value for key, value in flat.items()}}
-    hunting += int((measure(part, runs).peaks > 0).sum())
+    hunting += int((measure(runs.part(flat), runs).peaks > 0).sum())
 peak = max(high_water(), resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss)
 print(before / 1024, peak / 1024, time.perf_counter() - start, hunting)
 """

@@ -132,7 +132,7 @@ def run_overhead(blocks: int) -> list[Goal]:
         for name, crew_of in (("threads of this process", local_crew), ("Dask, 2 processes", lambda: local_cluster(2))):
             with crew_of() as crew:
                 run_in_memory([study.at(np.arange(4096))], crew)
-                memory = clock(lambda: run_in_memory([study], crew))  # noqa: B023
+                memory = clock(lambda: run_in_memory([study], crew))
                 stored = clock(lambda: run_in_store(study, Path(folder) / name, crew))  # noqa: B023
             blocks_in_memory = sum(1 for _ in crew.jobs([study]))
             rows.append([name, f"{memory / blocks_in_memory * 1e3:.1f}", f"{stored / blocks * 1e3:.1f}"])

@@ -59,7 +59,9 @@ def friso_map(each: Map, rtol: float) -> tuple[np.ndarray, float]:
     """Peak counts of all cells, and the rejected share of steps: the work that the prototype does."""
     settings = Options(rtol=rtol, record_from=0.8 * COUNTED_AFTER, least_swing=SWING / 4)
     chunks = list(run_chunks(each.rig.kernel, each.flat, len(each.prototype), settings))
-    peaks = np.concatenate([_count(chunk) for chunk in chunks])
+    peaks = np.empty(len(each.prototype))
+    for chunk in chunks:
+        peaks[chunk.numbers] = _count(chunk)
     attempted, rejected = (sum(float(c.statistic(name).sum()) for c in chunks) for name in ("attempted", "rejected"))
     failed = sum(int((chunk.results.statuses != 1).sum()) for chunk in chunks)
     if failed:
@@ -78,7 +80,7 @@ def _count(chunk: Runs) -> np.ndarray:
 def _measured_map(each: Map, rtol: float) -> None:
     """The same with all measures that `friso.sweep` reports."""
     for chunk in run_chunks(each.rig.kernel, each.flat, len(each.prototype), options(rtol)):
-        measure(each.flat, chunk)
+        measure(chunk.part(each.flat), chunk)
 
 
 def run_maps(maps: list[Map], prototype: ModuleType | None, repetitions: int) -> list[Goal]:

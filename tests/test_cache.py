@@ -37,7 +37,7 @@ stats = module.run.stats
 print(sum(stats.cache_hits.values()), sum(stats.cache_misses.values()))
 """
 
-COMPILING = "compiling a kernel"
+COMPILING = "compiling; the next run"
 
 
 @pytest.fixture(autouse=True)

@@ -38,11 +38,12 @@ def eight() -> Kernel:
 
 def run(shape: Kernel, flat: Flat, options: Options, runs: int = RUNS) -> Results:
     """The results of all chunks in one piece. Turning points and samples that are not there are NaN."""
-    parts = [chunk.results for chunk in run_chunks(shape, flat, runs, options)]
+    chunks = list(run_chunks(shape, flat, runs, options))
+    order, parts = np.argsort(np.concatenate([chunk.numbers for chunk in chunks])), [chunk.results for chunk in chunks]
     columns = []
     for arrays in zip(*parts, strict=True):
         width = max(array.shape[1] if array.ndim > 1 else 0 for array in arrays)
-        columns.append(np.concatenate([widened(array, width) for array in arrays]))
+        columns.append(np.concatenate([widened(array, width) for array in arrays])[order])
     results = Results(*columns)
     for j, count in enumerate(results.turn_counts):
         results.turn_times[j, count:] = results.turn_values[j, count:] = np.nan

@@ -50,26 +50,33 @@ class Options:
 
 @dataclass(frozen=True)
 class Runs:
-    """Results of a chunk of runs, `first` being the number of its first."""
+    """Results of some of the runs, whose numbers are given."""
 
-    first: int
+    numbers: np.ndarray
     results: Results
 
     def statistic(self, name: str) -> np.ndarray:
         """One column of `STATISTICS`, shape (runs,)."""
         return self.results.statistics[:, STATISTICS.index(name)]
 
+    def part(self, flat: Mapping[str, Any]) -> dict[str, Any]:
+        """The flat keys of these runs alone."""
+        return _part(flat, self.numbers)
+
+
+def _part(flat: Mapping[str, Any], numbers: np.ndarray) -> dict[str, Any]:
+    return {key: value[numbers] if np.ndim(value) else value for key, value in flat.items()}
+
 
 def run_chunks(kernel: Kernel, flat: Mapping[str, Any], runs: int, options: Options) -> Iterator[Runs]:
     """Run `runs` stages of one structure, given as flat keys to SI numbers or arrays of shape (runs,).
 
-    Results do not depend on lanes, threads or chunks. A failed run has a status; the others go on.
+    They come chunk by chunk, those with many turning points after the others of their chunk. Results do not depend
+    on lanes, threads or chunks. A failed run has a status; the others go on.
     """
     for first in range(0, runs, options.chunk):
-        last = min(first + options.chunk, runs)
-        part = {key: value[first:last] if np.ndim(value) else value for key, value in flat.items()}
-        batch = prepare(kernel, part, last - first, options)
-        yield Runs(first, _run_with_room(kernel, batch, part, options))
+        numbers = np.arange(first, min(first + options.chunk, runs))
+        yield from _run_with_room(kernel, flat, numbers, CAPACITY, options)
 
 
 def prepare(kernel: Kernel, flat: Mapping[str, Any], runs: int, options: Options) -> Batch:
@@ -125,10 +132,36 @@ def _segments(flat: Mapping[str, Any], runs: int, window: float) -> tuple[np.nda
     return segments, windows.astype(np.int64)
 
 
-def _run_with_room(kernel: Kernel, batch: Batch, flat: Mapping[str, Any], options: Options) -> Results:
-    """Run a chunk; runs with more turning points than there is room for again, with more."""
-    runs = len(batch.starts)
-    settings = Settings(
+def _run_with_room(
+    kernel: Kernel, flat: Mapping[str, Any], numbers: np.ndarray, room: int, options: Options
+) -> Iterator[Runs]:
+    """Run the runs with these numbers; those with more turning points than there is room for again, fewer at a time
+    with more room each."""
+    part = _part(flat, numbers)
+    batch = prepare(kernel, part, len(numbers), options)
+    samples = 0
+    if options.interval is not None:
+        samples = int(np.max(part["motion.duration"]) / options.interval * (1 + 1e-12)) + 1
+    results = empty_results(len(numbers), room, samples, len(kernel.states))
+    _run(kernel, batch, _settings(options), results, options.threads)
+    crowded = results.turn_counts > room
+    if room >= MOST_TURNS:
+        results.statuses[crowded] = Status.FULL
+        results.turn_counts[crowded] = room
+        crowded[:] = False
+    if not crowded.any():
+        yield Runs(numbers, results)
+        return
+    if not crowded.all():
+        yield Runs(numbers[~crowded], Results(*(array[~crowded] for array in results)))
+    del results, batch
+    again, fewer = numbers[crowded], max(1, options.chunk * CAPACITY // (4 * room))
+    for first in range(0, len(again), fewer):
+        yield from _run_with_room(kernel, flat, again[first : first + fewer], 4 * room, options)
+
+
+def _settings(options: Options) -> Settings:
+    return Settings(
         rtol=float(options.rtol),
         budget=float(options.budget),
         inner=float(options.bands[0]),
@@ -138,39 +171,6 @@ def _run_with_room(kernel: Kernel, batch: Batch, flat: Mapping[str, Any], option
         interval=float(options.interval or np.inf),
         cancel=np.zeros(1, np.int64) if options.cancel is None else options.cancel,
     )
-    samples = 0
-    if options.interval is not None:
-        samples = int(np.max(flat["motion.duration"]) / options.interval * (1 + 1e-12)) + 1
-    results = empty_results(runs, CAPACITY, samples, len(kernel.states))
-    _run(kernel, batch, settings, results, options.threads)
-    while np.any(crowded := _crowded(results)):
-        room = min(4 * results.turn_times.shape[1], MOST_TURNS)
-        again = empty_results(int(crowded.sum()), room, samples, len(kernel.states))
-        _run(kernel, Batch(*(array[crowded] for array in batch)), settings, again, options.threads)
-        results = _merged(results, again, crowded)
-    return results
-
-
-def _crowded(results: Results) -> np.ndarray:
-    """Which runs had more turning points than room; those with more than any may have get their status."""
-    room = results.turn_times.shape[1]
-    crowded = results.turn_counts > room
-    if room < MOST_TURNS:
-        return crowded
-    results.statuses[crowded] = Status.FULL
-    results.turn_counts[crowded] = room
-    return np.zeros_like(crowded)
-
-
-def _merged(results: Results, again: Results, which: np.ndarray) -> Results:
-    """`results` with the runs `which` replaced, all with the larger room for turning points."""
-    merged = empty_results(len(which), again.turn_times.shape[1], 0, 0)
-    merged = merged._replace(samples=results.samples)
-    for target, old, new in zip(merged, results, again, strict=True):
-        if target is not old:
-            target[..., : old.shape[1] if old.ndim > 1 else None] = old
-        target[which] = new
-    return merged
 
 
 def _run(kernel: Kernel, batch: Batch, settings: Settings, results: Results, threads: int | None) -> None:

@@ -107,7 +107,7 @@ def load_or_build(name: str, builder: str, task: bytes, load: Callable[[ModuleTy
 
 
 def _build(builder: str, entry: Path, task: bytes) -> None:
-    logger.warning("compiling a kernel for these equations; the next run finds it compiled")
+    logger.warning("compiling; the next run finds it compiled")
     shutil.rmtree(entry, ignore_errors=True)
     entry.mkdir(mode=0o700)
     environ = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}

@@ -66,10 +66,9 @@ def run_cells(
         flat = flat_cells(part, links, {name: column[cells] for name, column in columns.items()})
         table.invalidate(cells, flat)
         for shape, members in _by_structure(flat, table.valid(cells), len(cells)):
-            own = _taken(flat, members)
+            own = {key: value[members] if np.ndim(value) else value for key, value in flat.items()}
             for runs in run_chunks(kernel(shape), own, len(members), options(rtol, threads, cancel)):
-                here = slice(runs.first, runs.first + len(runs.results.statuses))
-                table.write(cells[members[here]], measure(_taken(own, here), runs), runs)
+                table.write(cells[members[runs.numbers]], measure(runs.part(own), runs), runs)
     return table.columns
 
 
@@ -80,10 +79,6 @@ def flat_cells(stage: Stage, links: Mapping[str, str], columns: Mapping[str, np.
     if not links:
         return stage.flat(keys)
     return stage.flat(keys | linked(links, stage.flat(keys) | dict(columns)))
-
-
-def _taken(flat: Mapping[str, Any], which: Any) -> dict[str, Any]:
-    return {key: value[which] if np.ndim(value) else value for key, value in flat.items()}
 
 
 def _by_words(stage: Stage, columns: Mapping[str, np.ndarray]) -> Iterator[tuple[Stage, np.ndarray]]:

@@ -27,7 +27,7 @@ from friso.studies.study import Block, Study, study_of
 if TYPE_CHECKING:
     import xarray as xr
 
-LEAST_BLOCKS, BLOCK, BLOCKS, LARGEST_BLOCK = 8, 1024, 1000, 16384
+LEAST_BLOCKS, BLOCK, BLOCKS, LARGEST_BLOCK = 8, 1024, 250, 16384
 """A study has at least `LEAST_BLOCKS` blocks, so that an interruption loses a part of it only; `BLOCK` cells in each,
 more from `BLOCKS` blocks on, so that writing does not hold up the workers, and `LARGEST_BLOCK` at most. A store has
 the same blocks on every machine."""
