@@ -25,8 +25,9 @@ from benchmarks.rigs import rig_of
 from friso.stage import Stage
 from friso.studies.distribute import local_cluster
 from friso.studies.execute import Crew, local_crew
+from friso.studies.request import Request
 from friso.studies.samples import Samples
-from friso.studies.study import Study, make_study
+from friso.studies.study import Study
 from friso.studies.sweep import run_in_memory, run_in_store
 from friso.studies.thesis.studies import STUDIES, rig
 
@@ -49,12 +50,12 @@ EIGHT = {
 
 def thesis_studies(rtol: float, points: int = 41) -> list[Study]:
     """All maps of the thesis."""
-    return [make_study(s.stage(), s.axes(points), links=s.links, rtol=rtol) for s in STUDIES.values()]
+    return [Request(s.stage(), s.axes(points), links=s.links).study(rtol=rtol) for s in STUDIES.values()]
 
 
 def large_study(count: int, rtol: float) -> Study:
     """The free rig over a Sobol sample of eight parameters."""
-    return make_study(_untuned(rig()), {}, Samples(EIGHT, count), rtol=rtol)
+    return Request(_untuned(rig()), {}, Samples(EIGHT, count)).study(rtol=rtol)
 
 
 def _untuned(stage: Stage) -> Stage:
@@ -127,7 +128,7 @@ def run_overhead(blocks: int) -> list[Goal]:
     """What a block costs besides its runs: blocks of cells that no stage may have, which need none."""
     rows = []
     axes = {"friction.coulomb": f"3.5 N..4 N:{blocks}", "controller.crossover": "1 Hz..16 Hz:1024"}
-    study = make_study(rig(), axes)
+    study = Request(rig(), axes).study()
     with tempfile.TemporaryDirectory(prefix="friso-bench-") as folder:
         for name, crew_of in (("threads of this process", local_crew), ("Dask, 2 processes", lambda: local_cluster(2))):
             with crew_of() as crew:

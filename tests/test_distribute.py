@@ -15,8 +15,8 @@ import friso
 from friso.stage import Stage, StageError
 from friso.studies import distribute
 from friso.studies.distribute import connected, local_cluster
+from friso.studies.request import Request
 from friso.studies.store import Store
-from friso.studies.study import make_study
 from friso.studies.sweep import run_in_memory, run_in_store
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
@@ -43,20 +43,20 @@ def cluster() -> Iterator[LocalCluster]:
 def test_the_same_bits_as_in_one_process(rig: Stage, cluster: LocalCluster) -> None:
     with connected(cluster.scheduler_address) as crew:
         assert crew.size == 2
-        (found,) = run_in_memory([make_study(rig, AXES)], crew)
+        (found,) = run_in_memory([Request(rig, AXES).study()], crew)
     xr.testing.assert_identical(found, friso.sweep(rig, AXES))
 
 
 def test_a_local_cluster_of_its_own_verifies_too(rig: Stage) -> None:
     with local_cluster(1) as crew:
-        (found,) = run_in_memory([make_study(rig, AXES)], crew, verify=0.05)
+        (found,) = run_in_memory([Request(rig, AXES).study()], crew, verify=0.05)
     xr.testing.assert_identical(found, friso.sweep(rig, AXES, verify=0.05))
 
 
 def test_a_worker_uses_no_more_threads_than_it_was_given(rig: Stage, cluster: LocalCluster) -> None:
     """A kernel that took all processors of the machine would show as more running threads than the worker has."""
     with connected(cluster.scheduler_address) as crew:
-        study = make_study(rig, {"controller.crossover": "2 Hz..16 Hz:300"}, rtol=1e-8)
+        study = Request(rig, {"controller.crossover": "2 Hz..16 Hz:300"}).study(rtol=1e-8)
         counts: list[int] = []
         pids = list(crew.executor._client.run(os.getpid).values())
         stop = threading.Event()
@@ -82,7 +82,7 @@ def test_a_worker_uses_no_more_threads_than_it_was_given(rig: Stage, cluster: Lo
 
 
 def test_a_killed_worker_costs_only_its_blocks(rig: Stage, tmp_path: Path) -> None:
-    study, path = make_study(rig, AXES, rtol=1e-9), tmp_path / "a.zarr"
+    study, path = Request(rig, AXES).study(rtol=1e-9), tmp_path / "a.zarr"
     computed: list[int] = []
     with (
         LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=":0") as cluster,
@@ -117,7 +117,7 @@ def test_a_worker_that_joins_later_with_another_friso_is_refused(rig: Stage, clu
     with connected(cluster.scheduler_address) as crew:
         crew.arguments["expected"] = "9.9.9 (0123456789ab)"
         with pytest.raises(StageError, match="a worker has friso"):
-            run_in_memory([make_study(rig, AXES)], crew)
+            run_in_memory([Request(rig, AXES).study()], crew)
 
 
 def test_kernels_are_compiled_once_per_worker(rig: Stage, cluster: LocalCluster) -> None:
@@ -127,9 +127,9 @@ def test_kernels_are_compiled_once_per_worker(rig: Stage, cluster: LocalCluster)
         return _loaded.cache_info().misses
 
     with connected(cluster.scheduler_address) as crew:
-        run_in_memory([make_study(rig, AXES)], crew)
+        run_in_memory([Request(rig, AXES).study()], crew)
         before = crew.executor._client.run(loaded)
-        run_in_memory([make_study(rig, AXES)], crew)
+        run_in_memory([Request(rig, AXES).study()], crew)
         assert crew.executor._client.run(loaded) == before
         assert all(count == 1 for count in before.values())
 
@@ -156,6 +156,6 @@ def test_ctrl_c_leaves_no_task_behind(rig: Stage, cluster: LocalCluster) -> None
 
     with connected(cluster.scheduler_address) as crew:
         with pytest.raises(KeyboardInterrupt):
-            run_in_memory([make_study(rig, AXES, rtol=1e-8)], crew, 0.0, interrupt)
-        (found,) = run_in_memory([make_study(rig, AXES)], crew)
+            run_in_memory([Request(rig, AXES).study(rtol=1e-8)], crew, 0.0, interrupt)
+        (found,) = run_in_memory([Request(rig, AXES).study()], crew)
     assert (found.verdict != "").all()

@@ -17,8 +17,8 @@ import friso
 from friso.stage import Stage, StageError
 from friso.studies import store as storing
 from friso.studies.execute import local_crew
+from friso.studies.request import Request
 from friso.studies.store import Store, read_store
-from friso.studies.study import make_study
 from friso.studies.sweep import run_in_store
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
@@ -53,7 +53,7 @@ def test_a_store_holds_what_the_sweep_in_memory_gives(rig: Stage, whole: xr.Data
 
 def test_a_finished_store_is_not_run_again(rig: Stage, tmp_path: Path) -> None:
     friso.sweep(rig, AXES, store=tmp_path / "a.zarr")
-    with Store.opened(tmp_path / "a.zarr", make_study(rig, AXES)) as store:
+    with Store.opened(tmp_path / "a.zarr", Request(rig, AXES).study()) as store:
         assert list(store.missing()) == []
 
 
@@ -99,7 +99,7 @@ def test_a_refined_study_too(rig: Stage, tmp_path: Path) -> None:
 def test_ctrl_c_keeps_what_is_done_and_repeats_the_rest(
     rig: Stage, whole: xr.Dataset, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    study, path = make_study(rig, AXES), tmp_path / "a.zarr"
+    study, path = Request(rig, AXES).study(), tmp_path / "a.zarr"
     written: list[int] = []
     write = Store.write
 
@@ -132,7 +132,7 @@ def test_a_full_disk_stops_the_study_and_a_later_run_ends_it(
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         return put(*arguments, **options)
 
-    path, study = tmp_path / "a.zarr", make_study(rig, AXES)
+    path, study = tmp_path / "a.zarr", Request(rig, AXES).study()
     with Store.opened(path, study):
         pass
     monkeypatch.setattr(local, "_put", full)
@@ -158,7 +158,7 @@ def test_a_full_disk_stops_the_study_and_a_later_run_ends_it(
 )
 def test_a_store_of_another_study_is_refused(rig: Stage, tmp_path: Path, change: dict, message: str) -> None:
     path = tmp_path / "a.zarr"
-    with Store.opened(path, make_study(rig, AXES)):
+    with Store.opened(path, Request(rig, AXES).study()):
         pass
     before = sorted((file, file.read_bytes()) for file in path.rglob("*") if file.is_file())
     stage = rig.replace(change.pop("stage", {}))
@@ -170,7 +170,7 @@ def test_a_store_of_another_study_is_refused(rig: Stage, tmp_path: Path, change:
 
 def test_a_store_of_other_equations_is_refused(rig: Stage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("friso.studies.study.code_digest", lambda *folders: "another digest")
-    with Store.opened(tmp_path / "a.zarr", make_study(rig, AXES)):
+    with Store.opened(tmp_path / "a.zarr", Request(rig, AXES).study()):
         pass
     monkeypatch.undo()
     with pytest.raises(StageError, match="version of the equations"):
@@ -195,10 +195,12 @@ def test_anything_else_is_refused(rig: Stage, tmp_path: Path) -> None:
 
 HOLD = """
 import sys, time
+from pathlib import Path
 import friso
+from friso.studies.request import Request
 from friso.studies.store import Store
-from friso.studies.study import make_study
-with Store.opened(__import__("pathlib").Path(sys.argv[2]), make_study(friso.load(sys.argv[1]), {AXES!r})):
+
+with Store.opened(Path(sys.argv[2]), Request(friso.load(sys.argv[1]), {AXES!r}).study()):
     print("open", flush=True)
     time.sleep(60)
 """
@@ -214,7 +216,7 @@ def test_two_processes_on_one_store_are_refused(rig: Stage, tmp_path: Path) -> N
         with pytest.raises(StageError, match="another friso is writing"):
             friso.sweep(rig, AXES, store=path)
         process.send_signal(signal.SIGKILL)
-    with Store.opened(path, make_study(rig, AXES)):  # the lock went with its process
+    with Store.opened(path, Request(rig, AXES).study()):  # the lock went with its process
         pass
 
 
@@ -223,13 +225,16 @@ def test_a_store_is_there_whole_or_not_at_all(rig: Stage, tmp_path: Path, monkey
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     monkeypatch.setattr(xr.Dataset, "to_zarr", fails)
-    with pytest.raises(StageError, match="No space left"), Store.opened(tmp_path / "a.zarr", make_study(rig, AXES)):
+    with (
+        pytest.raises(StageError, match="No space left"),
+        Store.opened(tmp_path / "a.zarr", Request(rig, AXES).study()),
+    ):
         pass
     assert list(tmp_path.iterdir()) == []
 
 
 def test_a_large_study_takes_no_room_before_it_is_run(rig: Stage, tmp_path: Path) -> None:
-    study = make_study(rig, {"controller.crossover": "1 Hz..40 Hz:100000", "joint.stroke": "0 m..1 mm:10000"})
+    study = Request(rig, {"controller.crossover": "1 Hz..40 Hz:100000", "joint.stroke": "0 m..1 mm:10000"}).study()
     store = Store(tmp_path / "large.zarr", study)
     assert np.prod(store.blocks) <= storing.LARGEST_BLOCK
     with Store.opened(tmp_path / "large.zarr", study):

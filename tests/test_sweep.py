@@ -10,8 +10,9 @@ from hypothesis import strategies as st
 
 import friso
 from friso.stage import Stage, StageError
+from friso.studies.request import Request
 from friso.studies.samples import Samples
-from friso.studies.study import make_study, study_of
+from friso.studies.study import study_of
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 MASS = {"masses.cart": "0.7 * mass", "masses.stage": "0.3 * mass", "parasitic.mass": "0.15 * mass"}
@@ -89,14 +90,14 @@ def test_samples_vary_several_keys_at_once(rig: Stage) -> None:
     index = (1, 5)
     case = friso.check(study_of(runs).cell_stage(index))["given"]
     assert case.largest_force == runs.largest_force.values[index]
-    again = make_study(rig, {}, Samples(ranges, 16))
+    again = Request(rig, {}, Samples(ranges, 16)).study()
     assert np.array_equal(again.axes[0].values, runs["controller.crossover"].values)
-    other = make_study(rig, {}, Samples(ranges, 16, seed=1))
+    other = Request(rig, {}, Samples(ranges, 16, seed=1)).study()
     assert not np.array_equal(other.axes[0].values, again.axes[0].values)
-    latin = make_study(rig, {}, Samples(ranges, 10, "latin")).axes[0].values
+    latin = Request(rig, {}, Samples(ranges, 10, "latin")).study().axes[0].values
     assert sorted(np.floor((latin - 2) / 1.4)) == list(range(10))
     own = Samples({"controller.crossover": ["4 Hz", "4 Hz"], "joint.stroke": (np.array([0.1, 1.0]), "mm")})
-    assert make_study(rig, {}, own).axes[1].values.tolist() == pytest.approx([1e-4, 1e-3])
+    assert Request(rig, {}, own).study().axes[1].values.tolist() == pytest.approx([1e-4, 1e-3])
 
 
 def test_ranges_and_lists_as_texts(rig: Stage) -> None:
@@ -107,14 +108,14 @@ def test_ranges_and_lists_as_texts(rig: Stage) -> None:
         "joint.stroke": "0.1 mm, 0.3 mm",
         "joint.locked": "true, false",
     }
-    study = make_study(rig, axes)
+    study = Request(rig, axes).study()
     assert study.shape == (41, 7, 3, 2, 2)
     values = {axis.name: axis.values for axis in study.axes}
     assert np.array_equal(values["controller.crossover"], np.linspace(1, 40, 41))
     assert np.array_equal(values["joint.limiter_damping"], np.geomspace(1e-2, 1e4, 7))
     assert values["joint.stroke"].tolist() == [1e-4, 3e-4]
     assert values["joint.locked"].tolist() == [True, False]
-    scales = {axis.name: axis.scale for axis in make_study(rig, {"joint.stroke": "1 um..1 mm:4"}, log=True).axes}
+    scales = {axis.name: axis.scale for axis in Request(rig, {"joint.stroke": "1 um..1 mm:4"}, log=True).study().axes}
     assert scales == {"joint.stroke": "log"}
 
 
@@ -133,7 +134,7 @@ def test_blocks_cover_every_cell_once(shape: list[int], target: int) -> None:
     keys = ("controller.crossover", "controller.alpha", "controller.beta", "friction.static")
     axes = {key: np.linspace(0.1, 0.2, size) for key, size in zip(keys, shape, strict=False)}
     units = ("Hz", "", "", "N")
-    study = make_study(stage, {key: (axes[key], unit) for key, unit in zip(axes, units, strict=False)})
+    study = Request(stage, {key: (axes[key], unit) for key, unit in zip(axes, units, strict=False)}).study()
     block = study.block_shape(target)
     assert np.prod(block) <= max(target, 1)
     seen = np.zeros(study.shape, int)
@@ -149,7 +150,7 @@ def test_a_dataset_holds_its_study(rig: Stage) -> None:
     axes = {"controller.crossover": "4 Hz..8 Hz:2", "joint.locked": [True, False]}
     runs = friso.sweep(rig, axes, samples=Samples({"joint.stroke": "0.1 mm..1 mm"}, 2), metrics=["peaks"])
     study = study_of(runs)
-    made = make_study(rig, axes, Samples({"joint.stroke": "0.1 mm..1 mm"}, 2), metrics=["peaks"])
+    made = Request(rig, axes, Samples({"joint.stroke": "0.1 mm..1 mm"}, 2)).study(metrics=["peaks"])
     assert not made.differences(study, runs.attrs["equations"])
     assert runs.attrs["stage"] == rig.to_toml()
 

@@ -15,7 +15,8 @@ from friso.studies import verify
 from friso.studies.cells import METRICS, UNITS, Columns
 from friso.studies.execute import local_crew
 from friso.studies.refine import FINER, SHARE, finer, refine
-from friso.studies.study import Study, make_study
+from friso.studies.request import Request
+from friso.studies.study import Study
 from friso.studies.verify import drawn, loosest_rtol
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
@@ -52,7 +53,7 @@ def test_only_cells_that_were_run_are_verified(rig: Stage) -> None:
 @settings(deadline=None, max_examples=30)
 def test_cells_are_drawn_evenly_once_and_always_the_same(count: int, points: int, modulus: int) -> None:
     stage = friso.load(EXAMPLES / "thesis_rig.toml")
-    study = make_study(stage, {"controller.crossover": (np.linspace(1, 2, points), "Hz")})
+    study = Request(stage, {"controller.crossover": (np.linspace(1, 2, points), "Hz")}).study()
     picked = drawn(study, count, lambda cells: cells % modulus == 0)
     assert np.array_equal(picked, np.unique(picked))
     assert np.all(picked % modulus == 0)
@@ -63,7 +64,7 @@ def test_cells_are_drawn_evenly_once_and_always_the_same(count: int, points: int
 
 
 def test_the_loosest_safe_tolerance_is_chosen(rig: Stage, monkeypatch: pytest.MonkeyPatch) -> None:
-    study = make_study(rig, {"controller.crossover": "1 Hz..16 Hz:400"})
+    study = Request(rig, {"controller.crossover": "1 Hz..16 Hz:400"}).study()
     right = np.where(np.arange(400) < 200, "hunts", "settles")
 
     def pretended(study: Study, cells: np.ndarray, crew: object) -> Columns:
@@ -120,7 +121,7 @@ def asked(study: Study, verdict: np.ndarray, settling: np.ndarray | None = None)
 
 
 def test_a_smooth_boundary_is_found_as_on_the_full_grid(rig: Stage) -> None:
-    study = finer(make_study(rig, {"controller.crossover": "1 Hz..40 Hz:41", "joint.stroke": "0 m..1 mm:41"}))
+    study = finer(Request(rig, {"controller.crossover": "1 Hz..40 Hz:41", "joint.stroke": "0 m..1 mm:41"}).study())
     assert study.shape == (161, 161)
     assert study.axes[0].values[::FINER] == pytest.approx(np.linspace(1, 40, 41))
     x, y = np.meshgrid(np.linspace(0, 1, 161), np.linspace(0, 1, 161), indexing="ij")
@@ -167,4 +168,4 @@ def test_what_cannot_be_refined_is_refused(rig: Stage) -> None:
         samples = None if axes else friso.Samples({"joint.stroke": "0 m..1 mm"}, 8)
         with pytest.raises(StageError, match="one to three axes of numbers"):
             friso.sweep(rig, axes, samples, refine=True)
-    assert replace(make_study(rig, {"joint.stroke": "0 m..1 mm:3"}), refined=True).refined
+    assert replace(Request(rig, {"joint.stroke": "0 m..1 mm:3"}).study(), refined=True).refined

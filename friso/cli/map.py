@@ -67,17 +67,17 @@ def map_cells(
     Example: friso map rig.toml --x controller.crossover="1 Hz..16 Hz:41" --y joint.stroke="0 m..1 mm:41"
     A study that was interrupted goes on: friso map thesis_rig_map.zarr
     """
-    from friso.cli.map_study import Request, study_for, write_exports, write_views
+    from friso.cli.map_study import Varied, study_for, write_exports, write_views
 
     exports = _checked_exports(export)
-    request = Request(x, y, tuple(axis or ()), tuple(link or ()), samples, latin, log)
+    varied = Varied(x, y, tuple(axis or ()), tuple(link or ()), samples, latin, log)
     with _crew(workers, scheduler) as crew:
         if source.is_dir():
-            store, study = source, _stored(source, request, overrides)
+            store, study = source, _stored(source, varied, overrides)
         else:
             stage = read_stage(source, overrides)
             store = out or Path(f"{source.stem}_map.zarr")
-            study = study_for(stage, request, metric, refine, None if yes else LARGE, crew)
+            study = study_for(stage, varied, metric, refine, None if yes else LARGE, crew)
             study = replace(study, rtol=_chosen_rtol(rtol, study, crew))
         runs = _run(study, store, crew, _share(verify), as_json)
     files = [*write_views(runs, store, metric), *write_exports(runs, exports)]
@@ -122,12 +122,12 @@ def _crew(workers: int | None, scheduler: str | None) -> Iterator[Crew]:
             yield crew
 
 
-def _stored(store: Path, request: Any, overrides: list[str] | None) -> Study:
+def _stored(store: Path, varied: Any, overrides: list[str] | None) -> Study:
     """The study of a store that is gone on with. Raises StageError."""
     from friso.studies.store import read_store
     from friso.studies.study import study_of
 
-    if request.axes or request.links or overrides:
+    if varied.axes or varied.links or overrides:
         given = "a store together with axes, links or --set"
         raise StageError(str(store), given, "a store alone: it knows its study", f"friso map {store}")
     with read_store(store) as runs:

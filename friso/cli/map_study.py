@@ -14,8 +14,9 @@ from friso.quantities import StageError
 from friso.stage import Stage
 from friso.studies.execute import Crew
 from friso.studies.refine import FINER, SHARE, finer
+from friso.studies.request import Request
 from friso.studies.samples import Samples
-from friso.studies.study import Study, make_study, study_size, trial_study
+from friso.studies.study import Study
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -27,7 +28,7 @@ BYTES = 8
 
 
 @dataclass(frozen=True)
-class Request:
+class Varied:
     """The options that say what is varied, as they were given."""
 
     x: str | None
@@ -63,22 +64,21 @@ def _pairs(given: list[tuple[str, str]], example: str) -> dict[str, str]:
     return pairs
 
 
-def study_for(stage: Stage, request: Request, metric: str, refine: bool, most: int | None, crew: Crew) -> Study:
+def study_for(stage: Stage, varied: Varied, metric: str, refine: bool, most: int | None, crew: Crew) -> Study:
     """The study asked for. Raises StageError, also if it has more than `most` cells: then with what it would cost."""
-    axes, links = request.axes, request.linked
+    axes, links = varied.axes, varied.linked
     if not axes:
         raise StageError("--x", "no axis", "one axis or more", AXIS_EXAMPLE)
     samples = None
-    if request.samples is not None:
-        axes, samples = {}, Samples(axes, request.samples, "latin" if request.latin else "sobol")
-    elif request.latin:
+    if varied.samples is not None:
+        axes, samples = {}, Samples(axes, varied.samples, "latin" if varied.latin else "sobol")
+    elif varied.latin:
         raise StageError("--latin", "no --samples beside it", "how many samples", "--samples 1024 --latin")
-    given = (stage, axes, samples, links)
-    cells = study_size(*given, request.log)
-    runs = int(cells * (SHARE * FINER ** len(axes) if refine else 1))
+    request = Request(stage, axes, samples, links, varied.log)
+    runs = int(request.size() * (SHARE * FINER ** len(axes) if refine else 1))
     if most is not None and runs > most:
-        raise _too_large(runs, trial_study(*given, request.log), crew)
-    study = make_study(*given, log=request.log)
+        raise _too_large(runs, request.trial(), crew)
+    study = request.study()
     if metric not in study.metrics or metric == "status":
         expected = f"one of {', '.join(name for name in study.metrics if name != 'status')}"
         raise StageError("--metric", metric, expected, "--metric peak_to_peak")

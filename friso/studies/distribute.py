@@ -6,7 +6,7 @@ import asyncio
 import logging
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -15,9 +15,6 @@ from friso.stage import Stage
 from friso.studies.cells import Columns, run_cells
 from friso.studies.execute import Crew
 from friso.studies.study import equations_version
-
-if TYPE_CHECKING:
-    from distributed import Client
 
 PATIENCE = 10.0
 """How long a scheduler may take to answer [s]."""
@@ -28,16 +25,10 @@ def local_cluster(workers: int) -> Iterator[Crew]:
     """A crew of worker processes on this machine, one thread each."""
     from distributed import LocalCluster
 
-    with (
-        LocalCluster(
-            n_workers=workers,
-            threads_per_worker=1,
-            processes=True,
-            dashboard_address=":0",
-            silence_logs=logging.CRITICAL,
-        ) as cluster,
-        connected(cluster.scheduler_address) as crew,
-    ):
+    cluster: Any = LocalCluster(
+        n_workers=workers, threads_per_worker=1, dashboard_address=":0", silence_logs=logging.CRITICAL
+    )
+    with cluster, connected(cluster.scheduler_address) as crew:
         yield crew
 
 
@@ -52,7 +43,7 @@ def connected(scheduler: str) -> Iterator[Crew]:
 
     try:
         asyncio.run(_answers(scheduler))
-        client = Client(scheduler, timeout=PATIENCE, set_as_default=False)
+        client: Any = Client(scheduler, timeout=PATIENCE, set_as_default=False)
     except (OSError, ValueError) as error:
         expected = f"the address of a Dask scheduler that answers ({error})"
         raise StageError("--scheduler", scheduler, expected, "--scheduler tcp://10.0.0.1:8786") from None
@@ -65,7 +56,7 @@ def connected(scheduler: str) -> Iterator[Crew]:
 
 async def _answers(scheduler: str) -> None:
     """Raises OSError or ValueError if there is nothing at the address: a client that fails lingers for long."""
-    from distributed.comm import connect
+    from distributed.comm.core import connect
 
     comm = await connect(scheduler, timeout=PATIENCE)
     await comm.close()
@@ -80,7 +71,7 @@ def run_checked(
     return run_cells(stage, links, columns, rtol)
 
 
-def _refuse_strangers(client: Client) -> None:
+def _refuse_strangers(client: Any) -> None:
     """Raises StageError unless every worker has the same friso as this process."""
     if not client.nthreads():
         raise StageError("--scheduler", "a scheduler without workers", "workers: dask worker tcp://...")

@@ -97,6 +97,6 @@ def _value(node: ast.expr, known: Mapping[str, Any]) -> Any:
         case ast.Call(ast.Name(name), arguments):
             return _FUNCTIONS[name](*(_value(argument, known) for argument in arguments))
         case ast.Constant(value):
-            return np.float64(value)
+            return np.float64(str(value))
         case _:
             return np.asarray(known[ast.unparse(node)], dtype=float)[()]

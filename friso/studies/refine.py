@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from scipy.ndimage import distance_transform_edt
@@ -105,8 +106,9 @@ class _Known:
 
     def _nearest(self) -> tuple[np.ndarray, np.ndarray]:
         """Distance to the nearest cell asked for, and its number, both of the study's shape."""
-        distance, places = distance_transform_edt(~self.asked, return_indices=True)
-        return distance, np.ravel_multi_index(tuple(places), self.shape)
+        found: Any = distance_transform_edt(~self.asked, return_indices=True)
+        distance, places = found
+        return distance, np.asarray(np.ravel_multi_index(tuple(places), self.shape))
 
     def _changes(self, nearest: np.ndarray) -> np.ndarray:
         """Which cells have a neighbour of another verdict, where each has that of the nearest cell asked for."""
@@ -128,7 +130,7 @@ class _Known:
         """Numbers of up to `count` cells that are most worth a run."""
         distance, nearest = self._nearest()
         changes = self._changes(nearest)
-        from_change = distance_transform_edt(~changes) if changes.any() else np.ones(self.shape)
+        from_change: Any = distance_transform_edt(~changes) if changes.any() else np.ones(self.shape)
         settling = np.nan_to_num(self.columns["settling_time_10um"], nan=LATE)
         late = np.where(self.columns["verdict"] == "hunts", 1.0, np.minimum(settling / LATE, 1.0))
         worth = np.where(self.asked, 0.0, distance * late[nearest] / np.cbrt(np.maximum(from_change, 1.0)))

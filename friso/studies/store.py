@@ -124,12 +124,13 @@ class Store:
         def answer(cells: np.ndarray) -> Columns:
             file = folder / f"{next(number)}.npz"
             if file.exists():
-                with np.load(file) as kept:
-                    return {name: kept[name] for name in kept.files}
+                with np.load(file) as answers:
+                    return dict(answers)
             found = ask(cells)
             draft = file.with_suffix(".partial")
             with draft.open("wb") as stream:
-                np.savez_compressed(stream, **{name: found[name].astype(WORDS.get(name, "f8")) for name in found})
+                kept: dict[str, Any] = {name: found[name].astype(WORDS.get(name, "f8")) for name in found}
+                np.savez_compressed(stream, **kept)
             draft.rename(file)
             return found
 

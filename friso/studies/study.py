@@ -13,13 +13,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from friso.engine.cache import code_digest
-from friso.engine.tolerance import checked_rtol
-from friso.quantities import StageError
 from friso.stage import Stage, loads, numeric_keys
-from friso.studies import links as linking
-from friso.studies.axes import Axis, Range, Values, read_axes
-from friso.studies.cells import METRICS, UNITS, flat_cells
-from friso.studies.samples import SAMPLE, Samples, sampled
+from friso.studies.axes import Axis
+from friso.studies.cells import METRICS, flat_cells
+from friso.studies.samples import SAMPLE
 from friso.version import VERSION
 
 if TYPE_CHECKING:
@@ -172,69 +169,6 @@ def equations_version() -> str:
     return f"{VERSION} ({code_digest('equations', 'engine', 'hunting')[:12]})"
 
 
-def make_study(
-    stage: Stage,
-    axes: Mapping[str, Values],
-    samples: Samples | None = None,
-    links: Mapping[str, str] | None = None,
-    metrics: Sequence[str] | None = None,
-    rtol: float = 1e-6,
-    log: bool = False,
-) -> Study:
-    """Read what a user gave into a study. Raises StageError, and ValueError for a tolerance that is not usable."""
-    checked_rtol(rtol)
-    links = dict(links or {})
-    free = linking.names(links)
-    read = read_axes(stage, axes, free, log)
-    if not read and samples is None:
-        example = '{"controller.crossover": ["4 Hz", "8 Hz"]}'
-        raise StageError("axes", "none", "at least one key with its values", example)
-    dimensions = [Dimension(axis.name, (_gridded(axis),)) for axis in read]
-    if samples is not None:
-        dimensions.append(Dimension(SAMPLE, sampled(stage, samples, free, log)))
-    names = [axis.name for dimension in dimensions for axis in dimension.axes]
-    for name in names:
-        if names.count(name) > 1 or name in (*METRICS, SAMPLE):
-            raise StageError(name, "a name that is taken", "every axis once, under a name of its own")
-    linking.check_links(stage, links, frozenset(names))
-    return Study(stage, tuple(dimensions), links, _checked_metrics(metrics), rtol)
-
-
-TRIED = 512
-"""Cells of a trial."""
-
-
-def study_size(
-    stage: Stage, axes: Mapping[str, Values], samples: Samples | None, links: Mapping[str, str], log: bool
-) -> int:
-    """The number of cells of a study, without any array being made. Raises StageError as `make_study` does."""
-    sizes = [_points(axis) for axis in read_axes(stage, axes, linking.names(links), log)]
-    return math.prod(sizes) * (1 if samples is None or samples.count is None else samples.count)
-
-
-def trial_study(
-    stage: Stage, axes: Mapping[str, Values], samples: Samples | None, links: Mapping[str, str], log: bool
-) -> Study:
-    """A few cells drawn evenly from a study that is too large to be made."""
-    given = {**axes, **(samples.ranges if samples else {})}
-    rng = np.random.default_rng(0)
-    drawn = []
-    for axis in read_axes(stage, given, linking.names(links), log):
-        if isinstance(axis, Range):
-            drawn.append(Axis(axis.name, axis.at(rng.random(TRIED)), axis.unit, axis.scale))
-        else:
-            drawn.append(replace(axis, values=rng.choice(axis.values, TRIED)))
-    return Study(stage, (Dimension(SAMPLE, tuple(drawn)),), dict(links), METRICS, 1e-6)
-
-
-def _points(axis: Axis | Range) -> int:
-    count = len(axis.values) if isinstance(axis, Axis) else axis.count
-    if count is None:
-        given = f"{axis.first:g}..{axis.last:g} {axis.unit}, without a number of points"
-        raise StageError(axis.name, given, "FIRST..LAST:POINTS", '"1 Hz..40 Hz:41"')
-    return count
-
-
 def study_of(runs: xr.Dataset) -> Study:
     """The study that a dataset or an opened store holds the results of."""
     dimensions, order = [], json.loads(runs.attrs["axes"])
@@ -251,23 +185,6 @@ def _stored_axis(coordinate: xr.DataArray) -> Axis:
     values = coordinate.values
     attributes = coordinate.attrs
     return Axis(str(coordinate.name), values, attributes["units"], attributes["scale"], values.dtype.kind not in "bUT")
-
-
-def _gridded(axis: Axis | Range) -> Axis:
-    if isinstance(axis, Axis):
-        if len(np.unique(axis.values)) < len(axis.values):
-            raise StageError(axis.name, "values that occur twice", "every value once", '["4 Hz", "8 Hz"]')
-        return axis
-    _points(axis)
-    return axis.axis()
-
-
-def _checked_metrics(metrics: Sequence[str] | None) -> tuple[str, ...]:
-    """The metrics asked for, with verdict and status, in their usual order."""
-    for name in metrics or ():
-        if name not in METRICS:
-            raise StageError("metrics", name, f"some of {', '.join(METRICS)}", '["peaks", "period"]')
-    return tuple(name for name in METRICS if not metrics or name in metrics or name not in UNITS)
 
 
 def _written(stage: Stage, key: str, value: float) -> Any:

@@ -16,9 +16,10 @@ from friso.studies.cells import METRICS, WORDS, Columns, attributes_of
 from friso.studies.execute import Crew, Progress, local_crew, run_scattered
 from friso.studies.refine import Ask, finer
 from friso.studies.refine import refine as refine_study
+from friso.studies.request import Request
 from friso.studies.samples import Samples
 from friso.studies.store import Store
-from friso.studies.study import Study, cells_of, make_study
+from friso.studies.study import Study, cells_of
 from friso.studies.verify import verified
 
 if TYPE_CHECKING:
@@ -56,7 +57,7 @@ def sweep(
     study that was interrupted resumes. Raises StageError for a wrong axis, link or store, ValueError for a tolerance
     that is not usable.
     """
-    study = make_study(stage, axes, samples, links, metrics, rtol)
+    study = Request(stage, axes, samples, links or {}).study(metrics, rtol)
     study = finer(study) if refine else study
     with local_crew(threads) as crew:
         if store is None:
