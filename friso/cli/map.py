@@ -68,6 +68,7 @@ def map_cells(
     A study that was interrupted goes on: friso map thesis_rig_map.zarr
     """
     from friso.cli.map_study import Varied, study_for, write_exports, write_views
+    from friso.studies.store import in_memory
 
     exports = _checked_exports(export)
     varied = Varied(x, y, tuple(axis or ()), tuple(link or ()), samples, latin, log)
@@ -80,7 +81,12 @@ def map_cells(
             study = study_for(stage, varied, metric, refine, None if yes else LARGE, crew)
             study = replace(study, rtol=_chosen_rtol(rtol, study, crew))
         runs = _run(study, store, crew, _share(verify), as_json)
-    files = [*write_views(runs, store, metric), *write_exports(runs, exports)]
+    files = write_exports(runs, exports)
+    if study.cells <= LARGE:
+        runs = in_memory(runs)
+        files = [*write_views(runs, store, metric), *files]
+    else:
+        say(f"no figure and no page of {study.cells:.3g} cells")
     _report(runs, study, store, files, as_json)
 
 

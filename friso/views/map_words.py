@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Hashable, Iterable
 from typing import TYPE_CHECKING
 
@@ -11,6 +12,9 @@ from friso.views.figure import GREY, INK, ORANGE, PINK, VERMILLION, Kind
 
 if TYPE_CHECKING:
     import xarray as xr
+
+AT_ONCE = 1_000_000
+"""Texts that are counted at a time."""
 
 _QUANTITIES = {
     "controller.alpha": "Controller α",
@@ -127,9 +131,13 @@ def counts(runs: xr.Dataset, name: str) -> dict[str, int]:
     """How many cells have each text of a variable, the most frequent first; none where there is no such variable."""
     if name not in runs:
         return {}
-    codes, words = words_of(runs, name)
-    numbers = np.bincount(codes.ravel(), minlength=len(words))
-    return {words[i]: int(numbers[i]) for i in np.argsort(-numbers, kind="stable")}
+    found: Counter[str] = Counter()
+    along, shape = str(runs[name].dims[0]), runs[name].shape
+    rows = max(1, AT_ONCE // max(1, int(np.prod(shape[1:]))))
+    for first in range(0, shape[0], rows):  # a large store is never read whole
+        codes, words = words_of(runs.isel({along: slice(first, first + rows)}), name)
+        found.update(dict(zip(words, np.bincount(codes.ravel(), minlength=len(words)).tolist(), strict=True)))
+    return dict(found.most_common())
 
 
 def failures(runs: xr.Dataset) -> dict[str, int]:
