@@ -380,7 +380,8 @@ def test_document_and_page_have_every_claim(small: Reproduction, tmp_path: Path)
 def test_fig_14b_at_both_tolerances(small: Reproduction) -> None:
     assert [runs.attrs["rtol"] for runs in small.tolerances.values()] == [1e-4, 1e-8]
     loose, tight = small.tolerances.values()
-    assert small.changed == pytest.approx(float((loose.verdict != tight.verdict).mean()))
+    assert small.changed[0] == pytest.approx(float((loose.verdict != tight.verdict).mean()))
+    assert small.changed[1] == pytest.approx(float((loose.peaks != tight.peaks).mean()))
 
 
 def test_a_new_judge_needs_no_change_of_the_page(small: Reproduction) -> None:

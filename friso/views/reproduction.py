@@ -60,6 +60,7 @@ def write_figures(reproduction: Reproduction, folder: Path) -> list[Path]:
 def claims_document(reproduction: Reproduction) -> dict[str, Any]:
     """All claims with their judgements, ready for JSON; how they were judged stands before them."""
     tolerances = {f"{rtol:g}" for rtol in reproduction.tolerances}
+    verdicts, counts = reproduction.changed
     return {
         "source": rig().source,
         "friso": VERSION,
@@ -67,7 +68,9 @@ def claims_document(reproduction: Reproduction) -> dict[str, Any]:
         "points_of_variants": reproduction.coarse,
         "rtol": reproduction.rtol,
         "conventions": CONVENTIONS,
-        "figure_14b": {"rtol": sorted(tolerances), "verdicts_changed": reproduction.changed} if tolerances else None,
+        "figure_14b": {"rtol": sorted(tolerances), "verdicts_changed": verdicts, "counts_changed": counts}
+        if tolerances
+        else None,
         "claims": [_entry(verdict) for verdict in reproduction.verdicts],
     }
 

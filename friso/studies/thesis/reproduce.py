@@ -46,13 +46,14 @@ Progress = Callable[[int, int, str], None]
 @dataclass(frozen=True)
 class Reproduction:
     """All that was found: maps by study name and responses by name; the map of Fig. 14B by relative tolerance
-    and the share of its cells whose verdict differs between them (NaN if not computed); a verdict per claim; values
+    and the shares of its cells whose verdict, and whose peak count, differs between them (NaN if not computed); a
+    verdict per claim; values
     per axis of the maps (`points`) and of those with the open parameters varied (`coarse`)."""
 
     maps: Mapping[str, xr.Dataset]
     responses: Mapping[str, Response]
     tolerances: Mapping[float, xr.Dataset]
-    changed: float
+    changed: tuple[float, float]
     verdicts: tuple[Verdict, ...]
     points: int
     coarse: int
@@ -159,12 +160,12 @@ def lasting(runs: xr.Dataset) -> xr.Dataset:
     return runs.assign(verdict=verdict, peaks=peaks)
 
 
-def _changed(tolerances: Mapping[float, xr.Dataset]) -> float:
-    """Share of cells whose verdict differs between the two tolerances."""
+def _changed(tolerances: Mapping[float, xr.Dataset]) -> tuple[float, float]:
+    """Shares of cells whose verdict, and whose peak count, differs between the two tolerances."""
     if not tolerances:
-        return np.nan
-    loose, tight = (runs["verdict"].values for runs in tolerances.values())
-    return float((loose != tight).mean())
+        return np.nan, np.nan
+    loose, tight = tolerances.values()
+    return float((loose["verdict"] != tight["verdict"]).mean()), float((loose["peaks"] != tight["peaks"]).mean())
 
 
 def _judged(claim: Claim, baseline: Evidence, plain: Evidence, varied: Iterable[tuple[Variant, Evidence]]) -> Verdict:
