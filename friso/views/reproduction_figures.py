@@ -56,8 +56,7 @@ def _maps(reproduction: Reproduction, number: str) -> Figure:
         verdicts, counts = reproduction.changed
         zeros.append(
             f"B: at the thesis's relative tolerance {verdicts:.1%} of the cells get another verdict, and {counts:.1%} "
-            "another peak count, than at the tight one. friso steps onto the kinks of friction and limiter; a solver "
-            "that steps over them miscounts far more at that tolerance."
+            "another peak count, than at the tight one."
         )
     return Figure(
         f"figure-{number}",
