@@ -3,8 +3,12 @@
 import os
 import shutil
 import tempfile
+from pathlib import Path
 
 import pytest
+
+import friso
+from friso.stage import Stage
 
 FOLDER = "FRISO_CACHE_DIR"
 MADE = "FRISO_TEST_CACHE_DIR"
@@ -20,3 +24,9 @@ def pytest_unconfigure(config: pytest.Config) -> None:
     if not hasattr(config, "workerinput") and MADE in os.environ:
         shutil.rmtree(os.environ.pop(MADE), ignore_errors=True)
         os.environ.pop(FOLDER, None)
+
+
+@pytest.fixture(scope="session")
+def rig() -> Stage:
+    """The thesis rig, its joint free."""
+    return friso.load(Path(__file__).parent.parent / "examples" / "thesis_rig.toml")

@@ -30,11 +30,6 @@ pytestmark = [
 
 
 @pytest.fixture(scope="module")
-def rig() -> Stage:
-    return friso.load(EXAMPLES / "thesis_rig.toml")
-
-
-@pytest.fixture(scope="module")
 def cluster() -> Iterator[LocalCluster]:
     with LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=":0") as cluster:
         yield cluster
@@ -118,6 +113,19 @@ def test_a_worker_that_joins_later_with_another_friso_is_refused(rig: Stage, clu
         crew.arguments["expected"] = "9.9.9 (0123456789ab)"
         with pytest.raises(StageError, match="a worker has friso"):
             run_in_memory([Request(rig, AXES).study()], crew)
+
+
+def test_a_scheduler_that_dies_is_said_so(rig: Stage) -> None:
+    scheduler = LocalCluster(n_workers=1, threads_per_worker=1, processes=True, dashboard_address=":0")
+
+    def close(cells: int) -> None:
+        scheduler.close()
+
+    with (
+        pytest.raises(RuntimeError, match="the cluster lost a block"),
+        connected(scheduler.scheduler_address) as crew,
+    ):
+        run_in_memory([Request(rig, AXES).study(rtol=1e-8)], crew, 0.0, close)
 
 
 def test_kernels_are_compiled_once_per_worker(rig: Stage, cluster: LocalCluster) -> None:

@@ -66,6 +66,27 @@ def test_a_finished_map_is_drawn_again_from_its_store_alone(mapped: tuple[Path, 
     assert json.loads(done.stdout)["verdicts"] == document["verdicts"]
 
 
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("--metric", "amplitude"), "peak_to_peak"),
+        (("--rtol", "1e-4"), "a store alone"),
+        (("--refine",), "a store alone"),
+        (("--log",), "a store alone"),
+        (("--samples", "8"), "a store alone"),
+        (("--out", "b.zarr"), "a store alone"),
+        (("--set", "controller.alpha=0.2"), "a store alone"),
+    ],
+)
+def test_a_store_takes_nothing_that_makes_another_study(
+    mapped: tuple[Path, dict], options: tuple[str, ...], message: str
+) -> None:
+    done = friso(mapped[0], "map", "a.zarr", *options)
+    assert done.returncode == 2
+    assert message in done.stderr
+    assert "Traceback" not in done.stderr
+
+
 def test_ctrl_c_says_how_to_go_on(tmp_path: Path) -> None:
     """Interrupted on a terminal in the middle of its bar; resumed by the store alone."""
     command = [sys.executable, "-m", "friso.cli", "map", str(RIG), "--x", "controller.crossover=4 Hz..12 Hz:300"]

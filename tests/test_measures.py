@@ -1,14 +1,23 @@
 """Peak count and period on turning points made by hand: what they count, and what they leave out."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.signal import find_peaks
 
+from friso.engine.batch import run_chunks
+from friso.engine.kernel import kernel
+from friso.equations.structure import structure
 from friso.hunting import peaks as scanning
+from friso.hunting.measures import measure, options
 from friso.hunting.peaks import COUNTED_ABOVE, COUNTED_AFTER, scan
 from friso.hunting.turning import APART
+from friso.stage import Stage
+from friso.studies.request import Request
+from friso.studies.samples import Samples
 
 
 def peaks(turns: list[tuple[float, float]]) -> list[float]:
@@ -98,3 +107,28 @@ def test_compiled_loops_do_what_the_plain_ones_do(monkeypatch: pytest.MonkeyPatc
     assert np.array_equal(compiled[0], plain[0])
     assert np.array_equal(compiled[1], plain[1], equal_nan=True)
     assert 0 < np.isnan(plain[1]).sum() < 300
+
+
+@pytest.mark.xdist_group("rig")
+@pytest.mark.parametrize("rtol", [1e-2, 1e-4])
+def test_small_swings_that_are_passed_over_change_no_measure(rig: Stage, rtol: float) -> None:
+    """The kernel keeps a zigzag of turning points only; against all of them, on stages that ring on their limiter."""
+    samples = Samples(
+        {"joint.limiter_damping": "0.01 N*s/m..1e4 N*s/m:log", "controller.crossover": "2 Hz..12 Hz"}, 256
+    )
+    study = Request(rig, {}, samples).study()
+    flat = rig.flat(study.columns(np.arange(256)))
+    shape = kernel(structure(flat))
+    found = {}
+    for least in (options(rtol).least_swing, 0.0):
+        columns = [np.full(256, np.nan) for _ in range(6)]
+        for runs in run_chunks(shape, flat, 256, replace(options(rtol), least_swing=least)):
+            each = measure(runs.part(flat), runs)
+            measured = (each.peaks, each.period, each.peak_to_peak, *each.settling_time, runs.results.turn_counts)
+            for column, values in zip(columns, measured, strict=True):
+                column[runs.numbers] = values
+        found[least] = columns
+    (*filtered, few), (*unfiltered, many) = found.values()
+    for one, other in zip(filtered, unfiltered, strict=True):
+        assert np.array_equal(one, other, equal_nan=True)
+    assert few.sum() < many.sum()

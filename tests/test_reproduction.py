@@ -12,15 +12,17 @@ import sympy as sp
 import xarray as xr
 
 import friso
+import friso.studies.thesis.reproduce as reproduction
 from friso.studies.thesis import STUDIES, Evidence, Finding, Part, Reproduction, Response, claims, reproduce, rig
 from friso.studies.thesis.claims import _JUDGES, judges, registered
 from friso.studies.thesis.judges import series_stiffness
 from friso.studies.thesis.judges.shares import NARROW, WIDE
 from friso.studies.thesis.maps import begins, ends, free_square, trend
 from friso.studies.thesis.open_parameters import METHOD, OPEN
-from friso.studies.thesis.reproduce import lasting
-from friso.studies.thesis.verdicts import not_covered, verdict
+from friso.studies.thesis.reproduce import _changed, lasting
+from friso.studies.thesis.verdicts import not_covered, turned, verdict
 from friso.views.reproduction import claims_document, reproduction_html, write_reproduction
+from friso.views.reproduction_figures import reproduction_figures
 
 ROOT = Path(__file__).parent.parent
 POINTS = 21
@@ -261,6 +263,17 @@ def test_judges_recognise_what_does_not(claim: str) -> None:
     assert len([part for part in finding.parts if not part.holds]) >= min(2, len(finding.parts) - 1), finding
 
 
+def test_a_limit_is_lower_by_a_cell_at_least() -> None:
+    """A limit lower by a cell at half of the strokes, and never higher, is lower by too little."""
+    judge = registered()["F16B"].judge
+    half = crossover_pair(6, 5.2)
+    soft = half["isolator-crossover-soft"]
+    stiff = half["isolator-crossover"].assign_coords(soft.coords)
+    half["isolator-crossover-soft"] = soft.where(soft["joint.stroke"] > 0.75e-3, stiff)
+    assert judge(Evidence(half, {})).judgement == "differs"
+    assert judge(Evidence(crossover_pair(6, 5.2), {})).judgement == "holds"
+
+
 def test_every_judge_of_maps_is_tried_both_ways() -> None:
     assert HOLDS.keys() == FAILS.keys() == registered().keys() - {"E1"}
 
@@ -294,19 +307,54 @@ def test_what_a_judgement_depends_on() -> None:
         "5",
         finding(True, False),
         finding(True, False),
-        [(OPEN[0], finding(True, True)), (OPEN[1], finding(True, False))],
+        [(OPEN[0], finding(True, True)), (OPEN[1], finding(True, False)), (METHOD[0], finding(True, False))],
     )
     assert [str(each) for each in found.depends_on] == ["alpha 0.2: holds (number 1)"]
     assert "unknown parameter (holds with alpha 0.2)" in found.reason
-    assert found.dependence == "Depends on alpha (0.2: holds)."
+    varied = "What the thesis leaves open, varied one at a time, "
+    assert found.dependence == f"{varied}2 values: a part turns with alpha (0.2: holds)."
     untouched = verdict(claim, "5", finding(True), finding(True), [(OPEN[0], finding(True))])
-    assert untouched.dependence == "Does not depend on the open parameters."
+    assert untouched.dependence == f"{varied}1 values: none turns a part."
+    assert verdict(claim, "5", finding(True), finding(True), []).dependence.startswith("Nothing that")
 
 
-def test_what_the_coarse_grid_turns_is_no_dependence() -> None:
-    found = verdict(claims()[0], "5", finding(False), finding(True), [(OPEN[0], finding(True))])
-    assert found.depends_on == ()
+def test_a_variant_is_compared_with_the_baseline_alone() -> None:
+    """What turns against the coarse grid alone, back to the baseline's, is none; what turns to the coarse one's is."""
+    full, coarse = finding(False), finding(True)
+    found = verdict(claims()[0], "5", full, coarse, [(OPEN[0], finding(False)), (OPEN[1], finding(True))])
+    assert [each.variant for each in found.depends_on] == [OPEN[1]]
     assert "coarser grid: holds" in found.reason
+
+
+@pytest.mark.parametrize("holds", [(True, True, False), (True, False, True), (False, True, True), (True, False, False)])
+def test_what_is_run_again_at_full_points(holds: tuple[bool, bool, bool]) -> None:
+    assert turned(*(finding(each) for each in holds))
+    assert not turned(finding(True), finding(True), finding(True))
+
+
+def test_variants_that_turn_a_part_are_decided_at_full_points(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The coarse grid is one of 3 values: whatever is found to turn is what a study at full points finds."""
+    monkeypatch.setattr(reproduction, "COARSE", 3)
+    decided = {each.claim.id: each for each in reproduce(["control", "system"], points=7).verdicts if each.finding}
+    monkeypatch.setattr(reproduction, "COARSE", 7)
+    exact = {each.claim.id: each for each in reproduce(["control", "system"], points=7).verdicts if each.finding}
+    assert decided.keys() == exact.keys() >= {"F11B", "F12B"}
+    for claim, each in decided.items():
+        assert set(each.depends_on) <= set(exact[claim].depends_on)
+        assert each.hangs_on == exact[claim].hangs_on
+        assert each.tried == exact[claim].tried
+    assert any(each.grid and each.depends_on == exact[claim].depends_on for claim, each in decided.items())
+
+
+def test_values_that_do_not_enter_are_not_counted(small: Reproduction) -> None:
+    tried = {each.claim.id: each.tried for each in small.verdicts if each.finding}
+    alpha_and_beta = 4
+    own_path, own_joint = 3, 2
+    assert tried["E1"] == 0
+    assert tried["F16B"] == len(OPEN)
+    assert tried["F12B"] == len(OPEN) - alpha_and_beta - own_joint
+    assert tried["F11A"] == len(OPEN) - own_path - own_joint
+    assert tried["F5"] == len(OPEN) - own_joint
 
 
 # --- the whole --------------------------------------------------------------------------------------------------------
@@ -382,6 +430,24 @@ def test_fig_14b_at_both_tolerances(small: Reproduction) -> None:
     loose, tight = small.tolerances.values()
     assert small.changed[0] == pytest.approx(float((loose.verdict != tight.verdict).mean()))
     assert small.changed[1] == pytest.approx(float((loose.peaks != tight.peaks).mean()))
+
+
+def test_a_count_unknown_at_both_tolerances_does_not_differ(small: Reproduction) -> None:
+    loose = made("isolator-damping", lambda d, s: np.where(s < 1e-4, -1, 2 * (s < 1e-3)), 5)
+    tight = loose.copy()
+    assert np.isnan(loose.peaks).any()
+    assert _changed({1e-4: loose, 1e-8: tight}) == (0.0, 0.0)
+    other = loose.assign(peaks=loose.peaks.fillna(1.0))
+    assert _changed({1e-4: loose, 1e-8: other})[1] == pytest.approx(float(np.isnan(loose.peaks).mean()))
+    document = claims_document(replace(small, tolerances={1e-4: loose, 1e-8: tight}))
+    assert document["figure_14b"]["rtol"] == [1e-8, 1e-4]
+
+
+def test_titles_say_what_is_drawn_whatever_was_found(small: Reproduction) -> None:
+    still = {name: Response(cell(0, 0.0, np.nan).cell, each.trace) for name, each in small.responses.items()}
+    for number, figure in reproduction_figures(replace(small, responses=still)).items():
+        assert "hunt" not in figure.title, number
+        assert "symmetric" not in figure.caption, number
 
 
 def test_a_new_judge_needs_no_change_of_the_page(small: Reproduction) -> None:

@@ -15,9 +15,11 @@ import xarray as xr
 
 import friso
 from friso.stage import Stage, StageError
+from friso.studies import refine
 from friso.studies import store as storing
 from friso.studies.execute import local_crew
 from friso.studies.request import Request
+from friso.studies.samples import Samples
 from friso.studies.store import Store, read_store
 from friso.studies.sweep import run_in_store
 
@@ -25,11 +27,6 @@ EXAMPLES = Path(__file__).parent.parent / "examples"
 AXES = {"controller.crossover": "2 Hz..16 Hz:12", "joint.stroke": "0.1 mm..1 mm:16"}
 
 pytestmark = pytest.mark.xdist_group("rig")
-
-
-@pytest.fixture(scope="module")
-def rig() -> Stage:
-    return friso.load(EXAMPLES / "thesis_rig.toml")
 
 
 @pytest.fixture(scope="module")
@@ -166,6 +163,65 @@ def test_a_store_of_another_study_is_refused(rig: Stage, tmp_path: Path, change:
         friso.sweep(stage, change.pop("axes", AXES), store=path, **change)
     assert "nothing was overwritten" in str(error.value)
     assert before == sorted((file, file.read_bytes()) for file in path.rglob("*") if file.is_file())
+
+
+SAMPLES = {"masses.stage": "0.5 kg..1 kg"}
+FOLLOW = {"friction.static": "3 * friction.coulomb", "friction.coulomb": "0.9 * friction.coulomb"}
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "message"),
+    [
+        (
+            {"samples": Samples(SAMPLES, 8)},
+            {"samples": Samples({"masses.cart": "0.5 kg..1 kg"}, 8)},
+            "masses.stage there",
+        ),
+        (
+            {"samples": Samples({"joint.stroke": ["0.1 mm", "1 mm"], "controller.alpha": [0.1, 0.2]})},
+            {"samples": Samples({"joint.stroke": ["0.1 mm", "1 mm"]})},
+            "joint.stroke with controller.alpha there",
+        ),
+        ({"axes": AXES, "links": FOLLOW}, {"axes": AXES, "links": dict(reversed(FOLLOW.items()))}, "links"),
+    ],
+)
+def test_a_store_of_nearly_the_same_study_is_refused(
+    rig: Stage, tmp_path: Path, first: dict, second: dict, message: str
+) -> None:
+    """Other sampled keys with the same values, fewer of them, the same links in another order."""
+    with Store.opened(tmp_path / "a.zarr", Request(rig, **{"axes": {}, **first}).study()):
+        pass
+    with pytest.raises(StageError, match=message):
+        friso.sweep(rig, **{"axes": {}, **second}, store=tmp_path / "a.zarr")
+
+
+def test_chunks_that_a_power_cut_took_are_run_again(rig: Stage, whole: xr.Dataset, tmp_path: Path) -> None:
+    path = tmp_path / "a.zarr"
+    friso.sweep(rig, AXES, store=path)
+    chunks = [sorted((path / name).glob("[0-9]*")) for name in ("peaks", "verdict")]
+    chunks[0][1].unlink()
+    chunks[1][3].write_bytes(b"")
+    with Store.opened(path, Request(rig, AXES).study()) as store:
+        assert len(list(store.missing())) == 2
+    same(friso.sweep(rig, AXES, store=path), whole)
+
+
+def test_answers_to_other_questions_are_not_taken(rig: Stage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A refined study begun by a friso that chose other cells."""
+    path, study = tmp_path / "a.zarr", refine.finer(Request(rig, AXES).study())
+    asked: list[int] = []
+
+    def stop(cells: int) -> None:
+        asked.append(cells)
+        if len(asked) == 3:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(refine, "LATTICE", 6)
+    with pytest.raises(KeyboardInterrupt), local_crew(2) as crew:
+        run_in_store(study, path, crew, 0.0, stop)
+    monkeypatch.undo()
+    assert (path / ".answers" / "0.npz").exists()
+    same(friso.sweep(rig, AXES, refine=True, store=path), friso.sweep(rig, AXES, refine=True))
 
 
 def test_a_store_of_other_equations_is_refused(rig: Stage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -20,11 +20,6 @@ MASS = {"masses.cart": "0.7 * mass", "masses.stage": "0.3 * mass", "parasitic.ma
 pytestmark = pytest.mark.xdist_group("rig")
 
 
-@pytest.fixture(scope="module")
-def rig() -> Stage:
-    return friso.load(EXAMPLES / "thesis_rig.toml")
-
-
 def test_cells_equal_runs_alone(rig: Stage) -> None:
     """Any cell, run alone as a stage of its own, gives the same numbers bit for bit."""
     runs = friso.sweep(
@@ -184,6 +179,8 @@ def test_results_do_not_depend_on_threads(rig: Stage) -> None:
         ({"controller.crossover": "1 Hz..4 Hz:3:cubic"}, "FIRST..LAST:POINTS"),
         ({"controller.crossover": "8 Hz"}, "one point"),
         ({"sample": ["8 kg"]}, "sample"),
+        ({"name": ["a", "b"]}, "a name that a link uses"),
+        ({"controller.crossover": "1 Hz..2 Hz:10000000000000"}, "at most"),
     ],
 )
 def test_wrong_axes_are_refused(rig: Stage, axes: dict, message: str) -> None:
@@ -200,6 +197,8 @@ def test_wrong_axes_are_refused(rig: Stage, axes: dict, message: str) -> None:
         ({"masses.cart": "mass if mass else 1"}, "min, max, sqrt, abs"),
         ({"masses.cart": "0.7 *"}, "min, max, sqrt, abs"),
         ({"masses.cart": "max(mass)"}, "min, max, sqrt, abs"),
+        ({"masses.cart": "mass * friction.model"}, "the name friction.model"),
+        ({"masses.cart": "mass", "controller.crossover": "8"}, "does not follow the axis"),
     ],
 )
 def test_wrong_links_are_refused(rig: Stage, links: dict, message: str) -> None:

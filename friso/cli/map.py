@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -43,8 +43,9 @@ def map_cells(
     overrides: Overrides = None,
     metric: Annotated[str, typer.Option(metavar="NAME", help="What colours the map.")] = "peaks",
     rtol: Annotated[
-        str, typer.Option(metavar="NUMBER|auto", help="Relative tolerance; auto: the loosest safe one.")
-    ] = "1e-6",
+        str | None,
+        typer.Option(metavar="NUMBER|auto", help="Relative tolerance, 1e-6 unless told; auto: the loosest safe one."),
+    ] = None,
     verify: Annotated[float, typer.Option(metavar="SHARE", help="Share of the cells run again at rtol/100.")] = 0.05,
     refine: Annotated[
         bool, typer.Option("--refine", help="A grid 4 times finer, run along its boundaries only.")
@@ -67,26 +68,30 @@ def map_cells(
     Example: friso map rig.toml --x controller.crossover="1 Hz..16 Hz:41" --y joint.stroke="0 m..1 mm:41"
     A study that was interrupted goes on: friso map thesis_rig_map.zarr
     """
-    from friso.cli.map_study import Varied, study_for, write_exports, write_views
+    from friso.cli.map_study import Varied, stored_study, study_for, write_exports, write_views
     from friso.studies.store import in_memory
+    from friso.studies.verify import checked_share
 
-    exports = _checked_exports(export)
+    exports, share = _checked_exports(export), checked_share(verify)
     varied = Varied(x, y, tuple(axis or ()), tuple(link or ()), samples, latin, log)
     with _crew(workers, scheduler) as crew:
         if source.is_dir():
-            store, study = source, _stored(source, varied, overrides)
+            if varied != Varied() or overrides or rtol or refine or out:
+                given = "a store together with what makes another study of it"
+                raise StageError(str(source), given, "a store alone: it knows its study", f"friso map {source}")
+            store, study = source, stored_study(source, metric)
         else:
             stage = read_stage(source, overrides)
             store = out or Path(f"{source.stem}_map.zarr")
             study = study_for(stage, varied, metric, refine, None if yes else LARGE, crew)
-            study = replace(study, rtol=_chosen_rtol(rtol, study, crew))
-        runs = _run(study, store, crew, _share(verify), as_json)
-    files = write_exports(runs, exports)
+            study = replace(study, rtol=_chosen_rtol(rtol or "1e-6", study, crew))
+        runs = _run(study, store, crew, share)
     if study.cells <= LARGE:
         runs = in_memory(runs)
-        files = [*write_views(runs, store, metric), *files]
+        files = [*write_views(runs, store, metric), *write_exports(runs, exports)]
     else:
         say(f"no figure and no page of {study.cells:.3g} cells")
+        files = write_exports(runs, exports)
     _report(runs, study, store, files, as_json)
 
 
@@ -96,9 +101,9 @@ def _chosen_rtol(text: str, study: Study, crew: Crew) -> float:
         return read_tolerance(text)
     from friso.studies.verify import WANTED, loosest_rtol
 
-    rtol, shares = loosest_rtol(study, crew)
-    found = ", ".join(f"{each:g}: {share:.1%}" for each, share in shares.items())
-    if shares[rtol] >= WANTED:
+    rtol, shares, cells = loosest_rtol(study, crew)
+    found = f"of {cells} cells, " + ", ".join(f"{share:.1%} at {each:g}" for each, share in shares.items())
+    if shares.get(rtol, 0.0) >= WANTED:
         say(f"rtol {rtol:g} is the loosest at which {WANTED:.0%} of the verdicts survive ({found})")
     else:
         say(f"at no tolerance do {WANTED:.0%} of the verdicts survive ({found}); rtol {rtol:g} is used")
@@ -128,19 +133,7 @@ def _crew(workers: int | None, scheduler: str | None) -> Iterator[Crew]:
             yield crew
 
 
-def _stored(store: Path, varied: Any, overrides: list[str] | None) -> Study:
-    """The study of a store that is gone on with. Raises StageError."""
-    from friso.studies.store import read_store
-    from friso.studies.study import study_of
-
-    if varied.axes or varied.links or overrides:
-        given = "a store together with axes, links or --set"
-        raise StageError(str(store), given, "a store alone: it knows its study", f"friso map {store}")
-    with read_store(store) as runs:
-        return study_of(runs)
-
-
-def _run(study: Study, store: Path, crew: Crew, share: float, quiet: bool) -> xr.Dataset:
+def _run(study: Study, store: Path, crew: Crew, share: float) -> xr.Dataset:
     """Run what the store lacks. Whatever ends it early, the message says where the rest is."""
     from friso.studies.sweep import run_in_store
 
@@ -154,16 +147,10 @@ def _run(study: Study, store: Path, crew: Crew, share: float, quiet: bool) -> xr
 
         try:
             return run_in_store(study, store, crew, share, count)
-        except (KeyboardInterrupt, OSError):
+        except (KeyboardInterrupt, OSError, RuntimeError):
             if store.exists():
                 say(f"{done} of {study.cells} cells are kept; to go on: friso map {store}")
             raise
-
-
-def _share(verify: float) -> float:
-    if not 0 <= verify <= 1:
-        raise StageError("--verify", str(verify), "a share of the cells, from 0 to 1", "--verify 0.05")
-    return verify
 
 
 def _checked_exports(export: list[Path] | None) -> list[Path]:

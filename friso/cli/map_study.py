@@ -16,7 +16,7 @@ from friso.studies.execute import Crew
 from friso.studies.refine import FINER, SHARE, finer
 from friso.studies.request import Request
 from friso.studies.samples import Samples
-from friso.studies.study import Study
+from friso.studies.study import Study, study_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -31,13 +31,13 @@ BYTES = 8
 class Varied:
     """The options that say what is varied, as they were given."""
 
-    x: str | None
-    y: str | None
-    more: tuple[str, ...]
-    links: tuple[str, ...]
-    samples: int | None
-    latin: bool
-    log: bool
+    x: str | None = None
+    y: str | None = None
+    more: tuple[str, ...] = ()
+    links: tuple[str, ...] = ()
+    samples: int | None = None
+    latin: bool = False
+    log: bool = False
 
     @property
     def axes(self) -> dict[str, str]:
@@ -78,11 +78,24 @@ def study_for(stage: Stage, varied: Varied, metric: str, refine: bool, most: int
     runs = int(request.size() * (SHARE * FINER ** len(axes) if refine else 1))
     if most is not None and runs > most:
         raise _too_large(runs, request.trial(), crew)
-    study = request.study()
+    study = _with_metric(request.study(), metric)
+    return finer(study) if refine else study
+
+
+def stored_study(store: Path, metric: str) -> Study:
+    """The study of a store that is gone on with. Raises StageError."""
+    from friso.studies.store import read_store
+
+    with read_store(store) as runs:
+        return _with_metric(study_of(runs), metric)
+
+
+def _with_metric(study: Study, metric: str) -> Study:
+    """The study, if it has that metric. Raises StageError."""
     if metric not in study.metrics or metric == "status":
         expected = f"one of {', '.join(name for name in study.metrics if name != 'status')}"
         raise StageError("--metric", metric, expected, "--metric peak_to_peak")
-    return finer(study) if refine else study
+    return study
 
 
 def _too_large(runs: int, trial: Study, crew: Crew) -> StageError:

@@ -63,13 +63,20 @@ def cache_folder() -> Path:
 
 
 @cache
-def code_digest(*folders: str) -> str:
-    """A digest of the sources in these folders of the package."""
+def code_digest(*parts: str) -> str:
+    """A digest of the sources in these folders (and files) of the package."""
     code = hashlib.sha256()
-    for folder in folders:
-        for file in sorted((Path(__file__).parent.parent / folder).rglob("*.py")):
+    for part in parts:
+        place = Path(__file__).parent.parent / part
+        for file in sorted(place.rglob("*.py")) if place.is_dir() else [place]:
             code.update(file.read_bytes())
     return code.hexdigest()
+
+
+@cache
+def machine() -> str:
+    """What decides on the last bits of a run besides friso's code: processor and compiler."""
+    return f"{llvm.get_host_cpu_name()}, numba {numba.__version__}, numpy {np.__version__}"
 
 
 @cache

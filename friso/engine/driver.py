@@ -38,9 +38,9 @@ def find_turn(B, lane, high):
     for _ in range(30):
         if f_low == f_high:
             break
-        before, theta = theta, (low * f_high - high * f_low) / (f_high - f_low)
+        theta = (low * f_high - high * f_low) / (f_high - f_low)
         f = deviation_rate(B, lane, theta)
-        if f == 0.0 or abs(theta - before) < 1e-9:  # off by less than rounding in the value, which is flat here
+        if f == 0.0 or high - low < 1e-10:
             break
         if (f > 0.0) == (f_high > 0.0):
             high, f_high = theta, f
@@ -49,12 +49,6 @@ def find_turn(B, lane, high):
             low, f_low = theta, f
             f_high, side = (f_high * 0.5 if side == -1 else f_high), -1
     return theta
-
-
-def vertex(B, lane, high, before, after):
-    """The deviation where it turns in (0, high), as the vertex of the parabola with these rates at the ends."""
-    theta = high * before / (before - after)
-    return deviation(B, lane, 0.0) + 0.5 * theta * before * B[TAKEN * LANES + lane]
 
 
 def find_entry(B, lane, high, band):
@@ -87,12 +81,8 @@ def note_turn(B, lane, fraction, settings, times, values, count):
     if not ((before > 0.0 and after <= 0.0) or (before < 0.0 and after >= 0.0)):
         return count
     kind = 1.0 if before > 0.0 else -1.0
-    likely = vertex(B, lane, fraction, before, after)
-    if is_ringing(B, lane, kind, likely, settings, values, count):
-        theta, value = fraction * before / (before - after), likely
-    else:
-        theta = find_turn(B, lane, fraction)
-        value = deviation(B, lane, theta)
+    theta = find_turn(B, lane, fraction)
+    value = deviation(B, lane, theta)
     time = moment(B, lane, theta)
     B[DEVIATION_MAX * LANES + lane] = max(B[DEVIATION_MAX * LANES + lane], value)
     B[DEVIATION_MIN * LANES + lane] = min(B[DEVIATION_MIN * LANES + lane], value)
@@ -103,16 +93,6 @@ def note_turn(B, lane, fraction, settings, times, values, count):
     if time < B[RECORD_FROM * LANES + lane]:
         return count
     return keep_turn(B, lane, kind, time, value, settings.least_swing, times, values, count)
-
-
-def is_ringing(B, lane, kind, value, settings, values, count):
-    """Whether a turning point at about this value is far from being kept: its exact place then matters to nobody."""
-    if count == 0 or count > values.size:
-        return False
-    swing = kind * (value - values[count - 1])
-    if B[LAST_KIND * LANES + lane] == kind:
-        return swing < -0.5 * settings.least_swing
-    return swing < 0.5 * settings.least_swing
 
 
 def keep_turn(B, lane, kind, time, value, least, times, values, count):
@@ -266,7 +246,7 @@ def run(queue, batch, settings, results):
     segment = np.zeros(LANES, np.int64)
     busy = 0
     for lane in range(LANES):
-        j = take_next(queue)
+        j = take_next(queue) if settings.cancel[0] == 0 else last
         if j < last:
             segment[lane] = start_run(B, lane, j, batch, settings, results)
             who[lane], busy = j, busy + 1

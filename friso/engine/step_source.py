@@ -319,11 +319,8 @@ class StepWriter:
             "outer_exit = now if off > outer else outer_exit",
             "entered = ((was > inner) & (off <= inner)) | ((was > outer) & (off <= outer))",
             "turned = ((turning_s > 0.0) & (turning_n <= 0.0)) | ((turning_s < 0.0) & (turning_n >= 0.0))",
-            "rate = max(abs(turning_s), abs(turning_n))",
-            "reach = off + rate * h",
-            "pokes_out = ((off <= inner) & (reach > inner)) | ((off <= outer) & (reach > outer))",
-            f"turned = turned & (rate > {NO_SWING!r} * tol{self._velocity})",
-            "turned = turned & ((now >= record_from) | pokes_out)",  # others change no result
+            f"swing = max(abs(turning_s), abs(turning_n)) > {NO_SWING!r} * tol{self._velocity}",
+            "turned = turned & swing & ((now >= record_from) | (off <= outer))",  # others change no result
             "attempted = attempted + 1.0",
             "rejected_last = 0.0 if good else 1.0",
             "rejected = rejected + rejected_last",

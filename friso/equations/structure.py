@@ -51,6 +51,12 @@ def structure(flat: Mapping[str, Any]) -> Structure:
     )
 
 
+def decisive_keys(flat: Mapping[str, Any]) -> tuple[str, ...]:
+    """The numeric keys on which the structure depends, by being zero or a whole number, for instance."""
+    law = friction_law(flat["friction.model"])
+    return ("joint.stroke", "controller.ki", "controller.kd", "controller.tau", *law.decisive)
+
+
 def _joint_form(flat: Mapping[str, Any]) -> JointForm:
     if "joint.limiter_stiffness" not in flat:
         return "rigid"

@@ -36,6 +36,8 @@ class FrictionSection(Section):
     """Base of the friction laws, each of which declares its keys, `model: Literal["name"]`, and its equations."""
 
     model: Any
+    decisive: ClassVar[tuple[str, ...]] = ()
+    """The numeric keys on which `variant` depends."""
 
     @staticmethod
     def variant(flat: Mapping[str, Any]) -> Hashable:

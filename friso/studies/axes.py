@@ -15,6 +15,9 @@ from friso.stage import Stage, numeric_keys, parse_set
 Values = str | Sequence[Any] | np.ndarray | tuple[Any, str]
 Scale = Literal["linear", "log"]
 
+MOST_POINTS = 1_000_000_000
+"""Points of an axis at most, 8 GB of them."""
+
 RANGE_EXAMPLE = '"1 Hz..40 Hz:41", "10 um..1 cm:41:log" or "4 Hz, 8 Hz, 16 Hz"'
 
 _SCALE = r"\s*(?P<scale>linear|log)\s*"
@@ -143,9 +146,10 @@ def _range(name: str, text: str, reader: _Reader, log: bool) -> Range:
 def _count(text: str, digits: str | None) -> int | None:
     if digits is None:
         return None
-    count = int(digits) if digits.strip().isascii() and digits.strip().isdigit() else 0
-    if count < 2:
-        raise StageError("", quoted(text, f"{digits.strip()} points"), "2 points or more", RANGE_EXAMPLE)
+    count = int(digits) if digits.strip().isascii() and digits.strip().isdigit() and len(digits) < 20 else 0
+    if not 2 <= count <= MOST_POINTS:
+        expected = f"2 points or more, at most {MOST_POINTS:,}"
+        raise StageError("", quoted(text, f"{digits.strip()} points"), expected, RANGE_EXAMPLE)
     return count
 
 
@@ -168,7 +172,7 @@ def _listed(name: str, values: Values, reader: _Reader) -> Axis:
 def _words(stage: Stage, key: str, values: Values) -> Axis:
     """An axis of words or booleans, each of which the stage takes."""
     options = [parse_set(f"{key}={word}")[1] for word in values.split(",")] if isinstance(values, str) else list(values)
-    if key.partition(".")[0] not in type(stage).model_fields:
+    if key.partition(".")[0] not in type(stage).model_fields or "." not in key:
         expected = "a key of the stage file, or a name that a link uses"
         raise StageError(key, "a name that nothing depends on", expected, 'with the link masses.cart = "0.7 * mass"')
     for value in options:

@@ -10,7 +10,7 @@ import numpy as np
 from friso.engine.arrays import Status
 from friso.engine.batch import Runs, run_chunks
 from friso.engine.kernel import kernel
-from friso.equations.structure import Structure, structure
+from friso.equations.structure import Structure, decisive_keys, structure
 from friso.hunting.measures import BANDS, Measures, measure, options
 from friso.stage import Stage, numeric_keys, violations
 from friso.studies.links import linked
@@ -72,6 +72,14 @@ def run_cells(
     return table.columns
 
 
+def allowed(stage: Stage, links: Mapping[str, str], columns: Mapping[str, np.ndarray]) -> np.ndarray:
+    """Which cells a stage may have, shape (cells,)."""
+    table = _Table(len(next(iter(columns.values()))))
+    for part, cells in _by_words(stage, columns):
+        table.invalidate(cells, flat_cells(part, links, {name: column[cells] for name, column in columns.items()}))
+    return table.columns["verdict"] != "invalid"
+
+
 def flat_cells(stage: Stage, links: Mapping[str, str], columns: Mapping[str, np.ndarray]) -> dict[str, Any]:
     """The flat SI form of all cells, links followed; numeric columns only."""
     known = numeric_keys(stage.flat())
@@ -98,13 +106,9 @@ def _by_words(stage: Stage, columns: Mapping[str, np.ndarray]) -> Iterator[tuple
 def _by_structure(flat: Mapping[str, Any], valid: np.ndarray, count: int) -> Iterator[tuple[Structure, np.ndarray]]:
     """The places of the valid cells, grouped by the equations they need.
 
-    Only a few keys decide on the structure, and only by being zero or a whole number; cells are told apart by those.
+    Only a few keys decide on the structure; cells are told apart by those.
     """
-    decisive = [
-        key
-        for key in ("joint.stroke", "controller.ki", "controller.kd", "controller.tau", "friction.stribeck_exponent")
-        if np.ndim(flat.get(key, 0.0))
-    ]
+    decisive = [key for key in decisive_keys(flat) if np.ndim(flat.get(key, 0.0))]
     groups: dict[Structure, list[np.ndarray]] = {}
     columns = np.stack([flat[key] for key in decisive], axis=1) if decisive else np.zeros((count, 1))
     kinds, which = np.unique(columns, axis=0, return_inverse=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Iterator, Mapping
+from concurrent.futures import CancelledError
 from contextlib import contextmanager
 from typing import Any
 
@@ -39,7 +40,8 @@ def connected(scheduler: str) -> Iterator[Crew]:
     Every thread of a worker computes one block at a time, in that thread alone. Raises StageError if the scheduler
     does not answer, has no workers, or one with another version of friso.
     """
-    from distributed import Client
+    from distributed import Client, KilledWorker
+    from distributed.comm.core import CommClosedError
 
     try:
         asyncio.run(_answers(scheduler))
@@ -51,7 +53,8 @@ def connected(scheduler: str) -> Iterator[Crew]:
         _refuse_strangers(client)
         threads = sum(client.nthreads().values())
         arguments = {"expected": equations_version(), "pure": False}
-        yield Crew(client.get_executor(), threads, 4 * threads, run_checked, arguments)
+        failures = (CancelledError, KilledWorker, CommClosedError, TimeoutError)
+        yield Crew(client.get_executor(), threads, 4 * threads, run_checked, arguments, failures=failures)
 
 
 async def _answers(scheduler: str) -> None:
@@ -75,15 +78,17 @@ def _refuse_strangers(client: Any) -> None:
     """Raises StageError unless every worker has the same friso as this process."""
     if not client.nthreads():
         raise StageError("--scheduler", "a scheduler without workers", "workers: dask worker tcp://...")
-    versions: dict[str, Any] = client.run(_version)
-    for address, version in versions.items():
-        if version != equations_version():
-            raise _stranger(f"the worker {address}", version)
 
+    def version() -> str:  # sent as it is, not by name: an older friso, or none, has no such function
+        try:
+            from friso.studies.study import equations_version
+        except ImportError as error:
+            return f"that runs no studies ({error})"
+        return equations_version()
 
-def _version() -> str:
-    """What a worker says of its friso; it has one, or it could not be asked this."""
-    return equations_version()
+    for address, found in client.run(version).items():
+        if found != equations_version():
+            raise _stranger(f"the worker {address}", found)
 
 
 def _stranger(who: str, version: str) -> StageError:

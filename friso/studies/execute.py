@@ -21,15 +21,16 @@ Progress = Callable[[int], None]
 
 @dataclass
 class Crew:
-    """An executor, how many blocks are computed side by side, how many a study needs at least for all to have work,
-    and how to have those in flight end early."""
+    """An executor, how many blocks are computed side by side, and how many a study needs at least for all to have
+    work; a flag, shape (1,), that has blocks in flight end early; and what it raises where it is to blame itself."""
 
     executor: Executor
     size: int
     shares: int
     task: Callable[..., Columns] = run_cells
     arguments: dict[str, Any] = field(default_factory=dict)
-    cancel: Callable[[], None] = lambda: None
+    cancel: np.ndarray = field(default_factory=lambda: np.zeros(1, np.int64))
+    failures: tuple[type[BaseException], ...] = ()
 
     def __enter__(self) -> Self:
         return self
@@ -43,6 +44,7 @@ class Crew:
         No more blocks are in flight than keep the crew busy, so that a study of any length streams. Whatever ends
         this early (Ctrl-C among it) cancels the blocks in flight.
         """
+        self.cancel[0] = 0
         upcoming = iter(jobs)
         flying: dict[Future[Columns], tuple[Study, Block]] = {}
         try:
@@ -52,12 +54,12 @@ class Crew:
                 if not flying:
                     return
                 for future in wait(flying, return_when=FIRST_COMPLETED).done:
-                    yield *flying.pop(future), future.result()
+                    yield *flying.pop(future), self._result(future)
         finally:
             for future in flying:
                 future.cancel()
             if flying:
-                self.cancel()
+                self.cancel[0] = 1
                 wait(flying)
 
     def jobs(self, studies: Sequence[Study]) -> Iterator[tuple[Study, Block]]:
@@ -65,6 +67,13 @@ class Crew:
         for study in studies:
             shape = study.block_shape(max(1, min(LARGEST_BLOCK, study.cells // self.shares)))
             yield from ((study, block) for block in study.blocks(shape))
+
+    def _result(self, future: Future[Columns]) -> Columns:
+        """Raises RuntimeError if the executor failed, and whatever the task raised."""
+        try:
+            return future.result()
+        except self.failures as error:
+            raise RuntimeError(f"the cluster lost a block: {error or type(error).__name__}") from error
 
     def _submit(self, study: Study, block: Block) -> Future[Columns]:
         columns = study.block_columns(block)
@@ -77,13 +86,8 @@ def local_crew(threads: int | None = None) -> Crew:
     A second block is prepared, or its results written, while they do.
     """
     stop = np.zeros(1, np.int64)
-    return Crew(
-        ThreadPoolExecutor(2, thread_name_prefix="friso"),
-        size=1,
-        shares=1,
-        arguments={"threads": threads, "cancel": stop},
-        cancel=lambda: stop.fill(1),
-    )
+    arguments = {"threads": threads, "cancel": stop}
+    return Crew(ThreadPoolExecutor(2, thread_name_prefix="friso"), size=1, shares=1, arguments=arguments, cancel=stop)
 
 
 def run_scattered(study: Study, cells: np.ndarray, crew: Crew) -> Columns:

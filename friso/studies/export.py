@@ -22,12 +22,21 @@ def export(runs: xr.Dataset, path: Path) -> None:
     Columns of a CSV file are named with their units.
     """
     if path.suffix == ".nc":
-        flat = runs.assign({name: runs[name].astype(kind) for name, kind in WORDS.items() if name in runs})
-        flat.to_netcdf(path, engine="scipy")
+        runs.assign({name: runs[name].copy(data=_bytes(runs[name].values)) for name in WORDS}).to_netcdf(
+            path, engine="scipy"
+        )
     elif path.suffix == ".csv":
         _write_csv(runs, path)
     else:
         raise ValueError(f"export: given {path.suffix}, expected .nc or .csv")
+
+
+def _bytes(texts: np.ndarray) -> np.ndarray:
+    """The texts in UTF-8, as long as the longest of them."""
+    import pandas as pd
+
+    codes, words = pd.factorize(texts.ravel())
+    return np.array([str(word).encode() for word in words])[codes].reshape(texts.shape)
 
 
 def _write_csv(runs: xr.Dataset, path: Path) -> None:

@@ -46,8 +46,11 @@ def check_links(stage: Stage, links: Mapping[str, str], axes: frozenset[str]) ->
     for key in links:
         if key not in known:
             stage.flat({key: 0.0})  # raises, and names the nearest key
+        if key in axes and key not in names({key: links[key]}):
+            given = f"{key} = {links[key]}, which does not follow the axis {key}"
+            raise StageError("link", given, "an axis or a link, or a link in which the axis occurs", EXAMPLE)
     for name in sorted(names(links) - axes):
-        if name not in stage.flat():
+        if name not in known or name not in stage.flat():
             raise StageError("link", f"the name {name}", "axes and numeric keys that the stage has", EXAMPLE)
 
 

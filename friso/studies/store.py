@@ -7,9 +7,12 @@ whenever the process was killed.
 
 from __future__ import annotations
 
+import logging
 import os
 import shutil
+import uuid
 import warnings
+import zipfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from itertools import count
@@ -19,6 +22,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from filelock import FileLock, Timeout
 
+from friso.engine.cache import machine
 from friso.quantities import StageError
 from friso.studies.cells import UNITS, WORDS, Columns, attributes_of
 from friso.studies.refine import Ask
@@ -31,6 +35,8 @@ LEAST_BLOCKS, BLOCK, BLOCKS, LARGEST_BLOCK = 8, 1024, 250, 16384
 """A study has at least `LEAST_BLOCKS` blocks, so that an interruption loses a part of it only; `BLOCK` cells in each,
 more from `BLOCKS` blocks on, so that writing does not hold up the workers, and `LARGEST_BLOCK` at most. A store has
 the same blocks on every machine."""
+
+logger = logging.getLogger("friso")
 
 _ANSWERS = ".answers"
 
@@ -54,11 +60,12 @@ class Store:
         Raises StageError if the folder holds anything else, another study, or is in use by another process.
         """
         store = cls(path, study)
-        if not path.exists():
+        if not path.exists() or (path.is_dir() and not any(path.iterdir())):
             store._make()
         _refuse_foreign(path)
         with _locked(path):
             _refuse_other(path, study)
+            _warn_of_another_machine(path)
             for leftover in path.rglob("*.partial"):  # of a file that was being written when its process was killed
                 leftover.unlink(missing_ok=True)
             yield store
@@ -80,7 +87,7 @@ class Store:
             if name in encoding:
                 encoding[name]["_FillValue"] = np.nan
         template = xr.Dataset(variables, coords=study.coordinates(), attrs=study.attributes())
-        draft = self.path.with_name(f".{self.path.name}.{os.getpid()}")
+        draft = self.path.with_name(f".{self.path.name}.{uuid.uuid4().hex}")
         try:
             template.to_zarr(draft, compute=False, encoding=encoding, zarr_format=_FORMAT, consolidated=True)
             draft.rename(self.path)
@@ -96,8 +103,18 @@ class Store:
         """The blocks not yet done."""
         verdicts = self.read()["verdict"]
         for block in self.study.blocks(self.blocks):
-            if np.any(verdicts[block].values == ""):
+            if not self._is_done(block, verdicts):
                 yield block
+
+    def _is_done(self, block: Block, verdicts: xr.DataArray) -> bool:
+        """Whether all files of a block are there and its verdicts can be read; a power cut may take either."""
+        number = ".".join(str(part.start // size) for part, size in zip(block, self.blocks, strict=True))
+        if not all((self.path / name / number).exists() for name in self.study.metrics):
+            return False
+        try:
+            return not np.any(verdicts[block].values == "")
+        except (OSError, RuntimeError, ValueError):
+            return False
 
     def write(self, block: Block, found: Mapping[str, np.ndarray]) -> None:
         """Write the measures of a block, its verdicts last. Raises OSError where the disk is full."""
@@ -113,7 +130,8 @@ class Store:
 
         arrays = {name: found[name].astype(WORDS.get(name, "f8")).reshape(shape) for name in names}
         part = xr.Dataset({name: (self.study.names, array) for name, array in arrays.items()})
-        part.to_zarr(self.path, region=region, zarr_format=_FORMAT, consolidated=True)
+        # a chunk that holds nothing is written too: that it is there tells that its block was done
+        part.to_zarr(self.path, region=region, zarr_format=_FORMAT, consolidated=True, write_empty_chunks=True)
 
     def keeping(self, ask: Ask) -> Ask:
         """`ask` with its answers kept in the store: asked the same questions again, they need no runs."""
@@ -123,14 +141,13 @@ class Store:
 
         def answer(cells: np.ndarray) -> Columns:
             file = folder / f"{next(number)}.npz"
-            if file.exists():
-                with np.load(file) as answers:
-                    return dict(answers)
+            if (kept := _answer(file, cells)) is not None:
+                return kept
             found = ask(cells)
             draft = file.with_suffix(".partial")
             with draft.open("wb") as stream:
-                kept: dict[str, Any] = {name: found[name].astype(WORDS.get(name, "f8")) for name in found}
-                np.savez_compressed(stream, **kept)
+                arrays: dict[str, Any] = {name: found[name].astype(WORDS.get(name, "f8")) for name in found}
+                np.savez_compressed(stream, cells=cells, **arrays)
             draft.rename(file)
             return found
 
@@ -186,6 +203,16 @@ def _shared(texts: xr.DataArray) -> np.ndarray:
     return found
 
 
+def _answer(file: Path, cells: np.ndarray) -> Columns | None:
+    """What was kept about just these cells, None if nothing."""
+    try:
+        with np.load(file) as kept:
+            answer = dict(kept)
+    except (OSError, ValueError, zipfile.BadZipFile):
+        return None
+    return answer if np.array_equal(answer.pop("cells"), cells) else None
+
+
 def _refuse_foreign(path: Path) -> None:
     """Raises StageError for anything but a store that friso has made."""
     import xarray as xr
@@ -211,6 +238,13 @@ def _refuse_other(path: Path, study: Study) -> None:
         given = "a store of another study:\n            " + "\n            ".join(differences)
         expected = "the same study to go on with, or another --out; nothing was overwritten"
         raise StageError("", given, expected, origin=str(path))
+
+
+def _warn_of_another_machine(path: Path) -> None:
+    with read_store(path) as found:
+        there = found.attrs["machine"]
+    if there != machine():
+        logger.warning("the store was begun on %s, here is %s: cells may differ in their last bits", there, machine())
 
 
 @contextmanager

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from friso.engine.cache import code_digest
+from friso.engine.cache import code_digest, machine
 from friso.stage import Stage, loads, numeric_keys
 from friso.studies.axes import Axis
 from friso.studies.cells import METRICS, flat_cells
@@ -134,26 +134,33 @@ class Study:
             "stage": self.stage.to_toml(),
             "friso": VERSION,
             "equations": equations_version(),
+            "machine": machine(),
             "rtol": self.rtol,
             "axes": json.dumps([axis.name for axis in self.axes]),
             "links": json.dumps(dict(self.links)),
             "refined": int(self.refined),
         }
 
+    def _named(self) -> str:
+        """The axes, dimension by dimension, by name."""
+        return ", ".join(" with ".join(axis.name for axis in dimension.axes) for dimension in self.dimensions)
+
     def differences(self, other: Study, its_equations: str) -> list[str]:
         """What tells a stored study (`other`, made by `its_equations`) from this one, in words; empty if nothing."""
         found = _stage_differences(self.stage, other.stage)
         if its_equations != equations_version():
             found.append(f"version of the equations: {its_equations} there, {equations_version()} here")
-        if self.names != other.names:
-            found.append(f"axes: {', '.join(other.names)} there, {', '.join(self.names)} here")
+        if self._named() != other._named():
+            found.append(f"axes: {other._named()} there, {self._named()} here")
         else:
             found += [
                 f"axis {mine.name}: {_described(its)} there, {_described(mine)} here"
-                for mine, its in zip(self.axes, other.axes, strict=False)
+                for mine, its in zip(self.axes, other.axes, strict=True)
                 if _described(mine) != _described(its)
             ]
-        for what in ("links", "metrics", "rtol", "refined"):
+        if list(self.links.items()) != list(other.links.items()):  # in order: a link sees those before it
+            found.append(f"links: {dict(other.links)} there, {dict(self.links)} here")
+        for what in ("metrics", "rtol", "refined"):
             if getattr(self, what) != getattr(other, what):
                 found.append(f"{what}: {getattr(other, what)} there, {getattr(self, what)} here")
         return found
@@ -164,9 +171,14 @@ def cells_of(block: Block) -> int:
     return math.prod(part.stop - part.start for part in block)
 
 
+_STUDIES = tuple(f"studies/{name}.py" for name in ("axes", "cells", "links", "refine", "request", "samples"))
+_DECISIVE = ("quantities.py", "stage", "equations", "engine", "hunting", *_STUDIES)
+"""Parts of the package that decide on the numbers of a cell, or on which cells a refined study runs."""
+
+
 def equations_version() -> str:
     """A digest of friso's own code that decides on the numbers of a cell."""
-    return f"{VERSION} ({code_digest('equations', 'engine', 'hunting')[:12]})"
+    return f"{VERSION} ({code_digest(*_DECISIVE)[:12]})"
 
 
 def study_of(runs: xr.Dataset) -> Study:

@@ -20,7 +20,7 @@ from friso.studies.request import Request
 from friso.studies.samples import Samples
 from friso.studies.store import Store
 from friso.studies.study import Study, cells_of
-from friso.studies.verify import verified
+from friso.studies.verify import checked_share, verified
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -59,6 +59,7 @@ def sweep(
     """
     study = Request(stage, axes, samples, links or {}).study(metrics, rtol)
     study = finer(study) if refine else study
+    checked_share(verify)
     with local_crew(threads) as crew:
         if store is None:
             return run_in_memory([study], crew, verify)[0]
@@ -106,7 +107,8 @@ def run_in_store(
         for _, block, found in crew.compute((study, block) for block in missing):
             store.write(block, found)
             progress(len(found["verdict"]))
-        if "verified_cells" not in (runs := store.read()).attrs:
+        runs = store.read()
+        if verify and runs.attrs.get("verified_share") != verify:
             store.annotate(verified(study, runs, crew, verify))
         return store.read()
 

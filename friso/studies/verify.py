@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from friso.engine.tolerance import TIGHTEST
-from friso.studies.cells import INFERRED
+from friso.quantities import StageError
+from friso.studies.cells import INFERRED, allowed
 from friso.studies.execute import Crew, run_scattered
 from friso.studies.study import Study
 
@@ -32,29 +33,50 @@ TRIED = 400
 """Cells on which a tolerance is chosen: 1 % of them are four."""
 
 
+def checked_share(share: float) -> float:
+    """The share of cells to verify. Raises StageError for one that is none."""
+    if not 0 <= share <= 1:
+        raise StageError("verify", f"{share:g}", "a share of the cells, from 0 to 1", "--verify 0.05")
+    return share
+
+
 def verified(study: Study, runs: xr.Dataset, crew: Crew, share: float) -> dict[str, Any]:
     """Run a share of the cells again at rtol/100; attributes that tell how many verdicts survived.
 
-    The same cells for the same study. Cells that were not run (invalid ones, and those of a refined map that were
-    inferred) are left out; nothing is told where there are no others, or no share was asked for.
+    The same cells for the same study. Of a refined map cells that were inferred are run too, and counted apart
+    (inferred_checked, inferred_confirmed). Invalid and failed cells have no verdict that could survive; nothing is
+    told where there are no others, or no share was asked for.
     """
-    count = max(LEAST, round(share * study.cells)) if share else 0
-    picked = drawn(study, count, lambda cells: _ran(runs, study, cells))
-    if not picked.size:
+    if not share:
         return {}
-    rtol = max(study.rtol / TIGHTER, TIGHTEST)
-    again = run_scattered(replace(study, rtol=rtol), picked, crew)["verdict"]
-    surviving = int(np.sum(_at(runs["verdict"], study, picked) == again))
-    return {"verified_cells": len(picked), "verified_surviving": surviving, "verified_rtol": rtol}
+    count, rtol = max(LEAST, round(share * study.cells)), max(study.rtol / TIGHTER, TIGHTEST)
+    tighter = replace(study, rtol=rtol)
+
+    def same(kind: str) -> tuple[int, int]:
+        picked = drawn(study, count, lambda cells: _kinds(runs, study, cells) == kind)
+        again = run_scattered(tighter, picked, crew)["verdict"] if picked.size else np.empty(0)
+        return len(picked), int(np.sum(_at(runs["verdict"], study, picked) == again))
+
+    cells, surviving = same("run")
+    if not cells:
+        return {}
+    found = {"verified_share": share, "verified_rtol": rtol, "verified_cells": cells, "verified_surviving": surviving}
+    if study.refined:
+        checked, confirmed = same(INFERRED)
+        found |= {"inferred_checked": checked, "inferred_confirmed": confirmed}
+    return found
 
 
-def loosest_rtol(study: Study, crew: Crew) -> tuple[float, dict[float, float]]:
-    """The loosest tolerance at which `WANTED` of the verdicts survive, and the surviving share at each one tried.
+def loosest_rtol(study: Study, crew: Crew) -> tuple[float, dict[float, float], int]:
+    """The loosest tolerance at which `WANTED` of the verdicts survive, the surviving share at each one tried, and on
+    how many cells that was found (none, and the tightest, where no cell has a stage).
 
-    If none is good enough it is the one at which most survive.
+    If no tolerance is good enough it is the one at which most survive.
     """
-    picked = drawn(study, TRIED, lambda cells: np.ones(len(cells), bool))
-    verdicts = {}
+    picked = drawn(study, TRIED, lambda cells: allowed(study.stage, study.links, study.columns(cells)))
+    if not picked.size:
+        return CANDIDATES[-1], {}, 0
+    verdicts: dict[float, np.ndarray] = {}
 
     def at(rtol: float) -> np.ndarray:
         if rtol not in verdicts:
@@ -63,17 +85,16 @@ def loosest_rtol(study: Study, crew: Crew) -> tuple[float, dict[float, float]]:
 
     shares: dict[float, float] = {}
     for rtol in CANDIDATES:
-        shares[rtol] = float(np.mean(at(rtol) == at(float(f"{rtol / TIGHTER:.0e}"))))
+        loose, tight = at(rtol), at(float(f"{rtol / TIGHTER:.0e}"))
+        shares[rtol] = float(np.mean((loose == tight) & (loose != "failed")))
         if shares[rtol] >= WANTED:
             break
-    return max(shares, key=lambda rtol: shares[rtol]), shares
+    return max(shares, key=lambda rtol: shares[rtol]), shares, len(picked)
 
 
 def drawn(study: Study, count: int, wanted: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
     """Up to `count` numbers of different cells for which `wanted` holds, drawn evenly, rising; always the same."""
     rng = np.random.default_rng(0)
-    if not count:
-        return np.empty(0, int)
     if study.cells <= 8 * count:
         order = rng.permutation(study.cells)
         return np.sort(order[wanted(order)][:count])
@@ -95,6 +116,8 @@ def _at(values: xr.DataArray, study: Study, cells: np.ndarray) -> np.ndarray:
     return values.isel(indexers).values
 
 
-def _ran(runs: xr.Dataset, study: Study, cells: np.ndarray) -> np.ndarray:
-    status = _at(runs["status"], study, cells).astype(str)
-    return ~(np.char.startswith(status, "invalid") | np.char.startswith(status, INFERRED))
+def _kinds(runs: xr.Dataset, study: Study, cells: np.ndarray) -> np.ndarray:
+    """Of each cell, whether it was "run" to its end, is `INFERRED`, or "" neither."""
+    status, verdict = (_at(runs[name], study, cells).astype(str) for name in ("status", "verdict"))
+    kinds = np.where(np.isin(verdict, ["invalid", "failed", ""]), "", "run")
+    return np.where(np.char.startswith(status, INFERRED), INFERRED, kinds)

@@ -165,10 +165,14 @@ def verification(runs: xr.Dataset) -> str:
     surviving = int(runs.attrs["verified_surviving"])
     interval = binomtest(surviving, checked).proportion_ci(0.95, method="wilson")
     rtol = float(runs.attrs["verified_rtol"])
-    return (
+    text = (
         f"{100 * surviving / checked:.1f} % of {grouped(checked)} verdicts checked survive rtol {rtol:g} "
         f"(95 % confidence: {100 * interval.low:.1f} to {100 * interval.high:.1f} %)."
     )
+    if inferred := int(runs.attrs.get("inferred_checked", 0)):
+        confirmed = int(runs.attrs["inferred_confirmed"])
+        text += f" Of {grouped(inferred)} inferred verdicts {100 * confirmed / inferred:.1f} % are confirmed by a run."
+    return text
 
 
 def statement(runs: xr.Dataset) -> str:

@@ -59,7 +59,7 @@ def write_figures(reproduction: Reproduction, folder: Path) -> list[Path]:
 
 def claims_document(reproduction: Reproduction) -> dict[str, Any]:
     """All claims with their judgements, ready for JSON; how they were judged stands before them."""
-    tolerances = {f"{rtol:g}" for rtol in reproduction.tolerances}
+    tolerances = sorted(reproduction.tolerances)
     verdicts, counts = reproduction.changed
     return {
         "source": rig().source,
@@ -68,7 +68,7 @@ def claims_document(reproduction: Reproduction) -> dict[str, Any]:
         "points_of_variants": reproduction.coarse,
         "rtol": reproduction.rtol,
         "conventions": CONVENTIONS,
-        "figure_14b": {"rtol": sorted(tolerances), "verdicts_changed": verdicts, "counts_changed": counts}
+        "figure_14b": {"rtol": tolerances, "verdicts_changed": verdicts, "counts_changed": counts}
         if tolerances
         else None,
         "claims": [_entry(verdict) for verdict in reproduction.verdicts],
@@ -85,6 +85,7 @@ def _entry(verdict: Verdict) -> dict[str, Any]:
         "number": numbers(verdict) or None,
         "criterion": "; ".join(part.criterion for part in verdict.finding.parts) if verdict.finding else None,
         "reason": verdict.reason or None,
+        "values_varied": verdict.tried if verdict.finding else None,
         "depends_on": [
             {
                 "kind": each.variant.kind,

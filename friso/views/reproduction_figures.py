@@ -97,11 +97,11 @@ def _response(reproduction: Reproduction) -> Figure:
         (Limit((COUNTED_ABOVE,), "peaks count above", GREY, "dotted"),),
     )
     caption = f"The rig with its joint locked. Peaks count after {COUNTED_AFTER:g} s, above 0.1 mm and 0.5 s apart."
-    return Figure("figure-5", "Figure 5: the locked rig hunts", caption, (panel,))
+    return Figure("figure-5", "Figure 5: position of the locked rig after the return move", caption, (panel,))
 
 
 def _shares(reproduction: Reproduction) -> Figure:
-    """P, I and D shares of the force while the locked rig hunts, the wide gap above the narrow one."""
+    """P, I and D shares of the force on the locked rig, the wide gap above the narrow one."""
     panels = []
     for name in (WIDE, NARROW):
         trace = reproduction.responses[name].trace
@@ -113,8 +113,5 @@ def _shares(reproduction: Reproduction) -> Figure:
             for key, label, colour, width in lines
         )
         panels.append(Panel(f"F_s 4 N, {name}", Axis("Time", "s"), Axis("Force", "N"), series))
-    caption = (
-        "Shares of the controller's force, joint locked. Sticks of different length in the two directions are a cycle "
-        "that is not symmetric."
-    )
-    return Figure("figure-13", "Figure 13: PID actions during hunting", caption, tuple(panels))
+    caption = f"Shares of the controller's force from {COUNTED_AFTER:g} s on, joint locked."
+    return Figure("figure-13", "Figure 13: PID actions at two gaps of the friction forces", caption, tuple(panels))

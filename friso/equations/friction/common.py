@@ -40,6 +40,7 @@ class StribeckSection(FrictionSection):
     stribeck_exponent: Annotated[float, Number(positive, "2")]
     viscous: Annotated[Value, Quantity("N*s/m", non_negative, "0.5 N*s/m")]
     rules: ClassVar[tuple[Rule, ...]] = (COULOMB_BELOW_STATIC,)
+    decisive: ClassVar[tuple[str, ...]] = ("friction.stribeck_exponent",)
 
     @staticmethod
     def variant(flat: Mapping[str, Any]) -> int | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Set
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any, Literal
@@ -36,11 +36,13 @@ class Variant:
     kind: Kind = "unknown parameter"
 
     def touches(self, study: ThesisStudy) -> bool:
-        """Whether the study's map can be another than the baseline's; a locked joint has no damping of its own."""
-        if self.kind != "unknown parameter":
-            return True
-        own = study.sets | (_OPEN_JOINT_KEYS if study.changes.get("joint.locked") else frozenset())
-        return not set(self.changes) <= own
+        """Whether the study's map can be another than the baseline's."""
+        return self.changes_more_than(study.sets, bool(study.changes.get("joint.locked")))
+
+    def changes_more_than(self, own: Set[str], locked: bool) -> bool:
+        """Whether it matters to what decides on the keys `own` itself; a locked joint has no damping of its own."""
+        decided = own | _OPEN_JOINT_KEYS if locked else own
+        return self.kind != "unknown parameter" or not self.changes.keys() <= decided
 
 
 def _variants(parameter: str, reason: str, values: Mapping[str, Mapping[str, Any]]) -> tuple[Variant, ...]:

@@ -12,11 +12,11 @@ from friso.engine.simulate import simulate
 from friso.hunting import COUNTED_ABOVE
 from friso.stage import StageError
 from friso.studies.sweep import sweep
-from friso.studies.thesis.claims import Claim, Evidence, Response, claims, registered
+from friso.studies.thesis.claims import Claim, Evidence, Finding, Registered, Response, claims, registered
 from friso.studies.thesis.judges.shares import NARROW, WIDE
 from friso.studies.thesis.open_parameters import METHOD, OPEN, RTOL, Variant
 from friso.studies.thesis.studies import LOCKED, NOTHING, STUDIES, ThesisStudy, rig
-from friso.studies.thesis.verdicts import Verdict, not_covered, verdict
+from friso.studies.thesis.verdicts import Verdict, not_covered, turned, verdict
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -25,7 +25,7 @@ POINTS = 41
 """Values per axis: 0.4 Hz apart in Fig. 16."""
 
 COARSE = 21
-"""Values per axis at which what the thesis leaves open is varied."""
+"""Values per axis at which what the thesis leaves open is varied first; what turns a part is run again at full."""
 
 VERIFIED = 0.05
 """Share of the cells of a shown map that are run again at a tighter tolerance."""
@@ -47,8 +47,8 @@ Progress = Callable[[int, int, str], None]
 class Reproduction:
     """All that was found: maps by study name and responses by name; the map of Fig. 14B by relative tolerance
     and the shares of its cells whose verdict, and whose peak count, differs between them (NaN if not computed); a
-    verdict per claim; values
-    per axis of the maps (`points`) and of those with the open parameters varied (`coarse`)."""
+    verdict per claim; values per axis of the maps (`points`) and of those on which open parameters are varied first
+    (`coarse`)."""
 
     maps: Mapping[str, xr.Dataset]
     responses: Mapping[str, Response]
@@ -74,19 +74,20 @@ def reproduce(
     coarse, variants = min(points, COARSE), (*OPEN, *METHOD)
     tell = _Teller(progress, 3 + len(variants) + 1)
     tell("maps")
-    baseline = _evidence(studies, points, rtol, VERIFIED)
+    responses = {name: _response(own, NOTHING, rtol) for name, own in RESPONSES.items()}
+    baseline = Evidence(_maps(studies, points, rtol, VERIFIED), responses)
     tell("Fig. 14B at two tolerances")
     tolerances = {each: _map(s, NOTHING, points, each) for s in studies if s.panel == "14B" for each in (RTOL, TIGHT)}
     tell("coarse maps")
-    plain = baseline if coarse == points else _evidence(studies, coarse, rtol)
-    varied: list[tuple[Variant, Evidence]] = []
+    plain = baseline if coarse == points else Evidence(_maps(studies, coarse, rtol), baseline.responses)
+    entries = _covered(baseline)
+    usual = _Usual(baseline, plain, _findings(entries, baseline), _findings(entries, plain))
+    varied: list[tuple[Variant, Mapping[str, Finding]]] = []
     for variant in variants:
         tell(f"{variant.parameter} {variant.value}")
-        of_grid = variant.kind == "unknown parameter"
-        near = (coarse, plain) if of_grid else (points, baseline)
-        varied.append((variant, _varied(studies, near[0], rtol, variant, near[1])))
+        varied.append((variant, _with_variant(variant, usual, studies, (coarse, points), rtol)))
     tell("done")
-    verdicts = tuple(_judged(claim, baseline, plain, varied) for claim in claims())
+    verdicts = tuple(_judged(claim, usual, varied) for claim in claims())
     return Reproduction(
         baseline.maps, baseline.responses, tolerances, _changed(tolerances), verdicts, points, coarse, rtol
     )
@@ -114,26 +115,74 @@ class _Teller:
         self.done += 1
 
 
-def _evidence(studies: Iterable[ThesisStudy], points: int, rtol: float, verify: float = 0.0) -> Evidence:
-    """The baseline."""
-    return Evidence(
-        {study.name: _map(study, NOTHING, points, rtol, verify) for study in studies},
-        {name: _response(changes, NOTHING, rtol) for name, changes in RESPONSES.items()},
-    )
+@dataclass(frozen=True)
+class _Usual:
+    """What variants stand beside: the baseline at full points and on the coarse grid, with the findings by claim."""
+
+    full: Evidence
+    coarse: Evidence
+    findings: Mapping[str, Finding]
+    coarse_findings: Mapping[str, Finding]
+
+
+def _with_variant(
+    variant: Variant, usual: _Usual, studies: Iterable[ThesisStudy], grids: tuple[int, int], rtol: float
+) -> Mapping[str, Finding]:
+    """What is found with one variant, by claim: of tolerance and metric at full points, of an open parameter on the
+    coarse grid first, and again at full points where that turns a part; only the maps that those claims need are run.
+    """
+    entries, (coarse, points) = _covered(usual.full), grids
+    if variant.kind != "unknown parameter":
+        return _findings(entries, _varied(studies, points, rtol, variant, usual.full))
+    near = _varied(studies, coarse, rtol, variant, usual.coarse)
+    found = _findings(entries, near)
+    if coarse == points:
+        return found
+    again = {claim for claim in found if turned(found[claim], usual.findings[claim], usual.coarse_findings[claim])}
+    needed = frozenset().union(*(entries[claim].needs for claim in again))
+    maps = _varied_maps([each for each in studies if each.name in needed], points, rtol, variant, usual.full)
+    return {**found, **_findings({claim: entries[claim] for claim in again}, Evidence(maps, near.responses))}
+
+
+def _covered(evidence: Evidence) -> Mapping[str, Registered]:
+    """The judges by claim whose needs the evidence meets."""
+    return {claim: entry for claim, entry in registered().items() if not _missing(entry, evidence)}
+
+
+def _missing(entry: Registered, evidence: Evidence) -> list[str]:
+    return sorted(entry.needs - evidence.maps.keys() - evidence.responses.keys())
+
+
+def _findings(entries: Mapping[str, Registered], evidence: Evidence) -> dict[str, Finding]:
+    return {claim: entry.judge(evidence) for claim, entry in entries.items()}
 
 
 def _varied(studies: Iterable[ThesisStudy], points: int, rtol: float, variant: Variant, plain: Evidence) -> Evidence:
     """The evidence with one variant; maps that it does not touch are the baseline's."""
-    tolerance, changes = variant.rtol or rtol, variant.changes
-    maps = {
-        study.name: _map(study, changes, points, tolerance) if variant.touches(study) else plain.maps[study.name]
-        for study in studies
-    }
-    responses = {name: _response(each, changes, tolerance) for name, each in RESPONSES.items()}
+    maps = _varied_maps(studies, points, rtol, variant, plain)
+    tolerance = variant.rtol or rtol
+    responses = {name: _response(own, variant.changes, tolerance) for name, own in RESPONSES.items()}
     if variant.kind == "metric":
         maps = {name: lasting(runs) for name, runs in maps.items()}
         responses = {name: Response(lasting(each.cell), each.trace) for name, each in responses.items()}
     return Evidence(maps, responses)
+
+
+def _varied_maps(
+    studies: Iterable[ThesisStudy], points: int, rtol: float, variant: Variant, plain: Evidence
+) -> dict[str, xr.Dataset]:
+    touched = [study for study in studies if variant.touches(study)]
+    return {**plain.maps, **_maps(touched, points, variant.rtol or rtol, changes=variant.changes)}
+
+
+def _maps(
+    studies: Iterable[ThesisStudy],
+    points: int,
+    rtol: float,
+    verify: float = 0.0,
+    changes: Mapping[str, object] = NOTHING,
+) -> dict[str, xr.Dataset]:
+    return {study.name: _map(study, changes, points, rtol, verify) for study in studies}
 
 
 def _map(
@@ -161,19 +210,32 @@ def lasting(runs: xr.Dataset) -> xr.Dataset:
 
 
 def _changed(tolerances: Mapping[float, xr.Dataset]) -> tuple[float, float]:
-    """Shares of cells whose verdict, and whose peak count, differs between the two tolerances."""
+    """Shares of cells whose verdict, and whose peak count, differs between the two tolerances; a count that is unknown
+    in both does not differ."""
     if not tolerances:
         return np.nan, np.nan
     loose, tight = tolerances.values()
-    return float((loose["verdict"] != tight["verdict"]).mean()), float((loose["peaks"] != tight["peaks"]).mean())
+    one, other = loose["peaks"].values, tight["peaks"].values
+    other_count = (one != other) & ~(np.isnan(one) & np.isnan(other))
+    return float((loose["verdict"] != tight["verdict"]).mean()), float(other_count.mean())
 
 
-def _judged(claim: Claim, baseline: Evidence, plain: Evidence, varied: Iterable[tuple[Variant, Evidence]]) -> Verdict:
+def _judged(claim: Claim, usual: _Usual, varied: Iterable[tuple[Variant, Mapping[str, Finding]]]) -> Verdict:
     entry = registered().get(claim.id)
     if entry is None:
         return not_covered(claim, "work of a later step")
-    missing = sorted(entry.needs - baseline.maps.keys() - baseline.responses.keys())
+    missing = _missing(entry, usual.full)
     if missing:
         return not_covered(claim, f"not computed in this run: {', '.join(missing)}")
-    findings = [(variant, entry.judge(evidence)) for variant, evidence in varied]
-    return verdict(claim, entry.figure, entry.judge(baseline), entry.judge(plain), findings)
+    findings = [(variant, found[claim.id]) for variant, found in varied if _enters(variant, entry.needs)]
+    return verdict(claim, entry.figure, usual.findings[claim.id], usual.coarse_findings[claim.id], findings)
+
+
+def _enters(variant: Variant, needs: Iterable[str]) -> bool:
+    """Whether a variant changes any of the maps and responses named."""
+    return any(
+        variant.touches(STUDIES[name])
+        if name in STUDIES
+        else variant.changes_more_than(RESPONSES[name].keys(), bool(RESPONSES[name].get("joint.locked")))
+        for name in needs
+    )

@@ -28,8 +28,9 @@ class Dependence:
 class Verdict:
     """What stands beside a claim; `finding` is None for one that is not covered.
 
-    `depends_on` are the open parameters at which other parts hold than in the baseline, `hangs_on` the same for
-    tolerance and metric; `grid` says what a coarser grid does to it, empty for nothing.
+    `depends_on` are the open parameters at which other parts hold than in the baseline, out of the `tried` values that
+    enter its evidence; `hangs_on` the same for tolerance and metric; `grid` says what a coarser grid does to the
+    baseline, empty for nothing.
     """
 
     claim: Claim
@@ -40,16 +41,18 @@ class Verdict:
     depends_on: tuple[Dependence, ...] = ()
     hangs_on: tuple[Dependence, ...] = ()
     grid: str = ""
+    tried: int = 0
 
     @property
     def dependence(self) -> str:
         """One sentence on the open parameters, and one on tolerance and metric where they matter."""
         if self.finding is None:
             return ""
-        opened = "Does not depend on the open parameters."
-        if self.depends_on:
-            opened = f"Depends on {_listed(self.depends_on)}."
-        return f"{opened} Turns with {_listed(self.hangs_on)}." if self.hangs_on else opened
+        opened = "Nothing that the thesis leaves open enters."
+        if self.tried:
+            turns = f"a part turns with {_listed(self.depends_on)}" if self.depends_on else "none turns a part"
+            opened = f"What the thesis leaves open, varied one at a time, {self.tried} values: {turns}."
+        return f"{opened} Method: a part turns with {_listed(self.hangs_on)}." if self.hangs_on else opened
 
 
 def _listed(dependences: Iterable[Dependence]) -> str:
@@ -65,26 +68,33 @@ def not_covered(claim: Claim, reason: str) -> Verdict:
     return Verdict(claim, "not yet covered", "", None, reason)
 
 
+def turned(finding: Finding, baseline: Finding, plain: Finding) -> bool:
+    """Whether a finding on the coarse grid, on which `plain` is the baseline, has to be made again on the full one.
+
+    It has to if any of the three differ in what holds: the coarse grid alone may turn a part, or hide that one turns.
+    """
+    return not finding.pattern == baseline.pattern == plain.pattern
+
+
 def verdict(
-    claim: Claim, figure: str, baseline: Finding, plain: Finding, varied: Iterable[tuple[Variant, Finding]]
+    claim: Claim, figure: str, baseline: Finding, plain: Finding, varied: Sequence[tuple[Variant, Finding]]
 ) -> Verdict:
     """The baseline's judgement, and the variants under which other parts hold.
 
-    Open parameters are varied on a coarser grid, on which `plain` is the baseline: what turns on it already is
-    the grid's doing and no dependence.
+    `varied` has the variants that enter the evidence of the claim; where they turn a part their findings are on the
+    grid of the baseline, with which alone they are compared. `plain` is the baseline on the coarse grid.
     """
-    usual = {baseline.pattern, plain.pattern}
     depends, hangs = [], []
     for variant, finding in varied:
-        of_grid = variant.kind == "unknown parameter"
-        if finding.pattern not in (usual if of_grid else {baseline.pattern}):
-            numbers = _turned(plain if of_grid else baseline, finding)
-            (depends if of_grid else hangs).append(Dependence(variant, finding.judgement, numbers))
+        if finding.pattern != baseline.pattern:
+            dependence = Dependence(variant, finding.judgement, _turned(baseline, finding))
+            (depends if variant.kind == "unknown parameter" else hangs).append(dependence)
+    tried = sum(variant.kind == "unknown parameter" for variant, _ in varied)
     grid = ""
     if plain.pattern != baseline.pattern:
         grid = f"on the coarser grid: {plain.judgement} ({'; '.join(_turned(baseline, plain))})"
     reason = _reason(baseline, [*depends, *hangs], grid)
-    return Verdict(claim, baseline.judgement, figure, baseline, reason, tuple(depends), tuple(hangs), grid)
+    return Verdict(claim, baseline.judgement, figure, baseline, reason, tuple(depends), tuple(hangs), grid, tried)
 
 
 def _turned(one: Finding, other: Finding) -> tuple[str, ...]:
@@ -105,4 +115,4 @@ def _reason(baseline: Finding, other: Sequence[Dependence], grid: str) -> str:
     named = [f"{kind} {', '.join(values)})" for kind, values in better.items()]
     own = dict.fromkeys(part.why for part in baseline.parts if not part.holds and part.why)
     found = "; ".join((*named, *own, *([grid] if grid else [])))
-    return found or "no variant of what the thesis leaves open makes it hold"
+    return found or "no value varied makes it hold"
