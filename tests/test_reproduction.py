@@ -12,15 +12,14 @@ import sympy as sp
 import xarray as xr
 
 import friso
-import friso.studies.thesis.reproduce as reproduction
 from friso.studies.thesis import STUDIES, Evidence, Finding, Part, Reproduction, Response, claims, reproduce, rig
 from friso.studies.thesis.claims import _JUDGES, judges, registered
 from friso.studies.thesis.judges import series_stiffness
 from friso.studies.thesis.judges.shares import NARROW, WIDE
 from friso.studies.thesis.maps import begins, ends, free_square, trend
 from friso.studies.thesis.open_parameters import METHOD, OPEN
-from friso.studies.thesis.reproduce import _changed, lasting
-from friso.studies.thesis.verdicts import not_covered, turned, verdict
+from friso.studies.thesis.reproduce import _changed, _coarser, lasting
+from friso.studies.thesis.verdicts import not_covered, verdict
 from friso.views.reproduction import claims_document, reproduction_html, write_reproduction
 from friso.views.reproduction_figures import reproduction_figures
 
@@ -323,27 +322,16 @@ def test_a_variant_is_compared_with_the_baseline_alone() -> None:
     full, coarse = finding(False), finding(True)
     found = verdict(claims()[0], "5", full, coarse, [(OPEN[0], finding(False)), (OPEN[1], finding(True))])
     assert [each.variant for each in found.depends_on] == [OPEN[1]]
-    assert "coarser grid: holds" in found.reason
+    assert "every second value of each axis: holds" in found.reason
 
 
-@pytest.mark.parametrize("holds", [(True, True, False), (True, False, True), (False, True, True), (True, False, False)])
-def test_what_is_run_again_at_full_points(holds: tuple[bool, bool, bool]) -> None:
-    assert turned(*(finding(each) for each in holds))
-    assert not turned(finding(True), finding(True), finding(True))
-
-
-def test_variants_that_turn_a_part_are_decided_at_full_points(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The coarse grid is one of 3 values: whatever is found to turn is what a study at full points finds."""
-    monkeypatch.setattr(reproduction, "COARSE", 3)
-    decided = {each.claim.id: each for each in reproduce(["control", "system"], points=7).verdicts if each.finding}
-    monkeypatch.setattr(reproduction, "COARSE", 7)
-    exact = {each.claim.id: each for each in reproduce(["control", "system"], points=7).verdicts if each.finding}
-    assert decided.keys() == exact.keys() >= {"F11B", "F12B"}
-    for claim, each in decided.items():
-        assert set(each.depends_on) <= set(exact[claim].depends_on)
-        assert each.hangs_on == exact[claim].hangs_on
-        assert each.tried == exact[claim].tried
-    assert any(each.grid and each.depends_on == exact[claim].depends_on for claim, each in decided.items())
+def test_the_coarser_grid_is_part_of_the_full_one() -> None:
+    full = Evidence(
+        {name: made(name, lambda x, y: x > y, points) for name, points in (("path", 41), ("control", 4))}, {}
+    )
+    coarse = _coarser(full).maps
+    assert coarse["path"].identical(made("path", lambda x, y: x > y, 21))
+    assert coarse["control"] is full.maps["control"]
 
 
 def test_values_that_do_not_enter_are_not_counted(small: Reproduction) -> None:

@@ -65,7 +65,6 @@ def claims_document(reproduction: Reproduction) -> dict[str, Any]:
         "source": rig().source,
         "friso": VERSION,
         "points": reproduction.points,
-        "points_of_variants": reproduction.coarse,
         "rtol": reproduction.rtol,
         "conventions": CONVENTIONS,
         "figure_14b": {"rtol": tolerances, "verdicts_changed": verdicts, "counts_changed": counts}
@@ -123,7 +122,6 @@ def reproduction_html(reproduction: Reproduction) -> str:
             plotly=Markup(plotly_renderer.script()) if drawn else None,
             conventions=CONVENTIONS,
             points=reproduction.points,
-            coarse=reproduction.coarse,
             rtol=f"{reproduction.rtol:g}",
             stage_file=rig().to_toml(),
             version=VERSION,

@@ -16,16 +16,13 @@ from friso.studies.thesis.claims import Claim, Evidence, Finding, Registered, Re
 from friso.studies.thesis.judges.shares import NARROW, WIDE
 from friso.studies.thesis.open_parameters import METHOD, OPEN, RTOL, Variant
 from friso.studies.thesis.studies import LOCKED, NOTHING, STUDIES, ThesisStudy, rig
-from friso.studies.thesis.verdicts import Verdict, not_covered, turned, verdict
+from friso.studies.thesis.verdicts import Verdict, not_covered, verdict
 
 if TYPE_CHECKING:
     import xarray as xr
 
 POINTS = 41
 """Values per axis: 0.4 Hz apart in Fig. 16."""
-
-COARSE = 21
-"""Values per axis at which what the thesis leaves open is varied first; what turns a part is run again at full."""
 
 VERIFIED = 0.05
 """Share of the cells of a shown map that are run again at a tighter tolerance."""
@@ -47,8 +44,7 @@ Progress = Callable[[int, int, str], None]
 class Reproduction:
     """All that was found: maps by study name and responses by name; the map of Fig. 14B by relative tolerance
     and the shares of its cells whose verdict, and whose peak count, differs between them (NaN if not computed); a
-    verdict per claim; values per axis of the maps (`points`) and of those on which open parameters are varied first
-    (`coarse`)."""
+    verdict per claim; values per axis of the maps (`points`), which are those of every variant too."""
 
     maps: Mapping[str, xr.Dataset]
     responses: Mapping[str, Response]
@@ -56,7 +52,6 @@ class Reproduction:
     changed: tuple[float, float]
     verdicts: tuple[Verdict, ...]
     points: int
-    coarse: int
     rtol: float
 
 
@@ -71,26 +66,22 @@ def reproduce(
     studies = _chosen(names)
     if points < 3:
         raise StageError("points", str(points), "3 or more values per axis", "41")
-    coarse, variants = min(points, COARSE), (*OPEN, *METHOD)
-    tell = _Teller(progress, 3 + len(variants) + 1)
+    variants = (*OPEN, *METHOD)
+    tell = _Teller(progress, 2 + len(variants) + 1)
     tell("maps")
     responses = {name: _response(own, NOTHING, rtol) for name, own in RESPONSES.items()}
     baseline = Evidence(_maps(studies, points, rtol, VERIFIED), responses)
     tell("Fig. 14B at two tolerances")
     tolerances = {each: _map(s, NOTHING, points, each) for s in studies if s.panel == "14B" for each in (RTOL, TIGHT)}
-    tell("coarse maps")
-    plain = baseline if coarse == points else Evidence(_maps(studies, coarse, rtol), baseline.responses)
     entries = _covered(baseline)
-    usual = _Usual(baseline, plain, _findings(entries, baseline), _findings(entries, plain))
     varied: list[tuple[Variant, Mapping[str, Finding]]] = []
     for variant in variants:
         tell(f"{variant.parameter} {variant.value}")
-        varied.append((variant, _with_variant(variant, usual, studies, (coarse, points), rtol)))
+        varied.append((variant, _findings(entries, _varied(studies, points, rtol, variant, baseline))))
     tell("done")
-    verdicts = tuple(_judged(claim, usual, varied) for claim in claims())
-    return Reproduction(
-        baseline.maps, baseline.responses, tolerances, _changed(tolerances), verdicts, points, coarse, rtol
-    )
+    found, coarse = _findings(entries, baseline), _findings(entries, _coarser(baseline))
+    verdicts = tuple(_judged(claim, baseline, found, coarse, varied) for claim in claims())
+    return Reproduction(baseline.maps, baseline.responses, tolerances, _changed(tolerances), verdicts, points, rtol)
 
 
 def _chosen(names: Iterable[str] | None) -> tuple[ThesisStudy, ...]:
@@ -115,33 +106,15 @@ class _Teller:
         self.done += 1
 
 
-@dataclass(frozen=True)
-class _Usual:
-    """What variants stand beside: the baseline at full points and on the coarse grid, with the findings by claim."""
-
-    full: Evidence
-    coarse: Evidence
-    findings: Mapping[str, Finding]
-    coarse_findings: Mapping[str, Finding]
-
-
-def _with_variant(
-    variant: Variant, usual: _Usual, studies: Iterable[ThesisStudy], grids: tuple[int, int], rtol: float
-) -> Mapping[str, Finding]:
-    """What is found with one variant, by claim: of tolerance and metric at full points, of an open parameter on the
-    coarse grid first, and again at full points where that turns a part; only the maps that those claims need are run.
-    """
-    entries, (coarse, points) = _covered(usual.full), grids
-    if variant.kind != "unknown parameter":
-        return _findings(entries, _varied(studies, points, rtol, variant, usual.full))
-    near = _varied(studies, coarse, rtol, variant, usual.coarse)
-    found = _findings(entries, near)
-    if coarse == points:
-        return found
-    again = {claim for claim in found if turned(found[claim], usual.findings[claim], usual.coarse_findings[claim])}
-    needed = frozenset().union(*(entries[claim].needs for claim in again))
-    maps = _varied_maps([each for each in studies if each.name in needed], points, rtol, variant, usual.full)
-    return {**found, **_findings({claim: entries[claim] for claim in again}, Evidence(maps, near.responses))}
+def _coarser(evidence: Evidence) -> Evidence:
+    """The evidence with every second value of each axis of the maps, which shows what hangs on the grid; maps of less
+    than five values stay."""
+    every = slice(None, None, 2)
+    maps = {
+        name: runs.isel(dict.fromkeys(runs.dims, every)) if min(runs.sizes.values()) >= 5 else runs
+        for name, runs in evidence.maps.items()
+    }
+    return Evidence(maps, evidence.responses)
 
 
 def _covered(evidence: Evidence) -> Mapping[str, Registered]:
@@ -159,20 +132,14 @@ def _findings(entries: Mapping[str, Registered], evidence: Evidence) -> dict[str
 
 def _varied(studies: Iterable[ThesisStudy], points: int, rtol: float, variant: Variant, plain: Evidence) -> Evidence:
     """The evidence with one variant; maps that it does not touch are the baseline's."""
-    maps = _varied_maps(studies, points, rtol, variant, plain)
     tolerance = variant.rtol or rtol
+    touched = [study for study in studies if variant.touches(study)]
+    maps = {**plain.maps, **_maps(touched, points, tolerance, changes=variant.changes)}
     responses = {name: _response(own, variant.changes, tolerance) for name, own in RESPONSES.items()}
     if variant.kind == "metric":
         maps = {name: lasting(runs) for name, runs in maps.items()}
         responses = {name: Response(lasting(each.cell), each.trace) for name, each in responses.items()}
     return Evidence(maps, responses)
-
-
-def _varied_maps(
-    studies: Iterable[ThesisStudy], points: int, rtol: float, variant: Variant, plain: Evidence
-) -> dict[str, xr.Dataset]:
-    touched = [study for study in studies if variant.touches(study)]
-    return {**plain.maps, **_maps(touched, points, variant.rtol or rtol, changes=variant.changes)}
 
 
 def _maps(
@@ -220,15 +187,21 @@ def _changed(tolerances: Mapping[float, xr.Dataset]) -> tuple[float, float]:
     return float((loose["verdict"] != tight["verdict"]).mean()), float(other_count.mean())
 
 
-def _judged(claim: Claim, usual: _Usual, varied: Iterable[tuple[Variant, Mapping[str, Finding]]]) -> Verdict:
+def _judged(
+    claim: Claim,
+    baseline: Evidence,
+    found: Mapping[str, Finding],
+    coarse: Mapping[str, Finding],
+    varied: Iterable[tuple[Variant, Mapping[str, Finding]]],
+) -> Verdict:
     entry = registered().get(claim.id)
     if entry is None:
         return not_covered(claim, "work of a later step")
-    missing = _missing(entry, usual.full)
+    missing = _missing(entry, baseline)
     if missing:
         return not_covered(claim, f"not computed in this run: {', '.join(missing)}")
-    findings = [(variant, found[claim.id]) for variant, found in varied if _enters(variant, entry.needs)]
-    return verdict(claim, entry.figure, usual.findings[claim.id], usual.coarse_findings[claim.id], findings)
+    findings = [(variant, other[claim.id]) for variant, other in varied if _enters(variant, entry.needs)]
+    return verdict(claim, entry.figure, found[claim.id], coarse[claim.id], findings)
 
 
 def _enters(variant: Variant, needs: Iterable[str]) -> bool:

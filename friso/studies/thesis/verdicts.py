@@ -68,21 +68,13 @@ def not_covered(claim: Claim, reason: str) -> Verdict:
     return Verdict(claim, "not yet covered", "", None, reason)
 
 
-def turned(finding: Finding, baseline: Finding, plain: Finding) -> bool:
-    """Whether a finding on the coarse grid, on which `plain` is the baseline, has to be made again on the full one.
-
-    It has to if any of the three differ in what holds: the coarse grid alone may turn a part, or hide that one turns.
-    """
-    return not finding.pattern == baseline.pattern == plain.pattern
-
-
 def verdict(
-    claim: Claim, figure: str, baseline: Finding, plain: Finding, varied: Sequence[tuple[Variant, Finding]]
+    claim: Claim, figure: str, baseline: Finding, coarse: Finding, varied: Sequence[tuple[Variant, Finding]]
 ) -> Verdict:
     """The baseline's judgement, and the variants under which other parts hold.
 
-    `varied` has the variants that enter the evidence of the claim; where they turn a part their findings are on the
-    grid of the baseline, with which alone they are compared. `plain` is the baseline on the coarse grid.
+    `varied` has the variants that enter the evidence of the claim, on the grid of the baseline; `coarse` is the
+    baseline on a coarser one, which is told where it turns a part.
     """
     depends, hangs = [], []
     for variant, finding in varied:
@@ -91,8 +83,8 @@ def verdict(
             (depends if variant.kind == "unknown parameter" else hangs).append(dependence)
     tried = sum(variant.kind == "unknown parameter" for variant, _ in varied)
     grid = ""
-    if plain.pattern != baseline.pattern:
-        grid = f"on the coarser grid: {plain.judgement} ({'; '.join(_turned(baseline, plain))})"
+    if coarse.pattern != baseline.pattern:
+        grid = f"with every second value of each axis: {coarse.judgement} ({'; '.join(_turned(baseline, coarse))})"
     reason = _reason(baseline, [*depends, *hangs], grid)
     return Verdict(claim, baseline.judgement, figure, baseline, reason, tuple(depends), tuple(hangs), grid, tried)
 

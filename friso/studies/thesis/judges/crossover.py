@@ -55,8 +55,8 @@ def softer_joint_lowers_the_limit(evidence: Evidence) -> Finding:
                 "over the strokes of the upper half of the range, the mean limit at 1e3 N/m is lower than at 2.4e3 N/m "
                 f"by at least one cell of the crossover grid ({cell:.3g} Hz)",
                 bool(drop.mean() >= cell),
-                f"{soft[long].mean():.3g} against {stiff[long].mean():.3g} Hz: lower by {drop.mean():.3g} Hz; lower at "
-                f"{(drop > 0).sum()} of {drop.size} strokes, higher at {(drop < 0).sum()}",
+                f"{soft[long].mean():.3g} against {stiff[long].mean():.3g} Hz: a drop of {drop.mean():.3g} Hz; lower "
+                f"at {(drop > 0).sum()} of {drop.size} strokes, higher at {(drop < 0).sum()}",
             ),
         )
     )
