@@ -59,6 +59,16 @@ def test_a_cell_is_run_again_alone(mapped: tuple[Path, dict]) -> None:
     assert json.loads(again.stdout)["cases"]["given"]["verdict"] == runs.verdict.values[2, 1]
 
 
+def test_files_of_the_user_are_not_overwritten(tmp_path: Path) -> None:
+    for name, options in (("a.png", ()), ("b.csv", ("--export", "b.csv"))):
+        (tmp_path / name).write_text("precious")
+        done = friso(tmp_path, "map", RIG, *SMALL, "--out", f"{name[0]}.zarr", *options)
+        assert done.returncode == 2
+        assert "nothing was overwritten" in done.stderr
+        assert (tmp_path / name).read_text() == "precious"
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.png", "b.csv"]
+
+
 def test_a_finished_map_is_drawn_again_from_its_store_alone(mapped: tuple[Path, dict]) -> None:
     folder, document = mapped
     done = friso(folder, "map", "a.zarr", "--metric", "verdict", "--json")
@@ -143,6 +153,7 @@ def _interruptible() -> None:
         ((*SMALL, "--samples", "8"), "FIRST..LAST alone"),
         ((*SMALL, "--latin"), "--samples"),
         ((*SMALL, "--workers", "0"), "1 worker or more"),
+        (("--x", "controller.crossover=4 Hz..8 Hz", "--samples", "9"), "two keys or more"),
         ((*SMALL, "--workers", "1", "--scheduler", "tcp://127.0.0.1:9"), "one of the two"),
     ],
 )

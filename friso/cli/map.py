@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -68,7 +69,7 @@ def map_cells(
     Example: friso map rig.toml --x controller.crossover="1 Hz..16 Hz:41" --y joint.stroke="0 m..1 mm:41"
     A study that was interrupted goes on: friso map thesis_rig_map.zarr
     """
-    from friso.cli.map_study import Varied, stored_study, study_for, write_exports, write_views
+    from friso.cli.map_study import Varied, refuse_overwriting, stored_study, study_for, write_exports, write_views
     from friso.studies.store import in_memory
     from friso.studies.verify import checked_share
 
@@ -85,6 +86,7 @@ def map_cells(
             store = out or Path(f"{source.stem}_map.zarr")
             study = study_for(stage, varied, metric, refine, None if yes else LARGE, crew)
             study = replace(study, rtol=_chosen_rtol(rtol or "1e-6", study, crew))
+        refuse_overwriting(store, exports)
         runs = _run(study, store, crew, share)
     if study.cells <= LARGE:
         runs = in_memory(runs)
@@ -114,8 +116,10 @@ def _chosen_rtol(text: str, study: Study, crew: Crew) -> float:
 def _crew(workers: int | None, scheduler: str | None) -> Iterator[Crew]:
     if workers is not None and scheduler is not None:
         raise StageError("--workers", "--workers and --scheduler", "one of the two", "--workers 4")
-    if workers is not None and workers < 1:
-        raise StageError("--workers", str(workers), "1 worker or more", "--workers 4")
+    most = os.cpu_count() or 1
+    if workers is not None and not 1 <= workers <= most:
+        expected = f"1 worker or more, up to the {most} processors"
+        raise StageError("--workers", str(workers), expected, "--workers 1")
     if scheduler is not None:
         from friso.studies.distribute import connected
 

@@ -70,6 +70,8 @@ def study_for(stage: Stage, varied: Varied, metric: str, refine: bool, most: int
     if not axes:
         raise StageError("--x", "no axis", "one axis or more", AXIS_EXAMPLE)
     samples = None
+    if varied.samples is not None and len(axes) == 1:
+        raise StageError("--samples", "samples of one key", "two keys or more; for one, a range with its points")
     if varied.samples is not None:
         axes, samples = {}, Samples(axes, varied.samples, "latin" if varied.latin else "sobol")
     elif varied.latin:
@@ -115,15 +117,29 @@ def write_views(runs: xr.Dataset, store: Path, metric: str) -> list[Path]:
     """The figure and the page of a map, beside its store."""
     from friso.views.map_figures import map_figure
     from friso.views.map_page import write_map_page
-    from friso.views.matplotlib_renderer import FORMATS, save
+    from friso.views.matplotlib_renderer import save
 
-    stem = store.with_suffix("") if store.suffix == ".zarr" else store
-    figure = map_figure(runs, metric)
-    paths = [stem.with_name(f"{stem.name}.{form}") for form in (*FORMATS, "html")]
+    figure, paths = map_figure(runs, metric), _view_paths(store)
     for path in paths[:-1]:
         save(figure, path)
     write_map_page(runs, paths[-1], metric, f"friso simulate --cell {store} {{indices}}")
     return paths
+
+
+def refuse_overwriting(store: Path, exports: list[Path]) -> None:
+    """Refuse to write over files that are no earlier result of this study. Raises StageError."""
+    for path in exports if store.exists() else [*_view_paths(store), *exports]:
+        if path.exists() or path == store:
+            raise StageError(
+                "--out", f"{path} is there already", "another name; nothing was overwritten", "--out new.zarr"
+            )
+
+
+def _view_paths(store: Path) -> list[Path]:
+    from friso.views.matplotlib_renderer import FORMATS
+
+    stem = store.with_suffix("") if store.suffix == ".zarr" else store
+    return [stem.with_name(f"{stem.name}.{form}") for form in (*FORMATS, "html")]
 
 
 def write_exports(runs: xr.Dataset, paths: list[Path]) -> list[Path]:
@@ -137,12 +153,14 @@ def write_exports(runs: xr.Dataset, paths: list[Path]) -> list[Path]:
 
 def sentences(runs: xr.Dataset, study: Study) -> list[str]:
     """What was found, for the terminal."""
-    from friso.views.map_words import verdict_counts, verification
+    from friso.views.map_words import caveats, failures, verdict_counts, verification
 
     counts = verdict_counts(runs)
     found = ", ".join(f"{count} {verdict}" for verdict, count in counts.items())
     size = " x ".join(map(str, study.shape))
-    return [f"{study.stage.name or 'stage'}: {size} cells at rtol {study.rtol:g}: {found}", verification(runs)]
+    reasons = [f"{count} without result: {reason}" for reason, count in failures(runs).items()]
+    head = f"{study.stage.name or 'stage'}: {size} cells at rtol {study.rtol:g}: {found}"
+    return [head, verification(runs), *caveats(runs), *reasons]
 
 
 def document(runs: xr.Dataset, study: Study, store: Path, files: list[Path]) -> dict[str, Any]:

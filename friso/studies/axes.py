@@ -172,7 +172,11 @@ def _listed(name: str, values: Values, reader: _Reader) -> Axis:
 def _words(stage: Stage, key: str, values: Values) -> Axis:
     """An axis of words or booleans, each of which the stage takes."""
     options = [parse_set(f"{key}={word}")[1] for word in values.split(",")] if isinstance(values, str) else list(values)
-    if key.partition(".")[0] not in type(stage).model_fields or "." not in key:
+    table, _, rest = key.partition(".")
+    if rest and getattr(stage, table, 0) is None:
+        given = f"a key of [{table}], which this stage does not have"
+        raise StageError(key, given, "a key of the stage, or a stage with that table")
+    if not rest or table not in type(stage).model_fields:
         expected = "a key of the stage file, or a name that a link uses"
         raise StageError(key, "a name that nothing depends on", expected, 'with the link masses.cart = "0.7 * mass"')
     for value in options:

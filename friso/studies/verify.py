@@ -47,7 +47,7 @@ def verified(study: Study, runs: xr.Dataset, crew: Crew, share: float) -> dict[s
     (inferred_checked, inferred_confirmed). Invalid and failed cells have no verdict that could survive; nothing is
     told where there are no others, or no share was asked for.
     """
-    if not share:
+    if not share or study.rtol < 10 * TIGHTEST:  # there is no tolerance to check it with
         return {}
     count, rtol = max(LEAST, round(share * study.cells)), max(study.rtol / TIGHTER, TIGHTEST)
     tighter = replace(study, rtol=rtol)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
@@ -96,7 +97,9 @@ class Look:
 def axes_of(runs: xr.Dataset) -> tuple[CellAxis, ...]:
     """The swept axes in the order of the runs; of sampled runs the sampled keys. ValueError where there are none."""
     if SAMPLE in runs.dims:
+        given = json.loads(runs.attrs.get("axes", "[]"))  # a store forgets the order of its coordinates
         keys = [key for key in runs.coords if runs[key].dims == (SAMPLE,) and key != SAMPLE]
+        keys.sort(key=lambda key: given.index(key) if key in given else len(given))
         return tuple(_sampled(runs, key) for key in keys)
     dims = _dims(runs)
     if not dims:

@@ -14,7 +14,7 @@ from friso.views import plotly_renderer
 from friso.views.map_cells import SAMPLE, axes_of
 from friso.views.map_data import packed, picked
 from friso.views.map_figures import map_figure
-from friso.views.map_words import failures, grouped, verdict_counts, verification
+from friso.views.map_words import MEANINGS, caveats, failures, grouped, verdict_counts, verification
 from friso.views.pages import environment, print_image
 
 if TYPE_CHECKING:
@@ -65,6 +65,10 @@ def _facts(runs: xr.Dataset) -> list[tuple[str, str]]:
     facts.append(("Verification", verification(runs)))
     verdicts = ", ".join(f"{label} {grouped(number)}" for label, number in verdict_counts(runs).items())
     facts += [("Verdicts", verdicts)] if verdicts else []
+    facts += [(f"{label}", MEANINGS[label]) for label in verdict_counts(runs) if label in MEANINGS]
+    facts += [("Mind", " ".join(found))] if (found := caveats(runs)) else []
+    links = json.loads(runs.attrs.get("links", "{}"))
+    facts += [("Links", "; ".join(f"{key} = {text}" for key, text in links.items()))] if links else []
     facts += [(f"Without result: {grouped(number)}", reason) for reason, number in failures(runs).items()]
     return facts
 

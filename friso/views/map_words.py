@@ -177,7 +177,28 @@ def verification(runs: xr.Dataset) -> str:
 
 def statement(runs: xr.Dataset) -> str:
     """What stands on every figure of a map: its verification, its tolerance and its number of runs."""
-    return f"{verification(runs)}\n{_extent(runs)}"
+    return "\n".join([verification(runs), _extent(runs), *([" ".join(found)] if (found := caveats(runs)) else [])])
+
+
+MEANINGS = {
+    "hunts": "has counted peaks: late (after 10 s), tall (above 0.1 mm) and apart (0.5 s); one alone is no cycle",
+    "transient": "has none, but still swings by more than 0.1 mm at the end and is not within 10 µm",
+    "settles": "has none, and swings no more than 0.1 mm at the end",
+    "failed": "the run was not completed",
+    "invalid": "no stage may have these values",
+}
+"""What the verdicts of a map mean."""
+
+
+def caveats(runs: xr.Dataset) -> list[str]:
+    """What the peak count alone does not tell: settled cells that do not stay in their band, hunting that has ended."""
+    if not {"settling_time_10um", "verdict", "status"} <= set(runs.data_vars):
+        return []
+    verdict, never = runs["verdict"].values, np.isnan(runs["settling_time_10um"].values)
+    ran = ~np.char.startswith(runs["status"].values.astype(str), "inferred")
+    off, over = int(((verdict == "settles") & never & ran).sum()), int(((verdict == "hunts") & ~never & ran).sum())
+    found = [f"{grouped(off)} of the cells that settle do not stay within 10 µm of the reference."] if off else []
+    return found + ([f"{grouped(over)} of those that hunt have settled by the end of the run."] if over else [])
 
 
 def _extent(runs: xr.Dataset) -> str:
