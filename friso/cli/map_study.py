@@ -115,15 +115,21 @@ def _too_large(runs: int, trial: Study, crew: Crew) -> StageError:
 
 def write_views(runs: xr.Dataset, store: Path, metric: str) -> list[Path]:
     """The figure and the page of a map, beside its store."""
-    from friso.views.map_figures import map_figure
     from friso.views.map_page import write_map_page
-    from friso.views.matplotlib_renderer import save
 
-    figure, paths = map_figure(runs, metric), _view_paths(store)
-    for path in paths[:-1]:
-        save(figure, path)
+    paths = _view_paths(store)
+    _save_figure(runs, metric, paths[:-1])
     write_map_page(runs, paths[-1], metric, f"friso simulate --cell {store} {{indices}}")
     return paths
+
+
+def _save_figure(runs: xr.Dataset, metric: str, paths: list[Path]) -> None:
+    from friso.views.map_figures import map_figure
+    from friso.views.matplotlib_renderer import save
+
+    figure = map_figure(runs, metric)
+    for path in paths:
+        save(figure, path)
 
 
 def refuse_overwriting(store: Path, exports: list[Path]) -> None:

@@ -195,7 +195,8 @@ def caveats(runs: xr.Dataset) -> list[str]:
     if not {"settling_time_10um", "verdict", "status"} <= set(runs.data_vars):
         return []
     verdict, never = runs["verdict"].values, np.isnan(runs["settling_time_10um"].values)
-    ran = ~np.char.startswith(runs["status"].values.astype(str), "inferred")
+    codes, words = words_of(runs, "status")
+    ran = np.array([not word.startswith("inferred") for word in words])[codes]
     off, over = int(((verdict == "settles") & never & ran).sum()), int(((verdict == "hunts") & ~never & ran).sum())
     found = [f"{grouped(off)} of the cells that settle do not stay within 10 µm of the reference."] if off else []
     return found + ([f"{grouped(over)} of those that hunt have settled by the end of the run."] if over else [])
