@@ -10,7 +10,6 @@ import re
 import subprocess
 import sys
 from dataclasses import dataclass, field, replace
-from html.parser import HTMLParser
 from types import SimpleNamespace
 from typing import Any
 
@@ -20,6 +19,7 @@ import xarray as xr
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from pages import Page
 
 from friso.version import VERSION
 from friso.views import matplotlib_renderer, plotly_renderer
@@ -511,25 +511,6 @@ def test_response_of_one_run():
 
 
 # ---------------------------------------------------------------- report
-
-
-class Page(HTMLParser):
-    """Tags, addresses that a browser would load, and the text outside scripts and styles."""
-
-    def __init__(self, text: str) -> None:
-        super().__init__()
-        self.tags: list[str] = []
-        self.loads: list[str] = []
-        self.words: list[str] = []
-        self.feed(text.replace(plotly_renderer.script(), ""))
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.tags.append(tag)
-        self.loads += [value or "" for name, value in attrs if name in ("src", "href", "srcset", "data")]
-
-    def handle_data(self, data: str) -> None:
-        if self.tags[-1:] not in (["script"], ["style"]):
-            self.words.append(data)
 
 
 @pytest.fixture(scope="module")

@@ -45,13 +45,7 @@ def simulate(
     """
     interval = None if sample_time is None else read_sample_time(sample_time)
     tolerance = None if rtol is None else read_tolerance(rtol)
-    if cell is not None:
-        stage, name, its_rtol = _cell(cell, given)
-        stage = with_overrides(stage, overrides)
-    elif len(given) == 1:
-        stage, name, its_rtol = read_stage(Path(given[0]), overrides), Path(given[0]).stem, 1e-6
-    else:
-        raise StageError("STAGE.toml", " ".join(given), "one stage file", "friso simulate rig.toml")
+    stage, name, its_rtol = _given(given, overrides) if cell is None else _cell(cell, given, overrides)
     folder = made_folder(out or Path("."))
     from friso.engine.simulate import simulate as simulate_stage
 
@@ -71,7 +65,14 @@ def simulate(
     leave(status == "done")
 
 
-def _cell(store: Path, given: list[str]) -> tuple[Stage, str, float]:
+def _given(given: list[str], overrides: list[str] | None) -> tuple[Stage, str, float]:
+    """The stage of the one file given, a name for it, and the usual tolerance. Raises StageError."""
+    if len(given) != 1:
+        raise StageError("STAGE.toml", " ".join(given), "one stage file", "friso simulate rig.toml")
+    return read_stage(Path(given[0]), overrides), Path(given[0]).stem, 1e-6
+
+
+def _cell(store: Path, given: list[str], overrides: list[str] | None) -> tuple[Stage, str, float]:
     """The stage of a cell, a name for it, and the tolerance it was run at. Raises StageError."""
     from friso.studies.store import read_store
     from friso.studies.study import study_of
@@ -83,7 +84,7 @@ def _cell(store: Path, given: list[str]) -> tuple[Stage, str, float]:
     if not inside:
         raise StageError(f"--cell {store}", " ".join(given), f"one number per axis: {sizes}", "3 4")
     name = f"{store.with_suffix('').name}_cell_{'_'.join(given)}"
-    return study.cell_stage(index), name, study.rtol
+    return with_overrides(study.cell_stage(index), overrides), name, study.rtol
 
 
 def _write_response(response: xr.Dataset, stem: Path) -> list[Path]:

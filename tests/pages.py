@@ -1,0 +1,29 @@
+"""A page as its tests read it."""
+
+from html.parser import HTMLParser
+
+from friso.views import plotly_renderer
+
+
+class Page(HTMLParser):
+    """Tags, addresses that a browser would load, and the text outside scripts and styles."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.tags: list[str] = []
+        self.loads: list[str] = []
+        self.words: list[str] = []
+        self.feed(text.replace(plotly_renderer.script(), ""))
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append(tag)
+        self.loads += [value or "" for name, value in attrs if name in ("src", "href", "srcset", "data")]
+
+    def handle_data(self, data: str) -> None:
+        if self.tags[-1:] not in (["script"], ["style"]):
+            self.words.append(data)
+
+    @property
+    def text(self) -> str:
+        """All words in one piece."""
+        return "".join(self.words)
