@@ -40,7 +40,7 @@ class Settings(NamedTuple):
 
 class Results(NamedTuple):
     """What the runs leave: statistics (n, len(STATISTICS)), status (n,), turning points (n, capacity) with their
-    count (n,), and sampled states (n, samples, states)."""
+    count (n,), sampled states (n, samples, states), and the states at the end (n, states)."""
 
     statistics: np.ndarray
     statuses: np.ndarray
@@ -48,6 +48,7 @@ class Results(NamedTuple):
     turn_values: np.ndarray
     turn_counts: np.ndarray
     samples: np.ndarray
+    ends: np.ndarray
 
 
 STATISTICS = (

@@ -68,19 +68,24 @@ def _part(flat: Mapping[str, Any], numbers: np.ndarray) -> dict[str, Any]:
     return {key: value[numbers] if np.ndim(value) else value for key, value in flat.items()}
 
 
-def run_chunks(kernel: Kernel, flat: Mapping[str, Any], runs: int, options: Options) -> Iterator[Runs]:
+def run_chunks(
+    kernel: Kernel, flat: Mapping[str, Any], runs: int, options: Options, starts: np.ndarray | None = None
+) -> Iterator[Runs]:
     """Run `runs` stages of one structure, given as flat keys to SI numbers or arrays of shape (runs,).
 
-    They come chunk by chunk, those with many turning points after the others of their chunk. Results do not depend
+    They start at rest, displaced as the motion says, or else from the states `starts`, shape (runs, states). They
+    come chunk by chunk, those with many turning points after the others of their chunk. Results do not depend
     on lanes, threads or chunks. A failed run has a status; the others go on.
     """
     for first in range(0, runs, options.chunk):
         numbers = np.arange(first, min(first + options.chunk, runs))
-        yield from _run_with_room(kernel, flat, numbers, CAPACITY, options)
+        yield from _run_with_room(kernel, flat, numbers, CAPACITY, options, starts)
 
 
-def prepare(kernel: Kernel, flat: Mapping[str, Any], runs: int, options: Options) -> Batch:
-    """The kernel's input for the runs of one chunk."""
+def prepare(
+    kernel: Kernel, flat: Mapping[str, Any], runs: int, options: Options, starts: np.ndarray | None = None
+) -> Batch:
+    """The kernel's input for the runs of one chunk, from the states `starts` unless as the motion says."""
     values = kernel.values({**flat, "motion.size": motion.size(flat)}, runs)
 
     def columns(rows: list[Any]) -> np.ndarray:
@@ -95,7 +100,7 @@ def prepare(kernel: Kernel, flat: Mapping[str, Any], runs: int, options: Options
         rates = columns(kernel.module.rate(values))[:, 0]
     scales[~((scales > 0) & np.isfinite(scales))] = 1.0  # nothing moves: any tolerance will do
     segments, windows = _segments(flat, runs, options.window)
-    starts = _starts(kernel, flat, runs)
+    starts = _starts(kernel, flat, runs) if starts is None else np.ascontiguousarray(starts, dtype=float)
     surfaces = kernel.module.surfaces(starts.T, 0.0, segments[:, 0, 1:].T, values)
     modes = (columns(surfaces) > 0).astype(float)
     first_steps = np.ascontiguousarray(FIRST_STEP / rates)
@@ -133,12 +138,17 @@ def _segments(flat: Mapping[str, Any], runs: int, window: float) -> tuple[np.nda
 
 
 def _run_with_room(
-    kernel: Kernel, flat: Mapping[str, Any], numbers: np.ndarray, room: int, options: Options
+    kernel: Kernel,
+    flat: Mapping[str, Any],
+    numbers: np.ndarray,
+    room: int,
+    options: Options,
+    starts: np.ndarray | None,
 ) -> Iterator[Runs]:
     """Run the runs with these numbers; those with more turning points than there is room for again, fewer at a time
     with more room each."""
     part = _part(flat, numbers)
-    batch = prepare(kernel, part, len(numbers), options)
+    batch = prepare(kernel, part, len(numbers), options, None if starts is None else starts[numbers])
     samples = 0
     if options.interval is not None:
         samples = int(np.max(part["motion.duration"]) / options.interval * (1 + 1e-12)) + 1
@@ -157,7 +167,7 @@ def _run_with_room(
     del results, batch
     again, fewer = numbers[crowded], max(1, options.chunk * CAPACITY // (4 * room))
     for first in range(0, len(again), fewer):
-        yield from _run_with_room(kernel, flat, again[first : first + fewer], 4 * room, options)
+        yield from _run_with_room(kernel, flat, again[first : first + fewer], 4 * room, options, starts)
 
 
 def _settings(options: Options) -> Settings:

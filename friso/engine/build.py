@@ -14,11 +14,14 @@ from friso.engine.kernel import compile_driver
 from friso.engine.module_source import write_module
 from friso.engine.tableaus import TABLEAUS
 from friso.equations.model import assemble
+from friso.equations.variational import variational
 
 
 def main(entry: Path, task: bytes) -> None:
-    structure, method, lanes = pickle.loads(task)
-    source = write_module(assemble(structure), TABLEAUS[method], repr(structure), lanes)
+    wanted = pickle.loads(task)
+    model = assemble(wanted.structure)
+    model = variational(model) if wanted.variational else model
+    source = write_module(model, TABLEAUS[wanted.method], repr(wanted), wanted.lanes)
     (entry / "kernel.py").write_text(source)
     compile_driver(import_entry(entry))
 

@@ -229,6 +229,8 @@ def finish(B, lane, j, segment, batch, settings, results):
     else:
         return False
     results.turn_counts[j] = int(B[TURNS * LANES + lane])
+    for i in range(STATES):
+        results.ends[j, i] = B[(X + i) * LANES + lane]
     statistics = results.statistics[j]
     for i in range(5):
         statistics[i] = B[(FORCE_PEAK + i) * LANES + lane]

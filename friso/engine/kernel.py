@@ -50,30 +50,44 @@ class Kernel:
         return [np.broadcast_to(np.asarray(flat[name], dtype=float), (runs,)) for name in self.parameters]
 
 
-def kernel(structure: Structure, method: str = "Rodas5P", lanes: int = LANES) -> Kernel:
+@dataclass(frozen=True)
+class Wanted:
+    """Which kernel: for stages of this structure, with their variational equations or without, by the named method,
+    in so many lanes."""
+
+    structure: Structure
+    variational: bool = False
+    method: str = "Rodas5P"
+    lanes: int = LANES
+
+
+def kernel(structure: Structure, variational: bool = False, method: str = "Rodas5P", lanes: int = LANES) -> Kernel:
     """The kernel for stages of this structure, stepping by the named method in so many lanes.
 
-    Threads that ask for one kernel at the same time get it from the one that is first.
+    A variational one carries a small deviation beside every state (`friso.equations.variational`). Threads that ask
+    for one kernel at the same time get it from the one that is first.
     """
-    with _loading[structure, method, lanes]:
-        return _loaded(structure, method, lanes)
+    return _kernel(Wanted(structure, variational, method, lanes))
 
 
-_loading: defaultdict[tuple[Structure, str, int], Lock] = defaultdict(Lock)
+def _kernel(wanted: Wanted) -> Kernel:
+    with _loading[wanted]:
+        return _loaded(wanted)
+
+
+_loading: defaultdict[Wanted, Lock] = defaultdict(Lock)
 
 
 @cache
-def _loaded(structure: Structure, method: str, lanes: int) -> Kernel:
-    task = pickle.dumps((structure, method, lanes))
-    name = f"{structure!r} {method} {lanes}"
-    return Kernel(load_or_build(name, "friso.engine.build", task, compile_driver))
+def _loaded(wanted: Wanted) -> Kernel:
+    return Kernel(load_or_build(repr(wanted), "friso.engine.build", pickle.dumps(wanted), compile_driver))
 
 
-def kernels(structures: Iterable[Structure]) -> list[Kernel]:
-    """The kernels of several structures; what has to be compiled is compiled side by side."""
+def kernels(wanted: Iterable[Wanted]) -> list[Kernel]:
+    """Several kernels; what has to be compiled is compiled side by side."""
     with ThreadPoolExecutor() as pool:
         try:
-            return list(pool.map(kernel, structures))
+            return list(pool.map(_kernel, wanted))
         except BaseException:
             stop_building()
             raise
@@ -88,6 +102,7 @@ def empty_results(runs: int, capacity: int, samples: int, states: int) -> Result
         turn_values=np.zeros((runs, capacity)),
         turn_counts=np.zeros(runs, np.int64),
         samples=np.full((runs, samples, states), np.nan),
+        ends=np.full((runs, states), np.nan),
     )
 
 

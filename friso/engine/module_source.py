@@ -77,6 +77,8 @@ def _numpy_functions(model: Model, writer: StepWriter) -> str:
         "constants(p)": writer.constants.expressions,
         "scales(p)": [each.scale for each in model.states],
         "rate(p)": [model.rate],
+        "breakaway(p)": [model.breakaway],
+        "stiffness(p)": [model.stiffness],
         "surfaces(x, t, r, p)": [kink.surface for kink in model.kinks],
         "right_hand_side(x, m, t, r, p)": model.rhs,
         "outputs(x, m, t, r, p)": [each.expression for each in model.outputs.values()],

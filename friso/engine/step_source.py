@@ -97,6 +97,10 @@ class StepWriter:
         self._rates = Block(rates, self.constants)
         self._watched = Block(watched, self.constants)
         self._followed = Block(follow, self.constants)
+        self._jumps = [
+            (Block({f"jump{self._index[x]}_": e for x, e in jumps.items()}, self.constants), [*map(self._index.get, jumps)])
+            for jumps in (model.jumps.get(kink, {}) for kink in model.kinks)
+        ]
         free: set[Any] = set().union(*(sp.sympify(e).free_symbols for e in watched.values()))
         self._watched_states = sorted(self._index[s] for s in free & set(self._index))
         self.layout = Layout(self.size, len(tableau.dense), len(self.constants.index), self.kinks)
@@ -211,14 +215,14 @@ class StepWriter:
     def _error(self) -> list[str]:
         """End of the step, and the mean square of its error against the tolerance."""
         last = self.tableau.stages - 1
-        lines = ["square = 0.0"]
-        for i in range(self.size):
+        lines = [f"end{i} = y{i} + k{last}_{i}" for i in range(self.size)] + ["square = 0.0"]
+        controlled = [i for i, state in enumerate(self.model.states) if state.controlled]
+        for i in controlled:
             lines += [
-                f"end{i} = y{i} + k{last}_{i}",
                 f"ratio = k{last}_{i} / (tol{i} + rtol * max(abs(x{i}), abs(end{i})))",
                 "square = square + ratio * ratio",
             ]
-        return [*lines, f"square = square * {1 / self.size!r}"]
+        return [*lines, f"square = square * {1 / len(controlled)!r}"]
 
     def _dense(self) -> list[str]:
         rows = enumerate(self.tableau.dense)
@@ -279,12 +283,15 @@ class StepWriter:
                 f"there{k} = cubic({', '.join(f'{point}{k}' for point in POINTS)}, fraction)",
                 f"beyond{k} = (guess{k} <= earliest) | (there{k} < 0.0)",
                 f"flip{k} = astray{k} | (good & cut & beyond{k})",
-                f"mode{k} = 1.0 - mode{k} if flip{k} else mode{k}",
             ]
-        return [
-            *lines,
+        lines += [
             "arrived = good & last & (not cut)",
             "t_n = stop if arrived else (t + fraction * h if good else t)",
+            *self._jump(),
+        ]
+        lines += [f"mode{k} = 1.0 - mode{k} if flip{k} else mode{k}" for k in range(self.kinks)]
+        return [
+            *lines,
             *self._step_factor(),
             "factor = factor if factor > 0.2 else 0.2",
             "factor = factor if factor < 6.0 else 6.0",
@@ -294,6 +301,14 @@ class StepWriter:
             f"proposed = {AFTER_KINK!r} * proposed if good & cut else proposed",
             "trial = max(proposed, trial) if good & (factor >= 1.0) else proposed",
         ]
+
+    def _jump(self) -> list[str]:
+        """Let the states jump that do so at the kinks just crossed."""
+        lines = []
+        for k, (block, jumping) in enumerate(self._jumps):
+            lines += block.code(f"_k{k}", self._rename("n", "t_n"))
+            lines += [f"n{i} = n{i} + jump{i}__k{k} if flip{k} else n{i}" for i in jumping]
+        return lines
 
     def _step_factor(self) -> list[str]:
         """SAFETY / error^(1/order), from the mean square error by roots alone: 3/32 of it stands for 1/10."""

@@ -28,12 +28,14 @@ TIME = sp.Symbol("time", real=True)
 
 @dataclass(frozen=True)
 class State:
-    """A state, its time derivative, unit, and the magnitude below which it does not matter."""
+    """A state, its time derivative, unit, and the magnitude below which it does not matter; a state that is not
+    `controlled` has no say in the size of the steps."""
 
     symbol: sp.Symbol
     derivative: sp.Expr
     unit: str
     scale: sp.Expr
+    controlled: bool = True
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import sympy as sp
@@ -33,7 +33,9 @@ class Model:
 
     The right-hand side is smooth while the kinks' `beyond` symbols are held; `TIME` counts from the last corner
     of the reference. `deviation` [m] is position minus reference, `length` [m] and `rate` [1/s] the scales of
-    the motion from which the solver takes its absolute tolerances.
+    the motion from which the solver takes its absolute tolerances, `breakaway` [N] the largest friction force at rest
+    and `stiffness` [N/m] the proportional one of the loop. `jumps` tells by how much states jump where a
+    kink is crossed, in terms of what holds just before: kinks to states to expressions.
     """
 
     states: tuple[State, ...]
@@ -43,6 +45,9 @@ class Model:
     deviation_rate: sp.Expr
     length: sp.Expr
     rate: sp.Expr
+    breakaway: sp.Expr
+    stiffness: sp.Expr
+    jumps: Mapping[Kink, Mapping[sp.Symbol, sp.Expr]] = field(default_factory=dict)
 
     @property
     def symbols(self) -> tuple[sp.Symbol, ...]:
@@ -88,6 +93,8 @@ def assemble(structure: Structure) -> Model:
         deviation_rate=stage.velocity - reference_velocity,
         length=length,
         rate=rate,
+        breakaway=friction.breakaway if friction else sp.S.Zero,
+        stiffness=loop_stiffness(structure.controller),
     )
 
 

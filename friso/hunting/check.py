@@ -9,7 +9,7 @@ import numpy as np
 
 from friso.engine.arrays import Status
 from friso.engine.batch import run_chunks
-from friso.engine.kernel import kernel, kernels
+from friso.engine.kernel import Wanted, kernel, kernels
 from friso.engine.simulate import simulate
 from friso.engine.tolerance import checked_rtol
 from friso.equations.structure import structure
@@ -69,7 +69,7 @@ def check(stage: Stage, rtol: float = 1e-6, traces: bool = False) -> dict[str, C
         variants["locked"] = stage.replace({"joint.locked": True})
         if stage.joint.stiffness is not None:
             variants["free"] = stage.replace({"joint.locked": False})
-    kernels({structure(variant.flat()) for variant in variants.values()})
+    kernels({Wanted(structure(variant.flat())) for variant in variants.values()})
     cases: dict[str, Case] = {}
     for name, variant in variants.items():
         same = next((case for case in cases.values() if case.stage == variant), None)

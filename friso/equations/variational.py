@@ -1,0 +1,61 @@
+"""The variational equations: how a small deviation from a motion evolves beside it.
+
+Between kinks the deviation obeys the linearised equations. Where a kink is crossed at which the right-hand side
+itself jumps, the deviation jumps with it, since the motion beside crosses a little earlier or later: the saltation
+matrix (Leine, Nijmeijer 2004, doi:10.1007/978-3-540-44398-8, chapter 7).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import sympy as sp
+
+from friso.equations.component import TIME, Kink, State, state
+from friso.equations.model import Model
+
+PREFIX = "small_"
+"""How the names of the deviations begin."""
+
+
+def variational(model: Model) -> Model:
+    """The model with a deviation beside each state, the states first; it takes no part in the control of the step."""
+    small = {each.symbol: state(f"{PREFIX}{each.symbol}") for each in model.states}
+    deviations = tuple(
+        State(small[each.symbol], _along(each.derivative, small), each.unit, each.scale, controlled=False)
+        for each in model.states
+    )
+    jumps = {kink: found for kink in model.kinks if (found := _saltation(model, kink, small))}
+    return replace(model, states=(*model.states, *deviations), jumps=jumps)
+
+
+Small = Mapping[sp.Symbol, sp.Symbol]
+
+
+def _along(expression: sp.Expr, small: Small) -> sp.Expr:
+    """Derivative of an expression along the deviation."""
+    terms = (sp.diff(expression, x) * deviation for x, deviation in small.items())
+    return sum(terms, start=sp.S.Zero)
+
+
+def _saltation(model: Model, kink: Kink, small: Small) -> dict[sp.Symbol, sp.Expr]:
+    """By how much the deviations jump at a kink: (f+ - f-) times their share across it over the speed of crossing."""
+    across = {
+        each.symbol: gap * (1 - 2 * kink.beyond)
+        for each in model.states
+        if not _vanishes(gap := each.derivative.subs(kink.beyond, 1) - each.derivative.subs(kink.beyond, 0), kink)
+    }
+    speed = sp.diff(kink.surface, TIME)
+    speed += sum((sp.diff(kink.surface, each.symbol) * each.derivative for each in model.states), start=sp.S.Zero)
+    share = _along(kink.surface, small) / speed
+    return {small[x]: gap * share for x, gap in across.items()}
+
+
+def _vanishes(gap: sp.Expr, kink: Kink) -> bool:
+    """Whether a difference is zero all over the surface of a kink, which is linear in at least one symbol."""
+    if gap == 0:
+        return True
+    symbol = next(s for s in sorted(kink.surface.free_symbols, key=str) if sp.diff(kink.surface, s, 2) == 0)
+    (at,) = sp.solve(kink.surface, symbol)
+    return sp.simplify(gap.subs(symbol, at)) == 0

@@ -1,0 +1,121 @@
+"""Stages that share their equations, their reference held at zero, started from any state."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from friso.engine.arrays import Results, Status
+from friso.engine.batch import Options, run_chunks
+from friso.engine.kernel import Kernel, kernel
+from friso.equations.structure import Structure, structure
+
+QUIET = 4.0
+"""Waits that are given to a motion to end, besides that for the break-away."""
+
+
+@dataclass(frozen=True)
+class Ensemble:
+    """Stages of one structure, given as flat keys to SI numbers or arrays of shape (count,).
+
+    `threads` bounds the threads of its runs, `cancel` is a flag that stops them (see `Options`).
+    """
+
+    flat: Mapping[str, Any]
+    count: int
+    threads: int | None = None
+    cancel: np.ndarray | None = None
+
+    @classmethod
+    def held(cls, flat: Mapping[str, Any], count: int, **how: Any) -> Ensemble:
+        """The stages with their reference held at 0 instead of their motion."""
+        kept = {key: value for key, value in flat.items() if not key.startswith("motion.")}
+        return cls({**kept, "motion.kind": "release"}, count, **how)
+
+    def take(self, numbers: np.ndarray) -> Ensemble:
+        """The stages with these numbers, any of them as often as wanted."""
+        flat = {key: value[numbers] if np.ndim(value) else value for key, value in self.flat.items()}
+        return replace(self, flat=flat, count=len(numbers))
+
+    @cached_property
+    def structure(self) -> Structure:
+        return structure({key: value[0] if np.ndim(value) else value for key, value in self.flat.items()})
+
+    @cached_property
+    def kernel(self) -> Kernel:
+        return kernel(self.structure)
+
+    @property
+    def chatters(self) -> bool:
+        """Whether the stages have a stroke limiter that may be touched and left many times in a swing."""
+        return "stroke_ahead" in self.kernel.kinks
+
+    @cached_property
+    def values(self) -> list[np.ndarray]:
+        """The parameters of each stage, as the generated functions take them."""
+        return self.kernel.values({**self.flat, "motion.size": np.nan, "motion.duration": np.inf}, self.count)
+
+    def number(self, name: str) -> np.ndarray:
+        """What the generated function `name` has to say about every stage, shape (count,): "rate" [1/s], the natural
+        frequency of mass and loop, "breakaway" [N], the largest friction force at rest, or "stiffness" [N/m], the
+        proportional one of the loop."""
+        (found,) = getattr(self.kernel.module, name)(self.values)
+        return np.broadcast_to(np.asarray(found, dtype=float), (self.count,))
+
+    @cached_property
+    def length(self) -> np.ndarray:
+        """By how much the break-away force deflects the loop [m], shape (count,)."""
+        return self.number("breakaway") / self.number("stiffness")
+
+    @cached_property
+    def scales(self) -> np.ndarray:
+        """Magnitudes of the states, shape (count, states)."""
+        values = self.kernel.values({**self.flat, "motion.size": self.length, "motion.duration": np.inf}, self.count)
+        return np.stack([np.broadcast_to(row, (self.count,)) for row in self.kernel.module.scales(values)], axis=1)
+
+    def index(self, state: str) -> int:
+        return self.kernel.states.index(state)
+
+    def rates(self, states: np.ndarray) -> np.ndarray:
+        """The time derivative of the states, both of shape (count, states)."""
+        modes = self._modes(states)
+        rows = self.kernel.module.right_hand_side(states.T, modes, 0.0, np.zeros(3), self.values)
+        return np.stack([np.broadcast_to(row, (self.count,)) for row in rows], axis=1)
+
+    def force(self, states: np.ndarray) -> np.ndarray:
+        """Actuator force [N] without its limit, shape (count,)."""
+        modes = np.zeros((len(self.kernel.kinks), self.count))
+        rows = self.kernel.module.outputs(states.T, modes, 0.0, np.zeros(3), self.values)
+        return np.broadcast_to(rows[list(self.kernel.outputs).index("force")], (self.count,))
+
+    def _modes(self, states: np.ndarray) -> np.ndarray:
+        rows = self.kernel.module.surfaces(states.T, 0.0, np.zeros(3), self.values)
+        return np.array([np.broadcast_to(row, (self.count,)) > 0 for row in rows], dtype=float)
+
+    def run(
+        self, starts: np.ndarray, durations: np.ndarray, rtol: float, variational: bool = False, **how: Any
+    ) -> Results:
+        """Run each stage from its state for its duration [s]; `how` as in `Options`."""
+        options = Options(rtol=rtol, threads=self.threads, cancel=self.cancel, **how)
+        flat = {**self.flat, "motion.duration": durations, "motion.displacement": self.length}
+        parts = list(run_chunks(kernel(self.structure, variational), flat, self.count, options, starts))
+        order = np.argsort(np.concatenate([part.numbers for part in parts]))
+        room = max(1, *(int(part.results.turn_counts.max(initial=0)) for part in parts))
+        columns = zip(*(_with_room(part.results, room) for part in parts), strict=True)
+        return Results(*(np.concatenate(column)[order] for column in columns))
+
+
+def _with_room(results: Results, room: int) -> Results:
+    """The results with room for so many turning points."""
+    gap = ((0, 0), (0, max(0, room - results.turn_times.shape[1])))
+    times, values = (np.pad(turns[:, :room], gap) for turns in (results.turn_times, results.turn_values))
+    return results._replace(turn_times=times, turn_values=values)
+
+
+def done(results: Results) -> np.ndarray:
+    """Which runs were completed, shape (runs,)."""
+    return results.statuses == Status.DONE

@@ -1,0 +1,176 @@
+"""Hunting cycles of many stages at once: found, closed, and judged by their multipliers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from friso.engine.arrays import STATISTICS
+from friso.hunting.cycle.ensemble import Ensemble, done
+from friso.hunting.cycle.guess import UNWINDING, Guess, symmetric_guess, whole_guess
+from friso.hunting.cycle.multipliers import multipliers
+from friso.hunting.cycle.rest import stuck, wait
+from friso.hunting.cycle.return_map import ReturnMap, return_map
+from friso.hunting.cycle.shooting import Orbits, close
+from friso.hunting.cycle.swings import swings
+
+RTOL = 1e-9
+"""Relative tolerance to which cycles are followed unless told."""
+
+ROUGH = 1e-6
+"""Relative tolerance that does for guesses."""
+
+TRIES = ((1.0, 1.0), (0.985, 1.05), (0.985, 1.0), (0.97, 1.05), (1.015, 1.0))
+"""Shares of the guessed distance and time from which orbits are tried to be closed, one after the other."""
+
+KEPT = 0.5
+"""Share of the guessed distance by which that of a closed orbit may differ: farther off it is another one, such as the
+rest at the reference, which every stage has."""
+
+REPEATED, STEADY = 40, 0.02
+"""Returns that are simulated where no orbit near a guess could be closed, and the share of the distance by which the
+last of them may differ if there is a cycle that attracts."""
+
+
+@dataclass(frozen=True)
+class Cycles:
+    """One cycle per stage, or none.
+
+    `found` (count,); `reasons` (count,), why there is none; `sign`, -1 for cycles that are their own mirror image after
+    half a period, over which everything is taken then, and 1 for others; `states` (count, states) on the cycle, in the
+    middle of the sticking; `period` [s], `amplitude` [m], half of peak to peak, `gap` (see `Orbits`), the `local`
+    multipliers (count, states - 1), the largest first, its `direction` (count, states), the macroscopic `slope` and the
+    `multiplier`, that of the two which decides, each of shape (count,); NaN where there is none.
+    """
+
+    sign: float
+    found: np.ndarray
+    reasons: np.ndarray
+    states: np.ndarray
+    period: np.ndarray
+    amplitude: np.ndarray
+    gap: np.ndarray
+    local: np.ndarray
+    direction: np.ndarray
+    slope: np.ndarray
+    multiplier: np.ndarray
+
+    @property
+    def attracting(self) -> np.ndarray:
+        """Which of them attract, shape (count,)."""
+        return self.found & (np.abs(self.multiplier) < 1)
+
+    @property
+    def orbits(self) -> Orbits:
+        """The cycles as closed orbits."""
+        return Orbits(self.states, self.period * (0.5 if self.sign < 0 else 1.0), self.sign, self.gap, self.found)
+
+    def take(self, numbers: np.ndarray) -> Cycles:
+        """The cycles with these numbers."""
+        arrays = {each.name: getattr(self, each.name) for each in fields(self) if each.name != "sign"}
+        return Cycles(self.sign, **{name: array[numbers] for name, array in arrays.items()})
+
+
+def symmetric_cycles(stages: Ensemble, rtol: float = RTOL, taken: ReturnMap | None = None) -> Cycles:
+    """The cycle of every stage that is its own mirror image, of stages whose equations are."""
+    taken = taken or return_map(stages, ROUGH)
+    return _closed(stages, symmetric_guess(stages, taken, ROUGH), -1.0, rtol)
+
+
+def whole_cycles(stages: Ensemble, rtol: float = RTOL, taken: tuple[ReturnMap, ReturnMap] | None = None) -> Cycles:
+    """A cycle of every stage that is not its own mirror image; `taken` are its return maps to both sides."""
+    there, back = taken or (return_map(stages, ROUGH), return_map(stages, ROUGH, -1.0))
+    return _closed(stages, whole_guess(stages, there, back), 1.0, rtol)
+
+
+def _closed(stages: Ensemble, guess: Guess, sign: float, rtol: float) -> Cycles:
+    """The cycles near guesses."""
+    count, size = stages.count, len(stages.kernel.states)
+    orbits = Orbits(np.full((count, size), np.nan), guess.times.copy(), sign, np.full(count, np.inf), np.zeros(count, bool))
+    for distance, time in TRIES:
+        missing = guess.there[~orbits.closed[guess.there]]
+        if not missing.size:
+            break
+        some, distances = stages.take(missing), guess.distances[missing] * distance
+        tried = close(some, stuck(some, distances), guess.times[missing] * time, sign, rtol)
+        _accept(stages, orbits, missing, tried, guess)
+    if stages.chatters:
+        _close_simulated(stages, guess, orbits, rtol)
+    reasons = np.where(np.isfinite(guess.times), NOT_CLOSED, NO_RETURN)
+    return described(stages, orbits, rtol, reasons)
+
+
+def _accept(stages: Ensemble, orbits: Orbits, which: np.ndarray, tried: Orbits, guess: Guess) -> None:
+    """Take over the orbits that are closed where they were expected."""
+    sticks = np.abs(tried.states[:, stages.index("position")] / guess.distances[which] - 1) < KEPT
+    good = tried.closed & sticks
+    for name in ("states", "times", "gaps", "closed"):
+        getattr(orbits, name)[which[good]] = getattr(tried, name)[good]
+
+
+def _close_simulated(stages: Ensemble, guess: Guess, orbits: Orbits, rtol: float) -> None:
+    """Close orbits from where a long simulation ends, as far as it repeats itself."""
+    missing = guess.there[~orbits.closed[guess.there]]
+    if not missing.size:
+        return
+    some, sign = stages.take(missing), orbits.sign
+    starts = stuck(some, guess.distances[missing])
+    seen = swings(some, starts, REPEATED * guess.times[missing], 4 * REPEATED, ROUGH)
+    count = np.isfinite(seen.values).sum(axis=1)
+    step = 1 if sign < 0 else 2
+    every = np.arange(some.count)
+    last, before = (np.maximum(count - 2 - k * step, 0) for k in (0, 1))
+    heights = [np.abs(seen.values[every, k]) for k in (last, before)]
+    times = seen.times[every, last] - seen.times[every, before]
+    steady = (count > REPEATED // 2) & (np.abs(heights[0] / heights[1] - 1) < STEADY)
+    if not steady.any():
+        return
+    fine = np.flatnonzero(steady)
+    waits = UNWINDING * wait(some, heights[0])
+    ends = some.take(fine).run(starts[fine], (seen.times[every, last] + waits)[fine], ROUGH).ends
+    ends *= np.sign(ends[:, stages.index("position")])[:, None]
+    _accept(stages, orbits, missing[fine], close(some.take(fine), ends, times[fine], sign, rtol), guess)
+
+
+NO_RETURN = "from no distance does the stage swing back as far as it came from"
+NOT_CLOSED = "the return map has a fixed point, but no orbit near it could be closed"
+
+
+def described(stages: Ensemble, orbits: Orbits, rtol: float, reasons: np.ndarray) -> Cycles:
+    """Cycles from closed orbits: their size and their multipliers."""
+    which = np.flatnonzero(orbits.closed)
+    some = stages.take(which)
+    shut = Orbits(orbits.states[which], orbits.times[which], orbits.sign, orbits.gaps[which], orbits.closed[which])
+    periods = shut.times * (2.0 if shut.sign < 0 else 1.0)
+    count, size = stages.count, len(stages.kernel.states)
+    cycles = Cycles(
+        orbits.sign,
+        orbits.closed.copy(),
+        np.where(orbits.closed, "", reasons).astype(object),
+        orbits.states,
+        *(np.full(count, np.nan) for _ in range(3)),
+        np.full((count, size - 1), np.nan, complex),
+        np.full((count, size), np.nan),
+        *(np.full(count, np.nan) for _ in range(2)),
+    )
+    if not which.size:
+        return cycles
+    found = multipliers(some, shut, rtol)
+    round_trip = some.run(shut.states, periods, rtol, window=0.0)
+    extremes = round_trip.statistics[:, [STATISTICS.index("deviation_max"), STATISTICS.index("deviation_min")]]
+    first = found.local[:, 0]
+    local = np.where(np.abs(first.imag) > 1e-6 * np.abs(first), np.abs(first), first.real)
+    decisive = np.where(np.isfinite(found.slope), found.slope, local) if some.chatters else local
+    values = {
+        "period": periods,
+        "amplitude": np.where(done(round_trip), (extremes[:, 0] - extremes[:, 1]) / 2, np.nan),
+        "gap": shut.gaps,
+        "local": found.local,
+        "direction": found.direction,
+        "slope": found.slope,
+        "multiplier": decisive,
+    }
+    for name, value in values.items():
+        getattr(cycles, name)[which] = value
+    return cycles

@@ -1,0 +1,96 @@
+"""Where hunting cycles may be: fixed points of the return map, and of the way there and back."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from friso.hunting.cycle.ensemble import Ensemble
+from friso.hunting.cycle.rest import stuck, wait
+from friso.hunting.cycle.return_map import ReturnMap, follow
+
+REFINED = 8
+"""Distances between the two of the map that enclose a fixed point, to enclose it closer."""
+
+UNWINDING = 0.4
+"""Time from landing until the actuator exerts no force, in units of the wait for the break-away."""
+
+APART = 0.01
+"""Share by which the two distances of an asymmetric cycle differ at least."""
+
+
+@dataclass(frozen=True)
+class Guess:
+    """A distance [m] at which each stage sticks, again and again, and the time [s] of its return, both of shape
+    (count,); NaN where there is none."""
+
+    distances: np.ndarray
+    times: np.ndarray
+
+    @property
+    def there(self) -> np.ndarray:
+        """The numbers of the stages that have one."""
+        return np.flatnonzero(np.isfinite(self.times))
+
+
+def symmetric_guess(stages: Ensemble, taken: ReturnMap, rtol: float) -> Guess:
+    """The largest distance from which a stage lands as far on the other side, the map falling through the diagonal."""
+    low, high = _falling(taken.distances, taken.returns - taken.distances)
+    there = np.flatnonzero(np.isfinite(low))
+    distances, times = np.full(stages.count, np.nan), np.full(stages.count, np.nan)
+    if there.size:
+        some = stages.take(there)
+        between = np.linspace(low[there], high[there], REFINED, axis=1)
+        finer = follow(some, between, rtol, 1.0)
+        distances[there] = root = _crossing(finer.distances, finer.returns - finer.distances)
+        times[there] = _interpolated(root, finer.distances, finer.times) + UNWINDING * wait(some, root)
+    return Guess(distances, times)
+
+
+def whole_guess(stages: Ensemble, there: ReturnMap, back: ReturnMap) -> Guess:
+    """The smallest distance from which a stage comes back to where it was, by way of a distance that differs from it.
+
+    `there` and `back` are the maps of the stages that stick on the positive and on the negative side.
+    """
+    found = Guess(np.full(stages.count, np.nan), np.full(stages.count, np.nan))
+    for k in range(stages.count):
+        start, far = there.distances[k], np.interp(there.distances[k], there.distances[k], there.returns[k])
+        end = np.interp(far, back.distances[k], back.returns[k], left=0.0)
+        differs = np.abs(far - start) > APART * start
+        crosses = ((end - start)[:-1] * (end - start)[1:] <= 0) & (differs & (far > 0) & (end > 0))[:-1]
+        crosses &= (differs & (far > 0) & (end > 0))[1:]
+        if crosses.any():
+            i = int(crosses.argmax())
+            at = np.interp(0.0, *_ascending((end - start)[i : i + 2], start[i : i + 2]))
+            middle = np.interp(at, start, far)
+            flights = np.interp(at, start, there.times[k]) + np.interp(middle, back.distances[k], back.times[k])
+            waits = wait(stages.take(np.array([k, k])), np.array([at, middle]))
+            found.distances[k], found.times[k] = at, flights + UNWINDING * waits.sum()
+    return found
+
+
+def _ascending(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    order = np.argsort(x)
+    return x[order], y[order]
+
+
+def _falling(distances: np.ndarray, rise: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The neighbouring distances between which a function falls through zero, the last such; NaN where none are."""
+    falls = (rise[:, :-1] > 0) & (rise[:, 1:] <= 0)
+    last = falls.shape[1] - 1 - falls[:, ::-1].argmax(axis=1)
+    every = np.arange(len(rise))
+    none = ~falls.any(axis=1)
+    return np.where(none, np.nan, distances[every, last]), np.where(none, np.nan, distances[every, last + 1])
+
+
+def _crossing(distances: np.ndarray, rise: np.ndarray) -> np.ndarray:
+    """Where a function falls through zero, between two of the distances."""
+    low, high = _falling(distances, rise)
+    above, below = _interpolated(low, distances, rise), _interpolated(high, distances, rise)
+    return low + (high - low) * above / (above - below)
+
+
+def _interpolated(at: np.ndarray, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Straight between the points x, y (count, points), at one place each (count,)."""
+    return np.array([np.interp(*row) for row in zip(at, x, y, strict=True)])

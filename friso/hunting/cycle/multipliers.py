@@ -1,0 +1,77 @@
+"""By how much a deviation from a cycle grows from one return to the next: Floquet multipliers, and the slope of the
+return map over a small but finite range."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from friso.hunting.cycle.ensemble import Ensemble
+from friso.hunting.cycle.shooting import Orbits, shoot
+from friso.hunting.cycle.swings import swings
+
+RANGE, POINTS, ENOUGH = 0.01, 41, 30
+"""Range of the macroscopic slope, as a share of the distance at which the stage sticks, runs across it, and how many
+of them have to come back."""
+
+
+@dataclass(frozen=True)
+class Multipliers:
+    """Of each orbit: its Floquet multipliers but the one that every cycle has along itself, the largest first
+    (count, states - 1), the direction that belongs to the first, with a position of 1 (count, states), and the
+    macroscopic slope of the return map along it (count,)."""
+
+    local: np.ndarray
+    direction: np.ndarray
+    slope: np.ndarray
+
+
+def multipliers(stages: Ensemble, orbits: Orbits, rtol: float) -> Multipliers:
+    """The multipliers of closed orbits; per half a period where that is what they were closed over."""
+    shot = shoot(stages, orbits.states, orbits.times, orbits.sign, rtol)
+    local, direction = _floquet(stages, shot.flows, stages.rates(shot.ends))
+    return Multipliers(local, direction, _slope(stages, orbits, direction, rtol))
+
+
+def _floquet(stages: Ensemble, flows: np.ndarray, rates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Multipliers and leading directions of the flow seen on the section at which the integrator's state is what it was
+    at the start."""
+    phase, position = stages.index("integral"), stages.index("position")
+    sections = flows - rates[:, :, None] * flows[:, None, phase, :] / rates[:, phase, None, None]
+    sections[:, :, phase] = 0.0
+    sections[~np.isfinite(sections).all(axis=(1, 2))] = 0.0
+    values, vectors = np.linalg.eig(sections)
+    order = np.argsort(-np.abs(values), axis=1)
+    values = np.take_along_axis(values, order, axis=1)[:, :-1]  # the last is that of the phase, which is zero
+    first = np.take_along_axis(vectors, order[:, None, :1], axis=2)[:, :, 0]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return values, np.real(first / first[:, position, None])
+
+
+def _slope(stages: Ensemble, orbits: Orbits, direction: np.ndarray, rtol: float) -> np.ndarray:
+    """Slope of the straight line through the returns from a small range about the orbits."""
+    away = np.linspace(-RANGE / 2, RANGE / 2, POINTS)[None, :]
+    heights = returns_of(stages, orbits, direction, away, 2, rtol)
+    slopes = np.full(stages.count, np.nan)
+    for k, pairs in enumerate(heights):
+        seen = pairs[np.isfinite(pairs).all(axis=1)]
+        if len(seen) > ENOUGH:
+            slopes[k] = np.polyfit(*(seen - seen.mean(axis=0)).T, 1)[0]
+    return slopes
+
+
+def returns_of(
+    stages: Ensemble, orbits: Orbits, direction: np.ndarray, away: np.ndarray, returns: int, rtol: float
+) -> np.ndarray:
+    """How far stages swing [m], shape (count, points, returns), on each of some returns, when they begin beside their
+    orbits: away along a direction (count, states) by shares (count or 1, points) of the distance at which they stick."""
+    position, count, points = stages.index("position"), stages.count, away.shape[1]
+    distance = orbits.states[:, position]
+    starts = orbits.states[:, None, :] + (away * np.abs(distance)[:, None])[:, :, None] * direction[:, None, :]
+    starts = starts.reshape(count * points, -1)
+    several = stages.take(np.repeat(np.arange(count), points))
+    each = 1 if orbits.sign < 0 else 2
+    durations = (returns + 0.5) * np.repeat(orbits.times, points)
+    found = swings(several, starts, durations, each * returns, rtol)
+    return np.abs(found.values[:, each - 1 :: each]).reshape(count, points, returns)

@@ -1,0 +1,64 @@
+"""The return map of hunting: how far a stage sticks from its reference, to how far it sticks next, on the other side."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from friso.hunting.cycle.ensemble import Ensemble
+from friso.hunting.cycle.rest import stuck, wait
+from friso.hunting.cycle.swings import swings
+
+POINTS = 32
+"""Distances from which the map is taken, at first."""
+
+RANGE = (0.02, 2.0)
+"""Smallest and largest of them, in units of the distance that the break-away force deflects the loop by."""
+
+PATIENCE = 2.0
+"""How long a stage may take to break away, in units of the time in which the integrator winds up to the break-away
+force; one that takes longer creeps home, as it does from distances like the deflection of its bristles."""
+
+FLIGHT = 60.0
+"""How long the way across may take, in units of 1/(natural frequency of mass and loop)."""
+
+
+@dataclass(frozen=True)
+class ReturnMap:
+    """For each stage and side, shape (count, points): distances at which it sticks [m], ascending, how far it
+    swings to the other side [m] (negative where it stops before, 0 where it does not break away), and when [s]."""
+
+    distances: np.ndarray
+    returns: np.ndarray
+    times: np.ndarray
+
+
+def return_map(stages: Ensemble, rtol: float, side: float = 1.0) -> ReturnMap:
+    """The map of stages that stick on one side, 1 or -1, of their reference; finer where it might return as far."""
+    coarse = np.geomspace(*RANGE, POINTS)[None, :] * stages.length[:, None]
+    first = follow(stages, coarse, rtol, side)
+    gain = np.argmax(first.returns / first.distances, axis=1)
+    every = np.arange(stages.count)
+    low, high = (first.distances[every, np.clip(gain + step, 0, POINTS - 1)] for step in (-1, 1))
+    finer = np.geomspace(low, high, POINTS // 2 + 2, axis=1)[:, 1:-1]
+    second = follow(stages, finer, rtol, side)
+    parts = (np.hstack(pair) for pair in zip(_columns(first), _columns(second), strict=True))
+    distances, returns, times = parts
+    order = np.argsort(distances, axis=1)
+    return ReturnMap(*(np.take_along_axis(part, order, axis=1) for part in (distances, returns, times)))
+
+
+def _columns(found: ReturnMap) -> tuple[np.ndarray, ...]:
+    return found.distances, found.returns, found.times
+
+
+def follow(stages: Ensemble, distances: np.ndarray, rtol: float, side: float) -> ReturnMap:
+    """Let every stage go from each of the distances [m], shape (count, points), ascending."""
+    shape = distances.shape
+    several = stages.take(np.repeat(np.arange(stages.count), shape[1]))
+    starts = stuck(several, side * distances.ravel())
+    durations = PATIENCE * wait(several, distances.ravel()) + FLIGHT / several.number("rate")
+    first = swings(several, starts, durations, 1, rtol)
+    returns, times = (np.nan_to_num(part).reshape(shape) for part in (-side * first.values, first.times))
+    return ReturnMap(distances, returns, times)

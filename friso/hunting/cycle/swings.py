@@ -1,0 +1,56 @@
+"""Swings of many runs at once: the extrema of the zigzag that each stage draws about its reference."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from friso.hunting.cycle.ensemble import Ensemble, done
+
+LEG = 0.5
+"""Legs of a swing are at least this share of the distance at which it started; smaller ones are ringing."""
+
+
+@dataclass(frozen=True)
+class Swings:
+    """The first swings of runs, shape (runs, swings): where they turn [m] and when [s]; NaN beyond the last."""
+
+    values: np.ndarray
+    times: np.ndarray
+
+
+def swings(stages: Ensemble, starts: np.ndarray, durations: np.ndarray, most: int, rtol: float) -> Swings:
+    """The first `most` swings of stages that start at rest from states (count, states) and are followed for durations
+    [s] (count,); a failed run has none.
+
+    An extremum counts once the way back from it is a leg long, or the run is over.
+    """
+    position = starts[:, stages.index("position")]
+    legs = LEG * np.abs(position)
+    results = stages.run(starts, durations, rtol, least_swing=0.1 * float(legs.min()))
+    runs, room = results.turn_values.shape
+    held = (np.arange(room) < results.turn_counts[:, None]) & done(results)[:, None]
+    values = np.hstack([position[:, None], np.where(held, results.turn_values, np.nan)])
+    times = np.hstack([np.zeros((runs, 1)), results.turn_times])
+    return _zigzag(values, times, legs, np.sign(position), most)
+
+
+def _zigzag(values: np.ndarray, times: np.ndarray, least: np.ndarray, side: np.ndarray, most: int) -> Swings:
+    """Follow the zigzags column by column; `side` is that on which they start."""
+    runs = len(values)
+    every = np.arange(runs)
+    found = Swings(np.full((runs, most + 1), np.nan), np.full((runs, most + 1), np.nan))
+    count, way = np.zeros(runs, np.int64), side.copy()  # way: the side on which the next extremum lies
+    best, when = values[:, 0].copy(), times[:, 0].copy()
+    for value, time in zip(values.T[1:], times.T[1:], strict=True):
+        turned = (way * (best - value) >= least) & (count <= most)
+        found.values[every[turned], count[turned]] = best[turned]
+        found.times[every[turned], count[turned]] = when[turned]
+        count[turned] += 1
+        way = np.where(turned, -way, way)
+        farther = turned | (way * (value - best) > 0)
+        best, when = np.where(farther, value, best), np.where(farther, time, when)
+    last = (count > 0) & (count <= most)
+    found.values[every[last], count[last]], found.times[every[last], count[last]] = best[last], when[last]
+    return Swings(found.values[:, 1:], found.times[:, 1:])
