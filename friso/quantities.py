@@ -76,6 +76,7 @@ positive = Bound("greater than 0", lambda value: value > 0)
 non_negative = Bound("0 or greater", lambda value: value >= 0)
 any_sign = Bound("of any sign", lambda value: value == value)
 inside_0_1 = Bound("between 0 and 1 (both excluded)", lambda value: (value > 0) & (value < 1))
+inside_minus_1_1 = Bound("between -1 and 1 (both excluded)", lambda value: (value > -1) & (value < 1))
 at_least_1 = Bound("1 or greater", lambda value: value >= 1)
 
 

@@ -59,17 +59,27 @@ def sampled_outputs(shape: Kernel, flat: dict[str, Any], states: np.ndarray, tim
     return [np.broadcast_to(np.asarray(each, dtype=float), time.shape) for each in outputs]
 
 
+def output_variables(shape: Kernel, flat: dict[str, Any], states: np.ndarray, time: np.ndarray) -> dict[str, Any]:
+    """The model's outputs from its states, shape (states, samples), at the times [s], as variables over "time"."""
+    arrays = sampled_outputs(shape, flat, states, time)
+    return {
+        name: ("time", array, {"units": unit, "long_name": label})
+        for (name, (unit, label)), array in zip(shape.outputs.items(), arrays, strict=True)
+    }
+
+
+def time_axis(time: np.ndarray) -> dict[str, Any]:
+    """The coordinate "time" [s]."""
+    return {"time": ("time", time, {"units": "s", "long_name": "time"})}
+
+
 def _dataset(
     stage: Stage, shape: Kernel, flat: dict[str, Any], runs: Runs, time: np.ndarray, rtol: float
 ) -> xr.Dataset:
     import xarray as xr
 
     results = runs.results
-    arrays = sampled_outputs(shape, flat, results.samples[0].T, time)
-    variables: dict[str, Any] = {
-        name: ("time", array, {"units": unit, "long_name": label})
-        for (name, (unit, label)), array in zip(shape.outputs.items(), arrays, strict=True)
-    }
+    variables = output_variables(shape, flat, results.samples[0].T, time)
     turns = slice(0, int(results.turn_counts[0]))
     label = "turning points of position - reference"
     variables["turning_time"] = (
@@ -84,7 +94,7 @@ def _dataset(
     )
     return xr.Dataset(
         variables,
-        coords={"time": ("time", time, {"units": "s", "long_name": "time"})},
+        coords=time_axis(time),
         attrs={
             "name": stage.name,
             "stage": stage.to_toml(),

@@ -129,8 +129,9 @@ def _mechanics(
 ) -> tuple[list[State], list[Component]]:
     """Newton's law for every body, and the components that bring the forces."""
     cart, stage, parasitic = bodies
-    drag = friction.force if friction else sp.S.Zero
-    on_stage = control.force if control else sp.S.Zero
+    bias = {name: key(f"bias.{name}") for name in structure.biased}
+    drag = (friction.force if friction else sp.S.Zero) - bias.get("cart", sp.S.Zero)
+    on_stage = (control.force if control else sp.S.Zero) + bias.get("stage", sp.S.Zero)
     parts = [position_outputs("", "stage", stage), position_outputs("cart_", "cart", cart)]
     states: list[State] = []
     if parasitic:

@@ -26,7 +26,7 @@ class ControllerForm:
 class Structure:
     """The choices that decide which states, terms and kinks there are.
 
-    `masses` names those given, for a rigid stage; `friction_variant` is whatever else the friction law's
+    `masses` names those given, for a rigid stage, `biased` those on which a constant force acts; `friction_variant` is whatever else the friction law's
     equations depend on (the Stribeck exponent where it is a whole number).
     """
 
@@ -36,6 +36,7 @@ class Structure:
     friction: str
     friction_variant: Hashable
     controller: ControllerForm | None
+    biased: tuple[str, ...] = ()
 
 
 def structure(flat: Mapping[str, Any]) -> Structure:
@@ -48,6 +49,7 @@ def structure(flat: Mapping[str, Any]) -> Structure:
         friction=law,
         friction_variant=friction_law(law).variant(flat),
         controller=_controller_form(flat) if "controller.kind" in flat else None,
+        biased=tuple(name for name in ("cart", "stage") if f"bias.{name}" in flat),
     )
 
 

@@ -11,6 +11,7 @@ from friso.stage.section import Rule, Section, Table, numeric_fields, unknown_ke
 from friso.stage.tables import (
     FRICTION,
     MOTION,
+    Bias,
     Controller,
     FrictionSection,
     GainsController,
@@ -25,6 +26,7 @@ from friso.stage.tables import (
 _FRICTION = Table(FRICTION.pick, '[friction] model = "lugre" ...')
 _JOINT = Table(lambda _: Joint, '[joint] stiffness = "2.4 N/mm" ...')
 _PARASITIC = Table(lambda _: Parasitic, '[parasitic] frequency = "300 Hz" ...')
+_BIAS = Table(lambda _: Bias, '[bias] cart = "0.2 N"')
 _CONTROLLER = Table(controller_form, '[controller] kind = "pid", crossover = "8 Hz", alpha = 0.1, beta = 2')
 _MOTION = Table(MOTION.pick, '[motion] kind = "step", size = "1 mm", duration = "20 s"')
 
@@ -38,6 +40,7 @@ class Stage(Section):
     friction: Annotated[FrictionSection | None, _FRICTION] = None
     joint: Annotated[Joint | None, _JOINT] = None
     parasitic: Annotated[Parasitic | None, _PARASITIC] = None
+    bias: Annotated[Bias | None, _BIAS] = None
     controller: Annotated[Controller, _CONTROLLER]
     motion: Annotated[Motion, _MOTION]
 
@@ -63,6 +66,10 @@ class Stage(Section):
             raise StageError("masses", given, "both masses", 'cart = "1.2 kg", stage = "0.5 kg"')
         if self.parasitic and not self.joint:
             raise StageError("parasitic", "a parasitic mode, but no [joint]", "both or neither", _JOINT.example)
+        for body in ("cart", "stage"):
+            if self.bias and getattr(self.bias, body) is not None and getattr(self.masses, body) is None:
+                example = f'[masses] {body} = "1 kg"'
+                raise StageError(f"bias.{body}", f"a force on the {body}, which has no mass", "its mass", example)
         for rule, broken in _broken_rules(self.flat()):
             if broken:
                 raise StageError(", ".join(rule.keys), self._written(rule), rule.expected, rule.example)
@@ -144,6 +151,7 @@ def _tables(flat: Mapping[str, Any]) -> dict[str, type[Section]]:
         "friction": FRICTION.classes[flat["friction.model"]],
         "joint": Joint,
         "parasitic": Parasitic,
+        "bias": Bias,
         "controller": TunedController if "controller.crossover" in flat else GainsController,
         "motion": MOTION.classes[flat["motion.kind"]],
     }

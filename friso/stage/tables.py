@@ -86,6 +86,13 @@ class Parasitic(Section):
     damping_ratio: Annotated[float, Number(non_negative, "0.01")]
 
 
+class Bias(Section):
+    """Constant forces, as of a cable or of gravity on a tilted rail."""
+
+    cart: Annotated[Value | None, Quantity("N", any_sign, "0.2 N")] = None
+    stage: Annotated[Value | None, Quantity("N", any_sign, "0.2 N")] = None
+
+
 class Controller(Section):
     """What both forms of the controller share."""
 

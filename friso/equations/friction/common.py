@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple
 
-from friso.quantities import Number, Quantity, Value, non_negative, positive
+from friso.quantities import Number, Quantity, Value, inside_minus_1_1, non_negative, positive
 from friso.stage import FrictionSection, Rule
 
 if TYPE_CHECKING:
@@ -31,35 +31,46 @@ class Friction:
         self.force, self.breakaway, self.component = force, breakaway, component
 
 
+class Curve(NamedTuple):
+    """What the equations of a Stribeck curve depend on: the exponent where it is a small whole number (then it is
+    written out as products), else None; and whether friction differs between the two directions."""
+
+    exponent: int | None
+    asymmetric: bool
+
+
 class StribeckSection(FrictionSection):
-    """The keys of the laws with a Stribeck curve."""
+    """The keys of the laws with a Stribeck curve; static and Coulomb friction are larger by the share `asymmetry` when
+    moving forward, and smaller by it when moving back."""
 
     static: Annotated[Value, Quantity("N", positive, "3 N")]
     coulomb: Annotated[Value, Quantity("N", positive, "1 N")]
     stribeck_velocity: Annotated[Value, Quantity("m/s", positive, "1.6 mm/s")]
     stribeck_exponent: Annotated[float, Number(positive, "2")]
     viscous: Annotated[Value, Quantity("N*s/m", non_negative, "0.5 N*s/m")]
+    asymmetry: Annotated[float | None, Number(inside_minus_1_1, "0.1")] = None
     rules: ClassVar[tuple[Rule, ...]] = (COULOMB_BELOW_STATIC,)
-    decisive: ClassVar[tuple[str, ...]] = ("friction.stribeck_exponent",)
+    decisive: ClassVar[tuple[str, ...]] = ("friction.stribeck_exponent", "friction.asymmetry")
 
     @staticmethod
-    def variant(flat: Mapping[str, Any]) -> int | None:
-        """The exponent where it is a small whole number (then it is written out as products), else None."""
+    def variant(flat: Mapping[str, Any]) -> Curve:
         exponent = float(flat["friction.stribeck_exponent"])
-        return int(exponent) if exponent in (1.0, 2.0, 3.0, 4.0) else None
+        return Curve(int(exponent) if exponent in (1.0, 2.0, 3.0, 4.0) else None, flat.get("friction.asymmetry", 0.0) != 0)
 
 
-def stribeck_level(velocity: sp.Expr, sign: sp.Expr, exponent: int | None) -> sp.Expr:
+def stribeck_level(velocity: sp.Expr, sign: sp.Expr, curve: Curve) -> sp.Expr:
     """g(v) of Eq. 4 [N]: F_c + (F_s - F_c) exp(-abs(v/v_s)^j), smooth in v while the sign is held."""
     from sympy import exp
 
     from friso.equations.component import key
 
     static, coulomb = key("friction.static"), key("friction.coulomb")
+    exponent = curve.exponent
     ratio = velocity / key("friction.stribeck_velocity")
     if exponent is None:
         tiny = 1e-60  # keeps the power differentiable at rest
         power = (ratio**2 + tiny) ** (key("friction.stribeck_exponent") / 2)
     else:
         power = ratio**exponent if exponent % 2 == 0 else (sign * ratio) ** exponent
-    return coulomb + (static - coulomb) * exp(-power)
+    level = coulomb + (static - coulomb) * exp(-power)
+    return level * (1 + key("friction.asymmetry") * sign) if curve.asymmetric else level

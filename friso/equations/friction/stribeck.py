@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from friso.equations.friction.common import Friction, StribeckSection, stribeck_level
+from friso.equations.friction.common import Curve, Friction, StribeckSection, stribeck_level
 from friso.quantities import Quantity, Value, positive
 from friso.stage import register_friction
 
@@ -21,7 +21,7 @@ class Stribeck(StribeckSection):
     regularisation_velocity: Annotated[Value, Quantity("m/s", positive, "10 um/s")]
 
     @staticmethod
-    def declare(velocity: sp.Symbol, variant: int | None) -> Friction:
+    def declare(velocity: sp.Symbol, variant: Curve) -> Friction:
         """Friction on a body moving at `velocity` [m/s]."""
         from sympy import tanh
 
@@ -30,6 +30,7 @@ class Stribeck(StribeckSection):
         forward = Kink("forward", velocity)
         level = stribeck_level(velocity, forward.sign, variant)
         force = level * tanh(velocity / key("friction.regularisation_velocity"))
-        even = variant is None or variant % 2 == 0  # then the curve is smooth at rest
-        component = Component(kinks=() if even else (forward,))
+        even = variant.exponent is None or variant.exponent % 2 == 0
+        smooth = even and not variant.asymmetric  # at rest
+        component = Component(kinks=() if smooth else (forward,))
         return Friction(force + key("friction.viscous") * velocity, key("friction.static"), component)

@@ -55,6 +55,13 @@ class Ensemble:
         return "stroke_ahead" in self.kernel.kinks
 
     @cached_property
+    def symmetric(self) -> np.ndarray:
+        """Whether the mirror image of every motion is one, shape (count,): tried on states drawn at random."""
+        states = np.random.default_rng(0).normal(size=(8, 1, self.scales.shape[1])) * self.scales
+        pairs = ((self.rates(some), self.rates(-some)) for some in states)
+        return np.all([np.all(np.abs(a + b) <= 1e-9 * np.abs(a), axis=1) for a, b in pairs], axis=0)
+
+    @cached_property
     def values(self) -> list[np.ndarray]:
         """The parameters of each stage, as the generated functions take them."""
         return self.kernel.values({**self.flat, "motion.size": np.nan, "motion.duration": np.inf}, self.count)

@@ -24,6 +24,9 @@ ROUGH = 1e-6
 TRIES = ((1.0, 1.0), (0.985, 1.05), (0.985, 1.0), (0.97, 1.05), (1.015, 1.0))
 """Shares of the guessed distance and time from which orbits are tried to be closed, one after the other."""
 
+APART = 0.05
+"""Share of the amplitude by which the two turns of an asymmetric cycle of a symmetric stage differ at least."""
+
 KEPT = 0.5
 """Share of the guessed distance by which that of a closed orbit may differ: farther off it is another one, such as the
 rest at the reference, which every stage has."""
@@ -39,7 +42,7 @@ class Cycles:
 
     `found` (count,); `reasons` (count,), why there is none; `sign`, -1 for cycles that are their own mirror image after
     half a period, over which everything is taken then, and 1 for others; `states` (count, states) on the cycle, in the
-    middle of the sticking; `period` [s], `amplitude` [m], half of peak to peak, `gap` (see `Orbits`), the `local`
+    middle of the sticking; `period` [s], `amplitude` [m], half of peak to peak, `middle` [m] between them, `gap` (see `Orbits`), the `local`
     multipliers (count, states - 1), the largest first, its `direction` (count, states), the macroscopic `slope` and the
     `multiplier`, that of the two which decides, each of shape (count,); NaN where there is none.
     """
@@ -50,6 +53,7 @@ class Cycles:
     states: np.ndarray
     period: np.ndarray
     amplitude: np.ndarray
+    middle: np.ndarray
     gap: np.ndarray
     local: np.ndarray
     direction: np.ndarray
@@ -78,8 +82,23 @@ def symmetric_cycles(stages: Ensemble, rtol: float = RTOL, taken: ReturnMap | No
     return _closed(stages, symmetric_guess(stages, taken, ROUGH), -1.0, rtol)
 
 
+def hunting_cycles(stages: Ensemble, rtol: float = RTOL) -> Cycles:
+    """The hunting cycle of every stage: the symmetric one, unless some of the stages are not symmetric."""
+    return symmetric_cycles(stages, rtol) if stages.symmetric.all() else whole_cycles(stages, rtol)
+
+
+def asymmetric_cycles(stages: Ensemble, taken: ReturnMap, rtol: float = RTOL) -> Cycles:
+    """One of the pair of cycles, mirror images of each other, that a symmetric stage may have beside its symmetric
+    cycle; from its return map."""
+    cycles = _closed(stages, whole_guess(stages, taken, taken, APART), 1.0, rtol)
+    same = np.abs(cycles.middle) < APART / 2 * cycles.amplitude
+    cycles.found[same], cycles.reasons[same] = False, NO_PAIR
+    return cycles
+
+
 def whole_cycles(stages: Ensemble, rtol: float = RTOL, taken: tuple[ReturnMap, ReturnMap] | None = None) -> Cycles:
-    """A cycle of every stage that is not its own mirror image; `taken` are its return maps to both sides."""
+    """The cycle of every stage, followed over a whole period, of stages that need not be symmetric; `taken` are the
+    return maps of stages that stick on the positive and on the negative side."""
     there, back = taken or (return_map(stages, ROUGH), return_map(stages, ROUGH, -1.0))
     return _closed(stages, whole_guess(stages, there, back), 1.0, rtol)
 
@@ -134,6 +153,7 @@ def _close_simulated(stages: Ensemble, guess: Guess, orbits: Orbits, rtol: float
 
 
 NO_RETURN = "from no distance does the stage swing back as far as it came from"
+NO_PAIR = "there is no asymmetric cycle beside the symmetric one"
 NOT_CLOSED = "the return map has a fixed point, but no orbit near it could be closed"
 
 
@@ -149,7 +169,7 @@ def described(stages: Ensemble, orbits: Orbits, rtol: float, reasons: np.ndarray
         orbits.closed.copy(),
         np.where(orbits.closed, "", reasons).astype(object),
         orbits.states,
-        *(np.full(count, np.nan) for _ in range(3)),
+        *(np.full(count, np.nan) for _ in range(4)),
         np.full((count, size - 1), np.nan, complex),
         np.full((count, size), np.nan),
         *(np.full(count, np.nan) for _ in range(2)),
@@ -165,6 +185,7 @@ def described(stages: Ensemble, orbits: Orbits, rtol: float, reasons: np.ndarray
     values = {
         "period": periods,
         "amplitude": np.where(done(round_trip), (extremes[:, 0] - extremes[:, 1]) / 2, np.nan),
+        "middle": np.where(done(round_trip), (extremes[:, 0] + extremes[:, 1]) / 2, np.nan),
         "gap": shut.gaps,
         "local": found.local,
         "direction": found.direction,

@@ -16,9 +16,6 @@ REFINED = 8
 UNWINDING = 0.4
 """Time from landing until the actuator exerts no force, in units of the wait for the break-away."""
 
-APART = 0.01
-"""Share by which the two distances of an asymmetric cycle differ at least."""
-
 
 @dataclass(frozen=True)
 class Guess:
@@ -48,20 +45,21 @@ def symmetric_guess(stages: Ensemble, taken: ReturnMap, rtol: float) -> Guess:
     return Guess(distances, times)
 
 
-def whole_guess(stages: Ensemble, there: ReturnMap, back: ReturnMap) -> Guess:
-    """The smallest distance from which a stage comes back to where it was, by way of a distance that differs from it.
+def whole_guess(stages: Ensemble, there: ReturnMap, back: ReturnMap, apart: float = 0.0) -> Guess:
+    """The distance from which a stage comes back to where it was, by way of one that differs by a share of at least
+    `apart`. Of several it is that for which the two differ least if apart is 0, else that for which they differ most.
 
     `there` and `back` are the maps of the stages that stick on the positive and on the negative side.
     """
     found = Guess(np.full(stages.count, np.nan), np.full(stages.count, np.nan))
     for k in range(stages.count):
-        start, far = there.distances[k], np.interp(there.distances[k], there.distances[k], there.returns[k])
+        start, far = there.distances[k], there.returns[k]
         end = np.interp(far, back.distances[k], back.returns[k], left=0.0)
-        differs = np.abs(far - start) > APART * start
-        crosses = ((end - start)[:-1] * (end - start)[1:] <= 0) & (differs & (far > 0) & (end > 0))[:-1]
-        crosses &= (differs & (far > 0) & (end > 0))[1:]
-        if crosses.any():
-            i = int(crosses.argmax())
+        goes = (np.abs(far - start) > apart * start) & (far > 0) & (end > 0)
+        crosses = np.flatnonzero(((end - start)[:-1] * (end - start)[1:] <= 0) & goes[:-1] & goes[1:])
+        if crosses.size:
+            differ = np.abs(np.log(far[crosses] / start[crosses]))
+            i = crosses[differ.argmax() if apart else differ.argmin()]
             at = np.interp(0.0, *_ascending((end - start)[i : i + 2], start[i : i + 2]))
             middle = np.interp(at, start, far)
             flights = np.interp(at, start, there.times[k]) + np.interp(middle, back.distances[k], back.times[k])

@@ -23,17 +23,23 @@ def stuck(stages: Ensemble, displacement: np.ndarray) -> np.ndarray:
     return states
 
 
-def displaced(stages: Ensemble, displacement: np.ndarray, velocity: np.ndarray | float = 0.0) -> np.ndarray:
-    """States of stages displaced [m] and pushed [m/s], all masses alike, with everything else at zero but for filters,
-    which have followed the displacement."""
+def displaced(stages: Ensemble, displacement: np.ndarray) -> np.ndarray:
+    """States of stages at rest that are displaced [m], what is measured of them having followed, all else zero."""
     states = np.zeros((stages.count, len(stages.kernel.states)))
     for i, name in enumerate(stages.kernel.states):
         if name in ("position", "cart_position", "parasitic_position", "filtered_position"):
             states[:, i] = displacement
         elif name == "filtered_error":
             states[:, i] = -displacement
-        elif name in ("velocity", "cart_velocity", "parasitic_velocity"):
-            states[:, i] = velocity
+    return states
+
+
+def pushed(stages: Ensemble, velocity: np.ndarray) -> np.ndarray:
+    """States of stages at their reference, all masses moving at a velocity [m/s], all else zero."""
+    states = np.zeros((stages.count, len(stages.kernel.states)))
+    for name in ("velocity", "cart_velocity", "parasitic_velocity"):
+        if name in stages.kernel.states:
+            states[:, stages.index(name)] = velocity
     return states
 
 

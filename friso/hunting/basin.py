@@ -1,0 +1,145 @@
+"""Which kicks and which moves end in hunting."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.stats import binomtest, qmc
+
+from friso.engine.arrays import Status
+from friso.engine.batch import Options, run_chunks
+from friso.engine.kernel import kernel
+from friso.equations.motion import last_corner
+from friso.equations.structure import structure
+from friso.hunting.cycle.ensemble import Ensemble
+from friso.hunting.cycle.hunting import Cycle
+from friso.hunting.cycle.rest import pushed
+from friso.stage import Stage
+
+PERIODS, LAST = 60.0, 1.5
+"""Periods of the cycle after which a run is judged, and those at its end by which it is."""
+
+RTOL = 1e-6
+"""Relative tolerance of these runs."""
+
+RANGE, POINTS = (1 / 30, 300.0), 128
+"""Smallest and largest kick in units of the cycle's own, and kicks tried in between."""
+
+EDGE = 0.01
+"""Share to which the edges of the windows are found."""
+
+MOVES = 128
+"""Moves drawn."""
+
+SHARES = (0.1, 2.0)
+"""Range of the moves drawn, in units of the acceleration and of the acceleration time of the stage file."""
+
+
+@dataclass(frozen=True)
+class Kick:
+    """Kicks of a stage at rest at its reference that start hunting: a displacement [m] (everything displaced, then let
+    go, as in the motion "release") or a push, a velocity [m/s] of all masses. `windows` are ranges of kicks that do,
+    their ends found to 1 %; the last may end with the range that was `searched`."""
+
+    windows: tuple[tuple[float, float], ...]
+    searched: tuple[float, float]
+
+    @property
+    def smallest(self) -> float | None:
+        """The smallest kick that starts hunting; None if none does."""
+        return self.windows[0][0] if self.windows else None
+
+
+@dataclass(frozen=True)
+class Moves:
+    """Share of moves that end in hunting, of a Sobol sample over acceleration [m/s^2] and acceleration time [s]: how
+    many were drawn, how many hunt, and the ranges they were drawn from."""
+
+    drawn: int
+    hunting: int
+    accelerations: tuple[float, float]
+    times: tuple[float, float]
+
+    @property
+    def fraction(self) -> float:
+        return self.hunting / self.drawn
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """The range that holds the true share with a probability of 95 % (Wilson)."""
+        found = binomtest(self.hunting, self.drawn).proportion_ci(0.95, method="wilson")
+        return float(found.low), float(found.high)
+
+
+def ends_hunting(
+    flat: Mapping[str, Any], count: int, cycle: Cycle, starts: np.ndarray | None = None, rtol: float = RTOL
+) -> np.ndarray:
+    """Which stages, given as flat keys to SI numbers or arrays (count,), still swing like the cycle long after their
+    motion, shape (count,). A run that fails does not."""
+    end = float(np.max(last_corner(flat))) + PERIODS * cycle.period
+    long = {**flat, "motion.duration": end}
+    options = Options(rtol=rtol, window=1 - LAST * cycle.period / end, record_from=end)
+    hunts = np.zeros(count, bool)
+    for runs in run_chunks(kernel(structure(_first(flat))), long, count, options, starts):
+        swing = runs.statistic("deviation_max") - runs.statistic("deviation_min")
+        hunts[runs.numbers] = (swing > cycle.amplitude) & (runs.results.statuses == Status.DONE)
+    return hunts
+
+
+def _first(flat: Mapping[str, Any]) -> dict[str, Any]:
+    return {key: value[0] if np.ndim(value) else value for key, value in flat.items()}
+
+
+def displacements(stage: Stage, cycle: Cycle) -> Kick:
+    """The displacements that start hunting."""
+    flat = {**_still(stage), "motion.kind": "release"}
+    return _kick(lambda kicks: ends_hunting({**flat, "motion.displacement": kicks}, len(kicks), cycle), cycle.amplitude)
+
+
+def pushes(stage: Stage, cycle: Cycle) -> Kick:
+    """The velocities that start hunting."""
+    flat = _still(stage)
+    stages = Ensemble.held(flat, 1)
+
+    def hunts(kicks: np.ndarray) -> np.ndarray:
+        several = stages.take(np.zeros(len(kicks), np.int64))
+        own = {**several.flat, "motion.displacement": float(stages.length[0])}
+        return ends_hunting(own, len(kicks), cycle, pushed(several, kicks))
+
+    return _kick(hunts, cycle.amplitude * float(stages.number("rate")[0]))
+
+
+def _still(stage: Stage) -> dict[str, Any]:
+    return {key: value for key, value in stage.flat().items() if not key.startswith("motion.")}
+
+
+def _kick(hunts: Callable[[np.ndarray], np.ndarray], unit: float) -> Kick:
+    """The windows of kicks that hunt, searched on a grid about `unit`, their edges by bisection."""
+    kicks = np.geomspace(RANGE[0] * unit, RANGE[1] * unit, POINTS)
+    found = hunts(kicks)
+    edges = np.flatnonzero(found[1:] != found[:-1])
+    low, high = kicks[edges], kicks[edges + 1]
+    while edges.size and np.any(high > (1 + EDGE) * low):
+        middle = np.sqrt(low * high)
+        like_low = hunts(middle) == found[edges]
+        low, high = np.where(like_low, middle, low), np.where(like_low, high, middle)
+    places = np.where(found[edges], low, high)  # the side that hunts
+    ends = [*([kicks[0]] if found[0] else []), *places, *([kicks[-1]] if found[-1] else [])]
+    windows = tuple((float(a), float(b)) for a, b in zip(ends[::2], ends[1::2], strict=True))
+    return Kick(windows, (float(kicks[0]), float(kicks[-1])))
+
+
+def moves(stage: Stage, cycle: Cycle) -> Moves | None:
+    """The share of moves that end in hunting; None for motions that have no acceleration."""
+    flat = stage.flat()
+    if flat["motion.kind"] != "there_and_back" or not flat["motion.acceleration"] * flat["motion.acceleration_time"]:
+        return None
+    acceleration, time = flat["motion.acceleration"], flat["motion.acceleration_time"]
+    accelerations = (SHARES[0] * acceleration, SHARES[1] * acceleration)
+    times = (SHARES[0] * time, min(SHARES[1] * time, flat["motion.return_at"] / 2))
+    drawn = qmc.scale(qmc.Sobol(2, rng=0).random(MOVES), *zip(accelerations, times, strict=True))
+    own = {**flat, "motion.acceleration": drawn[:, 0], "motion.acceleration_time": drawn[:, 1]}
+    return Moves(MOVES, int(ends_hunting(own, MOVES, cycle).sum()), accelerations, times)

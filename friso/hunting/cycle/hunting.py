@@ -1,0 +1,148 @@
+"""The hunting cycles of one stage: how large, how long, whether they attract; and why there are none."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from friso.engine.kernel import Wanted, kernels
+from friso.engine.simulate import output_variables, time_axis
+from friso.engine.tolerance import checked_rtol
+from friso.equations.structure import structure
+from friso.hunting.cycle.ensemble import Ensemble
+from friso.hunting.cycle.find import NOT_CLOSED, ROUGH, RTOL, Cycles, asymmetric_cycles, symmetric_cycles, whole_cycles
+from friso.hunting.cycle.multipliers import returns_of
+from friso.hunting.cycle.return_map import ReturnMap, return_map
+from friso.stage import Stage
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+AWAY, FOLLOWED, LINEAR = 2e-3, 8, 0.02
+"""Where a simulation beside a cycle begins, as share of the distance at which the stage sticks; how many returns it is
+followed for; and up to which share a deviation counts as small."""
+
+SAMPLES = 2000
+"""Sampling intervals in a period of the trace."""
+
+
+@dataclass(frozen=True)
+class Cycle:
+    """A hunting cycle.
+
+    `amplitude` [m], half of peak to peak, and `period` [s]. A `symmetric` cycle is its own mirror image after half a
+    period, and its multipliers are those of half a period; those of others are of a whole one. `multipliers`, shape
+    (states - 1,), are the Floquet multipliers, the largest first, without the one that every cycle has along itself;
+    `slope` is that of the return map over 1 % of the amplitude (NaN where stages so near do not come back), and
+    `multiplier` that of the two which decides: the slope with a stroke limiter, which may chatter, else the largest
+    Floquet multiplier (its modulus if it is complex). `growth` is the multiplier as a simulation beside the cycle
+    shows it, by an independent route (NaN where it leaves too fast). `residual` is the gap at which the orbit closes,
+    as a share of the magnitudes of its states; `trace` one period in time, from where the stage sticks.
+    """
+
+    symmetric: bool
+    amplitude: float
+    period: float
+    multiplier: float
+    multipliers: np.ndarray
+    slope: float
+    growth: float
+    residual: float
+    trace: xr.Dataset
+
+    @property
+    def attracts(self) -> bool:
+        """Whether motions beside the cycle come closer to it."""
+        return abs(self.multiplier) < 1
+
+    @property
+    def time_constant(self) -> float:
+        """Time [s] in which a small deviation from the cycle shrinks, or grows, by the factor e."""
+        returned = self.period / 2 if self.symmetric else self.period
+        return returned / abs(np.log(abs(self.multiplier)))
+
+
+@dataclass(frozen=True)
+class Hunting:
+    """What there is to know of a stage's hunting: its `cycles`, or the `reason` why there are none; whether that is
+    `certain` (where the return map has a fixed point, but no orbit could be closed, it is not); and the return map, of
+    a stage that sticks on the positive side (None where a stage cannot hunt at all)."""
+
+    cycles: tuple[Cycle, ...]
+    reason: str
+    certain: bool
+    returns: ReturnMap | None
+
+    @property
+    def attracting(self) -> tuple[Cycle, ...]:
+        """The cycles that attract."""
+        return tuple(cycle for cycle in self.cycles if cycle.attracts)
+
+
+def cannot_hunt(stage: Stage) -> str:
+    """Why a stage cannot hunt, whatever its numbers; "" if it may."""
+    form = structure(stage.flat())
+    if form.friction == "none":
+        return "there is no friction to stick to"
+    if form.controller is None or not form.controller.integral:
+        return "the controller has no integral action that could wind up"
+    return ""
+
+
+def hunting(stage: Stage, rtol: float = RTOL) -> Hunting:
+    """The hunting cycles of a stage: the symmetric one and an asymmetric pair, or those of an asymmetric stage.
+
+    The motion of the stage file plays no part. Raises ValueError for a tolerance that is not usable.
+    """
+    checked_rtol(rtol)
+    if reason := cannot_hunt(stage):
+        return Hunting((), reason, True, None)
+    flat = stage.flat()
+    kernels([Wanted(structure(flat), variational) for variational in (False, True)])
+    stages = Ensemble.held(flat, 1)
+    there = return_map(stages, ROUGH)
+    if stages.symmetric[0]:
+        sought = [symmetric_cycles(stages, rtol, there), asymmetric_cycles(stages, there, rtol)]
+    else:
+        sought = [whole_cycles(stages, rtol, (there, return_map(stages, ROUGH, -1.0)))]
+    cycles = tuple(_cycle(stages, each) for each in sought if each.found[0])
+    reasons = [each.reasons[0] for each in sought]
+    return Hunting(cycles, "" if cycles else reasons[0], bool(cycles) or reasons[0] != NOT_CLOSED, there)
+
+
+def _cycle(stages: Ensemble, found: Cycles) -> Cycle:
+    return Cycle(
+        symmetric=found.sign < 0,
+        amplitude=float(found.amplitude[0]),
+        period=float(found.period[0]),
+        multiplier=float(found.multiplier[0]),
+        multipliers=found.local[0],
+        slope=float(found.slope[0]),
+        growth=_growth(stages, found),
+        residual=float(found.gap[0]),
+        trace=_trace(stages, found),
+    )
+
+
+def _growth(stages: Ensemble, found: Cycles) -> float:
+    """By how much a small deviation grows from one return to the next, in a simulation beside the cycle."""
+    away = np.array([[0.0, AWAY, -AWAY]])
+    heights = returns_of(stages, found.orbits, found.direction, away, FOLLOWED, ROUGH / 100)[0]
+    deviations = (heights[1:] - heights[0]) / found.amplitude[0]
+    before, after = deviations[:, :-1].ravel(), deviations[:, 1:].ravel()
+    small = (np.abs(before) < LINEAR) & (np.abs(after) < LINEAR)  # and no NaN
+    if np.count_nonzero(small) < 2:
+        return np.nan
+    return float(before[small] @ after[small] / (before[small] @ before[small]))
+
+
+def _trace(stages: Ensemble, found: Cycles) -> xr.Dataset:
+    import xarray as xr
+
+    period = float(found.period[0])
+    results = stages.run(found.states, found.period, ROUGH / 100, interval=period / SAMPLES)
+    time = np.arange(results.samples.shape[1]) * (period / SAMPLES)
+    flat = {**stages.flat, "motion.displacement": float(stages.length[0]), "motion.duration": period}
+    return xr.Dataset(output_variables(stages.kernel, flat, results.samples[0].T, time), coords=time_axis(time))
