@@ -1,6 +1,26 @@
-"""What the numbers mean for hunting: the thesis's peak count, amplitude, period, settling, verdict."""
+"""What the numbers mean for hunting: peak count, hunting cycles, what starts them, margins, verdict."""
 
+from friso.hunting.basin import Kick, Moves
 from friso.hunting.check import Case, Solver, check
+from friso.hunting.cycle.hunting import Cycle, Hunting, hunting
+from friso.hunting.margin import Margin
 from friso.hunting.measures import BANDS, COUNTED_ABOVE, COUNTED_AFTER, Measures, measure
+from friso.hunting.verdict import Judgement
 
-__all__ = ["BANDS", "COUNTED_ABOVE", "COUNTED_AFTER", "Case", "Measures", "Solver", "check", "measure"]
+__all__ = [
+    "BANDS",
+    "COUNTED_ABOVE",
+    "COUNTED_AFTER",
+    "Case",
+    "Cycle",
+    "Hunting",
+    "Judgement",
+    "Kick",
+    "Margin",
+    "Measures",
+    "Moves",
+    "Solver",
+    "check",
+    "hunting",
+    "measure",
+]

@@ -13,7 +13,9 @@ from friso.engine.kernel import Wanted, kernel, kernels
 from friso.engine.simulate import simulate
 from friso.engine.tolerance import checked_rtol
 from friso.equations.structure import structure
+from friso.hunting.cycle.hunting import cannot_hunt
 from friso.hunting.measures import BANDS, measure, options
+from friso.hunting.verdict import Judgement, Word, judge
 from friso.stage import Stage
 
 if TYPE_CHECKING:
@@ -38,15 +40,14 @@ class Solver:
 class Case:
     """A stage and what became of it.
 
-    `verdict` is "hunts", "settles", "transient" or "failed" (see `Measures.verdict`);
-    `peaks` counts the thesis's peaks, at `peak_times` [s] and of
+    `judgement` holds the verdict and what it rests on; `peaks` counts the thesis's peaks, at `peak_times` [s] and of
     `peak_heights` [m] above the reference; `peak_to_peak` [m] and `period` [s] (None: no cycle) are of the last
     quarter; `settling_time` maps each band [m] to the time after the last corner of the reference [s] (None: never);
     `largest_force` [N] is the actuator's. `trace` holds the time response if asked for.
     """
 
     stage: Stage
-    verdict: str
+    judgement: Judgement
     peaks: int
     peak_times: np.ndarray
     peak_heights: np.ndarray
@@ -56,6 +57,11 @@ class Case:
     largest_force: float
     solver: Solver
     trace: xr.Dataset | None = None
+
+    @property
+    def verdict(self) -> Word:
+        """ "hunts", "bistable", "transient", "settles" or "failed" (see `Judgement`)."""
+        return self.judgement.verdict
 
 
 def check(stage: Stage, rtol: float = 1e-6, traces: bool = False) -> dict[str, Case]:
@@ -69,12 +75,18 @@ def check(stage: Stage, rtol: float = 1e-6, traces: bool = False) -> dict[str, C
         variants["locked"] = stage.replace({"joint.locked": True})
         if stage.joint.stiffness is not None:
             variants["free"] = stage.replace({"joint.locked": False})
-    kernels({Wanted(structure(variant.flat())) for variant in variants.values()})
+    kernels(set().union(*map(_needed, variants.values())))
     cases: dict[str, Case] = {}
     for name, variant in variants.items():
         same = next((case for case in cases.values() if case.stage == variant), None)
         cases[name] = same or _case(variant, rtol, traces)
     return cases
+
+
+def _needed(stage: Stage) -> set[Wanted]:
+    """The kernels for a case."""
+    shape = structure(stage.flat())
+    return {Wanted(shape)} if cannot_hunt(stage) else {Wanted(shape), Wanted(shape, variational=True)}
 
 
 def _case(stage: Stage, rtol: float, traces: bool) -> Case:
@@ -85,7 +97,7 @@ def _case(stage: Stage, rtol: float, traces: bool) -> Case:
     status = Status(int(found.status[0]))
     return Case(
         stage=stage,
-        verdict=str(found.verdict[0]),
+        judgement=judge(stage, found, rtol),
         peaks=int(found.peaks[0]),
         peak_times=runs.results.turn_times[0, :room][found.turns[0]],
         peak_heights=runs.results.turn_values[0, :room][found.turns[0]],

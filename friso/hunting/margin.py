@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.find import NOT_CLOSED, Cycles, hunting_cycles
+from friso.hunting.cycle.find import NOT_CLOSED, hunting_cycles
 from friso.stage import Stage
 
 FARTHEST, POINTS = 10.0, 25
@@ -43,24 +43,19 @@ def margin(stage: Stage, attracting: bool) -> Margin | None:
     """The edge above the bandwidth of a stage whose cycle attracts, or below that of one whose cycle does not; None
     within a factor of ten."""
     flat = stage.flat()
-    far = FARTHEST if attracting else 1 / FARTHEST
-    low, high, points = 1.0, far, POINTS
+    low, high, points = 1.0, FARTHEST if attracting else 1 / FARTHEST, POINTS
     for _ in range(ROUNDS):
         factors = np.geomspace(low, high, points)
         cycles = hunting_cycles(Ensemble.held(faster(flat, factors), points))
-        here = _attracting(cycles)
-        changed = np.flatnonzero(here != attracting)
+        unknown = cycles.reasons == NOT_CLOSED  # taken to be as it is on this side
+        changed = np.flatnonzero((cycles.attracting != attracting) & ~unknown)
         if not changed.size or changed[0] == 0:
             return None
-        low, high, points = factors[changed[0] - 1], factors[changed[0]], FINER
-    factor = _interpolated(factors, np.abs(cycles.multiplier), int(changed[0]))
+        k = int(changed[0])
+        low, high, points = factors[k - 1], factors[k], FINER
+    factor = _interpolated(factors, np.abs(cycles.multiplier), k)
     crossover = flat["controller.crossover"] * factor if "controller.crossover" in flat else None
-    return Margin(float(factor), crossover)
-
-
-def _attracting(cycles: Cycles) -> np.ndarray:
-    """Which cycles attract; of one that could not be closed it is not known, and taken to be so."""
-    return cycles.attracting | (cycles.reasons == NOT_CLOSED)
+    return Margin(factor, crossover)
 
 
 def _interpolated(factors: np.ndarray, size: np.ndarray, k: int) -> float:
