@@ -84,6 +84,12 @@ class Ensemble:
         values = self.kernel.values({**self.flat, "motion.size": self.length, "motion.duration": np.inf}, self.count)
         return np.stack([np.broadcast_to(row, (self.count,)) for row in self.kernel.module.scales(values)], axis=1)
 
+    @property
+    def sticking(self) -> int:
+        """The state that stays where it is while a stage sticks: the position of what the friction acts on."""
+        names = self.kernel.states
+        return names.index("cart_position" if "cart_position" in names else "position")
+
     def index(self, state: str) -> int:
         return self.kernel.states.index(state)
 

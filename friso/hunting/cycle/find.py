@@ -122,7 +122,7 @@ def _closed(stages: Ensemble, guess: Guess, sign: float, rtol: float) -> Cycles:
 
 def _accept(stages: Ensemble, orbits: Orbits, which: np.ndarray, tried: Orbits, guess: Guess) -> None:
     """Take over the orbits that are closed where they were expected."""
-    sticks = np.abs(tried.states[:, stages.index("position")] / guess.distances[which] - 1) < KEPT
+    sticks = np.abs(tried.states[:, stages.sticking] / guess.distances[which] - 1) < KEPT
     good = tried.closed & sticks
     for name in ("states", "times", "gaps", "closed"):
         getattr(orbits, name)[which[good]] = getattr(tried, name)[good]
@@ -148,7 +148,7 @@ def _close_simulated(stages: Ensemble, guess: Guess, orbits: Orbits, rtol: float
     fine = np.flatnonzero(steady)
     waits = UNWINDING * wait(some, heights[0])
     ends = some.take(fine).run(starts[fine], (seen.times[every, last] + waits)[fine], ROUGH).ends
-    ends *= np.sign(ends[:, stages.index("position")])[:, None]
+    ends *= np.sign(ends[:, stages.sticking])[:, None]
     _accept(stages, orbits, missing[fine], close(some.take(fine), ends, times[fine], sign, rtol), guess)
 
 
@@ -181,7 +181,7 @@ def described(stages: Ensemble, orbits: Orbits, rtol: float, reasons: np.ndarray
     extremes = round_trip.statistics[:, [STATISTICS.index("deviation_max"), STATISTICS.index("deviation_min")]]
     first = found.local[:, 0]
     local = np.where(np.abs(first.imag) > 1e-6 * np.abs(first), np.abs(first), first.real)
-    decisive = np.where(np.isfinite(found.slope), found.slope, local) if some.chatters else local
+    decisive = found.slope if some.chatters else local
     values = {
         "period": periods,
         "amplitude": np.where(done(round_trip), (extremes[:, 0] - extremes[:, 1]) / 2, np.nan),

@@ -6,6 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import theilslopes
 
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.shooting import Orbits, shoot
@@ -14,6 +15,9 @@ from friso.hunting.cycle.swings import swings
 RANGE, POINTS, ENOUGH = 0.01, 41, 30
 """Range of the macroscopic slope, as a share of the distance at which the stage sticks, runs across it, and how many
 of them have to come back."""
+
+NEAR = 0.25
+"""How far off the others, as a share of the range, a return may lie that counts."""
 
 
 @dataclass(frozen=True)
@@ -37,7 +41,7 @@ def multipliers(stages: Ensemble, orbits: Orbits, rtol: float) -> Multipliers:
 def _floquet(stages: Ensemble, flows: np.ndarray, rates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Multipliers and leading directions of the flow seen on the section at which the integrator's state is what it was
     at the start."""
-    phase, position = stages.index("integral"), stages.index("position")
+    phase = stages.index("integral")
     sections = flows - rates[:, :, None] * flows[:, None, phase, :] / rates[:, phase, None, None]
     sections[:, :, phase] = 0.0
     sections[~np.isfinite(sections).all(axis=(1, 2))] = 0.0
@@ -46,19 +50,27 @@ def _floquet(stages: Ensemble, flows: np.ndarray, rates: np.ndarray) -> tuple[np
     values = np.take_along_axis(values, order, axis=1)[:, :-1]  # the last is that of the phase, which is zero
     first = np.take_along_axis(vectors, order[:, None, :1], axis=2)[:, :, 0]
     with np.errstate(divide="ignore", invalid="ignore"):
-        return values, np.real(first / first[:, position, None])
+        return values, np.real(first / first[:, stages.sticking, None])
 
 
 def _slope(stages: Ensemble, orbits: Orbits, direction: np.ndarray, rtol: float) -> np.ndarray:
     """Slope of the straight line through the returns from a small range about the orbits."""
     away = np.linspace(-RANGE / 2, RANGE / 2, POINTS)[None, :]
     heights = returns_of(stages, orbits, direction, away, 2, rtol)
-    slopes = np.full(stages.count, np.nan)
-    for k, pairs in enumerate(heights):
-        seen = pairs[np.isfinite(pairs).all(axis=1)]
-        if len(seen) > ENOUGH:
-            slopes[k] = np.polyfit(*(seen - seen.mean(axis=0)).T, 1)[0]
-    return slopes
+    return np.array([_straight(pairs[np.isfinite(pairs).all(axis=1)]) for pairs in heights])
+
+
+def _straight(pairs: np.ndarray) -> float:
+    """Slope of a straight line through pairs (points, 2) but for those that lie off the others, as where the stage
+    does not break away; NaN with too few."""
+    if len(pairs) < ENOUGH:
+        return np.nan
+    first, second = (pairs - np.median(pairs, axis=0)).T
+    rough = theilslopes(second, first)[0]
+    near = np.abs(second - rough * first) < NEAR * np.ptp(first)
+    if np.count_nonzero(near) < ENOUGH:
+        return np.nan
+    return float(np.polyfit(first[near], second[near], 1)[0])
 
 
 def returns_of(
@@ -66,8 +78,8 @@ def returns_of(
 ) -> np.ndarray:
     """How far stages swing [m], shape (count, points, returns), on each of some returns, when they begin beside their
     orbits: away along a direction (count, states) by shares (count or 1, points) of the distance at which they stick."""
-    position, count, points = stages.index("position"), stages.count, away.shape[1]
-    distance = orbits.states[:, position]
+    count, points = stages.count, away.shape[1]
+    distance = orbits.states[:, stages.sticking]
     starts = orbits.states[:, None, :] + (away * np.abs(distance)[:, None])[:, :, None] * direction[:, None, :]
     starts = starts.reshape(count * points, -1)
     several = stages.take(np.repeat(np.arange(count), points))

@@ -16,11 +16,16 @@ def stuck(stages: Ensemble, displacement: np.ndarray) -> np.ndarray:
     follows.
     """
     states = displaced(stages, displacement)
-    integral = stages.index("integral")
-    free = stages.force(states)
-    states[:, integral] = 1.0
-    states[:, integral] = -free / (stages.force(states) - free)
+    states[:, stages.index("integral")] = relaxed(stages) * displacement
     return states
+
+
+def relaxed(stages: Ensemble) -> np.ndarray:
+    """State of the integrator per displacement [s] at which the actuator exerts no force on a stage at rest."""
+    states = displaced(stages, np.ones(stages.count))
+    free = stages.force(states)
+    states[:, stages.index("integral")] = 1.0
+    return -free / (stages.force(states) - free)
 
 
 def displaced(stages: Ensemble, displacement: np.ndarray) -> np.ndarray:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from contextlib import suppress
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 
 from friso.hunting.cycle.ensemble import Ensemble, done
+from friso.hunting.cycle.rest import relaxed
 
 STEPS = 40
 """Steps at most."""
@@ -27,6 +29,9 @@ CLOSED, CLOSED_CHATTERING = 1e-8, 1e-4
 
 FINEST = 1e-11
 """Gap that is as good as none."""
+
+NUDGE = 1e-5
+"""Change of a place over which the derivative by it is taken."""
 
 
 @dataclass(frozen=True)
@@ -66,29 +71,65 @@ def shoot(stages: Ensemble, states: np.ndarray, times: np.ndarray, sign: float, 
 def close(stages: Ensemble, states: np.ndarray, times: np.ndarray, sign: float, rtol: float) -> Orbits:
     """Close orbits from guesses: states (count, states) at which the stage sticks, and times [s] (count,).
 
-    `sign` is -1 for half a period of a symmetric cycle, 1 for a whole one. The integrator's state tells the phase and
-    is kept. Where a limiter chatters, the flow's derivative changes from one nanometre to the next and points nowhere;
+    `sign` is -1 for half a period of a symmetric cycle, 1 for a whole one. The phase is that at which the integrator's
+    state makes the actuator exert no force on a stage at rest. Where a limiter chatters, the flow's derivative changes from one nanometre to the next and points nowhere;
     the last Jacobian from farther away then serves for as many steps as it takes.
     """
-    shooting = _Shooting(stages, states, times, sign, rtol)
-    for _ in range(STEPS):
-        if not shooting.advance():
-            break
-    return shooting.outcome()
+    return _solved(_Shooting(lambda which, places: stages.take(which), states, times, sign, rtol)).orbits
+
+
+@dataclass(frozen=True)
+class Border:
+    """A plane for each orbit in the space of its place and the logarithms of its distance [m] and time [s]: the orbit
+    lies on it if normal @ (place, log distance, log time) = level; shapes (count, 3) and (count,)."""
+
+    normal: np.ndarray
+    level: np.ndarray
+
+
+Family = Callable[[np.ndarray, np.ndarray], Ensemble]
+"""Stages that depend on a number each, their place: from their numbers (count,) and places (count,)."""
+
+
+def close_along(
+    family: Family,
+    states: np.ndarray,
+    times: np.ndarray,
+    places: np.ndarray,
+    border: Border,
+    sign: float,
+    rtol: float,
+) -> tuple[Orbits, np.ndarray]:
+    """Close orbits as `close` does, their stages being free to change their places so that each comes to lie on its
+    border; orbits and places. Goes round folds, at which there is no orbit at a place beyond."""
+    solved = _solved(_Following(family, states, times, places, border, sign, rtol))
+    return solved.orbits, solved.best_places
+
+
+_S = TypeVar("_S", bound="_Shooting")
 
 
 class _Shooting:
     """Orbits on their way to being closed, all at once; those that are closed, or have failed, rest."""
 
-    def __init__(self, stages: Ensemble, states: np.ndarray, times: np.ndarray, sign: float, rtol: float) -> None:
-        self.stages, self.sign, self.rtol = stages, sign, rtol
+    def __init__(
+        self,
+        family: Family,
+        states: np.ndarray,
+        times: np.ndarray,
+        sign: float,
+        rtol: float,
+        places: np.ndarray | None = None,
+    ) -> None:
+        self.family, self.sign, self.rtol = family, sign, rtol
         self.states, self.times = states.copy(), times.copy()
-        self.best_states, self.best_times = states.copy(), times.copy()
-        self.gaps = np.full(stages.count, np.inf)
-        size = states.shape[1]
-        self.inverses = np.zeros((stages.count, size + 1, size + 1))
-        self.active = np.ones(stages.count, bool)
-        self.idle = np.zeros(stages.count, np.int64)
+        count = len(times)
+        self.places = np.zeros(count) if places is None else places.copy()
+        self.best_states, self.best_times, self.best_places = states.copy(), times.copy(), self.places.copy()
+        self.gaps, self.idle = np.full(count, np.inf), np.zeros(count, np.int64)
+        self.inverses: list[np.ndarray] = [np.empty(0)] * count
+        self.active = np.ones(count, bool)
+        self.chatters = family(np.arange(count), self.places).chatters
 
     def advance(self) -> bool:
         """One step of the orbits still on their way; whether any is on its way still."""
@@ -100,56 +141,115 @@ class _Shooting:
 
     def _advance(self, which: np.ndarray, renew: bool) -> None:
         """One step of some orbits, with a Jacobian of their own or with the last one."""
-        stages, states, times = self.stages.take(which), self.states[which], self.times[which]
+        stages, states, times = self.family(which, self.places[which]), self.states[which], self.times[which]
         if renew:
             shot = shoot(stages, states, times, self.sign, self.rtol)
             ends, fine = shot.ends, shot.done
-            self.inverses[which] = _inverted(stages, shot)
+            for k, jacobian in zip(which, self._jacobians(which, stages, shot), strict=True):
+                self.inverses[k] = _inverse(jacobian)
         else:
             results = stages.run(states, times, self.rtol)
             ends, fine = self.sign * results.ends, done(results)
         misses = ends - states
-        self._keep_best(which, np.where(fine, _gap(stages, misses), np.inf))
-        self._step(which, misses)
+        gaps = np.max(np.abs(misses) / stages.scales, axis=1)
+        self._keep_best(which, np.where(fine, gaps, np.inf))
+        off = self._off(which, stages)
+        for k, miss, other in zip(which, misses, off, strict=True):
+            self._step(k, self.inverses[k] @ -np.concatenate([miss, other]), stages.sticking)
+
+    def _jacobians(self, which: np.ndarray, stages: Ensemble, shot: Shot) -> np.ndarray:
+        """Derivatives of the misses and of the phase by the states and the time."""
+        count, size = shot.ends.shape
+        jacobians = np.zeros((count, size + 1, size + 1))
+        jacobians[:, :size, :size] = shot.flows - np.eye(size)
+        jacobians[:, :size, size] = stages.rates(shot.ends)
+        jacobians[:, size, stages.index("integral")] = 1.0
+        jacobians[:, size, stages.sticking] = -relaxed(stages)
+        return jacobians
+
+    def _off(self, which: np.ndarray, stages: Ensemble) -> np.ndarray:
+        """By how much the phase is off, shape (orbits, 1): the integrator's state that exerts no force is wanted."""
+        states = self.states[which]
+        return (states[:, stages.index("integral")] - relaxed(stages) * states[:, stages.sticking])[:, None]
 
     def _keep_best(self, which: np.ndarray, gaps: np.ndarray) -> None:
         """Keep what is closer than before; what is closed, fails or gets no closer rests."""
-        better = gaps < self.gaps[which]
+        better = which[gaps < self.gaps[which]]
         self.idle[which] = np.where(gaps < 0.5 * self.gaps[which], 0, self.idle[which] + 1)
-        self.best_states[which[better]], self.best_times[which[better]] = (
-            self.states[which[better]],
-            self.times[which[better]],
-        )
+        for best, now in ((self.best_states, self.states), (self.best_times, self.times)):
+            best[better] = now[better]
+        self.best_places[better] = self.places[better]
         self.gaps[which] = np.minimum(self.gaps[which], gaps)
-        self.active[which] = (gaps > FINEST) & np.isfinite(gaps) & (self.idle[which] < np.where(self.gaps[which] > RENEWED, *STALLED))
+        moving = self.idle[which] < np.where(self.gaps[which] > RENEWED, *STALLED)
+        self.active[which] = (gaps > FINEST) & np.isfinite(gaps) & moving
 
-    def _step(self, which: np.ndarray, misses: np.ndarray) -> None:
-        position = self.stages.index("position")
-        wanted = np.einsum("nij,nj->ni", self.inverses[which], np.pad(-misses, ((0, 0), (0, 1))))
-        far = np.abs(wanted[:, position]) / (STRIDE * np.abs(self.states[which, position]))
-        wanted /= np.maximum(far, np.maximum(np.abs(wanted[:, -1]) / (STRIDE * self.times[which]), 1.0))[:, None]
-        self.states[which] += wanted[:, :-1]
-        self.times[which] += wanted[:, -1]
+    def _step(self, k: int, wanted: np.ndarray, sticking: int) -> None:
+        """Take a step of one orbit, shortened to the stride."""
+        size = self.states.shape[1]
+        far = abs(wanted[sticking]) / (STRIDE * abs(self.states[k, sticking]))
+        late = abs(wanted[size]) / (STRIDE * self.times[k])
+        wanted = wanted / max(far, late, 1.0)
+        self.states[k] += wanted[:size]
+        self.times[k] += wanted[size]
+        self.places[k] += wanted[size + 1 :].sum()
 
-    def outcome(self) -> Orbits:
-        limit = CLOSED_CHATTERING if self.stages.chatters else CLOSED
+    @property
+    def orbits(self) -> Orbits:
+        limit = CLOSED_CHATTERING if self.chatters else CLOSED
         return Orbits(self.best_states, self.best_times, self.sign, self.gaps, self.gaps < limit)
 
 
-def _inverted(stages: Ensemble, shot: Shot) -> np.ndarray:
-    """Inverses of the bordered Jacobians, shape (count, states + 1, states + 1); NaN where there is none."""
-    count, size = shot.ends.shape
-    jacobians = np.zeros((count, size + 1, size + 1))
-    jacobians[:, :size, :size] = shot.flows - np.eye(size)
-    jacobians[:, :size, size] = stages.rates(shot.ends)
-    jacobians[:, size, stages.index("integral")] = 1.0
-    inverses = np.full_like(jacobians, np.nan)
-    for k in range(count):
-        with suppress(np.linalg.LinAlgError):
-            inverses[k] = np.linalg.inv(jacobians[k])
-    return inverses
+class _Following(_Shooting):
+    """Orbits that are closed while their stages change along lines."""
+
+    def __init__(
+        self,
+        family: Family,
+        states: np.ndarray,
+        times: np.ndarray,
+        places: np.ndarray,
+        border: Border,
+        sign: float,
+        rtol: float,
+    ) -> None:
+        super().__init__(family, states, times, sign, rtol, places)
+        self.border = border
+
+    def _jacobians(self, which: np.ndarray, stages: Ensemble, shot: Shot) -> np.ndarray:
+        plain = super()._jacobians(which, stages, shot)
+        size, line = shot.ends.shape[1], self.border
+        jacobians = np.pad(plain, ((0, 0), (0, 1), (0, 1)))
+        sides = [self._beside(which, step) for step in (-NUDGE, NUDGE)]
+        jacobians[:, : size + 1, -1] = (sides[1] - sides[0]) / (2 * NUDGE)
+        along, out, late = line.normal[which].T
+        jacobians[:, -1, stages.sticking] = out / self.states[which, stages.sticking]
+        jacobians[:, -1, size] = late / self.times[which]
+        jacobians[:, -1, -1] = along
+        return jacobians
+
+    def _beside(self, which: np.ndarray, step: float) -> np.ndarray:
+        """Where the orbits end, and how far their phase is off, with the stages a little farther along their lines."""
+        stages = self.family(which, self.places[which] + step)
+        ends = self.sign * stages.run(self.states[which], self.times[which], self.rtol).ends
+        return np.hstack([ends, super()._off(which, stages)])
+
+    def _off(self, which: np.ndarray, stages: Ensemble) -> np.ndarray:
+        sizes = (np.abs(self.states[which, stages.sticking]), self.times[which])
+        where = np.stack([self.places[which], *np.log(sizes)], axis=1)
+        off = (self.border.normal[which] * where).sum(axis=1) - self.border.level[which]
+        return np.hstack([super()._off(which, stages), off[:, None]])
 
 
-def _gap(stages: Ensemble, misses: np.ndarray) -> np.ndarray:
-    """Largest miss in units of the states' magnitudes, shape (count,)."""
-    return np.max(np.abs(misses) / stages.scales, axis=1)
+def _solved(shooting: _S) -> _S:
+    for _ in range(STEPS):
+        if not shooting.advance():
+            break
+    return shooting
+
+
+def _inverse(jacobian: np.ndarray) -> np.ndarray:
+    """The inverse of a matrix; NaN where there is none."""
+    try:
+        return np.linalg.inv(jacobian)
+    except np.linalg.LinAlgError:
+        return np.full_like(jacobian, np.nan)

@@ -1,0 +1,132 @@
+"""A hunting cycle followed along a line through the keys, round its folds: pseudo-arclength continuation.
+
+Keller 1977, in Applications of Bifurcation Theory (Academic Press); Kuznetsov 2004, doi:10.1007/978-1-4757-3978-7,
+chapter 10. The line is measured by a place (0 to 1) and the cycle by the distance at which the stage sticks.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from friso.hunting.cycle.ensemble import Ensemble
+from friso.hunting.cycle.find import RTOL, Cycles, described
+from friso.hunting.cycle.shooting import Border, Family, close_along
+
+FIRST, LONGEST, SHORTEST = 0.002, 0.1, 1e-6
+"""First, longest and shortest step along a branch, in the space of the key over its range and the logarithms of
+distance and time."""
+
+MOST = 300
+"""Steps in one direction at most."""
+
+SHRUNK = 1e-3
+"""Amplitude, in units of the deflection of the loop by the break-away force, below which a branch has ended in the rest
+at the reference."""
+
+STEEPEST = 30.0
+"""Multiplier beyond which a cycle is not followed farther: nothing comes near it."""
+
+TURN = 0.3
+"""Largest change of direction [rad] from one step to the next."""
+
+
+@dataclass(frozen=True)
+class Point:
+    """A cycle on a branch, its place on the line, and the logarithms of its distance [m] and its time of return [s]."""
+
+    place: float
+    distance: float
+    time: float
+    cycle: Cycles
+
+    @classmethod
+    def of(cls, stages: Ensemble, place: float, cycle: Cycles) -> Point:
+        """The point of one cycle."""
+        distance = abs(float(cycle.states[0, stages.sticking]))
+        return cls(place, float(np.log(distance)), float(np.log(cycle.orbits.times[0])), cycle)
+
+    @property
+    def multiplier(self) -> float:
+        return float(self.cycle.multiplier[0])
+
+    @property
+    def vector(self) -> np.ndarray:
+        """Where it is in the space of place, log distance and log time."""
+        return np.array([self.place, self.distance, self.time])
+
+
+@dataclass(frozen=True)
+class Branch:
+    """Cycles in order along a branch, of half a period (sign -1) or a whole one, and how it ends on either side."""
+
+    sign: float
+    points: tuple[Point, ...]
+    ends: tuple[str, str]
+
+
+class Tracer:
+    """Follows one cycle along a line of stages (a family of one)."""
+
+    def __init__(self, family: Family, sign: float, rtol: float = RTOL) -> None:
+        self.family, self.sign, self.rtol = family, sign, rtol
+
+    def solve(self, near: Point, target: np.ndarray, normal: np.ndarray) -> Point | None:
+        """The cycle on the plane through a target (place, log distance, log time) with this normal, found from a cycle
+        near it; None if none is found."""
+        border = Border(normal[None, :], np.array([normal @ target]))
+        states = near.cycle.states * np.exp(target[1] - near.distance)
+        times = near.cycle.orbits.times * np.exp(target[2] - near.time)
+        orbits, places = close_along(self.family, states, times, target[:1], border, self.sign, self.rtol)
+        if not orbits.closed[0]:
+            return None
+        stages = self.family(np.zeros(1, np.int64), places)
+        cycle = described(stages, orbits, self.rtol, np.array([""]))
+        if not np.isfinite(cycle.multiplier[0]) or not np.isfinite(cycle.amplitude[0]):
+            return None
+        return Point.of(stages, float(places[0]), cycle)
+
+    def walk(self, start: Point, ahead: float) -> tuple[list[Point], str]:
+        """The points that follow the start on one side, and how they end; `ahead` is 1 or -1."""
+        points, direction, step = [start], np.array([ahead, 0.0, 0.0]), FIRST
+        while len(points) <= MOST:
+            last = points[-1]
+            found = self.solve(last, last.vector + step * direction, direction)
+            if found is None or not _continues(points, found, direction, step):
+                step /= 3
+                if step < SHORTEST:
+                    return points[1:], f"it could not be followed farther (multiplier {last.multiplier:.3g})"
+                continue
+            points.append(found)
+            moved = found.vector - last.vector
+            direction, step = moved / np.linalg.norm(moved), min(1.5 * step, LONGEST)
+            if reason := self._stop(start, found):
+                return points[1:], reason
+        return points[1:], "it was followed for as many steps as there may be"
+
+    def _stop(self, start: Point, found: Point) -> str:
+        stages = self.family(np.zeros(1, np.int64), np.array([found.place]))
+        if not 0 <= found.place <= 1:
+            return "end of the range"
+        if found.cycle.amplitude[0] < SHRUNK * stages.length[0]:
+            return "the cycle shrinks into the rest at the reference"
+        if abs(found.multiplier) > STEEPEST:
+            return f"the cycle repels {STEEPEST:g}-fold and more per return"
+        if self.sign > 0 and stages.symmetric[0] and found.cycle.middle[0] * start.cycle.middle[0] < 0:
+            return "it meets the symmetric cycle"
+        return ""
+
+    def branch(self, start: Point) -> Branch:
+        """The whole branch through a point."""
+        (after, last), (before, first) = self.walk(start, 1.0), self.walk(start, -1.0)
+        return Branch(self.sign, (*before[::-1], start, *after), (first, last))
+
+
+def _continues(points: list[Point], found: Point, direction: np.ndarray, step: float) -> bool:
+    """Whether a point lies where the branch was going, not on another one."""
+    moved = found.vector - points[-1].vector
+    length = float(np.linalg.norm(moved))
+    if len(points) == 1:  # the direction of the branch is not known yet
+        return length < LONGEST
+    return length < 2 * step and float(moved @ direction) >= np.cos(TURN) * length

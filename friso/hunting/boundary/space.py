@@ -1,0 +1,66 @@
+"""The keys that are varied, as a box whose every side runs from 0 to 1."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from friso.hunting.cycle.ensemble import Ensemble
+from friso.hunting.cycle.shooting import Family
+from friso.stage import Stage
+
+Flat = Callable[[Mapping[str, np.ndarray]], Mapping[str, Any]]
+"""Flat keys of stages (SI) from arrays of values by name."""
+
+
+@dataclass(frozen=True)
+class Range:
+    """A key (or a free name that others follow) from `low` to `high` [SI], on a logarithmic scale if `log`."""
+
+    key: str
+    low: float
+    high: float
+    log: bool = False
+
+    def at(self, place: np.ndarray) -> np.ndarray:
+        """The values [SI] at places, 0 at `low` and 1 at `high`."""
+        if self.log:
+            return self.low * (self.high / self.low) ** place
+        return self.low + (self.high - self.low) * place
+
+    def place(self, value: np.ndarray) -> np.ndarray:
+        """The places of values [SI]."""
+        if self.log:
+            return np.log(value / self.low) / np.log(self.high / self.low)
+        return (value - self.low) / (self.high - self.low)
+
+
+@dataclass(frozen=True)
+class Space:
+    """Stages with one key varied, or several, over their ranges."""
+
+    ranges: tuple[Range, ...]
+    flat: Flat
+
+    @classmethod
+    def of(cls, stage: Stage, ranges: Sequence[Range]) -> Space:
+        return cls(tuple(ranges), stage.flat)
+
+    def values(self, points: np.ndarray) -> dict[str, np.ndarray]:
+        """The values [SI] of the keys at points of the box, shape (count, keys)."""
+        return {each.key: each.at(points[:, i]) for i, each in enumerate(self.ranges)}
+
+    def stages(self, points: np.ndarray) -> Ensemble:
+        """The stages at points of the box, shape (count, keys)."""
+        return Ensemble.held(self.flat(self.values(points)), len(points))
+
+    def lines(self, origins: np.ndarray, directions: np.ndarray) -> Family:
+        """The stages along lines through the box: from origins (count, keys) along directions (count, keys)."""
+
+        def family(which: np.ndarray, places: np.ndarray) -> Ensemble:
+            return self.stages(origins[which] + places[:, None] * directions[which])
+
+        return family
