@@ -93,14 +93,19 @@ class Tracer:
         while len(points) <= MOST:
             last = points[-1]
             found = self.solve(last, last.vector + step * direction, direction)
-            if found is None or not _continues(points, found, direction, step):
-                step /= 3
+            moved = np.zeros(3) if found is None else found.vector - last.vector
+            length = float(np.linalg.norm(moved))
+            near = found is not None and 0 < length < (2 * step if len(points) > 1 else LONGEST)
+            ahead = float(moved @ direction) / length if near else 0.0
+            if near and (ahead > 0 or len(points) == 1):
+                direction = moved / length
+            if found is None or not near or (ahead < np.cos(TURN) and len(points) > 1):
+                step /= 3  # and along the direction that the branch turned out to have
                 if step < SHORTEST:
                     return points[1:], f"it could not be followed farther (multiplier {last.multiplier:.3g})"
                 continue
             points.append(found)
-            moved = found.vector - last.vector
-            direction, step = moved / np.linalg.norm(moved), min(1.5 * step, LONGEST)
+            step = min(1.5 * step, LONGEST)
             if reason := self._stop(start, found):
                 return points[1:], reason
         return points[1:], "it was followed for as many steps as there may be"
@@ -121,12 +126,3 @@ class Tracer:
         """The whole branch through a point."""
         (after, last), (before, first) = self.walk(start, 1.0), self.walk(start, -1.0)
         return Branch(self.sign, (*before[::-1], start, *after), (first, last))
-
-
-def _continues(points: list[Point], found: Point, direction: np.ndarray, step: float) -> bool:
-    """Whether a point lies where the branch was going, not on another one."""
-    moved = found.vector - points[-1].vector
-    length = float(np.linalg.norm(moved))
-    if len(points) == 1:  # the direction of the branch is not known yet
-        return length < LONGEST
-    return length < 2 * step and float(moved @ direction) >= np.cos(TURN) * length

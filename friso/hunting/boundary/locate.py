@@ -1,0 +1,126 @@
+"""Where on a branch a cycle stops attracting: its multiplier passes -1 (flip), 1 (fold) or the unit circle (torus)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from scipy.optimize import brentq
+
+from friso.hunting.boundary.branch import Branch, Point, Tracer
+
+Kind = Literal["flip", "fold", "torus"]
+
+PRECISE, TRIES = 1e-7, 30
+"""Step along the branch that ends a search, and steps at most."""
+
+TIGHTER = 0.01
+"""Share of the tolerance at which a point is computed again for its error."""
+
+
+@dataclass(frozen=True)
+class Found:
+    """A point at which a branch stops attracting (or begins to), with the direction of the branch there, and by how
+    much its place changes when it is computed to a hundredth of the tolerance."""
+
+    kind: Kind
+    point: Point
+    direction: np.ndarray
+    error: float
+
+
+def distance_to(kind: Kind, point: Point) -> float:
+    """How far the multiplier is from where the kind of point has it; it changes sign there."""
+    if kind == "torus":
+        return abs(complex(point.cycle.local[0, 0])) - 1
+    return point.multiplier + (1 if kind == "flip" else -1)
+
+
+def changes(first: Point, second: Point) -> tuple[Kind, ...]:
+    """What happens to the multiplier between two neighbours on a branch."""
+    if _complex(first) and _complex(second):
+        return ("torus",) if distance_to("torus", first) * distance_to("torus", second) < 0 else ()
+    kinds: tuple[Kind, ...] = ("flip", "fold")
+    return tuple(kind for kind in kinds if distance_to(kind, first) * distance_to(kind, second) < 0)
+
+
+def _complex(point: Point) -> bool:
+    return bool(abs(point.cycle.local[0, 0].imag) > 1e-3)
+
+
+def located(tracer: Tracer, first: Point, second: Point, kind: Kind) -> Found | None:
+    """The point between two neighbours on a branch at which it happens; None if it cannot be reached."""
+    direction = second.vector - first.vector
+    length = float(np.linalg.norm(direction))
+    direction = direction / length
+    met: dict[float, Point] = {0.0: first, length: second}
+
+    def off(along: float) -> float:
+        if along not in met:
+            nearest = min(met, key=lambda place: abs(place - along))
+            found = tracer.solve(met[nearest], first.vector + along * direction, direction)
+            if found is None:
+                raise Unreached
+            met[along] = found
+        return distance_to(kind, met[along])
+
+    try:
+        along = brentq(off, 0.0, length, xtol=PRECISE, maxiter=TRIES)
+        off(along)
+    except (Unreached, RuntimeError):
+        return None
+    return _found(tracer, kind, met[along], direction, _slope(kind, met))
+
+
+class Unreached(Exception):
+    """No cycle is found where one is looked for."""
+
+
+def _slope(kind: Kind, met: dict[float, Point]) -> float:
+    """Change of the distance along the branch, from the two points nearest to where it is zero."""
+    (a, first), (b, second) = sorted(met.items(), key=lambda item: abs(distance_to(kind, item[1])))[:2]
+    return (distance_to(kind, second) - distance_to(kind, first)) / (b - a)
+
+
+def _found(tracer: Tracer, kind: Kind, point: Point, direction: np.ndarray, slope: float) -> Found:
+    """The point with its error; infinite where it cannot be computed at the tighter tolerance."""
+    tight = Tracer(tracer.family, tracer.sign, tracer.rtol * TIGHTER).solve(point, point.vector, direction)
+    if tight is None:
+        return Found(kind, point, direction, np.inf)
+    moved = (distance_to(kind, tight) - distance_to(kind, point)) / slope
+    return Found(kind, point, direction, abs(tight.place - point.place) + abs(moved * float(direction[0])))
+
+
+def corrected(
+    tracer: Tracer, near: Point, origin: np.ndarray, direction: np.ndarray, kind: Kind, reach: float
+) -> Found | None:
+    """The point at which it happens, by the secant method along a direction from an origin (place, log distance, log
+    time), not farther from it than `reach`, from a cycle near it; None if there is none."""
+    met: dict[float, Point] = {}
+    along, other = 0.0, 0.02 * reach
+    for place in (along, other):
+        found = tracer.solve(near, origin + place * direction, direction)
+        if found is None:
+            return None
+        met[place] = found
+    for _ in range(TRIES):
+        slope = (distance_to(kind, met[along]) - distance_to(kind, met[other])) / (along - other)
+        step = -distance_to(kind, met[along]) / slope if slope else np.inf
+        if not abs(along + step) <= reach:
+            return None
+        if abs(step) < PRECISE:
+            return _found(tracer, kind, met[along], direction, slope)
+        other, along = along, along + step
+        found = tracer.solve(met[other], origin + along * direction, direction)
+        if found is None:
+            return None
+        met[along] = found
+    return None
+
+
+def special_points(tracer: Tracer, branch: Branch) -> list[Found]:
+    """All points of a branch at which a multiplier passes the unit circle."""
+    pairs = zip(branch.points[:-1], branch.points[1:], strict=True)
+    found = [located(tracer, *pair, kind) for pair in pairs for kind in changes(*pair)]
+    return [each for each in found if each]
