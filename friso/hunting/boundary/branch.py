@@ -67,10 +67,10 @@ class Branch:
 
 
 class Tracer:
-    """Follows one cycle along a line of stages (a family of one)."""
+    """Follows one cycle along a line of stages (a family of one), from place 0 to the farthest."""
 
-    def __init__(self, family: Family, sign: float, rtol: float = RTOL) -> None:
-        self.family, self.sign, self.rtol = family, sign, rtol
+    def __init__(self, family: Family, sign: float, rtol: float = RTOL, farthest: float = 1.0) -> None:
+        self.family, self.sign, self.rtol, self.farthest = family, sign, rtol, farthest
 
     def solve(self, near: Point, target: np.ndarray, normal: np.ndarray) -> Point | None:
         """The cycle on the plane through a target (place, log distance, log time) with this normal, found from a cycle
@@ -112,7 +112,7 @@ class Tracer:
 
     def _stop(self, start: Point, found: Point) -> str:
         stages = self.family(np.zeros(1, np.int64), np.array([found.place]))
-        if not 0 <= found.place <= 1:
+        if not 0 <= found.place <= self.farthest:
             return "end of the range"
         if found.cycle.amplitude[0] < SHRUNK * stages.length[0]:
             return "the cycle shrinks into the rest at the reference"

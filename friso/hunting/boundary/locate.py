@@ -15,6 +15,9 @@ Kind = Literal["flip", "fold", "torus"]
 PRECISE, TRIES = 1e-7, 30
 """Step along the branch that ends a search, and steps at most."""
 
+ASIDE = 1e-3
+"""Step beside a first guess from which the slope is taken."""
+
 TIGHTER = 0.01
 """Share of the tolerance at which a point is computed again for its error."""
 
@@ -98,7 +101,7 @@ def corrected(
     """The point at which it happens, by the secant method along a direction from an origin (place, log distance, log
     time), not farther from it than `reach`, from a cycle near it; None if there is none."""
     met: dict[float, Point] = {}
-    along, other = 0.0, 0.02 * reach
+    along, other = 0.0, ASIDE
     for place in (along, other):
         found = tracer.solve(near, origin + place * direction, direction)
         if found is None:

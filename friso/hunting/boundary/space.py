@@ -10,7 +10,7 @@ import numpy as np
 
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.shooting import Family
-from friso.stage import Stage
+from friso.stage import Stage, violations
 
 Flat = Callable[[Mapping[str, np.ndarray]], Mapping[str, Any]]
 """Flat keys of stages (SI) from arrays of values by name."""
@@ -56,6 +56,11 @@ class Space:
     def stages(self, points: np.ndarray) -> Ensemble:
         """The stages at points of the box, shape (count, keys)."""
         return Ensemble.held(self.flat(self.values(points)), len(points))
+
+    def allowed(self, points: np.ndarray) -> np.ndarray:
+        """Which points of the box, shape (count, keys), belong to stages that may be, shape (count,)."""
+        broken = [np.broadcast_to(where, len(points)) for where, _ in violations(self.flat(self.values(points)))]
+        return ~np.any([np.zeros(len(points), bool), *broken], axis=0)
 
     def lines(self, origins: np.ndarray, directions: np.ndarray) -> Family:
         """The stages along lines through the box: from origins (count, keys) along directions (count, keys)."""

@@ -219,19 +219,22 @@ class _Following(_Shooting):
         plain = super()._jacobians(which, stages, shot)
         size, line = shot.ends.shape[1], self.border
         jacobians = np.pad(plain, ((0, 0), (0, 1), (0, 1)))
-        sides = [self._beside(which, step) for step in (-NUDGE, NUDGE)]
-        jacobians[:, : size + 1, -1] = (sides[1] - sides[0]) / (2 * NUDGE)
+        behind, ahead = self._beside(which)
+        jacobians[:, : size + 1, -1] = (ahead - behind) / (2 * NUDGE)
         along, out, late = line.normal[which].T
         jacobians[:, -1, stages.sticking] = out / self.states[which, stages.sticking]
         jacobians[:, -1, size] = late / self.times[which]
         jacobians[:, -1, -1] = along
         return jacobians
 
-    def _beside(self, which: np.ndarray, step: float) -> np.ndarray:
-        """Where the orbits end, and how far their phase is off, with the stages a little farther along their lines."""
-        stages = self.family(which, self.places[which] + step)
-        ends = self.sign * stages.run(self.states[which], self.times[which], self.rtol).ends
-        return np.hstack([ends, super()._off(which, stages)])
+    def _beside(self, which: np.ndarray) -> np.ndarray:
+        """Where the orbits end, and how far their phase is off, with the stages a little farther back and ahead along
+        their lines, shape (2, orbits, states + 1)."""
+        both = np.concatenate([which, which])
+        nudge = np.repeat([-NUDGE, NUDGE], len(which))
+        stages = self.family(both, self.places[both] + nudge)
+        ends = self.sign * stages.run(self.states[both], self.times[both], self.rtol).ends
+        return np.hstack([ends, super()._off(both, stages)]).reshape(2, len(which), -1)
 
     def _off(self, which: np.ndarray, stages: Ensemble) -> np.ndarray:
         sizes = (np.abs(self.states[which, stages.sticking]), self.times[which])

@@ -1,0 +1,10 @@
+"""The boundary of hunting: cycles followed through one key or two, and where they stop attracting."""
+
+from friso.hunting.boundary.branch import Branch, Point
+from friso.hunting.boundary.curve import Curve, Spot
+from friso.hunting.boundary.diagram import Diagram, diagram
+from friso.hunting.boundary.locate import Found, Kind
+from friso.hunting.boundary.plane import Plane, plane
+from friso.hunting.boundary.space import Range, Space
+
+__all__ = ["Branch", "Curve", "Diagram", "Found", "Kind", "Plane", "Point", "Range", "Space", "Spot", "diagram", "plane"]

@@ -1,0 +1,154 @@
+"""The edge of hunting in two keys: the curve on which a cycle flips or folds, followed point by point.
+
+Every point is corrected on the line through the predicted one across the curve, along which the cycle is a branch of
+its own: at a flip it is moved along the key, at a fold, beyond which there is no cycle, along its distance and time.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from friso.hunting.boundary.branch import Tracer
+from friso.hunting.boundary.locate import Found, Kind, corrected
+from friso.hunting.boundary.space import Space
+from friso.hunting.cycle.find import RTOL
+
+FIRST, LONGEST, SHORTEST = 0.01, 0.05, 1e-3
+"""First, longest and shortest step along a curve, in units of the ranges of both keys."""
+
+BESIDE = 1e-3
+"""Distance of the second point of a curve from the first, in the same units."""
+
+MOST = 400
+"""Steps in one direction at most."""
+
+TURN = 0.4
+"""Largest change of direction [rad] from one step to the next."""
+
+ASIDE = 0.7
+"""How far aside of its prediction, in steps, a point may lie."""
+
+DEEP = 0.5
+"""How far a fold may lie from its prediction in the logarithms of distance and time."""
+
+
+@dataclass(frozen=True)
+class Spot:
+    """A point of a curve: where it is in the box of the keys, shape (2,), what was found there, and the direction of
+    the line across the curve on which it was found, shape (2,)."""
+
+    at: np.ndarray
+    found: Found
+    across: np.ndarray
+
+    @property
+    def size(self) -> np.ndarray:
+        """Logarithms of the cycle's distance [m] and time [s], shape (2,)."""
+        return self.found.point.vector[1:]
+
+    @property
+    def error(self) -> np.ndarray:
+        """How far it moves, along each key, when it is computed to a hundredth of the tolerance, shape (2,)."""
+        return np.abs(self.found.error * self.across)
+
+
+@dataclass(frozen=True)
+class Curve:
+    """Spots in order along the curve, of cycles of half a period (sign -1) or a whole one, and how it ends on either
+    side ("closed" twice if it is)."""
+
+    kind: Kind
+    sign: float
+    spots: tuple[Spot, ...]
+    ends: tuple[str, str]
+
+    @property
+    def points(self) -> np.ndarray:
+        """Where it runs in the box of the keys, shape (spots, 2)."""
+        return np.array([spot.at for spot in self.spots])
+
+
+class CurveTracer:
+    """Follows the points of one kind through the box of two keys."""
+
+    def __init__(self, space: Space, kind: Kind, sign: float, rtol: float = RTOL) -> None:
+        self.space, self.kind, self.sign, self.rtol = space, kind, sign, rtol
+
+    def on_line(
+        self, origin: np.ndarray, across: np.ndarray, near: Spot, reach: float, size: np.ndarray | None = None
+    ) -> Spot | None:
+        """The point of the curve on the line through an origin of the box along a direction, found from one near it;
+        `size` is about what the logarithms of its distance and time will be."""
+        tracer = Tracer(self.space.lines(origin[None], across[None]), self.sign, self.rtol)
+        point = near.found.point
+        start = np.concatenate([[0.0], near.size if size is None else size])
+        along, far = np.array([1.0, 0.0, 0.0]), reach
+        if self.kind == "fold":
+            along, far = near.found.direction * [0.0, 1.0, 1.0], DEEP
+            along = along / np.linalg.norm(along)
+        found = corrected(tracer, point, start, along, self.kind, far)
+        if found is None or abs(found.point.place) > reach:
+            return None
+        return Spot(origin + found.point.place * across, found, across)
+
+    def curve(self, first: Spot) -> Curve | None:
+        """The whole curve through a point; None if no second one is found beside it."""
+        aside = first.across[::-1] * [1.0, -1.0]
+        for side in (BESIDE, -BESIDE):
+            second = self.on_line(first.at + side * aside, first.across, first, 20 * BESIDE)
+            if second is not None:
+                break
+        else:
+            return None
+        after, last = self.walk([first, second])
+        if last == CLOSED:
+            return Curve(self.kind, self.sign, tuple(after), (CLOSED, CLOSED))
+        before, beginning = self.walk([second, first])
+        return Curve(self.kind, self.sign, (*before[:1:-1], *after), (beginning, last))
+
+    def walk(self, spots: list[Spot]) -> tuple[list[Spot], str]:
+        """Two neighbouring points with those that follow them, and how they end."""
+        start, step = spots[0], FIRST
+        direction = _unit(spots[1].at - spots[0].at)
+        while len(spots) <= MOST:
+            before, last = spots[-2:]
+            ahead = last.at + step * direction
+            if np.any((ahead < 0) | (ahead > 1)):
+                return [*spots, *self._at_the_side(last, direction, step)], "end of the range"
+            size = last.size + step / np.linalg.norm(last.at - before.at) * (last.size - before.size)
+            found = self.on_line(ahead, direction[::-1] * [-1.0, 1.0], last, ASIDE * step, size)
+            moved = np.zeros(2) if found is None else found.at - last.at
+            if found is None or moved @ direction < np.cos(TURN) * np.linalg.norm(moved):
+                step /= 2
+                if step < SHORTEST:
+                    return spots, f"it could not be followed farther than {self._named(last.at)}"
+                continue
+            spots = [*spots, found]
+            direction, step = _unit(moved), min(1.4 * step, LONGEST)
+            if len(spots) > 7 and np.linalg.norm(found.at - start.at) < step:
+                return spots, CLOSED
+        return spots, "it was followed for as many steps as there may be"
+
+    def _at_the_side(self, last: Spot, direction: np.ndarray, step: float) -> list[Spot]:
+        """The point at which the curve leaves the box."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            times = np.where(direction > 0, (1 - last.at) / direction, np.where(direction < 0, -last.at / direction, np.inf))
+        side = int(np.argmin(times))
+        along = np.array([0.0, 1.0]) if side == 0 else np.array([1.0, 0.0])
+        found = self.on_line(np.clip(last.at + times[side] * direction, 0, 1), along, last, 2 * step)
+        inside = found is not None and bool(np.all((found.at >= 0) & (found.at <= 1)))
+        return [found] if found is not None and inside else []
+
+    def _named(self, at: np.ndarray) -> str:
+        values = self.space.values(at[None])
+        return ", ".join(f"{key} = {value[0]:.6g}" for key, value in values.items())
+
+
+def _unit(vector: np.ndarray) -> np.ndarray:
+    return vector / np.linalg.norm(vector)
+
+
+CLOSED = "closed"
+"""How a curve ends that comes back to its start."""

@@ -1,0 +1,83 @@
+"""The bifurcation diagram in one key: all branches of cycles over its range, and where they stop attracting."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from friso.hunting.boundary.branch import Branch, Point, Tracer
+from friso.hunting.boundary.locate import Found, special_points
+from friso.hunting.boundary.space import Space
+from friso.hunting.cycle.ensemble import Ensemble
+from friso.hunting.cycle.find import ROUGH, RTOL, Cycles, asymmetric_cycles, symmetric_cycles, whole_cycles
+from friso.hunting.cycle.return_map import return_map
+
+SEEDS = 33
+"""Stages over the range at which cycles are looked for."""
+
+SAME = 0.02
+"""Difference in the logarithm of distance up to which two cycles of one stage are the same."""
+
+
+@dataclass(frozen=True)
+class Diagram:
+    """Branches of cycles over the range of one key, the special points of each, and the hunting cycles found at stages
+    evenly over the range (their places)."""
+
+    space: Space
+    branches: tuple[Branch, ...]
+    special: tuple[tuple[Found, ...], ...]
+    places: np.ndarray
+    cycles: Cycles
+
+    def value(self, place: float) -> float:
+        """The value of the key [SI] at a place."""
+        return float(self.space.ranges[0].at(np.float64(place)))
+
+    def error(self, found: Found) -> float:
+        """By how much the value [SI] of a special point changes when it is computed to a hundredth of the tolerance."""
+        return abs(self.value(found.point.place + found.error) - self.value(found.point.place))
+
+
+def diagram(space: Space, rtol: float = RTOL, seeds: int = SEEDS) -> Diagram:
+    """Follow every cycle that is found at stages evenly over the range: the symmetric one and asymmetric ones."""
+    places = np.linspace(0, 1, seeds)
+    places = places[space.allowed(places[:, None])]
+    stages = space.stages(places[:, None])
+    taken = return_map(stages, ROUGH)
+    if stages.symmetric.all():
+        families = [symmetric_cycles(stages, rtol, taken), asymmetric_cycles(stages, taken, rtol)]
+    else:
+        families = [whole_cycles(stages, rtol, (taken, return_map(stages, ROUGH, -1.0)))]
+    branches: list[Branch] = []
+    special: list[tuple[Found, ...]] = []
+    for cycles in families:
+        tracer = Tracer(space.lines(np.zeros((1, 1)), np.ones((1, 1))), cycles.sign, rtol)
+        for k in np.flatnonzero(cycles.found):
+            start = _point(stages, places, cycles, int(k))
+            if not any(_passes(branch, start) for branch in branches):
+                branch = tracer.branch(start)
+                branches.append(branch)
+                special.append(tuple(special_points(tracer, branch)))
+    return Diagram(space, tuple(branches), tuple(special), places, families[0])
+
+
+def _point(stages: Ensemble, places: np.ndarray, cycles: Cycles, k: int) -> Point:
+    number = np.array([k])
+    return Point.of(stages.take(number), float(places[k]), cycles.take(number))
+
+
+def _passes(branch: Branch, point: Point) -> bool:
+    """Whether a branch passes through a cycle, or through its mirror image."""
+    if branch.sign != point.cycle.sign:
+        return False
+    path = np.array([each.vector for each in branch.points])
+    for first, second in zip(path[:-1], path[1:], strict=True):
+        low, high = sorted((first[0], second[0]))
+        if low <= point.place <= high:
+            share = (point.place - first[0]) / (second[0] - first[0]) if high > low else 0.0
+            between = first + share * (second - first)
+            if np.abs(between - point.vector)[1:].max() < SAME or abs(between[2] - point.time) < SAME / 4:
+                return True
+    return False

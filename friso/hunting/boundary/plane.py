@@ -1,0 +1,137 @@
+"""The edges of hunting in the plane of two keys: all curves, found from a grid of cycles."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from friso.hunting.boundary.branch import Point, Tracer
+from friso.hunting.boundary.curve import Curve, CurveTracer, Spot
+from friso.hunting.boundary.locate import Found, changes, located
+from friso.hunting.boundary.space import Space
+from friso.hunting.cycle.ensemble import Ensemble
+from friso.hunting.cycle.find import (
+    NOT_CLOSED,
+    ROUGH,
+    RTOL,
+    Cycles,
+    asymmetric_cycles,
+    symmetric_cycles,
+    whole_cycles,
+)
+from friso.hunting.cycle.return_map import return_map
+
+NODES = 13
+"""Stages along either side of the grid from which curves are looked for."""
+
+SAME = 0.2
+"""Distance of a curve from the way between two stages, as a share of it, at which their change is that of the curve."""
+
+
+@dataclass(frozen=True)
+class Plane:
+    """What was found in the box of two keys: the curves; the hunting cycles on those nodes of a grid, numbered in C
+    order with the first key along the first side, that are `allowed`; and where a change was seen that no curve could
+    be begun at, each shape (2,)."""
+
+    space: Space
+    curves: tuple[Curve, ...]
+    nodes: int
+    allowed: np.ndarray
+    cycles: Cycles
+    lost: tuple[np.ndarray, ...]
+
+
+def plane(space: Space, rtol: float = RTOL, nodes: int = NODES) -> Plane:
+    """All curves on which the hunting cycle stops attracting, and those on which an asymmetric cycle that bounds its
+    basin appears."""
+    corners = np.linspace(0, 1, nodes)
+    points = np.stack([axis.ravel() for axis in np.meshgrid(corners, corners, indexing="ij")], axis=1)
+    allowed = np.flatnonzero(space.allowed(points))
+    curves: list[Curve] = []
+    lost: list[np.ndarray] = []
+    hunting, searches = _searches(space.stages(points[allowed]), rtol)
+    for cycles, inside, outside in searches:
+        own: list[Curve] = []
+        for a, b in _changes(_on_grid(allowed[inside], nodes), _on_grid(allowed[outside], nodes)):
+            if any(_crossed(curve, points[a], points[b]) for curve in own):
+                continue
+            cycle = cycles.take(np.flatnonzero(allowed == a))
+            curve = _curve(space, points[a], points[b], cycle, rtol)
+            if curve:
+                own.append(curve)
+            else:
+                lost.append((points[a] + points[b]) / 2)
+        curves += own
+    return Plane(space, tuple(curves), nodes, allowed, hunting, tuple(lost))
+
+
+def _searches(stages: Ensemble, rtol: float) -> tuple[Cycles, list[tuple[Cycles, np.ndarray, np.ndarray]]]:
+    """The hunting cycles of stages, and what to look for: cycles, the numbers of the stages on one side of a curve, and
+    of those on the other. A stage whose cycle could not be closed is on neither."""
+    taken = return_map(stages, ROUGH)
+    symmetric = bool(stages.symmetric.all())
+    if symmetric:
+        hunting = symmetric_cycles(stages, rtol, taken)
+    else:
+        hunting = whole_cycles(stages, rtol, (taken, return_map(stages, ROUGH, -1.0)))
+    known = hunting.reasons != NOT_CLOSED
+    searches = [(hunting, np.flatnonzero(hunting.attracting), np.flatnonzero(known & ~hunting.attracting))]
+    if symmetric:
+        pairs = asymmetric_cycles(stages, taken, rtol)
+        beside = hunting.attracting & (pairs.reasons != NOT_CLOSED)
+        searches.append((pairs, np.flatnonzero(beside & pairs.found), np.flatnonzero(beside & ~pairs.found)))
+    return hunting, searches
+
+
+def _on_grid(numbers: np.ndarray, nodes: int) -> np.ndarray:
+    """Which nodes of the grid have these numbers, shape (nodes, nodes)."""
+    grid = np.zeros(nodes * nodes, bool)
+    grid[numbers] = True
+    return grid.reshape(nodes, nodes)
+
+
+def _changes(inside: np.ndarray, outside: np.ndarray) -> Iterator[tuple[int, int]]:
+    """Neighbours on the grid, by number, of which the first is inside and the second outside."""
+    numbers = np.arange(inside.size).reshape(inside.shape)
+    pairs = [(numbers[:-1], numbers[1:]), (numbers[:, :-1], numbers[:, 1:])]
+    for one, other in [*pairs, *(pair[::-1] for pair in pairs)]:
+        changed = inside.flat[one] & outside.flat[other]
+        yield from zip(one[changed].tolist(), other[changed].tolist(), strict=True)
+
+
+def _crossed(curve: Curve, start: np.ndarray, end: np.ndarray) -> bool:
+    """Whether a curve passes by the way between two neighbours."""
+    points = curve.points
+    legs = points[1:] - points[:-1]
+    way = start + np.linspace(0, 1, 9)[:, None] * (end - start)
+    for at in way:
+        shares = np.clip(((at - points[:-1]) * legs).sum(axis=1) / (legs**2).sum(axis=1), 0, 1)
+        away = np.linalg.norm(points[:-1] + shares[:, None] * legs - at, axis=1)
+        if away.min() < SAME * np.linalg.norm(end - start):
+            return True
+    return False
+
+
+def _curve(space: Space, start: np.ndarray, end: np.ndarray, cycle: Cycles, rtol: float) -> Curve | None:
+    """The curve that crosses the way from a stage with a cycle to a neighbour; None if it cannot be begun."""
+    mesh = float(np.linalg.norm(end - start))
+    across = (end - start) / mesh
+    tracer = Tracer(space.lines(start[None], across[None]), cycle.sign, rtol, farthest=mesh)
+    found = _first(tracer, Point.of(space.stages(start[None]), 0.0, cycle))
+    if found is None:
+        return None
+    spot = Spot(start + found.point.place * across, found, across)
+    return CurveTracer(space, found.kind, cycle.sign, rtol).curve(spot)
+
+
+def _first(tracer: Tracer, start: Point) -> Found | None:
+    """The first point on the branch that leaves the start ahead at which its cycle stops attracting or folds back."""
+    points, _ = tracer.walk(start, 1.0)
+    for pair in zip([start, *points[:-1]], points, strict=True):
+        kinds = changes(*pair)
+        if kinds:
+            return located(tracer, *pair, "fold" if "fold" in kinds else kinds[0])
+    return None
