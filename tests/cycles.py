@@ -1,6 +1,7 @@
 """Turning points of a run, and the return map of a hunting cycle."""
 
 import numpy as np
+from variants import gains, limit, lugre, release, stage
 
 from friso.engine.arrays import Status
 from friso.engine.batch import Options, run_chunks
@@ -38,3 +39,16 @@ def return_map(heights: np.ndarray, near: float = 0.03) -> tuple[float, float]:
     assert np.count_nonzero(use) >= 5
     slope, offset = np.polyfit(heights[:-1][use], heights[1:][use], 1)
     return float(offset / (1 - slope)), float(slope)
+
+
+def by_gains(crossover: float, force_limit: str) -> Stage:
+    """The rigid mass of 1.7 kg, its tuned controller (alpha 0.1, beta 2) written as gains, with a force limit.
+
+    k_p ((1 + tau_z/tau_i) + 1/(tau_i s) + tau_z s)/(tau_p s + 1) = kp + ki/s + kd s/(tau s + 1).
+    """
+    omega, root, beta = 2 * np.pi * crossover, np.sqrt(1 / 0.1), 2
+    tau_z, tau_p, k_p = root / omega, 1 / (omega * root), 1.7 * omega**2 / root
+    tau_i = beta * tau_z
+    kp = k_p * (1 + tau_z / tau_i - tau_p / tau_i)
+    numbers = map(float, (kp, k_p / tau_i, k_p * tau_z - kp * tau_p, tau_p))
+    return stage(release(), friction=lugre(2), controller=gains(*numbers, extra=limit(force_limit)))

@@ -103,10 +103,44 @@ def test_a_stage_stuck_off_its_reference_does_not_hunt(rtol: float, displacement
     assert case.settling_time[1e-5] is None
 
 
-def test_a_run_too_short_for_the_peak_count_is_not_called_settled(rig: Stage) -> None:
+def test_a_run_too_short_for_the_peak_count_hunts_all_the_same(rig: Stage) -> None:
+    """The cycle attracts, and the move ends in it, however short the run."""
     case = friso.check(rig.replace({"motion.duration": "9.9 s"}))["locked"]
-    assert case.peak_to_peak > 1e-3
-    assert case.verdict == "transient"
+    assert (case.verdict, case.peaks) == ("hunts", 0)
+
+
+def test_the_edge_of_hunting_of_the_thesis_rig(rig: Stage) -> None:
+    """references.md, section 2: the locked rig's multiplier passes -1 near 9.7 Hz."""
+    cases = friso.check(rig)
+    locked, free = cases["locked"].judgement, cases["free"].judgement
+    assert locked.margin is not None
+    assert free.margin is not None
+    assert locked.margin.crossover == pytest.approx(9.75, rel=2e-3)
+    assert free.margin.crossover == pytest.approx(5.60, rel=5e-3)
+    assert locked.displacement is not None
+    assert locked.displacement.smallest == pytest.approx(1.72e-3, rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ("crossover", "joint", "verdict", "attracts"),
+    [
+        ("10 Hz", "locked", "transient", False),
+        ("12 Hz", "locked", "settles", False),
+        ("5 Hz", "free", "bistable", True),
+    ],
+)
+def test_verdicts_by_the_cycle(rig: Stage, crossover: str, joint: str, verdict: str, attracts: bool) -> None:
+    """Just above the edge a move still swings for minutes; below that of the free rig it takes a kick to hunt."""
+    case = friso.check(rig.replace({"controller.crossover": crossover}))[joint]
+    assert case.verdict == verdict
+    assert case.judgement.cycle is not None
+    assert case.judgement.cycle.attracts == attracts
+
+
+def test_without_integral_action_there_is_a_reason() -> None:
+    case = friso.check(friso.load(EXAMPLES / "lugre_stick_slip.toml"))["given"]
+    assert (case.verdict, case.judgement.cycle) == ("transient", None)
+    assert "no integral action" in case.judgement.hunting.reason
 
 
 @pytest.mark.parametrize("share", [0.99, 0.999, 0.9999])

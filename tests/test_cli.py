@@ -27,7 +27,11 @@ def run(*arguments: object, cwd: Path | None = None) -> subprocess.CompletedProc
 def test_check_prints_the_verdict() -> None:
     done = run("check", RIG)
     assert done.returncode == 0
-    assert "Locked: hunts, 1.05 mm peak to peak every 1.6" in done.stdout
+    said = " ".join(done.stdout.split())
+    remedy = "Raise the crossover by 1.75 Hz (to 9.75 Hz) or free the joint."
+    assert f"Locked: hunts, ±0.52 mm every 1.63 s. {remedy}" in said
+    assert "Free (as given): settles to within 1 µm in 3." in said
+    assert "Hunting is possible below 5.60 Hz." in said
     assert "The free joint stops the hunting." in done.stdout
 
 
@@ -36,10 +40,29 @@ def test_check_json_is_one_document_with_the_agreed_keys() -> None:
     assert document["stage"] == "Thesis rig"
     locked = document["cases"]["locked"]
     agreed = {"verdict", "peaks", "peak_to_peak_m", "period_s", "settling_time_s", "cycle", "solver"}
-    assert agreed <= locked.keys()
+    known = {"cycles", "reason", "settled_after_s", "margin", "kick", "moves", "observed"}
+    assert agreed | known <= locked.keys()
     assert locked["solver"].keys() == {"status", "steps", "rejected", "rtol"}
-    assert (locked["verdict"], locked["peaks"], locked["cycle"]) == ("hunts", 6, None)
+    assert (locked["verdict"], locked["peaks"], locked["cycles"], locked["reason"]) == ("hunts", 6, 1, None)
     assert document["cases"]["given"] == document["cases"]["free"]
+
+
+def test_check_json_has_the_cycle_and_what_starts_it() -> None:
+    cases = json.loads(run("check", RIG, "--json").stdout)["cases"]
+    locked, free = cases["locked"], cases["free"]
+    cycle = locked["cycle"]
+    assert (cycle["symmetric"], cycle["attracts"], locked["observed"]) == (True, True, False)
+    expected = {"amplitude_m": 0.520e-3, "period_s": 1.6277, "multiplier": -0.9312, "growth": -0.9312, "slope": -0.9312}
+    assert {key: cycle[key] for key in expected} == pytest.approx(expected, rel=1e-3)
+    assert cycle["residual"] < 1e-6
+    assert cycle["time_constant_s"] == pytest.approx(11.42, rel=0.01)
+    assert locked["margin"] == pytest.approx({"factor": 1.2187, "crossover_hz": 9.75}, rel=2e-3)
+    assert [len(window) for window in locked["kick"]["displacement_m"]] == [2, 2, 2]
+    assert locked["kick"]["velocity_m_per_s"][0][0] == pytest.approx(0.0231, rel=0.02)
+    assert locked["moves"] == {"drawn": 128, "hunting": pytest.approx(111, abs=2)}
+    assert (free["cycle"], free["cycles"], free["kick"], free["moves"]) == (None, 0, None, None)
+    assert free["reason"] == "from no distance does the stage swing back as far as it came from"
+    assert free["settled_after_s"] == free["settling_time_10um_s"]
 
 
 def test_set_overrides_any_key() -> None:

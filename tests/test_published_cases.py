@@ -131,8 +131,11 @@ def test_release_that_starts_hunting(crossover: float, dies: float, hunts: float
 
     references.md has 0.29 and 1.8 mm; SciPy Radau on the equations of plain.py hunts from 0.25 mm but not from 0.24 mm.
     """
-    assert swings(released(crossover, dies), rtol=1e-8)[1][-1] < 1e-9
-    assert swings(released(crossover, hunts), rtol=1e-8)[1][-1] > 0.4e-3
+    times, heights = swings(released(crossover, dies), rtol=1e-8)
+    assert np.all(heights[times > 50] < 1e-9)  # none, or of rounding
+    times, heights = swings(released(crossover, hunts), rtol=1e-8)
+    assert np.all(heights[times > 50] > 0.4e-3)
+    assert times[-1] > 95
 
 
 @FREE_RIG

@@ -21,13 +21,16 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from pages import Page
 
+from friso.hunting import Cycle, Hunting, Judgement, Kick, Margin, Moves
+from friso.hunting.cycle.return_map import ReturnMap
 from friso.version import VERSION
 from friso.views import matplotlib_renderer, plotly_renderer
 from friso.views.cases import COLOURS, Shown, shown_cases
 from friso.views.check_figures import check_figures, response_figure
+from friso.views.check_table import rows
 from friso.views.drawable import drawable
 from friso.views.figure import Axis, Figure, Limit, Map, Markers, Panel, Series
-from friso.views.prefixes import choose, pretty, with_unit
+from friso.views.prefixes import choose, plus_minus, pretty, range_with_unit, with_unit
 from friso.views.report import conclusion, report_html, verdict_sentence, write_report
 from friso.views.thinning import BUCKETS, KEPT, thin
 
@@ -47,8 +50,50 @@ UNITS = {
 }
 
 
+NO_RETURN = "from no distance does the stage swing back as far as it came from"
+
+
 def fake_solver(status: str) -> Any:
     return SimpleNamespace(status=status, steps=4321, rejected=321, rtol=1e-6)
+
+
+def fake_cycle(symmetric: bool = True, multiplier: float = -0.9312, apart: float = 0.0) -> Cycle:
+    """A cycle of a stage that turns at 0.52 mm, `apart` [m] farther out on one side than on the other."""
+    time = np.linspace(0, 1.6277, 401)
+    position = 5.2e-4 * np.tanh(8 * np.cos(2 * np.pi * time / 1.6277)) + apart / 2
+    arrays = {"position": position, "cart_position": 0.9 * position, "velocity": np.gradient(position, time)}
+    variables = {name: ("time", array) for name, array in (arrays | {"force": 3 * np.sin(time)}).items()}
+    trace = xr.Dataset(variables, coords={"time": time})
+    return Cycle(symmetric, 5.2e-4, 1.6277, multiplier, np.array([multiplier]), -0.93, -0.9311, 1e-12, trace)
+
+
+def fake_hunting(*cycles: Cycle, reason: str = "", certain: bool = True) -> Hunting:
+    distances = np.geomspace(5e-5, 4e-3, 32)[None, :]
+    returns = np.where(distances > 2e-4, 1e-3 - 0.93 * distances, 0.0)
+    return Hunting(cycles, reason, certain, ReturnMap(distances, returns, np.ones((1, 32))))
+
+
+def hunts(**changes: Any) -> Judgement:
+    """What is known of the thesis rig, locked."""
+    found = Judgement(
+        "hunts",
+        fake_hunting(fake_cycle()),
+        Kick(((1.72e-3, 10.8e-3), (22.7e-3, 43.3e-3), (59.3e-3, 0.156)), (1.73e-5, 0.156)),
+        Kick(((0.0231, 0.0734),), (5e-4, 4.4)),
+        Moves(128, 111, (10.0, 200.0), (0.003, 0.06)),
+        Margin(1.2187, 9.7496),
+    )
+    return replace(found, **changes)
+
+
+def settles(**changes: Any) -> Judgement:
+    """What is known of it, free."""
+    found = Judgement("settles", fake_hunting(reason=NO_RETURN), margin=Margin(0.6998, 5.598), settled_after=0.5123)
+    return replace(found, **changes)
+
+
+def cannot_hunt(verdict: Any = "settles") -> Judgement:
+    return Judgement(verdict, Hunting((), "there is no friction to stick to", True, None))
 
 
 @dataclass(frozen=True)
@@ -57,7 +102,7 @@ class FakeCase:
 
     stage: Any
     trace: xr.Dataset | None
-    verdict: str = "settles"
+    judgement: Judgement = field(default_factory=settles)
     peaks: int = 0
     peak_times: np.ndarray = field(default_factory=lambda: np.empty(0))
     peak_heights: np.ndarray = field(default_factory=lambda: np.empty(0))
@@ -67,6 +112,10 @@ class FakeCase:
     largest_force: float = 179.4
     solver: Any = field(default_factory=lambda: fake_solver("done"))
 
+    @property
+    def verdict(self) -> str:
+        return self.judgement.verdict
+
 
 def fake_stage(name: str = "Thesis rig", locked: bool | None = None, force_limit: float | None = None) -> Any:
     joint = None if locked is None else SimpleNamespace(locked=locked, stroke=1e-3)
@@ -74,7 +123,8 @@ def fake_stage(name: str = "Thesis rig", locked: bool | None = None, force_limit
         name=name,
         source="made up",
         joint=joint,
-        controller=SimpleNamespace(force_limit=force_limit),
+        controller=SimpleNamespace(force_limit=force_limit, kp=3.0, ki=4.0, kd=6.0, tau=0.0),
+        flat=lambda: {"motion.kind": "hold"},
         to_toml=lambda: f"name = {json.dumps(name)}\n",
     )
 
@@ -113,6 +163,9 @@ def fake_trace(
         "friction_force": np.tanh(1e3 * velocity),
     }
     variables = {name: ("time", np.asarray(array, float), {"units": UNITS[name]}) for name, array in values.items()}
+    turns = np.arange(0.4, duration, 0.815)
+    variables["turning_time"] = ("turning_point", turns, {"units": "s"})
+    variables["turning_deviation"] = ("turning_point", 5.2e-4 * (-0.9) ** np.arange(len(turns)), {"units": "m"})
     return xr.Dataset(variables, coords={"time": ("time", time, {"units": "s"})}, attrs={"name": "Thesis rig"})
 
 
@@ -124,7 +177,7 @@ def fake_case(hunting: bool = False, stage: Any = None, kind: str = "there_and_b
     times = 10.2 + 1.63 * np.arange(6)
     return replace(
         case,
-        verdict="hunts",
+        judgement=hunts(),
         peaks=6,
         peak_times=times,
         peak_heights=np.full(6, 5.2e-4),
@@ -213,6 +266,10 @@ def test_values_in_sentences():
     assert with_unit(1234.5, "s") == "1234 s"
     assert with_unit(1e-15, "m") == "1.00e-06 nm"
     assert pretty("m/s**2") == "m/s²"
+    assert with_unit(0.0496, "Hz") == "0.0496 Hz"
+    assert plus_minus(0.52e-3, "m") == "±0.52 mm"
+    assert plus_minus(0.345e-3, "m") == "±345 µm"
+    assert range_with_unit(0.233e-3, 2.07e-3, "m") == "0.233 to 2.07 mm"
 
 
 # ---------------------------------------------------------------- thinning
@@ -392,9 +449,13 @@ def test_files_are_the_same_bytes_in_every_process(request, tmp_path):
 # ---------------------------------------------------------------- figures of a check
 
 
+def figure_of(name: str, cases: dict[str, Any]) -> Figure:
+    return next(figure for figure in check_figures(cases) if figure.name == name)
+
+
 def test_figures_of_a_stage_with_a_joint():
     figures = {figure.name: figure for figure in check_figures(both_joints())}
-    assert list(figures) == ["settled", "overview", "shares", "joint", "friction"]
+    assert list(figures) == ["settled", "return-map", "cycle", "overview", "shares", "joint", "friction"]
     zoom, settling = figures["settled"].panels
     assert zoom.x.limits == (10.0, 20.0)
     assert [line.label for line in zoom.series] == ["Locked", "Free (as given)"]
@@ -431,7 +492,8 @@ def test_given_is_shown_once_beside_its_twin():
 def test_every_motion_gives_figures_that_can_be_drawn(kind, hunting):
     case = fake_case(hunting, kind=kind, drop=["joint_deflection"])
     figures = check_figures({"given": case})
-    assert [figure.name for figure in figures] == ["settled", "overview", "shares", "friction"]
+    cycle = ["cycle"] if hunting else []
+    assert [figure.name for figure in figures] == ["settled", "return-map", *cycle, "overview", "shares", "friction"]
     for figure in figures:
         assert matplotlib_renderer.image(figure, "png").startswith(b"\x89PNG")
         assert same(mpl_arrays(figure), plotly_arrays(figure))
@@ -439,26 +501,25 @@ def test_every_motion_gives_figures_that_can_be_drawn(kind, hunting):
 
 def test_what_a_stage_lacks_has_no_panel():
     bare = ["friction_force", "force_p", "force_i", "force_d", "joint_deflection"]
-    figures = check_figures({"given": fake_case(drop=bare)})
-    assert [figure.name for figure in figures] == ["settled", "overview"]
-    assert "The friction" not in report_html({"given": fake_case(drop=bare)})
+    case = replace(fake_case(drop=bare), judgement=cannot_hunt())
+    assert [figure.name for figure in check_figures({"given": case})] == ["settled", "overview"]
+    assert "The friction" not in report_html({"given": case})
 
 
 def test_a_share_that_is_always_zero_is_left_out():
     case = fake_case(hunting=True)
     assert case.trace is not None
     case.trace["force_i"][:] = 0.0
-    shares = {figure.name: figure for figure in check_figures({"given": case})}["shares"]
-    assert [line.label for line in shares.panels[0].series] == ["P", "D", "total"]
+    assert [line.label for line in figure_of("shares", {"given": case}).panels[0].series] == ["P", "D", "total"]
 
 
 def test_a_force_limit_is_drawn_where_it_is_near():
     near, far = (fake_case(hunting=True, stage=fake_stage(force_limit=bound)) for bound in (6.0, 200.0))
-    panel = check_figures({"given": near})[1].panels[1]
+    panel = figure_of("overview", {"given": near}).panels[1]
     assert panel.limits[0].values == (-6.0, 6.0)
     assert panel.y.limits is not None
     assert panel.y.limits[1] > 6.0
-    assert check_figures({"given": far})[1].panels[1].limits == ()
+    assert figure_of("overview", {"given": far}).panels[1].limits == ()
 
 
 def test_a_cart_that_rests_is_a_point():
@@ -489,13 +550,54 @@ def test_nan_of_a_failed_run_breaks_nothing(start):
     for name in case.trace.data_vars:
         case.trace[name][start:] = np.nan if name != "force" else np.inf
     solver = fake_solver("step size underflow: use a looser rtol")
-    failed = replace(case, verdict="failed", solver=solver, peak_to_peak=float("nan"), period=float("nan"))
+    numbers = {"peak_to_peak": float("nan"), "period": float("nan")}
+    failed = replace(case, judgement=hunts(verdict="failed"), solver=solver, **numbers)
     cases = {"given": failed, "locked": failed, "free": fake_case(stage=fake_stage(locked=False))}
     for figure in check_figures(cases):
         assert same(mpl_arrays(figure), plotly_arrays(figure))
     page = report_html(cases)
     assert "step size underflow: use a looser rtol" in page
     assert "NaN" not in re.sub(r"<script.*?</script>", "", page, flags=re.DOTALL)
+
+
+def test_return_map_with_the_swings_of_this_motion():
+    locked, free = figure_of("return-map", both_joints()).panels
+    assert locked.x.limits == locked.y.limits == pytest.approx((0.0, 2.2 * 5.2e-4))
+    diagonal, curve, motion = locked.series
+    assert np.array_equal(diagonal.x, diagonal.y)
+    assert np.isnan(curve.y[curve.x < 2e-4]).all()
+    assert np.isfinite(curve.y[(curve.x > 2e-4) & (curve.x < 1e-3)]).all()
+    assert motion.x[:4] == pytest.approx(5.2e-4 * 0.9 ** np.array([0, 1, 1, 2]))
+    assert motion.y[:4] == pytest.approx(5.2e-4 * 0.9 ** np.array([1, 1, 2, 2]))
+    (cycle,) = locked.markers
+    assert (cycle.label, *cycle.x, *cycle.y) == ("attracts", *[pytest.approx(5.2e-4)] * 4)
+    assert free.markers == ()
+    assert f"Free (as given): no cycle, as {NO_RETURN}." in figure_of("return-map", both_joints()).caption
+
+
+def test_ringing_does_not_count_as_a_swing():
+    case = fake_case(hunting=True)
+    assert case.trace is not None
+    ringing = np.array([4e-4, 4.2e-4, -1e-4, -3e-4, -2e-4, 1e-4])
+    turns = {"turning_time": ("turning_point", np.arange(6.0) + 1), "turning_deviation": ("turning_point", ringing)}
+    case = replace(case, trace=case.trace.drop_vars(list(turns)).assign(turns))
+    motion = figure_of("return-map", {"given": case}).panels[0].series[2]
+    assert motion.x == pytest.approx([4.2e-4, 3e-4, 3e-4, 1e-4])
+    assert motion.y == pytest.approx([3e-4, 3e-4, 1e-4, 1e-4])
+
+
+def test_cycles_that_attract_are_solid_and_others_dashed():
+    both = fake_hunting(fake_cycle(), fake_cycle(symmetric=False, multiplier=1.02, apart=1e-4))
+    cases = {"given": replace(fake_case(hunting=True), judgement=hunts(hunting=both))}
+    attracts, repels = figure_of("return-map", cases).panels[0].markers
+    assert (attracts.label, attracts.symbol, repels.label, repels.symbol) == ("attracts", "target", "repels", "cross")
+    assert sorted(repels.x) == pytest.approx([4.7e-4, 5.7e-4])
+    position, force, loop = figure_of("cycle", cases).panels
+    assert [line.label for line in position.series] == ["attracts", "cart", "repels", "cart"]
+    assert [line.dash for line in position.series] == ["solid", "solid", "dashed", "dashed"]
+    assert [line.dash for line in force.series] == [line.dash for line in loop.series] == ["solid", "dashed"]
+    for name in ("return-map", "cycle"):
+        assert same(mpl_arrays(figure_of(name, cases)), plotly_arrays(figure_of(name, cases)))
 
 
 def test_response_of_one_run():
@@ -520,8 +622,8 @@ def page() -> str:
 
 def test_report_says_the_verdict_first(page):
     text = " ".join(" ".join(Page(page).words).split())
-    locked = text.index("Locked: hunts, 1.04 mm peak to peak every 1.63 s (6 peaks counted).")
-    free = text.index("Free (as given): settles to within 1 µm in 823 ms.")
+    locked = text.index("Locked: hunts, ±0.52 mm every 1.63 s. Raise the crossover by 1.75 Hz (to 9.75 Hz) or free the")
+    free = text.index("Free (as given): settles to within 1 µm in 823 ms. Hunting is possible below 5.60 Hz.")
     assert locked < free < text.index("Counted peaks") < text.index("Does it hunt?") < text.index("The stage file")
     assert "The free joint stops the hunting." in text
     assert f"friso {VERSION}, relative tolerance 1e-06" in text
@@ -532,7 +634,7 @@ def test_report_opens_offline_and_holds_plotly_once(page):
     parsed = Page(page)
     assert all(address.startswith("data:image/svg+xml;base64,") for address in parsed.loads)
     assert page.count(plotly_renderer.script()) == 1
-    assert page.count("Plotly.newPlot(") - plotly_renderer.script().count("Plotly.newPlot(") == 5
+    assert page.count("Plotly.newPlot(") - plotly_renderer.script().count("Plotly.newPlot(") == 7
     assert "default-src 'none'" in page
     own = page.replace(plotly_renderer.script(), "")
     assert not re.findall(r"https?://[^\"'<> ]*", own)
@@ -541,7 +643,7 @@ def test_report_opens_offline_and_holds_plotly_once(page):
 
 def test_report_holds_a_print_of_every_figure(page):
     prints = [address for address in Page(page).loads if address.startswith("data:image/svg+xml")]
-    assert len(prints) == 5
+    assert len(prints) == 7
     for address in prints:
         assert b"<svg" in base64.b64decode(address.split(",", 1)[1])
 
@@ -568,30 +670,159 @@ def test_report_is_written_as_utf8(tmp_path):
     assert "Führung µ" in path.read_bytes().decode("utf-8")
 
 
-def sentence(**changes: Any) -> str:
-    return verdict_sentence(Shown("given", "As given", "#000000", replace(fake_case(), **changes)))
+def sentence(judgement: Judgement, cases: Any = None, locked: bool | None = None, **changes: Any) -> str:
+    case = replace(fake_case(stage=fake_stage(locked=locked)), judgement=judgement, **changes)
+    return verdict_sentence(Shown("given", "As given", "#000000", case), cases or {"given": case})
 
 
-def test_verdict_sentences():
-    assert sentence() == "settles to within 1 µm in 823 ms."
-    only_coarse = {1e-6: None, 1e-5: 1.5}
-    assert sentence(settling_time=only_coarse) == "settles to within 10 µm in 1.50 s, but does not stay within 1 µm."
-    never = {1e-6: None, 1e-5: None}
-    assert "does not stay within 10 µm (70.0 µm peak to peak" in sentence(settling_time=never, peak_to_peak=7e-5)
-    assert sentence(verdict="hunts", peak_to_peak=1e-3, period=None) == "hunts, 1.00 mm peak to peak."
-    assert "another move" in sentence(verdict="bistable")
-    assert "not settled" in sentence(verdict="transient")
-    assert sentence(verdict="failed") == "failed (solver: done)."
+NEVER = {1e-6: None, 1e-5: None}
+
+
+def test_a_stage_that_hunts_gets_a_remedy():
+    assert sentence(hunts()) == "hunts, ±0.52 mm every 1.63 s. Raise the crossover by 1.75 Hz (to 9.75 Hz)."
+    free = {"free": replace(fake_case(), judgement=settles())}
+    assert sentence(hunts(), free, locked=True).endswith("by 1.75 Hz (to 9.75 Hz) or free the joint.")
+    assert "joint" not in sentence(hunts(), free, locked=False)
+    for known in (hunts(verdict="bistable"), settles(hunting=fake_hunting(certain=False)), settles(verdict="failed")):
+        assert "joint" not in sentence(hunts(), {"free": replace(fake_case(), judgement=known)}, locked=True)
+    none = sentence(hunts(margin=None), free, locked=True)
+    assert none.endswith("s. No bandwidth up to 10 times this one was found to stop it. Free the joint.")
+
+
+def test_a_controller_by_its_gains_is_made_faster():
+    gains = "kp × 1.49, ki × 1.82, kd × 1.22"
+    assert sentence(hunts(margin=Margin(1.22, None))).endswith(f"Make the controller 1.22 times faster ({gains}).")
+    slower = sentence(settles(margin=Margin(0.5, None)))
+    assert slower.endswith("Hunting is possible with a controller more than 2 times slower.")
+
+
+def test_a_bistable_stage_is_told_what_starts_its_hunting():
+    starts = "a displacement of 1.72 mm, a push of 23.1 mm/s or 87 % of the moves tried"
+    text = sentence(hunts(verdict="bistable"))
+    assert text.startswith(f"settles after this move, but {starts} (like this one, 0.1 to 2 times its acceleration")
+    assert "can start hunting, ±0.52 mm every 1.63 s. Raise the crossover by 1.75 Hz" in text
+    none = hunts(verdict="bistable", displacement=Kick((), (1e-5, 0.1)), push=Kick((), (1e-3, 4.0)), moves=None)
+    assert "none of the kicks and moves tried starts hunting (±0.52 mm every 1.63 s)" in sentence(none)
+
+
+def test_a_transient_is_said_to_be_one():
+    repels = fake_hunting(fake_cycle(multiplier=-1.0112))
+    known = settles(verdict="transient", hunting=repels, settled_after=190.2, margin=Margin(0.975, 9.7496))
+    text = sentence(known, peak_to_peak=6.9e-4, period=1.33)
+    assert text == (
+        "transient, as no cycle attracts, but this motion has not settled at its end (still 690 µm peak to peak every "
+        "1.33 s). Transients change slowly, by the factor e in 73.1 s. It settles to within 10 µm in 190 s. Hunting is "
+        "possible below 9.75 Hz."
+    )
+    long = sentence(settles(verdict="transient", settled_after=None), peak_to_peak=1e-7)
+    assert "(at rest, but off its reference). It does not settle to within 10 µm in 1000 s either." in long
+    assert sentence(cannot_hunt("transient"), peak_to_peak=0.383, period=6.36) == (
+        "cannot hunt, as there is no friction to stick to; but this motion has not settled at its end "
+        "(still 383 mm peak to peak every 6.36 s)."
+    )
+
+
+def test_a_stage_that_settles_is_told_where_hunting_begins():
+    assert sentence(settles()) == "settles to within 1 µm in 823 ms. Hunting is possible below 5.60 Hz."
+    assert sentence(settles(margin=None)).endswith("ms. No hunting was found down to 1/10 of this bandwidth.")
+    assert sentence(cannot_hunt()).endswith("ms. It cannot hunt, as there is no friction to stick to.")
+    coarse = sentence(settles(), settling_time={1e-6: None, 1e-5: 1.5})
+    assert coarse.startswith("settles to within 10 µm in 1.50 s, but does not stay within 1 µm.")
+    swings = sentence(settles(), settling_time=NEVER, peak_to_peak=7e-5)
+    assert swings.startswith("settles, but not to within 10 µm (still 70.0 µm peak to peak).")
+
+
+def test_what_is_not_certain_is_said():
+    text = sentence(settles(hunting=fake_hunting(reason="no orbit could be closed", certain=False)))
+    assert "This is not certain: no orbit could be closed; other motions may hunt." in text
+    seen = hunts(hunting=fake_hunting(reason=NO_RETURN), margin=None, observed=True)
+    text = sentence(seen, peak_to_peak=1.04e-3, period=1.63)
+    assert text.startswith(f"hunts, 1.04 mm peak to peak every 1.63 s. No cycle could be computed ({NO_RETURN});")
+    assert text.endswith("the verdict is that of a long simulation.")
+    assert sentence(settles(verdict="failed")) == "failed (solver: done)."
+
+
+def row(name: str, judgement: Judgement, **changes: Any) -> str | None:
+    item = Shown("given", "As given", "#000000", replace(fake_case(), judgement=judgement, **changes))
+    return dict(rows((item,))).get(name, [None])[0]
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("Hunting cycle, amplitude", "±0.52 mm"),
+        ("Hunting cycle, period", "1.628 s"),
+        ("Hunting multiplier", "-0.9312 (simulated: -0.9311)"),
+        ("Multiplier taken over", "half a period (Floquet)"),
+        ("Other hunting cycles", None),
+        ("Time constant of transients", "11.4 s"),
+        ("Edge of hunting", "9.75 Hz"),
+        ("Displacements that hunt", "1.72 to 10.8 mm, 22.7 to 43.3 mm, from 59.3 mm on"),
+        ("Pushes that hunt", "23.1 to 73.4 mm/s"),
+        ("Moves that end in hunting", "87 % (80 to 92 %) of 128 moves"),
+    ],
+)
+def test_rows_of_a_stage_that_hunts(name, text):
+    assert row(name, hunts()) == text
+    assert row(name, cannot_hunt()) is None
+
+
+def test_rows_of_other_cycles():
+    pair = fake_cycle(symmetric=False, multiplier=1.0105)
+    repels = fake_cycle(multiplier=-1.01)
+    assert row("Other hunting cycles", hunts(hunting=fake_hunting(fake_cycle(), pair))) == (
+        "asymmetric, ±0.52 mm, repels"
+    )
+    assert row("Hunting cycle, amplitude", settles(hunting=fake_hunting(repels))) == "±0.52 mm (repels)"
+    whole = hunts(hunting=fake_hunting(replace(pair, multiplier=-0.93, growth=np.nan)))
+    assert row("Multiplier taken over", whole) == "a whole period (slope of the returns)"
+    assert row("Hunting multiplier", whole) == "-0.9300"
+    assert row("Edge of hunting", hunts(margin=Margin(1.22, None))) == "1.22 × as fast"
+
+
+@pytest.mark.parametrize(
+    ("windows", "text"),
+    [
+        ((), "none from 0.0100 to 100 mm"),
+        (((1e-5, 0.1),), "all from 0.0100 to 100 mm"),
+        (((1e-5, 2e-3), (3e-3, 4e-3)), "up to 2.00 mm, 3.00 to 4.00 mm"),
+        ([(i * 1e-3, i * 1e-3 + 5e-4) for i in range(1, 8)], "1.00 to 1.50 mm, 2.00 to 2.50 mm, 3.00 to 3.50 mm, "),
+    ],
+)
+def test_windows_of_kicks(windows, text):
+    found = row("Displacements that hunt", hunts(displacement=Kick(tuple(windows), (1e-5, 0.1))))
+    assert found is not None
+    assert found.startswith(text)
+    assert found.endswith("and 3 more ranges") == (len(windows) == 7)
+
+
+@pytest.mark.parametrize(
+    ("judgement", "peaks", "text"),
+    [
+        (hunts(), 6, "6"),
+        (hunts(), 0, "0 (only those after 10 s, above 100 µm, count)"),
+        (hunts(verdict="bistable"), 0, "0 (another motion hunts)"),
+        (settles(verdict="transient"), 8, "8 (a long transient)"),
+        (settles(), 0, "0"),
+    ],
+)
+def test_a_peak_count_that_contradicts_the_verdict_is_explained(judgement, peaks, text):
+    assert row("Counted peaks", judgement, peaks=peaks) == text
 
 
 def test_conclusion_names_what_the_joint_does():
     cases = both_joints()
-    hunts, settles = cases["locked"], cases["free"]
-    assert conclusion({"locked": hunts, "free": hunts}) == "The free joint does not stop the hunting."
-    assert conclusion({"locked": settles, "free": hunts}) == "The stage hunts only with its joint free."
-    assert conclusion({"locked": settles, "free": settles}) is None
-    assert conclusion({"given": hunts}) is None
-    assert conclusion({"locked": hunts, "free": replace(settles, verdict="failed")}) is None
+    hunting, settled = cases["locked"], cases["free"]
+    bistable, failed = (replace(settled, judgement=hunts(verdict=word)) for word in ("bistable", "failed"))
+    assert conclusion({"locked": hunting, "free": settled}) == "The free joint stops the hunting."
+    assert conclusion({"locked": hunting, "free": hunting}) == "The free joint does not stop the hunting."
+    assert conclusion({"locked": hunting, "free": bistable}) == (
+        "The free joint stops the hunting after this move, but does not rule it out."
+    )
+    assert conclusion({"locked": settled, "free": bistable}) == "The stage hunts only with its joint free."
+    assert conclusion({"locked": settled, "free": settled}) is None
+    assert conclusion({"given": hunting}) is None
+    assert conclusion({"locked": hunting, "free": failed}) is None
 
 
 def test_a_figure_file_opens_as_an_image(tmp_path):

@@ -20,7 +20,7 @@ from friso.cli.common import (
 from friso.stage import Stage
 
 if TYPE_CHECKING:
-    from friso.hunting import Case
+    from friso.hunting import Case, Cycle, Judgement
 
 
 def check(
@@ -59,6 +59,7 @@ def _check_document(stage: Stage, cases: dict[str, Case]) -> dict[str, Any]:
 
 def _case_document(case: Case) -> dict[str, Any]:
     into_1um, into_10um = case.settling_time.values()
+    known = case.judgement
     return {
         "verdict": case.verdict,
         "peaks": case.peaks,
@@ -67,7 +68,14 @@ def _case_document(case: Case) -> dict[str, Any]:
         "settling_time_s": into_1um,
         "settling_time_10um_s": into_10um,
         "largest_force_n": _finite(case.largest_force),
-        "cycle": None,
+        "cycle": _cycle_document(known.cycle) if known.cycle else None,
+        "cycles": len(known.hunting.cycles),
+        "reason": known.hunting.reason or None,
+        "settled_after_s": known.settled_after,
+        "margin": {"factor": known.margin.factor, "crossover_hz": known.margin.crossover} if known.margin else None,
+        "kick": _kick_document(known),
+        "moves": {"drawn": known.moves.drawn, "hunting": known.moves.hunting} if known.moves else None,
+        "observed": known.observed,
         "solver": {
             "status": case.solver.status,
             "steps": case.solver.steps,
@@ -75,6 +83,26 @@ def _case_document(case: Case) -> dict[str, Any]:
             "rtol": case.solver.rtol,
         },
     }
+
+
+def _cycle_document(cycle: Cycle) -> dict[str, Any]:
+    return {
+        "amplitude_m": cycle.amplitude,
+        "period_s": cycle.period,
+        "multiplier": cycle.multiplier,
+        "symmetric": cycle.symmetric,
+        "attracts": cycle.attracts,
+        "slope": _finite(cycle.slope),
+        "growth": _finite(cycle.growth),
+        "residual": cycle.residual,
+        "time_constant_s": _finite(cycle.time_constant),
+    }
+
+
+def _kick_document(known: Judgement) -> dict[str, Any] | None:
+    if known.displacement is None or known.push is None:
+        return None
+    return {"displacement_m": known.displacement.windows, "velocity_m_per_s": known.push.windows}
 
 
 def _finite(value: float) -> float | None:
@@ -87,7 +115,8 @@ def _print_cases(stage: Stage, cases: dict[str, Case]) -> None:
     from rich.table import Table
 
     from friso.views.cases import shown_cases
-    from friso.views.summary import conclusion, rows, verdict_sentence
+    from friso.views.check_table import rows
+    from friso.views.summary import conclusion, verdict_sentence
 
     shown = shown_cases(cases)
     console = Console(highlight=False, markup=False)
@@ -95,7 +124,7 @@ def _print_cases(stage: Stage, cases: dict[str, Case]) -> None:
     for label, texts in rows(shown):
         table.add_row(label, *texts)
     console.print(table)
-    for sentence in [f"{item.label}: {verdict_sentence(item)}" for item in shown]:
+    for sentence in [f"{item.label}: {verdict_sentence(item, cases)}" for item in shown]:
         console.print(sentence)
     if found := conclusion(cases):
         console.print(found)

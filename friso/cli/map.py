@@ -42,7 +42,9 @@ def map_cells(
     latin: Annotated[bool, typer.Option("--latin", help="Samples by a Latin hypercube.")] = False,
     log: Annotated[bool, typer.Option("--log", help="All ranges logarithmic; for one alone, :log behind it.")] = False,
     overrides: Overrides = None,
-    metric: Annotated[str, typer.Option(metavar="NAME", help="What colours the map.")] = "peaks",
+    metric: Annotated[
+        str, typer.Option(metavar="NAME", help="What colours the map; of the cycle: multiplier, amplitude, period.")
+    ] = "peaks",
     rtol: Annotated[
         str | None,
         typer.Option(metavar="NUMBER|auto", help="Relative tolerance, 1e-6 unless told; auto: the loosest safe one."),
@@ -69,7 +71,15 @@ def map_cells(
     Example: friso map rig.toml --x controller.crossover="1 Hz..16 Hz:41" --y joint.stroke="0 m..1 mm:41"
     A study that was interrupted goes on: friso map thesis_rig_map.zarr
     """
-    from friso.cli.map_study import Varied, refuse_overwriting, stored_study, study_for, write_exports, write_views
+    from friso.cli.map_study import (
+        Varied,
+        coloured_by,
+        refuse_overwriting,
+        stored_study,
+        study_for,
+        write_exports,
+        write_views,
+    )
     from friso.studies.store import in_memory
     from friso.studies.verify import checked_share
 
@@ -90,7 +100,7 @@ def map_cells(
         runs = _run(study, store, crew, share)
     if study.cells <= LARGE:
         runs = in_memory(runs)
-        files = [*write_views(runs, store, metric), *write_exports(runs, exports)]
+        files = [*write_views(runs, store, coloured_by(study, metric)), *write_exports(runs, exports)]
     else:
         say(f"no figure and no page of {study.cells:.3g} cells")
         files = write_exports(runs, exports)

@@ -12,6 +12,7 @@ import numpy as np
 
 from friso.quantities import StageError
 from friso.stage import Stage
+from friso.studies.cells import CYCLE_UNITS, USUAL
 from friso.studies.execute import Crew
 from friso.studies.refine import FINER, SHARE, finer
 from friso.studies.request import Request
@@ -80,7 +81,8 @@ def study_for(stage: Stage, varied: Varied, metric: str, refine: bool, most: int
     runs = int(request.size() * (SHARE * FINER ** len(axes) if refine else 1))
     if most is not None and runs > most:
         raise _too_large(runs, request.trial(), crew)
-    study = _with_metric(request.study(), metric)
+    wanted = (*USUAL, *CYCLE_UNITS) if metric in (*CYCLE_UNITS, "period") else None
+    study = _with_metric(request.study(wanted), metric)
     return finer(study) if refine else study
 
 
@@ -98,6 +100,11 @@ def _with_metric(study: Study, metric: str) -> Study:
         expected = f"one of {', '.join(name for name in study.metrics if name != 'status')}"
         raise StageError("--metric", metric, expected, "--metric peak_to_peak")
     return study
+
+
+def coloured_by(study: Study, metric: str) -> str:
+    """The variable that colours the map: "period" is that of the hunting cycle, where the study has it."""
+    return "cycle_period" if metric == "period" and study.cycles else metric
 
 
 def _too_large(runs: int, trial: Study, crew: Crew) -> StageError:

@@ -42,6 +42,11 @@ def reproduce(
     for claim in document["claims"]:
         if claim["judgement"] != "not yet covered":
             print(f"{claim['id']:5} {claim['judgement']:14} {claim['number']}")
+    for name, cells in document["cycles"].items():
+        print(
+            f"{name}: of {cells['cells']} cells {cells['transient']} count peaks though no cycle attracts, and "
+            f"{cells['dormant']} count none though one does"
+        )
     counts = Counter(claim["judgement"] for claim in document["claims"])
     print(", ".join(f"{count} {judgement}" for judgement, count in counts.items()))
     print("\n".join(f"wrote {path}" for path in files if path.suffix in (".html", ".json")))

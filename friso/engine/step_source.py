@@ -98,7 +98,10 @@ class StepWriter:
         self._watched = Block(watched, self.constants)
         self._followed = Block(follow, self.constants)
         self._jumps = [
-            (Block({f"jump{self._index[x]}_": e for x, e in jumps.items()}, self.constants), [*map(self._index.get, jumps)])
+            (
+                Block({f"jump{self._index[x]}_": e for x, e in jumps.items()}, self.constants),
+                [*map(self._index.get, jumps)],
+            )
             for jumps in (model.jumps.get(kink, {}) for kink in model.kinks)
         ]
         free: set[Any] = set().union(*(sp.sympify(e).free_symbols for e in watched.values()))

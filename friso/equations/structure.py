@@ -26,8 +26,8 @@ class ControllerForm:
 class Structure:
     """The choices that decide which states, terms and kinks there are.
 
-    `masses` names those given, for a rigid stage, `biased` those on which a constant force acts; `friction_variant` is whatever else the friction law's
-    equations depend on (the Stribeck exponent where it is a whole number).
+    `masses` names those given, for a rigid stage, `biased` those on which a constant force acts; `friction_variant` is
+    whatever else the friction law's equations depend on (the Stribeck exponent where it is a whole number).
     """
 
     masses: tuple[str, ...]

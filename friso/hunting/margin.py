@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -12,10 +13,13 @@ from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import NOT_CLOSED, hunting_cycles
 from friso.stage import Stage
 
-FARTHEST, POINTS = 10.0, 25
-"""Factor up to which the bandwidth is changed, and steps on the way."""
+FARTHEST = 10.0
+"""Factor up to which the bandwidth is changed."""
 
-FINER, ROUNDS = 9, 3
+STRIDES, STEPS = 4, 7
+"""Parts of the way there, gone one after the other, and steps in each of them."""
+
+FINER, ROUNDS = 9, 2
 """Steps between the two that enclose the edge, and how often they are taken."""
 
 
@@ -24,11 +28,13 @@ class Margin:
     """The edge of hunting nearest in bandwidth: hunting is possible below it.
 
     `factor` is the bandwidth there over that of the stage, `crossover` [Hz] the crossover there (None for a controller
-    given by its gains, all of whose poles and zeros the factor scales).
+    given by its gains, all of whose poles and zeros the factor scales). It is `certain` unless there are stages on the
+    way there whose cycle could not be computed.
     """
 
     factor: float
     crossover: float | None
+    certain: bool
 
 
 def faster(flat: Mapping[str, Any], factor: np.ndarray) -> dict[str, Any]:
@@ -43,23 +49,50 @@ def margin(stage: Stage, attracting: bool) -> Margin | None:
     """The edge above the bandwidth of a stage whose cycle attracts, or below that of one whose cycle does not; None
     within a factor of ten."""
     flat = stage.flat()
-    low, high, points = 1.0, FARTHEST if attracting else 1 / FARTHEST, POINTS
+    far = FARTHEST if attracting else 1 / FARTHEST
+    ends = np.geomspace(1.0, far, STRIDES + 1)
+    certain, found = True, None
+    for low, high in pairwise(ends):
+        step = _step(flat, float(low), float(high), STEPS, attracting)
+        certain &= step.known
+        if step.edge:
+            found = step.edge
+            break
+    if found is None:
+        return None
     for _ in range(ROUNDS):
-        factors = np.geomspace(low, high, points)
-        cycles = hunting_cycles(Ensemble.held(faster(flat, factors), points))
-        unknown = cycles.reasons == NOT_CLOSED  # taken to be as it is on this side
-        changed = np.flatnonzero((cycles.attracting != attracting) & ~unknown)
-        if not changed.size or changed[0] == 0:
-            return None
-        k = int(changed[0])
-        low, high, points = factors[k - 1], factors[k], FINER
-    factor = _interpolated(factors, np.abs(cycles.multiplier), k)
-    crossover = flat["controller.crossover"] * factor if "controller.crossover" in flat else None
-    return Margin(factor, crossover)
+        found = _step(flat, found.low, found.high, FINER, attracting).edge or found
+    factor = found.low * (found.high / found.low) ** found.share
+    return Margin(factor, flat["controller.crossover"] * factor if "controller.crossover" in flat else None, certain)
 
 
-def _interpolated(factors: np.ndarray, size: np.ndarray, k: int) -> float:
-    """The factor between numbers k - 1 and k at which the multiplier passes 1, the middle where one is unknown."""
-    weight = (1 - size[k - 1]) / (size[k] - size[k - 1])
-    weight = weight if np.isfinite(weight) and 0 <= weight <= 1 else 0.5
-    return float(factors[k - 1] * (factors[k] / factors[k - 1]) ** weight)
+@dataclass(frozen=True)
+class _Edge:
+    """Two factors that enclose the edge, and where between them the multiplier passes 1, as a share of the way in their
+    logarithms."""
+
+    low: float
+    high: float
+    share: float
+
+
+@dataclass(frozen=True)
+class _Step:
+    """The edge between two factors, if it is there, and whether the cycles before it are all known."""
+
+    edge: _Edge | None
+    known: bool
+
+
+def _step(flat: Mapping[str, Any], low: float, high: float, points: int, attracting: bool) -> _Step:
+    """Look for the edge between two factors."""
+    factors = np.geomspace(low, high, points)
+    cycles = hunting_cycles(Ensemble.held(faster(flat, factors), points))
+    unknown = cycles.reasons == NOT_CLOSED  # taken to be as it is on this side
+    changed = np.flatnonzero((cycles.attracting != attracting) & ~unknown)
+    if not changed.size or changed[0] == 0:
+        return _Step(None, not unknown.any())
+    k, size = int(changed[0]), np.abs(cycles.multiplier)
+    share = (1 - size[k - 1]) / (size[k] - size[k - 1])
+    share = float(share) if np.isfinite(share) and 0 <= share <= 1 else 0.5  # the middle where one is unknown
+    return _Step(_Edge(float(factors[k - 1]), float(factors[k]), share), not unknown[:k].any())

@@ -60,7 +60,7 @@ def judge(stage: Stage, found: Measures, rtol: float) -> Judgement:
     if found.status[0] != Status.DONE:
         return Judgement("failed", known)
     if known.attracting:
-        return _with_a_cycle(stage, known, known.attracting[0])
+        return _with_a_cycle(stage, found, known, known.attracting[0])
     settled, after, steady = _settling(stage, found, rtol, possible=known.returns is not None)
     observed = steady and not settled
     word: Word = "hunts" if observed else "settles" if settled else "transient"
@@ -68,8 +68,9 @@ def judge(stage: Stage, found: Measures, rtol: float) -> Judgement:
     return Judgement(word, known, margin=edge, settled_after=after, observed=observed)
 
 
-def _with_a_cycle(stage: Stage, known: Hunting, cycle: Cycle) -> Judgement:
+def _with_a_cycle(stage: Stage, found: Measures, known: Hunting, cycle: Cycle) -> Judgement:
     hunts = bool(ends_hunting(stage.flat(), 1, cycle)[0])
+    within = float(found.settling_time[1][0])
     return Judgement(
         "hunts" if hunts else "bistable",
         known,
@@ -77,6 +78,7 @@ def _with_a_cycle(stage: Stage, known: Hunting, cycle: Cycle) -> Judgement:
         pushes(stage, cycle),
         moves(stage, cycle),
         margin(stage, attracting=True),
+        None if hunts or not np.isfinite(within) else within,
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -11,6 +11,9 @@ from friso.engine.arrays import Status
 from friso.engine.batch import Runs, run_chunks
 from friso.engine.kernel import kernel
 from friso.equations.structure import Structure, decisive_keys, structure
+from friso.hunting.cycle.ensemble import Ensemble
+from friso.hunting.cycle.find import Cycles, hunting_cycles
+from friso.hunting.cycle.hunting import why_not
 from friso.hunting.measures import BANDS, Measures, measure, options
 from friso.stage import Stage, numeric_keys, violations
 from friso.studies.links import linked
@@ -18,7 +21,7 @@ from friso.studies.links import linked
 Columns = dict[str, np.ndarray]
 """Names to arrays of shape (cells,)."""
 
-UNITS = {
+RUN_UNITS = {
     "peaks": "1",
     "peak_to_peak": "m",
     "period": "s",
@@ -28,13 +31,22 @@ UNITS = {
     "steps": "1",
     "rejected": "1",
 }
-"""The numeric measures of a cell and their units."""
+"""The numeric measures of a cell's run and their units."""
+
+CYCLE_UNITS = {"multiplier": "1", "amplitude": "m", "cycle_period": "s"}
+"""Those of its hunting cycle, which are computed if asked for: NaN where there is none, or none could be closed."""
+
+UNITS = RUN_UNITS | CYCLE_UNITS
+"""All numeric measures and their units."""
 
 WORDS = {"verdict": "<U9", "status": "<U160"}
 """The measures that are words, and how they are stored; a status longer than that is cut."""
 
-METRICS = (*UNITS, *WORDS)
-"""Everything that is known of a cell."""
+USUAL = (*RUN_UNITS, *WORDS)
+"""What is known of every cell."""
+
+METRICS = (*RUN_UNITS, *CYCLE_UNITS, *WORDS)
+"""Everything that may be known of a cell."""
 
 INFERRED = "inferred"
 """How the status of a cell begins that was not run, but lies among cells that agree."""
@@ -52,16 +64,17 @@ def run_cells(
     links: Mapping[str, str],
     columns: Mapping[str, np.ndarray],
     rtol: float,
+    cycles: bool = False,
     threads: int | None = 1,
     cancel: np.ndarray | None = None,
 ) -> Columns:
     """Run one stage per entry of the columns: axis names to SI values, words or booleans, each of shape (cells,).
 
-    The result holds `METRICS`, each of shape (cells,). A cell that no stage may have has the verdict "invalid" and the
-    reason in its status; one that a run did not complete for has "failed". Setting cancel[0] from another thread
-    ends the work early: cells not run by then keep the verdict "".
+    The result holds `USUAL`, with `cycles` also the measures of the hunting cycle, each of shape (cells,). A cell that
+    no stage may have has the verdict "invalid" and the reason in its status; one that a run did not complete for has
+    "failed". Setting cancel[0] from another thread ends the work early: cells not run by then keep the verdict "".
     """
-    table = _Table(len(next(iter(columns.values()))))
+    table = _Table(len(next(iter(columns.values()))), UNITS if cycles else RUN_UNITS)
     for part, cells in _by_words(stage, columns):
         flat = flat_cells(part, links, {name: column[cells] for name, column in columns.items()})
         table.invalidate(cells, flat)
@@ -69,12 +82,43 @@ def run_cells(
             own = {key: value[members] if np.ndim(value) else value for key, value in flat.items()}
             for runs in run_chunks(kernel(shape), own, len(members), options(rtol, threads, cancel)):
                 table.write(cells[members[runs.numbers]], measure(runs.part(own), runs), runs)
+    if cycles:
+        valid = table.valid(np.arange(table.count))
+        for which, found in cell_cycles(stage, links, columns, valid, threads, cancel):
+            table.write_cycles(which, found)
     return table.columns
+
+
+def cell_cycles(
+    stage: Stage,
+    links: Mapping[str, str],
+    columns: Mapping[str, np.ndarray],
+    valid: np.ndarray,
+    threads: int | None = None,
+    cancel: np.ndarray | None = None,
+) -> Iterator[tuple[np.ndarray, Cycles]]:
+    """The hunting cycles of the cells that are valid, shape (cells,), and may hunt: numbers of cells, and their cycles.
+
+    The motion plays no part: of cells that differ in it alone one is computed.
+    """
+    for part, cells in _by_words(stage, columns):
+        flat = flat_cells(part, links, {name: column[cells] for name, column in columns.items()})
+        for shape, members in _by_structure(flat, valid[cells], len(cells)):
+            if why_not(shape):
+                continue
+            varied = [np.zeros(len(members))]
+            varied += [
+                value[members] for key, value in flat.items() if np.ndim(value) and not key.startswith("motion.")
+            ]
+            _, first, again = np.unique(np.stack(varied), axis=1, return_index=True, return_inverse=True)
+            own = {key: value[members[first]] if np.ndim(value) else value for key, value in flat.items()}
+            stages = Ensemble.held(own, len(first), form=shape, threads=threads, cancel=cancel)
+            yield cells[members], hunting_cycles(stages).take(again.ravel())
 
 
 def allowed(stage: Stage, links: Mapping[str, str], columns: Mapping[str, np.ndarray]) -> np.ndarray:
     """Which cells a stage may have, shape (cells,)."""
-    table = _Table(len(next(iter(columns.values()))))
+    table = _Table(len(next(iter(columns.values()))), {})
     for part, cells in _by_words(stage, columns):
         table.invalidate(cells, flat_cells(part, links, {name: column[cells] for name, column in columns.items()}))
     return table.columns["verdict"] != "invalid"
@@ -127,8 +171,9 @@ _STATUS = np.array([status.text for status in Status], dtype=object)
 class _Table:
     """The growing measures, one entry per cell."""
 
-    def __init__(self, count: int) -> None:
-        self.columns: Columns = {name: np.full(count, np.nan) for name in UNITS}
+    def __init__(self, count: int, numeric: Iterable[str]) -> None:
+        self.count = count
+        self.columns: Columns = {name: np.full(count, np.nan) for name in numeric}
         self.columns |= {name: np.full(count, "", dtype=object) for name in WORDS}
 
     def invalidate(self, cells: np.ndarray, flat: Mapping[str, Any]) -> None:
@@ -146,5 +191,10 @@ class _Table:
         inner, outer = found.settling_time
         numbers = (found.peaks, found.peak_to_peak, found.period, inner, outer, found.largest_force)
         words = (found.verdict, _STATUS[found.status])
-        for name, column in zip(METRICS, (*numbers, found.steps, found.rejected, *words), strict=True):
+        for name, column in zip(USUAL, (*numbers, found.steps, found.rejected, *words), strict=True):
             self.columns[name][which[ran]] = column[ran]
+
+    def write_cycles(self, which: np.ndarray, found: Cycles) -> None:
+        """Write the measures of hunting cycles."""
+        for name, column in zip(CYCLE_UNITS, (found.multiplier, found.amplitude, found.period), strict=True):
+            self.columns[name][which] = column

@@ -66,12 +66,17 @@ async def _answers(scheduler: str) -> None:
 
 
 def run_checked(
-    stage: Stage, links: Mapping[str, str], columns: Mapping[str, np.ndarray], rtol: float, expected: str
+    stage: Stage,
+    links: Mapping[str, str],
+    columns: Mapping[str, np.ndarray],
+    rtol: float,
+    cycles: bool,
+    expected: str,
 ) -> Columns:
     """`run_cells` on a worker whose friso has to be the expected one: one that joined later was not asked before."""
     if equations_version() != expected:
         raise _stranger("a worker", equations_version())
-    return run_cells(stage, links, columns, rtol)
+    return run_cells(stage, links, columns, rtol, cycles)
 
 
 def _refuse_strangers(client: Any) -> None:

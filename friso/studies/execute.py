@@ -15,6 +15,9 @@ from friso.studies.study import Block, Study
 LARGEST_BLOCK = 2048
 """Cells of a block in memory: enough that all lanes are busy nearly to its end."""
 
+CYCLES_BLOCK = 256
+"""Cells of a block where cycles are wanted, for each of which a hundred runs are needed."""
+
 Progress = Callable[[int], None]
 """Called with the number of cells just done."""
 
@@ -65,7 +68,8 @@ class Crew:
     def jobs(self, studies: Sequence[Study]) -> Iterator[tuple[Study, Block]]:
         """The blocks of studies, as large as memory allows, but enough of them for the whole crew."""
         for study in studies:
-            shape = study.block_shape(max(1, min(LARGEST_BLOCK, study.cells // self.shares)))
+            largest = CYCLES_BLOCK if study.cycles else LARGEST_BLOCK
+            shape = study.block_shape(max(1, min(largest, study.cells // self.shares)))
             yield from ((study, block) for block in study.blocks(shape))
 
     def _result(self, future: Future[Columns]) -> Columns:
@@ -77,7 +81,9 @@ class Crew:
 
     def _submit(self, study: Study, block: Block) -> Future[Columns]:
         columns = study.block_columns(block)
-        return self.executor.submit(self.task, study.stage, study.links, columns, study.rtol, **self.arguments)
+        return self.executor.submit(
+            self.task, study.stage, study.links, columns, study.rtol, study.cycles, **self.arguments
+        )
 
 
 def local_crew(threads: int | None = None) -> Crew:

@@ -18,7 +18,7 @@ from scipy.ndimage import distance_transform_edt
 
 from friso.quantities import StageError
 from friso.studies.axes import Axis
-from friso.studies.cells import INFERRED, METRICS, UNITS, Columns
+from friso.studies.cells import INFERRED, UNITS, Columns
 from friso.studies.samples import SAMPLE
 from friso.studies.study import Dimension, Study
 
@@ -103,7 +103,7 @@ class _Known:
     def learn(self, cells: np.ndarray, ask: Ask) -> None:
         """Ask for cells; those that no stage may have cost no run."""
         found = ask(cells)
-        for name in METRICS:
+        for name in found:
             empty = np.full(self.asked.size, np.nan) if name in UNITS else np.full(self.asked.size, "", dtype=object)
             self.columns.setdefault(name, empty)[cells] = found[name]
         self.asked.flat[cells] = True

@@ -13,7 +13,7 @@ from friso.quantities import StageError
 from friso.stage import Stage
 from friso.studies import links as linking
 from friso.studies.axes import Axis, Range, Values, read_axes
-from friso.studies.cells import METRICS, UNITS
+from friso.studies.cells import METRICS, UNITS, USUAL
 from friso.studies.samples import SAMPLE, Samples, sampled
 from friso.studies.study import Dimension, Study
 
@@ -49,7 +49,7 @@ class Request:
                 drawn.append(Axis(axis.name, axis.at(rng.random(TRIED)), axis.unit, axis.scale))
             else:
                 drawn.append(replace(axis, values=rng.choice(axis.values, TRIED)))
-        return Study(self.stage, (Dimension(SAMPLE, tuple(drawn)),), dict(self.links), METRICS, 1e-6)
+        return Study(self.stage, (Dimension(SAMPLE, tuple(drawn)),), dict(self.links), USUAL, 1e-6)
 
     def study(self, metrics: Sequence[str] | None = None, rtol: float = 1e-6) -> Study:
         """The study. Raises StageError, and ValueError for a tolerance that is not usable."""
@@ -93,4 +93,5 @@ def _checked_metrics(metrics: Sequence[str] | None) -> tuple[str, ...]:
     for name in metrics or ():
         if name not in METRICS:
             raise StageError("metrics", name, f"some of {', '.join(METRICS)}", '["peaks", "period"]')
-    return tuple(name for name in METRICS if not metrics or name in metrics or name not in UNITS)
+    wanted = metrics or USUAL
+    return tuple(name for name in METRICS if name in wanted or name not in UNITS)

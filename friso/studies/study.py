@@ -15,7 +15,7 @@ import numpy as np
 from friso.engine.cache import code_digest, machine
 from friso.stage import Stage, loads, numeric_keys
 from friso.studies.axes import Axis
-from friso.studies.cells import METRICS, flat_cells
+from friso.studies.cells import CYCLE_UNITS, METRICS, flat_cells
 from friso.studies.samples import SAMPLE
 from friso.version import VERSION
 
@@ -55,6 +55,11 @@ class Study:
     @property
     def cells(self) -> int:
         return math.prod(self.shape)
+
+    @property
+    def cycles(self) -> bool:
+        """Whether measures of the hunting cycle are wanted."""
+        return any(name in self.metrics for name in CYCLE_UNITS)
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -12,7 +12,7 @@ import numpy as np
 
 from friso.stage import Stage
 from friso.studies.axes import Values
-from friso.studies.cells import METRICS, WORDS, Columns, attributes_of
+from friso.studies.cells import METRICS, USUAL, WORDS, Columns, attributes_of
 from friso.studies.execute import Crew, Progress, local_crew, run_scattered
 from friso.studies.refine import Ask, finer
 from friso.studies.refine import refine as refine_study
@@ -48,7 +48,9 @@ def sweep(
 
     The result has one dimension per axis with SI coordinates, and the variables (or the `metrics` among them) peaks,
     verdict, peak_to_peak [m], period [s], settling_time [s] into 1 um, settling_time_10um [s], largest_force [N],
-    steps, rejected and status; a cell that no stage may have is "invalid", with the reason in its status.
+    steps, rejected and status; a cell that no stage may have is "invalid", with the reason in its status. Asked for by
+    name, `metrics` are also those of the hunting cycle itself: multiplier (the cycle attracts where its modulus is
+    below 1), amplitude [m] and cycle_period [s]; they are smooth, whatever the motion does.
 
     A verdict is as good as its tolerance: with `verify` that share of the cells is run again at rtol/100, and the
     attributes verified_cells, verified_surviving and verified_rtol tell how many verdicts survived. With `refine` the
@@ -115,7 +117,7 @@ def run_in_store(
 
 def _refined(study: Study, crew: Crew, progress: Progress, keeping: Callable[[Ask], Ask] = lambda ask: ask) -> Columns:
     """The measures of a refined study, each of its shape; `keeping` may keep the answers of a resumed one."""
-    everything = replace(study, metrics=METRICS)
+    everything = replace(study, metrics=METRICS if study.cycles else USUAL)
 
     def ask(cells: np.ndarray) -> Columns:
         found = run_scattered(everything, cells, crew)

@@ -10,7 +10,7 @@ import numpy as np
 
 from friso.engine.tolerance import TIGHTEST
 from friso.quantities import StageError
-from friso.studies.cells import INFERRED, allowed
+from friso.studies.cells import INFERRED, WORDS, allowed
 from friso.studies.execute import Crew, run_scattered
 from friso.studies.study import Study
 
@@ -50,7 +50,7 @@ def verified(study: Study, runs: xr.Dataset, crew: Crew, share: float) -> dict[s
     if not share or study.rtol < 10 * TIGHTEST:  # there is no tolerance to check it with
         return {}
     count, rtol = max(LEAST, round(share * study.cells)), max(study.rtol / TIGHTER, TIGHTEST)
-    tighter = replace(study, rtol=rtol)
+    tighter = replace(study, rtol=rtol, metrics=tuple(WORDS))
 
     def same(kind: str) -> tuple[int, int]:
         picked = drawn(study, count, lambda cells: _kinds(runs, study, cells) == kind)

@@ -9,6 +9,7 @@ import numpy as np
 
 from friso.hunting import COUNTED_ABOVE, COUNTED_AFTER
 from friso.views.cases import BANDS, Shown, shown_cases
+from friso.views.cycle_figures import cycle_figures
 from friso.views.figure import (
     BLUE,
     GREY,
@@ -26,6 +27,7 @@ from friso.views.figure import (
     Panel,
     Series,
 )
+from friso.views.traces import common_range, samples, subject, trace_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -43,15 +45,16 @@ def check_figures(cases: Mapping[str, Case]) -> tuple[Figure, ...]:
     shown = [item for item in shown_cases(cases) if item.case.trace is not None]
     if not shown:
         return ()
-    figures = (_settled(shown), _overview(shown), _shares(shown), _joint(shown), _friction(shown))
+    motion = (_overview(shown), _shares(shown), _joint(shown), _friction(shown))
+    figures = (_settled(shown), *cycle_figures(shown), *motion)
     return tuple(figure for figure in figures if figure.panels)
 
 
 def response_figure(trace: xr.Dataset) -> Figure:
     """Position, error, force and joint deflection of one simulated run, over the whole of it."""
-    time = _values(trace, "time")
-    reference = Series(time, _values(trace, "reference"), "reference", GREY, "dashed")
-    position = Series(time, _values(trace, "position"), "position", BLUE)
+    time = samples(trace, "time")
+    reference = Series(time, samples(trace, "reference"), "reference", GREY, "dashed")
+    position = Series(time, samples(trace, "position"), "position", BLUE)
     panels = [Panel("Position", _TIME, Axis("Position", "m"), (reference, position))]
     for name, title in (
         ("error", "Error"),
@@ -59,7 +62,7 @@ def response_figure(trace: xr.Dataset) -> Figure:
         ("joint_deflection", "Joint deflection"),
     ):
         if name in trace:
-            line = Series(time, _values(trace, name), title.lower(), BLUE)
+            line = Series(time, samples(trace, name), title.lower(), BLUE)
             panels.append(Panel(title, _TIME, Axis(title, str(trace[name].attrs["units"])), (line,)))
     caption = "The whole run; the error is the reference minus the position."
     return Figure("response", "time response", caption, tuple(panels), subject=str(trace.attrs.get("name", "")))
@@ -80,7 +83,7 @@ def _settled(shown: list[Shown]) -> Figure:
             peaks.append(Markers(item.case.peak_times, item.case.peak_heights, label, item.colour, "triangle"))
     limits = (Limit((COUNTED_ABOVE,), "peaks count above", GREY, "dotted"),) if peaks else ()
     # A stage that stays within the finest band shows as a line, not as a screenful of solver noise.
-    view = _common([line.y for line in lines], least=2 * min(BANDS))
+    view = common_range([line.y for line in lines], least=2 * min(BANDS))
     zoom = Panel(
         f"From {start:g} s on: deviation from the reference",
         Axis("Time", "s", (start, end)),
@@ -90,12 +93,12 @@ def _settled(shown: list[Shown]) -> Figure:
         limits,
     )
     caption = (
-        "Hunting shows as a deviation that keeps coming back. Peaks are counted as in the thesis "
-        "(Sec. 3.2.2): after 10 s, higher than 0.1 mm, 0.5 s apart. Below: the size of the deviation over "
-        "the whole run, on a logarithmic scale that ends at 1 nm; a stage that hunts never stays under the "
-        "lines."
+        "Hunting shows as a deviation that keeps coming back; so does a long transient, for a while. Peaks are "
+        "counted as in the thesis (Sec. 3.2.2): after 10 s, higher than 0.1 mm, 0.5 s apart. Below: the size of the "
+        "deviation over the whole run, on a logarithmic scale that ends at 1 nm; a stage that hunts never stays under "
+        "the lines."
     )
-    return Figure("settled", "Does it hunt?", caption, (zoom, _settling(shown)), subject=_subject(shown))
+    return Figure("settled", "Does it hunt?", caption, (zoom, _settling(shown)), subject=subject(shown))
 
 
 def _settling(shown: list[Shown]) -> Panel:
@@ -103,7 +106,7 @@ def _settling(shown: list[Shown]) -> Panel:
     lines = []
     for item in shown:
         size = np.maximum(np.abs(_deviation(item)), _FLOOR)
-        lines.append(Series(_values(_trace(item), "time"), size, item.label, item.colour))
+        lines.append(Series(samples(trace_of(item), "time"), size, item.label, item.colour))
     largest = max((float(np.max(line.y[np.isfinite(line.y)], initial=_FLOOR)) for line in lines), default=_FLOOR)
     dashes: tuple[Dash, ...] = ("dotted", "dashed")
     bands = tuple(Limit((band,), text, INK, dash) for (band, text), dash in zip(BANDS.items(), dashes, strict=True))
@@ -113,30 +116,30 @@ def _settling(shown: list[Shown]) -> Panel:
 
 def _overview(shown: list[Shown]) -> Figure:
     """Reference and position, and the actuator force, over the whole run, the cases side by side."""
-    view = _common([_values(_trace(item), "position") for item in shown], least=2 * min(BANDS))
+    view = common_range([samples(trace_of(item), "position") for item in shown], least=2 * min(BANDS))
     panels = []
     for item in shown:
-        time = _values(_trace(item), "time")
+        time = samples(trace_of(item), "time")
         series = (
-            Series(time, _values(_trace(item), "reference"), "reference", LIGHT, width=4.0),
-            Series(time, _values(_trace(item), "position"), "position", item.colour),
+            Series(time, samples(trace_of(item), "reference"), "reference", LIGHT, width=4.0),
+            Series(time, samples(trace_of(item), "position"), "position", item.colour),
         )
         panels.append(Panel(f"{item.label}: reference and position", _TIME, Axis("Position", "m", view), series))
     bounds = _force_limit(shown)
-    arrays = [_values(_trace(item), "force") for item in shown]
-    view = _common([*arrays, *(np.array(bound.values) for bound in bounds)])
+    arrays = [samples(trace_of(item), "force") for item in shown]
+    view = common_range([*arrays, *(np.array(bound.values) for bound in bounds)])
     for item, force in zip(shown, arrays, strict=True):
-        series = (Series(_values(_trace(item), "time"), force, "force", item.colour),)
+        series = (Series(samples(trace_of(item), "time"), force, "force", item.colour),)
         title = f"{item.label}: actuator force"
         panels.append(Panel(title, _TIME, Axis("Force", "N", view), series, limits=bounds))
     caption = "The whole run. On this scale cases that differ by millimetres may look alike."
-    return Figure("overview", "The motion", caption, tuple(panels), len(shown), _subject(shown))
+    return Figure("overview", "The motion", caption, tuple(panels), len(shown), subject(shown))
 
 
 def _force_limit(shown: list[Shown]) -> tuple[Limit, ...]:
     """The force limit of the controller, where a case comes near it: a distant one would flatten all."""
     bound = shown[0].case.stage.controller.force_limit
-    forces = np.abs(np.concatenate([_values(_trace(item), "force") for item in shown]))
+    forces = np.abs(np.concatenate([samples(trace_of(item), "force") for item in shown]))
     if bound is None or not np.any(forces[np.isfinite(forces)] > bound / 2):
         return ()
     return (Limit((-float(bound), float(bound)), "force limit"),)
@@ -150,21 +153,21 @@ def _shares(shown: list[Shown]) -> Figure:
         start = max(start, end - _PERIODS * max(periods))
     panels = []
     for item in shown:
-        named = [(name, *SHARES[name]) for name in SHARES if name in _trace(item) and _any(_trace(item), name)]
+        named = [(name, *SHARES[name]) for name in SHARES if name in trace_of(item) and _any(trace_of(item), name)]
         lines = [(*share, 1.8) for share in named] + ([("force", "total", INK, 0.9)] if named else [])
         series = tuple(
-            Series(*_cut(item, _values(_trace(item), name), start, end), label, colour, width=width)
+            Series(*_cut(item, samples(trace_of(item), name), start, end), label, colour, width=width)
             for name, label, colour, width in lines
         )
         if series:
             panels.append(Panel(item.label, Axis("Time", "s", (start, end)), Axis("Force", "N"), series))
-    limits = _common([line.y for panel in panels for line in panel.series])
+    limits = common_range([line.y for panel in panels for line in panel.series])
     panels = [Panel(panel.title, panel.x, Axis("Force", "N", limits), panel.series) for panel in panels]
     caption = (
         "While the stage sticks, the integral share grows until the friction breaks away; the others follow "
         "the error. A share that is zero throughout is left out."
     )
-    return Figure("shares", "What the controller does", caption, tuple(panels), subject=_subject(shown))
+    return Figure("shares", "What the controller does", caption, tuple(panels), subject=subject(shown))
 
 
 def _joint(shown: list[Shown]) -> Figure:
@@ -173,11 +176,11 @@ def _joint(shown: list[Shown]) -> Figure:
     panels = []
     for item in shown:
         joint = item.case.stage.joint
-        if joint is None or joint.stroke is None or joint.locked or "joint_deflection" not in _trace(item):
+        if joint is None or joint.stroke is None or joint.locked or "joint_deflection" not in trace_of(item):
             continue
-        stroke, deflection = float(joint.stroke), _values(_trace(item), "joint_deflection")
+        stroke, deflection = float(joint.stroke), samples(trace_of(item), "joint_deflection")
         limits = (Limit((-stroke, stroke), "limiter touches"),)
-        time = _values(_trace(item), "time")
+        time = samples(trace_of(item), "time")
         axis = Axis("Joint deflection", "m")
         whole = Series(time, deflection, item.label, item.colour)
         after = Series(*_cut(item, deflection, start, end), item.label, item.colour)
@@ -186,12 +189,12 @@ def _joint(shown: list[Shown]) -> Figure:
             Panel(f"From {start:g} s on", Axis("Time", "s", (start, end)), axis, (after,), limits=limits),
         ]
     caption = "Deflection of the stage against the cart. Beyond the dashed lines the stroke limiter carries load."
-    return Figure("joint", "The joint", caption, tuple(panels), columns=2, subject=_subject(shown))
+    return Figure("joint", "The joint", caption, tuple(panels), columns=2, subject=subject(shown))
 
 
 def _friction(shown: list[Shown]) -> Figure:
     """Friction against velocity and displacement of the cart: while a case hunts, else the whole run."""
-    cases = [item for item in shown if "friction_force" in _trace(item)]
+    cases = [item for item in shown if "friction_force" in trace_of(item)]
     hunting = any(item.case.peaks for item in cases)
     start, end = _window(shown) if hunting else (-np.inf, np.inf)
     part = f"From {start:g} s on." if hunting else "The whole run."
@@ -204,14 +207,14 @@ def _friction(shown: list[Shown]) -> Figure:
     ):
         lines = []
         for item in cases:
-            values = _values(_trace(item), name)
+            values = samples(trace_of(item), name)
             if hunting and name == "cart_position":
-                values = values - _values(_trace(item), "reference")[-1]
-            force = _cut(item, _values(_trace(item), "friction_force"), start, end)[1]
+                values = values - samples(trace_of(item), "reference")[-1]
+            force = _cut(item, samples(trace_of(item), "friction_force"), start, end)[1]
             lines.append(Series(_cut(item, values, start, end)[1], force, item.label, item.colour, width=1.2))
         if lines:
             panels.append(_loops(title, Axis(quantity, unit), Axis("Friction force", "N"), lines))
-    return Figure("friction", "The friction", caption, tuple(panels), columns=2, subject=_subject(shown))
+    return Figure("friction", "The friction", caption, tuple(panels), columns=2, subject=subject(shown))
 
 
 def _loops(title: str, x: Axis, y: Axis, lines: list[Series]) -> Panel:
@@ -229,50 +232,26 @@ def _loops(title: str, x: Axis, y: Axis, lines: list[Series]) -> Panel:
 
 def _window(shown: list[Shown]) -> tuple[float, float]:
     """Begin and end [s] of the settled part: from where peaks count, or the later half of a shorter run."""
-    end = max(float(_values(_trace(item), "time")[-1]) for item in shown)
+    end = max(float(samples(trace_of(item), "time")[-1]) for item in shown)
     return (COUNTED_AFTER if end > COUNTED_AFTER else end / 2), end
 
 
-def _trace(item: Shown) -> xr.Dataset:
-    assert item.case.trace is not None  # check_figures let no other through
-    return item.case.trace
-
-
-def _values(trace: xr.Dataset, name: str) -> Array:
-    return np.asarray(trace[name].values, dtype=float)
-
-
 def _any(trace: xr.Dataset, name: str) -> bool:
-    return bool(np.any(_values(trace, name)))
+    return bool(np.any(samples(trace, name)))
 
 
 def _deviation(item: Shown) -> Array:
-    return _values(_trace(item), "position") - _values(_trace(item), "reference")
+    return samples(trace_of(item), "position") - samples(trace_of(item), "reference")
 
 
 def _cut(item: Shown, values: Array, start: float, end: float) -> tuple[Array, Array]:
     """Time [s] and values between start and end [s]."""
-    time = _values(_trace(item), "time")
+    time = samples(trace_of(item), "time")
     inside = (time >= start) & (time <= end)
     return time[inside], values[inside]
-
-
-def _common(arrays: list[Array], least: float = 0.0) -> tuple[float, float] | None:
-    """A range of at least `least` that holds all finite data with a margin; None where it would be empty."""
-    values = np.concatenate([np.empty(0), *arrays])
-    finite = values[np.isfinite(values)]
-    if finite.size == 0 or max(np.ptp(finite), least) == 0:
-        return None
-    low, high = float(finite.min()), float(finite.max())
-    margin = max(0.06 * (high - low), (least - (high - low)) / 2)
-    return low - margin, high + margin
 
 
 def _span(values: Array) -> float:
     """Largest less smallest finite value; 0 where there are none."""
     finite = values[np.isfinite(values)]
     return float(np.ptp(finite)) if finite.size else 0.0
-
-
-def _subject(shown: list[Shown]) -> str:
-    return str(shown[0].case.stage.name)

@@ -198,6 +198,8 @@ def _range(metric: str, numbers: np.ndarray) -> tuple[tuple[float, float] | None
     if not finite.size:
         return None, False, ()
     low, high = float(finite.min()), float(finite.max())
+    if metric == "multiplier":
+        return (-2.0, 0.0), False, ()
     if metric == "peaks":
         return None, False, (QUIET, *ramp(max(1, int(high))))
     positive = finite[finite > 0]

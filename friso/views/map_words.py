@@ -46,6 +46,9 @@ _VARIABLES = {
     "settling_time": "Settling time into 1 µm",
     "settling_time_10um": "Settling time into 10 µm",
     "largest_force": "Largest actuator force",
+    "multiplier": "Hunting multiplier",
+    "amplitude": "Amplitude of the hunting cycle",
+    "cycle_period": "Period of the hunting cycle",
     "steps": "Solver steps",
     "rejected": "Rejected solver steps",
 }
@@ -98,6 +101,8 @@ def no_number(name: str) -> Kind:
     if name.startswith("settling_time"):
         band = variable(name).removeprefix("Settling time into ")
         return Kind(f"never settles into {band}", _NO_NUMBER)
+    if name in ("multiplier", "amplitude", "cycle_period"):
+        return Kind("no cycle found", _NO_NUMBER)
     return Kind("no period" if name == "period" else "no value", _NO_NUMBER)
 
 

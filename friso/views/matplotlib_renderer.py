@@ -125,7 +125,7 @@ def _row_height(figure: Figure) -> float:
 
 def _draw(axes: Axes, panel: Panel, width: float) -> None:
     """Everything of one panel, which is `width` [inch] wide."""
-    _scale(axes, panel)
+    _scale(axes, panel, width)
     draw_coloured(axes, panel)
     handles: list[Line2D] = []
     for line in panel.series:
@@ -141,13 +141,13 @@ def _draw(axes: Axes, panel: Panel, width: float) -> None:
     _annotate(axes, panel, handles, width)
 
 
-def _scale(axes: Axes, panel: Panel) -> None:
+def _scale(axes: Axes, panel: Panel, width: float) -> None:
     """Scales and ticks: plain numbers, never a factor or an offset beside the axis."""
     axes.set_xscale("log" if panel.x.log else "linear")
     axes.set_yscale("log" if panel.y.log else "linear")
     if panel.markers and panel.x.limits is None:
         axes.margins(x=0.03)
-    bins = (9, [1, 2, 5, 10]), (6, [1, 2, 2.5, 5, 10])
+    bins = (min(9, int(2 * width)), [1, 2, 5, 10]), (6, [1, 2, 2.5, 5, 10])
     for axis, declared, (most, steps) in zip((axes.xaxis, axes.yaxis), (panel.x, panel.y), bins, strict=True):
         if declared.words:
             positions, words = word_ticks(declared)

@@ -168,7 +168,7 @@ def _traces(panel: Panel, number: int, bar: dict[str, Any] | None) -> list[Any]:
 
 
 def _line(line: Series, panel: Panel, place: dict[str, Any]) -> go.Scatter:
-    style = {"color": line.colour, "width": line.width, "dash": _DASHES[line.dash]}
+    style = {"color": line.colour, "width": line.width, "dash": _DASHES[line.dash], "simplify": False}
     return go.Scatter(
         x=line.x, y=line.y, mode="lines", line=style, connectgaps=False, **_text(line.label, panel), **place
     )

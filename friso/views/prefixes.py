@@ -8,10 +8,10 @@ import numpy as np
 
 from friso.views.figure import Array
 
-# Prefixes by exponent of ten. Lengths beyond metres and times beyond seconds are read best as they are.
+# Prefixes by exponent of ten, and the smallest and largest exponent of the units that take them: lengths beyond metres,
+# times beyond seconds and slow frequencies are read best as they are.
 _PREFIXES = {-9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
-_LARGEST = {"m": 0, "s": 0, "N": 9, "Hz": 9}
-_SMALLEST = -9
+_PREFIXED = {"m": (-9, 0), "s": (-9, 0), "N": (-9, 9), "Hz": (0, 9)}
 _SIGNS = str.maketrans({"*": "·"})
 _POWERS = {"^2": "²", "^3": "³", "**2": "²", "**3": "³"}
 
@@ -25,14 +25,15 @@ def choose(values: Array, unit: str, *, log: bool = False) -> tuple[float, str]:
     symbol = unit.replace("**", "^").replace("/", "*").split("*")[0]
     text = pretty(unit)
     magnitudes = np.abs(values[np.isfinite(values) & (values != 0)])
-    if symbol not in _LARGEST or magnitudes.size == 0:
+    if symbol not in _PREFIXED or magnitudes.size == 0:
         return 1.0, text
     size = float(np.max(magnitudes))
     if log:
         size = math.sqrt(size) * math.sqrt(float(np.min(magnitudes)))
     # 1e-9 of slack: a largest value of 0.001 m is 1 mm although 0.001 * 1000 may fall short of 1
     exponent = 3 * math.floor((math.log10(size) + 1e-9) / 3)
-    exponent = min(max(exponent, _SMALLEST), _LARGEST[symbol])
+    smallest, largest = _PREFIXED[symbol]
+    exponent = min(max(exponent, smallest), largest)
     return 10.0**-exponent, _PREFIXES[exponent] + text
 
 
@@ -52,6 +53,18 @@ def with_unit(value: float | None, unit: str, digits: int = 3) -> str:
     if number == 0 or 1e-3 <= abs(number) < 1e5:
         return f"{_rounded(number, digits)} {text}"
     return f"{number:.{digits - 1}e} {text}"
+
+
+def range_with_unit(low: float, high: float, unit: str, digits: int = 3) -> str:
+    """A range [unit] for a table or a sentence, e.g. "1.72 to 10.8 mm"."""
+    factor, text = choose(np.array([low, high]), unit)
+    return f"{_rounded(low * factor, digits)} to {_rounded(high * factor, digits)} {text}"
+
+
+def plus_minus(half: float, unit: str, digits: int = 3) -> str:
+    """Half a range [unit] with the prefix that suits the whole of it, e.g. "±0.52 mm"."""
+    factor, text = choose(np.array([2 * half]), unit)
+    return f"±{half * factor:.{digits}g} {text}"
 
 
 def _rounded(number: float, digits: int) -> str:

@@ -12,8 +12,9 @@ from friso.version import VERSION
 from friso.views import plotly_renderer
 from friso.views.cases import shown_cases
 from friso.views.check_figures import check_figures
+from friso.views.check_table import rows
 from friso.views.pages import environment, print_image
-from friso.views.summary import conclusion, rows, verdict_sentence
+from friso.views.summary import conclusion, verdict_sentence
 
 if TYPE_CHECKING:
     from friso.hunting import Case
@@ -36,7 +37,7 @@ def report_html(cases: Mapping[str, Case]) -> str:
             name=stage.name or "Unnamed stage",
             source=stage.source,
             shown=shown,
-            sentences=[(item, verdict_sentence(item)) for item in shown],
+            sentences=[(item, verdict_sentence(item, cases)) for item in shown],
             conclusion=conclusion(cases),
             rows=rows(shown),
             figures=[(figure, Markup(plotly_renderer.fragment(figure)), print_image(figure)) for figure in figures],

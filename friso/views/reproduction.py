@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from markupsafe import Markup
 
-from friso.studies.thesis import CONVENTIONS, rig
+from friso.studies.thesis import CONVENTIONS, STUDIES, rig
 from friso.version import VERSION
 from friso.views import matplotlib_renderer, plotly_renderer
 from friso.views.figure import GREEN, GREY, ORANGE, VERMILLION, Figure
@@ -70,6 +70,7 @@ def claims_document(reproduction: Reproduction) -> dict[str, Any]:
         "figure_14b": {"rtol": tolerances, "verdicts_changed": verdicts, "counts_changed": counts}
         if tolerances
         else None,
+        "cycles": {name: vars(found.comparison) for name, found in reproduction.cycles.items()},
         "claims": [_entry(verdict) for verdict in reproduction.verdicts],
     }
 
@@ -121,6 +122,7 @@ def reproduction_html(reproduction: Reproduction) -> str:
             interactive={figure.name: Markup(plotly_renderer.fragment(replace(figure, note=""))) for figure in drawn},
             plotly=Markup(plotly_renderer.script()) if drawn else None,
             conventions=CONVENTIONS,
+            cycles={STUDIES[name]: found.comparison for name, found in reproduction.cycles.items()},
             points=reproduction.points,
             rtol=f"{reproduction.rtol:g}",
             stage_file=rig().to_toml(),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,7 +13,7 @@ from friso.hunting.peaks import scan
 from friso.studies.thesis.judges.shares import NARROW, WIDE
 from friso.studies.thesis.studies import STUDIES, ThesisStudy
 from friso.views.check_figures import SHARES
-from friso.views.figure import GREY, INK, VERMILLION, Axis, Figure, Limit, Markers, Panel, Series
+from friso.views.figure import GREY, INK, PINK, VERMILLION, Axis, Figure, Limit, Markers, Panel, Series
 from friso.views.map_figures import map_panel
 from friso.views.map_words import statement
 
@@ -28,6 +29,8 @@ _TITLES = {
     "15": "Isolator: masses; friction forces",
     "16": "Isolator: crossover and stroke at two stiffnesses",
 }
+_HUNTING = ("edge of the attracting cycle", VERMILLION)
+_PAIR = ("edge of the asymmetric cycles that bound its basin", PINK)
 _SHOWN_FROM = 6.0  # [s] the return move is over by then, at the paths of Fig. 5 and 13
 
 
@@ -49,7 +52,7 @@ def _maps(reproduction: Reproduction, number: str) -> Figure:
             continue
         letter = study.panel[-1]
         for title, runs in _shown(reproduction, study, letter).items():
-            panels.append(map_panel(runs, "peaks", study.marker, title))
+            panels.append(_with_edges(map_panel(runs, "peaks", study.marker, title), reproduction, study))
             statements.append(f"{title}. {statement(runs)}".replace("\n", " "))
         zeros += [f"{letter}: {study.zeros}"] if study.zeros else []
     if number == "14" and reproduction.tolerances:
@@ -66,6 +69,20 @@ def _maps(reproduction: Reproduction, number: str) -> Figure:
         2,
         note="\n".join(statements),
     )
+
+
+def _with_edges(panel: Panel, reproduction: Reproduction, study: ThesisStudy) -> Panel:
+    """The map with the curves on which the hunting cycle stops attracting, and on which asymmetric ones appear."""
+    found = reproduction.cycles.get(study.name)
+    if found is None:
+        return panel
+    lines = tuple(
+        Series(
+            edge.x, edge.y, *(_HUNTING if edge.symmetric else _PAIR), "solid" if edge.kind == "flip" else "dashed", 2.2
+        )
+        for edge in found.edges
+    )
+    return replace(panel, series=(*panel.series, *lines))
 
 
 def _shown(reproduction: Reproduction, study: ThesisStudy, letter: str) -> Mapping[str, xr.Dataset]:

@@ -55,7 +55,9 @@ class StribeckSection(FrictionSection):
     @staticmethod
     def variant(flat: Mapping[str, Any]) -> Curve:
         exponent = float(flat["friction.stribeck_exponent"])
-        return Curve(int(exponent) if exponent in (1.0, 2.0, 3.0, 4.0) else None, flat.get("friction.asymmetry", 0.0) != 0)
+        return Curve(
+            int(exponent) if exponent in (1.0, 2.0, 3.0, 4.0) else None, flat.get("friction.asymmetry", 0.0) != 0
+        )
 
 
 def stribeck_level(velocity: sp.Expr, sign: sp.Expr, curve: Curve) -> sp.Expr:

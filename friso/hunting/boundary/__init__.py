@@ -7,4 +7,17 @@ from friso.hunting.boundary.locate import Found, Kind
 from friso.hunting.boundary.plane import Plane, plane
 from friso.hunting.boundary.space import Range, Space
 
-__all__ = ["Branch", "Curve", "Diagram", "Found", "Kind", "Plane", "Point", "Range", "Space", "Spot", "diagram", "plane"]
+__all__ = [
+    "Branch",
+    "Curve",
+    "Diagram",
+    "Found",
+    "Kind",
+    "Plane",
+    "Point",
+    "Range",
+    "Space",
+    "Spot",
+    "diagram",
+    "plane",
+]

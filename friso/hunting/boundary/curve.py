@@ -74,7 +74,8 @@ class CurveTracer:
     """Follows the points of one kind through the box of two keys."""
 
     def __init__(self, space: Space, kind: Kind, sign: float, rtol: float = RTOL) -> None:
-        self.space, self.kind, self.sign, self.rtol = space, kind, sign, rtol
+        self.space, self.sign, self.rtol = space, sign, rtol
+        self.kind: Kind = kind
 
     def on_line(
         self, origin: np.ndarray, across: np.ndarray, near: Spot, reach: float, size: np.ndarray | None = None
@@ -134,7 +135,9 @@ class CurveTracer:
     def _at_the_side(self, last: Spot, direction: np.ndarray, step: float) -> list[Spot]:
         """The point at which the curve leaves the box."""
         with np.errstate(divide="ignore", invalid="ignore"):
-            times = np.where(direction > 0, (1 - last.at) / direction, np.where(direction < 0, -last.at / direction, np.inf))
+            times = np.where(
+                direction > 0, (1 - last.at) / direction, np.where(direction < 0, -last.at / direction, np.inf)
+            )
         side = int(np.argmin(times))
         along = np.array([0.0, 1.0]) if side == 0 else np.array([1.0, 0.0])
         found = self.on_line(np.clip(last.at + times[side] * direction, 0, 1), along, last, 2 * step)

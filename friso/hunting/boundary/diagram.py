@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -33,7 +34,7 @@ class Diagram:
 
     def value(self, place: float) -> float:
         """The value of the key [SI] at a place."""
-        return float(self.space.ranges[0].at(np.float64(place)))
+        return float(self.space.ranges[0].at(np.array(place)))
 
     def error(self, found: Found) -> float:
         """By how much the value [SI] of a special point changes when it is computed to a hundredth of the tolerance."""
@@ -73,7 +74,7 @@ def _passes(branch: Branch, point: Point) -> bool:
     if branch.sign != point.cycle.sign:
         return False
     path = np.array([each.vector for each in branch.points])
-    for first, second in zip(path[:-1], path[1:], strict=True):
+    for first, second in pairwise(path):
         low, high = sorted((first[0], second[0]))
         if low <= point.place <= high:
             share = (point.place - first[0]) / (second[0] - first[0]) if high > low else 0.0

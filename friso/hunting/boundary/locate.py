@@ -69,7 +69,7 @@ def located(tracer: Tracer, first: Point, second: Point, kind: Kind) -> Found | 
         return distance_to(kind, met[along])
 
     try:
-        along = brentq(off, 0.0, length, xtol=PRECISE, maxiter=TRIES)
+        along = float(brentq(off, 0.0, length, xtol=PRECISE, maxiter=TRIES))  # type: ignore[arg-type]
         off(along)
     except (Unreached, RuntimeError):
         return None

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
+from friso.equations.structure import Structure, structure
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.shooting import Family
 from friso.stage import Stage, violations
@@ -18,12 +20,13 @@ Flat = Callable[[Mapping[str, np.ndarray]], Mapping[str, Any]]
 
 @dataclass(frozen=True)
 class Range:
-    """A key (or a free name that others follow) from `low` to `high` [SI], on a logarithmic scale if `log`."""
+    """A key (or a free name that others follow) from `low` to `high` [SI `unit`], on a logarithmic scale if `log`."""
 
     key: str
     low: float
     high: float
     log: bool = False
+    unit: str = ""
 
     def at(self, place: np.ndarray) -> np.ndarray:
         """The values [SI] at places, 0 at `low` and 1 at `high`."""
@@ -55,7 +58,13 @@ class Space:
 
     def stages(self, points: np.ndarray) -> Ensemble:
         """The stages at points of the box, shape (count, keys)."""
-        return Ensemble.held(self.flat(self.values(points)), len(points))
+        return Ensemble.held(self.flat(self.values(points)), len(points), form=self.form)
+
+    @cached_property
+    def form(self) -> Structure:
+        """The structure of the stages inside the box; those on its sides (a stroke of zero) are treated alike."""
+        middle = self.flat(self.values(np.full((1, len(self.ranges)), 0.5)))
+        return structure({key: value[0] if np.ndim(value) else value for key, value in middle.items()})
 
     def allowed(self, points: np.ndarray) -> np.ndarray:
         """Which points of the box, shape (count, keys), belong to stages that may be, shape (count,)."""

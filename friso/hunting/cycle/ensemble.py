@@ -22,11 +22,13 @@ QUIET = 4.0
 class Ensemble:
     """Stages of one structure, given as flat keys to SI numbers or arrays of shape (count,).
 
-    `threads` bounds the threads of its runs, `cancel` is a flag that stops them (see `Options`).
+    `form` is their structure where the first of them does not tell it. `threads` bounds the threads of their runs,
+    `cancel` is a flag that stops them (see `Options`).
     """
 
     flat: Mapping[str, Any]
     count: int
+    form: Structure | None = None
     threads: int | None = None
     cancel: np.ndarray | None = None
 
@@ -43,7 +45,7 @@ class Ensemble:
 
     @cached_property
     def structure(self) -> Structure:
-        return structure({key: value[0] if np.ndim(value) else value for key, value in self.flat.items()})
+        return self.form or structure({key: value[0] if np.ndim(value) else value for key, value in self.flat.items()})
 
     @cached_property
     def kernel(self) -> Kernel:
@@ -131,4 +133,4 @@ def _with_room(results: Results, room: int) -> Results:
 
 def done(results: Results) -> np.ndarray:
     """Which runs were completed, shape (runs,)."""
-    return results.statuses == Status.DONE
+    return np.equal(results.statuses, Status.DONE)

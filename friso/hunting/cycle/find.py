@@ -42,9 +42,10 @@ class Cycles:
 
     `found` (count,); `reasons` (count,), why there is none; `sign`, -1 for cycles that are their own mirror image after
     half a period, over which everything is taken then, and 1 for others; `states` (count, states) on the cycle, in the
-    middle of the sticking; `period` [s], `amplitude` [m], half of peak to peak, `middle` [m] between them, `gap` (see `Orbits`), the `local`
-    multipliers (count, states - 1), the largest first, its `direction` (count, states), the macroscopic `slope` and the
-    `multiplier`, that of the two which decides, each of shape (count,); NaN where there is none.
+    middle of the sticking; `period` [s], `amplitude` [m], half of peak to peak, `middle` [m] between the peaks, `gap`
+    (see `Orbits`), the `local` multipliers (count, states - 1), the largest first, their `direction` (count, states),
+    the macroscopic `slope` and the `multiplier`, that of the two which decides, each of shape (count,); NaN where there
+    is none.
     """
 
     sign: float
@@ -106,7 +107,9 @@ def whole_cycles(stages: Ensemble, rtol: float = RTOL, taken: tuple[ReturnMap, R
 def _closed(stages: Ensemble, guess: Guess, sign: float, rtol: float) -> Cycles:
     """The cycles near guesses."""
     count, size = stages.count, len(stages.kernel.states)
-    orbits = Orbits(np.full((count, size), np.nan), guess.times.copy(), sign, np.full(count, np.inf), np.zeros(count, bool))
+    orbits = Orbits(
+        np.full((count, size), np.nan), guess.times.copy(), sign, np.full(count, np.inf), np.zeros(count, bool)
+    )
     for distance, time in TRIES:
         missing = guess.there[~orbits.closed[guess.there]]
         if not missing.size:
@@ -136,21 +139,22 @@ def _close_simulated(stages: Ensemble, guess: Guess, orbits: Orbits, rtol: float
     some, sign = stages.take(missing), orbits.sign
     starts = stuck(some, guess.distances[missing])
     seen = swings(some, starts, REPEATED * guess.times[missing], 4 * REPEATED, ROUGH)
-    count = np.isfinite(seen.values).sum(axis=1)
-    step = 1 if sign < 0 else 2
-    every = np.arange(some.count)
-    last, before = (np.maximum(count - 2 - k * step, 0) for k in (0, 1))
-    heights = [np.abs(seen.values[every, k]) for k in (last, before)]
-    times = seen.times[every, last] - seen.times[every, before]
-    steady = (count > REPEATED // 2) & (np.abs(heights[0] / heights[1] - 1) < STEADY)
-    if not steady.any():
+    every, step = np.arange(some.count), 1 if sign < 0 else 2
+    last = np.maximum(np.isfinite(seen.values).sum(axis=1) - 2, step)
+    last -= (sign > 0) & (seen.values[every, last] < 0)  # on the side that it is followed from
+    heights = np.abs(np.stack([seen.values[every, last], seen.values[every, last - step]]))
+    times = seen.times[every, last] - seen.times[every, last - step]
+    fine = np.flatnonzero((last > REPEATED // 2) & (np.abs(heights[0] / heights[1] - 1) < STEADY))
+    if not fine.size:
         return
-    fine = np.flatnonzero(steady)
-    waits = UNWINDING * wait(some, heights[0])
-    ends = some.take(fine).run(starts[fine], (seen.times[every, last] + waits)[fine], ROUGH).ends
-    ends *= np.sign(ends[:, stages.sticking])[:, None]
+    ends_at = seen.times[every, last] + UNWINDING * wait(some, heights[0])
+    ends = some.take(fine).run(starts[fine], ends_at[fine], ROUGH).ends
+    if sign < 0:
+        ends *= np.sign(ends[:, stages.sticking])[:, None]
     _accept(stages, orbits, missing[fine], close(some.take(fine), ends, times[fine], sign, rtol), guess)
 
+
+_NUMBERS = ("period", "amplitude", "middle", "gap", "slope", "multiplier")
 
 NO_RETURN = "from no distance does the stage swing back as far as it came from"
 NO_PAIR = "there is no asymmetric cycle beside the symmetric one"
@@ -165,14 +169,13 @@ def described(stages: Ensemble, orbits: Orbits, rtol: float, reasons: np.ndarray
     periods = shut.times * (2.0 if shut.sign < 0 else 1.0)
     count, size = stages.count, len(stages.kernel.states)
     cycles = Cycles(
-        orbits.sign,
-        orbits.closed.copy(),
-        np.where(orbits.closed, "", reasons).astype(object),
-        orbits.states,
-        *(np.full(count, np.nan) for _ in range(4)),
-        np.full((count, size - 1), np.nan, complex),
-        np.full((count, size), np.nan),
-        *(np.full(count, np.nan) for _ in range(2)),
+        sign=orbits.sign,
+        found=orbits.closed.copy(),
+        reasons=np.where(orbits.closed, "", reasons).astype(object),
+        states=orbits.states,
+        local=np.full((count, size - 1), np.nan, complex),
+        direction=np.full((count, size), np.nan),
+        **{name: np.full(count, np.nan) for name in _NUMBERS},
     )
     if not which.size:
         return cycles
@@ -180,8 +183,8 @@ def described(stages: Ensemble, orbits: Orbits, rtol: float, reasons: np.ndarray
     round_trip = some.run(shut.states, periods, rtol, window=0.0)
     extremes = round_trip.statistics[:, [STATISTICS.index("deviation_max"), STATISTICS.index("deviation_min")]]
     first = found.local[:, 0]
-    local = np.where(np.abs(first.imag) > 1e-6 * np.abs(first), np.abs(first), first.real)
-    decisive = found.slope if some.chatters else local
+    complex_pair = np.abs(np.imag(first)) > 1e-6 * np.abs(first)
+    decisive = found.slope if some.chatters else np.where(complex_pair, np.abs(first), np.real(first))
     values = {
         "period": periods,
         "amplitude": np.where(done(round_trip), (extremes[:, 0] - extremes[:, 1]) / 2, np.nan),

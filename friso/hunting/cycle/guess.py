@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.rest import stuck, wait
+from friso.hunting.cycle.rest import wait
 from friso.hunting.cycle.return_map import ReturnMap, follow
 
 REFINED = 8

@@ -10,7 +10,7 @@ import numpy as np
 from friso.engine.kernel import Wanted, kernels
 from friso.engine.simulate import output_variables, time_axis
 from friso.engine.tolerance import checked_rtol
-from friso.equations.structure import structure
+from friso.equations.structure import Structure, structure
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import NOT_CLOSED, ROUGH, RTOL, Cycles, asymmetric_cycles, symmetric_cycles, whole_cycles
 from friso.hunting.cycle.multipliers import returns_of
@@ -83,7 +83,11 @@ class Hunting:
 
 def cannot_hunt(stage: Stage) -> str:
     """Why a stage cannot hunt, whatever its numbers; "" if it may."""
-    form = structure(stage.flat())
+    return why_not(structure(stage.flat()))
+
+
+def why_not(form: Structure) -> str:
+    """Why stages of this structure cannot hunt; "" if they may."""
     if form.friction == "none":
         return "there is no friction to stick to"
     if form.controller is None or not form.controller.integral:

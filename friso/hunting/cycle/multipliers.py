@@ -77,7 +77,7 @@ def returns_of(
     stages: Ensemble, orbits: Orbits, direction: np.ndarray, away: np.ndarray, returns: int, rtol: float
 ) -> np.ndarray:
     """How far stages swing [m], shape (count, points, returns), on each of some returns, when they begin beside their
-    orbits: away along a direction (count, states) by shares (count or 1, points) of the distance at which they stick."""
+    orbits: away along a direction (count, states) by shares (1, points) of the distance at which they stick."""
     count, points = stages.count, away.shape[1]
     distance = orbits.states[:, stages.sticking]
     starts = orbits.states[:, None, :] + (away * np.abs(distance)[:, None])[:, :, None] * direction[:, None, :]

@@ -65,15 +65,16 @@ def shoot(stages: Ensemble, states: np.ndarray, times: np.ndarray, sign: float, 
     results = stages.take(every).run(starts, times[every], rtol, variational=True)
     ends = results.ends.reshape(count, size, 2 * size)
     flows = sign * np.swapaxes(ends[:, :, size:], 1, 2)
-    return Shot(sign * ends[:, 0, :size], flows, done(results).reshape(count, size).all(axis=1))
+    return Shot(sign * ends[:, 0, :size], flows, np.all(done(results).reshape(count, size), axis=1))
 
 
 def close(stages: Ensemble, states: np.ndarray, times: np.ndarray, sign: float, rtol: float) -> Orbits:
     """Close orbits from guesses: states (count, states) at which the stage sticks, and times [s] (count,).
 
     `sign` is -1 for half a period of a symmetric cycle, 1 for a whole one. The phase is that at which the integrator's
-    state makes the actuator exert no force on a stage at rest. Where a limiter chatters, the flow's derivative changes from one nanometre to the next and points nowhere;
-    the last Jacobian from farther away then serves for as many steps as it takes.
+    state makes the actuator exert no force on a stage at rest. Where a limiter chatters, the flow's derivative changes
+    from one nanometre to the next and points nowhere; the last Jacobian from farther away then serves for as many
+    steps as it takes.
     """
     return _solved(_Shooting(lambda which, places: stages.take(which), states, times, sign, rtol)).orbits
 

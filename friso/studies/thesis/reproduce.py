@@ -13,6 +13,7 @@ from friso.hunting import COUNTED_ABOVE
 from friso.stage import StageError
 from friso.studies.sweep import sweep
 from friso.studies.thesis.claims import Claim, Evidence, Finding, Registered, Response, claims, registered
+from friso.studies.thesis.cycles import Cycles, cycles
 from friso.studies.thesis.judges.shares import NARROW, WIDE
 from friso.studies.thesis.open_parameters import METHOD, OPEN, RTOL, Variant
 from friso.studies.thesis.studies import LOCKED, NOTHING, STUDIES, ThesisStudy, rig
@@ -44,30 +45,37 @@ Progress = Callable[[int, int, str], None]
 class Reproduction:
     """All that was found: maps by study name and responses by name; the map of Fig. 14B by relative tolerance
     and the shares of its cells whose verdict, and whose peak count, differs between them (NaN if not computed); a
-    verdict per claim; values per axis of the maps (`points`), which are those of every variant too."""
+    verdict per claim; the hunting cycles behind each map by study name; values per axis of the maps (`points`), which
+    are those of every variant too."""
 
     maps: Mapping[str, xr.Dataset]
     responses: Mapping[str, Response]
     tolerances: Mapping[float, xr.Dataset]
     changed: tuple[float, float]
     verdicts: tuple[Verdict, ...]
+    cycles: Mapping[str, Cycles]
     points: int
     rtol: float
 
 
 def reproduce(
-    names: Iterable[str] | None = None, points: int = POINTS, rtol: float = 1e-6, progress: Progress | None = None
+    names: Iterable[str] | None = None,
+    points: int = POINTS,
+    rtol: float = 1e-6,
+    progress: Progress | None = None,
+    with_cycles: bool = True,
 ) -> Reproduction:
     """Run the studies `names` (default: all of Table 3), `points` values per axis, and judge the claims.
 
-    A claim that needs a study left out is "not yet covered". `progress` is called with steps done, steps in all
+    A claim that needs a study left out is "not yet covered". `with_cycles` the hunting cycles behind every map are
+    computed too, which takes several times as long as all the maps. `progress` is called with steps done, steps in all
     and what comes next. Raises StageError for an unknown study or too few points, ValueError for an unusable rtol.
     """
     studies = _chosen(names)
     if points < 3:
         raise StageError("points", str(points), "3 or more values per axis", "41")
     variants = (*OPEN, *METHOD)
-    tell = _Teller(progress, 2 + len(variants) + 1)
+    tell = _Teller(progress, 2 + len(variants) + (len(studies) if with_cycles else 0) + 1)
     tell("maps")
     responses = {name: _response(own, NOTHING, rtol) for name, own in RESPONSES.items()}
     baseline = Evidence(_maps(studies, points, rtol, VERIFIED), responses)
@@ -78,10 +86,15 @@ def reproduce(
     for variant in variants:
         tell(f"{variant.parameter} {variant.value}")
         varied.append((variant, _findings(entries, _varied(studies, points, rtol, variant, baseline))))
+    behind: dict[str, Cycles] = {}
+    for study in studies if with_cycles else ():
+        tell(f"hunting cycles, {study.name}")
+        behind[study.name] = cycles(study, baseline.maps[study.name])
     tell("done")
     found, coarse = _findings(entries, baseline), _findings(entries, _coarser(baseline))
     verdicts = tuple(_judged(claim, baseline, found, coarse, varied) for claim in claims())
-    return Reproduction(baseline.maps, baseline.responses, tolerances, _changed(tolerances), verdicts, points, rtol)
+    changed = _changed(tolerances)
+    return Reproduction(baseline.maps, baseline.responses, tolerances, changed, verdicts, behind, points, rtol)
 
 
 def _chosen(names: Iterable[str] | None) -> tuple[ThesisStudy, ...]:

@@ -1,0 +1,53 @@
+"""The boundary of hunting over ranges as a user gives them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from friso.engine.kernel import Wanted, kernels
+from friso.engine.tolerance import checked_rtol
+from friso.hunting.boundary import Diagram, Plane, Range, Space, diagram, plane
+from friso.hunting.cycle.find import RTOL
+from friso.hunting.cycle.hunting import cannot_hunt
+from friso.quantities import StageError
+from friso.stage import Stage
+from friso.studies.axes import Axis, read_axis
+from friso.studies.cells import flat_cells
+from friso.studies.links import check_links, names
+
+EXAMPLE = 'controller.crossover="1 Hz..40 Hz"'
+
+
+def boundary(
+    stage: Stage,
+    axes: Mapping[str, str],
+    links: Mapping[str, str] | None = None,
+    rtol: float = RTOL,
+    log: bool = False,
+) -> Diagram | Plane:
+    """Where the hunting cycle of a stage stops attracting, over one key or two.
+
+    An axis is a key with a range, ``{"controller.crossover": "1 Hz..40 Hz"}``, logarithmic if ":log" is behind it or
+    with `log`; `links` are SI expressions for keys that follow, as in `friso.sweep`. With one axis the result is a
+    `Diagram`: all branches of cycles over the range and the points at which they flip or fold; with two it is a
+    `Plane`: the curves on which they do. The motion of the stage file plays no part. Raises StageError for a wrong
+    range, link or stage (one that cannot hunt), ValueError for a tolerance that is not usable.
+    """
+    checked_rtol(rtol)
+    followers = dict(links or {})
+    ranges = tuple(_range(stage, name, text, names(followers), log) for name, text in axes.items())
+    if len(ranges) not in (1, 2):
+        raise StageError("axes", f"{len(ranges)} keys", "one key or two", EXAMPLE)
+    check_links(stage, followers, frozenset(each.key for each in ranges))
+    if reason := cannot_hunt(stage):
+        raise StageError("stage", f"one that cannot hunt: {reason}", "friction and integral action", EXAMPLE)
+    space = Space(ranges, lambda values: flat_cells(stage, followers, values))
+    kernels([Wanted(space.form, variational) for variational in (False, True)])
+    return diagram(space, rtol) if len(ranges) == 1 else plane(space, rtol)
+
+
+def _range(stage: Stage, name: str, text: str, free: frozenset[str], log: bool) -> Range:
+    read = read_axis(stage, name, text, name in free, log)
+    if isinstance(read, Axis) or read.count is not None:
+        raise StageError(name, repr(text), "a range FIRST..LAST, without a number of points", EXAMPLE)
+    return Range(name, read.first, read.last, read.scale == "log", read.unit)

@@ -1,0 +1,101 @@
+"""The hunting cycles behind the thesis's maps: the edge of hunting, and how far the peak count agrees with it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from friso.hunting.boundary import Kind, Range, Space, plane
+from friso.hunting.cycle.find import NOT_CLOSED
+from friso.studies.cells import cell_cycles, flat_cells
+from friso.studies.study import study_of
+from friso.studies.thesis.studies import ThesisStudy
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+EVERY = 2
+"""Of every so many values of each axis the cycle is looked for, to compare it with the peak count."""
+
+NODES = 9
+"""Stages along either axis from which curves are looked for."""
+
+SMALLEST = 1e-3
+"""Share of a linear range at which curves begin that would begin at zero, where there may be no stage."""
+
+
+@dataclass(frozen=True)
+class Edge:
+    """A curve on which a cycle stops attracting: its kind, whether it is of the symmetric cycle, and its points [SI]
+    along the two axes of the map, shape (points,) each."""
+
+    kind: Kind
+    symmetric: bool
+    x: np.ndarray
+    y: np.ndarray
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """What the peak count and the cycle say of the cells compared: both hunting (`agreed`) or both not (`quiet`), peaks
+    counted although no cycle attracts (`transient`), a cycle that attracts although no peaks are counted (`dormant`:
+    another move would start it), and cells of which the cycle could not be computed."""
+
+    cells: int
+    agreed: int
+    quiet: int
+    transient: int
+    dormant: int
+    unknown: int
+
+
+@dataclass(frozen=True)
+class Cycles:
+    """The curves over a map of the thesis, and the comparison with its peak counts."""
+
+    edges: tuple[Edge, ...]
+    comparison: Comparison
+
+
+def cycles(study: ThesisStudy, runs: xr.Dataset) -> Cycles:
+    """The hunting cycles over a map of the thesis, from the study and its runs."""
+    return Cycles(_edges(study, runs), _comparison(runs))
+
+
+def _comparison(runs: xr.Dataset) -> Comparison:
+    coarse = runs.isel(dict.fromkeys(runs.dims, slice(None, None, EVERY)))
+    study = study_of(coarse)
+    valid = (coarse["verdict"].values != "invalid").ravel()
+    attracts, known = np.zeros(study.cells, bool), np.zeros(study.cells, bool)
+    for which, found in cell_cycles(study.stage, study.links, study.columns(np.arange(study.cells)), valid):
+        attracts[which], known[which] = found.attracting, found.reasons != NOT_CLOSED
+    peaks = (coarse["peaks"].values > 0).ravel()
+    known &= valid
+    return Comparison(
+        cells=int(valid.sum()),
+        agreed=int((known & attracts & peaks).sum()),
+        quiet=int((known & ~attracts & ~peaks).sum()),
+        transient=int((known & ~attracts & peaks).sum()),
+        dormant=int((known & attracts & ~peaks).sum()),
+        unknown=int((valid & ~known).sum()),
+    )
+
+
+def _edges(study: ThesisStudy, runs: xr.Dataset) -> tuple[Edge, ...]:
+    """The curves over a map; none where the axes belong to the motion, which plays no part."""
+    if any(span.key.startswith("motion.") for span in study.spans):
+        return ()
+    source = study_of(runs)
+    ranges = tuple(_range(runs[span.key].values, span.key, span.log) for span in study.spans)
+    space = Space(ranges, lambda values: flat_cells(source.stage, source.links, values))
+    found = plane(space, nodes=NODES).curves
+    lines = [space.values(curve.points) for curve in found]
+    x, y = (each.key for each in ranges)
+    return tuple(Edge(curve.kind, curve.sign < 0, line[x], line[y]) for curve, line in zip(found, lines, strict=True))
+
+
+def _range(values: np.ndarray, key: str, log: bool) -> Range:
+    low, high = float(values[0]), float(values[-1])
+    return Range(key, low if low > 0 else SMALLEST * high, high, log)

@@ -1,0 +1,249 @@
+"""What starts hunting, and how far off its edge is: against runs of single stages, and against one another."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from cycles import by_gains
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.stats import qmc
+from variants import VARIANTS, lugre, stage, there_and_back, van_dijk
+
+import friso
+from friso.hunting.basin import EDGE, MOVES, SHARES, Kick, Moves, displacements, ends_hunting, moves, pushes
+from friso.hunting.cycle.ensemble import Ensemble, done
+from friso.hunting.cycle.hunting import Cycle, hunting
+from friso.hunting.cycle.rest import pushed
+from friso.hunting.margin import FARTHEST, faster, margin
+from friso.stage import Stage
+
+RIGID = pytest.mark.xdist_group("rigid")
+GAINS = pytest.mark.xdist_group("gains")
+
+LONG = 60
+"""Periods after which a single run has settled, or swings like the cycle."""
+
+
+def rigid(crossover: float) -> Stage:
+    """The rigid mass of 1.7 kg."""
+    return VARIANTS["rigid"].replace({"controller.crossover": f"{crossover} Hz"})
+
+
+@cache
+def cycle() -> Cycle:
+    """Its cycle at 8 Hz, 0.52 mm and 1.63 s, which attracts."""
+    (found,) = hunting(rigid(8)).attracting
+    return found
+
+
+@cache
+def windows() -> Kick:
+    return displacements(rigid(8), cycle())
+
+
+def hunts(chosen: Stage) -> bool:
+    """Whether a single run still swings like the cycle at its end, by its samples."""
+    response = friso.simulate(chosen, rtol=1e-7, sample_time=2e-3)
+    assert response.attrs["status"] == "done"
+    end = float(response.time[-1])
+    deviation = (response.position - response.reference).sel(time=slice(end - 2 * cycle().period, end))
+    swing = np.ptp(deviation.to_numpy()) / (2 * cycle().amplitude)
+    assert swing < 0.1 or swing == pytest.approx(1, rel=0.1)
+    return bool(swing > 0.5)
+
+
+def released(displacement: float) -> Stage:
+    motion = {"motion.displacement": f"{displacement!r} m", "motion.duration": f"{LONG * cycle().period!r} s"}
+    return rigid(8).replace(motion)
+
+
+@RIGID
+def test_displacements_that_start_hunting() -> None:
+    """At 8 Hz three windows: 1.7 to 11.1 mm, 23.2 to 43.7 mm, and from 60.5 mm on, as far as was searched.
+
+    The stage lands near enough to its reference to rest after a first swing, or a second, from the gaps between them.
+    """
+    found = windows()
+    ends = [1e3 * end for window in found.windows for end in window]
+    assert ends[:5] == pytest.approx([1.7, 11.1, 23.2, 43.7, 60.5], rel=0.02)
+    assert len(ends) == 6
+    assert found.windows[-1][1] == found.searched[1] == pytest.approx(300 * cycle().amplitude)
+    assert found.searched[0] == pytest.approx(cycle().amplitude / 30)
+    assert found.smallest == found.windows[0][0]
+
+
+@RIGID
+@pytest.mark.parametrize("edge", range(5))
+def test_edges_of_the_windows_by_single_runs(edge: int) -> None:
+    """A release 2 % inside of each edge hunts, one 2 % outside does not."""
+    place = [end for window in windows().windows for end in window][edge]
+    inwards = 1.02 if edge % 2 == 0 else 1 / 1.02
+    assert hunts(released(place * inwards))
+    assert not hunts(released(place / inwards))
+
+
+@RIGID
+def test_mirrored_releases_start_hunting_as_well() -> None:
+    several = np.geomspace(1e-3, 0.1, 32)
+    flat = rigid(8).flat()
+    one, other = (
+        ends_hunting({**flat, "motion.displacement": sign * several}, 32, cycle()).tolist() for sign in (1, -1)
+    )
+    assert one == other
+    assert True in one
+    assert False in one
+
+
+@RIGID
+def test_pushes_that_start_hunting() -> None:
+    """2 % inside the first window a push hunts, 2 % outside it does not: by runs from states by hand."""
+    chosen = rigid(8)
+    found = pushes(chosen, cycle())
+    low, high = found.windows[0]
+    velocities = np.array([low * 1.02, high / 1.02, low / 1.02, high * 1.02])
+    stages = Ensemble.held(chosen.flat(), 4)
+    starts = np.zeros((4, 5))
+    starts[:, stages.kernel.states.index("velocity")] = velocities
+    assert np.array_equal(starts, pushed(stages, velocities))
+    duration = LONG * cycle().period
+    results = stages.run(starts, np.full(4, duration), 1e-7, interval=duration / 20000)
+    assert done(results).all()
+    swing = np.ptp(results.samples[:, -600:, stages.index("position")], axis=1) / 2
+    assert swing[:2] == pytest.approx(cycle().amplitude, rel=0.05)
+    assert np.all(swing[2:] < 0.05 * cycle().amplitude)
+
+
+def test_nothing_that_starts_hunting() -> None:
+    assert Kick((), (1e-5, 1e-1)).smallest is None
+
+
+MOVING = stage(there_and_back(), friction=lugre(2), controller=van_dijk("8 Hz"))
+
+
+@RIGID
+def test_share_of_moves_is_reproducible() -> None:
+    """The same draws each time: the same numbers."""
+    first, second = moves(MOVING, cycle()), moves(MOVING, cycle())
+    assert first is not None
+    assert first == second
+    assert first.drawn == MOVES
+    assert first.accelerations == pytest.approx([10, 200])
+    assert first.times == pytest.approx([0.003, 0.06])
+    low, high = first.interval
+    assert 0 < low < first.fraction < high < 1
+
+
+@RIGID
+def test_moves_by_single_runs() -> None:
+    """The count is that of single runs of the same draws; eight of them are simulated, hunting and resting ones."""
+    found = moves(MOVING, cycle())
+    assert found is not None
+    drawn = qmc.scale(qmc.Sobol(2, rng=0).random(MOVES), *zip(found.accelerations, found.times, strict=True))
+    own = MOVING.flat() | {"motion.acceleration": drawn[:, 0], "motion.acceleration_time": drawn[:, 1]}
+    each = ends_hunting(own, MOVES, cycle())
+    assert each.sum() == found.hunting
+    assert 0 < found.hunting < MOVES
+    for k in (*np.flatnonzero(each)[:4], *np.flatnonzero(~each)[:4]):
+        acceleration, time = map(float, drawn[k])
+        move = there_and_back(f"{5.2 + LONG * cycle().period!r} s").replace("30 ms", f"{time!r} s")
+        move = move.replace("100 m/s^2", f"{acceleration!r} m/s^2")
+        assert hunts(stage(move, friction=lugre(2), controller=van_dijk("8 Hz"))) == each[k]
+
+
+@RIGID
+def test_moves_that_overlap_are_not_drawn() -> None:
+    """A move takes twice the acceleration time, and the stage returns after it has arrived."""
+    soon = MOVING.replace({"motion.return_at": "0.08 s"})
+    found = moves(soon, cycle())
+    assert found is not None
+    assert found.times == pytest.approx([SHARES[0] * 0.03, 0.04])
+
+
+@RIGID
+def test_motions_without_acceleration_have_no_share() -> None:
+    """A release has none, nor does a move that stays where it is."""
+    assert moves(rigid(8), cycle()) is None
+    assert moves(MOVING.replace({"motion.acceleration": "0 m/s^2"}), cycle()) is None
+
+
+@given(drawn=st.integers(1, 500), data=st.data())
+def test_interval_holds_the_share(drawn: int, data: st.DataObject) -> None:
+    """Wilson 1927, doi:10.1080/01621459.1927.10502953: at its ends the share p is 1.96 sqrt(p (1-p)/n) off."""
+    hunting = data.draw(st.integers(0, drawn))
+    found = Moves(drawn, hunting, (1.0, 2.0), (1.0, 2.0))
+    low, high = found.interval
+    assert 0 <= low <= found.fraction <= high <= 1
+    for p in (low, high):
+        if 0 < p < 1:
+            assert abs(p - found.fraction) == pytest.approx(1.959964 * np.sqrt(p * (1 - p) / drawn), rel=1e-5, abs=1e-9)
+
+
+def equal_gains(crossover: float) -> Stage:
+    """The controller of `rigid`, its transfer function written as gains; the force limit is far off."""
+    return by_gains(crossover, "1e6 N")
+
+
+@GAINS
+def test_gains_hunt_like_the_tuned_controller_they_equal() -> None:
+    """The states of the controller differ, what it does not: the same cycle, the same margin."""
+    chosen = equal_gains(8)
+    (found,) = hunting(chosen).cycles
+    assert found.period == pytest.approx(cycle().period, rel=1e-7)
+    assert found.amplitude == pytest.approx(cycle().amplitude, rel=1e-7)
+    assert found.multiplier == pytest.approx(cycle().multiplier, rel=1e-4)
+    assert found.growth == pytest.approx(cycle().growth, rel=1e-4)
+    edge, tuned = margin(chosen, attracting=True), margin(rigid(8), attracting=True)
+    assert edge is not None
+    assert tuned is not None
+    assert edge.crossover is None
+    assert edge.factor == pytest.approx(tuned.factor, rel=1e-5)
+
+
+@GAINS
+def test_faster_gains_are_those_of_the_tuned_controller_at_a_higher_crossover() -> None:
+    """All poles and zeros scaled, and the crossover with them: kp by the square, ki by the cube, kd once, tau back."""
+    scaled, wanted = faster(equal_gains(8).flat(), np.array(1.25)), equal_gains(10).flat()
+    for name in ("kp", "ki", "kd", "tau"):
+        assert float(scaled[f"controller.{name}"]) == pytest.approx(wanted[f"controller.{name}"], rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    "chosen", [pytest.param(rigid(8), marks=RIGID), pytest.param(equal_gains(8), marks=GAINS)], ids=["tuned", "gains"]
+)
+def test_cycle_attracts_up_to_the_margin_and_not_beyond(chosen: Stage) -> None:
+    """At 0.98 times the factor a cycle attracts, at 1.02 times none does; by hunting(), from stage files."""
+    edge = margin(chosen, attracting=True)
+    assert edge is not None
+    for share, attracting in ((0.98, 1), (1.02, 0)):
+        assert len(hunting(at(chosen, share * edge.factor)).attracting) == attracting
+
+
+def at(chosen: Stage, factor: float) -> Stage:
+    """The stage with a controller faster by a factor, written out."""
+    units = {"crossover": "Hz", "kp": "N/m", "ki": "N/(m*s)", "kd": "N*s/m", "tau": "s"}
+    scaled = faster(chosen.flat(), np.array(factor))
+    texts = {f"controller.{name}": unit for name, unit in units.items() if f"controller.{name}" in scaled}
+    return chosen.replace({key: f"{float(scaled[key])!r} {unit}" for key, unit in texts.items()})
+
+
+@RIGID
+def test_margin_from_above_is_that_from_below() -> None:
+    """Whether the stage hunts or not, the edge in between is the same."""
+    below, above = margin(rigid(8), attracting=True), margin(rigid(14), attracting=False)
+    assert below is not None
+    assert above is not None
+    assert below.crossover == pytest.approx(above.crossover, rel=1e-5)
+
+
+@RIGID
+@pytest.mark.parametrize(("crossover", "attracting"), [(0.9, True), (110, False)])
+def test_no_margin_within_a_factor_of_ten(crossover: float, attracting: bool) -> None:
+    """The edge at 9.77 Hz is too far off to be looked for."""
+    assert max(9.77 / crossover, crossover / 9.77) > FARTHEST
+    assert margin(rigid(crossover), attracting) is None
+
+
+def test_edges_are_sought_finer_than_they_are_checked() -> None:
+    """The checks above at 2 % mean something only while edges are found to 1 %."""
+    assert EDGE <= 0.01
