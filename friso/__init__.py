@@ -10,6 +10,7 @@ from friso.version import VERSION as __version__
 if TYPE_CHECKING:
     from friso.engine.simulate import simulate
     from friso.hunting.check import Case, check
+    from friso.studies.boundary import boundary
     from friso.studies.samples import Samples
     from friso.studies.store import read_store
     from friso.studies.sweep import sweep
@@ -19,6 +20,7 @@ _LAZY = {
     "check": "friso.hunting.check",
     "Case": "friso.hunting.check",
     "sweep": "friso.studies.sweep",
+    "boundary": "friso.studies.boundary",
     "Samples": "friso.studies.samples",
     "read_store": "friso.studies.store",
 }
@@ -29,6 +31,7 @@ __all__ = [
     "Stage",
     "StageError",
     "__version__",
+    "boundary",
     "check",
     "load",
     "loads",

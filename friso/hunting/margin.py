@@ -84,6 +84,7 @@ class _Step:
     known: bool
 
 
+@np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def _step(flat: Mapping[str, Any], low: float, high: float, points: int, attracting: bool) -> _Step:
     """Look for the edge between two factors."""
     factors = np.geomspace(low, high, points)

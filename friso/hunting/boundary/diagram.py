@@ -41,6 +41,7 @@ class Diagram:
         return abs(self.value(found.point.place + found.error) - self.value(found.point.place))
 
 
+@np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def diagram(space: Space, rtol: float = RTOL, seeds: int = SEEDS) -> Diagram:
     """Follow every cycle that is found at stages evenly over the range: the symmetric one and asymmetric ones."""
     places = np.linspace(0, 1, seeds)

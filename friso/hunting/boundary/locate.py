@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -124,6 +125,5 @@ def corrected(
 
 def special_points(tracer: Tracer, branch: Branch) -> list[Found]:
     """All points of a branch at which a multiplier passes the unit circle."""
-    pairs = zip(branch.points[:-1], branch.points[1:], strict=True)
-    found = [located(tracer, *pair, kind) for pair in pairs for kind in changes(*pair)]
+    found = [located(tracer, *pair, kind) for pair in pairwise(branch.points) for kind in changes(*pair)]
     return [each for each in found if each]

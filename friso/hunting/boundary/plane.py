@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -44,6 +45,7 @@ class Plane:
     lost: tuple[np.ndarray, ...]
 
 
+@np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def plane(space: Space, rtol: float = RTOL, nodes: int = NODES) -> Plane:
     """All curves on which the hunting cycle stops attracting, and those on which an asymmetric cycle that bounds its
     basin appears."""
@@ -108,7 +110,7 @@ def _crossed(curve: Curve, start: np.ndarray, end: np.ndarray) -> bool:
     legs = points[1:] - points[:-1]
     way = start + np.linspace(0, 1, 9)[:, None] * (end - start)
     for at in way:
-        shares = np.clip(((at - points[:-1]) * legs).sum(axis=1) / (legs**2).sum(axis=1), 0, 1)
+        shares = np.clip(((at - points[:-1]) * legs).sum(axis=1) / np.maximum((legs**2).sum(axis=1), 1e-30), 0, 1)
         away = np.linalg.norm(points[:-1] + shares[:, None] * legs - at, axis=1)
         if away.min() < SAME * np.linalg.norm(end - start):
             return True
@@ -130,7 +132,7 @@ def _curve(space: Space, start: np.ndarray, end: np.ndarray, cycle: Cycles, rtol
 def _first(tracer: Tracer, start: Point) -> Found | None:
     """The first point on the branch that leaves the start ahead at which its cycle stops attracting or folds back."""
     points, _ = tracer.walk(start, 1.0)
-    for pair in zip([start, *points[:-1]], points, strict=True):
+    for pair in pairwise([start, *points]):
         kinds = changes(*pair)
         if kinds:
             return located(tracer, *pair, "fold" if "fold" in kinds else kinds[0])

@@ -77,6 +77,7 @@ class Cycles:
         return Cycles(self.sign, **{name: array[numbers] for name, array in arrays.items()})
 
 
+@np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def symmetric_cycles(stages: Ensemble, rtol: float = RTOL, taken: ReturnMap | None = None) -> Cycles:
     """The cycle of every stage that is its own mirror image, of stages whose equations are."""
     taken = taken or return_map(stages, ROUGH)
@@ -88,6 +89,7 @@ def hunting_cycles(stages: Ensemble, rtol: float = RTOL) -> Cycles:
     return symmetric_cycles(stages, rtol) if stages.symmetric.all() else whole_cycles(stages, rtol)
 
 
+@np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def asymmetric_cycles(stages: Ensemble, taken: ReturnMap, rtol: float = RTOL) -> Cycles:
     """One of the pair of cycles, mirror images of each other, that a symmetric stage may have beside its symmetric
     cycle; from its return map."""
@@ -97,6 +99,7 @@ def asymmetric_cycles(stages: Ensemble, taken: ReturnMap, rtol: float = RTOL) ->
     return cycles
 
 
+@np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def whole_cycles(stages: Ensemble, rtol: float = RTOL, taken: tuple[ReturnMap, ReturnMap] | None = None) -> Cycles:
     """The cycle of every stage, followed over a whole period, of stages that need not be symmetric; `taken` are the
     return maps of stages that stick on the positive and on the negative side."""
@@ -161,6 +164,7 @@ NO_PAIR = "there is no asymmetric cycle beside the symmetric one"
 NOT_CLOSED = "the return map has a fixed point, but no orbit near it could be closed"
 
 
+@np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def described(stages: Ensemble, orbits: Orbits, rtol: float, reasons: np.ndarray) -> Cycles:
     """Cycles from closed orbits: their size and their multipliers."""
     which = np.flatnonzero(orbits.closed)

@@ -95,6 +95,7 @@ def why_not(form: Structure) -> str:
     return ""
 
 
+@np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def hunting(stage: Stage, rtol: float = RTOL) -> Hunting:
     """The hunting cycles of a stage: the symmetric one and an asymmetric pair, or those of an asymmetric stage.
 

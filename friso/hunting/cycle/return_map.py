@@ -34,6 +34,7 @@ class ReturnMap:
     times: np.ndarray
 
 
+@np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def return_map(stages: Ensemble, rtol: float, side: float = 1.0) -> ReturnMap:
     """The map of stages that stick on one side, 1 or -1, of their reference; finer where it might return as far."""
     coarse = np.geomspace(*RANGE, POINTS)[None, :] * stages.length[:, None]

@@ -1,0 +1,194 @@
+"""The boundary of hunting: branches of cycles in one key, curves in two, and the map of the multiplier."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from variants import VARIANTS
+
+import friso
+from friso.hunting.boundary import Diagram, Found, Plane, Range, Space, diagram, plane
+from friso.hunting.boundary.branch import Point, Tracer
+from friso.hunting.cycle.find import symmetric_cycles
+from friso.quantities import StageError
+from friso.stage import Stage
+
+pytestmark = pytest.mark.xdist_group("rigid")
+
+RIGID = VARIANTS["rigid"]
+AT_8_HZ = RIGID.replace({"controller.crossover": "8 Hz"})
+CROSSOVER = Range("controller.crossover", 1.0, 40.0, unit="Hz")
+
+
+@pytest.fixture(scope="module")
+def over_crossover() -> Diagram:
+    """Of one rigid mass of 1.7 kg with the friction of Table 2, as in references.md."""
+    return diagram(Space.of(RIGID, [CROSSOVER]))
+
+
+def special(found: Diagram, symmetric: bool) -> dict[str, list[tuple[float, Found]]]:
+    """The special points of the symmetric or of the asymmetric branches by kind, with their values."""
+    points: dict[str, list[tuple[float, Found]]] = {"flip": [], "fold": [], "torus": []}
+    for branch, own in zip(found.branches, found.special, strict=True):
+        if (branch.sign < 0) == symmetric:
+            for each in own:
+                points[each.kind].append((found.value(each.point.place), each))
+    return points
+
+
+def test_one_rigid_mass_flips_at_9_77_hz_and_folds_at_16_2_hz(over_crossover: Diagram) -> None:
+    """references.md: it stops attracting near 9.77 Hz; the issue: the unstable cycle lives on to a fold at 16.2 Hz."""
+    points = special(over_crossover, symmetric=True)
+    first = min(points["flip"], key=lambda each: each[0])
+    assert first[0] == pytest.approx(9.77, abs=0.005)
+    assert first[1].point.multiplier == pytest.approx(-1, abs=1e-6)
+    (fold,) = points["fold"]
+    assert fold[0] == pytest.approx(16.22, abs=0.05)
+    assert fold[1].point.multiplier == pytest.approx(1, abs=1e-3)
+
+
+def test_an_asymmetric_pair_bounds_the_basin_from_8_47_hz(over_crossover: Diagram) -> None:
+    """Subcritical: the pair ends in the flip of the symmetric cycle, and folds at 8.47 Hz."""
+    points = special(over_crossover, symmetric=False)
+    (fold,) = points["fold"]
+    assert fold[0] == pytest.approx(8.47, abs=0.005)
+    (pair,) = (branch for branch in over_crossover.branches if branch.sign > 0)
+    places = [over_crossover.value(point.place) for point in pair.points]
+    assert "it meets the symmetric cycle" in pair.ends
+    assert max(places) == pytest.approx(9.77, abs=0.02)
+
+
+def test_errors_are_honest(over_crossover: Diagram) -> None:
+    """A diagram at a hundredth of the tolerance has its points within a few of the errors told."""
+    tight = diagram(Space.of(RIGID, [CROSSOVER]), rtol=1e-11)
+    for symmetric in (True, False):
+        for kind, points in special(over_crossover, symmetric).items():
+            other = [value for value, _ in special(tight, symmetric)[kind]]
+            for value, found in points:
+                nearest = min(other, key=lambda each: abs(each - value))
+                assert abs(nearest - value) < 3 * over_crossover.error(found) + 1e-6
+                assert over_crossover.error(found) < 1e-4
+
+
+def test_the_branch_is_what_is_found_at_single_stages(over_crossover: Diagram) -> None:
+    (symmetric,) = (branch for branch in over_crossover.branches if branch.sign < 0)
+    some = [point for point in symmetric.points if 0 < point.place < 0.35][::6]
+    stages = over_crossover.space.stages(np.array([[point.place] for point in some]))
+    alone = symmetric_cycles(stages)
+    assert alone.found.all()
+    assert alone.amplitude == pytest.approx([point.cycle.amplitude[0] for point in some], rel=1e-6)
+    assert alone.multiplier == pytest.approx([point.multiplier for point in some], rel=1e-3)
+
+
+def test_a_branch_does_not_depend_on_where_it_is_begun(over_crossover: Diagram) -> None:
+    """The fold is reached from 4 Hz as from 15 Hz."""
+    space = over_crossover.space
+    folds = []
+    for crossover in (4.0, 15.0):
+        place = float(CROSSOVER.place(np.array(crossover)))
+        stages = space.stages(np.array([[place]]))
+        tracer = Tracer(space.lines(np.zeros((1, 1)), np.ones((1, 1))), -1.0)
+        branch = tracer.branch(Point.of(stages, place, symmetric_cycles(stages)))
+        folds.append(max(point.place for point in branch.points))
+    assert over_crossover.value(folds[0]) == pytest.approx(over_crossover.value(folds[1]), abs=1e-3)
+
+
+@pytest.fixture(scope="module")
+def over_friction() -> Plane:
+    axes = [Range("friction.static", 1.0, 6.0, unit="N"), Range("friction.coulomb", 0.3, 2.5, unit="N")]
+    return plane(Space.of(AT_8_HZ, axes), nodes=9)
+
+
+def test_every_curve_lies_where_the_multiplier_says(over_friction: Plane) -> None:
+    """Flips of the symmetric cycle: 1 % to either side of the curve the cycle attracts on one and repels on the other,
+    by cycles that are found from scratch."""
+    flips = [curve for curve in over_friction.curves if curve.kind == "flip" and curve.sign < 0]
+    assert flips
+    for curve in flips:
+        for spot in curve.spots[2:-2:5]:
+            sides = np.clip(np.stack([spot.at - 0.01 * spot.across, spot.at + 0.01 * spot.across]), 0, 1)
+            cycles = symmetric_cycles(over_friction.space.stages(sides))
+            if cycles.found.all():
+                assert sorted(np.abs(cycles.multiplier) < 1) == [False, True]
+
+
+def test_curves_in_two_keys_pass_through_the_points_in_one(over_friction: Plane) -> None:
+    """At 1 N of Coulomb friction: folds and flips of the diagram over static friction lie on the curves."""
+    static = Range("friction.static", 1.0, 6.0, unit="N")
+    single = diagram(Space.of(AT_8_HZ.replace({"friction.coulomb": "1 N"}), [static]))
+    for kind, points in special(single, symmetric=True).items():
+        crossings = [
+            value
+            for curve in over_friction.curves
+            if (curve.kind, curve.sign) == (kind, -1.0)
+            for value in at_1_n(over_friction, curve)
+        ]
+        for value, _ in points:
+            assert min(abs(np.array(crossings) - value)) < 0.01
+
+
+def at_1_n(found: Plane, curve: Any) -> list[float]:
+    """Static friction [N] where a curve crosses a Coulomb friction of 1 N."""
+    values = found.space.values(curve.points)
+    static, coulomb = values["friction.static"], values["friction.coulomb"] - 1.0
+    at = np.flatnonzero(coulomb[:-1] * coulomb[1:] <= 0)
+    return [float(static[i] - coulomb[i] * (static[i + 1] - static[i]) / (coulomb[i + 1] - coulomb[i])) for i in at]
+
+
+def test_the_map_of_the_multiplier_and_the_curve_agree_within_a_cell(over_friction: Plane) -> None:
+    axes = {"friction.static": "1 N..6 N:21", "friction.coulomb": "0.3 N..2.5 N:21"}
+    runs = friso.sweep(AT_8_HZ, axes, metrics=["multiplier", "amplitude", "cycle_period"])
+    size = np.abs(runs.multiplier.values)
+    edges = np.argwhere((size[:-1] < 1) & (size[1:] > 1) & np.isfinite(size[:-1]) & np.isfinite(size[1:]))
+    assert len(edges) > 5
+    flips = [curve for curve in over_friction.curves if curve.kind == "flip" and curve.sign < 0]
+    points = np.concatenate([refined(curve.points) for curve in flips])
+    for i, j in edges:
+        place = np.array([(i + 0.5) / 20, j / 20])
+        assert np.abs(points - place).max(axis=1).min() < 1 / 20
+
+
+def refined(points: np.ndarray) -> np.ndarray:
+    """Twenty points on every leg of a polyline."""
+    shares = np.linspace(0, 1, 20)[:, None]
+    return np.concatenate([a + shares * (b - a) for a, b in zip(points[:-1], points[1:], strict=True)])
+
+
+def test_an_asymmetric_stage_loses_its_cycle_in_a_fold() -> None:
+    """Unequal friction unfolds the pitchfork: what was a flip of the half period is a fold of the whole one."""
+    found = diagram(Space.of(RIGID.replace({"friction.asymmetry": 0.005}), [Range("controller.crossover", 4.0, 12.0)]))
+    assert {branch.sign for branch in found.branches} == {1.0}
+    kinds = {each.kind for own in found.special for each in own}
+    assert "fold" in kinds
+
+
+def test_a_range_without_a_boundary_has_no_points() -> None:
+    found = diagram(Space.of(RIGID, [Range("controller.crossover", 4.0, 6.0)]), seeds=5)
+    assert found.cycles.attracting.all()
+    assert not any(found.special)
+
+
+def test_a_logarithmic_range_finds_the_same_flip() -> None:
+    found = friso.boundary(RIGID, {"controller.crossover": "8 Hz..12 Hz:log"})
+    assert isinstance(found, Diagram)
+    (flip,) = special(found, symmetric=True)["flip"]
+    assert flip[0] == pytest.approx(9.77, abs=0.005)
+
+
+NO_INTEGRAL = VARIANTS["rigid cart, P"]
+
+
+@pytest.mark.parametrize(
+    ("stage", "axes", "words"),
+    [
+        (RIGID, {}, "0 keys"),
+        (RIGID, {"controller.crossover": "1 Hz..40 Hz:41"}, "without a number of points"),
+        (RIGID, {"controller.crossover": "40 Hz..1 Hz"}, "reversed"),
+        (RIGID, {"controller.crosover": "1 Hz..40 Hz"}, "controller.crosover"),
+        (NO_INTEGRAL, {"controller.kp": "1 N/m..4 N/m"}, "no integral action"),
+        (VARIANTS["rigid, no friction section"], {"controller.crossover": "1 Hz..40 Hz"}, "no friction"),
+    ],
+)
+def test_what_has_no_boundary_is_refused(stage: Stage, axes: dict[str, str], words: str) -> None:
+    with pytest.raises(StageError, match=words):
+        friso.boundary(stage, axes)
