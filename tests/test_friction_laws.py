@@ -105,6 +105,12 @@ def swing_heights(results: Results) -> np.ndarray:
     return np.array([value for value in farthest if abs(value) > 1e-2 * np.max(np.abs(values))])
 
 
+def turns(results: Results) -> np.ndarray:
+    """Turning points but those of rounding noise about a rest at zero."""
+    values = results.turn_values[0, : results.turn_counts[0]]
+    return values[np.abs(values) > 1e-14]
+
+
 CASES = given(st.floats(0.3, 3), st.floats(3, 12), st.floats(1.2, 4), st.floats(0.5, 1.1))
 
 
@@ -114,9 +120,10 @@ CASES = given(st.floats(0.3, 3), st.floats(3, 12), st.floats(1.2, 4), st.floats(
 def test_mirror(displacement: float, crossover: float, static: float, coulomb: float) -> None:
     keys = friction_keys(static=static, coulomb=coulomb) | {"controller.crossover": crossover, "motion.duration": 4.0}
     one, other = (run(keys | {"motion.displacement": side * displacement * 1e-3}) for side in (1, -1))
-    assert np.array_equal(one.turn_counts, other.turn_counts)
+    assert turns(one).size == turns(other).size
+    assert turns(one) == pytest.approx(-turns(other), rel=1e-6, abs=1e-12)
     assert swing_heights(one) == pytest.approx(-swing_heights(other), rel=1e-6)
-    assert one.statistics[0, 0] == pytest.approx(other.statistics[0, 0], rel=1e-9)
+    assert one.statistics[0, 0] == pytest.approx(other.statistics[0, 0], rel=1e-6)  # as finely as steps are looked at
 
 
 @RIGID

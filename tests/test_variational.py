@@ -26,7 +26,7 @@ from friso.hunting.cycle.shooting import shoot
 from friso.stage import Stage
 
 STEADY = settings(max_examples=40, deadline=None, derandomize=True)
-"""The same examples always: a motion that grazes a kink has no derivative, and one in some thousands does."""
+"""The same examples while the code stays the same: a motion that just grazes a kink has no derivative."""
 
 FINE = 1e-11
 """Relative tolerance of the runs with their deviations; the runs that are subtracted have a tenth of it."""
