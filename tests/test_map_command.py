@@ -79,7 +79,7 @@ def test_a_finished_map_is_drawn_again_from_its_store_alone(mapped: tuple[Path, 
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (("--metric", "amplitude"), "peak_to_peak"),
+        (("--metric", "loudness"), "peak_to_peak"),
         (("--rtol", "1e-4"), "a store alone"),
         (("--refine",), "a store alone"),
         (("--log",), "a store alone"),
@@ -144,7 +144,7 @@ def _interruptible() -> None:
         (("--x", "controller.crossover=1 Hz..2 Hz:1000000000"), "nothing was run"),
         ((*SMALL, "--out", RIG), "nothing was overwritten"),
         ((*SMALL, "--out", RIG / "below.zarr"), "can be written"),
-        ((*SMALL, "--metric", "amplitude"), "peak_to_peak"),
+        ((*SMALL, "--metric", "loudness"), "peak_to_peak"),
         ((*SMALL, "--rtol", "loose"), "1e-12 to 1e-2"),
         ((*SMALL, "--verify", "5"), "0 to 1"),
         ((*SMALL, "--export", "a.xls"), ".nc or .csv"),

@@ -14,6 +14,7 @@ import xarray as xr
 import friso
 from friso.studies.thesis import STUDIES, Evidence, Finding, Part, Reproduction, Response, claims, reproduce, rig
 from friso.studies.thesis.claims import _JUDGES, judges, registered
+from friso.studies.thesis.cycles import cycles
 from friso.studies.thesis.judges import series_stiffness
 from friso.studies.thesis.judges.shares import NARROW, WIDE
 from friso.studies.thesis.maps import begins, ends, free_square, trend
@@ -465,3 +466,29 @@ def test_a_judge_of_no_claim_is_refused() -> None:
     with pytest.raises(ValueError, match="expected a claim"):
         judges("F99", figure="99")
     assert not_covered(claims()[0], "reason").judgement == "not yet covered"
+
+
+def test_the_edge_of_hunting_behind_a_map(small: Reproduction) -> None:
+    """Crossover and mass, locked: the flip of the rig's 1.7 kg lies at 9.75 Hz, on the drawn curve as in the check; the
+    cells compared add up; the page shows curve and table."""
+    study = STUDIES["system"]
+    found = cycles(study, small.maps["system"])
+    counted = found.comparison
+    assert counted.cells == 9
+    assert counted.agreed + counted.quiet + counted.transient + counted.dormant + counted.unknown == 9
+    near = [
+        (x, y)
+        for edge in found.edges
+        if edge.kind == "flip" and edge.symmetric
+        for x, y in zip(edge.x, edge.y, strict=True)
+        if 1.2 < y < 2.2
+    ]
+    crossover = np.interp(1.7, *np.array(sorted((y, x) for x, y in near)).T)
+    margin = friso.check(study.stage())["given"].judgement.margin
+    assert margin is not None
+    assert crossover == pytest.approx(margin.crossover, rel=0.02)
+    shown = replace(small, cycles={"system": found})
+    assert "Peaks counted, but no cycle attracts" in reproduction_html(shown)
+    assert claims_document(shown)["cycles"]["system"]["cells"] == 9
+    panel = next(p for p in reproduction_figures(shown)["11"].panels if "Crossover" in p.title)
+    assert {line.label for line in panel.series} >= {"edge of the attracting cycle"}

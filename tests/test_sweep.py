@@ -223,4 +223,22 @@ def test_wrong_samples_are_refused(rig: Stage, samples: Samples, message: str) -
 
 def test_an_unknown_metric_is_refused(rig: Stage) -> None:
     with pytest.raises(StageError, match="peak_to_peak"):
-        friso.sweep(rig, {"controller.crossover": ["8 Hz"]}, metrics=["amplitude"])
+        friso.sweep(rig, {"controller.crossover": ["8 Hz"]}, metrics=["loudness"])
+
+
+def test_measures_of_the_hunting_cycle_are_those_of_the_stage_alone(rig: Stage) -> None:
+    """Asked for by name; the motion plays no part, and a cell without a cycle has no number."""
+    locked = rig.replace({"joint.locked": True})
+    axes = {"controller.crossover": ["4 Hz", "8 Hz", "30 Hz"], "motion.acceleration": ["1 m/s^2", "100 m/s^2"]}
+    runs = friso.sweep(locked, axes, metrics=["multiplier", "amplitude", "cycle_period", "peaks"])
+    assert set(runs.data_vars) == {"peaks", "multiplier", "amplitude", "cycle_period", "verdict", "status"}
+    for name in ("multiplier", "amplitude", "cycle_period"):
+        assert np.array_equal(runs[name].values[:, 0], runs[name].values[:, 1], equal_nan=True)
+        assert np.isnan(runs[name].values[2]).all()
+    cycle = friso.check(locked)["given"].judgement.cycle
+    assert cycle is not None
+    alone = (cycle.multiplier, cycle.amplitude, cycle.period)
+    found = [runs[name].values[1, 0] for name in ("multiplier", "amplitude", "cycle_period")]
+    assert found == pytest.approx(alone, rel=1e-9)
+    assert runs.multiplier.attrs["units"] == "1"
+    assert "multiplier" not in friso.sweep(locked, {"controller.crossover": ["8 Hz"]})

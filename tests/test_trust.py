@@ -12,7 +12,7 @@ from scipy.ndimage import binary_fill_holes, distance_transform_edt, label
 import friso
 from friso.stage import Stage, StageError
 from friso.studies import verify
-from friso.studies.cells import METRICS, UNITS, Columns
+from friso.studies.cells import UNITS, USUAL, Columns
 from friso.studies.execute import local_crew
 from friso.studies.refine import FINER, SHARE, finer, refine
 from friso.studies.request import Request
@@ -177,7 +177,7 @@ def test_the_boundary_of_the_locked_rig(rig: Stage) -> None:
     assert np.array_equal(refined["mass"], full["mass"])
     ran = np.isfinite(refined.peaks.values)
     assert ran.sum() <= full.peaks.size / 5
-    for name in METRICS:
+    for name in USUAL:
         assert np.array_equal(
             refined[name].values[ran],
             full[name].values[ran],

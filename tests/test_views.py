@@ -64,7 +64,7 @@ def fake_cycle(symmetric: bool = True, multiplier: float = -0.9312, apart: float
     arrays = {"position": position, "cart_position": 0.9 * position, "velocity": np.gradient(position, time)}
     variables = {name: ("time", array) for name, array in (arrays | {"force": 3 * np.sin(time)}).items()}
     trace = xr.Dataset(variables, coords={"time": time})
-    return Cycle(symmetric, 5.2e-4, 1.6277, multiplier, np.array([multiplier]), -0.93, -0.9311, 1e-12, trace)
+    return Cycle(symmetric, 5.2e-4, 0.0, 1.6277, multiplier, np.array([multiplier]), -0.93, -0.9311, 1e-12, trace)
 
 
 def fake_hunting(*cycles: Cycle, reason: str = "", certain: bool = True) -> Hunting:
@@ -81,14 +81,14 @@ def hunts(**changes: Any) -> Judgement:
         Kick(((1.72e-3, 10.8e-3), (22.7e-3, 43.3e-3), (59.3e-3, 0.156)), (1.73e-5, 0.156)),
         Kick(((0.0231, 0.0734),), (5e-4, 4.4)),
         Moves(128, 111, (10.0, 200.0), (0.003, 0.06)),
-        Margin(1.2187, 9.7496),
+        Margin(1.2187, 9.7496, True),
     )
     return replace(found, **changes)
 
 
 def settles(**changes: Any) -> Judgement:
     """What is known of it, free."""
-    found = Judgement("settles", fake_hunting(reason=NO_RETURN), margin=Margin(0.6998, 5.598), settled_after=0.5123)
+    found = Judgement("settles", fake_hunting(reason=NO_RETURN), margin=Margin(0.6998, 5.598, True), settled_after=0.5123)
     return replace(found, **changes)
 
 
@@ -691,8 +691,8 @@ def test_a_stage_that_hunts_gets_a_remedy():
 
 def test_a_controller_by_its_gains_is_made_faster():
     gains = "kp × 1.49, ki × 1.82, kd × 1.22"
-    assert sentence(hunts(margin=Margin(1.22, None))).endswith(f"Make the controller 1.22 times faster ({gains}).")
-    slower = sentence(settles(margin=Margin(0.5, None)))
+    assert sentence(hunts(margin=Margin(1.22, None, True))).endswith(f"Make the controller 1.22 times faster ({gains}).")
+    slower = sentence(settles(margin=Margin(0.5, None, True)))
     assert slower.endswith("Hunting is possible with a controller more than 2 times slower.")
 
 
@@ -707,7 +707,7 @@ def test_a_bistable_stage_is_told_what_starts_its_hunting():
 
 def test_a_transient_is_said_to_be_one():
     repels = fake_hunting(fake_cycle(multiplier=-1.0112))
-    known = settles(verdict="transient", hunting=repels, settled_after=190.2, margin=Margin(0.975, 9.7496))
+    known = settles(verdict="transient", hunting=repels, settled_after=190.2, margin=Margin(0.975, 9.7496, True))
     text = sentence(known, peak_to_peak=6.9e-4, period=1.33)
     assert text == (
         "transient, as no cycle attracts, but this motion has not settled at its end (still 690 µm peak to peak every "
@@ -777,7 +777,7 @@ def test_rows_of_other_cycles():
     whole = hunts(hunting=fake_hunting(replace(pair, multiplier=-0.93, growth=np.nan)))
     assert row("Multiplier taken over", whole) == "a whole period (slope of the returns)"
     assert row("Hunting multiplier", whole) == "-0.9300"
-    assert row("Edge of hunting", hunts(margin=Margin(1.22, None))) == "1.22 × as fast"
+    assert row("Edge of hunting", hunts(margin=Margin(1.22, None, True))) == "1.22 × as fast"
 
 
 @pytest.mark.parametrize(

@@ -19,8 +19,11 @@ from friso.hunting.cycle.hunting import Cycle
 from friso.hunting.cycle.rest import pushed
 from friso.stage import Stage
 
-PERIODS, LAST = 60.0, 1.5
-"""Periods of the cycle after which a run is judged, and those at its end by which it is."""
+PERIODS, LAST = (60.0, 600.0), 1.5
+"""Periods of the cycle after which a run is judged, at least and at most, and those at its end by which it is."""
+
+CONSTANTS = 8.0
+"""Time constants of the cycle for which a run is followed, within these limits: near a flip transients last."""
 
 RTOL = 1e-6
 """Relative tolerance of these runs."""
@@ -79,7 +82,8 @@ def ends_hunting(
 ) -> np.ndarray:
     """Which stages, given as flat keys to SI numbers or arrays (count,), still swing like the cycle long after their
     motion, shape (count,). A run that fails does not."""
-    end = float(np.max(last_corner(flat))) + PERIODS * cycle.period
+    periods = np.clip(CONSTANTS * cycle.time_constant / cycle.period, *PERIODS)
+    end = float(np.max(last_corner(flat)) + periods * cycle.period)
     long = {**flat, "motion.duration": end}
     options = Options(rtol=rtol, window=1 - LAST * cycle.period / end, record_from=end)
     hunts = np.zeros(count, bool)

@@ -122,7 +122,7 @@ def reproduction_html(reproduction: Reproduction) -> str:
             interactive={figure.name: Markup(plotly_renderer.fragment(replace(figure, note=""))) for figure in drawn},
             plotly=Markup(plotly_renderer.script()) if drawn else None,
             conventions=CONVENTIONS,
-            cycles={STUDIES[name]: found.comparison for name, found in reproduction.cycles.items()},
+            cycles=[(STUDIES[name], found.comparison) for name, found in reproduction.cycles.items()],
             points=reproduction.points,
             rtol=f"{reproduction.rtol:g}",
             stage_file=rig().to_toml(),

@@ -9,7 +9,7 @@ import numpy as np
 from friso.engine.arrays import STATISTICS
 from friso.hunting.cycle.ensemble import Ensemble, done
 from friso.hunting.cycle.guess import UNWINDING, Guess, symmetric_guess, whole_guess
-from friso.hunting.cycle.multipliers import multipliers
+from friso.hunting.cycle.multipliers import multipliers, returns_of
 from friso.hunting.cycle.rest import stuck, wait
 from friso.hunting.cycle.return_map import ReturnMap, return_map
 from friso.hunting.cycle.shooting import Orbits, close
@@ -30,6 +30,15 @@ APART = 0.05
 KEPT = 0.5
 """Share of the guessed distance by which that of a closed orbit may differ: farther off it is another one, such as the
 rest at the reference, which every stage has."""
+
+BESIDE, AROUND = 0.2, 81
+"""How far beside a cycle another one is looked for, as a share of its distance, and runs over that range."""
+
+SOONER = (0.96, 0.94, 0.98, 1.0, 0.9)
+"""Shares of the period of a cycle tried for another one."""
+
+DISTINCT = 1e-3
+"""Share of the distance by which two cycles differ at least."""
 
 REPEATED, STEADY = 40, 0.02
 """Returns that are simulated where no orbit near a guess could be closed, and the share of the distance by which the
@@ -82,6 +91,31 @@ def symmetric_cycles(stages: Ensemble, rtol: float = RTOL, taken: ReturnMap | No
     """The cycle of every stage that is its own mirror image, of stages whose equations are."""
     taken = taken or return_map(stages, ROUGH)
     return _closed(stages, symmetric_guess(stages, taken, ROUGH), -1.0, rtol)
+
+
+def partner(stages: Ensemble, cycles: Cycles, rtol: float = RTOL) -> Cycles | None:
+    """The other cycle of one stage near a fold, at which the two meet; None if none is found beside the first."""
+    away = np.linspace(-BESIDE, BESIDE, AROUND)
+    heights = returns_of(stages, cycles.orbits, cycles.direction, away[None, :], 2, rtol)[0]
+    rise = heights[:, 1] - heights[:, 0]
+    own = np.nanargmin(np.abs(heights[:, 0] / heights[AROUND // 2, 0] - 1))
+    crosses = np.flatnonzero(rise[:-1] * rise[1:] < 0)
+    crosses = crosses[np.abs(crosses + 0.5 - own) > 1]
+    if not crosses.size:
+        return None
+    k = crosses[np.abs(crosses - own).argmin()]
+    share = away[k] + (away[k + 1] - away[k]) * rise[k] / (rise[k] - rise[k + 1])
+    size = np.abs(cycles.states[:, stages.sticking])
+    several = stages.take(np.zeros(len(SOONER), np.int64))
+    starts = stuck(several, np.repeat(size * (1 + share), len(SOONER)))
+    tried = close(several, starts, cycles.orbits.times * np.array(SOONER), cycles.sign, rtol)
+    apart = np.abs(np.abs(tried.states[:, stages.sticking]) / size - 1)
+    others = np.flatnonzero(tried.closed & (apart > DISTINCT) & (apart < 2 * BESIDE))
+    if not others.size:
+        return None
+    one = others[:1]
+    orbit = Orbits(tried.states[one], tried.times[one], cycles.sign, tried.gaps[one], tried.closed[one])
+    return described(stages, orbit, rtol, np.array([""]))
 
 
 def hunting_cycles(stages: Ensemble, rtol: float = RTOL) -> Cycles:

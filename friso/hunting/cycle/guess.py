@@ -17,6 +17,10 @@ UNWINDING = 0.4
 """Time from landing until the actuator exerts no force, in units of the wait for the break-away."""
 
 
+ALMOST = 0.03
+"""Difference in the logarithm of distance up to which a stage almost comes back to where it was."""
+
+
 @dataclass(frozen=True)
 class Guess:
     """A distance [m] at which each stage sticks, again and again, and the time [s] of its return, both of shape
@@ -55,17 +59,27 @@ def whole_guess(stages: Ensemble, there: ReturnMap, back: ReturnMap, apart: floa
     for k in range(stages.count):
         start, far = there.distances[k], there.returns[k]
         end = np.interp(far, back.distances[k], back.returns[k], left=0.0)
-        goes = (np.abs(far - start) > apart * start) & (far > 0) & (end > 0)
-        crosses = np.flatnonzero(((end - start)[:-1] * (end - start)[1:] <= 0) & goes[:-1] & goes[1:])
-        if crosses.size:
-            differ = np.abs(np.log(far[crosses] / start[crosses]))
-            i = crosses[differ.argmax() if apart else differ.argmin()]
-            at = np.interp(0.0, *_ascending((end - start)[i : i + 2], start[i : i + 2]))
+        goes = np.flatnonzero((np.abs(far - start) > apart * start) & (far > 0) & (end > 0))
+        at = _comes_back(start, far, end, goes, apart)
+        if at is not None:
             middle = np.interp(at, start, far)
             flights = np.interp(at, start, there.times[k]) + np.interp(middle, back.distances[k], back.times[k])
             waits = wait(stages.take(np.array([k, k])), np.array([at, middle]))
             found.distances[k], found.times[k] = at, flights + UNWINDING * waits.sum()
     return found
+
+
+def _comes_back(start: np.ndarray, far: np.ndarray, end: np.ndarray, goes: np.ndarray, apart: float) -> float | None:
+    """The distance that is its own end, of those whose numbers are in `goes`; if there is none, the one that is almost:
+    near a fold both lie between two points of the map."""
+    rise = end - start
+    crosses = np.array([i for i in goes if i + 1 in goes and rise[i] * rise[i + 1] <= 0], dtype=int)
+    if crosses.size:
+        differ = np.abs(np.log(far[crosses] / start[crosses]))
+        i = crosses[differ.argmax() if apart else differ.argmin()]
+        return float(np.interp(0.0, *_ascending(rise[i : i + 2], start[i : i + 2])))
+    off = np.abs(np.log(end[goes] / start[goes]))
+    return float(start[goes[off.argmin()]]) if goes.size and off.min() < ALMOST else None
 
 
 def _ascending(x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

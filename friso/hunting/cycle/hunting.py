@@ -12,7 +12,16 @@ from friso.engine.simulate import output_variables, time_axis
 from friso.engine.tolerance import checked_rtol
 from friso.equations.structure import Structure, structure
 from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.find import NOT_CLOSED, ROUGH, RTOL, Cycles, asymmetric_cycles, symmetric_cycles, whole_cycles
+from friso.hunting.cycle.find import (
+    NOT_CLOSED,
+    ROUGH,
+    RTOL,
+    Cycles,
+    asymmetric_cycles,
+    partner,
+    symmetric_cycles,
+    whole_cycles,
+)
 from friso.hunting.cycle.multipliers import returns_of
 from friso.hunting.cycle.return_map import ReturnMap, return_map
 from friso.stage import Stage
@@ -32,7 +41,7 @@ SAMPLES = 2000
 class Cycle:
     """A hunting cycle.
 
-    `amplitude` [m], half of peak to peak, and `period` [s]. A `symmetric` cycle is its own mirror image after half a
+    `amplitude` [m], half of peak to peak, `middle` [m] between the peaks, and `period` [s]. A `symmetric` cycle is its own mirror image after half a
     period, and its multipliers are those of half a period; those of others are of a whole one. `multipliers`, shape
     (states - 1,), are the Floquet multipliers, the largest first, without the one that every cycle has along itself;
     `slope` is that of the return map over 1 % of the amplitude (NaN where stages so near do not come back), and
@@ -44,6 +53,7 @@ class Cycle:
 
     symmetric: bool
     amplitude: float
+    middle: float
     period: float
     multiplier: float
     multipliers: np.ndarray
@@ -61,7 +71,7 @@ class Cycle:
     def time_constant(self) -> float:
         """Time [s] in which a small deviation from the cycle shrinks, or grows, by the factor e."""
         returned = self.period / 2 if self.symmetric else self.period
-        return returned / abs(np.log(abs(self.multiplier)))
+        return float(returned / max(abs(np.log(abs(self.multiplier))), 1e-12))
 
 
 @dataclass(frozen=True)
@@ -112,6 +122,8 @@ def hunting(stage: Stage, rtol: float = RTOL) -> Hunting:
         sought = [symmetric_cycles(stages, rtol, there), asymmetric_cycles(stages, there, rtol)]
     else:
         sought = [whole_cycles(stages, rtol, (there, return_map(stages, ROUGH, -1.0)))]
+        if sought[0].found[0] and not sought[0].attracting[0] and (other := partner(stages, sought[0], rtol)):
+            sought.append(other)
     cycles = tuple(_cycle(stages, each) for each in sought if each.found[0])
     reasons = [each.reasons[0] for each in sought]
     return Hunting(cycles, "" if cycles else reasons[0], bool(cycles) or reasons[0] != NOT_CLOSED, there)
@@ -121,6 +133,7 @@ def _cycle(stages: Ensemble, found: Cycles) -> Cycle:
     return Cycle(
         symmetric=found.sign < 0,
         amplitude=float(found.amplitude[0]),
+        middle=float(found.middle[0]),
         period=float(found.period[0]),
         multiplier=float(found.multiplier[0]),
         multipliers=found.local[0],

@@ -1,0 +1,275 @@
+"""`friso boundary` as a user runs it: what it finds, says, draws and refuses."""
+
+import json
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from friso.hunting.boundary import Branch, Curve, Diagram, Found, Kind, Plane, Point, Range, Space, Spot
+from friso.hunting.cycle.ensemble import Ensemble
+from friso.hunting.cycle.find import NOT_CLOSED, Cycles, symmetric_cycles
+from friso.stage import Stage
+from friso.views import matplotlib_renderer, plotly_renderer
+from friso.views.boundary_data import corner_verdicts, end_verdicts, lines
+from friso.views.boundary_figures import boundary_figure
+from friso.views.boundary_words import Shown, sentences
+
+EXAMPLES = Path(__file__).parent.parent / "examples"
+RIG, STICK_SLIP = EXAMPLES / "thesis_rig.toml", EXAMPLES / "lugre_stick_slip.toml"
+LOCKED = ("--set", "joint.locked=true")
+CROSSOVER = ("--x", "controller.crossover=8 Hz..12 Hz")
+
+pytestmark = pytest.mark.xdist_group("locked")
+
+
+def boundary(folder: Path, *arguments: str, stage: Path = RIG) -> subprocess.CompletedProcess[str]:
+    """Run the command in a folder."""
+    command = [sys.executable, "-m", "friso.cli", "boundary", str(stage), *arguments]
+    return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=300)
+
+
+@pytest.fixture(scope="module")
+def single(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict, Path]:
+    """The document of the locked rig over its crossover, and the folder of its files."""
+    folder = tmp_path_factory.mktemp("single")
+    done = boundary(folder, *LOCKED, *CROSSOVER, "--json", "--out", "edge")
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout), folder / "edge"
+
+
+def test_the_locked_rig_flips_at_9_75_hz(single: tuple[dict, Path]) -> None:
+    document, _ = single
+    (flip,) = (point for point in document["points"] if (point["kind"], point["cycle"]) == ("flip", "symmetric"))
+    assert flip["value"] == pytest.approx(9.75, abs=0.001)
+    assert 0 < flip["error"] < 1e-4
+    assert flip["amplitude_m"] == pytest.approx(0.361e-3, rel=0.01)
+    assert flip["period_s"] == pytest.approx(1.36, rel=0.01)
+
+
+def test_the_document_of_one_key(single: tuple[dict, Path]) -> None:
+    document, _ = single
+    assert document.keys() == {"key", "unit", "points", "ends", "branches"}
+    assert (document["key"], document["unit"]) == ("controller.crossover", "Hz")
+    assert document["ends"] == {"low": "attracting cycle", "high": "no attracting cycle"}
+    values = [point["value"] for point in document["points"]]
+    assert values == sorted(values)
+    for point in document["points"]:
+        assert point.keys() == {"value", "kind", "error", "cycle", "amplitude_m", "period_s"}
+    assert {branch["cycle"] for branch in document["branches"]} == {"symmetric", "asymmetric"}
+    for branch in document["branches"]:
+        measures = ("values", "amplitude_m", "period_s", "multiplier", "attracts")
+        assert {len(branch[name]) for name in measures} == {len(branch["values"])}
+        assert branch["attracts"] == [abs(multiplier) < 1 for multiplier in branch["multiplier"]]
+        assert len(branch["ends"]) == 2
+
+
+def test_the_files_of_one_key(single: tuple[dict, Path]) -> None:
+    document, folder = single
+    names = {f"thesis_rig_boundary.{ending}" for ending in ("png", "svg", "pdf", "csv")}
+    assert {path.name for path in folder.iterdir()} == names
+    table = pd.read_csv(folder / "thesis_rig_boundary.csv")
+    special = table[table.kind.notna()].sort_values("controller.crossover [Hz]")
+    assert list(special.kind) == [point["kind"] for point in document["points"]]
+    assert list(special["controller.crossover [Hz]"]) == pytest.approx([point["value"] for point in document["points"]])
+    assert table["error of controller.crossover [Hz]"].notna().sum() == len(special)
+
+
+def test_values_are_told_in_the_unit_of_the_command_line(tmp_path: Path) -> None:
+    """The rig stops hunting as its cart gets lighter than 661 g; only its files are in kg."""
+    done = boundary(tmp_path, *LOCKED, "--x", "masses.cart=600 g..700 g", "--json")
+    document = json.loads(done.stdout)
+    assert document["unit"] == "g"
+    (flip,) = (point for point in document["points"] if point["cycle"] == "symmetric")
+    assert flip["value"] == pytest.approx(661.3, abs=0.5)
+    assert document["ends"] == {"low": "no attracting cycle", "high": "attracting cycle"}
+    assert done.stderr == ""
+
+
+def test_a_range_without_a_boundary_says_so(tmp_path: Path) -> None:
+    done = boundary(tmp_path, *LOCKED, "--x", "controller.crossover=4 Hz..6 Hz")
+    assert done.returncode == 0
+    assert "No boundary of hunting over controller.crossover 4 Hz to 6 Hz." in done.stdout
+    hunts = "an attracting cycle (hunting is possible)"
+    assert f"At 4 Hz: {hunts}; at 6 Hz: {hunts}." in done.stdout
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_curve_of_two_keys_separates_what_attracts(tmp_path: Path, rig: Stage) -> None:
+    """Cycles found from scratch 0.5 % beside the curve attract at the lower crossover and repel at the higher one."""
+    done = boundary(
+        tmp_path, *LOCKED, "--x", "controller.crossover=9.6 Hz..9.9 Hz", "--y", "masses.cart=1190 g..1210 g", "--json"
+    )
+    assert done.returncode == 0, done.stderr
+    document = json.loads(done.stdout)
+    assert document.keys() == {"x", "y", "curves", "lost", "corners"}
+    assert document["y"] == {"key": "masses.cart", "unit": "g"}
+    assert document["corners"] == {
+        **{"low low": "attracting cycle", "low high": "attracting cycle"},
+        **{"high low": "no attracting cycle", "high high": "no attracting cycle"},
+    }
+    (curve,) = (curve for curve in document["curves"] if curve["cycle"] == "symmetric")
+    assert curve["kind"] == "flip"
+    assert {len(curve[name]) for name in ("points", "error", "amplitude_m", "period_s")} == {len(curve["points"])}
+    points = np.array(curve["points"])[::4]
+    flat = rig.replace({"joint.locked": True}).flat(
+        {
+            "controller.crossover": np.concatenate([points[:, 0] * 0.995, points[:, 0] * 1.005]),
+            "masses.cart": np.tile(points[:, 1] / 1000, 2),
+        }
+    )
+    found = symmetric_cycles(Ensemble.held(flat, 2 * len(points)))
+    assert (np.split(np.abs(found.multiplier), 2)[0] < 1).all()
+    assert (np.split(np.abs(found.multiplier), 2)[1] > 1).all()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (("--y", "masses.cart=1 kg..2 kg"), "--x"),
+        (("--x", "controller.crossover"), "KEY=VALUE"),
+        (("--x", "controller.crossover=1 Hz..40 Hz:41"), "without a number of points"),
+        (("--x", "controller.crossover=8 Hz, 9 Hz"), "a range FIRST..LAST"),
+        (("--x", "controller.crossover=12 Hz..8 Hz"), "reversed"),
+        (("--x", "controller.crosover=8 Hz..12 Hz"), "did you mean crossover"),
+        (("--x", "joint.locked=false..true"), "true or false"),
+        (("--x", "masses.stage=0 kg..1 kg", "--log"), "never reaches 0"),
+        ((*CROSSOVER, "--y", "controller.crossover=1 Hz..2 Hz"), "a second time"),
+        ((*CROSSOVER, "--rtol", "1e-15"), "1e-12 to 1e-2"),
+        ((*CROSSOVER, "--link", "masses.cart=0.7 * mas"), "the name mas"),
+        ((*CROSSOVER, "--out", str(RIG)), "can be written"),
+    ],
+)
+def test_wrong_input_ends_in_one_message_and_status_2(tmp_path: Path, arguments: tuple, message: str) -> None:
+    done = boundary(tmp_path, *LOCKED, *arguments)
+    assert done.returncode == 2
+    assert message in done.stderr
+    assert "Traceback" not in done.stderr
+    assert done.stdout == ""
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_stage_that_cannot_hunt_is_refused(tmp_path: Path) -> None:
+    done = boundary(tmp_path, "--x", "controller.kp=1 N/m..10 N/m", stage=STICK_SLIP)
+    assert done.returncode == 2
+    assert "no integral action" in done.stderr
+
+
+def cycles(multipliers: Sequence[float], sign: float = -1.0) -> Cycles:
+    """Made-up cycles of 1 mm and 2 s; NaN where there is none, infinite where the orbit could not be closed."""
+    multiplier = np.array(multipliers)
+    found, count = np.isfinite(multiplier), len(multiplier)
+    reasons = np.where(np.isinf(multiplier), NOT_CLOSED, "").astype(object)
+    return Cycles(
+        sign,
+        found,
+        reasons,
+        states=np.zeros((count, 2)),
+        period=np.full(count, 2.0),
+        amplitude=np.full(count, 1e-3),
+        middle=np.zeros(count),
+        gap=np.zeros(count),
+        local=np.zeros((count, 1), complex),
+        direction=np.zeros((count, 2)),
+        slope=multiplier,
+        multiplier=multiplier,
+    )
+
+
+def point(place: float, multiplier: float, distance: float = 0.0) -> Point:
+    return Point(place, distance, 0.0, cycles([multiplier]))
+
+
+def found(kind: Kind, place: float, multiplier: float, distance: float = 0.0) -> Found:
+    return Found(kind, point(place, multiplier, distance), np.array([1.0, 0.0, 0.0]), 1e-6)
+
+
+STROKE, GAIN = Range("joint.stroke", 1e-3, 2e-3, unit="m"), Range("controller.kp", 1.0, 100.0, log=True, unit="N/m")
+MM = Shown("joint.stroke", "mm", 1e-3)
+
+
+@pytest.fixture
+def round_a_fold() -> Diagram:
+    """A cycle that attracts from the low end, flips in the middle and turns back at a fold, attracting just before."""
+    points = (point(0, -0.5), point(0.4, -0.9), point(0.6, -1.5), point(0.7, 5, 1.0), point(0.5, 8, 2.0))
+    special = (found("flip", 0.45, -1), found("flip", 0.72, -1, 0.5), found("fold", 0.73, 1, 0.6))
+    return Diagram(
+        Space((STROKE,), dict),
+        (Branch(-1.0, points, ("end of the range", "it could not be followed farther (multiplier 8)")),),
+        (special,),
+        np.linspace(0, 1, 3),
+        cycles([-0.5, np.nan, np.inf]),
+    )
+
+
+def test_special_points_stand_in_their_place_on_the_branch(round_a_fold: Diagram) -> None:
+    (line,) = lines(round_a_fold)
+    assert line.kinds == ("", "", "flip", "", "flip", "fold", "", "")
+    assert line.at[:, 0] == pytest.approx([1e-3, 1.4e-3, 1.45e-3, 1.6e-3, 1.72e-3, 1.73e-3, 1.7e-3, 1.5e-3])
+    assert line.attracts.tolist() == [True, True, False, False, True, False, False]
+    assert line.error[line.special] == pytest.approx(np.full((3, 1), 1e-9), rel=1e-3)
+    assert end_verdicts(round_a_fold) == ("attracting cycle", "unknown")
+
+
+def test_sentences_tell_what_becomes_of_a_cycle_as_the_key_rises(round_a_fold: Diagram) -> None:
+    ends, first, second, fold, followed = sentences(round_a_fold, (MM,))
+    assert ends.startswith("At 1 mm: an attracting cycle (hunting is possible); at 2 mm: not known")
+    assert "stops attracting at joint.stroke = 1.45 ± 1e-06 mm (flip: above, it still exists" in first
+    assert "begins to attract at joint.stroke = 1.72 ± 1e-06 mm (flip: below, it still exists" in second
+    assert "vanishes at joint.stroke = 1.73 ± 1e-06 mm (fold: above, it has merged" in fold
+    assert "over 1 to 1.73 mm; ends: end of the range; it could not be followed farther" in followed
+
+
+def test_the_figure_of_one_key_is_solid_where_the_cycle_attracts(round_a_fold: Diagram) -> None:
+    figure = boundary_figure(round_a_fold, (MM,), "Rig")
+    assert [panel.y.quantity for panel in figure.panels] == ["Amplitude", "Period", "Multiplier"]
+    dashes = [(line.dash, line.x[0], line.x[-1]) for line in figure.panels[2].series]
+    assert [dash for dash, _, _ in dashes] == ["solid", "dashed", "solid", "dashed"]
+    assert dashes[0][1:] == pytest.approx((1e-3, 1.45e-3))
+    assert [marker.label for marker in figure.panels[0].markers] == [
+        *("flip at 1.45 mm", "flip at 1.72 mm", "fold at 1.73 mm"),
+    ]
+    assert matplotlib_renderer.image(figure, "png")
+
+
+@pytest.fixture
+def crossing() -> Plane:
+    """Two by two nodes, one of each verdict, and a flip between the low ones and the high ones."""
+    across = np.array([1.0, 0.0])
+    spots = tuple(Spot(np.array([0.5, y]), found("flip", 0.0, -1), across) for y in (0.0, 0.5, 1.0))
+    curve = Curve("flip", -1.0, spots, ("end of the range", "end of the range"))
+    known = cycles([-0.5, np.inf, -2])
+    return Plane(Space((STROKE, GAIN), dict), (curve,), 2, np.array([0, 1, 3]), known, (np.array([0.5, 0.25]),))
+
+
+def test_sentences_of_two_keys(crossing: Plane) -> None:
+    curve, meaning, *corners, lost = sentences(crossing, (MM, Shown("controller.kp", "N/m")))
+    assert curve == (
+        "Flip of the hunting cycle: 3 points, joint.stroke 1.5 to 1.5 mm, controller.kp 1 to 100 N/m; "
+        "ends: end of the range; largest error: 1e-06 mm, 0 N/m."
+    )
+    assert meaning == "Flip: beyond, it still exists, but repels."
+    assert [verdict for _, _, verdict in corner_verdicts(crossing)] == [
+        *("attracting cycle", "unknown", "invalid", "no attracting cycle"),
+    ]
+    assert corners[3] == "At joint.stroke = 2 mm, controller.kp = 100 N/m: none (no hunting)."
+    assert lost.startswith("A change was seen near joint.stroke = 1.5 mm, controller.kp = 3.16228 N/m, but no curve")
+
+
+def test_the_figure_of_two_keys_shows_nodes_and_curves_in_one_legend(crossing: Plane) -> None:
+    figure = boundary_figure(crossing, (MM, Shown("controller.kp", "N/m")))
+    (panel,) = figure.panels
+    assert panel.y.log
+    assert not panel.x.log
+    canvas = matplotlib_renderer.render(figure)
+    texts = [text.get_text() for text in canvas.legends[0].get_texts()]
+    assert texts == [
+        *("an attracting cycle: hunting", "none: no hunting", "not known: orbit not closed"),
+        *("no stage may have these values", "flip of the hunting cycle"),
+    ]
+    names = [trace.name for trace in plotly_renderer.render(figure).data if trace.mode == "lines"]
+    assert "flip of the hunting cycle" in names
