@@ -1,5 +1,6 @@
 """The boundary of hunting: branches of cycles in one key, curves in two, and the map of the multiplier."""
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -151,7 +152,7 @@ def test_the_map_of_the_multiplier_and_the_curve_agree_within_a_cell(over_fricti
 def refined(points: np.ndarray) -> np.ndarray:
     """Twenty points on every leg of a polyline."""
     shares = np.linspace(0, 1, 20)[:, None]
-    return np.concatenate([a + shares * (b - a) for a, b in zip(points[:-1], points[1:], strict=True)])
+    return np.concatenate([a + shares * (b - a) for a, b in pairwise(points)])
 
 
 def test_an_asymmetric_stage_loses_its_cycle_in_a_fold() -> None:

@@ -490,5 +490,5 @@ def test_the_edge_of_hunting_behind_a_map(small: Reproduction) -> None:
     shown = replace(small, cycles={"system": found})
     assert "Peaks counted, but no cycle attracts" in reproduction_html(shown)
     assert claims_document(shown)["cycles"]["system"]["cells"] == 9
-    panel = next(p for p in reproduction_figures(shown)["11"].panels if "Crossover" in p.title)
-    assert {line.label for line in panel.series} >= {"edge of the attracting cycle"}
+    labels = {line.label for panel in reproduction_figures(shown)["11"].panels for line in panel.series}
+    assert "edge of the attracting cycle" in labels

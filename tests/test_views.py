@@ -88,7 +88,8 @@ def hunts(**changes: Any) -> Judgement:
 
 def settles(**changes: Any) -> Judgement:
     """What is known of it, free."""
-    found = Judgement("settles", fake_hunting(reason=NO_RETURN), margin=Margin(0.6998, 5.598, True), settled_after=0.5123)
+    edge = Margin(0.6998, 5.598, True)
+    found = Judgement("settles", fake_hunting(reason=NO_RETURN), margin=edge, settled_after=0.5123)
     return replace(found, **changes)
 
 
@@ -691,7 +692,8 @@ def test_a_stage_that_hunts_gets_a_remedy():
 
 def test_a_controller_by_its_gains_is_made_faster():
     gains = "kp × 1.49, ki × 1.82, kd × 1.22"
-    assert sentence(hunts(margin=Margin(1.22, None, True))).endswith(f"Make the controller 1.22 times faster ({gains}).")
+    faster = sentence(hunts(margin=Margin(1.22, None, True)))
+    assert faster.endswith(f"Make the controller 1.22 times faster ({gains}).")
     slower = sentence(settles(margin=Margin(0.5, None, True)))
     assert slower.endswith("Hunting is possible with a controller more than 2 times slower.")
 

@@ -12,6 +12,7 @@ from typing import Annotated, NoReturn
 
 import typer
 
+from friso.cli.boundary import boundary
 from friso.cli.check import check
 from friso.cli.common import INTERRUPTED, say
 from friso.cli.init import init
@@ -33,6 +34,7 @@ for name, command in (
     ("check", check),
     ("simulate", simulate),
     ("map", map_cells),
+    ("boundary", boundary),
     ("reproduce", reproduce),
 ):
     app.command(name)(command)

@@ -44,6 +44,20 @@ def with_overrides(stage: Stage, overrides: list[str] | None) -> Stage:
     return stage.replace(changes) if changes else stage
 
 
+def key_values(given: list[tuple[str, str]], example: str) -> dict[str, str]:
+    """Keys to values from options with their KEY=VALUE. Raises StageError."""
+    pairs: dict[str, str] = {}
+    for option, text in given:
+        key, equals, value = text.partition("=")
+        key = key.strip()
+        if not (equals and key and value.strip()):
+            raise StageError(option, text, "KEY=VALUE", example)
+        if key in pairs:
+            raise StageError(option, f"{key} a second time", "every key once", example)
+        pairs[key] = value.strip()
+    return pairs
+
+
 def made_folder(path: Path) -> Path:
     """The folder, made if it is not there. Raises StageError."""
     try:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from friso.cli.common import key_values
 from friso.quantities import StageError
 from friso.stage import Stage
 from friso.studies.cells import CYCLE_UNITS, USUAL
@@ -44,25 +45,12 @@ class Varied:
     def axes(self) -> dict[str, str]:
         """Name to range of every axis. Raises StageError."""
         named = {"--x": self.x, "--y": self.y} | {f"--axis {k + 1}": text for k, text in enumerate(self.more)}
-        return _pairs([(option, text) for option, text in named.items() if text is not None], AXIS_EXAMPLE)
+        return key_values([(option, text) for option, text in named.items() if text is not None], AXIS_EXAMPLE)
 
     @property
     def linked(self) -> dict[str, str]:
         """Key to expression of every link. Raises StageError."""
-        return _pairs([("--link", text) for text in self.links], '--link masses.cart="0.7 * mass"')
-
-
-def _pairs(given: list[tuple[str, str]], example: str) -> dict[str, str]:
-    pairs: dict[str, str] = {}
-    for option, text in given:
-        key, equals, value = text.partition("=")
-        key = key.strip()
-        if not (equals and key and value.strip()):
-            raise StageError(option, text, "KEY=VALUE", example)
-        if key in pairs:
-            raise StageError(option, f"{key} a second time", "every key once", example)
-        pairs[key] = value.strip()
-    return pairs
+        return key_values([("--link", text) for text in self.links], '--link masses.cart="0.7 * mass"')
 
 
 def study_for(stage: Stage, varied: Varied, metric: str, refine: bool, most: int | None, crew: Crew) -> Study:

@@ -54,6 +54,12 @@ def colour_key(figure: Figure) -> tuple[list[Kind], list[Markers]]:
     return sorted(dict.fromkeys(kinds), key=order.index), list(markers.values())
 
 
+def line_key(figure: Figure) -> list[Series]:
+    """The lines of these panels that have a label, each once, for the same legend."""
+    lines = [line for panel in figure.panels if panel.coloured for line in panel.series if line.label]
+    return list({(line.label, line.colour, line.dash): line for line in lines}.values())
+
+
 def word_ticks(axis: Axis, most: int = 12) -> tuple[list[int], list[str]]:
     """Positions and words written at an axis of words: all, or every second, third, ... so that `most` do."""
     positions = list(range(0, len(axis.words), -(-len(axis.words) // most)))

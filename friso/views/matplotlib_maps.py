@@ -16,7 +16,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 from friso.views.colours import Scale, painted, scale
-from friso.views.drawable import cell_edges, colour_key
+from friso.views.drawable import cell_edges, colour_key, line_key
 from friso.views.figure import GREY, INK, Array, Coloured, Figure, Map, Panel
 
 LINE = 0.17  # [inch] one line of the legend or the note
@@ -88,17 +88,23 @@ def footer_height(figure: Figure, width: float) -> float:
     return LINE * rows + 0.08 if rows else 0.0
 
 
-def add_footer(canvas: Canvas, figure: Figure, symbols: dict[str, dict[str, Any]], width: float) -> None:
+def add_footer(
+    canvas: Canvas, figure: Figure, symbols: dict[str, dict[str, Any]], dashes: dict[str, Any], width: float
+) -> None:
     """Legend of all maps and clouds, and under it the note, in the strip that `footer_height` asked for."""
     height = float(canvas.get_figheight())
     kinds, markers = colour_key(figure)
     lines = note_lines(figure, width)
-    if kinds or markers:
-        handles = [Patch(facecolor=kind.colour, edgecolor=GREY, linewidth=0.6, label=kind.label) for kind in kinds]
-        handles += [
-            Line2D([], [], linestyle="none", label=item.label, color=item.colour, **symbols[item.symbol])
-            for item in markers
-        ]
+    handles = [Patch(facecolor=kind.colour, edgecolor=GREY, linewidth=0.6, label=kind.label) for kind in kinds]
+    handles += [
+        Line2D([], [], linestyle="none", label=item.label, color=item.colour, **symbols[item.symbol])
+        for item in markers
+    ]
+    handles += [
+        Line2D([], [], linestyle=dashes[line.dash], label=line.label, color=line.colour, linewidth=line.width)
+        for line in line_key(figure)
+    ]
+    if handles:
         place = {"loc": "lower left", "bbox_to_anchor": (0.006, (LINE * len(lines) + 0.03) / height)}
         legend = canvas.legend(
             handles=handles,
@@ -107,7 +113,7 @@ def add_footer(canvas: Canvas, figure: Figure, symbols: dict[str, dict[str, Any]
             labelspacing=0.25,
             borderaxespad=0,
             borderpad=0.1,
-            handlelength=1.4,
+            handlelength=2.2 if line_key(figure) else 1.4,
             **place,
         )
         legend.set_in_layout(False)
@@ -120,7 +126,7 @@ def add_footer(canvas: Canvas, figure: Figure, symbols: dict[str, dict[str, Any]
 
 def _key_rows(figure: Figure, width: float) -> int:
     """Rows of the legend: columns are as wide as the longest text and its patch."""
-    labels = [item.label for item in (kind for group in colour_key(figure) for kind in group)]
+    labels = [item.label for group in (*colour_key(figure), line_key(figure)) for item in group]
     if not labels:
         return 0
     columns = max(1, int(LETTERS * (width - 0.3) / (max(map(len, labels)) + 6)))

@@ -13,10 +13,11 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
 from matplotlib.lines import Line2D
-from matplotlib.ticker import LogFormatterMathtext, LogLocator, MaxNLocator, NullFormatter, ScalarFormatter
+from matplotlib.ticker import Locator, LogFormatterMathtext, LogLocator, MaxNLocator, NullFormatter, ScalarFormatter
 
 from friso.views.drawable import drawable, word_ticks
 from friso.views.figure import GREY, INK, Figure, Panel
@@ -90,7 +91,7 @@ def render(figure: Figure) -> Canvas:
             axes = canvas.add_subplot(prepared.rows, prepared.columns, number + 1)
             _draw(axes, panel, WIDTH / prepared.columns)
         add_colour_bars(canvas, list(canvas.axes), prepared.panels)
-        add_footer(canvas, prepared, _SYMBOLS, WIDTH)
+        add_footer(canvas, prepared, _SYMBOLS, _DASHES, WIDTH)
         return canvas
 
 
@@ -153,14 +154,22 @@ def _scale(axes: Axes, panel: Panel, width: float) -> None:
             positions, words = word_ticks(declared)
             axis.set_ticks(positions, words, parse_math=False)
         elif declared.log:
-            axis.set_major_locator(LogLocator(numticks=8))
-            axis.set_major_formatter(LogFormatterMathtext())
-            axis.set_minor_formatter(NullFormatter())
+            _decades(axis, declared.limits or (0.0, np.inf), MaxNLocator(nbins=most, steps=steps))
         else:
             plain = ScalarFormatter(useOffset=False)
             plain.set_scientific(False)
             axis.set_major_formatter(plain)
             axis.set_major_locator(MaxNLocator(nbins=most, steps=steps))
+
+
+def _decades(axis: Any, limits: tuple[float, float], even: Locator) -> None:
+    """Ticks of a logarithmic axis: at powers of ten, also at 2 and 5 over a few decades, even ones within a decade."""
+    low, high = limits
+    few = high < 1000 * low
+    fine = even if high < 10 * low else LogLocator(subs=(1.0, 2.0, 5.0))
+    axis.set_major_locator(fine if few else LogLocator(numticks=8))
+    axis.set_major_formatter("{x:g}" if few else LogFormatterMathtext())
+    axis.set_minor_formatter(NullFormatter())
 
 
 def _annotate(axes: Axes, panel: Panel, handles: list[Line2D], width: float) -> None:

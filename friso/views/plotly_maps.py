@@ -11,7 +11,7 @@ import numpy as np
 import plotly.graph_objects as go
 
 from friso.views.colours import Scale, painted, scale
-from friso.views.drawable import cell_edges, colour_key
+from friso.views.drawable import cell_edges, colour_key, line_key
 from friso.views.figure import GREY, INK, Array, Axis, Coloured, Figure, Map, Panel
 
 BAR = 0.085  # width of a panel's own colour bar with its numbers and label, as a fraction of the width
@@ -19,6 +19,7 @@ LINE = 17  # [px] one line of the note
 KEY = 30  # [px] the legend
 _LETTERS = 118  # to a line of the note
 
+DASHES = {"solid": "solid", "dashed": "6px,4px", "dotted": "2px,3px"}
 SYMBOLS: dict[str, dict[str, Any]] = {
     "circle": {"symbol": "circle", "size": 9},
     "triangle": {"symbol": "triangle-down", "size": 9},
@@ -94,10 +95,11 @@ def key_traces(figure: Figure, legend: str) -> list[go.Scatter]:
     square = {"symbol": "square", "size": 11, "line": {"color": GREY, "width": 1}}
     entries = [(kind.label, square | {"color": kind.colour}) for kind in kinds]
     entries += [(item.label, SYMBOLS[item.symbol] | {"color": item.colour}) for item in markers]
-    return [
-        go.Scatter(x=[None], y=[None], mode="markers", name=html.escape(label), marker=marker, legend=legend)
-        for label, marker in entries
-    ]
+    styles = [(label, {"mode": "markers", "marker": marker}) for label, marker in entries]
+    for line in line_key(figure):
+        style = {"color": line.colour, "width": line.width, "dash": DASHES[line.dash]}
+        styles.append((line.label, {"mode": "lines", "line": style}))
+    return [go.Scatter(x=[None], y=[None], name=html.escape(label), legend=legend, **style) for label, style in styles]
 
 
 def footer(figure: Figure, legend: str) -> tuple[int, dict[str, Any], list[dict[str, Any]]]:
@@ -108,7 +110,7 @@ def footer(figure: Figure, legend: str) -> tuple[int, dict[str, Any], list[dict[
     text = "<br>".join(html.escape(line) for line in lines)
     font = {"size": 11, "color": INK}
     shown = [{"text": text, "align": "left", "showarrow": False, "font": font, **below}] if lines else []
-    if not any(colour_key(figure)):
+    if not any((*colour_key(figure), line_key(figure))):
         return note, {}, shown
     for annotation in shown:
         annotation["yshift"] = -KEY

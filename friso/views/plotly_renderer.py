@@ -15,7 +15,7 @@ from plotly.offline import get_plotlyjs
 
 from friso.views.drawable import drawable, word_ticks
 from friso.views.figure import GREY, INK, Axis, Figure, Markers, Panel, Series
-from friso.views.plotly_maps import BAR, SYMBOLS, bar_panels, coloured_traces, footer, key_traces
+from friso.views.plotly_maps import BAR, DASHES, SYMBOLS, bar_panels, coloured_traces, footer, key_traces
 
 HEADER = 54  # [px] title and legend above the axes
 PLOT = 230  # [px] height of the axes
@@ -24,7 +24,6 @@ FOOTER = 54  # [px] tick labels and axis label
 LEFT, RIGHT, TOP = 72, 14, 26  # [px]; the buttons stand in the top margin
 GAP = 0.09  # between two panels of a row, as a fraction of the width
 
-_DASHES = {"solid": "solid", "dashed": "6px,4px", "dotted": "2px,3px"}
 # The buttons are listed, since plotly's own choice has one that sends the data to a server.
 _BUTTONS = [["toImage"], ["zoom2d", "pan2d"], ["zoomIn2d", "zoomOut2d", "resetScale2d"]]
 _CONFIG = {
@@ -168,7 +167,7 @@ def _traces(panel: Panel, number: int, bar: dict[str, Any] | None) -> list[Any]:
 
 
 def _line(line: Series, panel: Panel, place: dict[str, Any]) -> go.Scatter:
-    style = {"color": line.colour, "width": line.width, "dash": _DASHES[line.dash], "simplify": False}
+    style = {"color": line.colour, "width": line.width, "dash": DASHES[line.dash], "simplify": False}
     return go.Scatter(
         x=line.x, y=line.y, mode="lines", line=style, connectgaps=False, **_text(line.label, panel), **place
     )

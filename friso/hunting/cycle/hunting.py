@@ -41,14 +41,14 @@ SAMPLES = 2000
 class Cycle:
     """A hunting cycle.
 
-    `amplitude` [m], half of peak to peak, `middle` [m] between the peaks, and `period` [s]. A `symmetric` cycle is its own mirror image after half a
-    period, and its multipliers are those of half a period; those of others are of a whole one. `multipliers`, shape
-    (states - 1,), are the Floquet multipliers, the largest first, without the one that every cycle has along itself;
-    `slope` is that of the return map over 1 % of the amplitude (NaN where stages so near do not come back), and
-    `multiplier` that of the two which decides: the slope with a stroke limiter, which may chatter, else the largest
-    Floquet multiplier (its modulus if it is complex). `growth` is the multiplier as a simulation beside the cycle
-    shows it, by an independent route (NaN where it leaves too fast). `residual` is the gap at which the orbit closes,
-    as a share of the magnitudes of its states; `trace` one period in time, from where the stage sticks.
+    `amplitude` [m], half of peak to peak, `middle` [m] between the peaks, and `period` [s]. A `symmetric` cycle is its
+    own mirror image after half a period, and its multipliers are those of half a period; those of others are of a whole
+    one. `multipliers`, shape (states - 1,), are the Floquet multipliers, the largest first, without the one that every
+    cycle has along itself; `slope` is that of the return map over 1 % of the amplitude (NaN where stages so near do not
+    come back), and `multiplier` that of the two which decides: the slope with a stroke limiter, which may chatter, else
+    the largest Floquet multiplier (its modulus if it is complex). `growth` is the multiplier as a simulation beside the
+    cycle shows it, by an independent route (NaN where it leaves too fast). `residual` is the gap at which the orbit
+    closes, as a share of the magnitudes of its states; `trace` one period in time, from where the stage sticks.
     """
 
     symmetric: bool
