@@ -20,7 +20,7 @@ from friso.cli.common import (
 from friso.stage import Stage
 
 if TYPE_CHECKING:
-    from friso.hunting import Case, Cycle, Judgement
+    from friso.hunting import Case, Cycle, Judgement, Margin
 
 
 def check(
@@ -72,7 +72,7 @@ def _case_document(case: Case) -> dict[str, Any]:
         "cycles": len(known.hunting.cycles),
         "reason": known.hunting.reason or None,
         "settled_after_s": known.settled_after,
-        "margin": {"factor": known.margin.factor, "crossover_hz": known.margin.crossover} if known.margin else None,
+        "margin": _margin_document(known.margin) if known.margin else None,
         "kick": _kick_document(known),
         "moves": {"drawn": known.moves.drawn, "hunting": known.moves.hunting} if known.moves else None,
         "observed": known.observed,
@@ -103,6 +103,10 @@ def _kick_document(known: Judgement) -> dict[str, Any] | None:
     if known.displacement is None or known.push is None:
         return None
     return {"displacement_m": known.displacement.windows, "velocity_m_per_s": known.push.windows}
+
+
+def _margin_document(edge: Margin) -> dict[str, Any]:
+    return {"factor": edge.factor, "crossover_hz": edge.crossover, "certain": edge.certain}
 
 
 def _finite(value: float) -> float | None:

@@ -28,8 +28,8 @@ class Margin:
     """The edge of hunting nearest in bandwidth: hunting is possible below it.
 
     `factor` is the bandwidth there over that of the stage, `crossover` [Hz] the crossover there (None for a controller
-    given by its gains, all of whose poles and zeros the factor scales). It is `certain` unless there are stages on the
-    way there whose cycle could not be computed.
+    given by its gains, all of whose poles and zeros the factor scales). It is `certain` unless the cycle of the stage
+    before it could not be computed.
     """
 
     factor: float
@@ -51,49 +51,41 @@ def margin(stage: Stage, attracting: bool) -> Margin | None:
     flat = stage.flat()
     far = FARTHEST if attracting else 1 / FARTHEST
     ends = np.geomspace(1.0, far, STRIDES + 1)
-    certain, found = True, None
+    found = None
     for low, high in pairwise(ends):
-        step = _step(flat, float(low), float(high), STEPS, attracting)
-        certain &= step.known
-        if step.edge:
-            found = step.edge
+        found = _between(flat, float(low), float(high), STEPS, attracting)
+        if found is not None:
             break
     if found is None:
         return None
     for _ in range(ROUNDS):
-        found = _step(flat, found.low, found.high, FINER, attracting).edge or found
+        found = _between(flat, found.low, found.high, FINER, attracting) or found
     factor = found.low * (found.high / found.low) ** found.share
-    return Margin(factor, flat["controller.crossover"] * factor if "controller.crossover" in flat else None, certain)
+    crossover = flat["controller.crossover"] * factor if "controller.crossover" in flat else None
+    return Margin(factor, crossover, found.certain)
 
 
 @dataclass(frozen=True)
 class _Edge:
-    """Two factors that enclose the edge, and where between them the multiplier passes 1, as a share of the way in their
-    logarithms."""
+    """Two factors that enclose the edge, where between them the multiplier passes 1, as a share of the way in their
+    logarithms, and whether the cycle at the first of them is known."""
 
     low: float
     high: float
     share: float
-
-
-@dataclass(frozen=True)
-class _Step:
-    """The edge between two factors, if it is there, and whether the cycles before it are all known."""
-
-    edge: _Edge | None
-    known: bool
+    certain: bool
 
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
-def _step(flat: Mapping[str, Any], low: float, high: float, points: int, attracting: bool) -> _Step:
-    """Look for the edge between two factors."""
+def _between(flat: Mapping[str, Any], low: float, high: float, points: int, attracting: bool) -> _Edge | None:
+    """The edge between two factors, if it is there."""
     factors = np.geomspace(low, high, points)
     cycles = hunting_cycles(Ensemble.held(faster(flat, factors), points))
     unknown = cycles.reasons == NOT_CLOSED  # taken to be as it is on this side
     changed = np.flatnonzero((cycles.attracting != attracting) & ~unknown)
     if not changed.size or changed[0] == 0:
-        return _Step(None, not unknown.any())
+        return None
     k, size = int(changed[0]), np.abs(cycles.multiplier)
     share = (1 - size[k - 1]) / (size[k] - size[k - 1])
     share = float(share) if np.isfinite(share) and 0 <= share <= 1 else 0.5  # the middle where one is unknown
-    return _Step(_Edge(float(factors[k - 1]), float(factors[k]), share), not unknown[:k].any())
+    return _Edge(float(factors[k - 1]), float(factors[k]), share, not unknown[k - 1])

@@ -98,7 +98,8 @@ def _outlook(case: Case) -> list[str]:
     known = case.judgement
     says = [] if known.hunting.certain else [f"This is not certain: {known.hunting.reason}; other motions may hunt."]
     if known.margin:
-        says.append(f"Hunting is possible {_below(known.margin)}.")
+        least = "" if known.margin.certain else "at least "
+        says.append(f"Hunting is possible {least}{_below(known.margin)}.")
     elif known.hunting.returns:
         says.append(f"No hunting was found down to 1/{FARTHEST:g} of this bandwidth.")
     return says
@@ -125,7 +126,8 @@ def _faster(case: Case, edge: Margin) -> str:
     controller = case.stage.controller
     if edge.crossover is not None:
         more = edge.crossover * (1 - 1 / edge.factor)
-        return f"raise the crossover by {with_unit(more, 'Hz')} (to {with_unit(edge.crossover, 'Hz')})"
+        about = "" if edge.certain else "about "
+        return f"raise the crossover by {about}{with_unit(more, 'Hz')} (to {with_unit(edge.crossover, 'Hz')})"
     changes = faster({f"controller.{name}": 1.0 for name in _GAINS}, np.array(edge.factor))
     gains = [f"{name} × {changes[f'controller.{name}']:.3g}" for name in _GAINS if getattr(controller, name)]
     return f"make the controller {edge.factor:.3g} times faster ({', '.join(gains)})"
