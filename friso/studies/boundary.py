@@ -4,16 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+import numpy as np
+
 from friso.engine.kernel import Wanted, kernels
 from friso.engine.tolerance import checked_rtol
 from friso.hunting.boundary import Diagram, Plane, Range, Space, diagram, plane
 from friso.hunting.cycle.find import RTOL
 from friso.hunting.cycle.hunting import cannot_hunt
 from friso.quantities import StageError
-from friso.stage import Stage
+from friso.stage import Stage, violations
 from friso.studies.axes import Axis, read_axis
 from friso.studies.cells import flat_cells
 from friso.studies.links import check_links, names
+
+LOOSEST = 1e-6
+"""Relative tolerance from which on cycles are not followed."""
+
+TRIED = 9
+"""Values of each range that are tried for a stage that may be."""
 
 EXAMPLE = 'controller.crossover="1 Hz..40 Hz"'
 
@@ -41,9 +49,25 @@ def boundary(
     check_links(stage, followers, frozenset(each.key for each in ranges))
     if reason := cannot_hunt(stage):
         raise StageError("stage", f"one that cannot hunt: {reason}", "friction and integral action", EXAMPLE)
+    for each in ranges:
+        if each.key.startswith("motion."):
+            given = "a key of the motion, which plays no part"
+            raise StageError(each.key, given, "a key of the stage or its controller", EXAMPLE)
+    if rtol > LOOSEST:
+        raise StageError("rtol", f"{rtol:g}", f"at most {LOOSEST:g}, since multipliers are derivatives", "1e-9")
     space = Space(ranges, lambda values: flat_cells(stage, followers, values))
+    _refuse_impossible(space)
     kernels([Wanted(space.form, variational) for variational in (False, True)])
     return diagram(space, rtol) if len(ranges) == 1 else plane(space, rtol)
+
+
+def _refuse_impossible(space: Space) -> None:
+    """Raises StageError if no stage may have the values of the ranges."""
+    places = np.meshgrid(*[np.linspace(0, 1, TRIED)] * len(space.ranges))
+    points = np.stack([axis.ravel() for axis in places], axis=1)
+    if not space.allowed(points).any():
+        key, why = space.ranges[0].key, violations(space.flat(space.values(points)))[0][1]
+        raise StageError(key, "ranges that no stage may have", why, EXAMPLE)
 
 
 def _range(stage: Stage, name: str, text: str, free: frozenset[str], log: bool) -> Range:

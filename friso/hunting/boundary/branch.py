@@ -28,6 +28,12 @@ at the reference."""
 STEEPEST = 30.0
 """Multiplier beyond which a cycle is not followed farther: nothing comes near it."""
 
+SMOOTH, STEEP = 0.25, 3.0
+"""Largest change of the multiplier from one step to the next, as long as it is not steep."""
+
+END_OF_RANGE = "end of the range"
+"""How a branch ends that has been followed to the end."""
+
 TURN = 0.3
 """Largest change of direction [rad] from one step to the next."""
 
@@ -104,22 +110,40 @@ class Tracer:
                 if step < SHORTEST:
                     return points[1:], f"it could not be followed farther (multiplier {last.multiplier:.3g})"
                 continue
+            coarse = abs(found.multiplier - last.multiplier) > SMOOTH and abs(last.multiplier) < STEEP
+            if coarse and step > FIRST:
+                step /= 2
+                continue
+            if not 0 <= found.place <= self.farthest:
+                return [*points[1:], *self._at_the_end(last, found)], END_OF_RANGE
+            if self._is_mirrored(start, found):
+                return points[1:], "it meets the symmetric cycle"
             points.append(found)
             step = min(1.5 * step, LONGEST)
-            if reason := self._stop(start, found):
+            if reason := self._stop(found):
                 return points[1:], reason
         return points[1:], "it was followed for as many steps as there may be"
 
-    def _stop(self, start: Point, found: Point) -> str:
+    def _at_the_end(self, last: Point, beyond: Point) -> list[Point]:
+        """The point at the end of the range that lies between two."""
+        end = 0.0 if beyond.place < 0 else self.farthest
+        share = (end - last.place) / (beyond.place - last.place)
+        found = self.solve(last, last.vector + share * (beyond.vector - last.vector), np.array([1.0, 0.0, 0.0]))
+        return [found] if found else []
+
+    def _is_mirrored(self, start: Point, found: Point) -> bool:
+        """Whether a cycle of a symmetric stage leans to the other side than the start: beyond the symmetric cycle the
+        branch is its own mirror image."""
         stages = self.family(np.zeros(1, np.int64), np.array([found.place]))
-        if not 0 <= found.place <= self.farthest:
-            return "end of the range"
+        leans = float(found.cycle.middle[0] * start.cycle.middle[0])
+        return bool(self.sign > 0 and stages.symmetric[0] and leans < 0)
+
+    def _stop(self, found: Point) -> str:
+        stages = self.family(np.zeros(1, np.int64), np.array([found.place]))
         if found.cycle.amplitude[0] < SHRUNK * stages.length[0]:
             return "the cycle shrinks into the rest at the reference"
         if abs(found.multiplier) > STEEPEST:
             return f"the cycle repels {STEEPEST:g}-fold and more per return"
-        if self.sign > 0 and stages.symmetric[0] and found.cycle.middle[0] * start.cycle.middle[0] < 0:
-            return "it meets the symmetric cycle"
         return ""
 
     def branch(self, start: Point) -> Branch:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from friso.hunting.boundary.branch import Tracer
+from friso.hunting.boundary.branch import END_OF_RANGE, Tracer
 from friso.hunting.boundary.locate import Found, Kind, corrected
 from friso.hunting.boundary.space import Space
 from friso.hunting.cycle.find import RTOL
@@ -98,7 +98,10 @@ class CurveTracer:
         """The whole curve through a point; None if no second one is found beside it."""
         aside = first.across[::-1] * [1.0, -1.0]
         for side in (BESIDE, -BESIDE):
-            second = self.on_line(first.at + side * aside, first.across, first, 20 * BESIDE)
+            beside = first.at + side * aside
+            if np.any((beside < 0) | (beside > 1)):
+                continue
+            second = self.on_line(beside, first.across, first, 20 * BESIDE)
             if second is not None:
                 break
         else:
@@ -117,7 +120,7 @@ class CurveTracer:
             before, last = spots[-2:]
             ahead = last.at + step * direction
             if np.any((ahead < 0) | (ahead > 1)):
-                return [*spots, *self._at_the_side(last, direction, step)], "end of the range"
+                return [*spots, *self._at_the_side(last, direction, step)], END_OF_RANGE
             size = last.size + step / np.linalg.norm(last.at - before.at) * (last.size - before.size)
             found = self.on_line(ahead, direction[::-1] * [-1.0, 1.0], last, ASIDE * step, size)
             moved = np.zeros(2) if found is None else found.at - last.at
@@ -146,7 +149,9 @@ class CurveTracer:
 
     def _named(self, at: np.ndarray) -> str:
         values = self.space.values(at[None])
-        return ", ".join(f"{key} = {value[0]:.6g}" for key, value in values.items())
+        units = [each.unit for each in self.space.ranges]
+        named = zip(values.items(), units, strict=True)
+        return ", ".join(f"{key} = {value[0]:.6g} {unit}".rstrip() for (key, value), unit in named)
 
 
 def _unit(vector: np.ndarray) -> np.ndarray:

@@ -8,9 +8,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from friso.hunting.boundary.branch import Point, Tracer
+from friso.hunting.boundary.branch import END_OF_RANGE, Point, Tracer
 from friso.hunting.boundary.curve import Curve, CurveTracer, Spot
-from friso.hunting.boundary.locate import Found, changes, located
+from friso.hunting.boundary.locate import changes, located
 from friso.hunting.boundary.space import Space
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import (
@@ -61,7 +61,10 @@ def plane(space: Space, rtol: float = RTOL, nodes: int = NODES) -> Plane:
             if any(_crossed(curve, points[a], points[b]) for curve in own):
                 continue
             cycle = cycles.take(np.flatnonzero(allowed == a))
-            curve = _curve(space, points[a], points[b], cycle, rtol)
+            spot, end = _first(space, points[a], points[b], cycle, rtol)
+            if spot is None and end == END_OF_RANGE:  # the neighbour has the cycle too, it was not found there
+                continue
+            curve = spot and CurveTracer(space, spot.found.kind, cycle.sign, rtol).curve(spot)
             if curve:
                 own.append(curve)
             else:
@@ -117,23 +120,17 @@ def _crossed(curve: Curve, start: np.ndarray, end: np.ndarray) -> bool:
     return False
 
 
-def _curve(space: Space, start: np.ndarray, end: np.ndarray, cycle: Cycles, rtol: float) -> Curve | None:
-    """The curve that crosses the way from a stage with a cycle to a neighbour; None if it cannot be begun."""
+def _first(space: Space, start: np.ndarray, end: np.ndarray, cycle: Cycles, rtol: float) -> tuple[Spot | None, str]:
+    """The first point on the way from a stage with a cycle to a neighbour at which the cycle stops attracting or folds
+    back, if there is one, and how the branch that leads there ends."""
     mesh = float(np.linalg.norm(end - start))
     across = (end - start) / mesh
     tracer = Tracer(space.lines(start[None], across[None]), cycle.sign, rtol, farthest=mesh)
-    found = _first(tracer, Point.of(space.stages(start[None]), 0.0, cycle))
-    if found is None:
-        return None
-    spot = Spot(start + found.point.place * across, found, across)
-    return CurveTracer(space, found.kind, cycle.sign, rtol).curve(spot)
-
-
-def _first(tracer: Tracer, start: Point) -> Found | None:
-    """The first point on the branch that leaves the start ahead at which its cycle stops attracting or folds back."""
-    points, _ = tracer.walk(start, 1.0)
-    for pair in pairwise([start, *points]):
+    first = Point.of(space.stages(start[None]), 0.0, cycle)
+    points, reason = tracer.walk(first, 1.0)
+    for pair in pairwise([first, *points]):
         kinds = changes(*pair)
         if kinds:
-            return located(tracer, *pair, "fold" if "fold" in kinds else kinds[0])
-    return None
+            found = located(tracer, *pair, "fold" if "fold" in kinds else kinds[0])
+            return (Spot(start + found.point.place * across, found, across) if found else None), reason
+    return None, reason

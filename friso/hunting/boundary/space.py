@@ -14,6 +14,9 @@ from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.shooting import Family
 from friso.stage import Stage, violations
 
+GENERIC = 0.4721359549995794
+"""A place at which no key has a special value (it is irrational)."""
+
 Flat = Callable[[Mapping[str, np.ndarray]], Mapping[str, Any]]
 """Flat keys of stages (SI) from arrays of values by name."""
 
@@ -62,8 +65,9 @@ class Space:
 
     @cached_property
     def form(self) -> Structure:
-        """The structure of the stages inside the box; those on its sides (a stroke of zero) are treated alike."""
-        middle = self.flat(self.values(np.full((1, len(self.ranges)), 0.5)))
+        """The structure of the stages inside the box, at a place where no key is zero or a whole number; those that are
+        simpler, as where the stroke is zero or an exponent whole, are treated alike."""
+        middle = self.flat(self.values(np.full((1, len(self.ranges)), GENERIC)))
         return structure({key: value[0] if np.ndim(value) else value for key, value in middle.items()})
 
     def allowed(self, points: np.ndarray) -> np.ndarray:
