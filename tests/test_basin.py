@@ -88,7 +88,7 @@ def test_mirrored_releases_start_hunting_as_well() -> None:
     several = np.geomspace(1e-3, 0.1, 32)
     flat = rigid(8).flat()
     one, other = (
-        ends_hunting({**flat, "motion.displacement": sign * several}, 32, cycle()).tolist() for sign in (1, -1)
+        ends_hunting({**flat, "motion.displacement": sign * several}, 32, cycle())[0].tolist() for sign in (1, -1)
     )
     assert one == other
     assert True in one
@@ -141,7 +141,8 @@ def test_moves_by_single_runs() -> None:
     assert found is not None
     drawn = qmc.scale(qmc.Sobol(2, rng=0).random(MOVES), *zip(found.accelerations, found.times, strict=True))
     own = MOVING.flat() | {"motion.acceleration": drawn[:, 0], "motion.acceleration_time": drawn[:, 1]}
-    each = ends_hunting(own, MOVES, cycle())
+    each, completed = ends_hunting(own, MOVES, cycle())
+    assert completed.all()
     assert each.sum() == found.hunting
     assert 0 < found.hunting < MOVES
     for k in (*np.flatnonzero(each)[:4], *np.flatnonzero(~each)[:4]):

@@ -49,14 +49,15 @@ def structure(flat: Mapping[str, Any]) -> Structure:
         friction=law,
         friction_variant=friction_law(law).variant(flat),
         controller=_controller_form(flat) if "controller.kind" in flat else None,
-        biased=tuple(name for name in ("cart", "stage") if f"bias.{name}" in flat),
+        biased=tuple(name for name in ("cart", "stage") if flat.get(f"bias.{name}", 0.0) != 0),
     )
 
 
 def decisive_keys(flat: Mapping[str, Any]) -> tuple[str, ...]:
     """The numeric keys on which the structure depends, by being zero or a whole number, for instance."""
     law = friction_law(flat["friction.model"])
-    return ("joint.stroke", "controller.ki", "controller.kd", "controller.tau", *law.decisive)
+    own = ("joint.stroke", "controller.ki", "controller.kd", "controller.tau", "bias.cart", "bias.stage")
+    return (*own, *law.decisive)
 
 
 def _joint_form(flat: Mapping[str, Any]) -> JointForm:

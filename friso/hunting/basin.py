@@ -59,7 +59,7 @@ class Kick:
 @dataclass(frozen=True)
 class Moves:
     """Share of moves that end in hunting, of a Sobol sample over acceleration [m/s^2] and acceleration time [s]: how
-    many were drawn, how many hunt, and the ranges they were drawn from."""
+    many were drawn (and run to their end), how many hunt, and the ranges they were drawn from."""
 
     drawn: int
     hunting: int
@@ -68,7 +68,7 @@ class Moves:
 
     @property
     def fraction(self) -> float:
-        return self.hunting / self.drawn
+        return self.hunting / max(self.drawn, 1)
 
     @property
     def interval(self) -> tuple[float, float]:
@@ -79,18 +79,19 @@ class Moves:
 
 def ends_hunting(
     flat: Mapping[str, Any], count: int, cycle: Cycle, starts: np.ndarray | None = None, rtol: float = RTOL
-) -> np.ndarray:
+) -> tuple[np.ndarray, np.ndarray]:
     """Which stages, given as flat keys to SI numbers or arrays (count,), still swing like the cycle long after their
-    motion, shape (count,). A run that fails does not."""
+    motion, and which runs were completed, both of shape (count,)."""
     periods = np.clip(CONSTANTS * cycle.time_constant / cycle.period, *PERIODS)
     end = float(np.max(last_corner(flat)) + periods * cycle.period)
     long = {**flat, "motion.duration": end}
     options = Options(rtol=rtol, window=1 - LAST * cycle.period / end, record_from=end)
-    hunts = np.zeros(count, bool)
+    hunts, completed = np.zeros(count, bool), np.zeros(count, bool)
     for runs in run_chunks(kernel(structure(_first(flat))), long, count, options, starts):
         swing = runs.statistic("deviation_max") - runs.statistic("deviation_min")
-        hunts[runs.numbers] = (swing > cycle.amplitude) & (runs.results.statuses == Status.DONE)
-    return hunts
+        completed[runs.numbers] = runs.results.statuses == Status.DONE
+        hunts[runs.numbers] = (swing > cycle.amplitude) & completed[runs.numbers]
+    return hunts, completed
 
 
 def _first(flat: Mapping[str, Any]) -> dict[str, Any]:
@@ -100,7 +101,11 @@ def _first(flat: Mapping[str, Any]) -> dict[str, Any]:
 def displacements(stage: Stage, cycle: Cycle) -> Kick:
     """The displacements that start hunting."""
     flat = {**_still(stage), "motion.kind": "release"}
-    return _kick(lambda kicks: ends_hunting({**flat, "motion.displacement": kicks}, len(kicks), cycle), cycle.amplitude)
+
+    def hunts(kicks: np.ndarray) -> np.ndarray:
+        return ends_hunting({**flat, "motion.displacement": kicks}, len(kicks), cycle)[0]
+
+    return _kick(hunts, cycle.amplitude)
 
 
 def pushes(stage: Stage, cycle: Cycle) -> Kick:
@@ -111,7 +116,7 @@ def pushes(stage: Stage, cycle: Cycle) -> Kick:
     def hunts(kicks: np.ndarray) -> np.ndarray:
         several = stages.take(np.zeros(len(kicks), np.int64))
         own = {**several.flat, "motion.displacement": float(stages.length[0])}
-        return ends_hunting(own, len(kicks), cycle, pushed(several, kicks))
+        return ends_hunting(own, len(kicks), cycle, pushed(several, kicks))[0]
 
     return _kick(hunts, cycle.amplitude * float(stages.number("rate")[0]))
 
@@ -146,4 +151,5 @@ def moves(stage: Stage, cycle: Cycle) -> Moves | None:
     times = (SHARES[0] * time, min(SHARES[1] * time, flat["motion.return_at"] / 2))
     drawn = qmc.scale(qmc.Sobol(2, rng=0).random(MOVES), *zip(accelerations, times, strict=True))
     own = {**flat, "motion.acceleration": drawn[:, 0], "motion.acceleration_time": drawn[:, 1]}
-    return Moves(MOVES, int(ends_hunting(own, MOVES, cycle).sum()), accelerations, times)
+    hunts, completed = ends_hunting(own, MOVES, cycle)
+    return Moves(int(completed.sum()), int(hunts.sum()), accelerations, times)

@@ -4,20 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.find import NOT_CLOSED, hunting_cycles
+from friso.hunting.cycle.find import UNCERTAIN, Cycles, hunting_cycles
 from friso.stage import Stage
 
 FARTHEST = 10.0
 """Factor up to which the bandwidth is changed."""
 
-STRIDES, STEPS = 4, 7
-"""Parts of the way there, gone one after the other, and steps in each of them."""
+STEPS, AT_ONCE = 41, 10
+"""Bandwidths that are tried on the way there, and how many of them together on the way down."""
 
 FINER, ROUNDS = 9, 2
 """Steps between the two that enclose the edge, and how often they are taken."""
@@ -25,11 +24,12 @@ FINER, ROUNDS = 9, 2
 
 @dataclass(frozen=True)
 class Margin:
-    """The edge of hunting nearest in bandwidth: hunting is possible below it.
+    """The edge of hunting in bandwidth.
 
-    `factor` is the bandwidth there over that of the stage, `crossover` [Hz] the crossover there (None for a controller
-    given by its gains, all of whose poles and zeros the factor scales). It is `certain` unless the cycle of the stage
-    before it could not be computed.
+    For a stage whose cycle attracts it is the last one: from there up to ten times the bandwidth no cycle is known to
+    attract. For others it is the nearest below: hunting is possible there. `factor` is the bandwidth at the edge over
+    that of the stage, `crossover` [Hz] the crossover there (None for a controller given by its gains, all of whose
+    poles and zeros the factor scales). It is `certain` unless a cycle next to the edge could not be computed.
     """
 
     factor: float
@@ -46,29 +46,26 @@ def faster(flat: Mapping[str, Any], factor: np.ndarray) -> dict[str, Any]:
 
 
 def margin(stage: Stage, attracting: bool) -> Margin | None:
-    """The edge above the bandwidth of a stage whose cycle attracts, or below that of one whose cycle does not; None
-    within a factor of ten."""
+    """The last edge above the bandwidth of a stage whose cycle attracts, or the next one below that of one whose cycle
+    does not; None within a factor of ten."""
     flat = stage.flat()
-    far = FARTHEST if attracting else 1 / FARTHEST
-    ends = np.geomspace(1.0, far, STRIDES + 1)
-    found = None
-    for low, high in pairwise(ends):
-        found = _between(flat, float(low), float(high), STEPS, attracting)
-        if found is not None:
-            break
-    if found is None:
+    factors = np.geomspace(1.0, FARTHEST if attracting else 1 / FARTHEST, STEPS)
+    edge = _last(flat, factors) if attracting else _next(flat, factors)
+    if edge is None:
         return None
     for _ in range(ROUNDS):
-        found = _between(flat, found.low, found.high, FINER, attracting) or found
-    factor = found.low * (found.high / found.low) ** found.share
-    crossover = flat["controller.crossover"] * factor if "controller.crossover" in flat else None
-    return Margin(factor, crossover, found.certain)
+        inner = np.geomspace(edge.low, edge.high, FINER)
+        edge = (_last if attracting else _next)(flat, inner) or edge
+    factor = edge.low * (edge.high / edge.low) ** edge.share
+    return Margin(
+        factor, flat["controller.crossover"] * factor if "controller.crossover" in flat else None, edge.certain
+    )
 
 
 @dataclass(frozen=True)
 class _Edge:
     """Two factors that enclose the edge, where between them the multiplier passes 1, as a share of the way in their
-    logarithms, and whether the cycle at the first of them is known."""
+    logarithms, and whether both cycles are known."""
 
     low: float
     high: float
@@ -76,16 +73,34 @@ class _Edge:
     certain: bool
 
 
-@np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
-def _between(flat: Mapping[str, Any], low: float, high: float, points: int, attracting: bool) -> _Edge | None:
-    """The edge between two factors, if it is there."""
-    factors = np.geomspace(low, high, points)
-    cycles = hunting_cycles(Ensemble.held(faster(flat, factors), points))
-    unknown = cycles.reasons == NOT_CLOSED  # taken to be as it is on this side
-    changed = np.flatnonzero((cycles.attracting != attracting) & ~unknown)
-    if not changed.size or changed[0] == 0:
+def _last(flat: Mapping[str, Any], factors: np.ndarray) -> _Edge | None:
+    """The edge behind the last factor at which the cycle attracts; None if that is the last one, or there is none."""
+    cycles = _cycles(flat, factors)
+    attract = np.flatnonzero(cycles.attracting)
+    if not attract.size or attract[-1] == len(factors) - 1:
         return None
-    k, size = int(changed[0]), np.abs(cycles.multiplier)
-    share = (1 - size[k - 1]) / (size[k] - size[k - 1])
+    return _edge(factors, cycles, int(attract[-1]), int(attract[-1]) + 1)
+
+
+def _next(flat: Mapping[str, Any], factors: np.ndarray) -> _Edge | None:
+    """The edge before the first factor at which the cycle attracts; None if that is the first one, or there is none."""
+    for start in range(0, len(factors), AT_ONCE):
+        part = factors[max(start - 1, 0) : start + AT_ONCE]
+        cycles = _cycles(flat, part)
+        attract = np.flatnonzero(cycles.attracting)
+        if attract.size:
+            return _edge(part, cycles, int(attract[0]) - 1, int(attract[0])) if attract[0] else None
+    return None
+
+
+@np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
+def _cycles(flat: Mapping[str, Any], factors: np.ndarray) -> Cycles:
+    return hunting_cycles(Ensemble.held(faster(flat, factors), len(factors)))
+
+
+def _edge(factors: np.ndarray, cycles: Cycles, a: int, b: int) -> _Edge:
+    size = np.abs(cycles.multiplier)
+    share = (1 - size[a]) / (size[b] - size[a])
     share = float(share) if np.isfinite(share) and 0 <= share <= 1 else 0.5  # the middle where one is unknown
-    return _Edge(float(factors[k - 1]), float(factors[k]), share, not unknown[k - 1])
+    certain = not {cycles.reasons[a], cycles.reasons[b]} & set(UNCERTAIN)
+    return _Edge(float(factors[a]), float(factors[b]), share, certain)

@@ -23,6 +23,9 @@ Word = Literal["hunts", "bistable", "transient", "settles", "failed"]
 LONG = 1000.0
 """Time [s] for which a motion that has not settled at its end is followed."""
 
+MOVING = "the reference never stands still"
+"""Why a stage whose reference is a ramp does not hunt: it may stick and slip, but not about a place."""
+
 STEADY = 0.01
 """Share by which the swing of a motion that neither grows nor decays changes over a quarter of the run."""
 
@@ -57,6 +60,8 @@ class Judgement:
 def judge(stage: Stage, found: Measures, rtol: float) -> Judgement:
     """The verdict on a stage whose motion was run and measured at a relative tolerance."""
     known = hunting(stage)
+    if known.returns is not None and _keeps_moving(stage):
+        known = Hunting((), MOVING, True, None)
     if found.status[0] != Status.DONE:
         return Judgement("failed", known)
     if known.attracting:
@@ -68,8 +73,15 @@ def judge(stage: Stage, found: Measures, rtol: float) -> Judgement:
     return Judgement(word, known, margin=edge, settled_after=after, observed=observed)
 
 
+def _keeps_moving(stage: Stage) -> bool:
+    flat = stage.flat()
+    return flat["motion.kind"] == "ramp" and flat["motion.velocity"] != 0
+
+
 def _with_a_cycle(stage: Stage, found: Measures, known: Hunting, cycle: Cycle) -> Judgement:
-    hunts = bool(ends_hunting(stage.flat(), 1, cycle)[0])
+    (hunts,), (completed,) = ends_hunting(stage.flat(), 1, cycle)
+    if not completed:
+        return Judgement("failed", known)
     within = float(found.settling_time[1][0])
     return Judgement(
         "hunts" if hunts else "bistable",
@@ -77,7 +89,7 @@ def _with_a_cycle(stage: Stage, found: Measures, known: Hunting, cycle: Cycle) -
         displacements(stage, cycle),
         pushes(stage, cycle),
         moves(stage, cycle),
-        margin(stage, attracting=True),
+        margin(stage, attracting=True) if known.cycles[0].attracts else None,
         None if hunts or not np.isfinite(within) else within,
     )
 

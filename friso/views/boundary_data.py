@@ -9,7 +9,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from friso.hunting.boundary import Branch, Curve, Diagram, Found, Plane, Space
-from friso.hunting.cycle.find import NOT_CLOSED, Cycles
+from friso.hunting.cycle.find import UNCERTAIN, Cycles
 from friso.views.figure import Array
 
 Shape = Literal["symmetric", "asymmetric", "whole"]
@@ -154,4 +154,6 @@ def lost_places(found: Plane) -> Array:
 
 def _verdicts(cycles: Cycles) -> list[str]:
     """The verdicts of stages by their hunting cycles."""
-    return np.select([cycles.attracting, cycles.reasons == NOT_CLOSED], [ATTRACTS, UNKNOWN], REPELS).tolist()
+    return np.select(
+        [cycles.attracting, np.isin(cycles.reasons.astype(str), UNCERTAIN)], [ATTRACTS, UNKNOWN], REPELS
+    ).tolist()

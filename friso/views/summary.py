@@ -117,7 +117,7 @@ def _remedy(item: Shown, cases: Mapping[str, Case]) -> list[str]:
     ways = [_faster(item.case, known.margin)] if known.margin else []
     ways += ["free the joint"] if _freeing_helps(item, cases) else []
     says = [f"{ways[0][0].upper()}{_alternatives(ways)[1:]}."] if ways else []
-    if known.margin or known.observed:
+    if known.margin or known.observed or not known.hunting.cycles[0].attracts:
         return says
     return [f"No bandwidth up to {FARTHEST:g} times this one was found to stop it.", *says]
 

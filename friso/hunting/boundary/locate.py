@@ -37,20 +37,22 @@ class Found:
 def distance_to(kind: Kind, point: Point) -> float:
     """How far the multiplier is from where the kind of point has it; it changes sign there."""
     if kind == "torus":
-        return abs(complex(point.cycle.local[0, 0])) - 1
+        return abs(point.multiplier) - 1
     return point.multiplier + (1 if kind == "flip" else -1)
 
 
 def changes(first: Point, second: Point) -> tuple[Kind, ...]:
     """What happens to the multiplier between two neighbours on a branch."""
-    if _complex(first) and _complex(second):
-        return ("torus",) if distance_to("torus", first) * distance_to("torus", second) < 0 else ()
+    if _complex(first) or _complex(second):
+        return ("torus",) if (abs(first.multiplier) - 1) * (abs(second.multiplier) - 1) < 0 else ()
     kinds: tuple[Kind, ...] = ("flip", "fold")
     return tuple(kind for kind in kinds if distance_to(kind, first) * distance_to(kind, second) < 0)
 
 
 def _complex(point: Point) -> bool:
-    return bool(abs(point.cycle.local[0, 0].imag) > 1e-3)
+    """Whether the multiplier that decides is the modulus of a complex pair."""
+    leading = complex(point.cycle.local[0, 0])
+    return bool(abs(leading.imag) > 1e-3 and np.isclose(abs(leading), point.multiplier))
 
 
 def located(tracer: Tracer, first: Point, second: Point, kind: Kind) -> Found | None:
@@ -92,8 +94,8 @@ def _found(tracer: Tracer, kind: Kind, point: Point, direction: np.ndarray, slop
     tight = Tracer(tracer.family, tracer.sign, tracer.rtol * TIGHTER).solve(point, point.vector, direction)
     if tight is None:
         return Found(kind, point, direction, np.inf)
-    moved = (distance_to(kind, tight) - distance_to(kind, point)) / slope
-    return Found(kind, point, direction, abs(tight.place - point.place) + abs(moved * float(direction[0])))
+    moved = (abs(distance_to(kind, tight) - distance_to(kind, point)) + abs(distance_to(kind, point))) / abs(slope)
+    return Found(kind, point, direction, abs(tight.place - point.place) + moved * abs(float(direction[0])))
 
 
 def corrected(
@@ -126,4 +128,12 @@ def corrected(
 def special_points(tracer: Tracer, branch: Branch) -> list[Found]:
     """All points of a branch at which a multiplier passes the unit circle."""
     found = [located(tracer, *pair, kind) for pair in pairwise(branch.points) for kind in changes(*pair)]
-    return [each for each in found if each]
+    return [each for each in found if each and not _meets_symmetric(tracer, each)]
+
+
+def _meets_symmetric(tracer: Tracer, found: Found) -> bool:
+    """Whether what looks like a fold of an asymmetric branch is where it meets the symmetric cycle."""
+    cycle = found.point.cycle
+    leans = abs(cycle.middle[0]) > 0.02 * cycle.amplitude[0]
+    stages = tracer.family(np.zeros(1, np.int64), np.array([found.point.place]))
+    return bool(found.kind == "fold" and tracer.sign > 0 and stages.symmetric[0] and not leans)

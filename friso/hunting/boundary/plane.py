@@ -14,9 +14,9 @@ from friso.hunting.boundary.locate import changes, located
 from friso.hunting.boundary.space import Space
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import (
-    NOT_CLOSED,
     ROUGH,
     RTOL,
+    UNCERTAIN,
     Cycles,
     asymmetric_cycles,
     symmetric_cycles,
@@ -82,11 +82,11 @@ def _searches(stages: Ensemble, rtol: float) -> tuple[Cycles, list[tuple[Cycles,
         hunting = symmetric_cycles(stages, rtol, taken)
     else:
         hunting = whole_cycles(stages, rtol, (taken, return_map(stages, ROUGH, -1.0)))
-    known = hunting.reasons != NOT_CLOSED
+    known = ~np.isin(hunting.reasons.astype(str), UNCERTAIN)
     searches = [(hunting, np.flatnonzero(hunting.attracting), np.flatnonzero(known & ~hunting.attracting))]
     if symmetric:
         pairs = asymmetric_cycles(stages, taken, rtol)
-        beside = hunting.attracting & (pairs.reasons != NOT_CLOSED)
+        beside = hunting.attracting & (~np.isin(pairs.reasons.astype(str), UNCERTAIN))
         searches.append((pairs, np.flatnonzero(beside & pairs.found), np.flatnonzero(beside & ~pairs.found)))
     return hunting, searches
 

@@ -25,7 +25,14 @@ TRIES = ((1.0, 1.0), (0.985, 1.05), (0.985, 1.0), (0.97, 1.05), (1.015, 1.0))
 """Shares of the guessed distance and time from which orbits are tried to be closed, one after the other."""
 
 APART = 0.05
-"""Share of the amplitude by which the two turns of an asymmetric cycle of a symmetric stage differ at least."""
+"""Share by which the two distances of an asymmetric cycle of a symmetric stage differ at least to be guessed."""
+
+LEANING = 1e-3
+"""Share of the amplitude by which the middle of an asymmetric cycle is off the reference at least."""
+
+BIRTH, RETURNS = 3e-3, 400
+"""Where beside a symmetric cycle that repels, as a share of its distance, a run begins, and for how many returns it is
+watched whether an asymmetric pair takes over."""
 
 KEPT = 0.5
 """Share of the guessed distance by which that of a closed orbit may differ: farther off it is another one, such as the
@@ -119,8 +126,20 @@ def partner(stages: Ensemble, cycles: Cycles, rtol: float = RTOL) -> Cycles | No
 
 
 def hunting_cycles(stages: Ensemble, rtol: float = RTOL) -> Cycles:
-    """The hunting cycle of every stage: the symmetric one, unless some of the stages are not symmetric."""
-    return symmetric_cycles(stages, rtol) if stages.symmetric.all() else whole_cycles(stages, rtol)
+    """The hunting cycle of every stage: of a symmetric one the symmetric cycle, whose multiplier is that of half a
+    period; of others, whose multiplier is that of a whole one (`sign` is 0 then if there are both kinds)."""
+    symmetric = stages.symmetric
+    kinds = ((symmetric, symmetric_cycles), (~symmetric, whole_cycles))
+    parts = [(which, find(stages.take(which), rtol)) for mask, find in kinds if (which := np.flatnonzero(mask)).size]
+    if len(parts) == 1:
+        return parts[0][1]
+    order = np.argsort(np.concatenate([which for which, _ in parts]))
+    columns = {
+        each.name: np.concatenate([getattr(part, each.name) for _, part in parts])[order]
+        for each in fields(Cycles)
+        if each.name != "sign"
+    }
+    return Cycles(0.0, **columns)
 
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
@@ -128,7 +147,7 @@ def asymmetric_cycles(stages: Ensemble, taken: ReturnMap, rtol: float = RTOL) ->
     """One of the pair of cycles, mirror images of each other, that a symmetric stage may have beside its symmetric
     cycle; from its return map."""
     cycles = _closed(stages, whole_guess(stages, taken, taken, APART), 1.0, rtol)
-    same = np.abs(cycles.middle) < APART / 2 * cycles.amplitude
+    same = np.abs(cycles.middle) < LEANING * cycles.amplitude
     cycles.found[same], cycles.reasons[same] = False, NO_PAIR
     return cycles
 
@@ -194,8 +213,26 @@ def _close_simulated(stages: Ensemble, guess: Guess, orbits: Orbits, rtol: float
 _NUMBERS = ("period", "amplitude", "middle", "gap", "slope", "multiplier")
 
 NO_RETURN = "from no distance does the stage swing back as far as it came from"
+NO_MULTIPLIER = "an orbit was closed, but its multiplier could not be computed"
 NO_PAIR = "there is no asymmetric cycle beside the symmetric one"
 NOT_CLOSED = "the return map has a fixed point, but no orbit near it could be closed"
+
+
+def pair_beside(stages: Ensemble, cycle: Cycles, rtol: float = RTOL) -> Cycles | None:
+    """One of the attracting pair beside the symmetric cycle of one stage, which repels: where a motion that leaves it
+    ends, if it stays near; None if it goes away."""
+    size = np.abs(cycle.states[:, stages.sticking])
+    start = cycle.states + BIRTH * size[:, None] * cycle.direction
+    end = stages.run(start, 2 * RETURNS * cycle.orbits.times, ROUGH).ends
+    if not np.isfinite(end).all() or abs(end[0, stages.sticking] / cycle.states[0, stages.sticking] - 1) > KEPT:
+        return None
+    orbit = close(stages, end, 2 * cycle.orbits.times, 1.0, rtol)
+    pair = described(stages, orbit, rtol, np.array([NOT_CLOSED]))
+    return pair if pair.found[0] and abs(pair.middle[0]) > LEANING * pair.amplitude[0] else None
+
+
+UNCERTAIN = (NOT_CLOSED, NO_MULTIPLIER)
+"""Reasons why no cycle was found although there may be one."""
 
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
@@ -235,4 +272,6 @@ def described(stages: Ensemble, orbits: Orbits, rtol: float, reasons: np.ndarray
     }
     for name, value in values.items():
         getattr(cycles, name)[which] = value
+    unknown = cycles.found & ~(np.isfinite(cycles.multiplier) & np.isfinite(cycles.amplitude))
+    cycles.found[unknown], cycles.reasons[unknown] = False, NO_MULTIPLIER
     return cycles

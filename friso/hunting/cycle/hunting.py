@@ -13,11 +13,12 @@ from friso.engine.tolerance import checked_rtol
 from friso.equations.structure import Structure, structure
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import (
-    NOT_CLOSED,
     ROUGH,
     RTOL,
+    UNCERTAIN,
     Cycles,
     asymmetric_cycles,
+    pair_beside,
     partner,
     symmetric_cycles,
     whole_cycles,
@@ -120,13 +121,16 @@ def hunting(stage: Stage, rtol: float = RTOL) -> Hunting:
     there = return_map(stages, ROUGH)
     if stages.symmetric[0]:
         sought = [symmetric_cycles(stages, rtol, there), asymmetric_cycles(stages, there, rtol)]
+        repels = sought[0].found[0] and not sought[0].attracting[0]
+        if repels and not sought[1].attracting[0] and (pair := pair_beside(stages, sought[0], rtol)):
+            sought.append(pair)
     else:
         sought = [whole_cycles(stages, rtol, (there, return_map(stages, ROUGH, -1.0)))]
         if sought[0].found[0] and not sought[0].attracting[0] and (other := partner(stages, sought[0], rtol)):
             sought.append(other)
     cycles = tuple(_cycle(stages, each) for each in sought if each.found[0])
     reasons = [each.reasons[0] for each in sought]
-    return Hunting(cycles, "" if cycles else reasons[0], bool(cycles) or reasons[0] != NOT_CLOSED, there)
+    return Hunting(cycles, "" if cycles else reasons[0], bool(cycles) or reasons[0] not in UNCERTAIN, there)
 
 
 def _cycle(stages: Ensemble, found: Cycles) -> Cycle:

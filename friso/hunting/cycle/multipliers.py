@@ -34,7 +34,8 @@ class Multipliers:
 def multipliers(stages: Ensemble, orbits: Orbits, rtol: float) -> Multipliers:
     """The multipliers of closed orbits; per half a period where that is what they were closed over."""
     shot = shoot(stages, orbits.states, orbits.times, orbits.sign, rtol)
-    local, direction = _floquet(stages, shot.flows, stages.rates(shot.ends))
+    flows = np.where(shot.done[:, None, None], shot.flows, np.nan)
+    local, direction = _floquet(stages, flows, stages.rates(shot.ends))
     return Multipliers(local, direction, _slope(stages, orbits, direction, rtol))
 
 
@@ -44,8 +45,9 @@ def _floquet(stages: Ensemble, flows: np.ndarray, rates: np.ndarray) -> tuple[np
     phase = stages.index("integral")
     sections = flows - rates[:, :, None] * flows[:, None, phase, :] / rates[:, phase, None, None]
     sections[:, :, phase] = 0.0
-    sections[~np.isfinite(sections).all(axis=(1, 2))] = 0.0
-    values, vectors = np.linalg.eig(sections)
+    known = np.all(np.isfinite(sections), axis=(1, 2), keepdims=True)
+    values, vectors = np.linalg.eig(np.where(known, sections, 0.0))
+    values = np.where(known[:, :, 0], values, np.nan)
     order = np.argsort(-np.abs(values), axis=1)
     values = np.take_along_axis(values, order, axis=1)[:, :-1]  # the last is that of the phase, which is zero
     first = np.take_along_axis(vectors, order[:, None, :1], axis=2)[:, :, 0]
