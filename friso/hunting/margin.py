@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -18,8 +18,12 @@ FARTHEST = 10.0
 STEPS, AT_ONCE = 41, 10
 """Bandwidths that are tried on the way there, and how many of them together on the way down."""
 
-FINER = 9
-"""Steps between the two that enclose the edge, 0.7 % apart: closer the slope of a chattering limiter is rough."""
+FINER, ROUNDS = 9, 2
+"""Steps between the two that enclose the edge, and how often they are taken."""
+
+ENOUGH = 6
+"""Cycles of these steps that have to be known for a curve to be laid through their multipliers, which are rough where
+a limiter chatters."""
 
 
 @dataclass(frozen=True)
@@ -53,12 +57,26 @@ def margin(stage: Stage, attracting: bool) -> Margin | None:
     edge = _last(flat, factors) if attracting else _next(flat, factors)
     if edge is None:
         return None
-    between = np.geomspace(edge.low, edge.high, FINER)
-    edge = (_last if attracting else _next)(flat, between) or edge
+    if Ensemble.held(flat, 1).chatters:
+        edge = _smoothed(flat, edge)
+    else:
+        for _ in range(ROUNDS):
+            edge = (_last if attracting else _next)(flat, np.geomspace(edge.low, edge.high, FINER)) or edge
     factor = edge.low * (edge.high / edge.low) ** edge.share
-    return Margin(
-        factor, flat["controller.crossover"] * factor if "controller.crossover" in flat else None, edge.certain
-    )
+    crossover = flat["controller.crossover"] * factor if "controller.crossover" in flat else None
+    return Margin(factor, crossover, edge.certain)
+
+
+def _smoothed(flat: Mapping[str, Any], edge: _Edge) -> _Edge:
+    """The edge by a cubic through the multipliers between; as it is where too few are known."""
+    places, share = np.linspace(0, 1, FINER), edge.share
+    cycles = _cycles(flat, edge.low * (edge.high / edge.low) ** places)
+    if np.count_nonzero(cycles.found) >= ENOUGH:
+        off = np.abs(cycles.multiplier[cycles.found]) - 1
+        roots = np.roots(np.polyfit(places[cycles.found], off, 3))
+        inside = roots.real[(np.abs(roots.imag) < 1e-9) & (roots.real >= 0) & (roots.real <= 1)]
+        share = float(inside[np.abs(inside - share).argmin()]) if inside.size else share
+    return replace(edge, share=share)
 
 
 @dataclass(frozen=True)
