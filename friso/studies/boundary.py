@@ -12,7 +12,7 @@ from friso.hunting.boundary import Diagram, Plane, Range, Space, diagram, plane
 from friso.hunting.cycle.find import RTOL
 from friso.hunting.cycle.hunting import cannot_hunt
 from friso.quantities import StageError
-from friso.stage import Stage, violations
+from friso.stage import Stage, numeric_keys, violations
 from friso.studies.axes import Axis, read_axis
 from friso.studies.cells import flat_cells
 from friso.studies.links import check_links, names
@@ -74,4 +74,7 @@ def _range(stage: Stage, name: str, text: str, free: frozenset[str], log: bool) 
     read = read_axis(stage, name, text, name in free, log)
     if isinstance(read, Axis) or read.count is not None:
         raise StageError(name, repr(text), "a range FIRST..LAST, without a number of points", EXAMPLE)
+    field = numeric_keys(stage.flat()).get(name)
+    if field is not None and not (field.bound.holds(read.first) and field.bound.holds(read.last)):
+        raise StageError(name, repr(text), f"values {field.bound.text}", EXAMPLE)
     return Range(name, read.first, read.last, read.scale == "log", read.unit)

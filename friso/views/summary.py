@@ -37,7 +37,8 @@ def conclusion(cases: Mapping[str, Case]) -> str | None:
         return None
     locked, free = (word in ("hunts", "bistable") for word in words)
     if not free:
-        return "The free joint stops the hunting." if locked else None
+        certain = cases["free"].judgement.hunting.certain
+        return "The free joint stops the hunting." if locked and certain else None
     if words == ["hunts", "bistable"]:
         return "The free joint stops the hunting after this move, but does not rule it out."
     return "The free joint does not stop the hunting." if locked else "The stage hunts only with its joint free."
