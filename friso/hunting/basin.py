@@ -13,8 +13,7 @@ from friso.engine.arrays import Status
 from friso.engine.batch import Options, run_chunks
 from friso.engine.kernel import kernel
 from friso.equations.motion import last_corner
-from friso.equations.structure import structure
-from friso.hunting.cycle.ensemble import Ensemble
+from friso.hunting.cycle.ensemble import Ensemble, shared_structure, without_motion
 from friso.hunting.cycle.hunting import Cycle
 from friso.hunting.cycle.rest import pushed
 from friso.stage import Stage
@@ -68,7 +67,7 @@ class Moves:
 
     @property
     def fraction(self) -> float:
-        return self.hunting / max(self.drawn, 1)
+        return self.hunting / self.drawn
 
     @property
     def interval(self) -> tuple[float, float]:
@@ -87,20 +86,16 @@ def ends_hunting(
     long = {**flat, "motion.duration": end}
     options = Options(rtol=rtol, window=1 - LAST * cycle.period / end, record_from=end)
     hunts, completed = np.zeros(count, bool), np.zeros(count, bool)
-    for runs in run_chunks(kernel(structure(_first(flat))), long, count, options, starts):
+    for runs in run_chunks(kernel(shared_structure(flat)), long, count, options, starts):
         swing = runs.statistic("deviation_max") - runs.statistic("deviation_min")
         completed[runs.numbers] = runs.results.statuses == Status.DONE
         hunts[runs.numbers] = (swing > cycle.amplitude) & completed[runs.numbers]
     return hunts, completed
 
 
-def _first(flat: Mapping[str, Any]) -> dict[str, Any]:
-    return {key: value[0] if np.ndim(value) else value for key, value in flat.items()}
-
-
 def displacements(stage: Stage, cycle: Cycle) -> Kick:
     """The displacements that start hunting."""
-    flat = {**_still(stage), "motion.kind": "release"}
+    flat = {**without_motion(stage.flat()), "motion.kind": "release"}
 
     def hunts(kicks: np.ndarray) -> np.ndarray:
         return ends_hunting({**flat, "motion.displacement": kicks}, len(kicks), cycle)[0]
@@ -110,8 +105,7 @@ def displacements(stage: Stage, cycle: Cycle) -> Kick:
 
 def pushes(stage: Stage, cycle: Cycle) -> Kick:
     """The velocities that start hunting."""
-    flat = _still(stage)
-    stages = Ensemble.held(flat, 1)
+    stages = Ensemble.held(stage.flat(), 1)
 
     def hunts(kicks: np.ndarray) -> np.ndarray:
         several = stages.take(np.zeros(len(kicks), np.int64))
@@ -119,10 +113,6 @@ def pushes(stage: Stage, cycle: Cycle) -> Kick:
         return ends_hunting(own, len(kicks), cycle, pushed(several, kicks))[0]
 
     return _kick(hunts, cycle.amplitude * float(stages.number("rate")[0]))
-
-
-def _still(stage: Stage) -> dict[str, Any]:
-    return {key: value for key, value in stage.flat().items() if not key.startswith("motion.")}
 
 
 def _kick(hunts: Callable[[np.ndarray], np.ndarray], unit: float) -> Kick:
@@ -142,7 +132,7 @@ def _kick(hunts: Callable[[np.ndarray], np.ndarray], unit: float) -> Kick:
 
 
 def moves(stage: Stage, cycle: Cycle) -> Moves | None:
-    """The share of moves that end in hunting; None for motions that have no acceleration."""
+    """The share of moves that end in hunting; None for motions that have no acceleration, or if every run fails."""
     flat = stage.flat()
     if flat["motion.kind"] != "there_and_back" or not flat["motion.acceleration"] * flat["motion.acceleration_time"]:
         return None
@@ -152,4 +142,4 @@ def moves(stage: Stage, cycle: Cycle) -> Moves | None:
     drawn = qmc.scale(qmc.Sobol(2, rng=0).random(MOVES), *zip(accelerations, times, strict=True))
     own = {**flat, "motion.acceleration": drawn[:, 0], "motion.acceleration_time": drawn[:, 1]}
     hunts, completed = ends_hunting(own, MOVES, cycle)
-    return Moves(int(completed.sum()), int(hunts.sum()), accelerations, times)
+    return Moves(int(completed.sum()), int(hunts.sum()), accelerations, times) if completed.any() else None

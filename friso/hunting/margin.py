@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.find import UNCERTAIN, Cycles, hunting_cycles
+from friso.hunting.cycle.find import Cycles, hunting_cycles
 from friso.stage import Stage
 
 FARTHEST = 10.0
@@ -119,5 +119,5 @@ def _edge(factors: np.ndarray, cycles: Cycles, a: int, b: int) -> _Edge:
     size = np.abs(cycles.multiplier)
     share = (1 - size[a]) / (size[b] - size[a])
     share = float(share) if np.isfinite(share) and 0 <= share <= 1 else 0.5  # the middle where one is unknown
-    certain = not {cycles.reasons[a], cycles.reasons[b]} & set(UNCERTAIN)
-    return _Edge(float(factors[a]), float(factors[b]), share, certain)
+    certain = not cycles.uncertain[[a, b]].any()
+    return _Edge(float(factors[a]), float(factors[b]), share, bool(certain))

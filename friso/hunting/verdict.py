@@ -8,12 +8,12 @@ from typing import Any, Literal
 import numpy as np
 
 from friso.engine.arrays import Status
-from friso.engine.batch import Runs, run_chunks
+from friso.engine.batch import run_chunks
 from friso.engine.kernel import kernel
 from friso.equations.motion import last_corner
 from friso.equations.structure import structure
 from friso.hunting.basin import Kick, Moves, displacements, ends_hunting, moves, pushes
-from friso.hunting.cycle.hunting import Cycle, Hunting, hunting
+from friso.hunting.cycle.hunting import Cycle, Hunting, cannot_hunt, hunting
 from friso.hunting.margin import Margin, margin
 from friso.hunting.measures import COUNTED_ABOVE, Measures, measure, options
 from friso.stage import Stage
@@ -59,9 +59,8 @@ class Judgement:
 
 def judge(stage: Stage, found: Measures, rtol: float) -> Judgement:
     """The verdict on a stage whose motion was run and measured at a relative tolerance."""
-    known = hunting(stage)
-    if known.returns is not None and _keeps_moving(stage):
-        known = Hunting((), MOVING, True, None)
+    moves_on = _keeps_moving(stage) and not cannot_hunt(stage)
+    known = Hunting((), MOVING, True, None) if moves_on else hunting(stage)
     if found.status[0] != Status.DONE:
         return Judgement("failed", known)
     if known.attracting:
@@ -104,13 +103,13 @@ def _settling(stage: Stage, found: Measures, rtol: float, possible: bool) -> tup
         return bool(still and found.peaks[0] == 0), None, False
     flat = stage.flat()
     end = max(LONG, flat["motion.duration"]) + float(last_corner(flat))
-    long, wide = (_followed({**flat, "motion.duration": end}, rtol, window) for window in (0.75, 0.5))
-    (after,) = measure({**flat, "motion.duration": end}, long).settling_time[1]
-    swing, before = (float((r.statistic("deviation_max") - r.statistic("deviation_min"))[0]) for r in (long, wide))
-    steady = swing > COUNTED_ABOVE and abs(before / swing - 1) < STEADY and long.results.statuses[0] == Status.DONE
+    last, half = (_followed({**flat, "motion.duration": end}, rtol, window) for window in (0.75, 0.5))
+    swing, after = last.peak_to_peak[0], last.settling_time[1][0]
+    steady = swing > COUNTED_ABOVE and abs(half.peak_to_peak[0] / swing - 1) < STEADY  # and not NaN: it was completed
     return False, float(after) if np.isfinite(after) else None, bool(steady)
 
 
-def _followed(flat: dict[str, Any], rtol: float, window: float) -> Runs:
+def _followed(flat: dict[str, Any], rtol: float, window: float) -> Measures:
+    """Measures of a run, its swing over the part of it that comes after `window`, a share of the whole."""
     (runs,) = run_chunks(kernel(structure(flat)), flat, 1, replace(options(rtol), window=window))
-    return runs
+    return measure(flat, runs)

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-import numpy as np
-
 from friso.engine.kernel import Wanted, kernels
 from friso.engine.tolerance import checked_rtol
 from friso.hunting.boundary import Diagram, Plane, Range, Space, diagram, plane
@@ -63,8 +61,7 @@ def boundary(
 
 def _refuse_impossible(space: Space) -> None:
     """Raises StageError if no stage may have the values of the ranges."""
-    places = np.meshgrid(*[np.linspace(0, 1, TRIED)] * len(space.ranges))
-    points = np.stack([axis.ravel() for axis in places], axis=1)
+    points = space.grid(TRIED)
     if not space.allowed(points).any():
         key, why = space.ranges[0].key, violations(space.flat(space.values(points)))[0][1]
         raise StageError(key, "ranges that no stage may have", why, EXAMPLE)

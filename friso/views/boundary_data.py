@@ -9,7 +9,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from friso.hunting.boundary import Branch, Curve, Diagram, Found, Plane, Space
-from friso.hunting.cycle.find import UNCERTAIN, Cycles
+from friso.hunting.cycle.find import Cycles
 from friso.views.figure import Array
 
 Shape = Literal["symmetric", "asymmetric", "whole"]
@@ -135,9 +135,7 @@ def node_verdicts(found: Plane) -> list[tuple[float, float, str]]:
     """The values [SI] of both keys at every node of the grid, the first key the slowest, and the verdict there."""
     verdicts = np.full(found.nodes**2, INVALID, object)
     verdicts[found.allowed] = _verdicts(found.cycles)
-    side = np.linspace(0, 1, found.nodes)
-    points = np.stack([axis.ravel() for axis in np.meshgrid(side, side, indexing="ij")], axis=1)
-    values = _values(found.space, points).tolist()
+    values = _values(found.space, found.space.grid(found.nodes)).tolist()
     return [(x, y, verdict) for (x, y), verdict in zip(values, verdicts.tolist(), strict=True)]
 
 
@@ -154,6 +152,4 @@ def lost_places(found: Plane) -> Array:
 
 def _verdicts(cycles: Cycles) -> list[str]:
     """The verdicts of stages by their hunting cycles."""
-    return np.select(
-        [cycles.attracting, np.isin(cycles.reasons.astype(str), UNCERTAIN)], [ATTRACTS, UNKNOWN], REPELS
-    ).tolist()
+    return np.select([cycles.attracting, cycles.uncertain], [ATTRACTS, UNKNOWN], REPELS).tolist()

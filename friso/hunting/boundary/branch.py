@@ -88,7 +88,7 @@ class Tracer:
         if not orbits.closed[0]:
             return None
         stages = self.family(np.zeros(1, np.int64), places)
-        cycle = described(stages, orbits, self.rtol, np.array([""]))
+        cycle = described(stages, orbits, self.rtol)
         if not np.isfinite(cycle.multiplier[0]) or not np.isfinite(cycle.amplitude[0]):
             return None
         return Point.of(stages, float(places[0]), cycle)

@@ -11,7 +11,7 @@ from friso.hunting.boundary.branch import Branch, Point, Tracer
 from friso.hunting.boundary.locate import Found, special_points
 from friso.hunting.boundary.space import Space
 from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.find import ROUGH, RTOL, Cycles, asymmetric_cycles, symmetric_cycles, whole_cycles
+from friso.hunting.cycle.find import ROUGH, RTOL, Cycles, families
 from friso.hunting.cycle.return_map import return_map
 
 SEEDS = 33
@@ -47,14 +47,10 @@ def diagram(space: Space, rtol: float = RTOL, seeds: int = SEEDS) -> Diagram:
     places = np.linspace(0, 1, seeds)
     places = places[space.allowed(places[:, None])]
     stages = space.stages(places[:, None])
-    taken = return_map(stages, ROUGH)
-    if stages.symmetric.all():
-        families = [symmetric_cycles(stages, rtol, taken), asymmetric_cycles(stages, taken, rtol)]
-    else:
-        families = [whole_cycles(stages, rtol, (taken, return_map(stages, ROUGH, -1.0)))]
+    sought = families(stages, return_map(stages, ROUGH), rtol)
     branches: list[Branch] = []
     special: list[tuple[Found, ...]] = []
-    for cycles in families:
+    for cycles in sought:
         tracer = Tracer(space.lines(np.zeros((1, 1)), np.ones((1, 1))), cycles.sign, rtol)
         for k in np.flatnonzero(cycles.found):
             start = _point(stages, places, cycles, int(k))
@@ -62,7 +58,7 @@ def diagram(space: Space, rtol: float = RTOL, seeds: int = SEEDS) -> Diagram:
                 branch = tracer.branch(start)
                 branches.append(branch)
                 special.append(tuple(special_points(tracer, branch)))
-    return Diagram(space, tuple(branches), tuple(special), places, families[0])
+    return Diagram(space, tuple(branches), tuple(special), places, sought[0])
 
 
 def _point(stages: Ensemble, places: np.ndarray, cycles: Cycles, k: int) -> Point:

@@ -26,7 +26,7 @@ TIGHTER = 0.01
 @dataclass(frozen=True)
 class Found:
     """A point at which a branch stops attracting (or begins to), with the direction of the branch there, and by how
-    much its place changes when it is computed to a hundredth of the tolerance."""
+    much its place may be off: what the search has left, and the change at a hundredth of the tolerance."""
 
     kind: Kind
     point: Point

@@ -13,15 +13,7 @@ from friso.hunting.boundary.curve import Curve, CurveTracer, Spot
 from friso.hunting.boundary.locate import changes, located
 from friso.hunting.boundary.space import Space
 from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.find import (
-    ROUGH,
-    RTOL,
-    UNCERTAIN,
-    Cycles,
-    asymmetric_cycles,
-    symmetric_cycles,
-    whole_cycles,
-)
+from friso.hunting.cycle.find import ROUGH, RTOL, Cycles, families
 from friso.hunting.cycle.return_map import return_map
 
 NODES = 13
@@ -49,8 +41,7 @@ class Plane:
 def plane(space: Space, rtol: float = RTOL, nodes: int = NODES) -> Plane:
     """All curves on which the hunting cycle stops attracting, and those on which an asymmetric cycle that bounds its
     basin appears."""
-    corners = np.linspace(0, 1, nodes)
-    points = np.stack([axis.ravel() for axis in np.meshgrid(corners, corners, indexing="ij")], axis=1)
+    points = space.grid(nodes)
     allowed = np.flatnonzero(space.allowed(points))
     curves: list[Curve] = []
     lost: list[np.ndarray] = []
@@ -76,18 +67,12 @@ def plane(space: Space, rtol: float = RTOL, nodes: int = NODES) -> Plane:
 def _searches(stages: Ensemble, rtol: float) -> tuple[Cycles, list[tuple[Cycles, np.ndarray, np.ndarray]]]:
     """The hunting cycles of stages, and what to look for: cycles, the numbers of the stages on one side of a curve, and
     of those on the other. A stage whose cycle could not be closed is on neither."""
-    taken = return_map(stages, ROUGH)
-    symmetric = bool(stages.symmetric.all())
-    if symmetric:
-        hunting = symmetric_cycles(stages, rtol, taken)
-    else:
-        hunting = whole_cycles(stages, rtol, (taken, return_map(stages, ROUGH, -1.0)))
-    known = ~np.isin(hunting.reasons.astype(str), UNCERTAIN)
-    searches = [(hunting, np.flatnonzero(hunting.attracting), np.flatnonzero(known & ~hunting.attracting))]
-    if symmetric:
-        pairs = asymmetric_cycles(stages, taken, rtol)
-        beside = hunting.attracting & (~np.isin(pairs.reasons.astype(str), UNCERTAIN))
-        searches.append((pairs, np.flatnonzero(beside & pairs.found), np.flatnonzero(beside & ~pairs.found)))
+    hunting, *pairs = families(stages, return_map(stages, ROUGH), rtol)
+    outside = ~hunting.attracting & ~hunting.uncertain
+    searches = [(hunting, np.flatnonzero(hunting.attracting), np.flatnonzero(outside))]
+    for pair in pairs:
+        beside = hunting.attracting & ~pair.uncertain
+        searches.append((pair, np.flatnonzero(beside & pair.found), np.flatnonzero(beside & ~pair.found)))
     return hunting, searches
 
 

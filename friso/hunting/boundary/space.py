@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from friso.equations.structure import Structure, structure
-from friso.hunting.cycle.ensemble import Ensemble
+from friso.equations.structure import Structure
+from friso.hunting.cycle.ensemble import Ensemble, shared_structure
 from friso.hunting.cycle.shooting import Family
 from friso.stage import Stage, violations
 
@@ -67,8 +67,12 @@ class Space:
     def form(self) -> Structure:
         """The structure of the stages inside the box, at a place where no key is zero or a whole number; those that are
         simpler, as where the stroke is zero or an exponent whole, are treated alike."""
-        middle = self.flat(self.values(np.full((1, len(self.ranges)), GENERIC)))
-        return structure({key: value[0] if np.ndim(value) else value for key, value in middle.items()})
+        return shared_structure(self.flat(self.values(np.full((1, len(self.ranges)), GENERIC))))
+
+    def grid(self, nodes: int) -> np.ndarray:
+        """Points evenly over the box, `nodes` along every side, the first key the slowest, shape (points, keys)."""
+        sides = np.meshgrid(*[np.linspace(0, 1, nodes)] * len(self.ranges), indexing="ij")
+        return np.stack([side.ravel() for side in sides], axis=1)
 
     def allowed(self, points: np.ndarray) -> np.ndarray:
         """Which points of the box, shape (count, keys), belong to stages that may be, shape (count,)."""

@@ -14,9 +14,6 @@ from friso.engine.batch import Options, run_chunks
 from friso.engine.kernel import Kernel, kernel
 from friso.equations.structure import Structure, structure
 
-QUIET = 4.0
-"""Waits that are given to a motion to end, besides that for the break-away."""
-
 
 @dataclass(frozen=True)
 class Ensemble:
@@ -35,8 +32,7 @@ class Ensemble:
     @classmethod
     def held(cls, flat: Mapping[str, Any], count: int, **how: Any) -> Ensemble:
         """The stages with their reference held at 0 instead of their motion."""
-        kept = {key: value for key, value in flat.items() if not key.startswith("motion.")}
-        return cls({**kept, "motion.kind": "release"}, count, **how)
+        return cls({**without_motion(flat), "motion.kind": "release"}, count, **how)
 
     def take(self, numbers: np.ndarray) -> Ensemble:
         """The stages with these numbers, any of them as often as wanted."""
@@ -45,7 +41,7 @@ class Ensemble:
 
     @cached_property
     def structure(self) -> Structure:
-        return self.form or structure({key: value[0] if np.ndim(value) else value for key, value in self.flat.items()})
+        return self.form or shared_structure(self.flat)
 
     @cached_property
     def kernel(self) -> Kernel:
@@ -122,6 +118,16 @@ class Ensemble:
         room = max(1, *(int(part.results.turn_counts.max(initial=0)) for part in parts))
         columns = zip(*(_with_room(part.results, room) for part in parts), strict=True)
         return Results(*(np.concatenate(column)[order] for column in columns))
+
+
+def without_motion(flat: Mapping[str, Any]) -> dict[str, Any]:
+    """The flat keys but for those of the motion."""
+    return {key: value for key, value in flat.items() if not key.startswith("motion.")}
+
+
+def shared_structure(flat: Mapping[str, Any]) -> Structure:
+    """The structure of stages that all have the same, told by the first of them."""
+    return structure({key: value[0] if np.ndim(value) else value for key, value in flat.items()})
 
 
 def _with_room(results: Results, room: int) -> Results:

@@ -9,7 +9,7 @@ import numpy as np
 from friso.engine.arrays import STATISTICS
 from friso.hunting.cycle.ensemble import Ensemble, done
 from friso.hunting.cycle.guess import UNWINDING, Guess, symmetric_guess, whole_guess
-from friso.hunting.cycle.multipliers import multipliers, returns_of
+from friso.hunting.cycle.multipliers import multipliers
 from friso.hunting.cycle.rest import stuck, wait
 from friso.hunting.cycle.return_map import ReturnMap, return_map
 from friso.hunting.cycle.shooting import Orbits, close
@@ -30,26 +30,22 @@ APART = 0.05
 LEANING = 1e-3
 """Share of the amplitude by which the middle of an asymmetric cycle is off the reference at least."""
 
-BIRTH, RETURNS = 3e-3, 400
-"""Where beside a symmetric cycle that repels, as a share of its distance, a run begins, and for how many returns it is
-watched whether an asymmetric pair takes over."""
-
 KEPT = 0.5
 """Share of the guessed distance by which that of a closed orbit may differ: farther off it is another one, such as the
 rest at the reference, which every stage has."""
 
-BESIDE, AROUND = 0.2, 81
-"""How far beside a cycle another one is looked for, as a share of its distance, and runs over that range."""
-
-SOONER = (0.96, 0.94, 0.98, 1.0, 0.9)
-"""Shares of the period of a cycle tried for another one."""
-
-DISTINCT = 1e-3
-"""Share of the distance by which two cycles differ at least."""
-
 REPEATED, STEADY = 40, 0.02
 """Returns that are simulated where no orbit near a guess could be closed, and the share of the distance by which the
 last of them may differ if there is a cycle that attracts."""
+
+
+NO_RETURN = "from no distance does the stage swing back as far as it came from"
+NO_MULTIPLIER = "an orbit was closed, but its multiplier could not be computed"
+NO_PAIR = "there is no asymmetric cycle beside the symmetric one"
+NOT_CLOSED = "the return map has a fixed point, but no orbit near it could be closed"
+
+UNCERTAIN = (NOT_CLOSED, NO_MULTIPLIER)
+"""Reasons why no cycle was found although there may be one."""
 
 
 @dataclass(frozen=True)
@@ -83,14 +79,23 @@ class Cycles:
         return self.found & (np.abs(self.multiplier) < 1)
 
     @property
+    def uncertain(self) -> np.ndarray:
+        """Of which stages no cycle was found although there may be one, shape (count,)."""
+        return np.isin(self.reasons.astype(str), UNCERTAIN)
+
+    @property
     def orbits(self) -> Orbits:
         """The cycles as closed orbits."""
         return Orbits(self.states, self.period * (0.5 if self.sign < 0 else 1.0), self.sign, self.gap, self.found)
 
+    @property
+    def arrays(self) -> dict[str, np.ndarray]:
+        """What is known of every stage, by name."""
+        return {each.name: getattr(self, each.name) for each in fields(self) if each.name != "sign"}
+
     def take(self, numbers: np.ndarray) -> Cycles:
         """The cycles with these numbers."""
-        arrays = {each.name: getattr(self, each.name) for each in fields(self) if each.name != "sign"}
-        return Cycles(self.sign, **{name: array[numbers] for name, array in arrays.items()})
+        return Cycles(self.sign, **{name: array[numbers] for name, array in self.arrays.items()})
 
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
@@ -98,31 +103,6 @@ def symmetric_cycles(stages: Ensemble, rtol: float = RTOL, taken: ReturnMap | No
     """The cycle of every stage that is its own mirror image, of stages whose equations are."""
     taken = taken or return_map(stages, ROUGH)
     return _closed(stages, symmetric_guess(stages, taken, ROUGH), -1.0, rtol)
-
-
-def partner(stages: Ensemble, cycles: Cycles, rtol: float = RTOL) -> Cycles | None:
-    """The other cycle of one stage near a fold, at which the two meet; None if none is found beside the first."""
-    away = np.linspace(-BESIDE, BESIDE, AROUND)
-    heights = returns_of(stages, cycles.orbits, cycles.direction, away[None, :], 2, rtol)[0]
-    rise = heights[:, 1] - heights[:, 0]
-    own = np.nanargmin(np.abs(heights[:, 0] / heights[AROUND // 2, 0] - 1))
-    crosses = np.flatnonzero(rise[:-1] * rise[1:] < 0)
-    crosses = crosses[np.abs(crosses + 0.5 - own) > 1]
-    if not crosses.size:
-        return None
-    k = crosses[np.abs(crosses - own).argmin()]
-    share = away[k] + (away[k + 1] - away[k]) * rise[k] / (rise[k] - rise[k + 1])
-    size = np.abs(cycles.states[:, stages.sticking])
-    several = stages.take(np.zeros(len(SOONER), np.int64))
-    starts = stuck(several, np.repeat(size * (1 + share), len(SOONER)))
-    tried = close(several, starts, cycles.orbits.times * np.array(SOONER), cycles.sign, rtol)
-    apart = np.abs(np.abs(tried.states[:, stages.sticking]) / size - 1)
-    others = np.flatnonzero(tried.closed & (apart > DISTINCT) & (apart < 2 * BESIDE))
-    if not others.size:
-        return None
-    one = others[:1]
-    orbit = Orbits(tried.states[one], tried.times[one], cycles.sign, tried.gaps[one], tried.closed[one])
-    return described(stages, orbit, rtol, np.array([""]))
 
 
 def hunting_cycles(stages: Ensemble, rtol: float = RTOL) -> Cycles:
@@ -134,12 +114,16 @@ def hunting_cycles(stages: Ensemble, rtol: float = RTOL) -> Cycles:
     if len(parts) == 1:
         return parts[0][1]
     order = np.argsort(np.concatenate([which for which, _ in parts]))
-    columns = {
-        each.name: np.concatenate([getattr(part, each.name) for _, part in parts])[order]
-        for each in fields(Cycles)
-        if each.name != "sign"
-    }
-    return Cycles(0.0, **columns)
+    columns = zip(*(part.arrays.items() for _, part in parts), strict=True)
+    return Cycles(0.0, **{pair[0][0]: np.concatenate([array for _, array in pair])[order] for pair in columns})
+
+
+def families(stages: Ensemble, there: ReturnMap, rtol: float = RTOL) -> tuple[Cycles, ...]:
+    """All cycles that are looked for, from the return maps of stages that stick on the positive side: the symmetric one
+    and one of an asymmetric pair, or the one over a whole period where some of the stages are not symmetric."""
+    if stages.symmetric.all():
+        return symmetric_cycles(stages, rtol, there), asymmetric_cycles(stages, there, rtol)
+    return (whole_cycles(stages, rtol, there),)
 
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
@@ -153,11 +137,11 @@ def asymmetric_cycles(stages: Ensemble, taken: ReturnMap, rtol: float = RTOL) ->
 
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
-def whole_cycles(stages: Ensemble, rtol: float = RTOL, taken: tuple[ReturnMap, ReturnMap] | None = None) -> Cycles:
-    """The cycle of every stage, followed over a whole period, of stages that need not be symmetric; `taken` are the
-    return maps of stages that stick on the positive and on the negative side."""
-    there, back = taken or (return_map(stages, ROUGH), return_map(stages, ROUGH, -1.0))
-    return _closed(stages, whole_guess(stages, there, back), 1.0, rtol)
+def whole_cycles(stages: Ensemble, rtol: float = RTOL, there: ReturnMap | None = None) -> Cycles:
+    """The cycle of every stage, followed over a whole period, of stages that need not be symmetric; `there` is the
+    return map of stages that stick on the positive side."""
+    there = there or return_map(stages, ROUGH)
+    return _closed(stages, whole_guess(stages, there, return_map(stages, ROUGH, -1.0)), 1.0, rtol)
 
 
 def _closed(stages: Ensemble, guess: Guess, sign: float, rtol: float) -> Cycles:
@@ -210,37 +194,11 @@ def _close_simulated(stages: Ensemble, guess: Guess, orbits: Orbits, rtol: float
     _accept(stages, orbits, missing[fine], close(some.take(fine), ends, times[fine], sign, rtol), guess)
 
 
-_NUMBERS = ("period", "amplitude", "middle", "gap", "slope", "multiplier")
-
-NO_RETURN = "from no distance does the stage swing back as far as it came from"
-NO_MULTIPLIER = "an orbit was closed, but its multiplier could not be computed"
-NO_PAIR = "there is no asymmetric cycle beside the symmetric one"
-NOT_CLOSED = "the return map has a fixed point, but no orbit near it could be closed"
-
-
-def pair_beside(stages: Ensemble, cycle: Cycles, rtol: float = RTOL) -> Cycles | None:
-    """One of the attracting pair beside the symmetric cycle of one stage, which repels: where a motion that leaves it
-    ends, if it stays near; None if it goes away."""
-    size = np.abs(cycle.states[:, stages.sticking])
-    start = cycle.states + BIRTH * size[:, None] * cycle.direction
-    end = stages.run(start, 2 * RETURNS * cycle.orbits.times, ROUGH).ends
-    if not np.isfinite(end).all() or abs(end[0, stages.sticking] / cycle.states[0, stages.sticking] - 1) > KEPT:
-        return None
-    orbit = close(stages, end, 2 * cycle.orbits.times, 1.0, rtol)
-    pair = described(stages, orbit, rtol, np.array([NOT_CLOSED]))
-    return pair if pair.found[0] and abs(pair.middle[0]) > LEANING * pair.amplitude[0] else None
-
-
-UNCERTAIN = (NOT_CLOSED, NO_MULTIPLIER)
-"""Reasons why no cycle was found although there may be one."""
-
-
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
-def described(stages: Ensemble, orbits: Orbits, rtol: float, reasons: np.ndarray) -> Cycles:
-    """Cycles from closed orbits: their size and their multipliers."""
+def described(stages: Ensemble, orbits: Orbits, rtol: float, reasons: np.ndarray | str = NOT_CLOSED) -> Cycles:
+    """Cycles from closed orbits: their size and their multipliers; `reasons` of those that are not closed."""
     which = np.flatnonzero(orbits.closed)
-    some = stages.take(which)
-    shut = Orbits(orbits.states[which], orbits.times[which], orbits.sign, orbits.gaps[which], orbits.closed[which])
+    some, shut = stages.take(which), orbits.take(which)
     periods = shut.times * (2.0 if shut.sign < 0 else 1.0)
     count, size = stages.count, len(stages.kernel.states)
     cycles = Cycles(
@@ -250,7 +208,7 @@ def described(stages: Ensemble, orbits: Orbits, rtol: float, reasons: np.ndarray
         states=orbits.states,
         local=np.full((count, size - 1), np.nan, complex),
         direction=np.full((count, size), np.nan),
-        **{name: np.full(count, np.nan) for name in _NUMBERS},
+        **{name: np.full(count, np.nan) for name in ("period", "amplitude", "middle", "gap", "slope", "multiplier")},
     )
     if not which.size:
         return cycles

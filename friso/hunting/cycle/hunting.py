@@ -12,18 +12,9 @@ from friso.engine.simulate import output_variables, time_axis
 from friso.engine.tolerance import checked_rtol
 from friso.equations.structure import Structure, structure
 from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.find import (
-    ROUGH,
-    RTOL,
-    UNCERTAIN,
-    Cycles,
-    asymmetric_cycles,
-    pair_beside,
-    partner,
-    symmetric_cycles,
-    whole_cycles,
-)
+from friso.hunting.cycle.find import ROUGH, RTOL, Cycles, families
 from friso.hunting.cycle.multipliers import returns_of
+from friso.hunting.cycle.neighbours import pair_beside, partner
 from friso.hunting.cycle.return_map import ReturnMap, return_map
 from friso.stage import Stage
 
@@ -119,18 +110,14 @@ def hunting(stage: Stage, rtol: float = RTOL) -> Hunting:
     kernels([Wanted(structure(flat), variational) for variational in (False, True)])
     stages = Ensemble.held(flat, 1)
     there = return_map(stages, ROUGH)
-    if stages.symmetric[0]:
-        sought = [symmetric_cycles(stages, rtol, there), asymmetric_cycles(stages, there, rtol)]
-        repels = sought[0].found[0] and not sought[0].attracting[0]
-        if repels and not sought[1].attracting[0] and (pair := pair_beside(stages, sought[0], rtol)):
-            sought.append(pair)
-    else:
-        sought = [whole_cycles(stages, rtol, (there, return_map(stages, ROUGH, -1.0)))]
-        if sought[0].found[0] and not sought[0].attracting[0] and (other := partner(stages, sought[0], rtol)):
+    sought = list(families(stages, there, rtol))
+    if sought[0].found[0] and not any(each.attracting[0] for each in sought):
+        beside = pair_beside if stages.symmetric[0] else partner
+        if other := beside(stages, sought[0], rtol):
             sought.append(other)
     cycles = tuple(_cycle(stages, each) for each in sought if each.found[0])
-    reasons = [each.reasons[0] for each in sought]
-    return Hunting(cycles, "" if cycles else reasons[0], bool(cycles) or reasons[0] not in UNCERTAIN, there)
+    first = sought[0]
+    return Hunting(cycles, "" if cycles else first.reasons[0], bool(cycles) or not first.uncertain[0], there)
 
 
 def _cycle(stages: Ensemble, found: Cycles) -> Cycle:

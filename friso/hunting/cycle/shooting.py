@@ -56,6 +56,10 @@ class Orbits:
     gaps: np.ndarray
     closed: np.ndarray
 
+    def take(self, numbers: np.ndarray) -> Orbits:
+        """The orbits with these numbers."""
+        return Orbits(self.states[numbers], self.times[numbers], self.sign, self.gaps[numbers], self.closed[numbers])
+
 
 def shoot(stages: Ensemble, states: np.ndarray, times: np.ndarray, sign: float, rtol: float) -> Shot:
     """Follow orbits together with a small deviation along every state."""
@@ -103,8 +107,9 @@ def close_along(
 ) -> tuple[Orbits, np.ndarray]:
     """Close orbits as `close` does, their stages being free to change their places so that each comes to lie on its
     border; orbits and places. Goes round folds, at which there is no orbit at a place beyond."""
-    solved = _solved(_Following(family, states, times, places, border, sign, rtol))
-    return solved.orbits, solved.best_places
+    following = _Following(family, states, times, sign, rtol, places)
+    following.border = border
+    return _solved(following).orbits, following.best_places
 
 
 _S = TypeVar("_S", bound="_Shooting")
@@ -203,18 +208,7 @@ class _Shooting:
 class _Following(_Shooting):
     """Orbits that are closed while their stages change along lines."""
 
-    def __init__(
-        self,
-        family: Family,
-        states: np.ndarray,
-        times: np.ndarray,
-        places: np.ndarray,
-        border: Border,
-        sign: float,
-        rtol: float,
-    ) -> None:
-        super().__init__(family, states, times, sign, rtol, places)
-        self.border = border
+    border: Border
 
     def _jacobians(self, which: np.ndarray, stages: Ensemble, shot: Shot) -> np.ndarray:
         plain = super()._jacobians(which, stages, shot)

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from friso.hunting.boundary import Kind, Range, Space, plane
-from friso.hunting.cycle.find import UNCERTAIN
 from friso.studies.cells import cell_cycles, flat_cells
 from friso.studies.study import study_of
 from friso.studies.thesis.studies import ThesisStudy
@@ -70,7 +69,7 @@ def _comparison(runs: xr.Dataset) -> Comparison:
     valid = (coarse["verdict"].values != "invalid").ravel()
     attracts, known = np.zeros(study.cells, bool), np.zeros(study.cells, bool)
     for which, found in cell_cycles(study.stage, study.links, study.columns(np.arange(study.cells)), valid):
-        attracts[which], known[which] = found.attracting, ~np.isin(found.reasons.astype(str), UNCERTAIN)
+        attracts[which], known[which] = found.attracting, ~found.uncertain
     peaks = (coarse["peaks"].values > 0).ravel()
     known &= valid
     return Comparison(
