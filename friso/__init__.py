@@ -9,6 +9,10 @@ from friso.version import VERSION as __version__
 
 if TYPE_CHECKING:
     from friso.engine.simulate import simulate
+    from friso.frequency.analysis import linear
+    from friso.frequency.bode import Bode, bode
+    from friso.frequency.members import Members, member
+    from friso.frequency.tuning import Tuning, tuning
     from friso.hunting.check import Case, check
     from friso.studies.boundary import boundary
     from friso.studies.samples import Samples
@@ -20,25 +24,39 @@ _LAZY = {
     "check": "friso.hunting.check",
     "Case": "friso.hunting.check",
     "sweep": "friso.studies.sweep",
+    "bode": "friso.frequency.bode",
+    "Bode": "friso.frequency.bode",
+    "linear": "friso.frequency.analysis",
+    "member": "friso.frequency.members",
+    "Members": "friso.frequency.members",
+    "tuning": "friso.frequency.tuning",
+    "Tuning": "friso.frequency.tuning",
     "boundary": "friso.studies.boundary",
     "Samples": "friso.studies.samples",
     "read_store": "friso.studies.store",
 }
 
 __all__ = [
+    "Bode",
     "Case",
+    "Members",
     "Samples",
     "Stage",
     "StageError",
+    "Tuning",
     "__version__",
+    "bode",
     "boundary",
     "check",
+    "linear",
     "load",
     "loads",
+    "member",
     "read_store",
     "save",
     "simulate",
     "sweep",
+    "tuning",
 ]
 
 

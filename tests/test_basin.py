@@ -15,7 +15,8 @@ from friso.hunting.basin import EDGE, MOVES, SHARES, Kick, Moves, displacements,
 from friso.hunting.cycle.ensemble import Ensemble, done
 from friso.hunting.cycle.hunting import Cycle, hunting
 from friso.hunting.cycle.rest import pushed
-from friso.hunting.margin import FARTHEST, faster, margin
+from friso.equations.bandwidth import faster
+from friso.hunting.margin import FARTHEST, margin
 from friso.stage import Stage
 
 RIGID = pytest.mark.xdist_group("rigid")

@@ -6,6 +6,8 @@ from collections.abc import Hashable, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
+import numpy as np
+
 from friso.stage.tables import friction_law
 
 JointForm = Literal["rigid", "locked", "free", "touching"]
@@ -51,6 +53,11 @@ def structure(flat: Mapping[str, Any]) -> Structure:
         controller=_controller_form(flat) if "controller.kind" in flat else None,
         biased=tuple(name for name in ("cart", "stage") if flat.get(f"bias.{name}", 0.0) != 0),
     )
+
+
+def shared_structure(flat: Mapping[str, Any]) -> Structure:
+    """The structure of stages that all have the same, told by the first of them."""
+    return structure({key: value[0] if np.ndim(value) else value for key, value in flat.items()})
 
 
 def decisive_keys(flat: Mapping[str, Any]) -> tuple[str, ...]:

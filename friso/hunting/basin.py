@@ -13,7 +13,8 @@ from friso.engine.arrays import Status
 from friso.engine.batch import Options, run_chunks
 from friso.engine.kernel import kernel
 from friso.equations.motion import last_corner
-from friso.hunting.cycle.ensemble import Ensemble, shared_structure, without_motion
+from friso.equations.structure import shared_structure
+from friso.hunting.cycle.ensemble import Ensemble, without_motion
 from friso.hunting.cycle.hunting import Cycle
 from friso.hunting.cycle.rest import pushed
 from friso.stage import Stage

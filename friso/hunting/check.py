@@ -70,11 +70,7 @@ def check(stage: Stage, rtol: float = 1e-6, traces: bool = False) -> dict[str, C
     With `traces`, each case has its time response. Raises ValueError for a tolerance that is not usable.
     """
     checked_rtol(rtol)
-    variants = {"given": stage}
-    if stage.joint:
-        variants["locked"] = stage.replace({"joint.locked": True})
-        if stage.joint.stiffness is not None:
-            variants["free"] = stage.replace({"joint.locked": False})
+    variants = stage.variants()
     kernels(set().union(*map(_needed, variants.values())))
     cases: dict[str, Case] = {}
     for name, variant in variants.items():

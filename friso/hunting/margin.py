@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from friso.equations.bandwidth import faster
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import Cycles, hunting_cycles
 from friso.stage import Stage
@@ -39,14 +40,6 @@ class Margin:
     factor: float
     crossover: float | None
     certain: bool
-
-
-def faster(flat: Mapping[str, Any], factor: np.ndarray) -> dict[str, Any]:
-    """Stages whose controller is faster by a factor, all its poles and zeros and the crossover being scaled."""
-    if "controller.crossover" in flat:
-        return {**flat, "controller.crossover": flat["controller.crossover"] * factor}
-    powers = {"kp": 2, "ki": 3, "kd": 1, "tau": -1}
-    return {**flat, **{f"controller.{name}": flat[f"controller.{name}"] * factor**n for name, n in powers.items()}}
 
 
 def margin(stage: Stage, attracting: bool) -> Margin | None:

@@ -13,6 +13,7 @@ from friso.stage.tables import (
     MOTION,
     Bias,
     Controller,
+    Drive,
     FrictionSection,
     GainsController,
     Joint,
@@ -28,6 +29,7 @@ _JOINT = Table(lambda _: Joint, '[joint] stiffness = "2.4 N/mm" ...')
 _PARASITIC = Table(lambda _: Parasitic, '[parasitic] frequency = "300 Hz" ...')
 _BIAS = Table(lambda _: Bias, '[bias] cart = "0.2 N"')
 _CONTROLLER = Table(controller_form, '[controller] kind = "pid", crossover = "8 Hz", alpha = 0.1, beta = 2')
+_DRIVE = Table(lambda _: Drive, '[drive] sample_time = "50 us"')
 _MOTION = Table(MOTION.pick, '[motion] kind = "step", size = "1 mm", duration = "20 s"')
 
 
@@ -42,6 +44,7 @@ class Stage(Section):
     parasitic: Annotated[Parasitic | None, _PARASITIC] = None
     bias: Annotated[Bias | None, _BIAS] = None
     controller: Annotated[Controller, _CONTROLLER]
+    drive: Annotated[Drive | None, _DRIVE] = None
     motion: Annotated[Motion, _MOTION]
 
     rules: ClassVar[tuple[Rule, ...]] = (
@@ -50,6 +53,16 @@ class Stage(Section):
             lambda f: "parasitic.mass" not in f or f["parasitic.mass"] < f["masses.stage"],
             "a parasitic mass smaller than the stage mass, out of which it is taken",
             '[parasitic] mass = "0.25 kg" with [masses] stage = "0.5 kg"',
+        ),
+        Rule(
+            ("controller.crossover", "drive.sample_time"),
+            lambda f: (
+                "drive.sample_time" not in f
+                or "controller.crossover" not in f
+                or f["controller.crossover"] * f["drive.sample_time"] < 1 / 2
+            ),
+            "a crossover below half the sampling frequency",
+            '[drive] sample_time = "50 us" (20 kHz) with crossover = "8 Hz"',
         ),
     )
 
@@ -110,6 +123,15 @@ class Stage(Section):
             _put(tables, key, getattr(value, "text", value))
         return Stage(**tables)
 
+    def variants(self) -> "Mapping[str, Stage]":
+        """The stage as "given" and, if it has a joint, with that "locked" and (if its stiffness is known) "free"."""
+        variants: dict[str, Stage | Self] = {"given": self}
+        if self.joint:
+            variants["locked"] = self.replace({"joint.locked": True})
+            if self.joint.stiffness is not None:
+                variants["free"] = self.replace({"joint.locked": False})
+        return variants
+
     def to_toml(self) -> str:
         """The text of a stage file that gives this stage again."""
         given = self.given()
@@ -152,6 +174,7 @@ def _tables(flat: Mapping[str, Any]) -> dict[str, type[Section]]:
         "joint": Joint,
         "parasitic": Parasitic,
         "bias": Bias,
+        "drive": Drive,
         "controller": TunedController if "controller.crossover" in flat else GainsController,
         "motion": MOTION.classes[flat["motion.kind"]],
     }

@@ -156,6 +156,13 @@ ROUNDING = 1e-12
 """Relative slack of the limits on times, which are sums of decimal numbers."""
 
 
+class Drive(Section):
+    """How the controller is carried out; the analysis of the linear loop reads it."""
+
+    sample_time: Annotated[Value | None, Quantity("s", positive, "50 us")] = None
+    delay: Annotated[Value | None, Quantity("s", non_negative, "50 us")] = None
+
+
 class Motion(Section):
     """Base of the motions: what the reference does."""
 

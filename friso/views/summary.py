@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from friso.hunting.basin import SHARES
-from friso.hunting.margin import FARTHEST, faster
+from friso.equations.bandwidth import faster
+from friso.hunting.margin import FARTHEST
 from friso.hunting.verdict import LONG
 from friso.views.cases import BANDS, Shown
 from friso.views.prefixes import plus_minus, with_unit

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from friso.equations.structure import Structure
-from friso.hunting.cycle.ensemble import Ensemble, shared_structure
+from friso.equations.structure import shared_structure
+from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.shooting import Family
 from friso.stage import Stage, violations
 

@@ -12,7 +12,7 @@ import numpy as np
 from friso.engine.arrays import Results, Status
 from friso.engine.batch import Options, run_chunks
 from friso.engine.kernel import Kernel, kernel
-from friso.equations.structure import Structure, structure
+from friso.equations.structure import Structure, shared_structure
 
 
 @dataclass(frozen=True)
@@ -123,11 +123,6 @@ class Ensemble:
 def without_motion(flat: Mapping[str, Any]) -> dict[str, Any]:
     """The flat keys but for those of the motion."""
     return {key: value for key, value in flat.items() if not key.startswith("motion.")}
-
-
-def shared_structure(flat: Mapping[str, Any]) -> Structure:
-    """The structure of stages that all have the same, told by the first of them."""
-    return structure({key: value[0] if np.ndim(value) else value for key, value in flat.items()})
 
 
 def _with_room(results: Results, room: int) -> Results:

@@ -1,0 +1,86 @@
+"""`friso.linear`: a stage in one of its states as a linear system of python-control."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any
+
+from friso.frequency.loops import closed_loop, open_loop
+from friso.frequency.members import Members, limit_cases
+from friso.frequency.parts import FORCE, REFERENCE, STAGE, VELOCITY, compensator, plant
+from friso.frequency.stiffness import limiter_in_series
+from friso.frequency.system import System
+from friso.quantities import StageError, quoted
+from friso.stage import Stage
+
+if TYPE_CHECKING:
+    from control import StateSpace
+
+
+def linear(stage: Stage, case: str | Members | None = None, part: str = "plant", series: bool = False) -> StateSpace:
+    """A stage in one state as a `control.StateSpace` in SI units, its states, inputs and outputs named.
+
+    `case` is the name of a limit case ("stuck", "sliding", "stuck-touched", "sliding-touched", or "given" for a stage
+    that has just one; default: the first of them that the stage has), or a state such as
+    `friso.member(speed=1e-3)` [m/s], `friso.member(bias=2.0)` [N], both with `touched=True` if the limiter is.
+    `part` is one of
+
+    - "plant": from "force" on the stage and "disturbance on cart" [N] to "stage", "cart" and "joint deflection" [m];
+    - "controller": from "reference" and "stage" [m] (and "stage velocity" [m/s] if it measures that) to "force" [N];
+    - "open": the loop cut at the actuator, from "force" to minus the "force" of the controller;
+    - "closed": from "force", "reference", "disturbance on cart" and "sensor noise" [m] to "stage", "cart", "joint
+      deflection" and "force".
+
+    All are in continuous time, without the sampling and delay of a drive. With `series`, a touched limiter acts by
+    the formula that Table 1 of the thesis prints instead of beside the joint. Where the cart is stuck, its bristles
+    follow it and are no states; a derivative of the measured velocity does not see the noise of the sensor, which has
+    none. Raises StageError for an unknown case or part.
+    """
+    flat: Mapping[str, Any] = stage.flat()
+    cases = limit_cases(flat)
+    one = case if isinstance(case, Members) else _chosen("case", case or next(iter(cases)), cases)
+    if series and one.touched.all():
+        flat, one = limiter_in_series(flat), one.with_limiter(False)
+    system = _chosen("part", part, _PARTS)(flat, one)
+    return _control(system, f"{stage.name} {part}".strip())
+
+
+def _control(system: System, name: str) -> StateSpace:
+    from control import StateSpace
+
+    names = {"states": [*system.states], "inputs": [*system.inputs], "outputs": [*system.outputs]}
+    return StateSpace(system.a[0], system.b[0], system.c[0], system.d[0], name=name, **names)
+
+
+def _plant(flat: Mapping[str, Any], one: Members) -> System:
+    return _shown(plant(flat, one))
+
+
+def _controller(flat: Mapping[str, Any], one: Members) -> System:
+    whole = compensator(flat, len(one))
+    measures_velocity = whole.take((VELOCITY,), (FORCE,)).d.any()
+    return whole.take((REFERENCE, STAGE, VELOCITY) if measures_velocity else (REFERENCE, STAGE), (FORCE,))
+
+
+def _closed(flat: Mapping[str, Any], one: Members) -> System:
+    return _shown(closed_loop(flat, one))
+
+
+def _shown(system: System) -> System:
+    """Without the velocity of the stage, which is the controller's business."""
+    return system.take(system.inputs, [name for name in system.outputs if name != VELOCITY])
+
+
+_PARTS: dict[str, Callable[[Mapping[str, Any], Members], System]] = {
+    "plant": _plant,
+    "controller": _controller,
+    "open": open_loop,
+    "closed": _closed,
+}
+
+
+def _chosen(what: str, name: str, known: Mapping[str, Any]) -> Any:
+    if name not in known:
+        first = next(iter(known))
+        raise StageError(what, quoted(name), f"one of {', '.join(known)}", f'friso.linear(stage, {what}="{first}")')
+    return known[name]

@@ -1,0 +1,148 @@
+"""The whole linear analysis of a stage: limit cases, the family behind them, and how fast its controller may be."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from friso.frequency.crossover import Limits, limits
+from friso.frequency.family import Scan, grid, loops, modes, plants, scan, spectral_abscissa
+from friso.frequency.loops import Drive
+from friso.frequency.margins import Margins, margins
+from friso.frequency.members import Members, family, limit_cases, member
+from friso.frequency.ranges import Range, ranges_below
+from friso.frequency.stiffness import limiter_in_series
+from friso.stage import Stage
+
+AROUND = 10.0
+"""Factor by which the frequencies shown reach beyond all crossovers and resonances."""
+
+POINTS = 1200
+"""Frequencies of a curve, besides those about resonances."""
+
+PRESCRIBED = (0.0, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1)
+"""Speeds of the cart [m/s] at which the open loop is shown, from stuck to sliding fast (thesis, Fig. 8)."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """A limit case: the state, its plant, stage position over force [m/N], and its loop L over `Bode.omega`, complex,
+    both of shape (k,), and its margins."""
+
+    members: Members
+    plant: np.ndarray
+    loop: np.ndarray
+    margins: Margins
+
+
+@dataclass(frozen=True)
+class Unstable:
+    """Speeds [m/s] from `low` to `high` at which a sliding stage is not stable."""
+
+    low: float
+    high: float
+    touched: bool
+    forward: bool
+
+
+@dataclass(frozen=True)
+class Bode:
+    """The linear analysis of a stage.
+
+    `omega` (k,) [rad/s], the frequencies of all curves; the limit `cases` by name, among them, if asked for, those with
+    the thesis's formula for a touched limiter ("-series"); the `scan` of the family, and its loops over `omega`; its
+    `worst` member, and the worst of those that are stable (None if none is), each with its margins; the ranges of speed
+    that are `unstable`; the loops at `prescribed` speeds of the cart by speed [m/s], the limiter free; `limits` by
+    joint ("locked" and "free", or "given" without one).
+    """
+
+    stage: Stage
+    omega: np.ndarray
+    cases: Mapping[str, Case]
+    scan: Scan
+    loops: np.ndarray
+    worst: tuple[Members, Margins]
+    worst_stable: tuple[Members, Margins] | None
+    unstable: tuple[Unstable, ...]
+    prescribed: Mapping[float, np.ndarray]
+    limits: Mapping[str, Limits]
+
+    @property
+    def stable(self) -> bool:
+        """Whether the one controller is stable in every state of the family."""
+        return bool(self.scan.stable.all())
+
+
+def bode(stage: Stage, shown: Range | None = None, series: bool = False) -> Bode:
+    """The linear analysis of a stage, its curves over frequencies `shown` [Hz] (default: those that matter); with
+    `series`, the thesis's formula for a touched limiter is shown beside."""
+    flat = stage.flat()
+    states = {name: (flat, one) for name, one in limit_cases(flat).items()} | (_in_series(flat) if series else {})
+    known = {name: margins(*each) for name, each in states.items()}
+    omega = _omega(flat, shown or _mattering(flat, known.values()))
+    every = scan(flat, family(flat))
+    worst = every.members[every.worst()]
+    stable = every.members[every.worst(every.stable)] if every.stable.any() else None
+    variants = stage.variants()
+    return Bode(
+        stage=stage,
+        omega=omega,
+        cases={
+            name: Case(one, plants(own, one, omega)[0], loops(own, one, omega)[0], known[name])
+            for name, (own, one) in states.items()
+        },
+        scan=every,
+        loops=loops(flat, every.members, omega),
+        worst=(worst, margins(flat, worst)),
+        worst_stable=None if stable is None else (stable, margins(flat, stable)),
+        unstable=_unstable(flat, every.members),
+        prescribed=_prescribed(flat, omega),
+        limits={name: limits(one.flat()) for name, one in variants.items() if name != "given" or len(variants) == 1},
+    )
+
+
+def _in_series(flat: Mapping[str, Any]) -> dict[str, tuple[Mapping[str, Any], Members]]:
+    """The cases with a touched limiter by the formula of Table 1: as stages whose limiter is not touched."""
+    touched = {name: one for name, one in limit_cases(flat).items() if one.touched[0]}
+    return {f"{name}-series": (limiter_in_series(flat), one.with_limiter(False)) for name, one in touched.items()}
+
+
+def _mattering(flat: Mapping[str, Any], known: Iterable[Margins]) -> Range:
+    """Frequencies [Hz] that show all crossovers and resonances."""
+    poles = modes(flat)
+    resonances = np.abs(poles[np.abs(poles.imag) > np.abs(poles.real)]) / (2 * np.pi)
+    places = np.array([*(f for each in known for f in each.crossovers), *resonances[resonances > 1e-3]])
+    places = places if places.size else np.ones(1)
+    return float(places.min()) / AROUND, min(float(places.max()) * AROUND, Drive.of(flat).highest / (2 * np.pi))
+
+
+def _omega(flat: Mapping[str, Any], shown: Range) -> np.ndarray:
+    """Frequencies [rad/s] for curves, dense about resonances."""
+    even = np.geomspace(*shown, POINTS) * 2 * np.pi
+    near = grid(flat)
+    return np.unique(np.concatenate([even, near[(near > even[0]) & (near < even[-1])]]))
+
+
+def _prescribed(flat: Mapping[str, Any], omega: np.ndarray) -> dict[float, np.ndarray]:
+    """The loop at prescribed speeds of the cart, its limiter free where it can be."""
+    if flat["friction.model"] == "none":
+        return {}
+    touched = bool(next(iter(limit_cases(flat).values())).touched[0])
+    return {speed: loops(flat, member(speed, touched=touched), omega)[0] for speed in PRESCRIBED}
+
+
+def _unstable(flat: Mapping[str, Any], every: Members) -> tuple[Unstable, ...]:
+    """The ranges of speed at which the stage is not stable, for each state of the limiter and direction."""
+    sliding = every[~every.stuck]
+    found = []
+    for touched, backward in sorted({*zip(sliding.touched.tolist(), (~sliding.forward).tolist(), strict=True)}):
+        alike = sliding[(sliding.touched == touched) & (sliding.forward != backward)]
+
+        def stability(speed: np.ndarray, one: Members = alike[[0]]) -> np.ndarray:
+            return -spectral_abscissa(flat, replace(one.repeated(len(speed)), speed=speed))
+
+        found += [Unstable(*ends, touched, not backward) for ends in ranges_below(alike.speed, stability)]
+    return tuple(found)

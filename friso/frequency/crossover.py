@@ -1,0 +1,96 @@
+"""How fast a controller may be: the crossovers at which a stage is stable, and has the modulus margin wanted."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from friso.equations.bandwidth import faster
+from friso.frequency.family import controller, grid, plants, spectral_abscissa
+from friso.frequency.loops import Drive
+from friso.frequency.members import Members, family, joined, limit_cases
+from friso.frequency.ranges import Range, ranges_below, shared
+
+WANTED = 0.5
+"""Modulus margin that is called comfortable: a peak sensitivity of 2, 6 dB."""
+
+LOWEST, HIGHEST = 0.1, 1e4
+"""Crossovers [Hz] that are searched."""
+
+STEPS = 241
+"""Crossovers of the search."""
+
+BIASES = 9
+"""Bias forces under which a stuck stage is looked at for each state of its limiter."""
+
+
+@dataclass(frozen=True)
+class Limits:
+    """The crossovers [Hz], from `searched`, at which a stage is `stable` and those with a `comfortable` modulus margin,
+    as ranges, in all limit cases: stuck under any bias force or sliding fast, its limiter free or touched.
+
+    `first_lost` is the state that is not stable just above the highest stable crossover, None where that is the end of
+    the search. For a controller given by its gains they are factors of its bandwidth instead.
+    """
+
+    searched: Range
+    stable: tuple[Range, ...]
+    comfortable: tuple[Range, ...]
+    first_lost: Members | None
+
+    @property
+    def highest_stable(self) -> float | None:
+        """The highest stable crossover [Hz]; None if none is stable, or that at the end of the search still is."""
+        if not self.stable or self.stable[-1][1] >= self.searched[1]:
+            return None
+        return self.stable[-1][1]
+
+
+def limits(flat: Mapping[str, Any]) -> Limits:
+    """The crossovers at which a stage is stable, and comfortably so."""
+    low, high = searched(flat)
+    members = settled_members(flat)
+    at = np.geomspace(low, high, STEPS)
+    stable = ranges_below(at, lambda f: _abscissa(flat, members, f).max(axis=1))
+    close = ranges_below(at, lambda f: WANTED - _distance(flat, members, f))
+    lost = None
+    if stable and stable[-1][1] < high:
+        above = _abscissa(flat, members, np.array([stable[-1][1] * (1 + 1e-6)]))[0]
+        lost = members[int(above.argmax())]
+    return Limits((low, high), stable, shared(close, stable), lost)
+
+
+def searched(flat: Mapping[str, Any]) -> Range:
+    """The crossovers that are searched; those of a sampled drive end below half the sampling frequency."""
+    drive = Drive.of(flat)
+    if "controller.crossover" not in flat:
+        return 1 / 100.0, 1000.0
+    return LOWEST, min(HIGHEST, 0.999 * drive.highest / (2 * np.pi))
+
+
+def settled_members(flat: Mapping[str, Any]) -> Members:
+    """Limit cases, and those that are stuck under a bias force: what a stage is in unless it creeps or just broke away,
+    when its friction falls with the speed."""
+    every = family(flat, BIASES, 2)
+    return joined([*limit_cases(flat).values(), every[every.stuck]])
+
+
+def _at(flat: Mapping[str, Any], crossover: np.ndarray) -> dict[str, Any]:
+    return faster(flat, crossover / flat.get("controller.crossover", 1.0))
+
+
+def _abscissa(flat: Mapping[str, Any], members: Members, crossover: np.ndarray) -> np.ndarray:
+    """Real part of the rightmost closed-loop pole [1/s], shape (crossovers, members)."""
+    many = _at(flat, np.repeat(crossover, len(members)))
+    return spectral_abscissa(many, members.repeated(len(crossover))).reshape(len(crossover), len(members))
+
+
+def _distance(flat: Mapping[str, Any], members: Members, crossover: np.ndarray) -> np.ndarray:
+    """Least distance of the loop from -1 over all members, shape (crossovers,)."""
+    ends = [grid(_at(flat, f)) for f in crossover[[0, len(crossover) // 2, -1]]]
+    omega = np.unique(np.concatenate(ends))
+    bare = plants(flat, members, omega) * Drive.of(flat).answer(omega)
+    return np.array([np.abs(1 + bare * controller(_at(flat, f), omega)).min() for f in crossover])

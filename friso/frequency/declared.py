@@ -1,0 +1,52 @@
+"""From declared equations to linear systems: their Jacobian, written out once and evaluated for many members."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import sympy as sp
+
+from friso.frequency.system import System
+
+
+@dataclass(frozen=True)
+class Declared:
+    """Equations to be linearised: symbols of the states with their rates, of the inputs and of the outputs with their
+    expressions, by name."""
+
+    states: tuple[sp.Symbol, ...]
+    rates: tuple[sp.Expr, ...]
+    inputs: Mapping[str, sp.Symbol]
+    outputs: Mapping[str, sp.Expr]
+
+    @cached_property
+    def _entries(self) -> tuple[list[tuple[int, int]], Any, list[str]]:
+        """Places of the entries of [[a, b], [c, d]] that are not zero, the function that computes them, and the names
+        of what it takes."""
+        rows = sp.Matrix([*self.rates, *self.outputs.values()])
+        whole = rows.jacobian([*self.states, *self.inputs.values()])
+        entries = {place: entry for place, entry in whole.todok().items() if entry != 0}
+        symbols = sorted(set[Any]().union(*(entry.free_symbols for entry in entries.values())), key=str)
+        function = sp.lambdify(symbols, list(entries.values()), "numpy", cse=True)
+        return list(entries), function, [str(symbol) for symbol in symbols]
+
+    def at(self, values: Mapping[str, Any], members: int) -> System:
+        """The linear systems where the symbols have these values, numbers or arrays of shape (members,), by name."""
+        places, function, names = self._entries
+        n, m, p = len(self.states), len(self.inputs), len(self.outputs)
+        whole = np.zeros((members, n + p, n + m))
+        for (i, j), entry in zip(places, function(*(values[name] for name in names)), strict=True):
+            whole[:, i, j] = entry
+        parts = whole[:, :n, :n], whole[:, :n, n:], whole[:, n:, :n], whole[:, n:, n:]
+        return System(*parts, tuple(map(str, self.states)), tuple(self.inputs), tuple(self.outputs))
+
+
+def solved(equations: Sequence[sp.Expr], unknowns: Sequence[sp.Symbol]) -> list[sp.Expr]:
+    """What the unknowns are where all equations, which are linear in them, are zero. Raises ValueError if they are not
+    linear."""
+    matrix, right = sp.linear_eq_to_matrix(list(equations), list(unknowns))
+    return list(matrix.LUsolve(right))

@@ -1,0 +1,146 @@
+"""The describing function of a friction law: what a sinusoidal motion feels of it, harmonic by harmonic.
+
+Gelb, Vander Velde, Multiple-Input Describing Functions and Nonlinear System Design, McGraw-Hill 1968, for the method;
+the law is the stage's own (LuGre: Canudas de Wit et al. 1995, doi:10.1109/9.376053). LuGre has a memory, so that its
+describing function depends on amplitude and frequency.
+
+Convention: position x(t) = Re(A exp(i omega t)) with real A > 0, and friction force F(t) = Re(sum of F_k exp(i k omega
+t)), positive against positive velocity. The dynamic stiffness N = F_1/A then has a spring as positive real part and a
+damper as positive imaginary part, and takes pi A^2 Im(N) out of the motion in every period.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from friso.engine.arrays import Status
+from friso.engine.tolerance import checked_rtol
+from friso.equations.imposed import HARMONIC
+from friso.frequency.describing.steady import CLOSED, RTOL, Imposition, share_of_period, steady
+from friso.stage import Stage, StageError
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+SAMPLES = 4096
+"""Samples per period from which higher harmonics are taken unless told."""
+
+NOT_CLOSED = "no periodic steady state found: the law's own states do not repeat; tighten rtol"
+NOT_RUN = "a run was not completed: loosen rtol"
+
+
+def dynamic_stiffness(
+    flat: Mapping[str, Any], amplitudes: np.ndarray, frequencies: np.ndarray, rtol: float = RTOL
+) -> np.ndarray:
+    """N = F_1/A [N/m], complex, of friction at amplitudes [m] and frequencies [Hz], all of shape (count,); NaN where no
+    steady state was found. The friction keys of `flat` may be arrays of that shape, too."""
+    if not len(amplitudes):
+        return np.empty(0, complex)
+    friction = Imposition.of(flat, amplitudes, frequencies, rtol)
+    found = steady(friction)
+    first, _ = _harmonics(friction, found.inner, 1, 0)
+    good = found.done & (found.gap <= CLOSED * rtol)
+    return np.where(good, first[:, 1] / amplitudes, np.nan)
+
+
+def describing(
+    stage: Stage,
+    amplitudes: Sequence[float] | np.ndarray,
+    frequencies: Sequence[float] | np.ndarray,
+    harmonics: int = 1,
+    samples: int = SAMPLES,
+    rtol: float = RTOL,
+) -> xr.Dataset:
+    """Describing function of the stage's friction, for every amplitude [m] with every frequency [Hz] of its motion.
+
+    Variables over ("amplitude", "frequency"): `stiffness`, N = F_1/A [N/m], complex; `work` [J], what friction takes
+    out of the motion in a period; `gap`, by how much the law's own states miss themselves after a period, as a share
+    of their scales; `aliasing` and `status`. `force` [N], complex, over ("amplitude", "frequency", "harmonic"), has the
+    harmonics from F_0, the mean, to F_`harmonics`. The first is integrated by the solver
+    itself; the others come from `samples` samples of the period, whose accuracy `aliasing` tells: by how much the first
+    harmonic from the samples differs from the integrated one, as a share of it (NaN if nothing was sampled, which is so
+    for `harmonics` = 1: then F_0 is NaN unless the law is symmetric).
+
+    Raises StageError for a stage without friction and for amplitudes, frequencies, harmonics or samples that are not
+    usable, ValueError for a tolerance that is not. A pair that fails has NaN and a reason in `status`.
+    """
+    import xarray as xr
+
+    sizes, rates = (
+        checked_positive("amplitudes", amplitudes, "1e-5 m"),
+        checked_positive("frequencies", frequencies, "10 Hz"),
+    )
+    if not 1 <= harmonics < samples / 4:
+        expected = f"from 1 to less than a quarter of the samples, {samples}"
+        raise StageError("harmonics", str(harmonics), expected, "harmonics = 9")
+    shape = (len(sizes), len(rates))
+    pairs = (np.repeat(sizes, shape[1]), np.tile(rates, shape[0]))
+    friction = Imposition.of(stage.flat(), *pairs, checked_rtol(rtol))
+    found = steady(friction)
+    force, aliasing = _harmonics(friction, found.inner, harmonics, samples if harmonics > 1 else 0)
+    status = np.where(found.gap <= CLOSED * rtol, Status.DONE.text, NOT_CLOSED)
+    status = np.where(found.done & np.isfinite(force[:, 1]), status, NOT_RUN)
+    force[status != Status.DONE.text] = np.nan
+    plane = ("amplitude", "frequency")
+    stiffness = force[:, 1] / pairs[0]
+    variables = {
+        "stiffness": (stiffness, "N/m", "dynamic stiffness of friction"),
+        "work": (np.pi * pairs[0] ** 2 * stiffness.imag, "J", "work of friction per period"),
+        "gap": (found.gap, "1", "gap of the periodic state"),
+        "aliasing": (aliasing, "1", "error of the sampled first harmonic"),
+    }
+    return xr.Dataset(
+        {
+            **{n: (plane, v.reshape(shape), {"units": u, "long_name": t}) for n, (v, u, t) in variables.items()},
+            "status": (plane, status.reshape(shape)),
+            "force": (
+                (*plane, "harmonic"),
+                force.reshape(*shape, -1),
+                {"units": "N", "long_name": "harmonics of the friction force"},
+            ),
+        },
+        coords={
+            "amplitude": ("amplitude", sizes, {"units": "m", "long_name": "amplitude of the motion"}),
+            "frequency": ("frequency", rates, {"units": "Hz", "long_name": "frequency of the motion"}),
+            "harmonic": np.arange(harmonics + 1),
+        },
+        attrs={"stage": stage.to_toml(), "rtol": rtol, "samples": samples},
+    )
+
+
+def checked_positive(name: str, values: Sequence[float] | np.ndarray, example: str) -> np.ndarray:
+    """Positive numbers as an array. Raises StageError."""
+    array = np.atleast_1d(np.asarray(values, dtype=float))
+    if array.ndim != 1 or not np.all(np.isfinite(array) & (array > 0)):
+        raise StageError(name, str(values), "positive numbers in one row", example)
+    return array
+
+
+def _harmonics(friction: Imposition, inner: np.ndarray, count: int, samples: int) -> tuple[np.ndarray, np.ndarray]:
+    """Harmonics 0 to `count` of the force [N], shape (runs, count + 1), from the law's own periodic states, and the
+    error of the first one if it is sampled, shape (runs,)."""
+    share, _ = share_of_period(friction)
+    force = np.full((friction.count, count + 1), 0.0 if share < 1 else np.nan, complex)
+    aliasing = np.full(friction.count, np.nan)
+    real, imaginary = (friction.kernel.states.index(name) for name in HARMONIC)
+    for numbers, results in friction.run(inner, share, samples):
+        first = (results.ends[:, real] + 1j * results.ends[:, imaginary]) / share
+        if samples:
+            sampled = _spectrum(friction.take(numbers), results.samples, share, samples)
+            aliasing[numbers] = np.abs(sampled[:, 1] - first) / np.abs(first)
+            force[numbers] = sampled[:, : count + 1]
+        force[numbers, 1] = np.where(np.equal(results.statuses, Status.DONE), first, np.nan)
+    return force, aliasing
+
+
+def _spectrum(friction: Imposition, states: np.ndarray, share: float, samples: int) -> np.ndarray:
+    """Harmonics of the force [N] from states (runs, samples of the share of a period, states)."""
+    within = round(samples * share)
+    force = friction.force(np.moveaxis(states[:, :within], 0, 2).swapaxes(0, 1)).T
+    whole = force if share == 1.0 else np.hstack([force, -force])
+    spectrum = np.fft.rfft(whole, axis=1) / samples
+    spectrum[:, 1:] *= 2
+    return spectrum

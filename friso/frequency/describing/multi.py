@@ -1,0 +1,189 @@
+"""Multi-harmonic balance of a loop with friction: a periodic motion as a Fourier series, found by Newton's method.
+
+Alternating frequency and time (Cameron, Griffin 1989, doi:10.1115/1.3176036): the series gives the velocity in time,
+that the friction force (`waveform`), and its harmonics have to move the loop by the series. The mechanics and the
+controller may be any linear ones. Started from a motion that is known, such as a simulated one: the method has no way
+of its own to find a cycle, and single-harmonic balance, the usual start, may not have any (`balance`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from friso.frequency.describing.loop import receptance
+from friso.frequency.describing.waveform import Answer, Law, friction_answer
+
+OVERSAMPLED = 32
+"""Time intervals per period and harmonic at least."""
+
+FINEST = 4096
+"""Time intervals per period at least."""
+
+STEPS = 40
+"""Newton steps at most."""
+
+CLOSED = 1e-9
+"""Step, as a share of the amplitude, at which the series counts as found."""
+
+HALVINGS = 6
+"""How often a step is halved that leads away."""
+
+
+@dataclass(frozen=True)
+class Series:
+    """A periodic motion: harmonics of cart and stage [m], complex, at `orders` of the angular frequency [rad/s], of
+    position = Re(sum of harmonic exp(i order omega t)); the step that Newton's method took last, as a share of the
+    amplitude, and whether that closed it."""
+
+    orders: np.ndarray
+    cart: np.ndarray
+    stage: np.ndarray
+    omega: float
+    change: float
+    closed: bool
+
+    @property
+    def period(self) -> float:
+        """Period [s]."""
+        return 2 * np.pi / self.omega
+
+    @property
+    def amplitude(self) -> float:
+        """Half of the peak-to-peak motion of the stage [m]."""
+        angles = np.linspace(0, 2 * np.pi, max(FINEST, OVERSAMPLED * int(self.orders[-1])), endpoint=False)
+        position = (np.exp(1j * np.outer(angles, self.orders)) @ self.stage).real
+        return float(np.ptp(position) / 2)
+
+
+@dataclass(frozen=True)
+class Basis:
+    """Cosines and sines of the `orders` at the middles of the intervals of the half period of a motion that is its own
+    mirror image, whose orders are odd, or of the whole period of another."""
+
+    orders: np.ndarray
+    sign: float
+    waves: np.ndarray
+    slopes: np.ndarray
+    share: float
+
+    @classmethod
+    def of(cls, harmonics: int, mirrored: bool, intervals: int) -> Basis:
+        """Up to the harmonic of this order, with so many intervals per period."""
+        orders = np.arange(1, harmonics + 1, 2) if mirrored else np.arange(harmonics + 1)
+        share = 0.5 if mirrored else 1.0
+        angles = 2 * np.pi * (np.arange(int(intervals * share)) + 0.5) / intervals
+        phases = np.outer(angles, orders)
+        waves = np.hstack([np.cos(phases), -np.sin(phases)])
+        slopes = np.hstack([-np.sin(phases), -np.cos(phases)]) * np.tile(orders, 2)
+        return cls(orders, -1.0 if mirrored else 1.0, waves, slopes, share)
+
+    def harmonics(self, signal: np.ndarray) -> np.ndarray:
+        """Complex harmonics (orders, columns) of signals at the middles (M, columns)."""
+        weights = np.where(self.orders == 0, 1.0, 2.0)[:, None] / len(self.waves)
+        real, imaginary = np.split(self.waves.T @ signal, 2)
+        return weights * (real + 1j * imaginary)
+
+
+def balanced(
+    flat: Mapping[str, Any],
+    time: np.ndarray,
+    position: np.ndarray,
+    harmonics: int,
+    mirrored: bool = True,
+    intervals: int | None = None,
+) -> Series:
+    """The periodic motion near a known one, with harmonics up to the order `harmonics`.
+
+    `time` [s] and `position` [m] of the cart, shape (samples,), are one period of the known motion, the last sample one
+    interval before the first comes again. A `mirrored` motion is its own mirror image after half a period. Raises
+    StageError for a stage without friction or for a law with more than one state of its own.
+    """
+    law, size = Law.of(flat), intervals or max(FINEST, OVERSAMPLED * harmonics)
+    basis = Basis.of(harmonics, mirrored, 2 * (size // 2))
+    spectrum = np.fft.rfft(position)[basis.orders] / len(position) * np.where(basis.orders == 0, 1, 2)
+    length = float(np.ptp(position) / 2)
+    unknown = np.concatenate([spectrum.real, spectrum.imag]) / length
+    omega = 2 * np.pi / (len(time) * (time[1] - time[0]))
+    problem = _Problem(flat, law, basis, length, omega, unknown)
+    state, change = problem.solve()
+    cart, speed = problem.split(state)
+    _, stage = receptance(flat, basis.orders * speed / (2 * np.pi))
+    force = basis.harmonics(problem.answer(state).force[:, None])[:, 0]
+    return Series(basis.orders, cart, stage * force, speed, change, change <= CLOSED)
+
+
+@dataclass(frozen=True)
+class _Problem:
+    """The equations X_k = R(k omega) F_k(X, omega) in real numbers: real and imaginary parts of the harmonics over the
+    length, and the logarithm of omega over the known one; the phase is held against a shift of the known motion."""
+
+    flat: Mapping[str, Any]
+    law: Law
+    basis: Basis
+    length: float
+    omega: float
+    known: np.ndarray
+
+    def split(self, state: np.ndarray) -> tuple[np.ndarray, float]:
+        real, imaginary = np.split(state[:-1] * self.length, 2)
+        return real + 1j * imaginary, float(self.omega * np.exp(state[-1]))
+
+    def answer(self, state: np.ndarray) -> Answer:
+        speed = self.omega * np.exp(state[-1])
+        velocity = speed * self.length * (self.basis.slopes @ state[:-1])
+        interval = 2 * np.pi / speed * self.basis.share / len(velocity)
+        return friction_answer(self.law, velocity, interval, self.basis.sign)
+
+    def receptances(self, speed: float) -> np.ndarray:
+        return receptance(self.flat, self.basis.orders * speed / (2 * np.pi))[0]
+
+    def residual(self, state: np.ndarray) -> np.ndarray:
+        """What is left of the equations, the last one that of the phase."""
+        cart, speed = self.split(state)
+        force = self.basis.harmonics(self.answer(state).force[:, None])[:, 0]
+        left = (cart - self.receptances(speed) * force) / self.length
+        return np.concatenate([left.real, left.imag, [self._phase @ (state[:-1] - self.known)]])
+
+    @property
+    def _phase(self) -> np.ndarray:
+        """Direction in which a shift in time moves the known motion."""
+        real, imaginary = np.split(self.known, 2)
+        return np.concatenate([-imaginary * self.basis.orders, real * self.basis.orders])
+
+    def jacobian(self, state: np.ndarray) -> np.ndarray:
+        """Derivative of the residual by the state."""
+        _, speed = self.split(state)
+        answer, nudge = self.answer(state), 1e-6
+        stretched = self.basis.slopes @ state[:-1]
+        by_motion = answer.along(speed * self.length * np.column_stack([self.basis.slopes, stretched]))
+        forces = self.basis.harmonics(np.column_stack([by_motion, answer.force]))
+        receptances = self.receptances(speed)
+        later = (self.receptances(speed * (1 + nudge)) - self.receptances(speed * (1 - nudge))) / (2 * nudge)
+        by_state = -receptances[:, None] * forces[:, :-1]
+        by_state[:, -1] -= later * forces[:, -1]
+        count = len(self.basis.orders)
+        whole = np.zeros((2 * count + 1, 2 * count + 1))
+        whole[:count], whole[count : 2 * count] = by_state.real / self.length, by_state.imag / self.length
+        whole[: 2 * count, : 2 * count] += np.eye(2 * count)
+        whole[-1, :-1] = self._phase
+        return whole
+
+    def solve(self) -> tuple[np.ndarray, float]:
+        """The state that solves the equations, and the last step."""
+        state, change = np.append(self.known, 0.0), np.inf
+        left = self.residual(state)
+        for _ in range(STEPS):
+            step = np.linalg.lstsq(self.jacobian(state), -left, rcond=None)[0]
+            for halving in range(HALVINGS):
+                tried = state + step / 2**halving
+                then = self.residual(tried)
+                if np.linalg.norm(then) < np.linalg.norm(left):
+                    break
+            state, left, change = tried, then, float(np.max(np.abs(step)))
+            if change <= CLOSED:
+                break
+        return state, change

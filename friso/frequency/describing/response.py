@@ -1,0 +1,123 @@
+"""The frequency response of a plant with friction, as a drive's analyser measures it: it depends on the force.
+
+The analyser divides the first harmonic of the position by the force (Gelb, Vander Velde 1968, quasi-linear response).
+Where one force has several answers, those at which the force falls with the amplitude do not last, and which of the
+others shows depends on where the analyser comes from.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from friso.engine.tolerance import checked_rtol
+from friso.frequency.describing.driven import CLOSE, Driven, Roots, roots
+from friso.frequency.describing.function import checked_positive
+from friso.frequency.describing.steady import RTOL
+from friso.stage import Stage
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+NOT_FOUND = "no amplitude was found at which this force moves the cart"
+TOUCHES = "the joint deflects beyond its stroke: the limiter, which this answer leaves out, would be touched"
+
+
+def plant_response(
+    stage: Stage,
+    forces: Sequence[float] | np.ndarray,
+    frequencies: Sequence[float] | np.ndarray,
+    rtol: float = RTOL,
+) -> xr.Dataset:
+    """First-harmonic response of the plant to sinusoidal actuator forces of the amplitudes `forces` [N].
+
+    Variables over ("force", "frequency", "branch"), by rising amplitude, NaN where there are fewer: `response`, stage
+    position over force [m/N], complex; `cart_response` [m/N]; `amplitude` of the cart [m]; `stiffness` of friction
+    [N/m]; `lasting`, whether the force rises with the amplitude (1, 0, or NaN); `error`, relative, of the force. Over
+    ("force", "frequency"): `up` and `down`, the response [m/N] that an analyser shows which starts at rest at the
+    lowest, or highest, frequency, and steps to the others in turn: of the lasting branches the one nearest in amplitude
+    to that before; `answers`, their number; `status`.
+
+    Raises StageError for forces or frequencies that are not usable and for a stage without friction.
+    """
+    import xarray as xr
+
+    sizes, rates = checked_positive("forces", forces, "2 N"), checked_positive("frequencies", frequencies, "10 Hz")
+    driven = Driven.of(stage.flat(), rates, checked_rtol(rtol))
+    found = roots(driven, sizes)
+    _, positions, stiffness = driven.answer(found.amplitude, found.frequency)
+    columns = {
+        "response": (positions[:, 0], "m/N", "stage position over force"),
+        "cart_response": (positions[:, 1], "m/N", "cart position over force"),
+        "amplitude": (found.amplitude, "m", "amplitude of the cart"),
+        "stiffness": (stiffness, "N/m", "dynamic stiffness of friction"),
+        "lasting": (found.rising.astype(float), "1", "whether the motion lasts"),
+        "error": (found.error, "1", "relative error of the force"),
+    }
+    plane, shape = ("force", "frequency"), (len(sizes), len(rates))
+    place, count = _branches(found, shape)
+    variables = {n: ((*plane, "branch"), _spread(v, place, shape), _words(u, t)) for n, (v, u, t) in columns.items()}
+    branches = {name: variable[1] for name, variable in variables.items()}
+    for name, order in (("up", 1), ("down", -1)):
+        shown = _followed(branches["amplitude"], branches["lasting"], order)
+        answer = np.take_along_axis(branches["response"], shown[:, :, None], axis=2)[:, :, 0]
+        variables[name] = (plane, answer, _words("m/N", f"stage position over force, stepping {name}"))
+    variables["answers"] = (plane, count, _words("1", "number of answers"))
+    variables["status"] = (plane, _status(stage, branches, sizes))
+    return xr.Dataset(
+        variables,
+        coords={
+            "force": ("force", sizes, _words("N", "amplitude of the actuator force")),
+            "frequency": ("frequency", rates, _words("Hz", "frequency")),
+        },
+        attrs={"stage": stage.to_toml(), "rtol": rtol},
+    )
+
+
+def _words(unit: str, text: str) -> dict[str, str]:
+    return {"units": unit, "long_name": text}
+
+
+def _branches(found: Roots, shape: tuple[int, int]) -> tuple[tuple[np.ndarray, ...], np.ndarray]:
+    """The place of every root: force, frequency and number among those there, by rising amplitude; and how many."""
+    cell = found.force * shape[1] + found.frequency
+    count = np.bincount(cell, minlength=shape[0] * shape[1])
+    order = np.lexsort((found.amplitude, cell))
+    number = np.empty(len(cell), np.int64)
+    number[order] = np.arange(len(cell)) - np.repeat(np.cumsum(count) - count, count)
+    return (found.force, found.frequency, number), count.reshape(shape)
+
+
+def _spread(values: np.ndarray, place: tuple[np.ndarray, ...], shape: tuple[int, int]) -> np.ndarray:
+    """The roots' values in an array over force, frequency and branch."""
+    array = np.full((*shape, int(place[2].max(initial=0)) + 1), np.nan, values.dtype)
+    array[place] = values
+    return array
+
+
+def _followed(amplitudes: np.ndarray, lasting: np.ndarray, order: int) -> np.ndarray:
+    """The number of the branch that shows at every frequency, stepping up (order 1) or down (-1), shape (forces,
+    frequencies): the lasting one that is nearest in amplitude to the one before, the least at the start."""
+    sizes = np.where(lasting == 1, np.log(amplitudes), np.inf)
+    shown = np.zeros(sizes.shape[:2], np.int64)
+    before = np.full(len(sizes), -np.inf)
+    every = np.arange(len(sizes))
+    for j in range(sizes.shape[1])[::order]:
+        far = np.where(np.isfinite(before)[:, None], np.abs(sizes[:, j] - before[:, None]), sizes[:, j])
+        shown[:, j] = np.argmin(far, axis=1)
+        now = sizes[every, j, shown[:, j]]
+        before = np.where(np.isfinite(now), now, before)
+    return shown
+
+
+def _status(stage: Stage, branches: dict[str, np.ndarray], forces: np.ndarray) -> np.ndarray:
+    """What is wrong with the answers to every force at every frequency, or "done"."""
+    lost = ~np.any(branches["error"] <= 100 * CLOSE, axis=2)
+    status = np.where(lost, NOT_FOUND, "done").astype(object)
+    flat = stage.flat()
+    if "joint.stroke" in flat and not flat["joint.locked"]:
+        deflection = np.abs(branches["response"] - branches["cart_response"]) * forces[:, None, None]
+        status[np.any(deflection > flat["joint.stroke"], axis=2)] = TOUCHES
+    return status.astype(str)

@@ -1,0 +1,169 @@
+"""Friction under an imposed sinusoidal motion: the periodic steady state of its internal states, found in lanes.
+
+An internal state forgets where it came from at the rate at which the motion wears it off: at amplitudes far below the
+deflection at break-away that takes thousands of periods, and plain settling is hopeless. The map of the internal
+states over a period is solved for its fixed point instead, by secants; LuGre's and Dahl's states obey linear equations
+under an imposed motion, so that their map is affine and the first secant is exact.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from friso.engine.arrays import Results, Status
+from friso.engine.batch import Options, run_chunks
+from friso.engine.kernel import Kernel, kernel
+from friso.equations.imposed import FREQUENCY, HARMONIC, imposed_form
+
+RTOL = 1e-9
+"""Relative tolerance of the runs unless told."""
+
+CLOSED = 1e3
+"""Gap up to which a state counts as periodic, in units of the relative tolerance."""
+
+ROUNDS = 12
+"""Secant steps at most."""
+
+FINEST = 1e-4
+"""Least distance of the two points of a secant, as a share of the state's scale."""
+
+CARRIED = ("position", "velocity", *HARMONIC)
+"""States that are not the law's own."""
+
+
+@dataclass(frozen=True)
+class Imposition:
+    """Friction laws of one form, each under a motion of its own: flat keys to SI numbers or arrays of shape (count,),
+    with the amplitude under "motion.displacement" [m] and the frequency under "imposed.frequency" [Hz]."""
+
+    flat: Mapping[str, Any]
+    count: int
+    rtol: float = RTOL
+
+    @classmethod
+    def of(cls, flat: Mapping[str, Any], amplitudes: np.ndarray, frequencies: np.ndarray, rtol: float) -> Imposition:
+        """The friction of stages at amplitudes [m] and frequencies [Hz], both of shape (count,)."""
+        friction = {key: value for key, value in flat.items() if key.startswith("friction.")}
+        motion = {"motion.kind": "release", "motion.displacement": amplitudes, "motion.duration": 1.0}
+        return cls({**friction, **motion, FREQUENCY: frequencies}, len(amplitudes), rtol)
+
+    @cached_property
+    def kernel(self) -> Kernel:
+        first = {key: value[0] if np.ndim(value) else value for key, value in self.flat.items()}
+        return kernel(imposed_form(first))
+
+    @cached_property
+    def values(self) -> list[np.ndarray]:
+        return self.kernel.values({**self.flat, "motion.size": self.flat["motion.displacement"]}, self.count)
+
+    @cached_property
+    def inner(self) -> list[int]:
+        """Places of the law's own states."""
+        return [i for i, name in enumerate(self.kernel.states) if name not in CARRIED]
+
+    @cached_property
+    def scales(self) -> np.ndarray:
+        """Magnitudes of the states, shape (count, states)."""
+        return _rows(self.kernel.module.scales(self.values), self.count).T
+
+    @cached_property
+    def symmetric(self) -> bool:
+        """Whether the force is odd: the mirror image of every motion has the mirrored force; tried at random states."""
+        states = np.random.default_rng(0).normal(size=(8, *self.scales.shape)) * self.scales
+        pairs = ((self._reaction(some.T), self._reaction(-some.T)) for some in states)
+        return all(bool(np.all(np.abs(a + b) <= 1e-9 * np.abs(a))) for a, b in pairs)
+
+    def _reaction(self, states: np.ndarray) -> np.ndarray:
+        """Friction force and rates of the law's own states, from states (states, count)."""
+        module, at_rest = self.kernel.module, np.zeros(3)
+        modes = _rows(module.surfaces(states, 0.0, at_rest, self.values), self.count) > 0
+        rates = module.right_hand_side(states, modes.astype(float), 0.0, at_rest, self.values)
+        return np.vstack([self.force(states), _rows([rates[i] for i in self.inner], self.count)])
+
+    def force(self, states: np.ndarray) -> np.ndarray:
+        """Friction force [N] in states of shape (states, ..., count)."""
+        module, at_rest = self.kernel.module, np.zeros(3)
+        modes = np.array([surface > 0 for surface in module.surfaces(states, 0.0, at_rest, self.values)], dtype=float)
+        (force,) = module.outputs(states, modes, 0.0, at_rest, self.values)
+        return np.broadcast_to(force, states.shape[1:])
+
+    def take(self, numbers: np.ndarray) -> Imposition:
+        """Those with these numbers, any of them as often as wanted."""
+        flat = {key: value[numbers] if np.ndim(value) else value for key, value in self.flat.items()}
+        return Imposition(flat, len(numbers), self.rtol)
+
+    def run(self, inner: np.ndarray, share: float, samples: int = 0) -> Iterator[tuple[np.ndarray, Results]]:
+        """Follow a share of a period from the law's own states (count, inner), with so many samples per period."""
+        starts = np.zeros((self.count, len(self.kernel.states)))
+        starts[:, self.kernel.states.index("position")] = self.flat["motion.displacement"]
+        starts[:, self.inner] = inner
+        interval = 1 / samples if samples else None
+        chunk = max(8, min(2048, ROOM // max(samples, 1)))
+        options = Options(rtol=self.rtol, interval=interval, chunk=chunk)
+        for part in run_chunks(self.kernel, {**self.flat, "motion.duration": share}, self.count, options, starts):
+            yield part.numbers, part.results
+
+
+ROOM = 1 << 20
+"""Samples that are kept at a time."""
+
+
+def _rows(rows: list[Any], count: int) -> np.ndarray:
+    return np.array([np.broadcast_to(row, (count,)) for row in rows], dtype=float).reshape(len(rows), count)
+
+
+@dataclass(frozen=True)
+class Steady:
+    """Periodic steady states: the law's own states at the farthest point of the motion (count, inner), the `gap` that
+    is left after a period as a share of their scales, and whether every run was completed, both of shape (count,)."""
+
+    inner: np.ndarray
+    gap: np.ndarray
+    done: np.ndarray
+
+
+def steady(friction: Imposition) -> Steady:
+    """The periodic steady states; half a period does where the law is symmetric."""
+    count, size = friction.count, len(friction.inner)
+    inner, gap, done = np.zeros((count, size)), np.zeros(count), np.ones(count, bool)
+    width = friction.scales[:, friction.inner].copy()
+    open_ = np.arange(count) if size else np.empty(0, np.int64)
+    for _ in range(ROUNDS):
+        if not open_.size:
+            break
+        some, scales = friction.take(open_), friction.scales[open_][:, friction.inner]
+        step, missed, fine = _secant(some, inner[open_], width[open_])
+        gap[open_], done[open_] = np.max(np.abs(missed) / scales, axis=1), fine
+        far = fine & (gap[open_] > CLOSED * friction.rtol)
+        inner[open_[far]] += step[far]
+        width[open_[far]] = np.clip(np.abs(step[far]), FINEST * scales[far], scales[far])
+        open_ = open_[far]
+    return Steady(inner, gap, done)
+
+
+def share_of_period(friction: Imposition) -> tuple[float, float]:
+    """How much of a period has to be followed, and the sign with which the law's states come back."""
+    return (0.5, -1.0) if friction.symmetric else (1.0, 1.0)
+
+
+def _secant(friction: Imposition, inner: np.ndarray, width: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The step to the fixed point of the map's secant, by how much the states miss themselves, and which runs were
+    completed, from the states and the widths of the secants (count, inner)."""
+    share, sign = share_of_period(friction)
+    count, size = inner.shape
+    every = np.repeat(np.arange(count), size + 1)
+    aside = np.tile(np.vstack([np.zeros(size), np.eye(size)]), (count, 1)) * width[every]
+    ends, fine = np.empty((len(every), size)), np.empty(len(every), bool)
+    for numbers, results in friction.take(every).run(inner[every] + aside, share):
+        ends[numbers] = sign * results.ends[:, friction.inner]
+        fine[numbers] = np.equal(results.statuses, Status.DONE)
+    ends, fine = ends.reshape(count, size + 1, size), fine.reshape(count, size + 1).all(axis=1)
+    missed = ends[:, 0] - inner
+    slopes = np.swapaxes((ends[:, 1:] - ends[:, :1]) / width[:, :, None], 1, 2) - np.eye(size)
+    slopes[~fine] = -np.eye(size)
+    return np.linalg.solve(slopes, -missed[:, :, None])[:, :, 0], missed, fine

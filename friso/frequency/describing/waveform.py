@@ -1,0 +1,125 @@
+"""The friction force on any periodic motion, and its derivative by the motion: what multi-harmonic balance needs.
+
+The law's own state obeys an ordinary differential equation of its own, under a velocity that is given at the middles of
+M equal intervals; the implicit midpoint rule makes it a chain that ends where it began (or at the mirror image of it,
+over half a period of a symmetric motion), and the force at the middles follows. The rule is of second order, and a
+quick state settles on its steady value there however long the intervals are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Mapping
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+import sympy as sp
+from scipy.linalg import solve_banded
+
+from friso.equations.component import Kink, state
+from friso.equations.imposed import Imposed, imposed_form
+from friso.quantities import StageError
+from friso.stage.tables import friction_law
+
+STEPS, CLOSE = 30, 1e-12
+"""Newton steps of the law's own state at most, and the change of it, as a share of its largest value, that is none."""
+
+
+@dataclass(frozen=True)
+class Law:
+    """A friction law with at most one state of its own, z: functions of the parameters by name, of velocity and z, that
+    give the rate of z with its derivatives by z and velocity, and the force with its derivatives by the same."""
+
+    values: Mapping[str, Any]
+    function: Callable[..., list[Any]]
+    names: tuple[str, ...]
+    remembers: bool
+
+    @classmethod
+    def of(cls, flat: Mapping[str, Any]) -> Law:
+        """The law of a stage. Raises StageError for a stage without friction, or a law with more states."""
+        form = imposed_form(flat)
+        function, names, remembers = _compiled(form)
+        return cls({name: flat[name] for name in names}, function, names, remembers)
+
+    def at(self, velocity: np.ndarray, z: np.ndarray) -> list[np.ndarray]:
+        """Rate, its derivatives by z and by velocity, force, its derivatives by the same, at velocities and states."""
+        found = self.function(velocity, z, (velocity > 0).astype(float), *self.values.values())
+        return [np.broadcast_to(np.asarray(each, dtype=float), velocity.shape) for each in found]
+
+
+@cache
+def _compiled(form: Imposed) -> tuple[Callable[..., list[Any]], tuple[str, ...], bool]:
+    velocity, none = state("velocity"), state("no_state")
+    friction = friction_law(form.friction).declare(velocity, form.friction_variant)
+    inner: Hashable = friction.component.states
+    if len(inner) > 1:
+        given = f'"{form.friction}", with {len(inner)} states of its own'
+        raise StageError("friction.model", given, "a law with at most one", 'model = "lugre"')
+    z, rate = (inner[0].symbol, inner[0].derivative) if inner else (none, sp.S.Zero)
+    forward = Kink("forward", velocity).beyond
+    parts = [e for f in (rate, friction.force) for e in (f, sp.diff(f, z), sp.diff(f, velocity))]
+    names = sorted(set[Any]().union(*(e.free_symbols for e in parts)) - {velocity, z, forward}, key=str)
+    function = sp.lambdify([velocity, z, forward, *names], parts, "numpy", cse=True)
+    return function, tuple(map(str, names)), bool(inner)
+
+
+@dataclass(frozen=True)
+class Answer:
+    """Friction force [N] at the middles of the intervals (M,), and what its derivative by the velocities there is made
+    of: see `along`."""
+
+    force: np.ndarray
+    by_velocity: np.ndarray
+    by_state: np.ndarray
+    chain: Chain | None
+    pushed: np.ndarray
+
+    def along(self, velocities: np.ndarray) -> np.ndarray:
+        """Changes of the force for changes of the velocities, both of shape (M, columns)."""
+        direct = self.by_velocity[:, None] * velocities
+        if self.chain is None:
+            return direct
+        return direct + self.by_state[:, None] * _middles(self.chain.solve(self.pushed[:, None] * velocities))
+
+
+@dataclass(frozen=True)
+class Chain:
+    """States z_0 to z_M of which after[k] z_(k+1) - before[k] z_k is given, and z_M = sign z_0."""
+
+    after: np.ndarray
+    before: np.ndarray
+    sign: float
+
+    def solve(self, given: np.ndarray) -> np.ndarray:
+        """The states, shape (M + 1, columns), for given differences (M, columns)."""
+        count = len(self.after)
+        bands = np.zeros((2, count + 1))
+        bands[0, 0], bands[0, 1:], bands[1, :-1] = 1.0, self.after, -self.before
+        start = np.zeros((count + 1, given.shape[1] + 1))
+        start[1:, :-1], start[0, -1] = given, 1.0
+        found = solve_banded((1, 0), bands, start, check_finite=False)
+        forced, free = found[:, :-1], found[:, -1:]
+        return forced + free * (forced[-1] / (self.sign - free[-1]))
+
+
+def _middles(z: np.ndarray) -> np.ndarray:
+    return (z[:-1] + z[1:]) / 2
+
+
+def friction_answer(law: Law, velocity: np.ndarray, interval: float, sign: float) -> Answer:
+    """The friction on a motion with these velocities [m/s] at the middles (M,) of intervals [s], after which it comes
+    back (sign 1) or comes to its mirror image (-1)."""
+    z = np.zeros(len(velocity) + 1)
+    chain, pushed = None, np.zeros(0)
+    for _ in range(STEPS if law.remembers else 0):
+        rate, by_z, by_velocity, *_ = law.at(velocity, _middles(z))
+        chain = Chain(1 - interval * by_z / 2, 1 + interval * by_z / 2, sign)
+        missed = interval * rate - np.diff(z)
+        step = chain.solve(missed[:, None])[:, 0]
+        z, pushed = z + step, interval * by_velocity
+        if np.max(np.abs(step)) <= CLOSE * np.max(np.abs(z)):
+            break
+    _, _, _, force, by_state, by_velocity = law.at(velocity, _middles(z))
+    return Answer(force, by_velocity, by_state, chain, pushed)

@@ -1,0 +1,110 @@
+"""The friction law on a cart that is stuck under a bias force or slides at a speed: its steady state there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import sympy as sp
+
+from friso.equations.component import state
+from friso.equations.structure import shared_structure
+from friso.frequency.declared import Declared, solved
+from friso.stage.stage import numeric_keys
+from friso.stage.tables import friction_law
+
+if TYPE_CHECKING:
+    from collections.abc import Hashable
+
+    from friso.frequency.members import Members
+
+VELOCITY, BIAS = state("velocity"), sp.Symbol("bias", real=True)
+FORWARD = "beyond_forward"
+"""Name of the symbol that tells the direction of the motion."""
+
+SLOWEST, FASTEST = 1e-3, 1e3
+"""Speeds of the family, in units of the slowest and of the fastest speed that the law names."""
+
+SLOW, FAST = 0.1, 1e5
+"""Rates [1/s] at which bristles give way at the least and the greatest speed, of a law that names no speed."""
+
+
+@dataclass(frozen=True)
+class Law:
+    """A friction law as a linear system from the velocity of the cart to its force, and its steady states: those of its
+    internal states that slide at a velocity, and that bear a bias force at rest."""
+
+    declared: Declared
+    sliding: Callable[[Mapping[str, Any]], list[Any]]
+    stuck: Callable[[Mapping[str, Any]], list[Any]]
+    force: Callable[[Mapping[str, Any]], list[Any]]
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        return tuple(map(str, self.declared.states))
+
+
+def law_of(flat: Mapping[str, Any]) -> Law | None:
+    """The law of a stage; None without friction."""
+    form = shared_structure(flat)
+    return _law(form.friction, form.friction_variant)
+
+
+@cache
+def _law(name: str, variant: Hashable) -> Law | None:
+    friction = friction_law(name).declare(VELOCITY, variant)
+    if friction is None:
+        return None
+    states = tuple(each.symbol for each in friction.component.states)
+    rates = tuple(each.derivative for each in friction.component.states)
+    declared = Declared(states, rates, {"velocity": VELOCITY}, {"force": friction.force})
+    sliding = solved(rates, states) if states else []
+    at_rest = friction.force.subs(VELOCITY, 0) - BIAS
+    stuck = solved([at_rest], states) if states else []
+    steady = friction.force.subs(dict(zip(states, sliding, strict=True)))
+    return Law(declared, _compiled(sliding), _compiled(stuck), _compiled([steady]))
+
+
+def _compiled(expressions: list[sp.Expr]) -> Callable[[Mapping[str, Any]], list[Any]]:
+    """The expressions as a function of the values of their symbols by name."""
+    symbols = sorted(set[Any]().union(*(each.free_symbols for each in expressions)), key=str)
+    function = sp.lambdify(symbols, expressions, "numpy")
+    return lambda values: function(*(values[str(symbol)] for symbol in symbols))
+
+
+def level(flat: Mapping[str, Any], forward: bool) -> float:
+    """Friction force [N] from which on a stuck cart breaks away; 0 for a law that creeps instead of sticking."""
+    law = law_of(flat)
+    if law is None or not law.states:
+        return 0.0
+    sign = 1.0 if forward else -1.0
+    (force,) = law.force({**flat, "velocity": 0.0, FORWARD: float(forward)})
+    return sign * float(force)
+
+
+def speeds(flat: Mapping[str, Any], count: int) -> np.ndarray:
+    """Speeds [m/s] from creeping to so fast that friction hardly depends on it, shape (count,)."""
+    units = {key: each.unit for key, each in numeric_keys(flat).items() if key.startswith("friction.")}
+    named = [flat[key] for key, unit in units.items() if unit == "m/s" and key in flat]
+    if named:
+        return np.geomspace(SLOWEST * min(named), FASTEST * max(named), count)
+    bristles = flat["friction.coulomb"] / flat["friction.bristle_stiffness"]
+    return np.geomspace(SLOW * bristles, FAST * bristles, count)
+
+
+def operating_point(flat: Mapping[str, Any], members: Members) -> dict[str, Any]:
+    """Values of the internal states of the law and of its direction, by name, each of shape (members,)."""
+    law, forward = law_of(flat), members.forward.astype(float)
+    if law is None:
+        return {}
+    sign = 2 * forward - 1
+    at = {**flat, "velocity": sign * np.maximum(members.speed, np.finfo(float).tiny), FORWARD: forward}
+    sliding, stuck = law.sliding(at), law.stuck({**at, "bias": sign * members.bias})
+    internal = {
+        name: np.where(members.stuck, rest, moving)
+        for name, rest, moving in zip(law.states, stuck, sliding, strict=True)
+    }
+    return {FORWARD: forward, **internal}

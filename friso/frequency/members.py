@@ -1,0 +1,101 @@
+"""The states a stage can be in: the limit cases of the thesis (Table 1), and the family behind them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+
+from friso.equations.structure import structure
+from friso.frequency.friction import level, speeds
+
+BIASES, SPEEDS = 65, 257
+"""Bias forces and speeds of the family, of each state of the limiter."""
+
+NEARLY = 0.999
+"""Share of the break-away force up to which a stuck stage is biased."""
+
+
+@dataclass(frozen=True)
+class Members:
+    """States of a stage, one per row, each array of shape (members,).
+
+    `speed` [m/s] of the cart, 0 where it is stuck; `bias` [N], the friction force of a stuck cart, positive where it
+    opposes the motion; `touched`, whether the limiter is; `forward`, the direction of the motion.
+    """
+
+    speed: np.ndarray
+    bias: np.ndarray
+    touched: np.ndarray
+    forward: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.speed)
+
+    def __getitem__(self, which: Any) -> Members:
+        """Those at the numbers given, or in a boolean array."""
+        return Members(*(np.atleast_1d(getattr(self, each.name)[which]) for each in fields(self)))
+
+    @property
+    def stuck(self) -> np.ndarray:
+        return self.speed == 0
+
+    def with_limiter(self, touched: bool) -> Members:
+        """The same with the limiter touched or not."""
+        return replace(self, touched=np.full(len(self), touched))
+
+    def repeated(self, times: int) -> Members:
+        """All of them, so many times one after the other."""
+        return Members(*(np.tile(getattr(self, each.name), times) for each in fields(self)))
+
+
+def member(speed: float = 0.0, bias: float = 0.0, touched: bool = False, forward: bool = True) -> Members:
+    """A single state."""
+    return Members(np.array([speed]), np.array([bias]), np.array([touched]), np.array([forward]))
+
+
+def joined(parts: list[Members]) -> Members:
+    return Members(*(np.concatenate([getattr(part, each.name) for part in parts]) for each in fields(Members)))
+
+
+def limit_cases(flat: Mapping[str, Any]) -> dict[str, Members]:
+    """The limit cases by name: "stuck" and "sliding" (fast), and both with "-touched" behind where the limiter is
+    touched (Table 1); "given" for a stage that has just one."""
+    moves = ["sliding"] if flat["friction.model"] == "none" else ["stuck", "sliding"]
+    limits = _limits(flat)
+    if len(moves) == len(limits) == 1:
+        return {"given": member(_fast(flat), touched=limits[0])}
+    named = structure(flat).joint in ("free", "touching")
+    return {
+        f"{move}-touched" if touched and named else move: member(0.0 if move == "stuck" else _fast(flat), 0.0, touched)
+        for touched in limits
+        for move in moves
+    }
+
+
+def family(flat: Mapping[str, Any], biases: int = BIASES, speeds_: int = SPEEDS) -> Members:
+    """Every limit case's neighbours: stuck under bias forces up to nearly the break-away force, for and against the
+    motion, and sliding at all speeds, in both directions if friction differs between them."""
+    if flat["friction.model"] == "none":
+        return joined([*limit_cases(flat).values()])
+    shares = np.linspace(-NEARLY, NEARLY, biases)
+    parts = []
+    for touched in _limits(flat):
+        for forward in (True, False) if flat.get("friction.asymmetry", 0.0) != 0 else (True,):
+            bias = shares * level(flat, forward)
+            bias = np.unique(bias)  # a law that creeps instead of sticking bears none
+            speed = np.concatenate([np.zeros(len(bias)), speeds(flat, speeds_)])
+            bias = np.concatenate([bias, np.zeros(speeds_)])
+            parts.append(Members(speed, bias, np.full(len(speed), touched), np.full(len(speed), forward)))
+    return joined(parts)
+
+
+def _fast(flat: Mapping[str, Any]) -> float:
+    return 0.0 if flat["friction.model"] == "none" else float(speeds(flat, 2)[-1])
+
+
+def _limits(flat: Mapping[str, Any]) -> tuple[bool, ...]:
+    """Whether the limiter may be free, touched, or both."""
+    return {"free": (False, True), "touching": (True,)}.get(structure(flat).joint, (False,))

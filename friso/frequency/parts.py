@@ -1,0 +1,93 @@
+"""Plant and controller of a stage as linear systems, for many members at once."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+import sympy as sp
+
+from friso.equations.model import assemble
+from friso.equations.pid import Loop, controller
+from friso.equations.structure import ControllerForm, Structure, shared_structure
+from friso.frequency.declared import Declared
+from friso.frequency.friction import law_of, operating_point
+from friso.frequency.members import Members
+from friso.frequency.system import System
+
+FORCE, DISTURBANCE, REFERENCE, NOISE = "force", "disturbance on cart", "reference", "sensor noise"
+STAGE, CART, DEFLECTION, VELOCITY = "stage", "cart", "joint deflection", "stage velocity"
+
+_REFERENCE, _POSITION, _VELOCITY = (sp.Symbol(f"measured_{name}", real=True) for name in ("r", "y", "v"))
+_CONTROLLER_INPUTS = {REFERENCE: _REFERENCE, STAGE: _POSITION, VELOCITY: _VELOCITY}
+
+
+def plant(flat: Mapping[str, Any], members: Members) -> System:
+    """From the forces on stage and cart [N] to position of stage and cart, joint deflection [m] and velocity of the
+    stage [m/s], of members all of which are stuck or none; `flat` may hold arrays of shape (members,)."""
+    declared = _plant(shared_structure(flat))
+    velocity = np.where(members.forward, members.speed, -members.speed)
+    values = {**flat, **operating_point(flat, members)}
+    values |= {"velocity": velocity, "cart_velocity": velocity, "parasitic_velocity": velocity}
+    values |= {"beyond_stroke_ahead": members.touched.astype(float), "beyond_stroke_behind": 0.0}
+    whole = declared.at(values, len(members))
+    law = law_of(flat)
+    return _held(whole, law.states) if law is not None and members.stuck.all() else whole
+
+
+def mechanics(flat: Mapping[str, Any], touched: np.ndarray) -> System:
+    """The masses without friction: from the forces on stage and cart to their positions, shape of `touched`."""
+    declared = _plant(replace(shared_structure(flat), friction="none", friction_variant=None))
+    values = {**flat, "beyond_stroke_ahead": touched.astype(float), "beyond_stroke_behind": 0.0}
+    return declared.at(values, len(touched)).take((FORCE, DISTURBANCE), (STAGE, CART))
+
+
+def compensator(flat: Mapping[str, Any], members: int) -> System:
+    """The controller: from reference, position [m] and velocity [m/s] of the stage to the force [N]."""
+    form = shared_structure(flat).controller
+    assert form is not None  # a stage file has a controller
+    declared = _compensator(replace(form, limited=False))
+    return declared.at(flat, members)
+
+
+@cache
+def _plant(form: Structure) -> Declared:
+    """The model's own equations, the controller replaced by a force."""
+    model = assemble(replace(form, controller=None, biased=("cart", "stage")))
+    found = {name: output.expression for name, output in model.outputs.items()}
+    outputs = {STAGE: found["position"], CART: found["cart_position"], VELOCITY: found["velocity"]}
+    if "joint_deflection" in found:
+        outputs[DEFLECTION] = found["joint_deflection"]
+    inputs = {FORCE: sp.Symbol("bias.stage", real=True), DISTURBANCE: sp.Symbol("bias.cart", real=True)}
+    return Declared(model.symbols, model.rhs, inputs, outputs)
+
+
+@cache
+def _compensator(form: ControllerForm) -> Declared:
+    loop = Loop(_REFERENCE - _POSITION, _POSITION, _VELOCITY, sp.S.Zero)
+    control = controller(form, loop, sp.S.One, sp.S.One)
+    states = control.component.states
+    symbols, rates = tuple(each.symbol for each in states), tuple(each.derivative for each in states)
+    return Declared(symbols, rates, _CONTROLLER_INPUTS, {FORCE: control.force})
+
+
+def _held(whole: System, internal: tuple[str, ...]) -> System:
+    """The system with the internal states of the friction law following the cart, which is stuck.
+
+    At rest their rate is proportional to the velocity of the cart alone, so that they differ from a multiple of its
+    position by a constant: where on the rail it got stuck. Nothing controls that, nor does it matter; it would be a
+    pole at 0.
+    """
+    velocity = whole.states.index("cart_velocity" if "cart_velocity" in whole.states else "velocity")
+    position = whole.states.index("cart_position" if "cart_position" in whole.states else "position")
+    a, c = whole.a.copy(), whole.c.copy()
+    for z in map(whole.states.index, internal):
+        share = whole.a[:, z, velocity]
+        for matrix in (a, c):
+            matrix[:, :, position] += share[:, None] * matrix[:, :, z]
+    kept = [i for i, name in enumerate(whole.states) if name not in internal]
+    states = tuple(whole.states[i] for i in kept)
+    return replace(whole, a=a[:, kept][:, :, kept], b=whole.b[:, kept], c=c[:, :, kept], states=states)

@@ -1,0 +1,39 @@
+"""Linear systems, many of one kind at once: arrays with the members first."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+Complex = npt.NDArray[np.complex128]
+
+
+@dataclass(frozen=True)
+class System:
+    """x' = a x + b u, y = c x + d u for every member: a (members, n, n), b (members, n, m), c (members, p, n),
+    d (members, p, m), with the names of states, inputs and outputs; of a sampled one, x' is the next x."""
+
+    a: np.ndarray
+    b: np.ndarray
+    c: np.ndarray
+    d: np.ndarray
+    states: tuple[str, ...]
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+
+    def take(self, inputs: Sequence[str], outputs: Sequence[str]) -> System:
+        """The system with these inputs and outputs alone, in this order."""
+        columns = [self.inputs.index(name) for name in inputs]
+        rows = [self.outputs.index(name) for name in outputs]
+        b, c, d = self.b[..., columns], self.c[..., rows, :], self.d[..., rows, :][..., columns]
+        return System(self.a, b, c, d, self.states, tuple(inputs), tuple(outputs))
+
+    def at(self, points: np.ndarray) -> Complex:
+        """Transfer matrices c (s - a)^-1 b + d at the points s (k,), complex, shape (members, k, p, m)."""
+        n = len(self.states)
+        shifted = points[:, None, None] * np.eye(n) - self.a[:, None]
+        answers = np.linalg.solve(shifted, self.b[:, None])
+        return (self.c[:, None] @ answers + self.d[:, None]).astype(complex)

@@ -1,0 +1,44 @@
+"""Van Dijk's tuning rules (thesis, Eq. 7 and 8) on the mass they are meant for: gains, and the margins they give."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from friso.equations.pid import van_dijk_gains
+from friso.frequency.margins import Margins, margins
+from friso.frequency.members import member
+
+
+@dataclass(frozen=True)
+class Tuning:
+    """Gain k_p [N/m] and time constants tau_z, tau_i, tau_p [s] of Eq. 8, and the margins of the loop on the bare
+    mass."""
+
+    k_p: float
+    tau_z: float
+    tau_i: float
+    tau_p: float
+    margins: Margins
+
+    @property
+    def true_crossover(self) -> float:
+        """Where the loop crosses 0 dB [Hz]: somewhat above the crossover it is tuned for."""
+        return self.margins.crossovers[-1]
+
+
+def tuning(crossover: float, alpha: float, beta: float, mass: float) -> Tuning:
+    """The controller for a mass [kg] at a crossover [Hz], by van Dijk's rules, and how it does on that mass."""
+    flat = {
+        "friction.model": "none",
+        "masses.stage": mass,
+        "controller.kind": "pid",
+        "controller.crossover": crossover,
+        "controller.alpha": alpha,
+        "controller.beta": beta,
+        "controller.tuned_mass": mass,
+    }
+    gains = {
+        name: float(expression.subs({symbol: flat[str(symbol)] for symbol in expression.free_symbols}))
+        for name, expression in van_dijk_gains().items()
+    }
+    return Tuning(**gains, margins=margins(flat, member()))
