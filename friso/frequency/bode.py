@@ -12,7 +12,7 @@ from friso.frequency.crossover import Limits, limits
 from friso.frequency.family import Scan, grid, loops, modes, plants, scan, spectral_abscissa
 from friso.frequency.loops import Drive
 from friso.frequency.margins import Margins, margins
-from friso.frequency.members import Members, family, limit_cases, member
+from friso.frequency.members import Members, family, joined, limit_cases, member
 from friso.frequency.ranges import Range, ranges_below
 from friso.frequency.stiffness import limiter_in_series
 from friso.stage import Stage
@@ -112,7 +112,7 @@ def _in_series(flat: Mapping[str, Any]) -> dict[str, tuple[Mapping[str, Any], Me
 
 def _mattering(flat: Mapping[str, Any], known: Iterable[Margins]) -> Range:
     """Frequencies [Hz] that show all crossovers and resonances."""
-    poles = modes(flat)
+    poles = modes(flat, joined([*limit_cases(flat).values()]))
     resonances = np.abs(poles[np.abs(poles.imag) > np.abs(poles.real)]) / (2 * np.pi)
     places = np.array([*(f for each in known for f in each.crossovers), *resonances[resonances > 1e-3]])
     places = places if places.size else np.ones(1)

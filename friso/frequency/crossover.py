@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from friso.equations.bandwidth import faster
-from friso.frequency.family import controller, grid, plants, spectral_abscissa
+from friso.frequency.family import closed_in_cases, controller, modes, nearest, plants, spectral_abscissa
 from friso.frequency.loops import Drive
+from friso.frequency.margins import frequencies
 from friso.frequency.members import Members, family, joined, limit_cases
 from friso.frequency.ranges import Range, ranges_below, shared
 
@@ -20,8 +21,11 @@ WANTED = 0.5
 LOWEST, HIGHEST = 0.1, 1e4
 """Crossovers [Hz] that are searched."""
 
-STEPS = 241
+STEPS = 161
 """Crossovers of the search."""
+
+POINTS = 800
+"""Frequencies at which they are, besides those about resonances."""
 
 BIASES = 9
 """Bias forces under which a stuck stage is looked at for each state of its limiter."""
@@ -90,7 +94,13 @@ def _abscissa(flat: Mapping[str, Any], members: Members, crossover: np.ndarray) 
 
 def _distance(flat: Mapping[str, Any], members: Members, crossover: np.ndarray) -> np.ndarray:
     """Least distance of the loop from -1 over all members, shape (crossovers,)."""
-    ends = [grid(_at(flat, f)) for f in crossover[[0, len(crossover) // 2, -1]]]
-    omega = np.unique(np.concatenate(ends))
+    omega = _search_grid(flat, members)
     bare = plants(flat, members, omega) * Drive.of(flat).answer(omega)
-    return np.array([np.abs(1 + bare * controller(_at(flat, f), omega)).min() for f in crossover])
+    return np.array([nearest(bare * controller(_at(flat, f), omega)).min() for f in crossover])
+
+
+def _search_grid(flat: Mapping[str, Any], members: Members) -> np.ndarray:
+    """Angular frequencies [rad/s] that show the loop at all crossovers searched: always the same ones, so that the
+    distance is a smooth function of the crossover."""
+    closed = np.concatenate([closed_in_cases(_at(flat, np.array(end))) for end in searched(flat)])
+    return frequencies(closed, modes(flat, members), Drive.of(flat).highest, POINTS)

@@ -7,7 +7,7 @@ Z v turns them into g - g_c Z s g_c^T / (1 + Z s g_cc), a few operations for eac
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
@@ -16,16 +16,20 @@ import numpy as np
 
 from friso.frequency.friction import law_of, operating_point
 from friso.frequency.loops import Drive, closed_poles
-from friso.frequency.margins import frequencies
-from friso.frequency.members import Members, limit_cases
-from friso.frequency.parts import REFERENCE, STAGE, VELOCITY, compensator, mechanics
+from friso.frequency.margins import frequencies, margins
+from friso.frequency.members import Members, family, limit_cases
+from friso.frequency.parts import REFERENCE, STAGE, VELOCITY, compensator, mechanics, plant
 from friso.frequency.system import Complex
 
 CHUNK = 256
 """Members that are computed together: their arrays then stay in the cache."""
 
-COARSE = 8
-"""Every so manieth of the frequencies that show a single loop does for a family."""
+POINTS, FEW = 250, 7
+"""Frequencies at which all members are looked at, besides those about resonances, and the bias forces and speeds that
+tell where these are."""
+
+CLOSEST = 8
+"""Members whose margin is computed exactly."""
 
 
 @dataclass(frozen=True)
@@ -51,13 +55,24 @@ class Scan:
 
 
 def scan(flat: Mapping[str, Any], members: Members) -> Scan:
-    """Stability and modulus margin of every member, the latter on a grid of frequencies."""
+    """Stability of every member, and its modulus margin: on a grid of frequencies, and exactly for those that come
+    closest to -1 there."""
     omega = grid(flat)
-    closed = spectral_abscissa(flat, members)
-    distance = np.concatenate(
-        _side_by_side(lambda part: np.abs(1 + loops(flat, part, omega)).min(axis=1), _chunks(members))
-    )
-    return Scan(members, closed, distance)
+    abscissa = spectral_abscissa(flat, members)
+    parts = (members[part] for part in _split(np.arange(len(members))))
+    distance = np.concatenate(_side_by_side(lambda part: nearest(loops(flat, part, omega)), parts))
+    for k in np.argsort(np.where(abscissa < 0, distance, np.inf))[:CLOSEST]:
+        exact = margins(flat, members[k]).modulus_margin
+        distance[k] = distance[k] if np.isnan(exact) else exact
+    return Scan(members, abscissa, distance)
+
+
+def nearest(loop: Complex) -> np.ndarray:
+    """Least distance from -1 of loops over ascending frequencies, shape (..., k), joined by straight lines: (...)."""
+    start, way = 1 + loop[..., :-1], np.diff(loop, axis=-1)
+    length = np.maximum(np.abs(way) ** 2, np.finfo(float).tiny)
+    along = np.clip(-(start * way.conj()).real / length, 0, 1)
+    return np.abs(start + along * way).min(axis=-1)
 
 
 def spectral_abscissa(flat: Mapping[str, Any], members: Members) -> np.ndarray:
@@ -75,15 +90,20 @@ def spectral_abscissa(flat: Mapping[str, Any], members: Members) -> np.ndarray:
 
 def grid(flat: Mapping[str, Any]) -> np.ndarray:
     """Angular frequencies [rad/s] that show the limit cases of a stage."""
+    return frequencies(closed_in_cases(flat), modes(flat, family(flat, FEW, FEW)), Drive.of(flat).highest, POINTS)
+
+
+def closed_in_cases(flat: Mapping[str, Any]) -> Complex:
+    """Finite poles [rad/s] of the closed loop in all limit cases."""
     drive = Drive.of(flat)
-    closed = np.concatenate([closed_poles(flat, one, drive).ravel() for one in limit_cases(flat).values()])
-    return frequencies(closed[np.isfinite(closed)], modes(flat), drive.highest)[::COARSE]
+    poles = np.concatenate([closed_poles(flat, one, drive).ravel() for one in limit_cases(flat).values()])
+    return poles[np.isfinite(poles)]
 
 
-def modes(flat: Mapping[str, Any]) -> Complex:
-    """Poles [rad/s] of the masses without friction and controller, in all limit cases."""
-    machines = [mechanics(flat, one.touched) for one in limit_cases(flat).values()]
-    return np.concatenate([np.linalg.eigvals(each.a).ravel() for each in machines]).astype(complex)
+def modes(flat: Mapping[str, Any], members: Members) -> Complex:
+    """Poles [rad/s] of the plant in all these states."""
+    groups = [members[mask] for mask in (members.stuck, ~members.stuck) if mask.any()]
+    return np.concatenate([np.linalg.eigvals(plant(flat, each).a).ravel() for each in groups]).astype(complex)
 
 
 def plants(flat: Mapping[str, Any], members: Members, omega: np.ndarray) -> Complex:
@@ -123,10 +143,6 @@ def impedance(flat: Mapping[str, Any], members: Members, s: np.ndarray) -> Compl
         for k in range(len(law.states)):
             total += residues[:, k, None] / (s - values[:, k, None])
     return total
-
-
-def _chunks(members: Members) -> Iterator[Members]:
-    return (members[part] for part in _split(np.arange(len(members))))
 
 
 def _split(numbers: np.ndarray) -> list[np.ndarray]:

@@ -25,7 +25,10 @@ BEYOND = 100.0
 NEGLIGIBLE = 1e-9
 """Share of the fastest pole below which one is taken to be 0."""
 
-AROUND = np.tan(np.linspace(-1.5, 1.5, 31))
+LIGHT = 0.3
+"""Damping ratio below which a pole is a resonance."""
+
+AROUND = np.tan(np.linspace(-1.5, 1.5, 15))
 """Where a resonance is looked at, in units of its half width."""
 
 Response = Callable[[np.ndarray], Complex]
@@ -79,16 +82,20 @@ def loop_response(flat: Mapping[str, Any], one: Members) -> tuple[Complex, Respo
     return poles, lambda omega: sampled.at(np.exp(1j * omega * drive.sample_time))[0, :, 0, 0]
 
 
-def frequencies(closed: Complex, modes: Complex, highest: float) -> np.ndarray:
+def frequencies(closed: Complex, modes: Complex, highest: float, points: int = POINTS) -> np.ndarray:
     """Angular frequencies [rad/s] that show all that a loop does, up to the highest, by the poles of the closed loop
-    and those of what is in it."""
+    and those of what is in it: so many evenly spread, and more about resonances."""
     size = np.abs(closed)
     size = size[size > NEGLIGIBLE * size.max(initial=0.0)] if size.any() else np.ones(1)
-    even = np.geomspace(size.min() / BEYOND, min(size.max() * BEYOND, highest), POINTS)
-    poles = np.concatenate([closed, modes])
-    near = (np.abs(poles.imag)[:, None] + np.abs(poles.real)[:, None] * AROUND).ravel()
-    inside = near[(near > even[0]) & (near < even[-1])]
-    return np.unique(np.concatenate([even, inside]))
+    even = np.geomspace(size.min() / BEYOND, min(size.max() * BEYOND, highest), points)
+    return with_resonances(even, np.concatenate([closed, modes]))
+
+
+def with_resonances(even: np.ndarray, poles: Complex) -> np.ndarray:
+    """Ascending angular frequencies [rad/s] with those about the resonances among these poles between them."""
+    light = poles[np.abs(poles.real) < LIGHT * np.abs(poles.imag)]
+    near = (np.abs(light.imag)[:, None] + np.abs(light.real)[:, None] * AROUND).ravel()
+    return np.unique(np.concatenate([even, near[(near > even[0]) & (near < even[-1])]]))
 
 
 def of_loop(response: Response, poles: Complex, omega: np.ndarray) -> Margins:
