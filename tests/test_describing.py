@@ -1,0 +1,363 @@
+"""The describing function of friction: closed forms, python-control, plain integration, and invariants."""
+
+from collections.abc import Callable
+from typing import Any
+
+import control
+import numpy as np
+import plain
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.integrate import solve_ivp
+from scipy.special import dawsn
+from variants import DAHL, HOLD, NO_FRICTION, free, lugre, stage, stribeck, van_dijk
+
+from friso.engine.kernel import Wanted, kernels
+from friso.equations.imposed import imposed_form
+from friso.frequency.describing.function import describing, dynamic_stiffness
+from friso.frequency.describing.mass_line import mass_line
+from friso.frequency.describing.response import TOUCHES, plant_response
+from friso.frequency.describing.steady import Imposition, steady
+from friso.stage import Stage, StageError
+from friso.stage.tables import FRICTION
+
+ASYMMETRIC = lugre(2) + "asymmetry = 0.2\n"
+LAWS = {"lugre": lugre(2), "dahl": DAHL, "stribeck": stribeck(2), "asymmetric": ASYMMETRIC}
+STEADY = settings(max_examples=25, deadline=None, derandomize=True)
+DESCRIBING = pytest.mark.xdist_group("describing")
+pytestmark = DESCRIBING
+
+
+def rigid(friction: str) -> Stage:
+    return stage(HOLD, friction=friction, controller=van_dijk())
+
+
+@pytest.fixture(scope="module", autouse=True)
+def compiled() -> None:
+    kernels([Wanted(imposed_form(rigid(law).flat())) for law in LAWS.values()])
+
+
+def test_every_law_with_a_force_is_tried() -> None:
+    assert {name.split()[0] for name in FRICTION.classes} - {"none"} <= set(LAWS)
+
+
+def of(flat: dict[str, Any], amplitude: Any, frequency: Any, **how: Any) -> np.ndarray:
+    pairs = np.broadcast_arrays(np.atleast_1d(amplitude).astype(float), frequency)
+    return dynamic_stiffness(flat, *(np.array(pair, dtype=float) for pair in pairs), **how)
+
+
+def changed(law: str, **values: float) -> dict[str, Any]:
+    return rigid(law).flat() | {f"friction.{name}": value for name, value in values.items()}
+
+
+def order(errors: np.ndarray, sizes: np.ndarray) -> np.ndarray:
+    """Observed orders of convergence in 1/size."""
+    return -np.diff(np.log(errors)) / np.diff(np.log(sizes))
+
+
+# closed forms
+
+
+def test_static_limit_is_coulomb_plus_stiction() -> None:
+    """Bristles without deflection and damping: F = g(v) sign(v) + sigma_2 v, with g = F_c + (F_s - F_c) exp(-(v/v_s)^2).
+
+    F_1 = i 4/pi (F_c + (F_s - F_c) D(a)/a) + i omega sigma_2 A, a = A omega/v_s, D Dawson's function, since the integral
+    of exp(-a^2 sin^2 t) sin t over a quarter period is D(a)/a. What is left falls with 1/sigma_0.
+    """
+    speeds = np.array([0.05, 0.5, 1.0, 3.0, 20.0]) * 1.6e-3
+    frequency = 2.0
+    amplitude = speeds / (2 * np.pi * frequency)
+    level = 1 + 2 * dawsn(speeds / 1.6e-3) / (speeds / 1.6e-3)
+    expected = 1j * (4 / np.pi * level / amplitude + 2 * np.pi * frequency * 0.5)
+    stiffnesses = np.array([1e7, 1e8, 1e9])
+    errors = []
+    for sigma_0 in stiffnesses:
+        flat = changed(LAWS["lugre"], bristle_stiffness=sigma_0, bristle_damping=0.0)
+        errors.append(np.abs(of(flat, amplitude, frequency) / expected - 1))
+    assert np.all(errors[-1] < 1e-3)
+    assert order(np.max(errors, axis=1), stiffnesses) == pytest.approx(1.0, abs=0.1)
+
+
+def test_relay_of_python_control() -> None:
+    """Coulomb friction is a relay on the velocity: N = i omega DF(A omega)."""
+    relay = control.relay_hysteresis_nonlinearity(1.0, 0.0)
+    expected = 2j * np.pi * 3.0 * control.describing_function(relay, [2 * np.pi * 3.0 * 1e-3])
+    stiffnesses = np.array([1e7, 1e8, 1e9])
+    errors = [np.abs(of(changed(DAHL, bristle_stiffness=s, viscous=0.0), 1e-3, 3.0) / expected - 1) for s in stiffnesses]
+    assert errors[-1] < 1e-5
+    assert order(np.ravel(errors), stiffnesses) == pytest.approx(1.0, abs=0.1)
+
+
+def test_static_law_equals_python_control() -> None:
+    """A curve of force against velocity has N = i omega DF(A omega), with no limit taken."""
+    flat = rigid(LAWS["stribeck"]).flat()
+    amplitudes, omega = np.array([2e-5, 1e-4, 1e-3]), 2 * np.pi * 5.0
+    found = control.describing_function(lambda v: plain.friction(flat, v, 0.0)[0], amplitudes * omega, num_points=4000)
+    assert of(flat, amplitudes, 5.0) == pytest.approx(1j * omega * found, rel=1e-7)
+
+
+def test_dahl_loses_what_a_spring_behind_a_backlash_loses() -> None:
+    """A spring that slips at F_c is k (x - backlash of x); its loop and Dahl's have the same area, 4 F_c (A - F_c/k), but
+    for exp(-2 k A/F_c). Their springs differ, by Dahl's rounder corners."""
+    amplitudes = np.array([4e-5, 1e-4, 1e-3])
+    backlash = control.friction_backlash_nonlinearity(2 / 1e5)
+    spring = 1e5 * (1 - control.describing_function(backlash, amplitudes))
+    dahl = of(changed(DAHL, viscous=0.0), amplitudes, 1.0)
+    left = np.exp(-2e5 * amplitudes) * 5
+    assert np.all(np.abs(np.imag(dahl) / np.imag(spring) - 1) < left + 1e-7)
+
+
+def test_presliding_limit() -> None:
+    """Amplitudes far below break-away: sigma_0 + i omega (sigma_1 + sigma_2), up to terms proportional to A."""
+    flat, frequency = rigid(LAWS["lugre"]).flat(), 7.0
+    expected = 1e5 + 2j * np.pi * frequency * (flat["friction.bristle_damping"] + 0.5)
+    amplitudes = np.array([1e-8, 1e-9, 1e-10])
+    errors = np.abs(of(flat, amplitudes, frequency) / expected - 1)
+    assert errors[-1] < 1e-5
+    assert order(errors, 1 / amplitudes) == pytest.approx(1.0, abs=0.1)
+    (dahl,) = of(rigid(DAHL).flat(), 1e-10, frequency)
+    assert dahl == pytest.approx(1e5 + 2j * np.pi * frequency * 0.5, rel=2e-5)
+
+
+# independent integration
+
+
+def settled(flat: dict[str, Any], amplitude: float, frequency: float, periods: int) -> complex:
+    """F_1/A from SciPy's Radau over periods of which the last one counts; the first one starts from z = 0."""
+    omega = 2 * np.pi * frequency
+
+    def velocity(t: float) -> float:
+        return -amplitude * omega * np.sin(omega * t)
+
+    def rates(t: float, y: np.ndarray) -> list[float]:
+        force, z_rate = plain.friction(flat, velocity(t), y[0])
+        return [z_rate, 2 * force * np.cos(omega * t), -2 * force * np.sin(omega * t)]
+
+    start, end, y = 0.0, 0.0, np.zeros(3)
+    for half in range(2 * periods):  # from kink to kink, at which the velocity is zero
+        start, end = end, (half + 1) / (2 * frequency)
+        if half == 2 * periods - 2:
+            y[1:] = 0.0
+        found = solve_ivp(rates, (start, end), y, "Radau", rtol=1e-9, atol=1e-12, max_step=(end - start) / 40)
+        y = found.y[:, -1]
+    return complex(y[1], y[2]) * frequency / amplitude
+
+
+@pytest.mark.parametrize(
+    ("amplitude", "frequency", "periods"), [(3e-5, 0.1, 3), (1e-4, 100.0, 2), (1e-3, 5.0, 2), (2e-2, 2.0, 2)]
+)
+def test_plain_integration(amplitude: float, frequency: float, periods: int) -> None:
+    """The same law written by hand; at 0.1 mm and 100 Hz the Stribeck effect makes it a negative spring."""
+    flat = rigid(LAWS["lugre"]).flat()
+    (found,) = of(flat, amplitude, frequency)
+    assert abs(found / settled(flat, amplitude, frequency, periods) - 1) < 3e-6
+    assert (found.real < 0) == (frequency == 100.0)
+
+
+def test_long_memory_is_solved_for() -> None:
+    """At 10 nm a state takes thousands of periods to forget its start: settling for three misses what solving finds."""
+    flat = rigid(ASYMMETRIC).flat()
+    friction = Imposition.of(flat, np.array([1e-8]), np.array([10.0]), 1e-10)
+    found = steady(friction)
+    (_, results), *_ = friction.run(found.inner, 1.0)
+    z = friction.kernel.states.index("bristle_deflection")
+    assert results.ends[0, z] == pytest.approx(found.inner[0, 0], rel=1e-6)
+    (_, three), *_ = friction.run(np.zeros((1, 1)), 3.0)
+    assert abs(three.ends[0, z] / found.inner[0, 0] - 1) > 0.5
+
+
+# how exact, and invariants
+
+
+def test_tighter_tolerance_changes_nothing() -> None:
+    amplitudes, frequencies = np.meshgrid(np.geomspace(1e-7, 1e-1, 13), np.geomspace(0.1, 100, 7))
+    flat = rigid(LAWS["lugre"]).flat()
+    loose, tight = (of(flat, amplitudes.ravel(), frequencies.ravel(), rtol=rtol) for rtol in (1e-8, 1e-11))
+    assert np.max(np.abs(loose / tight - 1)) < 3e-7
+
+
+def test_sampled_harmonics_converge_with_the_square_of_the_samples() -> None:
+    many = np.array([1024, 4096, 16384])
+    found = [describing(rigid(LAWS["lugre"]), [0.1], [100.0], 9, int(samples)) for samples in many]
+    errors = np.array([float(each["aliasing"].item()) for each in found])
+    assert errors[-1] < 2e-5
+    assert order(errors, many) == pytest.approx(2.0, abs=0.1)
+    third = [each["force"].values[0, 0, 3] for each in found]
+    assert abs(third[1] / third[2] - 1) < 1e-2
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_whole_and_half_period_agree(law: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A symmetric law followed over a whole period has the harmonics of half a period and no even ones."""
+    amplitudes, frequencies = np.array([1e-6, 3e-5, 1e-3]), [0.5, 20.0]
+    half = describing(rigid(LAWS[law]), amplitudes, frequencies, 5)
+    monkeypatch.setattr(Imposition, "symmetric", False)
+    whole = describing(rigid(LAWS[law]), amplitudes, frequencies, 5)
+    assert set(np.ravel(whole["status"])) == {"done"}
+    assert np.max(np.abs(half["force"] - whole["force"])) < 1e-6
+    even = np.abs(whole["force"].sel(harmonic=[0, 2, 4])).values
+    assert (np.max(even) < 1e-6) == (law != "asymmetric")
+
+
+def test_asymmetric_sliding_has_a_mean_force() -> None:
+    """Levels (1 +- 0.2) F_c at speed: a mean of 0.2 F_c, and Coulomb's N on average."""
+    found = describing(rigid(ASYMMETRIC), [0.2], [1.0], 3)
+    assert found["force"].values[0, 0, 0] == pytest.approx(0.2, rel=0.02)
+    assert np.imag(found["stiffness"].item()) == pytest.approx(4 / np.pi / 0.2 + np.pi, rel=0.01)
+
+
+@STEADY
+@given(st.floats(1e-7, 1e-1), st.floats(0.05, 200), st.floats(0.2, 1), st.floats(0, 300), st.floats(1.01, 2))
+def test_passive_friction_takes_energy(
+    amplitude: float, frequency: float, share: float, damping: float, more: float
+) -> None:
+    """sigma_2 > sigma_1 (F_s - F_c)/F_c (Astrom & Canudas de Wit 2008)."""
+    viscous = more * damping * (1 - share) / share
+    flat = changed(LAWS["lugre"], static=1.0, coulomb=share, bristle_damping=damping, viscous=viscous)
+    (found,) = of(flat, amplitude, frequency)
+    assert np.imag(found) > 0
+
+
+@STEADY
+@given(st.floats(1e-7, 1e-1), st.floats(0.05, 200), st.floats(1e-3, 1e3), st.floats(1e-3, 1e3), st.floats(0.1, 10))
+def test_units(amplitude: float, frequency: float, length: float, force: float, time: float) -> None:
+    flat = rigid(LAWS["lugre"]).flat()
+    factors = {
+        "static": force,
+        "coulomb": force,
+        "stribeck_velocity": length / time,
+        "bristle_stiffness": force / length,
+        "bristle_damping": force * time / length,
+        "viscous": force * time / length,
+    }
+    other = flat | {f"friction.{key}": flat[f"friction.{key}"] * factor for key, factor in factors.items()}
+    (one,), (scaled,) = of(flat, amplitude, frequency), of(other, amplitude * length, frequency / time)
+    assert abs(scaled / (one * force / length) - 1) < 1e-6
+
+
+def test_the_thesis_values_feed_some_motions() -> None:
+    """sigma_1 316 is not passive: the work is positive all the same at the amplitudes and frequencies looked at here."""
+    found = describing(rigid(LAWS["lugre"]), np.geomspace(1e-8, 1e-1, 29), np.geomspace(0.1, 200, 15))
+    assert set(np.ravel(found["status"])) == {"done"}
+    assert float(found["work"].min()) > 0
+    assert float(np.real(found["stiffness"]).min()) < 0
+
+
+# what a user may get wrong
+
+
+@pytest.mark.parametrize(
+    ("ask", "text"),
+    [
+        (lambda: describing(rigid(NO_FRICTION), [1e-3], [1.0]), r'friction.model\s+given:\s+"none", without a force'),
+        (lambda: describing(rigid(DAHL), [0.0], [1.0]), r"amplitudes\s+given:\s+\[0.0\]\s+expected: positive"),
+        (lambda: describing(rigid(DAHL), [1.0], [np.nan]), r"frequencies\s+given:\s+\[nan\]"),
+        (lambda: describing(rigid(DAHL), [1.0], [1.0], 0), r"harmonics\s+given:\s+0"),
+        (lambda: describing(rigid(DAHL), [1.0], [1.0], 9, 32), r"harmonics\s+given:\s+9"),
+        (lambda: plant_response(rigid(DAHL), [-1.0], [1.0]), r"forces\s+given:\s+\[-1.0\]"),
+        (lambda: plant_response(rigid(NO_FRICTION), [1.0], [1.0]), "friction.model"),
+    ],
+)
+def test_bad_input(ask: Callable[[], object], text: str) -> None:
+    with pytest.raises(StageError, match=text):
+        ask()
+
+
+def test_a_state_that_does_not_close_is_said_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("friso.frequency.describing.steady.ROUNDS", 1)
+    found = describing(rigid(LAWS["lugre"]), [1e-5], [1.0])
+    assert found["status"].item().startswith("no periodic steady state")
+    assert np.isnan(found["stiffness"].item())
+
+
+# the plant
+
+
+def compliance(frequency: float) -> complex:
+    """A mass of 1.7 kg on bristles that do not slip."""
+    omega = 2 * np.pi * frequency
+    return 1 / (1e5 - 1.7 * omega**2 + 1j * omega * (316.2277660168379 + 0.5))
+
+
+def test_small_forces_see_the_bristles() -> None:
+    found = plant_response(rigid(LAWS["lugre"]), [1e-4], [1.0, 38.0, 200.0])
+    expected = [compliance(frequency) for frequency in (1.0, 38.0, 200.0)]
+    assert found["up"].values[0] == pytest.approx(np.array(expected), rel=1e-4)
+
+
+def test_large_forces_see_the_mass() -> None:
+    found = plant_response(rigid(LAWS["lugre"]), [300.0], [5.0])
+    omega = 2 * np.pi * 5
+    assert found["up"].item() == pytest.approx(1 / (-1.7 * omega**2 + 0.5j * omega), rel=0.01)
+
+
+def driven(force: Callable[[float], float], frequency: float, start: list[float], cycles: int) -> complex:
+    """First harmonic of the position of 1.7 kg under a sinusoidal force, in the last of so many cycles (LSODA)."""
+    flat, omega, samples = rigid(LAWS["lugre"]).flat(), 2 * np.pi * frequency, 512
+
+    def rates(t: float, y: np.ndarray) -> list[float]:
+        friction, z_rate = plain.friction(flat, y[1], y[2])
+        return [y[1], (force(t) * np.cos(omega * t) - friction) / 1.7, z_rate]
+
+    times = np.arange(cycles * samples) / samples / frequency
+    how = {"rtol": 1e-8, "atol": [1e-11, 1e-10, 1e-12], "max_step": 0.01 / frequency}
+    position = solve_ivp(rates, (0, cycles / frequency), start, "LSODA", times, **how).y[0, -samples:]
+    return complex(2 * np.mean(position * np.exp(-2j * np.pi * np.arange(samples) / samples)))
+
+
+@pytest.mark.parametrize(
+    ("size", "frequency", "error"), [(0.5, 5.0, 0.003), (5.0, 10.0, 0.02), (3.0, 20.0, 0.05), (10.0, 60.0, 0.01)]
+)
+def test_response_against_simulation(size: float, frequency: float, error: float) -> None:
+    """The first harmonic alone acts on the friction: a few percent (docs/describing.md has the table)."""
+    found = plant_response(rigid(LAWS["lugre"]), [size], [frequency])
+    assert found["answers"].item() == 1
+    start = complex(size * found["up"].item())
+    velocity = (2j * np.pi * frequency * start).real
+    simulated = driven(lambda _: size, frequency, [start.real, velocity, 0.0], 20)
+    assert abs(start / simulated - 1) < error
+
+
+def test_two_motions_under_one_force() -> None:
+    """1.8 N at 5 Hz: stuck if it comes from rest, sliding if it slid before, and nothing between that lasts."""
+    found = plant_response(rigid(LAWS["lugre"]), [1.8], [5.0]).squeeze()
+    assert found["lasting"].values.tolist() == [1.0, 0.0, 1.0]
+    assert np.max(found["error"]) < 1e-9
+    stuck, _, sliding = 1.8 * found["response"].values
+    from_rest = driven(lambda t: 1.8 * min(1.0, t * 5 / 20), 5.0, [0.0, 0.0, 0.0], 60)
+    start = [sliding.real, (10j * np.pi * sliding).real, 0.0]
+    assert abs(from_rest / stuck - 1) < 0.25  # near break-away, of which the first harmonic knows little
+    assert abs(driven(lambda _: 1.8, 5.0, start, 30) / sliding - 1) < 0.25
+
+
+def test_an_analyser_shows_the_branch_it_comes_from() -> None:
+    found = plant_response(rigid(LAWS["lugre"]), [2.0], np.geomspace(1, 20, 30))
+    several = found["answers"].values[0] == 3
+    assert several.any()
+    assert not several.all()
+    up, down = np.abs(found["up"].values[0]), np.abs(found["down"].values[0])
+    assert np.all(down[several] > 10 * up[several])
+    assert up[~several] == pytest.approx(down[~several])
+
+
+def test_free_joint_has_its_resonances_and_its_stroke() -> None:
+    """Stuck cart: 11.03 Hz; sliding cart: antiresonance 7.12 Hz, resonance 13.12 Hz (references.md, section 5)."""
+    joined = stage(HOLD, masses="both", friction=lugre(2), joint=free("1 mm"), controller=van_dijk())
+    frequencies = np.linspace(5, 16, 111)
+    small = plant_response(joined, [1e-3], frequencies)
+    assert frequencies[np.argmax(np.abs(small["up"].values[0]))] == pytest.approx(11.03, abs=0.15)
+    large = plant_response(joined, [1e3], frequencies)
+    answer = np.abs(large["up"].values[0])
+    assert frequencies[np.argmax(answer)] == pytest.approx(13.12, abs=0.15)
+    assert frequencies[np.argmin(answer)] == pytest.approx(7.12, abs=0.15)
+    assert set(np.ravel(small["status"])) == {"done"}
+    assert TOUCHES in np.ravel(large["status"])
+
+
+def test_mass_line_scatters_where_friction_matters() -> None:
+    places = [{"friction.static": f"{level!r} N", "friction.coulomb": f"{level / 3!r} N"} for level in (1.0, 1.75, 2.5)]
+    found = mass_line(rigid(LAWS["lugre"]), places, [3.0], [20.0, 400.0])
+    assert float(found["spread_magnitude"].values[0, 0]) > 0.02
+    assert float(found["spread_magnitude"].values[0, 1]) < 1e-3
+    assert found["magnitude"].values[:, 0, 1] == pytest.approx(np.ones(3), abs=0.03)
