@@ -11,11 +11,11 @@ from scipy.stats import qmc
 from variants import VARIANTS, lugre, stage, there_and_back, van_dijk
 
 import friso
+from friso.equations.bandwidth import faster
 from friso.hunting.basin import EDGE, MOVES, SHARES, Kick, Moves, displacements, ends_hunting, moves, pushes
 from friso.hunting.cycle.ensemble import Ensemble, done
 from friso.hunting.cycle.hunting import Cycle, hunting
 from friso.hunting.cycle.rest import pushed
-from friso.equations.bandwidth import faster
 from friso.hunting.margin import FARTHEST, margin
 from friso.stage import Stage
 

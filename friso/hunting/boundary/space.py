@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from friso.equations.structure import Structure
-from friso.equations.structure import shared_structure
+from friso.equations.structure import Structure, shared_structure
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.shooting import Family
 from friso.stage import Stage, violations

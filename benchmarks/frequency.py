@@ -1,0 +1,64 @@
+"""Linear analysis: `python -m benchmarks.frequency`.
+
+The worst case over a family of 10^4 states at once, against one python-control system after the other; the whole
+analysis of the thesis rig; and its speed with a sampled drive.
+"""
+
+from __future__ import annotations
+
+import argparse
+
+import control
+import numpy as np
+
+import friso
+from benchmarks.report import Goal, clock, print_goals, print_table, spread
+from friso.frequency.bode import bode
+from friso.frequency.family import grid, scan
+from friso.frequency.members import Members, family
+from friso.stage import Stage
+from friso.studies.thesis.studies import rig
+
+MEMBERS = 10_000
+ONE_BY_ONE = 50
+DRIVES = {"continuous": {}, "sampled": {"drive.sample_time": "50 us", "drive.delay": "50 us"}}
+
+
+def one_by_one(stage: Stage, members: Members, omega: np.ndarray) -> list[float]:
+    """Poles and least distance from -1 of each member, by python-control."""
+    found = []
+    for k in range(len(members)):
+        loop = friso.linear(stage, members[k], "open")
+        poles = control.feedback(loop, 1).poles()
+        found.append(float(np.abs(1 + loop(1j * omega)).min()) if poles.real.max() < 0 else np.nan)
+    return found
+
+
+def run(repetitions: int) -> list[Goal]:
+    rows, goals = [], []
+    for name, changes in DRIVES.items():
+        stage = rig().replace(changes)
+        flat = stage.flat()
+        members = family(flat, MEMBERS // 4, MEMBERS // 4)
+        times = [clock(lambda: scan(flat, members)) for _ in range(repetitions + 1)][1:]  # noqa: B023
+        whole = [clock(lambda: bode(stage)) for _ in range(repetitions)]  # noqa: B023
+        rows.append([name, len(members), spread(times, digits=2), spread(whole, digits=2)])
+        about = f"worst case over {len(members)} states, {name}"
+        goals.append(Goal(about, "< 1 s", f"{min(times):.2f} s", min(times) < 1))
+        if name == "continuous":
+            few = members[np.linspace(0, len(members) - 1, ONE_BY_ONE).astype(int)]
+            slow = clock(lambda: one_by_one(stage, few, grid(flat))) / ONE_BY_ONE * len(members)  # noqa: B023
+            ratio = f"{slow / min(times):.0f} times"
+            goals.append(Goal("against python-control, state after state", "", ratio, None))
+    print_table(("drive", "states", "scan min / median [s]", "friso.bode min / median [s]"), rows)
+    return goals
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--repetitions", type=int, default=5)
+    print_goals(run(parser.parse_args().repetitions), "Goals")
+
+
+if __name__ == "__main__":
+    main()
