@@ -8,15 +8,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-import sympy as sp
 import xarray as xr
 
 import friso
 from friso.studies.thesis import STUDIES, Evidence, Finding, Part, Reproduction, Response, claims, reproduce, rig
 from friso.studies.thesis.claims import _JUDGES, judges, registered
 from friso.studies.thesis.cycles import cycles
-from friso.studies.thesis.judges import series_stiffness
 from friso.studies.thesis.judges.shares import NARROW, WIDE
+from friso.studies.thesis.linear import NEEDS
 from friso.studies.thesis.maps import begins, ends, free_square, trend
 from friso.studies.thesis.open_parameters import METHOD, OPEN
 from friso.studies.thesis.reproduce import _changed, _coarser, lasting
@@ -42,6 +41,9 @@ TABLE_3 = {
     "isolator-crossover-soft": {"controller.crossover": (1, 16), "joint.stroke": (0, 1e-3)},
 }
 """Typed from the thesis's Table 3, in SI units (crossovers in Hz)."""
+
+LINEAR = {"E1", "F7", "F8", "F22", "F23"}
+"""Claims that linear analysis decides: their judges are tried in test_linear_claims.py."""
 
 
 @pytest.fixture(scope="module")
@@ -94,9 +96,9 @@ def test_every_claim_is_in_the_table() -> None:
 
 
 def test_what_simulation_alone_decides_has_a_judge() -> None:
-    needed = {"F5", "F11A", "F11B", "F12A", "F12B", "F13", "F14A", "F14B", "F15A", "F15B", "F16A", "F16B", "E1"}
-    assert needed <= registered().keys()
-    known = STUDIES.keys() | {"locked", WIDE, NARROW}
+    needed = {"F5", "F11A", "F11B", "F12A", "F12B", "F13", "F14A", "F14B", "F15A", "F15B", "F16A", "F16B"}
+    assert needed | LINEAR == registered().keys()
+    known = STUDIES.keys() | {"locked", WIDE, NARROW} | NEEDS.keys()
     assert all(entry.needs <= known for entry in registered().values())
 
 
@@ -275,14 +277,7 @@ def test_a_limit_is_lower_by_a_cell_at_least() -> None:
 
 
 def test_every_judge_of_maps_is_tried_both_ways() -> None:
-    assert HOLDS.keys() == FAILS.keys() == registered().keys() - {"E1"}
-
-
-def test_printed_formulas() -> None:
-    assert registered()["E1"].judge(Evidence({}, {})).judgement == "holds"
-    stiffness, printed = series_stiffness.PRINTED_STIFFNESS, series_stiffness.PRINTED_SENSITIVITY
-    assert series_stiffness.compare(stiffness, sp.sqrt(printed)).judgement == "holds in part"
-    assert not series_stiffness.compare(2 * stiffness, printed).parts[0].holds
+    assert HOLDS.keys() == FAILS.keys() == registered().keys() - LINEAR
 
 
 # --- verdicts ---------------------------------------------------------------------------------------------------------
@@ -339,7 +334,9 @@ def test_values_that_do_not_enter_are_not_counted(small: Reproduction) -> None:
     tried = {each.claim.id: each.tried for each in small.verdicts if each.finding}
     alpha_and_beta = 4
     own_path, own_joint = 3, 2
-    assert tried["E1"] == 0
+    assert tried["E1"] == tried["F7"] == len(OPEN) - alpha_and_beta - own_path
+    assert tried["F8"] == tried["F23"] == len(OPEN) - own_path
+    assert tried["F22"] == len(OPEN) - own_path - own_joint
     assert tried["F16B"] == len(OPEN)
     assert tried["F12B"] == len(OPEN) - alpha_and_beta - own_joint
     assert tried["F11A"] == len(OPEN) - own_path - own_joint
@@ -384,7 +381,7 @@ def test_a_part_of_the_studies_covers_its_claims_only() -> None:
     steps: list[tuple[int, int, str]] = []
     found = reproduce(["control"], points=3, progress=lambda *step: steps.append(step), with_cycles=False)
     judged = {each.claim.id for each in found.verdicts if each.finding}
-    assert judged == {"F5", "F12B", "F13", "E1"}
+    assert judged == {"F5", "F12B", "F13"} | LINEAR
     assert {each.reason for each in found.verdicts if each.claim.id == "F11A"} == {"not computed in this run: path"}
     assert [step[0] for step in steps] == list(range(len(steps)))
     assert steps[-1][0] < steps[-1][1] <= len(steps)
@@ -406,7 +403,7 @@ def test_document_and_page_have_every_claim(small: Reproduction, tmp_path: Path)
     page = reproduction_html(small)
     for claim in claims():
         assert f">{claim.id}<" in page
-    for number in ("5", "11", "12", "13", "14", "15", "16"):
+    for number in ("5", "7", "8", "11", "12", "13", "14", "15", "16", "22", "23"):
         assert f'id="figure-figure-{number}"' in page
     assert "default-src 'none'" in page
     paths = write_reproduction(small, tmp_path / "new" / "folder")
@@ -441,22 +438,22 @@ def test_titles_say_what_is_drawn_whatever_was_found(small: Reproduction) -> Non
 
 def test_a_new_judge_needs_no_change_of_the_page(small: Reproduction) -> None:
     """The way in for later work: a decorated function, and its finding stands in page and document, escaped."""
-    assert "F7" not in registered()
+    assert "F28" not in registered()
     try:
 
-        @judges("F7", figure="7")
-        def limit_cases(evidence: Evidence) -> Finding:
+        @judges("F28", figure="28")
+        def settled(evidence: Evidence) -> Finding:
             return Finding((Part("<b>criterion</b> & more", False, "10.5 <i>Hz</i>", "<script>alert(1)</script>"),))
 
         with pytest.raises(ValueError, match="one already"):
-            judges("F7", figure="7")
+            judges("F28", figure="28")
         found = reproduce([], points=3)
     finally:
-        _JUDGES.pop("F7", None)
-    (entry,) = (each for each in claims_document(found)["claims"] if each["id"] == "F7")
+        _JUDGES.pop("F28", None)
+    (entry,) = (each for each in claims_document(found)["claims"] if each["id"] == "F28")
     assert (entry["judgement"], entry["number"]) == ("differs", "10.5 <i>Hz</i>")
     page = reproduction_html(replace(small, verdicts=found.verdicts))
-    assert "Figure 7" in page
+    assert "Figure 28" in page
     assert "&lt;b&gt;criterion&lt;/b&gt; &amp; more" in page
     assert "<script>alert(1)" not in page
     assert "10.5 <i>" not in page

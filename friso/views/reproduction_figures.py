@@ -1,4 +1,4 @@
-"""The figures of the thesis's simulations in its own arrangement, from a reproduction to plain data."""
+"""The figures of the thesis in its own arrangement, from a reproduction to plain data."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from friso.views.check_figures import SHARES
 from friso.views.figure import GREY, INK, PINK, VERMILLION, Axis, Figure, Limit, Markers, Panel, Series
 from friso.views.map_figures import map_panel
 from friso.views.map_words import statement
+from friso.views.reproduction_loops import loop_figures
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -36,12 +37,9 @@ _SHOWN_FROM = 6.0  # [s] the return move is over by then, at the paths of Fig. 5
 
 def reproduction_figures(reproduction: Reproduction) -> dict[str, Figure]:
     """The figures by their number in the thesis, in its order, those whose studies were run."""
-    found = {"5": _response(reproduction)}
-    for number in ("11", "12", "13", "14", "15", "16"):
-        figure = _shares(reproduction) if number == "13" else _maps(reproduction, number)
-        if figure.panels:
-            found[number] = figure
-    return found
+    found = {"5": _response(reproduction), "13": _shares(reproduction), **loop_figures(reproduction)}
+    found |= {number: _maps(reproduction, number) for number in _TITLES}
+    return {number: found[number] for number in sorted(found, key=int) if found[number].panels}
 
 
 def _maps(reproduction: Reproduction, number: str) -> Figure:

@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Literal
 if TYPE_CHECKING:
     import xarray as xr
 
+    from friso.studies.thesis.linear import Linear
+
 Judgement = Literal["holds", "holds in part", "differs", "not yet covered"]
 
 ABOUT = 1.5
@@ -33,6 +35,11 @@ CONVENTIONS = (
     "none hunting beyond it."
 )
 """How the criteria read the words of the claims: one reading for all."""
+
+
+def about(found: float, expected: float, factor: float = ABOUT) -> bool:
+    """Whether a positive number is within a factor of what is expected; NaN is not."""
+    return expected / factor <= found <= expected * factor
 
 
 @dataclass(frozen=True)
@@ -93,10 +100,18 @@ class Response:
 
 @dataclass(frozen=True)
 class Evidence:
-    """What a judge may look at: maps by study name and responses by name."""
+    """What a judge may look at: maps by study name, responses by name, and the linear analysis of the rig, None where
+    that was not made."""
 
     maps: Mapping[str, xr.Dataset]
     responses: Mapping[str, Response]
+    linear: Linear | None = None
+
+    @property
+    def analysis(self) -> Linear:
+        """The linear analysis, for a judge that needs a part of it."""
+        assert self.linear is not None
+        return self.linear
 
 
 Judge = Callable[[Evidence], Finding]
@@ -104,7 +119,8 @@ Judge = Callable[[Evidence], Finding]
 
 @dataclass(frozen=True)
 class Registered:
-    """A judge, the figure (or equation) that shows its evidence, and the names of the maps and responses it needs."""
+    """A judge, the figure (or equation) that shows its evidence, and the names of the maps, responses and parts of the
+    linear analysis that it needs."""
 
     judge: Judge
     figure: str

@@ -5,9 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Set
 from dataclasses import dataclass, field
 from types import MappingProxyType
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from friso.studies.thesis.studies import NOTHING, ThesisStudy
+
+if TYPE_CHECKING:
+    from friso.studies.thesis.linear import Need
 
 Kind = Literal["unknown parameter", "solver tolerance", "metric"]
 
@@ -43,6 +46,11 @@ class Variant:
         """Whether it matters to what decides on the keys `own` itself; a locked joint has no damping of its own."""
         decided = own | _OPEN_JOINT_KEYS if locked else own
         return self.kind != "unknown parameter" or not self.changes.keys() <= decided
+
+    def touches_linear(self, need: Need) -> bool:
+        """Whether that part of the linear analysis can be another; it knows neither solver nor metric."""
+        outside = {key for key in self.changes if key.startswith(need.outside)}
+        return self.kind == "unknown parameter" and self.changes_more_than(outside, need.locked)
 
 
 def _variants(parameter: str, reason: str, values: Mapping[str, Mapping[str, Any]]) -> tuple[Variant, ...]:

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from friso.engine.simulate import simulate
+from friso.frequency.bode import Bode, bode
 from friso.hunting import COUNTED_ABOVE
 from friso.stage import StageError
 from friso.studies.sweep import sweep
 from friso.studies.thesis.claims import Claim, Evidence, Finding, Registered, Response, claims, registered
 from friso.studies.thesis.cycles import Cycles, cycles
 from friso.studies.thesis.judges.shares import NARROW, WIDE
+from friso.studies.thesis.linear import NEEDS, Linear, analysed
 from friso.studies.thesis.open_parameters import METHOD, OPEN, RTOL, Variant
 from friso.studies.thesis.studies import LOCKED, NOTHING, STUDIES, ThesisStudy, rig
 from friso.studies.thesis.verdicts import Verdict, not_covered, verdict
@@ -38,18 +40,26 @@ RESPONSES: Mapping[str, Mapping[str, object]] = {
 }
 """The runs shown in time, Fig. 5 and 13: what each changes in the rig."""
 
+SHOWN = (1e-2, 3e3)
+"""Frequencies [Hz] of Fig. 7 and 8."""
+
 Progress = Callable[[int, int, str], None]
 
 
 @dataclass(frozen=True)
 class Reproduction:
-    """All that was found: maps by study name and responses by name; the map of Fig. 14B by relative tolerance
-    and the shares of its cells whose verdict, and whose peak count, differs between them (NaN if not computed); a
-    verdict per claim; the hunting cycles behind each map by study name; values per axis of the maps (`points`), which
-    are those of every variant too."""
+    """All that was found.
+
+    Maps by study name and responses by name; the linear analysis of the rig, and in `bode` its curves over the
+    frequency; the map of Fig. 14B by relative tolerance and the shares of its cells whose verdict, and whose peak
+    count, differs between them (NaN if not computed); a verdict per claim; the hunting cycles behind each map by study
+    name; values per axis of the maps (`points`), which are those of every variant too.
+    """
 
     maps: Mapping[str, xr.Dataset]
     responses: Mapping[str, Response]
+    linear: Linear
+    bode: Bode
     tolerances: Mapping[float, xr.Dataset]
     changed: tuple[float, float]
     verdicts: tuple[Verdict, ...]
@@ -78,7 +88,7 @@ def reproduce(
     tell = _Teller(progress, 2 + len(variants) + (len(studies) if with_cycles else 0) + 1)
     tell("maps")
     responses = {name: _response(own, NOTHING, rtol) for name, own in RESPONSES.items()}
-    baseline = Evidence(_maps(studies, points, rtol, VERIFIED), responses)
+    baseline = Evidence(_maps(studies, points, rtol, VERIFIED), responses, analysed(rig()))
     tell("Fig. 14B at two tolerances")
     tolerances = {each: _map(s, NOTHING, points, each) for s in studies if s.panel == "14B" for each in (RTOL, TIGHT)}
     entries = _covered(baseline)
@@ -91,10 +101,16 @@ def reproduce(
         tell(f"hunting cycles, {study.name}")
         behind[study.name] = cycles(study, baseline.maps[study.name])
     tell("done")
+    verdicts, curves = _verdicts(entries, baseline, varied), bode(rig(), SHOWN, series=True)
+    known = (baseline.maps, baseline.responses, baseline.analysis, curves)
+    return Reproduction(*known, tolerances, _changed(tolerances), verdicts, behind, points, rtol)
+
+
+def _verdicts(
+    entries: Mapping[str, Registered], baseline: Evidence, varied: Sequence[tuple[Variant, Mapping[str, Finding]]]
+) -> tuple[Verdict, ...]:
     found, coarse = _findings(entries, baseline), _findings(entries, _coarser(baseline))
-    verdicts = tuple(_judged(claim, baseline, found, coarse, varied) for claim in claims())
-    changed = _changed(tolerances)
-    return Reproduction(baseline.maps, baseline.responses, tolerances, changed, verdicts, behind, points, rtol)
+    return tuple(_judged(claim, baseline, found, coarse, varied) for claim in claims())
 
 
 def _chosen(names: Iterable[str] | None) -> tuple[ThesisStudy, ...]:
@@ -127,7 +143,7 @@ def _coarser(evidence: Evidence) -> Evidence:
         name: runs.isel(dict.fromkeys(runs.dims, every)) if min(runs.sizes.values()) >= 5 else runs
         for name, runs in evidence.maps.items()
     }
-    return Evidence(maps, evidence.responses)
+    return replace(evidence, maps=maps)
 
 
 def _covered(evidence: Evidence) -> Mapping[str, Registered]:
@@ -136,7 +152,8 @@ def _covered(evidence: Evidence) -> Mapping[str, Registered]:
 
 
 def _missing(entry: Registered, evidence: Evidence) -> list[str]:
-    return sorted(entry.needs - evidence.maps.keys() - evidence.responses.keys())
+    linear = NEEDS.keys() if evidence.linear else set[str]()
+    return sorted(entry.needs - evidence.maps.keys() - evidence.responses.keys() - linear)
 
 
 def _findings(entries: Mapping[str, Registered], evidence: Evidence) -> dict[str, Finding]:
@@ -144,7 +161,7 @@ def _findings(entries: Mapping[str, Registered], evidence: Evidence) -> dict[str
 
 
 def _varied(studies: Iterable[ThesisStudy], points: int, rtol: float, variant: Variant, plain: Evidence) -> Evidence:
-    """The evidence with one variant; maps that it does not touch are the baseline's."""
+    """The evidence with one variant; what it does not touch is the baseline's."""
     tolerance = variant.rtol or rtol
     touched = [study for study in studies if variant.touches(study)]
     maps = {**plain.maps, **_maps(touched, points, tolerance, changes=variant.changes)}
@@ -152,7 +169,10 @@ def _varied(studies: Iterable[ThesisStudy], points: int, rtol: float, variant: V
     if variant.kind == "metric":
         maps = {name: lasting(runs) for name, runs in maps.items()}
         responses = {name: Response(lasting(each.cell), each.trace) for name, each in responses.items()}
-    return Evidence(maps, responses)
+    linear = plain.linear
+    if any(variant.touches_linear(need) for need in NEEDS.values()):
+        linear = analysed(rig().replace(dict(variant.changes)))
+    return Evidence(maps, responses, linear)
 
 
 def _maps(
@@ -218,10 +238,15 @@ def _judged(
 
 
 def _enters(variant: Variant, needs: Iterable[str]) -> bool:
-    """Whether a variant changes any of the maps and responses named."""
-    return any(
-        variant.touches(STUDIES[name])
-        if name in STUDIES
-        else variant.changes_more_than(RESPONSES[name].keys(), bool(RESPONSES[name].get("joint.locked")))
-        for name in needs
-    )
+    """Whether a variant changes anything of what is named."""
+    return any(_changes(variant, name) for name in needs)
+
+
+def _changes(variant: Variant, name: str) -> bool:
+    """Whether a variant changes the map, the part of the linear analysis or the response of this name."""
+    if name in STUDIES:
+        return variant.touches(STUDIES[name])
+    if name in NEEDS:
+        return variant.touches_linear(NEEDS[name])
+    own = RESPONSES[name]
+    return variant.changes_more_than(own.keys(), bool(own.get("joint.locked")))

@@ -7,6 +7,8 @@ its finding without a change.
 from friso.studies.thesis.judges import (
     control_and_friction,
     crossover,
+    limit_cases,
+    loops,
     masses,
     path_and_system,
     response,
@@ -18,6 +20,8 @@ from friso.studies.thesis.judges import (
 __all__ = [
     "control_and_friction",
     "crossover",
+    "limit_cases",
+    "loops",
     "masses",
     "path_and_system",
     "response",

@@ -1,0 +1,99 @@
+"""Fig. 7: the plant in the four limit cases of Table 1."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from friso.studies.thesis.claims import ABOUT, ORDER, Evidence, Finding, Part, about, judges
+from friso.studies.thesis.linear import PARASITIC, PLANT, LimitCase
+
+_FIRST = 10.0
+"""Where the thesis finds the eigenfrequency of the free joint [Hz] (Sec. 3.4.2)."""
+
+_MASSES = {False: 0.5, True: 1.7}
+"""Mass [kg] that moves above the first eigenfrequency, by whether the limiter is touched (Sec. 4.2.1)."""
+
+_FREE, _TOUCHED = ("stuck", "sliding"), ("stuck-touched", "sliding-touched")
+
+
+@judges("F7", figure="7", needs=(PLANT,))
+def four_limit_cases(evidence: Evidence) -> Finding:
+    """Resonances, antiresonances and mass lines of the plant."""
+    plants = evidence.analysis.plants
+    return Finding((*_joint_modes(plants), *_high_modes(plants), _mass_lines(plants)))
+
+
+def _joint_modes(plants: Mapping[str, LimitCase]) -> tuple[Part, Part]:
+    """The eigenfrequency of the free joint, and its pair where the cart slides."""
+    low = {name: [f for f in plants[name].antiresonances if f < plants[name].first] for name in _FREE}
+    pair = f"antiresonance {low['sliding'][-1]:.3g} Hz, resonance" if low["sliding"] else "no antiresonance below"
+    return (
+        Part(
+            f"with the limiter free, the first resonance is about {_FIRST:g} Hz (from {_FIRST / ABOUT:.3g} to "
+            f"{_FIRST * ABOUT:.3g} Hz), stuck and sliding",
+            all(about(plants[name].first, _FIRST) for name in _FREE),
+            ", ".join(f"{name} {plants[name].first:.3g} Hz" for name in _FREE),
+        ),
+        Part(
+            "an antiresonance lies below that resonance where the cart slides, and none where it is stuck",
+            bool(low["sliding"] and not low["stuck"]),
+            f"sliding: {pair} {plants['sliding'].first:.3g} Hz; stuck: {len(low['stuck'])} antiresonances below it",
+        ),
+    )
+
+
+def _high_modes(plants: Mapping[str, LimitCase]) -> tuple[Part, Part, Part]:
+    """The parasitic mode, and the pair above it where the limiter is touched."""
+    names = (*_FREE, *_TOUCHED)
+    pairs = {name: plants[name].pair_above for name in _TOUCHED}
+    free = [name for name in _FREE if plants[name].pair_above]
+    found = [f"{name} {pair[0]:.4g} and {pair[1]:.4g} Hz" for name, pair in pairs.items() if pair]
+    series = [f"{name} {_and(plants[f'{name}-series'])}" for name in _TOUCHED]
+    ratio = max((pair[1] / plants[name].parasitic for name, pair in pairs.items() if pair), default=float("inf"))
+    above = all(pairs.values())
+    return (
+        Part(
+            f"in all four cases a resonance is about {PARASITIC:g} Hz (from {PARASITIC / ABOUT:.3g} to "
+            f"{PARASITIC * ABOUT:.3g} Hz)",
+            all(about(plants[name].parasitic, PARASITIC) for name in names),
+            ", ".join(f"{name} {plants[name].parasitic:.4g} Hz" for name in names),
+            why="with the limiter touched the parasitic mass swings against cart and stage, not against the stage",
+        ),
+        Part(
+            "with the limiter touched, an antiresonance and then a resonance lie above the parasitic mode, and with it "
+            "free none",
+            above and not free,
+            f"{', '.join(found) or 'none'}; with the formula that Table 1 prints for a touched limiter, no more modes "
+            f"than with it free: {'; '.join(series)}",
+        ),
+        Part(
+            f"that pair lies just above it: its resonance within half a decade of it (a factor of {ORDER:.2g})",
+            above and ratio <= ORDER,
+            f"a factor of {ratio:.2g}" if above else "no pair",
+            why=_why_far(ratio) if above else "",
+        ),
+    )
+
+
+def _why_far(ratio: float) -> str:
+    return (
+        "idealisation: the pair is that of the cart on the limiter, and of cart and stage against each other on it, "
+        "with k_l of 2e7 N/m as printed (Sec. 3.2.3). It goes about with the root of k_l, which would have to be "
+        f"{(ratio / ORDER) ** 2:.2g} times smaller, and its resonance with the part of the stage's mass that the "
+        "parasitic mode leaves"
+    )
+
+
+def _mass_lines(plants: Mapping[str, LimitCase]) -> Part:
+    masses = {name: plants[name].mass for name in (*_FREE, *_TOUCHED)}
+    listed = ", ".join(f"{name} {mass:.3g} kg at {plants[name].mass_at:.3g} Hz" for name, mass in masses.items())
+    return Part(
+        f"below the parasitic mode the magnitude follows about {_MASSES[False]:g} kg (within a factor of {ABOUT:g}) "
+        f"with the limiter free and about {_MASSES[True]:g} kg with it touched",
+        all(about(mass, _MASSES[name in _TOUCHED]) for name, mass in masses.items()),
+        f"{listed}; it is the limiter that tells them apart, not, as Sec. 3.4.2 says, sticking and slipping",
+    )
+
+
+def _and(case: LimitCase) -> str:
+    return " and ".join(f"{f:.4g}" for f in case.resonances) + " Hz"

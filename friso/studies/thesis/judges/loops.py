@@ -1,0 +1,202 @@
+"""Fig. 8, 22 and 23: the open loops, simulated and measured, and how fast the controller may be."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from friso.frequency.crossover import WANTED
+from friso.frequency.margins import Margins
+from friso.frequency.ranges import Range
+from friso.studies.thesis.claims import ABOUT, ORDER, Evidence, Finding, Part, about, judges
+from friso.studies.thesis.linear import FREE, FURTHER, LOCKED_LOOP, Contact, Linear, Loops, Speeds
+
+_SIMULATED, _MEASURED = 60.0, 48.0
+"""The highest crossovers of the simulation (Sec. 3.4.2) and of the rig (Sec. 4.2.4) [Hz]."""
+
+_CROSSES = 20.0
+"""Where the free rig crossed 0 dB, tuned to 8 Hz [Hz] (Sec. 4.2.4)."""
+
+
+@judges("F8", figure="8", needs=(FREE, LOCKED_LOOP))
+def stable_at_every_speed(evidence: Evidence) -> Finding:
+    """Stability over the speed of the cart, what speed does to the loop, and the crossover by the design method."""
+    found = evidence.analysis
+    single = found.free.single
+    return Finding(
+        (
+            _stable_at_speeds(found.speeds),
+            Part(
+                f"between the prescribed speeds the loop differs far (by more than a factor of {ORDER:.2g}) at a tenth "
+                f"of the crossover, and hardly (at most {ABOUT:g}) at ten times",
+                found.speeds.slow > ORDER and found.speeds.fast <= ABOUT,
+                f"factor {found.speeds.slow:.3g} at a tenth, {found.speeds.fast:.3g} at ten times",
+            ),
+            Part(
+                "by the design method of Sec. 3.4.2 (the loop of the whole mass, sliding, crosses 0 dB once) the "
+                f"crossover may be about {_SIMULATED:g} Hz (from {_SIMULATED / ABOUT:.3g} to {_SIMULATED * ABOUT:.3g} "
+                "Hz)",
+                single is not None and about(single, _SIMULATED),
+                f"up to {_hertz(single)}, where {_beyond(found.locked)}; all limit cases are stable up to "
+                f"{_hertz(found.free.unsampled)} in continuous time; {_edges(found, _SIMULATED)}",
+            ),
+        )
+    )
+
+
+def _beyond(locked: Loops) -> str:
+    """What crosses 0 dB besides, at the highest setting."""
+    further = _further(locked.margins[_MEASURED]["sliding"], _MEASURED)
+    return f"a mode reaches it too (locked, tuned to {_MEASURED:g} Hz: {_listed(further)})"
+
+
+def _stable_at_speeds(speeds: Speeds) -> Part:
+    unstable = {"limiter free": speeds.unstable, "touched": speeds.unstable_touched}
+    where = [f"{name} {_speeds(ranges)}" for name, ranges in unstable.items() if ranges]
+    why = "idealisation: there friction falls as the speed rises (Stribeck effect)"
+    if speeds.incurable:
+        why += ", and no faster controller up to 10 kHz is stable"
+    if not speeds.undeflected:
+        why += (
+            "; linearised about an initial speed with the bristles not yet deflected (z = 0), which leaves that out, "
+            "the loop is stable at every speed: probably what the thesis drew"
+        )
+    return Part(
+        "the loop is stable at every speed of the cart, its limiter free or touched",
+        not where,
+        f"unstable: {', '.join(where)}" if where else "stable at every speed",
+        why=why if where else "",
+    )
+
+
+def _speeds(ranges: tuple[Range, ...]) -> str:
+    return " and ".join(f"from {low * 1e3:.2g} to {high * 1e3:.2g} mm/s" for low, high in ranges)
+
+
+@judges("F22", figure="22", needs=(LOCKED_LOOP,))
+def locked_loops_cross_where_tuned(evidence: Evidence) -> Finding:
+    """The crossings of the locked rig, sliding, at the thesis's settings."""
+    settings = {f: cases["sliding"] for f, cases in evidence.analysis.locked.margins.items()}
+    tuned = {f: nearest(known, f) for f, known in settings.items()}
+    lowest, highest = min(settings), max(settings)
+    further = _further(settings[highest], highest)
+    near = min(further, key=lambda f: abs(np.log(f / FURTHER)), default=np.nan)
+    why = f"idealisation: {_why_elsewhere(evidence.analysis.contact)}"
+    return Finding(
+        (
+            Part(
+                f"at every setting from {lowest:g} to {highest:g} Hz the sliding rig crosses 0 dB about there (within "
+                f"a factor of {ABOUT:g})",
+                all(about(found, f) for f, found in tuned.items()),
+                ", ".join(f"{found:.3g} Hz tuned to {f:g}" for f, found in tuned.items()),
+            ),
+            Part(
+                "at the highest setting it crosses 0 dB again above, at the lowest it does not",
+                bool(further and not _further(settings[lowest], lowest)),
+                f"tuned to {highest:g} Hz: {_listed(further)}",
+                why=why,
+            ),
+            Part(
+                f"one of these crossings is about {FURTHER:g} Hz (from {FURTHER / ABOUT:.3g} to "
+                f"{FURTHER * ABOUT:.3g} Hz)",
+                about(near, FURTHER),
+                f"nearest {near:.3g} Hz" if further else "none",
+                why=why,
+            ),
+            _threatened(settings[highest], highest, further),
+        )
+    )
+
+
+def _why_elsewhere(contact: Contact) -> str:
+    """What it would take to cross 0 dB where the thesis measured it."""
+    soft, undamped = (_further(known, _MEASURED) for known in (contact.margins, contact.undamped))
+    return (
+        "no mode of the locked model lies there. The contact of cart and stage would with k_l of "
+        f"{contact.stiffness:.2g} N/m (Sec. 3.2.3: 2e7 N/m, for limiters, not for fixtures): further crossings then "
+        f"{_listed(soft)} with the limiter damping of the rig, {_listed(undamped)} with 1 N s/m. Or it is the frame of "
+        "the encoder's scale, in which Sec. 4.3.1 saw resonances, and which is not in the model"
+    )
+
+
+def _threatened(known: Margins, setting: float, further: tuple[float, ...]) -> Part:
+    """Whether a further crossing takes the loop close to instability."""
+    there = any(about(known.closest, f) for f in further)
+    where = f"distance {known.modulus_margin:.2g} from -1, at {known.closest:.3g} Hz" if known.stable else "unstable"
+    return Part(
+        "at the highest setting that crossing threatens stability: about there the loop comes closer to -1 than "
+        f"{WANTED:g} (or it is unstable)",
+        bool(further) and (not known.stable or (there and known.modulus_margin < WANTED)),
+        where,
+        why=f"tuned to {setting:g} Hz, the model is far from instability even there: it takes a delay of "
+        f"{_micro(known.delay_margin)}"
+        if further and known.stable
+        else "",
+    )
+
+
+@judges("F23", figure="23", needs=(FREE, LOCKED_LOOP))
+def free_loop_crosses_above(evidence: Evidence) -> Finding:
+    """The crossing of the free joint tuned for the whole mass, and its highest stable setting."""
+    found = evidence.analysis
+    cases = found.free.margins[min(found.free.margins)]
+    crossing = {name: nearest(cases[name], _CROSSES) for name in ("stuck", "sliding")}
+    highest = found.free.unsampled
+    return Finding(
+        (
+            Part(
+                f"tuned to 8 Hz for the whole mass, the free joint's loop crosses 0 dB about {_CROSSES:g} Hz (from "
+                f"{_CROSSES / ABOUT:.3g} to {_CROSSES * ABOUT:.3g} Hz), stuck and sliding",
+                all(about(each, _CROSSES) for each in crossing.values()),
+                f"{', '.join(f'{name} {each:.3g} Hz' for name, each in crossing.items())}; with the masses identified "
+                f"(0.75 kg, tuned for 2.5 kg) {nearest(found.identified, _CROSSES):.3g} Hz",
+            ),
+            Part(
+                f"the setting up to which all limit cases are stable is about {_MEASURED:g} Hz (from "
+                f"{_MEASURED / ABOUT:.3g} to {_MEASURED * ABOUT:.3g} Hz)",
+                highest is not None and about(highest, _MEASURED),
+                f"in continuous time {_hertz(highest)}; {_sampled(found)}; {_edges(found, _MEASURED)}",
+                why="idealisation: the simulated controller neither samples nor delays; the rig's does, but the thesis "
+                "gives no delay. Besides, its frame has resonances (Sec. 4.3.1) that the model does not have",
+            ),
+        )
+    )
+
+
+def nearest(known: Margins, frequency: float) -> float:
+    """The crossing of 0 dB closest to a frequency [Hz]; NaN without any."""
+    return min(known.crossovers, key=lambda f: abs(np.log(f / frequency)), default=np.nan)
+
+
+def _further(known: Margins, setting: float) -> tuple[float, ...]:
+    """Crossings of 0 dB above that of the crossover tuned for [Hz]."""
+    return tuple(f for f in known.crossovers if f > nearest(known, setting))
+
+
+def _listed(frequencies: tuple[float, ...]) -> str:
+    return f"{' and '.join(f'{f:.4g}' for f in frequencies)} Hz" if frequencies else "none"
+
+
+def _hertz(crossover: float | None) -> str:
+    return "10 kHz, the end of the search" if crossover is None else f"{crossover:.4g} Hz"
+
+
+def _sampled(found: Linear) -> str:
+    """What sampling and delays leave of the highest stable crossover."""
+    by_delay = ", ".join(
+        f"{_hertz(free)} and {_hertz(found.locked.sampled[delay])} with {_micro(delay)}"
+        for delay, free in found.free.sampled.items()
+    )
+    return f"sampled at 50 us, by delay, free and locked: {by_delay}"
+
+
+def _edges(found: Linear, setting: float) -> str:
+    """The delays at which a setting is at the edge of stability."""
+    edges = {"free": found.free.delay_at[setting], "locked": found.locked.delay_at[setting]}
+    said = [
+        f"{name} {f'with a delay of {_micro(at)}' if np.isfinite(at) else 'beyond it'}" for name, at in edges.items()
+    ]
+    return f"sampled at 50 us, {setting:g} Hz is at the edge of stability: {', '.join(said)}"
+
+
+def _micro(seconds: float) -> str:
+    return f"{seconds * 1e6:.0f} us"

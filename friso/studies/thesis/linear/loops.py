@@ -1,0 +1,127 @@
+"""The loops of the rig at the thesis's crossovers, and how fast its controller may be, with and without its drive."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from friso.equations.bandwidth import faster
+from friso.frequency.crossover import HIGHEST
+from friso.frequency.family import controller, loops, modes, plants, spectral_abscissa
+from friso.frequency.margins import Margins, frequencies, margins, with_resonances
+from friso.frequency.members import joined, limit_cases
+from friso.frequency.ranges import ranges_below
+from friso.stage import Stage
+
+SETTINGS = (8.0, 16.0, 24.0, 32.0, 40.0, 48.0)
+"""Crossovers [Hz] of Fig. 22."""
+
+LIMITS = (48.0, 60.0)
+"""Crossovers [Hz] that the thesis calls the highest, of the rig (Sec. 4.2.4) and of the simulation (Sec. 3.4.2)."""
+
+SAMPLED = "50 us"
+"""Sample time of the rig's controller (Sec. 3.5)."""
+
+DELAYS = (0.0, 50e-6, 100e-6, 150e-6, 200e-6, 500e-6, 1e-3)
+"""Delays [s] of drive, encoder and computation, besides the hold, none of which the thesis states: from none over a few
+samples to what a fieldbus takes."""
+
+CURVE = (1.0, 3e3)
+"""Frequencies [Hz] over which the loops are drawn."""
+
+POINTS = 1500
+"""Frequencies of a curve, besides those about resonances."""
+
+LOWEST, STEPS = 1.0, 61
+"""The first crossover [Hz] of those that are looked at before the end of a range is located, and how many."""
+
+
+@dataclass(frozen=True)
+class Loops:
+    """The loops of a rig with its joint free or locked, tuned to each crossover [Hz].
+
+    `margins` by crossover and limit case; over `omega` [rad/s], the loop of the sliding cart, its limiter free if it
+    can be, in `curves` by crossover, complex. `single` is the highest crossover [Hz] up to which the loop of the
+    sliding stage as one mass (locked or with a touched limiter) crosses 0 dB only once. `unsampled` is that up to which
+    it is stable in all limit cases, in continuous time without delay, and `sampled` that at the rig's sample time, by
+    delay [s]: None beyond 10 kHz, half the sampling frequency, and 0 where there is none. `delay_at` is the delay [s],
+    at that sample time, that takes a crossover to the edge of stability; NaN for one that is not stable anyway.
+    """
+
+    margins: Mapping[float, Mapping[str, Margins]]
+    omega: np.ndarray
+    curves: Mapping[float, np.ndarray]
+    single: float | None
+    unsampled: float | None
+    sampled: Mapping[float, float | None]
+    delay_at: Mapping[float, float]
+
+
+def loops_of(stage: Stage, settings: tuple[float, ...]) -> Loops:
+    """The loops of a stage, tuned to the crossovers `settings` [Hz]."""
+    flat = stage.flat()
+    tuned = {f: _tuned(flat, f) for f in settings}
+    omega = _omega(flat)
+    moving = limit_cases(flat)["sliding"]
+    drive = stage.replace({"drive.sample_time": SAMPLED}).flat()
+    return Loops(
+        margins={f: {name: margins(own, one) for name, one in limit_cases(own).items()} for f, own in tuned.items()},
+        omega=omega,
+        curves={f: loops(own, moving, omega)[0] for f, own in tuned.items()},
+        single=_single(flat),
+        unsampled=_highest(flat),
+        sampled={delay: _highest({**drive, "drive.delay": delay}) for delay in DELAYS},
+        delay_at={f: _edge(_tuned(drive, f)) for f in LIMITS},
+    )
+
+
+def _tuned(flat: Mapping[str, Any], crossover: Any) -> dict[str, Any]:
+    return faster(flat, crossover / flat["controller.crossover"])
+
+
+def _omega(flat: Mapping[str, Any]) -> np.ndarray:
+    """Frequencies [rad/s] of the curves, dense about resonances."""
+    poles = modes(flat, joined([*limit_cases(flat).values()]))
+    return with_resonances(np.geomspace(*CURVE, POINTS) * 2 * np.pi, poles)
+
+
+def _single(flat: Mapping[str, Any]) -> float | None:
+    """See `Loops`; the free joint's limiter is touched, since the controller is tuned for all the mass."""
+    cases = limit_cases(flat)
+    one = cases.get("sliding-touched", cases["sliding"])
+    poles = modes(flat, one)
+    omega = frequencies(poles, poles, np.inf)
+    bare = plants(flat, one, omega)[0]
+
+    def more(crossover: np.ndarray) -> np.ndarray:
+        above = np.array([np.abs(bare * controller(_tuned(flat, f), omega)) > 1 for f in crossover])
+        return (above[:, 1:] != above[:, :-1]).sum(axis=1) - 1.5
+
+    return _end_of_first(more)
+
+
+def _highest(flat: Mapping[str, Any]) -> float | None:
+    """The crossover [Hz] up to which all limit cases are stable; None beyond 10 kHz."""
+    cases = joined([*limit_cases(flat).values()])
+
+    def rightmost(crossover: np.ndarray) -> np.ndarray:
+        many = _tuned(flat, np.repeat(crossover, len(cases)))
+        return spectral_abscissa(many, cases.repeated(len(crossover))).reshape(-1, len(cases)).max(axis=1)
+
+    return _end_of_first(rightmost)
+
+
+def _end_of_first(excess: Callable[[np.ndarray], np.ndarray]) -> float | None:
+    """Where the first range of crossovers [Hz] ends in which something is below 0; None at the end of the search, 0
+    without any."""
+    at = np.geomspace(LOWEST, 0.999 * HIGHEST, STEPS)
+    end = next((high for _, high in ranges_below(at, excess)), 0.0)
+    return None if end >= at[-1] else end
+
+
+def _edge(flat: Mapping[str, Any]) -> float:
+    """The delay [s] that some limit case does not bear."""
+    return float(np.min([margins(flat, one).delay_margin for one in limit_cases(flat).values()]))

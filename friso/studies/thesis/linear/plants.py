@@ -1,0 +1,108 @@
+"""What the plant shows in each limit case, as one reads it off Fig. 7."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.signal import find_peaks
+
+from friso.frequency.family import modes, plants
+from friso.frequency.margins import frequencies
+from friso.frequency.members import Members, limit_cases
+from friso.frequency.parts import FORCE, STAGE, plant
+from friso.frequency.stiffness import limiter_in_series
+
+PARASITIC = 300.0
+"""Frequency [Hz] at which the thesis finds the parasitic mode (Sec. 3.4.2)."""
+
+VISIBLE = np.log(10) / 20
+"""Height from which a peak of the logarithm of the magnitude counts as a resonance: 1 dB."""
+
+FINER = 201
+"""Frequencies between the two neighbours of an extreme, among which it is located."""
+
+
+@dataclass(frozen=True)
+class LimitCase:
+    """Stage position over force in one limit case: its `resonances` and `antiresonances` [Hz], ascending; the `mass`
+    [kg] whose line it follows below the parasitic mode, at `mass_at` [Hz] (both NaN where there is none)."""
+
+    resonances: tuple[float, ...]
+    antiresonances: tuple[float, ...]
+    mass: float
+    mass_at: float
+
+    @property
+    def parasitic(self) -> float:
+        """The resonance closest to the thesis's parasitic mode [Hz]; NaN without any."""
+        return min(self.resonances, key=lambda f: abs(np.log(f / PARASITIC)), default=np.nan)
+
+    @property
+    def first(self) -> float:
+        """The first resonance [Hz]; NaN without any."""
+        return self.resonances[0] if self.resonances else np.nan
+
+    @property
+    def pair_above(self) -> tuple[float, float] | None:
+        """The first antiresonance above the parasitic mode and the resonance that follows it [Hz]; None without."""
+        pairs = [(z, p) for z in self.antiresonances for p in self.resonances if self.parasitic < z < p]
+        return min(pairs, default=None)
+
+
+@dataclass(frozen=True)
+class Springs:
+    """Stiffness [N/m] of the `joint`, of the `bristles` of the cart, and of the plant at rest, which has `both`."""
+
+    joint: float
+    bristles: float
+    both: float
+
+
+def springs_of(flat: Mapping[str, Any]) -> Springs:
+    """The springs of a stage whose cart is stuck, its limiter free."""
+    machine = plant(flat, limit_cases(flat)["stuck"]).take((FORCE,), (STAGE,))
+    both = float(1 / abs(machine.at(np.zeros(1))[0, 0, 0, 0]))
+    return Springs(flat["joint.stiffness"], flat["friction.bristle_stiffness"], both)
+
+
+def limit_cases_of(flat: Mapping[str, Any]) -> dict[str, LimitCase]:
+    """All limit cases by name; those with a touched limiter by the formula of Table 1 too, with "-series" behind."""
+    cases = limit_cases(flat)
+    series = limiter_in_series(flat)
+    found = {name: _limit_case(flat, one) for name, one in cases.items()}
+    printed = {name: one.with_limiter(False) for name, one in cases.items() if one.touched[0]}
+    return found | {f"{name}-series": _limit_case(series, one) for name, one in printed.items()}
+
+
+def _limit_case(flat: Mapping[str, Any], one: Members) -> LimitCase:
+    poles = modes(flat, one)
+    omega = frequencies(poles, poles, np.inf)
+    resonances, antiresonances = (_peaks(flat, one, omega, sign) for sign in (1, -1))
+    at = _mass_line(LimitCase(resonances, antiresonances, np.nan, np.nan))
+    omega_at = np.array([2 * np.pi * at])
+    mass = np.nan if np.isnan(at) else float(1 / (abs(plants(flat, one, omega_at)[0, 0]) * omega_at[0] ** 2))
+    return LimitCase(resonances, antiresonances, mass, at)
+
+
+def _peaks(flat: Mapping[str, Any], one: Members, omega: np.ndarray, sign: int) -> tuple[float, ...]:
+    """Frequencies [Hz] at which the magnitude has its peaks, or those of its inverse for a negative sign."""
+
+    def height(at: np.ndarray) -> np.ndarray:
+        return sign * np.log(np.abs(plants(flat, one, at)[0]))
+
+    places, _ = find_peaks(height(omega), prominence=VISIBLE)
+    if not len(places):
+        return ()
+    finer = np.geomspace(omega[places - 1], omega[places + 1], FINER, axis=1)
+    best = height(finer.ravel()).reshape(finer.shape).argmax(axis=1)
+    return tuple((finer[np.arange(len(places)), best] / (2 * np.pi)).tolist())
+
+
+def _mass_line(case: LimitCase) -> float:
+    """In the middle of the mass line [Hz]: between the antiresonance of the parasitic mode and what is below it."""
+    high = max((f for f in case.antiresonances if f < case.parasitic), default=np.nan)
+    low = max((f for f in case.resonances if f < high), default=high / 10)
+    return float(np.sqrt(low * high))

@@ -1,0 +1,95 @@
+"""The 8 Hz loop over the speed of the cart, as Fig. 8 prescribes it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from friso.equations.bandwidth import faster
+from friso.frequency.bode import PRESCRIBED
+from friso.frequency.crossover import HIGHEST
+from friso.frequency.family import loops, spectral_abscissa
+from friso.frequency.friction import law_of, operating_point, speeds
+from friso.frequency.loops import closed_loop
+from friso.frequency.members import Members, member
+from friso.frequency.parts import DISTURBANCE
+from friso.frequency.ranges import Range, ranges_below
+
+SPEEDS = 257
+"""Speeds at which stability is looked at before the ends of its ranges are located."""
+
+CROSSOVERS = 25
+"""Faster controllers that are tried on a cart that is not stable."""
+
+
+@dataclass(frozen=True)
+class Speeds:
+    """The loop with the cart at prescribed speeds [m/s].
+
+    `unstable` are the ranges of speed in which it is not, the limiter free and `unstable_touched`; `undeflected` the
+    same with bristles that the motion has not deflected yet (z = 0), which is where a linearisation about an initial
+    speed begins; `incurable` tells whether no faster controller up to 10 kHz makes the whole range stable; `slow` and
+    `fast` are the ratios of the greatest to the least magnitude of the loop over the prescribed speeds, at a tenth and
+    at ten times the crossover.
+    """
+
+    unstable: tuple[Range, ...]
+    unstable_touched: tuple[Range, ...]
+    undeflected: tuple[Range, ...]
+    incurable: bool
+    slow: float
+    fast: float
+
+
+def speeds_of(flat: Mapping[str, Any]) -> Speeds:
+    """The loop of a stage over the speed of its cart."""
+    found = {touched: _unstable(flat, touched) for touched in (False, True)}
+    tenth = 2 * np.pi * flat["controller.crossover"] * np.array([0.1, 10.0])
+    size = np.abs(np.array([loops(flat, member(speed), tenth)[0] for speed in PRESCRIBED]))
+    slow, fast = (size.max(axis=0) / size.min(axis=0)).tolist()
+    return Speeds(
+        unstable=found[False],
+        unstable_touched=found[True],
+        undeflected=ranges_below(speeds(flat, SPEEDS), lambda v: -abscissa_with_bristles(flat, v, 0.0)),
+        incurable=_incurable(flat, found[False]),
+        slow=slow,
+        fast=fast,
+    )
+
+
+def _unstable(flat: Mapping[str, Any], touched: bool) -> tuple[Range, ...]:
+    return ranges_below(speeds(flat, SPEEDS), lambda v: -spectral_abscissa(flat, _sliding(v, touched)))
+
+
+def _sliding(speed: np.ndarray, touched: bool = False) -> Members:
+    """States that slide at these speeds [m/s]."""
+    n = len(speed)
+    return Members(speed, np.zeros(n), np.full(n, touched), np.full(n, True))
+
+
+def _incurable(flat: Mapping[str, Any], unstable: tuple[Range, ...]) -> bool:
+    """Whether at some speed within the ranges no faster controller is stable."""
+    crossover = np.geomspace(flat["controller.crossover"], HIGHEST, CROSSOVERS)
+    many = faster(flat, crossover / flat["controller.crossover"])
+    middles = [np.full(CROSSOVERS, np.sqrt(low * high)) for low, high in unstable]
+    return any(bool((spectral_abscissa(many, _sliding(speed)) > 0).all()) for speed in middles)
+
+
+def abscissa_with_bristles(flat: Mapping[str, Any], speed: np.ndarray, share: float) -> np.ndarray:
+    """Real part [1/s] of the rightmost pole of the loop, its friction linearised at speeds (n,) [m/s] and at a share of
+    the deflection of the bristles that belongs to these speeds in steady state."""
+    law = law_of(flat)
+    assert law is not None  # the rig has friction
+    sliding = _sliding(speed)
+    at = {**flat, "velocity": speed} | operating_point(flat, sliding)
+    at |= {name: share * at[name] for name in law.states}
+    friction = law.declared.at(at, len(speed))
+    loop = closed_loop({**flat, "friction.model": "none"}, sliding)
+    push = loop.b[:, :, [loop.inputs.index(DISTURBANCE)]]
+    cart = np.eye(len(loop.states))[[loop.states.index("cart_velocity")]]
+    above = np.concatenate([loop.a - push @ friction.d @ cart, -push @ friction.c], axis=2)
+    below = np.concatenate([friction.b @ cart, friction.a], axis=2)
+    return np.linalg.eigvals(np.concatenate([above, below], axis=1)).real.max(axis=1)
