@@ -11,10 +11,14 @@ if TYPE_CHECKING:
     from friso.engine.simulate import simulate
     from friso.frequency.analysis import linear
     from friso.frequency.bode import Bode, bode
+    from friso.frequency.describing.function import describing
+    from friso.frequency.describing.mass_line import mass_line
+    from friso.frequency.describing.response import plant_response
     from friso.frequency.members import Members, member
     from friso.frequency.tuning import Tuning, tuning
     from friso.hunting.check import Case, check
     from friso.studies.boundary import boundary
+    from friso.studies.harmonic_balance import harmonic_balance
     from friso.studies.samples import Samples
     from friso.studies.store import read_store
     from friso.studies.sweep import sweep
@@ -26,9 +30,13 @@ _LAZY = {
     "sweep": "friso.studies.sweep",
     "bode": "friso.frequency.bode",
     "Bode": "friso.frequency.bode",
+    "describing": "friso.frequency.describing.function",
+    "harmonic_balance": "friso.studies.harmonic_balance",
     "linear": "friso.frequency.analysis",
+    "mass_line": "friso.frequency.describing.mass_line",
     "member": "friso.frequency.members",
     "Members": "friso.frequency.members",
+    "plant_response": "friso.frequency.describing.response",
     "tuning": "friso.frequency.tuning",
     "Tuning": "friso.frequency.tuning",
     "boundary": "friso.studies.boundary",
@@ -48,10 +56,14 @@ __all__ = [
     "bode",
     "boundary",
     "check",
+    "describing",
+    "harmonic_balance",
     "linear",
     "load",
     "loads",
+    "mass_line",
     "member",
+    "plant_response",
     "read_store",
     "save",
     "simulate",

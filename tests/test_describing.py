@@ -16,8 +16,9 @@ from variants import DAHL, HOLD, NO_FRICTION, free, lugre, stage, stribeck, van_
 from friso.engine.kernel import Wanted, kernels
 from friso.equations.imposed import imposed_form
 from friso.frequency.describing.function import describing, dynamic_stiffness
+from friso.frequency.describing.loop import TOUCHES
 from friso.frequency.describing.mass_line import mass_line
-from friso.frequency.describing.response import TOUCHES, plant_response
+from friso.frequency.describing.response import plant_response
 from friso.frequency.describing.steady import Imposition, steady
 from friso.stage import Stage, StageError
 from friso.stage.tables import FRICTION
@@ -59,34 +60,38 @@ def order(errors: np.ndarray, sizes: np.ndarray) -> np.ndarray:
 # closed forms
 
 
-def test_static_limit_is_coulomb_plus_stiction() -> None:
-    """Bristles without deflection and damping: F = g(v) sign(v) + sigma_2 v, with g = F_c + (F_s - F_c) exp(-(v/v_s)^2).
+STIFFNESSES = np.array([1e8, 1e9, 1e10])
 
-    F_1 = i 4/pi (F_c + (F_s - F_c) D(a)/a) + i omega sigma_2 A, a = A omega/v_s, D Dawson's function, since the integral
-    of exp(-a^2 sin^2 t) sin t over a quarter period is D(a)/a. What is left falls with 1/sigma_0.
+
+def test_static_limit_is_coulomb_plus_stiction() -> None:
+    """Bristles without deflection and damping: F = g(v) sign(v) + sigma_2 v, g = F_c + (F_s - F_c) exp(-(v/v_s)^2).
+
+    F_1 = i 4/pi (F_c + (F_s - F_c) D(a)/a) + i omega sigma_2 A, a = A omega/v_s, D Dawson's function, since the
+    integral of exp(-a^2 sin^2 t) sin t over a quarter period is D(a)/a. At the turn of the motion the force changes
+    over a way of F_s/sigma_0 and so over an angle that falls with its square root, which the real part feels, and the
+    imaginary part (the loss) by its square.
     """
     speeds = np.array([0.05, 0.5, 1.0, 3.0, 20.0]) * 1.6e-3
     frequency = 2.0
-    amplitude = speeds / (2 * np.pi * frequency)
+    amplitudes = speeds / (2 * np.pi * frequency)
     level = 1 + 2 * dawsn(speeds / 1.6e-3) / (speeds / 1.6e-3)
-    expected = 1j * (4 / np.pi * level / amplitude + 2 * np.pi * frequency * 0.5)
-    stiffnesses = np.array([1e7, 1e8, 1e9])
-    errors = []
-    for sigma_0 in stiffnesses:
-        flat = changed(LAWS["lugre"], bristle_stiffness=sigma_0, bristle_damping=0.0)
-        errors.append(np.abs(of(flat, amplitude, frequency) / expected - 1))
-    assert np.all(errors[-1] < 1e-3)
-    assert order(np.max(errors, axis=1), stiffnesses) == pytest.approx(1.0, abs=0.1)
+    expected = 4 / np.pi * level / amplitudes + 2 * np.pi * frequency * 0.5
+    laws = [changed(LAWS["lugre"], bristle_stiffness=sigma_0, bristle_damping=0.0) for sigma_0 in STIFFNESSES]
+    off = np.array([of(law, amplitudes, frequency) for law in laws]) / expected - 1j
+    assert np.max(np.abs(np.imag(off[-1]))) < 1e-4
+    for one in off.T:
+        assert order(np.abs(np.imag(one)), STIFFNESSES) == pytest.approx(1.0, abs=0.02)
+        assert order(np.real(one), STIFFNESSES) == pytest.approx(0.5, abs=0.02)
 
 
 def test_relay_of_python_control() -> None:
-    """Coulomb friction is a relay on the velocity: N = i omega DF(A omega)."""
+    """Coulomb friction is a relay on the velocity: N = i omega DF(A omega); Dahl's loses F_c/(sigma_0 A) less."""
     relay = control.relay_hysteresis_nonlinearity(1.0, 0.0)
-    expected = 2j * np.pi * 3.0 * control.describing_function(relay, [2 * np.pi * 3.0 * 1e-3])
-    stiffnesses = np.array([1e7, 1e8, 1e9])
-    errors = [np.abs(of(changed(DAHL, bristle_stiffness=s, viscous=0.0), 1e-3, 3.0) / expected - 1) for s in stiffnesses]
-    assert errors[-1] < 1e-5
-    assert order(np.ravel(errors), stiffnesses) == pytest.approx(1.0, abs=0.1)
+    expected = 6 * np.pi * np.real(control.describing_function(relay, [6 * np.pi * 1e-3]))
+    laws = [changed(DAHL, bristle_stiffness=sigma_0, viscous=0.0) for sigma_0 in STIFFNESSES]
+    off = np.array([of(law, 1e-3, 3.0) for law in laws])[:, 0] / expected - 1j
+    assert np.imag(off) == pytest.approx(-1.0 / (STIFFNESSES * 1e-3), rel=1e-3)
+    assert order(np.real(off), STIFFNESSES) == pytest.approx(0.5, abs=0.02)
 
 
 def test_static_law_equals_python_control() -> None:
@@ -98,8 +103,8 @@ def test_static_law_equals_python_control() -> None:
 
 
 def test_dahl_loses_what_a_spring_behind_a_backlash_loses() -> None:
-    """A spring that slips at F_c is k (x - backlash of x); its loop and Dahl's have the same area, 4 F_c (A - F_c/k), but
-    for exp(-2 k A/F_c). Their springs differ, by Dahl's rounder corners."""
+    """A spring that slips at F_c is k (x - backlash of x); its loop and Dahl's have the same area, 4 F_c (A - F_c/k),
+    but for exp(-2 k A/F_c). Their springs differ, by Dahl's rounder corners."""
     amplitudes = np.array([4e-5, 1e-4, 1e-3])
     backlash = control.friction_backlash_nonlinearity(2 / 1e5)
     spring = 1e5 * (1 - control.describing_function(backlash, amplitudes))
@@ -145,14 +150,13 @@ def settled(flat: dict[str, Any], amplitude: float, frequency: float, periods: i
 
 
 @pytest.mark.parametrize(
-    ("amplitude", "frequency", "periods"), [(3e-5, 0.1, 3), (1e-4, 100.0, 2), (1e-3, 5.0, 2), (2e-2, 2.0, 2)]
+    ("amplitude", "frequency", "periods"), [(3e-5, 0.1, 7), (1e-4, 100.0, 2), (1e-3, 5.0, 2), (2e-2, 2.0, 2)]
 )
 def test_plain_integration(amplitude: float, frequency: float, periods: int) -> None:
-    """The same law written by hand; at 0.1 mm and 100 Hz the Stribeck effect makes it a negative spring."""
+    """The same law written by hand."""
     flat = rigid(LAWS["lugre"]).flat()
     (found,) = of(flat, amplitude, frequency)
-    assert abs(found / settled(flat, amplitude, frequency, periods) - 1) < 3e-6
-    assert (found.real < 0) == (frequency == 100.0)
+    assert abs(found / settled(flat, amplitude, frequency, periods) - 1) < 1e-8
 
 
 def test_long_memory_is_solved_for() -> None:
@@ -236,12 +240,18 @@ def test_units(amplitude: float, frequency: float, length: float, force: float, 
     assert abs(scaled / (one * force / length) - 1) < 1e-6
 
 
-def test_the_thesis_values_feed_some_motions() -> None:
-    """sigma_1 316 is not passive: the work is positive all the same at the amplitudes and frequencies looked at here."""
+def test_sinusoids_lose_energy_although_the_thesis_values_are_not_passive() -> None:
+    """At all amplitudes and frequencies looked at; as a spring, friction is negative at some of them."""
     found = describing(rigid(LAWS["lugre"]), np.geomspace(1e-8, 1e-1, 29), np.geomspace(0.1, 200, 15))
     assert set(np.ravel(found["status"])) == {"done"}
     assert float(found["work"].min()) > 0
     assert float(np.real(found["stiffness"]).min()) < 0
+
+
+def test_friction_may_differ_from_pair_to_pair() -> None:
+    flat, levels = rigid(LAWS["lugre"]).flat(), np.array([1.5, 3.0])
+    both = of(flat | {"friction.static": levels}, [1e-4, 1e-4], 2.0)
+    assert both == pytest.approx([of(flat | {"friction.static": level}, 1e-4, 2.0)[0] for level in levels], rel=1e-12)
 
 
 # what a user may get wrong

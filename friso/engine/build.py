@@ -13,13 +13,15 @@ from friso.engine.cache import import_entry
 from friso.engine.kernel import compile_driver
 from friso.engine.module_source import write_module
 from friso.engine.tableaus import TABLEAUS
+from friso.equations.imposed import Imposed, imposed
 from friso.equations.model import assemble
 from friso.equations.variational import variational
 
 
 def main(entry: Path, task: bytes) -> None:
     wanted = pickle.loads(task)
-    model = assemble(wanted.structure)
+    form = wanted.structure
+    model = imposed(form) if isinstance(form, Imposed) else assemble(form)
     model = variational(model) if wanted.variational else model
     source = write_module(model, TABLEAUS[wanted.method], repr(wanted), wanted.lanes)
     (entry / "kernel.py").write_text(source)

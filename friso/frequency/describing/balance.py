@@ -59,9 +59,9 @@ def single_harmonic(
     frequencies: Sequence[float] | np.ndarray = FREQUENCIES,
     rtol: float = RTOL,
 ) -> Balance:
-    """Solve the balance of a stage with friction, within a grid of amplitudes [m] of the cart and frequencies [Hz], each
-    in ascending order. Two solutions in one cell escape it. Raises StageError for a stage without friction and for a
-    grid that is not usable."""
+    """Solve the balance of a stage with friction, within a grid of amplitudes [m] of the cart and frequencies [Hz],
+    each in ascending order. Two solutions in one cell escape it. Raises StageError for a stage without friction and for
+    a grid that is not usable."""
     loop = _Loop(stage, checked_rtol(rtol))
     sizes = checked_positive("amplitudes", amplitudes, "1e-5 m, 1e-4 m")
     rates = checked_positive("frequencies", frequencies, "0.1 Hz, 1 Hz")
@@ -73,7 +73,8 @@ def single_harmonic(
     middles += np.log([sizes[cells[:, 0] + 1], rates[cells[:, 1] + 1]]) / 2
     found = loop.polished(middles)
     i, j = np.unravel_index(np.argmin(residual), shape)
-    return Balance(*np.exp(found), loop.left(found)[1], float(residual[i, j]), float(sizes[i]), float(rates[j]))
+    at = (float(residual[i, j]), float(sizes[i]), float(rates[j]))
+    return Balance(np.exp(found[0]), np.exp(found[1]), loop.left(found)[1], *at)
 
 
 def _turns(left: np.ndarray) -> np.ndarray:
@@ -104,7 +105,9 @@ class _Loop:
         for _ in range(STEPS if logs.size else 0):
             sides = [self.left(logs + NUDGE * step[:, None])[0] for step in np.vstack([np.eye(2), -np.eye(2)])]
             slopes = np.array([(sides[k] - sides[k + 2]) / (2 * NUDGE) for k in range(2)])
-            matrix = np.moveaxis(np.array([slopes.real, slopes.imag]), 2, 0)
+            matrix = np.moveaxis(np.array([np.real(slopes), np.imag(slopes)]), 2, 0)
             left = self.left(logs)[0]
-            logs = logs - np.linalg.solve(matrix, np.stack([left.real, left.imag], axis=1)[:, :, None])[:, :, 0].T
+            logs = (
+                logs - np.linalg.solve(matrix, np.stack([np.real(left), np.imag(left)], axis=1)[:, :, None])[:, :, 0].T
+            )
         return logs

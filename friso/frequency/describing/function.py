@@ -88,7 +88,7 @@ def describing(
     stiffness = force[:, 1] / pairs[0]
     variables = {
         "stiffness": (stiffness, "N/m", "dynamic stiffness of friction"),
-        "work": (np.pi * pairs[0] ** 2 * stiffness.imag, "J", "work of friction per period"),
+        "work": (np.pi * pairs[0] ** 2 * np.imag(stiffness), "J", "work of friction per period"),
         "gap": (found.gap, "1", "gap of the periodic state"),
         "aliasing": (aliasing, "1", "error of the sampled first harmonic"),
     }
@@ -114,7 +114,7 @@ def describing(
 def checked_positive(name: str, values: Sequence[float] | np.ndarray, example: str) -> np.ndarray:
     """Positive numbers as an array. Raises StageError."""
     array = np.atleast_1d(np.asarray(values, dtype=float))
-    if array.ndim != 1 or not np.all(np.isfinite(array) & (array > 0)):
+    if array.ndim != 1 or not array.size or not np.all(np.isfinite(array) & (array > 0)):
         raise StageError(name, str(values), "positive numbers in one row", example)
     return array
 

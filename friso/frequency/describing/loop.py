@@ -3,22 +3,41 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import numpy as np
 
-from friso.frequency.parts import compensator, mechanics
+from friso.equations.component import key
+from friso.equations.model import assemble
+from friso.equations.structure import Structure, shared_structure
+from friso.frequency.declared import Declared
+
+FORCE, CART, STAGE = "force on cart", "cart", "stage"
+
+TOUCHES = "the joint deflects beyond its stroke: the limiter, which this answer leaves out, would be touched"
 
 
 def receptance(flat: Mapping[str, Any], frequencies: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Positions of cart and stage per friction force on the cart [m/N], complex, shape (frequencies,), of a loop whose
-    reference rests, whose limiter is not touched and whose force is not limited, at frequencies [Hz].
+    reference rests, whose limiter is not touched and whose force is not limited, at frequencies [Hz]."""
+    loop = _loop(shared_structure(flat)).at({**flat, "beyond_stroke_ahead": 0.0, "beyond_stroke_behind": 0.0}, 1)
+    (answer,) = loop.take((FORCE,), (CART, STAGE)).at(2j * np.pi * frequencies)
+    return -answer[:, 0, 0], -answer[:, 1, 0]
 
-    Without friction x = H (u, -F), and the controller answers with u = K x_s to the position of the stage.
-    """
-    s = 2j * np.pi * frequencies
-    (masses,) = mechanics(flat, np.zeros(1, bool)).at(s)
-    (control,) = compensator(flat, 1).at(s)
-    gain = control[:, 0, 1] + s * control[:, 0, 2]
-    stage = -masses[:, 0, 1] / (1 - masses[:, 0, 0] * gain)
-    return masses[:, 1, 0] * gain * stage - masses[:, 1, 1], stage
+
+@cache
+def _loop(form: Structure) -> Declared:
+    """The stage's own equations with a force in the place of friction."""
+    control = replace(form.controller, limited=False) if form.controller else None
+    linear = replace(form, friction="none", friction_variant=None, controller=control, biased=("cart",))
+    model = assemble(linear)
+    outputs = {CART: model.outputs["cart_position"].expression, STAGE: model.outputs["position"].expression}
+    return Declared(model.symbols, model.rhs, {FORCE: key("bias.cart")}, outputs)
+
+
+def beyond_stroke(flat: Mapping[str, Any], deflections: np.ndarray) -> np.ndarray:
+    """Whether the limiter would be touched at largest deflections [m] of the joint, of their shape."""
+    free = "joint.stroke" in flat and not flat["joint.locked"]
+    return deflections > flat["joint.stroke"] if free else np.zeros(np.shape(deflections), bool)

@@ -9,12 +9,12 @@ of its own to find a cycle, and single-harmonic balance, the usual start, may no
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from friso.frequency.describing.loop import receptance
+from friso.frequency.describing.loop import TOUCHES, beyond_stroke, receptance
 from friso.frequency.describing.waveform import Answer, Law, friction_answer
 
 OVERSAMPLED = 32
@@ -29,22 +29,30 @@ STEPS = 40
 CLOSED = 1e-9
 """Step, as a share of the amplitude, at which the series counts as found."""
 
+LONGEST = 0.5
+"""Longest step, as a share of the known amplitude or of the frequency."""
+
 HALVINGS = 6
 """How often a step is halved that leads away."""
+
+RESTING = 1e-3
+"""Amplitude, as a share of the known one, below which what was found is the rest at the reference."""
+
+DONE, REST, OPEN = "done", "only the rest at the reference was found", "no series was found near the known motion"
 
 
 @dataclass(frozen=True)
 class Series:
     """A periodic motion: harmonics of cart and stage [m], complex, at `orders` of the angular frequency [rad/s], of
-    position = Re(sum of harmonic exp(i order omega t)); the step that Newton's method took last, as a share of the
-    amplitude, and whether that closed it."""
+    position = Re(sum of harmonic exp(i order omega t)); the `step` that Newton's method took last, as a share of the
+    known amplitude, and the `status`: what is in it is a motion only if that is "done"."""
 
     orders: np.ndarray
     cart: np.ndarray
     stage: np.ndarray
     omega: float
-    change: float
-    closed: bool
+    step: float
+    status: str
 
     @property
     def period(self) -> float:
@@ -54,9 +62,12 @@ class Series:
     @property
     def amplitude(self) -> float:
         """Half of the peak-to-peak motion of the stage [m]."""
+        return float(np.ptp(self.over_period(self.stage)) / 2)
+
+    def over_period(self, harmonics: np.ndarray) -> np.ndarray:
+        """The signal with these harmonics at many times of a period."""
         angles = np.linspace(0, 2 * np.pi, max(FINEST, OVERSAMPLED * int(self.orders[-1])), endpoint=False)
-        position = (np.exp(1j * np.outer(angles, self.orders)) @ self.stage).real
-        return float(np.ptp(position) / 2)
+        return np.real(np.exp(1j * np.outer(angles, self.orders)) @ harmonics)
 
 
 @dataclass(frozen=True)
@@ -106,14 +117,25 @@ def balanced(
     basis = Basis.of(harmonics, mirrored, 2 * (size // 2))
     spectrum = np.fft.rfft(position)[basis.orders] / len(position) * np.where(basis.orders == 0, 1, 2)
     length = float(np.ptp(position) / 2)
-    unknown = np.concatenate([spectrum.real, spectrum.imag]) / length
+    unknown = _parts(spectrum) / length
     omega = 2 * np.pi / (len(time) * (time[1] - time[0]))
     problem = _Problem(flat, law, basis, length, omega, unknown)
-    state, change = problem.solve()
+    state, step = problem.solve()
     cart, speed = problem.split(state)
     _, stage = receptance(flat, basis.orders * speed / (2 * np.pi))
     force = basis.harmonics(problem.answer(state).force[:, None])[:, 0]
-    return Series(basis.orders, cart, stage * force, speed, change, change <= CLOSED)
+    series = Series(basis.orders, cart, stage * force, speed, step, DONE)
+    return replace(series, status=_status(flat, series, length))
+
+
+def _status(flat: Mapping[str, Any], series: Series, length: float) -> str:
+    """What became of a series that was to be found near a motion of this amplitude [m]."""
+    if series.amplitude < RESTING * length:
+        return REST
+    if series.step > CLOSED:
+        return OPEN
+    deflection = np.max(np.abs(series.over_period(series.stage - series.cart)))
+    return TOUCHES if beyond_stroke(flat, deflection) else DONE
 
 
 @dataclass(frozen=True)
@@ -146,7 +168,7 @@ class _Problem:
         cart, speed = self.split(state)
         force = self.basis.harmonics(self.answer(state).force[:, None])[:, 0]
         left = (cart - self.receptances(speed) * force) / self.length
-        return np.concatenate([left.real, left.imag, [self._phase @ (state[:-1] - self.known)]])
+        return np.append(_parts(left), self._phase @ (state[:-1] - self.known))
 
     @property
     def _phase(self) -> np.ndarray:
@@ -167,23 +189,30 @@ class _Problem:
         by_state[:, -1] -= later * forces[:, -1]
         count = len(self.basis.orders)
         whole = np.zeros((2 * count + 1, 2 * count + 1))
-        whole[:count], whole[count : 2 * count] = by_state.real / self.length, by_state.imag / self.length
+        whole[: 2 * count] = _parts(by_state) / self.length
         whole[: 2 * count, : 2 * count] += np.eye(2 * count)
         whole[-1, :-1] = self._phase
         return whole
 
     def solve(self) -> tuple[np.ndarray, float]:
         """The state that solves the equations, and the last step."""
-        state, change = np.append(self.known, 0.0), np.inf
-        left = self.residual(state)
+        state, size = np.append(self.known, 0.0), np.inf
         for _ in range(STEPS):
+            left = self.residual(state)
             step = np.linalg.lstsq(self.jacobian(state), -left, rcond=None)[0]
-            for halving in range(HALVINGS):
-                tried = state + step / 2**halving
-                then = self.residual(tried)
-                if np.linalg.norm(then) < np.linalg.norm(left):
-                    break
-            state, left, change = tried, then, float(np.max(np.abs(step)))
-            if change <= CLOSED:
+            step /= max(1.0, float(np.max(np.abs(step))) / LONGEST)
+            state = state + step * self._share(state, step, float(np.linalg.norm(left)))
+            size = float(np.max(np.abs(step)))
+            if size <= CLOSED:
                 break
-        return state, change
+        return state, size
+
+    def _share(self, state: np.ndarray, step: np.ndarray, left: float) -> float:
+        """The share of a step that leads closer."""
+        shares = [0.5**halving for halving in range(HALVINGS)]
+        return next((s for s in shares if np.linalg.norm(self.residual(state + s * step)) < left), shares[-1])
+
+
+def _parts(values: np.ndarray) -> np.ndarray:
+    """Real parts and, behind them, imaginary parts."""
+    return np.concatenate([np.real(values), np.imag(values)])

@@ -8,13 +8,14 @@ others shows depends on where the analyser comes from.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from friso.engine.tolerance import checked_rtol
 from friso.frequency.describing.driven import CLOSE, Driven, Roots, roots
 from friso.frequency.describing.function import checked_positive
+from friso.frequency.describing.loop import TOUCHES, beyond_stroke
 from friso.frequency.describing.steady import RTOL
 from friso.stage import Stage
 
@@ -22,7 +23,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 NOT_FOUND = "no amplitude was found at which this force moves the cart"
-TOUCHES = "the joint deflects beyond its stroke: the limiter, which this answer leaves out, would be touched"
 
 
 def plant_response(
@@ -58,8 +58,10 @@ def plant_response(
     }
     plane, shape = ("force", "frequency"), (len(sizes), len(rates))
     place, count = _branches(found, shape)
-    variables = {n: ((*plane, "branch"), _spread(v, place, shape), _words(u, t)) for n, (v, u, t) in columns.items()}
-    branches = {name: variable[1] for name, variable in variables.items()}
+    branches = {name: _spread(values, place, shape) for name, (values, _, _) in columns.items()}
+    variables: dict[str, Any] = {
+        name: ((*plane, "branch"), branches[name], _words(unit, text)) for name, (_, unit, text) in columns.items()
+    }
     for name, order in (("up", 1), ("down", -1)):
         shown = _followed(branches["amplitude"], branches["lasting"], order)
         answer = np.take_along_axis(branches["response"], shown[:, :, None], axis=2)[:, :, 0]
@@ -116,8 +118,6 @@ def _status(stage: Stage, branches: dict[str, np.ndarray], forces: np.ndarray) -
     """What is wrong with the answers to every force at every frequency, or "done"."""
     lost = ~np.any(branches["error"] <= 100 * CLOSE, axis=2)
     status = np.where(lost, NOT_FOUND, "done").astype(object)
-    flat = stage.flat()
-    if "joint.stroke" in flat and not flat["joint.locked"]:
-        deflection = np.abs(branches["response"] - branches["cart_response"]) * forces[:, None, None]
-        status[np.any(deflection > flat["joint.stroke"], axis=2)] = TOUCHES
+    deflection = np.abs(branches["response"] - branches["cart_response"]) * forces[:, None, None]
+    status[np.any(beyond_stroke(stage.flat(), deflection), axis=2)] = TOUCHES
     return status.astype(str)

@@ -32,6 +32,9 @@ ROUNDS = 12
 FINEST = 1e-4
 """Least distance of the two points of a secant, as a share of the state's scale."""
 
+ROOM = 1 << 20
+"""Samples that are kept at a time."""
+
 CARRIED = ("position", "velocity", *HARMONIC)
 """States that are not the law's own."""
 
@@ -109,10 +112,6 @@ class Imposition:
             yield part.numbers, part.results
 
 
-ROOM = 1 << 20
-"""Samples that are kept at a time."""
-
-
 def _rows(rows: list[Any], count: int) -> np.ndarray:
     return np.array([np.broadcast_to(row, (count,)) for row in rows], dtype=float).reshape(len(rows), count)
 
@@ -162,7 +161,7 @@ def _secant(friction: Imposition, inner: np.ndarray, width: np.ndarray) -> tuple
     for numbers, results in friction.take(every).run(inner[every] + aside, share):
         ends[numbers] = sign * results.ends[:, friction.inner]
         fine[numbers] = np.equal(results.statuses, Status.DONE)
-    ends, fine = ends.reshape(count, size + 1, size), fine.reshape(count, size + 1).all(axis=1)
+    ends, fine = ends.reshape(count, size + 1, size), np.all(fine.reshape(count, size + 1), axis=1)
     missed = ends[:, 0] - inner
     slopes = np.swapaxes((ends[:, 1:] - ends[:, :1]) / width[:, :, None], 1, 2) - np.eye(size)
     slopes[~fine] = -np.eye(size)

@@ -8,7 +8,7 @@ quick state settles on its steady value there however long the intervals are.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -53,7 +53,7 @@ class Law:
 def _compiled(form: Imposed) -> tuple[Callable[..., list[Any]], tuple[str, ...], bool]:
     velocity, none = state("velocity"), state("no_state")
     friction = friction_law(form.friction).declare(velocity, form.friction_variant)
-    inner: Hashable = friction.component.states
+    inner = friction.component.states
     if len(inner) > 1:
         given = f'"{form.friction}", with {len(inner)} states of its own'
         raise StageError("friction.model", given, "a law with at most one", 'model = "lugre"')

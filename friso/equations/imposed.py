@@ -1,0 +1,85 @@
+"""The friction law of a stage on a body whose motion is imposed as a sinusoid, for its describing function.
+
+Time counts in periods, so that every run lasts the same. The first harmonic of the friction force is integrated beside
+it: to the solver's tolerance, however thin the layers are in which the force changes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+from friso.quantities import StageError
+from friso.stage.tables import FrictionSection, friction_law
+
+if TYPE_CHECKING:
+    import sympy as sp
+
+    from friso.equations.component import State
+    from friso.equations.friction.common import Friction
+    from friso.equations.model import Model
+
+FREQUENCY = "imposed.frequency"
+"""Key of the frequency of the motion [Hz]; its amplitude is the displacement from which it starts."""
+
+HARMONIC = ("in_phase", "in_quadrature")
+"""States that grow over a period by the real and the imaginary part of the first harmonic of the friction force [N]
+(of force = Re(harmonic exp(2 pi i time)), position = amplitude cos(2 pi time))."""
+
+
+@dataclass(frozen=True)
+class Imposed:
+    """Which law, and what else its equations depend on (see `Structure`)."""
+
+    friction: str
+    friction_variant: Hashable
+
+
+def imposed_form(flat: Mapping[str, Any]) -> Imposed:
+    """The law of a stage given as flat mapping. Raises StageError where it has no force."""
+    name = flat["friction.model"]
+    law = friction_law(name)
+    if law.declare is FrictionSection.declare:
+        raise StageError("friction.model", f'"{name}", without a force', "a friction law", 'model = "lugre"')
+    return Imposed(name, law.variant(flat))
+
+
+def imposed(form: Imposed) -> Model:
+    """The equations of the law under the imposed motion."""
+    import sympy as sp
+
+    from friso.equations.component import Output, State, key, state
+    from friso.equations.model import MOTION_SIZE, Model
+
+    position, velocity, period = state("position"), state("velocity"), 1 / key(FREQUENCY)
+    friction: Friction = friction_law(form.friction).declare(velocity, form.friction_variant)
+    omega, size = 2 * sp.pi / period, friction.breakaway
+    shares = (2 * friction.force * position / MOTION_SIZE, 2 * friction.force * velocity / (omega * MOTION_SIZE))
+    states = (
+        State(position, velocity * period, "m", scale=MOTION_SIZE),
+        State(velocity, -(omega**2) * position * period, "m/s", scale=MOTION_SIZE * omega),
+        *(_per_period(each, period) for each in friction.component.states),
+        *(State(state(name), share, "N", scale=size) for name, share in zip(HARMONIC, shares, strict=True)),
+    )
+    return Model(
+        states=states,
+        kinks=friction.component.kinks,
+        outputs={"friction_force": Output(friction.force, "N", "friction force")},
+        deviation=position,
+        deviation_rate=velocity * period,
+        length=MOTION_SIZE,
+        rate=2 * sp.pi,
+        breakaway=friction.breakaway,
+        stiffness=sp.S.Zero,
+    )
+
+
+def _per_period(inner: State, period: sp.Expr) -> State:
+    """A state of the law, its rate counted per period; one that is a length matters as the motion does."""
+    import sympy as sp
+
+    from friso.equations.model import MOTION_SIZE
+
+    scale = sp.Min(inner.scale, MOTION_SIZE) if inner.unit == "m" else inner.scale
+    return replace(inner, derivative=inner.derivative * period, scale=scale)

@@ -1,0 +1,50 @@
+"""The mass line of a plant with friction, as measured at several places of the rail (thesis, Fig. 17)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from friso.frequency.describing.response import plant_response
+from friso.frequency.describing.steady import RTOL
+from friso.stage import Stage
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+def mass_line(
+    stage: Stage,
+    places: Sequence[Mapping[str, Any]],
+    forces: Sequence[float] | np.ndarray,
+    frequencies: Sequence[float] | np.ndarray,
+    rtol: float = RTOL,
+) -> xr.Dataset:
+    """How far the measured plant lies off the line 1/(m omega^2) of its whole mass, place by place.
+
+    `places` tell what differs there, as keys of the stage file with their values, such as {"friction.static": "2 N"}.
+    Variables over ("place", "force", "frequency"): `ratio`, the response of an analyser that steps upwards (see
+    `plant_response`) over that line, complex and 1 on it; `magnitude`, its absolute value; `phase` [rad], that of the
+    response over -180 degrees. The `spread_magnitude` and `spread_phase` over ("force", "frequency") are standard
+    deviations over the places. Raises StageError for places that no stage may have, and as `plant_response`.
+    """
+    import xarray as xr
+
+    flat = stage.flat()
+    mass = flat.get("masses.cart", 0.0) + flat.get("masses.stage", 0.0)
+    rows = [plant_response(stage.replace(place), forces, frequencies, rtol)["up"] for place in places]
+    response = xr.concat(rows, "place")
+    ratio = -response * mass * (2 * np.pi * response["frequency"]) ** 2
+    magnitude = np.abs(ratio)
+    phase = ratio.copy(data=np.angle(ratio.values))
+    named = {
+        "ratio": (ratio, "1", "response over mass line"),
+        "magnitude": (magnitude, "1", "magnitude over mass line"),
+        "phase": (phase, "rad", "phase over mass line"),
+        "spread_magnitude": (magnitude.std("place", ddof=1), "1", "scatter of the magnitude"),
+        "spread_phase": (phase.std("place", ddof=1), "rad", "scatter of the phase"),
+    }
+    variables = {name: each.assign_attrs(units=unit, long_name=text) for name, (each, unit, text) in named.items()}
+    return xr.Dataset(variables, attrs={"stage": stage.to_toml(), "rtol": rtol})

@@ -1,0 +1,86 @@
+"""Hunting cycles by harmonic balance, beside those that are there: why the textbook's method misleads here."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from friso.frequency.describing.balance import single_harmonic
+from friso.frequency.describing.function import checked_positive
+from friso.frequency.describing.multi import DONE, balanced
+from friso.hunting.cycle.ensemble import Ensemble
+from friso.hunting.cycle.find import RTOL, Cycles, hunting_cycles
+from friso.quantities import StageError
+from friso.stage import Stage
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+SAMPLES = 16_384
+"""Samples per period of the simulated cycle from which multi-harmonic balance starts."""
+
+HARMONICS = (1, 5, 25, 51, 75, 101, 151, 201, 301, 401)
+"""Highest harmonics that are tried unless told."""
+
+
+def harmonic_balance(
+    stage: Stage,
+    crossovers: Sequence[float] | np.ndarray,
+    harmonics: Sequence[int] = HARMONICS,
+    rtol: float = RTOL,
+) -> xr.Dataset:
+    """The hunting cycle of a stage at crossovers [Hz], by simulation and by harmonic balance.
+
+    Over "crossover": `period` [s], `amplitude` [m] and `multiplier` of the cycle, found by shooting; `solutions`, the
+    number of cycles that single-harmonic balance predicts, and `least_residual`, the least residual of that balance
+    (see `friso.frequency.describing.balance`). Over ("crossover", "highest"), `highest` being the highest harmonic of a
+    multi-harmonic balance that starts from the simulated cycle: `period_error` and `amplitude_error`, relative, NaN
+    where it does not close on a motion; and `status`. Raises StageError for a stage without friction, one whose
+    controller has no crossover, and one that has no cycle that is its own mirror image.
+    """
+    import xarray as xr
+
+    rates = checked_positive("crossovers", crossovers, "4 Hz")
+    flat = stage.flat()
+    if "controller.crossover" not in flat:
+        raise StageError("controller", "gains", "a crossover", 'crossover = "8 Hz", alpha = 0.1, beta = 2')
+    stages = Ensemble.held({**flat, "controller.crossover": rates}, len(rates))
+    cycles = hunting_cycles(stages, rtol)
+    if cycles.sign >= 0 or not cycles.found.all():
+        why = "; ".join({str(reason) for reason in cycles.reasons if reason}) or "a cycle that is not symmetric"
+        raise StageError("crossovers", why, "a stage with a symmetric hunting cycle at each", "4 Hz")
+    singles = [single_harmonic(stage.replace({"controller.crossover": f"{rate!r} Hz"})) for rate in map(float, rates)]
+    known = {
+        "period": (cycles.period, "s"),
+        "amplitude": (cycles.amplitude, "m"),
+        "multiplier": (cycles.multiplier, "1"),
+    }
+    known |= {
+        "solutions": (np.array([len(single.amplitudes) for single in singles]), "1"),
+        "least_residual": (np.array([single.least for single in singles]), "1"),
+    }
+    variables: dict[str, Any] = {name: ("crossover", value, {"units": unit}) for name, (value, unit) in known.items()}
+    names, plane = ("period_error", "amplitude_error", "status"), ("crossover", "highest")
+    rows = [_errors(stages, cycles, number, harmonics, rtol) for number in range(len(rates))]
+    variables |= {name: (plane, [[cell[k] for cell in row] for row in rows]) for k, name in enumerate(names)}
+    coords = {"crossover": ("crossover", rates, {"units": "Hz"}), "highest": list(harmonics)}
+    return xr.Dataset(variables, coords, {"stage": stage.to_toml(), "rtol": rtol})
+
+
+def _errors(
+    stages: Ensemble, cycles: Cycles, number: int, harmonics: Sequence[int], rtol: float
+) -> list[tuple[float, float, str]]:
+    """Errors of period and amplitude, relative, and status, of one stage for every highest harmonic."""
+    one, period = stages.take(np.array([number])), float(cycles.period[number])
+    interval = period / SAMPLES
+    run = one.run(cycles.states[[number]], np.array([period]), rtol, interval=interval)
+    cart = run.samples[0, :SAMPLES, stages.sticking]
+    flat = {key: value[0] if np.ndim(value) else value for key, value in one.flat.items()}
+    cells = []
+    for highest in harmonics:
+        series = balanced(flat, np.arange(SAMPLES) * interval, cart, highest)
+        found = (series.period / period - 1, series.amplitude / float(cycles.amplitude[number]) - 1)
+        cells.append((*(found if series.status == DONE else (np.nan, np.nan)), series.status))
+    return cells
