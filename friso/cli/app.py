@@ -12,9 +12,11 @@ from typing import Annotated, NoReturn
 
 import typer
 
+from friso.cli.bode import bode
 from friso.cli.boundary import boundary
 from friso.cli.check import check
 from friso.cli.common import INTERRUPTED, say
+from friso.cli.guideline import guideline
 from friso.cli.init import init
 from friso.cli.map import map_cells
 from friso.cli.reproduce import reproduce
@@ -34,8 +36,10 @@ for name, command in (
     ("check", check),
     ("simulate", simulate),
     ("map", map_cells),
+    ("bode", bode),
     ("boundary", boundary),
     ("reproduce", reproduce),
+    ("guideline", guideline),
 ):
     app.command(name)(command)
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import re
 from itertools import repeat
 from pathlib import Path
@@ -17,6 +16,7 @@ from friso.cli.common import (
     Overrides,
     StageFile,
     Tolerance,
+    finite,
     key_values,
     made_folder,
     read_stage,
@@ -104,7 +104,7 @@ def _point(line: Line, k: int, key: Shown) -> dict[str, Any]:
     return {
         "value": key.number(line.at[k, 0]),
         "kind": line.kinds[k],
-        "error": _finite(key.number(line.error[k, 0])),
+        "error": finite(key.number(line.error[k, 0])),
         "cycle": line.shape,
         "amplitude_m": float(line.amplitude[k]),
         "period_s": float(line.period[k]),
@@ -152,11 +152,7 @@ def _curve(line: Line, shown: tuple[Shown, ...]) -> dict[str, Any]:
 
 def _numbers(values: np.ndarray, shown: tuple[Shown, ...]) -> list[list[float | None]]:
     """Values of both keys [SI], shape (n, 2), in the units shown."""
-    return [[_finite(key.number(value)) for key, value in zip(shown, row, strict=True)] for row in values.tolist()]
-
-
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None
+    return [[finite(key.number(value)) for key, value in zip(shown, row, strict=True)] for row in values.tolist()]
 
 
 def _write(found: Diagram | Plane, shown: tuple[Shown, ...], name: str, stem: Path) -> list[Path]:

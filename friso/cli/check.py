@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 from typing import TYPE_CHECKING, Any
 
 from friso.cli.common import (
@@ -12,8 +11,10 @@ from friso.cli.common import (
     Overrides,
     StageFile,
     Tolerance,
+    finite,
     leave,
     made_folder,
+    print_table,
     read_stage,
     read_tolerance,
 )
@@ -63,11 +64,11 @@ def _case_document(case: Case) -> dict[str, Any]:
     return {
         "verdict": case.verdict,
         "peaks": case.peaks,
-        "peak_to_peak_m": _finite(case.peak_to_peak),
+        "peak_to_peak_m": finite(case.peak_to_peak),
         "period_s": case.period,
         "settling_time_s": into_1um,
         "settling_time_10um_s": into_10um,
-        "largest_force_n": _finite(case.largest_force),
+        "largest_force_n": finite(case.largest_force),
         "cycle": _cycle_document(known.cycle) if known.cycle else None,
         "cycles": len(known.hunting.cycles),
         "reason": known.hunting.reason or None,
@@ -92,10 +93,10 @@ def _cycle_document(cycle: Cycle) -> dict[str, Any]:
         "multiplier": cycle.multiplier,
         "symmetric": cycle.symmetric,
         "attracts": cycle.attracts,
-        "slope": _finite(cycle.slope),
-        "growth": _finite(cycle.growth),
+        "slope": finite(cycle.slope),
+        "growth": finite(cycle.growth),
         "residual": cycle.residual,
-        "time_constant_s": _finite(cycle.time_constant),
+        "time_constant_s": finite(cycle.time_constant),
     }
 
 
@@ -109,26 +110,13 @@ def _margin_document(edge: Margin) -> dict[str, Any]:
     return {"factor": edge.factor, "crossover_hz": edge.crossover, "certain": edge.certain}
 
 
-def _finite(value: float) -> float | None:
-    return value if math.isfinite(value) else None
-
-
 def _print_cases(stage: Stage, cases: dict[str, Case]) -> None:
-    """A sentence per case, and the short table of `check`."""
-    from rich.console import Console
-    from rich.table import Table
-
+    """The short table of `check`, and a sentence per case."""
     from friso.views.cases import shown_cases
     from friso.views.check_table import rows
     from friso.views.summary import conclusion, verdict_sentence
 
     shown = shown_cases(cases)
-    console = Console(highlight=False, markup=False)
-    table = Table("", *(item.label for item in shown), title=stage.name or None, title_justify="left")
-    for label, texts in rows(shown):
-        table.add_row(label, *texts)
-    console.print(table)
-    for sentence in [f"{item.label}: {verdict_sentence(item, cases)}" for item in shown]:
-        console.print(sentence)
-    if found := conclusion(cases):
-        console.print(found)
+    sentences = [f"{item.label}: {verdict_sentence(item, cases)}" for item in shown]
+    found = conclusion(cases)
+    print_table(stage.name, [item.label for item in shown], rows(shown), [*sentences, *([found] if found else [])])

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import sys
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -25,6 +27,25 @@ OutFolder = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Fo
 
 def say(message: str) -> None:
     print(f"friso: {message}", file=sys.stderr)
+
+
+def finite(value: float) -> float | None:
+    """A number for a JSON document, which knows no infinite and undefined ones."""
+    return float(value) if math.isfinite(value) else None
+
+
+def print_table(title: str, columns: Sequence[str], rows: Iterable[tuple[str, list[str]]], below: list[str]) -> None:
+    """A table whose rows have names, and sentences below it."""
+    from rich.console import Console
+    from rich.table import Table
+
+    console = Console(highlight=False, markup=False)
+    table = Table("", *columns, title=title or None, title_justify="left")
+    for label, texts in rows:
+        table.add_row(label, *texts)
+    console.print(table)
+    for sentence in below:
+        console.print(sentence)
 
 
 def leave(done: bool) -> None:

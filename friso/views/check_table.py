@@ -7,14 +7,11 @@ from typing import TYPE_CHECKING
 
 from friso.hunting import COUNTED_ABOVE, COUNTED_AFTER
 from friso.views.cases import BANDS, Shown
-from friso.views.prefixes import plus_minus, range_with_unit, with_unit
+from friso.views.prefixes import NOTHING, plus_minus, range_with_unit, window_with_unit, with_unit
 from friso.views.summary import at_the_end
 
 if TYPE_CHECKING:
     from friso.hunting import Case, Cycle, Kick
-
-NOTHING = "–"
-"""Stands where a case has nothing to say."""
 
 _WINDOWS = 4  # windows of kicks that are listed, at most
 
@@ -69,18 +66,9 @@ def _kicks(kick: Kick | None, unit: str) -> str:
         return NOTHING
     if not kick.windows:
         return f"none from {range_with_unit(*kick.searched, unit)}"
-    texts = [_window(*window, kick.searched, unit) for window in kick.windows[:_WINDOWS]]
+    texts = [window_with_unit(*window, kick.searched, unit) for window in kick.windows[:_WINDOWS]]
     more = len(kick.windows) - len(texts)
     return ", ".join([*texts, *([f"and {more} more ranges"] if more else [])])
-
-
-def _window(low: float, high: float, searched: tuple[float, float], unit: str) -> str:
-    """A window that ends with the range searched is open there."""
-    if (low, high) == searched:
-        return f"all from {range_with_unit(low, high, unit)}"
-    if low == searched[0]:
-        return f"up to {with_unit(high, unit)}"
-    return f"from {with_unit(low, unit)} on" if high == searched[1] else range_with_unit(low, high, unit)
 
 
 def _moves(case: Case) -> str:

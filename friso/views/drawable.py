@@ -11,8 +11,8 @@ from typing import TypeVar
 
 import numpy as np
 
-from friso.views.figure import Array, Axis, Coloured, Figure, Kind, Limit, Markers, Panel, Series
-from friso.views.prefixes import choose
+from friso.views.figure import Array, Axis, Band, Coloured, Figure, Kind, Limit, Markers, Panel, Series
+from friso.views.prefixes import choose, pretty
 from friso.views.thinning import thin
 
 Field = TypeVar("Field", bound=Coloured)
@@ -68,20 +68,24 @@ def word_ticks(axis: Axis, most: int = 12) -> tuple[list[int], list[str]]:
 
 def _panel(panel: Panel) -> Panel:
     limits = _finite([value for limit in panel.limits for value in limit.values])
-    xs = _gather(panel.x, [item.x for item in (*panel.series, *panel.markers, *panel.coloured)])
-    ys = _gather(panel.y, [item.y for item in (*panel.series, *panel.markers, *panel.coloured)])
-    x_factor, x_unit = choose(xs, panel.x.unit, log=panel.x.log)
-    y_factor, y_unit = choose(ys if panel.y.limits else np.concatenate((ys, limits)), panel.y.unit, log=panel.y.log)
+    points = (*panel.series, *panel.markers, *panel.coloured)
+    xs = _gather(panel.x, [item.x for item in (*points, *panel.bands)])
+    sides = [side for band in panel.bands for side in (band.low, band.high)]
+    ys = _gather(panel.y, [*(item.y for item in points), *sides])
+    x_factor, x_unit = _prefix(panel.x, xs)
+    y_factor, y_unit = _prefix(panel.y, ys if panel.y.limits else np.concatenate((ys, limits)))
     extent = (float(xs.min()), float(xs.max())) if xs.size else (0.0, 1.0)
     lines = [_thinned(line) for line in panel.series] + [_limit(limit, extent) for limit in panel.limits]
-    return Panel(
-        title=panel.title,
+    return replace(
+        panel,
         x=_axis(panel.x, x_factor, x_unit),
         y=_axis(panel.y, y_factor, y_unit),
         series=tuple(replace(line, x=line.x * x_factor, y=line.y * y_factor) for line in lines),
         markers=tuple(_markers(marker, x_factor, y_factor) for marker in panel.markers),
         maps=tuple(_coloured(field, x_factor, y_factor) for field in panel.maps),
         clouds=tuple(_coloured(cloud, x_factor, y_factor) for cloud in panel.clouds),
+        bands=tuple(_band(band, x_factor, y_factor) for band in panel.bands),
+        limits=(),
     )
 
 
@@ -93,6 +97,11 @@ def _gather(axis: Axis, arrays: Iterable[Array]) -> Array:
     return values[values > 0] if axis.log else values
 
 
+def _prefix(axis: Axis, values: Array) -> tuple[float, str]:
+    """Factor and unit with prefix."""
+    return choose(values, axis.unit, log=axis.log) if axis.prefixed else (1.0, pretty(axis.unit))
+
+
 def _finite(values: Iterable[float] | Array) -> Array:
     array = np.asarray(values, dtype=float)
     return array[np.isfinite(array)]
@@ -100,7 +109,8 @@ def _finite(values: Iterable[float] | Array) -> Array:
 
 def _axis(axis: Axis, factor: float, unit: str) -> Axis:
     limits = None if axis.limits is None else (axis.limits[0] * factor, axis.limits[1] * factor)
-    return replace(axis, unit=unit, limits=limits)
+    step = None if axis.step is None else axis.step * factor
+    return replace(axis, unit=unit, limits=limits, step=step)
 
 
 def _thinned(line: Series) -> Series:
@@ -121,6 +131,10 @@ def _limit(limit: Limit, extent: tuple[float, float]) -> Series:
 def _markers(markers: Markers, x_factor: float, y_factor: float) -> Markers:
     shown = np.isfinite(markers.x) & np.isfinite(markers.y)
     return replace(markers, x=markers.x[shown] * x_factor, y=markers.y[shown] * y_factor)
+
+
+def _band(band: Band, x_factor: float, y_factor: float) -> Band:
+    return replace(band, x=band.x * x_factor, low=band.low * y_factor, high=band.high * y_factor)
 
 
 def _coloured(field: Field, x_factor: float, y_factor: float) -> Field:

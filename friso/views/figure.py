@@ -28,7 +28,8 @@ INK, GREY, LIGHT = "#222222", "#767676", "#c9c9c9"
 class Axis:
     """One axis: `quantity` and `unit` make its label, `limits` [unit] its range (None: from the data).
 
-    An axis of words has the positions 0, 1, 2, ..., named by `words`, and no unit.
+    An axis of words has the positions 0, 1, 2, ..., named by `words`, and no unit. Ticks stand at multiples of `step`
+    [unit], if that is given: angles are read in quarters of a turn. The unit has no prefix unless it is `prefixed`.
     """
 
     quantity: str
@@ -36,6 +37,8 @@ class Axis:
     limits: tuple[float, float] | None = None
     log: bool = False
     words: tuple[str, ...] = ()
+    step: float | None = None
+    prefixed: bool = True
 
     @property
     def label(self) -> str:
@@ -70,6 +73,29 @@ class Markers:
 
     def __post_init__(self) -> None:
         _same_length(self.label, self.x, self.y)
+
+
+@dataclass(frozen=True)
+class Band:
+    """What lies between `low` and `high` over x, all finite and of shape (n,), filled and never thinned."""
+
+    x: Array
+    low: Array
+    high: Array
+    label: str
+    colour: str
+
+    def __post_init__(self) -> None:
+        _same_length(self.label, self.x, self.low)
+        _same_length(self.label, self.x, self.high)
+        if not np.isfinite([self.x, self.low, self.high]).all():
+            raise ValueError(f"{self.label}: x, low and high are not all finite; a band has no gaps")
+
+    @property
+    def outline(self) -> tuple[Array, Array]:
+        """The closed line around it, each of shape (2 n + 1,): there along the top, back along the bottom."""
+        there_and_back = np.concatenate([self.x, self.x[::-1], self.x[:1]])
+        return there_and_back, np.concatenate([self.high, self.low[::-1], self.high[:1]])
 
 
 @dataclass(frozen=True)
@@ -153,7 +179,10 @@ class Cloud(Coloured):
 
 @dataclass(frozen=True)
 class Panel:
-    """One pair of axes with what is drawn in it: maps and clouds lowest, then limits, lines and markers."""
+    """One pair of axes with what is drawn in it: maps and clouds lowest, then bands, limits, lines and markers.
+
+    With `equal`, a unit is as long on the one axis as on the other, and both have limits.
+    """
 
     title: str
     x: Axis
@@ -163,6 +192,8 @@ class Panel:
     limits: tuple[Limit, ...] = ()
     maps: tuple[Map, ...] = ()
     clouds: tuple[Cloud, ...] = ()
+    bands: tuple[Band, ...] = ()
+    equal: bool = False
 
     @property
     def coloured(self) -> tuple[Coloured, ...]:

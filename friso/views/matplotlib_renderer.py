@@ -14,10 +14,18 @@ from typing import Any
 
 import matplotlib as mpl
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
-from matplotlib.lines import Line2D
-from matplotlib.ticker import Locator, LogFormatterMathtext, LogLocator, MaxNLocator, NullFormatter, ScalarFormatter
+from matplotlib.ticker import (
+    Locator,
+    LogFormatterMathtext,
+    LogLocator,
+    MaxNLocator,
+    MultipleLocator,
+    NullFormatter,
+    ScalarFormatter,
+)
 
 from friso.views.drawable import drawable, word_ticks
 from friso.views.figure import GREY, INK, Figure, Panel
@@ -27,6 +35,7 @@ FORMATS = ("png", "svg", "pdf")
 WIDTH = 9.0  # [inch]
 ROW_HEIGHT = 2.7  # [inch] axes, labels, title and legend of one row of panels
 MAP_HEIGHTS = {1: 4.9, 2: 3.7}  # [inch] the same of one or two columns of maps: their two axes matter alike
+EQUAL_HEIGHT = 5.9  # [inch] the same of panels with equal scales, which are about as high as wide
 HEADER_HEIGHT = 0.35  # [inch] the figure's own title
 
 # No dates and no version numbers in the files, so that a rerun gives the same bytes.
@@ -120,6 +129,8 @@ def _style() -> Iterator[None]:
 
 
 def _row_height(figure: Figure) -> float:
+    if any(panel.equal for panel in figure.panels):
+        return EQUAL_HEIGHT
     mapped = any(panel.coloured for panel in figure.panels)
     return MAP_HEIGHTS.get(figure.columns, ROW_HEIGHT) if mapped else ROW_HEIGHT
 
@@ -128,7 +139,9 @@ def _draw(axes: Axes, panel: Panel, width: float) -> None:
     """Everything of one panel, which is `width` [inch] wide."""
     _scale(axes, panel, width)
     draw_coloured(axes, panel)
-    handles: list[Line2D] = []
+    handles: list[Artist] = []
+    for band in panel.bands:
+        handles += axes.fill(*band.outline, color=band.colour, linewidth=0)
     for line in panel.series:
         style = {"color": line.colour, "linestyle": _DASHES[line.dash], "linewidth": line.width}
         handles += axes.plot(line.x, line.y, **style)
@@ -139,6 +152,8 @@ def _draw(axes: Axes, panel: Panel, width: float) -> None:
         axes.set_xlim(panel.x.limits)
     if panel.y.limits:
         axes.set_ylim(panel.y.limits)
+    if panel.equal:
+        axes.set_aspect("equal")
     _annotate(axes, panel, handles, width)
 
 
@@ -158,8 +173,9 @@ def _scale(axes: Axes, panel: Panel, width: float) -> None:
         else:
             plain = ScalarFormatter(useOffset=False)
             plain.set_scientific(False)
+            even = MaxNLocator(nbins=most, steps=steps)
             axis.set_major_formatter(plain)
-            axis.set_major_locator(MaxNLocator(nbins=most, steps=steps))
+            axis.set_major_locator(MultipleLocator(declared.step) if declared.step else even)
 
 
 def _decades(axis: Any, limits: tuple[float, float], even: Locator) -> None:
@@ -172,17 +188,17 @@ def _decades(axis: Any, limits: tuple[float, float], even: Locator) -> None:
     axis.set_minor_formatter(NullFormatter())
 
 
-def _annotate(axes: Axes, panel: Panel, handles: list[Line2D], width: float) -> None:
+def _annotate(axes: Axes, panel: Panel, handles: list[Artist], width: float) -> None:
     """Labels, and title over legend above the axes, where the legend covers no data."""
     axes.set_xlabel(panel.x.label, parse_math=False)
     axes.set_ylabel(panel.y.label, parse_math=False)
-    labels = [item.label for item in (*panel.series, *panel.markers)]
+    labels = [item.label for item in (*panel.bands, *panel.series, *panel.markers)]
     handles = [handle for handle, label in zip(handles, labels, strict=True) if label]
     labels = [label for label in labels if label]
     rows = 0
     if len(labels) > 1 and not panel.coloured:
-        columns = _legend_columns(labels, width)
-        rows = -(-len(labels) // columns)
+        rows = -(-len(labels) // _legend_columns(labels, width))
+        columns = -(-len(labels) // rows)  # matplotlib fills them one after the other
         place = {"loc": "lower left", "bbox_to_anchor": (0, 1), "borderaxespad": 0.1, "borderpad": 0.2}
         legend = axes.legend(handles, labels, ncols=columns, columnspacing=1.4, labelspacing=0.25, **place)
         for text in legend.get_texts():

@@ -1,14 +1,21 @@
-"""What the pages that friso writes share: their templates, and figures as pictures for paper."""
+"""What the pages that friso writes share: their templates, figures as pictures for paper, and the page of a stage."""
 
 from __future__ import annotations
 
 import base64
+from collections.abc import Sequence
 from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup
 
-from friso.views import matplotlib_renderer
+from friso.version import VERSION
+from friso.views import matplotlib_renderer, plotly_renderer
 from friso.views.figure import Figure
+
+if TYPE_CHECKING:
+    from friso.stage import Stage
 
 
 def environment() -> Environment:
@@ -22,3 +29,20 @@ def print_image(figure: Figure) -> str:
     """The figure as an SVG data address: what is printed, and what is seen without scripts."""
     svg = matplotlib_renderer.image(replace(figure, title="", subject=""), "svg")
     return "data:image/svg+xml;base64," + base64.b64encode(svg).decode("ascii")
+
+
+def stage_page(template: str, stage: Stage, figures: Sequence[Figure], **shown: Any) -> str:
+    """The page of a template about a stage and its figures; `shown` are the other values that it names."""
+    return (
+        environment()
+        .get_template(template)
+        .render(
+            name=stage.name or "Unnamed stage",
+            source=stage.source,
+            figures=[(figure, Markup(plotly_renderer.fragment(figure)), print_image(figure)) for figure in figures],
+            plotly=Markup(plotly_renderer.script()) if figures else None,
+            stage_file=stage.to_toml(),
+            version=VERSION,
+            **shown,
+        )
+    )

@@ -14,12 +14,13 @@ import plotly.graph_objects as go
 from plotly.offline import get_plotlyjs
 
 from friso.views.drawable import drawable, word_ticks
-from friso.views.figure import GREY, INK, Axis, Figure, Markers, Panel, Series
+from friso.views.figure import GREY, INK, Axis, Band, Figure, Markers, Panel, Series
 from friso.views.plotly_maps import BAR, DASHES, SYMBOLS, bar_panels, coloured_traces, footer, key_traces
 
 HEADER = 54  # [px] title and legend above the axes
 PLOT = 230  # [px] height of the axes
 MAP_PLOTS = {1: 430, 2: 320}  # [px] the same of one or two columns of maps: their two axes matter alike
+EQUAL_PLOT = 520  # [px] the same of panels with equal scales
 FOOTER = 54  # [px] tick labels and axis label
 LEFT, RIGHT, TOP = 72, 14, 26  # [px]; the buttons stand in the top margin
 GAP = 0.09  # between two panels of a row, as a fraction of the width
@@ -50,8 +51,7 @@ def fragment(figure: Figure) -> str:
 def render(figure: Figure) -> go.Figure:
     """The figure for plotly; its traces carry the arrays of `drawable(figure)`, in the same order."""
     prepared = drawable(figure)
-    mapped = any(panel.coloured for panel in prepared.panels)
-    plot = MAP_PLOTS.get(prepared.columns, PLOT) if mapped else PLOT
+    plot = _plot_height(prepared)
     row = HEADER + plot + FOOTER
     height = row * prepared.rows
     key = f"legend{len(prepared.panels) + 1}"  # the panels have the numbers before
@@ -83,6 +83,13 @@ def render(figure: Figure) -> go.Figure:
     return go.Figure(data=traces + key_traces(prepared, key), layout=layout)
 
 
+def _plot_height(figure: Figure) -> int:
+    if any(panel.equal for panel in figure.panels):
+        return EQUAL_PLOT
+    mapped = any(panel.coloured for panel in figure.panels)
+    return MAP_PLOTS.get(figure.columns, PLOT) if mapped else PLOT
+
+
 def _columns(column: int, columns: int) -> tuple[float, float]:
     """Left and right end of a column, as fractions of the width."""
     width = (1 - GAP * (columns - 1)) / columns
@@ -101,12 +108,14 @@ def _add_panel(
 ) -> None:
     """Axes, legend and title of one panel; panels with equal x axes are zoomed together."""
     suffix = _suffix(number)
-    x_axis = _axis(panel.x) | {"domain": x_domain, "anchor": f"y{suffix}"}
+    shape = {"constrain": "domain"} if panel.equal else {}
+    x_axis = _axis(panel.x) | {"domain": x_domain, "anchor": f"y{suffix}"} | shape
     if panel.x in links:
         x_axis["matches"] = links[panel.x]
     links.setdefault(panel.x, f"x{suffix}")
     layout[f"xaxis{suffix}"] = x_axis
-    layout[f"yaxis{suffix}"] = _axis(panel.y) | {"domain": y_domain, "anchor": f"x{suffix}"}
+    shape |= {"scaleanchor": f"x{suffix}"} if panel.equal else {}
+    layout[f"yaxis{suffix}"] = _axis(panel.y) | {"domain": y_domain, "anchor": f"x{suffix}"} | shape
     layout[f"legend{suffix}"] = {
         "orientation": "h",
         "x": x_domain[0],
@@ -147,6 +156,8 @@ def _axis(axis: Axis) -> dict[str, Any]:
         settings |= {"tickmode": "array", "tickvals": positions, "ticktext": [html.escape(word) for word in words]}
     if axis.log:
         settings["dtick"] = 1
+    if axis.step:
+        settings |= {"tick0": 0, "dtick": axis.step}
     if axis.limits:
         settings["range"] = [math.log10(limit) for limit in axis.limits] if axis.log else list(axis.limits)
     return settings
@@ -156,14 +167,21 @@ def _traces(panel: Panel, number: int, bar: dict[str, Any] | None) -> list[Any]:
     """What is drawn in a panel, maps first, in the order of `drawable`."""
     suffix = _suffix(number)
     place = {"xaxis": f"x{suffix}", "yaxis": f"y{suffix}"}
-    count = sum(bool(item.label) for item in (*panel.series, *panel.markers))
+    count = sum(bool(item.label) for item in (*panel.bands, *panel.series, *panel.markers))
     key = count > 1 and not panel.coloured
     named = place | {"legend": f"legend{suffix}"}
     return [
         *coloured_traces(panel, place, bar),
+        *(_area(band, named | {"showlegend": key and bool(band.label)}) for band in panel.bands),
         *(_line(line, panel, named | {"showlegend": key and bool(line.label)}) for line in panel.series),
         *(_points(marker, panel, named | {"showlegend": key and bool(marker.label)}) for marker in panel.markers),
     ]
+
+
+def _area(band: Band, place: dict[str, Any]) -> go.Scatter:
+    x, y = band.outline
+    style = {"mode": "lines", "line": {"width": 0}, "fill": "toself", "fillcolor": band.colour, "hoverinfo": "skip"}
+    return go.Scatter(x=x, y=y, name=html.escape(band.label), **style, **place)
 
 
 def _line(line: Series, panel: Panel, place: dict[str, Any]) -> go.Scatter:

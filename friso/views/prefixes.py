@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
 from friso.views.figure import Array
+
+NOTHING = "–"
+"""Stands where there is nothing to say."""
 
 # Prefixes by exponent of ten, and the smallest and largest exponent of the units that take them: lengths beyond metres,
 # times beyond seconds and slow frequencies are read best as they are.
@@ -47,7 +51,7 @@ def pretty(unit: str) -> str:
 def with_unit(value: float | None, unit: str, digits: int = 3) -> str:
     """A value [unit] for a table or a sentence, e.g. "0.52 mm"; a dash where there is none."""
     if value is None or not math.isfinite(value):
-        return "–"
+        return NOTHING
     factor, text = choose(np.array([value]), unit)
     number = value * factor
     if number == 0 or 1e-3 <= abs(number) < 1e5:
@@ -56,15 +60,31 @@ def with_unit(value: float | None, unit: str, digits: int = 3) -> str:
 
 
 def range_with_unit(low: float, high: float, unit: str, digits: int = 3) -> str:
-    """A range [unit] for a table or a sentence, e.g. "1.72 to 10.8 mm"."""
+    """A range [unit] for a table or a sentence, e.g. "1.72 to 10.8 mm"; a wide one has two prefixes."""
     factor, text = choose(np.array([low, high]), unit)
+    if 0 < low * factor < 0.01:
+        return f"{with_unit(low, unit, digits)} to {with_unit(high, unit, digits)}"
     return f"{_rounded(low * factor, digits)} to {_rounded(high * factor, digits)} {text}"
+
+
+def window_with_unit(low: float, high: float, searched: tuple[float, float], unit: str) -> str:
+    """Part of a range [unit] that was searched, in words; a part that ends with what was searched is open there."""
+    if (low, high) == searched:
+        return f"all from {range_with_unit(low, high, unit)}"
+    if low == searched[0]:
+        return f"up to {with_unit(high, unit)}"
+    return f"from {with_unit(low, unit)} on" if high == searched[1] else range_with_unit(low, high, unit)
 
 
 def plus_minus(half: float, unit: str, digits: int = 3) -> str:
     """Half a range [unit] with the prefix that suits the whole of it, e.g. "±0.52 mm"."""
     factor, text = choose(np.array([2 * half]), unit)
     return f"±{half * factor:.{digits}g} {text}"
+
+
+def listed(parts: Sequence[str], word: str) -> str:
+    """ "a", "a or b", "a, b or c" with the word "or"."""
+    return f" {word} ".join(part for part in (", ".join(parts[:-1]), *parts[-1:]) if part)
 
 
 def _rounded(number: float, digits: int) -> str:

@@ -6,14 +6,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from markupsafe import Markup
-
-from friso.version import VERSION
-from friso.views import plotly_renderer
 from friso.views.cases import shown_cases
 from friso.views.check_figures import check_figures
 from friso.views.check_table import rows
-from friso.views.pages import environment, print_image
+from friso.views.pages import stage_page
 from friso.views.summary import conclusion, verdict_sentence
 
 if TYPE_CHECKING:
@@ -29,21 +25,13 @@ def report_html(cases: Mapping[str, Case]) -> str:
     """The whole page for the cases "given" and, with a joint, "locked" and "free"; traces may be missing."""
     shown = shown_cases(cases)
     stage = shown[0].case.stage if "given" not in cases else cases["given"].stage
-    figures = check_figures(cases)
-    return (
-        environment()
-        .get_template("report.html")
-        .render(
-            name=stage.name or "Unnamed stage",
-            source=stage.source,
-            shown=shown,
-            sentences=[(item, verdict_sentence(item, cases)) for item in shown],
-            conclusion=conclusion(cases),
-            rows=rows(shown),
-            figures=[(figure, Markup(plotly_renderer.fragment(figure)), print_image(figure)) for figure in figures],
-            plotly=Markup(plotly_renderer.script()) if figures else None,
-            stage_file=stage.to_toml(),
-            version=VERSION,
-            rtol=", ".join(sorted({f"{item.case.solver.rtol:g}" for item in shown})),
-        )
+    return stage_page(
+        "report.html",
+        stage,
+        check_figures(cases),
+        shown=shown,
+        sentences=[(item, verdict_sentence(item, cases)) for item in shown],
+        conclusion=conclusion(cases),
+        rows=rows(shown),
+        rtol=", ".join(sorted({f"{item.case.solver.rtol:g}" for item in shown})),
     )

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from friso.hunting.basin import SHARES
 from friso.equations.bandwidth import faster
+from friso.hunting.basin import SHARES
 from friso.hunting.margin import FARTHEST
 from friso.hunting.verdict import LONG
 from friso.views.cases import BANDS, Shown
-from friso.views.prefixes import plus_minus, with_unit
+from friso.views.prefixes import listed, plus_minus, with_unit
 
 if TYPE_CHECKING:
     from friso.hunting import Case, Margin
@@ -65,7 +65,7 @@ def _bistable(case: Case) -> str:
         starts.append(f"{100 * moves.fraction:.0f} % of the moves tried ({like})")
     if not starts:
         return f"settles after this move, and none of the kicks and moves tried starts hunting ({_swing(case)})."
-    return f"settles after this move, but {_alternatives(starts)} can start hunting, {_swing(case)}."
+    return f"settles after this move, but {listed(starts, 'or')} can start hunting, {_swing(case)}."
 
 
 def _transient(case: Case) -> str:
@@ -118,7 +118,7 @@ def _remedy(item: Shown, cases: Mapping[str, Case]) -> list[str]:
     known = item.case.judgement
     ways = [_faster(item.case, known.margin)] if known.margin else []
     ways += ["free the joint"] if _freeing_helps(item, cases) else []
-    says = [f"{ways[0][0].upper()}{_alternatives(ways)[1:]}."] if ways else []
+    says = [f"{ways[0][0].upper()}{listed(ways, 'or')[1:]}."] if ways else []
     if known.margin or known.observed or not known.hunting.cycles[0].attracts:
         return says
     return [f"No bandwidth up to {FARTHEST:g} times this one was found to stop it.", *says]
@@ -158,8 +158,3 @@ def _end(case: Case) -> str:
 
 def _every(case: Case) -> str:
     return f" every {with_unit(case.period, 's')}" if case.period else ""
-
-
-def _alternatives(ways: list[str]) -> str:
-    """ "a", "a or b", "a, b or c"."""
-    return " or ".join(part for part in (", ".join(ways[:-1]), ways[-1]) if part)

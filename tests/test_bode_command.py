@@ -1,0 +1,543 @@
+"""`friso bode` as a user runs it: what it computes, says, draws and refuses."""
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Mapping
+from dataclasses import replace
+from itertools import chain
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from pages import Page
+
+import friso
+from friso.cli.bode import bode as command
+from friso.cli.bode import bode_document
+from friso.frequency.bode import Bode, Unstable, bode
+from friso.quantities import StageError
+from friso.stage import Stage
+from friso.views import matplotlib_renderer, plotly_renderer
+from friso.views.bode_figures import bode_figures, phases
+from friso.views.bode_states import shown_states
+from friso.views.bode_table import rows
+from friso.views.bode_words import caveats, crossovers, sentences, stability
+from friso.views.drawable import drawable
+from friso.views.figure import Axis, Band, Figure, Panel, Series
+
+EXAMPLES = Path(__file__).parent.parent / "examples"
+RIG, EMPS = EXAMPLES / "thesis_rig.toml", EXAMPLES / "emps_axis.toml"
+FIGURES = ("bode_plant", "bode_loop", "bode_speeds", "bode_nyquist", "bode_sensitivity")
+MARGINS = {
+    *("stable", "crossovers_hz", "phase_margin_deg", "gain_margin", "gain_reduction", "modulus_margin"),
+    *("peak_sensitivity", "delay_margin_s", "closest_hz", "poles"),
+}
+RIGID = """
+[masses]
+stage = "2 kg"
+[controller]
+kind = "pid"
+crossover = "10 Hz"
+alpha = 0.1
+beta = 2
+[motion]
+kind = "step"
+size = "1 mm"
+duration = "2 s"
+"""
+
+
+def run(folder: Path, *arguments: str, stage: Path = RIG) -> subprocess.CompletedProcess[str]:
+    """Run the command in a folder."""
+    done = [sys.executable, "-m", "friso.cli", "bode", str(stage), *arguments]
+    environment = {**os.environ, "COLUMNS": "160"}
+    return subprocess.run(done, cwd=folder, capture_output=True, text=True, timeout=300, env=environment)
+
+
+@pytest.fixture(scope="module")
+def found(rig: Stage) -> Bode:
+    return bode(rig)
+
+
+@pytest.fixture(scope="module")
+def unstable(rig: Stage) -> Bode:
+    """Hardly any phase lead: stuck and sliding are unstable alike."""
+    return bode(rig.replace({"controller.alpha": 0.9, "controller.beta": 1}))
+
+
+@pytest.fixture(scope="module")
+def emps() -> Bode:
+    return bode(friso.load(EMPS))
+
+
+@pytest.fixture(scope="module")
+def rigid(tmp_path_factory: pytest.TempPathFactory) -> Bode:
+    path = tmp_path_factory.mktemp("rigid") / "rigid.toml"
+    path.write_text(RIGID)
+    return bode(friso.load(path))
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, Any], Path]:
+    """The document of the rig, and the folder of its files."""
+    folder = tmp_path_factory.mktemp("bode")
+    done = run(folder, "--json", "--out", "out", "--frequencies", "0.1 Hz..1 kHz")
+    assert (done.returncode, done.stderr) == (0, "")
+    return _strict(done.stdout), folder / "out"
+
+
+def _strict(text: str) -> dict[str, Any]:
+    """A JSON document, in which infinite and undefined numbers have no place."""
+
+    def refuse(name: str) -> None:
+        raise AssertionError(f"{name} in the document")
+
+    return json.loads(text, parse_constant=refuse)
+
+
+# ---------------------------------------------------------------- the document
+
+
+def test_the_document_has_the_agreed_keys(written: tuple[dict, Path]) -> None:
+    document, _ = written
+    assert document.keys() == {
+        *("stage", "cases", "worst", "worst_stable", "unstable_speeds_m_per_s", "limits"),
+        "highest_stable_crossover_hz",
+    }
+    assert document["stage"] == "Thesis rig"
+    assert document["cases"].keys() == {"stuck", "sliding", "stuck-touched", "sliding-touched"}
+    assert all(case.keys() == MARGINS for case in document["cases"].values())
+    for name in ("worst", "worst_stable"):
+        assert document[name].keys() == MARGINS | {"at"}
+        assert document[name]["at"].keys() == {"bias_n", "speed_m_per_s", "limiter", "forward"}
+    assert document["limits"].keys() == {"locked", "free"}
+    for known in document["limits"].values():
+        assert known.keys() == {
+            *("highest_stable_crossover_hz", "stable_hz", "modulus_margin_above_half_hz", "searched_hz"),
+        }
+
+
+def test_the_document_tells_margins_and_limits_of_the_rig(written: tuple[dict, Path]) -> None:
+    document, _ = written
+    sliding = document["cases"]["sliding"]
+    assert sliding["crossovers_hz"] == pytest.approx([5.123, 9.009, 24.75], rel=1e-3)
+    assert sliding["phase_margin_deg"] == pytest.approx(37.42, abs=0.01)
+    assert (sliding["gain_margin"], sliding["gain_reduction"]) == (None, pytest.approx(0.1228, rel=1e-3))
+    for case in document["cases"].values():
+        assert case["stable"]
+        assert case["stable"] == all(real < 0 for real, _ in case["poles"])
+        assert case["peak_sensitivity"] * case["modulus_margin"] == pytest.approx(1)
+    assert not document["worst"]["stable"]
+    assert document["worst"]["modulus_margin"] is None
+    assert document["worst"]["at"]["limiter"] == "free"
+    assert document["worst"]["at"]["speed_m_per_s"] == pytest.approx(1.78e-3, rel=0.05)
+    free, touched = document["unstable_speeds_m_per_s"]
+    assert (free["limiter"], touched["limiter"]) == ("free", "touched")
+    assert (free["low"], free["high"]) == pytest.approx((1.2225e-4, 3.9e-3), rel=1e-3)
+    assert document["highest_stable_crossover_hz"] is None
+    comfortable = document["limits"]["free"]["modulus_margin_above_half_hz"]
+    assert np.ravel(comfortable) == pytest.approx([0.1, 0.651, 3.64, 14.3], rel=5e-3)
+
+
+def test_the_highest_stable_crossover_is_that_of_the_joint_as_given(rig: Stage) -> None:
+    slow = rig.replace({"drive.delay": "2 ms"})
+    for locked in (True, False):
+        document = bode_document(bode(slow.replace({"joint.locked": locked})))
+        own = document["limits"]["locked" if locked else "free"]["highest_stable_crossover_hz"]
+        assert document["highest_stable_crossover_hz"] == own
+        assert own == pytest.approx(60.8 if locked else 21.1, rel=5e-3)
+        assert (document["worst"]["at"]["limiter"] is None) == locked
+
+
+def test_series_adds_the_thesis_formula_beside(rig: Stage) -> None:
+    found = bode(rig, (1.0, 100.0), series=True)
+    cases = bode_document(found)["cases"]
+    added = {"stuck-touched-series", "sliding-touched-series"}
+    assert added <= cases.keys()
+    plant = bode_figures(found)[0].panels[0]
+    dashed = {line.label for line in plant.series if line.dash == "dashed"}
+    assert {"Stuck, limiter in series", "Sliding, limiter in series"} <= dashed
+    (line,) = (line for line in plant.series if line.label == "Stuck, limiter in series")
+    assert line.y == pytest.approx(np.abs(found.cases["stuck-touched-series"].plant))
+
+
+def test_a_controller_by_gains_has_factors_instead_of_crossovers(emps: Bode) -> None:
+    document = bode_document(emps)
+    assert document["highest_stable_crossover_hz"] is None
+    known = document["limits"]["given"]
+    assert known == {
+        "highest_stable_crossover_factor": None,
+        "stable_factor": ((0.01, 1000.0),),
+        "modulus_margin_above_half_factor": ((0.01, 1000.0),),
+        "searched_factor": (0.01, 1000.0),
+    }
+    assert document["cases"].keys() == {"stuck", "sliding"}
+    assert document["cases"]["stuck"]["crossovers_hz"] == []
+    assert document["cases"]["stuck"]["phase_margin_deg"] is None
+    assert document["worst_stable"] == document["worst"]
+    assert document["unstable_speeds_m_per_s"] == []
+
+
+def test_a_rigid_stage_without_friction_has_the_one_case_given(rigid: Bode) -> None:
+    document = bode_document(rigid)
+    assert document["cases"].keys() == {"given"}
+    assert document["worst"]["at"] == {"bias_n": 0.0, "speed_m_per_s": 0.0, "limiter": None, "forward": True}
+    assert document["limits"].keys() == {"given"}
+    assert [item.label for item in shown_states(rigid)] == ["As given"]
+    assert stability(rigid) == ["The loop is stable."]
+
+
+def test_an_unstable_loop_is_a_plain_statement(unstable: Bode) -> None:
+    case = bode_document(unstable)["cases"]["sliding"]
+    assert case["stable"] is False
+    assert max(real for real, _ in case["poles"]) > 0
+    nothing = ("phase_margin_deg", "gain_margin", "gain_reduction", "modulus_margin", "peak_sensitivity", "closest_hz")
+    assert {name: case[name] for name in nothing} == dict.fromkeys(nothing)
+    assert len(case["crossovers_hz"]) == 3
+
+
+# ---------------------------------------------------------------- what is said
+
+
+def test_the_table_and_the_sentences_of_the_rig(capsys: pytest.CaptureFixture, monkeypatch: Any) -> None:
+    monkeypatch.setenv("COLUMNS", "200")
+    command(RIG)
+    said = capsys.readouterr().out
+    assert "Thesis rig" in said
+    assert [name in said for name in ("Phase margin", "Modulus margin", "Worst of the family")] == [True] * 3
+    flat = " ".join(said.split())
+    assert "5.12 Hz, 9.01 Hz, 24.8 Hz" in flat
+    assert (
+        "This one controller is not stable in every state. Unstable: sliding, 0.122 to 3.90 mm/s, limiter free; "
+        "sliding, 0.187 to 3.37 mm/s, limiter touched."
+    ) in flat
+    assert "There friction falls as the speed rises (Stribeck effect)" in flat
+    assert "Worst: sliding at 1.78 mm/s, limiter free; a deviation grows e-fold in 2.9" in flat
+    assert "Free (as given): stable: all from 0.100 Hz to 10.0 kHz; modulus margin above 0.5: up to 0.65" in flat
+    assert "drive.sample_time" in flat
+
+
+def test_the_table_says_where_there_is_no_limit_and_no_margin(found: Bode) -> None:
+    shown = shown_states(found)
+    table = {name: dict(zip([item.label for item in shown], texts, strict=True)) for name, texts in rows(shown)}
+    assert table["Gain margin"]["Sliding"] == "no limit"
+    assert table["Gain margin downwards"]["Sliding"] == "−18.2 dB"
+    assert table["Phase margin"]["Worst of the family"] == "–"
+    assert table["Stable"]["Worst of the family"] == "no"
+    assert table["State"]["Worst of the family"] == "sliding at 1.78 mm/s, limiter free"
+    assert table["Unstable"]["Worst of the family"].startswith("grows e-fold in 2.9")
+    assert table["Least damped pole"]["Stuck"] == "ζ = 0.01 at 301 Hz"
+    assert "Unstable" not in dict(rows(shown[:4]))
+
+
+def test_friction_that_rises_is_not_blamed(found: Bode) -> None:
+    """At 10 mm/s to 1 m/s viscous friction rules."""
+    risen = replace(found, unstable=(Unstable(1e-2, 1.0, False, True),))
+    assert not any("Stribeck" in sentence for sentence in stability(risen))
+    assert any("Stribeck" in sentence for sentence in stability(found))
+
+
+def test_unstable_limit_cases_are_a_matter_of_tuning(unstable: Bode) -> None:
+    where, why, worst = stability(unstable)
+    assert "Unstable: stuck, limiter free; stuck under a bias force of 2." in where
+    assert "sliding, all from 1.60 µm/s to 1.60 m/s, limiter free" in where
+    assert why.startswith("That is a matter of tuning")
+    assert "Stribeck" not in why
+    assert worst.startswith("Worst: sliding")
+    assert crossovers(unstable)["free"].startswith("Free (as given): stable: none from 0.100 Hz to 10.0 kHz")
+    assert caveats(unstable) == []
+
+
+def test_the_state_that_is_lost_first_is_named(rig: Stage) -> None:
+    """Tuned for too light a mass, the loop of a sliding cart is too slow for its integral action."""
+    said = crossovers(bode(rig.replace({"controller.tuned_mass": "0.2 kg"})))
+    assert "highest stable crossover: 8.41 Hz (above, the state that is lost first: sliding at 1.6" in said["locked"]
+    assert "5.92 Hz (above, the state that is lost first: sliding at 1.60 m/s, limiter free)" in said["free"]
+
+
+def test_what_the_stage_file_lacks_is_named(found: Bode, rig: Stage) -> None:
+    (said,) = caveats(found)
+    assert "sampling (drive.sample_time), delay (drive.delay) and modes that the stage file does not contain" in said
+    assert said.startswith("The loop is still stable at 10.0 kHz, where")
+    sampled = replace(found, stage=rig.replace({"drive.sample_time": "50 us", "drive.delay": "0 s"}))
+    (said,) = caveats(sampled)
+    assert "half the sampling frequency" in said
+    assert "the real machine modes that" in said
+    assert "drive." not in said
+
+
+def test_words_of_a_controller_by_gains(emps: Bode) -> None:
+    said = " ".join(sentences(emps))
+    assert "This one controller is stable in every state: stuck under bias forces of up to 20.4 N" in said
+    assert "in multiples of its bandwidth" in said
+    assert "stable: all from 0.0100 to 1000 times this bandwidth" in said
+    assert "crossover" not in said
+
+
+def test_no_texts_but_json_on_standard_output(capsys: pytest.CaptureFixture) -> None:
+    command(EMPS, as_json=True)
+    shown = capsys.readouterr()
+    assert _strict(shown.out)["stage"] == "EMPS axis"
+    assert shown.err == ""
+
+
+# ---------------------------------------------------------------- figures and page
+
+
+def test_files_and_page(written: tuple[dict, Path]) -> None:
+    _, folder = written
+    pictures = {f"{name}.{form}" for name in FIGURES for form in ("png", "svg", "pdf")}
+    assert {path.name for path in folder.iterdir()} == pictures | {"bode.html"}
+    assert (folder / "bode_plant.png").read_bytes().startswith(b"\x89PNG")
+    assert (folder / "bode_nyquist.pdf").read_bytes().startswith(b"%PDF")
+    page = Page((folder / "bode.html").read_text(encoding="utf-8"))
+    assert all(address.startswith("data:") for address in page.loads)
+    assert page.tags.count("img") == len(FIGURES)
+    for words in ("not stable in every state", "Free (as given)", "Phase margin", "Nyquist plot", "Sensitivity"):
+        assert words in page.text
+    assert "stribeck_velocity" in page.text
+
+
+def drawn_on_paper(figure: Figure) -> list[list[np.ndarray]]:
+    """The arrays of every panel: bands, then lines."""
+    panels = []
+    for axes in matplotlib_renderer.render(figure).axes:
+        outlines = [part for patch in axes.patches for part in np.asarray(patch.get_xy()).T]  # type: ignore[attr-defined]
+        panels.append(outlines + [np.asarray(part, float) for line in axes.lines for part in line.get_data()])
+    return panels
+
+
+def drawn_on_the_page(figure: Figure) -> list[list[np.ndarray]]:
+    panels: dict[str, list[np.ndarray]] = {}
+    for trace in plotly_renderer.render(figure).data:
+        panels.setdefault(trace.xaxis, []).extend(np.asarray(part, float) for part in (trace.x, trace.y))
+    return list(panels.values())
+
+
+@pytest.mark.parametrize("name", FIGURES)
+def test_both_renderers_draw_the_same_arrays(found: Bode, name: str) -> None:
+    (figure,) = (figure for figure in bode_figures(found) if figure.name == name)
+    paper, page = drawn_on_paper(figure), drawn_on_the_page(figure)
+    assert [len(panel) for panel in paper] == [len(panel) for panel in page]
+    for one, other in zip(chain(*paper), chain(*page), strict=True):
+        assert np.array_equal(one, other, equal_nan=True)
+
+
+def _figures(found: Bode) -> Mapping[str, Figure]:
+    return {figure.name: figure for figure in bode_figures(found)}
+
+
+def test_the_plant_is_drawn_with_its_mass_lines(found: Bode) -> None:
+    magnitude, phase = _figures(found)["bode_plant"].panels
+    lines = {line.label: line for line in magnitude.series}
+    assert [*lines] == [
+        *("Stuck", "Sliding", "Stuck, limiter touched", "Sliding, limiter touched"),
+        *("mass of 1.7 kg", "mass of 0.5 kg"),
+    ]
+    assert lines["Sliding"].y == pytest.approx(np.abs(found.cases["sliding"].plant))
+    assert lines["mass of 0.5 kg"].y * found.omega**2 == pytest.approx(2.0)
+    assert drawable(_figures(found)["bode_plant"]).panels[0].y.label == "Magnitude [m/N]"
+    starts = [line.y[0] for line in phase.series]
+    assert starts == pytest.approx([0, -92, 0, -92], abs=2)
+    assert [line.y[-1] for line in phase.series] == pytest.approx([-180] * 4, abs=2)
+
+
+def test_loops_cross_0_db_where_the_table_says(found: Bode) -> None:
+    magnitude, phase = _figures(found)["bode_loop"].panels
+    (sliding,) = (line for line in magnitude.series if line.label == "Sliding")
+    passes = np.flatnonzero(np.diff(np.sign(sliding.y)))
+    expected = found.cases["sliding"].margins.crossovers
+    assert sliding.x[passes] == pytest.approx(expected, rel=0.02)
+    assert [limit.values for limit in (*magnitude.limits, *phase.limits)] == [(0.0,), (-180.0,)]
+
+
+def test_loops_at_prescribed_speeds(found: Bode, unstable: Bode) -> None:
+    magnitude, phase = _figures(found)["bode_speeds"].panels
+    assert [(line.label, line.dash) for line in magnitude.series] == [
+        *(("stuck", "solid"), ("1 µm/s", "solid"), ("10 µm/s", "solid"), ("100 µm/s", "solid")),
+        *(("1 mm/s (unstable)", "dashed"), ("10 mm/s", "solid"), ("100 mm/s", "solid")),
+    ]
+    assert magnitude.series[3].y == pytest.approx(20 * np.log10(np.abs(found.prescribed[1e-4])))
+    assert len({line.colour for line in magnitude.series}) == 7
+    assert [line.y[-1] for line in phase.series] == pytest.approx([-180] * 7, abs=2)
+    assert all(line.label.endswith("(unstable)") for line in _figures(unstable)["bode_speeds"].panels[0].series)
+
+
+def test_nyquist_has_equal_scales_the_point_and_the_circle(found: Bode) -> None:
+    figure = _figures(found)["bode_nyquist"]
+    (panel,) = figure.panels
+    (circle,) = (line for line in panel.series if line.label == "modulus margin 0.5")
+    assert np.hypot(circle.x + 1, circle.y) == pytest.approx(0.5)
+    assert (panel.markers[0].x[0], panel.markers[0].y[0]) == (-1, 0)
+    (stuck,) = (line for line in panel.series if line.label == "Stuck")
+    assert stuck.x + 1j * stuck.y == pytest.approx(found.cases["stuck"].loop)
+    least = min(np.hypot(stuck.x + 1, stuck.y))
+    assert least == pytest.approx(found.cases["stuck"].margins.modulus_margin, rel=1e-3)
+    assert {"stable states of the family", "unstable states of the family"} <= {line.label for line in panel.series}
+    canvas = matplotlib_renderer.render(figure)
+    canvas.draw_without_rendering()
+    box = canvas.axes[0].get_window_extent()
+    (x0, x1), (y0, y1) = canvas.axes[0].get_xlim(), canvas.axes[0].get_ylim()
+    assert box.width / (x1 - x0) == pytest.approx(box.height / (y1 - y0))
+    assert plotly_renderer.render(figure).layout.yaxis.scaleanchor == "x"
+
+
+def test_the_band_of_the_sensitivity_holds_the_stable_states(found: Bode) -> None:
+    figure = _figures(found)["bode_sensitivity"]
+    (panel,) = figure.panels
+    (band,) = panel.bands
+    stable = found.scan.stable
+    sensitivity = 1 / np.abs(1 + found.loops[stable])
+    assert 10 ** (band.low / 20) == pytest.approx(sensitivity.min(axis=0))
+    assert 10 ** (band.high / 20) == pytest.approx(sensitivity.max(axis=0))
+    assert f"of {stable.sum()} stable states" in figure.note
+    assert f"{(~stable).sum()} unstable ones are left out" in figure.note
+    (six,) = panel.limits
+    assert six.values[0] == pytest.approx(6.02, abs=0.01)
+    for line in panel.series:
+        assert (line.y >= band.low - 1e-6).all()
+        assert (line.y <= band.high + 1e-6).all()
+
+
+def test_loops_that_are_not_stable_have_no_sensitivity(unstable: Bode) -> None:
+    figures = _figures(unstable)
+    assert [line.label for line in figures["bode_sensitivity"].panels[0].series] == ["Stuck, limiter touched"]
+    labels = [line.label for line in figures["bode_loop"].panels[0].series]
+    assert labels[:3] == ["Stuck (unstable)", "Sliding (unstable)", "Stuck, limiter touched"]
+
+
+def test_figures_of_a_single_case(rigid: Bode) -> None:
+    figures = _figures(rigid)
+    assert [*figures] == ["bode_plant", "bode_loop", "bode_nyquist", "bode_sensitivity"]
+    assert not figures["bode_sensitivity"].panels[0].bands
+    plant = figures["bode_plant"].panels
+    assert [line.label for line in plant[0].series] == ["As given", "mass of 2 kg"]
+    assert plant[1].series[0].y == pytest.approx(-180)
+    for figure in figures.values():
+        assert matplotlib_renderer.image(figure, "png")
+        assert plotly_renderer.fragment(figure)
+
+
+def test_figures_show_the_frequencies_asked_for(rig: Stage) -> None:
+    panel = bode_figures(bode(rig, (0.5, 2000.0)))[0].panels[0]
+    assert panel.x.limits == pytest.approx((0.5, 2000.0))
+    assert (panel.series[0].x[0], panel.series[0].x[-1]) == pytest.approx((0.5, 2000.0))
+
+
+def test_phases_do_not_jump() -> None:
+    s = 1j * np.geomspace(1e-2, 1e2, 400)
+    mass, triple, late = 1 / s**2, 1 / s**3, np.exp(-s) / s**2
+    undamped = 1 / (s**2 + 1)
+    negative = (s + 1) / (s * (s - 1))  # begins with 90 degrees lead, or 270 lag
+    assert phases([mass])[0] == pytest.approx(-180)
+    assert phases([triple])[0] == pytest.approx(-270)
+    assert phases([late])[0] == pytest.approx(-180 - np.degrees(s.imag))
+    assert np.unique(phases([undamped])[0].round()).tolist() == [-180, 0]
+    one, other = phases([1 / s, negative])
+    assert (one[0], one[-1]) == pytest.approx((-90, -90))
+    assert (other[0], other[-1]) == pytest.approx((-270, -90), abs=2)
+
+
+# ---------------------------------------------------------------- what figures learned for this
+
+
+def banded() -> Figure:
+    x = np.linspace(0, 2e-3, 5)
+    band = Band(x, -1e-3 * x, 2e-3 * x, "between", "#c9c9c9")
+    line = Series(x, 1e-3 * x, "line", "#000000")
+    y = Axis("Deviation", "m", (-4e-6, 4e-6), step=2e-6)
+    return Figure("banded", "Banded", "", (Panel("", Axis("Time", "s", prefixed=False), y, (line,), bands=(band,)),))
+
+
+def test_a_band_is_prefixed_and_drawn_alike_under_its_label() -> None:
+    figure = banded()
+    (panel,) = drawable(figure).panels
+    assert (panel.y.unit, panel.y.step) == ("µm", pytest.approx(2.0))
+    assert panel.x.unit == "s"
+    assert panel.bands[0].high[-1] == pytest.approx(4.0)
+    for one, other in zip(drawn_on_paper(figure)[0], drawn_on_the_page(figure)[0], strict=True):
+        assert one == pytest.approx(other)
+    canvas = matplotlib_renderer.render(figure)
+    assert [text.get_text() for text in canvas.axes[0].get_legend().get_texts()] == ["between", "line"]  # type: ignore[union-attr]
+    canvas.draw_without_rendering()
+    assert np.diff(canvas.axes[0].get_yticks()) == pytest.approx(2.0)
+    page = plotly_renderer.render(figure)
+    assert [trace.name for trace in page.data] == ["between", "line"]
+    assert page.layout.yaxis.dtick == pytest.approx(2.0)
+
+
+def test_a_band_with_gaps_or_of_two_lengths_is_refused() -> None:
+    x = np.arange(3.0)
+    with pytest.raises(ValueError, match="a band has no gaps"):
+        Band(x, x, np.array([0.0, np.nan, 1.0]), "between", "#000000")
+    with pytest.raises(ValueError, match=r"x has the shape \(3,\), y \(2,\); expected one length"):
+        Band(x, x[:2], x, "between", "#000000")
+
+
+# ---------------------------------------------------------------- what is refused
+
+
+@pytest.mark.parametrize(
+    ("text", "given", "expected"),
+    [
+        ("1 kHz..0.1 Hz", r'"1 kHz..0.1 Hz" \(reversed range\)', "a range that rises"),
+        ("1 Hz..1 Hz", r'"1 Hz..1 Hz" \(empty range\)', "a range that rises"),
+        ("0 Hz..1 kHz", '"0 Hz"', "from 1 uHz to 1 GHz"),
+        ("-1 Hz..1 kHz", '"-1 Hz"', "from 1 uHz to 1 GHz"),
+        ("1 Hz..1e300 Hz", '"1e300 Hz"', "from 1 uHz to 1 GHz"),
+        ("1 Hz..", '"1 Hz.."', "a range of frequencies, FIRST..LAST"),
+        ("..1 kHz", '"..1 kHz"', "a range of frequencies, FIRST..LAST"),
+        ("1 Hz", '"1 Hz"', "a range of frequencies, FIRST..LAST"),
+        ("", '""', "a range of frequencies, FIRST..LAST"),
+        ("1..100", r'"1" \(its unit is missing\)', "convertible to Hz, rad/s or rpm"),
+        ("1 m..2 m", r'"1 m" \(not a frequency\)', "convertible to Hz, rad/s or rpm"),
+        ("1 Hz..2 Hz..3 Hz", "is not a unit", "convertible to Hz, rad/s or rpm"),
+    ],
+)
+def test_frequencies_that_are_refused(text: str, given: str, expected: str) -> None:
+    with pytest.raises(StageError, match=rf"(?s)--frequencies\n.*{given}.*{expected}.*0\.1 Hz\.\.1 kHz"):
+        command(RIG, frequencies=text)
+
+
+@pytest.mark.parametrize(
+    ("overrides", "frequencies", "message"),
+    [
+        (['drive.sample_time="1 ms"'], "1 Hz..600 Hz", "frequencies of up to 500 Hz, half the sampling frequency"),
+        (['drive.sample_time="100 ms"'], None, "a crossover below half the sampling frequency"),
+        (['controller.crosover="8 Hz"'], None, "did you mean crossover"),
+        (["crossover"], None, "KEY=VALUE"),
+    ],
+)
+def test_overrides_that_are_refused(overrides: list[str], frequencies: str | None, message: str) -> None:
+    with pytest.raises(StageError, match=message):
+        command(RIG, overrides=overrides, frequencies=frequencies)
+
+
+def test_half_the_sampling_frequency_itself_is_shown(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    command(RIG, overrides=['drive.sample_time="1 ms"'], frequencies="1 Hz..500 Hz", as_json=True)
+    assert capsys.readouterr().out.startswith("{")
+
+
+def test_a_folder_that_is_a_file_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "taken").write_text("")
+    with pytest.raises(StageError, match="a folder that can be written"):
+        command(RIG, out=tmp_path / "taken")
+
+
+def test_wrong_input_ends_in_one_message_and_status_2(tmp_path: Path) -> None:
+    bare = tmp_path / "bare.toml"
+    text = RIG.read_text()
+    start, end = text.index("\n[controller]"), text.index("\n[motion]")
+    bare.write_text(text[:start] + text[end:])
+    done = run(tmp_path, "--out", "out", stage=bare)
+    assert (done.returncode, done.stdout) == (2, "")
+    lines = done.stderr.splitlines()
+    assert lines[0].endswith("bare.toml: controller")
+    assert [line.split(":")[0].strip() for line in lines[1:]] == ["given", "expected", "example"]
+    assert not (tmp_path / "out").exists()
+    done = run(tmp_path, "--frequencies", "2 Hz..1 Hz")
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "Traceback" not in done.stderr
