@@ -48,7 +48,7 @@ def bode(
 
     Example: friso bode examples/thesis_rig.toml --frequencies "0.1 Hz..1 kHz" --out bode
     """
-    stage = read_stage(stage_file, overrides)
+    stage = read_stage(stage_file, overrides, with_drive=True)
     shown = None if frequencies is None else _read_frequencies(frequencies, stage)
     folder = None if out is None else made_folder(out)
     from friso.frequency.bode import bode as analysis

@@ -54,9 +54,12 @@ def leave(done: bool) -> None:
         raise typer.Exit(1)
 
 
-def read_stage(path: Path, overrides: list[str] | None) -> Stage:
-    """The stage of the file with the overrides. Raises StageError."""
-    return with_overrides(load(path), overrides)
+def read_stage(path: Path, overrides: list[str] | None, with_drive: bool = False) -> Stage:
+    """The stage of the file with the overrides; a drive that the command leaves out is mentioned. Raises StageError."""
+    stage = with_overrides(load(path), overrides)
+    if stage.drive and not with_drive:
+        say("[drive] is left out: simulation is in continuous time; friso bode knows sampling and delay")
+    return stage
 
 
 def with_overrides(stage: Stage, overrides: list[str] | None) -> Stage:

@@ -9,15 +9,16 @@ from typing import Any
 import numpy as np
 
 from friso.frequency.crossover import Limits, limits
-from friso.frequency.family import Scan, grid, loops, modes, plants, scan, spectral_abscissa
+from friso.frequency.family import Scan, closed_in_cases, loops, modes, plants, scan, spectral_abscissa
+from friso.frequency.friction import steady_force
 from friso.frequency.loops import Drive
-from friso.frequency.margins import Margins, margins
+from friso.frequency.margins import Margins, margins, with_resonances
 from friso.frequency.members import Members, family, joined, limit_cases, member
 from friso.frequency.ranges import Range, ranges_below
 from friso.frequency.stiffness import limiter_in_series
 from friso.stage import Stage
 
-AROUND = 10.0
+AROUND = 3.0
 """Factor by which the frequencies shown reach beyond all crossovers and resonances."""
 
 POINTS = 1200
@@ -40,12 +41,23 @@ class Case:
 
 @dataclass(frozen=True)
 class Unstable:
-    """Speeds [m/s] from `low` to `high` at which a sliding stage is not stable."""
+    """Speeds [m/s] from `low` to `high` at which a sliding stage is not stable; `falling`, whether its friction is
+    smaller at the upper end."""
 
     low: float
     high: float
     touched: bool
     forward: bool
+    falling: bool
+
+
+@dataclass(frozen=True)
+class Prescribed:
+    """A cart that slides at a `speed` [m/s], stuck at 0: its loop L over `Bode.omega`, and whether it is stable."""
+
+    speed: float
+    loop: np.ndarray
+    stable: bool
 
 
 @dataclass(frozen=True)
@@ -55,7 +67,7 @@ class Bode:
     `omega` (k,) [rad/s], the frequencies of all curves; the limit `cases` by name, among them, if asked for, those with
     the thesis's formula for a touched limiter ("-series"); the `scan` of the family, and its loops over `omega`; its
     `worst` member, and the worst of those that are stable (None if none is), each with its margins; the ranges of speed
-    that are `unstable`; the loops at `prescribed` speeds of the cart by speed [m/s], the limiter free; `limits` by
+    that are `unstable`; the loops at `prescribed` speeds of the cart, the limiter free; `limits` by
     joint ("locked" and "free", or "given" without one).
     """
 
@@ -67,7 +79,7 @@ class Bode:
     worst: tuple[Members, Margins]
     worst_stable: tuple[Members, Margins] | None
     unstable: tuple[Unstable, ...]
-    prescribed: Mapping[float, np.ndarray]
+    prescribed: tuple[Prescribed, ...]
     limits: Mapping[str, Limits]
 
     @property
@@ -121,17 +133,18 @@ def _mattering(flat: Mapping[str, Any], known: Iterable[Margins]) -> Range:
 
 def _omega(flat: Mapping[str, Any], shown: Range) -> np.ndarray:
     """Frequencies [rad/s] for curves, dense about resonances."""
-    even = np.geomspace(*shown, POINTS) * 2 * np.pi
-    near = grid(flat)
-    return np.unique(np.concatenate([even, near[(near > even[0]) & (near < even[-1])]]))
+    poles = np.concatenate([closed_in_cases(flat), modes(flat, joined([*limit_cases(flat).values()]))])
+    return with_resonances(np.geomspace(*shown, POINTS) * 2 * np.pi, poles)
 
 
-def _prescribed(flat: Mapping[str, Any], omega: np.ndarray) -> dict[float, np.ndarray]:
+def _prescribed(flat: Mapping[str, Any], omega: np.ndarray) -> tuple[Prescribed, ...]:
     """The loop at prescribed speeds of the cart, its limiter free where it can be."""
     if flat["friction.model"] == "none":
-        return {}
+        return ()
     touched = bool(next(iter(limit_cases(flat).values())).touched[0])
-    return {speed: loops(flat, member(speed, touched=touched), omega)[0] for speed in PRESCRIBED}
+    states = joined([member(speed, touched=touched) for speed in PRESCRIBED])
+    every = zip(PRESCRIBED, loops(flat, states, omega), spectral_abscissa(flat, states) < 0, strict=True)
+    return tuple(Prescribed(speed, loop, bool(stable)) for speed, loop, stable in every)
 
 
 def _unstable(flat: Mapping[str, Any], every: Members) -> tuple[Unstable, ...]:
@@ -144,5 +157,7 @@ def _unstable(flat: Mapping[str, Any], every: Members) -> tuple[Unstable, ...]:
         def stability(speed: np.ndarray, one: Members = alike[[0]]) -> np.ndarray:
             return -spectral_abscissa(flat, replace(one.repeated(len(speed)), speed=speed))
 
-        found += [Unstable(*ends, touched, not backward) for ends in ranges_below(alike.speed, stability)]
+        for low, high in ranges_below(alike.speed, stability):
+            before, after = steady_force(flat, np.array([low, high]), not backward)
+            found.append(Unstable(low, high, touched, not backward, bool(after < before)))
     return tuple(found)

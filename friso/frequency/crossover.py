@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -31,40 +31,56 @@ BIASES = 9
 """Bias forces under which a stuck stage is looked at for each state of its limiter."""
 
 
+JUST = 1e-5
+"""Share by which a crossover is changed to be just above or below the end of a range."""
+
+
 @dataclass(frozen=True)
 class Limits:
     """The crossovers [Hz], from `searched`, at which a stage is `stable` and those with a `comfortable` modulus margin,
     as ranges, in all limit cases: stuck under any bias force or sliding fast, its limiter free or touched.
 
-    `first_lost` is the state that is not stable just above the highest stable crossover, None where that is the end of
-    the search. For a controller given by its gains they are factors of its bandwidth instead.
+    Of both kinds, one range holds the stage's own crossover, or is the next one below it (or the lowest). The `highest`
+    stable and comfortable ones end it: None if there is none, or if the search ends there. `first_lost` is the state
+    that is not stable just above, `closest` the one that comes closest to -1 there. For a controller given by its gains
+    all are factors of its bandwidth instead.
     """
 
     searched: Range
     stable: tuple[Range, ...]
     comfortable: tuple[Range, ...]
+    highest_stable: float | None
+    highest_comfortable: float | None
     first_lost: Members | None
-
-    @property
-    def highest_stable(self) -> float | None:
-        """The highest stable crossover [Hz]; None if none is stable, or that at the end of the search still is."""
-        if not self.stable or self.stable[-1][1] >= self.searched[1]:
-            return None
-        return self.stable[-1][1]
+    closest: Members | None
 
 
 def limits(flat: Mapping[str, Any]) -> Limits:
     """The crossovers at which a stage is stable, and comfortably so."""
-    low, high = searched(flat)
-    members = settled_members(flat)
-    at = np.geomspace(low, high, STEPS)
+    ends, members = searched(flat), settled_members(flat)
+    at = np.geomspace(*ends, STEPS)
+    own = flat.get("controller.crossover", 1.0)
     stable = ranges_below(at, lambda f: _abscissa(flat, members, f).max(axis=1))
-    close = ranges_below(at, lambda f: WANTED - _distance(flat, members, f))
-    lost = None
-    if stable and stable[-1][1] < high:
-        above = _abscissa(flat, members, np.array([stable[-1][1] * (1 + 1e-6)]))[0]
-        lost = members[int(above.argmax())]
-    return Limits((low, high), stable, shared(close, stable), lost)
+    comfortable = shared(ranges_below(at, lambda f: WANTED - _distance(flat, members, f).min(axis=1)), stable)
+    highest, calm = (_end(ranges, own, ends[1]) for ranges in (stable, comfortable))
+    above = np.array([(highest or 1.0) * (1 + JUST)])
+    beyond = np.array([(calm or 1.0) * (1 + JUST)])
+    return Limits(
+        ends,
+        stable,
+        comfortable,
+        highest,
+        calm,
+        first_lost=members[int(_abscissa(flat, members, above)[0].argmax())] if highest else None,
+        closest=members[int(_distance(flat, members, beyond)[0].argmin())] if calm else None,
+    )
+
+
+def _end(ranges: Sequence[Range], own: float, end: float) -> float | None:
+    """Where the range ends that holds a crossover, or the next below it, or else the lowest; None at the end of the
+    search, and if there is none."""
+    below = [high for low, high in ranges if low <= own] or [high for _, high in ranges[:1]]
+    return below[-1] if below and below[-1] < end else None
 
 
 def searched(flat: Mapping[str, Any]) -> Range:
@@ -93,10 +109,10 @@ def _abscissa(flat: Mapping[str, Any], members: Members, crossover: np.ndarray) 
 
 
 def _distance(flat: Mapping[str, Any], members: Members, crossover: np.ndarray) -> np.ndarray:
-    """Least distance of the loop from -1 over all members, shape (crossovers,)."""
+    """Least distance of the loop from -1, shape (crossovers, members)."""
     omega = _search_grid(flat, members)
     bare = plants(flat, members, omega) * Drive.of(flat).answer(omega)
-    return np.array([nearest(bare * controller(_at(flat, f), omega)).min() for f in crossover])
+    return np.array([nearest(bare * controller(_at(flat, f), omega)) for f in crossover])
 
 
 def _search_grid(flat: Mapping[str, Any], members: Members) -> np.ndarray:

@@ -78,11 +78,14 @@ def _compiled(expressions: list[sp.Expr]) -> Callable[[Mapping[str, Any]], list[
 def level(flat: Mapping[str, Any], forward: bool) -> float:
     """Friction force [N] from which on a stuck cart breaks away; 0 for a law that creeps instead of sticking."""
     law = law_of(flat)
-    if law is None or not law.states:
-        return 0.0
-    sign = 1.0 if forward else -1.0
-    (force,) = law.force({**flat, "velocity": 0.0, FORWARD: float(forward)})
-    return sign * float(force)
+    return float(steady_force(flat, np.zeros(1), forward)[0]) if law is not None and law.states else 0.0
+
+
+def steady_force(flat: Mapping[str, Any], speeds: np.ndarray, forward: bool) -> np.ndarray:
+    """Friction force [N] against a steady motion at speeds [m/s], both of shape (count,), in one direction."""
+    law, sign = law_of(flat), 1.0 if forward else -1.0
+    (force,) = law.force({**flat, "velocity": sign * speeds, FORWARD: float(forward)}) if law else (np.zeros(1),)
+    return np.broadcast_to(sign * np.asarray(force), speeds.shape)
 
 
 def speeds(flat: Mapping[str, Any], count: int) -> np.ndarray:

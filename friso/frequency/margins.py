@@ -58,7 +58,7 @@ class Margins:
     @property
     def peak_sensitivity(self) -> float:
         """Largest absolute value of 1/(1 + L)."""
-        return 1 / self.modulus_margin
+        return 1 / self.modulus_margin if self.modulus_margin else np.inf
 
 
 def margins(flat: Mapping[str, Any], one: Members) -> Margins:
@@ -68,7 +68,9 @@ def margins(flat: Mapping[str, Any], one: Members) -> Margins:
     poles = poles[np.isfinite(poles)]
     loop, response = loop_response(flat, one)
     omega = frequencies(poles, loop, drive.highest)
-    return of_loop(response, poles, omega)
+    ends = [0.0] if np.abs(loop).min() > 0 else []  # a loop with an integrator is infinite at rest
+    ends += [drive.highest] if drive.sample_time else []
+    return of_loop(response, poles, omega, response(np.array(ends)) if ends else np.empty(0, complex))
 
 
 def loop_response(flat: Mapping[str, Any], one: Members) -> tuple[Complex, Response]:
@@ -98,15 +100,16 @@ def with_resonances(even: np.ndarray, poles: Complex) -> np.ndarray:
     return np.unique(np.concatenate([even, near[(near > even[0]) & (near < even[-1])]]))
 
 
-def of_loop(response: Response, poles: Complex, omega: np.ndarray) -> Margins:
-    """The margins of a loop from its response, the poles of the closed loop, and frequencies [rad/s] that show it."""
+def of_loop(response: Response, poles: Complex, omega: np.ndarray, ends: Complex) -> Margins:
+    """The margins of a loop from its response, the poles of the closed loop, frequencies [rad/s] that show it, and its
+    values where it is real at any gain: at rest, and at half the sampling frequency."""
     seen = response(omega)
     crossovers = _roots(lambda w: np.log(np.abs(response(np.array([w]))[0])), omega, np.log(np.abs(seen)))
     stable = bool(np.all(poles.real < 0))
     if not stable:
         return Margins(poles, stable, _hertz(crossovers), *[np.nan] * 6)
     turned = np.angle(-response(crossovers)) if crossovers.size else np.empty(0)
-    gains = _gains(response, omega, seen)
+    gains = _gains(response, omega, seen, ends)
     closest, distance = _closest(response, omega, np.abs(1 + seen))
     return Margins(
         poles=poles,
@@ -133,17 +136,11 @@ def _roots(function: Callable[[float], float], omega: np.ndarray, values: np.nda
     return np.array(sorted({*found, *omega[values == 0].tolist()}))
 
 
-def _gains(response: Response, omega: np.ndarray, seen: Complex) -> np.ndarray:
-    """Factors by which the gain takes the loop through -1: where L is real and negative, at both ends too."""
+def _gains(response: Response, omega: np.ndarray, seen: Complex, ends: Complex) -> np.ndarray:
+    """Factors by which the gain takes the loop through -1: where L is real and negative."""
     real = _roots(lambda w: response(np.array([w]))[0].imag, omega, seen.imag)
-    at = np.concatenate([response(real) if real.size else np.empty(0), _real_ends(seen)])
+    at = np.concatenate([response(real) if real.size else np.empty(0), ends])
     return -1 / at.real[at.real < 0]
-
-
-def _real_ends(seen: Complex) -> Complex:
-    """The first and last value where they are as good as real: the loop at rest, and at half the sampling frequency."""
-    ends = seen[[0, -1]]
-    return ends[np.abs(ends.imag) < 1e-6 * np.abs(ends.real)]
 
 
 def _closest(response: Response, omega: np.ndarray, distance: np.ndarray) -> tuple[float, float]:

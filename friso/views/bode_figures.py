@@ -9,8 +9,6 @@ import numpy as np
 
 from friso.frequency.bode import Bode, Case
 from friso.frequency.crossover import WANTED
-from friso.frequency.family import spectral_abscissa
-from friso.frequency.members import joined, member
 from friso.views.bode_states import SERIES, colour, dash, has_family, has_limiter, label
 from friso.views.bode_table import decibels
 from friso.views.colours import ramp
@@ -134,17 +132,10 @@ def _speeds(found: Bode) -> Figure:
     count = len(found.prescribed)
     styles = zip(ramp(count + 1)[:count], np.linspace(2.6, 1.2, count), strict=True)  # the last shade is light
     curves = [
-        _marked(Curve(loop, with_unit(speed, "m/s", 1) if speed else "stuck", shade, width=width), stable)
-        for (speed, loop), (shade, width), stable in zip(found.prescribed.items(), styles, _stable(found), strict=True)
+        _marked(Curve(at.loop, with_unit(at.speed, "m/s", 1) if at.speed else "stuck", shade, width=width), at.stable)
+        for at, (shade, width) in zip(found.prescribed, styles, strict=True)
     ]
     return Figure("bode_speeds", "Open loop, prescribed cart speeds", caption, loop_panels(_hertz(found), curves))
-
-
-def _stable(found: Bode) -> list[bool]:
-    """Whether the loop is stable at the prescribed speeds."""
-    touched = bool(next(iter(found.cases.values())).members.touched[0])
-    at = [member(speed, touched=touched) for speed in found.prescribed]
-    return (spectral_abscissa(found.stage.flat(), joined(at)) < 0).tolist() if at else []
 
 
 def _marked(curve: Curve, stable: bool) -> Curve:

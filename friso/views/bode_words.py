@@ -8,7 +8,7 @@ import numpy as np
 
 from friso.frequency.bode import Bode, Unstable
 from friso.frequency.crossover import WANTED, Limits
-from friso.frequency.friction import FORWARD, law_of
+from friso.frequency.members import Members
 from friso.frequency.ranges import Range
 from friso.views.bode_states import SERIES, cart, has_friction, has_limiter, in_words, place
 from friso.views.bode_table import growth
@@ -125,23 +125,12 @@ def _why(found: Bode) -> list[str]:
     if not (settled and found.scan.stable[found.scan.members.stuck].all()):
         even = ": not even the settled states (as below) are all stable" if has_friction(found) else ""
         return [f"That is a matter of tuning{even}."]
-    if not all(_falls(each, found) for each in found.unstable):
+    if not all(each.falling for each in found.unstable):
         return []
     return [
         "There friction falls as the speed rises (Stribeck effect): that is what makes a stage stick and slip, not its "
         "tuning; the settled states (as below) are stable. Whether the stage hunts, friso check tells."
     ]
-
-
-def _falls(lost: Unstable, found: Bode) -> bool:
-    """Whether steady friction is smaller at the upper end of a range of speeds than at its lower end."""
-    flat = found.stage.flat()
-    law = law_of(flat)
-    assert law is not None  # without friction no range of speeds is unstable
-    sign = 1.0 if lost.forward else -1.0
-    speeds = sign * np.array([lost.low, lost.high])
-    (low, high) = sign * np.asarray(law.force({**flat, "velocity": speeds, FORWARD: float(lost.forward)})[0])
-    return bool(high < low)
 
 
 def _worst(found: Bode) -> str:
@@ -153,23 +142,23 @@ def _worst(found: Bode) -> str:
 
 
 def _limits(found: Bode, name: str) -> str:
-    known = found.limits[name]
+    known, unit = found.limits[name], _unit(found)
     says = [f"stable: {_windows(known.stable, known, found)}"]
-    says.append(f"modulus margin above {WANTED:g}: {_windows(known.comfortable, known, found)}")
-    if known.highest_stable is not None:
-        says.append(f"highest stable {'crossover' if _crossing(found) else 'bandwidth'}: {_highest(found, name)}")
+    calm = f"modulus margin above {WANTED:g}: {_windows(known.comfortable, known, found)}"
+    if known.closest is not None:
+        state = _state(found, name, known.closest)
+        calm += f" (above {with_unit(known.highest_comfortable, unit)}, closest to −1: {state})"
+    says.append(calm)
+    if known.first_lost is not None:
+        highest = f"highest stable {'crossover' if _crossing(found) else 'bandwidth'}"
+        lost = f"above, the state that is lost first: {_state(found, name, known.first_lost)}"
+        says.append(f"{highest}: {with_unit(known.highest_stable, unit)} ({lost})")
     return f"{'; '.join(says)}."
 
 
-def _highest(found: Bode, name: str) -> str:
-    """The highest stable crossover, and what is lost first above it."""
-    known = found.limits[name]
-    text = with_unit(known.highest_stable, _unit(found))
-    if known.first_lost is None:
-        return text
-    lost = known.first_lost
-    words = in_words(cart(lost) if has_friction(found) else "", bool(lost.touched[0]), name == "free")
-    return f"{text} (above, the state that is lost first: {words})"
+def _state(found: Bode, name: str, one: Members) -> str:
+    """A state of a joint in words."""
+    return in_words(cart(one) if has_friction(found) else "", bool(one.touched[0]), name == "free")
 
 
 def _windows(ranges: Sequence[Range], known: Limits, found: Bode) -> str:
