@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
+from friso.frequency.friction import level
 from friso.frequency.loops import closed_loop, open_loop
-from friso.frequency.members import Members, limit_cases
+from friso.frequency.members import Members, limit_cases, limiter_states
 from friso.frequency.parts import FORCE, REFERENCE, STAGE, VELOCITY, compensator, plant
 from friso.frequency.stiffness import limiter_in_series
 from friso.frequency.system import System
@@ -34,15 +35,29 @@ def linear(stage: Stage, case: str | Members | None = None, part: str = "plant",
     All are in continuous time, without the sampling and delay of a drive. With `series`, a touched limiter acts by
     the formula that Table 1 of the thesis prints instead of beside the joint. Where the cart is stuck, its bristles
     follow it and are no states; a derivative of the measured velocity does not see the noise of the sensor, which has
-    none. Raises StageError for an unknown case or part.
+    none. Raises StageError for an unknown case or part, and for a state that the stage cannot be in.
     """
     flat: Mapping[str, Any] = stage.flat()
     cases = limit_cases(flat)
-    one = case if isinstance(case, Members) else _chosen("case", case or next(iter(cases)), cases)
+    one = _checked(flat, case) if isinstance(case, Members) else _chosen("case", case or next(iter(cases)), cases)
     if series and one.touched.all():
         flat, one = limiter_in_series(flat), one.with_limiter(False)
     system = _chosen("part", part, _PARTS)(flat, one)
     return _control(system, f"{stage.name} {part}".strip())
+
+
+def _checked(flat: Mapping[str, Any], one: Members) -> Members:
+    """A single state, if the stage can be in it. Raises StageError."""
+    if len(one) != 1:
+        raise StageError("case", f"{len(one)} states", "a single one", "friso.linear(stage, friso.member(speed=1e-3))")
+    if bool(one.touched[0]) not in limiter_states(flat):
+        given = f"a limiter that is {'' if one.touched[0] else 'not '}touched"
+        raise StageError("case", given, "what the joint allows: free with a stroke, it may be both", "touched=False")
+    least, most = -level(flat, not one.forward[0]), level(flat, bool(one.forward[0]))
+    if one.bias[0] and not least < one.bias[0] < most:
+        expected = f"between {least:g} N and {most:g} N, at which the cart breaks away"
+        raise StageError("case", f"a bias of {one.bias[0]:g} N", expected, "friso.member(bias=0.5)")
+    return one
 
 
 def _control(system: System, name: str) -> StateSpace:

@@ -9,13 +9,16 @@ from typing import Any
 import numpy as np
 
 from friso.frequency.crossover import Limits, limits
-from friso.frequency.family import Scan, closed_in_cases, loops, modes, plants, scan, spectral_abscissa
+from friso.frequency.drive import Drive
+from friso.frequency.family import Scan, closed, loops, modes, scan, spectral_abscissa
 from friso.frequency.friction import steady_force
-from friso.frequency.loops import Drive
+from friso.frequency.loops import response
 from friso.frequency.margins import Margins, margins, with_resonances
 from friso.frequency.members import Members, family, joined, limit_cases, member
+from friso.frequency.parts import FORCE, STAGE, plant
 from friso.frequency.ranges import Range, ranges_below
 from friso.frequency.stiffness import limiter_in_series
+from friso.frequency.system import Complex
 from friso.stage import Stage
 
 AROUND = 3.0
@@ -103,7 +106,7 @@ def bode(stage: Stage, shown: Range | None = None, series: bool = False) -> Bode
         stage=stage,
         omega=omega,
         cases={
-            name: Case(one, plants(own, one, omega)[0], loops(own, one, omega)[0], known[name])
+            name: Case(one, _plant(own, one, omega), response(own, one, Drive.of(own))(omega), known[name])
             for name, (own, one) in states.items()
         },
         scan=every,
@@ -114,6 +117,11 @@ def bode(stage: Stage, shown: Range | None = None, series: bool = False) -> Bode
         prescribed=_prescribed(flat, omega),
         limits={name: limits(one.flat()) for name, one in variants.items() if name != "given" or len(variants) == 1},
     )
+
+
+def _plant(flat: Mapping[str, Any], one: Members, omega: np.ndarray) -> Complex:
+    """Stage position over force [m/N] of a stage in one state, exactly."""
+    return plant(flat, one).take((FORCE,), (STAGE,)).at(1j * omega)[0, :, 0, 0]
 
 
 def _in_series(flat: Mapping[str, Any]) -> dict[str, tuple[Mapping[str, Any], Members]]:
@@ -133,8 +141,8 @@ def _mattering(flat: Mapping[str, Any], known: Iterable[Margins]) -> Range:
 
 def _omega(flat: Mapping[str, Any], shown: Range) -> np.ndarray:
     """Frequencies [rad/s] for curves, dense about resonances."""
-    poles = np.concatenate([closed_in_cases(flat), modes(flat, joined([*limit_cases(flat).values()]))])
-    return with_resonances(np.geomspace(*shown, POINTS) * 2 * np.pi, poles)
+    cases = joined([*limit_cases(flat).values()])
+    return with_resonances(np.geomspace(*shown, POINTS) * 2 * np.pi, [closed(flat, cases), modes(flat, cases)])
 
 
 def _prescribed(flat: Mapping[str, Any], omega: np.ndarray) -> tuple[Prescribed, ...]:
@@ -143,8 +151,11 @@ def _prescribed(flat: Mapping[str, Any], omega: np.ndarray) -> tuple[Prescribed,
         return ()
     touched = bool(next(iter(limit_cases(flat).values())).touched[0])
     states = joined([member(speed, touched=touched) for speed in PRESCRIBED])
-    every = zip(PRESCRIBED, loops(flat, states, omega), spectral_abscissa(flat, states) < 0, strict=True)
-    return tuple(Prescribed(speed, loop, bool(stable)) for speed, loop, stable in every)
+    every = zip(PRESCRIBED, spectral_abscissa(flat, states) < 0, strict=True)
+    return tuple(
+        Prescribed(speed, response(flat, states[k], Drive.of(flat))(omega), bool(stable))
+        for k, (speed, stable) in enumerate(every)
+    )
 
 
 def _unstable(flat: Mapping[str, Any], every: Members) -> tuple[Unstable, ...]:

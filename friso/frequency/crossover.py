@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 
 from friso.equations.bandwidth import faster
-from friso.frequency.family import closed_in_cases, controller, modes, nearest, plants, spectral_abscissa
-from friso.frequency.loops import Drive
-from friso.frequency.margins import frequencies
+from friso.frequency.drive import Drive
+from friso.frequency.family import Looked, controller, distance_to_lines, grid, looked_at, plants
 from friso.frequency.members import Members, family, joined, limit_cases
 from friso.frequency.ranges import Range, ranges_below, shared
 
@@ -24,8 +23,8 @@ LOWEST, HIGHEST = 0.1, 1e4
 STEPS = 161
 """Crossovers of the search."""
 
-POINTS = 800
-"""Frequencies at which they are, besides those about resonances."""
+DENSITY = 60
+"""Frequencies per decade at which they are, besides those about resonances."""
 
 BIASES = 9
 """Bias forces under which a stuck stage is looked at for each state of its limiter."""
@@ -58,11 +57,11 @@ class Limits:
 def limits(flat: Mapping[str, Any]) -> Limits:
     """The crossovers at which a stage is stable, and comfortably so."""
     ends, members = searched(flat), settled_members(flat)
-    at = np.geomspace(*ends, STEPS)
     own = flat.get("controller.crossover", 1.0)
-    stable = ranges_below(at, lambda f: _abscissa(flat, members, f).max(axis=1))
-    comfortable = shared(ranges_below(at, lambda f: WANTED - _distance(flat, members, f).min(axis=1)), stable)
-    highest, calm = (_end(ranges, own, ends[1]) for ranges in (stable, comfortable))
+    stable = stable_crossovers(flat, members)
+    close = ranges_below(np.geomspace(*ends, STEPS), lambda f: WANTED - _distance(flat, members, f).min(axis=1))
+    comfortable = shared(close, stable)
+    highest, calm = (end_of(ranges, own, ends[1]) for ranges in (stable, comfortable))
     above = np.array([(highest or 1.0) * (1 + JUST)])
     beyond = np.array([(calm or 1.0) * (1 + JUST)])
     return Limits(
@@ -76,7 +75,13 @@ def limits(flat: Mapping[str, Any]) -> Limits:
     )
 
 
-def _end(ranges: Sequence[Range], own: float, end: float) -> float | None:
+def stable_crossovers(flat: Mapping[str, Any], members: Members) -> tuple[Range, ...]:
+    """The crossovers [Hz] (or factors of the bandwidth) at which all members are stable."""
+    at = np.geomspace(*searched(flat), STEPS)
+    return ranges_below(at, lambda f: _abscissa(flat, members, f).max(axis=1))
+
+
+def end_of(ranges: Sequence[Range], own: float, end: float) -> float | None:
     """Where the range ends that holds a crossover, or the next below it, or else the lowest; None at the end of the
     search, and if there is none."""
     below = [high for low, high in ranges if low <= own] or [high for _, high in ranges[:1]]
@@ -104,19 +109,24 @@ def _at(flat: Mapping[str, Any], crossover: np.ndarray) -> dict[str, Any]:
 
 def _abscissa(flat: Mapping[str, Any], members: Members, crossover: np.ndarray) -> np.ndarray:
     """Real part of the rightmost closed-loop pole [1/s], shape (crossovers, members)."""
-    many = _at(flat, np.repeat(crossover, len(members)))
-    return spectral_abscissa(many, members.repeated(len(crossover))).reshape(len(crossover), len(members))
+    return _looked_at(flat, members, crossover).abscissa.reshape(len(crossover), len(members))
 
 
 def _distance(flat: Mapping[str, Any], members: Members, crossover: np.ndarray) -> np.ndarray:
     """Least distance of the loop from -1, shape (crossovers, members)."""
     omega = _search_grid(flat, members)
-    bare = plants(flat, members, omega) * Drive.of(flat).answer(omega)
-    return np.array([nearest(bare * controller(_at(flat, f), omega)) for f in crossover])
+    bare = plants(flat, members, omega) * Drive.of(flat).transfer(omega)
+    shared = np.array([distance_to_lines(bare * controller(_at(flat, f), omega)) for f in crossover])
+    return np.minimum(shared, _looked_at(flat, members, crossover).resonant.reshape(shared.shape))
+
+
+def _looked_at(flat: Mapping[str, Any], members: Members, crossover: np.ndarray) -> Looked:
+    """All members at the first crossover, then at the second, and so on."""
+    return looked_at(_at(flat, np.repeat(crossover, len(members))), members.repeated(len(crossover)))
 
 
 def _search_grid(flat: Mapping[str, Any], members: Members) -> np.ndarray:
     """Angular frequencies [rad/s] that show the loop at all crossovers searched: always the same ones, so that the
     distance is a smooth function of the crossover."""
-    closed = np.concatenate([closed_in_cases(_at(flat, np.array(end))) for end in searched(flat)])
-    return frequencies(closed, modes(flat, members), Drive.of(flat).highest, POINTS)
+    both = [grid(_at(flat, np.array(end)), DENSITY, members) for end in searched(flat)]
+    return np.unique(np.concatenate(both))

@@ -1,7 +1,8 @@
 """A whole family of states at once: friction as an impedance between cart and ground, the masses computed once.
 
-The mechanics without friction answer forces on stage and cart by g (2 x 2); a cart that feels the friction force
-Z v turns them into g - g_c Z s g_c^T / (1 + Z s g_cc), a few operations for each member and frequency.
+The masses without friction answer forces on stage and cart by g (2 x 2), with the cart held the stage by h. A cart that
+feels the dynamic stiffness k = s Z of friction makes the stage answer by (g_ss + k g_cc h)/(1 + k g_cc), without taking
+large numbers from each other: a few operations for each member and frequency.
 """
 
 from __future__ import annotations
@@ -9,26 +10,30 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from friso.frequency.drive import LIGHT, Drive
 from friso.frequency.friction import law_of, operating_point
-from friso.frequency.loops import Drive, closed_poles
+from friso.frequency.loops import Poles, poles
 from friso.frequency.margins import frequencies, margins
-from friso.frequency.members import Members, family, limit_cases
+from friso.frequency.members import Members, family, joined, limit_cases
 from friso.frequency.parts import REFERENCE, STAGE, VELOCITY, compensator, mechanics, plant
-from friso.frequency.system import Complex
+from friso.frequency.system import Complex, System
 
 CHUNK = 256
 """Members that are computed together: their arrays then stay in the cache."""
 
-POINTS, FEW = 250, 7
-"""Frequencies at which all members are looked at, besides those about resonances, and the bias forces and speeds that
-tell where these are."""
+DENSITY, FEW = 35, 7
+"""Frequencies per decade at which all members are looked at, and the bias forces and speeds of those about whose
+resonances there are more."""
 
-CLOSEST = 8
+NEAR = np.array([-1.0, -0.5, 0.0, 0.5, 1.0])
+"""Where a member is looked at about its own closed-loop resonances, in units of their half widths."""
+
+CLOSEST = 16
 """Members whose margin is computed exactly."""
 
 
@@ -55,19 +60,56 @@ class Scan:
 
 
 def scan(flat: Mapping[str, Any], members: Members) -> Scan:
-    """Stability of every member, and its modulus margin: on a grid of frequencies, and exactly for those that come
-    closest to -1 there."""
-    omega = grid(flat)
-    abscissa = spectral_abscissa(flat, members)
+    """Stability of every member, and its modulus margin: on frequencies that all share and about its own closed-loop
+    resonances, and exactly for those that come closest to -1 there."""
+    omega = grid(flat, DENSITY, family(flat, FEW, FEW))
+    known = looked_at(flat, members)
     parts = (members[part] for part in _split(np.arange(len(members))))
-    distance = np.concatenate(_side_by_side(lambda part: nearest(loops(flat, part, omega)), parts))
-    for k in np.argsort(np.where(abscissa < 0, distance, np.inf))[:CLOSEST]:
+    shared = np.concatenate(_side_by_side(lambda part: distance_to_lines(loops(flat, part, omega)), parts))
+    distance = np.minimum(shared, known.resonant)
+    for k in np.argsort(np.where(known.abscissa < 0, distance, np.inf))[:CLOSEST]:
         exact = margins(flat, members[k]).modulus_margin
         distance[k] = distance[k] if np.isnan(exact) else exact
-    return Scan(members, abscissa, distance)
+    return Scan(members, known.abscissa, distance)
 
 
-def nearest(loop: Complex) -> np.ndarray:
+class Looked(NamedTuple):
+    """Real part of the rightmost closed-loop pole [1/s], 0 on the edge of stability, and the least abs(1 + L) about
+    closed-loop resonances, both of shape (members,)."""
+
+    abscissa: np.ndarray
+    resonant: np.ndarray
+
+
+def looked_at(flat: Mapping[str, Any], members: Members) -> Looked:
+    """Every member by its own poles; `flat` may hold arrays of shape (members,), but for the drive's keys."""
+    drive, found = Drive.of(flat), Looked(np.empty(len(members)), np.empty(len(members)))
+
+    def look(which: np.ndarray) -> None:
+        own = {key: value[which] if np.ndim(value) else value for key, value in flat.items()}
+        known = poles(own, members[which], drive)
+        found.abscissa[which], found.resonant[which] = known.abscissa, _about_resonances(known)
+
+    numbers = (np.flatnonzero(mask) for mask in (members.stuck, ~members.stuck))
+    _side_by_side(look, [part for each in numbers for part in _split(each)])
+    return found
+
+
+def spectral_abscissa(flat: Mapping[str, Any], members: Members) -> np.ndarray:
+    """Real part [1/s] of the rightmost closed-loop pole, shape (members,), 0 on the edge of stability."""
+    return looked_at(flat, members).abscissa
+
+
+def _about_resonances(known: Poles) -> np.ndarray:
+    """The least abs(1 + L) about the lightly damped closed-loop poles of each member, shape (members,)."""
+    closed = known.in_s
+    light = (closed.imag > 0) & (np.abs(closed.real) < LIGHT * closed.imag)
+    omega = np.where(light, closed.imag, np.nan)[:, :, None] + NEAR * np.where(light, closed.real, np.nan)[:, :, None]
+    omega = np.clip(omega, 0, known.drive.highest).reshape(len(closed), -1)
+    return np.nanmin(np.where(np.isnan(omega), np.inf, known.distance(np.nan_to_num(omega, nan=1.0))), axis=1)
+
+
+def distance_to_lines(loop: Complex) -> np.ndarray:
     """Least distance from -1 of loops over ascending frequencies, shape (..., k), joined by straight lines: (...)."""
     start, way = 1 + loop[..., :-1], np.diff(loop, axis=-1)
     length = np.maximum(np.abs(way) ** 2, np.finfo(float).tiny)
@@ -75,56 +117,57 @@ def nearest(loop: Complex) -> np.ndarray:
     return np.abs(start + along * way).min(axis=-1)
 
 
-def spectral_abscissa(flat: Mapping[str, Any], members: Members) -> np.ndarray:
-    """Real part [1/s] of the rightmost closed-loop pole, shape (members,); `flat` may hold arrays of that shape."""
-    drive, found = Drive.of(flat), np.empty(len(members))
-
-    def rightmost(which: np.ndarray) -> None:
-        own = {key: value[which] if np.ndim(value) else value for key, value in flat.items()}
-        found[which] = closed_poles(own, members[which], drive).real.max(axis=1)
-
-    numbers = (np.flatnonzero(mask) for mask in (members.stuck, ~members.stuck))
-    _side_by_side(rightmost, [part for each in numbers for part in _split(each)])
-    return found
-
-
-def grid(flat: Mapping[str, Any]) -> np.ndarray:
-    """Angular frequencies [rad/s] that show the limit cases of a stage."""
-    return frequencies(closed_in_cases(flat), modes(flat, family(flat, FEW, FEW)), Drive.of(flat).highest, POINTS)
-
-
-def closed_in_cases(flat: Mapping[str, Any]) -> Complex:
-    """Finite poles [rad/s] of the closed loop in all limit cases."""
+def grid(flat: Mapping[str, Any], density: float, members: Members) -> np.ndarray:
+    """Angular frequencies [rad/s] that show the loops of members: so many per decade, and more about the resonances of
+    plants and of the closed loop in the limit cases."""
     drive = Drive.of(flat)
-    poles = np.concatenate([closed_poles(flat, one, drive).ravel() for one in limit_cases(flat).values()])
-    return poles[np.isfinite(poles)]
+    cases = joined([*limit_cases(flat).values()])
+    return frequencies(flat, cases, drive, density, [modes(flat, members), closed(flat, cases)])
+
+
+def closed(flat: Mapping[str, Any], members: Members) -> Complex:
+    """Finite closed-loop poles [rad/s] of members."""
+    drive = Drive.of(flat)
+    every = np.concatenate([poles(flat, each, drive).in_s.ravel() for each in members.kinds])
+    return every[np.isfinite(every)]
 
 
 def modes(flat: Mapping[str, Any], members: Members) -> Complex:
     """Poles [rad/s] of the plant in all these states."""
-    groups = [members[mask] for mask in (members.stuck, ~members.stuck) if mask.any()]
-    return np.concatenate([np.linalg.eigvals(plant(flat, each).a).ravel() for each in groups]).astype(complex)
+    return np.concatenate([np.linalg.eigvals(plant(flat, each).a).ravel() for each in members.kinds]).astype(complex)
 
 
 def plants(flat: Mapping[str, Any], members: Members, omega: np.ndarray) -> Complex:
     """Stage position over actuator force [m/N], complex, shape (members, k), at angular frequencies (k,) [rad/s]."""
     s = 1j * omega
     sides = np.unique(members.touched)
-    free = mechanics(flat, sides).at(s)  # (sides, k, 2, 2)
-    g = free[np.searchsorted(sides, members.touched)]
-    drag = s * impedance(flat, members, s)
-    return g[..., 0, 0] - g[..., 0, 1] * drag * g[..., 1, 0] / (1 + drag * g[..., 1, 1])
+    side = np.searchsorted(sides, members.touched)
+    masses = mechanics(flat, sides)
+    g, held = masses.at(s)[side], _cart_held(masses, s)[side]
+    pushed = s * impedance(flat, members, s) * g[..., 1, 1]
+    return (g[..., 0, 0] + pushed * held) / (1 + pushed)
+
+
+def _cart_held(masses: System, s: np.ndarray) -> Complex:
+    """Stage position over force [m/N] while the cart is held, shape (members, k), at the complex frequencies s (k,)
+    [rad/s]; 0 where cart and stage are one."""
+    if "cart_position" not in masses.states:
+        return np.zeros((len(masses.a), len(s)), complex)
+    kept = [i for i, name in enumerate(masses.states) if not name.startswith("cart_")]
+    a, b, c = masses.a[:, kept][:, :, kept], masses.b[:, kept], masses.c[:, :, kept]
+    names = tuple(masses.states[i] for i in kept)
+    return replace(masses, a=a, b=b, c=c, states=names).at(s)[..., 0, 0]
 
 
 def loops(flat: Mapping[str, Any], members: Members, omega: np.ndarray) -> Complex:
     """L, shape (members, k); of a sampled loop but for the aliases of the plant."""
     drive = Drive.of(flat)
-    return plants(flat, members, omega) * controller(flat, omega) * drive.answer(omega)
+    return plants(flat, members, omega) * controller(flat, omega) * drive.transfer(omega)
 
 
 def controller(flat: Mapping[str, Any], omega: np.ndarray) -> Complex:
     """Force over a deviation of the stage from its reference [N/m], its sign reversed, shape (k,)."""
-    s = Drive.of(flat).laplace(omega)
+    s = Drive.of(flat).controller_s(omega)
     answers = compensator(flat, 1).take((STAGE, VELOCITY, REFERENCE), ("force",)).at(s)[0, :, 0]
     return -(answers[:, 0] + 1j * omega * answers[:, 1])
 

@@ -5,31 +5,36 @@ Astrom, Murray 2008, Feedback Systems, chapter 9 (stability margins).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
-from friso.frequency.loops import Drive, closed_poles, open_loop, sampled_open_loop
+from friso.frequency.drive import Drive, resonances
+from friso.frequency.loops import poles, response
 from friso.frequency.members import Members
 from friso.frequency.system import Complex
 
-POINTS = 2000
-"""Frequencies at which a loop is looked at before anything is located, besides those about its resonances."""
+DENSITY = 250
+"""Frequencies per decade at which a loop is looked at before anything is located, besides those about resonances."""
 
 BEYOND = 100.0
 """Factor by which these reach beyond the slowest and the fastest pole."""
 
-NEGLIGIBLE = 1e-9
+NEGLIGIBLE = 1e-12
 """Share of the fastest pole below which one is taken to be 0."""
-
-LIGHT = 0.3
-"""Damping ratio below which a pole is a resonance."""
 
 AROUND = np.tan(np.linspace(-1.5, 1.5, 15))
 """Where a resonance is looked at, in units of its half width."""
+
+REST = 1e-6
+"""Frequency, in units of the lowest that is looked at, at which a finite loop is as at rest, and the share of its
+magnitude by which it may still change, or be off the real axis."""
+
+REAL = 1e-9
+"""Share of the real part below which the imaginary one may be rounding."""
 
 Response = Callable[[np.ndarray], Complex]
 
@@ -38,7 +43,8 @@ Response = Callable[[np.ndarray], Complex]
 class Margins:
     """Stability of a loop L cut at the actuator, and how far it is from its edge.
 
-    `poles` [rad/s] of the closed loop (k,), complex; `crossovers` [Hz], all frequencies where abs(L) = 1; the least
+    `poles` [rad/s] of the closed loop (k,), complex; the `abscissa` [1/s], the real part of the rightmost, 0 on the
+    edge of stability as far as rounding can tell; `crossovers` [Hz], all frequencies where abs(L) = 1; the least
     `phase_margin` [deg], lag or lead, that takes the loop to the edge; `gain_margin`, the factor above 1, and
     `gain_reduction`, that below 1, by which the gain may change; `delay_margin` [s]; `modulus_margin`, the least
     distance of L from -1, reached at `closest` [Hz]. Infinite (the reduction 0) where nothing takes it there; NaN for
@@ -46,7 +52,7 @@ class Margins:
     """
 
     poles: Complex
-    stable: bool
+    abscissa: float
     crossovers: tuple[float, ...]
     phase_margin: float
     gain_margin: float
@@ -56,64 +62,69 @@ class Margins:
     closest: float
 
     @property
+    def stable(self) -> bool:
+        return self.abscissa < 0
+
+    @property
+    def on_the_edge(self) -> bool:
+        """Whether a deviation neither dies out nor grows: a position that is not controlled, an undamped swing."""
+        return self.abscissa == 0
+
+    @property
     def peak_sensitivity(self) -> float:
         """Largest absolute value of 1/(1 + L)."""
         return 1 / self.modulus_margin if self.modulus_margin else np.inf
 
 
 def margins(flat: Mapping[str, Any], one: Members) -> Margins:
-    """The margins of a stage in one of its states."""
+    """The margins of a stage in one of its states. Raises StageError for a delay that is too long (see `Drive`)."""
     drive = Drive.of(flat)
-    poles = closed_poles(flat, one, drive)[0]
-    poles = poles[np.isfinite(poles)]
-    loop, response = loop_response(flat, one)
-    omega = frequencies(poles, loop, drive.highest)
-    ends = [0.0] if np.abs(loop).min() > 0 else []  # a loop with an integrator is infinite at rest
-    ends += [drive.highest] if drive.sample_time else []
-    return of_loop(response, poles, omega, response(np.array(ends)) if ends else np.empty(0, complex))
+    known, at = poles(flat, one, drive), response(flat, one, drive)
+    closed = known.in_s[0]
+    omega = frequencies(flat, one, drive, DENSITY, [closed, drive.to_s(known.cut[0])])
+    ends = [*_at_rest(at, omega[0]), *([at(np.array([drive.highest]))[0]] if drive.sample_time else [])]
+    return of_loop(at, closed[np.isfinite(closed)], float(known.abscissa[0]), omega, np.array(ends, complex))
 
 
-def loop_response(flat: Mapping[str, Any], one: Members) -> tuple[Complex, Response]:
-    """Poles [rad/s] of the cut loop, and L over angular frequencies [rad/s], exactly, of a stage in one state."""
-    drive = Drive.of(flat)
-    continuous = open_loop(flat, one)
-    poles = np.linalg.eigvals(continuous.a)[0].astype(complex)
-    if not drive.sample_time:
-        return poles, lambda omega: continuous.at(1j * omega)[0, :, 0, 0] * np.exp(-1j * omega * drive.delay)
-    sampled = sampled_open_loop(flat, one, drive)
-    return poles, lambda omega: sampled.at(np.exp(1j * omega * drive.sample_time))[0, :, 0, 0]
-
-
-def frequencies(closed: Complex, modes: Complex, highest: float, points: int = POINTS) -> np.ndarray:
-    """Angular frequencies [rad/s] that show all that a loop does, up to the highest, by the poles of the closed loop
-    and those of what is in it: so many evenly spread, and more about resonances."""
-    size = np.abs(closed)
+def frequencies(
+    flat: Mapping[str, Any], members: Members, drive: Drive, density: float, resonant: Sequence[Complex]
+) -> np.ndarray:
+    """Angular frequencies [rad/s] that show all that loops of these states do, up to the highest the drive knows: so
+    many per decade, and more about the resonances among the poles `resonant`."""
+    size = np.concatenate([np.abs(poles(flat, each, Drive(0.0, 0.0)).closed).ravel() for each in members.kinds])
     size = size[size > NEGLIGIBLE * size.max(initial=0.0)] if size.any() else np.ones(1)
-    even = np.geomspace(size.min() / BEYOND, min(size.max() * BEYOND, highest), points)
-    return with_resonances(even, np.concatenate([closed, modes]))
+    low, high = size.min() / BEYOND, min(size.max() * BEYOND, drive.highest)
+    return with_resonances(np.geomspace(low, high, int(density * np.log10(high / low)) + 2), resonant)
 
 
-def with_resonances(even: np.ndarray, poles: Complex) -> np.ndarray:
-    """Ascending angular frequencies [rad/s] with those about the resonances among these poles between them."""
-    light = poles[np.abs(poles.real) < LIGHT * np.abs(poles.imag)]
+def with_resonances(even: np.ndarray, resonant: Sequence[Complex]) -> np.ndarray:
+    """Ascending angular frequencies [rad/s] with those about the resonances of these poles among them."""
+    light = resonances(np.concatenate([each.ravel() for each in resonant]))
     near = (np.abs(light.imag)[:, None] + np.abs(light.real)[:, None] * AROUND).ravel()
     return np.unique(np.concatenate([even, near[(near > even[0]) & (near < even[-1])]]))
 
 
-def of_loop(response: Response, poles: Complex, omega: np.ndarray, ends: Complex) -> Margins:
-    """The margins of a loop from its response, the poles of the closed loop, frequencies [rad/s] that show it, and its
-    values where it is real at any gain: at rest, and at half the sampling frequency."""
+def _at_rest(at: Response, slow: float) -> list[complex]:
+    """The loop at rest, if it is finite there: real, and the same on the way there."""
+    low, lower = at(np.array([2 * REST, REST]) * slow)
+    flat = np.abs(low - lower) < REST * np.abs(lower) and np.abs(lower.imag) < REST * np.abs(lower.real)
+    return [complex(lower.real)] if flat else []
+
+
+def of_loop(response: Response, poles: Complex, abscissa: float, omega: np.ndarray, ends: Complex) -> Margins:
+    """The margins of a loop from its response, the poles of the closed loop with the real part of the rightmost,
+    frequencies [rad/s] that show it, and its values where it is real at any gain: at rest, and at half the sampling
+    frequency."""
     seen = response(omega)
-    crossovers = _roots(lambda w: np.log(np.abs(response(np.array([w]))[0])), omega, np.log(np.abs(seen)))
-    stable = bool(np.all(poles.real < 0))
-    if not stable:
-        return Margins(poles, stable, _hertz(crossovers), *[np.nan] * 6)
+    crossovers = _roots(lambda w: _decades(response(np.array([w])))[0], omega, _decades(seen))
+    if abscissa >= 0:
+        return Margins(poles, abscissa, _hertz(crossovers), *[np.nan] * 6)
     turned = np.angle(-response(crossovers)) if crossovers.size else np.empty(0)
     gains = _gains(response, omega, seen, ends)
     closest, distance = _closest(response, omega, np.abs(1 + seen))
     return Margins(
         poles=poles,
-        stable=stable,
+        abscissa=abscissa,
         crossovers=_hertz(crossovers),
         phase_margin=float(np.degrees(np.abs(turned).min(initial=np.inf))),
         gain_margin=float(gains[gains > 1].min(initial=np.inf)),
@@ -128,6 +139,11 @@ def _hertz(omega: np.ndarray) -> tuple[float, ...]:
     return tuple((omega / (2 * np.pi)).tolist())
 
 
+def _decades(loop: Complex) -> np.ndarray:
+    """Logarithm of the magnitude, of a loop that may be 0."""
+    return np.log(np.maximum(np.abs(loop), np.finfo(float).tiny))
+
+
 def _roots(function: Callable[[float], float], omega: np.ndarray, values: np.ndarray) -> np.ndarray:
     """Where a function of the frequency, known at some, passes zero."""
     with np.errstate(invalid="ignore"):
@@ -138,7 +154,8 @@ def _roots(function: Callable[[float], float], omega: np.ndarray, values: np.nda
 
 def _gains(response: Response, omega: np.ndarray, seen: Complex, ends: Complex) -> np.ndarray:
     """Factors by which the gain takes the loop through -1: where L is real and negative."""
-    real = _roots(lambda w: response(np.array([w]))[0].imag, omega, seen.imag)
+    clear = np.where(np.abs(seen.imag) > REAL * np.abs(seen.real), seen.imag, np.nan)  # not rounding
+    real = _roots(lambda w: response(np.array([w]))[0].imag, omega, clear)
     at = np.concatenate([response(real) if real.size else np.empty(0), ends])
     return -1 / at.real[at.real < 0]
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from friso.equations.structure import structure
 from friso.frequency.friction import level, speeds
+from friso.quantities import StageError
 
 BIASES, SPEEDS = 65, 257
 """Bias forces and speeds of the family, of each state of the limiter."""
@@ -39,6 +40,11 @@ class Members:
         return Members(*(np.atleast_1d(getattr(self, each.name)[which]) for each in fields(self)))
 
     @property
+    def kinds(self) -> list[Members]:
+        """Those that are stuck and those that are not, as far as there are any: they have different states."""
+        return [self[mask] for mask in (self.stuck, ~self.stuck) if mask.any()]
+
+    @property
     def stuck(self) -> np.ndarray:
         return self.speed == 0
 
@@ -52,7 +58,12 @@ class Members:
 
 
 def member(speed: float = 0.0, bias: float = 0.0, touched: bool = False, forward: bool = True) -> Members:
-    """A single state."""
+    """A single state: sliding at a speed [m/s], or, at 0, stuck under a bias force [N]. Raises StageError for a speed
+    that is negative and for a bias of a cart that slides."""
+    if not 0 <= speed < np.inf:
+        raise StageError("speed", f"{speed} m/s", "0 or greater; forward=False for the other direction", "speed=1e-3")
+    if bias and speed:
+        raise StageError("bias", f"{bias} N at {speed} m/s", "a bias of a cart that is stuck", "member(bias=1.0)")
     return Members(np.array([speed]), np.array([bias]), np.array([touched]), np.array([forward]))
 
 
@@ -64,7 +75,7 @@ def limit_cases(flat: Mapping[str, Any]) -> dict[str, Members]:
     """The limit cases by name: "stuck" and "sliding" (fast), and both with "-touched" behind where the limiter is
     touched (Table 1); "given" for a stage that has just one."""
     moves = ["sliding"] if flat["friction.model"] == "none" else ["stuck", "sliding"]
-    limits = _limits(flat)
+    limits = limiter_states(flat)
     if len(moves) == len(limits) == 1:
         return {"given": member(_fast(flat), touched=limits[0])}
     named = structure(flat).joint in ("free", "touching")
@@ -80,12 +91,11 @@ def family(flat: Mapping[str, Any], biases: int = BIASES, speeds_: int = SPEEDS)
     motion, and sliding at all speeds, in both directions if friction differs between them."""
     if flat["friction.model"] == "none":
         return joined([*limit_cases(flat).values()])
-    shares = np.linspace(-NEARLY, NEARLY, biases)
     parts = []
-    for touched in _limits(flat):
+    for touched in limiter_states(flat):
         for forward in (True, False) if flat.get("friction.asymmetry", 0.0) != 0 else (True,):
-            bias = shares * level(flat, forward)
-            bias = np.unique(bias)  # a law that creeps instead of sticking bears none
+            least, most = (-NEARLY * level(flat, not forward), NEARLY * level(flat, forward))
+            bias = np.unique(np.linspace(least, most, biases))  # a law that creeps instead of sticking bears none
             speed = np.concatenate([np.zeros(len(bias)), speeds(flat, speeds_)])
             bias = np.concatenate([bias, np.zeros(speeds_)])
             parts.append(Members(speed, bias, np.full(len(speed), touched), np.full(len(speed), forward)))
@@ -96,6 +106,6 @@ def _fast(flat: Mapping[str, Any]) -> float:
     return 0.0 if flat["friction.model"] == "none" else float(speeds(flat, 2)[-1])
 
 
-def _limits(flat: Mapping[str, Any]) -> tuple[bool, ...]:
+def limiter_states(flat: Mapping[str, Any]) -> tuple[bool, ...]:
     """Whether the limiter may be free, touched, or both."""
     return {"free": (False, True), "touching": (True,)}.get(structure(flat).joint, (False,))

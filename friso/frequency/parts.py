@@ -17,6 +17,7 @@ from friso.frequency.declared import Declared
 from friso.frequency.friction import law_of, operating_point
 from friso.frequency.members import Members
 from friso.frequency.system import System
+from friso.quantities import StageError
 
 FORCE, DISTURBANCE, REFERENCE, NOISE = "force", "disturbance on cart", "reference", "sensor noise"
 STAGE, CART, DEFLECTION, VELOCITY = "stage", "cart", "joint deflection", "stage velocity"
@@ -35,7 +36,7 @@ def plant(flat: Mapping[str, Any], members: Members) -> System:
     values |= {"beyond_stroke_ahead": members.touched.astype(float), "beyond_stroke_behind": 0.0}
     whole = declared.at(values, len(members))
     law = law_of(flat)
-    return _held(whole, law.states) if law is not None and members.stuck.all() else whole
+    return _following(whole, law.states) if law is not None and members.stuck.all() else whole
 
 
 def mechanics(flat: Mapping[str, Any], touched: np.ndarray) -> System:
@@ -46,11 +47,14 @@ def mechanics(flat: Mapping[str, Any], touched: np.ndarray) -> System:
 
 
 def compensator(flat: Mapping[str, Any], members: int) -> System:
-    """The controller: from reference, position [m] and velocity [m/s] of the stage to the force [N]."""
+    """The controller: from reference, position [m] and velocity [m/s] of the stage to the force [N]. Raises StageError
+    for one that exerts none."""
     form = shared_structure(flat).controller
     assert form is not None  # a stage file has a controller
-    declared = _compensator(replace(form, limited=False))
-    return declared.at(flat, members)
+    found = _compensator(replace(form, limited=False)).at(flat, members)
+    if not (found.c.any() or found.d.any()):
+        raise StageError("controller", "gains that are all 0", "a controller that acts", 'kp = "3 N/m"')
+    return found
 
 
 @cache
@@ -74,7 +78,7 @@ def _compensator(form: ControllerForm) -> Declared:
     return Declared(symbols, rates, _CONTROLLER_INPUTS, {FORCE: control.force})
 
 
-def _held(whole: System, internal: tuple[str, ...]) -> System:
+def _following(whole: System, internal: tuple[str, ...]) -> System:
     """The system with the internal states of the friction law following the cart, which is stuck.
 
     At rest their rate is proportional to the velocity of the cart alone, so that they differ from a multiple of its

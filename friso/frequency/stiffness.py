@@ -1,4 +1,4 @@
-"""Two springs in a row: the joint and the pre-sliding stiffness of the bearing (thesis, Eq. 1 and 2), and the formula
+"""Springs in series: the joint and the pre-sliding stiffness of the bearing (thesis, Eq. 1 and 2), and the formula
 that Table 1 prints for a touched limiter."""
 
 from __future__ import annotations
@@ -7,25 +7,26 @@ from collections.abc import Mapping
 from typing import Any
 
 
-def in_row(one: Any, other: Any) -> Any:
-    """Stiffness [N/m] of two springs, or damping [N s/m] of two dampers, one behind the other (Eq. 1)."""
+def in_series(one: Any, other: Any) -> Any:
+    """Stiffness [N/m] of two springs, or damping [N s/m] of two dampers, in series (Eq. 1)."""
     return one * other / (one + other)
 
 
 def sensitivity(friction_stiffness: Any, joint_stiffness: Any) -> Any:
-    """How the stiffness of both in a row changes with that of the friction (Eq. 2): (eta/(1 + eta))^2 with the ratio
+    """How the stiffness of both in series changes with that of the friction (Eq. 2): (eta/(1 + eta))^2 with the ratio
     eta = k_j/k_f."""
     eta = joint_stiffness / friction_stiffness
     return (eta / (1 + eta)) ** 2
 
 
 def limiter_in_series(flat: Mapping[str, Any]) -> dict[str, Any]:
-    """The stage with joint and limiter one behind the other, as Table 1 of the thesis prints it for a touched limiter;
+    """The stage with joint and limiter in series, as Table 1 of the thesis prints it for a touched limiter;
     to be used as one whose limiter is not touched."""
     pairs = {"stiffness": "limiter_stiffness", "damping": "limiter_damping"}
-    return {**flat, **{f"joint.{a}": _printed(flat, a, b) for a, b in pairs.items() if f"joint.{a}" in flat}}
+    free = {"joint.stroke": 1.0}  # however long: it is not touched
+    return {**flat, **free, **{f"joint.{a}": _printed(flat, a, b) for a, b in pairs.items() if f"joint.{a}" in flat}}
 
 
 def _printed(flat: Mapping[str, Any], joint: str, limiter: str) -> Any:
     one, other = flat[f"joint.{joint}"], flat[f"joint.{limiter}"]
-    return in_row(one, other) if one + other else one
+    return in_series(one, other) if one + other else one

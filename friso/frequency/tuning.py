@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from friso.equations.pid import van_dijk_gains
 from friso.frequency.margins import Margins, margins
 from friso.frequency.members import member
+from friso.quantities import StageError
+from friso.stage.stage import numeric_keys
 
 
 @dataclass(frozen=True)
@@ -27,7 +29,8 @@ class Tuning:
 
 
 def tuning(crossover: float, alpha: float, beta: float, mass: float) -> Tuning:
-    """The controller for a mass [kg] at a crossover [Hz], by van Dijk's rules, and how it does on that mass."""
+    """The controller for a mass [kg] at a crossover [Hz], by van Dijk's rules, and how it does on that mass. Raises
+    StageError for numbers that no stage file may have."""
     flat = {
         "friction.model": "none",
         "masses.stage": mass,
@@ -37,6 +40,9 @@ def tuning(crossover: float, alpha: float, beta: float, mass: float) -> Tuning:
         "controller.beta": beta,
         "controller.tuned_mass": mass,
     }
+    for key, item in numeric_keys({**flat, "motion.kind": "hold"}).items():
+        if key in flat and not item.bound.holds(flat[key]):
+            raise StageError(key.split(".")[1], str(flat[key]), item.bound.text, "friso.tuning(8.0, 0.1, 2.0, 1.7)")
     gains = {
         name: float(expression.subs({symbol: flat[str(symbol)] for symbol in expression.free_symbols}))
         for name, expression in van_dijk_gains().items()

@@ -54,7 +54,7 @@ def _stable_at_speeds(speeds: Speeds) -> Part:
     where = [f"{name} {_speeds(ranges)}" for name, ranges in unstable.items() if ranges]
     why = "idealisation: there friction falls as the speed rises (Stribeck effect)"
     if speeds.incurable:
-        why += ", and no faster controller up to 10 kHz is stable"
+        why += ", and in the middle of that range no faster controller up to 10 kHz is stable"
     if not speeds.undeflected:
         why += (
             "; linearised about an initial speed with the bristles not yet deflected (z = 0), which leaves that out, "

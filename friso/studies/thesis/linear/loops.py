@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 
 from friso.equations.bandwidth import faster
-from friso.frequency.crossover import HIGHEST
-from friso.frequency.family import controller, loops, modes, plants, spectral_abscissa
-from friso.frequency.margins import Margins, frequencies, margins, with_resonances
+from friso.frequency.crossover import HIGHEST, end_of, searched, stable_crossovers
+from friso.frequency.drive import Drive
+from friso.frequency.family import controller, loops, modes, plants
+from friso.frequency.margins import DENSITY, Margins, frequencies, margins, with_resonances
 from friso.frequency.members import joined, limit_cases
 from friso.frequency.ranges import ranges_below
 from friso.stage import Stage
@@ -85,15 +86,14 @@ def _tuned(flat: Mapping[str, Any], crossover: Any) -> dict[str, Any]:
 def _omega(flat: Mapping[str, Any]) -> np.ndarray:
     """Frequencies [rad/s] of the curves, dense about resonances."""
     poles = modes(flat, joined([*limit_cases(flat).values()]))
-    return with_resonances(np.geomspace(*CURVE, POINTS) * 2 * np.pi, poles)
+    return with_resonances(np.geomspace(*CURVE, POINTS) * 2 * np.pi, [poles])
 
 
 def _single(flat: Mapping[str, Any]) -> float | None:
     """See `Loops`; the free joint's limiter is touched, since the controller is tuned for all the mass."""
     cases = limit_cases(flat)
     one = cases.get("sliding-touched", cases["sliding"])
-    poles = modes(flat, one)
-    omega = frequencies(poles, poles, np.inf)
+    omega = frequencies(flat, one, Drive.of(flat), DENSITY, [modes(flat, one)])
     bare = plants(flat, one, omega)[0]
 
     def more(crossover: np.ndarray) -> np.ndarray:
@@ -104,14 +104,9 @@ def _single(flat: Mapping[str, Any]) -> float | None:
 
 
 def _highest(flat: Mapping[str, Any]) -> float | None:
-    """The crossover [Hz] up to which all limit cases are stable; None beyond 10 kHz."""
-    cases = joined([*limit_cases(flat).values()])
-
-    def rightmost(crossover: np.ndarray) -> np.ndarray:
-        many = _tuned(flat, np.repeat(crossover, len(cases)))
-        return spectral_abscissa(many, cases.repeated(len(crossover))).reshape(-1, len(cases)).max(axis=1)
-
-    return _end_of_first(rightmost)
+    """The crossover [Hz] up to which all limit cases are stable; None at the end of the search, 0 where none is."""
+    ranges = stable_crossovers(flat, joined([*limit_cases(flat).values()]))
+    return end_of(ranges, flat["controller.crossover"], searched(flat)[1]) if ranges else 0.0
 
 
 def _end_of_first(excess: Callable[[np.ndarray], np.ndarray]) -> float | None:

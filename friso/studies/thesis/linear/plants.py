@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 from scipy.signal import find_peaks
 
+from friso.frequency.drive import Drive
 from friso.frequency.family import modes, plants
-from friso.frequency.margins import frequencies
+from friso.frequency.margins import DENSITY, frequencies
 from friso.frequency.members import Members, limit_cases
 from friso.frequency.parts import FORCE, STAGE, plant
 from friso.frequency.stiffness import limiter_in_series
@@ -78,8 +79,7 @@ def limit_cases_of(flat: Mapping[str, Any]) -> dict[str, LimitCase]:
 
 
 def _limit_case(flat: Mapping[str, Any], one: Members) -> LimitCase:
-    poles = modes(flat, one)
-    omega = frequencies(poles, poles, np.inf)
+    omega = frequencies(flat, one, Drive.of(flat), DENSITY, [modes(flat, one)])
     resonances, antiresonances = (_peaks(flat, one, omega, sign) for sign in (1, -1))
     at = _mass_line(LimitCase(resonances, antiresonances, np.nan, np.nan))
     omega_at = np.array([2 * np.pi * at])

@@ -31,7 +31,7 @@ class Speeds:
 
     `unstable` are the ranges of speed in which it is not, the limiter free and `unstable_touched`; `undeflected` the
     same with bristles that the motion has not deflected yet (z = 0), which is where a linearisation about an initial
-    speed begins; `incurable` tells whether no faster controller up to 10 kHz makes the whole range stable; `slow` and
+    speed begins; `incurable` tells whether in its middle no faster controller up to 10 kHz is stable; `slow` and
     `fast` are the ratios of the greatest to the least magnitude of the loop over the prescribed speeds, at a tenth and
     at ten times the crossover.
     """
@@ -71,7 +71,7 @@ def _sliding(speed: np.ndarray, touched: bool = False) -> Members:
 
 
 def _incurable(flat: Mapping[str, Any], unstable: tuple[Range, ...]) -> bool:
-    """Whether at some speed within the ranges no faster controller is stable."""
+    """Whether in the middle of some of the ranges no faster controller is stable."""
     crossover = np.geomspace(flat["controller.crossover"], HIGHEST, CROSSOVERS)
     many = faster(flat, crossover / flat["controller.crossover"])
     middles = [np.full(CROSSOVERS, np.sqrt(low * high)) for low, high in unstable]

@@ -10,7 +10,7 @@ import numpy as np
 
 from friso.frequency.margins import Margins, margins
 from friso.frequency.members import limit_cases
-from friso.frequency.stiffness import in_row
+from friso.frequency.stiffness import in_series
 from friso.stage import Stage
 from friso.studies.thesis.studies import LOCKED
 
@@ -46,7 +46,7 @@ def identified(stage: Stage) -> Margins:
 def soft_contact(stage: Stage) -> Contact:
     """See `Contact`. The part of the stage that its parasitic mode carries hardly takes part in the mode."""
     flat = stage.flat()
-    reduced = in_row(flat["masses.cart"], flat["masses.stage"] - flat["parasitic.mass"])
+    reduced = in_series(flat["masses.cart"], flat["masses.stage"] - flat["parasitic.mass"])
     stiffness = float((2 * np.pi * FURTHER) ** 2 * reduced)
     soft = stage.replace({**AT_HIGHEST, "joint.limiter_stiffness": f"{stiffness!r} N/m"})
     return Contact(stiffness, _sliding(soft), _sliding(soft.replace({"joint.limiter_damping": LITTLE})))

@@ -1,0 +1,182 @@
+"""The drive that carries out the controller: hold and delay of the plant, and the controller in discrete time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from math import comb, factorial
+from typing import Any
+
+import numpy as np
+from scipy.signal import tf2ss
+
+from friso.frequency.system import Complex, System
+from friso.quantities import StageError
+
+LIGHT = 0.3
+"""Damping ratio below which a pole is a resonance."""
+
+PADE, TURN = 4, 2.5
+"""A delay in continuous time is, where poles are wanted, a row of rational functions of this order, each for at most so
+much phase [rad] at the fastest resonance: wrong by 2e-4 rad then."""
+
+LEAST_TURN, MOST_TURN = 5.0, 20.0
+"""Phase [rad] for which they are made at least, and at most for a loop's own resonances: one that turns farther within
+its delay is unstable anyway."""
+
+MOST_SECTIONS, MOST_SAMPLES = 24, 64
+"""Longest row of these, and longest delay of a sampled drive in samples."""
+
+PADE_6 = tuple(comb(6, k) / (comb(12, k) * factorial(k)) for k in range(7))
+"""Coefficients of the numerator of Pade's approximation of order 6 to the exponential."""
+
+SCALED = 0.5
+"""Norm to which matrices are scaled for it: its relative error is then below 1e-16."""
+
+
+@dataclass(frozen=True)
+class Drive:
+    """Sample time [s], 0 for a controller in continuous time, and delay between measurement and force [s]."""
+
+    sample_time: float
+    delay: float
+
+    @classmethod
+    def of(cls, flat: Mapping[str, Any]) -> Drive:
+        """The drive of a stage. Raises StageError for a delay of more samples than are followed."""
+        drive = cls(flat.get("drive.sample_time", 0.0), flat.get("drive.delay", 0.0))
+        if drive.sample_time and drive.delay > MOST_SAMPLES * drive.sample_time * (1 + 1e-9):
+            given = f"{drive.delay:g} s, {drive.delay / drive.sample_time:.3g} samples of {drive.sample_time:g} s"
+            raise StageError("drive.delay", given, f"at most {MOST_SAMPLES} samples", 'delay = "100 us"')
+        return drive
+
+    @property
+    def highest(self) -> float:
+        """Angular frequency [rad/s] up to which the drive knows frequencies: half that of sampling."""
+        return np.pi / self.sample_time if self.sample_time else np.inf
+
+    @property
+    def samples_late(self) -> tuple[int, float]:
+        """The delay as whole samples, and the rest [s]."""
+        whole = int(self.delay / self.sample_time + 1e-9)
+        return whole, max(0.0, self.delay - whole * self.sample_time)
+
+    def transfer(self, omega: np.ndarray) -> np.ndarray:
+        """What hold and delay do to angular frequencies [rad/s], all but their aliases."""
+        half = omega * self.sample_time / 2
+        return np.sinc(half / np.pi) * np.exp(-1j * (half + omega * self.delay))
+
+    def controller_s(self, omega: np.ndarray) -> np.ndarray:
+        """The s [rad/s] of the continuous controller at which the sampled one answers (bilinear transform)."""
+        if not self.sample_time:
+            return 1j * omega
+        return 2j / self.sample_time * np.tan(omega * self.sample_time / 2)
+
+    def to_s(self, poles: Complex) -> Complex:
+        """Poles of the loop as s [rad/s]: of a sampled one, those whose exponential over a sample they are; 0 is at
+        minus infinity."""
+        if not self.sample_time:
+            return poles
+        with np.errstate(divide="ignore"):
+            return (np.log(np.abs(poles)) / self.sample_time + 1j * (np.angle(poles) / self.sample_time)).astype(
+                complex
+            )
+
+
+def resonances(poles: Complex) -> Complex:
+    """Those of the poles [rad/s] that are lightly damped."""
+    return poles[np.abs(poles.real) < LIGHT * np.abs(poles.imag)]
+
+
+def bilinear(control: System, sample_time: float) -> System:
+    """A controller in discrete time [s], by the bilinear transform."""
+    half = control.a * sample_time / 2
+    one = np.eye(len(control.states))
+    inverse = np.linalg.inv(one - half)
+    b = inverse @ control.b * sample_time
+    d = control.d + control.c @ b / 2
+    return replace(control, a=inverse @ (one + half), b=b, c=control.c @ inverse, d=d)
+
+
+def zero_order_hold(machine: System, sample_time: float, late: float) -> System:
+    """A plant with one input in discrete time behind a hold and a delay `late` [s] of less than a sample: exact, the
+    force that still acts being a further state."""
+    members, n, waiting = len(machine.a), len(machine.states), int(late > 0)
+    rest, before = _transition(machine, late)
+    ahead, after = _transition(machine, sample_time - late)
+    following = np.zeros((members, n + waiting, n + 1 + waiting))  # from states, the new force, and the one before it
+    following[:, :n, :n], following[:, :n, [n]] = ahead @ rest, after
+    if waiting:
+        following[:, :n, [n + 1]], following[:, n, n] = ahead @ before, 1.0
+    a, b = np.delete(following, n, axis=2), following[:, :, [n]]
+    c = np.concatenate([machine.c, np.zeros((members, machine.c.shape[1], waiting))], axis=2)
+    return replace(machine, a=a, b=b, c=c, states=machine.states + ("force_before",) * waiting)
+
+
+def waited(machine: System, samples: int) -> System:
+    """A plant with one input in discrete time whose force waits for some samples."""
+    if not samples:
+        return machine
+    register = np.eye(samples, k=-1)
+    return _behind(
+        machine, (register, np.eye(samples, 1), np.eye(1, samples, samples - 1), np.zeros((1, 1))), "waiting"
+    )
+
+
+def delayed(machine: System, delay: float, loop: float) -> System:
+    """A plant with one input behind a delay [s], as a row of rational functions (Pade), whose closed loop without delay
+    has resonances of up to `loop` [rad/s]. Raises StageError where the plant's own turn too often in the delay."""
+    own = fastest(np.linalg.eigvals(machine.a).astype(complex)) * delay
+    sections = int(np.ceil(max(LEAST_TURN, own, min(loop * delay, MOST_TURN)) / TURN))
+    if sections > MOST_SECTIONS:
+        expected = f"at most {MOST_SECTIONS * TURN / (2 * np.pi):.3g} periods, or a drive.sample_time"
+        given = f"{delay:g} s, {own / (2 * np.pi):.3g} periods of the fastest mode"
+        raise StageError("drive.delay", given, expected, 'delay = "100 us"')
+    from control import pade
+
+    for k in range(sections):
+        machine = _behind(machine, tf2ss(*pade(delay / sections, PADE)), f"delay_{k}")
+    return machine
+
+
+def fastest(poles: Complex) -> float:
+    """Largest magnitude [rad/s] of the resonances among poles; 0 if there are none."""
+    return float(np.abs(resonances(poles.ravel())).max(initial=0.0))
+
+
+def _behind(machine: System, first: tuple[np.ndarray, ...], name: str) -> System:
+    """A plant with one input behind another system with one input and output, given by its four matrices."""
+    la, lb, lc, ld = first
+    members, n, k = len(machine.a), len(machine.states), len(la)
+    a = np.zeros((members, n + k, n + k))
+    a[:, n:, n:] = la
+    a[:, :n, :n], a[:, :n, n:] = machine.a, machine.b @ lc
+    b = np.concatenate([machine.b @ ld, np.tile(np.asarray(lb), (members, 1, 1))], axis=1)
+    c = np.concatenate([machine.c, machine.d @ lc], axis=2)
+    return replace(machine, a=a, b=b, c=c, d=machine.d @ ld, states=machine.states + (name,) * k)
+
+
+def _transition(machine: System, time: float) -> tuple[np.ndarray, np.ndarray]:
+    """How states and a constant force act on the states a time [s] later."""
+    n = len(machine.states)
+    whole = np.zeros((len(machine.a), n + 1, n + 1))
+    whole[:, :n, :n], whole[:, :n, n:] = machine.a * time, machine.b * time
+    moved = exponentials(whole)
+    return moved[:, :n, :n], moved[:, :n, n:]
+
+
+def exponentials(matrices: np.ndarray) -> np.ndarray:
+    """Matrix exponentials, shape (members, n, n): Pade's of order 6 with scaling and squaring (Higham 2005,
+    doi:10.1137/04061101X), for all members at once, which `scipy.linalg.expm` takes one by one."""
+    norm = np.abs(matrices).sum(axis=-2).max()
+    squarings = max(0, int(np.ceil(np.log2(norm / SCALED)))) if norm > 0 else 0
+    scaled, one = matrices / 2.0**squarings, np.eye(matrices.shape[-1])
+    power, even, odd = one, one * 0.0, one * 0.0
+    for k, weight in enumerate(PADE_6):
+        term = weight * power
+        even, odd = (even + term, odd) if k % 2 == 0 else (even, odd + term)
+        power = power @ scaled
+    moved = np.linalg.solve(even - odd, even + odd)
+    for _ in range(squarings):
+        moved = moved @ moved
+    return moved

@@ -1,0 +1,205 @@
+"""The guideline as data: sweeps, laws fitted to one half of them, their errors on the other, and the worked steps."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections import Counter
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from friso.engine.kernel import Wanted, kernels
+from friso.hunting.cycle.ensemble import shared_structure
+from friso.quantities import StageError
+from friso.studies.guideline.checks import Checked, checked
+from friso.studies.guideline.groups import Count, counted
+from friso.studies.guideline.hunting_laws import FREE_LAW, LOCKED_LAW
+from friso.studies.guideline.laws import Errors, Fitted, fitted
+from friso.studies.guideline.rig import Laws, plain
+from friso.studies.guideline.sweeps import (
+    FREE,
+    FREE_FIT,
+    FREE_TEST,
+    LOCKED_FIT,
+    LOCKED_TEST,
+    Keep,
+    Sweep,
+    free_sweep,
+    locked_sweep,
+    together,
+)
+from friso.studies.guideline.worked import Worked, worked
+from friso.studies.thesis.studies import rig
+
+SAMPLES = 1024
+"""Samples to which the locked law is fitted unless told; the other sweeps are shares of it."""
+
+FEWEST, MOST = 64, 65536
+"""Fewer samples do not tell the exponents of a law; more are beyond the Sobol points' use here."""
+
+FREE_SHARE, TEST_SHARE = 3 / 8, 1 / 2
+"""Samples with a free joint per one of a rigid mass, whose edge costs a tenth; and of their test per one of their
+fit."""
+
+CHECKED = 1 / 8
+"""Samples that are simulated, per one of the locked fit."""
+
+WEIGHT = 8
+"""Time of a sample with a free joint, in that of one of a rigid mass: for the progress bar."""
+
+RATIOS = (0.0, 0.05, 0.3, 3.0, 20.0, np.inf)
+"""Ratios of slip to drop between which errors of the locked law are told apart."""
+
+Progress = Callable[[int, int, str], None]
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A law and what it rests on: the samples it was fitted to, those it was tested on, and its errors on both. With a
+    free joint the locked edge is that computed in `on_fit`, that of the locked law in `on_test`, where `given` has the
+    errors with the computed one. `checked` tells of simulations of samples of the test."""
+
+    law: Fitted
+    fit: Sweep
+    test: Sweep
+    on_fit: Errors
+    on_test: Errors
+    given: Errors
+    checked: Checked
+
+    @property
+    def whole(self) -> Sweep:
+        """Samples of fit and test."""
+        return together(self.fit, self.test)
+
+    @property
+    def kinds(self) -> Mapping[str, int]:
+        """How many samples of fit and test have an edge of which kind, or none for which reason."""
+        return Counter(self.whole.edges.kind.astype(str))
+
+    @property
+    def again(self) -> int:
+        """Samples of fit and test in which a cycle attracts again above a crossover at which none does."""
+        return int(np.count_nonzero(self.whole.edges.windows > 1))
+
+
+@dataclass(frozen=True)
+class Guideline:
+    """All that `docs/guideline.md` tells: how many groups there are by part of the stage, both laws, the worked steps;
+    how long it took [s] on how many cores, and how many parts of the sweeps an earlier, interrupted run had left."""
+
+    samples: int
+    counts: Mapping[str, Count]
+    locked: Fit
+    free: Fit
+    worked: Worked
+    seconds: float
+    cores: int
+    resumed: int
+
+    def held_out(self, free: bool, which: Callable[[Sweep], np.ndarray]) -> Errors | None:
+        """Errors of the laws on those held-out samples for which `which` is true, shape (count,); None of none."""
+        held = (self.free if free else self.locked).test.usable
+        some = held.take(which(held))
+        locked = self.locked.law.edge(some.values)
+        law = self.free.law.edge(some.values, locked) if free else locked
+        return Errors.between(law, some.edge) if len(law) else None
+
+    def held_out_by_rates(self) -> list[tuple[float, float, Errors | None]]:
+        """Errors of the locked law by the ratio of its two rates: from, to, errors."""
+
+        def ratio(sweep: Sweep) -> np.ndarray:
+            slip, drop = np.exp(self.locked.law.log_rates(sweep.values))
+            return slip / drop
+
+        ends = pairwise(RATIOS)
+        return [(a, b, self.held_out(False, lambda s, a=a, b=b: (ratio(s) >= a) & (ratio(s) < b))) for a, b in ends]
+
+
+def guideline(samples: int = SAMPLES, keep: Path | None = None, progress: Progress | None = None) -> Guideline:
+    """Compute the guideline. `keep` is a folder for what is done, from which an interrupted run goes on.
+
+    Raises StageError for a number of samples that does not do.
+    """
+    checked_samples(samples)
+    begin = time.perf_counter()
+    sizes = _sizes(samples)
+    told = _told(sizes, progress)
+    parts = Keep(keep)
+    resumed = parts.count
+    told("compiling", 0)
+    _compile()
+
+    rigid = locked_sweep(sizes["locked fit"], LOCKED_FIT, parts, told)
+    rigid_test = locked_sweep(sizes["locked test"], LOCKED_TEST, parts, told)
+    free, beside = free_sweep(sizes["free fit"], FREE_FIT, parts, told)
+    free_test, beside_test = free_sweep(sizes["free test"], FREE_TEST, parts, told)
+    told("laws and simulations", 0)
+    few = max(8, int(samples * CHECKED))
+    locked_fit = _locked(rigid, together(rigid_test, beside, beside_test), few)
+    free_fit = _free(free, free_test, locked_fit.law, few)
+    told("worked steps", 0)
+    laws = Laws(locked_fit.law, free_fit.law)
+    steps = worked(laws, locked_fit.on_test.safe, free_fit.on_test.safe)
+    seconds, cores = time.perf_counter() - begin, len(os.sched_getaffinity(0))
+    return Guideline(samples, counts(), locked_fit, free_fit, steps, seconds, cores, resumed)
+
+
+def checked_samples(samples: int) -> None:
+    """Raises StageError for a number of samples that does not do."""
+    if not FEWEST <= samples <= MOST:
+        raise StageError("--samples", f"{samples}", f"a whole number from {FEWEST} to {MOST}", f"--samples {SAMPLES}")
+
+
+def counts() -> dict[str, Count]:
+    """Parameters and groups of the rig rigid, with its joint, and with its parasitic mode as well."""
+    return {"rigid": counted(plain()), "joint": counted(plain("joint")), "parasitic": counted(rig().flat())}
+
+
+def _sizes(samples: int) -> dict[str, int]:
+    free = int(samples * FREE_SHARE)
+    return {
+        "locked fit": samples,
+        "locked test": samples // 4,  # the samples with a free joint, locked, are more of them
+        "free fit": free,
+        "free test": int(free * TEST_SHARE),
+    }
+
+
+def _told(sizes: Mapping[str, int], progress: Progress | None) -> Callable[[str, int], None]:
+    total = sum(size * (WEIGHT + 1 if name.startswith("free") else 1) for name, size in sizes.items())
+    done = 0
+
+    def told(what: str, more: int) -> None:
+        nonlocal done
+        done += more * (WEIGHT if what == FREE else 1)
+        if progress is not None:
+            progress(done, total, what)
+
+    return told
+
+
+def _compile() -> None:
+    """Compile all equations that are needed, side by side."""
+    flats = (plain(), plain("joint"), rig().flat(), rig().flat() | {"joint.locked": True})
+    kernels([Wanted(shared_structure(flat), variational) for flat in flats for variational in (False, True)])
+
+
+def _locked(fit: Sweep, test: Sweep, few: int) -> Fit:
+    used, held = fit.usable, test.usable
+    law = fitted(LOCKED_LAW, used.values, used.edge)
+    errors = Errors.between(law.edge(held.values), held.edge)
+    return Fit(law, fit, test, Errors.between(law.edge(used.values), used.edge), errors, errors, checked(test, few))
+
+
+def _free(fit: Sweep, test: Sweep, locked: Fitted, few: int) -> Fit:
+    used, held = fit.usable, test.usable
+    law = fitted(FREE_LAW, used.values, used.edge, used.locked)
+    given = Errors.between(law.edge(held.values, held.locked), held.edge)
+    whole = Errors.between(law.edge(held.values, locked.edge(held.values)), held.edge)
+    on_fit = Errors.between(law.edge(used.values, used.locked), used.edge)
+    return Fit(law, fit, test, on_fit, whole, given, checked(test, few))

@@ -1,0 +1,214 @@
+"""Laws of the edge: a few frequencies, each a product of powers, combined; which powers, cross-validation decides.
+
+A law is fitted to the logarithm of the edge with a loss that outliers do not dominate (soft L1). Beginning with none,
+the exponent that lowers the cross-validated loss most is let in, until the next one gains too little.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import least_squares
+
+REFERENCE: Mapping[str, float] = {
+    "gap": 1.0,
+    "stribeck": 1.0,
+    "bristle_damping": 0.4,
+    "viscous": 1e-3,
+    "alpha": 0.1,
+    "beta": 2.0,
+    "tuned_mass": 1.0,
+    "stage_share": 0.5,
+    "joint_damping": 0.01,
+    "limiter_damping": 0.05,
+}
+"""Values of the groups at which their powers are 1, round numbers near the thesis rig."""
+
+SCALE = 0.1
+"""Error of the logarithm from which on the loss grows linearly instead of with the square."""
+
+FOLDS, GAIN, MOST = 8, 0.02, 8
+"""Parts of the cross-validation, share by which an exponent has to lower its loss, and exponents at most."""
+
+Values = Mapping[str, np.ndarray]
+
+
+@dataclass(frozen=True)
+class Rate:
+    """A frequency in units of sqrt(sigma_0/m): a factor times groups to the fixed powers of `base`, times others, over
+    their references, to exponents that are fitted, those of `candidates` that turn out to matter."""
+
+    name: str
+    base: Mapping[str, float]
+    candidates: tuple[str, ...]
+
+    def fixed(self, values: Values) -> np.ndarray:
+        """The logarithm of the part that is not fitted, shape (count,)."""
+        return sum((power * np.log(values[group]) for group, power in self.base.items()), start=np.zeros(()))
+
+
+Combine = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
+"""From the logarithms of the rates, shape (rates, count), and of the locked edge, (count,), to that of the edge and its
+derivative by those of the rates."""
+
+Exponent = tuple[int, str]
+"""The number of a rate and a group."""
+
+
+@dataclass(frozen=True)
+class Law:
+    """Rates, and how the edge follows from them."""
+
+    rates: tuple[Rate, ...]
+    combine: Combine
+
+    @property
+    def candidates(self) -> list[Exponent]:
+        return [(number, group) for number, rate in enumerate(self.rates) for group in rate.candidates]
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """A law with its numbers: the `factors` of the rates and the `exponents` that were chosen, in their order; `path`,
+    the cross-validated loss (rms-like, see `loss`) with none, one, two, ... of them."""
+
+    law: Law
+    factors: tuple[float, ...]
+    exponents: Mapping[Exponent, float]
+    path: tuple[float, ...] = ()
+
+    def of(self, rate: int) -> dict[str, float]:
+        """The exponents of a rate by group."""
+        return {group: value for (number, group), value in self.exponents.items() if number == rate}
+
+    def log_rates(self, values: Values) -> np.ndarray:
+        """Logarithms of the rates, shape (rates, count)."""
+        parameters = np.array([*np.log(self.factors), *self.exponents.values()])
+        return _log_rates(self.law, tuple(self.exponents), values, parameters)
+
+    def edge(self, values: Values, locked: np.ndarray | None = None) -> np.ndarray:
+        """The edge of stages with these groups, in units of sqrt(sigma_0/m); `locked` is that with the joint locked."""
+        rates = self.log_rates(values)
+        return np.exp(self.law.combine(rates, np.log(locked) if locked is not None else np.zeros(rates.shape[1:]))[0])
+
+
+@dataclass(frozen=True)
+class Errors:
+    """How far a law is off: of `count` samples the root of the mean square, the median and the 95 % quantile of the
+    error of the logarithm, and the `worst`; `least` and `most`, between which the edge over that of the law lies."""
+
+    count: int
+    rms: float
+    median: float
+    usual: float
+    worst: float
+    least: float
+    most: float
+    safe: float
+
+    @classmethod
+    def between(cls, law: np.ndarray, found: np.ndarray) -> Errors:
+        """Errors of the edges by a law against those found, both (count,); `safe` is the factor on the law below which
+        95 % of the edges lie."""
+        off = np.log(found / law)
+        size = np.abs(off)
+        return cls(
+            len(off),
+            float(np.sqrt(np.mean(off**2))),
+            float(np.median(size)),
+            float(np.quantile(size, 0.95)),
+            float(size.max()),
+            float(np.exp(off.min())),
+            float(np.exp(off.max())),
+            float(np.exp(np.quantile(off, 0.95))),
+        )
+
+
+def in_series(power: float, rates: np.ndarray, locked: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Slownesses add: edge^-power is the sum of rate^-power."""
+    total = np.logaddexp.reduce(-power * rates, axis=0)
+    return -total / power, np.exp(-power * rates - total)
+
+
+def beside_locked(rates: np.ndarray, locked: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """edge^-2 is that of the locked edge plus that of the largest rate."""
+    largest = rates.argmax(axis=0)
+    log, weights = in_series(2.0, np.stack([rates.max(axis=0), locked]), locked)
+    return log, np.where(np.arange(len(rates))[:, None] == largest, weights[0], 0.0)
+
+
+def fitted(law: Law, values: Values, edges: np.ndarray, locked: np.ndarray | None = None, seed: int = 0) -> Fitted:
+    """The law fitted to edges, shape (count,), its exponents chosen by cross-validation."""
+    target = np.log(edges)
+    given = np.zeros(len(edges)) if locked is None else np.log(locked)
+    folds = np.random.default_rng(seed).permutation(len(edges)) % FOLDS
+    chosen: tuple[Exponent, ...] = ()
+    path = [_validated(law, chosen, values, target, given, folds)]
+    while len(chosen) < MOST:
+        tried = [each for each in law.candidates if each not in chosen]
+        scores = [_validated(law, (*chosen, each), values, target, given, folds) for each in tried]
+        if not scores or min(scores) > (1 - GAIN) * path[-1]:
+            break
+        path.append(min(scores))
+        chosen = (*chosen, tried[int(np.argmin(scores))])
+    found = _solved(law, chosen, values, target, given)
+    rates = len(law.rates)
+    factors = tuple(float(factor) for factor in np.exp(found[:rates]))
+    return Fitted(law, factors, dict(zip(chosen, map(float, found[rates:]), strict=True)), tuple(path))
+
+
+def loss(off: np.ndarray) -> float:
+    """Size of errors of the logarithm: their rms, were all small; beyond `SCALE` they count linearly."""
+    return float(np.sqrt(np.mean(2 * SCALE**2 * (np.sqrt(1 + (off / SCALE) ** 2) - 1))))
+
+
+def _validated(
+    law: Law, chosen: tuple[Exponent, ...], values: Values, target: np.ndarray, given: np.ndarray, folds: np.ndarray
+) -> float:
+    """The loss on each part of the samples of the law fitted to the others."""
+    off = np.empty(len(target))
+    for fold in range(FOLDS):
+        out, rest = folds == fold, folds != fold
+        found = _solved(law, chosen, _some(values, rest), target[rest], given[rest])
+        rates = _log_rates(law, chosen, _some(values, out), found)
+        off[out] = law.combine(rates, given[out])[0] - target[out]
+    return loss(off)
+
+
+def _solved(
+    law: Law, chosen: tuple[Exponent, ...], values: Values, target: np.ndarray, given: np.ndarray
+) -> np.ndarray:
+    """Logarithms of the factors, then the exponents."""
+    features = _features(law, chosen, values)
+    fixed = np.stack([np.broadcast_to(rate.fixed(values), target.shape) for rate in law.rates])
+
+    def off(parameters: np.ndarray) -> np.ndarray:
+        return law.combine(fixed + np.einsum("rpc,p->rc", features, parameters), given)[0] - target
+
+    def slopes(parameters: np.ndarray) -> np.ndarray:
+        weights = law.combine(fixed + np.einsum("rpc,p->rc", features, parameters), given)[1]
+        return np.einsum("rc,rpc->cp", weights, features)
+
+    start = np.zeros(len(law.rates) + len(chosen))
+    return least_squares(off, start, slopes, loss="soft_l1", f_scale=SCALE).x  # type: ignore[arg-type]
+
+
+def _features(law: Law, chosen: tuple[Exponent, ...], values: Values) -> np.ndarray:
+    """Derivatives of the logarithms of the rates by the parameters, shape (rates, parameters, count)."""
+    count, rates = len(next(iter(values.values()))), len(law.rates)
+    features = np.zeros((rates, rates + len(chosen), count))
+    features[np.arange(rates), np.arange(rates)] = 1.0
+    for column, (rate, group) in enumerate(chosen):
+        features[rate, rates + column] = np.log(values[group] / REFERENCE[group])
+    return features
+
+
+def _log_rates(law: Law, chosen: tuple[Exponent, ...], values: Values, parameters: np.ndarray) -> np.ndarray:
+    fixed = np.stack([np.broadcast_to(rate.fixed(values), values["gap"].shape) for rate in law.rates])
+    return fixed + np.einsum("rpc,p->rc", _features(law, chosen, values), parameters)
+
+
+def _some(values: Values, which: np.ndarray) -> dict[str, np.ndarray]:
+    return {name: value[which] for name, value in values.items()}

@@ -1,0 +1,66 @@
+"""Whether stages still hunt after a long simulation, however they began."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from friso.engine.arrays import Status
+from friso.engine.batch import Options, run_chunks
+from friso.engine.kernel import kernel
+from friso.hunting.cycle.ensemble import Ensemble
+from friso.hunting.cycle.rest import stuck, wait
+
+DISTANCES = np.geomspace(0.05, 2.0, 72)
+"""Where a stage sticks at first, in units of the deflection of the loop by the break-away force: 5 % apart, about
+every cycle, whose own distance is 0.1 to 1.5 of them."""
+
+SMALL = 0.1
+"""Distance, in the same units, of a small cycle: its period is the longest, since a stage waits the longer the nearer
+it sticks. A stage that swings by less than this does not hunt."""
+
+PERIODS, LAST = 200.0, 2.0
+"""Periods of such a cycle for which is simulated, and those at the end in which the stage is looked at. Beside a cycle
+that repels by 1 % per half a period a deviation grows 50 times in them."""
+
+RTOL = 1e-6
+"""Relative tolerance of these runs."""
+
+
+@dataclass(frozen=True)
+class Begin:
+    """Keys of a motion, states at the start, (count, states) (None: at rest), and when the motion is over [s]."""
+
+    motion: Mapping[str, Any]
+    starts: np.ndarray | None = None
+    over: np.ndarray | float = 0.0
+
+
+def from_rest(stages: Ensemble, distances: np.ndarray) -> Begin:
+    """Stuck at distances (count,), in units of the deflection by the break-away force."""
+    return Begin({"motion.displacement": stages.length}, stuck(stages, distances * stages.length))
+
+
+@np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
+def still_hunts(stages: Ensemble, begin: Begin) -> tuple[np.ndarray, np.ndarray]:
+    """Which stages still hunt at the end, and which runs were completed, both of shape (count,)."""
+    period = 2 * (wait(stages, SMALL * stages.length) + 2 * np.pi / stages.number("rate"))
+    end = begin.over + PERIODS * period
+    options = Options(rtol=RTOL, window=1 - LAST / PERIODS, record_from=float(np.min(end)) / 2, least_swing=np.inf)
+    flat = {**stages.flat, **begin.motion, "motion.duration": end}
+    hunts, completed = np.zeros(stages.count, bool), np.zeros(stages.count, bool)
+    for runs in run_chunks(kernel(stages.structure), flat, stages.count, options, begin.starts):
+        swing = runs.statistic("deviation_max") - runs.statistic("deviation_min")
+        completed[runs.numbers] = np.equal(runs.results.statuses, Status.DONE)
+        hunts[runs.numbers] = completed[runs.numbers] & (swing > SMALL * stages.length[runs.numbers])
+    return hunts, completed
+
+
+def hunts_somehow(stages: Ensemble) -> np.ndarray:
+    """Which stages hunt for ever from some of the distances, shape (count,)."""
+    several = stages.take(np.repeat(np.arange(stages.count), len(DISTANCES)))
+    hunts, _ = still_hunts(several, from_rest(several, np.tile(DISTANCES, stages.count)))
+    return np.any(hunts.reshape(stages.count, -1), axis=1)

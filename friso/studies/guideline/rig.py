@@ -1,0 +1,106 @@
+"""The worked example: the thesis rig, by the laws and by direct computation side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from friso.hunting.cycle.ensemble import Ensemble
+from friso.hunting.margin import margin
+from friso.stage import Stage
+from friso.studies.guideline.edges import find_edges
+from friso.studies.guideline.groups import values_of
+from friso.studies.guideline.laws import Fitted
+from friso.studies.thesis.studies import rig
+
+RIGID_GRID = np.geomspace(2.0, 60.0, 14)
+FREE_GRID = np.geomspace(1.0, 20.0, 28)
+"""Crossovers tried for the rig [Hz]; the more with a free joint, some of whose cycles cannot be closed."""
+
+Changes = Mapping[str, Any]
+"""Keys that differ from those of the rig, SI."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """A stage of the rig's kind: what is changed, and its edge [Hz] by the law and as computed (NaN: none found)."""
+
+    changes: Changes
+    law: float
+    computed: float
+
+
+@dataclass(frozen=True)
+class Laws:
+    """The two laws that give the edge of any stage."""
+
+    locked: Fitted
+    free: Fitted
+
+    def locked_edge(self, flat: Mapping[str, Any]) -> np.ndarray:
+        """The edge [Hz] with the joint locked of stages given by flat keys to SI numbers or arrays."""
+        values, rate = _shaped(flat)
+        return self.locked.edge(values) * rate
+
+    def free_edge(self, flat: Mapping[str, Any]) -> np.ndarray:
+        """The edge [Hz] with the joint free, likewise."""
+        values, rate = _shaped(flat)
+        return self.free.edge(values, self.locked.edge(values)) * rate
+
+    def rates(self, flat: Mapping[str, Any]) -> dict[str, np.ndarray]:
+        """All rates of the laws [Hz], by name."""
+        values, rate = _shaped(flat)
+        return {
+            each.name: np.exp(log) * rate
+            for law in (self.locked, self.free)
+            for each, log in zip(law.law.rates, law.log_rates(values), strict=True)
+        }
+
+
+def _shaped(flat: Mapping[str, Any]) -> tuple[dict[str, np.ndarray], np.ndarray]:
+    """The groups as arrays of one shape, and the frequency [Hz] of the mass on its bristles."""
+    values = values_of(flat)
+    rate = np.sqrt(flat["friction.bristle_stiffness"] / (flat["masses.cart"] + flat["masses.stage"])) / (2 * np.pi)
+    arrays = np.broadcast_arrays(*(np.atleast_1d(value) for value in values.values()))
+    return dict(zip(values, arrays, strict=True)), np.atleast_1d(rate)
+
+
+def plain(part: str = "") -> dict[str, Any]:
+    """The flat keys of the rig without its parasitic mode; without its joint as well unless part is "joint"."""
+    dropped = "parasitic." if part == "joint" else ("parasitic.", "joint.")
+    return {key: value for key, value in rig().flat().items() if not key.startswith(dropped)}
+
+
+def cases(laws: Laws, changes: Sequence[Changes], free: bool) -> list[Case]:
+    """The rig with each of these changes, rigid or with its joint free."""
+    base = rig().flat() if any("parasitic.frequency" in each for each in changes) else plain("joint" if free else "")
+    keys = {key for each in changes for key in each}
+    flat = base | {key: np.array([each.get(key, base[key]) for each in changes], float) for key in keys}
+
+    def stages(which: np.ndarray, crossover: np.ndarray) -> Ensemble:
+        some = {key: value[which] if np.ndim(value) else value for key, value in flat.items()}
+        return Ensemble.held(some | {"controller.crossover": crossover}, len(which))
+
+    grid = FREE_GRID if free else RIGID_GRID
+    computed = find_edges(stages, np.broadcast_to(grid, (len(changes), len(grid)))).crossover
+    known = plain("joint") | {key: value for key, value in flat.items() if not key.startswith("parasitic.")}
+    law = np.broadcast_to(laws.free_edge(known) if free else laws.locked_edge(known), computed.shape)
+    return [Case(*each) for each in zip(changes, law.tolist(), computed.tolist(), strict=True)]
+
+
+def direct(stage: Stage) -> float:
+    """The edge [Hz] as `friso check` finds it, from a crossover at which the stage hunts; NaN without one."""
+    found = margin(stage, attracting=True)
+    return found.crossover if found and found.crossover else np.nan
+
+
+def parasitic_rule(stage: Stage) -> tuple[str, ...]:
+    """HOOK: what linear analysis says about the parasitic mode of this stage, as paragraphs of the page.
+
+    To be filled in with `friso.linear`: the highest crossover at which the loop is stable with its margins, over the
+    frequency of the parasitic mode. Until then it says nothing.
+    """
+    return ()

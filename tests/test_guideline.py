@@ -1,0 +1,322 @@
+"""The guideline: its groups leave hunting as it is, its edges are the known ones, its laws find what made the data."""
+
+import json
+import sys
+from functools import partial
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+import sympy as sp
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from variants import VARIANTS, free, lugre, release, stage, van_dijk
+
+from friso.cli import main
+from friso.equations.model import assemble
+from friso.equations.structure import structure
+from friso.hunting.cycle.ensemble import Ensemble
+from friso.hunting.cycle.find import hunting_cycles
+from friso.quantities import StageError
+from friso.stage import Stage
+from friso.studies.guideline import checks, compute, sweeps, worked
+from friso.studies.guideline.edges import ABOVE, BELOW, FLIP, Edges, find_edges
+from friso.studies.guideline.groups import (
+    GROUPS,
+    PARAMETERS,
+    Scale,
+    counted,
+    dimensions,
+    flat_of,
+    parameters_of,
+    values_of,
+)
+from friso.studies.guideline.hunting_laws import FREE_LAW, LOCKED_LAW
+from friso.studies.guideline.laws import Errors, Law, Rate, fitted, in_series
+from friso.studies.guideline.persistence import hunts_somehow
+from friso.studies.guideline.rig import plain
+
+RIGID = pytest.mark.xdist_group("rigid")
+FREE_RIG = pytest.mark.xdist_group("free")
+
+
+def rigid() -> Stage:
+    return VARIANTS["rigid"]
+
+
+def free_rig() -> Stage:
+    return stage(release(), friction=lugre(2), joint=free(), controller=van_dijk())
+
+
+def multiplier(flat: dict[str, Any]) -> float:
+    (found,) = hunting_cycles(Ensemble.held(flat, 1)).multiplier
+    return float(found)
+
+
+# groups
+
+
+@pytest.mark.parametrize("flat", [plain(), plain("joint"), plain("joint") | {"parasitic.frequency": 300.0}], ids=len)
+def test_groups_are_as_many_as_buckingham_says_and_independent(flat: dict[str, Any]) -> None:
+    """As many groups as parameters less the rank of their dimensions, none with a dimension, none made of others."""
+    if "parasitic.frequency" in flat:
+        flat |= {"parasitic.mass": 0.25, "parasitic.damping_ratio": 0.01}
+    names = parameters_of(flat)
+    groups = [GROUPS[name] for name in values_of(flat) if set(GROUPS[name].powers) <= set(names)]
+    count = counted(flat)
+    assert count.rank == 3
+    assert len(groups) == count.groups == {11: 8, 17: 14, 20: 17}[count.parameters]
+    powers = np.array([[group.powers.get(name, 0.0) for name in names] for group in groups])
+    assert np.linalg.matrix_rank(powers) == len(groups)
+    assert np.allclose(powers @ np.stack([dimensions(name, flat) for name in names]), 0)
+
+
+def test_parameters_are_all_that_the_equations_contain() -> None:
+    """Every key in the equations of the rig is in a parameter; rigid masses enter as their sum alone."""
+    model = assemble(structure(plain()))
+    keys = {str(symbol) for symbol in model.parameters} - {"motion.size", "motion.duration"}
+    assert keys == {key for name in parameters_of(plain()) for key in PARAMETERS[name].keys}
+    cart, part = sp.Symbol("masses.cart", real=True), sp.Symbol("masses.stage", real=True)
+    whole = [rhs.subs(cart, sp.Symbol("m") - part) for rhs in model.rhs]
+    assert all(part not in sp.expand(sp.simplify(rhs)).free_symbols for rhs in whole)
+
+
+def test_groups_and_back() -> None:
+    flat = free_rig().flat()
+    again = flat_of(values_of(flat), Scale(1.7, 1e5, 3.0))
+    numbers = {key: value for key, value in again.items() if not isinstance(value, str)}
+    assert {key: flat[key] for key in numbers} == pytest.approx(numbers, rel=1e-12)
+    assert again.keys() | {"motion.kind"} >= {key for key in flat if not key.startswith("motion.")}
+
+
+@RIGID
+@settings(max_examples=8, deadline=None)
+@given(*[st.floats(-3, 3)] * 3)
+def test_equal_groups_equal_multiplier(mass: float, stiffness: float, force: float) -> None:
+    """Whatever mass, stiffness and force are, to a thousandth and a thousand times as large."""
+    values = values_of(rigid().replace({"controller.crossover": "6 Hz"}).flat())
+    scaled = flat_of(values, Scale(10**mass, 10**stiffness, 10**force))
+    assert multiplier(scaled) == pytest.approx(multiplier(flat_of(values)), rel=1e-5)
+
+
+@FREE_RIG
+def test_equal_groups_equal_multiplier_with_a_free_joint() -> None:
+    values = values_of(free_rig().replace({"controller.crossover": "3 Hz"}).flat())
+    assert multiplier(flat_of(values, Scale(30.0, 2e7, 11.0))) == pytest.approx(multiplier(flat_of(values)), rel=1e-3)
+
+
+def test_groups_of_another_controller_or_friction_are_refused() -> None:
+    for name in ("rigid, LuGre 3, P", "rigid, Stribeck 3"):
+        with pytest.raises(StageError, match="van Dijk's rules, for which the groups are derived"):
+            values_of(VARIANTS[name].flat())
+
+
+# edges
+
+
+def edge_of(chosen: Stage, low: float, high: float, points: int) -> Edges:
+    flat = chosen.flat()
+    return find_edges(
+        lambda which, crossover: Ensemble.held(flat | {"controller.crossover": crossover}, len(which)),
+        np.geomspace(low, high, points)[None],
+    )
+
+
+@RIGID
+def test_edge_of_the_rigid_mass() -> None:
+    """9.77 Hz (references.md), where it flips; and what is said where the grid does not hold it."""
+    found = edge_of(rigid(), 5, 20, 6)
+    assert found.crossover[0] == pytest.approx(9.770, abs=2e-3)
+    assert found.kind[0] == FLIP
+    assert -1 < found.inside[0] < -0.99
+    assert -1.01 < found.outside[0] < -1
+    assert edge_of(rigid(), 3, 8, 3).kind[0] == ABOVE
+    assert edge_of(rigid(), 18, 30, 3).kind[0] == BELOW
+    assert not edge_of(rigid(), 18, 30, 3).known[0]
+
+
+@FREE_RIG
+def test_edge_of_the_free_rig() -> None:
+    """5.60 Hz with its parasitic mode (docs/hunting.md); 0.05 for the limiter that chatters, and the mode left out."""
+    found = edge_of(free_rig(), 4, 9, 5)
+    assert found.crossover[0] == pytest.approx(5.60, abs=0.05)
+
+
+@RIGID
+def test_simulation_agrees_where_hunting_ends() -> None:
+    """An independent route: from 72 distances, hunting goes on at 9 Hz, and nowhere at 11.2 Hz."""
+    flat = rigid().flat()
+    found = hunts_somehow(Ensemble.held(flat | {"controller.crossover": np.array([9.0, 11.2])}, 2))
+    assert found.tolist() == [True, False]
+
+
+# laws
+
+
+def made(count: int, seed: int, noise: float) -> tuple[dict[str, np.ndarray], np.ndarray]:
+    """Samples of the locked law with known numbers."""
+    values = sweeps.drawn(sweeps.LOCKED_BOX, count, seed)
+    slip = 1.5 * values["stribeck"] * values["gap"] * (values["alpha"] / 0.1) ** -0.4
+    drop = 0.4 / values["stribeck"] * values["tuned_mass"] ** -0.9
+    off = noise * np.random.default_rng(seed).normal(size=count)
+    return values, np.exp(off) / (1 / slip + 1 / drop)
+
+
+def test_law_finds_known_numbers_and_leaves_out_the_rest() -> None:
+    values, edges = made(256, 1, 0.02)
+    law = fitted(LOCKED_LAW, values, edges)
+    assert law.factors == pytest.approx((1.5, 0.4), rel=0.02)
+    assert set(law.exponents) == {(0, "alpha"), (1, "tuned_mass")}
+    assert law.of(0)["alpha"] == pytest.approx(-0.4, abs=0.02)
+    assert law.of(1)["tuned_mass"] == pytest.approx(-0.9, abs=0.03)
+    assert law.path[-1] == pytest.approx(0.02, rel=0.15)
+    others, held_out = made(256, 2, 0.02)
+    errors = Errors.between(law.edge(others), held_out)
+    assert errors.rms == pytest.approx(0.02, rel=0.15)
+    assert errors.median < errors.usual < errors.worst < 0.1
+    assert errors.least < 1 < errors.safe < errors.most
+
+
+def test_law_is_not_led_astray_by_outliers() -> None:
+    values, edges = made(256, 1, 0.02)
+    edges[::40] *= 5
+    assert fitted(LOCKED_LAW, values, edges).factors == pytest.approx((1.5, 0.4), rel=0.05)
+
+
+def test_held_out_errors_tell_a_law_of_the_wrong_shape() -> None:
+    values, edges = made(256, 1, 0.0)
+    wrong = fitted(Law((Rate("one", {"gap": 1.0}, ("alpha",)),), partial(in_series, 1.0)), values, edges)
+    others, held_out = made(256, 2, 0.0)
+    assert Errors.between(wrong.edge(others), held_out).rms > 0.5
+
+
+def test_free_law_takes_the_larger_rate_beside_the_locked_edge() -> None:
+    values = sweeps.drawn({**sweeps.LOCKED_BOX, **sweeps.JOINT_BOX, "joint": (1e-4, 0.1)}, 200, 3)
+    locked = made(200, 3, 0.0)[1]
+    joint = 1.3 * np.sqrt(values["joint"]) * values["gap"] ** 0.66
+    largest = np.maximum(joint, 0.9 * np.sqrt(values["joint"] / values["stroke"]))
+    law = fitted(FREE_LAW, values, 1 / np.sqrt(locked**-2 + largest**-2), locked)
+    assert law.factors == pytest.approx((1.3, 0.9), rel=0.02)
+    assert law.of(0)["gap"] == pytest.approx(0.66, abs=0.01)
+
+
+# the page
+
+
+@pytest.fixture(scope="module")
+def quick() -> compute.Guideline:
+    """A guideline of invented sweeps and a shortened rig: what is shown, not what is found."""
+    patch = pytest.MonkeyPatch()
+    patch.setattr(sweeps, "find_edges", invented)
+    patch.setattr(compute, "checked", lambda sweep, most: checks.Checked(most, most, 0, most, 0, 100, 0))
+    patch.setattr(compute, "worked", shown)
+    patch.setattr(compute, "_compile", lambda: None)
+    try:
+        yield compute.guideline(compute.FEWEST)
+    finally:
+        patch.undo()
+
+
+def invented(stages: Any, grid: np.ndarray) -> Edges:
+    """Edges as the laws have them, the last of each part missing."""
+    flat = stages(np.arange(len(grid)), grid[:, 0]).flat
+    values = {name: np.broadcast_to(value, len(grid)) for name, value in values_of(flat).items()}
+    edge = 1 / (1 / (1.5 * values["stribeck"] * values["gap"]) + values["stribeck"] / 0.4)
+    if "joint" in values:
+        edge = 1 / np.sqrt(edge**-2 + 1 / np.maximum(values["joint"], values["joint"] / values["stroke"]))
+    edge[-1] = np.nan
+    kind = np.where(np.isfinite(edge), FLIP, BELOW).astype(object)
+    ones = np.ones(len(grid))
+    return Edges(edge, kind, -0.99 * ones, -1.01 * ones, ones.astype(int))
+
+
+def shown(laws: Any, safe_locked: float, safe_free: float) -> worked.Worked:
+    """The worked steps, edges by the laws standing for computed ones."""
+    patch = pytest.MonkeyPatch()
+
+    def by_law(laws: Any, changes: Any, free: bool) -> list[worked.Case]:
+        own = [plain("joint") | {k: v for k, v in each.items() if not k.startswith("parasitic")} for each in changes]
+        edges = [float((laws.free_edge if free else laws.locked_edge)(flat)[0]) for flat in own]
+        return [worked.Case(each, edge, edge) for each, edge in zip(changes, edges, strict=True)]
+
+    patch.setattr(worked, "cases", by_law)
+    patch.setattr(worked, "direct", lambda stage: 9.77)
+    try:
+        return worked.worked(laws, safe_locked, safe_free)
+    finally:
+        patch.undo()
+
+
+def test_guideline_counts_what_it_leaves_out(quick: compute.Guideline) -> None:
+    assert quick.locked.kinds[BELOW] == quick.locked.whole.edge.size - quick.locked.whole.usable.edge.size > 0
+    assert quick.locked.on_test.count == quick.locked.test.usable.edge.size
+    assert quick.locked.on_test.worst < 1e-3  # the invented edges are the law's own
+    assert not set(map(tuple, np.stack(list(quick.locked.fit.values.values()), 1))) & set(
+        map(tuple, np.stack(list(quick.locked.test.values.values()), 1))
+    )
+
+
+def test_page_renders_with_its_charts(quick: compute.Guideline, tmp_path: Path) -> None:
+    from friso.views.guideline import guideline_document, write_guideline
+
+    files = {path.name: path for path in write_guideline(quick, tmp_path)}
+    page = files["guideline.md"].read_text()
+    for part in ("omega_locked = 1/(1/omega_slip + 1/omega_drop)", "1.50 sigma_0 v_s/F_s", "8 groups decide"):
+        assert part.replace("1.50", "1.5") in page
+    assert "nan" not in page
+    pictures = [name for name in files if name.endswith(".png")]
+    assert len(pictures) == 5
+    assert all(f"({name})" in page and files[name].stat().st_size < 300_000 for name in pictures)
+    table = files["guideline_edges.csv"].read_text().splitlines()
+    assert len(table) == 1 + sum(len(each.whole.edge) for each in (quick.locked, quick.free))
+    document = json.loads(json.dumps(guideline_document(quick), allow_nan=False))
+    assert document["laws"]["locked"]["rates"]["slip"]["factor"] == pytest.approx(1.5, rel=1e-3)
+
+
+def test_interrupted_sweep_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Parts done are taken over, the others computed; nothing half-written counts."""
+    calls: list[int] = []
+
+    def stopping(stages: Any, grid: np.ndarray) -> Edges:
+        calls.append(len(grid))
+        if len(calls) == 2:
+            raise KeyboardInterrupt
+        return invented(stages, grid)
+
+    monkeypatch.setattr(sweeps, "find_edges", stopping)
+    keep = sweeps.Keep(tmp_path / "kept")
+    with pytest.raises(KeyboardInterrupt):
+        sweeps.locked_sweep(96, 1, keep, lambda what, done: None)
+    assert keep.count == 1
+    resumed = sweeps.locked_sweep(96, 1, keep, lambda what, done: None)
+    assert calls == [32] * 4
+    whole = sweeps.locked_sweep(96, 1, sweeps.Keep(), lambda what, done: None)
+    assert np.array_equal(resumed.edge, whole.edge, equal_nan=True)
+    keep.clear()
+    assert keep.count == 0
+
+
+@pytest.mark.parametrize("samples", ["0", "-3", "63", "100000"])
+def test_wrong_number_of_samples(samples: str, monkeypatch: Any, capsys: Any, tmp_path: Path) -> None:
+    monkeypatch.setattr(sys, "argv", ["friso", "guideline", "--samples", samples, "--out", str(tmp_path / "none")])
+    with pytest.raises(SystemExit) as left:
+        main()
+    assert left.value.code == 2
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert f"--samples\n  given:    {samples}\n  expected: a whole number from 64 to 65536" in err
+    assert not (tmp_path / "none").exists()
+
+
+def test_unfinished_guideline_says_what_is_kept(monkeypatch: Any, capsys: Any, tmp_path: Path) -> None:
+    def interrupted(*_: Any) -> SimpleNamespace:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("friso.studies.guideline.guideline", interrupted)
+    monkeypatch.setattr(sys, "argv", ["friso", "guideline", "--samples", "64", "--out", str(tmp_path)])
+    with pytest.raises(SystemExit) as left:
+        main()
+    assert left.value.code == 130
+    assert "0 parts of the sweeps are kept" in capsys.readouterr().err
