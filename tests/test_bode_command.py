@@ -104,13 +104,13 @@ def _strict(text: str) -> dict[str, Any]:
 def test_the_document_has_the_agreed_keys(written: tuple[dict, Path]) -> None:
     document, _ = written
     assert document.keys() == {
-        *("stage", "cases", "worst", "worst_stable", "unstable_speeds_m_per_s", "limits"),
+        *("stage", "cases", "worst", "worst_settled", "unstable_speeds_m_per_s", "limits"),
         "highest_stable_crossover_hz",
     }
     assert document["stage"] == "Thesis rig"
     assert document["cases"].keys() == {"stuck", "sliding", "stuck-touched", "sliding-touched"}
     assert all(case.keys() == MARGINS for case in document["cases"].values())
-    for name in ("worst", "worst_stable"):
+    for name in ("worst", "worst_settled"):
         assert document[name].keys() == MARGINS | {"at"}
         assert document[name]["at"].keys() == {"bias_n", "speed_m_per_s", "limiter", "forward"}
     assert document["limits"].keys() == {"locked", "free"}
@@ -177,7 +177,7 @@ def test_a_controller_by_gains_has_factors_instead_of_crossovers(emps: Bode) -> 
     assert document["cases"].keys() == {"stuck", "sliding"}
     assert document["cases"]["stuck"]["crossovers_hz"] == []
     assert document["cases"]["stuck"]["phase_margin_deg"] is None
-    assert document["worst_stable"] == document["worst"]
+    assert document["worst_settled"]["stable"]
     assert document["unstable_speeds_m_per_s"] == []
 
 
@@ -187,7 +187,8 @@ def test_a_rigid_stage_without_friction_has_the_one_case_given(rigid: Bode) -> N
     assert document["worst"]["at"] == {"bias_n": 0.0, "speed_m_per_s": 0.0, "limiter": None, "forward": True}
     assert document["limits"].keys() == {"given"}
     assert [item.label for item in shown_states(rigid)] == ["As given"]
-    assert stability(rigid) == ["The loop is stable."]
+    (said,) = stability(rigid)
+    assert said.startswith("The loop is stable, modulus margin 0.73")
 
 
 def test_an_unstable_loop_is_a_plain_statement(unstable: Bode) -> None:
@@ -211,11 +212,12 @@ def test_the_table_and_the_sentences_of_the_rig(capsys: pytest.CaptureFixture, m
     flat = " ".join(said.split())
     assert "5.12 Hz, 9.01 Hz, 24.8 Hz" in flat
     assert (
-        "This one controller is not stable in every state. Unstable: sliding, 0.122 to 3.90 mm/s, limiter free; "
+        "At 8.00 Hz, this controller is stable in all settled states (the limit cases, and stuck under any bias force). "
+        "Worst: sliding at 1.60 m/s, limiter free, modulus margin 0.569 (peak sensitivity 1.76) at 29.0 Hz. "
+        "It is not stable in every state. Unstable: sliding, 0.122 to 3.90 mm/s, limiter free; "
         "sliding, 0.187 to 3.37 mm/s, limiter touched."
     ) in flat
     assert "There friction falls as the speed rises (Stribeck effect)" in flat
-    assert "Worst: sliding at 1.78 mm/s, limiter free; a deviation grows e-fold in 2.9" in flat
     assert "Free (as given): stable: all from 0.100 Hz to 10.0 kHz; modulus margin above 0.5: up to 0.65" in flat
     assert "drive.sample_time" in flat
 
@@ -241,12 +243,13 @@ def test_friction_that_rises_is_not_blamed(found: Bode) -> None:
 
 
 def test_unstable_limit_cases_are_a_matter_of_tuning(unstable: Bode) -> None:
-    where, why, worst = stability(unstable)
+    settled, where, why = stability(unstable)
+    assert settled.startswith("At 8.00 Hz, this controller is not stable in all settled states")
+    assert "grows e-fold in 64.4 ms, swinging at 9.26 Hz" in settled
     assert "Unstable: stuck, limiter free; stuck under a bias force of 2." in where
     assert "sliding, all from 1.60 µm/s to 1.60 m/s, limiter free" in where
     assert why.startswith("That is a matter of tuning")
     assert "Stribeck" not in why
-    assert worst.startswith("Worst: sliding")
     assert crossovers(unstable)["free"].startswith("Free (as given): stable: none from 0.100 Hz to 10.0 kHz")
     assert caveats(unstable) == []
 
@@ -254,8 +257,8 @@ def test_unstable_limit_cases_are_a_matter_of_tuning(unstable: Bode) -> None:
 def test_the_state_that_is_lost_first_is_named(rig: Stage) -> None:
     """Tuned for too light a mass, the loop of a sliding cart is too slow for its integral action."""
     said = crossovers(bode(rig.replace({"controller.tuned_mass": "0.2 kg"})))
-    assert "highest stable crossover: 8.41 Hz (above, the state that is lost first: sliding at 1.6" in said["locked"]
-    assert "5.92 Hz (above, the state that is lost first: sliding at 1.60 m/s, limiter free)" in said["free"]
+    assert "stable: up to 8.41 Hz (above 8.41 Hz, lost first: sliding at 1.6" in said["locked"]
+    assert "5.92 Hz (above 5.92 Hz, lost first: sliding at 1.60 m/s, limiter free)" in said["free"]
 
 
 def test_what_the_stage_file_lacks_is_named(found: Bode, rig: Stage) -> None:
@@ -271,7 +274,8 @@ def test_what_the_stage_file_lacks_is_named(found: Bode, rig: Stage) -> None:
 
 def test_words_of_a_controller_by_gains(emps: Bode) -> None:
     said = " ".join(sentences(emps))
-    assert "This one controller is stable in every state: stuck under bias forces of up to 20.4 N" in said
+    assert "As given, this controller is stable in all settled states" in said
+    assert "So it is in every state: stuck under bias forces of up to 20.4 N" in said
     assert "in multiples of its bandwidth" in said
     assert "stable: all from 0.0100 to 1000 times this bandwidth" in said
     assert "crossover" not in said

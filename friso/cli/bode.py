@@ -92,7 +92,7 @@ def bode_document(found: Bode) -> dict[str, Any]:
         "stage": found.stage.name,
         "cases": {name: _margins(case.margins) for name, case in found.cases.items()},
         "worst": _at(found, *found.worst),
-        "worst_stable": None if found.worst_stable is None else _at(found, *found.worst_stable),
+        "worst_settled": _at(found, *found.settled),
         "unstable_speeds_m_per_s": [
             {"low": each.low, "high": each.high, "limiter": _limiter(found, each.touched), "forward": each.forward}
             for each in found.unstable

@@ -22,7 +22,7 @@ def guideline(
     out: OutFolder = Path("guideline"),
     as_json: AsJson = False,
 ) -> None:
-    """The design guideline: guideline.md, its charts, guideline_edges.csv. Ten to twenty minutes on two cores.
+    """The design guideline: guideline.md, its charts, guideline_edges.csv. Half an hour on two shared cores.
 
     Example: friso guideline --out docs
     A quick try: friso guideline --samples 64 --out /tmp/guideline

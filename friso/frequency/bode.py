@@ -19,9 +19,9 @@ from friso.frequency.parts import FORCE, STAGE, plant
 from friso.frequency.ranges import Range, ranges_below
 from friso.frequency.stiffness import limiter_in_series
 from friso.frequency.system import Complex
-from friso.stage import Stage
+from friso.stage import Stage, StageError
 
-AROUND = 3.0
+AROUND = 5.0
 """Factor by which the frequencies shown reach beyond all crossovers and resonances."""
 
 POINTS = 1200
@@ -69,8 +69,8 @@ class Bode:
 
     `omega` (k,) [rad/s], the frequencies of all curves; the limit `cases` by name, among them, if asked for, those with
     the thesis's formula for a touched limiter ("-series"); the `scan` of the family, and its loops over `omega`; its
-    `worst` member, and the worst of those that are stable (None if none is), each with its margins; the ranges of speed
-    that are `unstable`; the loops at `prescribed` speeds of the cart, the limiter free; `limits` by
+    `worst` member, and the worst of the `settled` ones (limit cases, and stuck under any bias), each with its margins;
+    the ranges of speed that are `unstable`; the loops at `prescribed` speeds of the cart, the limiter free; `limits` by
     joint ("locked" and "free", or "given" without one).
     """
 
@@ -80,7 +80,7 @@ class Bode:
     scan: Scan
     loops: np.ndarray
     worst: tuple[Members, Margins]
-    worst_stable: tuple[Members, Margins] | None
+    settled: tuple[Members, Margins]
     unstable: tuple[Unstable, ...]
     prescribed: tuple[Prescribed, ...]
     limits: Mapping[str, Limits]
@@ -93,14 +93,17 @@ class Bode:
 
 def bode(stage: Stage, shown: Range | None = None, series: bool = False) -> Bode:
     """The linear analysis of a stage, its curves over frequencies `shown` [Hz] (default: those that matter); with
-    `series`, the thesis's formula for a touched limiter is shown beside."""
+    `series`, the thesis's formula for a touched limiter is shown beside. Raises StageError for frequencies that are not
+    usable, a controller that exerts no force, and a delay that is too long (see `Drive`)."""
+    if shown is not None and not 0 < shown[0] < shown[1] < np.inf:
+        raise StageError("shown", repr(shown), "two rising frequencies [Hz]", "friso.bode(stage, (0.1, 1000.0))")
     flat = stage.flat()
     states = {name: (flat, one) for name, one in limit_cases(flat).items()} | (_in_series(flat) if series else {})
     known = {name: margins(*each) for name, each in states.items()}
     omega = _omega(flat, shown or _mattering(flat, known.values()))
     every = scan(flat, family(flat))
     worst = every.members[every.worst()]
-    stable = every.members[every.worst(every.stable)] if every.stable.any() else None
+    settled = every.members[every.worst(every.members.settled)]
     variants = stage.variants()
     return Bode(
         stage=stage,
@@ -112,7 +115,7 @@ def bode(stage: Stage, shown: Range | None = None, series: bool = False) -> Bode
         scan=every,
         loops=loops(flat, every.members, omega),
         worst=(worst, margins(flat, worst)),
-        worst_stable=None if stable is None else (stable, margins(flat, stable)),
+        settled=(settled, margins(flat, settled)),
         unstable=_unstable(flat, every.members),
         prescribed=_prescribed(flat, omega),
         limits={name: limits(one.flat()) for name, one in variants.items() if name != "given" or len(variants) == 1},

@@ -41,7 +41,8 @@ class Limits:
 
     Of both kinds, one range holds the stage's own crossover, or is the next one below it (or the lowest). The `highest`
     stable and comfortable ones end it: None if there is none, or if the search ends there. `first_lost` is the state
-    that is not stable just above, `closest` the one that comes closest to -1 there. For a controller given by its gains
+    that is not stable just above, `closest` the one that comes closest to -1 there; where there is no such range, those
+    of the stage's own crossover. For a controller given by its gains
     all are factors of its bandwidth instead.
     """
 
@@ -62,16 +63,15 @@ def limits(flat: Mapping[str, Any]) -> Limits:
     close = ranges_below(np.geomspace(*ends, STEPS), lambda f: WANTED - _distance(flat, members, f).min(axis=1))
     comfortable = shared(close, stable)
     highest, calm = (end_of(ranges, own, ends[1]) for ranges in (stable, comfortable))
-    above = np.array([(highest or 1.0) * (1 + JUST)])
-    beyond = np.array([(calm or 1.0) * (1 + JUST)])
+    above, beyond = (np.array([end * (1 + JUST) if end else own]) for end in (highest, calm))
     return Limits(
         ends,
         stable,
         comfortable,
         highest,
         calm,
-        first_lost=members[int(_abscissa(flat, members, above)[0].argmax())] if highest else None,
-        closest=members[int(_distance(flat, members, beyond)[0].argmin())] if calm else None,
+        first_lost=members[int(_abscissa(flat, members, above)[0].argmax())] if highest or not stable else None,
+        closest=members[int(_distance(flat, members, beyond)[0].argmin())] if calm or not comfortable else None,
     )
 
 

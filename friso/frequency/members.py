@@ -48,6 +48,11 @@ class Members:
     def stuck(self) -> np.ndarray:
         return self.speed == 0
 
+    @property
+    def settled(self) -> np.ndarray:
+        """Which of a family are stuck, or slide the fastest."""
+        return self.stuck | (self.speed == self.speed.max())
+
     def with_limiter(self, touched: bool) -> Members:
         """The same with the limiter touched or not."""
         return replace(self, touched=np.full(len(self), touched))

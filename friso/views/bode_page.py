@@ -21,7 +21,7 @@ def bode_html(found: Bode, figures: Sequence[Figure]) -> str:
         "bode.html",
         found.stage,
         figures,
-        verdict=(GREEN if found.stable else VERMILLION, verdict),
+        verdict=(GREEN if found.settled[1].stable else VERMILLION, verdict),
         further=further,
         heading=crossover_heading(found),
         crossovers=[(COLOURS[name], sentence) for name, sentence in crossovers(found).items()],

@@ -31,15 +31,14 @@ class Shown:
 
 
 def shown_states(found: Bode) -> tuple[Shown, ...]:
-    """The limit cases, the worst of the family behind them, and the worst that is stable, if that is another one."""
+    """The limit cases, the worst of all settled states, and the worst of the whole family, if that is another one."""
     cases = [Shown(label(name), colour(name), _speed(case.members), case.margins) for name, case in found.cases.items()]
     if not has_family(found):
         return tuple(cases)
-    worst, known = found.worst
-    cases.append(Shown("Worst of the family", GREY, place(worst, found), known))
-    if not found.stable and found.worst_stable is not None:
-        worst, known = found.worst_stable
-        cases.append(Shown("Worst that is stable", GREY, place(worst, found), known))
+    (settled, known), (worst, lost) = found.settled, found.worst
+    cases.append(Shown("Worst settled", GREY, place(settled, found), known))
+    if worst != settled:
+        cases.append(Shown("Worst of the family", GREY, place(worst, found), lost))
     return tuple(cases)
 
 

@@ -27,10 +27,12 @@ def decibels(factor: float) -> float:
 
 
 def growth(known: Margins) -> str:
-    """How fast a deviation from an unstable state grows."""
+    """How fast a deviation from an unstable state grows; on the edge of stability it does not."""
+    if known.on_the_edge:
+        return "neither dies out nor grows"
     pole = known.poles[known.poles.real.argmax()]
     swings = f", swinging at {with_unit(abs(pole.imag) / (2 * np.pi), 'Hz')}" if pole.imag else ""
-    return f"grows e-fold in {with_unit(1 / pole.real, 's')}{swings}" if pole.real > 0 else "does not decay"
+    return f"grows e-fold in {with_unit(1 / pole.real, 's')}{swings}"
 
 
 def _number(value: float, none: float, text: Callable[[float], str]) -> str:
@@ -55,7 +57,7 @@ def _peak(known: Margins) -> str:
 
 
 def _slowest(known: Margins) -> str:
-    return with_unit(-1 / known.poles.real.max(), "s") if known.stable else NOTHING
+    return with_unit(-1 / known.abscissa, "s") if known.stable else NOTHING
 
 
 def _least_damped(known: Margins) -> str:
@@ -68,7 +70,7 @@ def _least_damped(known: Margins) -> str:
 
 
 _ROWS: dict[str, Callable[[Margins], str]] = {
-    "Stable": lambda known: "yes" if known.stable else "no",
+    "Stable": lambda known: "yes" if known.stable else ("on the edge" if known.on_the_edge else "no"),
     "0 dB crossings": lambda known: ", ".join(with_unit(f, "Hz") for f in known.crossovers) or "none",
     "Phase margin": lambda known: _number(known.phase_margin, math.inf, "{:.1f}°".format),
     "Gain margin": lambda known: _number(known.gain_margin, math.inf, _factor),

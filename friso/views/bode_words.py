@@ -8,6 +8,7 @@ import numpy as np
 
 from friso.frequency.bode import Bode, Unstable
 from friso.frequency.crossover import WANTED, Limits
+from friso.frequency.margins import Margins
 from friso.frequency.members import Members
 from friso.frequency.ranges import Range
 from friso.views.bode_states import SERIES, cart, has_friction, has_limiter, in_words, place
@@ -23,14 +24,37 @@ def sentences(found: Bode) -> list[str]:
 
 
 def stability(found: Bode) -> list[str]:
-    """Whether the one controller is stable in all states; where not, why; and which state is worst."""
+    """Whether the one controller is stable in the settled states, and how well; whether in all others; and why not."""
     if len(found.scan.members) == 1:
-        known = found.worst[1]
-        return ["The loop is stable." if known.stable else f"The loop is not stable: a deviation {growth(known)}."]
+        return [f"The loop is {_well(found.settled[1])}."]
+    says = [_settled(found)]
     if found.stable:
-        return [f"This one controller is stable in every state: {_looked_at(found)}.", _worst(found)]
-    says = f"This one controller is not stable in every state. Unstable: {'; '.join(_where(found))}."
-    return [says, *_why(found), _worst(found)]
+        return [*says, f"So it is in every state: {_looked_at(found)}. Worst: {_worst(found)}."]
+    return [*says, f"It is not stable in every state. Unstable: {'; '.join(_where(found))}.", *_why(found)]
+
+
+def _settled(found: Bode) -> str:
+    """The worst of the settled states, which is the answer to most questions."""
+    one, known = found.settled
+    states = f"all settled states ({SETTLED})" if has_friction(found) else "all limit cases"
+    where = place(one, found)
+    if known.stable:
+        return f"{_tuned(found)}, this controller is stable in {states}. Worst: {where}, {_margin(known)}."
+    return f"{_tuned(found)}, this controller is not stable in {states}. Worst: {where}, {growth(known)}."
+
+
+def _tuned(found: Bode) -> str:
+    flat = found.stage.flat()
+    return f"At {with_unit(flat['controller.crossover'], 'Hz')}" if _crossing(found) else "As given"
+
+
+def _well(known: Margins) -> str:
+    return f"stable, {_margin(known)}" if known.stable else f"not stable: a deviation {growth(known)}"
+
+
+def _margin(known: Margins) -> str:
+    margin = f"modulus margin {known.modulus_margin:.3g} (peak sensitivity {known.peak_sensitivity:.3g})"
+    return f"{margin} at {with_unit(known.closest, 'Hz')}"
 
 
 def crossover_heading(found: Bode) -> str:
@@ -135,25 +159,25 @@ def _why(found: Bode) -> list[str]:
 
 def _worst(found: Bode) -> str:
     one, known = found.worst
-    if not known.stable:
-        return f"Worst: {place(one, found)}; a deviation {growth(known)}."
-    margin = f"modulus margin {known.modulus_margin:.3g} (peak sensitivity {known.peak_sensitivity:.3g})"
-    return f"Worst: {place(one, found)}; {margin} at {with_unit(known.closest, 'Hz')}."
+    return f"{place(one, found)}, {_margin(known)}"
 
 
 def _limits(found: Bode, name: str) -> str:
-    known, unit = found.limits[name], _unit(found)
-    says = [f"stable: {_windows(known.stable, known, found)}"]
-    calm = f"modulus margin above {WANTED:g}: {_windows(known.comfortable, known, found)}"
-    if known.closest is not None:
-        state = _state(found, name, known.closest)
-        calm += f" (above {with_unit(known.highest_comfortable, unit)}, closest to −1: {state})"
-    says.append(calm)
-    if known.first_lost is not None:
-        highest = f"highest stable {'crossover' if _crossing(found) else 'bandwidth'}"
-        lost = f"above, the state that is lost first: {_state(found, name, known.first_lost)}"
-        says.append(f"{highest}: {with_unit(known.highest_stable, unit)} ({lost})")
-    return f"{'; '.join(says)}."
+    known = found.limits[name]
+    stable = _remark(found, name, known.highest_stable, "lost first", known.first_lost)
+    calm = _remark(found, name, known.highest_comfortable, "closest to −1", known.closest)
+    return (
+        f"stable: {_windows(known.stable, known, found)}{stable}; modulus margin above {WANTED:g}: "
+        f"{_windows(known.comfortable, known, found)}{calm}."
+    )
+
+
+def _remark(found: Bode, name: str, end: float | None, what: str, one: Members | None) -> str:
+    """Which state ends a range of crossovers, or is why there is none."""
+    if one is None or len(found.scan.members) == 1:
+        return ""
+    where = f"above {with_unit(end, _unit(found))}" if end else "as given"
+    return f" ({where}, {what}: {_state(found, name, one)})"
 
 
 def _state(found: Bode, name: str, one: Members) -> str:

@@ -53,7 +53,9 @@ def _power(group: str, exponent: float) -> str:
 
 def number(value: float | None, digits: int = 3) -> str:
     """A number to so many digits; a dash where there is none."""
-    return "–" if value is None or not math.isfinite(value) else f"{value:.{digits}g}"
+    if value is None or not math.isfinite(value):
+        return "–"
+    return f"{value:.0f}" if 10**digits <= abs(value) < 1e6 else f"{value:.{digits}g}"
 
 
 def percent(off: float) -> str:

@@ -23,7 +23,7 @@ SMALL = 0.1
 it sticks. A stage that swings by less than this does not hunt."""
 
 PERIODS, LAST = 200.0, 2.0
-"""Periods of such a cycle for which is simulated, and those at the end in which the stage is looked at. Beside a cycle
+"""Periods of such a cycle for which is simulated unless told, and those at the end in which the stage is looked at. Beside a cycle
 that repels by 1 % per half a period a deviation grows 50 times in them."""
 
 RTOL = 1e-6
@@ -45,11 +45,11 @@ def from_rest(stages: Ensemble, distances: np.ndarray) -> Begin:
 
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
-def still_hunts(stages: Ensemble, begin: Begin) -> tuple[np.ndarray, np.ndarray]:
+def still_hunts(stages: Ensemble, begin: Begin, periods: float = PERIODS) -> tuple[np.ndarray, np.ndarray]:
     """Which stages still hunt at the end, and which runs were completed, both of shape (count,)."""
     period = 2 * (wait(stages, SMALL * stages.length) + 2 * np.pi / stages.number("rate"))
-    end = begin.over + PERIODS * period
-    options = Options(rtol=RTOL, window=1 - LAST / PERIODS, record_from=float(np.min(end)) / 2, least_swing=np.inf)
+    end = begin.over + periods * period
+    options = Options(rtol=RTOL, window=1 - LAST / periods, record_from=float(np.min(end)) / 2, least_swing=np.inf)
     flat = {**stages.flat, **begin.motion, "motion.duration": end}
     hunts, completed = np.zeros(stages.count, bool), np.zeros(stages.count, bool)
     for runs in run_chunks(kernel(stages.structure), flat, stages.count, options, begin.starts):
