@@ -14,7 +14,7 @@ import numpy as np
 import friso
 from benchmarks.report import Goal, clock, print_goals, print_table, spread
 from friso.frequency.bode import bode
-from friso.frequency.family import grid, scan
+from friso.frequency.family import DENSITY, grid, scan
 from friso.frequency.members import Members, family
 from friso.stage import Stage
 from friso.studies.thesis.studies import rig
@@ -47,7 +47,7 @@ def run(repetitions: int) -> list[Goal]:
         goals.append(Goal(about, "< 1 s", f"{min(times):.2f} s", min(times) < 1))
         if name == "continuous":
             few = members[np.linspace(0, len(members) - 1, ONE_BY_ONE).astype(int)]
-            slow = clock(lambda: one_by_one(stage, few, grid(flat))) / ONE_BY_ONE * len(members)  # noqa: B023
+            slow = clock(lambda: one_by_one(stage, few, grid(flat, DENSITY))) / ONE_BY_ONE * len(members)  # noqa: B023
             ratio = f"{slow / min(times):.0f} times"
             goals.append(Goal("against python-control, state after state", "", ratio, None))
     print_table(("drive", "states", "scan min / median [s]", "friso.bode min / median [s]"), rows)

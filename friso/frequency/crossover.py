@@ -114,7 +114,7 @@ def _abscissa(flat: Mapping[str, Any], members: Members, crossover: np.ndarray) 
 
 def _distance(flat: Mapping[str, Any], members: Members, crossover: np.ndarray) -> np.ndarray:
     """Least distance of the loop from -1, shape (crossovers, members)."""
-    omega = _search_grid(flat, members)
+    omega = _search_grid(flat)
     bare = plants(flat, members, omega) * Drive.of(flat).transfer(omega)
     shared = np.array([distance_to_lines(bare * controller(_at(flat, f), omega)) for f in crossover])
     return np.minimum(shared, _looked_at(flat, members, crossover).resonant.reshape(shared.shape))
@@ -125,8 +125,8 @@ def _looked_at(flat: Mapping[str, Any], members: Members, crossover: np.ndarray)
     return looked_at(_at(flat, np.repeat(crossover, len(members))), members.repeated(len(crossover)))
 
 
-def _search_grid(flat: Mapping[str, Any], members: Members) -> np.ndarray:
+def _search_grid(flat: Mapping[str, Any]) -> np.ndarray:
     """Angular frequencies [rad/s] that show the loop at all crossovers searched: always the same ones, so that the
     distance is a smooth function of the crossover."""
-    both = [grid(_at(flat, np.array(end)), DENSITY, members) for end in searched(flat)]
+    both = [grid(_at(flat, np.array(end)), DENSITY) for end in searched(flat)]
     return np.unique(np.concatenate(both))

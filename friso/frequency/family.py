@@ -19,16 +19,15 @@ from friso.frequency.drive import LIGHT, Drive
 from friso.frequency.friction import law_of, operating_point
 from friso.frequency.loops import Poles, poles
 from friso.frequency.margins import frequencies, margins
-from friso.frequency.members import Members, family, joined, limit_cases
+from friso.frequency.members import Members, joined, limit_cases
 from friso.frequency.parts import REFERENCE, STAGE, VELOCITY, compensator, mechanics, plant
 from friso.frequency.system import Complex, System
 
 CHUNK = 256
 """Members that are computed together: their arrays then stay in the cache."""
 
-DENSITY, FEW = 35, 7
-"""Frequencies per decade at which all members are looked at, and the bias forces and speeds of those about whose
-resonances there are more."""
+DENSITY = 35
+"""Frequencies per decade at which all members are looked at, besides those about resonances of the limit cases."""
 
 NEAR = np.array([-1.0, -0.5, 0.0, 0.5, 1.0])
 """Where a member is looked at about its own closed-loop resonances, in units of their half widths."""
@@ -62,7 +61,7 @@ class Scan:
 def scan(flat: Mapping[str, Any], members: Members) -> Scan:
     """Stability of every member, and its modulus margin: on frequencies that all share and about its own closed-loop
     resonances, and exactly for those that come closest to -1 there."""
-    omega = grid(flat, DENSITY, family(flat, FEW, FEW))
+    omega = grid(flat, DENSITY)
     known = looked_at(flat, members)
     parts = (members[part] for part in _split(np.arange(len(members))))
     shared = np.concatenate(_side_by_side(lambda part: distance_to_lines(loops(flat, part, omega)), parts))
@@ -117,12 +116,11 @@ def distance_to_lines(loop: Complex) -> np.ndarray:
     return np.abs(start + along * way).min(axis=-1)
 
 
-def grid(flat: Mapping[str, Any], density: float, members: Members) -> np.ndarray:
-    """Angular frequencies [rad/s] that show the loops of members: so many per decade, and more about the resonances of
-    plants and of the closed loop in the limit cases."""
-    drive = Drive.of(flat)
+def grid(flat: Mapping[str, Any], density: float) -> np.ndarray:
+    """Angular frequencies [rad/s] that show the loops in all limit cases: so many per decade, and more about the
+    resonances of plant and closed loop."""
     cases = joined([*limit_cases(flat).values()])
-    return frequencies(flat, cases, drive, density, [modes(flat, members), closed(flat, cases)])
+    return frequencies(flat, cases, Drive.of(flat), density, [modes(flat, cases), closed(flat, cases)])
 
 
 def closed(flat: Mapping[str, Any], members: Members) -> Complex:
