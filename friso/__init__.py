@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from friso.frequency.tuning import Tuning, tuning
     from friso.hunting.check import Case, check
     from friso.studies.boundary import boundary
+    from friso.studies.guideline.compute import guideline
     from friso.studies.harmonic_balance import harmonic_balance
     from friso.studies.samples import Samples
     from friso.studies.store import read_store
@@ -31,6 +32,7 @@ _LAZY = {
     "bode": "friso.frequency.bode",
     "Bode": "friso.frequency.bode",
     "describing": "friso.frequency.describing.function",
+    "guideline": "friso.studies.guideline.compute",
     "harmonic_balance": "friso.studies.harmonic_balance",
     "linear": "friso.frequency.analysis",
     "mass_line": "friso.frequency.describing.mass_line",
@@ -57,6 +59,7 @@ __all__ = [
     "boundary",
     "check",
     "describing",
+    "guideline",
     "harmonic_balance",
     "linear",
     "load",

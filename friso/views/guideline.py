@@ -15,11 +15,11 @@ from friso.studies.guideline.claims import claims
 from friso.studies.guideline.edges import KINDS
 from friso.studies.guideline.groups import GROUPS, LIMITER_OVER_BRISTLES, values_of
 from friso.studies.guideline.laws import FOLDS, GAIN, Errors, Fitted
+from friso.studies.guideline.parasitic import DRIVE
 from friso.studies.guideline.persistence import DISTANCES
-from friso.studies.guideline.rig import Case, parasitic_rule, plain
+from friso.studies.guideline.rig import Case, plain
 from friso.studies.guideline.sweeps import FREE_GRID, JOINT_BOX, LOCKED_BOX, LOCKED_GRID, Sweep
 from friso.studies.guideline.worked import CLAIMED_AT, GAPS, MARGIN, STATIC, STUDIED, Design
-from friso.studies.thesis.studies import rig
 from friso.version import VERSION
 from friso.views import matplotlib_renderer
 from friso.views.guideline_figures import guideline_figures
@@ -53,7 +53,8 @@ def guideline_page(found: Guideline) -> str:
         groups=_groups(found),
         figures={figure.name: figure for figure in guideline_figures(found)},
         claims=claims(found.worked),
-        parasitic=parasitic_rule(rig()),
+        parasitic=found.parasitic,
+        drive=DRIVE,
         kinds=KINDS,
         errors_of=_errors(found),
         number=number,
@@ -182,6 +183,7 @@ def guideline_document(found: Guideline) -> dict[str, Any]:
                 "designs": [[_designed(each) for each in designs] for designs in steps.designs],
                 "studies": {name: [_case(case) for case in cases] for name, cases in steps.studies.items()},
             },
+            "parasitic": [asdict(each) for each in found.parasitic],
             "claims": [asdict(claim) for claim in claims(steps)],
         }
     )

@@ -56,7 +56,7 @@ def _locked(found: Guideline) -> Figure:
         (law,),
         clouds=(_by_end(slip / drop, sweep.edge / mean, sweep),),
     )
-    caption = "Above the points no cycle is known to attract. Left the bristles' slip limits hunting, right the drop of friction."
+    caption = "Above the points no cycle is known to attract. Left slip limits hunting, right the drop of friction."
     return Figure("guideline_locked", "Where hunting ends, joint locked", caption, (panel,))
 
 

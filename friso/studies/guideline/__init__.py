@@ -2,6 +2,5 @@
 these, with their error on samples that were not used for the fit."""
 
 from friso.studies.guideline.compute import SAMPLES, Fit, Guideline, guideline
-from friso.studies.guideline.rig import parasitic_rule
 
-__all__ = ["SAMPLES", "Fit", "Guideline", "guideline", "parasitic_rule"]
+__all__ = ["SAMPLES", "Fit", "Guideline", "guideline"]

@@ -23,8 +23,8 @@ SIZES, TIMES = (3.0, 300.0), (0.3, 3.0)
 """Ranges of the moves: a t_acc^2 in units of the deflection by the break-away force, and t_acc over 1/omega_c; the
 thesis's is 90 and 1.5 at 8 Hz."""
 
-PERIODS = 2000.0
-"""Periods for which is simulated: at 1.15 times the edge transients of up to a thousand were seen."""
+PERIODS = {BELOW: 200.0, ABOVE: 2000.0}
+"""Periods for which is simulated: above the edge transients of up to a thousand were seen."""
 
 APART = 20.0
 """Periods of the crossover between the move there and the move back."""
@@ -63,7 +63,7 @@ def _hunts(sweep: Sweep, share: float, how: _How, tried: int) -> tuple[np.ndarra
     which = np.repeat(np.arange(count), tried)
     values = {name: value[which] for name, value in sweep.values.items()} | {"crossover": share * sweep.edge[which]}
     stages = Ensemble.held(flat_of(values), len(which))
-    hunts, completed = still_hunts(stages, how(stages, values["crossover"], count), PERIODS)
+    hunts, completed = still_hunts(stages, how(stages, values["crossover"], count), PERIODS[share])
     return hunts.reshape(count, tried), completed.reshape(count, tried)
 
 

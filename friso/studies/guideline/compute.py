@@ -19,6 +19,7 @@ from friso.studies.guideline.checks import Checked, checked
 from friso.studies.guideline.groups import Count, counted
 from friso.studies.guideline.hunting_laws import FREE_LAW, LOCKED_LAW
 from friso.studies.guideline.laws import Errors, Fitted, fitted
+from friso.studies.guideline.parasitic import Parasitic, parasitic_limits
 from friso.studies.guideline.rig import Laws, plain
 from friso.studies.guideline.sweeps import (
     FREE,
@@ -89,14 +90,16 @@ class Fit:
 
 @dataclass(frozen=True)
 class Guideline:
-    """All that `docs/guideline.md` tells: how many groups there are by part of the stage, both laws, the worked steps;
-    how long it took [s] on how many cores, and how many parts of the sweeps an earlier, interrupted run had left."""
+    """All that `docs/guideline.md` tells: how many groups there are by part of the stage, both laws, the worked steps,
+    what a parasitic mode allows; how long it took [s] on how many cores, and how many parts of the sweeps an earlier,
+    interrupted run had left."""
 
     samples: int
     counts: Mapping[str, Count]
     locked: Fit
     free: Fit
     worked: Worked
+    parasitic: list[Parasitic]
     seconds: float
     cores: int
     resumed: int
@@ -145,8 +148,9 @@ def guideline(samples: int = SAMPLES, keep: Path | None = None, progress: Progre
     told("worked steps", 0)
     laws = Laws(locked_fit.law, free_fit.law)
     steps = worked(laws, locked_fit.on_test.safe, free_fit.on_test.safe)
+    modes = parasitic_limits(rig())
     seconds, cores = time.perf_counter() - begin, len(os.sched_getaffinity(0))
-    return Guideline(samples, counts(), locked_fit, free_fit, steps, seconds, cores, resumed)
+    return Guideline(samples, counts(), locked_fit, free_fit, steps, modes, seconds, cores, resumed)
 
 
 def checked_samples(samples: int) -> None:

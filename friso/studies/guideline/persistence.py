@@ -23,8 +23,8 @@ SMALL = 0.1
 it sticks. A stage that swings by less than this does not hunt."""
 
 PERIODS, LAST = 200.0, 2.0
-"""Periods of such a cycle for which is simulated unless told, and those at the end in which the stage is looked at. Beside a cycle
-that repels by 1 % per half a period a deviation grows 50 times in them."""
+"""Periods of such a cycle for which is simulated unless told, and those at the end in which the stage is looked at.
+Beside a cycle that repels by 1 % per half a period a deviation grows 50 times in them."""
 
 RTOL = 1e-6
 """Relative tolerance of these runs."""

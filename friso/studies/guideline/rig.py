@@ -95,12 +95,3 @@ def direct(stage: Stage) -> float:
     """The edge [Hz] as `friso check` finds it, from a crossover at which the stage hunts; NaN without one."""
     found = margin(stage, attracting=True)
     return found.crossover if found and found.crossover else np.nan
-
-
-def parasitic_rule(stage: Stage) -> tuple[str, ...]:
-    """HOOK: what linear analysis says about the parasitic mode of this stage, as paragraphs of the page.
-
-    To be filled in with `friso.linear`: the highest crossover at which the loop is stable with its margins, over the
-    frequency of the parasitic mode. Until then it says nothing.
-    """
-    return ()
