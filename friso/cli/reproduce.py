@@ -22,7 +22,7 @@ def reproduce(
     out: OutFolder = Path("reproduction"),
     as_json: AsJson = False,
 ) -> None:
-    """Every figure and claim of the thesis that simulation and linear analysis decide, judged: reproduction.html, claims.json.
+    """Every figure and claim of the thesis that computation decides, judged: reproduction.html, claims.json.
 
     Example: friso reproduce --points 21 --out reproduction
     One study: friso reproduce isolator-crossover
