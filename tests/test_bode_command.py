@@ -116,7 +116,8 @@ def test_the_document_has_the_agreed_keys(written: tuple[dict, Path]) -> None:
     assert document["limits"].keys() == {"locked", "free"}
     for known in document["limits"].values():
         assert known.keys() == {
-            *("highest_stable_crossover_hz", "stable_hz", "modulus_margin_above_half_hz", "searched_hz"),
+            *("highest_stable_crossover_hz", "still_stable_there", "stable_hz", "modulus_margin_above_half_hz"),
+            "searched_hz",
         }
 
 
@@ -137,7 +138,8 @@ def test_the_document_tells_margins_and_limits_of_the_rig(written: tuple[dict, P
     free, touched = document["unstable_speeds_m_per_s"]
     assert (free["limiter"], touched["limiter"]) == ("free", "touched")
     assert (free["low"], free["high"]) == pytest.approx((1.2225e-4, 3.9e-3), rel=1e-3)
-    assert document["highest_stable_crossover_hz"] is None
+    assert document["highest_stable_crossover_hz"] == 1e4
+    assert document["limits"]["free"]["still_stable_there"]
     comfortable = document["limits"]["free"]["modulus_margin_above_half_hz"]
     assert np.ravel(comfortable) == pytest.approx([0.1, 0.651, 3.64, 14.3], rel=5e-3)
 
@@ -169,7 +171,8 @@ def test_a_controller_by_gains_has_factors_instead_of_crossovers(emps: Bode) -> 
     assert document["highest_stable_crossover_hz"] is None
     known = document["limits"]["given"]
     assert known == {
-        "highest_stable_crossover_factor": None,
+        "highest_stable_crossover_factor": 1000.0,
+        "still_stable_there": True,
         "stable_factor": ((0.01, 1000.0),),
         "modulus_margin_above_half_factor": ((0.01, 1000.0),),
         "searched_factor": (0.01, 1000.0),
@@ -212,7 +215,8 @@ def test_the_table_and_the_sentences_of_the_rig(capsys: pytest.CaptureFixture, m
     flat = " ".join(said.split())
     assert "5.12 Hz, 9.01 Hz, 24.8 Hz" in flat
     assert (
-        "At 8.00 Hz, this controller is stable in all settled states (the limit cases, and stuck under any bias force). "
+        "At 8.00 Hz, this controller is stable in all settled states (the limit cases, and stuck under any bias "
+        "force). "
         "Worst: sliding at 1.60 m/s, limiter free, modulus margin 0.569 (peak sensitivity 1.76) at 29.0 Hz. "
         "It is not stable in every state. Unstable: sliding, 0.122 to 3.90 mm/s, limiter free; "
         "sliding, 0.187 to 3.37 mm/s, limiter touched."

@@ -416,6 +416,7 @@ def test_limits_are_where_the_margins_say(rig: Stage, locked: bool) -> None:
     found = limits(flat)
     edge = found.highest_stable
     assert edge is not None
+    assert not found.open_ended
     members = settled_members(flat)
     for share, stable in ((0.999, True), (1.001, False)):
         moved = {**flat, "controller.crossover": share * edge}

@@ -137,6 +137,7 @@ def _limiter(found: Bode, touched: bool) -> str | None:
 def _limits(known: Limits, unit: str) -> dict[str, Any]:
     return {
         f"highest_stable_crossover_{unit}": known.highest_stable,
+        "still_stable_there": known.open_ended,
         f"stable_{unit}": known.stable,
         f"modulus_margin_above_half_{unit}": known.comfortable,
         f"searched_{unit}": known.searched,

@@ -40,10 +40,10 @@ class Limits:
     as ranges, in all limit cases: stuck under any bias force or sliding fast, its limiter free or touched.
 
     Of both kinds, one range holds the stage's own crossover, or is the next one below it (or the lowest). The `highest`
-    stable and comfortable ones end it: None if there is none, or if the search ends there. `first_lost` is the state
-    that is not stable just above, `closest` the one that comes closest to -1 there; where there is no such range, those
-    of the stage's own crossover. For a controller given by its gains
-    all are factors of its bandwidth instead.
+    stable and comfortable ones end it, possibly with the search (None if there is none). `first_lost` is the state that
+    is not stable just above, `closest` the one that comes closest to -1 there (None at the end of the search); where
+    there is no such range, those of the stage's own crossover. For a controller given by its gains all are factors of
+    its bandwidth instead.
     """
 
     searched: Range
@@ -54,6 +54,11 @@ class Limits:
     first_lost: Members | None
     closest: Members | None
 
+    @property
+    def open_ended(self) -> bool:
+        """Whether the stage is still stable where the search ends."""
+        return self.highest_stable == self.searched[1]
+
 
 def limits(flat: Mapping[str, Any]) -> Limits:
     """The crossovers at which a stage is stable, and comfortably so."""
@@ -62,7 +67,7 @@ def limits(flat: Mapping[str, Any]) -> Limits:
     stable = stable_crossovers(flat, members)
     close = ranges_below(np.geomspace(*ends, STEPS), lambda f: WANTED - _distance(flat, members, f).min(axis=1))
     comfortable = shared(close, stable)
-    highest, calm = (end_of(ranges, own, ends[1]) for ranges in (stable, comfortable))
+    highest, calm = (end_of(ranges, own) for ranges in (stable, comfortable))
     above, beyond = (np.array([end * (1 + JUST) if end else own]) for end in (highest, calm))
     return Limits(
         ends,
@@ -70,8 +75,8 @@ def limits(flat: Mapping[str, Any]) -> Limits:
         comfortable,
         highest,
         calm,
-        first_lost=members[int(_abscissa(flat, members, above)[0].argmax())] if highest or not stable else None,
-        closest=members[int(_distance(flat, members, beyond)[0].argmin())] if calm or not comfortable else None,
+        first_lost=None if highest == ends[1] else members[int(_abscissa(flat, members, above)[0].argmax())],
+        closest=None if calm == ends[1] else members[int(_distance(flat, members, beyond)[0].argmin())],
     )
 
 
@@ -81,11 +86,10 @@ def stable_crossovers(flat: Mapping[str, Any], members: Members) -> tuple[Range,
     return ranges_below(at, lambda f: _abscissa(flat, members, f).max(axis=1))
 
 
-def end_of(ranges: Sequence[Range], own: float, end: float) -> float | None:
-    """Where the range ends that holds a crossover, or the next below it, or else the lowest; None at the end of the
-    search, and if there is none."""
+def end_of(ranges: Sequence[Range], own: float) -> float | None:
+    """Where the range ends that holds a crossover, or the next below it, or else the lowest; None if there is none."""
     below = [high for low, high in ranges if low <= own] or [high for _, high in ranges[:1]]
-    return below[-1] if below and below[-1] < end else None
+    return below[-1] if below else None
 
 
 def searched(flat: Mapping[str, Any]) -> Range:

@@ -76,7 +76,7 @@ def crossovers(found: Bode) -> dict[str, str]:
 
 def caveats(found: Bode) -> list[str]:
     """That stability does not go on for ever, where the search found no end."""
-    ends = {known.searched[1] for known in found.limits.values() if known.stable and known.highest_stable is None}
+    ends = {known.searched[1] for known in found.limits.values() if known.open_ended}
     if not ends:
         return []
     drive = found.stage.drive

@@ -21,7 +21,7 @@ DRIVE = {"drive.sample_time": "50 us", "drive.delay": "50 us"}
 class Parasitic:
     """A parasitic mode at a frequency [Hz] with a damping ratio, and the crossovers [Hz], joint locked and free, up to
     which the modulus margin is 0.5 in all settled states: the end of the range that holds the rig's own, or of the next
-    below; None where there is none, or no end up to 10 kHz."""
+    below; None where there is none."""
 
     frequency: float
     damping_ratio: float

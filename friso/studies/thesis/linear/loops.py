@@ -106,7 +106,8 @@ def _single(flat: Mapping[str, Any]) -> float | None:
 def _highest(flat: Mapping[str, Any]) -> float | None:
     """The crossover [Hz] up to which all limit cases are stable; None at the end of the search, 0 where none is."""
     ranges = stable_crossovers(flat, joined([*limit_cases(flat).values()]))
-    return end_of(ranges, flat["controller.crossover"], searched(flat)[1]) if ranges else 0.0
+    end = end_of(ranges, flat["controller.crossover"]) or 0.0
+    return None if end == searched(flat)[1] else end
 
 
 def _end_of_first(excess: Callable[[np.ndarray], np.ndarray]) -> float | None:
