@@ -99,6 +99,7 @@ def bode_document(found: Bode) -> dict[str, Any]:
         ],
         "limits": {name: _limits(known, "hz" if crossover else "factor") for name, known in found.limits.items()},
         "highest_stable_crossover_hz": found.limits[own].highest_stable if crossover else None,
+        "still_stable_there": found.limits[own].open_ended,
     }
 
 

@@ -61,7 +61,7 @@ def crossover_heading(found: Bode) -> str:
     """What the sentences of `crossovers` are about."""
     if len(found.scan.members) == 1:
         return f"How fast this controller may be, {_subject(found)}:"
-    settled = f"settled states: {SETTLED}" if has_friction(found) else "limit cases"
+    settled = "settled states" if has_friction(found) else "limit cases"
     return f"How fast this controller may be, {_subject(found)} that suit all {settled}:"
 
 
@@ -152,8 +152,8 @@ def _why(found: Bode) -> list[str]:
     if not all(each.falling for each in found.unstable):
         return []
     return [
-        "There friction falls as the speed rises (Stribeck effect): that is what makes a stage stick and slip, not its "
-        "tuning; the settled states (as below) are stable. Whether the stage hunts, friso check tells."
+        "There friction falls as the speed rises (Stribeck effect), which makes a stage stick and slip; a higher "
+        "crossover may shrink the range. The settled states are stable; whether the stage hunts, friso check tells."
     ]
 
 
