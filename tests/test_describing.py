@@ -18,13 +18,12 @@ from friso.equations.imposed import imposed_form
 from friso.frequency.describing.function import describing, dynamic_stiffness
 from friso.frequency.describing.loop import TOUCHES
 from friso.frequency.describing.mass_line import mass_line
-from friso.frequency.describing.response import plant_response
+from friso.frequency.describing.response import MISSING, NOT_FOUND, plant_response
 from friso.frequency.describing.steady import Imposition, steady
 from friso.stage import Stage, StageError
 from friso.stage.tables import FRICTION
 
-ASYMMETRIC = lugre(2) + "asymmetry = 0.2\n"
-LAWS = {"lugre": lugre(2), "dahl": DAHL, "stribeck": stribeck(2), "asymmetric": ASYMMETRIC}
+LAWS = {"lugre": lugre(2), "dahl": DAHL, "stribeck": stribeck(2) + "asymmetry = 0.2\n"}
 STEADY = settings(max_examples=25, deadline=None, derandomize=True)
 DESCRIBING = pytest.mark.xdist_group("describing")
 pytestmark = DESCRIBING
@@ -95,10 +94,15 @@ def test_relay_of_python_control() -> None:
 
 
 def test_static_law_equals_python_control() -> None:
-    """A curve of force against velocity has N = i omega DF(A omega), with no limit taken."""
+    """A curve of force against velocity, here larger forwards, has N = i omega DF(A omega), with no limit taken."""
     flat = rigid(LAWS["stribeck"]).flat()
     amplitudes, omega = np.array([2e-5, 1e-4, 1e-3]), 2 * np.pi * 5.0
-    found = control.describing_function(lambda v: plain.friction(flat, v, 0.0)[0], amplitudes * omega, num_points=4000)
+
+    def curve(v: float) -> float:
+        viscous = flat["friction.viscous"] * v
+        return (plain.friction(flat, v, 0.0)[0] - viscous) * (1 + 0.2 * np.sign(v)) + viscous
+
+    found = control.describing_function(curve, amplitudes * omega, num_points=4000)
     assert of(flat, amplitudes, 5.0) == pytest.approx(1j * omega * found, rel=1e-7)
 
 
@@ -161,7 +165,7 @@ def test_plain_integration(amplitude: float, frequency: float, periods: int) -> 
 
 def test_long_memory_is_solved_for() -> None:
     """At 10 nm a state takes thousands of periods to forget its start: settling for three misses what solving finds."""
-    flat = rigid(ASYMMETRIC).flat()
+    flat = rigid(LAWS["lugre"]).flat()
     friction = Imposition.of(flat, np.array([1e-8]), np.array([10.0]), 1e-10)
     found = steady(friction)
     (_, results), *_ = friction.run(found.inner, 1.0)
@@ -179,6 +183,14 @@ def test_tighter_tolerance_changes_nothing() -> None:
     flat = rigid(LAWS["lugre"]).flat()
     loose, tight = (of(flat, amplitudes.ravel(), frequencies.ravel(), rtol=rtol) for rtol in (1e-8, 1e-11))
     assert np.max(np.abs(loose / tight - 1)) < 3e-7
+
+
+@pytest.mark.parametrize("rtol", [1e-2, 1e-3, 1e-4])
+def test_loose_tolerance_still_finds_the_periodic_state(rtol: float) -> None:
+    """The gap that counts as none does not grow with the tolerance without end."""
+    flat, amplitudes = rigid(LAWS["lugre"]).flat(), [1e-8, 1e-5, 3e-5, 1e-3]
+    assert np.max(np.abs(of(flat, amplitudes, 10.0, rtol=rtol) / of(flat, amplitudes, 10.0) - 1)) < 1e-6
+    assert float(describing(rigid(LAWS["lugre"]), amplitudes, [10.0], rtol=rtol)["gap"].max()) < 1e-4
 
 
 def test_sampled_harmonics_converge_with_the_square_of_the_samples() -> None:
@@ -201,12 +213,12 @@ def test_whole_and_half_period_agree(law: str, monkeypatch: pytest.MonkeyPatch) 
     assert set(np.ravel(whole["status"])) == {"done"}
     assert np.max(np.abs(half["force"] - whole["force"])) < 1e-6
     even = np.abs(whole["force"].sel(harmonic=[0, 2, 4])).values
-    assert (np.max(even) < 1e-6) == (law != "asymmetric")
+    assert (np.max(even) < 1e-6) == (law != "stribeck")
 
 
 def test_asymmetric_sliding_has_a_mean_force() -> None:
     """Levels (1 +- 0.2) F_c at speed: a mean of 0.2 F_c, and Coulomb's N on average."""
-    found = describing(rigid(ASYMMETRIC), [0.2], [1.0], 3)
+    found = describing(rigid(LAWS["stribeck"]), [0.2], [1.0], 3)
     assert found["force"].values[0, 0, 0] == pytest.approx(0.2, rel=0.02)
     assert np.imag(found["stiffness"].item()) == pytest.approx(4 / np.pi / 0.2 + np.pi, rel=0.01)
 
@@ -337,8 +349,49 @@ def test_two_motions_under_one_force() -> None:
     stuck, _, sliding = 1.8 * found["response"].values
     from_rest = driven(lambda t: 1.8 * min(1.0, t * 5 / 20), 5.0, [0.0, 0.0, 0.0], 60)
     start = [sliding.real, (10j * np.pi * sliding).real, 0.0]
-    assert abs(from_rest / stuck - 1) < 0.25  # near break-away, of which the first harmonic knows little
-    assert abs(driven(lambda _: 1.8, 5.0, start, 30) / sliding - 1) < 0.25
+    assert abs(from_rest / stuck - 1) < 0.15  # near break-away, of which the first harmonic knows little: it is 0.142
+    assert abs(driven(lambda _: 1.8, 5.0, start, 30) / sliding - 1) < 0.2  # docs/describing.md: 24 % too large, 0.193
+
+
+@pytest.mark.parametrize(
+    ("forces", "frequency"),
+    [([1.8, 10.0], 0.01), ([1.8, 1000.0], 0.1), ([1e-3, 1.0, 300.0], 0.01), ([0.01, 2.0, 30.0], 5.0)],
+)
+def test_answers_do_not_depend_on_what_else_is_asked(forces: list[float], frequency: float) -> None:
+    together = plant_response(rigid(LAWS["lugre"]), forces, [40.0, frequency])
+    assert set(np.ravel(together["status"])) == {"done"}
+    assert set(np.ravel(together["answers"])) <= {1, 3}
+    for i, force in enumerate(forces):
+        alone = plant_response(rigid(LAWS["lugre"]), [force], [frequency])
+        assert together["answers"].values[i, 1] == alone["answers"].item()
+        count = alone["answers"].item()
+        assert np.array_equal(together["amplitude"].values[i, 1, :count], alone["amplitude"].values[0, 0])
+
+
+def test_stuck_answer_of_slow_forces() -> None:
+    """1.8 N from rest bends the bristles, however slowly and however much more another force is."""
+    found = plant_response(rigid(LAWS["lugre"]), [1.8, 1000.0], [0.1])
+    assert found["lasting"].values[0, 0].tolist() == [1.0, 0.0, 1.0]
+    assert abs(found["up"].values[0, 0]) == pytest.approx(1.13e-5, rel=1e-2)
+
+
+def test_absurd_forces_and_frequencies_have_a_status() -> None:
+    found = plant_response(rigid(LAWS["lugre"]), [1e-300, 1.0, 1e300], [1e-6, 1.0, 1e6])
+    assert set(np.ravel(found["status"].values[[0, 2]])) == {NOT_FOUND}
+    assert np.all(np.isnan(found["up"].values[[0, 2]]))
+    assert set(found["status"].values[1]) == {"done"}
+
+
+def test_missing_answers_are_said_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where friction is not known for small motions, neither is the stuck answer, and no analyser shows another."""
+
+    def partly(flat: dict[str, Any], amplitudes: np.ndarray, frequencies: np.ndarray, rtol: float) -> np.ndarray:
+        return np.where(amplitudes < 1e-4, np.nan, dynamic_stiffness(flat, amplitudes, frequencies, rtol))
+
+    monkeypatch.setattr("friso.frequency.describing.driven.dynamic_stiffness", partly)
+    found = plant_response(rigid(LAWS["lugre"]), [1.0, 1.8], [5.0])
+    assert set(np.ravel(found["status"])) <= {MISSING, NOT_FOUND}
+    assert np.isnan(found["up"].values[0, 0])
 
 
 def test_an_analyser_shows_the_branch_it_comes_from() -> None:
@@ -349,6 +402,36 @@ def test_an_analyser_shows_the_branch_it_comes_from() -> None:
     up, down = np.abs(found["up"].values[0]), np.abs(found["down"].values[0])
     assert np.all(down[several] > 10 * up[several])
     assert up[~several] == pytest.approx(down[~several])
+
+
+JOINED = stage(HOLD, masses="both", friction=lugre(2), joint=free("100 mm"), controller=van_dijk())
+
+
+def against_simulation(size: float, frequency: float, cycles: int = 25) -> complex:
+    """Response of stage and cart on a free joint over that of the equations (LSODA) in the last of so many cycles."""
+    found, flat, samples = plant_response(JOINED, [size], [frequency]), JOINED.flat(), 512
+    omega, cart, moved = (
+        2 * np.pi * frequency,
+        *(size * found[n].values[0, 0, 0] for n in ("cart_response", "response")),
+    )
+
+    def rates(t: float, y: np.ndarray) -> list[float]:
+        friction, z_rate = plain.friction(flat, y[1], y[4])
+        pull = plain.joint(flat, y[2] - y[0], y[3] - y[1])
+        drive = (size * np.cos(omega * t) - pull) / flat["masses.stage"]
+        return [y[1], (pull - friction) / flat["masses.cart"], y[3], drive, z_rate]
+
+    start = [cart.real, (1j * omega * cart).real, moved.real, (1j * omega * moved).real, 0.0]
+    times = np.arange(cycles * samples) / samples / frequency
+    how = {"rtol": 1e-8, "atol": 1e-12, "max_step": 0.01 / frequency}
+    position = solve_ivp(rates, (0, cycles / frequency), start, "LSODA", times, **how).y[2, -samples:]
+    return complex(moved / (2 * np.mean(position * np.exp(-2j * np.pi * np.arange(samples) / samples))))
+
+
+@pytest.mark.parametrize(("size", "frequency", "error"), [(1.0, 3.0, 1e-3), (6.0, 20.0, 5e-3)])
+def test_free_joint_against_simulation(size: float, frequency: float, error: float) -> None:
+    """docs/describing.md has more of them."""
+    assert abs(abs(against_simulation(size, frequency)) - 1) < error
 
 
 def test_free_joint_has_its_resonances_and_its_stroke() -> None:

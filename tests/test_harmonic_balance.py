@@ -1,6 +1,7 @@
 """Harmonic balance of a loop with friction: where it works, and that for hunting it does not until very late."""
 
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import plain
@@ -8,6 +9,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from variants import DAHL, HOLD, LOCKED, MEASURED, NO_FRICTION, PARASITIC, gains, lugre, stage, stribeck, van_dijk
 
+from friso.frequency.describing import balance
 from friso.frequency.describing.balance import FREQUENCIES, single_harmonic
 from friso.frequency.describing.function import dynamic_stiffness
 from friso.frequency.describing.loop import receptance
@@ -55,6 +57,60 @@ def test_single_harmonic_balance_finds_a_cycle_that_is_there() -> None:
     assert np.all(found.residuals < 1e-9)
 
 
+def test_what_is_not_known_is_no_cycle(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Friction that was not found at one grid point leaves four cells open, and the cycle elsewhere is still found."""
+    sizes, rates = np.geomspace(1e-3, 1, 31), np.geomspace(0.1, 100, 31)
+    amplitude, _ = near_sine()
+    spoilt = [sizes[3], rates[3]]
+
+    def partly(flat: dict[str, Any], amplitudes: np.ndarray, frequencies: np.ndarray, rtol: float) -> np.ndarray:
+        there = np.isclose(amplitudes, spoilt[0]) & np.isclose(frequencies, spoilt[1])
+        return np.where(there, np.nan, dynamic_stiffness(flat, amplitudes, frequencies, rtol))
+
+    monkeypatch.setattr(balance, "dynamic_stiffness", partly)
+    found = single_harmonic(unstable("1e8 N/m"), sizes, rates)
+    assert (found.unknown, found.unsolved) == (4, 0)
+    assert found.amplitudes == pytest.approx([amplitude], rel=2e-3)
+    assert np.isfinite(found.least)
+    monkeypatch.setattr(balance, "dynamic_stiffness", lambda _, amplitudes, *__: np.full(len(amplitudes), np.nan))
+    nothing = single_harmonic(unstable("1e8 N/m"), sizes, rates)
+    assert (nothing.unknown, nothing.amplitudes.size) == (900, 0)
+    assert np.isnan(nothing.least)
+
+
+def test_a_turn_without_a_solution_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Newton's method that ends nowhere, or in a cell far away, has found no cycle."""
+    amplitude, omega = near_sine()
+    grid = (amplitude * np.geomspace(0.1, 10, 12), omega / (2 * np.pi) * np.geomspace(0.1, 10, 12))
+    monkeypatch.setattr(balance, "STEPS", 0)
+    found = single_harmonic(unstable("1e8 N/m"), *grid)
+    assert (found.amplitudes.size, found.unsolved) == (0, 1)
+    cells, axes = np.array([[2, 2], [2, 2]]), (np.arange(9.0), np.arange(9.0))
+    assert balance._near(axes, cells, np.array([[3.9, 2.5], [1.1, 4.1]])).tolist() == [True, False]
+
+
+def test_singular_step_stays(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A spring in the place of friction: nothing depends on the amplitude."""
+    monkeypatch.setattr(balance, "dynamic_stiffness", lambda _, amplitudes, *__: np.full(len(amplitudes), 1e5 + 0j))
+    start = np.log([[1e-3, 1e-4], [5.0, 8.0]])
+    assert np.array_equal(balance._Loop(hunting(8.0), 1e-9).polished(start), start)
+
+
+def test_frequencies_are_close_enough_for_the_loop() -> None:
+    """With the joint locked the loop turns by 143 degrees from one of the usual frequencies to the next at 224 Hz."""
+    locked = hunting(8.0, LOCKED, PARASITIC)
+
+    def turn(frequencies: np.ndarray) -> float:
+        answer = receptance(locked.flat(), frequencies)[0]
+        return float(np.degrees(np.max(np.abs(np.angle(answer[1:] / answer[:-1])))))
+
+    fine = balance._Loop(locked, 1e-9).refined(FREQUENCIES)
+    assert turn(FREQUENCIES) > 140
+    assert turn(fine) < 90
+    assert set(FREQUENCIES) <= set(fine)
+    assert len(fine) < len(FREQUENCIES) + 10
+
+
 def test_multi_harmonic_balance_finds_it_too() -> None:
     """With one harmonic it is single-harmonic balance; with many, it is a motion that comes back to where it starts."""
     amplitude, omega = near_sine()
@@ -87,17 +143,18 @@ def at_start(flat: dict[str, float], series: Series) -> dict[str, float]:
     }
 
 
-@pytest.mark.parametrize("friction", [lugre(2), DAHL, stribeck(2)])
+@pytest.mark.parametrize("friction", [lugre(2), DAHL, stribeck(2) + "asymmetry = 0.2\n"])
 def test_friction_on_a_sine_has_its_describing_function(friction: str) -> None:
-    """The chain of midpoints against the engine: of second order in the interval."""
+    """The chain of midpoints against the engine, over half a period or a whole one: of second order in the interval."""
     flat, frequency = hunting(8.0).flat() | stage(HOLD, friction=friction, controller=gains()).flat(), 5.0
+    halves, sign = (2, 1.0) if "asymmetry" in friction else (1, -1.0)
     for amplitude in (1e-5, 1e-3):
         expected = dynamic_stiffness(flat, np.array([amplitude]), np.array([frequency]))[0]
         errors = []
         for count in (2000, 8000):
-            angles = np.pi * (np.arange(count) + 0.5) / count
+            angles = halves * np.pi * (np.arange(count) + 0.5) / count
             velocity = -2 * np.pi * frequency * amplitude * np.sin(angles)
-            force = friction_answer(Law.of(flat), velocity, 0.5 / frequency / count, -1.0).force
+            force = friction_answer(Law.of(flat), velocity, halves / (2 * frequency * count), sign).force
             errors.append(abs(2 * np.mean(force * np.exp(-1j * angles)) / amplitude / expected - 1))
         assert errors[1] < 1e-4
         assert errors[1] < errors[0] / 10 or errors[1] < 1e-7
@@ -162,7 +219,7 @@ def test_where_the_integrator_can_drive_the_loop_is_a_spring_too() -> None:
         loop = -1 / receptance(flat, FREQUENCIES)[0]
         feeds = np.imag(loop) < 0
         spring = np.min(np.real(loop[feeds]))
-        amplitudes, frequencies = map(np.ravel, np.meshgrid(np.geomspace(1e-8, 1, 60), FREQUENCIES[feeds]))
+        amplitudes, frequencies = map(np.ravel, np.meshgrid(np.geomspace(1e-8, 1, 31), FREQUENCIES[feeds]))
         assert spring > 0
         assert np.min(np.real(dynamic_stiffness(flat, amplitudes, frequencies))) > -spring / 10
 

@@ -34,6 +34,16 @@ NUDGE = 1e-5
 STEPS = 20
 """Newton steps to a solution."""
 
+LONGEST = 1.0
+"""Newton step of the logarithms at most."""
+
+SOLVED = 1e-6
+"""Residual at which a solution counts as one."""
+
+TURN, WITHIN, HALVINGS = np.pi / 2, 16, 12
+"""Angle [rad] by which the loop may turn from one frequency to the next, at how many places between two it is looked
+at, and how often the grid is halved for it at most."""
+
 
 @dataclass(frozen=True)
 class Balance:
@@ -43,6 +53,9 @@ class Balance:
     (solutions,), none of them if there is no cycle. `least` is the smallest residual of the grid, at the amplitude
     `least_amplitude` [m] of the cart and `least_frequency` [Hz]. A residual is abs(N - 1/R) over abs(N) + abs(1/R): 0
     where the balance holds, and at most 1.
+
+    That there is no other cycle within the grid is known but for `unknown` cells, at a corner of which friction was not
+    found, and `unsolved` ones, round which the balance turns but in which no solution was found.
     """
 
     amplitudes: np.ndarray
@@ -51,6 +64,8 @@ class Balance:
     least: float
     least_amplitude: float
     least_frequency: float
+    unknown: int
+    unsolved: int
 
 
 def single_harmonic(
@@ -60,29 +75,44 @@ def single_harmonic(
     rtol: float = RTOL,
 ) -> Balance:
     """Solve the balance of a stage with friction, within a grid of amplitudes [m] of the cart and frequencies [Hz],
-    each in ascending order. Two solutions in one cell escape it. Raises StageError for a stage without friction and for
-    a grid that is not usable."""
+    each in ascending order; more frequencies are put between those from one to the next of which the loop turns by a
+    right angle or more. Two solutions in one cell escape it. Raises StageError for a stage without friction and for a
+    grid that is not usable."""
     loop = _Loop(stage, checked_rtol(rtol))
     sizes = checked_positive("amplitudes", amplitudes, "1e-5 m, 1e-4 m")
-    rates = checked_positive("frequencies", frequencies, "0.1 Hz, 1 Hz")
-    shape = (len(sizes), len(rates))
-    logs = np.stack([np.repeat(np.log(sizes), shape[1]), np.tile(np.log(rates), shape[0])])
+    rates = loop.refined(checked_positive("frequencies", frequencies, "0.1 Hz, 1 Hz"))
+    axes, shape = (np.log(sizes), np.log(rates)), (len(sizes), len(rates))
+    logs = np.stack([np.repeat(axes[0], shape[1]), np.tile(axes[1], shape[0])])
     left, residual = (part.reshape(shape) for part in loop.left(logs))
-    cells = np.argwhere(_turns(left) != 0)
-    middles = np.log([sizes[cells[:, 0]], rates[cells[:, 1]]]) / 2
-    middles += np.log([sizes[cells[:, 0] + 1], rates[cells[:, 1] + 1]]) / 2
+    turns, unknown = _turns(left)
+    cells = np.argwhere(turns != 0)
+    middles = np.stack([(axis[cell] + axis[cell + 1]) / 2 for axis, cell in zip(axes, cells.T, strict=True)])
     found = loop.polished(middles)
-    i, j = np.unravel_index(np.argmin(residual), shape)
-    at = (float(residual[i, j]), float(sizes[i]), float(rates[j]))
-    return Balance(np.exp(found[0]), np.exp(found[1]), loop.left(found)[1], *at)
+    error = loop.left(found)[1]
+    good = (error < SOLVED) & _near(axes, cells, found)
+    i, j = np.unravel_index(np.argmin(np.where(np.isnan(residual), np.inf, residual)), shape)
+    least = (float(residual[i, j]), float(sizes[i]), float(rates[j]))
+    found, error = found[:, good], error[good]
+    return Balance(np.exp(found[0]), np.exp(found[1]), error, *least, int(unknown.sum()), int((~good).sum()))
 
 
-def _turns(left: np.ndarray) -> np.ndarray:
+def _turns(left: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """How often a complex function on a grid turns round zero along the edges of each cell: its zeros inside, those at
-    which it is mirrored counted as -1."""
-    along = np.angle(left[1:] / left[:-1])
-    across = np.angle(left[:, 1:] / left[:, :-1])
-    return np.rint((along[:, :-1] + across[1:] - along[:, 1:] - across[:-1]) / (2 * np.pi)).astype(int)
+    which it is mirrored counted as -1; and whether that is unknown (and told as 0), for a corner that is NaN."""
+    along = np.angle(left[1:] * np.conj(left[:-1]))
+    across = np.angle(left[:, 1:] * np.conj(left[:, :-1]))
+    turns = (along[:, :-1] + across[1:] - along[:, 1:] - across[:-1]) / (2 * np.pi)
+    unknown = ~np.isfinite(turns)
+    return np.rint(np.where(unknown, 0.0, turns)).astype(int), unknown
+
+
+def _near(axes: tuple[np.ndarray, np.ndarray], cells: np.ndarray, found: np.ndarray) -> np.ndarray:
+    """Whether places (2, count) are inside their cells (count, 2), or inside one next to them."""
+    near = np.ones(len(cells), bool)
+    for axis, cell, place in zip(axes, cells.T, found, strict=True):
+        low, high = axis[np.maximum(cell - 1, 0)], axis[np.minimum(cell + 2, len(axis) - 1)]
+        near &= (low <= place) & (place <= high)
+    return near
 
 
 @dataclass(frozen=True)
@@ -100,14 +130,30 @@ class _Loop:
         loop = 1 / receptance(flat, frequencies)[0]
         return stiffness - loop, np.abs(stiffness - loop) / (np.abs(stiffness) + np.abs(loop))
 
+    def refined(self, frequencies: np.ndarray) -> np.ndarray:
+        """Frequencies [Hz] with more between them, from one to the next of which the loop turns by less than TURN."""
+        for _ in range(HALVINGS):
+            logs, share = np.log(frequencies), np.linspace(0, 1, WITHIN + 1)
+            dense = np.exp(logs[:-1, None] + np.diff(logs)[:, None] * share)
+            answer = receptance(self.stage.flat(), dense.ravel())[0].reshape(dense.shape)
+            turned = np.sum(np.abs(np.angle(answer[:, 1:] / answer[:, :-1])), axis=1)
+            wide = np.flatnonzero(turned >= TURN)
+            if not wide.size:
+                break
+            frequencies = np.insert(frequencies, wide + 1, np.exp((logs[wide] + logs[wide + 1]) / 2))
+        return frequencies
+
     def polished(self, logs: np.ndarray) -> np.ndarray:
-        """Solutions by Newton's method from near them."""
+        """Solutions by Newton's method from near them, which stays where it has no step."""
         for _ in range(STEPS if logs.size else 0):
             sides = [self.left(logs + NUDGE * step[:, None])[0] for step in np.vstack([np.eye(2), -np.eye(2)])]
             slopes = np.array([(sides[k] - sides[k + 2]) / (2 * NUDGE) for k in range(2)])
             matrix = np.moveaxis(np.array([np.real(slopes), np.imag(slopes)]), 2, 0)
             left = self.left(logs)[0]
-            logs = (
-                logs - np.linalg.solve(matrix, np.stack([np.real(left), np.imag(left)], axis=1)[:, :, None])[:, :, 0].T
-            )
+            usable = np.isfinite(left) & np.all(np.isfinite(slopes), axis=0)
+            matrix[~usable] = np.eye(2)
+            usable &= np.linalg.det(matrix) != 0
+            matrix[~usable] = np.eye(2)
+            step = np.linalg.solve(matrix, np.stack([np.real(left), np.imag(left)], axis=1)[:, :, None])[:, :, 0].T
+            logs = logs - np.where(usable, np.clip(step, -LONGEST, LONGEST), 0.0)
         return logs

@@ -9,22 +9,32 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from friso.frequency.describing.function import dynamic_stiffness
-from friso.frequency.describing.steady import RTOL
+from friso.frequency.describing.steady import RTOL, Imposition
 from friso.frequency.parts import mechanics
 
-POINTS = 160
-"""Amplitudes, per frequency, between which roots are looked for."""
+PER_DECADE = 32
+"""Amplitudes per decade between which roots are looked for, at the same places whatever else is asked for."""
 
 BEYOND = 30.0
 """How far these reach beyond the amplitudes of a cart that is stuck and of one that is free."""
 
-EXTREMES = (1e-6, 10.0)
-"""Amplitudes in units of that of a free cart at which it counts as stuck, and as free."""
+STUCK, STATELESS = 1e-3, 1e-12
+"""Amplitude at which a cart counts as stuck, in units of the scale of the law's own state; without one, in metres."""
+
+FREE = 10.0
+"""Amplitude in units of that of a cart without friction at which it counts as free."""
+
+DECADES = 8
+"""Decades at most by which the amplitudes are extended until their forces lie on both sides of the one asked for."""
+
+LIMITS = (1e-18, 1e18)
+"""Amplitudes [m] beyond which nothing is looked for."""
 
 CLOSE = 1e-10
 """Relative error of the force at which an amplitude counts as found."""
@@ -54,41 +64,79 @@ class Driven:
         stage and cart over them [m/N], complex, and the dynamic stiffness of friction [N/m], each of shape (count,)."""
         stiffness = dynamic_stiffness(self.flat, amplitudes, self.frequencies[which], self.rtol)
         some = self.compliances[which]
-        cart = some[:, 1, 0] / (1 + some[:, 1, 1] * stiffness)
-        stage = some[:, 0, 0] - some[:, 0, 1] * stiffness * cart
-        return amplitudes / np.abs(cart), np.stack([stage, cart], axis=1), stiffness
+        with np.errstate(all="ignore"):  # what cannot be computed is NaN or infinite, and no root
+            cart = some[:, 1, 0] / (1 + some[:, 1, 1] * stiffness)
+            stage = some[:, 0, 0] - some[:, 0, 1] * stiffness * cart
+            return amplitudes / np.abs(cart), np.stack([stage, cart], axis=1), stiffness
 
-    def grid(self, forces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Amplitudes [m] with their forces [N], both of shape (frequencies, POINTS), that reach from well below the
-        amplitude of a stuck cart under the least of `forces` to well above that of a free one under the greatest."""
-        count = len(self.frequencies)
-        free = np.abs(self.compliances[:, 1, 0])
-        every = np.arange(count)
-        ends = [self.answer(share * free * forces.max(), every)[1][:, 1] for share in EXTREMES]
-        compliant = np.abs([*ends, free])
-        low, high = compliant.min(axis=0) * forces.min() / BEYOND, compliant.max(axis=0) * forces.max() * BEYOND
-        amplitudes = np.geomspace(low, high, POINTS, axis=1)
-        found, _, _ = self.answer(amplitudes.ravel(), np.repeat(every, POINTS))
-        return amplitudes, found.reshape(amplitudes.shape)
+    @cached_property
+    def stuck(self) -> float:
+        """An amplitude [m] at which bristles do not slip."""
+        friction = Imposition.of(self.flat, np.ones(1), np.ones(1), self.rtol)
+        return float(np.min(STUCK * friction.scales[0, friction.inner], initial=STATELESS if not friction.inner else 1))
+
+    def ends(self, forces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Amplitudes [m] that need less than each of `forces` at each frequency, and more, shape (forces, frequencies):
+        well beyond those of a stuck and of a free cart, whatever the other forces are."""
+        every, shape = np.arange(len(self.frequencies)), (len(forces), len(self.frequencies))
+        with np.errstate(over="ignore"):
+            bare = np.clip(np.abs(self.compliances[:, 1, 0]) * forces[:, None], *LIMITS)
+        stuck = np.abs(self.answer(np.full(shape[1], self.stuck), every)[1][:, 1])
+        slid = np.abs(self.answer((FREE * bare).ravel(), np.tile(every, shape[0]))[1][:, 1]).reshape(shape)
+        with np.errstate(over="ignore"):
+            some = np.stack([bare, stuck * forces[:, None], slid * forces[:, None]])
+        low, high = np.fmin.reduce(some) / BEYOND, np.fmax.reduce(some) * BEYOND
+        return self._extended(low, forces, -1), self._extended(high, forces, 1)
+
+    def _extended(self, amplitudes: np.ndarray, forces: np.ndarray, side: int) -> np.ndarray:
+        """Amplitudes moved down (side -1) or up (1) until their forces lie on that side of the ones asked for."""
+        amplitudes = np.clip(amplitudes, *LIMITS)
+        force, frequency = (each.ravel() for each in np.indices(amplitudes.shape))
+        for _ in range(DECADES):
+            reached = self.answer(amplitudes[force, frequency], frequency)[0]
+            missed = ~(side * (reached - forces[force]) > 0)
+            force, frequency = force[missed], frequency[missed]
+            if not force.size:
+                break
+            amplitudes[force, frequency] = np.clip(amplitudes[force, frequency] * 10.0**side, *LIMITS)
+        return amplitudes
+
+    def grid(self, forces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Amplitudes [m] with their forces [N], both of shape (frequencies, points), and whether roots for a force are
+        looked for in the cell behind each of them, shape (forces, frequencies, points - 1)."""
+        low, high = self.ends(forces)
+        first = np.floor(PER_DECADE * np.log10(low)).astype(int)
+        last = np.ceil(PER_DECADE * np.log10(high)).astype(int)
+        points = int(np.max(last.max(axis=0) - first.min(axis=0))) + 1
+        numbers = first.min(axis=0)[:, None] + np.arange(points)
+        amplitudes = 10.0 ** (numbers / PER_DECADE)
+        asked = numbers <= last.max(axis=0)[:, None]
+        reached = np.full(amplitudes.shape, np.nan)
+        reached[asked], _, _ = self.answer(amplitudes[asked], np.nonzero(asked)[0])
+        cells = numbers[None, :, :-1]
+        return amplitudes, reached, (cells >= first[:, :, None]) & (cells < last[:, :, None])
 
 
 @dataclass(frozen=True)
 class Roots:
     """Amplitudes [m] of the cart, each with the numbers of its force and frequency; whether the force rises with the
-    amplitude there, and the relative error of the force that is left; all of shape (count,)."""
+    amplitude there, and the relative error of the force that is left; all of shape (count,). `unknown`, of shape
+    (forces, frequencies), is whether friction was not found at some amplitude at which a root may be."""
 
     force: np.ndarray
     frequency: np.ndarray
     amplitude: np.ndarray
     rising: np.ndarray
     error: np.ndarray
+    unknown: np.ndarray
 
 
 def roots(driven: Driven, forces: np.ndarray) -> Roots:
     """All amplitudes at which forces [N] move the cart, as far as they are told apart by the grid."""
-    amplitudes, reached = driven.grid(forces)
-    excess = reached - forces[:, None, None]
-    force, frequency, cell = np.nonzero(np.sign(excess[:, :, :-1]) * np.sign(excess[:, :, 1:]) < 0)
+    amplitudes, reached, inside = driven.grid(forces)
+    above = reached >= forces[:, None, None]
+    known = np.isfinite(reached[:, :-1] + reached[:, 1:])
+    force, frequency, cell = np.nonzero((above[:, :, :-1] != above[:, :, 1:]) & inside & known)
     low, high = (np.log(amplitudes[frequency, cell + side]) for side in (0, 1))
     f_low, f_high = (np.log(reached[frequency, cell + side] / forces[force]) for side in (0, 1))
     rising = f_high > f_low
@@ -97,7 +145,7 @@ def roots(driven: Driven, forces: np.ndarray) -> Roots:
         (low, high),
         (f_low, f_high),
     )
-    return Roots(force, frequency, np.exp(middle), rising, np.abs(error))
+    return Roots(force, frequency, np.exp(middle), rising, np.abs(error), np.any(inside & ~known, axis=2))
 
 
 def _illinois(function: Any, ends: tuple[np.ndarray, ...], values: tuple[np.ndarray, ...]) -> tuple[np.ndarray, ...]:

@@ -19,7 +19,7 @@ import numpy as np
 from friso.engine.arrays import Status
 from friso.engine.tolerance import checked_rtol
 from friso.equations.imposed import HARMONIC
-from friso.frequency.describing.steady import CLOSED, RTOL, Imposition, share_of_period, steady
+from friso.frequency.describing.steady import RTOL, Imposition, Steady, closed, share_of_period, steady
 from friso.stage import Stage, StageError
 
 if TYPE_CHECKING:
@@ -42,7 +42,7 @@ def dynamic_stiffness(
     friction = Imposition.of(flat, amplitudes, frequencies, rtol)
     found = steady(friction)
     first, _ = _harmonics(friction, found.inner, 1, 0)
-    good = found.done & (found.gap <= CLOSED * rtol)
+    good = found.done & (found.gap <= closed(rtol))
     return np.where(good, first[:, 1] / amplitudes, np.nan)
 
 
@@ -69,46 +69,55 @@ def describing(
     """
     import xarray as xr
 
-    sizes, rates = (
-        checked_positive("amplitudes", amplitudes, "1e-5 m"),
-        checked_positive("frequencies", frequencies, "10 Hz"),
-    )
+    sizes = checked_positive("amplitudes", amplitudes, "1e-5 m")
+    rates = checked_positive("frequencies", frequencies, "10 Hz")
     if not 1 <= harmonics < samples / 4:
         expected = f"from 1 to less than a quarter of the samples, {samples}"
         raise StageError("harmonics", str(harmonics), expected, "harmonics = 9")
-    shape = (len(sizes), len(rates))
-    pairs = (np.repeat(sizes, shape[1]), np.tile(rates, shape[0]))
+    pairs = (np.repeat(sizes, len(rates)), np.tile(rates, len(sizes)))
     friction = Imposition.of(stage.flat(), *pairs, checked_rtol(rtol))
     found = steady(friction)
     force, aliasing = _harmonics(friction, found.inner, harmonics, samples if harmonics > 1 else 0)
-    status = np.where(found.gap <= CLOSED * rtol, Status.DONE.text, NOT_CLOSED)
-    status = np.where(found.done & np.isfinite(force[:, 1]), status, NOT_RUN)
+    status = _status(found, force, rtol)
     force[status != Status.DONE.text] = np.nan
-    plane = ("amplitude", "frequency")
-    stiffness = force[:, 1] / pairs[0]
-    variables = {
-        "stiffness": (stiffness, "N/m", "dynamic stiffness of friction"),
-        "work": (np.pi * pairs[0] ** 2 * np.imag(stiffness), "J", "work of friction per period"),
-        "gap": (found.gap, "1", "gap of the periodic state"),
-        "aliasing": (aliasing, "1", "error of the sampled first harmonic"),
+    coords = _coords(sizes, rates, harmonics)
+    variables = _variables(pairs[0], force, {"gap": found.gap, "aliasing": aliasing, "status": status})
+    shape = (len(sizes), len(rates))
+    shaped = {name: (dims, v.reshape(*shape, *v.shape[1:]), words) for name, (dims, v, words) in variables.items()}
+    return xr.Dataset(shaped, coords, {"stage": stage.to_toml(), "rtol": rtol, "samples": samples})
+
+
+def _coords(amplitudes: np.ndarray, frequencies: np.ndarray, harmonics: int) -> dict[str, Any]:
+    return {
+        "amplitude": ("amplitude", amplitudes, {"units": "m", "long_name": "amplitude of the motion"}),
+        "frequency": ("frequency", frequencies, {"units": "Hz", "long_name": "frequency of the motion"}),
+        "harmonic": np.arange(harmonics + 1),
     }
-    return xr.Dataset(
-        {
-            **{n: (plane, v.reshape(shape), {"units": u, "long_name": t}) for n, (v, u, t) in variables.items()},
-            "status": (plane, status.reshape(shape)),
-            "force": (
-                (*plane, "harmonic"),
-                force.reshape(*shape, -1),
-                {"units": "N", "long_name": "harmonics of the friction force"},
-            ),
-        },
-        coords={
-            "amplitude": ("amplitude", sizes, {"units": "m", "long_name": "amplitude of the motion"}),
-            "frequency": ("frequency", rates, {"units": "Hz", "long_name": "frequency of the motion"}),
-            "harmonic": np.arange(harmonics + 1),
-        },
-        attrs={"stage": stage.to_toml(), "rtol": rtol, "samples": samples},
-    )
+
+
+def _status(found: Steady, force: np.ndarray, rtol: float) -> np.ndarray:
+    status = np.where(found.gap <= closed(rtol), Status.DONE.text, NOT_CLOSED)
+    return np.where(found.done & np.isfinite(force[:, 1]), status, NOT_RUN)
+
+
+def _variables(
+    amplitudes: np.ndarray, force: np.ndarray, rest: Mapping[str, np.ndarray]
+) -> dict[str, tuple[tuple[str, ...], np.ndarray, dict[str, str]]]:
+    """Dimensions, values (pairs, ...) and attributes of the variables."""
+    plane = ("amplitude", "frequency")
+    stiffness = force[:, 1] / amplitudes
+    named = {
+        "stiffness": (stiffness, "N/m", "dynamic stiffness of friction"),
+        "work": (np.pi * amplitudes**2 * np.imag(stiffness), "J", "work of friction per period"),
+        "gap": (rest["gap"], "1", "gap of the periodic state"),
+        "aliasing": (rest["aliasing"], "1", "error of the sampled first harmonic"),
+        "force": (force, "N", "harmonics of the friction force"),
+    }
+    variables = {
+        name: ((*plane, "harmonic")[: 1 + values.ndim], values, {"units": unit, "long_name": text})
+        for name, (values, unit, text) in named.items()
+    }
+    return {**variables, "status": (plane, rest["status"], {})}
 
 
 def checked_positive(name: str, values: Sequence[float] | np.ndarray, example: str) -> np.ndarray:

@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 NOT_FOUND = "no amplitude was found at which this force moves the cart"
+MISSING = "answers are missing: friction was not found at some amplitude, or the least or greatest answer does not last"
 
 
 def plant_response(
@@ -38,7 +39,8 @@ def plant_response(
     [N/m]; `lasting`, whether the force rises with the amplitude (1, 0, or NaN); `error`, relative, of the force. Over
     ("force", "frequency"): `up` and `down`, the response [m/N] that an analyser shows which starts at rest at the
     lowest, or highest, frequency, and steps to the others in turn: of the lasting branches the one nearest in amplitude
-    to that before; `answers`, their number; `status`.
+    to that before, NaN where none lasts; `answers`, their number; `status`, also of forces and frequencies that are
+    beyond what can be computed. The answers to one force do not depend on what else is asked for.
 
     Raises StageError for forces or frequencies that are not usable and for a stage without friction.
     """
@@ -47,8 +49,27 @@ def plant_response(
     sizes, rates = checked_positive("forces", forces, "2 N"), checked_positive("frequencies", frequencies, "10 Hz")
     driven = Driven.of(stage.flat(), rates, checked_rtol(rtol))
     found = roots(driven, sizes)
+    plane, place, count = ("force", "frequency"), *_branches(found, (len(sizes), len(rates)))
+    columns = _columns(driven, found)
+    branches = {name: _spread(values, place, count.shape) for name, (values, _, _) in columns.items()}
+    variables: dict[str, Any] = {
+        name: ((*plane, "branch"), branches[name], _words(unit, text)) for name, (_, unit, text) in columns.items()
+    }
+    for name, order in (("up", 1), ("down", -1)):
+        variables[name] = (plane, _shown(branches, order), _words("m/N", f"stage position over force, stepping {name}"))
+    variables["answers"] = (plane, count, _words("1", "number of answers"))
+    variables["status"] = (plane, _status(stage, branches, sizes, found.unknown))
+    coords = {
+        "force": ("force", sizes, _words("N", "amplitude of the actuator force")),
+        "frequency": ("frequency", rates, _words("Hz", "frequency")),
+    }
+    return xr.Dataset(variables, coords, {"stage": stage.to_toml(), "rtol": rtol})
+
+
+def _columns(driven: Driven, found: Roots) -> dict[str, tuple[np.ndarray, str, str]]:
+    """What is told of every root, with units and text."""
     _, positions, stiffness = driven.answer(found.amplitude, found.frequency)
-    columns = {
+    return {
         "response": (positions[:, 0], "m/N", "stage position over force"),
         "cart_response": (positions[:, 1], "m/N", "cart position over force"),
         "amplitude": (found.amplitude, "m", "amplitude of the cart"),
@@ -56,26 +77,6 @@ def plant_response(
         "lasting": (found.rising.astype(float), "1", "whether the motion lasts"),
         "error": (found.error, "1", "relative error of the force"),
     }
-    plane, shape = ("force", "frequency"), (len(sizes), len(rates))
-    place, count = _branches(found, shape)
-    branches = {name: _spread(values, place, shape) for name, (values, _, _) in columns.items()}
-    variables: dict[str, Any] = {
-        name: ((*plane, "branch"), branches[name], _words(unit, text)) for name, (_, unit, text) in columns.items()
-    }
-    for name, order in (("up", 1), ("down", -1)):
-        shown = _followed(branches["amplitude"], branches["lasting"], order)
-        answer = np.take_along_axis(branches["response"], shown[:, :, None], axis=2)[:, :, 0]
-        variables[name] = (plane, answer, _words("m/N", f"stage position over force, stepping {name}"))
-    variables["answers"] = (plane, count, _words("1", "number of answers"))
-    variables["status"] = (plane, _status(stage, branches, sizes))
-    return xr.Dataset(
-        variables,
-        coords={
-            "force": ("force", sizes, _words("N", "amplitude of the actuator force")),
-            "frequency": ("frequency", rates, _words("Hz", "frequency")),
-        },
-        attrs={"stage": stage.to_toml(), "rtol": rtol},
-    )
 
 
 def _words(unit: str, text: str) -> dict[str, str]:
@@ -99,6 +100,13 @@ def _spread(values: np.ndarray, place: tuple[np.ndarray, ...], shape: tuple[int,
     return array
 
 
+def _shown(branches: dict[str, np.ndarray], order: int) -> np.ndarray:
+    """The response [m/N] that shows, shape (forces, frequencies), NaN where no branch lasts."""
+    shown = _followed(branches["amplitude"], branches["lasting"], order)[:, :, None]
+    answer, lasting = (np.take_along_axis(branches[name], shown, axis=2)[:, :, 0] for name in ("response", "lasting"))
+    return np.where(lasting == 1, answer, np.nan)
+
+
 def _followed(amplitudes: np.ndarray, lasting: np.ndarray, order: int) -> np.ndarray:
     """The number of the branch that shows at every frequency, stepping up (order 1) or down (-1), shape (forces,
     frequencies): the lasting one that is nearest in amplitude to the one before, the least at the start."""
@@ -114,10 +122,15 @@ def _followed(amplitudes: np.ndarray, lasting: np.ndarray, order: int) -> np.nda
     return shown
 
 
-def _status(stage: Stage, branches: dict[str, np.ndarray], forces: np.ndarray) -> np.ndarray:
+def _status(stage: Stage, branches: dict[str, np.ndarray], forces: np.ndarray, unknown: np.ndarray) -> np.ndarray:
     """What is wrong with the answers to every force at every frequency, or "done"."""
-    lost = ~np.any(branches["error"] <= 100 * CLOSE, axis=2)
-    status = np.where(lost, NOT_FOUND, "done").astype(object)
+    there, lasting = ~np.isnan(branches["amplitude"]), branches["lasting"]
+    count = np.sum(there, axis=2)
+    last = np.take_along_axis(lasting, np.maximum(count - 1, 0)[:, :, None], axis=2)[:, :, 0]
+    missing = unknown | (lasting[:, :, 0] != 1) | (last != 1)
+    lost = (count == 0) | np.any(there & ~(branches["error"] <= 100 * CLOSE), axis=2)
     deflection = np.abs(branches["response"] - branches["cart_response"]) * forces[:, None, None]
+    status = np.where(missing, MISSING, "done").astype(object)
     status[np.any(beyond_stroke(stage.flat(), deflection), axis=2)] = TOUCHES
+    status[lost] = NOT_FOUND
     return status.astype(str)

@@ -23,8 +23,8 @@ from friso.equations.imposed import FREQUENCY, HARMONIC, imposed_form
 RTOL = 1e-9
 """Relative tolerance of the runs unless told."""
 
-CLOSED = 1e3
-"""Gap up to which a state counts as periodic, in units of the relative tolerance."""
+CLOSED, WIDEST = 1e3, 1e-4
+"""Gap up to which a state counts as periodic: so many relative tolerances, but never more than the second."""
 
 ROUNDS = 12
 """Secant steps at most."""
@@ -116,6 +116,11 @@ def _rows(rows: list[Any], count: int) -> np.ndarray:
     return np.array([np.broadcast_to(row, (count,)) for row in rows], dtype=float).reshape(len(rows), count)
 
 
+def closed(rtol: float) -> float:
+    """Gap up to which a state counts as periodic."""
+    return min(CLOSED * rtol, WIDEST)
+
+
 @dataclass(frozen=True)
 class Steady:
     """Periodic steady states: the law's own states at the farthest point of the motion (count, inner), the `gap` that
@@ -138,7 +143,7 @@ def steady(friction: Imposition) -> Steady:
         some, scales = friction.take(open_), friction.scales[open_][:, friction.inner]
         step, missed, fine = _secant(some, inner[open_], width[open_])
         gap[open_], done[open_] = np.max(np.abs(missed) / scales, axis=1), fine
-        far = fine & (gap[open_] > CLOSED * friction.rtol)
+        far = fine & (gap[open_] > closed(friction.rtol))
         inner[open_[far]] += step[far]
         width[open_[far]] = np.clip(np.abs(step[far]), FINEST * scales[far], scales[far])
         open_ = open_[far]
@@ -164,5 +169,7 @@ def _secant(friction: Imposition, inner: np.ndarray, width: np.ndarray) -> tuple
     ends, fine = ends.reshape(count, size + 1, size), np.all(fine.reshape(count, size + 1), axis=1)
     missed = ends[:, 0] - inner
     slopes = np.swapaxes((ends[:, 1:] - ends[:, :1]) / width[:, :, None], 1, 2) - np.eye(size)
+    fine &= np.all(np.isfinite(slopes), axis=(1, 2)) & np.all(np.isfinite(missed), axis=1)
     slopes[~fine] = -np.eye(size)
+    slopes[np.linalg.det(slopes) == 0] = -np.eye(size)  # the map only shifts: follow it
     return np.linalg.solve(slopes, -missed[:, :, None])[:, :, 0], missed, fine
