@@ -18,12 +18,14 @@ from variants import VARIANTS, free, lugre, release, stage, van_dijk
 from friso.cli import main
 from friso.equations.model import assemble
 from friso.equations.structure import structure
+from friso.frequency.crossover import limits
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import hunting_cycles
 from friso.quantities import StageError
 from friso.stage import Stage
-from friso.studies.guideline import checks, compute, sweeps, worked
-from friso.studies.guideline.edges import ABOVE, BELOW, FLIP, Edges, find_edges
+from friso.studies.guideline import checks, compute, persistence, sweeps, worked
+from friso.studies.guideline.claims import claims, least_gap
+from friso.studies.guideline.edges import ABOVE, BELOW, FLIP, JUMP, LOST, UNKNOWN, Edges, find_edges
 from friso.studies.guideline.groups import (
     GROUPS,
     PARAMETERS,
@@ -36,8 +38,10 @@ from friso.studies.guideline.groups import (
 )
 from friso.studies.guideline.hunting_laws import FREE_LAW, LOCKED_LAW
 from friso.studies.guideline.laws import Errors, Law, Rate, fitted, in_series
+from friso.studies.guideline.parasitic import DRIVE, holding
 from friso.studies.guideline.persistence import hunts_somehow
 from friso.studies.guideline.rig import plain
+from friso.studies.thesis.studies import rig
 
 RIGID = pytest.mark.xdist_group("rigid")
 FREE_RIG = pytest.mark.xdist_group("free")
@@ -149,8 +153,76 @@ def test_edge_of_the_free_rig() -> None:
 def test_simulation_agrees_where_hunting_ends() -> None:
     """An independent route: from 72 distances, hunting goes on at 9 Hz, and nowhere at 11.2 Hz."""
     flat = rigid().flat()
-    found = hunts_somehow(Ensemble.held(flat | {"controller.crossover": np.array([9.0, 11.2])}, 2))
+    found, known = hunts_somehow(Ensemble.held(flat | {"controller.crossover": np.array([9.0, 11.2])}, 2))
     assert found.tolist() == [True, False]
+    assert known.all()
+
+
+def sample(*values: float) -> dict[str, np.ndarray]:
+    """A sample of the locked sweep, as in docs/guideline_edges.csv."""
+    return {name: np.array([value]) for name, value in zip(sweeps.LOCKED_BOX, values, strict=True)}
+
+
+SMALL_CYCLE = sample(0.1203, 0.1348, 0.7575, 9.152e-4, 0.07403, 3.099, 1.055)
+"""Its cycle flips at 0.0262."""
+
+JUMPS = sample(0.1171, 0.1368, 0.6217, 2.004e-4, 0.1415, 3.435, 1.132)
+"""Its cycle is replaced by one that repels at 0.0740."""
+
+FOLLOWED = sample(0.1671, 0.1298, 0.5491, 2.928e-3, 0.1181, 1.926, 0.8068)
+"""Its cycle is replaced by one that repels at 0.0769, beside which simulations hunt up to 0.081."""
+
+FAR_FLIP = sample(0.1807, 0.1057, 0.1102, 2.777e-4, 0.2063, 2.345, 0.8403)
+"""Its cycle is lost at 0.0985, where simulations settle; far above, at 0.11, a cycle that repels is known."""
+
+
+def at(values: dict[str, np.ndarray], crossover: float) -> Ensemble:
+    return Ensemble.held(flat_of(values | {"crossover": np.array([crossover])}), 1)
+
+
+def swept(values: dict[str, np.ndarray]) -> Edges:
+    return find_edges(sweeps._stages(values), sweeps.LOCKED_GRID[None])  # pyright: ignore[reportPrivateUsage]
+
+
+@RIGID
+def test_simulation_sees_small_cycles() -> None:
+    """At a gap of 0.12 a cycle swings by less than a tenth of the deflection by the break-away force."""
+    stages = at(SMALL_CYCLE, 0.9 * 0.02619)
+    cycles = hunting_cycles(stages)
+    assert cycles.attracting[0]
+    assert 0.005 < cycles.amplitude[0] / stages.length[0] < 0.05
+    assert [each[0] for each in hunts_somehow(stages)] == [True, True]
+
+
+@RIGID
+def test_failed_simulation_is_not_one_that_settles(monkeypatch: pytest.MonkeyPatch) -> None:
+    def failing(stages: Ensemble, begin: Any, periods: float) -> tuple[np.ndarray, np.ndarray]:
+        return np.zeros(stages.count, bool), np.arange(stages.count) > 0
+
+    monkeypatch.setattr(persistence, "still_hunts", failing)
+    assert [each.tolist() for each in hunts_somehow(at(JUMPS, 0.1))] == [[False], [False]]
+    found = swept(FAR_FLIP)
+    assert found.kind[0] == UNKNOWN
+    assert not found.known[0]
+
+
+@RIGID
+def test_edge_stays_where_simulations_settle_above() -> None:
+    """A cycle that repels far above does not tell of the edge."""
+    found = swept(FAR_FLIP)
+    assert found.kind[0] == LOST
+    assert found.crossover[0] == pytest.approx(0.0985, abs=3e-4)
+
+
+@RIGID
+def test_jump_is_told_apart_and_followed() -> None:
+    found = swept(JUMPS)
+    assert found.kind[0] == JUMP
+    assert found.crossover[0] == pytest.approx(0.0740, abs=2e-4)
+    assert (found.inside[0] > -0.9) or (found.outside[0] < -1.1)
+    followed = swept(FOLLOWED)
+    assert followed.kind[0] == JUMP
+    assert 0.0775 < followed.crossover[0] < 0.083
 
 
 # laws
@@ -201,6 +273,92 @@ def test_free_law_takes_the_larger_rate_beside_the_locked_edge() -> None:
     law = fitted(FREE_LAW, values, 1 / np.sqrt(locked**-2 + largest**-2), locked)
     assert law.factors == pytest.approx((1.3, 0.9), rel=0.02)
     assert law.of(0)["gap"] == pytest.approx(0.66, abs=0.01)
+
+
+# the claims and the parasitic mode
+
+
+def studied(edge: Any, kind: str = FLIP) -> worked.Worked:
+    """Worked steps of invented computed edges: `edge` gives that of the flat keys of the rig."""
+    flat = plain("joint")
+    studies = {
+        name: tuple(worked.Case(each, 9.0, edge(name, flat | dict(each)), kind) for each in changes)
+        for name, (changes, _) in worked._studies().items()  # pyright: ignore[reportPrivateUsage]
+    }
+    friction = tuple(worked.Case(each, 9.0, edge("friction", flat | each), kind) for each in worked.friction_range())
+    machines = tuple(worked.Machine(name, 9.0, value) for name, value in (("", 9.8), ("", 9.7), ("", 5.4)))
+    return worked.Worked({}, machines, friction, 13.0, 1.1, (), (), studies)
+
+
+def as_claimed(name: str, flat: dict[str, Any]) -> float:
+    """Edges of which all claims hold."""
+    if name == "gap":
+        return 8.0 * (flat["friction.static"] - flat["friction.coulomb"])
+    return {
+        "mass": 17.0 / (flat["masses.cart"] + flat["masses.stage"]),
+        "share": 6.0,
+        "stiffness": 0.1 * flat["joint.stiffness"] ** 0.5,
+        "stroke": 6.0 if flat["joint.stroke"] > 2.5e-4 else 8.5,
+        "friction": 14.0,
+        "parasitic": 5.6,
+    }[name]
+
+
+def test_claims_hold_differ_or_are_unknown() -> None:
+    holds = claims(studied(as_claimed))
+    assert [each.judgement for each in holds] == ["holds"] * 6
+    differs = claims(studied(lambda name, flat: 30.0 if name in ("share", "friction") else as_claimed(name, flat)))
+    assert [each.judgement for each in differs] == ["holds", "differs", "holds", "holds", "holds", "holds in part"]
+    lost = claims(studied(lambda name, flat: np.nan, UNKNOWN))
+    assert {each.judgement for each in lost} == {"unknown"}
+    assert all("unknown" in each.found for each in lost)
+
+
+def test_edges_below_the_grid_are_good_ones() -> None:
+    """They are neither unknown nor the worst."""
+    below = worked.Case({}, 2.0, np.nan, BELOW)
+    design = worked.Design(8.0, 7.0, 1e3, 1e-3, (below, worked.Case({}, 2.0, 3.0)), 0.5)
+    assert (design.worst, design.does) == (3.0, True)
+    lost = worked.Design(8.0, 7.0, 1e3, 1e-3, (below, worked.Case({}, 2.0, np.nan, UNKNOWN)), 0.5)
+    assert np.isnan(lost.worst)
+    assert not lost.does
+    share = claims(studied(lambda name, flat: np.nan if name == "share" else as_claimed(name, flat), BELOW))[1]
+    assert share.judgement == "holds"
+    assert BELOW in share.found
+
+
+@pytest.mark.parametrize(("static", "low", "high"), [(2.0, 1.0, 1.0), (1.0, 0.85, np.inf), (20.0, 0.0, 2.0)])
+def test_least_gap_that_hunts(static: float, low: float, high: float) -> None:
+    """Found, above all that were tried, and below all."""
+    gaps = static * np.linspace(0.1, 0.85, 11)
+    cases = [worked.Case({"friction.static": static, "friction.coulomb": static - g}, 9.0, 8 * g) for g in gaps]
+    found = least_gap(cases, static)
+    assert (found.low, found.high) == pytest.approx((low, high), rel=1e-6)
+
+
+def test_range_of_crossovers_is_that_about_the_own_one() -> None:
+    assert holding(((0.1, 6.5), (17.0, 69.0)), 8.0) is None
+    assert holding(((0.1, 6.5), (7.0, 69.0)), 8.0) == (7.0, 69.0)
+
+
+def test_parasitic_rows_say_what_the_page_says_of_them() -> None:
+    """At 300 Hz: damped a little it does no harm with the joint locked; hardly damped it has to be 15 times above."""
+    damped, free_damped, light, free_light = (
+        holding(limits(parasitic_stage(ratio, held).flat()).comfortable, 8.0)
+        for ratio in (0.01, 0.001)
+        for held in (True, False)
+    )
+    assert damped is not None
+    assert damped[1] == pytest.approx(69.9, rel=0.01)
+    assert free_damped == pytest.approx((3.82, 14.2), rel=0.01)
+    assert light is not None
+    assert 300 / light[1] == pytest.approx(15.5, rel=0.01)
+    assert free_light is None
+
+
+def parasitic_stage(ratio: float, held: bool) -> Stage:
+    mode = {"parasitic.frequency": "300 Hz", "parasitic.damping_ratio": ratio, "joint.locked": held}
+    return rig().replace({**mode, **DRIVE})
 
 
 # the page
@@ -271,6 +429,8 @@ def test_page_renders_with_its_charts(quick: compute.Guideline, tmp_path: Path) 
     assert len(pictures) == 5
     assert all(f"({name})" in page and files[name].stat().st_size < 300_000 for name in pictures)
     table = files["guideline_edges.csv"].read_text().splitlines()
+    assert table[0].endswith("locked edge,edge,law,kind,multiplier inside,outside,windows")
+    assert {line.count(",") for line in table} == {table[0].count(",")}
     assert len(table) == 1 + sum(len(each.whole.edge) for each in (quick.locked, quick.free))
     document = json.loads(json.dumps(guideline_document(quick), allow_nan=False))
     assert document["laws"]["locked"]["rates"]["slip"]["factor"] == pytest.approx(1.5, rel=1e-3)

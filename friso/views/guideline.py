@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
+from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -12,7 +14,7 @@ import numpy as np
 from friso.studies.guideline import Fit, Guideline
 from friso.studies.guideline.checks import ABOVE, BELOW, MOVES, PERIODS
 from friso.studies.guideline.claims import claims
-from friso.studies.guideline.edges import KINDS
+from friso.studies.guideline.edges import KINDS, STEP
 from friso.studies.guideline.groups import GROUPS, LIMITER_OVER_BRISTLES, values_of
 from friso.studies.guideline.laws import FOLDS, GAIN, Errors, Fitted
 from friso.studies.guideline.parasitic import DRIVE
@@ -27,6 +29,24 @@ from friso.views.guideline_words import formulas, number, percent
 from friso.views.pages import environment
 
 PAGE, TABLE = "guideline.md", "guideline_edges.csv"
+
+
+CONSTANTS: Mapping[str, Any] = {
+    "below": BELOW,
+    "above": ABOVE,
+    "distances": len(DISTANCES),
+    "moves": MOVES,
+    "periods": PERIODS,
+    "folds": FOLDS,
+    "gain": GAIN,
+    "limiter": LIMITER_OVER_BRISTLES,
+    "static": STATIC,
+    "gaps": GAPS,
+    "margin": MARGIN,
+    "at": CLAIMED_AT,
+    "step": f"{100 * (STEP - 1):.0f} %",
+}
+"""Settings of the computation that the page tells."""
 
 
 def write_guideline(found: Guideline, folder: Path) -> list[Path]:
@@ -61,35 +81,33 @@ def guideline_page(found: Guideline) -> str:
         percent=percent,
         studied=STUDIED,
         rows=_rows,
+        worst=_worst(found),
         finite=math.isfinite,
         minutes=found.seconds / 60,
-        constants={
-            "below": BELOW,
-            "above": ABOVE,
-            "distances": len(DISTANCES),
-            "moves": MOVES,
-            "periods": PERIODS,
-            "folds": FOLDS,
-            "gain": GAIN,
-            "limiter": LIMITER_OVER_BRISTLES,
-            "static": STATIC,
-            "gaps": GAPS,
-            "margin": MARGIN,
-            "at": CLAIMED_AT,
-        },
+        constants=CONSTANTS,
         grids={"locked": LOCKED_GRID, "free": FREE_GRID},
         version=VERSION,
     )
+
+
+ONE_WINDOW = "with one window (a diagnosis)"
+"""Name of the rows of samples in which a cycle attracts up to the edge without a break."""
+
+FAR = 1.5
+"""Factor from which an edge is told of as far off the law."""
 
 
 def _errors(found: Guideline) -> list[tuple[str, Errors]]:
     """Errors on held-out samples, by which they are."""
     rows = [
         ("joint locked", found.locked.on_test),
-        ("those with one window", found.held_out(False, _one_window)),
-        *((f"omega_slip/omega_drop {_between(a, b)}", errors) for a, b, errors in found.held_out_by_rates()),
+        (f"of these {ONE_WINDOW}", found.held_out(False, _one_window)),
+        *(
+            (f"omega_slip/omega_drop {_between(each.low, each.high)}", each.errors)
+            for each in found.held_out_by_rates()
+        ),
         ("joint free, all by law", found.free.on_test),
-        ("those with one window", found.held_out(True, _one_window)),
+        (f"of these {ONE_WINDOW}", found.held_out(True, _one_window)),
         ("joint free, locked edge as computed", found.free.given),
     ]
     return [(name, errors) for name, errors in rows if errors is not None]
@@ -97,6 +115,20 @@ def _errors(found: Guideline) -> list[tuple[str, Errors]]:
 
 def _one_window(sweep: Sweep) -> np.ndarray:
     return sweep.edges.windows == 1
+
+
+def _worst(found: Guideline) -> dict[str, Any] | None:
+    """Of the samples, fitted and held out, whose locked edge is off the law by more than a factor: how many, the ends
+    of their gap and stribeck groups, and how many of which kind; None without any."""
+    used = found.locked.whole.usable
+    off = np.abs(np.log(used.edge / found.locked.law.edge(used.values)))
+    far = used.take(off > np.log(FAR))
+    if not len(far.edge):
+        return None
+    kinds = Counter(far.edges.kind.astype(str))
+    ends = {name: _span(far.values[name]) for name in ("gap", "stribeck")}
+    words = ", ".join(f"{kind} ({count})" for kind, count in kinds.most_common())
+    return {"count": len(far.edge), "of": len(used.edge), "factor": FAR, "kinds": words, **ends}
 
 
 def _between(low: float, high: float) -> str:
@@ -142,19 +174,22 @@ def edges_table(found: Guideline) -> str:
         ("free", "held out"): found.free.test,
     }
     names = [name for name in GROUPS if name in found.free.fit.values]
-    lines = [",".join(["joint state", "half", *names, "locked edge", "edge", "kind", "multiplier inside", "outside"])]
+    after = ["locked edge", "edge", "law", "kind", "multiplier inside", "outside", "windows"]
+    lines = [",".join(["joint state", "half", *names, *after])]
     for (state, half), sweep in sweeps.items():
-        lines += [",".join([state, half, *row]) for row in _cells(sweep, names)]
+        law = found.locked.law.edge(sweep.values)
+        law = found.free.law.edge(sweep.values, law) if state == "free" else law
+        lines += [",".join([state, half, *row]) for row in _cells(sweep, law, names)]
     return "\n".join(lines) + "\n"
 
 
-def _cells(sweep: Sweep, names: list[str]) -> list[list[str]]:
+def _cells(sweep: Sweep, law: np.ndarray, names: list[str]) -> list[list[str]]:
     count = len(sweep.edge)
     empty = np.full(count, np.nan)
     edges = sweep.edges
-    numbers = [sweep.values.get(name, empty) for name in names] + [sweep.locked, sweep.edge]
+    numbers = [sweep.values.get(name, empty) for name in names] + [sweep.locked, sweep.edge, law]
     texts = [[_cell(value) for value in column] for column in numbers]
-    after = [[_cell(value) for value in column] for column in (edges.inside, edges.outside)]
+    after = [[_cell(value) for value in column] for column in (edges.inside, edges.outside, edges.windows)]
     return [list(row) for row in zip(*texts, edges.kind.astype(str).tolist(), *after, strict=True)]
 
 
@@ -180,6 +215,7 @@ def guideline_document(found: Guideline) -> dict[str, Any]:
                 "machines": [asdict(machine) for machine in steps.machines],
                 "friction": [_case(case) for case in steps.friction],
                 "highest_locked_edge_hz": steps.bound,
+                "safe_factor": steps.safe,
                 "designs": [[_designed(each) for each in designs] for designs in steps.designs],
                 "studies": {name: [_case(case) for case in cases] for name, cases in steps.studies.items()},
             },
@@ -196,12 +232,13 @@ def _designed(design: Design) -> dict[str, Any]:
         "stiffness_n_per_m": design.stiffness,
         "stroke_m": design.stroke,
         "worst_edge_hz": design.worst,
+        "modulus_margin": design.margin,
         "cases": [_case(case) for case in design.cases],
     }
 
 
 def _case(case: Case) -> dict[str, Any]:
-    return {"changes": dict(case.changes), "law_hz": case.law, "computed_hz": case.computed}
+    return {"changes": dict(case.changes), "law_hz": case.law, "computed_hz": case.computed, "kind": case.kind}
 
 
 def _law(fit: Fit) -> dict[str, Any]:

@@ -7,11 +7,13 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from friso.studies.guideline import Fit, Guideline
-from friso.studies.guideline.edges import FLIP, FOLD, LOST
+from friso.studies.guideline.edges import FLIP, FOLD, JUMP, LOST
+from friso.studies.guideline.rig import Laws, plain
 from friso.studies.guideline.sweeps import Sweep
 from friso.studies.guideline.worked import STUDIED, Case
 from friso.views.figure import (
     BLUE,
+    GREEN,
     GREY,
     INK,
     LIGHT,
@@ -29,12 +31,20 @@ from friso.views.figure import (
 
 ENDS = {
     FLIP: Kind("the cycle flips", BLUE),
+    JUMP: Kind("another cycle takes its place", GREEN),
     FOLD: Kind("it folds", ORANGE),
     LOST: Kind("just beyond, no orbit can be closed", VERMILLION),
 }
 HALVES = (Kind("samples of the fit", LIGHT), Kind("samples held out", BLUE))
 FULL = 1.0
 """Joint force at full stroke over static friction from which a stroke counts as ample in the chart of the joint."""
+
+
+SHARES = 5.0
+"""Share of the joint's effect up to which the chart of the stroke goes at most."""
+
+FINER = 10
+"""Places per step between two computed edges at which a law is drawn."""
 
 
 def guideline_figures(found: Guideline) -> tuple[Figure, ...]:
@@ -87,14 +97,19 @@ def _stroke(found: Guideline) -> Figure:
     felt = joint < sweep.locked  # else the effect is small, and its share a small difference
     x = (joint / stroke) ** 2
     line = np.geomspace(*_ends(x[felt]), 200)
+    y = effect[felt]
+    shown = (float(min(0.0, *(1.05 * y))), float(max(1.6, *(1.05 * y))))
+    shown = max(shown[0], -SHARES), min(shown[1], SHARES)
+    out = int(np.count_nonzero((y < shown[0]) | (y > shown[1])))
     panel = Panel(
         "Joints slower than the locked edge",
         _log("(omega_joint / omega_stroke)^2, about k_j S_j / F_s", x[felt]),
-        Axis("share of the joint's effect", "", (0.0, 1.6)),
+        Axis("share of the joint's effect", "", shown),
         (Series(line, np.minimum(1.0, line), "the law", INK),),
-        clouds=(_by_end(x[felt], effect[felt], sweep.take(felt)),),
+        clouds=(_by_end(x[felt], y, sweep.take(felt)),),
     )
     caption = "The effect is that on 1/omega_edge^2; a stroke beyond 1 adds nothing."
+    caption += f" {out} of {len(y)} points lie outside the chart." if out else ""
     return Figure("guideline_stroke", "How much stroke the joint needs", caption, (panel,))
 
 
@@ -127,7 +142,8 @@ def _scatter(title: str, law: Sequence[Array], computed: Sequence[Array]) -> Pan
 
 def _rig(found: Guideline) -> Figure:
     """The thesis rig with one thing changed at a time."""
-    panels = tuple(_studied(title, x, found.worked.studies[name]) for name, (title, x) in PANELS.items())
+    laws = Laws(found.locked.law, found.free.law)
+    panels = tuple(_studied(title, x, found.worked.studies[name], laws) for name, (title, x) in PANELS.items())
     caption = "Lines: the laws. Points: computed edges. The rig has 1.7 kg, 2.4 N/mm, 1 mm."
     return Figure("guideline_rig", "The thesis rig", caption, panels, 2)
 
@@ -140,16 +156,21 @@ PANELS: Mapping[str, tuple[str, Axis]] = {
 }
 
 
-def _studied(title: str, x: Axis, cases: Sequence[Case]) -> Panel:
+def _studied(title: str, x: Axis, cases: Sequence[Case], laws: Laws) -> Panel:
     name = next(name for name, (known, _) in PANELS.items() if known == title)
-    at = np.array([STUDIED[name](case.changes) for case in cases])
-    law, computed = (np.array([getattr(case, which) for case in cases]) for which in ("law", "computed"))
-    top = 1.15 * float(np.nanmax([law, computed]))
+    at, computed = np.array([(STUDIED[name](case.changes), case.computed) for case in cases]).T
+    places = np.linspace(0, len(cases) - 1, FINER * (len(cases) - 1) + 1)
+    changes = {
+        key: np.interp(places, np.arange(len(cases)), [case.changes[key] for case in cases]) for key in cases[0].changes
+    }
+    finer = plain("joint") | changes
+    law = laws.locked_edge(finer) if name == "mass" else laws.free_edge(finer)
+    top = 1.15 * float(np.nanmax([*law, *computed]))
     return Panel(
         title,
         x,
         Axis("Edge", "Hz", (0.0, top)),
-        (Series(at, law, "law", INK),),
+        (Series(np.asarray(STUDIED[name](changes)), law, "law", INK),),
         (Markers(at, computed, "computed", VERMILLION),),
     )
 

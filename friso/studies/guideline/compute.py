@@ -16,7 +16,7 @@ from friso.engine.kernel import Wanted, kernels
 from friso.hunting.cycle.ensemble import shared_structure
 from friso.quantities import StageError
 from friso.studies.guideline.checks import Checked, checked
-from friso.studies.guideline.groups import Count, counted
+from friso.studies.guideline.groups import Count, counted, values_of
 from friso.studies.guideline.hunting_laws import FREE_LAW, LOCKED_LAW
 from friso.studies.guideline.laws import Errors, Fitted, fitted
 from friso.studies.guideline.parasitic import Parasitic, parasitic_limits
@@ -33,7 +33,7 @@ from friso.studies.guideline.sweeps import (
     locked_sweep,
     together,
 )
-from friso.studies.guideline.worked import Worked, worked
+from friso.studies.guideline.worked import Worked, friction_range, worked
 from friso.studies.thesis.studies import rig
 
 SAMPLES = 1024
@@ -112,15 +112,45 @@ class Guideline:
         law = self.free.law.edge(some.values, locked) if free else locked
         return Errors.between(law, some.edge) if len(law) else None
 
-    def held_out_by_rates(self) -> list[tuple[float, float, Errors | None]]:
-        """Errors of the locked law by the ratio of its two rates: from, to, errors."""
+    def held_out_by_rates(self) -> list[ByRates]:
+        """Errors of the locked law by the ratio of its two rates."""
+        return by_rates(self.locked)
 
-        def ratio(sweep: Sweep) -> np.ndarray:
-            slip, drop = np.exp(self.locked.law.log_rates(sweep.values))
-            return slip / drop
 
-        ends = pairwise(RATIOS)
-        return [(a, b, self.held_out(False, lambda s, a=a, b=b: (ratio(s) >= a) & (ratio(s) < b))) for a, b in ends]
+@dataclass(frozen=True)
+class ByRates:
+    """Errors of the locked law on the held-out samples whose ratio of slip to drop is from `low` to below `high`; None
+    without such samples."""
+
+    low: float
+    high: float
+    errors: Errors | None
+
+
+def by_rates(locked: Fit) -> list[ByRates]:
+    """Errors of the locked law by the ratio of its two rates."""
+    held = locked.test.usable
+    ratio = _ratio(locked.law, held.values)
+    found = []
+    for low, high in pairwise(RATIOS):
+        some = held.take((ratio >= low) & (ratio < high))
+        errors = Errors.between(locked.law.edge(some.values), some.edge) if len(some.edge) else None
+        found.append(ByRates(low, high, errors))
+    return found
+
+
+def safe_over_friction(locked: Fit) -> float:
+    """The largest of the safe factors of those bins of slip over drop that the rig visits over its friction range."""
+    flats = [plain() | each for each in friction_range()]
+    groups = [values_of(flat) for flat in flats]
+    visited = _ratio(locked.law, {name: np.array([each[name] for each in groups], float) for name in groups[0]})
+    bins = [each for each in by_rates(locked) if np.any((visited >= each.low) & (visited < each.high))]
+    return max(each.errors.safe if each.errors else locked.on_test.safe for each in bins)
+
+
+def _ratio(law: Fitted, values: Mapping[str, np.ndarray]) -> np.ndarray:
+    slip, drop = np.exp(law.log_rates(values))
+    return slip / drop
 
 
 def guideline(samples: int = SAMPLES, keep: Path | None = None, progress: Progress | None = None) -> Guideline:
@@ -147,7 +177,7 @@ def guideline(samples: int = SAMPLES, keep: Path | None = None, progress: Progre
     free_fit = _free(free, free_test, locked_fit.law, few)
     told("worked steps", 0)
     laws = Laws(locked_fit.law, free_fit.law)
-    steps = worked(laws, locked_fit.on_test.safe, free_fit.on_test.safe)
+    steps = worked(laws, safe_over_friction(locked_fit), free_fit.on_test.safe)
     modes = parasitic_limits(rig())
     seconds, cores = time.perf_counter() - begin, len(os.sched_getaffinity(0))
     return Guideline(samples, counts(), locked_fit, free_fit, steps, modes, seconds, cores, resumed)

@@ -14,15 +14,28 @@ from friso.studies.guideline.persistence import hunts_somehow
 ROUNDS = 6
 """Bisections of the step of the grid that holds the edge."""
 
-FLIP, FOLD, LOST = "flip", "fold", "lost"
-BELOW, ABOVE = "below the range", "above the range"
+MEETS = 0.9, 1.1
+"""Sizes of the multiplier of one and the same cycle just below a flip, at least, and just above it, at most: the
+bracket of an edge is less than 1 % wide in the end."""
+
+STEP, STEPS = 1.02, 16
+"""Where a cycle is replaced by another, the factor by which is gone upward as long as simulations hunt, and how often
+at most: as far as the next crossover of a sweep's grid."""
+
+LONG = 2000.0
+"""Periods of a small cycle for which is simulated there: transients may be long beside a cycle that repels."""
+
+FLIP, JUMP, FOLD, LOST = "flip", "jump", "fold", "lost"
+BELOW, ABOVE, UNKNOWN = "below the range", "above the range", "unknown"
 
 KINDS = {
     FLIP: "the cycle goes on, but repels (its multiplier has passed -1)",
+    JUMP: "the cycle is replaced by another, which repels (the multipliers do not meet at -1), and simulations settle",
     FOLD: "there is no cycle beyond, from no distance does the stage swing back as far",
     LOST: "beyond, no orbit could be closed near the fixed point of the return map, and simulations settle",
     BELOW: "at no crossover tried does a cycle attract",
     ABOVE: "a cycle attracts up to the highest crossover tried",
+    UNKNOWN: "a simulation that had to decide failed, or after a jump hunting had no end within the steps allowed",
 }
 """What is known of an edge, and of stages without one in the range."""
 
@@ -58,11 +71,13 @@ def joined(parts: list[Edges]) -> Edges:
 
 @dataclass(frozen=True)
 class _Known:
-    """What a multiplier tells: whether the cycle attracts, the multiplier (NaN: no cycle), whether there may be one."""
+    """What is known at crossovers: whether something attracts, the multiplier (NaN: no cycle), whether there may be a
+    cycle that could not be closed, and whether simulation, which had to decide then, failed."""
 
     attracts: np.ndarray
     multiplier: np.ndarray
     uncertain: np.ndarray
+    failed: np.ndarray
 
     def reshaped(self, *shape: int) -> _Known:
         return _Known(*(getattr(self, each.name).reshape(shape) for each in fields(_Known)))
@@ -73,18 +88,20 @@ def _known(stages: Stages, which: np.ndarray, crossover: np.ndarray) -> _Known:
     """Where an orbit may be but could not be closed, a long simulation tells whether anything hunts on."""
     some = stages(which, crossover)
     cycles = hunting_cycles(some)
-    attracts, unsure = cycles.attracting, np.flatnonzero(cycles.uncertain)
+    attracts, failed, unsure = cycles.attracting, np.zeros(some.count, bool), np.flatnonzero(cycles.uncertain)
     if unsure.size:
-        attracts[unsure] = hunts_somehow(some.take(unsure))
-    return _Known(attracts, cycles.multiplier, cycles.uncertain)
+        attracts[unsure], known = hunts_somehow(some.take(unsure))
+        failed[unsure] = ~known
+    return _Known(attracts, cycles.multiplier, cycles.uncertain, failed)
 
 
 def find_edges(stages: Stages, grid: np.ndarray, rounds: int = ROUNDS) -> Edges:
     """The edges of stages whose crossovers are tried on a grid, shape (count, points), ascending; then the step behind
-    the last one at which a cycle attracts is halved, `rounds` times.
+    the last one at which a cycle attracts is halved, `rounds` times, and gone on upward where the cycle is replaced by
+    another one beside which something still hunts.
 
-    A flip is interpolated between the multipliers on both sides of it; else the middle of what is left is taken (of the
-    logarithm).
+    A flip is interpolated between the multipliers on both sides of it, if it comes to lie in what is left of the step;
+    else the middle of that is taken (of the logarithm).
     """
     count, points = grid.shape
     seen = _known(stages, np.repeat(np.arange(count), points), grid.ravel()).reshaped(count, points)
@@ -93,11 +110,13 @@ def find_edges(stages: Stages, grid: np.ndarray, rounds: int = ROUNDS) -> Edges:
     which = np.flatnonzero(some & (last < points - 1))
     nothing = [np.full(count, np.nan) for _ in range(3)]
     windows = (np.diff(seen.attracts, axis=1, prepend=False) & seen.attracts).sum(axis=1)
-    edges = Edges(nothing[0], np.where(some, ABOVE, BELOW).astype(object), nothing[1], nothing[2], windows)
+    kind = np.where(some, ABOVE, np.where(seen.failed.any(axis=1), UNKNOWN, BELOW)).astype(object)
+    edges = Edges(nothing[0], kind, nothing[1], nothing[2], windows)
     if which.size:
         search = _Search(stages, which, grid, seen, last)
         for _ in range(rounds):
             search.halve()
+        search.follow()
         for name, found in search.found().items():
             getattr(edges, name)[which] = found
     return edges
@@ -107,8 +126,9 @@ class _Search:
     """Steps that hold an edge on their way to being halved; all arrays of shape (stages,).
 
     `low`, the logarithm of a crossover at which a cycle attracts, with its multiplier; `high`, one at which none is
-    known to, and whether that is because no orbit could be closed; and `flip`, the lowest known one at which the cycle
-    repels (inf: none), with its multiplier, which tells of the edge where orbits just above it cannot be closed.
+    known to, and whether that is because no orbit could be closed; `flip`, the lowest known one at which the cycle
+    repels (inf: none), with its multiplier, which tells of the edge where orbits just above it cannot be closed; and
+    whether a simulation above failed.
     """
 
     def __init__(self, stages: Stages, which: np.ndarray, grid: np.ndarray, seen: _Known, last: np.ndarray) -> None:
@@ -122,6 +142,7 @@ class _Search:
         first = flips.argmax(axis=1)
         self.flip = np.where(flips.any(axis=1), np.log(grid[which, first]), np.inf)
         self.flipped = seen.multiplier[which, first]
+        self.failed = (beyond & seen.failed[which]).any(axis=1)
 
     def halve(self) -> None:
         middle = (self.low + self.high) / 2
@@ -131,15 +152,39 @@ class _Search:
         self.high, self.outside = np.where(inside, self.high, middle), np.where(inside, self.outside, seen.multiplier)
         self.unsure = np.where(inside, self.unsure, seen.uncertain)
         self.flip, self.flipped = np.where(flips, middle, self.flip), np.where(flips, seen.multiplier, self.flipped)
+        self.failed |= seen.failed
+
+    @property
+    def jumps(self) -> np.ndarray:
+        """Where a repelling cycle is known just above, but not that which attracts just below."""
+        meets = (self.inside < -MEETS[0]) & (-MEETS[1] < self.outside) & (self.outside < 0)
+        return np.isfinite(self.outside) & ~meets
+
+    def follow(self) -> None:
+        """Go on upward from jumps as long as simulations hunt."""
+        on = np.flatnonzero(self.jumps)
+        for _ in range(STEPS):
+            if not on.size:
+                return
+            hunts, known = hunts_somehow(self.stages(self.which[on], np.exp(self.high[on])), LONG)
+            self.failed[on] |= ~known
+            on = on[hunts]
+            self.low[on] = self.high[on]
+            self.high[on] += np.log(STEP)
+        self.failed[on] = True
 
     def found(self) -> dict[str, np.ndarray]:
         """What the steps tell of the edges, by the names of `Edges`."""
-        flips = np.isfinite(self.inside) & np.isfinite(self.flip) & (np.isfinite(self.outside) | self.unsure)
         off = np.abs(self.inside) - 1, np.abs(self.flipped) - 1
         crossed = self.low - off[0] * (self.flip - self.low) / (off[1] - off[0])
+        within = (self.low <= crossed) & (crossed <= self.high)
+        surely = np.isfinite(self.outside) & ~self.jumps
+        flips = within & (surely | (self.unsure & (self.inside < -MEETS[0]) & (self.flipped < 0)))
+        kind = np.where(flips, FLIP, np.where(self.jumps, JUMP, np.where(self.unsure, LOST, FOLD)))
+        edge = np.exp(np.where(flips, crossed, (self.low + self.high) / 2))
         return {
-            "crossover": np.exp(np.where(flips, crossed, (self.low + self.high) / 2)),
-            "kind": np.where(flips, FLIP, np.where(self.unsure, LOST, FOLD)),
+            "crossover": np.where(self.failed, np.nan, edge),
+            "kind": np.where(self.failed, UNKNOWN, kind),
             "inside": self.inside,
             "outside": np.where(flips, self.flipped, self.outside),
         }

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
-from friso.frequency.crossover import limits
+from friso.frequency.crossover import limits, settled_members
+from friso.frequency.family import scan
+from friso.frequency.ranges import Range
 from friso.stage import Stage
 
 FREQUENCIES = (100.0, 200.0, 300.0, 600.0, 1000.0)
@@ -19,14 +23,14 @@ DRIVE = {"drive.sample_time": "50 us", "drive.delay": "50 us"}
 
 @dataclass(frozen=True)
 class Parasitic:
-    """A parasitic mode at a frequency [Hz] with a damping ratio, and the crossovers [Hz], joint locked and free, up to
-    which the modulus margin is 0.5 in all settled states: the end of the range that holds the rig's own, or of the next
-    below; None where there is none."""
+    """A parasitic mode at a frequency [Hz] with a damping ratio, and the range of crossovers [Hz], joint locked and
+    free, that holds the stage's own and in which the modulus margin is 0.5 in all settled states; None where the stage
+    lacks it at its own crossover."""
 
     frequency: float
     damping_ratio: float
-    locked: float | None
-    free: float | None
+    locked: Range | None
+    free: Range | None
 
 
 def parasitic_limits(stage: Stage) -> list[Parasitic]:
@@ -36,8 +40,24 @@ def parasitic_limits(stage: Stage) -> list[Parasitic]:
         for frequency in FREQUENCIES:
             mode = {"parasitic.frequency": f"{frequency!r} Hz", "parasitic.damping_ratio": damping, **DRIVE}
             locked, free = (
-                limits(stage.replace({**mode, "joint.locked": held}).flat()).highest_comfortable
-                for held in (True, False)
+                _comfortable(stage.replace({**mode, "joint.locked": held}).flat()) for held in (True, False)
             )
             found.append(Parasitic(frequency, damping, locked, free))
     return found
+
+
+def settled_margin(stage: Stage, changes: Mapping[str, Any]) -> float:
+    """The least modulus margin of the settled states of a stage with these changes (flat keys to SI numbers), sampled
+    as the thesis's drive; 0 if one of them is not stable."""
+    flat = stage.replace(DRIVE).flat() | dict(changes)
+    seen = scan(flat, settled_members(flat))
+    return float(seen.distance.min()) if seen.stable.all() else 0.0
+
+
+def _comfortable(flat: Mapping[str, Any]) -> Range | None:
+    return holding(limits(flat).comfortable, flat["controller.crossover"])
+
+
+def holding(ranges: Sequence[Range], own: float) -> Range | None:
+    """The range that holds a crossover; None if none does."""
+    return next((each for each in ranges if each[0] <= own <= each[1]), None)

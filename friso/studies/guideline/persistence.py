@@ -14,13 +14,17 @@ from friso.engine.kernel import kernel
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.rest import stuck, wait
 
-DISTANCES = np.geomspace(0.05, 2.0, 72)
-"""Where a stage sticks at first, in units of the deflection of the loop by the break-away force: 5 % apart, about
-every cycle, whose own distance is 0.1 to 1.5 of them."""
+DISTANCES = np.geomspace(0.02, 2.0, 95)
+"""Where a stage sticks at first, in units of the deflection of the loop by the break-away force: 5 % apart, about every
+cycle, whose own distance is 0.03 (at the smallest friction gaps) to 1.5 of them."""
 
-SMALL = 0.1
-"""Distance, in the same units, of a small cycle: its period is the longest, since a stage waits the longer the nearer
-it sticks. A stage that swings by less than this does not hunt."""
+SMALL = 0.01
+"""Peak to peak, in the same units, up to which a motion does not count as hunting: the smallest cycles of the sweeps,
+those of the smallest friction gaps, swing by 0.06 and more."""
+
+SLOW = 0.05
+"""Distance, in the same units, whose cycle tells how long is simulated: a stage waits the longer the nearer it sticks,
+so that the periods of small cycles are the longest."""
 
 PERIODS, LAST = 200.0, 2.0
 """Periods of such a cycle for which is simulated unless told, and those at the end in which the stage is looked at.
@@ -47,7 +51,7 @@ def from_rest(stages: Ensemble, distances: np.ndarray) -> Begin:
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def still_hunts(stages: Ensemble, begin: Begin, periods: float = PERIODS) -> tuple[np.ndarray, np.ndarray]:
     """Which stages still hunt at the end, and which runs were completed, both of shape (count,)."""
-    period = 2 * (wait(stages, SMALL * stages.length) + 2 * np.pi / stages.number("rate"))
+    period = 2 * (wait(stages, SLOW * stages.length) + 2 * np.pi / stages.number("rate"))
     end = begin.over + periods * period
     options = Options(rtol=RTOL, window=1 - LAST / periods, record_from=float(np.min(end)) / 2, least_swing=np.inf)
     flat = {**stages.flat, **begin.motion, "motion.duration": end}
@@ -59,8 +63,11 @@ def still_hunts(stages: Ensemble, begin: Begin, periods: float = PERIODS) -> tup
     return hunts, completed
 
 
-def hunts_somehow(stages: Ensemble) -> np.ndarray:
-    """Which stages hunt for ever from some of the distances, shape (count,)."""
+def hunts_somehow(stages: Ensemble, periods: float = PERIODS) -> tuple[np.ndarray, np.ndarray]:
+    """Which stages hunt for ever from some of the distances, and of which that is known, both of shape (count,): a
+    stage of which a run failed, while none hunts, may hunt or not."""
     several = stages.take(np.repeat(np.arange(stages.count), len(DISTANCES)))
-    hunts, _ = still_hunts(several, from_rest(several, np.tile(DISTANCES, stages.count)))
-    return np.any(hunts.reshape(stages.count, -1), axis=1)
+    runs = still_hunts(several, from_rest(several, np.tile(DISTANCES, stages.count)), periods)
+    hunts, completed = (each.reshape(stages.count, -1) for each in runs)
+    some = np.any(hunts, axis=1)
+    return np.asarray(some), np.asarray(some | np.all(completed, axis=1))

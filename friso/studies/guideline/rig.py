@@ -11,7 +11,7 @@ import numpy as np
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.margin import margin
 from friso.stage import Stage
-from friso.studies.guideline.edges import find_edges
+from friso.studies.guideline.edges import ABOVE, BELOW, FLIP, find_edges
 from friso.studies.guideline.groups import values_of
 from friso.studies.guideline.laws import Fitted
 from friso.studies.thesis.studies import rig
@@ -26,11 +26,19 @@ Changes = Mapping[str, Any]
 
 @dataclass(frozen=True)
 class Case:
-    """A stage of the rig's kind: what is changed, and its edge [Hz] by the law and as computed (NaN: none found)."""
+    """A stage of the rig's kind: what is changed, and its edge [Hz] by the law and as computed (NaN: none found), with
+    its `kind`, one of `KINDS`, which tells why there is none."""
 
     changes: Changes
     law: float
     computed: float
+    kind: str = FLIP
+
+    @property
+    def ranked(self) -> float:
+        """The computed edge [Hz] to be compared: 0 if it lies below the crossovers tried, infinite if above, NaN if it
+        is not known."""
+        return {BELOW: 0.0, ABOVE: np.inf}.get(self.kind, self.computed)
 
 
 @dataclass(frozen=True)
@@ -85,10 +93,11 @@ def cases(laws: Laws, changes: Sequence[Changes], free: bool) -> list[Case]:
         return Ensemble.held(some | {"controller.crossover": crossover}, len(which))
 
     grid = FREE_GRID if free else RIGID_GRID
-    computed = find_edges(stages, np.broadcast_to(grid, (len(changes), len(grid)))).crossover
+    found = find_edges(stages, np.broadcast_to(grid, (len(changes), len(grid))))
     known = plain("joint") | {key: value for key, value in flat.items() if not key.startswith("parasitic.")}
-    law = np.broadcast_to(laws.free_edge(known) if free else laws.locked_edge(known), computed.shape)
-    return [Case(*each) for each in zip(changes, law.tolist(), computed.tolist(), strict=True)]
+    law = np.broadcast_to(laws.free_edge(known) if free else laws.locked_edge(known), found.kind.shape)
+    columns = law.tolist(), found.crossover.tolist(), found.kind.astype(str).tolist()
+    return [Case(*each) for each in zip(changes, *columns, strict=True)]
 
 
 def direct(stage: Stage) -> float:

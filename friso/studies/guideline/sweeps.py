@@ -7,13 +7,16 @@ import os
 import shutil
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 
 import numpy as np
 from scipy.stats import qmc
 
+import friso.hunting.cycle as hunting_cycle
 from friso.hunting.cycle.ensemble import Ensemble
+from friso.studies.guideline import edges as edges_module
+from friso.studies.guideline import groups, persistence
 from friso.studies.guideline.edges import ROUNDS, Edges, find_edges, joined
 from friso.studies.guideline.groups import flat_of
 from friso.version import VERSION
@@ -112,7 +115,8 @@ class Keep:
         """The part with this name: as it was kept, or made now and kept."""
         if self.folder is None:
             return make()
-        settings = (VERSION, name, LOCKED_BOX, JOINT_BOX, LOCKED_GRID.tolist(), FREE_GRID.tolist(), ROUNDS)
+        boxes = LOCKED_BOX, JOINT_BOX, LOCKED_GRID.tolist(), FREE_GRID.tolist()
+        settings = (VERSION, _sources(), name, *boxes, ROUNDS)
         key = hashlib.sha256(repr(settings).encode()).hexdigest()[:16]
         path = self.folder / f"{key}.npz"
         if path.exists():
@@ -126,6 +130,14 @@ class Keep:
             np.savez(file, allow_pickle=False, **(vars(made) | words))
         os.replace(half, path)  # whole, or not there
         return made
+
+
+@cache
+def _sources() -> str:
+    """A hash of the modules that make edges: parts that others made are not taken over."""
+    cycle = sorted(Path(hunting_cycle.__file__ or "").parent.glob("*.py"))
+    paths = [*(Path(str(module.__file__)) for module in (edges_module, groups, persistence)), *cycle]
+    return hashlib.sha256(b"".join(path.read_bytes() for path in paths)).hexdigest()
 
 
 def drawn(box: Box, count: int, seed: int) -> dict[str, np.ndarray]:

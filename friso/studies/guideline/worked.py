@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 from scipy.optimize import brentq
 
-from friso.studies.guideline.rig import Case, Laws, cases, direct, plain
+from friso.studies.guideline.parasitic import settled_margin
+from friso.studies.guideline.rig import FREE_GRID, Case, Laws, cases, direct, plain
 from friso.studies.guideline.sweeps import LOCKED_BOX
 from friso.studies.thesis.studies import rig
 
@@ -54,13 +55,15 @@ class Machine:
 @dataclass(frozen=True)
 class Design:
     """An isolator for a bandwidth limit [Hz]: the edge [Hz] for which it is laid out by the law, `aim`; its stiffness
-    [N/m], the stroke that it needs [m] and the `force` at full stroke [N]; and its edges over the friction range."""
+    [N/m], the stroke that it needs [m] and the `force` at full stroke [N]; its edges over the friction range, and the
+    least modulus `margin` of the settled states at the limit, with the rig's own friction and parasitic mode."""
 
     limit: float
     aim: float
     stiffness: float
     stroke: float
     cases: tuple[Case, ...]
+    margin: float
 
     @property
     def force(self) -> float:
@@ -68,8 +71,8 @@ class Design:
 
     @property
     def worst(self) -> float:
-        """The highest edge computed [Hz]; NaN if one is not known."""
-        return max((case.computed for case in self.cases), key=lambda edge: edge if np.isfinite(edge) else np.inf)
+        """The highest edge computed [Hz], or the least crossover tried if all lie below; NaN if one is not known."""
+        return float(np.max([FREE_GRID[0], *(case.ranked for case in self.cases)]))  # NaN if one of them is
 
     @property
     def does(self) -> bool:
@@ -93,7 +96,8 @@ class Need:
 @dataclass(frozen=True)
 class Worked:
     """The rig: its `rates` [Hz] by name; `machines` by law and computation; its edge over the `friction` range, rigid,
-    and the `bound` [Hz] that the law has over all friction forces; what it `needs`, by bandwidth limit, and where that
+    the `bound` [Hz] that the law has over all friction forces at the rig's bristles and masses and the gaps swept, and
+    the `safe` factor on the locked law; what it `needs`, by bandwidth limit, and where that
     is an isolator its `designs`, by the law and then corrected until computation agrees; and the `studies` of claims of
     the thesis, by name."""
 
@@ -101,14 +105,15 @@ class Worked:
     machines: tuple[Machine, ...]
     friction: tuple[Case, ...]
     bound: float
+    safe: float
     needs: tuple[Need, ...]
     designs: tuple[tuple[Design, ...], ...]
     studies: Mapping[str, tuple[Case, ...]]
 
     @property
     def worst(self) -> Case:
-        """The case of the friction range with the highest computed edge."""
-        return max(self.friction, key=lambda case: case.computed if np.isfinite(case.computed) else 0.0)
+        """The case of the friction range with the highest computed edge, or one of which it is not known."""
+        return max(self.friction, key=lambda case: case.ranked if case.ranked == case.ranked else np.inf)
 
 
 def friction_range(gaps: Sequence[float] = GAPS) -> list[dict[str, float]]:
@@ -126,6 +131,7 @@ def worked(laws: Laws, safe_locked: float, safe_free: float) -> Worked:
         machines(laws),
         tuple(friction),
         highest(laws),
+        safe_locked,
         needs,
         tuple(designed(laws, each.limit, safe_free) for each in needs if each.needed),
         {name: tuple(cases(laws, changes, free)) for name, (changes, free) in _studies().items()},
@@ -150,7 +156,8 @@ def machines(laws: Laws) -> tuple[Machine, ...]:
 
 
 def highest(laws: Laws) -> float:
-    """The highest edge [Hz] of the rig by the law, over all friction forces with a gap in the range."""
+    """The highest edge [Hz] of the rig by the law, over all friction forces with a gap in the range, its masses and
+    bristles as they are: the edge goes with sqrt(sigma_0/m)."""
     static, gap = np.meshgrid(np.geomspace(0.05, 500.0, 400), np.linspace(*LOCKED_BOX["gap"], 50))
     flat = plain() | {"friction.static": static.ravel(), "friction.coulomb": (static * (1 - gap)).ravel()}
     return float(laws.locked_edge(flat).max())
@@ -179,7 +186,9 @@ def _design(laws: Laws, limit: float, aim: float) -> Design:
     stiffness = MARGIN * _root(lambda log: over(np.exp(log), AMPLE), np.log(1.0), np.log(1e7))
     stroke = _root(lambda log: over(stiffness, np.exp(log)), np.log(1e-7), np.log(AMPLE))
     changes = [each | {"joint.stiffness": stiffness, "joint.stroke": stroke} for each in forces]
-    return Design(limit, aim, stiffness, stroke, tuple(cases(laws, changes, free=True)))
+    joint = {"joint.stiffness": stiffness, "joint.stroke": stroke}
+    margin = settled_margin(rig(), joint | {"controller.crossover": limit})
+    return Design(limit, aim, stiffness, stroke, tuple(cases(laws, changes, free=True)), margin)
 
 
 DESIGN_GAPS = (0.3, 0.6, 0.85)
