@@ -71,13 +71,18 @@ class Design:
 
     @property
     def worst(self) -> float:
-        """The highest edge computed [Hz], or the least crossover tried if all lie below; NaN if one is not known."""
-        return float(np.max([FREE_GRID[0], *(case.ranked for case in self.cases)]))  # NaN if one of them is
+        """The highest edge that is known [Hz], or the least crossover tried if all lie below."""
+        return float(np.nanmax([FREE_GRID[0], *(case.ranked for case in self.cases)]))
+
+    @property
+    def unknown(self) -> int:
+        """Pairs of friction forces whose edge could not be computed."""
+        return int(np.isnan([case.ranked for case in self.cases]).sum())
 
     @property
     def does(self) -> bool:
         """Whether no cycle attracts at the limit over the friction range."""
-        return self.worst <= self.limit
+        return self.worst <= self.limit and not self.unknown
 
 
 @dataclass(frozen=True)
@@ -165,10 +170,11 @@ def highest(laws: Laws) -> float:
 
 def designed(laws: Laws, limit: float, safe: float) -> tuple[Design, ...]:
     """The isolator by the law, its edge by a safety factor below the limit; then, as long as computed edges are above
-    the limit, again with the aim lowered by as much."""
+    the limit, again with the aim lowered by as much, and where one is unknown at least by `BLIND`."""
     found = [_design(laws, limit, limit / safe)]
-    while not found[-1].does and len(found) < CORRECTED and np.isfinite(found[-1].worst):
-        found.append(_design(laws, limit, CLOSER * found[-1].aim * limit / found[-1].worst))
+    while not found[-1].does and len(found) < CORRECTED:
+        share = min(limit / found[-1].worst, BLIND if found[-1].unknown else 1.0)
+        found.append(_design(laws, limit, CLOSER * found[-1].aim * share))
     return tuple(found)
 
 
@@ -196,6 +202,9 @@ DESIGN_GAPS = (0.3, 0.6, 0.85)
 
 CORRECTED, CLOSER = 5, 0.98
 """Designs at most, that by the law included, and the factor on each new aim, with which fewer are needed."""
+
+BLIND = 0.85
+"""Factor on the new aim where an edge is unknown."""
 
 MARGIN = 0.9
 """Share of the stiffest joint that is chosen: at all of it only an endless stroke would do."""
