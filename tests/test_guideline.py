@@ -97,7 +97,7 @@ def test_groups_and_back() -> None:
 
 
 @RIGID
-@settings(max_examples=8, deadline=None)
+@settings(max_examples=8, deadline=None, derandomize=True)
 @given(*[st.floats(-3, 3)] * 3)
 def test_equal_groups_equal_multiplier(mass: float, stiffness: float, force: float) -> None:
     """Whatever mass, stiffness and force are, to a thousandth and a thousand times as large."""
@@ -320,7 +320,7 @@ def test_edges_below_the_grid_are_good_ones() -> None:
     design = worked.Design(8.0, 7.0, 1e3, 1e-3, (below, worked.Case({}, 2.0, 3.0)), 0.5)
     assert (design.worst, design.does) == (3.0, True)
     lost = worked.Design(8.0, 7.0, 1e3, 1e-3, (below, worked.Case({}, 2.0, np.nan, UNKNOWN)), 0.5)
-    assert np.isnan(lost.worst)
+    assert (lost.worst, lost.unknown) == (1.0, 1)
     assert not lost.does
     share = claims(studied(lambda name, flat: np.nan if name == "share" else as_claimed(name, flat), BELOW))[1]
     assert share.judgement == "holds"
