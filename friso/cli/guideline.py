@@ -18,11 +18,11 @@ UNFINISHED = ".guideline"
 def guideline(
     samples: Annotated[
         int, typer.Option(metavar="NUMBER", help="Samples for the locked law, from 64; the other sweeps are shares.")
-    ] = 1024,
+    ] = 512,
     out: OutFolder = Path("guideline"),
     as_json: AsJson = False,
 ) -> None:
-    """The design guideline: guideline.md, its charts, guideline_edges.csv. Half an hour on two shared cores.
+    """The design guideline: guideline.md, its charts, guideline_edges.csv. Ten minutes on two cores, twenty if shared.
 
     Example: friso guideline --out docs
     A quick try: friso guideline --samples 64 --out /tmp/guideline

@@ -36,7 +36,7 @@ from friso.studies.guideline.sweeps import (
 from friso.studies.guideline.worked import Worked, friction_range, worked
 from friso.studies.thesis.studies import rig
 
-SAMPLES = 1024
+SAMPLES = 512
 """Samples to which the locked law is fitted unless told; the other sweeps are shares of it."""
 
 FEWEST, MOST = 64, 65536
