@@ -47,10 +47,7 @@ def harmonic_balance(
     if "controller.crossover" not in flat:
         raise StageError("controller", "gains", "a crossover", 'crossover = "8 Hz", alpha = 0.1, beta = 2')
     stages = Ensemble.held({**flat, "controller.crossover": rates}, len(rates))
-    cycles = hunting_cycles(stages, rtol)
-    if cycles.sign >= 0 or not cycles.found.all():
-        why = "; ".join({str(reason) for reason in cycles.reasons if reason}) or "a cycle that is not symmetric"
-        raise StageError("crossovers", why, "a stage with a symmetric hunting cycle at each", "4 Hz")
+    cycles = _symmetric(stages, rtol)
     singles = [single_harmonic(stage.replace({"controller.crossover": f"{rate!r} Hz"})) for rate in map(float, rates)]
     known = {
         "period": (cycles.period, "s"),
@@ -67,6 +64,15 @@ def harmonic_balance(
     variables |= {name: (plane, [[cell[k] for cell in row] for row in rows]) for k, name in enumerate(names)}
     coords = {"crossover": ("crossover", rates, {"units": "Hz"}), "highest": list(harmonics)}
     return xr.Dataset(variables, coords, {"stage": stage.to_toml(), "rtol": rtol})
+
+
+def _symmetric(stages: Ensemble, rtol: float) -> Cycles:
+    """The cycle of every stage that is its own mirror image. Raises StageError where one has none."""
+    cycles = hunting_cycles(stages, rtol)
+    if cycles.sign >= 0 or not cycles.found.all():
+        why = "; ".join({str(reason) for reason in cycles.reasons if reason}) or "a cycle that is not symmetric"
+        raise StageError("crossovers", why, "a stage with a symmetric hunting cycle at each", "4 Hz")
+    return cycles
 
 
 def _errors(
