@@ -23,9 +23,10 @@ from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import hunting_cycles
 from friso.quantities import StageError
 from friso.stage import Stage
-from friso.studies.guideline import checks, compute, persistence, sweeps, worked
+from friso.hunting import persistence
+from friso.studies.guideline import checks, compute, sweeps, worked
 from friso.studies.guideline.claims import claims, least_gap
-from friso.studies.guideline.edges import ABOVE, BELOW, FLIP, JUMP, LOST, UNKNOWN, Edges, find_edges
+from friso.hunting.edges import ABOVE, BELOW, FLIP, JUMP, LOST, UNKNOWN, Edges, find_edges
 from friso.studies.guideline.groups import (
     GROUPS,
     PARAMETERS,
@@ -39,7 +40,7 @@ from friso.studies.guideline.groups import (
 from friso.studies.guideline.hunting_laws import FREE_LAW, LOCKED_LAW
 from friso.studies.guideline.laws import Errors, Law, Rate, fitted, in_series
 from friso.studies.guideline.parasitic import DRIVE, holding
-from friso.studies.guideline.persistence import hunts_somehow
+from friso.hunting.persistence import hunts_somehow
 from friso.studies.guideline.rig import plain
 from friso.studies.thesis.studies import rig
 

@@ -16,6 +16,7 @@ from friso.cli.bode import bode
 from friso.cli.boundary import boundary
 from friso.cli.check import check
 from friso.cli.common import INTERRUPTED, say
+from friso.cli.flexure import flexure
 from friso.cli.guideline import guideline
 from friso.cli.init import init
 from friso.cli.map import map_cells
@@ -38,6 +39,7 @@ for name, command in (
     ("map", map_cells),
     ("bode", bode),
     ("boundary", boundary),
+    ("flexure", flexure),
     ("reproduce", reproduce),
     ("guideline", guideline),
 ):

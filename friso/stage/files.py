@@ -14,13 +14,13 @@ _EXAMPLE = '[masses] and, on the next line, cart = "1.2 kg"'
 
 def load(path: str | os.PathLike[str]) -> Stage:
     """The stage of a TOML file. Raises StageError."""
-    return loads(_text(Path(path)), origin=str(path))
+    return loads(text_of(Path(path)), origin=str(path))
 
 
 def loads(text: str, origin: str = "stage file") -> Stage:
     """The stage of a TOML text; `origin` names it in errors. Raises StageError."""
     try:
-        return Stage(**_parsed(text))
+        return Stage(**parsed(text, _EXPECTED))
     except StageError as error:
         raise error.found_in(origin) from None
 
@@ -61,7 +61,8 @@ def _value(text: str) -> Any:
     return document["line"]["value"] if is_one_value else text
 
 
-def _text(path: Path) -> str:
+def text_of(path: Path) -> str:
+    """What stands in a text file. Raises StageError."""
     try:
         return path.read_bytes().decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -76,12 +77,13 @@ def _reason(error: OSError | ValueError) -> str:
     return str(getattr(error, "strerror", None) or error).lower()
 
 
-def _parsed(text: str) -> dict[str, Any]:
+def parsed(text: str, expected: str) -> dict[str, Any]:
+    """The tables of a TOML text that is to be what is `expected`. Raises StageError."""
     if not text.strip():
-        raise StageError("", "an empty file", _EXPECTED, _EXAMPLE)
+        raise StageError("", "an empty file", expected, _EXAMPLE)
     try:
         return tomllib.loads(text)
     except RecursionError:
-        raise StageError("", "tables nested too deeply", _EXPECTED, _EXAMPLE) from None
+        raise StageError("", "tables nested too deeply", expected, _EXAMPLE) from None
     except ValueError as error:  # TOMLDecodeError, and Python's own for integers of thousands of digits
         raise StageError("", f"not TOML: {error}", "tables in brackets, then key = value", _EXAMPLE) from None

@@ -130,7 +130,7 @@ def _described(cls: type[Section], key: str) -> tuple[str, str]:
     for item in field.metadata:
         if isinstance(item, Table):
             return f"a table [{key}]", item.example
-        if isinstance(item, Quantity | Number):
+        if hasattr(item, "written_example"):
             return item.expected, f"{key} = {item.written_example}"
     if field.annotation is bool:
         return "true or false", f"{key} = true"

@@ -1,12 +1,13 @@
 """The stage: all tables together, and the flat SI mapping that the equations read."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Annotated, Any, ClassVar, Self
 
 import numpy as np
 from pydantic import field_validator, model_validator
 
 from friso.quantities import Number, Quantity, StageError, as_toml, quoted
+from friso.stage.flexure import Flexure, derived, with_material
 from friso.stage.section import Rule, Section, Table, numeric_fields, unknown_key
 from friso.stage.tables import (
     FRICTION,
@@ -26,6 +27,7 @@ from friso.stage.tables import (
 
 _FRICTION = Table(FRICTION.pick, '[friction] model = "lugre" ...')
 _JOINT = Table(lambda _: Joint, '[joint] stiffness = "2.4 N/mm" ...')
+_FLEXURE = Table(lambda _: Flexure, '[flexure] leaves = 2, length = "70 mm", width = "45 mm" ...')
 _PARASITIC = Table(lambda _: Parasitic, '[parasitic] frequency = "300 Hz" ...')
 _BIAS = Table(lambda _: Bias, '[bias] cart = "0.2 N"')
 _CONTROLLER = Table(controller_form, '[controller] kind = "pid", crossover = "8 Hz", alpha = 0.1, beta = 2')
@@ -41,6 +43,7 @@ class Stage(Section):
     masses: Annotated[Masses, Table(lambda _: Masses, '[masses] cart = "1.2 kg"')]
     friction: Annotated[FrictionSection | None, _FRICTION] = None
     joint: Annotated[Joint | None, _JOINT] = None
+    flexure: Annotated[Flexure | None, _FLEXURE] = None  # type: ignore[valid-type]
     parasitic: Annotated[Parasitic | None, _PARASITIC] = None
     bias: Annotated[Bias | None, _BIAS] = None
     controller: Annotated[Controller, _CONTROLLER]
@@ -77,8 +80,10 @@ class Stage(Section):
         if self.joint and (self.masses.cart is None or self.masses.stage is None):
             given = "a [joint], but a single mass"
             raise StageError("masses", given, "both masses", 'cart = "1.2 kg", stage = "0.5 kg"')
-        if self.parasitic and not self.joint:
-            raise StageError("parasitic", "a parasitic mode, but no [joint]", "both or neither", _JOINT.example)
+        for table in ("parasitic", "flexure"):
+            if getattr(self, table) and not self.joint:
+                raise StageError(table, f"a [{table}], but no [joint]", "both or neither", _JOINT.example)
+        self._has_one_stiffness()
         for body in ("cart", "stage"):
             if self.bias and getattr(self.bias, body) is not None and getattr(self.masses, body) is None:
                 example = f'[masses] {body} = "1 kg"'
@@ -88,10 +93,22 @@ class Stage(Section):
                 raise StageError(", ".join(rule.keys), self._written(rule), rule.expected, rule.example)
         return self
 
+    def _has_one_stiffness(self) -> None:
+        """A joint has its stiffness, or leaf springs from which it follows."""
+        joint = self.joint
+        if joint and self.flexure:
+            given = ["joint.stiffness"] if joint.stiffness is not None else ["[parasitic]"] if self.parasitic else []
+            if given:
+                expected = "one of the two: stiffness and parasitic mode follow from the leaf springs"
+                raise StageError(given[0], f"{given[0]} together with [flexure]", expected, _FLEXURE.example)
+        elif joint and not joint.locked and joint.stiffness is None:
+            expected = "the stiffness of the joint, or a [flexure]; only a joint with locked = true can do without"
+            raise StageError("joint.stiffness", "nothing", expected, 'stiffness = "2.4 N/mm"')
+
     def _written(self, rule: Rule) -> str:
         """The values that a rule is about, as the user wrote them."""
         pairs = [key.split(".") for key in rule.keys]
-        values = [(name, getattr(getattr(self, table), name)) for table, name in pairs]
+        values = [(name, getattr(getattr(self, table), name)) for table, name in pairs if getattr(self, table)]
         return ", ".join(f"{name} = {quoted(getattr(value, 'text', value))}" for name, value in values)
 
     def given(self) -> dict[str, Any]:
@@ -111,10 +128,12 @@ class Stage(Section):
                 given = {key: value for key, value in section if value is not None}
                 flat |= {f"{table}.{key}": _plain(value) for key, value in given.items()}
         known = numeric_keys(flat)
+        if self.flexure:
+            known = {key: item for key, item in known.items() if not key.startswith(("parasitic.", "joint.stiffness"))}
         for key in swept or {}:
             if key not in known:
                 raise unknown_key(key, known)
-        return _with_defaults(flat | dict(swept or {}))
+        return derived(_with_defaults(flat | dict(swept or {})))
 
     def replace(self, changes: Mapping[str, Any]) -> "Stage":
         """The stage with dotted keys set, or removed by None; checked like a file. Raises StageError."""
@@ -123,12 +142,19 @@ class Stage(Section):
             _put(tables, key, getattr(value, "text", value))
         return Stage(**tables)
 
+    def with_numbers(self, numbers: Mapping[str, float], without: Iterable[str] = ()) -> "Stage":
+        """The stage with SI numbers for dotted keys, written such that they are read again as the same ones, and
+        without some tables. Raises StageError."""
+        known = numeric_keys({**self.flat(), **numbers})
+        texts = {key: f"{value!r} {known[key].unit}" if known[key].unit else value for key, value in numbers.items()}
+        return self.replace(texts | dict.fromkeys(without))
+
     def variants(self) -> "Mapping[str, Stage]":
         """The stage as "given" and, if it has a joint, with that "locked" and (if its stiffness is known) "free"."""
         variants: dict[str, Stage | Self] = {"given": self}
         if self.joint:
             variants["locked"] = self.replace({"joint.locked": True})
-            if self.joint.stiffness is not None:
+            if self.joint.stiffness is not None or self.flexure:
                 variants["free"] = self.replace({"joint.locked": False})
         return variants
 
@@ -172,6 +198,7 @@ def _tables(flat: Mapping[str, Any]) -> dict[str, type[Section]]:
         "masses": Masses,
         "friction": FRICTION.classes[flat["friction.model"]],
         "joint": Joint,
+        "flexure": Flexure,
         "parasitic": Parasitic,
         "bias": Bias,
         "drive": Drive,
@@ -193,7 +220,7 @@ def _with_defaults(flat: dict[str, Any]) -> dict[str, Any]:
         flat["controller.tuned_mass"] = flat.get("masses.cart", 0.0) + flat.get("masses.stage", 0.0)
     if "controller.force_limit" in flat:
         flat.setdefault("controller.anti_windup", "clamp")
-    return flat
+    return with_material(flat)
 
 
 def _put(tables: dict[str, Any], key: str, value: Any) -> None:

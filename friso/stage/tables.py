@@ -71,7 +71,7 @@ class Joint(Section):
 
     @model_validator(mode="after")
     def _free_joint_is_complete(self) -> Self:
-        for key, example in (("stiffness", "2.4 N/mm"), ("damping", "0.5 N*s/m"), ("stroke", "1 mm")):
+        for key, example in (("damping", "0.5 N*s/m"), ("stroke", "1 mm")):
             if not self.locked and getattr(self, key) is None:
                 expected = f"the {key} of the joint; only a joint with locked = true can do without"
                 raise StageError(key, "nothing", expected, f'{key} = "{example}"')

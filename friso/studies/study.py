@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from friso.engine.cache import code_digest, machine
-from friso.stage import Stage, loads, numeric_keys
+from friso.stage import Stage, loads
 from friso.studies.axes import Axis
 from friso.studies.cells import CYCLE_UNITS, METRICS, flat_cells
 from friso.studies.samples import SAMPLE
@@ -114,7 +114,7 @@ class Study:
         stage = self.stage.replace(words)
         flat = flat_cells(stage, self.links, {name: columns[name] for name in numeric})
         changed = {key for key in (*numeric, *self.links) if key in flat}
-        return stage.replace({key: _written(stage, key, float(flat[key][0])) for key in sorted(changed)})
+        return stage.with_numbers({key: float(flat[key][0]) for key in sorted(changed)})
 
     def at(self, cells: np.ndarray) -> Study:
         """A study of just these cells, side by side."""
@@ -202,12 +202,6 @@ def _stored_axis(coordinate: xr.DataArray) -> Axis:
     values = coordinate.values
     attributes = coordinate.attrs
     return Axis(str(coordinate.name), values, attributes["units"], attributes["scale"], values.dtype.kind not in "bUT")
-
-
-def _written(stage: Stage, key: str, value: float) -> Any:
-    """An SI value as a stage file has it; read again it is the same number."""
-    unit = numeric_keys(stage.flat())[key].unit
-    return f"{value!r} {unit}" if unit else value
 
 
 def _described(axis: Axis) -> str:

@@ -35,7 +35,7 @@ FORMATS = ("png", "svg", "pdf")
 WIDTH = 9.0  # [inch]
 ROW_HEIGHT = 2.7  # [inch] axes, labels, title and legend of one row of panels
 MAP_HEIGHTS = {1: 4.9, 2: 3.7}  # [inch] the same of one or two columns of maps: their two axes matter alike
-EQUAL_HEIGHT = 5.9  # [inch] the same of panels with equal scales, which are about as high as wide
+EQUAL_HEIGHTS = {1: 5.9, 2: 3.6}  # [inch] the same of panels with equal scales, which need height for their width
 HEADER_HEIGHT = 0.35  # [inch] the figure's own title
 
 # No dates and no version numbers in the files, so that a rerun gives the same bytes.
@@ -130,7 +130,7 @@ def _style() -> Iterator[None]:
 
 def _row_height(figure: Figure) -> float:
     if any(panel.equal for panel in figure.panels):
-        return EQUAL_HEIGHT
+        return EQUAL_HEIGHTS.get(figure.columns, ROW_HEIGHT)
     mapped = any(panel.coloured for panel in figure.panels)
     return MAP_HEIGHTS.get(figure.columns, ROW_HEIGHT) if mapped else ROW_HEIGHT
 

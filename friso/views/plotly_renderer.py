@@ -20,7 +20,7 @@ from friso.views.plotly_maps import BAR, DASHES, SYMBOLS, bar_panels, coloured_t
 HEADER = 54  # [px] title and legend above the axes
 PLOT = 230  # [px] height of the axes
 MAP_PLOTS = {1: 430, 2: 320}  # [px] the same of one or two columns of maps: their two axes matter alike
-EQUAL_PLOT = 520  # [px] the same of panels with equal scales
+EQUAL_PLOTS = {1: 520, 2: 290}  # [px] the same of panels with equal scales
 FOOTER = 54  # [px] tick labels and axis label
 LEFT, RIGHT, TOP = 72, 14, 26  # [px]; the buttons stand in the top margin
 GAP = 0.09  # between two panels of a row, as a fraction of the width
@@ -85,7 +85,7 @@ def render(figure: Figure) -> go.Figure:
 
 def _plot_height(figure: Figure) -> int:
     if any(panel.equal for panel in figure.panels):
-        return EQUAL_PLOT
+        return EQUAL_PLOTS.get(figure.columns, PLOT)
     mapped = any(panel.coloured for panel in figure.panels)
     return MAP_PLOTS.get(figure.columns, PLOT) if mapped else PLOT
 

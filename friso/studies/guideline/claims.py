@@ -8,8 +8,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from friso.studies.guideline.edges import ABOVE, BELOW, KINDS
-from friso.studies.guideline.edges import UNKNOWN as NOT_TOLD
+from friso.hunting.edges import ABOVE, BELOW, KINDS
+from friso.hunting.edges import UNKNOWN as NOT_TOLD
 from friso.studies.guideline.rig import Case
 from friso.studies.guideline.worked import CLAIMED_AT, STUDIED, Worked
 from friso.studies.thesis.claims import ABOUT, about

@@ -9,7 +9,7 @@ import numpy as np
 
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import hunting_cycles
-from friso.studies.guideline.persistence import hunts_somehow
+from friso.hunting.persistence import hunts_somehow
 
 ROUNDS = 6
 """Bisections of the step of the grid that holds the edge."""

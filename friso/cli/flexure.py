@@ -1,0 +1,124 @@
+"""`friso flexure`: what the leaf springs of a joint are worth: stiffness, modes, stress."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from friso.cli.common import AsJson, OutFolder, Overrides, StageFile, leave, made_folder, print_table, read_stage, say
+from friso.cli.progress import busy
+from friso.quantities import Quantity, StageError, positive, quoted
+from friso.stage import Stage
+
+if TYPE_CHECKING:
+    from friso.flexure.mechanism import Mechanism
+    from friso.views.flexure_found import Found
+
+STROKE = Quantity("m", positive, "1 mm")
+EXAMPLE = """[flexure]
+            leaves = 2
+            length = "70 mm"
+            width = "45 mm"
+            thickness = "0.35 mm"
+            spacing = "60 mm"
+            material = "stainless 1.4310\""""
+
+
+def flexure(
+    stage_file: StageFile,
+    stroke: Annotated[
+        str | None, typer.Option(metavar='"LENGTH"', help="Deflection to one side; default: joint.stroke.")
+    ] = None,
+    overrides: Overrides = None,
+    out: OutFolder = None,
+    as_json: AsJson = False,
+) -> None:
+    """What are the leaf springs of a joint worth: stiffness, modes, stress, fatigue and buckling, and a drawing.
+
+    Example: friso flexure rig.toml --stroke "1 mm" --out flexure
+    """
+    stage = read_stage(stage_file, overrides, with_drive=True)
+    mechanism = _mechanism(stage, str(stage_file))
+    deflection = _stroke(stroke, stage, mechanism)
+    folder = None if out is None else made_folder(out)
+    with busy("bending the leaves"):
+        found = _evaluate(stage, mechanism, deflection)
+        files = [] if folder is None else _write(found, folder)
+    if as_json:
+        from friso.views.flexure_document import flexure_document
+
+        print(json.dumps(flexure_document(found), allow_nan=False))
+    else:
+        _print(found)
+        for file in files:
+            print(f"wrote {file}")
+    if found.failure:
+        say(f"the beam model found no answer: {found.failure}")
+    leave(not found.failure)
+
+
+def _mechanism(stage: Stage, origin: str) -> Mechanism:
+    """The leaf springs of the stage. Raises StageError without [flexure]."""
+    from friso.flexure.mechanism import Mechanism
+
+    if stage.flexure is None:
+        expected = "a table of leaf springs, from which joint.stiffness and [parasitic] follow (leave these out)"
+        raise StageError("flexure", "no [flexure]", expected, EXAMPLE, origin)
+    return Mechanism.of(stage.flat())
+
+
+def _stroke(text: str | None, stage: Stage, mechanism: Mechanism) -> float:
+    """The stroke [m], of the option or else of the joint, which leaves can bend by. Raises StageError."""
+    key, example = ("joint.stroke", 'stroke = "1 mm"') if text is None else ("--stroke", '--stroke "1 mm"')
+    if text is None:
+        given = stage.joint and stage.joint.stroke
+        if given is None:
+            raise StageError("--stroke", "nothing", "the stroke, since the joint has none", '--stroke "1 mm"')
+    else:
+        try:
+            given = STROKE.read(text)
+        except StageError as error:
+            raise StageError(key, error.given, error.expected, example) from None
+    if given > mechanism.length / 2:
+        expected = f"at most half the length of the leaves, {1e3 * mechanism.length / 2:g} mm"
+        raise StageError(key, quoted(getattr(given, "text", given)), expected, example)
+    return float(given)
+
+
+def _evaluate(stage: Stage, mechanism: Mechanism, stroke: float) -> Found:
+    """Both models; a failure of the beams is kept as such."""
+    from friso.flexure.beams import BeamFailure, beams
+    from friso.flexure.closed_model import closed
+    from friso.views.flexure_found import Found
+
+    simple = closed(mechanism, stroke)
+    try:
+        return Found(stage, simple, beams(mechanism, stroke))
+    except BeamFailure as failure:
+        return Found(stage, simple, None, str(failure))
+
+
+def _print(found: Found) -> None:
+    from friso.views.flexure_table import rows
+    from friso.views.flexure_words import sentences
+
+    print_table(found.stage.name, list(found.models), rows(found), sentences(found))
+
+
+def _write(found: Found, folder: Path) -> list[Path]:
+    """The page, the drawing, and every figure in all formats."""
+    from friso.views.flexure_figures import flexure_figures
+    from friso.views.flexure_page import drawing, flexure_html
+    from friso.views.matplotlib_renderer import FORMATS, save
+
+    figures = flexure_figures(found)
+    pictures = {folder / f"{figure.name}.{form}": figure for figure in figures for form in FORMATS}
+    for path, figure in pictures.items():
+        save(figure, path)
+    page, sheet = folder / "flexure.html", folder / "flexure_drawing.svg"
+    sheet.write_text(drawing(found), encoding="utf-8", newline="\n")
+    page.write_text(flexure_html(found, figures), encoding="utf-8", newline="\n")
+    return [page, sheet, *pictures]

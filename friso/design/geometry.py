@@ -1,0 +1,90 @@
+"""The leaf springs that may be built: geometries as numbers to choose from, and as mechanisms."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import Any
+
+import numpy as np
+
+from friso.design.spec import Spec
+from friso.flexure.mechanism import Mechanism
+from friso.materials import materials
+
+SIZES = ("length", "width", "spacing")
+
+
+@dataclass(frozen=True)
+class Sheet:
+    """What is bought: how many leaves, of which sheet [m] and material."""
+
+    leaves: float
+    thickness: float
+    material: str
+
+
+def sheets(spec: Spec) -> list[Sheet]:
+    """All that may be bought."""
+    own = spec.leaves
+    return [Sheet(*each) for each in product(own.leaves, sorted(map(float, own.thickness)), own.materials)]
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """Leaf springs: length, width and spacing [m], and their sheet."""
+
+    length: float
+    width: float
+    spacing: float
+    sheet: Sheet
+
+    def keys(self) -> dict[str, Any]:
+        """The keys of [flexure], as text with units."""
+        sizes = {f"flexure.{name}": f"{getattr(self, name) * 1e3:.6g} mm" for name in SIZES}
+        bought = {
+            "flexure.leaves": int(self.sheet.leaves),
+            "flexure.thickness": f"{self.sheet.thickness * 1e3:.6g} mm",
+            "flexure.material": self.sheet.material,
+        }
+        return sizes | bought
+
+
+def mechanisms(flat: Mapping[str, Any], sizes: np.ndarray, bought: list[Sheet]) -> Mechanism:
+    """Geometries of lengths, widths and spacings [m], shape (count, 3), each of its sheet, in the stage `flat`."""
+    known = [materials()[each.material] for each in bought]
+    columns = {
+        "leaves": [each.leaves for each in bought],
+        "thickness": [each.thickness for each in bought],
+        "young": [each.young for each in known],
+        "poisson": [each.poisson for each in known],
+        "density": [each.density for each in known],
+        "yield": [each.yield_strength for each in known],
+        "fatigue": [each.fatigue for each in known],
+    }
+    keys = {f"flexure.{name}": np.array(column, float) for name, column in columns.items()}
+    keys |= {f"flexure.{name}": column for name, column in zip(SIZES, sizes.T, strict=True)}
+    return Mechanism.of({**flat, **keys})
+
+
+def box(spec: Spec) -> tuple[np.ndarray, np.ndarray]:
+    """The least and the largest length, width and spacing [m], each (3,)."""
+    ends = np.array([spec.leaves.space(name) for name in SIZES])
+    return ends[:, 0], ends[:, 1]
+
+
+def sizes_of(geometries: Sequence[Geometry]) -> np.ndarray:
+    """Their lengths, widths and spacings [m], shape (count, 3)."""
+    return np.array([[getattr(each, name) for name in SIZES] for each in geometries])
+
+
+def rounded(spec: Spec, geometry: Geometry, step: float) -> list[Geometry]:
+    """The geometries with whole multiples of a step [m] next to one, as far as there is space for them."""
+    low, high = box(spec)
+    near = [
+        {float(np.round(size / step + side, 0) * step) for side in (-0.5, 0.5)} for size in sizes_of([geometry])[0]
+    ]
+    found = [np.array(each) for each in product(*map(sorted, near))]
+    inside = [each for each in found if np.all(each >= low * (1 - 1e-9)) and np.all(each <= high * (1 + 1e-9))]
+    return [Geometry(*map(float, each), geometry.sheet) for each in inside]

@@ -1,0 +1,177 @@
+"""The design method (thesis, Sec. 3.4): from a specification to leaf springs, stroke, crossover and gains."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from friso.design.choice import Choice, Confirmed, chosen, confirmed
+from friso.design.controller import Controller, comfortable_below, controller
+from friso.design.edges import Corners, edges_over, rigid
+from friso.design.front import Candidate, front
+from friso.design.hunting_map import HuntingMap, hunting_map
+from friso.design.population import Population, corners
+from friso.design.prepare import prepared, with_leaves
+from friso.design.relax import Relaxation, relaxations
+from friso.design.requirements import Task
+from friso.design.spec import Spec
+from friso.design.verification import Verification, verification
+from friso.frequency.crossover import Limits, limits
+from friso.stage import Stage
+
+STROKES = 4
+"""Strokes that are tried where the specification leaves a range, the largest first."""
+
+FIRST, BEYOND, STEPS = 1 / 40, 3.0, 12
+"""Where edges are searched, in units of the machine's limit: from there to there, in so many steps."""
+
+ROUNDS, LOWER = 12, 0.97
+"""How often leaves and crossover are chosen anew, and the factor on a crossover for which beams confirm no leaves."""
+
+ALIKE = 0.98
+"""Share of the crossover wanted from which one is taken as it is, instead of choosing softer leaves for it."""
+
+Progress = Callable[[str, int, int], None]
+"""Called with what is being done, how much of it is done, and how much there is."""
+
+
+class NoDesign(Exception):
+    """No design meets the specification: why, and what to relax by how much."""
+
+    def __init__(self, reason: str, relaxed: tuple[Relaxation, ...] = ()) -> None:
+        super().__init__(reason)
+        self.reason, self.relaxed = reason, relaxed
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """Leaves and crossover that go together: the task the leaves were chosen for, the choice, the stage with both, and
+    how fast its controller may be."""
+
+    task: Task
+    choice: Choice
+    stage: Stage
+    limits: Limits
+
+
+@dataclass(frozen=True)
+class Design:
+    """A design with the numbers of each step.
+
+    `without`: the edges of hunting over the `corners` of the specification without isolator, `edges` with it.
+    `candidates`: the Pareto front, some of it `confirmed` by beams; `fitted`: what was chosen. `controller`: margins.
+    `map`: hunting over crossover and stroke. `verification`: the moves simulated. `stage`: the design as a stage.
+    """
+
+    spec: Spec
+    given: Stage
+    without: Corners
+    candidates: tuple[Candidate, ...]
+    confirmed: tuple[Confirmed, ...]
+    fitted: Fitted
+    edges: Corners
+    controller: Controller
+    map: HuntingMap
+    verification: Verification
+
+    @property
+    def stage(self) -> Stage:
+        return self.fitted.stage
+
+    @property
+    def needed(self) -> bool:
+        """Whether the machine hunts without isolator at all crossovers that it allows."""
+        return self.spec.safety.hunting * self.without.highest > self.spec.limit
+
+
+def design(stage: Stage, spec: Spec, progress: Progress = lambda what, done, total: None) -> Design:
+    """Carry the method out. Raises StageError for input that cannot be used, NoDesign if nothing meets the
+    specification."""
+    base = prepared(stage, spec)
+    flat, population, limit = base.flat(), corners(spec, base.flat()), spec.limit
+    progress("hunting without isolator", 0, 1)
+    without = edges_over(rigid(flat), population, FIRST * limit, BEYOND * limit, STEPS)
+    task, candidates = leaves(spec, flat, least_friction(population, flat), progress)
+    progress("leaves and crossover", 0, 1)
+    found = fitted(base, task, candidates)
+    progress("hunting with isolator", 0, 1)
+    crossover = found.stage.flat()["controller.crossover"]
+    edges = edges_over(found.stage.flat(), population, FIRST * crossover, crossover, STEPS)
+    _does_not_hunt(spec, edges, crossover)
+    progress("margins", 0, 1)
+    control = controller(found.stage, found.limits, population)
+    progress("hunting map", 0, 1)
+    drawn = hunting_map(found.stage, spec, population)
+    by_beams = tuple(confirmed(found.task, candidates))
+    tried = verification(found.stage, spec, progress)
+    return Design(spec, stage, without, tuple(candidates), by_beams, found, edges, control, drawn, tried)
+
+
+def least_friction(population: Population, flat: Mapping[str, Any]) -> float:
+    """The least force [N] at which the cart breaks away."""
+    key = "friction.static" if "friction.static" in flat else "friction.coulomb"
+    return float(np.min(population.keys.get(key, flat[key])))
+
+
+def leaves(spec: Spec, flat: Mapping[str, Any], friction: float, progress: Progress) -> tuple[Task, list[Candidate]]:
+    """The front for the largest stroke that allows the machine's limit; else that which allows the highest crossover.
+    Raises NoDesign where no leaf springs meet the requirements."""
+    stroke, found = spec.leaves.stroke, []
+    several = stroke.high > stroke.low
+    strokes = np.geomspace(stroke.high, stroke.low, STROKES).tolist() if several else [stroke.high]
+    for k, each in enumerate(strokes):
+        progress("leaf springs", k, len(strokes))
+        task = Task(spec, each, spec.limit, friction, flat)
+        if candidates := front(task):
+            found.append((task, candidates))
+            if allowed(task, candidates) >= spec.limit:
+                break
+    if not found:
+        raise NoDesign(
+            "no leaf springs meet the specification", relaxations(Task(spec, strokes[-1], 0.0, friction, flat))
+        )
+    return max(found, key=lambda each: min(allowed(*each), spec.limit))
+
+
+def allowed(task: Task, candidates: list[Candidate]) -> float:
+    """The highest crossover [Hz] whose multiple is still below a first interfering frequency of the front."""
+    return max(each.frequency for each in candidates) / task.spec.safety.parasitic
+
+
+def fitted(base: Stage, task: Task, candidates: list[Candidate]) -> Fitted:
+    """Leaves as soft as the crossover allows, and the crossover as high as leaves and margins allow. Raises NoDesign."""
+    wanted = min(task.spec.limit, allowed(task, candidates))
+    for _ in range(ROUNDS):
+        task = replace(task, crossover=wanted)
+        choice = chosen(task, candidates)
+        if choice is None:
+            wanted *= LOWER
+            continue
+        stage = with_leaves(base, choice.geometry, task.stroke)
+        found = limits(stage.flat())
+        best = comfortable_below(found, wanted)
+        if best is None:
+            raise NoDesign(f"up to {wanted:.3g} Hz there is no crossover with a modulus margin of 0.5")
+        if best >= ALIKE * wanted:
+            return Fitted(task, choice, stage.replace({"controller.crossover": f"{_down(best):.6g} Hz"}), found)
+        wanted = best
+    raise NoDesign("beams do not confirm leaf springs of the front (see their failures)")
+
+
+def _down(crossover: float) -> float:
+    """Rounded down to three digits."""
+    step = 10 ** (np.floor(np.log10(crossover)) - 2)
+    return float(np.floor(crossover / step * (1 + 1e-9)) * step)
+
+
+def _does_not_hunt(spec: Spec, edges: Corners, crossover: float) -> None:
+    """Raises NoDesign where the crossover does not keep its distance from the edge of hunting."""
+    if edges.hunts and spec.safety.hunting * edges.highest > crossover:
+        needed = spec.safety.hunting * edges.highest
+        raise NoDesign(
+            f"with the softest leaf springs that can be had, the stage hunts up to {edges.highest:.3g} Hz, so that the "
+            f"crossover has to be {needed:.3g} Hz or more; it can be {crossover:.3g} Hz"
+        )

@@ -1,0 +1,130 @@
+"""The machines that a specification allows: its corners, and machines and moves drawn at random from it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import product
+from typing import Any
+
+import numpy as np
+from scipy.stats import qmc
+
+from friso.design.spec import Spec
+from friso.intervals import Interval
+from friso.quantities import StageError
+
+LEVELS = (0.0, 0.5, 1.0)
+"""Shares of each range of static friction and gap that the corners take: hunting is not monotonous in them."""
+
+SEED = 6
+"""Of the scrambled Sobol sequence: the same machines for the same specification."""
+
+DISTANT = 5.0
+"""Time [s] from the start of a move to that of the way back, at least, as in the thesis's path."""
+
+
+@dataclass(frozen=True)
+class Population:
+    """Machines: flat keys to SI arrays (count,) that differ from those of the stage."""
+
+    keys: Mapping[str, np.ndarray]
+    count: int
+
+    def over(self, flat: Mapping[str, Any]) -> dict[str, Any]:
+        """The flat keys of the stage, these machines instead of the one; it is tuned for the masses it has in the file.
+        """
+        return {**flat, **self.keys}
+
+    def of(self, number: int) -> dict[str, float]:
+        """What differs in one of the machines."""
+        return {key: float(values[number]) for key, values in self.keys.items()}
+
+
+def corners(spec: Spec, flat: Mapping[str, Any]) -> Population:
+    """The ends of all ranges of friction and masses, and the middle of those of static friction and gap."""
+    ranges = _friction(spec, flat) | _masses(spec)
+    main = [name for name in ("static", "coulomb", "gap") if name in ranges]
+    rest = [name for name in ranges if name not in main]
+    shares = {name: _distinct(ranges[name], LEVELS if name in main else (0.0, 1.0)) for name in ranges}
+    grid = np.array(list(product(*(shares[name] for name in main)))).reshape(-1, len(main))
+    ends = np.array(list(product(*(shares[name] for name in rest)))).reshape(-1, len(rest))
+    if len(ends) > 2:  # all others together at their low and high ends
+        ends = np.array([[share[k] for share in (shares[name] for name in rest)] for k in (0, -1)])
+    both = np.hstack([np.repeat(grid, len(ends), axis=0), np.tile(ends, (len(grid), 1))])
+    return _population(ranges, dict(zip([*main, *rest], both.T, strict=True)), flat, len(both))
+
+
+def drawn(spec: Spec, flat: Mapping[str, Any], count: int) -> Population:
+    """Machines and moves drawn evenly from all ranges: friction, masses, stiffness (a share either way), travel and
+    acceleration (evenly in the logarithm)."""
+    ranges = _friction(spec, flat) | _masses(spec)
+    names = [*ranges, "stiffness", "travel", "acceleration"]
+    sequence = qmc.Sobol(len(names), rng=SEED).random_base2(int(np.ceil(np.log2(count))))[:count]
+    shares = dict(zip(names, sequence.T, strict=True))
+    found = _population(ranges, {name: shares[name] for name in ranges}, flat, count)
+    moves = _moves(spec, shares["travel"], shares["acceleration"])
+    tolerance = spec.safety.stiffness_tolerance
+    stiffness = {"joint.stiffness": flat["joint.stiffness"] * (1 + tolerance * (2 * shares["stiffness"] - 1))}
+    return Population({**found.keys, **moves, **stiffness}, count)
+
+
+def typical_move(spec: Spec) -> dict[str, Any]:
+    """The keys of a move in the middle of the ranges of travel and acceleration."""
+    keys = _moves(spec, np.array(0.5), np.array(0.5))
+    return {"motion.kind": "there_and_back", **{key: float(value) for key, value in keys.items()}}
+
+
+def _moves(spec: Spec, travel: np.ndarray, acceleration: np.ndarray) -> dict[str, np.ndarray]:
+    """There and back, at shares of the ranges."""
+    way, rate = (
+        interval.low * (interval.high / interval.low) ** share
+        for interval, share in ((spec.moves.travel, travel), (spec.moves.acceleration, acceleration))
+    )
+    time = np.sqrt(way / rate)
+    back = np.maximum(DISTANT, 2 * time + DISTANT / 2)
+    return {
+        "motion.acceleration": rate,
+        "motion.acceleration_time": time,
+        "motion.return_at": back,
+    }
+
+
+def _friction(spec: Spec, flat: Mapping[str, Any]) -> dict[str, Interval]:
+    """The ranges of friction by key. Raises StageError for one that the stage's friction law does not have."""
+    given = {name: getattr(spec.friction, name) for name in type(spec.friction).model_fields}
+    ranges = {name: interval for name, interval in given.items() if interval is not None}
+    for name in ranges:
+        key = f"friction.{'coulomb' if name == 'gap' else name}"
+        if key not in flat:
+            law = flat["friction.model"]
+            expected = "a range of what the friction law of the stage has"
+            raise StageError(f"friction.{name}", f"a range, but the stage has {law} friction", expected)
+    return ranges
+
+
+def _masses(spec: Spec) -> dict[str, Interval]:
+    given = {name: getattr(spec.masses, name) for name in ("cart", "stage")}
+    return {name: interval for name, interval in given.items() if interval is not None}
+
+
+def _distinct(interval: Interval, shares: tuple[float, ...]) -> tuple[float, ...]:
+    return shares if interval.high > interval.low else (0.0,)
+
+
+def _population(
+    ranges: Mapping[str, Interval], shares: Mapping[str, np.ndarray], flat: Mapping[str, Any], count: int
+) -> Population:
+    """Machines at shares of the ranges; those whose sliding friction is no smaller than the static one are given almost
+    as much: they cannot hunt, but exist."""
+    values = {name: interval.at(shares[name]) for name, interval in ranges.items()}
+    keys = {f"masses.{name}": values.pop(name) for name in ("cart", "stage") if name in values}
+    static = np.broadcast_to(values.get("static", flat.get("friction.static")), (count,)).astype(float)
+    if "gap" in values:
+        values["coulomb"] = static * (1 - values.pop("gap"))
+    elif "friction.coulomb" in flat:
+        coulomb = np.broadcast_to(values.get("coulomb", flat["friction.coulomb"]), (count,))
+        values["coulomb"] = np.minimum(coulomb, static)
+    if "friction.coulomb" in flat:
+        values["static"] = static
+    return Population(keys | {f"friction.{name}": value for name, value in values.items()}, count)

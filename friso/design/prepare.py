@@ -1,0 +1,59 @@
+"""The stage that a design starts from, and the stage with leaf springs."""
+
+from __future__ import annotations
+
+from friso.design.geometry import Geometry
+from friso.design.spec import Spec
+from friso.quantities import StageError
+from friso.stage import Stage
+
+JOINT = '[joint] locked = true, damping = "0.5 N*s/m", limiter_stiffness = "2e7 N/m", limiter_damping = "100 N*s/m"'
+
+
+def prepared(stage: Stage, spec: Spec) -> Stage:
+    """The stage with a free joint of leaf springs, the largest that the specification allows, to be replaced; masses in
+    the middle of their ranges. Raises StageError for a stage that cannot be given an isolator."""
+    _can_be_isolated(stage)
+    own = spec.leaves
+    low, high = (min(map(float, own.thickness)), own.stroke.high)
+    masses = {
+        f"masses.{name}": f"{each.centre!r} kg"
+        for name in ("cart", "stage")
+        if (each := getattr(spec.masses, name)) is not None
+    }
+    sizes = {f"flexure.{name}": f"{own.space(name)[1]!r} m" for name in ("length", "width", "spacing")}
+    leaves = {
+        "flexure.leaves": own.leaves[0],
+        "flexure.thickness": f"{low!r} m",
+        "flexure.material": own.materials[0],
+        "joint.locked": False,
+        "joint.stroke": f"{high!r} m",
+        "controller.crossover": f"{spec.limit!r} Hz",
+    }
+    joint = stage.joint
+    removed = {"joint.stiffness": None} if joint and joint.stiffness is not None else {}
+    removed |= {"parasitic": None} if stage.parasitic else {}
+    numbers = ("young", "poisson", "density", "yield", "fatigue")
+    given = stage.flexure.given() if stage.flexure else {}
+    removed |= {f"flexure.{key}": None for key in numbers if key in given}
+    return stage.replace(removed | masses | sizes | leaves)
+
+
+def with_leaves(base: Stage, geometry: Geometry, stroke: float) -> Stage:
+    """A prepared stage with leaf springs of a geometry and a stroke [m]."""
+    name = f"{base.name}, with friction isolator" if base.name else "With friction isolator"
+    return base.replace({"name": name, "joint.stroke": f"{stroke * 1e3:.6g} mm", **geometry.keys()})
+
+
+def _can_be_isolated(stage: Stage) -> None:
+    if stage.masses.cart is None or stage.masses.stage is None:
+        expected = "both masses: the isolator goes between cart and stage"
+        raise StageError("masses", "a single mass", expected, 'cart = "1.2 kg", stage = "0.5 kg"')
+    if stage.joint is None or stage.joint.damping is None:
+        expected = "a [joint] with its damping and its limiter; its stiffness is what is sought"
+        raise StageError("joint", "nothing" if stage.joint is None else "no damping", expected, JOINT)
+    if stage.friction is None or stage.friction.model == "none":
+        raise StageError("friction", "none", "friction, which the isolator is for", '[friction] model = "lugre" ...')
+    if "controller.crossover" not in stage.flat():
+        expected = "a controller by van Dijk's rules, whose crossover is sought"
+        raise StageError("controller", "gains", expected, 'crossover = "8 Hz", alpha = 0.1, beta = 2')

@@ -1,0 +1,104 @@
+"""When no leaf springs meet a specification: which requirement to relax, and by how much it has to be."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.optimize import differential_evolution
+
+from friso.design.geometry import SIZES, Sheet, box, mechanisms
+from friso.design.requirements import Requirement, Task, requirements
+from friso.flexure.mechanism import Mechanism
+
+BEYOND = 3.0
+"""Factor by which space and sheets are looked at beyond what the specification allows."""
+
+POPULATION, GENERATIONS, SEED = 16, 80, 5
+"""Of differential evolution (doi:10.1023/A:1008202821328)."""
+
+UNMET = 10.0
+"""Added to the objective where another requirement is not met: the logarithm of a factor beyond all relaxation."""
+
+SLACK = 1e-3
+"""Logarithm of the factor by which the others may be broken here."""
+
+
+@dataclass(frozen=True)
+class Relaxation:
+    """A requirement that, relaxed alone from `value` to `needed`, lets leaf springs of these sizes [m] do: length,
+    width, spacing and thickness."""
+
+    requirement: Requirement
+    needed: float
+    sizes: tuple[float, float, float, float]
+    material: str
+
+
+def relaxations(task: Task) -> tuple[Relaxation, ...]:
+    """For each requirement, by how much it has to be relaxed if all others stand; those that can be, the least change
+    first. Empty where no single one is enough."""
+    wanted = [*requirements(task), *_space(task)]
+    found = [each for k in range(len(wanted)) if (each := _alone(task, wanted, k))]
+    return tuple(sorted(found, key=lambda each: abs(np.log(each.needed / each.requirement.value))))
+
+
+def _space(task: Task) -> list[Requirement]:
+    """The limits of space and sheets as requirements."""
+    low, high = box(task.spec)
+    gauges = sorted(map(float, task.spec.leaves.thickness))
+    names = (*SIZES, "thickness")
+    ends = zip(names, [*low, gauges[0]], [*high, gauges[-1]], strict=True)
+    found = []
+    for name, least, most in ends:
+        words = "sheets" if name == "thickness" else f"{name} of the leaves"
+        found += [
+            Requirement(f"{words}, at least", f"leaves.{name}", least, "m", False, _over(name, least, low=True)),
+            Requirement(f"{words}, at most", f"leaves.{name}", most, "m", True, _over(name, most, low=False)),
+        ]
+    return found
+
+
+def _over(name: str, limit: float, low: bool) -> Callable[[Mechanism], Any]:
+    def excess(it: Mechanism) -> Any:
+        return limit / getattr(it, name) if low else getattr(it, name) / limit
+
+    return excess
+
+
+def _alone(task: Task, wanted: list[Requirement], k: int) -> Relaxation | None:
+    """The least relaxation of requirement `k` with which the others can be met."""
+    low, high = box(task.spec)
+    gauges = task.spec.leaves.thickness
+    bounds = np.log([[*low, min(gauges)], [*high, max(gauges)]]).T + np.log(BEYOND) * np.array([-1, 1])
+    kinds = [(n, material) for n in task.spec.leaves.leaves for material in task.spec.leaves.materials]
+
+    def built(x: np.ndarray) -> tuple[np.ndarray, list[Sheet]]:
+        sizes = np.exp(x[:4]).T
+        return sizes[:, :3], [Sheet(kinds[int(kind)][0], t, kinds[int(kind)][1]) for t, kind in zip(sizes[:, 3], x[4], strict=True)]
+
+    def objective(x: np.ndarray) -> np.ndarray:
+        many = mechanisms(task.flat, *built(x))
+        excess = np.log([np.broadcast_to(each.excess(many), x.shape[1]) for each in wanted])
+        others = np.delete(excess, k, axis=0).max(axis=0)
+        return np.where(others <= SLACK, excess[k], UNMET + others)
+
+    with np.errstate(divide="ignore"):  # a requirement that asks for nothing
+        found = differential_evolution(
+            objective,
+            [*bounds, (0, len(kinds) - 1e-9)],
+            vectorized=True,
+            updating="deferred",
+            popsize=POPULATION,
+            maxiter=GENERATIONS,
+            rng=SEED,
+            polish=False,
+        )
+    if found.fun >= UNMET:
+        return None
+    sizes, (sheet,) = built(found.x[:, None])
+    length, width, spacing = map(float, sizes[0])
+    needed = wanted[k].relaxed(float(np.exp(max(found.fun, 0.0))))
+    return Relaxation(wanted[k], needed, (length, width, spacing, sheet.thickness), sheet.material)

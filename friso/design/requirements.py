@@ -1,0 +1,129 @@
+"""What a specification requires of leaf springs, each as a ratio: of many geometries at once, by closed forms."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from friso.design.spec import Spec
+from friso.flexure import closed_forms
+from friso.flexure.joint import first_interfering
+from friso.flexure.mechanism import Mechanism
+
+GRAVITY = 9.80665
+
+
+@dataclass(frozen=True)
+class Task:
+    """What leaf springs are designed for: the specification, a stroke [m], the crossover [Hz] whose multiple the first
+    interfering frequency has to be, the least static friction [N], and the flat keys of the stage without its joint's
+    leaves."""
+
+    spec: Spec
+    stroke: float
+    crossover: float
+    friction: float
+    flat: Mapping[str, Any]
+
+    @property
+    def load(self) -> float:
+        """Force along the leaves [N]: what the specification says and the weight of the stage."""
+        return float(self.spec.load.force_x) + GRAVITY * float(self.flat["masses.stage"])
+
+
+@dataclass(frozen=True)
+class Requirement:
+    """A requirement in words; `key` of the specification that says how much, its `value` there and `unit`; and whether
+    relaxing it makes that `larger`. `excess` tells by what factor geometries break it: 1 where they just meet it."""
+
+    name: str
+    key: str
+    value: float
+    unit: str
+    larger: bool
+    excess: Callable[[Mechanism], Any]
+
+    def relaxed(self, excess: float) -> float:
+        """The value with which a geometry that breaks it by this factor would do."""
+        return self.value * excess if self.larger else self.value / excess
+
+
+def requirements(task: Task) -> list[Requirement]:
+    """All of them but for the space and the sheets."""
+    spec, safety, stroke = task.spec, task.spec.safety, task.stroke
+
+    def fatigue(it: Mechanism) -> Any:
+        known = np.where(np.isnan(it.fatigue), np.inf, it.fatigue)
+        return safety.fatigue * it.stress_concentration * closed_forms.max_stress(it, stroke) / known
+
+    found = [
+        Requirement(
+            "the cart must not break away inside the stroke",
+            "friction.static",
+            task.friction,
+            "N",
+            True,
+            lambda it: safety.breakaway * closed_forms.drive_stiffness(it) * stroke / task.friction,
+        ),
+        Requirement("stress borne for ever", "safety.fatigue", safety.fatigue, "", False, fatigue),
+        Requirement(
+            "yield strength under stroke and load",
+            "safety.strength",
+            safety.strength,
+            "",
+            False,
+            lambda it: safety.strength * static_stress(it, task) / it.yield_strength,
+        ),
+        Requirement(
+            "buckling under load",
+            "safety.buckling",
+            safety.buckling,
+            "",
+            False,
+            lambda it: safety.buckling * leaf_load(it, task) * it.leaves / closed_forms.buckling_load(it),
+        ),
+        Requirement(
+            "first interfering frequency",
+            "safety.parasitic",
+            safety.parasitic,
+            "",
+            False,
+            lambda it: safety.parasitic * task.crossover / first_interfering(it)[0],
+        ),
+    ]
+    return found + _support(spec, stroke)
+
+
+def _support(spec: Spec, stroke: float) -> list[Requirement]:
+    """The stiffness wanted at full stroke."""
+    forms = {"support_x": ("along the leaves", closed_forms.support_x), "support_y": ("across them", closed_forms.support_y)}
+    return [
+        Requirement(
+            f"stiffness {where} at full stroke",
+            f"load.{key}",
+            float(wanted),
+            "N/m",
+            False,
+            lambda it, wanted=wanted, form=form: wanted / form(it, stroke),
+        )
+        for key, (where, form) in forms.items()
+        if (wanted := getattr(spec.load, key)) is not None
+    ]
+
+
+def leaf_load(it: Mechanism, task: Task) -> Any:
+    """The largest force along a leaf [N]: its share of the load, and what a moment about the width adds."""
+    outermost = it.depth / 2 / it.offset_squares
+    return task.load / it.leaves + float(task.spec.load.moment_y) * outermost
+
+
+def static_stress(it: Mechanism, task: Task) -> Any:
+    """Largest stress at the clamps [Pa] at full stroke under all loads at once, with the concentration there."""
+    load, middle = task.spec.load, it.width / 2 / it.edgewise
+    across = float(load.force_y) / it.leaves + float(load.moment_x) * it.depth / 2 / it.offset_squares
+    edgewise = (across * it.length / 2 + float(load.moment_z) / it.leaves) * middle
+    along = leaf_load(it, task) / it.area
+    return it.stress_concentration * (closed_forms.max_stress(it, task.stroke) + edgewise + along)

@@ -1,0 +1,268 @@
+"""The specification of a friction isolator: what the machine is, what it has to do, and what may be built."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Self
+
+from pydantic import GetCoreSchemaHandler, model_validator
+from pydantic_core import CoreSchema, core_schema
+
+from friso.intervals import Interval, Span
+from friso.materials import materials
+from friso.quantities import (
+    Number,
+    Quantity,
+    StageError,
+    Value,
+    at_least_1,
+    inside_0_1,
+    non_negative,
+    positive,
+    quoted,
+)
+from friso.stage.files import parsed, text_of
+from friso.stage.flexure import leaf_count, unknown_material
+from friso.stage.section import Section, Table
+
+
+@dataclass(frozen=True)
+class Choice:
+    """A key that takes one item or a list of them, each read by `read_one`, which raises StageError."""
+
+    of: Quantity | Number | None
+    example: str
+
+    @property
+    def expected(self) -> str:
+        """What the key takes, in words."""
+        return f"a list, each {self.of.expected}" if self.of else f"a list of some of {', '.join(materials())}"
+
+    @property
+    def written_example(self) -> str:
+        """The example as it stands in a file."""
+        return self.example
+
+    def read(self, given: Any) -> tuple[Any, ...]:
+        """The items. Raises StageError."""
+        items = given if isinstance(given, list | tuple) else [given]
+        if not items:
+            raise StageError("", "an empty list", self.expected, self.example)
+        return tuple(self._one(item) for item in items)
+
+    def _one(self, given: Any) -> Any:
+        if self.of:
+            try:
+                return self.of.read(given)
+            except StageError as error:
+                raise StageError("", error.given, self.expected, self.example) from None
+        if not isinstance(given, str) or given not in materials():
+            raise unknown_material(given if isinstance(given, str) else str(given))
+        return given
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return core_schema.no_info_plain_validator_function(self.read)
+
+
+GAUGES = (0.05, 0.08, 0.1, 0.12, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.5, 0.6, 0.7, 0.8, 1.0, 1.2, 1.5, 2.0)
+"""Thicknesses of spring strip that are usually in stock [mm]."""
+
+
+@dataclass(frozen=True)
+class Gauges(Choice):
+    """A list of thicknesses, or a range that stands for the usual gauges in it."""
+
+    def read(self, given: Any) -> tuple[Any, ...]:
+        """The thicknesses. Raises StageError."""
+        if not (isinstance(given, str) and ".." in given):
+            return super().read(given)
+        assert isinstance(self.of, Quantity)
+        among = Span(self.of, "0.1 mm .. 0.5 mm").read(given)
+        found = [f"{each:g} mm" for each in GAUGES if among.low <= each * 1e-3 * (1 + 1e-9) <= among.high * (1 + 1e-8)]
+        if not found:
+            expected = f"a range with a usual gauge in it ({', '.join(f'{each:g}' for each in GAUGES)} mm)"
+            raise StageError("", quoted(given), expected, 'thickness = "0.1 mm .. 0.5 mm"')
+        return super().read(found)
+
+
+_FORCE = Quantity("N", non_negative, "20 N")
+_MOMENT = Quantity("N*m", non_negative, "0.5 N*m")
+_SUPPORT = Quantity("N/m", positive, "20 N/um")
+_LENGTH = Quantity("m", positive, "70 mm")
+_MASS = Quantity("kg", positive, "1.2 kg")
+_GAUGE = Quantity("m", positive, "0.3 mm")
+_GAUGES = 'thickness = ["0.2 mm", "0.25 mm", "0.3 mm"]'
+
+
+class Machine(Section):
+    """How fast the controller of the machine may be, or the parasitic frequencies that decide it."""
+
+    bandwidth_limit: Annotated[Value | None, Quantity("Hz", positive, "48 Hz")] = None
+    parasitic_frequencies: Annotated[
+        tuple[Any, ...] | None, Choice(Quantity("Hz", positive, "480 Hz"), '["480 Hz", "730 Hz"]')
+    ] = None
+
+    @model_validator(mode="after")
+    def _has_one(self) -> Self:
+        if (self.bandwidth_limit is None) == (self.parasitic_frequencies is None):
+            given = "both" if self.bandwidth_limit else "neither"
+            example = 'bandwidth_limit = "48 Hz" or parasitic_frequencies = ["480 Hz"]'
+            raise StageError("", given, "the bandwidth limit, or the parasitic frequencies that decide it", example)
+        return self
+
+
+class Friction(Section):
+    """Ranges of the friction of the bearing; a key left out stays as in the stage file."""
+
+    static: Annotated[Interval | None, Span(Quantity("N", positive, "3 N"), "1 N .. 3 N")] = None
+    coulomb: Annotated[Interval | None, Span(Quantity("N", positive, "1 N"), "0.5 N .. 1 N")] = None
+    gap: Annotated[Interval | None, Span(Number(inside_0_1, "0.5"), "0.3 .. 0.85")] = None
+    """The share of the static friction that is lost in sliding, (F_s - F_c)/F_s, instead of `coulomb`."""
+    stribeck_velocity: Annotated[Interval | None, Span(Quantity("m/s", positive, "1.6 mm/s"), "1 mm/s .. 3 mm/s")] = (
+        None
+    )
+    bristle_stiffness: Annotated[Interval | None, Span(Quantity("N/m", positive, "1e5 N/m"), "5e4 N/m .. 2e5 N/m")] = (
+        None
+    )
+    viscous: Annotated[Interval | None, Span(Quantity("N*s/m", non_negative, "0.5 N*s/m"), "0 N*s/m .. 5 N*s/m")] = (
+        None
+    )
+
+    @model_validator(mode="after")
+    def _is_not_contradictory(self) -> Self:
+        if self.coulomb and self.gap:
+            raise StageError("", "coulomb together with gap", "one of the two", 'gap = "0.3 .. 0.85"')
+        if self.static and self.coulomb and self.coulomb.low >= self.static.high:
+            given = f"coulomb = {quoted(self.coulomb.text)}, static = {quoted(self.static.text)}"
+            raise StageError("", given, "Coulomb friction below the static friction", 'coulomb = "0.5 N .. 1 N"')
+        return self
+
+
+class SpecMasses(Section):
+    """Masses with their tolerance; a key left out stays as in the stage file."""
+
+    cart: Annotated[Interval | None, Span(_MASS, "1.2 kg +/- 5 %")] = None
+    stage: Annotated[Interval | None, Span(_MASS, "0.5 kg +/- 5 %")] = None
+
+
+class Moves(Section):
+    """The moves: travel and acceleration, each from its range."""
+
+    travel: Annotated[Interval, Span(Quantity("m", positive, "10 mm"), "1 mm .. 100 mm")]
+    acceleration: Annotated[Interval, Span(Quantity("m/s^2", positive, "10 m/s^2"), "10 m/s^2 .. 100 m/s^2")]
+
+
+class Position(Section):
+    """When a move is done: from when on the stage stays within `window` of its reference; the time this may take."""
+
+    window: Annotated[Value, Quantity("m", positive, "1 um")]
+    settling_time: Annotated[Value | None, Quantity("s", positive, "1 s")] = None
+
+
+class Load(Section):
+    """What the joint carries at the leaf ends: forces along the leaves (besides the weight of the stage) and along their
+    width, moments about all axes; and how stiff it has to be along the leaves and their width at full stroke."""
+
+    force_x: Annotated[Value, _FORCE] = Value(0, "0 N")
+    force_y: Annotated[Value, _FORCE] = Value(0, "0 N")
+    moment_x: Annotated[Value, _MOMENT] = Value(0, "0 N*m")
+    moment_y: Annotated[Value, _MOMENT] = Value(0, "0 N*m")
+    moment_z: Annotated[Value, _MOMENT] = Value(0, "0 N*m")
+    support_x: Annotated[Value | None, _SUPPORT] = None
+    support_y: Annotated[Value | None, _SUPPORT] = None
+
+
+class Leaves(Section):
+    """What may be built: the space for the leaves, the sheets and materials to be had, and the stroke.
+
+    A single length, width or spacing is the largest allowed, a tenth of it the least.
+    """
+
+    leaves: Annotated[tuple[Any, ...], Choice(Number(leaf_count, "2"), "leaves = 2")] = (2,)
+    length: Annotated[Interval, Span(_LENGTH, "30 mm .. 70 mm")]
+    width: Annotated[Interval, Span(_LENGTH, "10 mm .. 45 mm")]
+    spacing: Annotated[Interval, Span(_LENGTH, "20 mm .. 60 mm")]
+    thickness: Annotated[tuple[Any, ...], Gauges(_GAUGE, _GAUGES)]
+    materials: Annotated[tuple[Any, ...], Choice(None, 'materials = ["stainless 1.4310"]')]
+    stroke: Annotated[Interval, Span(_LENGTH, "0.3 mm .. 1 mm")]
+
+    def space(self, name: str) -> tuple[float, float]:
+        """The least and the largest length, width or spacing [m]."""
+        allowed: Interval = getattr(self, name)
+        return (allowed.low if allowed.low < allowed.high else allowed.high / 10), allowed.high
+
+    @model_validator(mode="after")
+    def _can_be_built(self) -> Self:
+        thickest = max(self.thickness)
+        for name in ("length", "width"):
+            longest = getattr(self, name)
+            if min(self.thickness) >= longest.high:
+                given = f"thickness = {quoted(self.thickness[0].text)}, {name} = {quoted(longest.text)}"
+                raise StageError("thickness", given, f"sheets thinner than the {name} of the leaves", _GAUGES)
+        if thickest >= self.spacing.high:
+            given = f"thickness up to {thickest:g} m, spacing = {quoted(self.spacing.text)}"
+            raise StageError("spacing", given, "leaves farther apart than they are thick", 'spacing = "20 mm .. 60 mm"')
+        return self
+
+
+class Safety(Section):
+    """Factors of safety, and the tolerance of the drive stiffness in production."""
+
+    strength: Annotated[float, Number(at_least_1, "1.5")] = 1.5
+    """Yield strength over stress."""
+    fatigue: Annotated[float, Number(at_least_1, "1.3")] = 1.3
+    """Stress borne for ever over that at the clamps at full stroke."""
+    buckling: Annotated[float, Number(at_least_1, "3")] = 3.0
+    """Buckling load over load."""
+    breakaway: Annotated[float, Number(at_least_1, "1.1")] = 1.1
+    """Least static friction over the force of the joint at full stroke."""
+    parasitic: Annotated[float, Number(at_least_1, "10")] = 10.0
+    """First interfering parasitic frequency over crossover (thesis, Sec. 4.3.3)."""
+    hunting: Annotated[float, Number(at_least_1, "1.2")] = 1.2
+    """Crossover over the highest at which a cycle attracts."""
+    stiffness_tolerance: Annotated[float, Number(inside_0_1, "0.1")] = 0.1
+    """Share by which the drive stiffness may be off: the thickness, in its cube, by a third of that."""
+
+
+_MACHINE = Table(lambda _: Machine, '[machine] bandwidth_limit = "48 Hz"')
+_FRICTION = Table(lambda _: Friction, '[friction] static = "1 N .. 3 N"')
+_MASSES = Table(lambda _: SpecMasses, '[masses] stage = "0.5 kg +/- 5 %"')
+_MOVES = Table(lambda _: Moves, '[moves] travel = "1 mm .. 100 mm", acceleration = "10 m/s^2 .. 100 m/s^2"')
+_POSITION = Table(lambda _: Position, '[position] window = "1 um"')
+_LOAD = Table(lambda _: Load, '[load] force_x = "20 N"')
+_LEAVES = Table(lambda _: Leaves, '[leaves] length = "30 mm .. 70 mm", ...')
+_SAFETY = Table(lambda _: Safety, "[safety] buckling = 3")
+
+
+class Spec(Section):
+    """A specification, as its file describes it."""
+
+    name: str = ""
+    source: str = ""
+    machine: Annotated[Machine, _MACHINE]
+    friction: Annotated[Friction, _FRICTION]
+    masses: Annotated[SpecMasses, _MASSES] = SpecMasses()
+    moves: Annotated[Moves, _MOVES]
+    position: Annotated[Position, _POSITION]
+    load: Annotated[Load, _LOAD] = Load()
+    leaves: Annotated[Leaves, _LEAVES]
+    safety: Annotated[Safety, _SAFETY] = Safety()
+
+    @property
+    def limit(self) -> float:
+        """The highest crossover [Hz] that the machine allows."""
+        if self.machine.bandwidth_limit is not None:
+            return float(self.machine.bandwidth_limit)
+        known: Sequence[float] = self.machine.parasitic_frequencies or ()
+        return min(known) / self.safety.parasitic
+
+
+def load_spec(path: str | os.PathLike[str]) -> Spec:
+    """The specification in a TOML file. Raises StageError."""
+    try:
+        return Spec(**parsed(text_of(Path(path)), "a specification; examples/thesis_spec.toml is one"))
+    except StageError as error:
+        raise error.found_in(str(path)) from None

@@ -1,0 +1,156 @@
+"""The design tried: moves of machines drawn from the specification, its joint free, and locked for comparison."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.stats import binomtest
+
+from friso.design.population import Population, drawn
+from friso.design.spec import Spec
+from friso.engine.arrays import Status
+from friso.engine.batch import Options, run_chunks
+from friso.engine.kernel import kernel
+from friso.equations.motion import last_corner
+from friso.equations.structure import shared_structure
+from friso.stage import Stage
+
+MACHINES = 10_000
+"""Machines and moves that are drawn."""
+
+FOLLOWED, LONGER = 15.0, 10.0
+"""Time [s] for which a machine is followed after its move, as in the thesis's path; and how many times longer one that
+is not in position in the last quarter of it."""
+
+LAST = 0.25
+"""Share of the run, at its end, in which a machine has to stay in position."""
+
+THERE_AND_BACK = {
+    "kind": "there_and_back",
+    "acceleration": "1 m/s^2",
+    "acceleration_time": "0 s",
+    "return_at": "5 s",
+    "duration": "20 s",
+}
+"""A motion whose numbers are replaced by those of a machine."""
+
+RTOL = 1e-5
+"""Relative tolerance of these runs."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of the machines, arrays of shape (count,): whether the run was `completed`, whether the stage
+    `hunts` (it leaves the window about its reference in the last quarter of a run ten times as long as the others),
+    the time [s] after the last corner of the reference from which on it stays in the window (NaN: never), and its
+    swing, peak to peak, in the last quarter [m]."""
+
+    completed: np.ndarray
+    hunts: np.ndarray
+    settling: np.ndarray
+    swing: np.ndarray
+
+    @property
+    def tried(self) -> int:
+        """Moves that were simulated to their end."""
+        return int(self.completed.sum())
+
+    @property
+    def hunting(self) -> int:
+        return int(self.hunts.sum())
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """The range that holds the probability of hunting with 95 % (Clopper and Pearson)."""
+        found = binomtest(self.hunting, self.tried).proportion_ci(0.95, method="exact")
+        return float(found.low), float(found.high)
+
+    def slower_than(self, share: float) -> float:
+        """The settling time [s] that is exceeded by a share of the moves; infinite where more of them hunt."""
+        times = np.where(np.isnan(self.settling), np.inf, self.settling)[self.completed]
+        return float(np.quantile(times, 1 - share, method="higher"))
+
+    @property
+    def worst(self) -> int:
+        """The number of the move that hunts with the largest swing, or else settles last."""
+        rank = np.where(self.hunts, self.swing + 1e9, np.nan_to_num(self.settling, nan=-1.0))
+        return int(np.where(self.completed, rank, -np.inf).argmax())
+
+
+@dataclass(frozen=True)
+class Verification:
+    """The machines and moves drawn, what became of them with the joint `free` and `locked`, and the `worst` of the free
+    ones as a stage."""
+
+    population: Population
+    free: Outcome
+    locked: Outcome
+    worst: Stage
+
+
+def verification(stage: Stage, spec: Spec, progress: Callable[[str, int, int], None]) -> Verification:
+    """Try the design in all that the specification allows; `progress` gets what is done, moves done and moves in all."""
+    flat = stage.flat()
+    machines = drawn(spec, flat, MACHINES)
+    window = float(spec.position.window)
+    outcomes = []
+    for name, held in (("joint free", False), ("joint locked", True)):
+        own = machines.over(flat) | {"joint.locked": held, "motion.kind": "there_and_back"}
+        outcomes.append(tried(own, machines.count, window, lambda done, name=name: progress(name, done, machines.count)))
+    return Verification(machines, *outcomes, _one(stage, machines.of(outcomes[0].worst)))
+
+
+def tried(
+    flat: dict[str, Any],
+    count: int,
+    window: float,
+    progress: Callable[[int], None] = lambda done: None,
+    patient: bool = True,
+) -> Outcome:
+    """The moves of stages given as flat keys, arrays of shape (count,); if `patient`, those that are not in position
+    again, for longer."""
+    first = _followed(flat, count, window, FOLLOWED, progress)
+    again = np.flatnonzero(first.completed & first.hunts & patient)
+    if again.size:
+        own = {key: value[again] if np.ndim(value) else value for key, value in flat.items()}
+        longer = _followed(own, again.size, window, LONGER * FOLLOWED, lambda done: None)
+        for name in ("completed", "hunts", "settling", "swing"):
+            getattr(first, name)[again] = getattr(longer, name)
+    return first
+
+
+def _followed(
+    flat: dict[str, Any], count: int, window: float, time: float, progress: Callable[[int], None]
+) -> Outcome:
+    """The moves, each followed for a time [s] after its last corner."""
+    corner = np.broadcast_to(np.asarray(last_corner(flat), float), (count,))
+    whole = {**flat, "motion.duration": corner + time}
+    options = Options(rtol=RTOL, bands=(window, 10 * window), window=1 - LAST, record_from=0.0, least_swing=np.inf)
+    found = Outcome(np.zeros(count, bool), np.zeros(count, bool), np.full(count, np.nan), np.full(count, np.nan))
+    done = 0
+    for runs in run_chunks(kernel(shared_structure(whole)), whole, count, options):
+        numbers, ended, left = runs.numbers, runs.statistic("ended"), runs.statistic("inner_exit")
+        completed = runs.results.statuses == Status.DONE
+        found.completed[numbers] = completed
+        found.hunts[numbers] = completed & (left > (1 - LAST) * ended)
+        settled = completed & ~found.hunts[numbers]
+        found.settling[numbers] = np.where(settled, np.maximum(left - corner[numbers], 0.0), np.nan)
+        found.swing[numbers] = runs.statistic("deviation_max") - runs.statistic("deviation_min")
+        done += len(numbers)
+        progress(done)
+    return found
+
+
+def _one(stage: Stage, keys: dict[str, float]) -> Stage:
+    """One of the machines with its move as a stage. Its joint is given by its numbers: of which size of the leaves its
+    stiffness is off is not told apart."""
+    flat = stage.flat()
+    follow = ("joint.stiffness", "parasitic.frequency", "parasitic.mass", "parasitic.damping_ratio")
+    joint = {key: float(flat[key]) for key in (*follow, "controller.tuned_mass")}
+    moved = stage.replace({"motion": THERE_AND_BACK})
+    corner = float(last_corner({**flat, **moved.flat(), **keys}))
+    numbers = joint | keys | {"motion.duration": corner + FOLLOWED}
+    return moved.with_numbers(numbers, without=["flexure"])

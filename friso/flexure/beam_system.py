@@ -1,0 +1,216 @@
+"""The leaves of one mechanism as geometrically exact beams of exudyn: forces, stiffness and mass of their nodes.
+
+Only this module knows exudyn. A leaf is a chain of equal two-node elements of constant strain. Three things keep few of
+them exact. The bending an element misses because its moment is taken as constant is added to its shear flexibility
+(residual bending flexibility: h^2/(12 E I) per force). The mass its bent middle carries beyond the straight line
+between its nodes is added to its rotary inertia (rho A h^2/6). And what the leaf has as a plate (plate.py) is averaged
+over the element, such that the whole leaf has the stiffness of the plate in parallel motion, under a constant torque,
+and under the torque that a force across the deflected leaf adds.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import exudyn
+import numpy as np
+
+from friso.flexure import plate
+from friso.flexure.closed_forms import SHEAR
+from friso.flexure.mechanism import Mechanism
+
+ELEMENTS = 16
+"""Elements along a leaf; its modes are reported at the nodes between them."""
+
+TILTS = 8
+"""Newton iterations for the tilt of the torsional compliance, from 0; four are enough."""
+
+COORDINATES = 6
+"""Of a node: displacements along x, y, z and angles of successive rotations about them."""
+
+
+class BeamFailure(RuntimeError):
+    """A mechanism that the beam model cannot evaluate."""
+
+
+class Leaves:
+    """The leaves, which are all alike, none of their ends held: exudyn has one of them and is asked about each in turn.
+    States and forces are of shape (leaves, nodes, 6), the cart end first."""
+
+    def __init__(self, mechanism: Mechanism, elements: int = ELEMENTS) -> None:
+        self.count, self.nodes = int(mechanism.leaves), elements + 1
+        self._container = exudyn.SystemContainer()
+        self._system = self._container.AddSystem()
+        _add_leaf(self._system, mechanism, elements)
+        self._system.Assemble()
+        settings = exudyn.SimulationSettings()
+        settings.solution.file.write = False
+        settings.solution.sensors.active = False
+        settings.staticSolver.verboseMode = 0
+        self._solver = exudyn.MainSolverStatic()
+        self._solver.InitializeSolver(self._system, settings)
+
+    def forces(self, state: np.ndarray) -> np.ndarray:
+        """Forces and moments [N, N m] that hold the nodes in this state."""
+        return -np.array([self._forces(leaf) for leaf in state]).reshape(state.shape)
+
+    def stiffness(self, state: np.ndarray) -> np.ndarray:
+        """Tangent stiffness of each leaf in this state, shape (leaves, 6 nodes, 6 nodes)."""
+        return np.array([self._stiffness(leaf) for leaf in state])
+
+    def mass(self) -> np.ndarray:
+        """Mass of an undeflected leaf, shape (6 nodes, 6 nodes)."""
+        self._move(np.zeros((self.nodes, COORDINATES)))
+        self._solver.ComputeMassMatrix(self._system)
+        return np.array(self._solver.GetSystemMassMatrix())
+
+    def _move(self, leaf: np.ndarray) -> None:
+        if not np.all(np.isfinite(leaf)):
+            raise BeamFailure("The beams have no finite state: check that all dimensions are positive numbers.")
+        self._system.systemData.SetODE2Coordinates(leaf.ravel())
+
+    def _forces(self, leaf: np.ndarray) -> np.ndarray:
+        self._move(leaf)
+        self._solver.ComputeODE2RHS(self._system)
+        return np.array(self._solver.GetSystemResidual())
+
+    def _stiffness(self, leaf: np.ndarray) -> np.ndarray:
+        self._move(leaf)
+        self._solver.ComputeJacobianODE2RHS(
+            self._system, scalarFactor_ODE2=-1, scalarFactor_ODE2_t=0, scalarFactor_ODE1=0
+        )
+        return np.array(self._solver.GetSystemJacobian())
+
+
+@dataclass(frozen=True)
+class Place:
+    """A configuration in the plane of motion: displacements of the `inner` nodes (leaves, nodes between the ends, 3)
+    and of the `stage` (x, z, about y)."""
+
+    inner: np.ndarray
+    stage: np.ndarray
+
+    @classmethod
+    def rest(cls, leaves: Leaves) -> Place:
+        return cls(np.zeros((leaves.count, leaves.nodes - 2, 3)), np.zeros(3))
+
+    def plus(self, rate: Place, factor: float = 1.0) -> Place:
+        return Place(self.inner + factor * rate.inner, self.stage + factor * rate.stage)
+
+    def state(self, offsets: np.ndarray) -> np.ndarray:
+        """That of all nodes, shape (leaves, nodes, 6)."""
+        x, z, turn = self.stage
+        leaves, inner, _ = self.inner.shape
+        state = np.zeros((leaves, inner + 2, COORDINATES))
+        state[:, 1:-1, 0::2] = self.inner
+        state[:, -1, 0] = x + np.sin(turn) * offsets
+        state[:, -1, 2] = z + (np.cos(turn) - 1) * offsets
+        state[:, -1, 4] = turn
+        return state
+
+
+@dataclass(frozen=True)
+class Condensed:
+    """Coordinates of the leaves' nodes, eliminated: the inner nodes `follow` the stage (leaves, inner coordinates, 3)
+    and `settle` (leaves, inner coordinates) under forces that are out of balance; `force` (3,) and `stiffness` (3, 3)
+    are what is left at the stage."""
+
+    follow: np.ndarray
+    settle: np.ndarray
+    force: np.ndarray
+    stiffness: np.ndarray
+
+    @classmethod
+    def of(
+        cls, stiffness: np.ndarray, forces: np.ndarray, which: int, ends: np.ndarray, bend: tuple[int, float]
+    ) -> Condensed:
+        """Of the stiffness of the leaves and forces on their nodes, the coordinates which, which + 2 and which + 4 of
+        each node; `ends` (leaves, 3, 3) tells how those of the leaf ends follow the stage, `bend` at which coordinate
+        their path is curved, and what the forces do there [N m]."""
+        own = stiffness[:, COORDINATES + which :: 2, COORDINATES + which :: 2]
+        out = forces[:, 1:, which::2].reshape(len(forces), -1)
+        inside, border = slice(None, -3), slice(-3, None)
+        back = np.swapaxes(ends, 1, 2)
+        across = own[:, inside, border] @ ends
+        solved = np.linalg.solve(own[:, inside, inside], np.concatenate([across, out[:, inside, None]], axis=2))
+        follow, settle = -solved[:, :, :3], -solved[:, :, 3]
+        felt = np.swapaxes(across, 1, 2)
+        left = np.sum(back @ own[:, border, border] @ ends + felt @ follow, axis=0)
+        left[bend[0], bend[0]] += bend[1]
+        force = np.sum(back @ out[:, border, None] + felt @ settle[:, :, None], axis=0)[:, 0]
+        return cls(follow, settle, force, left)
+
+
+def _add_leaf(system: Any, it: Mechanism, elements: int) -> None:
+    """The nodes and elements of a leaf."""
+    h = float(it.length) / elements
+    middles = h * (np.arange(elements // 2) + 0.5)
+    half = [_section(it, h, *pair) for pair in zip(_curl(it, h, middles), _twist(it, h, middles), strict=True)]
+    nodes = [
+        system.AddNode({"nodeType": "RigidBodyRxyz", "referenceCoordinates": [i * h, 0, 0, 0, 0, 0], "Vshow": False})
+        for i in range(elements + 1)
+    ]
+    for i, section in enumerate(half[::-1] + half):
+        system.AddObject(
+            {
+                "objectType": "BeamGeometricallyExact",
+                "nodeNumbers": nodes[i : i + 2],
+                "length": h,
+                "sectionData": section,
+                "Vshow": False,
+            }
+        )
+
+
+def _section(it: Mechanism, h: float, curl: float, twist: float) -> Any:
+    """The section of an element of length h, its compliance in bending and torsion over that of a plain beam given."""
+    shear = SHEAR * it.shear * it.area
+    weak, strong = it.young * it.bending / curl, it.young * it.edgewise
+    torsion = it.shear * plate.torsion_constant(it.width, it.thickness) / twist
+    edgewise, flatwise = (1 / (1 / shear + h**2 / (12 * bending)) for bending in (strong, weak))
+    bulge = it.area * h**2 / 6
+    section = exudyn.BeamSection()
+    section.stiffnessMatrix = np.diag([it.young * it.area, edgewise, flatwise, torsion, weak, strong])
+    section.massPerLength = it.density * it.area
+    moments = [it.bending + it.edgewise, it.bending + bulge, it.edgewise + bulge]
+    section.inertia = it.density * np.diag(moments)
+    return section
+
+
+_POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(4)
+
+
+def _inside(h: float, middles: np.ndarray) -> np.ndarray:
+    """Points for integrals over elements, shape (elements, 4)."""
+    return middles[:, None] + _POINTS * h / 2
+
+
+def _curl(it: Mechanism, h: float, middles: np.ndarray) -> np.ndarray:
+    """Compliance in bending of elements, weighted by the square of the moment in parallel motion."""
+    s = _inside(h, middles)
+    return (plate.compliance_profile(s, it.length, it.width, it.poisson) * s**2) @ _WEIGHTS / (s**2 @ _WEIGHTS)
+
+
+def _twist(it: Mechanism, h: float, middles: np.ndarray) -> np.ndarray:
+    """Compliance in torsion of elements: as `plate.free_twist`, so that a constant torque meets the stiffness of the
+    plate, but tilted by exp(tilt s^2), so that the torque of a force across the deflected leaf, s^3, does so too.
+
+    The rate of twist p under that torque, the warping of which the clamps forbid: p - p''/rate^2 = s^3, p = 0 there.
+    The torque in an element is s^3 + s h^2/2 at its middle: its strain being constant, it sees the curved leaf as arcs
+    (found by comparison; 1/n^2 errors of the stiffness along y vanish).
+    """
+    s, end = 2 * _inside(h, middles) / it.length, 2 * middles / it.length
+    even = plate.free_twist(s * it.length / 2, it.length, it.width, it.poisson) @ _WEIGHTS / 2
+    rate = plate.warping_rate(it.width, it.poisson) * it.length / 2
+    decay = np.exp(rate * (s - 1)) * (1 - np.exp(-2 * rate * s)) / (1 - np.exp(-2 * rate))
+    odd = (s**3 + 6 * s / rate**2 - (1 + 6 / rate**2) * decay) * s**3 @ _WEIGHTS / 2
+    torques = end**3 + end * (2 * h / it.length) ** 2 / 2
+    wanted, tilt = odd.sum() / even.sum(), 0.0
+    for _ in range(TILTS):
+        shares = even * np.exp(tilt * end**2)
+        shares /= shares.sum()
+        met = shares @ torques**2
+        tilt += (wanted - met) / (shares @ (torques * end) ** 2 - met * (shares @ end**2))
+    tilted = even * np.exp(tilt * end**2)
+    return tilted * even.sum() / tilted.sum()

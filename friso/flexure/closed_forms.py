@@ -1,0 +1,195 @@
+"""The mechanism by closed forms, for one or for a million geometries at once.
+
+Sources: Soemers, Design Principles for Precision Mechanisms (2010), ch. 2; Awtar, Slocum & Sevincer (2007),
+doi:10.1115/1.2717231, for the deflected leaf; plate.py for what clamps do to a wide leaf.
+Stiffness in N/m, forces in N, lengths in m, frequencies in Hz; arrays of one shape throughout.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from friso.flexure import plate
+from friso.flexure.mechanism import Mechanism
+
+SHEAR = 5 / 6
+"""Share of a rectangle's area that carries shear (Timoshenko's coefficient)."""
+
+CLAMPED = 4.730040744862704
+"""First root of cos x cosh x = 1: a beam between clamps."""
+
+BENDING_MASS = 0.1726
+"""Share of a leaf's mass that takes part where its first bending mode is driven from one end: half of the base motion,
+the other half being a motion that is odd about the middle; 0.25 x 0.690."""
+
+
+def drive_stiffness(it: Mechanism) -> Any:
+    """Stiffness along the motion, the stage kept parallel: n 12 E I/L^3, stiffened as a plate."""
+    beam = 12 * it.young * it.bending / it.length**3
+    return it.leaves * beam * plate.stiffening(it.length, it.width, it.poisson)
+
+
+def support_x(it: Mechanism, deflection: Any = 0.0) -> Any:
+    """Stiffness along the leaves with all else held: falls as the deflected leaves bend under it."""
+    straight = it.leaves * it.young * it.area / it.length
+    return straight / (1 + 12 / 700 * (deflection / it.thickness) ** 2)
+
+
+def support_y(it: Mechanism, deflection: Any = 0.0) -> Any:
+    """Stiffness along the width with all else held: bending and shear in the plane of the leaves, and the twist
+    4 delta (s/L)^3 that a force across a deflected leaf adds, s from its middle, without the warping its clamps forbid.
+    """
+    flat = it.length**3 / (12 * it.young * it.edgewise) + it.length / (SHEAR * it.shear * it.area)
+    rigidity = it.shear * plate.torsion_constant(it.width, it.thickness)
+    twisted = deflection**2 * it.length / (28 * rigidity) * _cubic_twist(it)
+    return it.leaves / (flat + twisted)
+
+
+def _cubic_twist(it: Mechanism) -> Any:
+    """Compliance of a leaf under a torque that goes with s^3, over that of one free to warp.
+
+    The rate of twist p solves p - p''/rate^2 = s^3, with p = 0 at the clamps: p = s^3 + 6 s/rate^2 - A sinh(rate s).
+    """
+    half = plate.warping_rate(it.width, it.poisson) * it.length / 2
+    free = half**7 / 7
+    end = half**3 + 6 * half
+    decay = half**3 / np.tanh(half) - 3 * half**2 + 6 * half / np.tanh(half) - 6
+    return (free + 6 * half**5 / 5 - end * decay) / free
+
+
+def max_stress(it: Mechanism, deflection: Any) -> Any:
+    """Largest bending stress [Pa] at the clamps, 3 E t delta/L^2 for a beam."""
+    beam = 3 * it.young * it.thickness * deflection / it.length**2
+    return beam * plate.stress_factors(it.length, it.width, it.poisson)[1]
+
+
+def shortening(it: Mechanism, deflection: Any) -> Any:
+    """By how much the stage comes nearer to the cart: 3 delta^2/(5 L)."""
+    return 3 * deflection**2 / (5 * it.length)
+
+
+def buckling_load(it: Mechanism) -> Any:
+    """Load along the leaves, borne by all of them, at which the stage sways: n pi^2 E I/L^2, stiffened as a plate."""
+    return it.leaves * np.pi**2 * it.young * it.bending / it.length**2 * _mode_stiffening(it)
+
+
+def leaf_bending(it: Mechanism) -> Any:
+    """Frequency of the first bending mode of a leaf between its clamps: 1.028 t/L^2 sqrt(E/rho), stiffened."""
+    beam = CLAMPED**2 / (2 * np.pi * it.length**2) * np.sqrt(it.young * it.bending / (it.density * it.area))
+    return beam * np.sqrt(_mode_stiffening(it))
+
+
+def _mode_stiffening(it: Mechanism) -> Any:
+    """Stiffening for moments that change their sign along the leaf as in a mode: as in parallel motion, on which the
+    even share of the moments, which are far from the clamps, has little influence."""
+    return plate.stiffening(it.length, it.width, it.poisson)
+
+
+def leaf_torsion(it: Mechanism) -> Any:
+    """Frequency of the first torsional mode of a leaf between its clamps, by Rayleigh's quotient of 1 - cos(2 pi x/L).
+    """
+    wave = 2 * np.pi / it.length
+    rigidity = it.young * it.thickness**3 / (12 * (1 - it.poisson**2))
+    energy = rigidity * (it.width**3 / 12 * wave**4 + 2 * (1 - it.poisson) * it.width * wave**2)
+    inertia = it.density * it.thickness * it.width**3 / 12 * 3
+    return np.sqrt(energy / inertia) / (2 * np.pi)
+
+
+def leaf_participation(it: Mechanism) -> Any:
+    """Share of the stage's mass that the in-phase bending mode of the leaves takes with it."""
+    return BENDING_MASS * it.leaves * it.leaf_mass / it.body.mass
+
+
+def stage_stiffness(it: Mechanism) -> np.ndarray:
+    """Stiffness of the stage at its reference point, undeflected, shape (..., 6, 6)."""
+    odd, even = (plate.stiffening(it.length, it.width, it.poisson, each) for each in (True, False))
+    bending = it.young * it.bending / it.length
+    edgewise = it.young * it.edgewise / it.length
+    sheared = 12 * edgewise / (SHEAR * it.shear * it.area * it.length)
+    parallel, half = 12 * edgewise / it.length**2 / (1 + sheared), it.length / 2
+    along = it.young * it.area / it.length
+    twist = plate.torsion_stiffness(it.length, it.width, it.thickness, it.shear, it.poisson)
+    spread = it.offset_squares
+    return _symmetric(
+        it,
+        {
+            (0, 0): it.leaves * along,
+            (1, 1): it.leaves * parallel,
+            (2, 2): it.leaves * 12 * bending * odd / it.length**2,
+            (3, 3): it.leaves * twist + parallel * spread,
+            (4, 4): it.leaves * bending * (3 * odd + even) + along * spread,
+            (5, 5): it.leaves * (parallel * half**2 + edgewise),
+            (2, 4): it.leaves * 6 * bending * odd / it.length,
+            (1, 5): -it.leaves * parallel * half,
+        },
+    )
+
+
+def stage_mass(it: Mechanism) -> np.ndarray:
+    """Mass of stage and leaves, the latter following as they do statically, at the reference point, (..., 6, 6)."""
+    own, length, spread = it.leaf_mass, it.length, it.offset_squares
+    leaves = _symmetric(
+        it,
+        {
+            (0, 0): it.leaves * own / 3,
+            (1, 1): it.leaves * own * 13 / 35,
+            (2, 2): it.leaves * own * 13 / 35,
+            (3, 3): it.leaves * own * it.width**2 / 36 + own * spread * 13 / 35,
+            (4, 4): it.leaves * own * length**2 / 105 + own * spread / 3,
+            (5, 5): it.leaves * own * length**2 / 105,
+            (2, 4): it.leaves * own * length * 11 / 210,
+            (1, 5): -it.leaves * own * length * 11 / 210,
+        },
+    )
+    return leaves + _body_mass(it)
+
+
+def _body_mass(it: Mechanism) -> np.ndarray:
+    """The rigid stage alone at the reference point."""
+    mass = it.body.mass
+    x, y, z = it.body.centre[0] - it.length, it.body.centre[1], it.body.centre[2]
+    inertia = it.body.inertia
+    return _symmetric(
+        it,
+        {
+            (0, 0): mass,
+            (1, 1): mass,
+            (2, 2): mass,
+            (3, 3): inertia[0] + mass * (y**2 + z**2),
+            (4, 4): inertia[1] + mass * (x**2 + z**2),
+            (5, 5): inertia[2] + mass * (x**2 + y**2),
+            (3, 4): -mass * x * y,
+            (3, 5): -mass * x * z,
+            (4, 5): -mass * y * z,
+            (0, 4): mass * z,
+            (0, 5): -mass * y,
+            (1, 3): -mass * z,
+            (1, 5): mass * x,
+            (2, 3): mass * y,
+            (2, 4): -mass * x,
+        },
+    )
+
+
+def _symmetric(it: Mechanism, entries: dict[tuple[int, int], Any]) -> np.ndarray:
+    """The matrices, shape (..., 6, 6), with these entries on and above the diagonal."""
+    shape = np.broadcast_shapes(*(np.shape(entry) for entry in entries.values()), np.shape(it.length))
+    matrices = np.zeros((*shape, 6, 6))
+    for (i, k), entry in entries.items():
+        matrices[..., i, k] = matrices[..., k, i] = entry
+    return matrices
+
+
+def stage_modes(it: Mechanism) -> tuple[np.ndarray, np.ndarray]:
+    """Frequencies, shape (..., 6), ascending, and shapes, (..., 6, 6), one per column at unit modal mass, of the stage
+    on leaves without inner modes; NaN where the numbers make no mechanism."""
+    mass, stiffness = stage_mass(it), stage_stiffness(it)
+    possible = np.isfinite(mass + stiffness).all(axis=(-2, -1)) & (np.einsum("...ii->...i", mass) > 0).all(axis=-1)
+    factor = np.linalg.cholesky(np.where(possible[..., None, None], mass, np.eye(6)))
+    inverse = np.linalg.inv(factor)
+    turned = np.swapaxes(inverse, -1, -2)
+    squares, vectors = np.linalg.eigh(inverse @ np.where(possible[..., None, None], stiffness, 0.0) @ turned)
+    frequencies = np.sqrt(np.maximum(squares, 0)) / (2 * np.pi)
+    return np.where(possible[..., None], frequencies, np.nan), turned @ vectors

@@ -1,0 +1,53 @@
+"""What the leaf springs of a stage are to its equations of motion: the stiffness of the joint and its parasitic mode."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from friso.flexure import closed_forms
+from friso.flexure.evaluation import VISIBLE
+from friso.flexure.mechanism import Mechanism
+from friso.stage.flexure import register_derivation
+
+
+@register_derivation("flexure")
+def joint_keys(flat: Mapping[str, Any]) -> dict[str, Any]:
+    """`joint.stiffness` and the keys of [parasitic] of a stage whose leaves are given, by closed forms."""
+    it = Mechanism.of(flat)
+    with np.errstate(all="ignore"):  # numbers that make no mechanism are found out by the rules of the stage file
+        frequency, share = first_interfering(it)
+    return {
+        "joint.stiffness": closed_forms.drive_stiffness(it),
+        "parasitic.frequency": frequency,
+        "parasitic.mass": share / (1 + share) * it.body.mass,
+        "parasitic.damping_ratio": it.damping_ratio,
+    }
+
+
+def first_interfering(it: Mechanism) -> tuple[Any, Any]:
+    """Frequency [Hz] of the lowest mode, but for the drive mode, that actuator and sensor see, and its residue times
+    the stage's mass: how much more of a mass it is than the stage is.
+
+    The model of the equations, a part m_p of the stage's mass m on a spring, has the residue m_p/(m (m - m_p)).
+    """
+    leaf = closed_forms.leaf_participation(it)
+    inner = closed_forms.leaf_bending(it) * np.sqrt(1 + leaf)
+    frequencies, shapes = closed_forms.stage_modes(it)
+    seen = np.abs(seen_at(it, it.actuation, shapes) * seen_at(it, it.sensor, shapes))
+    residues = seen * np.asarray(it.body.mass)[..., None]
+    heights = residues / (2 * np.asarray(it.damping_ratio)[..., None])
+    rigid = np.where(heights > VISIBLE, frequencies, np.inf)
+    rigid[..., 0] = np.inf  # the drive mode
+    first = np.argmin(rigid, axis=-1)[..., None]
+    lowest, residue = (np.take_along_axis(each, first, axis=-1)[..., 0] for each in (rigid, residues))
+    leaves_first = inner <= lowest
+    return np.where(leaves_first, inner, lowest)[()], np.where(leaves_first, leaf, residue)[()]
+
+
+def seen_at(it: Mechanism, point: tuple[Any, Any, Any], shapes: np.ndarray) -> np.ndarray:
+    """Motion along z of a point of the stage in its modes, shapes (..., 6, modes)."""
+    x, y = (np.asarray(each, dtype=float)[..., None] for each in (point[0] - it.length, point[1]))
+    return shapes[..., 2, :] + shapes[..., 3, :] * y - shapes[..., 4, :] * x

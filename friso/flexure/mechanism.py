@@ -1,0 +1,145 @@
+"""A parallel leaf-spring mechanism as data (thesis, Fig. 6).
+
+x runs along the leaves, from the cart (0) to the stage (L), y along their width, z through their thickness, which is
+the direction of motion. The origin lies between the clamps at the cart, in the middle of the width and of the row of
+leaves. Numbers may be arrays of one shape: many mechanisms at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
+from typing import Any
+
+import numpy as np
+
+AXES = ("x", "y", "z")
+
+ALUMINIUM = 2700.0
+"""Density [kg/m^3] of the block that stands in for a stage whose inertia is not given."""
+
+
+@dataclass(frozen=True)
+class Body:
+    """The stage: mass [kg], moments of inertia [kg m^2] about axes through its centre of mass, and where that is [m],
+    each a triple for x, y, z. Products of inertia are 0."""
+
+    mass: Any
+    inertia: tuple[Any, Any, Any]
+    centre: tuple[Any, Any, Any]
+
+
+@dataclass(frozen=True)
+class Mechanism:
+    """Leaves in a row, neighbours `spacing` apart, all of `length`, `width` and `thickness` [m].
+
+    `young` [Pa], `poisson`, `density` [kg/m^3], `yield_strength` and `fatigue` [Pa] (NaN where it is not known) are of
+    their material. `actuation` and `sensor` are the points [m] where the actuator pushes along z and where the position
+    along z is measured. `damping_ratio` is that of its own modes, `stress_concentration` a factor on the stress at the
+    clamps.
+    """
+
+    leaves: Any
+    length: Any
+    width: Any
+    thickness: Any
+    spacing: Any
+    young: Any
+    poisson: Any
+    density: Any
+    yield_strength: Any
+    fatigue: Any
+    body: Body
+    actuation: tuple[Any, Any, Any]
+    sensor: tuple[Any, Any, Any]
+    damping_ratio: Any = 0.01
+    stress_concentration: Any = 1.0
+
+    @classmethod
+    def of(cls, flat: Mapping[str, Any]) -> Mechanism:
+        """The mechanism of a stage given as flat keys to SI numbers or arrays. Raises KeyError without [flexure]."""
+        own = {key.removeprefix("flexure."): value for key, value in flat.items() if key.startswith("flexure.")}
+        names = ("leaves", "length", "width", "thickness", "spacing", "young", "poisson", "density")
+        shape = {name: own[name] for name in names}
+        bare = cls(
+            **shape,
+            yield_strength=own["yield"],
+            fatigue=own.get("fatigue", np.nan),
+            body=Body(flat["masses.stage"], (0.0, 0.0, 0.0), (own["length"], 0.0, 0.0)),
+            actuation=(own["length"] / 2, 0.0, 0.0),
+            sensor=(own["length"] / 2, 0.0, 0.0),
+            damping_ratio=own["damping_ratio"],
+            stress_concentration=own["stress_concentration"],
+        )
+        inertia = _triple(own, "inertia", block_inertia(bare))
+        actuation = _triple(own, "actuation", bare.actuation)
+        return replace(
+            bare,
+            body=Body(bare.body.mass, inertia, _triple(own, "centre", bare.body.centre)),
+            actuation=actuation,
+            sensor=_triple(own, "sensor", actuation),
+        )
+
+    def one(self, number: int) -> Mechanism:
+        """One of many mechanisms."""
+
+        def pick(value: Any) -> Any:
+            if isinstance(value, tuple):
+                return tuple(map(pick, value))
+            if isinstance(value, Body):
+                return Body(*(pick(getattr(value, each.name)) for each in fields(Body)))
+            return float(value[number]) if np.ndim(value) else value
+
+        return Mechanism(*(pick(getattr(self, each.name)) for each in fields(Mechanism)))
+
+    @property
+    def shear(self) -> Any:
+        """Shear modulus [Pa]."""
+        return self.young / (2 * (1 + self.poisson))
+
+    @property
+    def area(self) -> Any:
+        """Cross-section of a leaf [m^2]."""
+        return self.width * self.thickness
+
+    @property
+    def bending(self) -> Any:
+        """Second moment of area of a leaf in the direction of motion [m^4]."""
+        return self.width * self.thickness**3 / 12
+
+    @property
+    def edgewise(self) -> Any:
+        """Second moment of area of a leaf in its plane [m^4]."""
+        return self.thickness * self.width**3 / 12
+
+    @property
+    def leaf_mass(self) -> Any:
+        """Mass of a leaf between its clamps [kg]."""
+        return self.density * self.area * self.length
+
+    @property
+    def depth(self) -> Any:
+        """Distance of the outermost leaves [m]."""
+        return (self.leaves - 1) * self.spacing
+
+    @property
+    def offset_squares(self) -> Any:
+        """Sum over the leaves of their squared distance from the middle of the row [m^2]."""
+        return self.spacing**2 * self.leaves * (self.leaves**2 - 1) / 12
+
+    @property
+    def offsets(self) -> np.ndarray:
+        """Places of the leaves along z [m], of a single mechanism, shape (leaves,)."""
+        return (np.arange(int(self.leaves)) - (int(self.leaves) - 1) / 2) * float(self.spacing)
+
+
+def block_inertia(mechanism: Mechanism) -> tuple[Any, Any, Any]:
+    """Moments of inertia of an aluminium block of the stage's mass, as wide as the leaves and as deep as their row."""
+    mass, y, z = mechanism.body.mass, mechanism.width, mechanism.depth
+    x = mass / (ALUMINIUM * y * z)
+    return tuple(mass / 12 * (a**2 + b**2) for a, b in ((y, z), (x, z), (x, y)))  # type: ignore[return-value]
+
+
+def _triple(own: Mapping[str, Any], name: str, default: tuple[Any, Any, Any]) -> tuple[Any, Any, Any]:
+    """The three keys of a point or of inertias, each as given or its default."""
+    return tuple(own.get(f"{name}_{axis}", value) for axis, value in zip(AXES, default, strict=True))  # type: ignore[return-value]

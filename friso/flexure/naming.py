@@ -1,0 +1,64 @@
+"""Names of modes by what moves most, as its share of the kinetic energy tells."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+STAGE = ("stage along x", "stage along y", "drive", "stage about x", "stage about y", "stage about z")
+"""Names by the motion of the stage."""
+
+RIPPLE = 0.05
+"""Share of the largest displacement below which the sign of a shape does not count."""
+
+
+def mode_name(
+    stage: np.ndarray, mass: float, inertia: Sequence[float], arm: np.ndarray, leaves: np.ndarray, leaf_mass: float
+) -> str:
+    """The name of a mode at unit modal mass.
+
+    `stage` (6,) is the motion of the stage at its reference point, the middle of the leaf ends: translations, then
+    rotations; `mass` [kg] and `inertia` [kg m^2] (3,) are its own, about the centre of mass, which is `arm` [m] (3,)
+    away from the reference point. `leaves` (leaves, points, 3) are displacements of their middle lines at even places
+    from cart to stage, `leaf_mass` [kg] that of one. What of the energy is found nowhere else is torsion of the leaves.
+    """
+    speed = stage[:3] + np.cross(stage[3:], arm)
+    own = np.concatenate([mass * speed**2, np.asarray(inertia, dtype=float) * stage[3:] ** 2])
+    _, y, z = leaf_mass * np.sum(_mean(leaves**2), axis=0)
+    shares = {
+        **dict(zip(STAGE, own, strict=True)),
+        "leaf bending": z,
+        "leaf in-plane bending": y,
+        "leaf torsion": 1 - own.sum() - y - z,
+    }
+    name = max(shares, key=shares.__getitem__)
+    if name == "drive" and stage[2] ** 2 < speed[2] ** 2 / 2:
+        return STAGE[3 + int(np.argmax(own[3:5]))]
+    if name == "leaf bending":
+        ripples = _own(leaves[:, :, 2])
+        # what all leaves do alike
+        alike = len(leaves) * np.sum(np.mean(ripples, axis=0) ** 2) / np.sum(ripples**2)
+        return f"leaf bending, {'in' if alike > 0.5 else 'out of'} phase{_number(ripples)}"
+    if name == "leaf in-plane bending":
+        return name + _number(_own(leaves[:, :, 1]))
+    return name
+
+
+def _mean(values: np.ndarray) -> np.ndarray:
+    """Mean over the points along the leaves, axis 1, by the trapezoidal rule."""
+    return (values[:, 1:] + values[:, :-1]).mean(axis=1) / 2
+
+
+def _own(shapes: np.ndarray) -> np.ndarray:
+    """The shapes (leaves, points) without what follows a shift of the stage statically."""
+    x = np.linspace(0, 1, shapes.shape[1])
+    return shapes - np.outer(shapes[:, -1], x**2 * (3 - 2 * x))
+
+
+def _number(shapes: np.ndarray) -> str:
+    """What is added for a shape of two waves or more, counted on the leaf that moves most."""
+    shape = shapes[np.argmax(np.sum(shapes**2, axis=1))]
+    signs = np.sign(shape[np.abs(shape) > RIPPLE * np.max(np.abs(shape))])
+    waves = 1 + int(np.sum(signs[1:] != signs[:-1]))
+    return "" if waves == 1 else f" {waves}"

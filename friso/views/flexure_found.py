@@ -1,0 +1,63 @@
+"""A mechanism as both models see it, at one stroke: what `friso flexure` prints and draws."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+
+from friso.flexure.evaluation import Evaluation, Mode
+from friso.flexure.mechanism import Mechanism
+from friso.stage import Stage
+from friso.views.figure import BLUE, ORANGE
+
+GRAVITY = 9.80665
+"""Standard acceleration of free fall [m/s^2]."""
+
+BEAMS, CLOSED = "Beams", "Closed forms"
+COLOURS = {BEAMS: BLUE, CLOSED: ORANGE}
+
+
+@dataclass(frozen=True)
+class Found:
+    """The leaf springs of a stage at a stroke by closed forms and by beams; None with the reason in `failure` where
+    the beams found no answer."""
+
+    stage: Stage
+    closed: Evaluation
+    beams: Evaluation | None
+    failure: str = ""
+
+    @property
+    def best(self) -> Evaluation:
+        """The one whose figures count."""
+        return self.beams or self.closed
+
+    @property
+    def models(self) -> dict[str, Evaluation]:
+        """What there is, by the name of its column."""
+        known = {} if self.beams is None else {BEAMS: self.beams}
+        return {**known, CLOSED: self.closed}
+
+    @property
+    def mechanism(self) -> Mechanism:
+        return self.closed.mechanism
+
+
+def weight(it: Mechanism) -> float:
+    """Of the stage [N]."""
+    return GRAVITY * float(it.body.mass)
+
+
+def buckling_margin(it: Evaluation) -> float:
+    """Buckling load over the weight of the stage."""
+    return it.buckling / weight(it.mechanism)
+
+
+def named_modes(it: Evaluation) -> dict[str, Mode]:
+    """The modes by name, in their order; namesakes beyond the first are counted."""
+    seen: Counter[str] = Counter()
+    named = {}
+    for mode in it.modes:
+        seen[mode.name] += 1
+        named[mode.name if seen[mode.name] == 1 else f"{mode.name} ({seen[mode.name]})"] = mode
+    return named

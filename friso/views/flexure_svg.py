@@ -1,0 +1,147 @@
+"""Strokes of a technical drawing as SVG elements: lines, texts, dimensions, leaders. Paper millimetres, y downwards."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from xml.sax.saxutils import escape, quoteattr
+
+Point = tuple[float, float]
+
+TEXT = 3.0
+"""Height of letters [mm]."""
+
+ARROW = 2.4
+"""Length of an arrowhead [mm]."""
+
+OVER = 1.5
+"""How far an extension line goes beyond the dimension line [mm]."""
+
+LETTER = 0.6
+"""Width of a letter over its height, on the safe side."""
+
+LINES = {
+    "outline": 'stroke="#222222" stroke-width="0.5"',
+    "thin": 'stroke="#222222" stroke-width="0.18"',
+    "dashed": 'stroke="#0072B2" stroke-width="0.3" stroke-dasharray="2.4 1.2"',
+    "phantom": 'stroke="#767676" stroke-width="0.25" stroke-dasharray="6 1 1 1 1 1"',
+    "centre": 'stroke="#767676" stroke-width="0.18" stroke-dasharray="6 1.2 1 1.2"',
+}
+"""Kinds of lines, after ISO 128: edges, dimensions, other positions of moving parts, parts that are only indicated."""
+
+HATCH = (
+    '<defs><pattern id="leaf-hatch" width="1.6" height="1.6" patternUnits="userSpaceOnUse" '
+    'patternTransform="rotate(45)"><rect width="1.6" height="1.6" fill="#ffffff"/>'
+    '<line x1="0" y1="0" x2="0" y2="1.6" stroke="#767676" stroke-width="0.3"/></pattern></defs>'
+)
+
+
+def sheet(width: float, height: float, label: str, parts: Iterable[str]) -> str:
+    """The whole drawing [mm] with its title for readers that see no pictures."""
+    size = f'width="{_n(width)}mm" height="{_n(height)}mm" viewBox="0 0 {_n(width)} {_n(height)}"'
+    paper = f'<rect width="{_n(width)}" height="{_n(height)}" fill="#ffffff"/>'
+    body = "\n".join([f"<title>{escape(label)}</title>", HATCH, paper, *parts])
+    font = "font-family=\"'DejaVu Sans', Arial, sans-serif\""
+    return f'<svg xmlns="http://www.w3.org/2000/svg" {size} {font} role="img">\n{body}\n</svg>\n'
+
+
+def path(points: Iterable[Point], kind: str = "outline", fill: str = "none", closed: bool = False) -> str:
+    """A line through points; filled if it is closed."""
+    corners = " L ".join(f"{_n(x)} {_n(y)}" for x, y in points)
+    return f'<path d="M {corners}{" Z" if closed else ""}" fill={quoteattr(fill)} {LINES[kind]}/>'
+
+
+def box(corner: Point, other: Point, kind: str = "outline", fill: str = "none") -> str:
+    """A rectangle between opposite corners."""
+    (x1, y1), (x2, y2) = corner, other
+    return path([(x1, y1), (x2, y1), (x2, y2), (x1, y2)], kind, fill, closed=True)
+
+
+def area(corner: Point, other: Point, fill: str) -> str:
+    """A rectangle between opposite corners without a line around it."""
+    (x1, y1), (x2, y2) = corner, other
+    corners = " L ".join(f"{_n(x)} {_n(y)}" for x, y in ((x1, y1), (x2, y1), (x2, y2), (x1, y2)))
+    return f'<path d="M {corners} Z" fill="{fill}"/>'
+
+
+def circle(centre: Point, radius: float, fill: str = "none") -> str:
+    return f'<circle cx="{_n(centre[0])}" cy="{_n(centre[1])}" r="{_n(radius)}" fill="{fill}" {LINES["thin"]}/>'
+
+
+def words(
+    at: Point, text: str, anchor: str = "start", size: float = TEXT, bold: bool = False, upright: bool = False
+) -> str:
+    """A text on its baseline; `upright` ones are read from the right."""
+    x, y = _n(at[0]), _n(at[1])
+    turn = f' transform="rotate(-90 {x} {y})"' if upright else ""
+    weight = ' font-weight="bold"' if bold else ""
+    halo = 'stroke="#ffffff" stroke-width="0.8" stroke-linejoin="round" paint-order="stroke"'
+    style = f'font-size="{_n(size)}" text-anchor="{anchor}" fill="#222222" {halo}{weight}{turn}'
+    return f'<text x="{x}" y="{y}" {style}>{escape(text)}</text>'
+
+
+def fits(text: str, room: float) -> bool:
+    """Whether a text has room within a length [mm]."""
+    return LETTER * TEXT * len(text) + 1 < room
+
+
+def clipped(text: str, width: float, size: float = TEXT) -> str:
+    """The text, or its beginning, as far as it fits into the width [mm]."""
+    most = int(width / (LETTER * size))
+    return text if len(text) <= most else f"{text[: most - 1].rstrip()}…"
+
+
+def arrow(tip: Point, towards: Point) -> str:
+    """An arrowhead at `tip`, pointing the way `towards`, of any length."""
+    size = math.hypot(*towards)
+    dx, dy = towards[0] / size * ARROW, towards[1] / size * ARROW
+    (x, y), slim = tip, 0.17
+    corners = [(x, y), (x - dx - slim * dy, y - dy + slim * dx), (x - dx + slim * dy, y - dy - slim * dx)]
+    return path(corners, "thin", "#222222", closed=True)
+
+
+def across(x1: float, x2: float, y: float, edge: float, text: str) -> list[str]:
+    """A horizontal dimension at the height y between x1 < x2, with extension lines from `edge`."""
+    parts = [_extension((x, edge), (x, y)) for x in (x1, x2)]
+    parts += _arrows((x1, y), (x2, y), (1.0, 0.0))
+    if fits(text, x2 - x1):
+        return [*parts, words(((x1 + x2) / 2, y - 0.9), text, "middle")]
+    return [*parts, words((x2 + ARROW + 3, y - 0.9), text)]
+
+
+def upwards(y1: float, y2: float, x: float, edge: float, text: str) -> list[str]:
+    """A vertical dimension at the place x between y1 < y2, with extension lines from `edge`, read from the right."""
+    parts = [_extension((edge, y), (x, y)) for y in (y1, y2)]
+    parts += _arrows((x, y1), (x, y2), (0.0, 1.0))
+    if fits(text, y2 - y1):
+        return [*parts, words((x - 0.9, (y1 + y2) / 2), text, "middle", upright=True)]
+    return [*parts, words((x - 0.9, y1 - ARROW - 2), text, upright=True)]
+
+
+def leader(tip: Point, knee: Point, lines: list[str], reach: float = 2.0) -> list[str]:
+    """A note with a line that ends in an arrow at `tip`: from the knee it goes on level, to the right."""
+    end = (knee[0] + reach, knee[1])
+    parts = [path([tip, knee, end], "thin"), arrow(tip, (tip[0] - knee[0], tip[1] - knee[1]))]
+    return parts + [words((end[0] + 0.8, end[1] + TEXT * (0.35 + 1.35 * k)), line) for k, line in enumerate(lines)]
+
+
+def _arrows(start: Point, end: Point, way: Point) -> list[str]:
+    """A line with arrows at both ends; from outside, where there is no room between them."""
+    back = (-way[0], -way[1])
+    if math.dist(start, end) > 3 * ARROW:
+        return [path([start, end], "thin"), arrow(start, back), arrow(end, way)]
+    tail = 2 * ARROW
+    outer = [(start[0] - tail * way[0], start[1] - tail * way[1]), (end[0] + tail * way[0], end[1] + tail * way[1])]
+    return [path(outer, "thin"), arrow(start, way), arrow(end, back)]
+
+
+def _extension(edge: Point, at: Point) -> str:
+    """From near the edge to a little beyond the dimension line."""
+    size = math.dist(edge, at) or 1.0
+    dx, dy = (at[0] - edge[0]) / size, (at[1] - edge[1]) / size
+    return path([(edge[0] + 0.8 * dx, edge[1] + 0.8 * dy), (at[0] + OVER * dx, at[1] + OVER * dy)], "thin")
+
+
+def _n(value: float) -> str:
+    """A coordinate to a hundredth of a millimetre."""
+    return f"{value:.2f}".rstrip("0").rstrip(".")

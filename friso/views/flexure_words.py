@@ -1,0 +1,173 @@
+"""What a leaf-spring mechanism is, allows and endangers, in sentences."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from friso.flexure.evaluation import Evaluation
+from friso.views.flexure_found import GRAVITY, Found, buckling_margin, weight
+from friso.views.flexure_table import megapascals, newtons_per, percent
+from friso.views.prefixes import listed, with_unit
+
+RULE = 0.1
+"""Highest crossover over the first interfering frequency (thesis, Section 5: parasitic modes ten times higher)."""
+
+AGREE = 0.1
+"""Share by which the models may differ before that is said."""
+
+
+def sentences(found: Found) -> list[str]:
+    """All that is said, in order."""
+    return [*warnings(found), *findings(found), *assumptions(found)]
+
+
+def findings(found: Found) -> list[str]:
+    """What the joint is, and what it allows."""
+    return [_joint(found.best), _control(found.best), _endurance(found.best)]
+
+
+def warnings(found: Found) -> list[str]:
+    """What is wrong with it."""
+    failed = f"The beam model found no answer: {found.failure} All that follows is by closed forms."
+    return [*([failed] if found.beams is None else []), *_borne(found.best), *_breaks_away(found), *_differences(found)]
+
+
+def assumptions(found: Found) -> list[str]:
+    """What stands in for keys that the stage file leaves out."""
+    flat, it = found.stage.flat(), found.mechanism
+    said = [_centre(flat), _inertia(flat, it.depth, it.width), _points(flat)]
+    parts = [part for part in said if part]
+    return [f"Assumed, since [flexure] does not say: {'; '.join(parts)}."] if parts else []
+
+
+def _joint(it: Evaluation) -> str:
+    own, drive = it.mechanism, it.modes[0]
+    return (
+        f"The joint: {own.leaves:g} leaves of {_size(own.length)} x {_size(own.width)} x {_size(own.thickness)} mm, "
+        f"{newtons_per(it.drive[0], 'mm')}; with the cart held the stage of {own.body.mass:g} kg swings at "
+        f"{with_unit(drive.frequency, 'Hz')}. Over {_stroke(it)} the force departs from linear by "
+        f"{percent(it.nonlinearity)} and takes {with_unit(it.forces[-1], 'N')} at its end."
+    )
+
+
+def _control(it: Evaluation) -> str:
+    first = it.interfering
+    if first is None:
+        return (
+            f"None of the {len(it.modes) - 1} modes above the drive mode that are known is seen by both actuator and "
+            f"sensor (highest: {with_unit(it.modes[-1].frequency, 'Hz')}); the leaves set no limit to the crossover."
+        )
+    return (
+        f"The first mode that interferes with control is {first.name}, at {with_unit(first.frequency, 'Hz')}: by the "
+        f"thesis's rule (ten times the crossover) the crossover may be {with_unit(RULE * first.frequency, 'Hz')} at "
+        "most."
+    )
+
+
+def _endurance(it: Evaluation) -> str:
+    bent = f"At the clamp the leaves bear {megapascals(it.clamp_stress)} at full stroke"
+    if math.isnan(it.fatigue_margin):
+        return f"{bent}; how much they bear for ever is not known (flexure.fatigue), so neither is the largest stroke."
+    largest = with_unit(it.stroke * it.fatigue_margin, "m")
+    bounds = f" More than half the length, {with_unit(it.mechanism.length / 2, 'm')}, is beyond both models."
+    beyond = bounds if it.stroke * it.fatigue_margin > it.mechanism.length / 2 else ""
+    return (
+        f"{bent} and would bear {megapascals(it.mechanism.fatigue)} for ever: by fatigue a stroke of {largest}.{beyond}"
+    )
+
+
+def _borne(it: Evaluation) -> list[str]:
+    """Stresses and loads beyond what the leaves bear."""
+    said, own = [], it.mechanism
+    if it.yield_margin < 1:
+        said.append(
+            f"The leaves yield: {megapascals(it.clamp_stress)} at the clamp at {_stroke(it)}, the material bears "
+            f"{megapascals(own.yield_strength)}. Longer or thinner leaves, or less stroke, mend it."
+        )
+    elif it.fatigue_margin < 1:
+        said.append(
+            f"The leaves break in the long run: {megapascals(it.clamp_stress)} at the clamp at {_stroke(it)}, for ever "
+            f"they bear {megapascals(own.fatigue)}. Longer or thinner leaves, or less stroke, mend it."
+        )
+    if buckling_margin(it) < 1:
+        said.append(
+            f"Hung or stood on its leaves the stage buckles them: it weighs {with_unit(weight(own), 'N')} "
+            f"(g = {GRAVITY} m/s²), they bear {with_unit(it.buckling, 'N')} along their length."
+        )
+    return said
+
+
+def _breaks_away(found: Found) -> list[str]:
+    static, force = found.stage.flat().get("friction.static"), float(found.best.forces[-1])
+    if static is None or force <= static:
+        return []
+    return [
+        f"The cart breaks away inside the stroke: the leaves push with {with_unit(force, 'N')} at "
+        f"{_stroke(found.best)}, static friction holds {with_unit(static, 'N')}. The joint cannot use its stroke "
+        f"beyond about {with_unit(found.best.stroke * static / force, 'm')}."
+    ]
+
+
+def _differences(found: Found) -> list[str]:
+    """Where the two models differ so much that one of them is beyond its range."""
+    if found.beams is None:
+        return []
+    shares = {name: get(found.closed) / get(found.beams) - 1 for name, get in _COMPARED.items()}
+    far = [f"{name} by {100 * share:+.0f} %" for name, share in shares.items() if abs(share) > AGREE]
+    if not far:
+        return []
+    return [
+        f"Closed forms differ from beams in {listed(far, 'and')}: there the leaves are outside the range of the "
+        "former, and the beams count."
+    ]
+
+
+_COMPARED: Mapping[str, Callable[[Evaluation], float]] = {
+    "drive stiffness": lambda it: float(it.drive[0]),
+    "force at full stroke": lambda it: float(it.forces[-1]),
+    "support stiffness x": lambda it: float(it.support_x[0]),
+    "support stiffness x at full stroke": lambda it: float(it.support_x[-1]),
+    "support stiffness y": lambda it: float(it.support_y[0]),
+    "support stiffness y at full stroke": lambda it: float(it.support_y[-1]),
+    "drive frequency": lambda it: it.modes[0].frequency,
+    "first interfering frequency": lambda it: it.interfering.frequency if it.interfering else math.nan,
+    "stress": lambda it: it.stress,
+    "buckling load": lambda it: it.buckling,
+}
+
+
+def _centre(flat: Mapping[str, Any]) -> str:
+    if _given(flat, "centre") == 3:
+        return ""
+    return "centre of mass in the middle of the leaf ends"
+
+
+def _inertia(flat: Mapping[str, Any], depth: float, width: float) -> str:
+    if _given(flat, "inertia") == 3:
+        return ""
+    return (
+        f"moments of inertia of an aluminium block as wide as the leaves ({_size(width)} mm) and as deep as their row "
+        f"({_size(depth)} mm)"
+    )
+
+
+def _points(flat: Mapping[str, Any]) -> str:
+    actuation = "" if _given(flat, "actuation") == 3 else "actuation at half the leaf length"
+    sensor = "" if _given(flat, "sensor") == 3 else "sensor at the point of actuation"
+    return ", ".join(part for part in (actuation, sensor) if part)
+
+
+def _given(flat: Mapping[str, Any], name: str) -> int:
+    """How many of the three keys of a triple the stage file has."""
+    return sum(f"flexure.{name}_{axis}" in flat for axis in "xyz")
+
+
+def _stroke(it: Evaluation) -> str:
+    return f"a stroke of {with_unit(it.stroke, 'm')}"
+
+
+def _size(length: float) -> str:
+    """A length [m] in mm as it stands on a drawing."""
+    return f"{1e3 * length:.4g}"
