@@ -10,10 +10,17 @@ import numpy as np
 
 from friso.design.population import Population
 from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.edges import ABOVE, BELOW, UNKNOWN, find_edges
+from friso.hunting.cycle.find import hunting_cycles
+from friso.hunting.persistence import DISTANCES, hunts_somehow
 
 ROUNDS = 4
-"""Bisections of the step that holds an edge: to 1 % of it on the grids here."""
+"""Bisections of the step that holds an edge: to 1 or 2 % of it on the grids here."""
+
+RTOL = 1e-7
+"""Relative tolerance to which cycles are followed: their multipliers are needed to a percent."""
+
+PERIODS, TRIED = 60.0, DISTANCES[::4]
+"""How long, and from where, is simulated where a cycle may be that could not be closed; verification goes further."""
 
 
 @dataclass(frozen=True)
@@ -48,19 +55,41 @@ class Corners:
 
 
 def edges_over(flat: Mapping[str, Any], population: Population, low: float, high: float, steps: int) -> Corners:
-    """The edges of the stage `flat` in all corners, searched from `low` to `high` [Hz], tuned by van Dijk's rules."""
-    base = population.over({**flat, "controller.crossover": np.nan})
-    whole = Ensemble.held(base, population.count)
+    """The edges of the stage `flat` in all corners, searched from `low` to `high` [Hz], tuned by van Dijk's rules: on a
+    grid, and between the last point at which a cycle attracts and the next."""
+    whole = Ensemble.held(population.over({**flat, "controller.crossover": np.nan}), population.count)
+    grid, every = np.log(np.geomspace(low, high, steps)), np.arange(population.count)
+    attracts, known = _attracts(whole, np.repeat(every, steps), np.tile(grid, population.count))
+    attracts, known = attracts.reshape(-1, steps), known.reshape(-1, steps)
+    last = steps - 1 - attracts[:, ::-1].argmax(axis=1)
+    inside, outside = grid[last], grid[np.minimum(last + 1, steps - 1)]
+    open_ = np.flatnonzero(attracts.any(axis=1) & (last < steps - 1))
+    for _ in range(ROUNDS):
+        middle = (inside[open_] + outside[open_]) / 2
+        within, _ = _attracts(whole, open_, middle)
+        inside[open_], outside[open_] = (
+            np.where(within, middle, inside[open_]),
+            np.where(within, outside[open_], middle),
+        )
+    edges = np.exp((inside + outside) / 2)
+    edges[last == steps - 1] = np.inf
+    edges[~attracts.any(axis=1)] = 0.0
+    unknown = ~known & (np.arange(steps) > np.where(attracts.any(axis=1), last, -1)[:, None])
+    edges[unknown.any(axis=1) & np.isfinite(edges)] = np.nan
+    return Corners(population, edges, (low, high))
 
-    def stages(which: np.ndarray, crossover: np.ndarray) -> Ensemble:
-        some = whole.take(which)
-        return Ensemble.held({**some.flat, "controller.crossover": crossover}, len(which))
 
-    grid = np.broadcast_to(np.geomspace(low, high, steps), (population.count, steps))
-    found = find_edges(stages, grid, ROUNDS)
-    special = {BELOW: 0.0, ABOVE: np.inf, UNKNOWN: np.nan}
-    edges = [special.get(kind, edge) for kind, edge in zip(found.kind, found.crossover, strict=True)]
-    return Corners(population, np.array(edges, float), (low, high))
+@np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
+def _attracts(whole: Ensemble, which: np.ndarray, crossover: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Whether a cycle attracts in corners at logarithms of crossovers, and whether that is known."""
+    some = whole.take(which)
+    stages = Ensemble.held({**some.flat, "controller.crossover": np.exp(crossover)}, len(which))
+    cycles = hunting_cycles(stages, RTOL)
+    attracts, known = cycles.attracting.copy(), np.ones(len(which), bool)
+    unsure = np.flatnonzero(cycles.uncertain)
+    if unsure.size:
+        attracts[unsure], known[unsure] = hunts_somehow(stages.take(unsure), PERIODS, TRIED)
+    return attracts, known
 
 
 def rigid(flat: Mapping[str, Any]) -> dict[str, Any]:

@@ -82,9 +82,7 @@ def sizes_of(geometries: Sequence[Geometry]) -> np.ndarray:
 def rounded(spec: Spec, geometry: Geometry, step: float) -> list[Geometry]:
     """The geometries with whole multiples of a step [m] next to one, as far as there is space for them."""
     low, high = box(spec)
-    near = [
-        {float(np.round(size / step + side, 0) * step) for side in (-0.5, 0.5)} for size in sizes_of([geometry])[0]
-    ]
+    near = [{float(np.round(size / step + side, 0) * step) for side in (-0.5, 0.5)} for size in sizes_of([geometry])[0]]
     found = [np.array(each) for each in product(*map(sorted, near))]
     inside = [each for each in found if np.all(each >= low * (1 - 1e-9)) and np.all(each <= high * (1 + 1e-9))]
     return [Geometry(*map(float, each), geometry.sheet) for each in inside]

@@ -38,7 +38,9 @@ def hunting_map(stage: Stage, spec: Spec, population: Population) -> HuntingMap:
         )
     )
     shape = (STROKES, CROSSOVERS, population.count)
-    stroke, crossover, number = (each.ravel() for each in np.meshgrid(strokes, crossovers, np.arange(population.count), indexing="ij"))
+    stroke, crossover, number = (
+        each.ravel() for each in np.meshgrid(strokes, crossovers, np.arange(population.count), indexing="ij")
+    )
     machines = {key: value[number] for key, value in population.keys.items()}
     runs = {**flat, **machines, **typical_move(spec), "controller.crossover": crossover, "joint.stroke": stroke}
     found = tried(runs, len(number), float(spec.position.window), patient=False)

@@ -142,7 +142,7 @@ def allowed(task: Task, candidates: list[Candidate]) -> float:
 
 
 def fitted(base: Stage, task: Task, candidates: list[Candidate]) -> Fitted:
-    """Leaves as soft as the crossover allows, and the crossover as high as leaves and margins allow. Raises NoDesign."""
+    """Leaves as soft as the crossover allows, that as high as leaves and margins allow. Raises NoDesign."""
     wanted = min(task.spec.limit, allowed(task, candidates))
     for _ in range(ROUNDS):
         task = replace(task, crossover=wanted)

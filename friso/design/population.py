@@ -32,8 +32,7 @@ class Population:
     count: int
 
     def over(self, flat: Mapping[str, Any]) -> dict[str, Any]:
-        """The flat keys of the stage, these machines instead of the one; it is tuned for the masses it has in the file.
-        """
+        """The flat keys of the stage with these machines instead of it; they are tuned as it is."""
         return {**flat, **self.keys}
 
     def of(self, number: int) -> dict[str, float]:

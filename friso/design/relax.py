@@ -77,7 +77,9 @@ def _alone(task: Task, wanted: list[Requirement], k: int) -> Relaxation | None:
 
     def built(x: np.ndarray) -> tuple[np.ndarray, list[Sheet]]:
         sizes = np.exp(x[:4]).T
-        return sizes[:, :3], [Sheet(kinds[int(kind)][0], t, kinds[int(kind)][1]) for t, kind in zip(sizes[:, 3], x[4], strict=True)]
+        return sizes[:, :3], [
+            Sheet(kinds[int(kind)][0], t, kinds[int(kind)][1]) for t, kind in zip(sizes[:, 3], x[4], strict=True)
+        ]
 
     def objective(x: np.ndarray) -> np.ndarray:
         many = mechanisms(task.flat, *built(x))

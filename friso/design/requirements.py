@@ -99,7 +99,10 @@ def requirements(task: Task) -> list[Requirement]:
 
 def _support(spec: Spec, stroke: float) -> list[Requirement]:
     """The stiffness wanted at full stroke."""
-    forms = {"support_x": ("along the leaves", closed_forms.support_x), "support_y": ("across them", closed_forms.support_y)}
+    forms = {
+        "support_x": ("along the leaves", closed_forms.support_x),
+        "support_y": ("across them", closed_forms.support_y),
+    }
     return [
         Requirement(
             f"stiffness {where} at full stroke",

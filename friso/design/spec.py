@@ -127,9 +127,7 @@ class Friction(Section):
     bristle_stiffness: Annotated[Interval | None, Span(Quantity("N/m", positive, "1e5 N/m"), "5e4 N/m .. 2e5 N/m")] = (
         None
     )
-    viscous: Annotated[Interval | None, Span(Quantity("N*s/m", non_negative, "0.5 N*s/m"), "0 N*s/m .. 5 N*s/m")] = (
-        None
-    )
+    viscous: Annotated[Interval | None, Span(Quantity("N*s/m", non_negative, "0.5 N*s/m"), "0 N*s/m .. 5 N*s/m")] = None
 
     @model_validator(mode="after")
     def _is_not_contradictory(self) -> Self:
@@ -163,8 +161,8 @@ class Position(Section):
 
 
 class Load(Section):
-    """What the joint carries at the leaf ends: forces along the leaves (besides the weight of the stage) and along their
-    width, moments about all axes; and how stiff it has to be along the leaves and their width at full stroke."""
+    """What the joint carries at the leaf ends: forces along the leaves (besides the weight of the stage) and along
+    their width, moments about all axes; and how stiff it has to be along leaves and width at full stroke."""
 
     force_x: Annotated[Value, _FORCE] = Value(0, "0 N")
     force_y: Annotated[Value, _FORCE] = Value(0, "0 N")

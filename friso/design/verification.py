@@ -92,14 +92,16 @@ class Verification:
 
 
 def verification(stage: Stage, spec: Spec, progress: Callable[[str, int, int], None]) -> Verification:
-    """Try the design in all that the specification allows; `progress` gets what is done, moves done and moves in all."""
+    """Try the design in all that the specification allows."""
     flat = stage.flat()
     machines = drawn(spec, flat, MACHINES)
     window = float(spec.position.window)
     outcomes = []
     for name, held in (("joint free", False), ("joint locked", True)):
         own = machines.over(flat) | {"joint.locked": held, "motion.kind": "there_and_back"}
-        outcomes.append(tried(own, machines.count, window, lambda done, name=name: progress(name, done, machines.count)))
+        outcomes.append(
+            tried(own, machines.count, window, lambda done, name=name: progress(name, done, machines.count))
+        )
     return Verification(machines, *outcomes, _one(stage, machines.of(outcomes[0].worst)))
 
 
@@ -122,9 +124,7 @@ def tried(
     return first
 
 
-def _followed(
-    flat: dict[str, Any], count: int, window: float, time: float, progress: Callable[[int], None]
-) -> Outcome:
+def _followed(flat: dict[str, Any], count: int, window: float, time: float, progress: Callable[[int], None]) -> Outcome:
     """The moves, each followed for a time [s] after its last corner."""
     corner = np.broadcast_to(np.asarray(last_corner(flat), float), (count,))
     whole = {**flat, "motion.duration": corner + time}

@@ -14,8 +14,9 @@ from scipy.linalg import eigh
 
 from friso.flexure import plate
 from friso.flexure.beam_system import COORDINATES, Leaves
-from friso.flexure.evaluation import Mode
-from friso.flexure.mechanism import Mechanism
+from friso.flexure.closed_forms import body_mass
+from friso.flexure.evaluation import Mode, peak_of
+from friso.flexure.mechanism import Mechanism, along_motion
 from friso.flexure.naming import mode_name
 
 MODES = 12
@@ -118,17 +119,19 @@ def modes(it: Mechanism, leaf: Reduced) -> tuple[Mode, ...]:
 
 def _mode(it: Mechanism, frequency: float, stage: np.ndarray, leaves: np.ndarray) -> Mode:
     """The mode that moves stage and leaves so, its sign such that the largest displacement of a leaf is positive."""
-    actuator, sensor = (_along_motion(it, stage, point) for point in (it.actuation, it.sensor))
+    actuator, sensor = (float(along_motion(it, point, stage[:, None])[0]) for point in (it.actuation, it.sensor))
     sign = 1.0 if leaves.flat[np.argmax(np.abs(leaves))] >= 0 else -1.0
-    peak = abs(actuator * sensor) * float(it.body.mass) / (2 * float(it.damping_ratio))
     arm = np.subtract(it.body.centre, (it.length, 0.0, 0.0)).astype(float)
     name = mode_name(stage, float(it.body.mass), it.body.inertia, arm, leaves, float(it.leaf_mass))
-    return Mode(name, float(frequency), sign * actuator, sign * sensor, peak, sign * stage, sign * leaves)
-
-
-def _along_motion(it: Mechanism, stage: np.ndarray, point: tuple[float, float, float]) -> float:
-    """Displacement along z of a point fixed to the stage."""
-    return float(stage[2] + stage[3] * point[1] - stage[4] * (point[0] - it.length))
+    return Mode(
+        name,
+        float(frequency),
+        sign * actuator,
+        sign * sensor,
+        peak_of(it, actuator, sensor),
+        sign * stage,
+        sign * leaves,
+    )
 
 
 def end_motions(offsets: np.ndarray) -> np.ndarray:
@@ -147,18 +150,6 @@ def _rows(offsets: np.ndarray) -> np.ndarray:
     """Orthonormal patterns of the leaves, one per row: all alike, in proportion to their place, and the others."""
     powers = np.vander(np.arange(len(offsets)) - (len(offsets) - 1) / 2, increasing=True)
     return np.linalg.qr(powers)[0].T
-
-
-def body_mass(it: Mechanism) -> np.ndarray:
-    """The rigid stage at its reference point, (6, 6)."""
-    x, y, z = np.subtract(it.body.centre, (it.length, 0.0, 0.0)).astype(float)
-    arm = np.array([[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]])
-    mass = float(it.body.mass)
-    whole = mass * np.eye(COORDINATES)
-    whole[:3, 3:] = mass * arm
-    whole[3:, :3] = mass * arm.T
-    whole[3:, 3:] = np.diag([float(each) for each in it.body.inertia]) + mass * arm.T @ arm
-    return whole
 
 
 def buckling_load(it: Mechanism, leaves: Leaves, straight: np.ndarray, load: float) -> float:

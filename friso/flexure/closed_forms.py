@@ -88,13 +88,16 @@ def _mode_stiffening(it: Mechanism) -> Any:
 
 
 def leaf_torsion(it: Mechanism) -> Any:
-    """Frequency of the first torsional mode of a leaf between its clamps, by Rayleigh's quotient of 1 - cos(2 pi x/L).
-    """
-    wave = 2 * np.pi / it.length
-    rigidity = it.young * it.thickness**3 / (12 * (1 - it.poisson**2))
-    energy = rigidity * (it.width**3 / 12 * wave**4 + 2 * (1 - it.poisson) * it.width * wave**2)
-    inertia = it.density * it.thickness * it.width**3 / 12 * 3
-    return np.sqrt(energy / inertia) / (2 * np.pi)
+    """Frequency of the first torsional mode of a leaf between its clamps, by Rayleigh's quotient of the twist that an
+    even torque along it makes."""
+    rate = plate.warping_rate(it.width, it.poisson)
+    nodes, weights = np.polynomial.legendre.leggauss(24)
+    half = np.asarray(rate * it.length / 2)[..., None]
+    s = nodes * half
+    twist = (half**2 - s**2) / 2 - half * (np.cosh(half) - np.cosh(s)) / np.sinh(half)
+    quotient = (twist @ weights) / (twist**2 @ weights)
+    rigidity = it.young * it.thickness**2 / (12 * (1 - it.poisson**2))
+    return rate**2 * np.sqrt(quotient * rigidity / it.density) / (2 * np.pi)
 
 
 def leaf_participation(it: Mechanism) -> Any:
@@ -143,11 +146,11 @@ def stage_mass(it: Mechanism) -> np.ndarray:
             (1, 5): -it.leaves * own * length * 11 / 210,
         },
     )
-    return leaves + _body_mass(it)
+    return leaves + body_mass(it)
 
 
-def _body_mass(it: Mechanism) -> np.ndarray:
-    """The rigid stage alone at the reference point."""
+def body_mass(it: Mechanism) -> np.ndarray:
+    """Mass of the rigid stage alone at its reference point, shape (..., 6, 6)."""
     mass = it.body.mass
     x, y, z = it.body.centre[0] - it.length, it.body.centre[1], it.body.centre[2]
     inertia = it.body.inertia

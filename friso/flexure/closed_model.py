@@ -8,8 +8,7 @@ from friso.flexure import closed_forms
 from friso.flexure.closed_forms import CLAMPED
 from friso.flexure.curved import stage_stiffness_at
 from friso.flexure.evaluation import Evaluation, Mode, peak_of
-from friso.flexure.joint import seen_at
-from friso.flexure.mechanism import Mechanism
+from friso.flexure.mechanism import Mechanism, along_motion
 from friso.flexure.naming import mode_name
 
 POINTS = 17
@@ -48,8 +47,9 @@ def _modes(it: Mechanism) -> tuple[Mode, ...]:
 
 def _stage_mode(it: Mechanism, frequency: float, shape: np.ndarray) -> Mode:
     leaves = following(it, shape)
-    at = [float(seen_at(it, point, shape[:, None])[0]) for point in (it.actuation, it.sensor)]
-    name = mode_name(shape, it.body.mass, np.array(it.body.inertia), leaves)
+    at = [float(along_motion(it, point, shape[:, None])[0]) for point in (it.actuation, it.sensor)]
+    arm = np.array(it.body.centre) - np.array([it.length, 0.0, 0.0])
+    name = mode_name(shape, it.body.mass, np.array(it.body.inertia), arm, leaves, it.leaf_mass)
     return Mode(name, float(frequency), *at, peak_of(it, *at), shape, leaves)
 
 

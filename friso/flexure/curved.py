@@ -33,7 +33,8 @@ def leaf_stiffness(it: Mechanism, deflection: float) -> np.ndarray:
     x, weight = (nodes + 1) / 2 * it.length, weights / 2 * it.length
     share = x / it.length
     height, slope = deflection * (3 * share**2 - 2 * share**3), 6 * deflection / it.length * (share - share**2)
-    compliance = np.einsum("pij,pik,pi,p->jk", *(2 * (_resultants(it, deflection, x, height, slope),)), *_per(it, x, weight, slope))
+    loads, (per, arc) = _resultants(it, deflection, x, height, slope), _per(it, x, weight, slope)
+    compliance = np.einsum("pij,pik,pi,p->jk", loads, loads, per, arc)
     return np.linalg.inv(compliance)
 
 

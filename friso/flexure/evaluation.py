@@ -9,8 +9,8 @@ import numpy as np
 
 from friso.flexure.mechanism import Mechanism
 
-VISIBLE = 0.1
-"""Height of a resonance over the line of the stage's mass from which it counts as interfering with control."""
+VISIBLE = 0.01
+"""Height of a resonance over the line of the stage's mass from which actuator and sensor count as seeing it."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""What the leaf springs of a stage are to its equations of motion: the stiffness of the joint and its parasitic mode."""
+"""What the leaf springs of a stage are to its equations of motion: stiffness of the joint and parasitic mode."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from friso.flexure import closed_forms
 from friso.flexure.evaluation import VISIBLE
-from friso.flexure.mechanism import Mechanism
+from friso.flexure.mechanism import Mechanism, along_motion
 from friso.stage.flexure import register_derivation
 
 
@@ -35,8 +35,9 @@ def first_interfering(it: Mechanism) -> tuple[Any, Any]:
     """
     leaf = closed_forms.leaf_participation(it)
     inner = closed_forms.leaf_bending(it) * np.sqrt(1 + leaf)
+    inner = np.where(leaf > VISIBLE * 2 * it.damping_ratio, inner, np.inf)
     frequencies, shapes = closed_forms.stage_modes(it)
-    seen = np.abs(seen_at(it, it.actuation, shapes) * seen_at(it, it.sensor, shapes))
+    seen = np.abs(along_motion(it, it.actuation, shapes) * along_motion(it, it.sensor, shapes))
     residues = seen * np.asarray(it.body.mass)[..., None]
     heights = residues / (2 * np.asarray(it.damping_ratio)[..., None])
     rigid = np.where(heights > VISIBLE, frequencies, np.inf)
@@ -45,9 +46,3 @@ def first_interfering(it: Mechanism) -> tuple[Any, Any]:
     lowest, residue = (np.take_along_axis(each, first, axis=-1)[..., 0] for each in (rigid, residues))
     leaves_first = inner <= lowest
     return np.where(leaves_first, inner, lowest)[()], np.where(leaves_first, leaf, residue)[()]
-
-
-def seen_at(it: Mechanism, point: tuple[Any, Any, Any], shapes: np.ndarray) -> np.ndarray:
-    """Motion along z of a point of the stage in its modes, shapes (..., 6, modes)."""
-    x, y = (np.asarray(each, dtype=float)[..., None] for each in (point[0] - it.length, point[1]))
-    return shapes[..., 2, :] + shapes[..., 3, :] * y - shapes[..., 4, :] * x

@@ -143,3 +143,10 @@ def block_inertia(mechanism: Mechanism) -> tuple[Any, Any, Any]:
 def _triple(own: Mapping[str, Any], name: str, default: tuple[Any, Any, Any]) -> tuple[Any, Any, Any]:
     """The three keys of a point or of inertias, each as given or its default."""
     return tuple(own.get(f"{name}_{axis}", value) for axis, value in zip(AXES, default, strict=True))  # type: ignore[return-value]
+
+
+def along_motion(it: Mechanism, point: tuple[Any, Any, Any], shapes: np.ndarray) -> np.ndarray:
+    """Displacement along z of a point of the stage, (..., modes), in motions of it about its reference point, the
+    middle of the leaf ends, shapes (..., 6, modes)."""
+    x, y = (np.asarray(each, dtype=float)[..., None] for each in (point[0] - it.length, point[1]))
+    return shapes[..., 2, :] + shapes[..., 3, :] * y - shapes[..., 4, :] * x

@@ -89,9 +89,7 @@ def stiffening(length: Any, width: Any, poisson: Any, odd: bool = True) -> Any:
     # compliance: integral of f'' m over that of m^2, times (1 - nu^2) for a beam
     share = poisson**2 / (1 - poisson**2)
     whole = length**3 / 12 if odd else length
-    lost = sum(
-        weight * _moment_of(rate, length, odd) for rate, weight in zip(curl.rates, curl.weights, strict=True)
-    )
+    lost = sum(weight * _moment_of(rate, length, odd) for rate, weight in zip(curl.rates, curl.weights, strict=True))
     compliance = 1 + share * (1 - lost / whole)
     return 1 + CONVERGED * (1 / ((1 - poisson**2) * compliance) - 1)
 
@@ -101,8 +99,8 @@ def compliance_profile(s: Any, length: Any, width: Any, poisson: Any) -> Any:
     parallel motion of its ends."""
     curl = Curl.of(length, width, poisson, odd=True)
     stiff = 1 - (1 - poisson**2) * curl.curvature(s, length) / s
-    raw = 1 + (stiffening(length, width, poisson) - 1) / CONVERGED
-    return 1 - stiff * (1 - 1 / stiffening(length, width, poisson)) / (1 - 1 / raw)
+    whole = stiffening(length, width, poisson)
+    return 1 - stiff * (CONVERGED + whole - 1) / whole  # the share of `stiff` that more functions leave
 
 
 def _moment_of(rate: Any, length: Any, odd: bool) -> Any:

@@ -63,11 +63,13 @@ def still_hunts(stages: Ensemble, begin: Begin, periods: float = PERIODS) -> tup
     return hunts, completed
 
 
-def hunts_somehow(stages: Ensemble, periods: float = PERIODS) -> tuple[np.ndarray, np.ndarray]:
+def hunts_somehow(
+    stages: Ensemble, periods: float = PERIODS, distances: np.ndarray = DISTANCES
+) -> tuple[np.ndarray, np.ndarray]:
     """Which stages hunt for ever from some of the distances, and of which that is known, both of shape (count,): a
     stage of which a run failed, while none hunts, may hunt or not."""
-    several = stages.take(np.repeat(np.arange(stages.count), len(DISTANCES)))
-    runs = still_hunts(several, from_rest(several, np.tile(DISTANCES, stages.count)), periods)
+    several = stages.take(np.repeat(np.arange(stages.count), len(distances)))
+    runs = still_hunts(several, from_rest(several, np.tile(distances, stages.count)), periods)
     hunts, completed = (each.reshape(stages.count, -1) for each in runs)
     some = np.any(hunts, axis=1)
     return np.asarray(some), np.asarray(some | np.all(completed, axis=1))

@@ -45,7 +45,9 @@ _LENGTH = Quantity("m", positive, "70 mm")
 _PLACE = Quantity("m", any_sign, "35 mm")
 _INERTIA = Quantity("kg*m^2", positive, "2e-4 kg*m^2")
 
-_EITHER = 'material = "stainless 1.4310" or young = "195 GPa", poisson = 0.3, density = "7900 kg/m^3", yield = "1.3 GPa"'
+_EITHER = (
+    'material = "stainless 1.4310" or young = "195 GPa", poisson = 0.3, density = "7900 kg/m^3", yield = "1.3 GPa"'
+)
 
 
 class _Leaves(Section):

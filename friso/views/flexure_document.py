@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from friso.flexure.evaluation import Evaluation
-from friso.views.flexure_found import Found, buckling_margin
+from friso.views.flexure_found import Found, buckling_margin, interferes
 
 
 def flexure_document(found: Found) -> dict[str, Any]:
@@ -31,7 +31,7 @@ def _evaluation(it: Evaluation) -> dict[str, Any]:
         },
         "eigenfrequencies_hz": [mode.frequency for mode in it.modes],
         "names": [mode.name for mode in it.modes],
-        "interferes": [mode.interferes for mode in it.modes],
+        "interferes": [interferes(it, mode) for mode in it.modes],
         "first_interfering_hz": None if first is None else first.frequency,
         "max_stress_pa": it.stress,
         "clamp_stress_pa": it.clamp_stress,

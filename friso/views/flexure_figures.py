@@ -6,14 +6,18 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from friso.flexure.evaluation import Evaluation
-from friso.views.figure import GREY, Array, Axis, Dash, Figure, Panel, Series
+from friso.views.figure import GREY, Array, Axis, Dash, Figure, Markers, Panel, Series
 from friso.views.flexure_found import CLOSED, COLOURS, Found
 from friso.views.flexure_modes import modes_figure
 
 DASHES: dict[str, Dash] = {CLOSED: "dashed"}
 """Closed forms are dashed, so that both are seen where they agree."""
+
+FINE = 101
+"""Deflections between which lines are drawn."""
 
 
 def flexure_figures(found: Found) -> tuple[Figure, ...]:
@@ -27,8 +31,8 @@ def _force(found: Found) -> Figure:
     reach, steepness = found.best.stroke, float(found.best.drive[0])
     ends = np.array([0.0, reach])
     straight = Series(ends, steepness * ends, "initial stiffness", GREY, "dotted", 1.2)
-    lines = _lines(found, lambda it: it.forces)
-    panel = Panel("", _deflection(found), Axis("Force", "N"), (*lines, straight))
+    lines, points = _lines(found, lambda it: it.forces, -1.0)
+    panel = Panel("", _deflection(found), Axis("Force", "N"), (*lines, straight), (points,))
     caption = (
         "The force that holds the stage deflected, the same to both sides. Above the straight line the leaves stiffen: "
         "pulled between their clamps, they cannot shorten freely."
@@ -38,14 +42,9 @@ def _force(found: Found) -> Figure:
 
 def _support(found: Found) -> Figure:
     """Support stiffness along the leaves and along their width."""
-    axis = _deflection(found)
-    panels = tuple(
-        Panel(title, axis, Axis("Stiffness", "N/µm", (0.0, 1.1 * _most(found, of) / 1e6), prefixed=False), lines)
-        for title, of in (
-            ("Along the leaves (x)", lambda it: it.support_x),
-            ("Along their width (y)", lambda it: it.support_y),
-        )
-        for lines in [_lines(found, lambda it, of=of: of(it) / 1e6)]
+    panels = (
+        _supports(found, "Along the leaves (x)", lambda it: it.support_x / 1e6),
+        _supports(found, "Along their width (y)", lambda it: it.support_y / 1e6),
     )
     caption = (
         "What the leaves hold against forces across the motion, at the middle of their ends and with all else held: it "
@@ -54,16 +53,27 @@ def _support(found: Found) -> Figure:
     return Figure("flexure_support", "Support stiffness over the deflection", caption, panels, columns=2)
 
 
-def _lines(found: Found, of: Callable[[Evaluation], Array]) -> tuple[Series, ...]:
-    """The same quantity by each model."""
-    return tuple(
-        Series(it.deflections, of(it), name, COLOURS[name], DASHES.get(name, "solid"), 1.8)
-        for name, it in found.models.items()
-    )
+def _supports(found: Found, title: str, of: Callable[[Evaluation], Array]) -> Panel:
+    """One support stiffness [N/µm], the same to both sides."""
+    lines, points = _lines(found, of, 1.0)
+    top = 1.1 * max(float(line.y.max()) for line in lines)
+    axis = Axis("Stiffness", "N/µm", (0.0, top), prefixed=False)
+    return Panel(title, _deflection(found), axis, lines, (points,))
 
 
-def _most(found: Found, of: Callable[[Evaluation], Array]) -> float:
-    return max(float(of(it).max()) for it in found.models.values())
+def _lines(found: Found, of: Callable[[Evaluation], Array], parity: float) -> tuple[tuple[Series, ...], Markers]:
+    """The same quantity by each model, drawn smoothly, and where the model that counts was computed.
+
+    At the opposite deflection the quantity is `parity` times as large.
+    """
+    lines = []
+    for name, it in found.models.items():
+        x, y = it.deflections, of(it)
+        both = np.concatenate([-x[:0:-1], x]), np.concatenate([parity * y[:0:-1], y])
+        fine = np.linspace(0.0, it.stroke, FINE)
+        lines.append(Series(fine, CubicSpline(*both)(fine), name, COLOURS[name], DASHES.get(name, "solid"), 1.8))
+    best = next(iter(found.models))
+    return tuple(lines), Markers(found.best.deflections, of(found.best), "", COLOURS[best])
 
 
 def _deflection(found: Found) -> Axis:

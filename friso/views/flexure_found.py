@@ -53,6 +53,11 @@ def buckling_margin(it: Evaluation) -> float:
     return it.buckling / weight(it.mechanism)
 
 
+def interferes(it: Evaluation, mode: Mode) -> bool:
+    """Whether a mode disturbs control: all but the drive mode, on which control works, may."""
+    return mode.interferes and mode is not it.modes[0]
+
+
 def named_modes(it: Evaluation) -> dict[str, Mode]:
     """The modes by name, in their order; namesakes beyond the first are counted."""
     seen: Counter[str] = Counter()

@@ -124,7 +124,7 @@ class Drawing:
 
     @property
     def height(self) -> float:
-        return self.foot + 19 + FOOT
+        return self.foot + 23 + FOOT
 
     def side(self, x: float, z: float) -> Point:
         """A place [m] in the view from the side."""

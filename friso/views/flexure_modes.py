@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from friso.flexure.evaluation import Evaluation, Mode
 from friso.flexure.mechanism import Mechanism
@@ -21,8 +22,14 @@ LARGE = 0.16
 ASPECT = 1.45
 """Width of a picture over its height."""
 
+HALF = 0.5
+"""Share of the energy from which on a mode can be drawn by what is known of it."""
+
 ENOUGH = 0.9
 """Share of all motion from which on a view shows a mode."""
+
+FINE = 65
+"""Places along a leaf between which lines are drawn."""
 
 VIEWS = {"from the side": (0, 2), "from above": (0, 1), "along the leaves": (1, 2)}
 """The two axes of each view, the more usual ones first."""
@@ -38,16 +45,17 @@ class Shape:
 
 def modes_figure(it: Evaluation) -> Figure:
     """The first modes, a panel each."""
-    panels = tuple(_panel(it.mechanism, mode, number) for number, mode in enumerate(it.modes[:SHOWN]))
+    drawn = [mode for mode in it.modes if mode.interferes or drawable_share(it.mechanism, mode) > HALF][:SHOWN]
+    panels = tuple(_panel(it.mechanism, mode, mode is it.modes[0] or mode.interferes) for mode in drawn)
     caption = (
         "The first modes with the cart held and the leaves straight, at a size to be seen. Grey: at rest. The stage is "
         "drawn as the block of its mass and moments of inertia. A mode that actuator and sensor both see limits the "
-        "crossover."
+        "crossover. Torsion of the leaves about their middle lines is not drawn."
     )
     return Figure("flexure_modes", "Modes", caption, panels, columns=2)
 
 
-def _panel(it: Mechanism, mode: Mode, number: int) -> Panel:
+def _panel(it: Mechanism, mode: Mode, seen: bool) -> Panel:
     view = best_view(it, mode)
     axes = VIEWS[view]
     shapes = [*_leaves(it, mode, axes), _block(it, mode, axes)]
@@ -55,14 +63,13 @@ def _panel(it: Mechanism, mode: Mode, number: int) -> Panel:
     low, high = corners.min(axis=0), corners.max(axis=0)
     largest = max(float(np.abs(shape.moved[:, axes]).max()) for shape in shapes)
     size = float(np.max(high - low))
-    gain = LARGE * size / largest if largest > 1e-9 * _motion(it, mode) else 0.0
-    seen = mode.interferes or number == 0
+    gain = LARGE * size / largest
     colour, label = (VERMILLION, "seen by actuator and sensor") if seen else (BLUE, "not seen by both")
     rest = _joined([shape.rest[:, axes] for shape in shapes])
     moved = _joined([(shape.rest + gain * shape.moved)[:, axes] for shape in shapes])
-    lines = (Series(*rest, "at rest", LIGHT, width=1.6), Series(*moved, label, colour, width=1.6))
+    lines = (Series(*rest, f"at rest, {view}", LIGHT, width=1.6), Series(*moved, label, colour, width=1.6))
     x, y = _limits(low - LARGE * size * 1.1, high + LARGE * size * 1.1)
-    title = f"{mode.name}, {with_unit(mode.frequency, 'Hz')} ({view})"
+    title = f"{mode.name}, {with_unit(mode.frequency, 'Hz')}"
     return Panel(title, Axis("xyz"[axes[0]], "m", x), Axis("xyz"[axes[1]], "m", y), lines, equal=True)
 
 
@@ -74,9 +81,12 @@ def best_view(it: Mechanism, mode: Mode) -> str:
     return next((view for view, share in seen.items() if share > ENOUGH), max(seen, key=seen.__getitem__))
 
 
-def _motion(it: Mechanism, mode: Mode) -> float:
-    """The largest displacement of a point that is known."""
-    return max(float(np.abs(mode.leaves).max()), float(np.abs(_corners_moved(it, mode)).max()), 1e-12)
+def drawable_share(it: Mechanism, mode: Mode) -> float:
+    """Share of the kinetic energy that is in the stage and the middle lines: the rest is torsion of the leaves."""
+    speed = _rigid(it, mode, _centre(it)[None, :])[0]
+    stage = it.body.mass * np.sum(speed**2) + np.sum(np.array(it.body.inertia, dtype=float) * mode.stage[3:] ** 2)
+    middle = (mode.leaves[:, 1:] ** 2 + mode.leaves[:, :-1] ** 2).mean(axis=1) / 2
+    return float(stage + it.leaf_mass * np.sum(middle))
 
 
 def _corners_moved(it: Mechanism, mode: Mode) -> Array:
@@ -110,13 +120,13 @@ def _leaves(it: Mechanism, mode: Mode, axes: tuple[int, int]) -> list[Shape]:
 
 
 def _middle(it: Mechanism, mode: Mode, leaf: Array, offset: float) -> list[Shape]:
-    x = np.linspace(0.0, float(it.length), len(leaf))
+    x, leaf = _smooth(it, leaf)
     return [Shape(np.stack([x, np.zeros_like(x), np.full_like(x, offset)], axis=1), leaf)]
 
 
 def _outline(it: Mechanism, mode: Mode, leaf: Array, offset: float) -> list[Shape]:
     """Both long edges and both ends: cross-sections turn as the middle line does."""
-    x = np.linspace(0.0, float(it.length), len(leaf))
+    x, leaf = _smooth(it, leaf)
     turn = np.gradient(leaf[:, 1], x)
     turn[[0, -1]] = 0.0, mode.stage[5]  # the clamps hold the ends
     sides = []
@@ -125,6 +135,12 @@ def _outline(it: Mechanism, mode: Mode, leaf: Array, offset: float) -> list[Shap
         sides.append((rest, leaf + np.stack([-y * turn, 0 * turn, 0 * turn], axis=1)))
     around = [np.concatenate([one, other[::-1], one[:1]]) for one, other in zip(*sides, strict=True)]
     return [Shape(*around)]
+
+
+def _smooth(it: Mechanism, leaf: Array) -> tuple[Array, Array]:
+    """More places along a leaf [m] and the displacement there, by a cubic spline."""
+    known, fine = (np.linspace(0.0, float(it.length), count) for count in (len(leaf), FINE))
+    return fine, CubicSpline(known, leaf)(fine)
 
 
 def _sections(it: Mechanism, mode: Mode, leaf: Array, offset: float) -> list[Shape]:

@@ -23,11 +23,13 @@ LETTER = 0.6
 LINES = {
     "outline": 'stroke="#222222" stroke-width="0.5"',
     "thin": 'stroke="#222222" stroke-width="0.18"',
+    "push": 'stroke="#D55E00" stroke-width="0.5"',
     "dashed": 'stroke="#0072B2" stroke-width="0.3" stroke-dasharray="2.4 1.2"',
     "phantom": 'stroke="#767676" stroke-width="0.25" stroke-dasharray="6 1 1 1 1 1"',
     "centre": 'stroke="#767676" stroke-width="0.18" stroke-dasharray="6 1.2 1 1.2"',
 }
-"""Kinds of lines, after ISO 128: edges, dimensions, other positions of moving parts, parts that are only indicated."""
+"""Kinds of lines, after ISO 128: edges, dimensions, actuation, other positions of moving parts, parts that are only
+indicated, axes of symmetry."""
 
 HATCH = (
     '<defs><pattern id="leaf-hatch" width="1.6" height="1.6" patternUnits="userSpaceOnUse" '
@@ -91,13 +93,13 @@ def clipped(text: str, width: float, size: float = TEXT) -> str:
     return text if len(text) <= most else f"{text[: most - 1].rstrip()}…"
 
 
-def arrow(tip: Point, towards: Point) -> str:
+def arrow(tip: Point, towards: Point, fill: str = "#222222") -> str:
     """An arrowhead at `tip`, pointing the way `towards`, of any length."""
     size = math.hypot(*towards)
     dx, dy = towards[0] / size * ARROW, towards[1] / size * ARROW
     (x, y), slim = tip, 0.17
     corners = [(x, y), (x - dx - slim * dy, y - dy + slim * dx), (x - dx + slim * dy, y - dy - slim * dx)]
-    return path(corners, "thin", "#222222", closed=True)
+    return path(corners, "thin", fill, closed=True)
 
 
 def across(x1: float, x2: float, y: float, edge: float, text: str) -> list[str]:

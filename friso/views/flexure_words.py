@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from friso.flexure.evaluation import Evaluation
+from friso.flexure.mechanism import AXES
 from friso.views.flexure_found import GRAVITY, Found, buckling_margin, weight
 from friso.views.flexure_table import megapascals, newtons_per, percent
 from friso.views.prefixes import listed, with_unit
@@ -20,7 +21,8 @@ AGREE = 0.1
 
 def sentences(found: Found) -> list[str]:
     """All that is said, in order."""
-    return [*warnings(found), *findings(found), *assumptions(found)]
+    joint, *further = findings(found)
+    return [joint, *warnings(found), *further, *assumptions(found)]
 
 
 def findings(found: Found) -> list[str]:
@@ -30,7 +32,7 @@ def findings(found: Found) -> list[str]:
 
 def warnings(found: Found) -> list[str]:
     """What is wrong with it."""
-    failed = f"The beam model found no answer: {found.failure} All that follows is by closed forms."
+    failed = f"The beam model found no answer: {found.failure.rstrip('.')}. All this is by closed forms."
     return [*([failed] if found.beams is None else []), *_borne(found.best), *_breaks_away(found), *_differences(found)]
 
 
@@ -74,7 +76,8 @@ def _endurance(it: Evaluation) -> str:
     bounds = f" More than half the length, {with_unit(it.mechanism.length / 2, 'm')}, is beyond both models."
     beyond = bounds if it.stroke * it.fatigue_margin > it.mechanism.length / 2 else ""
     return (
-        f"{bent} and would bear {megapascals(it.mechanism.fatigue)} for ever: by fatigue a stroke of {largest}.{beyond}"
+        f"{bent} and would bear {megapascals(it.mechanism.fatigue)} for ever: "
+        f"by fatigue the stroke may be {largest}.{beyond}"
     )
 
 
@@ -139,13 +142,11 @@ _COMPARED: Mapping[str, Callable[[Evaluation], float]] = {
 
 
 def _centre(flat: Mapping[str, Any]) -> str:
-    if _given(flat, "centre") == 3:
-        return ""
-    return "centre of mass in the middle of the leaf ends"
+    return "" if "flexure.centre_x" in flat else "centre of mass in the middle of the leaf ends"
 
 
 def _inertia(flat: Mapping[str, Any], depth: float, width: float) -> str:
-    if _given(flat, "inertia") == 3:
+    if all(f"flexure.inertia_{axis}" in flat for axis in AXES):
         return ""
     return (
         f"moments of inertia of an aluminium block as wide as the leaves ({_size(width)} mm) and as deep as their row "
@@ -154,14 +155,9 @@ def _inertia(flat: Mapping[str, Any], depth: float, width: float) -> str:
 
 
 def _points(flat: Mapping[str, Any]) -> str:
-    actuation = "" if _given(flat, "actuation") == 3 else "actuation at half the leaf length"
-    sensor = "" if _given(flat, "sensor") == 3 else "sensor at the point of actuation"
+    actuation = "" if "flexure.actuation_x" in flat else "actuation at half the leaf length"
+    sensor = "" if "flexure.sensor_x" in flat else "sensor at the point of actuation"
     return ", ".join(part for part in (actuation, sensor) if part)
-
-
-def _given(flat: Mapping[str, Any], name: str) -> int:
-    """How many of the three keys of a triple the stage file has."""
-    return sum(f"flexure.{name}_{axis}" in flat for axis in "xyz")
 
 
 def _stroke(it: Evaluation) -> str:

@@ -177,28 +177,25 @@ def _push_mark(at: Point, sideways: bool) -> list[str]:
     if not sideways:
         return [circle(at, 2.2), circle(at, 0.4, "#222222")]
     x, y = at
-    return [path([(x, y - 6), (x, y + 6)], "thin"), arrow((x, y - 6), (0, -1)), arrow((x, y + 6), (0, 1))]
+    line = path([(x, y - 6), (x, y + 6)], "push")
+    return [line, arrow((x, y - 6.5), (0, -1), "#D55E00"), arrow((x, y + 6.5), (0, 1), "#D55E00")]
 
 
 def _legend(it: Drawing) -> list[str]:
     """What the letters mean and what is not to scale."""
     names = {"A": "actuation along z", "S": "sensor", "C": "centre of mass"}
     texts = [f"{k} {names[k]} ({', '.join(_mm(each) for each in point)})" for k, point in it.points.items()]
-    faults = []
+    faults = ["clamps"]
     if it.leaf > it.size(it.mechanism.thickness):
-        faults.append("leaves drawn thicker")
+        faults.append("thickness of the leaves")
     if it.travel > it.size(it.stroke):
-        faults.append(f"stroke drawn {it.travel / it.size(it.stroke):.2g} times as large")
-    notes = [
-        "x, y, z from the middle between the clamps at the cart",
-        "dashed: at the stroke",
-        "clamps schematic",
-        *faults,
+        faults.append(f"stroke ({it.travel / it.size(it.stroke):.2g} times as large)")
+    lines = [
+        " · ".join(texts),
+        "x, y, z from the middle between the clamps at the cart · dashed: at the stroke",
+        f"Not to scale: {', '.join(faults)}.",
     ]
-    return [
-        words((5, it.foot + 4), " · ".join(texts), size=2.8),
-        words((5, it.foot + 9), f"{' · '.join(notes)}.", size=2.8),
-    ]
+    return [words((5, it.foot + 4 + 4.5 * k), line, size=2.8) for k, line in enumerate(lines)]
 
 
 def _title_block(it: Drawing, title: str, material: str) -> list[str]:

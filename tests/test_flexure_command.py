@@ -1,0 +1,487 @@
+"""`friso flexure` as a user runs it: what it computes, says, draws and refuses."""
+
+import json
+import math
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+import typer
+from pages import Page
+
+import friso
+from friso.cli.flexure import EXAMPLE
+from friso.cli.flexure import flexure as command
+from friso.flexure.beams import BeamFailure, beams
+from friso.flexure.closed_model import closed
+from friso.flexure.evaluation import Mode
+from friso.flexure.mechanism import Mechanism
+from friso.quantities import StageError
+from friso.stage import Stage
+from friso.views import matplotlib_renderer, plotly_renderer
+from friso.views.figure import Figure
+from friso.views.flexure_document import flexure_document
+from friso.views.flexure_figures import flexure_figures
+from friso.views.flexure_found import BEAMS, CLOSED, Found, interferes
+from friso.views.flexure_layout import SCALES, WIDTH, block_size
+from friso.views.flexure_modes import VIEWS, best_view, modes_figure
+from friso.views.flexure_table import rows
+from friso.views.flexure_words import assumptions, findings, sentences, warnings
+from friso.views.leaf_drawing import drawing_svg
+
+RIG = Path(__file__).parent.parent / "examples" / "thesis_rig.toml"
+FIGURES = ("flexure_force", "flexure_support", "flexure_modes")
+LEAVES = """
+[flexure]
+leaves = 2
+length = "70 mm"
+width = "45 mm"
+thickness = "0.35 mm"
+spacing = "60 mm"
+young = "210 GPa"
+poisson = 0.3
+density = "7850 kg/m^3"
+yield = "1.1 GPa"
+"""
+KEYS = {
+    *("model", "stroke_m", "drive_stiffness_n_per_m", "drive_stiffness_at_stroke_n_per_m", "nonlinearity"),
+    *("support_stiffness_n_per_m", "eigenfrequencies_hz", "names", "interferes", "first_interfering_hz"),
+    *("max_stress_pa", "clamp_stress_pa", "stress_concentration", "yield_margin", "fatigue_margin", "shortening_m"),
+    *("buckling_load_n", "buckling_load_per_leaf_n", "buckling_margin", "stiffness_zero", "stiffness_full"),
+    *("deflections_m", "forces_n"),
+}
+MATERIAL = {**dict.fromkeys(("flexure.young", "flexure.poisson", "flexure.density", "flexure.yield"))}
+
+
+def with_leaves(table: str = LEAVES) -> str:
+    """The thesis rig, its joint made of leaf springs."""
+    text = RIG.read_text()
+    start, end = text.index("\n[parasitic]"), text.index("\n[controller]")
+    return text[:start].replace('stiffness = "2.4 N/mm"\n', "") + table + text[end:]
+
+
+def of_material(stage: Stage, name: str) -> Stage:
+    return stage.replace({**MATERIAL, "flexure.material": name})
+
+
+def evaluated(stage: Stage, stroke: float = 1e-3) -> Found:
+    it = Mechanism.of(stage.flat())
+    return Found(stage, closed(it, stroke), beams(it, stroke))
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    file = tmp_path_factory.mktemp("leaves") / "leaves.toml"
+    file.write_text(with_leaves())
+    return file
+
+
+@pytest.fixture(scope="module")
+def stage(path: Path) -> Stage:
+    return friso.load(path)
+
+
+@pytest.fixture(scope="module")
+def found(stage: Stage) -> Found:
+    return evaluated(stage)
+
+
+@pytest.fixture(scope="module")
+def folder(path: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of all files, written once."""
+    out = tmp_path_factory.mktemp("flexure")
+    command(path, out=out)
+    return out
+
+
+@pytest.fixture
+def broken(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Beams that find no answer."""
+
+    def fail(mechanism: Mechanism, stroke: float) -> None:
+        raise BeamFailure("The beams find no equilibrium at a deflection of 1 mm: reduce the stroke.")
+
+    monkeypatch.setattr("friso.flexure.beams.beams", fail)
+
+
+def _strict(text: str) -> dict[str, Any]:
+    """A JSON document, in which infinite and undefined numbers have no place."""
+
+    def refuse(name: str) -> None:
+        raise AssertionError(f"{name} in the document")
+
+    return json.loads(text, parse_constant=refuse)
+
+
+# ---------------------------------------------------------------- the document
+
+
+def test_the_document_has_the_agreed_keys(path: Path, capsys: pytest.CaptureFixture) -> None:
+    command(path, as_json=True)
+    shown = capsys.readouterr()
+    document = _strict(shown.out)
+    assert shown.err == ""
+    assert document.keys() == KEYS | {"stage", "failure", "closed_forms"}
+    assert document["closed_forms"].keys() == KEYS
+    assert (document["stage"], document["failure"]) == ("Thesis rig", None)
+    assert (document["model"], document["closed_forms"]["model"]) == ("beams", "closed forms")
+    assert np.shape(document["stiffness_zero"]) == np.shape(document["stiffness_full"]) == (6, 6)
+    assert len(document["deflections_m"]) == len(document["forces_n"])
+    assert len(document["eigenfrequencies_hz"]) == len(document["names"]) == len(document["interferes"])
+    assert document["fatigue_margin"] is None
+
+
+@pytest.mark.parametrize("model", ["beams", "closed forms"])
+def test_the_document_tells_what_textbooks_and_shells_say(found: Found, model: str) -> None:
+    document = flexure_document(found)
+    known = document if model == "beams" else document["closed_forms"]
+    assert known["model"] == model
+    length, width, thickness = 0.07, 0.045, 0.35e-3
+    assert known["drive_stiffness_n_per_m"] == pytest.approx(2540, rel=0.01)  # shells; a beam has 2362.5
+    support = known["support_stiffness_n_per_m"]
+    assert support["x"]["zero"] == pytest.approx(2 * 210e9 * width * thickness / length, rel=1e-3)
+    assert support["x"]["full"] == pytest.approx(83e6, rel=0.01)
+    bent = length**3 / (210e9 * thickness * width**3)
+    sheared = length / (5 / 6 * 210e9 / 2.6 * width * thickness)
+    assert support["y"]["zero"] == pytest.approx(2 / (bent + sheared), rel=1e-3)
+    assert known["max_stress_pa"] == pytest.approx(51.8e6, rel=0.02)  # shells, at mid-width
+    assert known["clamp_stress_pa"] == pytest.approx(1.5 * known["max_stress_pa"])
+    assert known["yield_margin"] == pytest.approx(1.1e9 / known["clamp_stress_pa"])
+    assert known["shortening_m"] == pytest.approx(3 * 1e-3**2 / (5 * length), rel=5e-3)
+    assert known["buckling_load_n"] == 2 * known["buckling_load_per_leaf_n"]
+    assert known["buckling_margin"] == pytest.approx(known["buckling_load_n"] / (0.5 * 9.80665))
+    assert known["eigenfrequencies_hz"][0] == pytest.approx(11.3, rel=0.01)
+    assert known["forces_n"][-1] == pytest.approx(known["drive_stiffness_n_per_m"] * 1e-3, rel=5e-3)
+
+
+def test_modes_that_interfere_with_control_are_told_from_the_drive(found: Found) -> None:
+    document = flexure_document(found)
+    assert document["names"][0] == "drive"
+    assert document["interferes"][0] is False
+    first = document["interferes"].index(True)
+    assert document["first_interfering_hz"] == document["eigenfrequencies_hz"][first]
+    assert document["first_interfering_hz"] == pytest.approx(390, rel=0.03)
+
+
+def test_the_stroke_is_that_of_the_joint_unless_told(path: Path, capsys: pytest.CaptureFixture) -> None:
+    for stroke, expected in ((None, 1e-3), ("500 um", 5e-4)):
+        command(path, stroke=stroke, as_json=True)
+        document = _strict(capsys.readouterr().out)
+        assert (document["stroke_m"], document["deflections_m"][-1]) == (expected, expected)
+
+
+def test_a_failure_of_the_beams_leaves_the_closed_forms(
+    broken: None, path: Path, tmp_path: Path, capsys: pytest.CaptureFixture
+) -> None:
+    with pytest.raises(typer.Exit) as leave:
+        command(path, out=tmp_path, as_json=True)
+    assert leave.value.exit_code == 1
+    shown = capsys.readouterr()
+    document = _strict(shown.out)
+    assert document["model"] == "closed forms"
+    assert "reduce the stroke" in document["failure"]
+    assert "the beam model found no answer" in shown.err
+    assert (tmp_path / "flexure.html").exists()
+    with pytest.raises(typer.Exit):
+        command(path)
+    said = " ".join(capsys.readouterr().out.split())
+    assert "The beam model found no answer: The beams find no equilibrium" in said
+    assert (BEAMS in said, CLOSED in said) == (False, True)
+
+
+# ---------------------------------------------------------------- what is said
+
+
+def test_the_table_and_the_sentences(path: Path, capsys: pytest.CaptureFixture, monkeypatch: Any) -> None:
+    monkeypatch.setenv("COLUMNS", "200")
+    command(path)
+    said = " ".join(capsys.readouterr().out.split())
+    assert "Thesis rig" in said
+    assert "The joint: 2 leaves of 70 x 45 x 0.35 mm, 2.54 N/mm; with the cart held the stage of 0.5 kg swings" in said
+    assert "The first mode that interferes with control is leaf bending, in phase, at 39" in said
+    assert "the crossover may be 39." in said
+    assert "is not known (flexure.fatigue)" in said
+    assert "Assumed, since [flexure] does not say: centre of mass in the middle of the leaf ends" in said
+    assert "aluminium block as wide as the leaves (45 mm) and as deep as their row (60 mm)" in said
+    assert "actuation at half the leaf length, sensor at the point of actuation" in said
+
+
+def test_the_table_has_a_row_for_each_mode_by_name(found: Found) -> None:
+    table = dict(rows(found))
+    assert table["Drive stiffness"] == ["2.54 N/mm", "2.54 N/mm"]
+    assert table["Support stiffness x, straight"] == ["94.5 N/µm", "94.5 N/µm"]
+    assert table["Margin to fatigue"] == ["unknown", "unknown"]
+    assert table["Concentration factor at the clamp"] == ["1.5", "1.5"]
+    assert "interferes" not in "".join(table["Mode: drive"])
+    assert all(text.endswith("Hz (interferes)") for text in table["Mode: leaf bending, in phase"])
+    assert {f"Mode: {mode.name}" for mode in found.best.modes} <= table.keys()
+    assert sum(name.startswith("Mode: ") for name in table) >= len(found.best.modes)
+
+
+def test_a_sound_joint_has_no_warnings_and_a_largest_stroke(stage: Stage) -> None:
+    found = evaluated(of_material(stage, "stainless 1.4310"))
+    assert warnings(found) == []
+    largest = 1e3 * found.best.fatigue_margin
+    assert f"by fatigue the stroke may be {largest:.2f} mm" in " ".join(findings(found))
+
+
+@pytest.mark.parametrize(
+    ("changes", "stroke", "warning"),
+    [
+        ({"flexure.thickness": "1 mm"}, 8e-3, "The leaves yield: "),
+        ({"flexure.fatigue": "60 MPa"}, 1e-3, "The leaves break in the long run: "),
+        ({"flexure.thickness": "0.05 mm", "masses.stage": "5 kg"}, 1e-4, "the stage buckles them: it weighs 49.0 N"),
+        ({"friction.static": "2 N"}, 1e-3, "The cart breaks away inside the stroke: the leaves push with 2.54 N"),
+    ],
+)
+def test_what_the_leaves_do_not_bear_is_a_warning(
+    stage: Stage, changes: dict[str, Any], stroke: float, warning: str
+) -> None:
+    assert any(warning in said for said in warnings(evaluated(stage.replace(changes), stroke)))
+
+
+def test_models_that_differ_are_a_warning(found: Found) -> None:
+    assert not any("differ" in said for said in warnings(found))
+    assert found.beams is not None
+    other = replace(found, beams=replace(found.beams, stress=found.beams.stress * 0.8, drive=found.beams.drive * 2))
+    (said,) = (said for said in warnings(other) if "differ" in said)
+    assert "drive stiffness by -50 % and stress by +2" in said
+
+
+def test_only_what_is_left_out_is_assumed(stage: Stage) -> None:
+    given = {f"flexure.{name}_x": "30 mm" for name in ("centre", "actuation", "sensor")}
+    inertia = {f"flexure.inertia_{axis}": "2e-4 kg*m^2" for axis in "xyz"}
+    assert assumptions(evaluated(stage.replace({**given, **inertia}))) == []
+    (said,) = assumptions(evaluated(stage.replace(given)))
+    assert said.startswith("Assumed, since [flexure] does not say: moments of inertia")
+    assert said.endswith("(60 mm).")
+
+
+def test_without_a_mode_that_interferes_there_is_no_limit(found: Found) -> None:
+    quiet = tuple(replace(mode, peak=0.0) for mode in found.closed.modes)
+    alone = Found(found.stage, replace(found.closed, modes=quiet), None, "told")
+    assert any("the leaves set no limit to the crossover" in said for said in sentences(alone))
+    assert flexure_document(alone)["first_interfering_hz"] is None
+
+
+# ---------------------------------------------------------------- figures and page
+
+
+def test_files_and_page(folder: Path) -> None:
+    pictures = {f"{name}.{form}" for name in FIGURES for form in ("png", "svg", "pdf")}
+    assert {path.name for path in folder.iterdir()} == pictures | {"flexure.html", "flexure_drawing.svg"}
+    assert (folder / "flexure_modes.png").read_bytes().startswith(b"\x89PNG")
+    assert (folder / "flexure_force.pdf").read_bytes().startswith(b"%PDF")
+    page = Page((folder / "flexure.html").read_text(encoding="utf-8"))
+    assert all(address.startswith("data:") for address in page.loads)
+    assert (page.tags.count("img"), page.tags.count("svg")) == (len(FIGURES), 1)
+    for words in ("The joint: 2 leaves", "Closed forms", "Buckling load", "Scale 1:1", "Force over the stroke"):
+        assert words in page.text
+    assert "thickness = " in page.text
+
+
+def test_force_and_supports_are_drawn_by_both_models(found: Found) -> None:
+    force, support, _ = flexure_figures(found)
+    (panel,) = force.panels
+    assert [line.label for line in panel.series] == [BEAMS, CLOSED, "initial stiffness"]
+    assert (panel.series[0].x[-1], panel.series[0].y[-1]) == pytest.approx((1e-3, found.best.forces[-1]))
+    assert panel.series[2].y[-1] == pytest.approx(found.best.drive[0] * 1e-3)
+    for panel, expected in zip(support.panels, (found.best.support_x, found.best.support_y), strict=True):
+        assert [line.label for line in panel.series] == [BEAMS, CLOSED]
+        assert panel.markers[0].y * 1e6 == pytest.approx(expected)
+        assert (panel.series[0].y[0] * 1e6, panel.series[0].y[-1] * 1e6) == pytest.approx((expected[0], expected[-1]))
+
+
+def test_modes_are_drawn_with_their_names_and_who_sees_them(found: Found) -> None:
+    figure = modes_figure(found.best)
+    titles = [panel.title for panel in figure.panels]
+    assert titles[0].startswith("drive, 11.3 Hz")
+    assert not any("torsion" in title for title in titles)  # whose middle lines rest
+    labels = {panel.title.rsplit(", ", 1)[0]: panel.series[1].label for panel in figure.panels}
+    assert labels["leaf bending, in phase"] == "seen by actuator and sensor"
+    assert labels["leaf bending, out of phase"] == "not seen by both"
+    for panel in figure.panels:
+        assert panel.equal
+        for line in panel.series:
+            for values, axis in ((line.x, panel.x), (line.y, panel.y)):
+                low, high = axis.limits or (math.nan, math.nan)
+                assert (np.nanmin(values) >= low, np.nanmax(values) <= high) == (True, True)
+
+
+@pytest.mark.parametrize(
+    ("stage_motion", "view"),
+    [
+        ((0, 0, 1, 0, 0, 0), "from the side"),
+        ((1, 0, 0, 0, 0, 0), "from the side"),
+        ((0, 0, 0, 0, 20, 0), "from the side"),
+        ((0, 1, 0, 0, 0, 0), "from above"),
+        ((0, 0, 0, 0, 0, 20), "from above"),
+        ((0, 0, 0, 20, 0, 0), "along the leaves"),
+    ],
+)
+def test_a_mode_is_seen_from_where_it_moves(found: Found, stage_motion: tuple[float, ...], view: str) -> None:
+    mode = Mode("some", 1.0, 0.0, 0.0, 0.0, np.array(stage_motion, float), np.zeros((2, 17, 3)))
+    assert best_view(found.mechanism, mode) == view
+    assert view in VIEWS
+
+
+def test_the_drive_mode_shifts_the_stage_up_or_down(found: Found) -> None:
+    rest, moved = modes_figure(found.best).panels[0].series
+    shift = moved.y - rest.y
+    block = slice(-6, -1)
+    assert np.ptp(shift[block]) < 0.1 * abs(shift[block]).max()  # as a whole
+    assert moved.x[block] == pytest.approx(rest.x[block], abs=1e-3)
+    assert shift[0] == pytest.approx(0, abs=1e-12)  # at the cart
+
+
+@pytest.mark.parametrize("render", [matplotlib_renderer.render, plotly_renderer.render])
+def test_both_renderers_draw_the_figures(found: Found, render: Callable[[Figure], Any]) -> None:
+    for figure in flexure_figures(found):
+        drawn = render(figure)
+        assert len(getattr(drawn, "axes", figure.panels)) == len(figure.panels)
+
+
+# ---------------------------------------------------------------- the drawing
+
+
+def _texts(svg: str) -> list[str]:
+    return ["".join(item.itertext()) for item in ElementTree.fromstring(svg).iter("{http://www.w3.org/2000/svg}text")]
+
+
+def _places(svg: str) -> np.ndarray:
+    """Where all texts begin or end, shape (n, 2)."""
+    items = ElementTree.fromstring(svg).iter("{http://www.w3.org/2000/svg}text")
+    return np.array([[float(item.get("x", "nan")), float(item.get("y", "nan"))] for item in items])
+
+
+SHAPES = [
+    {},
+    {"flexure.leaves": 6, "flexure.length": "15 mm", "flexure.width": "60 mm", "flexure.thickness": "0.1 mm"},
+    {"flexure.leaves": 3, "flexure.length": "120 mm", "flexure.width": "10 mm", "flexure.sensor_z": "200 mm"},
+    {"flexure.length": "30 mm", "flexure.spacing": "4 mm", "flexure.actuation_x": "-80 mm"},
+    {"flexure.length": "7 m", "flexure.width": "4 m", "flexure.spacing": "5 m"},
+]
+
+
+@pytest.mark.parametrize("changes", SHAPES)
+@pytest.mark.parametrize("stroke", [1e-5, 1e-3, 7e-3])
+def test_the_drawing_is_xml_with_all_dimensions(stage: Stage, changes: dict[str, Any], stroke: float) -> None:
+    it = Mechanism.of(stage.replace(changes).flat())
+    svg = drawing_svg(it, stroke, title="A & B <c>", material="steel")
+    texts = _texts(svg)
+    for dimension in (it.length, it.width, it.spacing):
+        assert f"{1e3 * dimension:.4g}" in texts
+    assert f"{it.leaves:g} leaves, thickness {1e3 * it.thickness:.4g}" in texts
+    assert f"±{1e3 * stroke:.4g} stroke, gap to the limiter" in texts
+    assert {"A & B <c>", "Material: steel", "cart", "stage", "x", "y", "z"} <= set(texts)
+    places = _places(svg)
+    height = float(ElementTree.fromstring(svg).get("viewBox", "").split()[3])
+    assert (places >= 0).all()
+    assert (places <= [WIDTH, height]).all()
+    assert height < 297
+    assert "<script" not in svg
+
+
+def test_the_drawing_is_to_scale(stage: Stage) -> None:
+    svg = drawing_svg(Mechanism.of(stage.flat()), 1e-3)
+    assert "Scale 1:1" in _texts(svg)
+    leaf = next(item for item in svg.splitlines() if 'fill="#0072B22e"' in item)
+    corners = [float(number) for number in leaf.split('"')[1].replace("M", "").replace("L", "").rstrip(" Z").split()]
+    assert (max(corners[::2]) - min(corners[::2]), max(corners[1::2]) - min(corners[1::2])) == pytest.approx((70, 45))
+    assert list(SCALES) == sorted(SCALES, reverse=True)
+
+
+def test_the_block_of_the_stage_has_its_moments_of_inertia(stage: Stage) -> None:
+    it = Mechanism.of(stage.flat())
+    x, y, z = block_size(it)
+    assert (y, z) == pytest.approx((0.045, 0.06))
+    assert x * y * z * 2700 == pytest.approx(0.5)
+    flat = replace(it, body=replace(it.body, inertia=(1e-4, 1e-4, 2e-4)))
+    assert block_size(flat)[2] == pytest.approx(0, abs=1e-9)
+    ElementTree.fromstring(drawing_svg(flat, 1e-3))
+
+
+# ---------------------------------------------------------------- what is refused
+
+
+def test_a_stage_without_leaves_is_shown_a_table_that_works() -> None:
+    with pytest.raises(StageError, match=r"(?s)thesis_rig.toml: flexure\n.*no \[flexure\].*leave these out") as refused:
+        command(RIG)
+    table = refused.value.example
+    assert table == EXAMPLE
+    assert table in str(refused.value)
+    lines = "\n".join(line.strip() for line in table.splitlines())
+    assert friso.loads(with_leaves(f"\n{lines}\n")).flat()["flexure.young"] == 195e9
+
+
+@pytest.mark.parametrize(
+    ("stroke", "given", "expected"),
+    [
+        ("1", r'"1" \(its unit is missing\)', "convertible to m, greater than 0"),
+        ("0 mm", '"0 mm"', "greater than 0"),
+        ("-1 mm", '"-1 mm"', "greater than 0"),
+        ("1 N", "N is not convertible to m", "convertible to m"),
+        ("36 mm", '"36 mm"', "at most half the length of the leaves, 35 mm"),
+        ("", '""', "convertible to m"),
+    ],
+)
+def test_strokes_that_are_refused(path: Path, stroke: str, given: str, expected: str) -> None:
+    with pytest.raises(StageError, match=rf'(?s)--stroke\n.*{given}.*{expected}.*--stroke "1 mm"'):
+        command(path, stroke=stroke)
+
+
+def test_a_stroke_of_the_stage_file_is_refused_alike(path: Path) -> None:
+    with pytest.raises(StageError, match="(?s)joint.stroke\n.*36 mm.*at most half the length of the leaves, 35 mm"):
+        command(path, overrides=['joint.stroke="36 mm"'])
+
+
+def test_a_locked_joint_without_a_stroke_needs_one(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    file = tmp_path / "locked.toml"
+    file.write_text(with_leaves().replace("locked = false", "locked = true").replace('stroke = "1 mm"\n', ""))
+    with pytest.raises(StageError, match="(?s)--stroke\n.*nothing.*the joint has none"):
+        command(file)
+    command(file, stroke="1 mm", as_json=True)
+    assert _strict(capsys.readouterr().out)["stroke_m"] == 1e-3
+
+
+@pytest.mark.parametrize(
+    ("overrides", "message"),
+    [
+        (['flexure.thickness="80 mm"', 'flexure.width="300 mm"'], "leaves at least ten times as long as thick"),
+        (['flexure.lenght="70 mm"'], "did you mean length"),
+        (["flexure.leaves=1"], "a whole number, 2 to 20"),
+    ],
+)
+def test_overrides_that_are_refused(path: Path, overrides: list[str], message: str) -> None:
+    with pytest.raises(StageError, match=message):
+        command(path, overrides=overrides)
+
+
+def test_an_unknown_material_names_the_nearest(tmp_path: Path) -> None:
+    file = tmp_path / "material.toml"
+    start = LEAVES.index("young")
+    file.write_text(with_leaves(LEAVES[:start] + 'material = "titanum"\n'))
+    with pytest.raises(StageError, match="did you mean titanium"):
+        command(file)
+
+
+def test_wrong_input_ends_in_one_message_and_status_2(tmp_path: Path) -> None:
+    run = [sys.executable, "-m", "friso.cli", "flexure", str(RIG), "--out", "out"]
+    done = subprocess.run(run, cwd=tmp_path, capture_output=True, text=True, timeout=300, env={**os.environ})
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "Traceback" not in done.stderr
+    assert "leaves = 2" in done.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def test_interfering_modes_are_those_of_the_evaluation(found: Found) -> None:
+    for it in found.models.values():
+        first = next((mode for mode in it.modes if interferes(it, mode)), None)
+        assert first is it.interfering
