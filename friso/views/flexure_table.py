@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from friso.flexure.evaluation import Evaluation
-from friso.views.flexure_found import Found, buckling_margin, named_modes
+from friso.flexure.evaluation import Evaluation, Mode
+from friso.views.flexure_found import Found, buckling_margin, interferes, named_modes
 from friso.views.prefixes import NOTHING, with_unit
 
 INTERFERES = "interferes"
@@ -49,22 +49,19 @@ def _plain(value: float) -> str:
 
 def _modes(found: Found) -> list[tuple[str, list[str]]]:
     """A row for each mode that some model knows, by name and in the order of frequency, the drive mode first."""
-    known = [named_modes(it) for it in found.models.values()]
-    names = [*known[0], *(name for name in known[-1] if name not in known[0])]
-    first, *others = names
-    frequency = {name: next(modes[name].frequency for modes in known if name in modes) for name in names}
-    return [
-        (f"Mode: {name}", [_mode(modes, name) for modes in known])
-        for name in [first, *sorted(others, key=frequency.__getitem__)]
-    ]
+    known = [(it, named_modes(it)) for it in found.models.values()]
+    frequencies: dict[str, float] = {}
+    for _, modes in known:
+        frequencies = {name: mode.frequency for name, mode in modes.items()} | frequencies
+    drive = next(iter(known[0][1]))
+    names = [drive, *sorted(frequencies.keys() - {drive}, key=frequencies.__getitem__)]
+    return [(f"Mode: {name}", [_mode(it, modes.get(name)) for it, modes in known]) for name in names]
 
 
-def _mode(modes: dict, name: str) -> str:
-    if name not in modes:
+def _mode(it: Evaluation, mode: Mode | None) -> str:
+    if mode is None:
         return NOTHING
-    mode, drive = modes[name], next(iter(modes))
-    mark = f" ({INTERFERES})" if mode.interferes and name != drive else ""
-    return with_unit(mode.frequency, "Hz") + mark
+    return with_unit(mode.frequency, "Hz") + (f" ({INTERFERES})" if interferes(it, mode) else "")
 
 
 _STIFF: dict[str, Callable[[Evaluation], str]] = {

@@ -7,6 +7,8 @@ its finding without a change.
 from friso.studies.thesis.judges import (
     control_and_friction,
     crossover,
+    design_rules,
+    leaf_springs,
     limit_cases,
     loops,
     masses,
@@ -20,6 +22,8 @@ from friso.studies.thesis.judges import (
 __all__ = [
     "control_and_friction",
     "crossover",
+    "design_rules",
+    "leaf_springs",
     "limit_cases",
     "loops",
     "masses",

@@ -1,0 +1,115 @@
+"""Sec. 4.3.3 and 6: the rules of design."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+
+from friso.design.controller import settled_margin
+from friso.frequency.crossover import WANTED
+from friso.studies.thesis.claims import ABOUT, Evidence, Finding, Part, about, judges
+from friso.studies.thesis.maps import begins, ends, table
+from friso.studies.thesis.studies import rig
+
+_STROKE, _GAP, _RATIO = 0.3e-3, 1.0, 10.0
+"""Least stroke [m], friction gap [N], and parasitic frequency over crossover."""
+
+_WORKS, _LOCKED = 5.25, 15.0
+"""Crossovers [Hz] from which the isolator works, the middle of 5 and 5.5 Hz, and which the locked rig needs."""
+
+_RATIOS = np.geomspace(2.0, 80.0, 16)
+"""Parasitic frequencies that are tried, over the crossover."""
+
+
+@judges("D1", figure="14A, 16A, 12A, 11B", needs=("isolator-stiffness", "isolator-crossover", "friction", "system"))
+def rules_of_design(evidence: Evidence) -> Finding:
+    """Each rule by the maps of the parameter study, and that on parasitic modes by linear analysis."""
+    return Finding((_soft(evidence), _far(), _stroke(evidence), _gap(evidence), *_crossovers(evidence)))
+
+
+def _soft(evidence: Evidence) -> Part:
+    """Whether a joint that is softer than one that does, does too."""
+    stiffness, stroke, hunts, _ = table(evidence.maps["isolator-stiffness"], "joint.stiffness", "joint.stroke")
+    enough = stroke >= _STROKE
+    softest = ~hunts[0, enough]
+    limit = begins(stiffness, hunts)[enough]
+    return Part(
+        f"at 8 Hz, at every stroke of {_STROKE * 1e3:g} mm and more, the softest joint of the range settles, and at "
+        "most of these strokes a stiffer one hunts",
+        bool(softest.all() and np.mean(limit < stiffness[-1]) > 0.5),
+        f"softest settles at {softest.sum()} of {softest.size} strokes; a stiffer one hunts from {limit.min():.3g} to "
+        f"{limit.max():.3g} N/m on",
+    )
+
+
+@cache
+def _needed_ratio() -> float:
+    """The least parasitic frequency over the crossover from which the rig has a modulus margin of 0.5 in all settled
+    states; NaN if it never has."""
+    flat = {**rig().flat(), "joint.locked": False}
+    crossover = flat["controller.crossover"]
+    margins = [settled_margin({**flat, "parasitic.frequency": ratio * crossover}) for ratio in _RATIOS]
+    short = np.flatnonzero(np.array(margins) < WANTED)
+    if not short.size:
+        return float(_RATIOS[0])
+    return float(_RATIOS[short[-1] + 1]) if short[-1] + 1 < len(_RATIOS) else np.nan
+
+
+def _far() -> Part:
+    ratio = _needed_ratio()
+    return Part(
+        f"the parasitic mode has to be about {_RATIO:g} times the crossover (within a factor of {ABOUT:g}) for a "
+        f"modulus margin of {WANTED:g} in all settled states, the joint free, 8 Hz",
+        about(ratio, _RATIO),
+        f"{ratio:.3g} times",
+        why="the mass and the damping ratio of the mode, which the thesis leaves open, decide how far it has to be",
+    )
+
+
+def _stroke(evidence: Evidence) -> Part:
+    """The stroke beyond which nothing hunts at 8 Hz."""
+    stiffness, stroke, hunts, _ = table(evidence.maps["isolator-stiffness"], "joint.stiffness", "joint.stroke")
+    nearest = int(np.abs(stiffness - 2.4e3).argmin())
+    needed = float(ends(stroke, hunts[nearest][:, None])[0])
+    return Part(
+        f"with {stiffness[nearest]:.3g} N/m at 8 Hz, nothing hunts from a stroke of about {_STROKE * 1e3:g} mm on "
+        f"(within a factor of {ABOUT:g})",
+        about(needed, _STROKE),
+        f"{needed * 1e3:.3g} mm",
+        why="of the order of the stroke that the rule states, yet it hangs on the limiter's damping, which is open",
+    )
+
+
+def _gap(evidence: Evidence) -> Part:
+    static, coulomb, hunts, _ = table(evidence.maps["friction"], "friction.static", "friction.coulomb")
+    gap = static[:, None] - coulomb[None, :]
+    smallest = float(gap[hunts].min()) if hunts.any() else np.nan
+    return Part(
+        f"the smallest gap F_s - F_c that hunts at 8 Hz is about {_GAP:g} N (within a factor of {ABOUT:g})",
+        about(smallest, _GAP),
+        f"{smallest:.2g} N",
+    )
+
+
+def _crossovers(evidence: Evidence) -> tuple[Part, Part]:
+    """From where on the isolated and the locked rig do not hunt."""
+    crossover, stroke, hunts, _ = table(evidence.maps["isolator-crossover"], "controller.crossover", "joint.stroke")
+    free = float(np.mean(ends(crossover, hunts)[stroke >= _STROKE]))
+    crossover, mass, hunts, _ = table(evidence.maps["system"], "controller.crossover", "mass")
+    nearest = int(np.abs(mass - 1.7).argmin())
+    locked = float(ends(crossover, hunts)[nearest])
+    return (
+        Part(
+            f"with the isolator, at strokes of {_STROKE * 1e3:g} mm and more, nothing hunts from about 5 to 5.5 Hz on "
+            f"(within a factor of {ABOUT:g})",
+            about(free, _WORKS),
+            f"{free:.3g} Hz on average",
+        ),
+        Part(
+            f"locked, {mass[nearest]:.2g} kg, nothing hunts from about {_LOCKED:g} Hz on (within a factor of {ABOUT:g})",
+            about(locked, _LOCKED),
+            f"{locked:.3g} Hz",
+            why="the cycle attracts up to 9.8 Hz with the friction of Table 2, and up to 16 Hz there are long transients",
+        ),
+    )

@@ -1,0 +1,110 @@
+"""Sec. 3.5: the leaf springs of the rig."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from itertools import product
+
+import numpy as np
+
+from friso.flexure.beams import beams
+from friso.flexure.evaluation import Evaluation
+from friso.flexure.mechanism import Body, Mechanism, block_inertia
+from friso.materials import materials
+from friso.studies.thesis.claims import ABOUT, Evidence, Finding, Part, judges
+from friso.studies.thesis.studies import rig
+
+_STROKE, _STIFFNESS, _FIRST, _PARASITIC, _STRESS = 1e-3, 2.4e3, 11.0, 360.0, 50e6
+"""What the thesis finds with SPACAR [m, N/m, Hz, Hz, Pa] (Sec. 3.5)."""
+
+_CLOSE = 0.05
+"""Share within which stiffness and first frequency, of which nothing is left open but the steel, should agree."""
+
+_YOUNG = (185e9, 195e9, 210e9)
+"""Young's moduli [Pa] of stainless spring steel: as rolled, tempered, and of steel in general."""
+
+_SPACINGS, _HEIGHTS = (0.03, 0.06, 0.09), (0.0, 0.03, 0.06)
+"""Spacings of the leaves, and heights of the stage's centre of mass above their ends [m]: the thesis tells neither."""
+
+
+@cache
+def _evaluated() -> tuple[Evaluation, ...]:
+    """The thesis's leaves over what it leaves open."""
+    return tuple(beams(_mechanism(*each), _STROKE) for each in product(_YOUNG, _SPACINGS, _HEIGHTS))
+
+
+def _mechanism(young: float, spacing: float, height: float) -> Mechanism:
+    steel, mass, length = materials()["stainless 1.4310"], rig().flat()["masses.stage"], 70e-3
+    centre = (length + height, 0.0, 0.0)
+    bare = Mechanism(
+        leaves=2,
+        length=length,
+        width=45e-3,
+        thickness=0.35e-3,
+        spacing=spacing,
+        young=young,
+        poisson=steel.poisson,
+        density=float(steel.density),
+        yield_strength=float(steel.yield_strength),
+        fatigue=float(steel.fatigue),
+        body=Body(mass, (0.0, 0.0, 0.0), centre),
+        actuation=(0.0, 0.0, 0.0),  # "underneath the flexure mechanism" (Sec. 3.4.1)
+        sensor=(0.0, 0.0, 0.0),
+    )
+    return replace(bare, body=Body(mass, block_inertia(bare), centre))
+
+
+@judges("S35", figure="Sec. 3.5")
+def the_leaf_springs(evidence: Evidence) -> Finding:
+    """Stiffness, frequencies and stress, by geometrically exact beams."""
+    found = _evaluated()
+    stiffness = np.array([each.drive[0] for each in found])
+    first = np.array([each.modes[0].frequency for each in found])
+    stress = np.array([each.stress for each in found])
+    over = "over Young's moduli from 185 to 210 GPa"
+    return Finding(
+        (
+            Part(
+                f"the drive stiffness is {_STIFFNESS:g} N/m within {_CLOSE:.0%} for some stainless spring steel",
+                _met(stiffness / _STIFFNESS),
+                f"{_range(stiffness)} N/m {over}; 210 GPa as a beam, without anticlastic stiffening: 2362 N/m",
+            ),
+            Part(
+                f"with the cart held the first mode is {_FIRST:g} Hz within {_CLOSE:.0%} for some of them",
+                _met(first / _FIRST),
+                f"{_range(first)} Hz",
+            ),
+            _parasitic(found),
+            Part(
+                f"the stress at 1 mm is at most {_STRESS / 1e6:g} MPa with the modulus of tempered strip, 195 GPa, or "
+                "less",
+                bool(np.all(stress[[each.mechanism.young <= 195e9 for each in found]] <= _STRESS)),
+                f"{_range(stress / 1e6)} MPa {over}, at the largest over the width of the clamp",
+            ),
+        )
+    )
+
+
+def _parasitic(found: tuple[Evaluation, ...]) -> Part:
+    """The first mode but for the drive mode, over what is left open."""
+    modes = [min(each.modes[1:], key=lambda mode: mode.frequency) for each in found]
+    seen = np.array([each.interfering.frequency if each.interfering else np.nan for each in found])
+    frequencies = np.array([mode.frequency for mode in modes])
+    names = sorted({mode.name for mode in modes})
+    return Part(
+        f"the first parasitic mode is about {_PARASITIC:g} Hz (within a factor of {ABOUT:g}), whatever spacing of 30 "
+        "to 90 mm and height of the centre of mass of 0 to 60 mm above the leaf ends",
+        bool(np.all((frequencies >= _PARASITIC / ABOUT) & (frequencies <= _PARASITIC * ABOUT))),
+        f"{_range(frequencies)} Hz: {' or '.join(names)}; the first that actuator and sensor, underneath the leaves, "
+        f"see: {_range(seen)} Hz",
+        why="the sideways mode of the stage falls with its height, which the thesis leaves open",
+    )
+
+
+def _met(ratio: np.ndarray) -> bool:
+    return bool(np.any(np.abs(ratio - 1) <= _CLOSE))
+
+
+def _range(values: np.ndarray) -> str:
+    return f"{np.nanmin(values):.4g} to {np.nanmax(values):.4g}"
