@@ -17,10 +17,20 @@ from scipy.sparse.linalg import eigsh, splu
 
 DOF = 6
 Mesh = tuple[int, int]  # elements along x, along y
-Sheet = tuple[float, float, float, float, float, float]  # length, width, thickness [m], E [Pa], nu, rho [kg/m^3]
 MESH: Mesh = (24, 12)
 STRESS_MESH: Mesh = (32, 16)
 CROWDING, STRESS_CROWDING = 0.5, 0.8  # of the nodes at the ends and free edges: 0 evenly spaced, 1 as a cosine
+
+
+class Sheet(NamedTuple):
+    """What leaves are cut from: SI."""
+
+    length: float
+    width: float
+    thickness: float
+    young: float
+    poisson: float
+    density: float
 
 
 class Leaf(NamedTuple):
@@ -35,12 +45,6 @@ class Leaf(NamedTuple):
     clamp: slice
     edge: slice
     rigid: np.ndarray  # (6 * nodes of the edge, 6): motion of the edge from that of the middle of the edge
-
-
-class Modes(NamedTuple):
-    frequencies: np.ndarray  # (count,) [Hz]
-    shapes: np.ndarray  # (count, 6) the stage's part of the modes of unit modal mass [m or rad per sqrt(kg) m]
-    kinds: list[str]  # what moves, see kind()
 
 
 def rigid_motion(arms: np.ndarray) -> np.ndarray:
@@ -129,76 +133,34 @@ def follow(leaf: Leaf) -> np.ndarray:
     return moved
 
 
-def leaf_end_stiffness(
-    length: float,
-    width: float,
-    thickness: float,
-    young: float,
-    poisson: float,
-    deflection: float = 0.0,
-    mesh: Mesh = MESH,
-) -> np.ndarray:
-    """Stiffness (6, 6) of one leaf at its end (L, 0, deflection) [N/m, N, N m], deflected with the end kept parallel.
-
-    Linear about the curved mid-surface; its prestress is neglected.
-    """
-    leaf = leaf_mesh((length, width, thickness, young, poisson, 0.0), mesh, deflection)
-    end = leaf.rigid.T @ (leaf.stiffness @ follow(leaf))[leaf.edge]
-    return (end + end.T) / 2
-
-
-def offsets(leaves: int, spacing: float) -> np.ndarray:
-    """Places (leaves,) [m] of the leaves along z."""
-    return spacing * (np.arange(leaves) - (leaves - 1) / 2)
-
-
 def mechanism_stiffness(
-    length: float,
-    width: float,
-    thickness: float,
-    young: float,
-    poisson: float,
-    leaves: int,
-    spacing: float,
-    deflection: float = 0.0,
-    mesh: Mesh = MESH,
+    sheet: Sheet, leaves: int, spacing: float, deflection: float = 0.0, mesh: Mesh = MESH
 ) -> np.ndarray:
-    """Stiffness (6, 6) of all leaves at the stage's reference point (L, 0, deflection) [N/m, N, N m]."""
-    end = leaf_end_stiffness(length, width, thickness, young, poisson, deflection, mesh)
-    shifts = [rigid_motion(np.array([[0, 0, z]])) for z in offsets(leaves, spacing)]
-    return sum((shift.T @ end @ shift for shift in shifts), np.zeros((6, 6)))
+    """Stiffness (6, 6) of all leaves at the stage's reference point (L, 0, deflection) [N/m, N, N m], kept parallel.
+
+    Linear about the curved mid-surfaces; their prestress is neglected.
+    """
+    leaf = leaf_mesh(sheet, mesh, deflection)
+    end = leaf.rigid.T @ (leaf.stiffness @ follow(leaf))[leaf.edge]
+    return sum((shift.T @ (end + end.T) @ shift / 2 for shift in places(leaves, spacing)), np.zeros((6, 6)))
 
 
-def drive_stiffness(stiffness: np.ndarray) -> tuple[float, float]:
-    """Stiffness along z [N/m] of a stage on stiffness (6, 6): held parallel, and free in its other five directions."""
-    return float(stiffness[2, 2]), float(1 / np.linalg.inv(stiffness)[2, 2])
+def places(leaves: int, spacing: float) -> list[np.ndarray]:
+    """How the middles of the leaves' edges move with the stage, (6, 6) each."""
+    return [rigid_motion(np.array([[0, 0, z]])) for z in spacing * (np.arange(leaves) - (leaves - 1) / 2)]
 
 
-def clamp_stress(
-    length: float,
-    width: float,
-    thickness: float,
-    young: float,
-    poisson: float,
-    deflection: float,
-    mesh: Mesh = STRESS_MESH,
-) -> tuple[float, float]:
+def clamp_stress(sheet: Sheet, deflection: float, mesh: Mesh = STRESS_MESH) -> tuple[float, float]:
     """Mean and largest over the width of the size of the bending stress [Pa] at the clamp of a leaf kept parallel.
 
     From the moments that react at the nodes: they carry the whole moment exactly, and each is divided by the width
     that belongs to its node. The corners may be singular within a thickness or so; outside it stress falls to them.
     """
-    leaf = leaf_mesh((length, width, thickness, young, poisson, 0.0), mesh, crowding=STRESS_CROWDING)
+    leaf = leaf_mesh(sheet, mesh, crowding=STRESS_CROWDING)
     moments = deflection * (leaf.stiffness[leaf.clamp] @ follow(leaf)[:, 2])[4::DOF]
     widths = np.convolve(np.diff(leaf.nodes[: len(moments), 1]), [0.5, 0.5])
-    modulus = thickness**2 / 6
-    return abs(float(np.sum(moments))) / (width * modulus), float(np.max(np.abs(moments) / widths)) / modulus
-
-
-def body_mass(mass: float, inertia: tuple[float, float, float], arm: np.ndarray) -> np.ndarray:
-    """Mass matrix (6, 6) of the stage at its reference point; arm (3,) [m] from there to its centre of mass."""
-    centre = rigid_motion(arm[None, :])
-    return centre.T @ np.diag([mass] * 3 + list(inertia)) @ centre
+    modulus = sheet.thickness**2 / 6
+    return abs(float(np.sum(moments))) / (sheet.width * modulus), float(np.max(np.abs(moments) / widths)) / modulus
 
 
 def coupled(part: csc_matrix, leaf: Leaf, shifts: list[np.ndarray], body: np.ndarray) -> csc_matrix:
@@ -216,12 +178,7 @@ def start(whole: csc_matrix) -> np.ndarray:
 
 
 def modes(
-    length: float,
-    width: float,
-    thickness: float,
-    young: float,
-    poisson: float,
-    density: float,
+    sheet: Sheet,
     leaves: int,
     spacing: float,
     mass: float,
@@ -229,54 +186,49 @@ def modes(
     centre: tuple[float, float, float],
     count: int = 10,
     mesh: Mesh = MESH,
-) -> Modes:
-    """Lowest modes of the stage (inertia (3,) [kg m^2] about x, y, z through its centre (3,) [m]) on leaves with mass.
+) -> tuple[np.ndarray, list[str]]:
+    """Lowest frequencies (count,) [Hz] of the stage (inertia [kg m^2] about x, y, z through its centre [m]) on leaves
+    with mass, and what moves, see kind().
 
     At zero deflection; consistent mass of the leaves, with rotary inertia.
     """
-    leaf = leaf_mesh((length, width, thickness, young, poisson, density), mesh)
-    arm = np.asarray(centre, float) - [length, 0, 0]
-    body = body_mass(mass, inertia, arm)
-    shifts = [rigid_motion(np.array([[0, 0, z]])) for z in offsets(leaves, spacing)]
+    leaf = leaf_mesh(sheet, mesh)
+    arm = np.asarray(centre, float) - [sheet.length, 0, 0]
+    centred, own = rigid_motion(arm[None, :]), np.array([mass] * 3 + list(inertia))
+    body, shifts = centred.T @ (own[:, None] * centred), places(leaves, spacing)
     stiff, heavy = coupled(leaf.stiffness, leaf, shifts, np.zeros((6, 6))), coupled(leaf.mass, leaf, shifts, body)
     squares, vectors = eigsh(stiff, count, heavy, sigma=0.0, v0=start(stiff))
     order = np.argsort(squares)
     vectors = vectors[:, order]
-    at_centre = rigid_motion(arm[None, :]) @ vectors[-6:]
-    shares = np.array([mass] * 3 + list(inertia))[:, None] * at_centre**2
+    shares = own[:, None] * (centred @ vectors[-6:]) ** 2
     kinds = [kind(share, vector[:-6], leaf) for share, vector in zip(shares.T, vectors.T, strict=True)]
-    return Modes(np.sqrt(squares[order]) / (2 * np.pi), vectors[-6:].T, kinds)
+    return np.sqrt(squares[order]) / (2 * np.pi), kinds
 
 
 def kind(shares: np.ndarray, inner: np.ndarray, leaf: Leaf) -> str:
-    """What moves: shares (6,) of the stage's coordinates in the kinetic energy, and the inner unknowns of all leaves.
-
-    Half waves along the leaves; then the share of the kinetic energy in what is named.
-    """
-    largest, total = int(np.argmax(shares)), float(np.sum(shares))
-    if total > 0.5:
-        return f"stage {('ux', 'uy', 'uz', 'rx', 'ry', 'rz')[largest]} {total:.2f}"
+    """What moves, with the half waves along leaves: from the shares (6,) of the stage's coordinates in the kinetic
+    energy, and the inner unknowns of all leaves."""
+    if np.sum(shares) > 0.5:
+        return f"stage {('ux', 'uy', 'uz', 'rx', 'ry', 'rz')[int(np.argmax(shares))]}"
     across = len(leaf.rigid) // DOF
     field = inner.reshape(-1, leaf.inner.stop // (DOF * across) - 1, across, DOF)
     if np.sum(field[..., 2] ** 2) < np.sum(field[..., :2] ** 2):
-        return f"leaves in plane {1 - total:.2f}"
+        return "leaves in plane"
     y = leaf.nodes[:across, 1]
     lines = field[..., 2] @ np.stack([np.full(across, across**-0.5), y / np.linalg.norm(y)], axis=1)
     parts = np.sum(lines**2, axis=(0, 1))  # moving straight, and turned; the rest moves curved over the width
     if np.sum(parts) < np.sum(field[..., 2] ** 2) / 2:
-        return f"leaves dishing {1 - total:.2f}"
+        return "leaves dishing"
     main = lines[..., np.argmax(parts)]
     line = main[np.argmax(np.sum(main**2, axis=1))]
     signs = np.sign(line[np.abs(line) > 0.05 * np.max(np.abs(line))])
     waves = 1 + np.count_nonzero(np.diff(signs))
-    return f"leaves {('bending', 'twisting')[int(np.argmax(parts))]} {waves} {1 - total:.2f}"
+    return f"leaves {('bending', 'twisting')[int(np.argmax(parts))]} {waves}"
 
 
-def buckling_load(
-    length: float, width: float, thickness: float, young: float, poisson: float, leaves: int, mesh: Mesh = MESH
-) -> float:
+def buckling_load(sheet: Sheet, leaves: int, mesh: Mesh = MESH) -> float:
     """Load [N] along -x on the stage, shared by the leaves, at which it sways, kept parallel: linear buckling."""
-    leaf = leaf_mesh((length, width, thickness, young, poisson, 0.0), mesh)
+    leaf = leaf_mesh(sheet, mesh)
     moved = -follow(leaf)[:, 0]
     load = -leaf.rigid[:, 0] @ (leaf.stiffness @ moved)[leaf.edge]
     keep = np.diag([1.0, 1, 1, 0, 0, 0])[:, :3]  # of the stage's coordinates

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 
 from friso.design.population import Population
-from friso.frequency.crossover import WANTED, Limits, limits, settled_members
+from friso.frequency.crossover import Limits, settled_members
 from friso.frequency.family import scan
 from friso.frequency.tuning import Tuning, tuning
 from friso.stage import Stage
 
-DAMPINGS = np.geomspace(0.02, 0.7, 9)
+RATIOS = np.geomspace(0.02, 0.7, 9)
 """Joint damping that is tried, as a damping ratio of the stage on the joint."""
 
 ENOUGH = 0.95
@@ -68,13 +68,13 @@ def settled_margin(flat: Mapping[str, Any]) -> float:
     return float(seen.distance.min()) if seen.stable.all() else 0.0
 
 
-def _damping(flat: Mapping[str, Any]) -> Damping:
-    """The margin over the damping of the joint, from the stage's own upward."""
+def dampings(flat: Mapping[str, Any]) -> np.ndarray:
+    """Dampings of the joint [N s/m] to be tried: the stage's own and larger ones."""
     critical = 2 * np.sqrt(flat["joint.stiffness"] * flat["masses.stage"])
     own = flat["joint.damping"]
-    tried = np.array([own, *(each for each in DAMPINGS * critical if each > own)])
-    margins = [settled_margin({**flat, "joint.damping": each}) for each in tried]
-    return Damping(tried, np.array(margins))
+    return np.array([own, *(each for each in RATIOS * critical if each > own)])
 
 
-__all__ = ["WANTED", "Controller", "Damping", "comfortable_below", "controller", "limits", "settled_margin"]
+def _damping(flat: Mapping[str, Any]) -> Damping:
+    tried = dampings(flat)
+    return Damping(tried, np.array([settled_margin({**flat, "joint.damping": each}) for each in tried]))

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from friso.design.geometry import Geometry, Sheet, box, mechanisms, sheets
-from friso.design.requirements import Requirement, Task, requirements
+from friso.design.requirements import PARASITIC, Requirement, Task, requirements
 from friso.flexure import closed_forms
 from friso.flexure.joint import first_interfering
 
@@ -38,7 +38,7 @@ def front(task: Task) -> list[Candidate]:
     from pymoo.optimize import minimize
 
     bought, (low, high) = sheets(task.spec), box(task.spec)
-    wanted = [each for each in requirements(task) if each.key != "safety.parasitic"]
+    wanted = [each for each in requirements(task) if each.name != PARASITIC]
 
     class Leaves(Problem):
         def __init__(self) -> None:
@@ -60,17 +60,13 @@ def front(task: Task) -> list[Candidate]:
         seed=SEED,
         verbose=False,
     )
-    if result.X is None:
+    if result.X is None or result.F is None:
         return []
-    x, f = np.atleast_2d(result.X), np.atleast_2d(result.F)
-    return [
-        Candidate(
-            Geometry(*map(float, np.exp(x[k, :3])), bought[int(x[k, 3])]),
-            float(np.exp(f[k, 0])),
-            float(np.exp(-f[k, 1])),
-        )
-        for k in np.argsort(f[:, 0])
+    found = [
+        Candidate(Geometry.of(np.exp(x[:3]), bought[int(x[3])]), float(np.exp(f[0])), float(np.exp(-f[1])))
+        for x, f in zip(np.atleast_2d(result.X), np.atleast_2d(result.F), strict=True)
     ]
+    return sorted(found, key=lambda each: each.stiffness)
 
 
 @dataclass(frozen=True)

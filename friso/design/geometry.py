@@ -40,6 +40,12 @@ class Geometry:
     spacing: float
     sheet: Sheet
 
+    @classmethod
+    def of(cls, sizes: np.ndarray, sheet: Sheet) -> Geometry:
+        """Of length, width and spacing [m], shape (3,)."""
+        length, width, spacing = sizes.tolist()
+        return cls(length, width, spacing, sheet)
+
     def keys(self) -> dict[str, Any]:
         """The keys of [flexure], as text with units."""
         sizes = {f"flexure.{name}": f"{getattr(self, name) * 1e3:.6g} mm" for name in SIZES}
@@ -85,4 +91,4 @@ def rounded(spec: Spec, geometry: Geometry, step: float) -> list[Geometry]:
     near = [{float(np.round(size / step + side, 0) * step) for side in (-0.5, 0.5)} for size in sizes_of([geometry])[0]]
     found = [np.array(each) for each in product(*map(sorted, near))]
     inside = [each for each in found if np.all(each >= low * (1 - 1e-9)) and np.all(each <= high * (1 + 1e-9))]
-    return [Geometry(*map(float, each), geometry.sheet) for each in inside]
+    return [Geometry.of(each, geometry.sheet) for each in inside]

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from friso.design.choice import Choice, Confirmed, chosen, confirmed
-from friso.design.controller import Controller, comfortable_below, controller
+from friso.design.controller import Controller, comfortable_below, controller, dampings
 from friso.design.edges import Corners, edges_over, rigid
 from friso.design.front import Candidate, front
 from friso.design.hunting_map import HuntingMap, hunting_map
@@ -27,6 +27,9 @@ STROKES = 4
 
 FIRST, BEYOND, STEPS = 1 / 40, 3.0, 12
 """Where edges are searched, in units of the machine's limit: from there to there, in so many steps."""
+
+ABOVE = 2.0
+"""End of the search with an isolator, in units of the crossover chosen."""
 
 ROUNDS, LOWER = 12, 0.97
 """How often leaves and crossover are chosen anew, and the factor on a crossover for which beams confirm no leaves."""
@@ -99,8 +102,8 @@ def design(stage: Stage, spec: Spec, progress: Progress = lambda what, done, tot
     found = fitted(base, task, candidates)
     progress("hunting with isolator", 0, 1)
     crossover = found.stage.flat()["controller.crossover"]
-    edges = edges_over(found.stage.flat(), population, FIRST * crossover, crossover, STEPS)
-    _does_not_hunt(spec, edges, crossover)
+    edges = edges_over(found.stage.flat(), population, FIRST * crossover, ABOVE * crossover, STEPS)
+    _does_not_hunt(found, edges)
     progress("margins", 0, 1)
     control = controller(found.stage, found.limits, population)
     progress("hunting map", 0, 1)
@@ -167,11 +170,32 @@ def _down(crossover: float) -> float:
     return float(np.floor(crossover / step * (1 + 1e-9)) * step)
 
 
-def _does_not_hunt(spec: Spec, edges: Corners, crossover: float) -> None:
+def _does_not_hunt(found: Fitted, edges: Corners) -> None:
     """Raises NoDesign where the crossover does not keep its distance from the edge of hunting."""
-    if edges.hunts and spec.safety.hunting * edges.highest > crossover:
-        needed = spec.safety.hunting * edges.highest
-        raise NoDesign(
-            f"with the softest leaf springs that can be had, the stage hunts up to {edges.highest:.3g} Hz, so that the "
-            f"crossover has to be {needed:.3g} Hz or more; it can be {crossover:.3g} Hz"
-        )
+    spec, crossover = found.task.spec, found.stage.flat()["controller.crossover"]
+    needed = spec.safety.hunting * edges.highest
+    if not edges.hunts or needed <= crossover:
+        return
+    until = f"{edges.highest:.3g} Hz" if np.isfinite(needed) else f"beyond {edges.searched[1]:.3g} Hz"
+    stiffness, stroke = found.stage.flat()["joint.stiffness"], found.task.stroke * 1e3
+    reason = (
+        f"with the softest leaf springs that can be had, {stiffness:.4g} N/m and a stroke of {stroke:.3g} mm, the stage "
+        f"hunts up to {until}; a crossover with the factor of safety above that, {spec.safety.hunting:g}, is not to be "
+        f"had: it can be {crossover:.3g} Hz"
+    )
+    raise NoDesign(reason, tuple(_ways_out(found, edges.highest, needed, crossover)))
+
+
+def _ways_out(found: Fitted, edge: float, needed: float, crossover: float) -> Iterator[Relaxation]:
+    """What would let the crossover keep its distance from the edge [Hz]."""
+    spec, name = found.task.spec, "crossover above the edge of hunting"
+    if crossover >= ALIKE * spec.limit and np.isfinite(needed):
+        yield Relaxation(name, "machine.bandwidth_limit", spec.limit, needed, "Hz")
+    if edge < crossover:
+        yield Relaxation(name, "safety.hunting", spec.safety.hunting, crossover / edge, "")
+    own = found.stage.flat()["joint.damping"]
+    for each in dampings(found.stage.flat())[1:]:
+        best = comfortable_below(limits({**found.stage.flat(), "joint.damping": each}), spec.limit)
+        if best and best >= needed:
+            yield Relaxation(name, "joint.damping", own, float(each), "N*s/m")
+            return

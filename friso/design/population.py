@@ -118,7 +118,7 @@ def _population(
     as much: they cannot hunt, but exist."""
     values = {name: interval.at(shares[name]) for name, interval in ranges.items()}
     keys = {f"masses.{name}": values.pop(name) for name in ("cart", "stage") if name in values}
-    static = np.broadcast_to(values.get("static", flat.get("friction.static")), (count,)).astype(float)
+    static = np.broadcast_to(values.get("static", flat.get("friction.static", np.nan)), (count,)).astype(float)
     if "gap" in values:
         values["coulomb"] = static * (1 - values.pop("gap"))
     elif "friction.coulomb" in flat:

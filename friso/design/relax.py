@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from scipy.optimize import differential_evolution
 
-from friso.design.geometry import SIZES, Sheet, box, mechanisms
-from friso.design.requirements import Requirement, Task, requirements
+from friso.design.geometry import SIZES, Geometry, Sheet, box, mechanisms
+from friso.design.requirements import Requirement, Task, less, more, requirements
 from friso.flexure.mechanism import Mechanism
 
 BEYOND = 3.0
@@ -28,35 +28,40 @@ SLACK = 1e-3
 
 @dataclass(frozen=True)
 class Relaxation:
-    """A requirement that, relaxed alone from `value` to `needed`, lets leaf springs of these sizes [m] do: length,
-    width, spacing and thickness."""
+    """A `key` of the specification that, changed alone from `value` to `needed` [unit], lets the requirement be met: in
+    leaf springs, by those of a `geometry` (None for what is not about them)."""
 
-    requirement: Requirement
+    requirement: str
+    key: str
+    value: float
     needed: float
-    sizes: tuple[float, float, float, float]
-    material: str
+    unit: str
+    geometry: Geometry | None = None
 
 
 def relaxations(task: Task) -> tuple[Relaxation, ...]:
     """For each requirement, by how much it has to be relaxed if all others stand; those that can be, the least change
     first. Empty where no single one is enough."""
     wanted = [*requirements(task), *_space(task)]
-    found = [each for k in range(len(wanted)) if (each := _alone(task, wanted, k))]
-    return tuple(sorted(found, key=lambda each: abs(np.log(each.needed / each.requirement.value))))
+    found = [each for k in range(len(wanted)) for each in _alone(task, wanted, k)]
+    return tuple(sorted(found, key=_change))
+
+
+def _change(it: Relaxation) -> float:
+    """How large a change is, as a factor's logarithm."""
+    return float(abs(np.log(it.needed / it.value))) if it.needed > 0 else np.inf
 
 
 def _space(task: Task) -> list[Requirement]:
     """The limits of space and sheets as requirements."""
     low, high = box(task.spec)
     gauges = sorted(map(float, task.spec.leaves.thickness))
-    names = (*SIZES, "thickness")
-    ends = zip(names, [*low, gauges[0]], [*high, gauges[-1]], strict=True)
     found = []
-    for name, least, most in ends:
-        words = "sheets" if name == "thickness" else f"{name} of the leaves"
+    for name, least, most in zip((*SIZES, "thickness"), [*low, gauges[0]], [*high, gauges[-1]], strict=True):
+        words, key = "sheets" if name == "thickness" else f"{name} of the leaves", f"leaves.{name}"
         found += [
-            Requirement(f"{words}, at least", f"leaves.{name}", least, "m", False, _over(name, least, low=True)),
-            Requirement(f"{words}, at most", f"leaves.{name}", most, "m", True, _over(name, most, low=False)),
+            Requirement(f"{words}, at least", (less(key, float(least), "m"),), _over(name, least, low=True)),
+            Requirement(f"{words}, at most", (more(key, float(most), "m"),), _over(name, most, low=False)),
         ]
     return found
 
@@ -68,7 +73,7 @@ def _over(name: str, limit: float, low: bool) -> Callable[[Mechanism], Any]:
     return excess
 
 
-def _alone(task: Task, wanted: list[Requirement], k: int) -> Relaxation | None:
+def _alone(task: Task, wanted: list[Requirement], k: int) -> Iterator[Relaxation]:
     """The least relaxation of requirement `k` with which the others can be met."""
     low, high = box(task.spec)
     gauges = task.spec.leaves.thickness
@@ -78,7 +83,7 @@ def _alone(task: Task, wanted: list[Requirement], k: int) -> Relaxation | None:
     def built(x: np.ndarray) -> tuple[np.ndarray, list[Sheet]]:
         sizes = np.exp(x[:4]).T
         return sizes[:, :3], [
-            Sheet(kinds[int(kind)][0], t, kinds[int(kind)][1]) for t, kind in zip(sizes[:, 3], x[4], strict=True)
+            Sheet(kinds[int(kind)][0], float(t), kinds[int(kind)][1]) for t, kind in zip(sizes[:, 3], x[4], strict=True)
         ]
 
     def objective(x: np.ndarray) -> np.ndarray:
@@ -99,8 +104,10 @@ def _alone(task: Task, wanted: list[Requirement], k: int) -> Relaxation | None:
             polish=False,
         )
     if found.fun >= UNMET:
-        return None
-    sizes, (sheet,) = built(found.x[:, None])
-    length, width, spacing = map(float, sizes[0])
-    needed = wanted[k].relaxed(float(np.exp(max(found.fun, 0.0))))
-    return Relaxation(wanted[k], needed, (length, width, spacing, sheet.thickness), sheet.material)
+        return
+    (sizes,), (sheet,) = built(found.x[:, None])
+    geometry = Geometry.of(sizes, sheet)
+    for way in wanted[k].ways:
+        needed = way.needed(float(np.exp(max(found.fun, 0.0))))
+        if needed is not None:
+            yield Relaxation(wanted[k].name, way.key, way.value, needed, way.unit, geometry)

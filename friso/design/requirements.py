@@ -35,66 +35,87 @@ class Task:
 
 
 @dataclass(frozen=True)
-class Requirement:
-    """A requirement in words; `key` of the specification that says how much, its `value` there and `unit`; and whether
-    relaxing it makes that `larger`. `excess` tells by what factor geometries break it: 1 where they just meet it."""
+class Way:
+    """A way to relax a requirement: the `key` of the specification, its `value` there and `unit`, and to what it has to
+    be changed for a geometry that breaks the requirement by a factor (None: no change of it is enough)."""
 
-    name: str
     key: str
     value: float
     unit: str
-    larger: bool
+    needed: Callable[[float], float | None]
+
+
+@dataclass(frozen=True)
+class Requirement:
+    """A requirement in words, the ways to relax it, and by what factor geometries break it: 1 where they just do."""
+
+    name: str
+    ways: tuple[Way, ...]
     excess: Callable[[Mechanism], Any]
 
-    def relaxed(self, excess: float) -> float:
-        """The value with which a geometry that breaks it by this factor would do."""
-        return self.value * excess if self.larger else self.value / excess
+
+def more(key: str, value: float, unit: str) -> Way:
+    """To be relaxed by making it larger."""
+    return Way(key, value, unit, lambda excess: value * excess)
+
+
+def less(key: str, value: float, unit: str) -> Way:
+    """To be relaxed by making it smaller."""
+    return Way(key, value, unit, lambda excess: value / excess)
+
+
+def factor(key: str, value: float) -> Way:
+    """A factor of safety, which cannot be smaller than 1."""
+    return Way(key, value, "", lambda excess: value / excess if value >= excess else None)
+
+
+BREAKAWAY, PARASITIC = "the cart must not break away inside the stroke", "first interfering frequency"
 
 
 def requirements(task: Task) -> list[Requirement]:
     """All of them but for the space and the sheets."""
     spec, safety, stroke = task.spec, task.spec.safety, task.stroke
+    shorter = less("leaves.stroke", stroke, "m")
 
     def fatigue(it: Mechanism) -> Any:
         known = np.where(np.isnan(it.fatigue), np.inf, it.fatigue)
         return safety.fatigue * it.stress_concentration * closed_forms.max_stress(it, stroke) / known
 
-    found = [
+    return [
         Requirement(
-            "the cart must not break away inside the stroke",
-            "friction.static",
-            task.friction,
-            "N",
-            True,
+            BREAKAWAY,
+            (more("friction.static", task.friction, "N"), shorter),
             lambda it: safety.breakaway * closed_forms.drive_stiffness(it) * stroke / task.friction,
         ),
-        Requirement("stress borne for ever", "safety.fatigue", safety.fatigue, "", False, fatigue),
+        Requirement("stress borne for ever", (factor("safety.fatigue", safety.fatigue), shorter), fatigue),
         Requirement(
             "yield strength under stroke and load",
-            "safety.strength",
-            safety.strength,
-            "",
-            False,
+            (factor("safety.strength", safety.strength),),
             lambda it: safety.strength * static_stress(it, task) / it.yield_strength,
         ),
         Requirement(
             "buckling under load",
-            "safety.buckling",
-            safety.buckling,
-            "",
-            False,
+            (factor("safety.buckling", safety.buckling), _lighter(task)),
             lambda it: safety.buckling * leaf_load(it, task) * it.leaves / closed_forms.buckling_load(it),
         ),
         Requirement(
-            "first interfering frequency",
-            "safety.parasitic",
-            safety.parasitic,
-            "",
-            False,
+            PARASITIC,
+            (factor("safety.parasitic", safety.parasitic),),
             lambda it: safety.parasitic * task.crossover / first_interfering(it)[0],
         ),
+        *_support(spec, stroke),
     ]
-    return found + _support(spec, stroke)
+
+
+def _lighter(task: Task) -> Way:
+    """A smaller load along the leaves; the weight of the stage stays."""
+    force = float(task.spec.load.force_x)
+
+    def needed(excess: float) -> float | None:
+        left = task.load / excess - (task.load - force)
+        return left if left >= 0 else None
+
+    return Way("load.force_x", force, "N", needed)
 
 
 def _support(spec: Spec, stroke: float) -> list[Requirement]:
@@ -106,10 +127,7 @@ def _support(spec: Spec, stroke: float) -> list[Requirement]:
     return [
         Requirement(
             f"stiffness {where} at full stroke",
-            f"load.{key}",
-            float(wanted),
-            "N/m",
-            False,
+            (less(f"load.{key}", float(wanted), "N/m"),),
             lambda it, wanted=wanted, form=form: wanted / form(it, stroke),
         )
         for key, (where, form) in forms.items()

@@ -96,13 +96,14 @@ def verification(stage: Stage, spec: Spec, progress: Callable[[str, int, int], N
     flat = stage.flat()
     machines = drawn(spec, flat, MACHINES)
     window = float(spec.position.window)
-    outcomes = []
+    outcomes: list[Outcome] = []
     for name, held in (("joint free", False), ("joint locked", True)):
         own = machines.over(flat) | {"joint.locked": held, "motion.kind": "there_and_back"}
         outcomes.append(
             tried(own, machines.count, window, lambda done, name=name: progress(name, done, machines.count))
         )
-    return Verification(machines, *outcomes, _one(stage, machines.of(outcomes[0].worst)))
+    free, locked = outcomes
+    return Verification(machines, free, locked, _one(stage, machines.of(free.worst)))
 
 
 def tried(

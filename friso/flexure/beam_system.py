@@ -40,15 +40,15 @@ class Leaves:
 
     def __init__(self, mechanism: Mechanism, elements: int = ELEMENTS) -> None:
         self.count, self.nodes = int(mechanism.leaves), elements + 1
-        self._container = exudyn.SystemContainer()
-        self._system = self._container.AddSystem()
+        self._container: Any = exudyn.SystemContainer()
+        self._system: Any = self._container.AddSystem()
         _add_leaf(self._system, mechanism, elements)
         self._system.Assemble()
-        settings = exudyn.SimulationSettings()
+        settings: Any = exudyn.SimulationSettings()
         settings.solution.file.write = False
         settings.solution.sensors.active = False
         settings.staticSolver.verboseMode = 0
-        self._solver = exudyn.MainSolverStatic()
+        self._solver: Any = exudyn.MainSolverStatic()
         self._solver.InitializeSolver(self._system, settings)
 
     def forces(self, state: np.ndarray) -> np.ndarray:
@@ -170,7 +170,7 @@ def _section(it: Mechanism, h: float, curl: float, twist: float) -> Any:
     torsion = it.shear * plate.torsion_constant(it.width, it.thickness) / twist
     edgewise, flatwise = (1 / (1 / shear + h**2 / (12 * bending)) for bending in (strong, weak))
     bulge = it.area * h**2 / 6
-    section = exudyn.BeamSection()
+    section: Any = exudyn.BeamSection()
     section.stiffnessMatrix = np.diag([it.young * it.area, edgewise, flatwise, torsion, weak, strong])
     section.massPerLength = it.density * it.area
     moments = [it.bending + it.edgewise, it.bending + bulge, it.edgewise + bulge]

@@ -122,8 +122,8 @@ def _predicted(known: list[Held], z: float) -> Place:
     weights = (1 + s**2 * (2 * s - 3), s**2 * (3 - 2 * s), step * s * (s - 1) ** 2, step * s**2 * (s - 1))
     parts = (before.place, last.place, before.rate, last.rate)
     return Place(
-        sum(weight * part.inner for weight, part in zip(weights, parts, strict=True)),
-        sum(weight * part.stage for weight, part in zip(weights, parts, strict=True)),
+        np.sum([weight * part.inner for weight, part in zip(weights, parts, strict=True)], axis=0),
+        np.sum([weight * part.stage for weight, part in zip(weights, parts, strict=True)], axis=0),
     )
 
 

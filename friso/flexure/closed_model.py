@@ -47,10 +47,10 @@ def _modes(it: Mechanism) -> tuple[Mode, ...]:
 
 def _stage_mode(it: Mechanism, frequency: float, shape: np.ndarray) -> Mode:
     leaves = following(it, shape)
-    at = [float(along_motion(it, point, shape[:, None])[0]) for point in (it.actuation, it.sensor)]
+    actuator, sensor = (float(along_motion(it, point, shape[:, None])[0]) for point in (it.actuation, it.sensor))
     arm = np.array(it.body.centre) - np.array([it.length, 0.0, 0.0])
     name = mode_name(shape, it.body.mass, np.array(it.body.inertia), arm, leaves, it.leaf_mass)
-    return Mode(name, float(frequency), *at, peak_of(it, *at), shape, leaves)
+    return Mode(name, float(frequency), actuator, sensor, peak_of(it, actuator, sensor), shape, leaves)
 
 
 def following(it: Mechanism, stage: np.ndarray) -> np.ndarray:

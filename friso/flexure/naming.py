@@ -14,7 +14,12 @@ RIPPLE = 0.05
 
 
 def mode_name(
-    stage: np.ndarray, mass: float, inertia: Sequence[float], arm: np.ndarray, leaves: np.ndarray, leaf_mass: float
+    stage: np.ndarray,
+    mass: float,
+    inertia: Sequence[float] | np.ndarray,
+    arm: np.ndarray,
+    leaves: np.ndarray,
+    leaf_mass: float,
 ) -> str:
     """The name of a mode at unit modal mass.
 

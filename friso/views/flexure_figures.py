@@ -16,6 +16,9 @@ from friso.views.flexure_modes import modes_figure
 DASHES: dict[str, Dash] = {CLOSED: "dashed"}
 """Closed forms are dashed, so that both are seen where they agree."""
 
+Smooth = Callable[[Array, Array, Array], Array]
+"""From places, values there and other places to values there."""
+
 FINE = 101
 """Deflections between which lines are drawn."""
 
@@ -31,11 +34,11 @@ def _force(found: Found) -> Figure:
     reach, steepness = found.best.stroke, float(found.best.drive[0])
     ends = np.array([0.0, reach])
     straight = Series(ends, steepness * ends, "initial stiffness", GREY, "dotted", 1.2)
-    lines, points = _lines(found, lambda it: it.forces, -1.0)
+    lines, points = _lines(found, lambda it: it.forces, _odd)
     panel = Panel("", _deflection(found), Axis("Force", "N"), (*lines, straight), (points,))
     caption = (
-        "The force that holds the stage deflected, the same to both sides. Above the straight line the leaves stiffen: "
-        "pulled between their clamps, they cannot shorten freely."
+        "The force that holds the stage deflected, the same to both sides, while it is free to shift and turn "
+        "otherwise. Closed forms know one stiffness; the beams stiffen where they lean much. Dots: computed."
     )
     return Figure("flexure_force", "Force over the stroke", caption, (panel,))
 
@@ -55,25 +58,31 @@ def _support(found: Found) -> Figure:
 
 def _supports(found: Found, title: str, of: Callable[[Evaluation], Array]) -> Panel:
     """One support stiffness [N/µm], the same to both sides."""
-    lines, points = _lines(found, of, 1.0)
+    lines, points = _lines(found, of, _even_falling)
     top = 1.1 * max(float(line.y.max()) for line in lines)
     axis = Axis("Stiffness", "N/µm", (0.0, top), prefixed=False)
     return Panel(title, _deflection(found), axis, lines, (points,))
 
 
-def _lines(found: Found, of: Callable[[Evaluation], Array], parity: float) -> tuple[tuple[Series, ...], Markers]:
-    """The same quantity by each model, drawn smoothly, and where the model that counts was computed.
-
-    At the opposite deflection the quantity is `parity` times as large.
-    """
-    lines = []
-    for name, it in found.models.items():
-        x, y = it.deflections, of(it)
-        both = np.concatenate([-x[:0:-1], x]), np.concatenate([parity * y[:0:-1], y])
-        fine = np.linspace(0.0, it.stroke, FINE)
-        lines.append(Series(fine, CubicSpline(*both)(fine), name, COLOURS[name], DASHES.get(name, "solid"), 1.8))
+def _lines(found: Found, of: Callable[[Evaluation], Array], smooth: Smooth) -> tuple[tuple[Series, ...], Markers]:
+    """The same quantity by each model, drawn smoothly, and where the model that counts was computed."""
+    fine = np.linspace(0.0, found.best.stroke, FINE)
+    lines = tuple(
+        Series(fine, smooth(it.deflections, of(it), fine), name, COLOURS[name], DASHES.get(name, "solid"), 1.8)
+        for name, it in found.models.items()
+    )
     best = next(iter(found.models))
-    return tuple(lines), Markers(found.best.deflections, of(found.best), "", COLOURS[best])
+    return lines, Markers(found.best.deflections, of(found.best), "", COLOURS[best])
+
+
+def _odd(x: Array, y: Array, at: Array) -> Array:
+    """y over x between the known places, the opposite on the other side of 0."""
+    return CubicSpline(np.concatenate([-x[:0:-1], x]), np.concatenate([-y[:0:-1], y]))(at)
+
+
+def _even_falling(x: Array, y: Array, at: Array) -> Array:
+    """The same of a stiffness that is alike on both sides: its inverse grows about as the square of x."""
+    return 1 / CubicSpline(np.concatenate([-x[:0:-1], x]), 1 / np.concatenate([y[:0:-1], y]))(at)
 
 
 def _deflection(found: Found) -> Axis:

@@ -128,7 +128,7 @@ def _outline(it: Mechanism, mode: Mode, leaf: Array, offset: float) -> list[Shap
     """Both long edges and both ends: cross-sections turn as the middle line does."""
     x, leaf = _smooth(it, leaf)
     turn = np.gradient(leaf[:, 1], x)
-    turn[[0, -1]] = 0.0, mode.stage[5]  # the clamps hold the ends
+    turn -= turn[0]  # what is left at the clamp is shear, of nearly the same size all along the leaf
     sides = []
     for y in (-it.width / 2, it.width / 2):
         rest = np.stack([x, np.full_like(x, y), np.full_like(x, offset)], axis=1)

@@ -59,11 +59,11 @@ def box(corner: Point, other: Point, kind: str = "outline", fill: str = "none") 
     return path([(x1, y1), (x2, y1), (x2, y2), (x1, y2)], kind, fill, closed=True)
 
 
-def area(corner: Point, other: Point, fill: str) -> str:
+def area(corner: Point, other: Point, fill: str, opacity: float = 1.0) -> str:
     """A rectangle between opposite corners without a line around it."""
     (x1, y1), (x2, y2) = corner, other
     corners = " L ".join(f"{_n(x)} {_n(y)}" for x, y in ((x1, y1), (x2, y1), (x2, y2), (x1, y2)))
-    return f'<path d="M {corners} Z" fill="{fill}"/>'
+    return f'<path d="M {corners} Z" fill="{fill}" fill-opacity="{_n(opacity)}"/>'
 
 
 def circle(centre: Point, radius: float, fill: str = "none") -> str:
@@ -77,9 +77,15 @@ def words(
     x, y = _n(at[0]), _n(at[1])
     turn = f' transform="rotate(-90 {x} {y})"' if upright else ""
     weight = ' font-weight="bold"' if bold else ""
-    halo = 'stroke="#ffffff" stroke-width="0.8" stroke-linejoin="round" paint-order="stroke"'
-    style = f'font-size="{_n(size)}" text-anchor="{anchor}" fill="#222222" {halo}{weight}{turn}'
+    style = f'font-size="{_n(size)}" text-anchor="{anchor}" fill="#222222"{weight}{turn}'
     return f'<text x="{x}" y="{y}" {style}>{escape(text)}</text>'
+
+
+def words_over(at: Point, text: str, bold: bool = False) -> str:
+    """A text over lines, which it keeps off."""
+    plain = words(at, text, bold=bold)
+    around = 'aria-hidden="true" stroke="#ffffff" stroke-width="0.8" stroke-linejoin="round"'
+    return plain.replace("<text ", f"<text {around} ", 1) + plain
 
 
 def fits(text: str, room: float) -> bool:

@@ -77,7 +77,7 @@ def _endurance(it: Evaluation) -> str:
     beyond = bounds if it.stroke * it.fatigue_margin > it.mechanism.length / 2 else ""
     return (
         f"{bent} and would bear {megapascals(it.mechanism.fatigue)} for ever: "
-        f"by fatigue the stroke may be {largest}.{beyond}"
+        f"by fatigue the stroke may be about {largest}.{beyond}"
     )
 
 

@@ -27,6 +27,7 @@ from friso.views.flexure_svg import (
     sheet,
     upwards,
     words,
+    words_over,
 )
 
 CLOSE = 1e-6
@@ -87,7 +88,7 @@ def _side_dimensions(it: Drawing, start: float, end: float, row: float) -> list[
     parts += leader(tip, (tip[0] + 3, it.z0 - it.spans[1][1] - 4), note)
     edge, beside = it.z0 + row + RIM, end + CLAMP + 3
     parts += upwards(edge, edge + it.travel, beside, end + CLAMP, "")
-    parts.append(words((beside + 2, edge + it.travel / 2 + 1), f"±{_mm(it.stroke)} stroke, gap to the limiter"))
+    parts.append(words_over((beside + 2, edge + it.travel / 2 + 1), f"±{_mm(it.stroke)} stroke, gap to the limiter"))
     parts.append(words((start - CLAMP / 2, it.z0 - row - RIM - 1.5), "cart", "middle"))
     return parts + _axes(it.z0 - it.spans[1][0] + 6, "z") + _stage_note(it)
 
@@ -125,7 +126,8 @@ def _top_view(it: Drawing) -> list[str]:
     left = it.x0 + it.spans[0][0]
     parts = [words((5, it.y0 - it.spans[2][1] - ABOVE + 9), "From above (x–y)", bold=True)]
     parts += _block(it, 2, it.y0)
-    parts.append(box((start, it.y0 - half), (end, it.y0 + half), fill="#0072B22e"))
+    parts.append(area((start, it.y0 - half), (end, it.y0 + half), "#0072B2", 0.18))
+    parts.append(box((start, it.y0 - half), (end, it.y0 + half)))
     clamps = ((start - CLAMP, start), (end, end + CLAMP))
     parts += [box((x1, it.y0 - half - RIM), (x2, it.y0 + half + RIM), fill="url(#leaf-hatch)") for x1, x2 in clamps]
     parts.append(path([(left - 2, it.y0), (it.x0 + it.spans[0][1] + 2, it.y0)], "centre"))
@@ -152,8 +154,8 @@ def _marks(it: Drawing) -> list[str]:
         x, y = places["S"]
         parts.append(path([(x, y - 1.3), (x + 1.3, y), (x, y + 1.3), (x - 1.3, y)], "thin", "#D55E00", closed=True))
         for (x, y), letters in _together({letter: places[letter] for letter in "AS"}).items():
-            parts.append(words((x + 2.4, y - 1.8), ", ".join(letters), bold=True))
-        parts.append(words((places["C"][0] + 2.2, places["C"][1] + 4.2), "C", bold=True))
+            parts.append(words_over((x + 2.4, y - 1.8), ", ".join(letters), bold=True))
+        parts.append(words_over((places["C"][0] + 2.2, places["C"][1] + 4.2), "C", bold=True))
     return parts
 
 

@@ -1,0 +1,177 @@
+"""What a design is called and how it ends, in words that the terminal, the page and messages share."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from friso.design.edges import Corners
+from friso.design.geometry import SIZES
+from friso.design.method import Design, NoDesign
+from friso.design.relax import Relaxation
+from friso.design.verification import Outcome
+from friso.stage.stage import numeric_keys
+from friso.views.figure import GREEN, ORANGE, VERMILLION
+from friso.views.map_words import quantity
+from friso.views.prefixes import choose, pretty, with_unit
+
+SHOWN = 5
+"""Requirements whose relaxation is told in a message."""
+
+
+def headline(found: Design) -> list[tuple[str, str]]:
+    """The verdicts, each with its colour: isolator or not, what it is, whether it holds."""
+    return [
+        (ORANGE if found.needed else GREEN, need(found)),
+        (GREEN, f"The isolator: {leaves(found)}; stroke {size(found.fitted.task.stroke)} mm to each side, crossover "
+         f"{hertz(found.controller.crossover)}."),
+        _verified(found),
+    ]
+
+
+def need(found: Design) -> str:
+    """Whether the machine needs an isolator, and why."""
+    limit, factor, without = found.spec.limit, found.spec.safety.hunting, found.without
+    if not found.needed:
+        if not without.hunts:
+            return f"No isolator is needed: without one the machine {edge(without)}."
+        return (
+            f"No isolator is needed: without one the machine {edge(without)}, and it allows {hertz(limit)}, more than "
+            f"{factor:g} times that."
+        )
+    return (
+        f"An isolator is needed: without one the machine {edge(without)}; with the safety factor of {factor:g} the "
+        f"crossover would have to be {_at_least(factor * without.highest)}, and the machine allows {hertz(limit)}."
+    )
+
+
+def brings(found: Design) -> str:
+    """What an isolator brings and costs where none is needed."""
+    tried, crossover, limit = found.verification, found.controller.crossover, found.spec.limit
+    slower = f" It costs crossover: {hertz(crossover)} instead of {hertz(limit)}." if crossover < 0.97 * limit else ""
+    return (
+        f"All the same, this is what one brings: with it the machine {edge(found.edges)}. Moves settle in "
+        f"{seconds(tried.free.slower_than(0.5))} instead of {seconds(tried.locked.slower_than(0.5))} (median), 95 % "
+        f"of them in {seconds(tried.free.slower_than(0.05))} instead of "
+        f"{seconds(tried.locked.slower_than(0.05))}, at the same crossover.{slower}"
+    )
+
+
+def leaves(found: Design) -> str:
+    """The leaf springs chosen."""
+    it = found.fitted.choice.geometry
+    return (
+        f"{it.sheet.leaves:g} leaves of {size(it.length)} x {size(it.width)} x {size(it.sheet.thickness)} mm, "
+        f"{size(it.spacing)} mm apart, {it.sheet.material}"
+    )
+
+
+def _verified(found: Design) -> tuple[str, str]:
+    free, wanted = found.verification.free, found.spec.position.settling_time
+    said = f"Of {free.tried} simulated moves {hunting(free)}: {probability(free)}. {settling(free)}"
+    if wanted is None:
+        return (VERMILLION if free.hunting else GREEN), f"{said}."
+    met = free.slower_than(0.05) <= wanted
+    colour = VERMILLION if free.hunting or not met else GREEN
+    return colour, f"{said}; {'as' if met else 'not as'} specified ({seconds(float(wanted))})."
+
+
+def hunting(outcome: Outcome) -> str:
+    """How many moves hunt."""
+    return {0: "none hunts", 1: "one hunts"}.get(outcome.hunting, f"{outcome.hunting} hunt")
+
+
+def probability(outcome: Outcome) -> str:
+    """The interval of the probability of hunting."""
+    low, high = outcome.interval
+    within = f"below {percent(high)}" if not outcome.hunting else f"{percent(low)} to {percent(high)}"
+    return f"the probability of hunting is {within} (with 95 % confidence)"
+
+
+def settling(outcome: Outcome) -> str:
+    """Within what time moves settle."""
+    return f"Half of them settle in {seconds(outcome.slower_than(0.5))}, 95 % in {seconds(outcome.slower_than(0.05))}"
+
+
+def edge(corners: Corners) -> str:
+    """Up to where the machine hunts, as what it does."""
+    low, high = corners.searched
+    if not corners.hunts:
+        return f"hunts in no corner at any crossover from {hertz(low)} to {hertz(high)}"
+    if not math.isfinite(corners.highest):
+        return f"hunts, in its worst corner, up to {hertz(high)} and beyond"
+    return f"hunts, in its worst corner, up to {hertz(corners.highest)}"
+
+
+def corner(corners: Corners, flat: Mapping[str, Any]) -> str:
+    """The corner that hunts up to the highest crossover."""
+    keys = corners.population.of(corners.worst)
+    units = {key: item.unit for key, item in numeric_keys(flat).items()}
+    order = sorted(keys, key=lambda key: (not key.startswith("friction."), key != "friction.static"))
+    return ", ".join(f"{quantity(key)} {plain(keys[key], units[key])}" for key in order)
+
+
+def gaps(corners: Corners, flat: Mapping[str, Any]) -> np.ndarray | None:
+    """Static less Coulomb friction in the corners [N], shape (n,); None of a friction law that has not both."""
+    if not {"friction.static", "friction.coulomb"} <= flat.keys():
+        return None
+    static, coulomb = (corners.population.over(flat)[f"friction.{name}"] for name in ("static", "coulomb"))
+    return np.broadcast_to(static - coulomb, (corners.population.count,))
+
+
+def refusal(failure: NoDesign) -> str:
+    """Why no design meets a specification, and what to relax."""
+    if not failure.relaxed:
+        tail = "no requirement is known that, relaxed alone, is enough: relax several"
+        return f"{failure.reason}\n  {tail}"
+    return "\n  ".join([failure.reason, *map(_relaxation, failure.relaxed[:SHOWN])])
+
+
+def _relaxation(it: Relaxation) -> str:
+    own = it.requirement
+    needed = outwards(it.needed, own.larger)
+    dimensions = " x ".join(size(each) for each in (*it.sizes[:2], it.sizes[3]))
+    return (
+        f"relax {own.key} ({own.name}) from {plain(own.value, own.unit)} to {plain(needed, own.unit)}: then leaves of "
+        f"{dimensions} mm, {size(it.sizes[SIZES.index('spacing')])} mm apart, of {it.material} do"
+    )
+
+
+def outwards(value: float, larger: bool) -> float:
+    """Three digits of a value, so that it is not met more tightly than it has to be."""
+    step = 10.0 ** (math.floor(math.log10(value)) - 2)
+    whole = math.ceil(value / step - 1e-9) if larger else math.floor(value / step + 1e-9)
+    return float(f"{whole * step:.6g}")
+
+
+def plain(value: float, unit: str) -> str:
+    """A value with its unit, without zeros that say nothing: "70 mm", "0.3 N"."""
+    if unit == "N":
+        return f"{value:.4g} N"
+    factor, text = choose(np.array([value]), unit)
+    return f"{value * factor:.4g} {text if factor != 1 else pretty(unit)}".rstrip()
+
+
+def size(length: float) -> str:
+    """A length [m] in mm as it stands on a drawing."""
+    return f"{1e3 * length:.4g}"
+
+
+def hertz(frequency: float) -> str:
+    return with_unit(frequency, "Hz") if math.isfinite(frequency) else "any frequency"
+
+
+def seconds(time: float) -> str:
+    """A settling time; without end for moves that hunt."""
+    return with_unit(time, "s") if math.isfinite(time) else "no time (they hunt)"
+
+
+def percent(share: float) -> str:
+    return f"{100 * share:.2g} %"
+
+
+def _at_least(frequency: float) -> str:
+    return f"{hertz(frequency)} or more" if math.isfinite(frequency) else "higher than was searched"

@@ -1,0 +1,148 @@
+"""Both models of leaf springs against shells, on ten mechanisms spread over the design space.
+
+`python tests/test_flexure_shells.py` prints the errors of docs/flexure.md, on a finer mesh.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+import shells
+
+from friso.flexure.beams import beams
+from friso.flexure.closed_model import closed
+from friso.flexure.evaluation import Evaluation, Model
+from friso.flexure.mechanism import Body, Mechanism, block_inertia
+from friso.materials import materials
+
+MODELS: dict[str, Model] = {"closed forms": closed, "beams": beams}
+MECHANISMS = {
+    # leaves, length, width, thickness, spacing [mm], material, mass [kg], x of its centre beyond the leaf ends [mm]
+    "the thesis's": (2, 70, 45, 0.35, 60, "stainless 1.4310", 0.5, 0),
+    "small": (2, 40, 20, 0.2, 30, "spring steel", 0.1, 5),
+    "square": (2, 60, 60, 0.3, 60, "spring steel", 0.5, 0),
+    "narrow": (2, 100, 30, 0.5, 60, "titanium", 0.5, 10),
+    "slender": (2, 50, 12, 0.25, 40, "beryllium copper", 0.2, 0),
+    "large and square": (2, 80, 80, 0.4, 100, "stainless 1.4310", 2.0, 0),
+    "heavy": (2, 120, 60, 0.8, 90, "spring steel", 5.0, 20),
+    "tiny": (3, 30, 25, 0.15, 10, "stainless 1.4310", 0.05, 0),
+    "very slender": (4, 90, 15, 0.4, 20, "aluminium", 0.2, 0),
+    "stiff": (2, 45, 45, 0.5, 45, "spring steel", 1.0, -10),
+}
+LIMITS = {"drive": 0.02, "support": 0.05, "turning": 0.05, "frequency": 0.05, "stress": 0.03, "buckling": 0.02}
+"""Largest errors allowed."""
+
+KINDS = {
+    "stage uz": "drive",
+    "stage uy": "stage along y",
+    "stage rx": "stage about x",
+    "stage rz": "stage about z",
+    "leaves bending 1": "leaf bending",
+    "leaves twisting 1": "leaf torsion",
+}
+"""Modes that are compared, the lowest of each kind, by their names of the shells and of friso."""
+
+
+def mechanism(name: str) -> Mechanism:
+    leaves, length, width, thickness, spacing, material, mass, beyond = MECHANISMS[name]
+    known = materials()[material]
+    length, width, thickness, spacing, beyond = (mm * 1e-3 for mm in (length, width, thickness, spacing, beyond))
+    it = Mechanism(
+        leaves,
+        length,
+        width,
+        thickness,
+        spacing,
+        *(float(known.young), known.poisson, float(known.density)),
+        *(float(known.yield_strength), float(known.fatigue)),
+        Body(mass, (0.0, 0.0, 0.0), (length + beyond, 0.0, 0.0)),
+        *((length / 2, 0.0, 0.0),) * 2,
+    )
+    return Mechanism(**{**it.__dict__, "body": Body(mass, block_inertia(it), it.body.centre)})
+
+
+@cache
+def by_shells(name: str, mesh: shells.Mesh = shells.MESH) -> dict[str, float]:
+    """What shells say: stiffness [N/m, N m] straight and deflected by L/50, frequencies [Hz], stress [Pa] at L/100,
+    buckling load [N]."""
+    it = mechanism(name)
+    sheet = shells.Sheet(it.length, it.width, it.thickness, it.young, it.poisson, it.density)
+    row, body = (int(it.leaves), it.spacing), it.body
+    straight = shells.mechanism_stiffness(sheet, *row, mesh=mesh)
+    bent = shells.mechanism_stiffness(sheet, *row, deflection=it.length / 50, mesh=mesh)
+    frequencies, kinds = shells.modes(sheet, *row, body.mass, body.inertia, body.centre, count=12, mesh=mesh)
+    finer = (mesh[0] * 4 // 3, mesh[1] * 4 // 3)
+    found = {
+        "stress": shells.clamp_stress(sheet, it.length / 100, mesh=finer)[1],
+        "buckling": shells.buckling_load(sheet, row[0], mesh=mesh),
+    }
+    for kind, frequency in zip(kinds, frequencies, strict=True):
+        if kind in KINDS:
+            found.setdefault(f"frequency, {KINDS[kind]}", float(frequency))
+    return found | stiffnesses(straight, bent)
+
+
+def stiffnesses(straight: np.ndarray, bent: np.ndarray) -> dict[str, float]:
+    free = 1 / np.linalg.inv(straight)[2, 2], 1 / np.linalg.inv(bent)[2, 2]
+    return {
+        "drive, straight": float(free[0]),
+        "drive, deflected": float(free[1]),
+        "support x, straight": straight[0, 0],
+        "support y, straight": straight[1, 1],
+        "support x, deflected": bent[0, 0],
+        "support y, deflected": bent[1, 1],
+        "turning about x, straight": straight[3, 3],
+        "turning about y, straight": straight[4, 4],
+        "turning about z, straight": straight[5, 5],
+        "turning about x, deflected": bent[3, 3],
+        "turning about y, deflected": bent[4, 4],
+        "turning about z, deflected": bent[5, 5],
+    }
+
+
+def by_model(it: Evaluation, half: Evaluation) -> dict[str, float]:
+    """What a model says at strokes of L/50 and L/100."""
+    found = {"stress": half.stress, "buckling": it.buckling} | stiffnesses(*it.stiffness)
+    for mode in it.modes:
+        found.setdefault(f"frequency, {mode.name.split(',')[0]}", mode.frequency)
+    # the stiffness along x and y of the evaluation is that of its matrices, which closed forms have twice
+    own = {"support x": it.support_x, "support y": it.support_y}
+    both = {f"{name}, {at}": each[k] for name, each in own.items() for at, k in (("straight", 0), ("deflected", -1))}
+    return found | both | {"drive, straight": it.drive[0], "drive, deflected": it.drive[-1]}
+
+
+def errors(name: str, model: Model, mesh: shells.Mesh = shells.MESH) -> dict[str, float]:
+    it = mechanism(name)
+    found, wanted = by_model(model(it, it.length / 50), model(it, it.length / 100)), by_shells(name, mesh)
+    return {key: found[key] / value - 1 for key, value in wanted.items() if key in found}
+
+
+@pytest.mark.parametrize("name", MECHANISMS)
+def test_both_models_agree_with_shells(name: str) -> None:
+    for model in MODELS.values():
+        found = errors(name, model)
+        assert {"frequency, drive", "frequency, leaf bending", "frequency, leaf torsion"} <= found.keys()
+        wrong = {key: f"{each:.2%}" for key, each in found.items() if abs(each) > LIMITS[key.split(",")[0].split()[0]]}
+        assert not wrong
+
+
+def test_published_leaf() -> None:
+    """references.md, section 3: pyfe3d 40 x 24 of the thesis's leaf, E 210 GPa."""
+    sheet = shells.Sheet(0.07, 0.045, 0.35e-3, 210e9, 0.3, 7850.0)
+    assert shells.mechanism_stiffness(sheet, 2, 0.06)[2, 2] == pytest.approx(2540, rel=5e-3)
+    mean, largest = shells.clamp_stress(sheet, 1e-3)
+    assert mean == pytest.approx(48.6e6, rel=0.01)
+    assert largest == pytest.approx(51.8e6, rel=0.01)
+
+
+if __name__ == "__main__":
+    for title, model in MODELS.items():
+        table: dict[str, list[float]] = {}
+        for each in MECHANISMS:
+            for key, error in errors(each, model, mesh=(48, 24)).items():
+                table.setdefault(key, []).append(100 * error)
+        for key, column in sorted(table.items()):
+            worst = max(column, key=abs)
+            print(f"{title:13s} {key:28s} worst {worst:6.2f} % of {len(column):2d}, typical {np.median(column):6.2f} %")
