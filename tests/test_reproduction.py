@@ -45,6 +45,9 @@ TABLE_3 = {
 LINEAR = {"E1", "F7", "F8", "F22", "F23"}
 """Claims that linear analysis decides: their judges are tried in test_linear_claims.py."""
 
+LEAVES, RULES = {"S35"}, {"D1"}
+"""Claims on the leaf springs, and on the rules of design: tried in test_design_claims.py."""
+
 
 @pytest.fixture(scope="module")
 def small() -> Reproduction:
@@ -97,7 +100,7 @@ def test_every_claim_is_in_the_table() -> None:
 
 def test_what_simulation_alone_decides_has_a_judge() -> None:
     needed = {"F5", "F11A", "F11B", "F12A", "F12B", "F13", "F14A", "F14B", "F15A", "F15B", "F16A", "F16B"}
-    assert needed | LINEAR == registered().keys()
+    assert needed | LINEAR | LEAVES | RULES == registered().keys()
     known = STUDIES.keys() | {"locked", WIDE, NARROW} | NEEDS.keys()
     assert all(entry.needs <= known for entry in registered().values())
 
@@ -277,7 +280,7 @@ def test_a_limit_is_lower_by_a_cell_at_least() -> None:
 
 
 def test_every_judge_of_maps_is_tried_both_ways() -> None:
-    assert HOLDS.keys() == FAILS.keys() == registered().keys() - LINEAR
+    assert HOLDS.keys() == FAILS.keys() == registered().keys() - LINEAR - LEAVES - RULES
 
 
 # --- verdicts ---------------------------------------------------------------------------------------------------------
@@ -381,7 +384,7 @@ def test_a_part_of_the_studies_covers_its_claims_only() -> None:
     steps: list[tuple[int, int, str]] = []
     found = reproduce(["control"], points=3, progress=lambda *step: steps.append(step), with_cycles=False)
     judged = {each.claim.id for each in found.verdicts if each.finding}
-    assert judged == {"F5", "F12B", "F13"} | LINEAR
+    assert judged == {"F5", "F12B", "F13"} | LINEAR | LEAVES
     assert {each.reason for each in found.verdicts if each.claim.id == "F11A"} == {"not computed in this run: path"}
     assert [step[0] for step in steps] == list(range(len(steps)))
     assert steps[-1][0] < steps[-1][1] <= len(steps)

@@ -16,6 +16,7 @@ from friso.cli.bode import bode
 from friso.cli.boundary import boundary
 from friso.cli.check import check
 from friso.cli.common import INTERRUPTED, say
+from friso.cli.design import design
 from friso.cli.flexure import flexure
 from friso.cli.guideline import guideline
 from friso.cli.init import init
@@ -40,6 +41,7 @@ for name, command in (
     ("bode", bode),
     ("boundary", boundary),
     ("flexure", flexure),
+    ("design", design),
     ("reproduce", reproduce),
     ("guideline", guideline),
 ):

@@ -179,9 +179,9 @@ def _does_not_hunt(found: Fitted, edges: Corners) -> None:
     until = f"{edges.highest:.3g} Hz" if np.isfinite(needed) else f"beyond {edges.searched[1]:.3g} Hz"
     stiffness, stroke = found.stage.flat()["joint.stiffness"], found.task.stroke * 1e3
     reason = (
-        f"with the softest leaf springs that can be had, {stiffness:.4g} N/m and a stroke of {stroke:.3g} mm, the stage "
-        f"hunts up to {until}; a crossover with the factor of safety above that, {spec.safety.hunting:g}, is not to be "
-        f"had: it can be {crossover:.3g} Hz"
+        f"with the softest leaf springs that can be had, {stiffness:.4g} N/m and a stroke of {stroke:.3g} mm, the "
+        f"stage hunts up to {until}; a crossover with the factor of safety above that, {spec.safety.hunting:g}, is not "
+        f"to be had: it can be {crossover:.3g} Hz"
     )
     raise NoDesign(reason, tuple(_ways_out(found, edges.highest, needed, crossover)))
 

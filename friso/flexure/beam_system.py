@@ -23,9 +23,6 @@ from friso.flexure.mechanism import Mechanism
 ELEMENTS = 16
 """Elements along a leaf; its modes are reported at the nodes between them."""
 
-TILTS = 8
-"""Newton iterations for the tilt of the torsional compliance, from 0; four are enough."""
-
 COORDINATES = 6
 """Of a node: displacements along x, y, z and angles of successive rotations about them."""
 
@@ -194,23 +191,12 @@ def _curl(it: Mechanism, h: float, middles: np.ndarray) -> np.ndarray:
 
 def _twist(it: Mechanism, h: float, middles: np.ndarray) -> np.ndarray:
     """Compliance in torsion of elements: as `plate.free_twist`, so that a constant torque meets the stiffness of the
-    plate, but tilted by exp(tilt s^2), so that the torque of a force across the deflected leaf, s^3, does so too.
+    plate, but tilted, so that the torque of a force across the deflected leaf, s^3, does so too.
 
-    The rate of twist p under that torque, the warping of which the clamps forbid: p - p''/rate^2 = s^3, p = 0 there.
-    The torque in an element is s^3 + s h^2/2 at its middle: its strain being constant, it sees the curved leaf as arcs
+    That torque in an element is s^3 + s h^2/2 at its middle: its strain being constant, it sees the curved leaf as arcs
     (found by comparison; 1/n^2 errors of the stiffness along y vanish).
     """
     s, end = 2 * _inside(h, middles) / it.length, 2 * middles / it.length
     even = plate.free_twist(s * it.length / 2, it.length, it.width, it.poisson) @ _WEIGHTS / 2
-    rate = plate.warping_rate(it.width, it.poisson) * it.length / 2
-    decay = np.exp(rate * (s - 1)) * (1 - np.exp(-2 * rate * s)) / (1 - np.exp(-2 * rate))
-    odd = (s**3 + 6 * s / rate**2 - (1 + 6 / rate**2) * decay) * s**3 @ _WEIGHTS / 2
-    torques = end**3 + end * (2 * h / it.length) ** 2 / 2
-    wanted, tilt = odd.sum() / even.sum(), 0.0
-    for _ in range(TILTS):
-        shares = even * np.exp(tilt * end**2)
-        shares /= shares.sum()
-        met = shares @ torques**2
-        tilt += (wanted - met) / (shares @ (torques * end) ** 2 - met * (shares @ end**2))
-    tilted = even * np.exp(tilt * end**2)
-    return tilted * even.sum() / tilted.sum()
+    odd = (plate.cubic_twist(s, it.length, it.width, it.poisson) * s**3) @ _WEIGHTS / 2
+    return plate.tilted(even, end**3 + end * (2 * h / it.length) ** 2 / 2, end, odd.sum())

@@ -32,9 +32,10 @@ def drive_stiffness(it: Mechanism) -> Any:
 
 
 def support_x(it: Mechanism, deflection: Any = 0.0) -> Any:
-    """Stiffness along the leaves with all else held: falls as the deflected leaves bend under it."""
+    """Stiffness along the leaves with all else held: falls as the deflected leaves, which are plates, bend under it."""
     straight = it.leaves * it.young * it.area / it.length
-    return straight / (1 + 12 / 700 * (deflection / it.thickness) ** 2)
+    stiffened = plate.stiffening(it.length, it.width, it.poisson)
+    return straight / (1 + 12 / 700 * (deflection / it.thickness) ** 2 / stiffened)
 
 
 def support_y(it: Mechanism, deflection: Any = 0.0) -> Any:

@@ -42,9 +42,10 @@ def _per(it: Mechanism, x: np.ndarray, weight: np.ndarray, slope: np.ndarray) ->
     """Compliance of the section for each resultant, (points, 6), and the length of arc per point, (points,)."""
     s = x - it.length / 2
     sheared = 1 / (SHEAR * it.shear * it.area)
-    twist = plate.free_twist(s, it.length, it.width, it.poisson) / (
-        it.shear * plate.torsion_constant(it.width, it.thickness)
-    )
+    shape, ends = (it.length, it.width, it.poisson), 2 * s / it.length
+    wanted = (plate.cubic_twist(ends, *shape) * ends**3) @ weight
+    free = plate.tilted(plate.free_twist(s, *shape) * weight, ends**3, ends, wanted) / weight
+    twist = free / (it.shear * plate.torsion_constant(it.width, it.thickness))
     curl = plate.compliance_profile(s, it.length, it.width, it.poisson) / (it.young * it.bending)
     columns = (1 / (it.young * it.area), sheared, sheared, twist, curl, 1 / (it.young * it.edgewise))
     return np.stack(np.broadcast_arrays(*columns), axis=1), weight * np.sqrt(1 + slope**2)

@@ -104,6 +104,16 @@ class _Leaves(Section):
     )
 
     @model_validator(mode="after")
+    def _can_turn(self) -> Self:
+        inertia = [self.inertia_x, self.inertia_y, self.inertia_z]
+        known = [each for each in inertia if each is not None]
+        if len(known) == 3 and 2 * max(known) > sum(known) * (1 + 1e-9):
+            given = ", ".join(f"inertia_{axis} = {quoted(each.text)}" for axis, each in zip("xyz", known, strict=True))
+            example = 'inertia_x = "2e-4 kg*m^2", inertia_y = "3e-4 kg*m^2", inertia_z = "3e-4 kg*m^2"'
+            raise StageError("inertia", given, "none larger than the sum of the other two, as in all bodies", example)
+        return self
+
+    @model_validator(mode="after")
     def _has_a_material(self) -> Self:
         numbers = ("young", "poisson", "density", "yield")
         given = [key for key in (*numbers, "fatigue") if getattr(self, key) is not None]

@@ -2,39 +2,111 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
-import numpy as np
-
-from friso.design.controller import WANTED
+from friso.design.edges import Corners
 from friso.design.method import Design
-from friso.frequency.members import Members
+from friso.views.design_control import controller_step, moves_step
 from friso.views.design_leaves import leaves_step
-from friso.views.design_words import (
-    Step,
-    brings,
-    corner,
-    edge,
-    gaps,
-    hertz,
-    hunting,
-    need,
-    plain,
-    probability,
-    seconds,
-    settling,
-    size,
-)
-from friso.views.design_window import lower, upper
+from friso.views.design_words import Step, brings, corner, edge, gaps, hertz, plain, size
 from friso.views.flexure_table import newtons_per
 
 GAP = 1.0
-"""Static less Coulomb friction [N] that hunting needs, as the thesis found it."""
-
-LITTLE = 0.05
-"""Share by which more joint damping has to raise the modulus margin to be worth its trouble."""
+"""Static less Coulomb friction [N] that hunting needs at least, as the thesis found (Sec. 4.3.1)."""
 
 
 def steps(found: Design) -> tuple[Step, ...]:
     """All steps of the method, in order."""
     return isolator_step(found), joint_step(found), leaves_step(found), controller_step(found), moves_step(found)
+
+
+def isolator_step(found: Design) -> Step:
+    """Whether an isolator is needed."""
+    corners, flat = found.without, found.given.flat()
+    said = [f"Without isolator the machine {edge(corners)}.", *_worst(corners, found), *_gap(found)]
+    if not found.needed:
+        said.append(brings(found))
+    facts = [
+        ("Corners of friction and masses", str(corners.population.count)),
+        ("Edge of hunting without isolator", edge_text(corners)),
+        ("The same with the safety factor", hertz(found.spec.safety.hunting * corners.highest)),
+        ("Machine's limit", hertz(found.spec.limit)),
+        ("Crossovers searched", " to ".join(map(hertz, corners.searched))),
+    ]
+    known = gaps(corners, flat)
+    facts += [] if known is None else [("Static less Coulomb friction", f"{known.min():.3g} to {known.max():.3g} N")]
+    answer = "yes" if found.needed else "no"
+    return Step(f"Is an isolator needed: {answer}", tuple(said), tuple(facts), ())
+
+
+def joint_step(found: Design) -> Step:
+    """How soft, and with which stroke."""
+    task, it, breakaway = found.fitted.task, found.fitted.choice.beams, found.spec.safety.breakaway
+    stiffness, force = newtons_per(it.drive[0], "mm"), plain(it.forces[-1], "N")
+    held = (
+        f"At full stroke the joint pushes with {force}. The cart breaks away at {plain(task.friction, 'N')} at the "
+        f"least, with the safety factor of {breakaway:g} at {task.friction / breakaway:.3g} N, so that it stays stuck "
+        "inside the stroke."
+    )
+    said = [held, _stroke(found), f"With this joint the machine {edge(found.edges)}.", *_worst(found.edges, found)]
+    joint = found.stage.flat()
+    facts = (
+        ("Drive stiffness", stiffness),
+        ("Stroke to each side", f"{size(task.stroke)} mm"),
+        ("Departure from linear over the stroke", f"{100 * it.nonlinearity:.2g} %"),
+        ("Force at full stroke", force),
+        ("Least static friction", plain(task.friction, "N")),
+        (
+            "Limiter, beside the joint when touched",
+            f"{plain(joint['joint.limiter_stiffness'], 'N/m')}, "
+            f"{plain(joint['joint.limiter_damping'], 'N*s/m')} (as given)",
+        ),
+        ("Edge of hunting with isolator", edge_text(found.edges)),
+    )
+    return Step(f"Joint: {stiffness}, stroke {size(task.stroke)} mm", tuple(said), facts, ("design_map",))
+
+
+def edge_text(corners: Corners) -> str:
+    """An edge of hunting as a number."""
+    return hertz(corners.highest) if corners.hunts else "none found"
+
+
+def _stroke(found: Design) -> str:
+    stroke, allowed = found.fitted.task.stroke, found.spec.leaves.stroke
+    if allowed.low == allowed.high:
+        return f"The stroke of {size(stroke)} mm is the one specified."
+    if stroke == allowed.high:
+        return f"The stroke is the largest specified, {size(stroke)} mm: the larger, the less the limiter is touched."
+    return (
+        f"The stroke is {size(stroke)} mm, of {size(allowed.low)} to {size(allowed.high)} mm: with a larger one the "
+        "leaves would have to be so soft that they allow a lower crossover only, or none would do."
+    )
+
+
+def _worst(corners: Corners, found: Design) -> list[str]:
+    """The corner that decides, and those of which nothing is known."""
+    said = []
+    if corners.hunts:
+        count = corners.population.count
+        said.append(f"Worst of {count} corners: {corner(corners, found.stage.flat())}.")
+    if corners.unknown:
+        said.append(
+            f"Of {corners.unknown} corners the edge is not known: no cycle could be closed there; the simulated moves "
+            "below cover them."
+        )
+    return said
+
+
+def _gap(found: Design) -> list[str]:
+    """The friction that is lost in sliding, against what the thesis says of it."""
+    known = gaps(found.without, found.given.flat())
+    if known is None:
+        return []
+    small = found.without.edges[known < GAP]
+    said = f"Breaking away, the cart loses {known.min():.3g} to {known.max():.3g} N of its friction."
+    if not small.size:
+        return [f"{said} That is more than the {GAP:g} N that hunting needs by the thesis."]
+    hunting = small[small > 0]
+    if not hunting.size:
+        return [f"{said} Corners with less than {GAP:g} N do not hunt, as the thesis found."]
+    top = hunting.max()
+    reach = f"up to {hertz(float(top))}" if top < found.without.searched[1] else "at all crossovers searched"
+    return [f"{said} By the thesis hunting needs about {GAP:g} N; here corners with less hunt too, {reach}."]

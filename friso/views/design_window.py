@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from friso.design.controller import WANTED
 from friso.design.method import Design
+from friso.frequency.crossover import WANTED
 from friso.frequency.ranges import Range
 
 
@@ -33,12 +33,12 @@ def stiffest(found: Design) -> float:
 def upper(found: Design) -> list[Bound]:
     """What bounds the crossover from above, the lowest first."""
     multiple = found.spec.safety.parasitic
-    front = f"no leaves of the front have a first interfering frequency {multiple:g} times as high"
+    front = f"the highest first interfering frequency of the front over {multiple:g}"
     return sorted(
         [
-            Bound(found.spec.limit, "the machine allows no more"),
+            Bound(found.spec.limit, "the machine's limit"),
             Bound(stiffest(found), front),
-            Bound(comfortable(found)[1], f"beyond, the modulus margin falls below {WANTED:g}"),
+            Bound(comfortable(found)[1], f"above, the modulus margin is under {WANTED:g}"),
         ],
         key=lambda each: each.value,
     )
@@ -48,7 +48,9 @@ def lower(found: Design) -> list[Bound]:
     """What bounds the crossover from below, the highest first."""
     factor, edges = found.spec.safety.hunting, found.edges
     low = comfortable(found)[0]
-    bounds = [Bound(low, f"below, the modulus margin is under {WANTED:g}")] if low > found.fitted.limits.searched[0] else []
+    bounds = (
+        [Bound(low, f"below, the modulus margin is under {WANTED:g}")] if low > found.fitted.limits.searched[0] else []
+    )
     if edges.hunts:
         bounds.append(Bound(factor * edges.highest, f"{factor:g} times the edge of hunting"))
     return sorted(bounds, key=lambda each: -each.value)

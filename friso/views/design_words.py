@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from friso.design.edges import Corners
-from friso.design.geometry import SIZES
+from friso.design.geometry import Geometry
 from friso.design.method import Design, NoDesign
 from friso.design.relax import Relaxation
 from friso.design.verification import Outcome
@@ -22,30 +23,38 @@ SHOWN = 5
 """Requirements whose relaxation is told in a message."""
 
 
+@dataclass(frozen=True)
+class Step:
+    """A step of the method: its result as a title, the reasons, its numbers by name, and the names of its figures."""
+
+    title: str
+    sentences: tuple[str, ...]
+    facts: tuple[tuple[str, str], ...]
+    figures: tuple[str, ...]
+
+
 def headline(found: Design) -> list[tuple[str, str]]:
     """The verdicts, each with its colour: isolator or not, what it is, whether it holds."""
     return [
         (ORANGE if found.needed else GREEN, need(found)),
-        (GREEN, f"The isolator: {leaves(found)}; stroke {size(found.fitted.task.stroke)} mm to each side, crossover "
-         f"{hertz(found.controller.crossover)}."),
+        (
+            GREEN,
+            f"The isolator: {leaves(found)}; stroke {size(found.fitted.task.stroke)} mm to each side, crossover "
+            f"{hertz(found.controller.crossover)}.",
+        ),
         _verified(found),
     ]
 
 
 def need(found: Design) -> str:
     """Whether the machine needs an isolator, and why."""
-    limit, factor, without = found.spec.limit, found.spec.safety.hunting, found.without
-    if not found.needed:
-        if not without.hunts:
-            return f"No isolator is needed: without one the machine {edge(without)}."
-        return (
-            f"No isolator is needed: without one the machine {edge(without)}, and it allows {hertz(limit)}, more than "
-            f"{factor:g} times that."
-        )
-    return (
-        f"An isolator is needed: without one the machine {edge(without)}; with the safety factor of {factor:g} the "
-        f"crossover would have to be {_at_least(factor * without.highest)}, and the machine allows {hertz(limit)}."
-    )
+    limit, factor, without = hertz(found.spec.limit), found.spec.safety.hunting, found.without
+    if not without.hunts:
+        return f"No isolator is needed: without one the machine {edge(without)}."
+    above = f"{_at_least(factor * without.highest)}, {factor:g} times the edge of hunting"
+    if found.needed:
+        return f"An isolator is needed: without one the crossover has to be {above}; the machine allows {limit}."
+    return f"No isolator is needed: without one the crossover has to be {above}, and the machine allows {limit}."
 
 
 def brings(found: Design) -> str:
@@ -62,10 +71,14 @@ def brings(found: Design) -> str:
 
 def leaves(found: Design) -> str:
     """The leaf springs chosen."""
-    it = found.fitted.choice.geometry
+    return leaf_words(found.fitted.choice.geometry)
+
+
+def leaf_words(it: Geometry) -> str:
+    """Leaf springs in words."""
     return (
         f"{it.sheet.leaves:g} leaves of {size(it.length)} x {size(it.width)} x {size(it.sheet.thickness)} mm, "
-        f"{size(it.spacing)} mm apart, {it.sheet.material}"
+        f"{size(it.spacing)} mm apart, of {it.sheet.material}"
     )
 
 
@@ -111,7 +124,13 @@ def corner(corners: Corners, flat: Mapping[str, Any]) -> str:
     keys = corners.population.of(corners.worst)
     units = {key: item.unit for key, item in numeric_keys(flat).items()}
     order = sorted(keys, key=lambda key: (not key.startswith("friction."), key != "friction.static"))
-    return ", ".join(f"{quantity(key)} {plain(keys[key], units[key])}" for key in order)
+    return ", ".join(f"{_name(key)} {plain(keys[key], units[key])}" for key in order)
+
+
+def _name(key: str) -> str:
+    """A key inside a sentence: names of people stay as they are."""
+    name = quantity(key)
+    return name if name.startswith(("Coulomb", "Stribeck")) else name[0].lower() + name[1:]
 
 
 def gaps(corners: Corners, flat: Mapping[str, Any]) -> np.ndarray | None:
@@ -131,17 +150,17 @@ def refusal(failure: NoDesign) -> str:
 
 
 def _relaxation(it: Relaxation) -> str:
-    own = it.requirement
-    needed = outwards(it.needed, own.larger)
-    dimensions = " x ".join(size(each) for each in (*it.sizes[:2], it.sizes[3]))
-    return (
-        f"relax {own.key} ({own.name}) from {plain(own.value, own.unit)} to {plain(needed, own.unit)}: then leaves of "
-        f"{dimensions} mm, {size(it.sizes[SIZES.index('spacing')])} mm apart, of {it.material} do"
-    )
+    needed = outwards(it.needed, it.needed > it.value)
+    said = f"relax {it.key} from {plain(it.value, it.unit)} to {plain(needed, it.unit)} ({it.requirement})"
+    if it.geometry is None:
+        return said
+    return f"{said}: then {leaf_words(it.geometry)} do"
 
 
 def outwards(value: float, larger: bool) -> float:
     """Three digits of a value, so that it is not met more tightly than it has to be."""
+    if value <= 0:
+        return value
     step = 10.0 ** (math.floor(math.log10(value)) - 2)
     whole = math.ceil(value / step - 1e-9) if larger else math.floor(value / step + 1e-9)
     return float(f"{whole * step:.6g}")
@@ -149,8 +168,8 @@ def outwards(value: float, larger: bool) -> float:
 
 def plain(value: float, unit: str) -> str:
     """A value with its unit, without zeros that say nothing: "70 mm", "0.3 N"."""
-    if unit == "N":
-        return f"{value:.4g} N"
+    if unit.startswith("N") and abs(value) < 1000:
+        return f"{value:.4g} {pretty(unit)}"
     factor, text = choose(np.array([value]), unit)
     return f"{value * factor:.4g} {text if factor != 1 else pretty(unit)}".rstrip()
 

@@ -11,14 +11,14 @@ from typing import Any
 
 import numpy as np
 
+from friso.hunting.edges import KINDS, STEP
+from friso.hunting.persistence import DISTANCES
 from friso.studies.guideline import Fit, Guideline
 from friso.studies.guideline.checks import ABOVE, BELOW, MOVES, PERIODS
 from friso.studies.guideline.claims import claims
-from friso.hunting.edges import KINDS, STEP
 from friso.studies.guideline.groups import GROUPS, LIMITER_OVER_BRISTLES, values_of
 from friso.studies.guideline.laws import FOLDS, GAIN, Errors, Fitted
 from friso.studies.guideline.parasitic import DRIVE
-from friso.hunting.persistence import DISTANCES
 from friso.studies.guideline.rig import Case, plain
 from friso.studies.guideline.sweeps import FREE_GRID, JOINT_BOX, LOCKED_BOX, LOCKED_GRID, Sweep
 from friso.studies.guideline.worked import CLAIMED_AT, GAPS, MARGIN, STATIC, STUDIED, Design

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from friso.studies.guideline import Fit, Guideline
 from friso.hunting.edges import FLIP, FOLD, JUMP, LOST
+from friso.studies.guideline import Fit, Guideline
 from friso.studies.guideline.rig import Laws, plain
 from friso.studies.guideline.sweeps import Sweep
 from friso.studies.guideline.worked import STUDIED, Case

@@ -9,8 +9,8 @@ import numpy as np
 from scipy.stats import qmc
 
 from friso.hunting.cycle.ensemble import Ensemble
-from friso.studies.guideline.groups import flat_of
 from friso.hunting.persistence import DISTANCES, Begin, from_rest, still_hunts
+from friso.studies.guideline.groups import flat_of
 from friso.studies.guideline.sweeps import Sweep
 
 BELOW, ABOVE = 0.9, 1.15

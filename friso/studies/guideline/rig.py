@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from friso.hunting.cycle.ensemble import Ensemble
+from friso.hunting.edges import ABOVE, BELOW, FLIP, find_edges
 from friso.hunting.margin import margin
 from friso.stage import Stage
-from friso.hunting.edges import ABOVE, BELOW, FLIP, find_edges
 from friso.studies.guideline.groups import values_of
 from friso.studies.guideline.laws import Fitted
 from friso.studies.thesis.studies import rig

@@ -14,11 +14,11 @@ import numpy as np
 from scipy.stats import qmc
 
 import friso.hunting.cycle as hunting_cycle
-from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting import edges as edges_module
 from friso.hunting import persistence
-from friso.studies.guideline import groups
+from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.edges import ROUNDS, Edges, find_edges, joined
+from friso.studies.guideline import groups
 from friso.studies.guideline.groups import flat_of
 from friso.version import VERSION
 

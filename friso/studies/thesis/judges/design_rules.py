@@ -107,9 +107,10 @@ def _crossovers(evidence: Evidence) -> tuple[Part, Part]:
             f"{free:.3g} Hz on average",
         ),
         Part(
-            f"locked, {mass[nearest]:.2g} kg, nothing hunts from about {_LOCKED:g} Hz on (within a factor of {ABOUT:g})",
+            f"locked, with {mass[nearest]:.2g} kg, nothing hunts from about {_LOCKED:g} Hz on (within a factor of "
+            f"{ABOUT:g})",
             about(locked, _LOCKED),
             f"{locked:.3g} Hz",
-            why="the cycle attracts up to 9.8 Hz with the friction of Table 2, and up to 16 Hz there are long transients",
+            why="with the friction of Table 2 the cycle attracts up to 9.8 Hz; above there are long transients",
         ),
     )

@@ -1,0 +1,138 @@
+"""`friso design`: from a specification to leaf springs, stroke, crossover and gains, tried in simulated moves."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import textwrap
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, NoReturn
+
+import typer
+
+from friso.cli.common import AsJson, Overrides, StageFile, made_folder, read_stage, say
+from friso.cli.progress import step_bar
+from friso.quantities import StageError
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from friso.design.method import Design, NoDesign, Progress
+    from friso.design.spec import Spec
+    from friso.stage import Stage
+
+STAGES = ("design.toml", "worst.toml")
+PAGE = "design.html"
+
+
+def design(
+    stage_file: StageFile,
+    spec_file: Annotated[Path, typer.Argument(metavar="SPEC.toml", help="The specification.")],
+    overrides: Overrides = None,
+    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for the files written.")] = Path("design"),
+    as_json: AsJson = False,
+) -> None:
+    """From a specification to leaf springs, stroke and controller that do not hunt: design.toml, and why it is so.
+
+    Example: friso design examples/thesis_rig.toml examples/thesis_spec.toml --out design
+    """
+    from friso.design.method import NoDesign
+    from friso.design.spec import load_spec
+
+    stage = read_stage(stage_file, overrides, with_drive=True)
+    spec = load_spec(spec_file)
+    _check_place(out, (stage_file, spec_file))
+    try:
+        found, files = _designed(stage, spec, out)
+    except NoDesign as failure:
+        _refuse(failure, stage, spec, as_json)
+    if as_json:
+        from friso.views.design_document import design_document
+
+        print(json.dumps(design_document(found) | {"files": [str(file) for file in files]}, allow_nan=False))
+        return
+    _print(found, files)
+
+
+def _check_place(folder: Path, given: Sequence[Path]) -> None:
+    """Raises StageError where writing would cost a file that is not one of an earlier design, or is read here."""
+    for path in (folder / name for name in STAGES):
+        if not path.exists():
+            continue
+        expected = "another folder, or the files moved out of the way"
+        if any(each.exists() and path.samefile(each) for each in given):
+            raise StageError("--out", f"{folder}, where {path.name} is read", expected, "--out design-2")
+        if not (folder / PAGE).exists():
+            raise StageError("--out", f"{folder}, with a {path.name} of no earlier design", expected, "--out design-2")
+    if folder.exists():
+        made_folder(folder)
+
+
+def _designed(stage: Stage, spec: Spec, out: Path) -> tuple[Design, list[Path]]:
+    """The design and its files, with progress on a terminal. Raises StageError, NoDesign."""
+    from friso.design.method import design as method
+
+    with step_bar() as bar:
+
+        def progress(what: str, done: int, total: int) -> None:
+            if bar:
+                bar(done, total, what)
+
+        found = method(stage, spec, progress)
+        return found, _write(found, made_folder(out), progress)
+
+
+def _write(found: Design, folder: Path, progress: Progress) -> list[Path]:
+    """The stages, the page, the drawing, and every figure in all formats."""
+    from friso.stage.files import save as save_stage
+    from friso.views.design_figures import design_figures
+    from friso.views.design_page import design_html, drawing
+    from friso.views.matplotlib_renderer import FORMATS, save
+
+    figures = design_figures(found)
+    page, sheet = folder / PAGE, folder / "design_drawing.svg"
+    page.write_text(design_html(found, figures), encoding="utf-8", newline="\n")
+    sheet.write_text(drawing(found), encoding="utf-8", newline="\n")
+    stages = [folder / name for name in STAGES]
+    for path, stage in zip(stages, (found.stage, found.verification.worst), strict=True):
+        save_stage(stage, path, overwrite=True)
+    pictures = {folder / f"{figure.name}.{form}": figure for figure in figures for form in FORMATS}
+    for number, (path, figure) in enumerate(pictures.items()):
+        progress("figures", number, len(pictures))
+        save(figure, path)
+    return [*stages, page, sheet, *pictures]
+
+
+def _refuse(failure: NoDesign, stage: Stage, spec: Spec, as_json: bool) -> NoReturn:
+    """Say why there is no design, and leave."""
+    from friso.views.design_document import refused_document
+    from friso.views.design_words import refusal
+
+    if as_json:
+        print(json.dumps(refused_document(stage.name, spec.name, failure), allow_nan=False))
+    say(f"no design: {refusal(failure)}")
+    raise typer.Exit(2)
+
+
+def _print(found: Design, files: list[Path]) -> None:
+    """The summary, step by step, and what to do next."""
+    from friso.views.design_steps import steps
+    from friso.views.design_words import headline
+
+    for _, sentence in headline(found):
+        _say(sentence)
+    for number, step in enumerate(steps(found), 1):
+        print(f"\n{number}. {step.title}")
+        for sentence in step.sentences:
+            _say(sentence, "   ")
+    pictures = sum(path.suffix == ".png" for path in files)
+    named = ", ".join(str(path) for path in files[: len(STAGES) + 2])
+    print(f"\nwrote {named}, and {pictures} figures as PNG, SVG and PDF")
+    print(f"next: friso check {files[0]}")
+
+
+def _say(sentence: str, indent: str = "") -> None:
+    """A sentence on the terminal, in lines as wide as that."""
+    width = shutil.get_terminal_size().columns
+    lines = textwrap.wrap(sentence, max(40, width - len(indent)), break_long_words=False, break_on_hyphens=False)
+    print(textwrap.indent("\n".join(lines), indent))

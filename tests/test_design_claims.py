@@ -1,0 +1,74 @@
+"""The judges of the claims on the thesis's leaf springs and on its rules of design."""
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from friso.studies.thesis.claims import Evidence, Finding, registered
+from friso.studies.thesis.judges import design_rules
+from friso.studies.thesis.studies import STUDIES
+
+POINTS = 41
+
+
+def made(name: str, hunts: Callable[[np.ndarray, np.ndarray], Any]) -> xr.Dataset:
+    """A map of the study `name` that hunts where a function of both coordinates is true."""
+    spans = STUDIES[name].spans
+    x, y = (np.linspace(span.low, span.high, POINTS) for span in spans)
+    words = np.where(hunts(x[:, None], y[None, :]), "hunts", "settles")
+    return xr.Dataset(
+        {"verdict": (tuple(span.key for span in spans), words)},
+        coords=dict(zip((s.key for s in spans), (x, y), strict=True)),
+    )
+
+
+def judged(maps: Mapping[str, Callable[[np.ndarray, np.ndarray], Any]]) -> Finding:
+    return registered()["D1"].judge(Evidence({name: made(name, hunts) for name, hunts in maps.items()}, {}))
+
+
+HOLD = {
+    "isolator-stiffness": lambda k, s: (s < 0.3e-3) | (k > 6e3),
+    "isolator-crossover": lambda f, s: f < 5.3,
+    "friction": lambda s, c: s - c > 0.95,
+    "system": lambda f, m: f < 15,
+}
+DIFFER = {
+    "isolator-stiffness": lambda k, s: (s < 0.6e-3) & (k > 0),
+    "isolator-crossover": lambda f, s: f < 12,
+    "friction": lambda s, c: s - c > 2,
+    "system": lambda f, m: f < 5,
+}
+
+
+def test_rules_of_design_hold_and_differ(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(design_rules, "_needed_ratio", lambda: 9.0)
+    assert judged(HOLD).judgement == "holds"
+    monkeypatch.setattr(design_rules, "_needed_ratio", lambda: 17.0)
+    assert judged(DIFFER).judgement == "differs"
+
+
+def test_the_ratio_of_the_parasitic_mode_is_computed() -> None:
+    """At a ratio just below the one found, the margin is too small; from it on, never."""
+    from friso.design.controller import settled_margin
+    from friso.studies.thesis.studies import rig
+
+    ratio = design_rules._needed_ratio()
+    flat = {**rig().flat(), "joint.locked": False}
+    tried = design_rules._RATIOS
+    below = tried[tried < ratio * 0.999][-1]
+    crossover = flat["controller.crossover"]
+    assert settled_margin({**flat, "parasitic.frequency": ratio * crossover}) >= 0.5
+    assert settled_margin({**flat, "parasitic.frequency": below * crossover}) < 0.5
+
+
+def test_the_leaf_springs_of_the_thesis() -> None:
+    found = registered()["S35"].judge(Evidence({}, {}))
+    assert found.judgement == "holds", found
+    stiffness, first, parasitic, stress = (part.number for part in found.parts)
+    assert "2238 to 2541 N/m" in stiffness
+    assert first.startswith("10.5") and first.endswith("11.27 Hz")
+    assert "leaf bending" in parasitic and "stage along y" in parasitic
+    assert float(stress.split(" to ")[1].split()[0]) == pytest.approx(52.2, abs=0.5)

@@ -1,0 +1,368 @@
+"""Leaf springs by closed forms and by beams: published numbers, what physics demands of them, and each other."""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.integrate import solve_bvp
+from scipy.linalg import eigh
+
+from friso.flexure import closed_forms, curved, plate
+from friso.flexure.beam_system import BeamFailure, Leaves, Place
+from friso.flexure.beams import beams
+from friso.flexure.closed_model import closed
+from friso.flexure.joint import first_interfering
+from friso.flexure.mechanism import Body, Mechanism, block_inertia
+
+MANY = settings(max_examples=40, deadline=None, derandomize=True)
+FEW = settings(max_examples=10, deadline=None, derandomize=True)
+
+
+def mechanism(
+    length: float = 0.07,
+    width: float = 0.045,
+    thickness: float = 0.35e-3,
+    leaves: float = 2,
+    spacing: float = 0.06,
+    poisson: float = 0.3,
+    mass: float = 0.5,
+    off: tuple[float, float, float] = (0.0, 0.0, 0.0),
+) -> Mechanism:
+    """The thesis's leaves; the centre of mass of the stage is `off` the leaf ends [m]."""
+    middle = (length / 2, 0.0, 0.0)
+    body = Body(mass, (0.0, 0.0, 0.0), (length + off[0], off[1], off[2]))
+    it = Mechanism(
+        leaves, length, width, thickness, spacing, 210e9, poisson, 7850.0, 1.1e9, 4e8, body, middle, middle, 0.01
+    )
+    return replace(it, body=replace(body, inertia=block_inertia(it)))
+
+
+@st.composite
+def mechanisms(draw: st.DrawFn) -> Mechanism:
+    length = draw(st.floats(0.02, 0.15))
+    width = length / draw(st.floats(0.8, 6.0))
+    thickness = min(width / 10, length / draw(st.floats(60, 400)))
+    leaves, spacing = draw(st.integers(2, 4)), draw(st.floats(0.2, 1.5)) * length
+    off = tuple(draw(st.floats(-0.1, 0.1)) * length for _ in range(3))
+    return mechanism(
+        length,
+        width,
+        thickness,
+        leaves,
+        spacing,
+        poisson=draw(st.floats(0.2, 0.4)),
+        mass=2700 * width * length * spacing * draw(st.floats(0.3, 2.0)),  # a block about as long as the leaves
+        off=off,  # type: ignore[arg-type]
+    )
+
+
+THESIS = mechanism()
+
+
+def scaled(value: Any, factors: dict[str, float]) -> Any:
+    """With each number multiplied by the factor of its name."""
+    own = {}
+    for each in fields(value):
+        now = getattr(value, each.name)
+        if isinstance(now, Body):
+            own[each.name] = scaled(now, factors)
+        else:
+            factor = factors.get(each.name, 1.0)
+            own[each.name] = tuple(n * factor for n in now) if isinstance(now, tuple) else now * factor
+    return replace(value, **own)
+
+
+def together(many: list[Mechanism]) -> Mechanism:
+    """Many mechanisms as one of arrays."""
+
+    def stacked(values: list[Any]) -> Any:
+        if isinstance(values[0], tuple):
+            return tuple(map(stacked, zip(*values, strict=True)))
+        if isinstance(values[0], Body):
+            return Body(*(stacked([getattr(each, field.name) for each in values]) for field in fields(Body)))
+        return np.array(values, dtype=float)
+
+    return Mechanism(*(stacked([getattr(each, field.name) for each in many]) for field in fields(Mechanism)))
+
+
+# ---- published numbers (references.md, section 3: 70 x 45 x 0.35 mm, E 210 GPa, nu 0.3)
+
+
+def test_published_leaf_by_closed_forms() -> None:
+    beam = closed_forms.drive_stiffness(THESIS) / plate.stiffening(0.07, 0.045, 0.3)
+    mean, largest = plate.stress_factors(0.07, 0.045, 0.3)
+    assert beam == pytest.approx(2362.5, rel=1e-6)
+    assert closed_forms.drive_stiffness(THESIS) == pytest.approx(2540, rel=5e-3)  # shells
+    assert closed_forms.max_stress(THESIS, 1e-3) / largest == pytest.approx(45.0e6, rel=1e-6)
+    assert closed_forms.max_stress(THESIS, 1e-3) == pytest.approx(51.8e6, rel=0.01)  # shells
+    assert 45.0e6 * mean == pytest.approx(48.6e6, rel=0.01)  # shells
+    assert closed_forms.support_x(THESIS) == pytest.approx(94.5e6, rel=1e-9)
+    assert closed_forms.support_x(THESIS, 1e-3) == pytest.approx(83e6, rel=0.02)
+    assert closed_forms.shortening(THESIS, 1e-3) == pytest.approx(3e-6 / (5 * 0.07), rel=1e-12)
+    euler = 2 * np.pi**2 * 210e9 * 0.045 * 0.35e-3**3 / 12 / 0.07**2
+    assert closed_forms.buckling_load(THESIS) / plate.stiffening(0.07, 0.045, 0.3) == pytest.approx(euler, rel=1e-9)
+    assert closed_forms.leaf_bending(replace(THESIS, poisson=0.0)) == pytest.approx(
+        1.028 * 0.35e-3 / 0.07**2 * np.sqrt(210e9 / 7850), rel=1e-3
+    )
+
+
+@pytest.mark.parametrize("model", [closed, beams])
+def test_published_leaf_by_both_models(model: Any) -> None:
+    it = model(THESIS, 1e-3)
+    named = {mode.name: mode.frequency for mode in it.modes}
+    assert it.drive[0] == pytest.approx(2540, rel=5e-3)
+    assert it.stress == pytest.approx(51.8e6, rel=0.01)
+    assert it.support_x[[0, -1]] == pytest.approx([94.5e6, 83e6], rel=0.02)
+    assert 10.9 < named["drive"] < 11.4
+    stiffer = np.sqrt(210 / 200)  # shells at 200 GPa: 383.9 and 385.1 Hz
+    assert named["leaf bending, out of phase"] == pytest.approx(383.9 * stiffer, rel=5e-3)
+    assert named["leaf bending, in phase"] == pytest.approx(385.1 * stiffer, rel=5e-3)
+
+
+def test_a_plain_beam_is_what_exudyn_makes_of_it() -> None:
+    """Without lateral contraction no correction is left but that of torsion; 2.365 N/mm with 32 elements, published."""
+    it = beams(replace(THESIS, poisson=1e-9), 1e-3)
+    assert it.forces[-1] == pytest.approx(2.365, rel=2e-3)
+    assert it.drive[0] == pytest.approx(2362.5, rel=1e-3)
+    assert it.stress == pytest.approx(45.3e6, rel=0.01)
+    assert it.shortening == pytest.approx(3e-6 / (5 * 0.07), rel=0.01)
+
+
+# ---- closed forms
+
+
+@MANY
+@given(it=mechanisms(), factor=st.floats(0.1, 10))
+def test_similar_mechanisms(it: Mechanism, factor: float) -> None:
+    """All lengths by a factor: stiffness by the factor, mass by its cube, frequency by its inverse, same stress."""
+    lengths = dict.fromkeys(("length", "width", "thickness", "spacing", "centre", "actuation", "sensor"), factor)
+    large = scaled(it, {**lengths, "mass": factor**3, "inertia": factor**5})
+    stroke = it.length / 100
+    for name, power in (("drive_stiffness", 1), ("support_x", 1), ("support_y", 1), ("leaf_bending", -1)):
+        f = getattr(closed_forms, name)
+        assert f(large) == pytest.approx(factor**power * f(it), rel=1e-9)
+    for name, power in (("support_x", 1), ("support_y", 1), ("max_stress", 0), ("shortening", 1)):
+        f = getattr(closed_forms, name)
+        assert f(large, factor * stroke) == pytest.approx(factor**power * f(it, stroke), rel=1e-9)
+    assert closed_forms.buckling_load(large) == pytest.approx(factor**2 * closed_forms.buckling_load(it), rel=1e-9)
+    assert closed_forms.leaf_torsion(large) == pytest.approx(closed_forms.leaf_torsion(it) / factor, rel=1e-9)
+    assert closed_forms.stage_modes(large)[0] == pytest.approx(closed_forms.stage_modes(it)[0] / factor, rel=1e-6)
+
+
+@MANY
+@given(it=mechanisms(), force=st.floats(0.1, 10), density=st.floats(0.1, 10))
+def test_units_of_force_and_mass(it: Mechanism, force: float, density: float) -> None:
+    other = scaled(it, {"young": force, "density": density, "mass": density, "inertia": density})
+    assert closed_forms.stage_stiffness(other) == pytest.approx(force * closed_forms.stage_stiffness(it), rel=1e-9)
+    ratio = np.sqrt(force / density)
+    assert closed_forms.stage_modes(other)[0] == pytest.approx(ratio * closed_forms.stage_modes(it)[0], rel=1e-6)
+    (frequency, share), (f, m) = first_interfering(other), first_interfering(it)
+    assert (frequency, share) == pytest.approx((ratio * f, m), rel=1e-6)
+
+
+@MANY
+@given(it=mechanisms(), share=st.floats(0.0, 0.05))
+def test_stiffness_at_the_stage(it: Mechanism, share: float) -> None:
+    straight = closed_forms.stage_stiffness(it)
+    assert curved.stage_stiffness_at(it, 0.0) == pytest.approx(straight, rel=2e-3, abs=1e-6 * straight[2, 2])
+    bent = curved.stage_stiffness_at(it, share * it.length)
+    unit = np.array([1, 1, 1, *[it.length] * 3])
+    for each in (straight, bent):
+        even = each / np.outer(unit, unit)
+        assert np.allclose(even, even.T, rtol=1e-9, atol=1e-9 * np.max(even))
+        assert np.all(np.linalg.eigvalsh((even + even.T) / 2) > 0)
+    # the mechanism is softest along the motion, and its supports fall as it deflects
+    assert straight[2, 2] < straight[1, 1] < straight[0, 0] * 1.0001 + straight[1, 1]
+    assert closed_forms.support_x(it, share * it.length) <= closed_forms.support_x(it)
+    assert bent[0, 0] == pytest.approx(closed_forms.support_x(it, share * it.length), rel=0.03)
+    assert bent[1, 1] == pytest.approx(closed_forms.support_y(it, share * it.length), rel=0.03)
+
+
+@FEW
+@given(it=mechanisms(), share=st.floats(0.005, 0.05))
+def test_twist_of_a_deflected_leaf(it: Mechanism, share: float) -> None:
+    """k_y against the numerical solution of the twist p of a leaf, p - p''/rate^2 = torque/(G J), p = 0 at clamps."""
+    delta = share * it.length
+    half = it.length / 2
+    rate = plate.warping_rate(it.width, it.poisson)
+    rigidity = it.shear * plate.torsion_constant(it.width, it.thickness)
+
+    def torque(s: np.ndarray) -> np.ndarray:
+        """Of a unit force along y at the end, about the middle line 3 u^2 - 2 u^3 without its linear part."""
+        return 4 * delta * (s / it.length) ** 3
+
+    s = np.linspace(-half, half, 201)
+    found = solve_bvp(
+        lambda s, p: np.stack([p[1], rate**2 * (p[0] - torque(s) / rigidity)]),
+        lambda a, b: np.array([a[0], b[0]]),
+        s,
+        np.zeros((2, len(s))),
+        tol=1e-8,
+    )
+    nodes, weights = np.polynomial.legendre.leggauss(60)
+    twisted = half * np.sum(weights * found.sol(half * nodes)[0] * torque(half * nodes))
+    flat = it.length**3 / (12 * it.young * it.edgewise) + it.length / (5 / 6 * it.shear * it.area)
+    assert closed_forms.support_y(it, delta) == pytest.approx(it.leaves / (flat + twisted), rel=1e-5)
+
+
+@FEW
+@given(many=st.lists(mechanisms(), min_size=3, max_size=3))
+def test_arrays_are_one_by_one(many: list[Mechanism]) -> None:
+    arrays = together(many)
+    stroke = np.array([each.length / 50 for each in many])
+    for name in ("drive_stiffness", "buckling_load", "leaf_bending", "leaf_torsion", "leaf_participation"):
+        f = getattr(closed_forms, name)
+        assert f(arrays) == pytest.approx([f(each) for each in many], rel=1e-12)
+    for name in ("support_x", "support_y", "max_stress", "shortening"):
+        f = getattr(closed_forms, name)
+        assert f(arrays, stroke) == pytest.approx([f(*each) for each in zip(many, stroke, strict=True)], rel=1e-12)
+    for name in ("stage_stiffness", "stage_mass"):
+        f = getattr(closed_forms, name)
+        assert np.allclose(f(arrays), [f(each) for each in many], rtol=1e-12, atol=0)
+    found = first_interfering(arrays)
+    assert np.allclose(found, np.transpose([first_interfering(each) for each in many]), rtol=1e-7)
+    for k, each in enumerate(many):
+        assert closed_forms.drive_stiffness(arrays.one(k)) == closed_forms.drive_stiffness(each)
+
+
+@MANY
+@given(it=mechanisms())
+def test_modes_of_the_stage(it: Mechanism) -> None:
+    stiffness, mass = closed_forms.stage_stiffness(it), closed_forms.stage_mass(it)
+    frequencies, shapes = closed_forms.stage_modes(it)
+    squares = eigh(stiffness, mass, eigvals_only=True)
+    assert frequencies == pytest.approx(np.sqrt(squares) / (2 * np.pi), rel=1e-5)
+    assert np.allclose(shapes.T @ mass @ shapes, np.eye(6), atol=1e-6)
+
+
+def test_numbers_that_make_no_mechanism_are_nan() -> None:
+    frequencies, _ = closed_forms.stage_modes(together([THESIS, replace(THESIS, length=np.nan), THESIS]))
+    assert np.isnan(frequencies).all(axis=1).tolist() == [False, True, False]
+
+
+@pytest.mark.xfail(strict=True, reason="the lowest mode of the stage is taken for the drive mode, whatever it is")
+def test_drive_mode_of_a_heavy_stage() -> None:
+    """On narrow leaves a long stage turns about z more slowly than it is driven."""
+    it = mechanism(0.06, 0.01, 0.3e-3, spacing=0.03, mass=3.0)
+    by_beams, by_closed = beams(it, 1e-3).modes[0], closed(it, 1e-3).modes[0]
+    assert by_beams.name == by_closed.name == "drive"
+    assert by_closed.frequency == pytest.approx(by_beams.frequency, rel=0.01)
+    assert first_interfering(it)[0] != pytest.approx(by_beams.frequency, rel=0.01)
+
+
+# ---- beams
+
+
+@pytest.mark.xfail(strict=True, raises=BeamFailure, reason="a Poisson's ratio of 0 is refused")
+def test_no_lateral_contraction() -> None:
+    """The stage file allows it: poisson 0 or greater."""
+    assert beams(replace(THESIS, poisson=0.0), 1e-3).drive[0] == pytest.approx(2362.5, rel=1e-3)
+
+
+@FEW
+@given(it=mechanisms(), share=st.floats(0.002, 0.02))
+def test_beams_agree_with_closed_forms(it: Mechanism, share: float) -> None:
+    stroke = share * it.length
+    wanted, found = closed(it, stroke), beams(it, stroke)
+    assert found.drive[0] == pytest.approx(wanted.drive[0], rel=0.01)  # the stage may turn
+    assert found.forces == pytest.approx(wanted.forces, rel=0.03)
+    assert found.support_x == pytest.approx(wanted.support_x, rel=0.05)
+    assert found.support_y == pytest.approx(wanted.support_y, rel=0.05)
+    assert found.stress == pytest.approx(wanted.stress, rel=0.05)
+    assert found.shortening == pytest.approx(wanted.shortening, rel=0.02)
+    assert found.buckling == pytest.approx(wanted.buckling, rel=0.015)
+    assert found.modes[0].name == wanted.modes[0].name == "drive"
+    assert found.modes[0].frequency == pytest.approx(wanted.modes[0].frequency, rel=0.01)
+    unit = np.array([1, 1, 1, *[it.length] * 3])
+    for matrix in found.stiffness / np.outer(unit, unit):
+        assert np.allclose(matrix, matrix.T, rtol=1e-6, atol=1e-6 * np.max(matrix))
+        assert np.all(np.linalg.eigvalsh((matrix + matrix.T) / 2) > 0)
+
+
+@FEW
+@given(it=mechanisms())
+def test_tangent_is_the_slope_of_the_force(it: Mechanism) -> None:
+    """The drive stiffness is the derivative of the force over the stroke, which a parabola through three fits."""
+    found = beams(it, it.length / 50)
+    step = found.deflections[1]
+    slopes = (found.forces[2:] - found.forces[:-2]) / (2 * step)
+    assert slopes == pytest.approx(found.drive[1:-1], rel=2e-4)
+    work = np.sum((found.forces[1:] + found.forces[:-1]) / 2) * step - step**2 / 12 * (found.drive[-1] - found.drive[0])
+    linear = found.drive[0] * found.stroke**2 / 2
+    assert work == pytest.approx(linear, rel=2 * found.nonlinearity + 1e-6)
+
+
+@pytest.mark.parametrize("leaves", [2, 3, 4])
+def test_mirrored_motion(leaves: int) -> None:
+    """Pushed either way by the same amount, leaves in a row that is even about its middle answer the same."""
+    it = mechanism(leaves=leaves)
+    system = Leaves(it)
+    rng = np.random.default_rng(leaves)
+    inner = rng.standard_normal((leaves, system.nodes - 2, 3)) * np.array([1e-6, 1e-4, 1e-3])
+    place = Place(inner, np.array([-2e-6, 5e-4, 1e-5]))
+    mirrored = Place(inner[::-1] * [1, -1, -1], place.stage * [1, -1, -1])
+    there, back = (system.forces(each.state(it.offsets)) for each in (place, mirrored))
+    assert np.allclose(back[::-1, :, 0::2] * [1, -1, -1], there[:, :, 0::2], atol=1e-9 * np.max(np.abs(there)))
+
+
+@pytest.mark.parametrize("leaves", [3, 4])
+def test_more_leaves(leaves: int) -> None:
+    """Each leaf bears its share; the leaves of a row move alike where the stage does not turn."""
+    two, more = beams(THESIS, 1e-3), beams(mechanism(leaves=leaves), 1e-3)
+    for name in ("forces", "drive", "support_x", "support_y"):
+        assert getattr(more, name) == pytest.approx(leaves / 2 * getattr(two, name), rel=2e-3)
+    assert more.stress == pytest.approx(two.stress, rel=3e-3)
+    assert more.buckling == pytest.approx(leaves / 2 * two.buckling, rel=1e-3)
+    names = [mode.name for mode in more.modes]
+    assert names.count("leaf bending, in phase") == 1
+    assert names.count("leaf bending, out of phase") == leaves - 1
+
+
+def test_elements_converge() -> None:
+    coarse, fine = beams(THESIS, 1.4e-3), beams(THESIS, 1.4e-3, elements=48)
+    assert coarse.forces == pytest.approx(fine.forces, rel=1e-3)
+    assert coarse.support_x == pytest.approx(fine.support_x, rel=5e-3)
+    assert coarse.support_y == pytest.approx(fine.support_y, rel=5e-3)
+
+
+def test_modes_have_unit_modal_mass_and_are_orthogonal() -> None:
+    """As far as the stage, by far the heaviest part, tells."""
+    it = beams(replace(THESIS, density=1.0), 1e-3)
+    own = [mode for mode in it.modes if np.linalg.norm(mode.stage) > 0.1]
+    shapes = np.array([mode.stage for mode in own]).T
+    assert "drive" in [mode.name for mode in own]
+    assert np.allclose(shapes.T @ closed_forms.body_mass(it.mechanism) @ shapes, np.eye(len(own)), atol=1e-2)
+
+
+@pytest.mark.parametrize(
+    ("change", "stroke", "text"),
+    [
+        ({"thickness": -1e-3}, 1e-3, "positive thickness"),
+        ({"length": np.nan}, 1e-3, "positive length"),
+        ({"young": np.inf}, 1e-3, "positive young"),
+        ({}, 0.0, "positive stroke"),
+        ({}, np.nan, "positive stroke"),
+        ({}, 0.2, "reduce the stroke"),
+        ({}, 1e30, "reduce the stroke"),
+    ],
+)
+def test_failures_say_so_and_print_nothing(
+    change: dict[str, float], stroke: float, text: str, capfd: pytest.CaptureFixture[str]
+) -> None:
+    with pytest.raises(BeamFailure, match=text):
+        beams(replace(THESIS, **change), stroke)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_success_prints_nothing_and_repeats(capfd: pytest.CaptureFixture[str]) -> None:
+    first, second = beams(THESIS, 1e-3), beams(THESIS, 1e-3)
+    assert capfd.readouterr() == ("", "")
+    for name in ("forces", "drive", "support_x", "support_y", "stiffness"):
+        assert np.array_equal(getattr(first, name), getattr(second, name))
+    assert [mode.frequency for mode in first.modes] == [mode.frequency for mode in second.modes]
+    assert (first.stress, first.shortening, first.buckling) == (second.stress, second.shortening, second.buckling)

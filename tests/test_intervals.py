@@ -1,0 +1,116 @@
+"""Ranges of quantities as a specification gives them."""
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from friso.intervals import Interval, Span
+from friso.quantities import Bound, Number, Quantity, StageError, positive
+
+FORCE = Span(Quantity("N", positive, "3 N"), "1 N .. 3 N")
+SHARE = Span(Number(Bound("0 to 1", lambda value: (value >= 0) & (value <= 1)), "0.5"), "0.3 .. 0.8")
+
+
+@pytest.mark.parametrize(
+    ("given_text", "low", "high"),
+    [
+        ("1 N .. 3 N", 1.0, 3.0),
+        ("1 N..3 N", 1.0, 3.0),
+        ("200 mN .. 0.5 N", 0.2, 0.5),
+        ("2 N +/- 5 %", 1.9, 2.1),
+        ("2 N +/- 5%", 1.9, 2.1),
+        ("2 N ± 100 mN", 1.9, 2.1),
+        ("2 N +/- 0 %", 2.0, 2.0),
+        ("2 N", 2.0, 2.0),
+        ("1 N .. 1 N", 1.0, 1.0),
+    ],
+)
+def test_quantities(given_text: str, low: float, high: float) -> None:
+    found = FORCE.read(given_text)
+    assert (found.low, found.high) == pytest.approx((low, high), rel=1e-12)
+    assert found.text == given_text
+    assert FORCE.read(found) is found
+
+
+@pytest.mark.parametrize(
+    ("given_text", "low", "high"),
+    [
+        ("0.3 .. 0.8", 0.3, 0.8),
+        (0.5, 0.5, 0.5),
+        ("0.5", 0.5, 0.5),
+        ("0.5 +/- 10 %", 0.45, 0.55),
+        ("0.5 ± 0.1", 0.4, 0.6),
+    ],
+)
+def test_numbers(given_text: str | float, low: float, high: float) -> None:
+    found = SHARE.read(given_text)
+    assert (found.low, found.high) == pytest.approx((low, high), rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("given_text", "said"),
+    [
+        ("3 N .. 1 N", "a reversed range"),
+        ("1 .. 3 N", "N"),
+        ("1 N .. 3", "N"),
+        ("1 N ..", "N"),
+        ("1 mm .. 3 mm", "mm"),
+        ("2 N +/- 5", "N"),
+        ("2 N +/- 100 %", "below 100 %"),
+        ("2 N +/- -5 %", "below 100 %"),
+        ("2 N +/- x %", "not a number"),
+        ("2 N +/- 3 N", "-1 to 5 N"),
+        ("-1 N .. 3 N", "greater than 0"),
+        ("1 N .. inf N", ""),
+        ("nan N", ""),
+        ("", ""),
+        (2.0, ""),
+        (True, ""),
+        (None, ""),
+    ],
+)
+def test_refused_quantities(given_text: object, said: str) -> None:
+    with pytest.raises(StageError) as caught:
+        FORCE.read(given_text)
+    assert said in str(caught.value)
+    assert "range" in caught.value.expected or caught.value.expected
+
+
+@pytest.mark.parametrize(
+    "given_text", ["0.3 .. 1.8", "-0.1 .. 0.5", "0.8 .. 0.3", "a .. b", "0.5 N", True, None, "0.9 +/- 0.2"]
+)
+def test_refused_numbers(given_text: object) -> None:
+    with pytest.raises(StageError, match=r"0 to 1|a number"):
+        SHARE.read(given_text)
+
+
+def test_what_is_expected_names_unit_and_forms() -> None:
+    assert "N" in FORCE.expected
+    assert "LOW .. HIGH" in FORCE.expected
+    assert "VALUE +/- TOLERANCE" in FORCE.expected
+    assert FORCE.written_example == '"1 N .. 3 N"'
+    assert "0 to 1" in SHARE.expected
+
+
+@settings(max_examples=50, deadline=None, derandomize=True)
+@given(low=st.floats(1e-6, 1e6), width=st.floats(0, 1e6), share=st.floats(0, 1))
+def test_places_between(low: float, width: float, share: float) -> None:
+    found = FORCE.read(f"{low!r} N .. {low + width!r} N")
+    assert (found.low, found.high) == pytest.approx((low, low + width), rel=1e-12)
+    assert found.at(0) == found.low
+    assert found.at(1) == pytest.approx(found.high, rel=1e-12)
+    assert found.low <= found.at(share) <= found.high * (1 + 1e-12)
+    assert found.at(0.5) == pytest.approx(found.centre, rel=1e-12)
+
+
+@settings(max_examples=50, deadline=None, derandomize=True)
+@given(value=st.floats(1e-6, 1e6), percent=st.floats(0, 99))
+def test_tolerance(value: float, percent: float) -> None:
+    found = FORCE.read(f"{value!r} N +/- {percent!r} %")
+    assert found.centre == pytest.approx(value, rel=1e-12)
+    assert found.high - found.low == pytest.approx(2 * value * percent / 100, rel=1e-9, abs=1e-12 * value)
+
+
+def test_interval_is_plain_data() -> None:
+    assert Interval(1.0, 3.0, "x") == Interval(1.0, 3.0, "x")
+    assert Interval(1.0, 3.0, "").centre == 2.0
