@@ -105,5 +105,5 @@ def _bare(given: Any) -> Any:
 def _percent(text: str) -> float:
     number = _bare(text.rstrip("%").strip())
     if not 0 <= number < 100:
-        raise StageError("", quoted(text, "not a share"), "0 % or more, below 100 %")
+        raise StageError("", quoted(text, "not a share below 100 %"), "0 % or more, below 100 %")
     return number / 100

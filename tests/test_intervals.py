@@ -56,8 +56,8 @@ def test_numbers(given_text: str | float, low: float, high: float) -> None:
         ("1 N ..", "N"),
         ("1 mm .. 3 mm", "mm"),
         ("2 N +/- 5", "N"),
-        ("2 N +/- 100 %", "below 100 %"),
-        ("2 N +/- -5 %", "below 100 %"),
+        ("2 N +/- 100 %", "not a share"),
+        ("2 N +/- -5 %", "not a share"),
         ("2 N +/- x %", "not a number"),
         ("2 N +/- 3 N", "-1 to 5 N"),
         ("-1 N .. 3 N", "greater than 0"),
@@ -73,7 +73,6 @@ def test_refused_quantities(given_text: object, said: str) -> None:
     with pytest.raises(StageError) as caught:
         FORCE.read(given_text)
     assert said in str(caught.value)
-    assert "range" in caught.value.expected or caught.value.expected
 
 
 @pytest.mark.parametrize(

@@ -109,7 +109,7 @@ def design(stage: Stage, spec: Spec, progress: Progress = lambda what, done, tot
     progress("hunting map", 0, 1)
     drawn = hunting_map(found.stage, spec, population)
     by_beams = tuple(confirmed(found.task, candidates))
-    tried = verification(found.stage, spec, progress)
+    tried = verification(found.stage, spec, found.task.load / found.choice.beams.buckling, progress)
     return Design(spec, stage, without, tuple(candidates), by_beams, found, edges, control, drawn, tried)
 
 

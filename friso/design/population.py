@@ -54,9 +54,9 @@ def corners(spec: Spec, flat: Mapping[str, Any]) -> Population:
     return _population(ranges, dict(zip([*main, *rest], both.T, strict=True)), flat, len(both))
 
 
-def drawn(spec: Spec, flat: Mapping[str, Any], count: int) -> Population:
-    """Machines and moves drawn evenly from all ranges: friction, masses, stiffness (a share either way), travel and
-    acceleration (evenly in the logarithm)."""
+def drawn(spec: Spec, flat: Mapping[str, Any], count: int, softening: float) -> Population:
+    """Machines and moves drawn evenly from all ranges: friction, masses, stiffness (its tolerance either way, and down
+    by the share of it that the load may take, `softening`), travel and acceleration (evenly in the logarithm)."""
     ranges = _friction(spec, flat) | _masses(spec)
     names = [*ranges, "stiffness", "travel", "acceleration"]
     sequence = qmc.Sobol(len(names), rng=SEED).random_base2(int(np.ceil(np.log2(count))))[:count]
@@ -64,7 +64,8 @@ def drawn(spec: Spec, flat: Mapping[str, Any], count: int) -> Population:
     found = _population(ranges, {name: shares[name] for name in ranges}, flat, count)
     moves = _moves(spec, shares["travel"], shares["acceleration"])
     tolerance = spec.safety.stiffness_tolerance
-    stiffness = {"joint.stiffness": flat["joint.stiffness"] * (1 + tolerance * (2 * shares["stiffness"] - 1))}
+    factors = Interval((1 - tolerance) * (1 - softening), 1 + tolerance, "").at(shares["stiffness"])
+    stiffness = {"joint.stiffness": flat["joint.stiffness"] * factors}
     return Population({**found.keys, **moves, **stiffness}, count)
 
 

@@ -258,9 +258,12 @@ class Spec(Section):
         return min(known) / self.safety.parasitic
 
 
+EXPECTED = "a specification; examples/specs/thesis.toml is one"
+
+
 def load_spec(path: str | os.PathLike[str]) -> Spec:
     """The specification in a TOML file. Raises StageError."""
     try:
-        return Spec(**parsed(text_of(Path(path)), "a specification; examples/thesis_spec.toml is one"))
+        return Spec(**parsed(text_of(Path(path), EXPECTED), EXPECTED))
     except StageError as error:
         raise error.found_in(str(path)) from None

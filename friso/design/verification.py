@@ -91,10 +91,11 @@ class Verification:
     worst: Stage
 
 
-def verification(stage: Stage, spec: Spec, progress: Callable[[str, int, int], None]) -> Verification:
-    """Try the design in all that the specification allows."""
+def verification(stage: Stage, spec: Spec, softening: float, progress: Callable[[str, int, int], None]) -> Verification:
+    """Try the design in all that the specification allows; its load takes a share of the drive stiffness, `softening`,
+    or none of it."""
     flat = stage.flat()
-    machines = drawn(spec, flat, MACHINES)
+    machines = drawn(spec, flat, MACHINES, softening)
     window = float(spec.position.window)
     outcomes: list[Outcome] = []
     for name, held in (("joint free", False), ("joint locked", True)):

@@ -31,6 +31,11 @@ def drive_stiffness(it: Mechanism) -> Any:
     return it.leaves * beam * plate.stiffening(it.length, it.width, it.poisson)
 
 
+def loaded_drive_stiffness(it: Mechanism) -> Any:
+    """The stiffness along the motion under the load along the leaves: gone at the buckling load."""
+    return drive_stiffness(it) * (1 - it.load / buckling_load(it))
+
+
 def support_x(it: Mechanism, deflection: Any = 0.0) -> Any:
     """Stiffness along the leaves with all else held: falls as the deflected leaves, which are plates, bend under it."""
     straight = it.leaves * it.young * it.area / it.length

@@ -68,6 +68,11 @@ class Evaluation:
         return float(self.deflections[-1])
 
     @property
+    def loaded_drive(self) -> float:
+        """The drive stiffness [N/m] at deflection 0 under the load along the leaves: gone at the buckling load."""
+        return float(self.drive[0] * (1 - self.mechanism.load / self.buckling))
+
+    @property
     def clamp_stress(self) -> float:
         """The stress [Pa] at full stroke times the factor for the clamp."""
         return self.stress * self.mechanism.stress_concentration

@@ -36,7 +36,7 @@ class Mechanism:
     `young` [Pa], `poisson`, `density` [kg/m^3], `yield_strength` and `fatigue` [Pa] (NaN where it is not known) are of
     their material. `actuation` and `sensor` are the points [m] where the actuator pushes along z and where the position
     along z is measured. `damping_ratio` is that of its own modes, `stress_concentration` a factor on the stress at the
-    clamps.
+    clamps. The `load` [N] presses along the leaves, on all of them together.
     """
 
     leaves: Any
@@ -54,6 +54,7 @@ class Mechanism:
     sensor: tuple[Any, Any, Any]
     damping_ratio: Any = 0.01
     stress_concentration: Any = 1.0
+    load: Any = 0.0
 
     @classmethod
     def of(cls, flat: Mapping[str, Any]) -> Mechanism:
@@ -70,6 +71,7 @@ class Mechanism:
             sensor=(own["length"] / 2, 0.0, 0.0),
             damping_ratio=own["damping_ratio"],
             stress_concentration=own["stress_concentration"],
+            load=own.get("load", 0.0),
         )
         inertia = _triple(own, "inertia", block_inertia(bare))
         actuation = _triple(own, "actuation", bare.actuation)

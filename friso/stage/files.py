@@ -14,7 +14,7 @@ _EXAMPLE = '[masses] and, on the next line, cart = "1.2 kg"'
 
 def load(path: str | os.PathLike[str]) -> Stage:
     """The stage of a TOML file. Raises StageError."""
-    return loads(text_of(Path(path)), origin=str(path))
+    return loads(text_of(Path(path), _EXPECTED), origin=str(path))
 
 
 def loads(text: str, origin: str = "stage file") -> Stage:
@@ -61,8 +61,8 @@ def _value(text: str) -> Any:
     return document["line"]["value"] if is_one_value else text
 
 
-def text_of(path: Path) -> str:
-    """What stands in a text file. Raises StageError."""
+def text_of(path: Path, expected: str) -> str:
+    """What stands in a text file, which is to be what is `expected`. Raises StageError."""
     try:
         return path.read_bytes().decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -70,7 +70,7 @@ def text_of(path: Path) -> str:
         raise StageError("", given, "a text file saved as UTF-8", _EXAMPLE, str(path)) from None
     except (OSError, ValueError) as error:
         given = "a folder" if path.is_dir() else _reason(error)
-        raise StageError("", given, _EXPECTED, _EXAMPLE, str(path)) from None
+        raise StageError("", given, expected, _EXAMPLE, str(path)) from None
 
 
 def _reason(error: OSError | ValueError) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from friso.design.edges import Corners
 from friso.design.method import Design
 from friso.views.design_control import controller_step, moves_step
@@ -26,8 +28,8 @@ def isolator_step(found: Design) -> Step:
         said.append(brings(found))
     facts = [
         ("Corners of friction and masses", str(corners.population.count)),
-        ("Edge of hunting without isolator", edge_text(corners)),
-        ("The same with the safety factor", hertz(found.spec.safety.hunting * corners.highest)),
+        ("Edge of hunting without isolator", _edge(corners)),
+        ("The same with the safety factor", _edge(corners, found.spec.safety.hunting)),
         ("Machine's limit", hertz(found.spec.limit)),
         ("Crossovers searched", " to ".join(map(hertz, corners.searched))),
     ]
@@ -59,14 +61,17 @@ def joint_step(found: Design) -> Step:
             f"{plain(joint['joint.limiter_stiffness'], 'N/m')}, "
             f"{plain(joint['joint.limiter_damping'], 'N*s/m')} (as given)",
         ),
-        ("Edge of hunting with isolator", edge_text(found.edges)),
+        ("Edge of hunting with isolator", _edge(found.edges)),
     )
     return Step(f"Joint: {stiffness}, stroke {size(task.stroke)} mm", tuple(said), facts, ("design_map",))
 
 
-def edge_text(corners: Corners) -> str:
-    """An edge of hunting as a number."""
-    return hertz(corners.highest) if corners.hunts else "none found"
+def _edge(corners: Corners, factor: float = 1.0) -> str:
+    """An edge of hunting, times a factor, as a number."""
+    if not corners.hunts:
+        return "none found"
+    beyond = f"beyond {hertz(corners.searched[1])}"
+    return hertz(factor * corners.highest) if math.isfinite(corners.highest) else beyond
 
 
 def _stroke(found: Design) -> str:

@@ -34,14 +34,12 @@ def upper(found: Design) -> list[Bound]:
     """What bounds the crossover from above, the lowest first."""
     multiple = found.spec.safety.parasitic
     front = f"the highest first interfering frequency of the front over {multiple:g}"
-    return sorted(
-        [
-            Bound(found.spec.limit, "the machine's limit"),
-            Bound(stiffest(found), front),
-            Bound(comfortable(found)[1], f"above, the modulus margin is under {WANTED:g}"),
-        ],
-        key=lambda each: each.value,
-    )
+    bounds = [
+        Bound(found.spec.limit, "the machine's limit"),
+        Bound(stiffest(found), front),
+        Bound(comfortable(found)[1], f"above, the modulus margin is under {WANTED:g}"),
+    ]
+    return sorted((each for each in bounds if np.isfinite(each.value)), key=lambda each: each.value)
 
 
 def lower(found: Design) -> list[Bound]:

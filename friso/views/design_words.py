@@ -176,11 +176,11 @@ def plain(value: float, unit: str) -> str:
 
 def size(length: float) -> str:
     """A length [m] in mm as it stands on a drawing."""
-    return f"{1e3 * length:.4g}"
+    return f"{1e3 * length:.{4 if length >= 0.1 else 3}g}"
 
 
 def hertz(frequency: float) -> str:
-    return with_unit(frequency, "Hz") if math.isfinite(frequency) else "any frequency"
+    return with_unit(frequency, "Hz") if math.isfinite(frequency) else "not found"
 
 
 def seconds(time: float) -> str:

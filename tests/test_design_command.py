@@ -1,0 +1,488 @@
+"""`friso design` as a user runs it: what it writes, says, draws and refuses."""
+
+import json
+import sys
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import chain
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+import typer
+from pages import Page
+
+import friso
+from friso.cli.app import main
+from friso.cli.design import design as command
+from friso.design import choice, controller, edges, front, hunting_map, method, population, verification
+from friso.design.edges import Corners
+from friso.design.geometry import Geometry, Sheet
+from friso.design.method import Design, NoDesign, Progress
+from friso.design.relax import Relaxation
+from friso.design.spec import Spec, load_spec
+from friso.quantities import StageError
+from friso.stage import Stage
+from friso.views import matplotlib_renderer, plotly_renderer
+from friso.views.design_control import controller_step, moves_step, parallel_gains
+from friso.views.design_document import design_document, refused_document
+from friso.views.design_figures import design_figures
+from friso.views.design_leaves import leaves_step, requirement_rows
+from friso.views.design_steps import isolator_step, joint_step, steps
+from friso.views.design_window import lower, stiffest, upper
+from friso.views.design_words import edge, headline, outwards, refusal
+from friso.views.figure import Figure
+
+EXAMPLES = Path(__file__).parent.parent / "examples"
+RIG, SPEC = EXAMPLES / "thesis_rig.toml", EXAMPLES / "thesis_spec.toml"
+FIGURES = ("design_map", "design_front", "design_modes", "design_window", "design_damping", "design_settling")
+SMALL = {
+    front: {"POPULATION": 40, "GENERATIONS": 25},
+    choice: {"SHOWN": 3},
+    edges: {"ROUNDS": 1},
+    method: {"STEPS": 5},
+    population: {"LEVELS": (0.0, 1.0)},
+    controller: {"RATIOS": np.array([0.1, 0.7])},
+    hunting_map: {"CROSSOVERS": 4, "STROKES": 3},
+    verification: {"MACHINES": 64},
+}
+"""Sizes with which a design takes seconds."""
+
+LEAVES = Geometry(0.07, 0.02, 0.045, Sheet(2, 3e-4, "stainless 1.4310"))
+RELAXED = (
+    Relaxation("first interfering frequency", "safety.parasitic", 10.0, 8.123, "", LEAVES),
+    Relaxation("length of the leaves, at most", "leaves.length", 0.07, 0.07421, "m", LEAVES),
+    Relaxation("crossover above the edge of hunting", "joint.damping", 0.5, 3.2, "N*s/m"),
+)
+
+
+@pytest.fixture(scope="module")
+def spec(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The thesis's, with a settling time that all moves keep."""
+    path = tmp_path_factory.mktemp("spec") / "spec.toml"
+    path.write_text(SPEC.read_text().replace("# settling_time = ", "settling_time = "))
+    return path
+
+
+@pytest.fixture(scope="module")
+def small() -> Iterator[None]:
+    with pytest.MonkeyPatch.context() as patch:
+        for module, sizes in SMALL.items():
+            for name, value in sizes.items():
+                patch.setattr(module, name, value)
+        yield
+
+
+@pytest.fixture(scope="module")
+def found(rig: Stage, spec: Path, small: None) -> Design:
+    """A small design, computed once."""
+    return method.design(rig, load_spec(spec))
+
+
+@pytest.fixture(scope="module")
+def finished(found: Design) -> Iterator[list[str]]:
+    """The command finds this design; what it tells of its progress is kept."""
+    told: list[str] = []
+
+    def design(stage: Stage, spec: Spec, progress: Progress) -> Design:
+        progress("leaf springs", 0, 1)
+        told.append(stage.name)
+        return found
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(method, "design", design)
+        yield told
+
+
+@pytest.fixture(scope="module")
+def folder(spec: Path, finished: list[str], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of all files, written once."""
+    out = tmp_path_factory.mktemp("written") / "design"
+    command(RIG, spec, out=out)
+    return out
+
+
+@pytest.fixture
+def refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No design, and what to relax."""
+
+    def fail(stage: Stage, spec: Spec, progress: Progress) -> Design:
+        raise NoDesign("no leaf springs meet the specification", RELAXED)
+
+    monkeypatch.setattr(method, "design", fail)
+
+
+def _strict(text: str) -> dict[str, Any]:
+    """A JSON document, in which infinite and undefined numbers have no place."""
+
+    def refuse(name: str) -> None:
+        raise AssertionError(f"{name} in the document")
+
+    return json.loads(text, parse_constant=refuse)
+
+
+def _figures(found: Design) -> dict[str, Figure]:
+    return {figure.name: figure for figure in design_figures(found)}
+
+
+# ---------------------------------------------------------------- files and document
+
+
+def test_all_files_are_written_and_the_stages_load(found: Design, folder: Path) -> None:
+    pictures = {f"{name}.{form}" for name in FIGURES for form in ("png", "svg", "pdf")}
+    own = {"design.toml", "worst.toml", "design.html", "design_drawing.svg"}
+    assert {path.name for path in folder.iterdir()} == pictures | own
+    stage, worst = friso.load(folder / "design.toml"), friso.load(folder / "worst.toml")
+    assert stage.flat()["joint.stiffness"] == pytest.approx(found.fitted.choice.beams.drive[0], rel=0.02)
+    assert worst.flat()["friction.static"] == found.verification.worst.flat()["friction.static"]
+    assert ElementTree.parse(folder / "design_drawing.svg").getroot().tag.endswith("svg")
+    assert (folder / "design_front.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_design_may_be_written_again(spec: Path, folder: Path, capsys: pytest.CaptureFixture) -> None:
+    before = (folder / "design.html").read_bytes()
+    command(RIG, spec, out=folder)
+    assert (folder / "design.html").read_bytes() == before
+    assert "next: friso check" in capsys.readouterr().out
+
+
+def test_the_document_has_the_agreed_keys(
+    spec: Path, folder: Path, found: Design, capsys: pytest.CaptureFixture
+) -> None:
+    command(RIG, spec, out=folder, as_json=True)
+    shown = capsys.readouterr()
+    document = _strict(shown.out)
+    assert shown.err == ""
+    assert document.keys() == {
+        *("stage", "spec", "feasible", "needed", "machine_limit_hz", "without", "joint", "leaves", "front"),
+        *("controller", "verification", "files"),
+    }
+    assert (document["stage"], document["feasible"], document["needed"]) == ("Thesis rig", True, False)
+    assert document["files"][0] == str(folder / "design.toml")
+    assert len(document["files"]) == len(list(folder.iterdir()))
+    assert document["without"]["corners"] == found.without.population.count
+    assert document["without"]["worst_corner"].keys() == {
+        *("masses_cart_kg", "masses_stage_kg", "friction_static_n", "friction_coulomb_n"),
+    }
+    joint, leaves = document["joint"], document["leaves"]
+    assert joint["force_at_stroke_n"] == pytest.approx(joint["stiffness_n_per_m"] * joint["stroke_m"], rel=0.01)
+    assert joint["least_static_friction_n"] == 1.0
+    assert joint["highest_edge_hz"] < document["without"]["highest_edge_hz"]
+    assert leaves["drive_stiffness_n_per_m"] == joint["stiffness_n_per_m"]
+    assert [each["key"] for each in leaves["requirements"]][-1] == "safety.parasitic"
+    assert all(each["excess"] <= 1 for each in leaves["requirements"])
+
+
+def test_the_document_tells_front_controller_and_moves(found: Design) -> None:
+    document = design_document(found)
+    asked = [each for each in document["front"] if each["beams_hz"] is not None]
+    assert len(document["front"]) == len(found.candidates)
+    assert 0 < len(asked) <= 3
+    tuned = document["controller"]
+    assert tuned["least_modulus_margin"] == found.controller.corners.min()
+    assert tuned["kp_n_per_m"] == pytest.approx(1.5 * tuned["k_p_n_per_m"])  # beta = 2
+    assert parallel_gains(found)[1:] == (tuned["ki_n_per_m_s"], tuned["kd_n_s_per_m"])
+    moves = document["verification"]
+    assert (moves["moves"], moves["hunting"], moves["settling_time_met"]) == (64, 0, True)
+    assert moves["locked"]["moves"] == 64
+    assert moves["settling_median_s"] <= moves["settling_95_s"]
+
+
+def test_what_is_not_finite_is_null(found: Design) -> None:
+    never = replace(found.verification.free, settling=np.full(64, np.nan), hunts=np.ones(64, bool))
+    nowhere = replace(found.without, edges=np.where(np.arange(found.without.population.count) == 1, np.nan, 0.0))
+    other = replace(found, without=nowhere, verification=replace(found.verification, free=never))
+    document = design_document(other)
+    json.dumps(document, allow_nan=False)
+    assert document["verification"]["settling_95_s"] is None
+    assert (document["without"]["highest_edge_hz"], document["without"]["unknown_corners"]) == (None, 1)
+    assert document["verification"]["settling_time_met"] is False
+
+
+# ---------------------------------------------------------------- words
+
+
+def test_the_summary_tells_all_steps(spec: Path, folder: Path, capsys: pytest.CaptureFixture) -> None:
+    command(RIG, spec, out=folder)
+    said = capsys.readouterr().out
+    for words in (
+        *("No isolator is needed", "1. Is an isolator needed: no", "2. Joint: 0.", "3. Leaf springs: 2 leaves of"),
+        *("4. Controller: crossover", "5. Verification: 64 moves, none hunts", "design_drawing.svg, and 6 figures"),
+    ):
+        assert words in said
+    assert said.rstrip().endswith(f"next: friso check {folder / 'design.toml'}")
+    assert max(map(len, said.split("\nwrote")[0].splitlines())) <= 80
+
+
+def test_an_isolator_that_is_not_needed_is_weighed(found: Design) -> None:
+    (_, first), *_ = headline(found)
+    assert first.startswith("No isolator is needed: without one the crossover has to be")
+    said = " ".join(isolator_step(found).sentences)
+    assert "All the same, this is what one brings" in said
+    assert "the machine hunts, in its worst corner, up to" in said
+    assert "Breaking away, the cart loses 0.3 to 2.55 N" in said
+    assert "corners with less hunt too, up to" in said
+
+
+def test_an_isolator_that_is_needed_says_why(found: Design) -> None:
+    limit = replace(found.without, edges=np.full(found.without.population.count, 60.0))
+    needed = replace(found, without=limit)
+    (_, first), *_ = headline(needed)
+    assert first == (
+        "An isolator is needed: without one the crossover has to be 72.0 Hz or more, 1.2 times the edge of hunting; "
+        "the machine allows 48.0 Hz."
+    )
+    step = isolator_step(needed)
+    assert step.title == "Is an isolator needed: yes"
+    assert "All the same" not in " ".join(step.sentences)
+
+
+def test_the_joint_is_held_below_the_static_friction(found: Design) -> None:
+    said = " ".join(joint_step(found).sentences)
+    assert "The cart breaks away at 1 N at the least, with the safety factor of 1.1 at 0.909 N" in said
+    assert "The stroke of 1 mm is the one specified." in said
+    unknown = replace(found.edges, edges=np.where(np.arange(len(found.edges.edges)) < 2, np.nan, found.edges.edges))
+    assert "Of 2 corners the edge is not known" in " ".join(joint_step(replace(found, edges=unknown)).sentences)
+
+
+def test_edges_in_words(found: Design) -> None:
+    def some(*known: float) -> str:
+        return edge(Corners(found.without.population, np.array(known), (1.2, 144.0)))
+
+    assert some(0.0, 0.0) == "hunts in no corner at any crossover from 1.20 Hz to 144 Hz"
+    assert some(0.0, np.inf) == "hunts, in its worst corner, up to 144 Hz and beyond"
+    assert some(np.nan, 7.62) == "hunts, in its worst corner, up to 7.62 Hz"
+
+
+def test_leaves_and_what_binds_them(found: Design) -> None:
+    said = " ".join(leaves_step(found).sentences)
+    assert "The first mode that interferes with control is" in said
+    assert "what binds (less than 5 % to spare): " in said
+    assert f"Of the {len(found.candidates)} geometries on the front beams confirm" in said
+    broken = replace(found.confirmed[0], stiffness=np.nan, frequency=np.nan, failure="no equilibrium")
+    other = replace(found, confirmed=(broken, *found.confirmed[1:]))
+    assert "1 could not be computed" in " ".join(leaves_step(other).sentences)
+    rows = requirement_rows(found)
+    assert rows[0][0] == "the cart must not break away inside the stroke"
+    assert rows[0][1:3] == ("friction.static, leaves.stroke", "1 N, 1 mm")
+    assert rows[0][3].endswith("%, binds")
+
+
+def test_the_window_of_the_crossover(found: Design) -> None:
+    above, below = upper(found), lower(found)
+    assert [each.value for each in above] == sorted(each.value for each in above)
+    assert above[0].value == stiffest(found)
+    assert below[-1].value == pytest.approx(1.2 * found.edges.highest)
+    assert below[0].value < found.controller.crossover <= above[0].value
+    said = " ".join(controller_step(found).sentences)
+    assert "Not higher: it is bounded by" in said
+    assert "Not lower: from below it is bounded by" in said
+    assert "More damping in the joint is not worth adding" in said
+
+
+def test_damping_that_is_worth_adding(found: Design) -> None:
+    better = replace(found.controller.damping, margins=np.array([0.3, 0.58, 0.6]))
+    said = controller_step(replace(found, controller=replace(found.controller, damping=better))).sentences[-1]
+    assert said.startswith("Damping in the joint is worth adding: with its own damping of 0.5 N·s/m")
+    assert "it is 0.58; more brings little" in said
+
+
+def test_moves_that_hunt_or_take_too_long(found: Design) -> None:
+    hunts = np.arange(64) < 2
+    free = replace(found.verification.free, hunts=hunts, settling=np.where(hunts, np.nan, 2.0), swing=hunts * 1e-3)
+    other = replace(found, verification=replace(found.verification, free=free))
+    step = moves_step(other)
+    assert step.title == "Verification: 64 moves, 2 hunt"
+    said = " ".join(step.sentences)
+    assert "Specified for 95 % of the moves: 1.00 s; that is NOT met." in said
+    assert "The worst one, which swings over 1 mm" in said
+    assert "not as specified" in headline(other)[-1][1]
+    lost = replace(free, completed=np.arange(64) > 3)
+    step = moves_step(replace(found, verification=replace(found.verification, free=lost)))
+    assert "4 moves could not be simulated" in " ".join(step.sentences)
+
+
+# ---------------------------------------------------------------- figures and page
+
+
+def test_the_page_stands_alone_and_shows_all(found: Design, folder: Path) -> None:
+    page = Page((folder / "design.html").read_text(encoding="utf-8"))
+    assert all(address.startswith("data:") for address in page.loads)
+    assert page.tags.count("img") == len(FIGURES)
+    assert page.tags.count("svg") >= 1
+    for step in steps(found):
+        assert all(sentence in page.text for sentence in (step.title, *step.sentences))
+    for _, sentence in headline(found):
+        assert sentence in page.text
+    for words in ("Requirements", "safety.parasitic", "worst.toml", "Scale", "[flexure]", found.spec.name):
+        assert words in page.text
+    named = [name for step in steps(found) for name in step.figures]
+    assert sorted(named) == sorted(FIGURES)
+
+
+@pytest.mark.parametrize("name", [name for name in FIGURES if name not in ("design_map", "design_modes")])
+def test_both_renderers_draw_the_same_arrays(found: Design, name: str) -> None:
+    figure = _figures(found)[name]
+    (axes,) = matplotlib_renderer.render(figure).axes
+    paper = [part for patch in axes.patches for part in np.asarray(patch.get_xy()).T]  # type: ignore[attr-defined]
+    paper += [np.asarray(part, float) for line in axes.lines for part in line.get_data()]
+    traces = plotly_renderer.render(figure).data
+    page = chain.from_iterable((np.asarray(trace.x, float), np.asarray(trace.y, float)) for trace in traces)
+    for one, other in zip(paper, page, strict=True):
+        assert np.array_equal(one, other, equal_nan=True)
+
+
+def test_front_with_chosen_and_failed_points(found: Design) -> None:
+    broken = replace(found.confirmed[0], stiffness=np.nan, frequency=np.nan, failure="no equilibrium")
+    other = replace(found, confirmed=(broken, *found.confirmed[1:]))
+    (panel,) = _figures(other)["design_front"].panels
+    by_label = {each.label: each for each in panel.markers}
+    assert [*by_label] == ["by beams", "beams failed", "chosen, by beams"]
+    assert by_label["beams failed"].y == pytest.approx([broken.candidate.frequency])
+    assert by_label["chosen, by beams"].x == pytest.approx(found.fitted.choice.beams.drive[:1] / 1e3)
+    assert [limit.values for limit in panel.limits] == [(10 * found.controller.crossover,), (480.0,)]
+
+
+def test_map_with_the_chosen_point_and_cells_of_all_kinds(found: Design) -> None:
+    share = np.zeros_like(found.map.share)
+    share[0, 0], share[1, 1] = 0.5, np.nan
+    figure = _figures(replace(found, map=replace(found.map, share=share)))["design_map"]
+    (panel,) = figure.panels
+    (field,) = panel.maps
+    assert field.z[0, 0] == 50.0
+    assert field.codes is not None
+    assert (field.codes[1, 1], field.codes[2, 2]) == (1.0, 0.0)
+    assert np.isnan(field.codes[0, 0])
+    assert (panel.markers[0].x[0], panel.markers[0].y[0]) == (found.controller.crossover, 1.0)
+    assert [line.label.split(":")[0] for line in panel.series] == ["edge of hunting at 1 mm", "machine's limit"]
+
+
+def test_window_with_edges_beyond_the_search(found: Design) -> None:
+    endless = replace(found.without, edges=np.where(np.arange(len(found.without.edges)) == 0, np.inf, 5.0))
+    (panel,) = _figures(replace(found, without=endless))["design_window"].panels
+    assert panel.y.words == ("without", "isolator", "margin", "leaves", "machine")
+    assert panel.x.limits is not None
+    reach = [band.x.max() for band in panel.bands if band.low[0] < 0]
+    assert reach == [panel.x.limits[1]]
+    assert panel.series[0].x == pytest.approx([found.controller.crossover] * 2)
+
+
+def test_settling_ends_where_moves_hunt(found: Design) -> None:
+    hunts = np.arange(64) < 16
+    free = replace(found.verification.free, hunts=hunts, settling=np.where(hunts, np.nan, 0.2))
+    none = replace(free, settling=np.full(64, np.nan))
+    other = replace(found, verification=replace(found.verification, free=free, locked=none))
+    (panel,) = _figures(other)["design_settling"].panels
+    assert panel.series[0].y.max() == 75.0
+    assert [line.label for line in panel.series] == ["joint free", "joint locked", "specified"]
+    assert matplotlib_renderer.image(_figures(other)["design_settling"], "svg")
+
+
+# ---------------------------------------------------------------- what is refused
+
+
+def test_no_design_says_what_to_relax(refused: None, tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    with pytest.raises(typer.Exit) as left:
+        command(RIG, SPEC, out=tmp_path / "out")
+    shown = capsys.readouterr()
+    assert (left.value.exit_code, shown.out) == (2, "")
+    assert shown.err.splitlines() == [
+        "friso: no design: no leaf springs meet the specification",
+        "  relax safety.parasitic from 10 to 8.12 (first interfering frequency): then 2 leaves of 70 x 20 x 0.3 mm, 45 "
+        "mm apart, of stainless 1.4310 do",
+        "  relax leaves.length from 70 mm to 74.3 mm (length of the leaves, at most): then 2 leaves of 70 x 20 x 0.3 "
+        "mm, 45 mm apart, of stainless 1.4310 do",
+        "  relax joint.damping from 0.5 N·s/m to 3.2 N·s/m (crossover above the edge of hunting)",
+    ]
+    assert not (tmp_path / "out").exists()
+
+
+def test_no_design_as_a_document(refused: None, tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    with pytest.raises(typer.Exit):
+        command(RIG, SPEC, out=tmp_path / "out", as_json=True)
+    shown = capsys.readouterr()
+    document = _strict(shown.out)
+    assert document.keys() == {"stage", "spec", "feasible", "reason", "relax"}
+    assert document["feasible"] is False
+    assert document["relax"][1] == {
+        "key": "leaves.length",
+        "requirement": "length of the leaves, at most",
+        "from": 0.07,
+        "to": 0.07421,
+        "unit": "m",
+    }
+    assert "no design" in shown.err
+
+
+def test_no_single_relaxation() -> None:
+    assert refusal(NoDesign("too tight")) == (
+        "too tight\n  no requirement is known that, relaxed alone, is enough: relax several"
+    )
+    many = refusal(NoDesign("too tight", RELAXED * 3))
+    assert len(many.splitlines()) == 6
+    assert refused_document("rig", "spec", NoDesign("too tight"))["relax"] == []
+
+
+@pytest.mark.parametrize(
+    ("value", "larger", "expected"),
+    [(0.07421, True, 0.0743), (8.127, False, 8.12), (1.2, True, 1.2), (300.0, False, 300.0), (0.0, False, 0.0)],
+)
+def test_relaxations_are_rounded_to_be_enough(value: float, larger: bool, expected: float) -> None:
+    assert outwards(value, larger) == expected
+
+
+@pytest.mark.parametrize("name", ["design.toml", "worst.toml"])
+def test_files_of_no_design_are_not_overwritten(finished: list[str], tmp_path: Path, name: str) -> None:
+    (tmp_path / name).write_text("mine")
+    with pytest.raises(StageError, match=rf"--out\n.*{name} of no earlier design"):
+        command(RIG, SPEC, out=tmp_path)
+    assert (tmp_path / name).read_text() == "mine"
+
+
+def test_the_stage_that_is_read_is_not_overwritten(finished: list[str], folder: Path) -> None:
+    with pytest.raises(StageError, match=r"(?s)design\.toml is read.*another folder.*--out design-2"):
+        command(folder / "design.toml", SPEC, out=folder)
+
+
+def test_a_folder_that_is_a_file_is_refused(finished: list[str], tmp_path: Path) -> None:
+    (tmp_path / "taken").write_text("")
+    with pytest.raises(StageError, match="a folder that can be written"):
+        command(RIG, SPEC, out=tmp_path / "taken")
+
+
+def test_overrides_are_of_the_stage(finished: list[str], folder: Path, spec: Path) -> None:
+    command(RIG, spec, overrides=['name="Another"'], out=folder)
+    assert finished[-1] == "Another"
+    with pytest.raises(StageError, match="did you mean crossover"):
+        command(RIG, spec, overrides=['controller.crosover="8 Hz"'], out=folder)
+
+
+@pytest.mark.parametrize(
+    ("broken", "status", "message"),
+    [("specification", 2, "expected"), ("interrupt", 130, "interrupted"), ("argument", 2, "Missing argument")],
+)
+def test_exit_status(
+    broken: str,
+    status: int,
+    message: str,
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture,
+) -> None:
+    def interrupt(stage: Stage, spec: Spec, progress: Progress) -> Design:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(method, "design", interrupt)
+    bad = tmp_path / "bad.toml"
+    bad.write_text(SPEC.read_text().replace("stainless 1.4310", "stainles"))
+    given = {"specification": [str(RIG), str(bad)], "interrupt": [str(RIG), str(SPEC)], "argument": [str(RIG)]}
+    monkeypatch.setattr(sys, "argv", ["friso", "design", *given[broken], "--out", str(tmp_path / "out")])
+    with pytest.raises(SystemExit) as left:
+        main()
+    shown = capsys.readouterr()
+    assert (left.value.code, shown.out) == (status, "")
+    assert message in shown.err
+    assert "Traceback" not in shown.err
+    assert not (tmp_path / "out").exists()

@@ -1,0 +1,168 @@
+"""Specifications: what is read, what is refused, and the machines that they allow."""
+
+import copy
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import friso
+from friso.design.geometry import Geometry, Sheet, box, rounded, sheets
+from friso.design.population import corners, drawn, typical_move
+from friso.design.prepare import prepared, with_leaves
+from friso.design.spec import Spec, load_spec
+
+EXAMPLES = Path(__file__).parent.parent / "examples"
+SPEC = EXAMPLES / "specs" / "thesis.toml"
+TABLES = tomllib.loads(SPEC.read_text(encoding="utf-8"))
+
+
+def changed(table: str, **keys: Any) -> Spec:
+    """The example with keys of a table changed, or removed by None."""
+    tables = copy.deepcopy(TABLES)
+    tables.setdefault(table, {}).update(keys)
+    tables[table] = {key: value for key, value in tables[table].items() if value is not None}
+    return Spec(**tables)
+
+
+@pytest.fixture(scope="module")
+def rig() -> friso.Stage:
+    return friso.load(EXAMPLES / "thesis_rig.toml")
+
+
+def test_the_example_is_read() -> None:
+    spec = load_spec(SPEC)
+    assert spec.limit == 48
+    assert (spec.friction.static.low, spec.friction.static.high) == (1, 3)  # type: ignore[union-attr]
+    assert spec.masses.cart.low == pytest.approx(1.14)  # type: ignore[union-attr]
+    assert len(sheets(spec)) == 8
+
+
+def test_parasitic_frequencies_set_the_limit() -> None:
+    spec = changed("machine", bandwidth_limit=None, parasitic_frequencies=["730 Hz", "480 Hz"])
+    assert spec.limit == pytest.approx(48)
+
+
+def test_a_range_of_thickness_stands_for_usual_gauges() -> None:
+    assert changed("leaves", thickness="0.2 mm .. 0.35 mm").leaves.thickness == (0.2e-3, 0.25e-3, 0.3e-3, 0.35e-3)
+
+
+def test_a_single_length_is_the_largest() -> None:
+    low, high = box(changed("leaves", length="70 mm"))
+    assert (low[0], high[0]) == pytest.approx((7e-3, 70e-3))
+
+
+@pytest.mark.parametrize(
+    ("table", "keys", "words"),
+    [
+        ("friction", {"static": "3 N .. 1 N"}, "reversed range"),
+        ("friction", {"static": "1 .. 3 N"}, "its unit is missing"),
+        ("friction", {"static": "0 N .. 3 N"}, 'of which "0 N"'),
+        ("friction", {"coulomb": "1 N"}, "one of the two"),
+        ("friction", {"gap": None, "coulomb": "3 N .. 4 N"}, "below the static friction"),
+        ("machine", {"parasitic_frequencies": ["480 Hz"]}, "both"),
+        ("machine", {"bandwidth_limit": None}, "neither"),
+        ("leaves", {"materials": ["stainles"]}, "did you mean stainless 1.4310"),
+        ("leaves", {"materials": []}, "an empty list"),
+        ("leaves", {"thickness": ["80 mm"]}, "thinner than the length"),
+        ("leaves", {"thickness": "0.21 mm .. 0.24 mm"}, "a usual gauge"),
+        ("leaves", {"leaves": 2.5}, "a whole number"),
+        ("leaves", {"lenght": "3 mm"}, "did you mean length"),
+        ("masses", {"cart": "1 kg +/- 150 %"}, "below 100 %"),
+        ("safety", {"buckling": 0.5}, "1 or greater"),
+        ("position", {"window": "0 um"}, "greater than 0"),
+    ],
+)
+def test_what_is_refused(table: str, keys: dict[str, Any], words: str) -> None:
+    with pytest.raises(friso.StageError) as caught:
+        changed(table, **keys)
+    assert words in str(caught.value)
+    assert caught.value.key.startswith(table)
+
+
+def test_a_missing_file_and_an_empty_one(tmp_path: Path) -> None:
+    with pytest.raises(friso.StageError, match=r"specs/thesis\.toml"):
+        load_spec(tmp_path / "none.toml")
+    (tmp_path / "empty.toml").write_text("")
+    with pytest.raises(friso.StageError, match="an empty file"):
+        load_spec(tmp_path / "empty.toml")
+
+
+def test_corners_hold_the_ends_of_all_ranges(rig: friso.Stage) -> None:
+    found = corners(load_spec(SPEC), rig.flat())
+    static, coulomb = found.keys["friction.static"], found.keys["friction.coulomb"]
+    assert found.count == 3 * 3 * 2
+    assert (static.min(), static.max()) == (1, 3)
+    gap = (static - coulomb) / static
+    assert (gap.min(), gap.max()) == pytest.approx((0.3, 0.85))
+    assert set(np.round(found.keys["masses.stage"], 6)) == {0.475, 0.525}
+
+
+def test_drawn_machines_lie_in_all_ranges(rig: friso.Stage) -> None:
+    spec = load_spec(SPEC)
+    flat = rig.flat()
+    found = drawn(spec, flat, 500, 0.3)
+    factors = found.keys["joint.stiffness"] / flat["joint.stiffness"]
+    assert (factors.min(), factors.max()) == pytest.approx((0.9 * 0.7, 1.1), abs=5e-3)
+    travel = found.keys["motion.acceleration"] * found.keys["motion.acceleration_time"] ** 2
+    assert travel.min() >= 1e-3 * (1 - 1e-9)
+    assert travel.max() <= 0.1 * (1 + 1e-9)
+    assert np.all(found.keys["friction.coulomb"] < found.keys["friction.static"])
+    again = drawn(spec, flat, 500, 0.3)
+    assert all(np.array_equal(found.keys[key], again.keys[key]) for key in found.keys)
+
+
+def test_coulomb_friction_never_exceeds_the_static_one(rig: friso.Stage) -> None:
+    found = drawn(changed("friction", gap=None, coulomb="0.5 N .. 2 N"), rig.flat(), 200, 0.0)
+    assert np.all(found.keys["friction.coulomb"] <= found.keys["friction.static"])
+
+
+def test_the_typical_move_is_in_the_middle() -> None:
+    move = typical_move(load_spec(SPEC))
+    assert move["motion.acceleration"] * move["motion.acceleration_time"] ** 2 == pytest.approx(0.01)
+    assert move["motion.acceleration"] == pytest.approx(np.sqrt(10 * 100))
+
+
+def test_a_range_the_friction_law_does_not_have(rig: friso.Stage) -> None:
+    dahl = {"model": "dahl", "coulomb": "1 N", "bristle_stiffness": "1e5 N/m", "viscous": "0.5 N*s/m"}
+    stage = rig.replace({"friction": dahl})
+    with pytest.raises(friso.StageError, match="dahl friction"):
+        corners(load_spec(SPEC), stage.flat())
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ({"joint": None, "parasitic": None}, "limiter"),
+        ({"masses.cart": None, "joint": None, "parasitic": None}, "a single mass"),
+        ({"friction": {"model": "none"}}, "friction, which the isolator is for"),
+    ],
+)
+def test_stages_that_cannot_be_isolated(rig: friso.Stage, change: dict[str, Any], words: str) -> None:
+    with pytest.raises(friso.StageError, match=words):
+        prepared(rig.replace(change), load_spec(SPEC))
+
+
+def test_gains_instead_of_a_crossover(rig: friso.Stage) -> None:
+    gains = {"kind": "pid", "kp": "3 N/m", "ki": "4 N/(m*s)", "kd": "6 N*s/m", "tau": "1 ms"}
+    with pytest.raises(friso.StageError, match="van Dijk"):
+        prepared(rig.replace({"controller": gains}), load_spec(SPEC))
+
+
+def test_a_prepared_stage_takes_leaves(rig: friso.Stage) -> None:
+    spec = load_spec(SPEC)
+    base = prepared(rig, spec)
+    stage = with_leaves(base, Geometry(60e-3, 18e-3, 50e-3, Sheet(2.0, 0.3e-3, "stainless 1.4310")), 1e-3)
+    assert stage.flat()["flexure.length"] == pytest.approx(0.06)
+    assert friso.loads(stage.to_toml()) == stage
+    assert prepared(stage, spec).flexure is not None  # a stage that has leaves already
+
+
+def test_rounded_sizes_stay_in_the_space() -> None:
+    spec = load_spec(SPEC)
+    near = rounded(spec, Geometry(69.97e-3, 15.02e-3, 40.04e-3, sheets(spec)[0]), 1e-4)
+    assert {round(each.length * 1e3, 3) for each in near} == {69.9, 70.0}
+    assert {round(each.width * 1e3, 3) for each in near} == {15.0, 15.1}
+    assert len(near) == 8

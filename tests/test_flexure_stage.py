@@ -1,0 +1,256 @@
+"""The [flexure] table of stage files: what follows from it, and what is refused."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import friso
+from friso.flexure import closed_forms
+from friso.flexure.joint import first_interfering
+from friso.flexure.mechanism import Mechanism
+from friso.materials import materials
+from friso.stage import Stage, StageError, load, loads, save, violations
+from friso.studies.cells import allowed, flat_cells
+
+RIG = Path(__file__).parents[1] / "examples" / "thesis_rig.toml"
+NUMBERS = 'young = "210 GPa"\npoisson = 0.3\ndensity = "7850 kg/m^3"\nyield = "1.1 GPa"'
+LEAVES = '[flexure]\nleaves = 2\nlength = "70 mm"\nwidth = "45 mm"\nthickness = "0.35 mm"\nspacing = "60 mm"\n'
+FOLLOWS = ("joint.stiffness", "parasitic.frequency", "parasitic.mass", "parasitic.damping_ratio")
+
+
+def text_with(table: str = LEAVES + 'material = "stainless 1.4310"') -> str:
+    """The thesis rig, its joint made of leaf springs."""
+    text = RIG.read_text(encoding="utf-8")
+    start, end = text.index("\n[parasitic]"), text.index("\n[controller]")
+    return text[:start].replace('stiffness = "2.4 N/mm"\n', "") + "\n" + table + "\n" + text[end:]
+
+
+@pytest.fixture(scope="module")
+def stage() -> Stage:
+    return loads(text_with())
+
+
+def refused(table: str) -> StageError:
+    with pytest.raises(StageError) as caught:
+        loads(text_with(table), origin="rig.toml")
+    return caught.value
+
+
+def test_stiffness_and_parasitic_mode_follow(stage: Stage) -> None:
+    flat = stage.flat()
+    it = Mechanism.of(flat)
+    frequency, share = first_interfering(it)
+    assert flat["joint.stiffness"] == pytest.approx(closed_forms.drive_stiffness(it), rel=1e-12)
+    assert flat["joint.stiffness"] == pytest.approx(2540 * 195 / 210, rel=5e-3)
+    assert flat["parasitic.frequency"] == pytest.approx(frequency, rel=1e-12)
+    assert flat["parasitic.mass"] == pytest.approx(0.5 * share / (1 + share), rel=1e-12)
+    assert flat["parasitic.damping_ratio"] == 0.01
+    assert 300 < frequency < 400
+    # what the equations make of it has the frequency and the residue of the mode, m_p/(m (m - m_p))
+    mass = flat["parasitic.mass"]
+    assert mass / (0.5 - mass) == pytest.approx(share, rel=1e-12)
+
+
+def test_defaults_are_the_stated_ones(stage: Stage) -> None:
+    """Stage: an aluminium block at the leaf ends; actuator and sensor half-way along the leaves."""
+    it = Mechanism.of(stage.flat())
+    block = 0.5 / (2700 * 0.045 * 0.06)
+    assert it.body.inertia == pytest.approx(
+        (0.5 / 12 * (0.045**2 + 0.06**2), 0.5 / 12 * (block**2 + 0.06**2), 0.5 / 12 * (block**2 + 0.045**2)), rel=1e-12
+    )
+    assert it.body.centre == (0.07, 0.0, 0.0)
+    assert it.actuation == it.sensor == (0.035, 0.0, 0.0)
+    assert it.stress_concentration == 1.5
+    given = stage.replace(
+        {"flexure.centre_z": "-5 mm", "flexure.actuation_y": "8 mm", "flexure.inertia_z": "2e-4 kg*m^2"}
+    )
+    moved = Mechanism.of(given.flat())
+    assert moved.body.centre == pytest.approx((0.07, 0.0, -0.005))
+    assert moved.actuation == moved.sensor == pytest.approx((0.035, 0.008, 0.0))
+    assert moved.body.inertia[2] == 2e-4
+    elsewhere = Mechanism.of(given.replace({"flexure.sensor_y": "-1 mm"}).flat())
+    assert (elsewhere.actuation[1], elsewhere.sensor[1]) == pytest.approx((0.008, -0.001))
+
+
+def test_a_material_is_its_numbers(stage: Stage) -> None:
+    known = materials()["stainless 1.4310"]
+    own = {"young": known.young.text, "poisson": known.poisson, "density": known.density.text}
+    own |= {"yield": known.yield_strength.text, "fatigue": known.fatigue.text}
+    written = stage.replace({"flexure.material": None, **{f"flexure.{key}": value for key, value in own.items()}})
+    with_name = stage.flat()
+    assert with_name.pop("flexure.material") == known.name
+    assert {key: value for key, value in written.flat().items() if value != ""} == with_name
+
+
+def test_all_materials_have_sources_and_plausible_numbers() -> None:
+    assert len(materials()) >= 5
+    for name, it in materials().items():
+        assert it.name == name
+        assert len(it.source) > 20
+        assert len(it.grade) > 3
+        assert 60e9 < it.young < 220e9
+        assert 0.25 < it.poisson < 0.4
+        assert 2500 < it.density < 9000
+        assert 400e6 < it.yield_strength < 1500e6
+        assert 0.2 * it.yield_strength < it.fatigue < 0.7 * it.yield_strength
+        assert 4500 < np.sqrt(it.young / it.density) < 5300 or name == "beryllium copper"  # speed of sound in metals
+
+
+def test_saved_and_loaded_again(stage: Stage, tmp_path: Path) -> None:
+    numbers = loads(text_with(LEAVES + NUMBERS + '\ncentre_x = "72 mm"\nfatigue = "400 MPa"'))
+    for k, each in enumerate((stage, numbers)):
+        file = tmp_path / f"{k}.toml"
+        save(each, file)
+        assert load(file).flat() == each.flat()
+        assert load(file).to_toml() == each.to_toml()
+
+
+def test_the_same_numbers_written_as_a_joint(stage: Stage) -> None:
+    """Leaf springs, and a joint of their stiffness and parasitic mode, are the same stage to the equations."""
+    flat = stage.flat()
+    units = dict(zip(FOLLOWS, ("N/m", "Hz", "kg", ""), strict=True))
+    numbers = {key: f"{float(flat[key])!r} {unit}" if unit else flat[key] for key, unit in units.items()}
+    joint = stage.replace({"flexure": None} | numbers)
+    assert joint.flexure is None
+    assert joint.flat() == {key: value for key, value in flat.items() if not key.startswith("flexure.")}
+    for name, each in stage.variants().items():
+        own = {key: value for key, value in each.flat().items() if not key.startswith("flexure.")}
+        assert joint.variants()[name].flat() == own
+
+
+def test_a_sweep_is_one_by_one(stage: Stage) -> None:
+    thickness = np.array([0.2e-3, 0.35e-3, 0.5e-3, 0.9e-3])
+    many = stage.flat({"flexure.thickness": thickness})
+    for k, each in enumerate(thickness):
+        alone = stage.flat({"flexure.thickness": each})
+        written = stage.replace({"flexure.thickness": f"{float(each)!r} m"}).flat()
+        for key in FOLLOWS:
+            assert np.broadcast_to(many[key], thickness.shape)[k] == pytest.approx(alone[key], rel=1e-9)
+            assert written[key] == pytest.approx(alone[key], rel=1e-9)
+    assert np.all(np.diff(many["joint.stiffness"]) > 0)
+    ratio = many["joint.stiffness"] / thickness**3  # linear in the third power
+    assert ratio == pytest.approx(ratio[0], rel=1e-9)
+
+
+def test_numbers_that_make_no_mechanism_are_marked(stage: Stage) -> None:
+    """Cells of a sweep that no stage may have, rather than an error for all of them."""
+    lengths = np.array([0.07, -0.07, -1e-9, np.nan, 0.002])
+    flat = stage.flat({"flexure.length": lengths})
+    broken = np.any(np.broadcast_arrays(*(where for where, _ in violations(flat)), lengths)[:-1], axis=0)
+    assert broken.tolist() == [False, True, True, True, True]
+    assert np.isfinite(np.broadcast_to(flat["joint.stiffness"], lengths.shape)[0])
+    assert allowed(stage, {}, {"flexure.length": lengths}).tolist() == [True, False, False, False, False]
+    assert flat_cells(stage, {}, {"flexure.length": lengths})["joint.stiffness"][0] == pytest.approx(
+        stage.flat()["joint.stiffness"], rel=1e-12
+    )
+
+
+def test_bad_cells_are_found_in_every_number(stage: Stage) -> None:
+    bad = {
+        "flexure.leaves": [2.0, 21.0, 2.5, np.nan],
+        "flexure.width": [0.045, -1.0, 1e-3, np.nan],
+        "flexure.thickness": [0.35e-3, 8e-3, -1.0, np.nan],
+        "flexure.spacing": [0.06, 0.3e-3, -0.06, np.nan],
+        "masses.stage": [0.5, -1.0, -0.5, np.nan],
+    }
+    for key, values in bad.items():
+        assert allowed(stage, {}, {key: np.array(values)}).tolist() == [True, False, False, False], key
+
+
+@pytest.mark.xfail(strict=True, raises=RuntimeWarning, reason="Mechanism.of and drive_stiffness divide by 0 aloud")
+@pytest.mark.parametrize("key", ["flexure.length", "flexure.width", "flexure.spacing", "flexure.leaves"])
+def test_zeros_are_marked_in_silence(stage: Stage, key: str) -> None:
+    bad = 1.0 if key == "flexure.leaves" else 0.0
+    assert allowed(stage, {}, {key: np.array([stage.flat()[key], bad])}).tolist() == [True, False]
+
+
+@pytest.mark.xfail(strict=True, reason="numbers that follow from leaves are NumPy's, whose repr no stage file can hold")
+def test_numbers_that_follow_are_plain_floats(stage: Stage) -> None:
+    flat = stage.flat()
+    assert {type(flat[key]) for key in FOLLOWS} == {float}
+
+
+def test_swept_by_friso(stage: Stage) -> None:
+    runs = friso.sweep(
+        stage.replace({"joint.locked": True, "motion.duration": "6 s"}),
+        {"flexure.thickness": ["0.35 mm", "30 mm", "9 mm"]},
+    )
+    assert (runs.verdict.values == "invalid").tolist() == [False, True, True]
+    assert all("flexure.thickness" in reason for reason in runs.status.values[1:])
+
+
+@pytest.mark.xfail(strict=True, reason="the reason names joint.stiffness, which follows, before what was swept")
+def test_the_reason_names_what_was_swept(stage: Stage) -> None:
+    reasons = [why for _, why in violations(stage.flat({"flexure.thickness": np.array([0.35e-3, -1e-3])}))]
+    assert reasons[0].startswith("flexure.thickness")
+
+
+def test_what_follows_cannot_be_swept(stage: Stage) -> None:
+    for key in ("joint.stiffness", "parasitic.frequency"):
+        with pytest.raises(StageError, match=key.replace(".", r"\.")):
+            stage.flat({key: 1.0})
+
+
+@pytest.mark.parametrize(
+    ("name", "near"),
+    [("stainless", "stainless 1.4310"), ("Spring Steel", "spring steel"), ("titanum", "titanium"), ("unobtainium", "")],
+)
+def test_unknown_material(name: str, near: str) -> None:
+    error = refused(LEAVES + f'material = "{name}"')
+    assert error.key == "flexure.material"
+    assert error.origin == "rig.toml"
+    assert "unknown" in error.given
+    if near:
+        assert f"did you mean {near}?" in error.given
+    assert all(each in error.expected for each in materials())
+
+
+def _changed(key: str, value: str) -> str:
+    rows = [row for row in LEAVES.splitlines() if not row.startswith(f"{key} =")]
+    return "\n".join([*rows, f"{key} = {value}" if value else "", 'material = "titanium"'])
+
+
+@pytest.mark.parametrize(
+    ("table", "key", "said"),
+    [
+        (_changed("thickness", '"80 mm"'), "flexure.thickness", "as wide as thick"),
+        (_changed("length", '"0.3 mm"'), "flexure.thickness, flexure.length", "ten times as long as thick"),
+        (_changed("width", '"0.4 mm"'), "flexure.thickness, flexure.width", "three times as wide as thick"),
+        (_changed("spacing", '"0.2 mm"'), "flexure.thickness, flexure.spacing", "farther apart"),
+        (_changed("leaves", "1"), "flexure.leaves", "2 to 20"),
+        (_changed("leaves", "2.5"), "flexure.leaves", "whole number"),
+        (_changed("width", ""), "flexure.width", "nothing"),
+        (_changed("length", "70"), "flexure.length", "m"),
+        (_changed("damping_ratio", "0"), "flexure.damping_ratio", "greater than 0"),
+        (_changed("stress_concentration", "0.5"), "flexure.stress_concentration", "1"),
+        (LEAVES, "flexure.young", "a material, or all numbers of one"),
+        (LEAVES + 'young = "210 GPa"', "flexure.poisson", "a material, or all numbers of one"),
+        (LEAVES + 'material = "titanium"\nyoung = "210 GPa"', "flexure", "together with young"),
+        (LEAVES + 'material = "titanium"\nfatigue = "1 GPa"', "flexure", "together with fatigue"),
+        (LEAVES + NUMBERS.replace("0.3", "0.5"), "flexure.poisson", "below 0.5"),
+        (LEAVES + 'material = "titanium"\ncolour = "red"', "flexure.colour", "unknown"),
+        (
+            LEAVES + 'material = "titanium"\n[parasitic]\nfrequency = "300 Hz"\nmass = "0.25 kg"\ndamping_ratio = 0.01',
+            "[parasitic]",
+            "[flexure]",
+        ),
+    ],
+)
+def test_refused(table: str, key: str, said: str) -> None:
+    error = refused(table)
+    assert key in error.key
+    assert said in f"{error.given} {error.expected}"
+    assert error.example
+
+
+def test_stiffness_given_twice_or_not_at_all(stage: Stage) -> None:
+    with pytest.raises(StageError, match=r"joint\.stiffness together with \[flexure\]"):
+        stage.replace({"joint.stiffness": "2.4 N/mm"})
+    with pytest.raises(StageError, match="the stiffness of the joint, or a \\[flexure\\]"):
+        stage.replace({"flexure": None})
+    with pytest.raises(StageError, match=r"a \[flexure\], but no \[joint\]"):
+        stage.replace({"joint": None})
+    locked: dict[str, Any] = {"flexure": None, "joint.locked": True}
+    assert "joint.stiffness" not in stage.replace(locked).flat()
