@@ -11,9 +11,7 @@ import numpy as np
 from friso.design.spec import Spec
 from friso.flexure import closed_forms
 from friso.flexure.joint import first_interfering
-from friso.flexure.mechanism import Mechanism
-
-GRAVITY = 9.80665
+from friso.flexure.mechanism import GRAVITY, Mechanism
 
 
 @dataclass(frozen=True)

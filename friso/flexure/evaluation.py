@@ -73,6 +73,12 @@ class Evaluation:
         return float(self.drive[0] * (1 - self.mechanism.load / self.buckling))
 
     @property
+    def buckling_margin(self) -> float:
+        """Buckling load over the load along the leaves, or over the weight of the stage where no load presses."""
+        load = self.mechanism.load
+        return float(self.buckling / (load if load > 0 else self.mechanism.weight))
+
+    @property
     def clamp_stress(self) -> float:
         """The stress [Pa] at full stroke times the factor for the clamp."""
         return self.stress * self.mechanism.stress_concentration

@@ -15,6 +15,9 @@ import numpy as np
 
 AXES = ("x", "y", "z")
 
+GRAVITY = 9.80665
+"""Standard acceleration of free fall [m/s^2]."""
+
 ALUMINIUM = 2700.0
 """Density [kg/m^3] of the block that stands in for a stage whose inertia is not given."""
 
@@ -93,6 +96,11 @@ class Mechanism:
             return float(value[number]) if np.ndim(value) else value
 
         return Mechanism(*(pick(getattr(self, each.name)) for each in fields(Mechanism)))
+
+    @property
+    def weight(self) -> Any:
+        """Weight of the stage [N]."""
+        return GRAVITY * self.body.mass
 
     @property
     def shear(self) -> Any:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from friso.flexure.evaluation import Evaluation
-from friso.views.flexure_found import Found, buckling_margin, interferes
+from friso.views.flexure_found import Found, interferes
 
 
 def flexure_document(found: Found) -> dict[str, Any]:
@@ -23,6 +23,7 @@ def _evaluation(it: Evaluation) -> dict[str, Any]:
         "model": it.model,
         "stroke_m": it.stroke,
         "drive_stiffness_n_per_m": it.drive[0],
+        "drive_stiffness_under_load_n_per_m": it.loaded_drive,
         "drive_stiffness_at_stroke_n_per_m": it.drive[-1],
         "nonlinearity": it.nonlinearity,
         "support_stiffness_n_per_m": {
@@ -41,7 +42,7 @@ def _evaluation(it: Evaluation) -> dict[str, Any]:
         "shortening_m": it.shortening,
         "buckling_load_n": it.buckling,
         "buckling_load_per_leaf_n": it.buckling / it.mechanism.leaves,
-        "buckling_margin": buckling_margin(it),
+        "buckling_margin": it.buckling_margin,
         "stiffness_zero": it.stiffness[0],
         "stiffness_full": it.stiffness[1],
         "deflections_m": it.deflections,

@@ -10,9 +10,6 @@ from friso.flexure.mechanism import Mechanism
 from friso.stage import Stage
 from friso.views.figure import BLUE, ORANGE
 
-GRAVITY = 9.80665
-"""Standard acceleration of free fall [m/s^2]."""
-
 BEAMS, CLOSED = "Beams", "Closed forms"
 COLOURS = {BEAMS: BLUE, CLOSED: ORANGE}
 
@@ -41,16 +38,6 @@ class Found:
     @property
     def mechanism(self) -> Mechanism:
         return self.closed.mechanism
-
-
-def weight(it: Mechanism) -> float:
-    """Of the stage [N]."""
-    return GRAVITY * float(it.body.mass)
-
-
-def buckling_margin(it: Evaluation) -> float:
-    """Buckling load over the weight of the stage."""
-    return it.buckling / weight(it.mechanism)
 
 
 def interferes(it: Evaluation, mode: Mode) -> bool:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable
 
 from friso.flexure.evaluation import Evaluation, Mode
-from friso.views.flexure_found import Found, buckling_margin, interferes, named_modes
+from friso.views.flexure_found import Found, interferes, named_modes
 from friso.views.prefixes import NOTHING, with_unit
 
 INTERFERES = "interferes"
@@ -66,6 +66,7 @@ def _mode(it: Evaluation, mode: Mode | None) -> str:
 
 _STIFF: dict[str, Callable[[Evaluation], str]] = {
     "Drive stiffness": lambda it: newtons_per(it.drive[0], "mm"),
+    "Drive stiffness under the load": lambda it: newtons_per(it.loaded_drive, "mm"),
     "Departure from linear over the stroke": lambda it: percent(it.nonlinearity),
     "Support stiffness x, straight": lambda it: newtons_per(it.support_x[0], "µm"),
     "Support stiffness x, at full stroke": lambda it: newtons_per(it.support_x[-1], "µm"),
@@ -80,5 +81,5 @@ _BORNE: dict[str, Callable[[Evaluation], str]] = {
     "Margin to fatigue": lambda it: factor(it.fatigue_margin),
     "Shortening at full stroke": lambda it: with_unit(it.shortening, "m"),
     "Buckling load": lambda it: with_unit(it.buckling, "N"),
-    "Buckling load over the stage's weight": lambda it: factor(buckling_margin(it)),
+    "Buckling load over the load": lambda it: factor(it.buckling_margin),
 }

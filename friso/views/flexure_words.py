@@ -7,8 +7,8 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from friso.flexure.evaluation import Evaluation
-from friso.flexure.mechanism import AXES
-from friso.views.flexure_found import GRAVITY, Found, buckling_margin, weight
+from friso.flexure.mechanism import AXES, GRAVITY
+from friso.views.flexure_found import Found
 from friso.views.flexure_table import megapascals, newtons_per, percent
 from friso.views.prefixes import listed, with_unit
 
@@ -39,7 +39,7 @@ def warnings(found: Found) -> list[str]:
 def assumptions(found: Found) -> list[str]:
     """What stands in for keys that the stage file leaves out."""
     flat, it = found.stage.flat(), found.mechanism
-    said = [_centre(flat), _inertia(flat, it.depth, it.width), _points(flat)]
+    said = [_centre(flat), _inertia(flat, it.depth, it.width), _points(flat), _load(flat)]
     parts = [part for part in said if part]
     return [f"Assumed, since [flexure] does not say: {'; '.join(parts)}."] if parts else []
 
@@ -94,9 +94,9 @@ def _borne(it: Evaluation) -> list[str]:
             f"The leaves break in the long run: {megapascals(it.clamp_stress)} at the clamp at {_stroke(it)}, for ever "
             f"they bear {megapascals(own.fatigue)}. Longer or thinner leaves, or less stroke, mend it."
         )
-    if buckling_margin(it) < 1:
+    if it.buckling_margin < 1:
         said.append(
-            f"Hung or stood on its leaves the stage buckles them: it weighs {with_unit(weight(own), 'N')} "
+            f"A stage that stands on its leaves buckles them: it weighs {with_unit(own.weight, 'N')} "
             f"(g = {GRAVITY} m/s²), they bear {with_unit(it.buckling, 'N')} along their length."
         )
     return said
@@ -158,6 +158,11 @@ def _points(flat: Mapping[str, Any]) -> str:
     actuation = "" if "flexure.actuation_x" in flat else "actuation at half the leaf length"
     sensor = "" if "flexure.sensor_x" in flat else "sensor at the point of actuation"
     return ", ".join(part for part in (actuation, sensor) if part)
+
+
+def _load(flat: Mapping[str, Any]) -> str:
+    said = "no load on the leaves, but the weight of the stage for the margin to buckling"
+    return "" if "flexure.load" in flat else said
 
 
 def _stroke(it: Evaluation) -> str:
