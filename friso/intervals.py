@@ -8,7 +8,7 @@ from typing import Any
 from pydantic import GetCoreSchemaHandler
 from pydantic_core import CoreSchema, core_schema
 
-from friso.quantities import Number, Quantity, StageError, quoted
+from friso.quantities import Number, Quantity, StageError, non_negative, quoted
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ class Span:
         if tolerance.endswith("%"):
             off = abs(centre) * _percent(tolerance)
         elif isinstance(self.of, Quantity):
-            off = float(Quantity(self.of.unit, self.of.bound, self.example).read(tolerance))
+            off = float(Quantity(self.of.unit, non_negative, self.example).read(tolerance))
         else:
             off = float(_bare(tolerance))
         return centre - off, centre + off

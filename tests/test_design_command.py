@@ -35,7 +35,7 @@ from friso.views.design_figures import design_figures
 from friso.views.design_leaves import leaves_step, requirement_rows
 from friso.views.design_steps import isolator_step, joint_step, steps
 from friso.views.design_window import lower, stiffest, upper
-from friso.views.design_words import edge, headline, outwards, refusal
+from friso.views.design_words import brings, edge, headline, outwards, refusal, settling
 from friso.views.figure import Figure
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
@@ -44,8 +44,8 @@ FIGURES = ("design_map", "design_front", "design_modes", "design_window", "desig
 SMALL = {
     front: {"POPULATION": 40, "GENERATIONS": 25},
     choice: {"SHOWN": 3},
-    edges: {"ROUNDS": 1},
-    method: {"STEPS": 5},
+    edges: {"ROUNDS": 1, "PERIODS": 15.0, "TRIED": edges.TRIED[:1]},
+    method: {"STEPS": 6},
     population: {"LEVELS": (0.0, 1.0)},
     controller: {"RATIOS": np.array([0.1, 0.7])},
     hunting_map: {"CROSSOVERS": 4, "STROKES": 3},
@@ -63,9 +63,10 @@ RELAXED = (
 
 @pytest.fixture(scope="module")
 def spec(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The thesis's, with a settling time that all moves keep."""
+    """The thesis's with one static friction, and a settling time that all moves keep."""
     path = tmp_path_factory.mktemp("spec") / "spec.toml"
-    path.write_text(SPEC.read_text().replace("# settling_time = ", "settling_time = "))
+    text = SPEC.read_text().replace("# settling_time = ", "settling_time = ")
+    path.write_text(text.replace('static = "1 N .. 3 N"', 'static = "1 N"'))
     return path
 
 
@@ -236,7 +237,7 @@ def test_an_isolator_that_is_not_needed_is_weighed(found: Design) -> None:
     said = " ".join(isolator_step(found).sentences)
     assert "All the same, this is what one brings" in said
     assert "the machine hunts, in its worst corner, up to" in said
-    assert "Breaking away, the cart loses 0.3 to 2.55 N" in said
+    assert "Breaking away, the cart loses 0.3 to 0.85 N" in said
     assert "corners with less hunt too, up to" in said
 
 
@@ -316,6 +317,18 @@ def test_moves_that_hunt_or_take_too_long(found: Design) -> None:
     lost = replace(free, completed=np.arange(64) > 3)
     step = moves_step(replace(found, verification=replace(found.verification, free=lost)))
     assert "4 moves could not be simulated" in " ".join(step.sentences)
+
+
+def test_moves_of_a_locked_joint_that_hunts(found: Design) -> None:
+    hunts = np.arange(64) < 20
+    locked = replace(found.verification.locked, hunts=hunts, settling=np.where(hunts, np.nan, 3.0))
+    other = replace(found, verification=replace(found.verification, locked=locked))
+    said = " ".join(moves_step(other).sentences)
+    assert "With the joint locked: half of them settle in 3.00 s, fewer than 95 % at all, and 20 hunt." in said
+    assert "none hunts (with the joint locked, 20 hunt)" in headline(other)[-1][1]
+    never = replace(locked, hunts=np.ones(64, bool), settling=np.full(64, np.nan))
+    assert settling(never) == "Fewer than half of them settle"
+    assert "instead of never" in brings(replace(found, verification=replace(found.verification, locked=never)))
 
 
 # ---------------------------------------------------------------- figures and page
@@ -466,9 +479,12 @@ def test_a_folder_that_is_a_file_is_refused(finished: list[str], tmp_path: Path)
         command(RIG, SPEC, out=tmp_path / "taken")
 
 
-def test_overrides_are_of_the_stage(finished: list[str], folder: Path, quick: None, spec: Path) -> None:
-    command(RIG, spec, overrides=['name="Another"'], out=folder)
+def test_overrides_are_of_the_stage(
+    finished: list[str], folder: Path, quick: None, spec: Path, capsys: pytest.CaptureFixture
+) -> None:
+    command(RIG, spec, overrides=['name="Another"', 'drive.delay="1 ms"'], out=folder)
     assert finished[-1] == "Another"
+    assert "[drive] counts for the margins" in capsys.readouterr().err
     with pytest.raises(StageError, match="did you mean crossover"):
         command(RIG, spec, overrides=['controller.crosover="8 Hz"'], out=folder)
 

@@ -41,6 +41,8 @@ def design(
 
     stage = read_stage(stage_file, overrides, with_drive=True)
     spec = load_spec(spec_file)
+    if stage.drive:
+        say("[drive] counts for the margins; hunting and moves are simulated in continuous time")
     _check_place(out, (stage_file, spec_file))
     try:
         found, files = _designed(stage, spec, out)

@@ -14,7 +14,7 @@ from scipy.linalg import eigh
 
 from friso.flexure import plate
 from friso.flexure.beam_system import COORDINATES, Leaves
-from friso.flexure.closed_forms import body_mass
+from friso.flexure.closed_forms import axial, body_mass
 from friso.flexure.evaluation import Mode, peak_of
 from friso.flexure.mechanism import Mechanism, along_motion
 from friso.flexure.naming import mode_name
@@ -156,14 +156,14 @@ def buckling_load(it: Mechanism, leaves: Leaves, straight: np.ndarray, load: flo
     """Least load [N] along the leaves, shared by them, at which the stage sways, `straight` being the stiffness of a
     leaf without load and `load` a guess [N], at which it is linearised."""
     state = np.zeros((1, leaves.nodes, COORDINATES))
-    strain = load / float(it.leaves * it.young * it.area)
+    strain = load / float(it.leaves * axial(it))
     state[:, :, 0] = -strain * np.linspace(0, float(it.length), leaves.nodes)
     loaded = leaves.stiffness(state)[0]
     # all leaves bend alike; the stage's pitch stretches them
     moving = np.add.outer(np.arange(COORDINATES, len(straight), COORDINATES), (2, 4)).ravel()
     without, with_load = (int(it.leaves) * each[np.ix_(moving, moving)] for each in (straight, loaded))
     softening = without - with_load
-    without[-1, -1] += it.young * it.area / it.length * it.offset_squares
+    without[-1, -1] += axial(it) / it.length * it.offset_squares
     last = len(moving) - 1
     largest = eigh(softening, without, eigvals_only=True, subset_by_index=(last, last))[0]
     return float(load / largest)

@@ -17,7 +17,7 @@ import exudyn
 import numpy as np
 
 from friso.flexure import plate
-from friso.flexure.closed_forms import SHEAR
+from friso.flexure.closed_forms import SHEAR, axial, edgewise_shear
 from friso.flexure.mechanism import Mechanism
 
 ELEMENTS = 16
@@ -162,13 +162,13 @@ def _add_leaf(system: Any, it: Mechanism, elements: int) -> None:
 
 def _section(it: Mechanism, h: float, curl: float, twist: float) -> Any:
     """The section of an element of length h, its compliance in bending and torsion over that of a plain beam given."""
-    shear = SHEAR * it.shear * it.area
     weak, strong = it.young * it.bending / curl, it.young * it.edgewise
+    shears = (edgewise_shear(it), strong), (SHEAR * it.shear * it.area, weak)
     torsion = it.shear * plate.torsion_constant(it.width, it.thickness) / twist
-    edgewise, flatwise = (1 / (1 / shear + h**2 / (12 * bending)) for bending in (strong, weak))
+    edgewise, flatwise = (1 / (1 / shear + h**2 / (12 * bending)) for shear, bending in shears)
     bulge = it.area * h**2 / 6
     section: Any = exudyn.BeamSection()
-    section.stiffnessMatrix = np.diag([it.young * it.area, edgewise, flatwise, torsion, weak, strong])
+    section.stiffnessMatrix = np.diag([axial(it), edgewise, flatwise, torsion, weak, strong])
     section.massPerLength = it.density * it.area
     moments = [it.bending + it.edgewise, it.bending + bulge, it.edgewise + bulge]
     section.inertia = it.density * np.diag(moments)

@@ -60,7 +60,7 @@ def beams(mechanism: Mechanism, stroke: float, elements: int = ELEMENTS) -> Eval
 
 def _check(it: Mechanism, stroke: float) -> None:
     """Raises BeamFailure for numbers that make no mechanism."""
-    given = {name: getattr(it, name) for name in ("length", "width", "thickness", "young", "poisson", "density")}
+    given = {name: getattr(it, name) for name in ("length", "width", "thickness", "young", "density")}
     given |= {"leaves": it.leaves, "mass of the stage": it.body.mass, "stroke": stroke}
     for name, value in given.items():
         if not 0 < float(value) < np.inf:

@@ -36,9 +36,19 @@ def loaded_drive_stiffness(it: Mechanism) -> Any:
     return drive_stiffness(it) * (1 - it.load / buckling_load(it))
 
 
+def axial(it: Mechanism) -> Any:
+    """E A of a leaf [N], as stiff as its clamps make it."""
+    return it.young * it.area * plate.stretching(it.length, it.width, it.poisson)
+
+
+def edgewise_shear(it: Mechanism) -> Any:
+    """5/6 G A of a leaf in its plane [N], as stiff as its clamps make it."""
+    return SHEAR * it.shear * it.area * plate.edgewise_shear(it.length, it.width, it.poisson)
+
+
 def support_x(it: Mechanism, deflection: Any = 0.0) -> Any:
     """Stiffness along the leaves with all else held: falls as the deflected leaves, which are plates, bend under it."""
-    straight = it.leaves * it.young * it.area / it.length
+    straight = it.leaves * axial(it) / it.length
     stiffened = plate.stiffening(it.length, it.width, it.poisson)
     return straight / (1 + 12 / 700 * (deflection / it.thickness) ** 2 / stiffened)
 
@@ -47,7 +57,7 @@ def support_y(it: Mechanism, deflection: Any = 0.0) -> Any:
     """Stiffness along the width with all else held: bending and shear in the plane of the leaves, and the twist
     4 delta (s/L)^3 that a force across a deflected leaf adds, s from its middle, without the warping its clamps forbid.
     """
-    flat = it.length**3 / (12 * it.young * it.edgewise) + it.length / (SHEAR * it.shear * it.area)
+    flat = it.length**3 / (12 * it.young * it.edgewise) + it.length / edgewise_shear(it)
     rigidity = it.shear * plate.torsion_constant(it.width, it.thickness)
     twisted = deflection**2 * it.length / (28 * rigidity) * _cubic_twist(it)
     return it.leaves / (flat + twisted)
@@ -116,9 +126,9 @@ def stage_stiffness(it: Mechanism) -> np.ndarray:
     odd, even = (plate.stiffening(it.length, it.width, it.poisson, each) for each in (True, False))
     bending = it.young * it.bending / it.length
     edgewise = it.young * it.edgewise / it.length
-    sheared = 12 * edgewise / (SHEAR * it.shear * it.area * it.length)
+    sheared = 12 * edgewise / (edgewise_shear(it) * it.length)
     parallel, half = 12 * edgewise / it.length**2 / (1 + sheared), it.length / 2
-    along = it.young * it.area / it.length
+    along = axial(it) / it.length
     twist = plate.torsion_stiffness(it.length, it.width, it.thickness, it.shear, it.poisson)
     spread = it.offset_squares
     return _symmetric(
@@ -202,3 +212,8 @@ def stage_modes(it: Mechanism) -> tuple[np.ndarray, np.ndarray]:
     squares, vectors = np.linalg.eigh(inverse @ np.where(possible[..., None, None], stiffness, 0.0) @ turned)
     frequencies = np.sqrt(np.maximum(squares, 0)) / (2 * np.pi)
     return np.where(possible[..., None], frequencies, np.nan), turned @ vectors
+
+
+def drive_mode(shapes: np.ndarray) -> np.ndarray:
+    """Which of the stage's modes, shapes (..., 6, modes), moves most along the motion."""
+    return np.argmax(np.abs(shapes[..., 2, :]), axis=-1)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from friso.flexure import closed_forms
@@ -41,7 +43,9 @@ def closed(mechanism: Mechanism, stroke: float) -> Evaluation:
 def _modes(it: Mechanism) -> tuple[Mode, ...]:
     """Those of the stage on leaves that follow it, and the first bending modes and torsion of the leaves."""
     frequencies, shapes = closed_forms.stage_modes(it)
-    first, *others = [_stage_mode(it, frequencies[k], shapes[:, k]) for k in range(6)]
+    drive = int(closed_forms.drive_mode(shapes))
+    first = replace(_stage_mode(it, frequencies[drive], shapes[:, drive]), name="drive")
+    others = [_stage_mode(it, frequencies[k], shapes[:, k]) for k in range(6) if k != drive]
     return (first, *sorted([*others, *_bending_modes(it), _torsion_mode(it)], key=lambda mode: mode.frequency))
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from friso.flexure import plate
-from friso.flexure.closed_forms import SHEAR
+from friso.flexure.closed_forms import SHEAR, axial, edgewise_shear
 from friso.flexure.mechanism import Mechanism
 
 POINTS = 48
@@ -47,7 +47,7 @@ def _per(it: Mechanism, x: np.ndarray, weight: np.ndarray, slope: np.ndarray) ->
     free = plate.tilted(plate.free_twist(s, *shape) * weight, ends**3, ends, wanted) / weight
     twist = free / (it.shear * plate.torsion_constant(it.width, it.thickness))
     curl = plate.compliance_profile(s, it.length, it.width, it.poisson) / (it.young * it.bending)
-    columns = (1 / (it.young * it.area), sheared, sheared, twist, curl, 1 / (it.young * it.edgewise))
+    columns = (1 / axial(it), 1 / edgewise_shear(it), sheared, twist, curl, 1 / (it.young * it.edgewise))
     return np.stack(np.broadcast_arrays(*columns), axis=1), weight * np.sqrt(1 + slope**2)
 
 

@@ -18,19 +18,20 @@ from friso.stage.flexure import register_derivation
 def joint_keys(flat: Mapping[str, Any]) -> dict[str, Any]:
     """`joint.stiffness` and the keys of [parasitic] of a stage whose leaves are given, by closed forms. Raises
     StageError where a single mechanism buckles under its load."""
-    it = Mechanism.of(flat)
     with np.errstate(all="ignore"):  # numbers that make no mechanism are found out by the rules of the stage file
+        it = Mechanism.of(flat)
         frequency, share = first_interfering(it)
         stiffness, buckling = closed_forms.loaded_drive_stiffness(it), closed_forms.buckling_load(it)
     if np.ndim(stiffness) == 0 and it.load >= buckling > 0:
         expected = f"less than the buckling load of the leaves, {float(buckling):.4g} N"
         raise StageError("flexure.load", f"{float(it.load):.4g} N", expected, f'load = "{float(buckling) / 3:.2g} N"')
-    return {
+    found = {
         "joint.stiffness": stiffness,
         "parasitic.frequency": frequency,
         "parasitic.mass": share / (1 + share) * it.body.mass,
         "parasitic.damping_ratio": it.damping_ratio,
     }
+    return {key: value if np.ndim(value) else float(value) for key, value in found.items()}
 
 
 def first_interfering(it: Mechanism) -> tuple[Any, Any]:
@@ -46,8 +47,8 @@ def first_interfering(it: Mechanism) -> tuple[Any, Any]:
     seen = np.abs(along_motion(it, it.actuation, shapes) * along_motion(it, it.sensor, shapes))
     residues = seen * np.asarray(it.body.mass)[..., None]
     heights = residues / (2 * np.asarray(it.damping_ratio)[..., None])
-    rigid = np.where(heights > VISIBLE, frequencies, np.inf)
-    rigid[..., 0] = np.inf  # the drive mode
+    drive = np.arange(6) == closed_forms.drive_mode(shapes)[..., None]
+    rigid = np.where((heights > VISIBLE) & ~drive, frequencies, np.inf)
     first = np.argmin(rigid, axis=-1)[..., None]
     lowest, residue = (np.take_along_axis(each, first, axis=-1)[..., 0] for each in (rigid, residues))
     leaves_first = inner <= lowest

@@ -197,8 +197,8 @@ def _tables(flat: Mapping[str, Any]) -> dict[str, type[Section]]:
     classes = {
         "masses": Masses,
         "friction": FRICTION.classes[flat["friction.model"]],
+        "flexure": Flexure,  # before what follows from it: the first mistake is the one to be told
         "joint": Joint,
-        "flexure": Flexure,
         "parasitic": Parasitic,
         "bias": Bias,
         "drive": Drive,

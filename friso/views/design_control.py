@@ -114,9 +114,8 @@ def moves_step(found: Design) -> Step:
     """What the simulated moves show."""
     free, locked = found.verification.free, found.verification.locked
     said = [f"Of {free.tried} moves over all ranges and tolerances {hunting(free)}: {probability(free)}."]
-    said.append(
-        f"{settling(free)}. With the joint locked: {settling(locked).replace('Half', 'half')}, and {hunting(locked)}."
-    )
+    other = settling(locked)
+    said.append(f"{settling(free)}. With the joint locked: {other[0].lower()}{other[1:]}, and {hunting(locked)}.")
     broken = len(free.completed) - free.tried
     if broken:
         said.append(f"{broken} moves could not be simulated to their end and do not count.")

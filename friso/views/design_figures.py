@@ -160,7 +160,7 @@ def _settling(found: Design) -> Figure:
     times = np.concatenate([each.x for each in lines])
     low, high = float(np.quantile(times, FEW)), float(times.max())
     wide = high > WIDE * low
-    x = Axis("Settling time", "s", (low if wide else 0.0, 1.05 * high), log=wide)
+    x = Axis("Settling time", "s", (0.8 * low if wide else 0.0, 1.05 * high), log=wide)
     panel = Panel(
         "", x, Axis("Moves in position", "%", (0.0, 102.0)), tuple(lines), limits=(Limit((95.0,), "95 %", GREEN),)
     )

@@ -83,8 +83,9 @@ def leaf_words(it: Geometry) -> str:
 
 
 def _verified(found: Design) -> tuple[str, str]:
-    free, wanted = found.verification.free, found.spec.position.settling_time
-    said = f"Of {free.tried} simulated moves {hunting(free)}: {probability(free)}. {settling(free)}"
+    free, locked, wanted = found.verification.free, found.verification.locked, found.spec.position.settling_time
+    held = f" (with the joint locked, {hunting(locked)})" if locked.hunting else ""
+    said = f"Of {free.tried} simulated moves {hunting(free)}{held}: {probability(free)}. {settling(free)}"
     if wanted is None:
         return (VERMILLION if free.hunting else GREEN), f"{said}."
     met = free.slower_than(0.05) <= wanted
@@ -106,7 +107,11 @@ def probability(outcome: Outcome) -> str:
 
 def settling(outcome: Outcome) -> str:
     """Within what time moves settle."""
-    return f"Half of them settle in {seconds(outcome.slower_than(0.5))}, 95 % in {seconds(outcome.slower_than(0.05))}"
+    half, most = outcome.slower_than(0.5), outcome.slower_than(0.05)
+    if not math.isfinite(half):
+        return "Fewer than half of them settle"
+    rest = f"95 % in {seconds(most)}" if math.isfinite(most) else "fewer than 95 % at all"
+    return f"Half of them settle in {seconds(half)}, {rest}"
 
 
 def edge(corners: Corners) -> str:
@@ -184,8 +189,8 @@ def hertz(frequency: float) -> str:
 
 
 def seconds(time: float) -> str:
-    """A settling time; without end for moves that hunt."""
-    return with_unit(time, "s") if math.isfinite(time) else "no time (they hunt)"
+    """A settling time."""
+    return with_unit(time, "s") if math.isfinite(time) else "never"
 
 
 def percent(share: float) -> str:
