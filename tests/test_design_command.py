@@ -102,9 +102,10 @@ def finished(found: Design) -> Iterator[list[str]]:
 
 @pytest.fixture(scope="module")
 def written(spec: Path, finished: list[str], tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
-    """The folder of all files, written once, and the summary."""
+    """The folder of all files, written once with figures as SVG only, and the summary."""
     out = tmp_path_factory.mktemp("written") / "design"
-    with redirect_stdout(StringIO()) as said:
+    with redirect_stdout(StringIO()) as said, pytest.MonkeyPatch.context() as patch:
+        patch.setattr(matplotlib_renderer, "FORMATS", ("svg",))
         command(RIG, spec, out=out)
     return out, said.getvalue()
 
@@ -149,14 +150,13 @@ def _figures(found: Design) -> dict[str, Figure]:
 
 
 def test_all_files_are_written_and_the_stages_load(found: Design, folder: Path) -> None:
-    pictures = {f"{name}.{form}" for name in FIGURES for form in ("png", "svg", "pdf")}
+    pictures = {f"{name}.svg" for name in FIGURES}
     own = {"design.toml", "worst.toml", "design.html", "design_drawing.svg"}
     assert {path.name for path in folder.iterdir()} == pictures | own
     stage, worst = friso.load(folder / "design.toml"), friso.load(folder / "worst.toml")
     assert stage.flat()["joint.stiffness"] == pytest.approx(found.fitted.choice.beams.drive[0], rel=0.02)
     assert worst.flat()["friction.static"] == found.verification.worst.flat()["friction.static"]
     assert ElementTree.parse(folder / "design_drawing.svg").getroot().tag.endswith("svg")
-    assert (folder / "design_front.png").read_bytes().startswith(b"\x89PNG")
 
 
 def test_a_design_may_be_written_again(spec: Path, folder: Path, quick: None, capsys: pytest.CaptureFixture) -> None:
@@ -272,9 +272,13 @@ def test_edges_in_words(found: Design) -> None:
 
 
 def test_leaves_and_what_binds_them(found: Design) -> None:
+    excess = np.array([0.985, 0.2, 0.1, 0.6, 0.99])
+    tight = replace(found.fitted.choice, excess=excess)
+    found = replace(found, fitted=replace(found.fitted, choice=tight))
     said = " ".join(leaves_step(found).sentences)
     assert "The first mode that interferes with control is" in said
-    assert "what binds (less than 5 % to spare): " in said
+    names = "the cart must not break away inside the stroke and first interfering frequency"
+    assert f"what binds (less than 5 % to spare): {names}." in said
     assert f"Of the {len(found.candidates)} geometries on the front beams confirm" in said
     broken = replace(found.confirmed[0], stiffness=np.nan, frequency=np.nan, failure="no equilibrium")
     other = replace(found, confirmed=(broken, *found.confirmed[1:]))
@@ -282,26 +286,31 @@ def test_leaves_and_what_binds_them(found: Design) -> None:
     rows = requirement_rows(found)
     assert rows[0][0] == "the cart must not break away inside the stroke"
     assert rows[0][1:3] == ("friction.static, leaves.stroke", "1 N, 1 mm")
-    assert rows[0][3].endswith("%, binds")
+    assert [row[3] for row in rows] == ["98.5 %, binds", "20.0 %", "10.0 %", "60.0 %", "99.0 %, binds"]
+    loose = replace(found.fitted, choice=replace(tight, excess=excess / 2))
+    assert "no requirement binds but space and sheets" in " ".join(leaves_step(replace(found, fitted=loose)).sentences)
 
 
 def test_the_window_of_the_crossover(found: Design) -> None:
     above, below = upper(found), lower(found)
     assert [each.value for each in above] == sorted(each.value for each in above)
-    assert above[0].value == stiffest(found)
-    assert below[-1].value == pytest.approx(1.2 * found.edges.highest)
+    assert {48.0, stiffest(found)} <= {each.value for each in above}
+    assert 1.2 * found.edges.highest in {each.value for each in below}
     assert below[0].value < found.controller.crossover <= above[0].value
     said = " ".join(controller_step(found).sentences)
     assert "Not higher: it is bounded by" in said
     assert "Not lower: from below it is bounded by" in said
-    assert "More damping in the joint is not worth adding" in said
 
 
-def test_damping_that_is_worth_adding(found: Design) -> None:
-    better = replace(found.controller.damping, margins=np.array([0.3, 0.58, 0.6]))
-    said = controller_step(replace(found, controller=replace(found.controller, damping=better))).sentences[-1]
+def test_damping_that_is_worth_adding_or_not(found: Design) -> None:
+    def damped(*margins: float) -> str:
+        other = replace(found.controller.damping, margins=np.array(margins))
+        return controller_step(replace(found, controller=replace(found.controller, damping=other))).sentences[-1]
+
+    said = damped(0.3, 0.58, 0.6)
     assert said.startswith("Damping in the joint is worth adding: with its own damping of 0.5 N·s/m")
     assert "it is 0.58; more brings little" in said
+    assert damped(0.57, 0.59, 0.6).startswith("More damping in the joint is not worth adding")
 
 
 def test_moves_that_hunt_or_take_too_long(found: Design) -> None:

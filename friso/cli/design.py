@@ -127,9 +127,9 @@ def _print(found: Design, files: list[Path]) -> None:
         print(f"\n{number}. {step.title}")
         for sentence in step.sentences:
             _say(sentence, "   ")
-    pictures = sum(path.suffix == ".png" for path in files)
-    named = ", ".join(str(path) for path in files[: len(STAGES) + 2])
-    print(f"\nwrote {named}, and {pictures} figures as PNG, SVG and PDF")
+    named, pictures = files[: len(STAGES) + 2], files[len(STAGES) + 2 :]
+    figures = len({path.stem for path in pictures})
+    print(f"\nwrote {', '.join(map(str, named))}, and {figures} figures as PNG, SVG and PDF")
     print(f"next: friso check {files[0]}")
 
 
