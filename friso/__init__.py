@@ -3,8 +3,8 @@
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-import friso.equations.friction  # noqa: F401 (registers the friction laws with the stage file)
-import friso.flexure.joint  # noqa: F401 (registers what follows from leaf springs)
+import friso.equations.friction  # registers the friction laws with the stage file
+import friso.flexure.joint  # noqa: F401 (and what follows from leaf springs)
 from friso.stage import Stage, StageError, load, loads, save
 from friso.version import VERSION as __version__
 

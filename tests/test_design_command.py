@@ -25,7 +25,7 @@ from friso.design.edges import Corners
 from friso.design.geometry import Geometry, Sheet
 from friso.design.method import Design, NoDesign, Progress
 from friso.design.relax import Relaxation
-from friso.design.spec import Spec, load_spec
+from friso.design.spec import Position, Spec, load_spec
 from friso.quantities import StageError
 from friso.stage import Stage
 from friso.views import matplotlib_renderer, plotly_renderer
@@ -39,7 +39,7 @@ from friso.views.design_words import brings, edge, headline, outwards, refusal, 
 from friso.views.figure import Figure
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
-RIG, SPEC = EXAMPLES / "thesis_rig.toml", EXAMPLES / "thesis_spec.toml"
+RIG, SPEC = EXAMPLES / "thesis_rig.toml", EXAMPLES / "specs" / "thesis.toml"
 FIGURES = ("design_map", "design_front", "design_modes", "design_window", "design_damping", "design_settling")
 SMALL = {
     front: {"POPULATION": 40, "GENERATIONS": 25},
@@ -173,7 +173,7 @@ def test_the_document_has_the_agreed_keys(
     assert shown.err == ""
     assert document.keys() == {
         *("stage", "spec", "feasible", "needed", "machine_limit_hz", "without", "joint", "leaves", "front"),
-        *("controller", "verification", "files"),
+        *("controller", "verification", "files", "relax"),
     }
     assert (document["stage"], document["feasible"], document["needed"]) == ("Thesis rig", True, False)
     assert document["files"][0] == str(folder / "design.toml")
@@ -525,3 +525,22 @@ def test_exit_status(
     assert message in shown.err
     assert "Traceback" not in shown.err
     assert not (tmp_path / "out").exists()
+
+
+def test_a_specification_that_is_not_met_is_told(
+    spec: Path, folder: Path, quick: None, found: Design, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    """What there is is written all the same; the status is 2, and the message says what would be met."""
+    hurried = Position(window="1 um", settling_time="1 ms")  # type: ignore[arg-type]
+    less = replace(found, spec=found.spec.model_copy(update={"position": hurried}))
+    monkeypatch.setattr(method, "design", lambda stage, spec, progress: less)
+    with pytest.raises(typer.Exit) as left:
+        command(RIG, spec, out=folder, as_json=True)
+    assert left.value.exit_code == 2
+    shown = capsys.readouterr()
+    document = _strict(shown.out)
+    assert document["feasible"] is False
+    (relax,) = document["relax"]
+    assert relax["key"] == "position.settling_time"
+    assert relax["to"] > relax["from"] == 1e-3
+    assert "relax position.settling_time from 1 ms to" in shown.err

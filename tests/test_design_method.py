@@ -18,7 +18,7 @@ from friso.design.method import NoDesign, fitted, least_friction, leaves
 from friso.design.population import Population, corners
 from friso.design.prepare import prepared, with_leaves
 from friso.design.relax import relaxations
-from friso.design.requirements import PARASITIC, Task, requirements
+from friso.design.requirements import PARASITIC, RESERVE, Task, requirements
 from friso.design.spec import Spec, load_spec
 from friso.design.verification import Outcome, tried, verification
 from friso.flexure import beams as beams_module
@@ -88,7 +88,7 @@ def test_better_than_the_thesis_in_both(task: Task, candidates: list[Candidate])
     """At the thesis's own specification the method beats 70 x 45 x 0.35 mm in stiffness and in parasitic frequency."""
     thesis = Geometry(70e-3, 45e-3, 60e-3, Sheet(2.0, 0.35e-3, "stainless 1.4310"))
     own = closed(mechanisms(task.flat, sizes_of([thesis]), [thesis.sheet]).one(0), 1e-3)
-    choice = chosen(replace(task, crossover=42.0), candidates)
+    choice = chosen(replace(task, crossover=40.0), candidates)
     assert choice is not None
     assert choice.beams.drive[0] <= own.drive[0]
     assert own.interfering is not None
@@ -105,14 +105,14 @@ def test_requirements_by_the_evaluation(task: Task) -> None:
     excess = {each.name: float(each.excess(it)) for each in requirements(task)}
     weight = 9.80665 * 0.5
     assert excess["the cart must not break away inside the stroke"] == pytest.approx(1.1 * found.forces[-1] / 1.0)
-    assert excess["stress borne for ever"] == pytest.approx(1.3 / found.fatigue_margin)
-    assert excess["buckling under load"] == pytest.approx(3 * (10 + weight) / found.buckling)
+    assert excess["stress borne for ever"] == pytest.approx(RESERVE * 1.3 / found.fatigue_margin)
+    assert excess["buckling under load"] == pytest.approx(RESERVE * 3 * (10 + weight) / found.buckling)
     assert found.interfering is not None
     assert excess[PARASITIC] == pytest.approx(480 / found.interfering.frequency, rel=1e-6)
     edgewise = 10 / 2 * 30e-3 * 10e-3 / (0.3e-3 * 20e-3**3 / 12)
     along = (10 + weight) / 2 / (20e-3 * 0.3e-3)
     stress = 1.5 * (found.stress + edgewise + along)
-    assert excess["yield strength under stroke and load"] == pytest.approx(1.5 * stress / 1.3e9)
+    assert excess["yield strength under stroke and load"] == pytest.approx(RESERVE * 1.5 * stress / 1.3e9)
 
 
 def test_a_geometry_at_which_beams_fail_is_marked(

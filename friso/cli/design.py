@@ -34,7 +34,7 @@ def design(
 ) -> None:
     """From a specification to leaf springs, stroke and controller that do not hunt: design.toml, and why it is so.
 
-    Example: friso design examples/thesis_rig.toml examples/thesis_spec.toml --out design
+    Example: friso design examples/thesis_rig.toml examples/specs/thesis.toml --out design
     """
     from friso.design.method import NoDesign
     from friso.design.spec import load_spec
@@ -52,8 +52,13 @@ def design(
         from friso.views.design_document import design_document
 
         print(json.dumps(design_document(found) | {"files": [str(file) for file in files]}, allow_nan=False))
-        return
-    _print(found, files)
+    else:
+        _print(found, files)
+    if not found.meets:
+        from friso.views.design_words import shortfall
+
+        say(f"the design does not meet the specification: {shortfall(found)}")
+        raise typer.Exit(2)
 
 
 def _check_place(folder: Path, given: Sequence[Path]) -> None:

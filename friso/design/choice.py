@@ -9,9 +9,10 @@ import numpy as np
 
 from friso.design.front import Candidate, judged
 from friso.design.geometry import Geometry, mechanisms, rounded, sizes_of
-from friso.design.requirements import Requirement, Task, requirements
+from friso.design.requirements import Requirement, Task, requirements, total_load
 from friso.flexure.beams import BeamFailure, beams
 from friso.flexure.evaluation import Evaluation
+from friso.flexure.joint import first_interfering
 
 STEP = 1e-4
 """Sizes are whole multiples of this [m]."""
@@ -44,9 +45,9 @@ class Choice:
 
     @property
     def frequency(self) -> float:
-        """First interfering frequency [Hz]; infinite where no mode looked at interferes."""
+        """First interfering frequency [Hz], the lower one of both models: in one two modes may hide each other."""
         mode = self.beams.interfering
-        return mode.frequency if mode else np.inf
+        return min(mode.frequency if mode else np.inf, float(first_interfering(self.beams.mechanism)[0]))
 
 
 def chosen(task: Task, candidates: Sequence[Candidate]) -> Choice | None:
@@ -59,15 +60,18 @@ def chosen(task: Task, candidates: Sequence[Candidate]) -> Choice | None:
             passed.append(str(failure))
             continue
         choice = Choice(geometry, found, tuple(wanted), excess, tuple(passed))
-        if choice.frequency >= task.spec.safety.parasitic * task.crossover and _stays(task, found):
+        if choice.frequency >= task.spec.safety.parasitic * task.crossover and _bears(task, found):
             return choice
         passed.append(f"beams: {found.drive[0]:.4g} N/m, {choice.frequency:.4g} Hz")
     return None
 
 
-def _stays(task: Task, found: Evaluation) -> bool:
-    """Whether the cart does not break away inside the stroke."""
-    return bool(task.spec.safety.breakaway * found.forces[-1] <= task.friction)
+def _bears(task: Task, found: Evaluation) -> bool:
+    """Whether by beams, too, the cart does not break away inside the stroke and the leaves bear bending and load."""
+    safety = task.spec.safety
+    stays = safety.breakaway * found.forces[-1] <= task.friction
+    bent = np.isnan(found.fatigue_margin) or found.fatigue_margin >= safety.fatigue
+    return bool(stays and bent and found.buckling >= safety.buckling * total_load(found.mechanism, task))
 
 
 def _in_order(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -54,9 +54,16 @@ class Corners:
         return int(np.isnan(self.edges).sum())
 
 
-def edges_over(flat: Mapping[str, Any], population: Population, low: float, high: float, steps: int) -> Corners:
+def edges_over(
+    flat: Mapping[str, Any],
+    population: Population,
+    low: float,
+    high: float,
+    steps: int,
+    tell: Callable[[int, int], None] = lambda done, total: None,
+) -> Corners:
     """The edges of the stage `flat` in all corners, searched from `low` to `high` [Hz], tuned by van Dijk's rules: on a
-    grid, and between the last point at which a cycle attracts and the next."""
+    grid, and between the last point at which a cycle attracts and the next. `tell` gets steps done and steps in all."""
     whole = Ensemble.held(population.over({**flat, "controller.crossover": np.nan}), population.count)
     grid, every = np.log(np.geomspace(low, high, steps)), np.arange(population.count)
     attracts, known = _attracts(whole, np.repeat(every, steps), np.tile(grid, population.count))
@@ -64,7 +71,8 @@ def edges_over(flat: Mapping[str, Any], population: Population, low: float, high
     last = steps - 1 - attracts[:, ::-1].argmax(axis=1)
     inside, outside = grid[last], grid[np.minimum(last + 1, steps - 1)]
     open_ = np.flatnonzero(attracts.any(axis=1) & (last < steps - 1))
-    for _ in range(ROUNDS):
+    for k in range(ROUNDS):
+        tell(k + 1, ROUNDS + 1)
         middle = (inside[open_] + outside[open_]) / 2
         within, _ = _attracts(whole, open_, middle)
         inside[open_], outside[open_] = (

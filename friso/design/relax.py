@@ -76,15 +76,17 @@ def _over(name: str, limit: float, low: bool) -> Callable[[Mechanism], Any]:
 def _alone(task: Task, wanted: list[Requirement], k: int) -> Iterator[Relaxation]:
     """The least relaxation of requirement `k` with which the others can be met."""
     low, high = box(task.spec)
-    gauges = task.spec.leaves.thickness
-    bounds = np.log([[*low, min(gauges)], [*high, max(gauges)]]).T + np.log(BEYOND) * np.array([-1, 1])
+    gauges = np.sort(np.array(task.spec.leaves.thickness, dtype=float))
+    free = wanted[k].ways[0].key == "leaves.thickness"  # else a sheet that is to be had
+    ends = [[*low, gauges[0]], [*high, gauges[-1]]]
+    bounds = np.log(ends).T + np.log(BEYOND) * np.array([-1, 1])
     kinds = [(n, material) for n in task.spec.leaves.leaves for material in task.spec.leaves.materials]
 
     def built(x: np.ndarray) -> tuple[np.ndarray, list[Sheet]]:
         sizes = np.exp(x[:4]).T
-        return sizes[:, :3], [
-            Sheet(kinds[int(kind)][0], float(t), kinds[int(kind)][1]) for t, kind in zip(sizes[:, 3], x[4], strict=True)
-        ]
+        thickness = sizes[:, 3] if free else gauges[np.abs(np.log(gauges) - x[3][:, None]).argmin(axis=1)]
+        bought = [Sheet(kinds[int(n)][0], float(t), kinds[int(n)][1]) for t, n in zip(thickness, x[4], strict=True)]
+        return sizes[:, :3], bought
 
     def objective(x: np.ndarray) -> np.ndarray:
         many = mechanisms(task.flat, *built(x))

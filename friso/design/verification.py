@@ -65,13 +65,20 @@ class Outcome:
     @property
     def interval(self) -> tuple[float, float]:
         """The range that holds the probability of hunting with 95 % (Clopper and Pearson)."""
+        if not self.tried:
+            return 0.0, 1.0
         found = binomtest(self.hunting, self.tried).proportion_ci(0.95, method="exact")
         return float(found.low), float(found.high)
 
     def slower_than(self, share: float) -> float:
         """The settling time [s] that is exceeded by a share of the moves; infinite where more of them hunt."""
         times = np.where(np.isnan(self.settling), np.inf, self.settling)[self.completed]
-        return float(np.quantile(times, 1 - share, method="higher"))
+        return float(np.quantile(times, 1 - share, method="higher")) if times.size else np.inf
+
+    def followed(self, number: int) -> float:
+        """For how long [s] a machine was followed after its move."""
+        soon = self.settling[number] <= (1 - LAST) * FOLLOWED
+        return FOLLOWED if soon else LONGER * FOLLOWED
 
     @property
     def worst(self) -> int:
@@ -104,7 +111,7 @@ def verification(stage: Stage, spec: Spec, softening: float, progress: Callable[
             tried(own, machines.count, window, lambda done, name=name: progress(name, done, machines.count))
         )
     free, locked = outcomes
-    return Verification(machines, free, locked, _one(stage, machines.of(free.worst)))
+    return Verification(machines, free, locked, _one(stage, machines.of(free.worst), free.followed(free.worst)))
 
 
 def tried(
@@ -146,13 +153,13 @@ def _followed(flat: dict[str, Any], count: int, window: float, time: float, prog
     return found
 
 
-def _one(stage: Stage, keys: dict[str, float]) -> Stage:
-    """One of the machines with its move as a stage. Its joint is given by its numbers: of which size of the leaves its
-    stiffness is off is not told apart."""
+def _one(stage: Stage, keys: dict[str, float], time: float) -> Stage:
+    """One of the machines with its move as a stage, followed for a time [s] after the move. Its joint is given by its
+    numbers: of which size of the leaves its stiffness is off is not told apart."""
     flat = stage.flat()
     follow = ("joint.stiffness", "parasitic.frequency", "parasitic.mass", "parasitic.damping_ratio")
     joint = {key: float(flat[key]) for key in (*follow, "controller.tuned_mass")}
     moved = stage.replace({"motion": THERE_AND_BACK})
     corner = float(last_corner({**flat, **moved.flat(), **keys}))
-    numbers = joint | keys | {"motion.duration": corner + FOLLOWED}
+    numbers = joint | keys | {"motion.duration": corner + time}
     return moved.with_numbers(numbers, without=["flexure"])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,8 @@ from friso.design.choice import Confirmed
 from friso.design.edges import Corners
 from friso.design.front import Candidate
 from friso.design.geometry import Geometry
-from friso.design.method import Design, NoDesign
+from friso.design.method import SLOW, Design, NoDesign
+from friso.design.relax import Relaxation
 from friso.design.verification import Outcome
 from friso.stage.stage import numeric_keys
 from friso.views.design_control import parallel_gains
@@ -23,7 +25,8 @@ def design_document(found: Design) -> dict[str, Any]:
     document = {
         "stage": found.given.name,
         "spec": found.spec.name,
-        "feasible": True,
+        "feasible": found.meets,
+        "relax": _relax(found.unmet),
         "needed": found.needed,
         "machine_limit_hz": found.spec.limit,
         "without": _corners(found.without, found),
@@ -38,17 +41,15 @@ def design_document(found: Design) -> dict[str, Any]:
 
 def refused_document(stage: str, spec: str, failure: NoDesign) -> dict[str, Any]:
     """What there is to say where no design meets the specification."""
-    relax = [
-        {
-            "key": each.key,
-            "requirement": each.requirement,
-            "from": each.value,
-            "to": each.needed,
-            "unit": each.unit,
-        }
-        for each in failure.relaxed
+    told = {"stage": stage, "spec": spec, "feasible": False, "reason": failure.reason}
+    return _plain(told | {"relax": _relax(failure.relaxed)})
+
+
+def _relax(relaxed: Sequence[Relaxation]) -> list[dict[str, Any]]:
+    return [
+        {"key": it.key, "requirement": it.requirement, "from": it.value, "to": it.needed, "unit": it.unit}
+        for it in relaxed
     ]
-    return _plain({"stage": stage, "spec": spec, "feasible": False, "reason": failure.reason, "relax": relax})
 
 
 def _corners(it: Corners, found: Design) -> dict[str, Any]:
@@ -147,7 +148,7 @@ def _controller(found: Design) -> dict[str, Any]:
 
 def _verification(found: Design) -> dict[str, Any]:
     it, wanted = found.verification, found.spec.position.settling_time
-    met = None if wanted is None else it.free.slower_than(0.05) <= wanted
+    met = None if wanted is None else it.free.slower_than(SLOW) <= wanted
     return {**_outcome(it.free), "settling_time_met": met, "locked": _outcome(it.locked)}
 
 

@@ -151,10 +151,17 @@ def refusal(failure: NoDesign) -> str:
     if not failure.relaxed:
         tail = "no requirement is known that, relaxed alone, is enough: relax several"
         return f"{failure.reason}\n  {tail}"
-    return "\n  ".join([failure.reason, *map(_relaxation, failure.relaxed[:SHOWN])])
+    return "\n  ".join([failure.reason, *map(relaxation, failure.relaxed[:SHOWN])])
 
 
-def _relaxation(it: Relaxation) -> str:
+def shortfall(found: Design) -> str:
+    """What of the specification the design does not meet."""
+    free = found.verification.free
+    hunts = [f"of {free.tried} moves {hunting(free)}"] if free.hunting else []
+    return "; ".join([*hunts, *map(relaxation, found.unmet)])
+
+
+def relaxation(it: Relaxation) -> str:
     needed = outwards(it.needed, it.needed > it.value)
     said = f"relax {it.key} from {plain(it.value, it.unit)} to {plain(needed, it.unit)} ({it.requirement})"
     if it.geometry is None:

@@ -155,7 +155,8 @@ def _axis(axis: Axis) -> dict[str, Any]:
         positions, words = word_ticks(axis)
         settings |= {"tickmode": "array", "tickvals": positions, "ticktext": [html.escape(word) for word in words]}
     if axis.log:
-        settings["dtick"] = 1
+        decades = math.log10(axis.limits[1] / axis.limits[0]) if axis.limits else math.inf
+        settings["dtick"] = "D2" if decades < 2 else 1  # 1, 2, 5, 10 where decades alone are too few
     if axis.step:
         settings |= {"tick0": 0, "dtick": axis.step}
     if axis.limits:
