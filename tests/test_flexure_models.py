@@ -17,7 +17,7 @@ from friso.flexure.beam_system import BeamFailure, Leaves, Place
 from friso.flexure.beams import beams
 from friso.flexure.closed_model import closed
 from friso.flexure.joint import first_interfering
-from friso.flexure.mechanism import Body, Mechanism, block_inertia
+from friso.flexure.mechanism import Body, Mechanism, cube_inertia
 
 MANY = settings(max_examples=40, deadline=None, derandomize=True)
 FEW = settings(max_examples=10, deadline=None, derandomize=True)
@@ -39,7 +39,7 @@ def mechanism(
     it = Mechanism(
         leaves, length, width, thickness, spacing, 210e9, poisson, 7850.0, 1.1e9, 4e8, body, middle, middle, 0.01
     )
-    return replace(it, body=replace(body, inertia=block_inertia(it)))
+    return replace(it, body=replace(body, inertia=cube_inertia(it.body.mass)))
 
 
 @st.composite
@@ -180,7 +180,8 @@ def test_stiffness_at_the_stage(it: Mechanism, share: float) -> None:
     # the mechanism is softest along the motion, and its supports fall as it deflects
     assert straight[2, 2] < straight[1, 1] < straight[0, 0] * 1.0001 + straight[1, 1]
     assert closed_forms.support_x(it, share * it.length) <= closed_forms.support_x(it)
-    assert bent[0, 0] == pytest.approx(closed_forms.support_x(it, share * it.length), rel=0.03)
+    if it.length >= it.width:  # docs/flexure.md: from there on the closed forms hold
+        assert bent[0, 0] == pytest.approx(closed_forms.support_x(it, share * it.length), rel=0.03)
     assert bent[1, 1] == pytest.approx(closed_forms.support_y(it, share * it.length), rel=0.03)
 
 

@@ -14,7 +14,7 @@ import shells
 from friso.flexure.beams import beams
 from friso.flexure.closed_model import closed
 from friso.flexure.evaluation import Evaluation, Model
-from friso.flexure.mechanism import Body, Mechanism, block_inertia
+from friso.flexure.mechanism import Body, Mechanism, cube_inertia
 from friso.materials import materials
 
 MODELS: dict[str, Model] = {"closed forms": closed, "beams": beams}
@@ -63,7 +63,7 @@ def mechanism(name: str) -> Mechanism:
         Body(mass, (0.0, 0.0, 0.0), (length + beyond, 0.0, 0.0)),
         *((length / 2, 0.0, 0.0),) * 2,
     )
-    return Mechanism(**{**it.__dict__, "body": Body(mass, block_inertia(it), it.body.centre)})
+    return Mechanism(**{**it.__dict__, "body": Body(mass, cube_inertia(mass), it.body.centre)})
 
 
 @cache

@@ -54,12 +54,10 @@ def test_stiffness_and_parasitic_mode_follow(stage: Stage) -> None:
 
 
 def test_defaults_are_the_stated_ones(stage: Stage) -> None:
-    """Stage: an aluminium block at the leaf ends; actuator and sensor half-way along the leaves."""
+    """Stage: an aluminium cube at the leaf ends; actuator and sensor half-way along the leaves."""
     it = Mechanism.of(stage.flat())
-    block = 0.5 / (2700 * 0.045 * 0.06)
-    assert it.body.inertia == pytest.approx(
-        (0.5 / 12 * (0.045**2 + 0.06**2), 0.5 / 12 * (block**2 + 0.06**2), 0.5 / 12 * (block**2 + 0.045**2)), rel=1e-12
-    )
+    edge = (0.5 / 2700) ** (1 / 3)
+    assert it.body.inertia == pytest.approx((0.5 / 6 * edge**2,) * 3, rel=1e-12)
     assert it.body.centre == (0.07, 0.0, 0.0)
     assert it.actuation == it.sensor == (0.035, 0.0, 0.0)
     assert it.stress_concentration == 1.5

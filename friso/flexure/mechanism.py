@@ -19,7 +19,7 @@ GRAVITY = 9.80665
 """Standard acceleration of free fall [m/s^2]."""
 
 ALUMINIUM = 2700.0
-"""Density [kg/m^3] of the block that stands in for a stage whose inertia is not given."""
+"""Density [kg/m^3] of the cube that stands in for a stage whose inertia is not given."""
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,7 @@ class Mechanism:
             stress_concentration=own["stress_concentration"],
             load=own.get("load", 0.0),
         )
-        inertia = _triple(own, "inertia", block_inertia(bare))
+        inertia = _triple(own, "inertia", cube_inertia(bare.body.mass))
         actuation = _triple(own, "actuation", bare.actuation)
         return replace(
             bare,
@@ -143,11 +143,11 @@ class Mechanism:
         return (np.arange(int(self.leaves)) - (int(self.leaves) - 1) / 2) * float(self.spacing)
 
 
-def block_inertia(mechanism: Mechanism) -> tuple[Any, Any, Any]:
-    """Moments of inertia of an aluminium block of the stage's mass, as wide as the leaves and as deep as their row."""
-    mass, y, z = mechanism.body.mass, mechanism.width, mechanism.depth
-    x = mass / (ALUMINIUM * y * z)
-    return tuple(mass / 12 * (a**2 + b**2) for a, b in ((y, z), (x, z), (x, y)))  # type: ignore[return-value]
+def cube_inertia(mass: Any) -> tuple[Any, Any, Any]:
+    """Moments of inertia [kg m^2] of an aluminium cube of a mass [kg], which stands in for a stage whose own are not
+    known: it does not depend on the leaves."""
+    moment = mass / 6 * (mass / ALUMINIUM) ** (2 / 3)
+    return moment, moment, moment
 
 
 def _triple(own: Mapping[str, Any], name: str, default: tuple[Any, Any, Any]) -> tuple[Any, Any, Any]:

@@ -39,7 +39,7 @@ def warnings(found: Found) -> list[str]:
 def assumptions(found: Found) -> list[str]:
     """What stands in for keys that the stage file leaves out."""
     flat, it = found.stage.flat(), found.mechanism
-    said = [_centre(flat), _inertia(flat, it.depth, it.width), _points(flat), _load(flat)]
+    said = [_centre(flat), _inertia(flat, it.body.mass), _points(flat), _load(flat)]
     parts = [part for part in said if part]
     return [f"Assumed, since [flexure] does not say: {'; '.join(parts)}."] if parts else []
 
@@ -145,13 +145,10 @@ def _centre(flat: Mapping[str, Any]) -> str:
     return "" if "flexure.centre_x" in flat else "centre of mass in the middle of the leaf ends"
 
 
-def _inertia(flat: Mapping[str, Any], depth: float, width: float) -> str:
+def _inertia(flat: Mapping[str, Any], mass: float) -> str:
     if all(f"flexure.inertia_{axis}" in flat for axis in AXES):
         return ""
-    return (
-        f"moments of inertia of an aluminium block as wide as the leaves ({_size(width)} mm) and as deep as their row "
-        f"({_size(depth)} mm)"
-    )
+    return f"moments of inertia of an aluminium cube of {mass:g} kg"
 
 
 def _points(flat: Mapping[str, Any]) -> str:
