@@ -180,7 +180,7 @@ def test_stiffness_at_the_stage(it: Mechanism, share: float) -> None:
     # the mechanism is softest along the motion, and its supports fall as it deflects
     assert straight[2, 2] < straight[1, 1] < straight[0, 0] * 1.0001 + straight[1, 1]
     assert closed_forms.support_x(it, share * it.length) <= closed_forms.support_x(it)
-    if it.length >= it.width:  # docs/flexure.md: from there on the closed forms hold
+    if it.length >= it.width and it.poisson <= 0.35:  # where docs/flexure.md says that the closed forms hold
         assert bent[0, 0] == pytest.approx(closed_forms.support_x(it, share * it.length), rel=0.03)
     assert bent[1, 1] == pytest.approx(closed_forms.support_y(it, share * it.length), rel=0.03)
 
