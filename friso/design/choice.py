@@ -47,7 +47,7 @@ class Choice:
     def frequency(self) -> float:
         """First interfering frequency [Hz], the lower one of both models: in one two modes may hide each other."""
         mode = self.beams.interfering
-        return min(mode.frequency if mode else np.inf, float(first_interfering(self.beams.mechanism)[0]))
+        return min(mode.frequency if mode else np.inf, float(first_interfering(self.beams.mechanism)))
 
 
 def chosen(task: Task, candidates: Sequence[Candidate]) -> Choice | None:

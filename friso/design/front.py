@@ -83,4 +83,4 @@ def judged(task: Task, wanted: list[Requirement], sizes: np.ndarray, bought: lis
     """Geometries by closed forms."""
     many = mechanisms(task.flat, sizes, bought)
     excess = [np.broadcast_to(each.excess(many), (len(sizes),)) for each in wanted]
-    return Judged(closed_forms.drive_stiffness(many), first_interfering(many)[0], np.stack(excess, axis=1))
+    return Judged(closed_forms.drive_stiffness(many), first_interfering(many), np.stack(excess, axis=1))

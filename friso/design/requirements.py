@@ -103,7 +103,7 @@ def requirements(task: Task) -> list[Requirement]:
         Requirement(
             PARASITIC,
             (factor("safety.parasitic", safety.parasitic),),
-            lambda it: safety.parasitic * task.crossover / first_interfering(it)[0],
+            lambda it: safety.parasitic * task.crossover / first_interfering(it),
         ),
         *_support(spec, stroke),
     ]

@@ -113,7 +113,7 @@ def modes(it: Mechanism, leaf: Reduced) -> tuple[Mode, ...]:
         moved = np.einsum("nce,les,s->lnc", leaf.static[:, :3], ends, vector[stage])
         moved += np.einsum("ncm,lm->lnc", leaf.inner[:, :3], own)
         found.append(_mode(it, np.sqrt(max(square, 0.0)) / (2 * np.pi), vector[stage], moved))
-    drive = next((mode for mode in found if mode.name == "drive"), found[0])
+    drive = max(found, key=lambda mode: abs(mode.stage[2]) / mode.frequency if mode.frequency else np.inf)
     return (replace(drive, name="drive"), *(mode for mode in found if mode is not drive))
 
 

@@ -20,9 +20,13 @@ SHEAR = 5 / 6
 CLAMPED = 4.730040744862704
 """First root of cos x cosh x = 1: a beam between clamps."""
 
-BENDING_MASS = 0.1726
-"""Share of a leaf's mass that takes part where its first bending mode is driven from one end: half of the base motion,
-the other half being a motion that is odd about the middle; 0.25 x 0.690."""
+WITH_STAGE, WITH_TURN = 0.41543, 0.08939
+"""Mean over a leaf of its first bending mode, of mean square 1, times the shape that it takes statically when the stage
+moves along the motion, and when it turns about the width (per length of the leaf)."""
+
+LATERAL = 9.229
+"""Force across the end of a leaf, over sqrt(E I G J)/L^2, at which the leaf gives way sideways: it twists and bends,
+theta'' = -p^2 m (m theta - mean of m theta), m = 1 - x/L, theta = 0 at both clamps, the stage free to follow."""
 
 
 def drive_stiffness(it: Mechanism) -> Any:
@@ -116,9 +120,10 @@ def leaf_torsion(it: Mechanism) -> Any:
     return rate**2 * np.sqrt(quotient * rigidity / it.density) / (2 * np.pi)
 
 
-def leaf_participation(it: Mechanism) -> Any:
-    """Share of the stage's mass that the in-phase bending mode of the leaves takes with it."""
-    return BENDING_MASS * it.leaves * it.leaf_mass / it.body.mass
+def lateral_load(it: Mechanism) -> Any:
+    """Force across the leaves, along their width at the leaf ends and borne by all of them, at which they give way."""
+    twist = it.shear * plate.torsion_constant(it.width, it.thickness)
+    return it.leaves * LATERAL * np.sqrt(it.young * it.bending * twist) / it.length**2
 
 
 def stage_stiffness(it: Mechanism) -> np.ndarray:
@@ -201,12 +206,20 @@ def _symmetric(it: Mechanism, entries: dict[tuple[int, int], Any]) -> np.ndarray
     return matrices
 
 
-def stage_modes(it: Mechanism) -> tuple[np.ndarray, np.ndarray]:
-    """Frequencies, shape (..., 6), ascending, and shapes, (..., 6, 6), one per column at unit modal mass, of the stage
-    on leaves without inner modes; NaN where the numbers make no mechanism."""
+def modes(it: Mechanism) -> tuple[np.ndarray, np.ndarray]:
+    """Frequencies, shape (..., 7), ascending, and shapes, (..., 7, 7), one per column at unit modal mass, of the stage
+    (six coordinates) and the leaves that bend all alike in their first mode (the seventh, at its unit modal mass), the
+    leaves following the stage statically besides (Craig & Bampton 1968, doi:10.2514/3.4741); NaN where the numbers make
+    no mechanism."""
     mass, stiffness = stage_mass(it), stage_stiffness(it)
+    mass, stiffness = (np.pad(each, [(0, 0)] * (each.ndim - 2) + [(0, 1), (0, 1)]) for each in (mass, stiffness))
+    together = np.sqrt(it.leaves * it.leaf_mass)
+    for coordinate, coupling in ((2, WITH_STAGE * together), (4, WITH_TURN * together * it.length)):
+        mass[..., coordinate, 6] = mass[..., 6, coordinate] = coupling
+    mass[..., 6, 6] = 1.0
+    stiffness[..., 6, 6] = (2 * np.pi * leaf_bending(it)) ** 2
     possible = np.isfinite(mass + stiffness).all(axis=(-2, -1)) & (np.einsum("...ii->...i", mass) > 0).all(axis=-1)
-    factor = np.linalg.cholesky(np.where(possible[..., None, None], mass, np.eye(6)))
+    factor = np.linalg.cholesky(np.where(possible[..., None, None], mass, np.eye(7)))
     inverse = np.linalg.inv(factor)
     turned = np.swapaxes(inverse, -1, -2)
     squares, vectors = np.linalg.eigh(inverse @ np.where(possible[..., None, None], stiffness, 0.0) @ turned)
@@ -214,6 +227,8 @@ def stage_modes(it: Mechanism) -> tuple[np.ndarray, np.ndarray]:
     return np.where(possible[..., None], frequencies, np.nan), turned @ vectors
 
 
-def drive_mode(shapes: np.ndarray) -> np.ndarray:
-    """Which of the stage's modes, shapes (..., 6, modes), moves most along the motion."""
-    return np.argmax(np.abs(shapes[..., 2, :]), axis=-1)
+def drive_mode(frequencies: np.ndarray, shapes: np.ndarray) -> np.ndarray:
+    """Which of the modes, (..., modes) and shapes (..., 7, modes), is the drive mode: that which yields most to a steady
+    force along the motion."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.argmax(np.nan_to_num((shapes[..., 2, :] / frequencies) ** 2, posinf=np.inf), axis=-1)

@@ -41,20 +41,22 @@ def closed(mechanism: Mechanism, stroke: float) -> Evaluation:
 
 
 def _modes(it: Mechanism) -> tuple[Mode, ...]:
-    """Those of the stage on leaves that follow it, and the first bending modes and torsion of the leaves."""
-    frequencies, shapes = closed_forms.stage_modes(it)
-    drive = int(closed_forms.drive_mode(shapes))
-    first = replace(_stage_mode(it, frequencies[drive], shapes[:, drive]), name="drive")
-    others = [_stage_mode(it, frequencies[k], shapes[:, k]) for k in range(6) if k != drive]
-    return (first, *sorted([*others, *_bending_modes(it), _torsion_mode(it)], key=lambda mode: mode.frequency))
+    """Those of the stage and of leaves that bend alike, and those of leaves with the stage at rest."""
+    frequencies, shapes = closed_forms.modes(it)
+    drive = int(closed_forms.drive_mode(frequencies, shapes))
+    first = replace(_mode(it, frequencies[drive], shapes[:, drive]), name="drive")
+    others = [_mode(it, frequencies[k], shapes[:, k]) for k in range(7) if k != drive]
+    return (first, *sorted([*others, *_unlike(it), _torsion_mode(it)], key=lambda mode: mode.frequency))
 
 
-def _stage_mode(it: Mechanism, frequency: float, shape: np.ndarray) -> Mode:
-    leaves = following(it, shape)
-    actuator, sensor = (float(along_motion(it, point, shape[:, None])[0]) for point in (it.actuation, it.sensor))
+def _mode(it: Mechanism, frequency: float, shape: np.ndarray) -> Mode:
+    """A mode of the stage's six coordinates and the bending of the leaves."""
+    stage, leaves = shape[:6], following(it, shape[:6])
+    leaves[:, :, 2] += shape[6] / np.sqrt(it.leaves * it.leaf_mass) * _clamped_shape()
+    actuator, sensor = (float(along_motion(it, point, stage[:, None])[0]) for point in (it.actuation, it.sensor))
     arm = np.array(it.body.centre) - np.array([it.length, 0.0, 0.0])
-    name = mode_name(shape, it.body.mass, np.array(it.body.inertia), arm, leaves, it.leaf_mass)
-    return Mode(name, float(frequency), actuator, sensor, peak_of(it, actuator, sensor), shape, leaves)
+    name = mode_name(stage, it.body.mass, np.array(it.body.inertia), arm, leaves, it.leaf_mass)
+    return Mode(name, float(frequency), actuator, sensor, peak_of(it, actuator, sensor), stage, leaves)
 
 
 def following(it: Mechanism, stage: np.ndarray) -> np.ndarray:
@@ -77,28 +79,22 @@ def following(it: Mechanism, stage: np.ndarray) -> np.ndarray:
     )
 
 
-def _bending_modes(it: Mechanism) -> list[Mode]:
-    """The first bending mode of the leaves: all alike, against the stage, and as often again with the stage at rest."""
+def _unlike(it: Mechanism) -> list[Mode]:
+    """The first bending mode of the leaves against each other, the stage at rest."""
     count, own = int(it.leaves), float(it.leaf_mass)
-    shape = _clamped_shape(np.linspace(0.0, 1.0, POINTS))
-    frequency, share = float(closed_forms.leaf_bending(it)), float(closed_forms.leaf_participation(it))
-    modes = []
-    for k in range(count):
-        wave = np.cos(np.pi * k * (np.arange(count) + 0.5) / count)  # orthogonal patterns, the first all alike
+    found = []
+    for k in range(1, count):
+        wave = np.cos(np.pi * k * (np.arange(count) + 0.5) / count)  # orthogonal patterns
         leaves = np.zeros((count, POINTS, 3))
-        leaves[:, :, 2] = wave[:, None] * shape / np.sqrt(own * np.sum(wave**2))
-        stage = np.zeros(6)
-        stage[2] = -np.sqrt(share / it.body.mass) if k == 0 else 0.0
-        at = float(stage[2])
-        own_frequency = frequency * np.sqrt(1 + share) if k == 0 else frequency
-        name = "leaf bending, in phase" if k == 0 else "leaf bending, out of phase"
-        modes.append(Mode(name, own_frequency, at, at, peak_of(it, at, at), stage, leaves + following(it, stage)))
-    return modes
+        leaves[:, :, 2] = wave[:, None] * _clamped_shape() / np.sqrt(own * np.sum(wave**2))
+        frequency = float(closed_forms.leaf_bending(it))
+        found.append(Mode("leaf bending, out of phase", frequency, 0.0, 0.0, 0.0, np.zeros(6), leaves))
+    return found
 
 
-def _clamped_shape(s: np.ndarray) -> np.ndarray:
-    """First bending mode of a beam between clamps, its mean square 1."""
-    x = CLAMPED * s
+def _clamped_shape() -> np.ndarray:
+    """First bending mode of a beam between clamps at even places, its mean square 1."""
+    x = CLAMPED * np.linspace(0.0, 1.0, POINTS)
     ratio = (np.cosh(CLAMPED) - np.cos(CLAMPED)) / (np.sinh(CLAMPED) - np.sin(CLAMPED))
     return np.cosh(x) - np.cos(x) - ratio * (np.sinh(x) - np.sin(x))
 

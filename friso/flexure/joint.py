@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,9 @@ from friso.flexure.mechanism import Mechanism, along_motion
 from friso.quantities import StageError
 from friso.stage.flexure import register_derivation
 
+LEAST = 1e-9
+"""Residue, times the stage's mass, below which it makes no difference: the equations need a parasitic mass."""
+
 
 @register_derivation("flexure")
 def joint_keys(flat: Mapping[str, Any]) -> dict[str, Any]:
@@ -20,7 +24,7 @@ def joint_keys(flat: Mapping[str, Any]) -> dict[str, Any]:
     StageError where a single mechanism buckles under its load."""
     with np.errstate(all="ignore"):  # numbers that make no mechanism are found out by the rules of the stage file
         it = Mechanism.of(flat)
-        frequency, share = first_interfering(it)
+        frequency, share = parasitic_mode(it)
         stiffness, buckling = closed_forms.loaded_drive_stiffness(it), closed_forms.buckling_load(it)
     if np.ndim(stiffness) == 0 and it.load >= buckling > 0:
         expected = f"less than the buckling load of the leaves, {float(buckling):.4g} N"
@@ -34,22 +38,43 @@ def joint_keys(flat: Mapping[str, Any]) -> dict[str, Any]:
     return {key: value if np.ndim(value) else float(value) for key, value in found.items()}
 
 
-def first_interfering(it: Mechanism) -> tuple[Any, Any]:
-    """Frequency [Hz] of the lowest mode, but for the drive mode, that actuator and sensor see, and its residue times
-    the stage's mass: how much more of a mass it is than the stage is.
+@dataclass(frozen=True)
+class Seen:
+    """The modes of mechanisms but for the drive mode, arrays of shape (..., 7): frequency [Hz], and residue times the
+    mass of the stage, whose sign tells whether actuator and sensor move alike; those at the drive mode are 0."""
 
-    The model of the equations, a part m_p of the stage's mass m on a spring, has the residue m_p/(m (m - m_p)).
+    frequency: np.ndarray
+    residue: np.ndarray
+    visible: np.ndarray
+
+    @classmethod
+    def of(cls, it: Mechanism) -> Seen:
+        frequency, shapes = closed_forms.modes(it)
+        motion = along_motion(it, it.actuation, shapes) * along_motion(it, it.sensor, shapes)
+        own = np.arange(7) != closed_forms.drive_mode(frequency, shapes)[..., None]
+        residue = np.where(own, motion * np.asarray(it.body.mass)[..., None], 0.0)
+        return cls(frequency, residue, np.abs(residue) > VISIBLE * 2 * np.asarray(it.damping_ratio)[..., None])
+
+    def at(self, mode: np.ndarray) -> tuple[Any, Any]:
+        """Frequency [Hz] and residue, each (...), of one mode each; no frequency is infinite, its residue 0."""
+        picked = [np.take_along_axis(each, mode[..., None], axis=-1)[..., 0] for each in (self.frequency, self.residue)]
+        return np.where(self.visible.any(axis=-1), picked[0], np.inf)[()], picked[1][()]
+
+
+def first_interfering(it: Mechanism) -> Any:
+    """Frequency [Hz] of the lowest mode, but for the drive mode, that actuator and sensor see; infinite without one."""
+    seen = Seen.of(it)
+    return seen.at(np.argmin(np.where(seen.visible, seen.frequency, np.inf), axis=-1))[0]
+
+
+def parasitic_mode(it: Mechanism) -> tuple[Any, Any]:
+    """Frequency [Hz] and residue, times the stage's mass, of the mode whose resonance stands highest in the plant: the
+    largest residue over the square of the frequency. That of the leaves where none is seen.
+
+    The model of the equations, a part m_p of the stage's mass m on a spring, has the residue m_p/(m (m - m_p)); it
+    knows none below 0, of modes in which actuator and sensor move against each other, of which the size counts here.
     """
-    leaf = closed_forms.leaf_participation(it)
-    inner = closed_forms.leaf_bending(it) * np.sqrt(1 + leaf)
-    inner = np.where(leaf > VISIBLE * 2 * it.damping_ratio, inner, np.inf)
-    frequencies, shapes = closed_forms.stage_modes(it)
-    seen = np.abs(along_motion(it, it.actuation, shapes) * along_motion(it, it.sensor, shapes))
-    residues = seen * np.asarray(it.body.mass)[..., None]
-    heights = residues / (2 * np.asarray(it.damping_ratio)[..., None])
-    drive = np.arange(6) == closed_forms.drive_mode(shapes)[..., None]
-    rigid = np.where((heights > VISIBLE) & ~drive, frequencies, np.inf)
-    first = np.argmin(rigid, axis=-1)[..., None]
-    lowest, residue = (np.take_along_axis(each, first, axis=-1)[..., 0] for each in (rigid, residues))
-    leaves_first = inner <= lowest
-    return np.where(leaves_first, inner, lowest)[()], np.where(leaves_first, leaf, residue)[()]
+    seen = Seen.of(it)
+    frequency, residue = seen.at(np.argmax(np.abs(seen.residue) / np.maximum(seen.frequency, 1e-9) ** 2, axis=-1))
+    leaves = closed_forms.leaf_bending(it)
+    return np.where(np.isfinite(frequency), frequency, leaves)[()], np.maximum(np.abs(residue), LEAST)[()]

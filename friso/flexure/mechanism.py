@@ -70,17 +70,18 @@ class Mechanism:
             yield_strength=own["yield"],
             fatigue=own.get("fatigue", np.nan),
             body=Body(flat["masses.stage"], (0.0, 0.0, 0.0), (own["length"], 0.0, 0.0)),
-            actuation=(own["length"] / 2, 0.0, 0.0),
-            sensor=(own["length"] / 2, 0.0, 0.0),
+            actuation=(own["length"], 0.0, 0.0),
+            sensor=(own["length"], 0.0, 0.0),
             damping_ratio=own["damping_ratio"],
             stress_concentration=own["stress_concentration"],
             load=own.get("load", 0.0),
         )
         inertia = _triple(own, "inertia", cube_inertia(bare.body.mass))
-        actuation = _triple(own, "actuation", bare.actuation)
+        centre = _triple(own, "centre", bare.body.centre)
+        actuation = _triple(own, "actuation", centre)
         return replace(
             bare,
-            body=Body(bare.body.mass, inertia, _triple(own, "centre", bare.body.centre)),
+            body=Body(bare.body.mass, inertia, centre),
             actuation=actuation,
             sensor=_triple(own, "sensor", actuation),
         )
