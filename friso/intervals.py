@@ -18,6 +18,8 @@ class Interval:
     low: float
     high: float
     text: str
+    single: bool = False
+    """Whether a single value was given, not a range."""
 
     @property
     def centre(self) -> float:
@@ -64,11 +66,12 @@ class Span:
         except StageError as error:
             hint = error.given if error.given != quoted(given) else error.expected
             raise self._refused(given, f"of which {hint}") from None
+        single = not any(mark in text for mark in ("..", "+/-", "±"))
         if not low <= high:
             raise self._refused(given, "a reversed range")
         if not (self.of.bound.holds(low) and self.of.bound.holds(high)):
             raise self._refused(given, f"reaches from {low:g} to {high:g} {self.of.unit}".rstrip())
-        return Interval(low, high, str(getattr(given, "text", given)))
+        return Interval(low, high, str(getattr(given, "text", given)), single)
 
     def _refused(self, given: Any, hint: str) -> StageError:
         return StageError("", quoted(given, hint), self.expected, self.written_example)

@@ -47,12 +47,13 @@ def test_rules_of_design_hold_and_differ(monkeypatch: pytest.MonkeyPatch) -> Non
     monkeypatch.setattr(design_rules, "_needed_ratio", lambda: 9.0)
     assert judged(HOLD).judgement == "holds"
     monkeypatch.setattr(design_rules, "_needed_ratio", lambda: 17.0)
+    monkeypatch.setattr(design_rules, "_margins_at_the_top", lambda: {"locked": 0.0, "free": 0.3})
     assert judged(DIFFER).judgement == "differs"
 
 
 def test_the_ratio_of_the_parasitic_mode_is_computed() -> None:
     """At a ratio just below the one found, the margin is too small; from it on, never."""
-    from friso.design.controller import settled_margin
+    from friso.frequency.crossover import settled_margin
     from friso.studies.thesis.studies import rig
 
     ratio = design_rules._needed_ratio()

@@ -3,6 +3,7 @@
 from dataclasses import replace
 from pathlib import Path
 
+import control
 import numpy as np
 import pytest
 
@@ -10,11 +11,12 @@ import friso
 from friso.design import front as front_module
 from friso.design import relax as relax_module
 from friso.design.choice import chosen, confirmed
-from friso.design.controller import comfortable_below, controller, dampings, settled_margin
+from friso.design.controller import comfortable_below, controller, dampings
 from friso.design.edges import Corners, edges_over, rigid
 from friso.design.front import Candidate, front, judged
 from friso.design.geometry import Geometry, Sheet, box, mechanisms, sheets, sizes_of
 from friso.design.method import NoDesign, fitted, least_friction, leaves
+from friso.design.modal import Modal
 from friso.design.population import Population, corners
 from friso.design.prepare import prepared, with_leaves
 from friso.design.relax import relaxations
@@ -22,9 +24,13 @@ from friso.design.requirements import PARASITIC, RESERVE, Task, requirements
 from friso.design.spec import Spec, load_spec
 from friso.design.verification import Outcome, tried, verification
 from friso.flexure import beams as beams_module
+from friso.flexure import closed_forms
 from friso.flexure.beams import BeamFailure
 from friso.flexure.closed_model import closed
-from friso.frequency.crossover import limits
+from friso.flexure.evaluation import Evaluation
+from friso.flexure.mechanism import Mechanism
+from friso.frequency.crossover import limits, settled_margin
+from friso.frequency.tuning import Tuning
 from friso.hunting.margin import margin
 from friso.stage import Stage
 
@@ -103,16 +109,29 @@ def test_requirements_by_the_evaluation(task: Task) -> None:
     it = mechanisms(task.flat, sizes_of([geometry]), [geometry.sheet]).one(0)
     found = closed(it, task.stroke)
     excess = {each.name: float(each.excess(it)) for each in requirements(task)}
-    weight = 9.80665 * 0.5
-    assert excess["the cart must not break away inside the stroke"] == pytest.approx(1.1 * found.forces[-1] / 1.0)
-    assert excess["stress borne for ever"] == pytest.approx(RESERVE * 1.3 / found.fatigue_margin)
-    assert excess["buckling under load"] == pytest.approx(RESERVE * 3 * (10 + weight) / found.buckling)
+    weight = 9.80665 * 0.525  # of the heaviest stage
+    assert excess["the cart must not break away inside the stroke"] == pytest.approx(1.1 * 1.1 * found.forces[-1])
+    bent, twisted = 195e9 * 20e-3 * 0.3e-3**3 / 12, 75e9 * 20e-3 * 0.3e-3**3 / 3
+    across = 1 / (2 * 9.23 * np.sqrt(bent * twisted) / 60e-3**2)  # J of a strip; 1 % less for its finite width
+    assert excess["buckling under load"] == pytest.approx(
+        RESERVE * 3 * ((5 + weight) / found.buckling + across), rel=0.01
+    )
     assert found.interfering is not None
     assert excess[PARASITIC] == pytest.approx(480 / found.interfering.frequency, rel=1e-6)
-    edgewise = 10 / 2 * 30e-3 * 10e-3 / (0.3e-3 * 20e-3**3 / 12)
-    along = (10 + weight) / 2 / (20e-3 * 0.3e-3)
-    stress = 1.5 * (found.stress + edgewise + along)
-    assert excess["yield strength under stroke and load"] == pytest.approx(RESERVE * 1.5 * stress / 1.3e9)
+    # a force across the leaf ends turns the stage about z: each leaf is a cantilever (by the stiffness of the stage)
+    moved = np.linalg.solve(closed_forms.stage_stiffness(it), [0, 1, 0, 0, 0, 0])
+    root = -(closed_forms.stage_stiffness(replace_leaves(it)) @ moved)[5] + 60e-3 * 0.5
+    assert root == pytest.approx(0.5 * 60e-3, rel=1e-6)
+    stress = 1.5 * (root * 10e-3 / (0.3e-3 * 20e-3**3 / 12) + (5 + weight) / 2 / (20e-3 * 0.3e-3))
+    assert excess["stress borne for ever"] == pytest.approx(RESERVE * 1.3 * (1 / found.fatigue_margin + stress / 1.3e9))
+    assert excess["yield strength under stroke and load"] == pytest.approx(
+        RESERVE * 1.5 * (found.clamp_stress + stress) / 1.3e9
+    )
+
+
+def replace_leaves(it: Mechanism) -> Mechanism:
+    """One leaf in the middle instead of two, whose moment at its root is asked for."""
+    return replace(it, leaves=1.0)
 
 
 def test_a_geometry_at_which_beams_fail_is_marked(
@@ -183,10 +202,57 @@ def test_corners_without_hunting_and_with_no_end() -> None:
     none = Corners(some, np.zeros(3), (1.0, 40.0))
     assert not none.hunts
     assert none.highest == 1.0
-    endless = Corners(some, np.array([0.0, np.inf, np.nan]), (1.0, 40.0))
+    endless = Corners(some, np.array([0.0, np.inf, 3.0]), (1.0, 40.0), unknown=1)
     assert endless.hunts
-    assert endless.unknown == 1
+    assert endless.worst == 1
     assert np.isinf(endless.highest)
+
+
+def test_a_stage_that_never_hunts_has_no_edge(base: Stage) -> None:
+    """Almost no gap: no cycle attracts anywhere, and none is searched for between."""
+    some = Population({"friction.coulomb": np.array([2.999, 2.998])}, 2)
+    found = edges_over(rigid(base.flat()), some, 4.0, 40.0, 3)
+    assert not found.hunts
+    assert found.highest == 4.0
+
+
+def test_modes_count_in_the_margin(base: Stage, task: Task) -> None:
+    """With the one mode that the equations have, the margin is theirs; where actuator and sensor move against each
+    other the loop is found unstable, as the poles of the state space are."""
+    leaves_ = Geometry(60e-3, 18e-3, 50e-3, Sheet(2.0, 0.3e-3, "stainless 1.4310"))
+    stage = with_leaves(base, leaves_, 1e-3).replace({"controller.crossover": "40 Hz"})
+    found = beams_module.beams(Mechanism.of(stage.flat()), 1e-3)
+    assert Modal.of(stage.flat(), found).margin(np.array([40.0]))[0] == pytest.approx(
+        settled_margin(stage.flat()), rel=0.01
+    )
+    opposite = stage.replace({"flexure.actuation_y": "30 mm", "flexure.sensor_y": "-30 mm"})
+    against = beams_module.beams(Mechanism.of(opposite.flat()), 1e-3)
+    modal = Modal.of(opposite.flat(), against)
+    for crossover in (20.0, 40.0):
+        tuned = opposite.replace({"controller.crossover": f"{crossover} Hz"})
+        assert (modal.margin(np.array([crossover]))[0] > 0) == (rightmost(tuned, against) < 0)
+    assert modal.margin(np.array([40.0]))[0] == 0
+
+
+def rightmost(stage: Stage, leaves_: Evaluation) -> float:
+    """Real part [1/s] of the rightmost closed-loop pole with all modes, over the stuck and the sliding cart."""
+    rigid_joint = {key: float(stage.flat()[key]) for key in ("joint.stiffness",)}
+    bare = stage.replace({"flexure": None, **{key: f"{value!r} N/m" for key, value in rigid_joint.items()}})
+    found = []
+    for state in ("stuck", "sliding"):
+        plant = friso.linear(bare, state)["stage", "force"]
+        for mode in leaves_.modes[1:]:
+            omega = 2 * np.pi * mode.frequency
+            plant = plant + control.tf2ss(mode.actuator * mode.sensor, [1, 2 * 0.01 * omega, omega**2])
+        k_p, tau_z, tau_i, tau_p = (getattr(tuned_gains(stage), name) for name in ("k_p", "tau_z", "tau_i", "tau_p"))
+        loop = control.tf(k_p * np.array([tau_z, 1 + tau_z / tau_i, 1 / tau_i]), [tau_p, 1, 0])
+        found.append(control.feedback(plant * control.tf2ss(loop), 1).poles().real.max())
+    return max(found)
+
+
+def tuned_gains(stage: Stage) -> Tuning:
+    flat = stage.flat()
+    return friso.tuning(*(flat[f"controller.{name}"] for name in ("crossover", "alpha", "beta", "tuned_mass")))
 
 
 def test_the_crossover_is_comfortable_and_damping_helps(base: Stage) -> None:
@@ -195,8 +261,8 @@ def test_the_crossover_is_comfortable_and_damping_helps(base: Stage) -> None:
     found = limits(stage.flat())
     assert comfortable_below(found, 43.0) == pytest.approx(43.0)
     assert comfortable_below(found, 20.0) < 12.0  # type: ignore[operator]  # a gap: the joint is hardly damped
-    known = controller(stage, found, corners(SPEC, stage.flat()))
-    assert known.margin == pytest.approx(settled_margin(stage.flat()))
+    known = controller(stage, beams_module.beams(Mechanism.of(stage.flat()), 1e-3), found, corners(SPEC, stage.flat()))
+    assert known.margin == pytest.approx(settled_margin(stage.flat()), rel=0.01)
     assert known.margin >= 0.5
     worth = known.damping.worth
     assert known.damping.margins[worth] >= 0.95 * known.damping.margins.max()

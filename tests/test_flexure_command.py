@@ -214,7 +214,7 @@ def test_the_table_and_the_sentences(path: Path, capsys: pytest.CaptureFixture, 
     assert "is not known (flexure.fatigue)" in said
     assert "Assumed, since [flexure] does not say: centre of mass in the middle of the leaf ends" in said
     assert "aluminium cube of 0.5 kg" in said
-    assert "actuation at half the leaf length, sensor at the point of actuation" in said
+    assert "actuation at the centre of mass of the stage, sensor at the point of actuation" in said
 
 
 def test_the_table_has_a_row_for_each_mode_by_name(found: Found) -> None:
@@ -257,6 +257,23 @@ def test_models_that_differ_are_a_warning(found: Found) -> None:
     other = replace(found, beams=replace(found.beams, stress=found.beams.stress * 0.8, drive=found.beams.drive * 2))
     (said,) = (said for said in warnings(other) if "differ" in said)
     assert "drive stiffness by -50 % and stress by +2" in said
+
+
+def test_actuator_and_sensor_that_move_against_each_other_are_a_warning(stage: Stage) -> None:
+    sound = {"flexure.material": "stainless 1.4310", **MATERIAL}
+    across = {"flexure.actuation_y": "20 mm"}
+    alike, against = (
+        evaluated(stage.replace({**sound, **across, "flexure.sensor_y": place})) for place in ("20 mm", "-20 mm")
+    )
+    assert warnings(alike) == []
+    (said,) = warnings(against)
+    modes = [mode for mode in against.best.modes[1:] if mode.interferes and mode.actuator * mode.sensor < 0]
+    assert "stage about x" in [mode.name for mode in modes]
+    named = " and ".join(f"{mode.name} ({mode.frequency / 1e3:.2f} kHz)" for mode in modes)
+    assert said.startswith(f"In {named} actuator and sensor move against each other.")
+    assert "cannot damp that by phase" in said
+    assert "[parasitic], which knows only the size of a mode, makes the loop look better than it is" in said
+    assert "actuation along x at the centre of mass of the stage" in " ".join(assumptions(against))
 
 
 def test_only_what_is_left_out_is_assumed(stage: Stage) -> None:

@@ -41,6 +41,7 @@ KINDS = {
     "stage uz": "drive",
     "stage uy": "stage along y",
     "stage rx": "stage about x",
+    "stage ry": "stage about y",
     "stage rz": "stage about z",
     "leaves bending 1": "leaf bending",
     "leaves twisting 1": "leaf torsion",
@@ -61,7 +62,7 @@ def mechanism(name: str) -> Mechanism:
         *(float(known.young), known.poisson, float(known.density)),
         *(float(known.yield_strength), float(known.fatigue)),
         Body(mass, (0.0, 0.0, 0.0), (length + beyond, 0.0, 0.0)),
-        *((length / 2, 0.0, 0.0),) * 2,
+        *((length + beyond, 0.0, 0.0),) * 2,
     )
     return Mechanism(**{**it.__dict__, "body": Body(mass, cube_inertia(mass), it.body.centre)})
 
@@ -76,7 +77,7 @@ def by_shells(name: str, mesh: shells.Mesh = shells.MESH) -> dict[str, float]:
     straight = shells.mechanism_stiffness(sheet, *row, mesh=mesh)
     bent = shells.mechanism_stiffness(sheet, *row, deflection=it.length / 50, mesh=mesh)
     frequencies, kinds = shells.modes(
-        sheet, *row, body.mass, body.inertia, body.centre, count=6 + 4 * row[0], mesh=mesh
+        sheet, *row, body.mass, body.inertia, body.centre, count=6 + 8 * row[0], mesh=mesh
     )
     finer = (mesh[0] * 4 // 3, mesh[1] * 4 // 3)
     found = {

@@ -8,7 +8,8 @@ import pytest
 
 import friso
 from friso.flexure import closed_forms
-from friso.flexure.joint import first_interfering
+from friso.flexure.beams import beams
+from friso.flexure.joint import parasitic_mode
 from friso.flexure.mechanism import Mechanism
 from friso.materials import materials
 from friso.stage import Stage, StageError, load, loads, save, violations
@@ -41,32 +42,69 @@ def refused(table: str) -> StageError:
 def test_stiffness_and_parasitic_mode_follow(stage: Stage) -> None:
     flat = stage.flat()
     it = Mechanism.of(flat)
-    frequency, share = first_interfering(it)
+    frequency, share = parasitic_mode(it)
     assert flat["joint.stiffness"] == pytest.approx(closed_forms.drive_stiffness(it), rel=1e-12)
     assert flat["joint.stiffness"] == pytest.approx(2540 * 195 / 210, rel=5e-3)
     assert flat["parasitic.frequency"] == pytest.approx(frequency, rel=1e-12)
     assert flat["parasitic.mass"] == pytest.approx(0.5 * share / (1 + share), rel=1e-12)
     assert flat["parasitic.damping_ratio"] == 0.01
     assert 300 < frequency < 400
-    # what the equations make of it has the frequency and the residue of the mode, m_p/(m (m - m_p))
-    mass = flat["parasitic.mass"]
-    assert mass / (0.5 - mass) == pytest.approx(share, rel=1e-12)
+
+
+def resonances(stage: Stage) -> tuple[np.ndarray, np.ndarray]:
+    """Frequencies [Hz] and residues [1/kg] of the oscillations of a stage whose cart is stuck, by frequency: the plant
+    from force to position is the sum of residue/(s^2 + 2 zeta omega s + omega^2)."""
+    plant = friso.linear(stage, "stuck")
+    into = plant.B[:, plant.input_labels.index("force")]
+    poles, shapes = np.linalg.eig(plant.A)
+    residues = (plant.C[plant.output_labels.index("stage")] @ shapes) * np.linalg.solve(shapes, into.astype(complex))
+    upper = np.flatnonzero(poles.imag > 0)
+    upper = upper[np.argsort(np.abs(poles[upper]))]
+    return np.abs(poles[upper]) / (2 * np.pi), (residues[upper] * 2j * poles[upper].imag).real
+
+
+@pytest.mark.parametrize(
+    ("changes", "kind"),
+    [
+        ({}, "leaf bending, in phase"),
+        ({"flexure.actuation_x": "85 mm", "flexure.sensor_x": "85 mm"}, "stage about y"),
+        ({"flexure.actuation_y": "20 mm", "flexure.sensor_y": "20 mm"}, "stage about x"),
+    ],
+)
+def test_the_plant_resonates_as_the_beams_do(stage: Stage, changes: dict[str, str], kind: str) -> None:
+    """In the mode that stands highest, with its frequency and residue."""
+    changed = stage.replace(changes)
+    modes = beams(Mechanism.of(changed.flat()), 1e-3).modes[1:]
+    mode = max(modes, key=lambda each: abs(each.actuator * each.sensor) / each.frequency**2)
+    assert mode.name == kind
+    frequencies, residues = resonances(changed)
+    assert frequencies[-1] == pytest.approx(mode.frequency, rel=0.05)
+    assert residues[-1] == pytest.approx(mode.actuator * mode.sensor, rel=0.15)
+    assert frequencies[0] == pytest.approx(10.86, rel=0.01)  # the drive mode, that of nearly all of the mass
+    assert residues[0] == pytest.approx(1 / 0.5, rel=0.01)
+
+
+def test_a_mode_of_another_sign_counts_by_its_size(stage: Stage) -> None:
+    """Actuator and sensor on either side of the middle: the equations know no negative residue."""
+    alike = stage.replace({"flexure.actuation_y": "20 mm", "flexure.sensor_y": "20 mm"}).flat()
+    against = stage.replace({"flexure.actuation_y": "20 mm", "flexure.sensor_y": "-20 mm"}).flat()
+    assert [against[key] for key in FOLLOWS] == pytest.approx([alike[key] for key in FOLLOWS], rel=1e-9)
 
 
 def test_defaults_are_the_stated_ones(stage: Stage) -> None:
-    """Stage: an aluminium cube at the leaf ends; actuator and sensor half-way along the leaves."""
+    """Stage: an aluminium cube at the leaf ends; actuator and sensor at its centre of mass."""
     it = Mechanism.of(stage.flat())
     edge = (0.5 / 2700) ** (1 / 3)
     assert it.body.inertia == pytest.approx((0.5 / 6 * edge**2,) * 3, rel=1e-12)
     assert it.body.centre == (0.07, 0.0, 0.0)
-    assert it.actuation == it.sensor == (0.035, 0.0, 0.0)
+    assert it.actuation == it.sensor == (0.07, 0.0, 0.0)
     assert it.stress_concentration == 1.5
     given = stage.replace(
         {"flexure.centre_z": "-5 mm", "flexure.actuation_y": "8 mm", "flexure.inertia_z": "2e-4 kg*m^2"}
     )
     moved = Mechanism.of(given.flat())
     assert moved.body.centre == pytest.approx((0.07, 0.0, -0.005))
-    assert moved.actuation == moved.sensor == pytest.approx((0.035, 0.008, 0.0))
+    assert moved.actuation == moved.sensor == pytest.approx((0.07, 0.008, -0.005))
     assert moved.body.inertia[2] == 2e-4
     elsewhere = Mechanism.of(given.replace({"flexure.sensor_y": "-1 mm"}).flat())
     assert (elsewhere.actuation[1], elsewhere.sensor[1]) == pytest.approx((0.008, -0.001))

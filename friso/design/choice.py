@@ -9,7 +9,7 @@ import numpy as np
 
 from friso.design.front import Candidate, judged
 from friso.design.geometry import Geometry, mechanisms, rounded, sizes_of
-from friso.design.requirements import Requirement, Task, requirements, total_load
+from friso.design.requirements import Requirement, Task, buckling_share, load_stress, requirements
 from friso.flexure.beams import BeamFailure, beams
 from friso.flexure.evaluation import Evaluation
 from friso.flexure.joint import first_interfering
@@ -69,9 +69,10 @@ def chosen(task: Task, candidates: Sequence[Candidate]) -> Choice | None:
 def _bears(task: Task, found: Evaluation) -> bool:
     """Whether by beams, too, the cart does not break away inside the stroke and the leaves bear bending and load."""
     safety = task.spec.safety
-    stays = safety.breakaway * found.forces[-1] <= task.friction
-    bent = np.isnan(found.fatigue_margin) or found.fatigue_margin >= safety.fatigue
-    return bool(stays and bent and found.buckling >= safety.buckling * total_load(found.mechanism, task))
+    stays = safety.breakaway * (1 + safety.stiffness_tolerance) * found.forces[-1] <= task.friction
+    swing = 0.0 if np.isnan(found.fatigue_margin) else 1 / found.fatigue_margin
+    lasts = safety.fatigue * (swing + load_stress(found.mechanism, task) / found.mechanism.yield_strength) <= 1
+    return bool(stays and lasts and safety.buckling * buckling_share(found.mechanism, task, found.buckling) <= 1)
 
 
 def _in_order(

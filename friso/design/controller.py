@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from friso.design.modal import Modal
 from friso.design.population import Population
-from friso.frequency.crossover import Limits, settled_members
-from friso.frequency.family import scan
+from friso.flexure.evaluation import Evaluation
+from friso.frequency.crossover import Limits
 from friso.frequency.tuning import Tuning, tuning
 from friso.stage import Stage
 
@@ -54,18 +55,18 @@ def comfortable_below(found: Limits, highest: float) -> float | None:
     return max(below) if below else None
 
 
-def controller(stage: Stage, found: Limits, population: Population) -> Controller:
-    """The controller of a stage whose crossover is chosen."""
+def controller(stage: Stage, leaves: Evaluation, found: Limits, population: Population) -> Controller:
+    """The controller of a stage with leaf springs, its crossover chosen."""
     flat = stage.flat()
     gains = tuning(*(flat[f"controller.{name}"] for name in ("crossover", "alpha", "beta", "tuned_mass")))
-    corners = np.array([settled_margin({**flat, **population.of(k)}) for k in range(population.count)])
-    return Controller(flat["controller.crossover"], gains, found, settled_margin(flat), corners, _damping(flat))
+    corners = np.array([_margin({**flat, **population.of(k)}, leaves) for k in range(population.count)])
+    tried = dampings(flat)
+    damping = Damping(tried, np.array([_margin({**flat, "joint.damping": each}, leaves) for each in tried]))
+    return Controller(flat["controller.crossover"], gains, found, _margin(flat, leaves), corners, damping)
 
 
-def settled_margin(flat: Mapping[str, Any]) -> float:
-    """The least modulus margin of the settled states of a stage; 0 if one of them is not stable."""
-    seen = scan(flat, settled_members(flat))
-    return float(seen.distance.min()) if seen.stable.all() else 0.0
+def _margin(flat: Mapping[str, Any], leaves: Evaluation) -> float:
+    return float(Modal.of(flat, leaves).margin(flat["controller.crossover"])[0])
 
 
 def dampings(flat: Mapping[str, Any]) -> np.ndarray:
@@ -73,8 +74,3 @@ def dampings(flat: Mapping[str, Any]) -> np.ndarray:
     critical = 2 * np.sqrt(flat["joint.stiffness"] * flat["masses.stage"])
     own = flat["joint.damping"]
     return np.array([own, *(each for each in RATIOS * critical if each > own)])
-
-
-def _damping(flat: Mapping[str, Any]) -> Damping:
-    tried = dampings(flat)
-    return Damping(tried, np.array([settled_margin({**flat, "joint.damping": each}) for each in tried]))

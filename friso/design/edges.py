@@ -26,32 +26,28 @@ PERIODS, TRIED = 60.0, DISTANCES[::4]
 @dataclass(frozen=True)
 class Corners:
     """The corners of a specification with the highest crossover [Hz] at which a cycle attracts in each, shape (n,): 0
-    where there is none from `searched[0]` on, infinite where it lies above `searched[1]`, NaN where it is not known."""
+    where there is none from `searched[0]` on, infinite where it lies above `searched[1]`. In `unknown` of them a run
+    that had to decide failed somewhere: there it counts as hunting."""
 
     population: Population
     edges: np.ndarray
     searched: tuple[float, float]
+    unknown: int = 0
 
     @property
     def worst(self) -> int:
-        """The number of the corner that hunts up to the highest crossover, or of one of which it is not known."""
-        return int(np.where(np.isnan(self.edges), np.inf, self.edges).argmax())
+        """The number of the corner that hunts up to the highest crossover."""
+        return int(self.edges.argmax())
 
     @property
     def highest(self) -> float:
-        """The highest crossover [Hz] at which a cycle attracts in any of those that are known; at least where the
-        search begins."""
-        return float(np.nanmax([self.searched[0], *self.edges]))
+        """The highest crossover [Hz] at which a cycle attracts in any of them; at least where the search begins."""
+        return float(max(self.searched[0], self.edges.max()))
 
     @property
     def hunts(self) -> bool:
         """Whether a cycle attracts anywhere in the range that was searched."""
         return bool(np.any(self.edges > 0))
-
-    @property
-    def unknown(self) -> int:
-        """Corners of which it is not known."""
-        return int(np.isnan(self.edges).sum())
 
 
 def edges_over(
@@ -71,7 +67,7 @@ def edges_over(
     last = steps - 1 - attracts[:, ::-1].argmax(axis=1)
     inside, outside = grid[last], grid[np.minimum(last + 1, steps - 1)]
     open_ = np.flatnonzero(attracts.any(axis=1) & (last < steps - 1))
-    for k in range(ROUNDS):
+    for k in range(ROUNDS if open_.size else 0):
         tell(k + 1, ROUNDS + 1)
         middle = (inside[open_] + outside[open_]) / 2
         within, _ = _attracts(whole, open_, middle)
@@ -82,14 +78,12 @@ def edges_over(
     edges = np.exp((inside + outside) / 2)
     edges[last == steps - 1] = np.inf
     edges[~attracts.any(axis=1)] = 0.0
-    unknown = ~known & (np.arange(steps) > np.where(attracts.any(axis=1), last, -1)[:, None])
-    edges[unknown.any(axis=1) & np.isfinite(edges)] = np.nan
-    return Corners(population, edges, (low, high))
+    return Corners(population, edges, (low, high), int((~known).any(axis=1).sum()))
 
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def _attracts(whole: Ensemble, which: np.ndarray, crossover: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Whether a cycle attracts in corners at logarithms of crossovers, and whether that is known."""
+    """Whether a cycle attracts, or may for all that is known, in corners at logarithms of crossovers; whether it is."""
     some = whole.take(which)
     stages = Ensemble.held({**some.flat, "controller.crossover": np.exp(crossover)}, len(which))
     cycles = hunting_cycles(stages, RTOL)
@@ -97,7 +91,7 @@ def _attracts(whole: Ensemble, which: np.ndarray, crossover: np.ndarray) -> tupl
     unsure = np.flatnonzero(cycles.uncertain)
     if unsure.size:
         attracts[unsure], known[unsure] = hunts_somehow(stages.take(unsure), PERIODS, TRIED)
-    return attracts, known
+    return attracts | ~known, known
 
 
 def rigid(flat: Mapping[str, Any]) -> dict[str, Any]:

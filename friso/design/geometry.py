@@ -71,7 +71,13 @@ def mechanisms(flat: Mapping[str, Any], sizes: np.ndarray, bought: list[Sheet]) 
     }
     keys = {f"flexure.{name}": np.array(column, float) for name, column in columns.items()}
     keys |= {f"flexure.{name}": column for name, column in zip(SIZES, sizes.T, strict=True)}
-    return Mechanism.of({**flat, **keys})
+    return Mechanism.of({**flat, **moved_along(flat, sizes[:, 0]), **keys})
+
+
+def moved_along(flat: Mapping[str, Any], length: Any) -> dict[str, Any]:
+    """The points of the stage that are given: as the length [m] changes, they stay as far from the leaf ends."""
+    points = [f"flexure.{name}_x" for name in ("centre", "actuation", "sensor")]
+    return {key: flat[key] + length - flat["flexure.length"] for key in points if key in flat}
 
 
 def box(spec: Spec) -> tuple[np.ndarray, np.ndarray]:

@@ -14,6 +14,7 @@ from friso.design.controller import Controller, comfortable_below, controller, d
 from friso.design.edges import Corners, edges_over, rigid
 from friso.design.front import Candidate, front
 from friso.design.hunting_map import HuntingMap, hunting_map
+from friso.design.modal import Modal
 from friso.design.population import Population, corners
 from friso.design.prepare import prepared, with_leaves
 from friso.design.relax import Relaxation, relaxations
@@ -117,15 +118,20 @@ def design(stage: Stage, spec: Spec, progress: Progress = lambda what, done, tot
     flat, population, limit = base.flat(), corners(spec, base.flat()), spec.limit
     tell = partial(progress, "hunting without isolator")
     without = edges_over(rigid(flat), population, FIRST * limit, BEYOND * limit, STEPS, tell)
-    task, candidates = leaves(spec, flat, least_friction(population, flat), progress)
+    friction = least_friction(population, flat)
+    if friction <= 0:
+        raise NoDesign("the bias force on the cart exceeds the least static friction: no joint is soft enough")
+    task, candidates = leaves(spec, flat, friction, progress)
     progress("leaves and crossover", 0, 1)
     found = fitted(base, task, candidates)
     crossover, tell = found.stage.flat()["controller.crossover"], partial(progress, "hunting with isolator")
     tell(0, 1)
-    edges = edges_over(found.stage.flat(), population, FIRST * crossover, ABOVE * crossover, STEPS, tell)
+    stiffest = found.stage.flat()["joint.stiffness"] * (1 + spec.safety.stiffness_tolerance)
+    worst = {**found.stage.flat(), "joint.stiffness": stiffest}
+    edges = edges_over(worst, population, FIRST * crossover, ABOVE * crossover, STEPS, tell)
     _does_not_hunt(found, edges)
     progress("margins", 0, 1)
-    control = controller(found.stage, found.limits, population)
+    control = controller(found.stage, found.choice.beams, found.limits, population)
     progress("hunting map", 0, 1)
     drawn = hunting_map(found.stage, spec, population)
     by_beams = tuple(confirmed(found.task, candidates))
@@ -134,9 +140,11 @@ def design(stage: Stage, spec: Spec, progress: Progress = lambda what, done, tot
 
 
 def least_friction(population: Population, flat: Mapping[str, Any]) -> float:
-    """The least force [N] at which the cart breaks away."""
+    """The least force of the joint [N] at which the cart breaks away: in the weaker direction, less what a bias force
+    on the cart takes of it."""
     key = "friction.static" if "friction.static" in flat else "friction.coulomb"
-    return float(np.min(population.keys.get(key, flat[key])))
+    weaker = 1 - abs(flat.get("friction.asymmetry", 0.0))
+    return float(np.min(population.keys.get(key, flat[key]))) * weaker - abs(flat.get("bias.cart", 0.0))
 
 
 def leaves(spec: Spec, flat: Mapping[str, Any], friction: float, progress: Progress) -> tuple[Task, list[Candidate]]:
@@ -174,14 +182,17 @@ def fitted(base: Stage, task: Task, candidates: list[Candidate]) -> Fitted:
             wanted *= LOWER
             continue
         stage = with_leaves(base, choice.geometry, task.stroke)
-        found = limits(stage.flat())
+        found = replace(limits(stage.flat()), comfortable=Modal.of(stage.flat(), choice.beams).comfortable)
         best = comfortable_below(found, wanted)
         if best is None:
             raise NoDesign(f"up to {wanted:.3g} Hz there is no crossover with a modulus margin of 0.5")
         if best >= ALIKE * wanted:
             return Fitted(task, choice, stage.replace({"controller.crossover": f"{_down(best):.6g} Hz"}), found)
         wanted = best
-    raise NoDesign("beams do not confirm leaf springs of the front (see their failures)")
+    raise NoDesign(
+        f"of {len(candidates)} leaf springs on the front none, in sizes of whole tenths of a millimetre, is confirmed "
+        f"by the beam model at a crossover of {wanted:.3g} Hz"
+    )
 
 
 def _down(crossover: float) -> float:
@@ -209,13 +220,15 @@ def _does_not_hunt(found: Fitted, edges: Corners) -> None:
 def _ways_out(found: Fitted, edge: float, needed: float, crossover: float) -> Iterator[Relaxation]:
     """What would let the crossover keep its distance from the edge [Hz]."""
     spec, name = found.task.spec, "crossover above the edge of hunting"
-    if crossover >= ALIKE * spec.limit and np.isfinite(needed):
-        yield Relaxation(name, "machine.bandwidth_limit", spec.limit, needed, "Hz")
+    above = [max(low, needed) for low, high in found.limits.comfortable if high > needed]
+    allowed_ = found.choice.frequency / spec.safety.parasitic
+    if spec.limit < needed and above and min(above) <= allowed_:
+        yield Relaxation(name, "machine.bandwidth_limit", spec.limit, min(above), "Hz")
     if edge < crossover:
         yield Relaxation(name, "safety.hunting", spec.safety.hunting, crossover / edge, "")
     own = found.stage.flat()["joint.damping"]
     for each in dampings(found.stage.flat())[1:]:
-        best = comfortable_below(limits({**found.stage.flat(), "joint.damping": each}), spec.limit)
-        if best and best >= needed:
+        damped = {**found.stage.flat(), "joint.damping": each}
+        if any(low <= needed <= high for low, high in Modal.of(damped, found.choice.beams).comfortable):
             yield Relaxation(name, "joint.damping", own, float(each), "N*s/m")
             return

@@ -41,17 +41,37 @@ class Population:
 
 
 def corners(spec: Spec, flat: Mapping[str, Any]) -> Population:
-    """The ends of all ranges of friction and masses, and the middle of those of static friction and gap."""
-    ranges = _friction(spec, flat) | _masses(spec)
-    main = [name for name in ("static", "coulomb", "gap") if name in ranges]
-    rest = [name for name in ranges if name not in main]
-    shares = {name: _distinct(ranges[name], LEVELS if name in main else (0.0, 1.0)) for name in ranges}
-    grid = np.array(list(product(*(shares[name] for name in main)))).reshape(-1, len(main))
-    ends = np.array(list(product(*(shares[name] for name in rest)))).reshape(-1, len(rest))
-    if len(ends) > 2:  # all others together at their low and high ends
-        ends = np.array([[share[k] for share in (shares[name] for name in rest)] for k in (0, -1)])
-    both = np.hstack([np.repeat(grid, len(ends), axis=0), np.tile(ends, (len(grid), 1))])
-    return _population(ranges, dict(zip([*main, *rest], both.T, strict=True)), flat, len(both))
+    """The ends of all ranges of friction and masses, and the middle of those of static friction and gap.
+
+    Static friction and gap are combined with each other and with masses that are all light or all heavy; the rest of
+    the friction goes together, viscous friction against it, since it is what damps. Raises StageError where friction
+    never falls.
+    """
+    friction, masses = _friction(spec, flat), _masses(spec)
+    main = [name for name in ("static", "coulomb", "gap") if name in friction]
+    rest = [name for name in friction if name not in main]
+    groups = [dict.fromkeys(masses, share) for share in (0.0, 1.0)] if masses else [{}]
+    turned = (
+        [{name: 1 - share if name == "viscous" else share for name in rest} for share in (0.0, 1.0)] if rest else [{}]
+    )
+    ranges = friction | masses
+    levels = product(*(LEVELS if ranges[name].high > ranges[name].low else (0.0,) for name in main))
+    rows = [
+        {**dict(zip(main, level, strict=True)), **own, **mass} for level, own, mass in product(levels, turned, groups)
+    ]
+    shares = {name: np.array([row[name] for row in rows]) for name in ranges}
+    found = _population(ranges, shares, flat, len(rows))
+    _falls(found, flat)
+    return found
+
+
+def _falls(found: Population, flat: Mapping[str, Any]) -> None:
+    """Raises StageError where sliding friction is nowhere below the static one although there are both."""
+    static, coulomb = (found.keys.get(f"friction.{name}") for name in ("static", "coulomb"))
+    if static is not None and coulomb is not None and np.all(coulomb >= static):
+        given = f"static friction up to {static.max():g} N with Coulomb friction from {coulomb.min():g} N on"
+        expected = "static friction above Coulomb friction, which is the stage file's where the specification has none"
+        raise StageError("friction.static", given, expected, 'static = "1 N .. 3 N", gap = "0.3 .. 0.85"')
 
 
 def drawn(spec: Spec, flat: Mapping[str, Any], count: int, softening: float) -> Population:
@@ -106,10 +126,6 @@ def _friction(spec: Spec, flat: Mapping[str, Any]) -> dict[str, Interval]:
 def _masses(spec: Spec) -> dict[str, Interval]:
     given = {name: getattr(spec.masses, name) for name in ("cart", "stage")}
     return {name: interval for name, interval in given.items() if interval is not None}
-
-
-def _distinct(interval: Interval, shares: tuple[float, ...]) -> tuple[float, ...]:
-    return shares if interval.high > interval.low else (0.0,)
 
 
 def _population(

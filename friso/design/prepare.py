@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from friso.design.geometry import Geometry
+from friso.design.geometry import Geometry, moved_along
 from friso.design.spec import Spec
 from friso.quantities import StageError
 from friso.stage import Stage
@@ -12,15 +12,18 @@ JOINT = '[joint] locked = true, damping = "0.5 N*s/m", limiter_stiffness = "2e7 
 
 def prepared(stage: Stage, spec: Spec) -> Stage:
     """The stage with a free joint of leaf springs, the largest that the specification allows, to be replaced; masses in
-    the middle of their ranges. Raises StageError for a stage that cannot be given an isolator."""
+    the middle of their ranges, which the controller is tuned for. Points of the stage stay where they are from the leaf
+    ends; a load is the specification's. Raises StageError for a stage that cannot be given an isolator."""
     _can_be_isolated(stage)
     own = spec.leaves
     low, high = (min(map(float, own.thickness)), own.stroke.high)
-    masses = {
+    masses: dict[str, str | None] = {
         f"masses.{name}": f"{each.centre!r} kg"
         for name in ("cart", "stage")
         if (each := getattr(spec.masses, name)) is not None
     }
+    if masses and "tuned_mass" in stage.controller.given():
+        masses["controller.tuned_mass"] = None  # it follows the masses
     sizes = {f"flexure.{name}": f"{own.space(name)[1]!r} m" for name in ("length", "width", "spacing")}
     leaves = {
         "flexure.leaves": own.leaves[0],
@@ -35,14 +38,16 @@ def prepared(stage: Stage, spec: Spec) -> Stage:
     removed |= {"parasitic": None} if stage.parasitic else {}
     numbers = ("young", "poisson", "density", "yield", "fatigue")
     given = stage.flexure.given() if stage.flexure else {}
-    removed |= {f"flexure.{key}": None for key in numbers if key in given}
-    return stage.replace(removed | masses | sizes | leaves)
+    removed |= {f"flexure.{key}": None for key in (*numbers, "load") if key in given}
+    base = stage.replace(removed | masses | sizes | leaves)
+    return base.with_numbers(moved_along(stage.flat(), base.flat()["flexure.length"])) if given else base
 
 
 def with_leaves(base: Stage, geometry: Geometry, stroke: float) -> Stage:
     """A prepared stage with leaf springs of a geometry and a stroke [m]."""
     name = f"{base.name}, with friction isolator" if base.name else "With friction isolator"
-    return base.replace({"name": name, "joint.stroke": f"{stroke * 1e3:.6g} mm", **geometry.keys()})
+    moved = {key: f"{place * 1e3:.6g} mm" for key, place in moved_along(base.flat(), geometry.length).items()}
+    return base.replace({"name": name, "joint.stroke": f"{stroke * 1e3:.6g} mm", **geometry.keys(), **moved})
 
 
 def _can_be_isolated(stage: Stage) -> None:

@@ -111,5 +111,5 @@ def _alone(task: Task, wanted: list[Requirement], k: int) -> Iterator[Relaxation
     geometry = Geometry.of(sizes, sheet)
     for way in wanted[k].ways:
         needed = way.needed(float(np.exp(max(found.fun, 0.0))))
-        if needed is not None:
+        if needed is not None and not np.isclose(needed, way.value, rtol=1e-3):
             yield Relaxation(wanted[k].name, way.key, way.value, needed, way.unit, geometry)

@@ -32,8 +32,10 @@ class Task:
 
     @property
     def load(self) -> float:
-        """Force along the leaves [N]: what the specification says and the weight of the stage."""
-        return float(self.spec.load.force_x) + GRAVITY * float(self.flat["masses.stage"])
+        """Force along the leaves [N]: what the specification says and the weight of the heaviest stage."""
+        masses = self.spec.masses.stage
+        heaviest = masses.high if masses else float(self.flat["masses.stage"])
+        return float(self.spec.load.force_x) + GRAVITY * heaviest
 
 
 @dataclass(frozen=True)
@@ -78,16 +80,18 @@ def requirements(task: Task) -> list[Requirement]:
     """All of them but for the space and the sheets."""
     spec, safety, stroke = task.spec, task.spec.safety, task.stroke
     shorter = less("leaves.stroke", stroke, "m")
+    stiffest = safety.breakaway * (1 + safety.stiffness_tolerance)
 
     def fatigue(it: Mechanism) -> Any:
         known = np.where(np.isnan(it.fatigue), np.inf, it.fatigue)
-        return RESERVE * safety.fatigue * it.stress_concentration * closed_forms.max_stress(it, stroke) / known
+        swing = it.stress_concentration * closed_forms.max_stress(it, stroke) / known
+        return RESERVE * safety.fatigue * (swing + load_stress(it, task) / it.yield_strength)
 
     return [
         Requirement(
             BREAKAWAY,
             (more("friction.static", task.friction, "N"), shorter),
-            lambda it: safety.breakaway * closed_forms.drive_stiffness(it) * stroke / task.friction,
+            lambda it: stiffest * closed_forms.drive_stiffness(it) * stroke / task.friction,
         ),
         Requirement("stress borne for ever", (factor("safety.fatigue", safety.fatigue), shorter), fatigue),
         Requirement(
@@ -97,8 +101,8 @@ def requirements(task: Task) -> list[Requirement]:
         ),
         Requirement(
             "buckling under load",
-            (factor("safety.buckling", safety.buckling), _lighter(task)),
-            lambda it: RESERVE * safety.buckling * total_load(it, task) / closed_forms.buckling_load(it),
+            (factor("safety.buckling", safety.buckling), *_lighter(task)),
+            lambda it: RESERVE * safety.buckling * buckling_share(it, task, closed_forms.buckling_load(it)),
         ),
         Requirement(
             PARASITIC,
@@ -109,15 +113,18 @@ def requirements(task: Task) -> list[Requirement]:
     ]
 
 
-def _lighter(task: Task) -> Way:
-    """A smaller load along the leaves; the weight of the stage stays."""
-    force = float(task.spec.load.force_x)
+def _lighter(task: Task) -> tuple[Way, ...]:
+    """A smaller load along the leaves, if that is all there is; the weight of the stage stays."""
+    load = task.spec.load
+    force = float(load.force_x)
+    if not force or load.force_y or load.moment_y:
+        return ()
 
     def needed(excess: float) -> float | None:
         left = task.load / excess - (task.load - force)
         return left if left >= 0 else None
 
-    return Way("load.force_x", force, "N", needed)
+    return (Way("load.force_x", force, "N", needed),)
 
 
 def _support(spec: Spec, stroke: float) -> list[Requirement]:
@@ -137,9 +144,11 @@ def _support(spec: Spec, stroke: float) -> list[Requirement]:
     ]
 
 
-def total_load(it: Mechanism, task: Task) -> Any:
-    """The load along the leaves [N] that would press on each as the largest force along a leaf does."""
-    return leaf_load(it, task) * it.leaves
+def buckling_share(it: Mechanism, task: Task, buckling: Any) -> Any:
+    """How much of what makes the leaves give way is there: the largest force along a leaf, as if it pressed on all,
+    over the `buckling` load [N], and the force across them over that at which they give way sideways."""
+    across = float(task.spec.load.force_y) / closed_forms.lateral_load(it)
+    return leaf_load(it, task) * it.leaves / buckling + across
 
 
 def leaf_load(it: Mechanism, task: Task) -> Any:
@@ -150,8 +159,13 @@ def leaf_load(it: Mechanism, task: Task) -> Any:
 
 def static_stress(it: Mechanism, task: Task) -> Any:
     """Largest stress at the clamps [Pa] at full stroke under all loads at once, with the concentration there."""
+    return it.stress_concentration * closed_forms.max_stress(it, task.stroke) + load_stress(it, task)
+
+
+def load_stress(it: Mechanism, task: Task) -> Any:
+    """Of it, what the loads make [Pa]: a force across the leaf ends bends them in their plane as cantilevers, since
+    nothing else holds the stage about z; a moment about x as leaves whose ends stay parallel."""
     load, middle = task.spec.load, it.width / 2 / it.edgewise
-    across = float(load.force_y) / it.leaves + float(load.moment_x) * it.depth / 2 / it.offset_squares
-    edgewise = (across * it.length / 2 + float(load.moment_z) / it.leaves) * middle
-    along = leaf_load(it, task) / it.area
-    return it.stress_concentration * (closed_forms.max_stress(it, task.stroke) + edgewise + along)
+    about_x = float(load.moment_x) * it.depth / 2 / it.offset_squares * it.length / 2
+    edgewise = (float(load.force_y) * it.length + float(load.moment_z)) / it.leaves + about_x
+    return it.stress_concentration * (edgewise * middle + leaf_load(it, task) / it.area)

@@ -188,9 +188,9 @@ class Leaves(Section):
     stroke: Annotated[Interval, Span(_LENGTH, "0.3 mm .. 1 mm")]
 
     def space(self, name: str) -> tuple[float, float]:
-        """The least and the largest length, width or spacing [m]."""
+        """The least and the largest length, width or spacing [m]; a fixed one is a range from itself to itself."""
         allowed: Interval = getattr(self, name)
-        return (allowed.low if allowed.low < allowed.high else allowed.high / 10), allowed.high
+        return (allowed.high / 10 if allowed.single else allowed.low), allowed.high
 
     @model_validator(mode="after")
     def _can_be_built(self) -> Self:

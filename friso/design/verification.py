@@ -128,8 +128,9 @@ def tried(
     if again.size:
         own = {key: value[again] if np.ndim(value) else value for key, value in flat.items()}
         longer = _followed(own, again.size, window, LONGER * FOLLOWED, lambda done: None)
-        for name in ("completed", "hunts", "settling", "swing"):
-            getattr(first, name)[again] = getattr(longer, name)
+        better = np.flatnonzero(longer.completed)  # where the long run fails, the first verdict stays
+        for name in ("hunts", "settling", "swing"):
+            getattr(first, name)[again[better]] = getattr(longer, name)[better]
     return first
 
 

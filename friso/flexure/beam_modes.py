@@ -20,7 +20,7 @@ from friso.flexure.mechanism import Mechanism, along_motion
 from friso.flexure.naming import mode_name
 
 MODES = 12
-"""Modes reported."""
+"""Modes reported, the lowest; and those of the stage above them."""
 
 KINDS = (((2, 4), 8), ((1, 5), 4), ((3,), 5), ((0,), 2))
 """Coordinates of a node that go together while the leaf is straight, and how many modes between held ends are kept:
@@ -94,7 +94,7 @@ def _torsion(it: Mechanism, nodes: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def modes(it: Mechanism, leaf: Reduced) -> tuple[Mode, ...]:
-    """The lowest modes, the drive mode first, the others by frequency."""
+    """The lowest modes and all of the stage, the drive mode first, the others by frequency."""
     ends, rows = end_motions(it.offsets), _rows(it.offsets)
     count = len(leaf.squares)
     size = COORDINATES + count * len(rows)
@@ -106,15 +106,22 @@ def modes(it: Mechanism, leaf: Reduced) -> tuple[Mode, ...]:
     # row k of the leaves takes part with the weights rows[k]
     mass[COORDINATES:, stage] = np.einsum("kl,me,les->kms", rows, leaf.coupling, ends).reshape(-1, COORDINATES)
     mass[stage, COORDINATES:] = mass[COORDINATES:, stage].T
-    squares, vectors = eigh(stiffness, mass, subset_by_index=(0, min(MODES, size) - 1))
+    squares, vectors = eigh(stiffness, mass)
     found = []
     for square, vector in zip(squares, vectors.T, strict=True):
+        if len(found) >= MODES and not _of_stage(it, vector[stage]):
+            continue
         own = rows.T @ vector[COORDINATES:].reshape(len(rows), count)
         moved = np.einsum("nce,les,s->lnc", leaf.static[:, :3], ends, vector[stage])
         moved += np.einsum("ncm,lm->lnc", leaf.inner[:, :3], own)
         found.append(_mode(it, np.sqrt(max(square, 0.0)) / (2 * np.pi), vector[stage], moved))
     drive = max(found, key=lambda mode: abs(mode.stage[2]) / mode.frequency if mode.frequency else np.inf)
     return (replace(drive, name="drive"), *(mode for mode in found if mode is not drive))
+
+
+def _of_stage(it: Mechanism, motion: np.ndarray) -> bool:
+    """Whether half the energy of a mode is the stage's."""
+    return bool(motion @ body_mass(it) @ motion > 0.5)
 
 
 def _mode(it: Mechanism, frequency: float, stage: np.ndarray, leaves: np.ndarray) -> Mode:

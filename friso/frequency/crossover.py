@@ -10,7 +10,7 @@ import numpy as np
 
 from friso.equations.bandwidth import faster
 from friso.frequency.drive import Drive
-from friso.frequency.family import Looked, controller, distance_to_lines, grid, looked_at, plants
+from friso.frequency.family import Looked, controller, distance_to_lines, grid, looked_at, plants, scan
 from friso.frequency.members import Members, family, joined, limit_cases
 from friso.frequency.ranges import Range, ranges_below, shared
 
@@ -98,6 +98,12 @@ def searched(flat: Mapping[str, Any]) -> Range:
     if "controller.crossover" not in flat:
         return 1 / 100.0, 1000.0
     return LOWEST, min(HIGHEST, 0.999 * drive.highest / (2 * np.pi))
+
+
+def settled_margin(flat: Mapping[str, Any]) -> float:
+    """The least modulus margin of the settled states of a stage; 0 if one of them is not stable."""
+    seen = scan(flat, settled_members(flat))
+    return float(seen.distance.min()) if seen.stable.all() else 0.0
 
 
 def settled_members(flat: Mapping[str, Any]) -> Members:

@@ -94,8 +94,8 @@ def _worst(corners: Corners, found: Design) -> list[str]:
         said.append(f"Worst of {count} corners: {corner(corners, found.stage.flat())}.")
     if corners.unknown:
         said.append(
-            f"Of {corners.unknown} corners the edge is not known: no cycle could be closed there; the simulated moves "
-            "below cover them."
+            f"In {corners.unknown} corners a run that had to decide failed at some crossover: there it counts as "
+            "hunting."
         )
     return said
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from friso.flexure.evaluation import Evaluation
 from friso.flexure.mechanism import AXES, GRAVITY
-from friso.views.flexure_found import Found
+from friso.views.flexure_found import Found, interferes
 from friso.views.flexure_table import megapascals, newtons_per, percent
 from friso.views.prefixes import listed, with_unit
 
@@ -33,7 +33,13 @@ def findings(found: Found) -> list[str]:
 def warnings(found: Found) -> list[str]:
     """What is wrong with it."""
     failed = f"The beam model found no answer: {found.failure.rstrip('.')}. All this is by closed forms."
-    return [*([failed] if found.beams is None else []), *_borne(found.best), *_breaks_away(found), *_differences(found)]
+    return [
+        *([failed] if found.beams is None else []),
+        *_borne(found.best),
+        *_breaks_away(found),
+        *_against(found.best),
+        *_differences(found),
+    ]
 
 
 def assumptions(found: Found) -> list[str]:
@@ -113,6 +119,19 @@ def _breaks_away(found: Found) -> list[str]:
     ]
 
 
+def _against(it: Evaluation) -> list[str]:
+    """Modes in which the sensor sees the opposite of what the actuator does."""
+    modes = [mode for mode in it.modes if interferes(it, mode) and mode.actuator * mode.sensor < 0]
+    if not modes:
+        return []
+    named = listed([f"{mode.name} ({with_unit(mode.frequency, 'Hz')})" for mode in modes], "and")
+    return [
+        f"In {named} actuator and sensor move against each other. A controller cannot damp that by phase, and "
+        "[parasitic], which knows only the size of a mode, makes the loop look better than it is: actuate and measure "
+        "at the same point."
+    ]
+
+
 def _differences(found: Found) -> list[str]:
     """Where the two models differ so much that one of them is beyond its range."""
     if found.beams is None:
@@ -152,9 +171,14 @@ def _inertia(flat: Mapping[str, Any], mass: float) -> str:
 
 
 def _points(flat: Mapping[str, Any]) -> str:
-    actuation = "" if "flexure.actuation_x" in flat else "actuation at half the leaf length"
-    sensor = "" if "flexure.sensor_x" in flat else "sensor at the point of actuation"
-    return ", ".join(part for part in (actuation, sensor) if part)
+    places = {"actuation": "the centre of mass of the stage", "sensor": "the point of actuation"}
+    return ", ".join(_point(flat, name, place) for name, place in places.items() if f"flexure.{name}_x" not in flat)
+
+
+def _point(flat: Mapping[str, Any], name: str, place: str) -> str:
+    """Where something is whose place along x is left out."""
+    partly = any(f"flexure.{name}_{axis}" in flat for axis in AXES)
+    return f"{name}{' along x' if partly else ''} at {place}"
 
 
 def _load(flat: Mapping[str, Any]) -> str:

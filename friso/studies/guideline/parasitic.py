@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from friso.frequency.crossover import limits, settled_members
-from friso.frequency.family import scan
+from friso.frequency import crossover
+from friso.frequency.crossover import limits
 from friso.frequency.ranges import Range
 from friso.stage import Stage
 
@@ -49,9 +49,7 @@ def parasitic_limits(stage: Stage) -> list[Parasitic]:
 def settled_margin(stage: Stage, changes: Mapping[str, Any]) -> float:
     """The least modulus margin of the settled states of a stage with these changes (flat keys to SI numbers), sampled
     as the thesis's drive; 0 if one of them is not stable."""
-    flat = stage.replace(DRIVE).flat() | dict(changes)
-    seen = scan(flat, settled_members(flat))
-    return float(seen.distance.min()) if seen.stable.all() else 0.0
+    return crossover.settled_margin(stage.replace(DRIVE).flat() | dict(changes))
 
 
 def _comfortable(flat: Mapping[str, Any]) -> Range | None:

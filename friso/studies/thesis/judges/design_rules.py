@@ -6,8 +6,7 @@ from functools import cache
 
 import numpy as np
 
-from friso.design.controller import settled_margin
-from friso.frequency.crossover import WANTED
+from friso.frequency.crossover import WANTED, settled_margin
 from friso.studies.thesis.claims import ABOUT, Evidence, Finding, Part, about, judges
 from friso.studies.thesis.maps import begins, ends, table
 from friso.studies.thesis.studies import rig
@@ -18,6 +17,9 @@ _STROKE, _GAP, _RATIO = 0.3e-3, 1.0, 10.0
 _WORKS, _LOCKED = 5.25, 15.0
 """Crossovers [Hz] from which the isolator works, the middle of 5 and 5.5 Hz, and which the locked rig needs."""
 
+_HIGHEST = 48.0
+"""Crossover [Hz] up to which the thesis's rig was stable (Sec. 4.3.1, 4.3.3)."""
+
 _RATIOS = np.geomspace(2.0, 80.0, 16)
 """Parasitic frequencies that are tried, over the crossover."""
 
@@ -25,7 +27,7 @@ _RATIOS = np.geomspace(2.0, 80.0, 16)
 @judges("D1", figure="14A, 16A, 12A, 11B", needs=("isolator-stiffness", "isolator-crossover", "friction", "system"))
 def rules_of_design(evidence: Evidence) -> Finding:
     """Each rule by the maps of the parameter study, and that on parasitic modes by linear analysis."""
-    return Finding((_soft(evidence), _far(), _stroke(evidence), _gap(evidence), *_crossovers(evidence)))
+    return Finding((_soft(evidence), _far(), _stroke(evidence), _gap(evidence), *_crossovers(evidence), _up_to()))
 
 
 def _soft(evidence: Evidence) -> Part:
@@ -54,6 +56,23 @@ def _needed_ratio() -> float:
     if not short.size:
         return float(_RATIOS[0])
     return float(_RATIOS[short[-1] + 1]) if short[-1] + 1 < len(_RATIOS) else np.nan
+
+
+@cache
+def _margins_at_the_top() -> dict[str, float]:
+    """The least modulus margin of the settled states at the highest crossover, joint locked and free; 0: unstable."""
+    flat = {**rig().flat(), "controller.crossover": _HIGHEST}
+    return {name: settled_margin({**flat, "joint.locked": name == "locked"}) for name in ("locked", "free")}
+
+
+def _up_to() -> Part:
+    margins = _margins_at_the_top()
+    return Part(
+        f"the crossover may be up to {_HIGHEST:g} Hz: there all settled states are stable, locked and free, without "
+        "sampling and delay",
+        all(margin > 0 for margin in margins.values()),
+        ", ".join(f"modulus margin {margin:.2g} {name}" for name, margin in margins.items()),
+    )
 
 
 def _far() -> Part:
