@@ -243,7 +243,8 @@ def rightmost(stage: Stage, leaves_: Evaluation) -> float:
         plant = friso.linear(bare, state)["stage", "force"]
         for mode in leaves_.modes[1:]:
             omega = 2 * np.pi * mode.frequency
-            plant = plant + control.tf2ss(mode.actuator * mode.sensor, [1, 2 * 0.01 * omega, omega**2])
+            swing = [[0, 1], [-(omega**2), -2 * 0.01 * omega]]
+            plant = plant + control.ss(swing, [[0], [1]], [[mode.actuator * mode.sensor, 0]], [[0]])
         k_p, tau_z, tau_i, tau_p = (getattr(tuned_gains(stage), name) for name in ("k_p", "tau_z", "tau_i", "tau_p"))
         loop = control.tf(k_p * np.array([tau_z, 1 + tau_z / tau_i, 1 / tau_i]), [tau_p, 1, 0])
         found.append(control.feedback(plant * control.tf2ss(loop), 1).poles().real.max())
