@@ -35,7 +35,7 @@ def many(one: Mechanism, count: int) -> Mechanism:
         name: getattr(one, name) * factor for name, factor in zip(("length", "width", "thickness"), draw, strict=True)
     }
     centre = (sizes["length"], 0.0, 0.0)
-    return replace(one, **sizes, body=replace(one.body, centre=centre))
+    return replace(one, **sizes, body=replace(one.body, centre=centre), actuation=centre, sensor=centre)
 
 
 def all_figures(it: Mechanism) -> None:

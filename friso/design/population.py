@@ -135,12 +135,12 @@ def _population(
     as much: they cannot hunt, but exist."""
     values = {name: interval.at(shares[name]) for name, interval in ranges.items()}
     keys = {f"masses.{name}": values.pop(name) for name in ("cart", "stage") if name in values}
-    static = np.broadcast_to(values.get("static", flat.get("friction.static", np.nan)), (count,)).astype(float)
+    if "friction.static" not in flat:
+        return Population(keys | {f"friction.{name}": value for name, value in values.items()}, count)
+    static = np.broadcast_to(values.get("static", flat["friction.static"]), (count,)).astype(float)
     if "gap" in values:
         values["coulomb"] = static * (1 - values.pop("gap"))
-    elif "friction.coulomb" in flat:
-        coulomb = np.broadcast_to(values.get("coulomb", flat["friction.coulomb"]), (count,))
-        values["coulomb"] = np.minimum(coulomb, static)
-    if "friction.coulomb" in flat:
-        values["static"] = static
+    else:
+        values["coulomb"] = np.minimum(values.get("coulomb", flat["friction.coulomb"]), static)
+    values["static"] = static
     return Population(keys | {f"friction.{name}": value for name, value in values.items()}, count)

@@ -120,8 +120,8 @@ def modes(it: Mechanism, leaf: Reduced) -> tuple[Mode, ...]:
 
 
 def _of_stage(it: Mechanism, motion: np.ndarray) -> bool:
-    """Whether half the energy of a mode is the stage's."""
-    return bool(motion @ body_mass(it) @ motion > 0.5)
+    """Whether a tenth of the energy of a mode, or more, is the stage's."""
+    return bool(motion @ body_mass(it) @ motion > 0.1)
 
 
 def _mode(it: Mechanism, frequency: float, stage: np.ndarray, leaves: np.ndarray) -> Mode:

@@ -56,9 +56,10 @@ class Seen:
         return cls(frequency, residue, np.abs(residue) > VISIBLE * 2 * np.asarray(it.damping_ratio)[..., None])
 
     def at(self, mode: np.ndarray) -> tuple[Any, Any]:
-        """Frequency [Hz] and residue, each (...), of one mode each; no frequency is infinite, its residue 0."""
+        """Frequency [Hz] and residue, each (...), of one mode each; infinite and 0 where none is visible."""
         picked = [np.take_along_axis(each, mode[..., None], axis=-1)[..., 0] for each in (self.frequency, self.residue)]
-        return np.where(self.visible.any(axis=-1), picked[0], np.inf)[()], picked[1][()]
+        some = self.visible.any(axis=-1)
+        return np.where(some, picked[0], np.inf)[()], np.where(some, picked[1], 0.0)[()]
 
 
 def first_interfering(it: Mechanism) -> Any:
@@ -69,12 +70,13 @@ def first_interfering(it: Mechanism) -> Any:
 
 def parasitic_mode(it: Mechanism) -> tuple[Any, Any]:
     """Frequency [Hz] and residue, times the stage's mass, of the mode whose resonance stands highest in the plant: the
-    largest residue over the square of the frequency. That of the leaves where none is seen.
+    largest residue over the square of the frequency. Where none is seen, that of the leaves, without weight.
 
     The model of the equations, a part m_p of the stage's mass m on a spring, has the residue m_p/(m (m - m_p)); it
     knows none below 0, of modes in which actuator and sensor move against each other, of which the size counts here.
     """
     seen = Seen.of(it)
-    frequency, residue = seen.at(np.argmax(np.abs(seen.residue) / np.maximum(seen.frequency, 1e-9) ** 2, axis=-1))
+    height = np.where(seen.visible, np.abs(seen.residue), 0.0) / np.maximum(seen.frequency, 1e-9) ** 2
+    frequency, residue = seen.at(np.argmax(height, axis=-1))
     leaves = closed_forms.leaf_bending(it)
     return np.where(np.isfinite(frequency), frequency, leaves)[()], np.maximum(np.abs(residue), LEAST)[()]
