@@ -256,7 +256,8 @@ def test_an_isolator_that_is_needed_says_why(found: Design) -> None:
 
 def test_the_joint_is_held_below_the_static_friction(found: Design) -> None:
     said = " ".join(joint_step(found).sentences)
-    assert "The cart breaks away at 1 N at the least, with the safety factor of 1.1 at 0.909 N" in said
+    assert "The cart breaks away at 1 N at the least" in said
+    assert "with the safety factor of 1.1 and a stiffness off by 10% that allows 0.826 N" in said
     assert "The stroke of 1 mm is the one specified." in said
     unknown = replace(found.edges, unknown=2)
     assert "In 2 corners a run that had to decide" in " ".join(joint_step(replace(found, edges=unknown)).sentences)

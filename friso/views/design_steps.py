@@ -41,12 +41,13 @@ def isolator_step(found: Design) -> Step:
 
 def joint_step(found: Design) -> Step:
     """How soft, and with which stroke."""
-    task, it, breakaway = found.fitted.task, found.fitted.choice.beams, found.spec.safety.breakaway
+    task, it, safety = found.fitted.task, found.fitted.choice.beams, found.spec.safety
+    allowed = task.friction / safety.breakaway / (1 + safety.stiffness_tolerance)
     stiffness, force = newtons_per(it.drive[0], "mm"), plain(it.forces[-1], "N")
     held = (
         f"At full stroke the joint pushes with {force}. The cart breaks away at {plain(task.friction, 'N')} at the "
-        f"least, with the safety factor of {breakaway:g} at {task.friction / breakaway:.3g} N, so that it stays stuck "
-        "inside the stroke."
+        f"least; with the safety factor of {safety.breakaway:g} and a stiffness off by {safety.stiffness_tolerance:.0%} "
+        f"that allows {allowed:.3g} N, so that it stays stuck inside the stroke."
     )
     said = [held, _stroke(found), f"With this joint the machine {edge(found.edges)}.", *_worst(found.edges, found)]
     joint = found.stage.flat()
