@@ -46,8 +46,8 @@ def joint_step(found: Design) -> Step:
     stiffness, force = newtons_per(it.drive[0], "mm"), plain(it.forces[-1], "N")
     held = (
         f"At full stroke the joint pushes with {force}. The cart breaks away at {plain(task.friction, 'N')} at the "
-        f"least; with the safety factor of {safety.breakaway:g} and a stiffness off by {safety.stiffness_tolerance:.0%} "
-        f"that allows {allowed:.3g} N, so that it stays stuck inside the stroke."
+        f"least; with the safety factor of {safety.breakaway:g} and a stiffness off by "
+        f"{safety.stiffness_tolerance:.0%} that allows {allowed:.3g} N, so that it stays stuck inside the stroke."
     )
     said = [held, _stroke(found), f"With this joint the machine {edge(found.edges)}.", *_worst(found.edges, found)]
     joint = found.stage.flat()
