@@ -260,8 +260,8 @@ def test_the_crossover_is_comfortable_and_damping_helps(base: Stage) -> None:
     stage = with_leaves(base, Geometry(60e-3, 18e-3, 50e-3, Sheet(2.0, 0.3e-3, "stainless 1.4310")), 1e-3)
     stage = stage.replace({"controller.crossover": "40 Hz"})
     found = limits(stage.flat())
-    assert comfortable_below(found, 43.0) == pytest.approx(43.0)
-    assert comfortable_below(found, 20.0) < 12.0  # type: ignore[operator]  # a gap: the joint is hardly damped
+    assert comfortable_below(found.comfortable, 43.0) == pytest.approx(43.0)
+    assert comfortable_below(found.comfortable, 20.0) < 12.0  # type: ignore[operator]  # a gap: the joint is hardly damped
     known = controller(stage, beams_module.beams(Mechanism.of(stage.flat()), 1e-3), found, corners(SPEC, stage.flat()))
     assert known.margin == pytest.approx(settled_margin(stage.flat()), rel=0.01)
     assert known.margin >= 0.5
@@ -280,9 +280,9 @@ def test_without_a_comfortable_crossover_there_is_no_design(
 ) -> None:
     from friso.design import method
 
-    monkeypatch.setattr(method, "comfortable_below", lambda found, highest: None)
+    monkeypatch.setattr(method, "comfortable_below", lambda ranges, highest: None)
     with pytest.raises(NoDesign, match="modulus margin"):
-        fitted(base, replace(task, crossover=40.0), candidates)
+        fitted(base, replace(task, crossover=40.0), candidates, corners(SPEC, base.flat()))
 
 
 # --- verification -----------------------------------------------------------------------------------------------------

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import shutil
 import textwrap
 from pathlib import Path
@@ -71,8 +72,12 @@ def _check_place(folder: Path, given: Sequence[Path]) -> None:
             raise StageError("--out", f"{folder}, where {path.name} is read", expected, "--out design-2")
         if not (folder / PAGE).exists():
             raise StageError("--out", f"{folder}, with a {path.name} of no earlier design", expected, "--out design-2")
-    if folder.exists():
-        made_folder(folder)
+    was_there = folder.exists()
+    made_folder(folder)  # now, not after a minute of computing
+    if not os.access(folder, os.W_OK):
+        raise StageError("--out", str(folder), "a folder that can be written", "--out design-2")
+    if not was_there:
+        folder.rmdir()
 
 
 def _designed(stage: Stage, spec: Spec, out: Path) -> tuple[Design, list[Path]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,6 +12,7 @@ from friso.design.modal import Modal
 from friso.design.population import Population
 from friso.flexure.evaluation import Evaluation
 from friso.frequency.crossover import Limits
+from friso.frequency.ranges import Range, shared
 from friso.frequency.tuning import Tuning, tuning
 from friso.stage import Stage
 
@@ -49,10 +50,25 @@ class Controller:
     damping: Damping
 
 
-def comfortable_below(found: Limits, highest: float) -> float | None:
-    """The highest crossover [Hz], not above `highest`, with a modulus margin of 0.5 in all settled states."""
-    below = [min(high, highest) for low, high in found.comfortable if low < highest]
+def comfortable_below(ranges: Sequence[Range], highest: float) -> float | None:
+    """The highest crossover [Hz] of the ranges that is not above `highest`."""
+    below = [min(high, highest) for low, high in ranges if low < highest]
     return max(below) if below else None
+
+
+def comfortable(stage: Stage, leaves: Evaluation, population: Population) -> tuple[Range, ...]:
+    """The crossovers [Hz] with a modulus margin of 0.5 in all settled states, with the masses of the stage and with all
+    those of the population."""
+    flat = stage.flat()
+    ranges = Modal.of(flat, leaves).comfortable
+    masses = {
+        tuple((key, value) for key, value in population.of(k).items() if key.startswith("masses."))
+        for k in range(population.count)
+    }
+    for own in sorted(masses):
+        if own:
+            ranges = shared(ranges, Modal.of({**flat, **dict(own)}, leaves).comfortable)
+    return ranges
 
 
 def controller(stage: Stage, leaves: Evaluation, found: Limits, population: Population) -> Controller:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from friso.design.choice import Choice, Confirmed, chosen, confirmed
-from friso.design.controller import Controller, comfortable_below, controller, dampings
+from friso.design.controller import Controller, comfortable, comfortable_below, controller, dampings
 from friso.design.edges import Corners, edges_over, rigid
 from friso.design.front import Candidate, front
 from friso.design.hunting_map import HuntingMap, hunting_map
@@ -72,6 +72,7 @@ class Design:
     `without`: the edges of hunting over the `corners` of the specification without isolator, `edges` with it.
     `candidates`: the Pareto front, some of it `confirmed` by beams; `fitted`: what was chosen. `controller`: margins.
     `map`: hunting over crossover and stroke. `verification`: the moves simulated. `stage`: the design as a stage.
+    `damped`: the joint damping with which the crossover could be `faster` [Hz], where margins hold it down.
     """
 
     spec: Spec
@@ -84,6 +85,8 @@ class Design:
     controller: Controller
     map: HuntingMap
     verification: Verification
+    damped: Relaxation | None
+    faster: float
 
     @property
     def stage(self) -> Stage:
@@ -97,7 +100,8 @@ class Design:
         if wanted is None or found <= wanted or not np.isfinite(found):
             return ()
         name = f"{1 - SLOW:.0%} of the moves settle in time"
-        return (Relaxation(name, "position.settling_time", float(wanted), found, "s"),)
+        later = Relaxation(name, "position.settling_time", float(wanted), found, "s")
+        return (self.damped, later) if self.damped else (later,)
 
     @property
     def meets(self) -> bool:
@@ -123,7 +127,7 @@ def design(stage: Stage, spec: Spec, progress: Progress = lambda what, done, tot
         raise NoDesign("the bias force on the cart exceeds the least static friction: no joint is soft enough")
     task, candidates = leaves(spec, flat, friction, progress)
     progress("leaves and crossover", 0, 1)
-    found = fitted(base, task, candidates)
+    found = fitted(base, task, candidates, population)
     crossover, tell = found.stage.flat()["controller.crossover"], partial(progress, "hunting with isolator")
     tell(0, 1)
     stiffest = found.stage.flat()["joint.stiffness"] * (1 + spec.safety.stiffness_tolerance)
@@ -136,7 +140,25 @@ def design(stage: Stage, spec: Spec, progress: Progress = lambda what, done, tot
     drawn = hunting_map(found.stage, spec, population)
     by_beams = tuple(confirmed(found.task, candidates))
     tried = verification(found.stage, spec, found.task.load / found.choice.beams.buckling, progress)
-    return Design(spec, stage, without, tuple(candidates), by_beams, found, edges, control, drawn, tried)
+    damped, faster = with_damping(found)
+    known = (without, tuple(candidates), by_beams, found, edges, control, drawn, tried, damped, faster)
+    return Design(spec, stage, *known)
+
+
+def with_damping(found: Fitted) -> tuple[Relaxation | None, float]:
+    """The least joint damping of those tried with which the crossover could be what leaves and machine allow, and that
+    crossover [Hz]; none where it is already, or where damping does not help."""
+    flat, spec = found.stage.flat(), found.task.spec
+    wanted = min(spec.limit, found.choice.frequency / spec.safety.parasitic)
+    if flat["controller.crossover"] >= ALIKE * wanted:
+        return None, wanted
+    for each in dampings(flat)[1::2]:
+        ranges = Modal.of({**flat, "joint.damping": each}, found.choice.beams).comfortable
+        best = comfortable_below(ranges, wanted)
+        if best is not None and best >= ALIKE * wanted:
+            name = f"crossover of up to {best:.3g} Hz with a modulus margin of 0.5"
+            return Relaxation(name, "joint.damping", flat["joint.damping"], float(each), "N*s/m"), best
+    return None, wanted
 
 
 def least_friction(population: Population, flat: Mapping[str, Any]) -> float:
@@ -172,7 +194,7 @@ def allowed(task: Task, candidates: list[Candidate]) -> float:
     return max(each.frequency for each in candidates) / task.spec.safety.parasitic
 
 
-def fitted(base: Stage, task: Task, candidates: list[Candidate]) -> Fitted:
+def fitted(base: Stage, task: Task, candidates: list[Candidate], population: Population) -> Fitted:
     """Leaves as soft as the crossover allows, that as high as leaves and margins allow. Raises NoDesign."""
     wanted = min(task.spec.limit, allowed(task, candidates))
     for _ in range(ROUNDS):
@@ -182,8 +204,8 @@ def fitted(base: Stage, task: Task, candidates: list[Candidate]) -> Fitted:
             wanted *= LOWER
             continue
         stage = with_leaves(base, choice.geometry, task.stroke)
-        found = replace(limits(stage.flat()), comfortable=Modal.of(stage.flat(), choice.beams).comfortable)
-        best = comfortable_below(found, wanted)
+        found = replace(limits(stage.flat()), comfortable=comfortable(stage, choice.beams, population))
+        best = comfortable_below(found.comfortable, wanted)
         if best is None:
             raise NoDesign(f"up to {wanted:.3g} Hz there is no crossover with a modulus margin of 0.5")
         if best >= ALIKE * wanted:

@@ -22,8 +22,9 @@ POPULATION, GENERATIONS, SEED = 16, 80, 5
 UNMET = 10.0
 """Added to the objective where another requirement is not met: the logarithm of a factor beyond all relaxation."""
 
-SLACK = 1e-3
-"""Logarithm of the factor by which the others may be broken here."""
+SPARE, MORE = 0.01, 1.03
+"""Logarithm of the factor by which the others have to be kept, and the factor by which more is asked of the one that is
+relaxed: sizes are made in whole tenths, and beams have to confirm them."""
 
 
 @dataclass(frozen=True)
@@ -82,6 +83,9 @@ def _alone(task: Task, wanted: list[Requirement], k: int) -> Iterator[Relaxation
     bounds = np.log(ends).T + np.log(BEYOND) * np.array([-1, 1])
     kinds = [(n, material) for n in task.spec.leaves.leaves for material in task.spec.leaves.materials]
 
+    # what may be bought is met exactly
+    spare = np.array([0.0 if each.ways[0].key == "leaves.thickness" else SPARE for each in wanted])
+
     def built(x: np.ndarray) -> tuple[np.ndarray, list[Sheet]]:
         sizes = np.exp(x[:4]).T
         thickness = sizes[:, 3] if free else gauges[np.abs(np.log(gauges) - x[3][:, None]).argmin(axis=1)]
@@ -91,8 +95,8 @@ def _alone(task: Task, wanted: list[Requirement], k: int) -> Iterator[Relaxation
     def objective(x: np.ndarray) -> np.ndarray:
         many = mechanisms(task.flat, *built(x))
         excess = np.log([np.broadcast_to(each.excess(many), x.shape[1]) for each in wanted])
-        others = np.delete(excess, k, axis=0).max(axis=0)
-        return np.where(others <= SLACK, excess[k], UNMET + others)
+        others = np.delete(excess + spare[:, None], k, axis=0).max(axis=0)
+        return np.where(others <= 1e-9, excess[k], UNMET + others)
 
     with np.errstate(divide="ignore"):  # a requirement that asks for nothing
         found = differential_evolution(
@@ -110,6 +114,6 @@ def _alone(task: Task, wanted: list[Requirement], k: int) -> Iterator[Relaxation
     (sizes,), (sheet,) = built(found.x[:, None])
     geometry = Geometry.of(sizes, sheet)
     for way in wanted[k].ways:
-        needed = way.needed(float(np.exp(max(found.fun, 0.0))))
-        if needed is not None and not np.isclose(needed, way.value, rtol=1e-3):
+        needed = way.needed(MORE * float(np.exp(max(found.fun, 0.0))))
+        if needed is not None and not np.isclose(needed, way.value, rtol=1e-6):
             yield Relaxation(wanted[k].name, way.key, way.value, needed, way.unit, geometry)

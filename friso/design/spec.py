@@ -133,7 +133,7 @@ class Friction(Section):
     def _is_not_contradictory(self) -> Self:
         if self.coulomb and self.gap:
             raise StageError("", "coulomb together with gap", "one of the two", 'gap = "0.3 .. 0.85"')
-        if self.static and self.coulomb and self.coulomb.low >= self.static.high:
+        if self.static and self.coulomb and self.coulomb.high > self.static.high:
             given = f"coulomb = {quoted(self.coulomb.text)}, static = {quoted(self.static.text)}"
             raise StageError("", given, "Coulomb friction below the static friction", 'coulomb = "0.5 N .. 1 N"')
         return self
@@ -195,6 +195,9 @@ class Leaves(Section):
     @model_validator(mode="after")
     def _can_be_built(self) -> Self:
         thickest = max(self.thickness)
+        if 2 * self.stroke.low > self.length.high:
+            given = f"stroke = {quoted(self.stroke.text)}, length = {quoted(self.length.text)}"
+            raise StageError("stroke", given, "a stroke of at most half the length of the leaves", 'stroke = "1 mm"')
         for name in ("length", "width"):
             longest = getattr(self, name)
             if min(self.thickness) >= longest.high:
@@ -258,12 +261,13 @@ class Spec(Section):
         return min(known) / self.safety.parasitic
 
 
+EXAMPLE = '[machine] and, on the next line, bandwidth_limit = "48 Hz"'
 EXPECTED = "a specification; examples/specs/thesis.toml is one"
 
 
 def load_spec(path: str | os.PathLike[str]) -> Spec:
     """The specification in a TOML file. Raises StageError."""
     try:
-        return Spec(**parsed(text_of(Path(path), EXPECTED), EXPECTED))
+        return Spec(**parsed(text_of(Path(path), EXPECTED, EXAMPLE), EXPECTED, EXAMPLE))
     except StageError as error:
         raise error.found_in(str(path)) from None

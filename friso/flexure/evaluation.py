@@ -74,9 +74,10 @@ class Evaluation:
 
     @property
     def buckling_margin(self) -> float:
-        """Buckling load over the load along the leaves, or over the weight of the stage where no load presses."""
-        load = self.mechanism.load
-        return float(self.buckling / (load if load > 0 else self.mechanism.weight))
+        """Buckling load over the load along the leaves, or over the weight of the stage where there is none; infinite
+        where the load pulls."""
+        load = self.mechanism.load if self.mechanism.load else self.mechanism.weight
+        return float(self.buckling / load) if load > 0 else np.inf
 
     @property
     def clamp_stress(self) -> float:

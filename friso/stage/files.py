@@ -61,7 +61,7 @@ def _value(text: str) -> Any:
     return document["line"]["value"] if is_one_value else text
 
 
-def text_of(path: Path, expected: str) -> str:
+def text_of(path: Path, expected: str, example: str = _EXAMPLE) -> str:
     """What stands in a text file, which is to be what is `expected`. Raises StageError."""
     try:
         return path.read_bytes().decode("utf-8-sig")
@@ -70,20 +70,20 @@ def text_of(path: Path, expected: str) -> str:
         raise StageError("", given, "a text file saved as UTF-8", _EXAMPLE, str(path)) from None
     except (OSError, ValueError) as error:
         given = "a folder" if path.is_dir() else _reason(error)
-        raise StageError("", given, expected, _EXAMPLE, str(path)) from None
+        raise StageError("", given, expected, example, str(path)) from None
 
 
 def _reason(error: OSError | ValueError) -> str:
     return str(getattr(error, "strerror", None) or error).lower()
 
 
-def parsed(text: str, expected: str) -> dict[str, Any]:
+def parsed(text: str, expected: str, example: str = _EXAMPLE) -> dict[str, Any]:
     """The tables of a TOML text that is to be what is `expected`. Raises StageError."""
     if not text.strip():
-        raise StageError("", "an empty file", expected, _EXAMPLE)
+        raise StageError("", "an empty file", expected, example)
     try:
         return tomllib.loads(text)
     except RecursionError:
-        raise StageError("", "tables nested too deeply", expected, _EXAMPLE) from None
+        raise StageError("", "tables nested too deeply", expected, example) from None
     except ValueError as error:  # TOMLDecodeError, and Python's own for integers of thousands of digits
-        raise StageError("", f"not TOML: {error}", "tables in brackets, then key = value", _EXAMPLE) from None
+        raise StageError("", f"not TOML: {error}", "tables in brackets, then key = value", example) from None

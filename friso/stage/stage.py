@@ -80,9 +80,9 @@ class Stage(Section):
         if self.joint and (self.masses.cart is None or self.masses.stage is None):
             given = "a [joint], but a single mass"
             raise StageError("masses", given, "both masses", 'cart = "1.2 kg", stage = "0.5 kg"')
-        for table in ("parasitic", "flexure"):
+        for table, what in (("parasitic", "a parasitic mode"), ("flexure", "leaf springs")):
             if getattr(self, table) and not self.joint:
-                raise StageError(table, f"a [{table}], but no [joint]", "both or neither", _JOINT.example)
+                raise StageError(table, f"{what}, but no [joint]", "both or neither", _JOINT.example)
         self._has_one_stiffness()
         for body in ("cart", "stage"):
             if self.bias and getattr(self.bias, body) is not None and getattr(self.masses, body) is None:

@@ -28,7 +28,9 @@ LITTLE = 0.1
 def controller_step(found: Design) -> Step:
     """The crossover, why it is no other, and the gains."""
     it = found.controller
-    said = (_not_higher(found), _not_lower(found), _margin(found), _damping(found))
+    gains = f"Gains of a PID (kp, ki, kd): {_parallel(found)} of {plain(it.gains.tau_p, 's')}."
+    faster = [_faster(found)] if found.damped else []
+    said = (_not_higher(found), *faster, _not_lower(found), gains, _margin(found), _damping(found))
     figures = ("design_window", "design_damping")
     return Step(f"Controller: crossover {hertz(it.crossover)}", said, _gains(found), figures)
 
@@ -49,6 +51,15 @@ def _gains(found: Design) -> tuple[tuple[str, str], ...]:
         ("Least modulus margin, as designed", f"{it.margin:.3g}"),
         ("The same over the corners", f"{it.corners.min():.3g}"),
         (f"Modulus margin above {WANTED:g}", window),
+    )
+
+
+def _faster(found: Design) -> str:
+    """What would let the crossover be higher."""
+    assert found.damped
+    return (
+        f"With {plain(found.damped.needed, 'N*s/m')} of joint damping instead of "
+        f"{plain(found.damped.value, 'N*s/m')} it could be {hertz(found.faster)}: --set joint.damping tries it."
     )
 
 

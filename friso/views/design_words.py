@@ -151,7 +151,9 @@ def refusal(failure: NoDesign) -> str:
     if not failure.relaxed:
         tail = "no requirement is known that, relaxed alone, is enough: relax several"
         return f"{failure.reason}\n  {tail}"
-    return "\n  ".join([failure.reason, *map(relaxation, failure.relaxed[:SHOWN])])
+    later = any(each.geometry for each in failure.relaxed)
+    tail = ["(each alone; this is of the leaf springs, the steps after them were not tried)"] if later else []
+    return "\n  ".join([failure.reason, *map(relaxation, failure.relaxed[:SHOWN]), *tail])
 
 
 def shortfall(found: Design) -> str:

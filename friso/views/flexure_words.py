@@ -36,6 +36,7 @@ def warnings(found: Found) -> list[str]:
     return [
         *([failed] if found.beams is None else []),
         *_borne(found.best),
+        *_loaded(found.best),
         *_breaks_away(found),
         *_against(found.best),
         *_differences(found),
@@ -106,6 +107,20 @@ def _borne(it: Evaluation) -> list[str]:
             f"(g = {GRAVITY} m/s²), they bear {with_unit(it.buckling, 'N')} along their length."
         )
     return said
+
+
+def _loaded(it: Evaluation) -> list[str]:
+    """What a load along the leaves does."""
+    load = float(it.mechanism.load)
+    if not load:
+        return []
+    first = it.modes[0].frequency * math.sqrt(max(it.loaded_drive / it.drive[0], 0.0))
+    close = f" That is {it.buckling_margin:.2g} times below buckling: stiffness hangs on it." if load > 0 else ""
+    return [
+        f"Under the load of {with_unit(load, 'N')} along the leaves the drive stiffness is "
+        f"{newtons_per(it.loaded_drive, 'mm')} and the drive mode at {with_unit(first, 'Hz')}; all else is told "
+        f"without it.{close}"
+    ]
 
 
 def _breaks_away(found: Found) -> list[str]:
