@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.optimize import differential_evolution
 
 from friso.design.geometry import Geometry, Sheet, box, mechanisms, sheets
 from friso.design.requirements import PARASITIC, Requirement, Task, requirements
@@ -14,6 +15,9 @@ from friso.flexure.joint import first_interfering
 
 POPULATION, GENERATIONS = 160, 120
 """Geometries of the genetic algorithm, and how often they are renewed."""
+
+SEARCHED = 60
+"""Generations of the search for a geometry to start from."""
 
 SEED = 34
 """Of its random numbers: the same front for the same specification."""
@@ -32,41 +36,68 @@ def front(task: Task) -> list[Candidate]:
     """The front, by rising stiffness (NSGA-II, doi:10.1109/4235.996017); empty where no geometry meets the requirements
     but for that on the frequency, which is an objective here."""
     from pymoo.algorithms.moo.nsga2 import NSGA2
-    from pymoo.core.problem import Problem
     from pymoo.operators.crossover.sbx import SBX
     from pymoo.operators.mutation.pm import PM
     from pymoo.optimize import minimize
 
-    bought, (low, high) = sheets(task.spec), box(task.spec)
     wanted = [each for each in requirements(task) if each.name != PARASITIC]
+    start = closest(task, wanted)
+    if start is None:
+        return []
+    low, high = _ends(task)
+    first = low + (high - low) * np.random.default_rng(SEED).random((POPULATION, len(low)))
+    first[: len(first) // 4] = start  # from where the others are reached, however little room there is
+    variation = {"sampling": first, "crossover": SBX(prob=0.9, eta=10), "mutation": PM(eta=10)}
+    algorithm = NSGA2(pop_size=POPULATION, **variation)
+    result = minimize(_problem(task, wanted), algorithm, ("n_gen", GENERATIONS), seed=SEED, verbose=False)
+    if result.X is None or result.F is None:
+        return []
+    bought = sheets(task.spec)
+    chosen, objectives = (np.atleast_2d(np.asarray(each, dtype=float)) for each in (result.X, result.F))
+    found = [
+        Candidate(Geometry.of(np.exp(x[:3]), bought[int(x[3])]), float(np.exp(f[0])), float(np.exp(-f[1])))
+        for x, f in zip(chosen, objectives, strict=True)
+    ]
+    return sorted(found, key=lambda each: each.stiffness)
+
+
+def _ends(task: Task) -> tuple[np.ndarray, np.ndarray]:
+    """The least and the largest variables, each (4,): logarithms of the sizes, and the number of the sheet."""
+    low, high = box(task.spec)
+    return np.append(np.log(low), 0.0), np.append(np.log(high), len(sheets(task.spec)) - 1e-9)
+
+
+def _problem(task: Task, wanted: list[Requirement]) -> Any:
+    """The two objectives and the requirements, as pymoo takes them."""
+    from pymoo.core.problem import Problem
+
+    low, high = _ends(task)
+    bought = sheets(task.spec)
 
     class Leaves(Problem):
-        def __init__(self) -> None:
-            ends = np.log([low, high])
-            super().__init__(
-                n_var=4, n_obj=2, n_ieq_constr=len(wanted), xl=[*ends[0], 0], xu=[*ends[1], len(bought) - 1e-9]
-            )
-
         def _evaluate(self, x: np.ndarray, out: dict[str, Any], *args: Any, **kwargs: Any) -> None:
             found = judged(task, wanted, np.exp(x[:, :3]), [bought[int(k)] for k in x[:, 3]])
             out["F"] = np.stack([np.log(found.stiffness), -np.log(found.frequency)], axis=1)
             out["G"] = np.log(found.excess)
 
-    crossover, mutation = SBX(prob=0.9, eta=10), PM(eta=10)
-    result = minimize(
-        Leaves(),
-        NSGA2(pop_size=POPULATION, crossover=crossover, mutation=mutation),
-        ("n_gen", GENERATIONS),
-        seed=SEED,
-        verbose=False,
+    return Leaves(n_var=len(low), n_obj=2, n_ieq_constr=len(wanted), xl=low, xu=high)
+
+
+def closest(task: Task, wanted: list[Requirement]) -> np.ndarray | None:
+    """A geometry, as the logarithms of its sizes and the number of its sheet (4,), that meets the requirements with the
+    most to spare, by differential evolution; None if none meets them."""
+    bought = sheets(task.spec)
+
+    def objective(x: np.ndarray) -> np.ndarray:
+        found = judged(task, wanted, np.exp(x[:3]).T, [bought[int(k)] for k in x[3]])
+        return np.log(found.excess).max(axis=1)
+
+    low, high = _ends(task)
+    bounds = [*zip(low, high + 1e-12 * (high == low), strict=True)]
+    found = differential_evolution(
+        objective, bounds, vectorized=True, updating="deferred", maxiter=SEARCHED, rng=SEED, polish=False
     )
-    if result.X is None or result.F is None:
-        return []
-    found = [
-        Candidate(Geometry.of(np.exp(x[:3]), bought[int(x[3])]), float(np.exp(f[0])), float(np.exp(-f[1])))
-        for x, f in zip(np.atleast_2d(result.X), np.atleast_2d(result.F), strict=True)
-    ]
-    return sorted(found, key=lambda each: each.stiffness)
+    return found.x if found.fun <= 0 else None
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -18,6 +17,7 @@ from friso.design.verification import Outcome
 from friso.stage.stage import numeric_keys
 from friso.views.design_control import parallel_gains
 from friso.views.design_window import lower, upper
+from friso.views.documents import plain_json
 
 
 def design_document(found: Design) -> dict[str, Any]:
@@ -36,13 +36,13 @@ def design_document(found: Design) -> dict[str, Any]:
         "controller": _controller(found),
         "verification": _verification(found),
     }
-    return _plain(document)
+    return plain_json(document)
 
 
 def refused_document(stage: str, spec: str, failure: NoDesign) -> dict[str, Any]:
     """What there is to say where no design meets the specification."""
     told = {"stage": stage, "spec": spec, "feasible": False, "reason": failure.reason}
-    return _plain(told | {"relax": _relax(failure.relaxed)})
+    return plain_json(told | {"relax": _relax(failure.relaxed)})
 
 
 def _relax(relaxed: Sequence[Relaxation]) -> list[dict[str, Any]]:
@@ -168,18 +168,3 @@ def _outcome(it: Outcome) -> dict[str, Any]:
 def _suffix(unit: str) -> str:
     """A unit as a key ends with it: "_n_s_per_m"."""
     return f"_{unit.lower().replace('/', '_per_').replace('*', '_')}" if unit else ""
-
-
-def _plain(value: Any) -> Any:
-    """What JSON knows: plain numbers, lists and nothing; neither infinite nor undefined numbers."""
-    if isinstance(value, dict):
-        return {key: _plain(each) for key, each in value.items()}
-    if isinstance(value, np.ndarray | list):
-        return [_plain(each) for each in value]
-    if isinstance(value, bool | np.bool_):
-        return bool(value)
-    if isinstance(value, int):
-        return value
-    if isinstance(value, float):
-        return float(value) if math.isfinite(value) else None
-    return value

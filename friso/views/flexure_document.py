@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
-import numpy as np
-
 from friso.flexure.evaluation import Evaluation
+from friso.views.documents import plain_json
 from friso.views.flexure_found import Found, interferes
 
 
@@ -48,17 +46,4 @@ def _evaluation(it: Evaluation) -> dict[str, Any]:
         "deflections_m": it.deflections,
         "forces_n": it.forces,
     }
-    return {key: _plain(value) for key, value in plain.items()}
-
-
-def _plain(value: Any) -> Any:
-    """What JSON knows: plain numbers, lists and nothing; neither infinite nor undefined numbers."""
-    if isinstance(value, dict):
-        return {key: _plain(each) for key, each in value.items()}
-    if isinstance(value, np.ndarray | list):
-        return [_plain(each) for each in value]
-    if isinstance(value, bool | np.bool_):
-        return bool(value)
-    if isinstance(value, float | int):
-        return float(value) if math.isfinite(value) else None
-    return value
+    return {key: plain_json(value) for key, value in plain.items()}
