@@ -300,7 +300,7 @@ def test_stiffness_given_twice_or_not_at_all(stage: Stage) -> None:
         stage.replace({"joint.stiffness": "2.4 N/mm"})
     with pytest.raises(StageError, match="the stiffness of the joint, or a \\[flexure\\]"):
         stage.replace({"flexure": None})
-    with pytest.raises(StageError, match=r"a \[flexure\], but no \[joint\]"):
+    with pytest.raises(StageError, match=r"leaf springs, but no \[joint\]"):
         stage.replace({"joint": None})
     locked: dict[str, Any] = {"flexure": None, "joint.locked": True}
     assert "joint.stiffness" not in stage.replace(locked).flat()
