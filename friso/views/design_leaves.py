@@ -11,6 +11,7 @@ from friso.design.method import Design
 from friso.design.requirements import Requirement, Way
 from friso.views.design_words import Step, hertz, leaves, percent, plain, size
 from friso.views.flexure_table import megapascals, newtons_per
+from friso.views.flexure_words import assumptions
 from friso.views.prefixes import listed
 
 BINDS = 0.95
@@ -19,7 +20,7 @@ BINDS = 0.95
 
 def leaves_step(found: Design) -> Step:
     """Which leaf springs, and why these."""
-    said = (_interfering(found), _strength(found), _why(found), _confirmed(found))
+    said = (_interfering(found), _strength(found), _why(found), _confirmed(found), *assumptions(found.stage))
     figures = ("design_front", "design_modes")
     return Step(f"Leaf springs: {leaves(found)}", said, (*_sizes(found), *_numbers(found)), figures)
 

@@ -31,7 +31,7 @@ def flexure_html(found: Found, figures: Sequence[Figure]) -> str:
         found.stage,
         figures,
         verdicts=[(GREEN, joint), *((VERMILLION, warning) for warning in warnings(found))],
-        further=[*further, *assumptions(found)],
+        further=[*further, *assumptions(found.stage)],
         drawing=Markup(drawing(found)),
         shown=[Column(name, COLOURS[name]) for name in found.models],
         rows=rows(found),

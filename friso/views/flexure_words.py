@@ -8,6 +8,7 @@ from typing import Any
 
 from friso.flexure.evaluation import Evaluation
 from friso.flexure.mechanism import AXES, GRAVITY
+from friso.stage import Stage
 from friso.views.flexure_found import Found, interferes
 from friso.views.flexure_table import megapascals, newtons_per, percent
 from friso.views.prefixes import listed, with_unit
@@ -22,7 +23,7 @@ AGREE = 0.1
 def sentences(found: Found) -> list[str]:
     """All that is said, in order."""
     joint, *further = findings(found)
-    return [joint, *warnings(found), *further, *assumptions(found)]
+    return [joint, *warnings(found), *further, *assumptions(found.stage)]
 
 
 def findings(found: Found) -> list[str]:
@@ -43,10 +44,10 @@ def warnings(found: Found) -> list[str]:
     ]
 
 
-def assumptions(found: Found) -> list[str]:
+def assumptions(stage: Stage) -> list[str]:
     """What stands in for keys that the stage file leaves out."""
-    flat, it = found.stage.flat(), found.mechanism
-    said = [_centre(flat), _inertia(flat, it.body.mass), _points(flat), _load(flat)]
+    flat = stage.flat()
+    said = [_centre(flat), _inertia(flat, flat["masses.stage"]), _points(flat), _load(flat)]
     parts = [part for part in said if part]
     return [f"Assumed, since [flexure] does not say: {'; '.join(parts)}."] if parts else []
 
