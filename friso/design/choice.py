@@ -35,7 +35,7 @@ class Confirmed:
 @dataclass(frozen=True)
 class Choice:
     """The geometry chosen, by the beam model; its requirements, and by what factor it breaks each by closed forms (at
-    most 1); and how many geometries were passed over because beams did not confirm them, or failed."""
+    most 1); and of the geometries that were passed over, what beams found or why they failed."""
 
     geometry: Geometry
     beams: Evaluation

@@ -1,4 +1,8 @@
-"""The edge of hunting over the corners of a specification: below which crossover a cycle attracts."""
+"""The edge of hunting over the corners of a specification: below which crossover a cycle attracts.
+
+Coarser than `friso.hunting.edges`, which tells kinds of edges apart and simulates for minutes where a cycle cannot be
+closed: a design asks for 1 or 2 % in seconds, and simulates all its moves afterwards.
+"""
 
 from __future__ import annotations
 

@@ -74,46 +74,58 @@ def _over(name: str, limit: float, low: bool) -> Callable[[Mechanism], Any]:
     return excess
 
 
+@dataclass(frozen=True)
+class _Trials:
+    """Geometries in more space than is allowed, as variables: logarithms of length, width, spacing and thickness, and
+    the number of the kind. The thickness is `free`, or that of the sheet next to it that is to be had."""
+
+    task: Task
+    free: bool
+
+    @property
+    def kinds(self) -> list[tuple[float, str]]:
+        """Numbers of leaves with materials."""
+        own = self.task.spec.leaves
+        return [(count, material) for count in own.leaves for material in own.materials]
+
+    @property
+    def gauges(self) -> np.ndarray:
+        return np.sort(np.array(self.task.spec.leaves.thickness, dtype=float))
+
+    @property
+    def bounds(self) -> list[tuple[float, float]]:
+        low, high = box(self.task.spec)
+        ends = np.log([[*low, self.gauges[0]], [*high, self.gauges[-1]]]).T + np.log(BEYOND) * np.array([-1, 1])
+        return [*map(tuple, ends), (0, len(self.kinds) - 1e-9)]
+
+    def built(self, x: np.ndarray) -> tuple[np.ndarray, list[Sheet]]:
+        """Sizes (count, 3) and sheets of the variables, (5, count)."""
+        sizes, gauges, kinds = np.exp(x[:4]).T, self.gauges, self.kinds
+        nearest = gauges[np.abs(np.log(gauges) - x[3][:, None]).argmin(axis=1)]
+        thickness = sizes[:, 3] if self.free else nearest
+        chosen = (kinds[int(n)] for n in x[4])
+        return sizes[:, :3], [Sheet(count, float(t), of) for t, (count, of) in zip(thickness, chosen, strict=True)]
+
+
 def _alone(task: Task, wanted: list[Requirement], k: int) -> Iterator[Relaxation]:
     """The least relaxation of requirement `k` with which the others can be met."""
-    low, high = box(task.spec)
-    gauges = np.sort(np.array(task.spec.leaves.thickness, dtype=float))
-    free = wanted[k].ways[0].key == "leaves.thickness"  # else a sheet that is to be had
-    ends = [[*low, gauges[0]], [*high, gauges[-1]]]
-    bounds = np.log(ends).T + np.log(BEYOND) * np.array([-1, 1])
-    kinds = [(n, material) for n in task.spec.leaves.leaves for material in task.spec.leaves.materials]
-
-    # what may be bought is met exactly
-    spare = np.array([0.0 if each.ways[0].key == "leaves.thickness" else SPARE for each in wanted])
-
-    def built(x: np.ndarray) -> tuple[np.ndarray, list[Sheet]]:
-        sizes = np.exp(x[:4]).T
-        thickness = sizes[:, 3] if free else gauges[np.abs(np.log(gauges) - x[3][:, None]).argmin(axis=1)]
-        bought = [Sheet(kinds[int(n)][0], float(t), kinds[int(n)][1]) for t, n in zip(thickness, x[4], strict=True)]
-        return sizes[:, :3], bought
+    of_sheets = np.array([each.ways[0].key == "leaves.thickness" for each in wanted])
+    trials = _Trials(task, free=bool(of_sheets[k]))
+    spare = np.where(of_sheets, 0.0, SPARE)  # what may be bought is met exactly
 
     def objective(x: np.ndarray) -> np.ndarray:
-        many = mechanisms(task.flat, *built(x))
+        many = mechanisms(task.flat, *trials.built(x))
         excess = np.log([np.broadcast_to(each.excess(many), x.shape[1]) for each in wanted])
         others = np.delete(excess + spare[:, None], k, axis=0).max(axis=0)
         return np.where(others <= 1e-9, excess[k], UNMET + others)
 
+    search = {"popsize": POPULATION, "maxiter": GENERATIONS, "rng": SEED, "polish": False}
     with np.errstate(divide="ignore"):  # a requirement that asks for nothing
-        found = differential_evolution(
-            objective,
-            [*bounds, (0, len(kinds) - 1e-9)],
-            vectorized=True,
-            updating="deferred",
-            popsize=POPULATION,
-            maxiter=GENERATIONS,
-            rng=SEED,
-            polish=False,
-        )
+        found = differential_evolution(objective, trials.bounds, vectorized=True, updating="deferred", **search)
     if found.fun >= UNMET:
         return
-    (sizes,), (sheet,) = built(found.x[:, None])
-    geometry = Geometry.of(sizes, sheet)
+    (sizes,), (sheet,) = trials.built(found.x[:, None])
     for way in wanted[k].ways:
         needed = way.needed(MORE * float(np.exp(max(found.fun, 0.0))))
         if needed is not None and not np.isclose(needed, way.value, rtol=1e-6):
-            yield Relaxation(wanted[k].name, way.key, way.value, needed, way.unit, geometry)
+            yield Relaxation(wanted[k].name, way.key, way.value, needed, way.unit, Geometry.of(sizes, sheet))
