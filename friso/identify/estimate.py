@@ -1,0 +1,54 @@
+"""What an analysis of data answers with: a value and its 95 % interval, or a range and why there is no value."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+COVERAGE = 1.959963984540054
+"""Half-width of a 95 % interval of a normal distribution, in standard deviations."""
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A quantity found from data, all numbers in the SI `unit`.
+
+    `name` is a key of the stage file ("friction.coulomb") where it is one, else what it is ("resonance 1 frequency").
+    `low` to `high` is the 95 % interval of the `value`. Where the data cannot show the quantity, `value` is NaN,
+    `reason` says why, and `low`, `high` are what is left possible (infinite where nothing is known).
+    """
+
+    name: str
+    unit: str
+    value: float
+    low: float
+    high: float
+    method: str
+    reason: str = ""
+
+    @classmethod
+    def normal(cls, name: str, unit: str, value: float, deviation: float, method: str) -> Estimate:
+        """With the interval of a normal distribution of this standard deviation."""
+        half = COVERAGE * deviation
+        return cls(name, unit, float(value), float(value - half), float(value + half), method)
+
+    @classmethod
+    def unknown(
+        cls, name: str, unit: str, method: str, reason: str, low: float = -np.inf, high: float = np.inf
+    ) -> Estimate:
+        """Not shown by the data, for this reason; at most bounded."""
+        return cls(name, unit, np.nan, float(low), float(high), method, reason)
+
+    @property
+    def shown(self) -> bool:
+        """Whether the data show the value."""
+        return not self.reason
+
+    @property
+    def half_width(self) -> float:
+        return (self.high - self.low) / 2
+
+    def holds(self, truth: float) -> bool:
+        """Whether the interval holds a value."""
+        return self.low <= truth <= self.high

@@ -1,0 +1,1 @@
+"""Reading logs: sniff, table of channels, roles, checks, log."""

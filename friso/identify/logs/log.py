@@ -1,0 +1,54 @@
+"""The log: what was measured, by role, in SI units, on one even time base."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+ROLES: Mapping[str, str] = {
+    "reference": "m",
+    "position": "m",
+    "velocity": "m/s",
+    "acceleration": "m/s^2",
+    "force": "N",
+    "disturbance": "N",
+    "cart_position": "m",
+    "relative_position": "m",
+}
+"""Roles a channel can have, and the SI unit of each. `position` and `velocity` are the stage's (the body that is
+controlled), `cart_position` the other's; `relative_position` is position minus cart position; `force` is the actuator's,
+from a current or a voltage by a scale, with any `disturbance` that is added to the controller's output contained in
+it."""
+
+
+@dataclass(frozen=True)
+class Log:
+    """Signals by role (see `ROLES`), all of shape (n,), SI, at `time` [s], shape (n,).
+
+    Samples are `sample_time` [s] apart within each of the `segments`; between these there are gaps. `units` holds, for
+    a role whose channel could not be turned into the SI unit of the role (a force in volts without a scale, an angle
+    instead of a length), the unit in which it stands. `scalars` are single numbers that stood in the file, by name.
+    `read` tells line by line what was read and how, `warnings` what the engineer should know before believing it.
+    """
+
+    name: str
+    time: np.ndarray
+    sample_time: float
+    signals: Mapping[str, np.ndarray]
+    segments: tuple[slice, ...]
+    units: Mapping[str, str] = field(default_factory=dict)
+    scalars: Mapping[str, float] = field(default_factory=dict)
+    read: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
+
+    def __contains__(self, role: str) -> bool:
+        return role in self.signals
+
+    def __getitem__(self, role: str) -> np.ndarray:
+        return self.signals[role]
+
+    def unit(self, role: str) -> str:
+        """The unit in which a role stands."""
+        return self.units.get(role, ROLES[role])
