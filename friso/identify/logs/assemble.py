@@ -1,0 +1,147 @@
+"""From a file and what the user said to a log: roles, units, one time base, checks."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from friso.identify.logs import checks, delays
+from friso.identify.logs.log import ROLES, Log
+from friso.identify.logs.mapping import Mapping
+from friso.identify.logs.read import file_format, read_table
+from friso.identify.logs.roles import Choice, choose, role_of
+from friso.identify.logs.signals import Reading, Told, instants, no_time, signal, unused, with_told_units
+from friso.identify.logs.time_base import Track, together, track
+from friso.quantities import StageError, quoted
+
+LEAST_SAMPLES = 50
+"""Fewer samples than this are refused (our choice: no interval on anything would be worth its name)."""
+
+
+def read_log(
+    path: Path | str, mapping: Mapping | None = None, strict: bool = True, needed: Sequence[str] = ("position",)
+) -> Log:
+    """The log in a file: signals by role, SI, on one time base; what was read and what is doubtful told line by line.
+
+    With `strict`, every signal must be in the SI unit of its role; without, others are kept and listed in `Log.units`.
+    `needed` are the roles that must be there. Raises StageError (one message) for what cannot be read or used.
+    """
+    path, mapping = Path(path), mapping or Mapping()
+    form = file_format(path)
+    table = with_told_units(read_table(path), mapping, form, str(path))
+    reading = Reading(table, mapping, strict, form == "mat", str(path))
+    chosen = choose(table, mapping.roles, needed, str(path))
+    unused(mapping, chosen, str(path))
+    told = Told(list(table.read))
+    try:
+        tracks = _tracks(chosen, reading, told, needed)
+        base, signals = together(tracks)
+        told.read += base.read
+        told.warnings += base.warnings
+        _check(base, signals, needed)
+    except StageError as error:
+        raise error.found_in(str(path)) from None
+    told.warnings += _doubts(base, signals, told)
+    told.read.append(_spans(base))
+    return Log(
+        path.stem, base.time, base.period, signals, tuple(base.segments), told.units, dict(table.scalars),
+        tuple(told.read), tuple(told.warnings),
+    )  # fmt: skip
+
+
+def _tracks(chosen: dict[str, Choice], reading: Reading, told: Told, needed: Sequence[str]) -> dict[str, Track]:
+    """Each role's channel on even instants in the unit of the role. A channel that was only proposed and that nobody
+    needs is left out, which is told, where it has no instants or no unit; others raise StageError."""
+    clock = chosen.get("time")
+    tracks: dict[str, Track] = {}
+    sizes = [choice.channel.values.size for role, choice in chosen.items() if role in needed or choice.told]
+    for role in [role for role in ROLES if role in chosen]:
+        choice = chosen[role]
+        optional = not choice.told and role not in needed
+        time = instants(choice, clock, reading, told)
+        foreign = reading.mapping.sample_time is not None and choice.channel.values.size not in sizes
+        if optional and (time is None or foreign):
+            told.warnings.append(f"{role}: {choice.channel.name} left out: of another length, or without instants")
+            continue
+        if time is None:
+            raise no_time(choice.channel, reading)
+        try:
+            values = signal(choice, reading, told)
+        except StageError as error:
+            if not optional or role == "force":
+                raise
+            told.warnings.append(f"{role}: {error.given} left out; to use it: {error.example}")
+            continue
+        if time.size != values.size:
+            raise StageError(
+                role, f"{values.size} values at {time.size} instants", "one value at each", "", reading.origin
+            )
+        tracks[role] = _track(role, choice, time, values, told)
+    told.read += _clocks(clock, reading)
+    return tracks
+
+
+def _clocks(clock: Choice | None, reading: Reading) -> list[str]:
+    """Where the instants come from, in words."""
+    if reading.mapping.sample_time is not None:
+        return [f"time: a sample each {reading.mapping.sample_time:.9g} s, as told; times in the file unused"]
+    if clock is not None:
+        return [f"time: {clock.channel.name} ({clock.channel.source}), {clock.reason}"]
+    columns = [c for c in reading.table.channels if c.unit and (role_of(c.name) or ("",))[0] == "time"]
+    return [f"time: {c.name} ({c.source}), in {c.unit}" for c in columns] or [
+        "time: as the file tells with the signals"
+    ]
+
+
+def _track(role: str, choice: Choice, time: np.ndarray, values: np.ndarray, told: Told) -> Track:
+    """One track, its lines told."""
+    each = track(role, time, values)
+    told.read += each.read
+    told.warnings += each.warnings
+    n = checks.held(values)
+    if n > 1:
+        told.warnings.append(
+            f"{role}: {choice.channel.name} holds each value for {n} samples: it is sampled {n} times slower"
+        )
+    return each
+
+
+def _check(base: Track, signals: dict[str, np.ndarray], needed: Sequence[str]) -> None:
+    """Raises StageError for a log that is too short and for a signal that does not change and should."""
+    if base.time.size < LEAST_SAMPLES:
+        raise StageError("log", f"{base.time.size} samples", f"at least {LEAST_SAMPLES} samples", "")
+    for role in {*needed, "position", "force"} & set(signals):
+        if checks.constant(role, signals[role]):
+            value = quoted(float(signals[role][0]))
+            raise StageError(
+                role, f"a constant signal, {value} throughout", "a signal that changes", f'--map {role}="CHANNEL"'
+            )
+
+
+def _doubts(base: Track, signals: dict[str, np.ndarray], told: Told) -> list[str]:
+    """What the engineer should know of the signals before believing them."""
+    lines, parts, period = [], base.segments, base.period
+    for role, values in signals.items():
+        if checks.constant(role, values):
+            lines.append(f"{role}: constant throughout")
+        share = 0.0 if role in ("reference", "disturbance") else checks.clipped_share(values)
+        if share > checks.CLIPPED:
+            lines.append(f"{role}: {share:.2%} of the samples stand in flat tops at its extremes: saturated or clipped")
+    position, velocity, force = (signals.get(role) for role in ("position", "velocity", "force"))
+    same_kind = ("position" in told.units) == ("velocity" in told.units)
+    if position is not None and velocity is not None and same_kind:
+        lines.append(checks.velocity_warning(position, velocity, period, parts))
+        lines.append(delays.velocity_line(position, velocity, period, parts))
+    if position is not None and force is not None:
+        lines.append(delays.force_line(position, force, period, parts))
+    return [line for line in lines if line]
+
+
+def _spans(base: Track) -> str:
+    """The segments in words."""
+    parts = base.segments
+    shown = ", ".join(f"{base.time[p.start]:.6g} s to {base.time[p.stop - 1]:.6g} s" for p in parts[:6])
+    more = f" and {len(parts) - 6} more" if len(parts) > 6 else ""
+    return f"{base.time.size} samples at {1 / base.period:.6g} Hz in {len(parts)} segments: {shown}{more}"

@@ -1,0 +1,136 @@
+"""What makes a signal doubtful: repeated stamps, constant, clipped, held, wrapped; and signals that contradict."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from friso.quantities import StageError
+
+CLIPPED = 1e-3
+"""Share of the samples in flat tops above which a signal is reported as clipped."""
+
+
+def repeated_stamps(name: str, time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
+    """A channel without samples that repeat the one before, stamp and value; and how many there were.
+
+    Raises StageError for time that decreases and for another value at the same stamp.
+    """
+    steps = np.diff(time)
+    back = np.flatnonzero(steps < 0)
+    if back.size:
+        i = int(back[0])
+        given = f"time that decreases, from {time[i]:.9g} s to {time[i + 1]:.9g} s at sample {i + 2}"
+        raise StageError(name, given, "time that grows", "")
+    again = np.flatnonzero(steps == 0)
+    if again.size == 0:
+        return time, values, 0
+    other = again[values[again] != values[again + 1]]
+    if other.size:
+        i = int(other[0])
+        given = f"two values at {time[i]:.9g} s ({values[i]:.6g} and {values[i + 1]:.6g}), at {other.size} instants"
+        raise StageError(name, given, "one value at each instant; stamps rounded too far need --dt", '--dt "1 ms"')
+    keep = np.r_[True, steps > 0]
+    if keep.sum() < 2:
+        raise StageError(name, f"the same time stamp {time[0]:.9g} s throughout", "time that grows", '--dt "1 ms"')
+    return time[keep], values[keep], int(again.size)
+
+
+def unwrapped(values: np.ndarray) -> tuple[np.ndarray, int]:
+    """Whole numbers of a counter with the jumps of its overflow taken out, and its bits; unchanged with 0 bits where
+    it is no counter that overflows.
+
+    A counter of b bits steps back by nearly 2^b; every other step is below 2^b/4, and with 2^b added the step
+    back is at most twice as large as those (a square wave fails this).
+    """
+    finite = values[np.isfinite(values)]
+    if finite.size < 3 or np.any(finite != np.round(finite)):
+        return values, 0
+    bits = int(np.ceil(np.log2(np.ptp(finite) + 1))) if np.ptp(finite) > 0 else 0
+    steps = np.diff(values)
+    jumps = np.abs(steps) > 0.75 * 2.0**bits
+    small = np.abs(steps[~jumps & np.isfinite(steps)])
+    if bits < 8 or not jumps.any() or not 0 < small.max(initial=0.0) <= 0.25 * 2.0**bits:
+        return values, 0
+    if np.any(2.0**bits - np.abs(steps[jumps]) > 2 * small.max()):
+        return values, 0
+    turns = np.cumsum(np.r_[0.0, np.where(jumps, -np.sign(np.nan_to_num(steps)), 0.0)])
+    return values + 2.0**bits * turns, bits
+
+
+def constant(name: str, values: np.ndarray) -> bool:
+    """Whether a signal does not change at all."""
+    return bool(np.ptp(values) == 0)
+
+
+def clipped_share(values: np.ndarray) -> float:
+    """Share of the samples in flat tops at the extremes that the signal enters with a kink, as it does when it is
+    clipped: at least 3 equal extreme samples, the step before at least a fifth of the largest step."""
+    steps = np.abs(np.diff(values))
+    if values.size < 5 or steps.max() == 0:
+        return 0.0
+    count = 0
+    for extreme in (values.max(), values.min()):
+        edges = np.flatnonzero(np.diff(np.r_[False, values == extreme, False].astype(np.int8)))
+        for start, stop in zip(edges[::2], edges[1::2], strict=True):
+            if stop - start >= 3 and start >= 2 and steps[start - 2] >= 0.2 * steps.max():
+                count += int(stop - start)
+    return count / values.size
+
+
+def held(values: np.ndarray) -> int:
+    """For how many samples each value is held, 1 where the signal changes at any sample: the changes all fall on every
+    n-th sample, n up to 20 (a signal that changes more rarely is one of steps)."""
+    changes = np.flatnonzero(np.diff(values) != 0)
+    if changes.size < 50:
+        return 1
+    gaps = np.diff(changes)
+    n = int(np.gcd.reduce(gaps))
+    return n if 1 < n <= 20 else 1
+
+
+def velocity_factor(
+    position: np.ndarray, velocity: np.ndarray, period: float, parts: list[slice]
+) -> tuple[float, float]:
+    """Ratio of the measured velocity to the derivative of position (least squares, both smoothed over 11 samples) and
+    their correlation; NaN and 0 where there is nothing to compare."""
+    from scipy.signal import savgol_filter
+
+    window = 11
+    long = [part for part in parts if part.stop - part.start > 2 * window]
+    if not long:
+        return np.nan, 0.0
+    slope = np.concatenate([np.asarray(savgol_filter(position[p], window, 2, deriv=1, delta=period)) for p in long])
+    speed = np.concatenate([np.asarray(savgol_filter(velocity[p], window, 2)) for p in long])
+    power, size = float(slope @ slope), float(np.sqrt((slope @ slope) * (speed @ speed)))
+    return (float(speed @ slope) / power, float(speed @ slope) / size) if size > 0 else (np.nan, 0.0)
+
+
+_FACTORS = {
+    1e3: "mm against m",
+    1e-3: "m against mm",
+    1e6: "um against m",
+    60.0: "per minute",
+    1 / 60: "per minute",
+    2 * np.pi: "rad against turns",
+    180 / np.pi: "deg against rad",
+    np.pi / 180: "rad against deg",
+    -1.0: "the sign",
+}
+"""Usual mistakes: velocity over the derivative of position, and what it means."""
+
+
+def velocity_warning(position: np.ndarray, velocity: np.ndarray, period: float, parts: list[slice]) -> str:
+    """What is wrong between position and velocity, "" for nothing; a factor tells wrong units or counts."""
+    ratio, correlation = velocity_factor(position, velocity, period, parts)
+    if abs(correlation) < 0.8:
+        return (
+            f"velocity does not follow the derivative of position (correlation {correlation:.2f}): one of them is "
+            "wrong, delayed, or of another body"
+        )
+    if abs(ratio - 1) < 0.05:
+        return ""
+    guess = next((text for at, text in _FACTORS.items() if abs(ratio / at - 1) < 0.05), "wrong units or counts")
+    return (
+        f"velocity is {ratio:.4g} times the derivative of position ({guess}); if position is right: "
+        f'--scale velocity="{1 / ratio:.6g} ..." or the right --unit'
+    )

@@ -1,0 +1,109 @@
+"""Delay between two instruments: estimated with an interval, offered, never applied."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+BLOCKS = 8
+"""Parts of the record whose separate estimates give the interval."""
+MOST = 20
+"""Longest delay looked for, in samples."""
+WINDOW = 11
+"""Samples over which derivatives are smoothed (Savitzky-Golay, no delay of its own)."""
+
+
+def velocity_line(position: np.ndarray, velocity: np.ndarray, period: float, parts: list[slice]) -> str:
+    """A line that offers the delay of the velocity behind the derivative of position, "" for none."""
+    part = max(parts, key=lambda each: each.stop - each.start)
+    slope, speed = _smoothed(position[part], 1, period), _smoothed(velocity[part], 0, period)
+    return _line(
+        "velocity",
+        "the derivative of position",
+        in_blocks(lambda a, b: lag(slope[a:b], speed[a:b]), slope.size),
+        period,
+    )
+
+
+def force_line(position: np.ndarray, force: np.ndarray, period: float, parts: list[slice]) -> str:
+    """A line that offers the delay of the motion behind the force, "" for none.
+
+    For each lag the force is fitted by acceleration, velocity, its sign and a constant: against acceleration alone
+    friction would look like a delay. The lag with the least residual counts.
+    """
+    part = max(parts, key=lambda each: each.stop - each.start)
+    velocity, acceleration = (_smoothed(position[part], order, period) for order in (1, 2))
+    push = _smoothed(force[part], 0, period)
+    sign = np.sign(velocity) * (np.abs(velocity) > 0.01 * np.abs(velocity).max())
+    causes = np.stack([acceleration, velocity, sign, np.ones_like(push)], axis=1)
+    return _line("motion", "the force", in_blocks(lambda a, b: fitted_lag(push[a:b], causes[a:b]), push.size), period)
+
+
+def lag(first: np.ndarray, second: np.ndarray) -> float:
+    """By how many samples the second signal comes after the first: the peak of their cross-correlation, to a fraction
+    of a sample by a parabola; NaN where its height is below 0.5 or it lies at the border of +-`MOST`."""
+    first, second = first - first.mean(), second - second.mean()
+    middle = first[MOST:-MOST]
+    products = np.array([middle @ second[MOST + k : second.size - MOST + k] for k in range(-MOST, MOST + 1)])
+    norm = np.sqrt((middle @ middle) * (second @ second))
+    return _peak(products / norm, 0.5) if norm > 0 else np.nan
+
+
+def fitted_lag(effect: np.ndarray, causes: np.ndarray) -> float:
+    """By how many samples the causes, of shape (n, p), come after what they sum up to by least squares: the lag with
+    the largest share explained, to a fraction of a sample; NaN where that share is below 0.5 or at the border."""
+    middle = effect[MOST:-MOST] - effect[MOST:-MOST].mean()
+    whole = middle @ middle
+    shares = []
+    for k in range(-MOST, MOST + 1):
+        shifted = causes[MOST + k : effect.size - MOST + k]
+        fit = np.linalg.lstsq(shifted.T @ shifted, shifted.T @ middle, rcond=None)[0]
+        shares.append(float(fit @ (shifted.T @ middle)) / whole if whole > 0 else 0.0)
+    return _peak(np.array(shares), 0.5)
+
+
+def _peak(heights: np.ndarray, least: float) -> float:
+    """Where heights at -MOST ... MOST have their peak, by the parabola through the three highest; NaN below `least`."""
+    i = int(np.argmax(heights))
+    if heights[i] < least or i in (0, heights.size - 1):
+        return np.nan
+    left, top, right = heights[i - 1 : i + 2]
+    curve = left - 2 * top + right
+    return i - MOST + (0.5 * (left - right) / curve if curve < 0 else 0.0)
+
+
+def in_blocks(estimate: Callable[[int, int], float], size: int) -> tuple[float, float]:
+    """Mean of the estimates of the blocks of a record and half its 95 % interval (Student); NaN for fewer than 3."""
+    from scipy.stats import t as student
+
+    each = size // BLOCKS
+    if each < 10 * MOST:
+        return np.nan, np.nan
+    found = np.array([estimate(k * each, (k + 1) * each) for k in range(BLOCKS)])
+    found = found[np.isfinite(found)]
+    if found.size < 3:
+        return np.nan, np.nan
+    half = student.ppf(0.975, found.size - 1) * np.std(found, ddof=1) / np.sqrt(found.size)
+    return float(found.mean()), float(half)
+
+
+def _line(late: str, early: str, estimate: tuple[float, float], period: float) -> str:
+    """The words for an estimate in samples, "" where its interval holds 0 or it is below a tenth of a sample."""
+    value, half = estimate
+    if not np.isfinite(value) or abs(value) <= max(half, 0.1):
+        return ""
+    late, early = (late, early) if value > 0 else (early, late)
+    size = f"{abs(value) * period * 1e3:.3g} ms +/- {half * period * 1e3:.2g} ms (95 %)"
+    return (
+        f"{late} seems to come after {early} by {size}: a delay between two instruments looks like this; not corrected"
+    )
+
+
+def _smoothed(values: np.ndarray, order: int, period: float) -> np.ndarray:
+    """Derivative of this order, smoothed, without the ends; all values where there are too few."""
+    from scipy.signal import savgol_filter
+
+    if values.size <= 2 * WINDOW:
+        return values
+    return np.asarray(savgol_filter(values, WINDOW, 3, deriv=order, delta=period))[WINDOW:-WINDOW]

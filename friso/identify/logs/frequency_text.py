@@ -1,0 +1,146 @@
+"""Frequency responses as somebody else measured them: a text of magnitude and phase, or of real and imaginary part;
+a universal file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from friso.identify.logs.channel import Channel
+from friso.identify.logs.roles import words
+from friso.identify.logs.text import read_text
+from friso.identify.logs.uff import frequency_sets, label
+from friso.identify.logs.units import factor, spelled
+from friso.quantities import Quantity, StageError, any_sign
+
+_KEYS = {
+    "frequency": frozenset(["f", "freq", "frequency", "frequenz", "w", "omega"]),
+    "magnitude": frozenset(["mag", "magnitude", "gain", "amplitude", "amp", "abs", "modulus", "db"]),
+    "phase": frozenset(["phase", "phi", "ph", "arg", "angle"]),
+    "real": frozenset(["re", "real"]),
+    "imaginary": frozenset(["im", "imag", "imaginary"]),
+    "coherence": frozenset(["coh", "coherence"]),
+}
+"""Words in a heading that tell what a column is."""
+
+
+@dataclass(frozen=True)
+class MeasuredResponse:
+    """A response at rising frequencies [Hz]: complex values, and coherence or None, all of shape (n,). `unit` is what
+    the values are in, SI where the file tells a unit, "" where it tells none."""
+
+    frequency: np.ndarray
+    response: np.ndarray
+    coherence: np.ndarray | None
+    name: str
+    read: tuple[str, ...] = ()
+    unit: str = ""
+
+
+def kind_of(name: str) -> str | None:
+    """What a heading says that its column is; None for nothing of a response."""
+    parts = set(words(name))
+    order = ("coherence", "phase", "imaginary", "real", "magnitude", "frequency")
+    return next((kind for kind in order if parts & _KEYS[kind]), None)
+
+
+def is_response(names: Iterable[str]) -> bool:
+    """Whether headings hold a frequency with magnitude and phase, or with real and imaginary part."""
+    found = {kind_of(name) for name in names}
+    return "frequency" in found and ({"magnitude", "phase"} <= found or {"real", "imaginary"} <= found)
+
+
+def read_response_text(path: Path) -> MeasuredResponse:
+    """The response in a text file. Raises StageError."""
+    table = read_text(path)
+    found: dict[str, list[Channel]] = {}
+    for channel in table.channels:
+        if kind_of(channel.name) is not None:
+            found.setdefault(str(kind_of(channel.name)), []).append(channel)
+    for kind, channels in found.items():
+        if len(channels) > 1:
+            names = ", ".join(channel.name for channel in channels)
+            raise StageError(kind, f"{len(channels)} columns: {names}", "one column", "", str(path))
+    if not is_response(channel.name for channel in table.channels):
+        names = ", ".join(channel.name for channel in table.channels)
+        expected = "frequency, and magnitude and phase or real and imaginary part"
+        raise StageError("log", names, expected, "f [Hz];magnitude [dB];phase [deg]", str(path))
+    columns = {kind: channels[0] for kind, channels in found.items()}
+    frequency = _frequency(columns["frequency"], path)
+    if {"real", "imaginary"} <= set(columns):
+        response = columns["real"].values + 1j * columns["imaginary"].values
+        scale, unit, told = _unit(columns["real"].unit)
+        told = f"real and imaginary part {told}"
+    else:
+        response, scale, unit, told = _polar(columns["magnitude"], columns["phase"], path)
+    coherence = columns["coherence"].values if "coherence" in columns else None
+    read = (*table.read, told, f"{frequency.size} frequencies, {frequency.min():g} Hz to {frequency.max():g} Hz")
+    return _checked(MeasuredResponse(frequency, response * scale, coherence, path.stem, read, unit), path)
+
+
+def read_response_uff(path: Path) -> MeasuredResponse:
+    """The response in a universal file. Raises StageError."""
+    data, frequency, coherence = frequency_sets(path)
+    above, below = label(data, "ordinate_axis_units_lab"), label(data, "orddenom_axis_units_lab")
+    scale, unit, told = _unit(f"{above}/({below})" if above and below else above)
+    read = ("format: UFF, dataset 58", f"frequency response {told}", f"{frequency.size} frequencies")
+    response = np.asarray(data["data"], dtype=complex) * scale
+    name = label(data, "id1") or path.stem
+    return _checked(MeasuredResponse(frequency, response, coherence, name, read, unit), path)
+
+
+def _frequency(column: Channel, path: Path) -> np.ndarray:
+    """Frequencies in Hz. Raises StageError for a column without a unit."""
+    value = factor(column.unit, "Hz") if column.unit else None
+    if value is None:
+        given = f"{column.name} in {column.unit}" if column.unit else f"{column.name} without a unit"
+        raise StageError("frequency", given, "Hz or rad/s in the heading", "f [Hz]", str(path))
+    return column.values * value
+
+
+def _polar(magnitude: Channel, phase: Channel, path: Path) -> tuple[np.ndarray, float, str, str]:
+    """Response from magnitude and phase; its scale, unit and words. Raises StageError for a phase without a unit."""
+    turn = factor(phase.unit, "rad") if phase.unit else None
+    if turn is None:
+        raise StageError("phase", f"{phase.name} without a unit", "deg or rad in the heading", "phase [deg]", str(path))
+    angle = np.exp(1j * turn * phase.values)
+    unit = spelled(magnitude.unit)
+    if unit.lower().startswith("db") or "db" in words(magnitude.name):
+        with np.errstate(over="ignore"):
+            return 10 ** (magnitude.values / 20) * angle, 1.0, "", f"magnitude in dB, phase in {phase.unit}"
+    scale, si, told = _unit(magnitude.unit)
+    return magnitude.values * angle, scale, si, f"magnitude {told}, phase in {phase.unit}"
+
+
+def _unit(text: str) -> tuple[float, str, str]:
+    """Factor to SI, the SI unit, and both in words; a unit of a kind not known here stays as it is."""
+    text = spelled(text)
+    for si in ("m/N", "m/s/N", "m/s^2/N", "m/V", "m/A", "m/s^2/A", "m/s^2/V", "rad/s^2/A", "rad/A", "rad/s/A", "rad/V",
+               "rad/(N*m)", "m"):  # fmt: skip
+        if text and factor(text, si) is not None:
+            return Quantity(si, any_sign, "").factor(text), si, f"in {text}"
+    return 1.0, text, f"in {text}" if text else "without a unit"
+
+
+def _checked(measured: MeasuredResponse, path: Path) -> MeasuredResponse:
+    """The response without its line at 0 Hz, checked. Raises StageError for too few or falling frequencies and NaN."""
+    positive = measured.frequency > 0
+    if not positive.all():
+        kept = [a if a is None else a[positive] for a in (measured.frequency, measured.response, measured.coherence)]
+        read = (*measured.read, f"left out: {np.count_nonzero(~positive)} lines at 0 Hz or below")
+        measured = replace(measured, frequency=kept[0], response=kept[1], coherence=kept[2], read=read)
+    frequency = measured.frequency
+    if frequency.size < 3:
+        raise StageError("log", f"{frequency.size} frequencies", "at least 3", "", str(path))
+    for name, values in (("frequency", frequency), ("response", measured.response), ("coherence", measured.coherence)):
+        if values is not None and not np.isfinite(values).all():
+            row = int(np.flatnonzero(~np.isfinite(values))[0]) + 1
+            raise StageError(name, f"no number in row {row}", "finite numbers in every row", "", str(path))
+    falling = np.flatnonzero(np.diff(frequency) <= 0)
+    if falling.size:
+        given = f"{frequency[falling[0] + 1]:g} Hz after {frequency[falling[0]]:g} Hz"
+        raise StageError("frequency", given, "rising frequencies", "", str(path))
+    return measured

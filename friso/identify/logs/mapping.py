@@ -1,0 +1,141 @@
+"""What the user said of a log: which channel is what, in which unit; kept in a file beside the log."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterable
+from collections.abc import Mapping as Table
+from dataclasses import dataclass, field, fields, replace
+from pathlib import Path
+from typing import Any
+
+from friso.identify.logs.log import ROLES
+from friso.quantities import Quantity, StageError, as_toml, positive, quoted
+
+SUFFIX = ".friso.toml"
+MAPPABLE = ("time", *ROLES)
+"""What a channel can be mapped to."""
+_SAMPLE_TIME = Quantity("s", positive, "1 ms")
+
+
+@dataclass(frozen=True)
+class Mapping:
+    """Roles ({role: channel name}), units ({channel name: unit}), scales ({role: "35.1507 N/V"}), the sample time [s]
+    where the file tells none, and the kind of experiment where the user named it."""
+
+    roles: Table[str, str] = field(default_factory=dict)
+    units: Table[str, str] = field(default_factory=dict)
+    scales: Table[str, str] = field(default_factory=dict)
+    sample_time: float | None = None
+    experiment: str | None = None
+
+    def over(self, older: Mapping) -> Mapping:
+        """This mapping, and what an older one says where this one is silent."""
+        return Mapping(
+            {**older.roles, **self.roles},
+            {**older.units, **self.units},
+            {**older.scales, **self.scales},
+            older.sample_time if self.sample_time is None else self.sample_time,
+            older.experiment if self.experiment is None else self.experiment,
+        )
+
+
+def from_options(
+    maps: Iterable[str] = (),
+    units: Iterable[str] = (),
+    scales: Iterable[str] = (),
+    dt: str | None = None,
+    experiment: str | None = None,
+) -> Mapping:
+    """From the texts of `--map ROLE=CHANNEL`, `--unit CHANNEL=UNIT`, `--scale ROLE=SCALE`, `--dt "1 ms"`.
+    Raises StageError."""
+    roles = dict(_pair(text, "--map", 'position="Axis1.ActPos"', MAPPABLE) for text in maps)
+    channel_units = dict(_pair(text, "--unit", 'Axis1.ActPos="mm"', last=True) for text in units)
+    factors = dict(_pair(text, "--scale", 'force="35.1507 N/V"', tuple(ROLES)) for text in scales)
+    try:
+        sample_time = None if dt is None else float(_SAMPLE_TIME.read(dt))
+    except StageError as error:
+        raise error.found_in("--dt") from None
+    return Mapping(roles, channel_units, factors, sample_time, experiment)
+
+
+def _pair(
+    text: str, option: str, example: str, left: tuple[str, ...] | None = None, last: bool = False
+) -> tuple[str, str]:
+    """What stands left and right of the first (or last) equals sign. Raises StageError."""
+    first, sign, second = text.rpartition("=") if last else text.partition("=")
+    first, second = first.strip(), second.strip().strip('"')
+    if not sign or not first or not second:
+        raise StageError(option, quoted(text), "two texts with = between", f"{option} {example}")
+    if left is not None and first not in left:
+        raise StageError(option, quoted(first), f"one of {', '.join(left)}", f"{option} {example}")
+    return first, second
+
+
+def sidecar(log: Path, folder: Path | None = None) -> Path:
+    """Where the mapping of a log is kept: beside it, or in the folder given."""
+    return (log.parent if folder is None else folder) / f"{log.name}{SUFFIX}"
+
+
+def save(mapping: Mapping, log: Path, folder: Path | None = None) -> Path:
+    """Write the mapping beside the log, or into the folder where that cannot be written; the path written to.
+    Raises StageError."""
+    lines = ["# How this log was read by `friso identify`: reused next time, options override it."]
+    if mapping.sample_time is not None:
+        lines.append(f'sample_time = "{mapping.sample_time!r} s"')
+    if mapping.experiment is not None:
+        lines.append(f"experiment = {as_toml(mapping.experiment)}")
+    for name in ("roles", "units", "scales"):
+        table = getattr(mapping, name)
+        rows = [f"{as_toml(key)} = {as_toml(value)}" for key, value in table.items()]
+        lines += ["", f"[{name}]", *rows] if rows else []
+    places = [sidecar(log)] + ([sidecar(log, folder)] if folder is not None else [])
+    for place in places:
+        try:
+            place.write_text("\n".join(lines) + "\n", encoding="utf-8")
+        except OSError:
+            continue
+        return place
+    raise StageError("mapping", str(log.parent), "a folder that can be written", "--out results")
+
+
+def load(log: Path, folder: Path | None = None) -> Mapping | None:
+    """The mapping kept for a log: that beside it, else that in the folder; None where there is none. Raises StageError
+    for a file that is not one."""
+    for place in [sidecar(log)] + ([sidecar(log, folder)] if folder is not None else []):
+        if place.is_file():
+            return _parsed(place)
+    return None
+
+
+def _parsed(place: Path) -> Mapping:
+    """The mapping in a file. Raises StageError."""
+    try:
+        document = tomllib.loads(place.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError) as error:
+        raise StageError(
+            "", str(error), "a mapping kept by friso; remove the file to map anew", "", str(place)
+        ) from None
+    known = {each.name for each in fields(Mapping)}
+    tables = ("roles", "units", "scales")
+    for key, value in document.items():
+        if key not in known or (key in tables) != isinstance(value, dict):
+            raise StageError(key, quoted(value), f"tables {', '.join(tables)}; sample_time", "", str(place))
+    texts = {key: _texts(document.get(key, {}), key, place) for key in tables}
+    try:
+        options = from_options(dt=document.get("sample_time"), experiment=document.get("experiment"))
+        for group, allowed in (("roles", MAPPABLE), ("scales", tuple(ROLES))):
+            for key in texts[group]:
+                if key not in allowed:
+                    raise StageError(group, quoted(key), f"one of {', '.join(allowed)}")
+    except StageError as error:
+        raise error.found_in(str(place)) from None
+    return replace(options, **texts)
+
+
+def _texts(table: dict[str, Any], key: str, place: Path) -> dict[str, str]:
+    """A table of texts. Raises StageError."""
+    for name, value in table.items():
+        if not isinstance(value, str):
+            raise StageError(f"{key}.{name}", quoted(value), "a text", "", str(place))
+    return table

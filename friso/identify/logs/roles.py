@@ -1,0 +1,120 @@
+"""Which channel is what: as the user says, else proposed by name with a reason, never guessed between two."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Mapping as Names
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from friso.identify.logs.channel import Channel, Table
+from friso.identify.logs.units import split_heading
+from friso.quantities import StageError, quoted
+
+_SET = frozenset(["ref", "reference", "set", "setpoint", "desired", "target", "cmd", "command", "commanded", "demand"])
+_NOT_MEASURED = frozenset(
+    ["err", "error", "lag", "following", "diff", "max", "min", "limit", "sat", "flag", "status", "enable"]
+)
+_CART = frozenset(["cart", "carriage", "slider"])
+_RELATIVE = frozenset(["rel", "relative"])
+_KEYS = {
+    "time": frozenset(["t", "time", "timestamp", "zeit", "tout"]),
+    "position": frozenset(["pos", "position", "enc", "encoder", "displacement"]),
+    "velocity": frozenset(["vel", "velo", "velocity", "speed"]),
+    "acceleration": frozenset(["acc", "accel", "acceleration"]),
+    "force": frozenset(["force", "torque", "current", "iq"]),
+    "disturbance": frozenset(["disturbance", "injected", "injection"]),
+}
+"""Words in a name that tell what a channel is."""
+
+
+@dataclass(frozen=True)
+class Choice:
+    """A channel for a role and why; `told` where the user said so."""
+
+    role: str
+    channel: Channel
+    reason: str
+    told: bool
+
+
+def words(name: str) -> list[str]:
+    """Lower-case words of the last part of a dotted name: "Axis1.NcToPlc.ActPos" is ["act", "pos"]."""
+    last = name.rstrip(". ").rsplit(".", 1)[-1]
+    last = re.sub(r"([a-z])([A-Z])", r"\1 \2", last)
+    return [part for part in re.split(r"[^A-Za-z]+", last.lower()) if part]
+
+
+def role_of(name: str) -> tuple[str, str] | None:
+    """Role that a name tells, and the word that tells it; None for a name that tells none."""
+    parts = words(name)
+    found = set(parts)
+    if found & _NOT_MEASURED:
+        return None
+    key = {role: next((part for part in parts if part in keys), "") for role, keys in _KEYS.items()}
+    if key["time"] and len(parts) <= 2 and not any(key[role] for role in _KEYS if role != "time"):
+        return "time", key["time"]
+    if found & _SET or "setpos" in found:
+        others = key["velocity"] or key["acceleration"] or key["force"] or key["disturbance"]
+        return None if others else ("reference", next(part for part in parts if part in _SET or part == "setpos"))
+    if key["position"] or "actpos" in found:
+        word = key["position"] or "actpos"
+        kind = "relative_position" if found & _RELATIVE else "cart_position" if found & _CART else "position"
+        return kind, word
+    return next(((role, key[role]) for role in ("velocity", "acceleration", "disturbance", "force") if key[role]), None)
+
+
+def find(table: Table, wanted: str, role: str, origin: str = "") -> Channel:
+    """The channel of this name, with or without its unit in brackets. Raises StageError that lists the channels."""
+    plain = split_heading(wanted)[0]
+    for matches in ([c for c in table.channels if c.name == wanted], [c for c in table.channels if c.name == plain]):
+        if len(matches) == 1:
+            return matches[0]
+    names = [channel.name for channel in table.channels]
+    near = difflib.get_close_matches(wanted, names, 1, 0.6)
+    example = f'--map {role}="{near[0] if near else names[0]}"'
+    raise StageError(role, f"{quoted(wanted)}, which the log does not hold", listing(table), example, origin)
+
+
+def listing(table: Table) -> str:
+    """The channels there are, for a message; and what was left out as objects."""
+    shown = [c.name + (f" [{c.unit}]" if c.unit else "") for c in table.channels]
+    text = ", ".join(shown[:40]) + (f" and {len(shown) - 40} more" if len(shown) > 40 else "")
+    objects = "".join(f"; {line}" for line in table.read if "structure with time" in line)
+    return f"one of the channels {text}{objects}"
+
+
+def choose(table: Table, told: Names[str, str], needed: Sequence[str], origin: str = "") -> dict[str, Choice]:
+    """Roles with their channels: first what the user told, then what the names tell.
+
+    Raises StageError for a name that is not there, for two candidates, and for a role that is needed and not found.
+    """
+    chosen = {role: Choice(role, find(table, name, role, origin), "as told", True) for role, name in told.items()}
+    taken = {id(choice.channel) for choice in chosen.values()}
+    candidates: dict[str, list[tuple[Channel, str]]] = {}
+    for channel in table.channels:
+        role = role_of(channel.name)
+        if role is not None and role[0] not in told and id(channel) not in taken:
+            candidates.setdefault(role[0], []).append((channel, role[1]))
+    for role, found in candidates.items():
+        if role == "time" and _own_times(table):
+            continue
+        if len(found) > 1:
+            names = " and ".join(quoted(channel.name) for channel, _ in found)
+            raise StageError(
+                role, f"{len(found)} candidates: {names}", "one channel", f'--map {role}="{found[0][0].name}"', origin
+            )
+        channel, word = found[0]
+        chosen[role] = Choice(role, channel, f'the name says "{word}"', False)
+    for role in needed:
+        if role not in chosen:
+            example = f'--map {role}="{table.channels[0].name}"'
+            raise StageError(role, "no channel whose name tells it", listing(table), example, origin)
+    return chosen
+
+
+def _own_times(table: Table) -> bool:
+    """Whether the channels that are not times themselves have their instants from the file."""
+    others = [channel for channel in table.channels if (role_of(channel.name) or ("",))[0] != "time"]
+    return any(channel.time is not None for channel in others)

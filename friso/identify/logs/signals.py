@@ -1,0 +1,162 @@
+"""A channel that has a role: its instants in seconds and its values in the unit of the role."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping as Roles
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from friso.identify.logs.channel import Channel, Table
+from friso.identify.logs.checks import unwrapped
+from friso.identify.logs.log import ROLES
+from friso.identify.logs.mapping import Mapping
+from friso.identify.logs.roles import Choice, find
+from friso.identify.logs.text import with_times
+from friso.identify.logs.units import factor, in_si, read_scale
+from friso.quantities import StageError, quoted
+
+LARGEST = 1e30
+"""No instrument measures more in any unit; beyond it, squares of squares overflow."""
+_RATES = ("fs", "fsample", "samplerate", "samplingrate", "samplefrequency")
+_STEPS = ("dt", "ts", "tsample", "sampletime", "samplingtime")
+
+
+@dataclass
+class Told:
+    """Lines gathered on the way to a log, and the units that are not those of the roles."""
+
+    read: list[str] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
+    units: dict[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Reading:
+    """How channels are read: the table, what the user said, whether only the units of the roles will do, whether the
+    file is of a kind that cannot hold units, and where it lies."""
+
+    table: Table
+    mapping: Mapping
+    strict: bool
+    bare: bool
+    origin: str
+
+
+def with_told_units(table: Table, mapping: Mapping, form: str, origin: str) -> Table:
+    """The table with the units that the user said, and with the times that follow from them. Raises StageError."""
+    if not mapping.units:
+        return table
+    told = {id(find(table, name, "unit", origin)): unit for name, unit in mapping.units.items()}
+    channels = [replace(channel, unit=told.get(id(channel), channel.unit)) for channel in table.channels]
+    if form == "text":  # its times come from its columns
+        channels = [replace(channel, time=None) for channel in channels]
+    timed = zip(channels, with_times(channels), strict=True)
+    kept = tuple(new if old.time is None else old for old, new in timed)
+    return replace(table, channels=kept)
+
+
+def signal(choice: Choice, reading: Reading, told: Told) -> np.ndarray:
+    """Values of a channel in the unit of its role, with what was done to them told. Raises StageError."""
+    channel, role = choice.channel, choice.role
+    values, bits = unwrapped(channel.values) if ROLES[role] == "m" else (channel.values, 0)  # encoders overflow
+    if bits:
+        told.warnings.append(f"{role}: {channel.name} taken as a counter of {bits} bits that overflows: unwrapped")
+    scale = reading.mapping.scales.get(role)
+    unit = channel.unit
+    if scale is not None:
+        value, taken = _scaled(role, scale, unit, reading.origin)
+        line = f"{scale}" + ("" if unit else f", its values taken in {taken} as the scale says")
+    elif not unit and reading.strict and choice.told and reading.bare:
+        value, line = 1.0, f"no unit in the file: taken in {ROLES[role]}"
+        told.warnings.append(f"{role}: {channel.name} has no unit (this format has none): taken in {ROLES[role]}")
+    else:
+        value, si = in_si(unit, ROLES[role])
+        line = f"in {unit}" if unit else "without a unit"
+        if si != ROLES[role]:
+            if reading.strict:
+                raise _wrong_unit(choice, unit, si, reading)
+            told.units[role] = si
+    told.read.append(f"{role}: {channel.name} ({channel.source}), {choice.reason}; {line}")
+    with np.errstate(all="ignore"):  # what is no number stays so, and is the business of the time base
+        values = values * value
+        most = np.abs(values[np.isfinite(values)]).max(initial=0.0)
+    if most > LARGEST:
+        given = f"values up to {most:.3g} {told.units.get(role, ROLES[role])}"
+        raise StageError(role, given, "values that an instrument measures; is the file damaged?", "", reading.origin)
+    return values
+
+
+def _scaled(role: str, scale: str, unit: str, origin: str) -> tuple[float, str]:
+    try:
+        return read_scale(role, scale, unit)
+    except StageError as error:
+        raise error.found_in(origin) from None
+
+
+def _wrong_unit(choice: Choice, unit: str, si: str, reading: Reading) -> StageError:
+    """The error for a channel whose unit is none of the role's kind, or that has none."""
+    role, name = choice.role, choice.channel.name
+    if not unit:
+        usual = {"m": "mm", "m/s": "mm/s", "N": "N"}.get(ROLES[role], ROLES[role])
+        given = f"{quoted(name)}, which has no unit"
+        return StageError(
+            role, given, f"a unit convertible to {ROLES[role]}", f'--unit "{name}={usual}"', reading.origin
+        )
+    number = "35.1507" if role in ("force", "disturbance") else "1.5"
+    example = f'--scale {role}="{number} {ROLES[role]}/{si}"'
+    return StageError(role, f"{quoted(name)} in {unit}", f"a scale to {ROLES[role]}", example, reading.origin)
+
+
+def instants(choice: Choice, clock: Choice | None, reading: Reading, told: Told) -> np.ndarray | None:
+    """Instants of a channel [s]: from the sample time that the user said, the time channel, or the file; None where
+    there are none. Raises StageError."""
+    channel = choice.channel
+    if reading.mapping.sample_time is not None:
+        return reading.mapping.sample_time * np.arange(channel.values.size)
+    if clock is not None and (clock.told or channel.time is None) and clock.channel.values.size == channel.values.size:
+        return clock.channel.values * _seconds(clock, reading, told)
+    return channel.time
+
+
+def _seconds(clock: Choice, reading: Reading, told: Told) -> float:
+    """Seconds in the unit of the time channel. Raises StageError for none."""
+    name, unit = clock.channel.name, clock.channel.unit
+    if not unit and clock.told and reading.bare:
+        line = f"time: {name} has no unit (this format has none): taken in s"
+        told.warnings += [line] if line not in told.warnings else []
+        return 1.0
+    value = factor(unit, "s") if unit else None
+    if value is None:
+        given = f"{quoted(name)} in {unit}" if unit else f"{quoted(name)}, which has no unit"
+        example = "; or ".join(each for each in (f'--unit "{name}=ms"', _offers(reading.table)) if each)
+        raise StageError("time", given, "a unit convertible to s", example, reading.origin)
+    return value
+
+
+def no_time(channel: Channel, reading: Reading) -> StageError:
+    """The error for a channel without instants."""
+    example = _offers(reading.table) or '--map time="CHANNEL", or --dt "1 ms"'
+    return StageError(
+        "time", f"no instants for {quoted(channel.name)}", "a time channel or a sample time", example, reading.origin
+    )
+
+
+def _offers(table: Table) -> str:
+    """What single numbers in the file could mean for the sample time: offered, not used."""
+    offers = []
+    for name, value in table.scalars.items():
+        plain = name.rpartition(".")[2].lower().replace("_", "")
+        if plain in _RATES and value > 0:
+            offers.append(f'--dt "{1e3 / value:.9g} ms", if {name} = {value:g} in the file is the sample rate in Hz')
+        if plain in _STEPS and value > 0:
+            offers.append(f'--dt "{value:.9g} s", if {name} = {value:g} in the file is the sample time in s')
+    return "; ".join(offers)
+
+
+def unused(mapping: Mapping, chosen: Roles[str, Choice], origin: str) -> None:
+    """Raises StageError for a scale of a role that has no channel."""
+    for role in mapping.scales:
+        if role not in chosen:
+            raise StageError("scale", f"a scale for {role}, which has no channel", "a channel for it",
+                             f'--map {role}="CHANNEL"', origin)  # fmt: skip

@@ -1,0 +1,196 @@
+"""CSV, TSV and TXT with one table of numbers: any delimiter, decimal sign and encoding; lines before the table."""
+
+from __future__ import annotations
+
+import mmap
+import warnings
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from friso.identify.logs.channel import Channel, Table
+from friso.identify.logs.roles import role_of
+from friso.identify.logs.sniff import STAMP, Layout, layout, split_line
+from friso.identify.logs.units import factor
+from friso.quantities import StageError, quoted
+
+
+def read_text(path: Path) -> Table:
+    """The table of a text file. Raises StageError for ragged rows and for a text among the numbers, with its line."""
+    form = layout(path)
+    if not form.certain and form.delimiter != "," and _has_comma(path, form):
+        form = replace(form, decimal=",")
+    frame = read_frame(path, form)
+    names = unique(list(form.names) or [f"column {i + 1}" for i in range(form.columns)])
+    units = form.units or ("",) * form.columns
+    notes, columns = [], []
+    _no_short_rows(path, form, frame)
+    blank = frame.isna().all(axis=1).to_numpy()
+    frame, blanks = (frame[~blank], int(blank.sum())) if blank.any() else (frame, 0)
+    for i, (name, unit) in enumerate(zip(names, units, strict=True)):
+        cells = frame.iloc[:, i]
+        values = _numbers(path, form, cells, name)
+        if values is None and not name and cells.isna().all():
+            continue  # each row ends with a delimiter
+        if values is None:
+            notes += [f"left out: column {i + 1} ({name or 'no name'}), which holds no numbers"]
+        else:
+            columns.append(Channel(name or f"column {i + 1}", unit or values[1], values[0], None, f"column {i + 1}"))
+    if blanks:
+        notes.append(f"{blanks} empty lines left out")
+    channels = with_times(_same_ends(path, form, columns, frame))
+    return Table(channels, {}, (f"format: text, {form.told}", f"{len(frame)} rows, {len(columns)} columns", *notes))
+
+
+def read_frame(path: Path, form: Layout) -> Any:
+    """All cells from the first row of numbers on; columns without text are floats. Raises StageError.
+
+    The lines before are skipped here, not by pandas, which would take a lone quotation mark in them for an open one.
+    """
+    options: dict[str, Any] = {
+        "header": None, "decimal": form.decimal,
+        "skip_blank_lines": False, "low_memory": False, "names": range(form.columns),
+        "index_col": False, "sep": r"\s+" if form.delimiter == " " else form.delimiter, "skipinitialspace": True,
+    }  # fmt: skip
+    try:
+        with path.open(encoding=form.encoding, errors="replace", newline="") as file:
+            for _ in range(form.first):
+                file.readline()
+            with warnings.catch_warnings():
+                warnings.simplefilter("error", pd.errors.ParserWarning)  # that cells are dropped
+                return pd.read_csv(file, **options, on_bad_lines="error")
+    except (pd.errors.ParserError, pd.errors.ParserWarning, ValueError) as error:
+        raise ragged(path, form, str(error)) from None
+
+
+def ragged(path: Path, form: Layout, why: str = "") -> StageError:
+    """The error for the first line with more cells than columns; the parser's own words where there is none."""
+    with path.open(encoding=form.encoding, errors="replace") as file:
+        for number, line in enumerate(file, 1):
+            cells = split_line(line.rstrip("\r\n"), form.delimiter) if number > form.first else []
+            if len(cells) > form.columns and any(cells[form.columns :]):
+                given = f"{len(cells)} cells in line {number}"
+                return StageError("log", given, f"{form.columns} cells in every row", "", str(path))
+    return StageError("log", why.strip(), f"rows of {form.columns} numbers", "", str(path))
+
+
+def _no_short_rows(path: Path, form: Layout, frame: Any) -> None:
+    """Raises StageError for a row with fewer cells than columns above others that have them all."""
+    there = frame.iloc[:, -1].notna().to_numpy()
+    missing = np.flatnonzero(~there[: int(np.flatnonzero(there)[-1])]) if there.any() else np.empty(0, dtype=int)
+    if not missing.size:
+        return
+    suspects = set((missing + form.first + 1).tolist())
+    with path.open(encoding=form.encoding, errors="replace") as file:
+        for number, line in enumerate(file, 1):
+            cells = split_line(line.rstrip("\r\n"), form.delimiter) if number in suspects and line.strip() else []
+            if 0 < len(cells) < form.columns:
+                given = f"{len(cells)} cells in line {number}"
+                raise StageError("log", given, f"{form.columns} cells in every row", "", str(path))
+
+
+def _has_comma(path: Path, form: Layout) -> bool:
+    """Whether a comma stands anywhere after the first numbers (the head showed whole numbers only)."""
+    with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as bytes_:
+        at = 0
+        for _ in range(form.first):
+            at = bytes_.find(b"\n", at) + 1
+        return bytes_.find(b",", at) >= 0
+
+
+def unique(names: list[str]) -> list[str]:
+    """Names told apart by a number where they are the same."""
+    seen: dict[str, int] = {}
+    out = []
+    for name in names:
+        seen[name] = seen.get(name, 0) + 1
+        out.append(name if seen[name] == 1 or not name else f"{name} #{seen[name]}")
+    return out
+
+
+def _numbers(path: Path, form: Layout, cells: Any, name: str) -> tuple[np.ndarray, str] | None:
+    """Values of a column, with "s" for the unit of time stamps; None for a column of texts.
+    Raises StageError for a text among numbers."""
+    if cells.dtype == bool or pd.api.types.is_numeric_dtype(cells.dtype):
+        values = cells.to_numpy(dtype=float)
+        return None if np.isnan(values).all() else (values, "")
+    texts = cells.astype(str).str.strip()
+    there = cells.notna() & (texts != "")
+    if texts[there].str.fullmatch(STAMP.pattern).all() and there.any():
+        return _stamped(path, texts, there, form), "s"
+    texts = texts.where(~texts.str.lower().isin(("true", "false")), texts.str.lower().map({"true": "1", "false": "0"}))
+    points = texts.str.replace(",", ".", regex=False) if form.decimal == "," else texts
+    values = as_numbers(points.where(there))
+    wrong = there.to_numpy() & np.isnan(values) & (texts.str.lower() != "nan").to_numpy()
+    if wrong.sum() > 0.5 * there.sum():
+        return None
+    if wrong.any():
+        row = int(np.flatnonzero(wrong)[0])
+        line = form.first + 1 + int(cells.index[row])
+        given = f"{quoted(str(texts.iloc[row]))} in line {line}, column {name or 'without a name'}"
+        raise StageError("log", given, "numbers all the way down", "", str(path))
+    return values, ""
+
+
+def as_numbers(texts: Any) -> np.ndarray:
+    """Texts as floats, NaN for what is no number."""
+    numbers: Any = pd.to_numeric(texts, errors="coerce")
+    return numbers.to_numpy(dtype=float)
+
+
+def _stamped(path: Path, texts: Any, there: Any, form: Layout) -> np.ndarray:
+    """Seconds since the first of these time stamps; a time of day that steps back goes on the next day."""
+    texts = texts.str.replace(",", ".", regex=False)
+    try:
+        stamps: Any
+        if texts[there].str.match(r"\d{4}-").all():
+            stamps = pd.to_datetime(texts.where(there), format="ISO8601", utc=True)
+            seconds = (stamps - stamps[there].iloc[0]).dt.total_seconds().to_numpy(dtype=float)
+        else:
+            whole = texts.where(texts.str.count(":") == 2, texts + ":00").where(there)
+            stamps = pd.to_timedelta(whole)
+            seconds = stamps.dt.total_seconds().to_numpy(dtype=float)
+            seconds = seconds + 86400.0 * np.cumsum(np.r_[0.0, np.nan_to_num(np.diff(seconds)) < -43200.0])
+    except ValueError as error:
+        raise StageError(
+            "log", str(error), "dates and times as in ISO 8601", "2026-01-31T12:00:00.001", str(path)
+        ) from None
+    return seconds - seconds[int(np.flatnonzero(there)[0])]
+
+
+def _same_ends(path: Path, form: Layout, columns: list[Channel], frame: Any) -> list[Channel]:
+    """The columns without the empty cells below their last value. A cell that is missing at the end of a single row
+    stays and is a NaN, which the checks report."""
+    out = []
+    for column in columns:
+        last = int(np.flatnonzero(~np.isnan(column.values))[-1]) + 1
+        out.append(replace(column, values=column.values[:last]))
+    if len({len(column.values) for column in out}) > 1 and sum(role_of(c.name) == ("time", "time") for c in out) < 2:
+        shortest = min(out, key=lambda column: len(column.values))
+        missing = len(frame) - len(shortest.values)
+        if missing <= 2 and missing < 0.01 * len(frame):
+            line = form.first + 1 + int(frame.index[len(shortest.values)])
+            given = f"a row in line {line} that ends before {shortest.name}"
+            raise StageError("log", given, f"{form.columns} cells in every row", "", str(path))
+    return out
+
+
+def with_times(columns: list[Channel]) -> tuple[Channel, ...]:
+    """Each column with the instants of the time column to its left that is as long (a file may have one per channel);
+    where none stands to its left, of the only one there is. A time column is one that says so and has its unit."""
+    clocks = [(i, c) for i, c in enumerate(columns) if (role_of(c.name) or ("",))[0] == "time"]
+    clocks = [(i, c, factor(c.unit, "s")) for i, c in clocks if c.unit]
+    out = []
+    for i, column in enumerate(columns):
+        fitting = [each for each in clocks if each[2] is not None and len(each[1].values) == len(column.values)]
+        left = [each for each in fitting if each[0] < i] or (fitting if len(fitting) == 1 else [])
+        is_clock = any(i == each[0] for each in clocks)
+        if left and not is_clock:
+            _, clock, seconds = left[-1]
+            out.append(replace(column, time=clock.values * (seconds or 1.0)))
+        else:
+            out.append(column)
+    return tuple(out)

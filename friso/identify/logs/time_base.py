@@ -1,0 +1,169 @@
+"""Instants of a channel: cleaned, split at gaps, even within each segment; channels of several rates on one base."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+import numpy as np
+
+from friso.identify.logs.checks import repeated_stamps
+from friso.quantities import StageError
+
+GAP = 1.5
+"""A step of time above this many sample times is a gap: at least one sample is missing (one missing makes 2)."""
+MOST_GAPS = 0.1
+"""More gaps than this share of the samples is no even sampling."""
+EVEN = 0.01
+"""Time stamps that scatter (rms) by less than this share of a sample time are taken as even: interpolation would change
+a signal by less than 1 % of what it changes per sample."""
+SHORTEST = 10
+"""Segments of fewer samples are left out: no filter of ours settles within."""
+
+
+@dataclass
+class Track:
+    """A channel with even instants within each segment: `time` [s] and `values` of shape (n,); what was done to it."""
+
+    time: np.ndarray
+    values: np.ndarray
+    period: float
+    segments: list[slice]
+    read: list[str] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
+
+
+def track(name: str, time: np.ndarray, values: np.ndarray) -> Track:
+    """A channel cleaned of what is no number and of repeated stamps, split at gaps, on even instants.
+
+    Raises StageError for too little, for time that decreases, for stamps that are repeated with other values, and for
+    sampling that is not even.
+    """
+    read: list[str] = []
+    time, values, missing = _numbers_only(name, time, values)
+    if missing:
+        read.append(f"{name}: {missing} samples that are no numbers left out, the record split there")
+    time, values, repeated = repeated_stamps(name, time, values)
+    if repeated:
+        read.append(f"{name}: {repeated} samples repeated with the same time stamp left out")
+    steps = np.diff(time)
+    gaps = steps > GAP * np.median(steps)
+    if gaps.mean() > MOST_GAPS:
+        given = f"time stamps with {gaps.mean():.0%} of the steps over {GAP} times the usual {np.median(steps):.4g} s"
+        raise StageError(name, given, "even sampling, or the true sample time", '--dt "1 ms"')
+    period = float(steps[~gaps].mean())
+    edges = [0, *(np.flatnonzero(gaps) + 1).tolist(), time.size]
+    segments = [slice(a, b) for a, b in pairwise(edges)]
+    return _evened(name, Track(time, values, period, segments, read))
+
+
+def _numbers_only(name: str, time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
+    """The samples that are numbers, and how many are not between the first and the last. Raises StageError."""
+    there = np.isfinite(time) & np.isfinite(values)
+    if there.sum() < max(2, 0.5 * there.size):
+        given = f"{there.size - there.sum()} of {there.size} samples that are no numbers (NaN)"
+        raise StageError(name, given, "at least half of the samples", "")
+    inside = np.flatnonzero(there)
+    return time[there], values[there], int(np.count_nonzero(~there[inside[0] : inside[-1]]))
+
+
+def _evened(name: str, raw: Track) -> Track:
+    """The track on even instants: its own where the stamps scatter little, else interpolated, which is told."""
+    time, scatter = np.empty_like(raw.time), 0.0
+    for part in raw.segments:
+        steps = raw.period * np.arange(part.stop - part.start)
+        time[part] = steps + np.mean(raw.time[part] - steps)
+        scatter += float(np.sum((raw.time[part] - time[part]) ** 2))
+    jitter = np.sqrt(scatter / time.size) / raw.period
+    raw.read.append(
+        f"{name}: {time.size} samples at {1 / raw.period:.6g} Hz, time stamps scatter {jitter:.2g} of a step"
+    )
+    if jitter <= EVEN:
+        raw.time = time
+        return raw
+    raw.warnings.append(
+        f"{name}: time stamps scatter by {jitter:.2g} of a sample time: interpolated onto even instants; if the "
+        f'sampling was even and only the stamps are not, say --dt "{raw.period * 1e3:.6g} ms"'
+    )
+    times, values, segments, start = [], [], [], 0
+    for part in raw.segments:
+        count = int((raw.time[part.stop - 1] - raw.time[part.start]) / raw.period + 1e-6) + 1
+        grid = raw.time[part.start] + raw.period * np.arange(count)
+        times.append(grid)
+        values.append(np.interp(grid, raw.time[part], raw.values[part]))
+        segments.append(slice(start, start + count))
+        start += count
+    raw.time, raw.values, raw.segments = np.concatenate(times), np.concatenate(values), segments
+    return raw
+
+
+def together(tracks: Mapping[str, Track]) -> tuple[Track, dict[str, np.ndarray]]:
+    """All tracks at the instants of the coarsest one that all of them cover: these instants as a track, and the values
+    by name. Others are interpolated linearly within their own segments only. Raises StageError where nothing is
+    covered by all."""
+    base_name = max(tracks, key=lambda name: round(np.log(tracks[name].period), 4))
+    base = tracks[base_name]
+    read, warnings, values = [], [], {}
+    for name, each in tracks.items():
+        if _same_instants(each, base):
+            values[name] = each.values
+            continue
+        values[name] = _at(base, each)
+        if not _coincident(base, each):
+            read.append(
+                f"{name}: interpolated linearly from {1 / each.period:.6g} Hz onto the {1 / base.period:.6g} Hz "
+                f"instants of {base_name}"
+            )
+        if each.period < base.period / GAP:
+            warnings.append(
+                f"{name}: sampled at {1 / each.period:.6g} Hz and read at {1 / base.period:.6g} Hz without a filter "
+                "against aliasing"
+            )
+    covered = np.all([np.isfinite(each) for each in values.values()], axis=0)
+    segments = [run for part in base.segments for run in _runs(covered, part)]
+    short = [run for run in segments if run.stop - run.start < SHORTEST]
+    segments = [run for run in segments if run.stop - run.start >= SHORTEST]
+    if not segments:
+        spans = ", ".join(f"{name} {each.time[0]:.6g} s to {each.time[-1]:.6g} s" for name, each in tracks.items())
+        raise StageError("log", f"no {SHORTEST} samples in a row that all channels share: {spans}", "a common span", "")
+    if short:
+        read.append(f"{len(short)} segments shorter than {SHORTEST} samples left out")
+    kept, start = [], 0
+    for run in segments:
+        kept.append(slice(start, start + run.stop - run.start))
+        start = kept[-1].stop
+    pick = np.concatenate([np.arange(run.start, run.stop) for run in segments])
+    whole = Track(base.time[pick], base.values[pick], base.period, kept, read, warnings)
+    return whole, {name: each[pick] for name, each in values.items()}
+
+
+def _same_instants(one: Track, other: Track) -> bool:
+    """Whether two tracks have the same instants, to a hundredth of a sample time."""
+    same = one.time.size == other.time.size and one.segments == other.segments
+    return same and bool(np.all(np.abs(one.time - other.time) <= EVEN * other.period))
+
+
+def _coincident(base: Track, other: Track) -> bool:
+    """Whether the instants of the base within the other's first segment are instants of the other as well."""
+    part = other.segments[0]
+    inside = base.time[(base.time >= other.time[part.start]) & (base.time <= other.time[part.stop - 1])]
+    steps = (inside - other.time[part.start]) / other.period
+    return bool(np.all(np.abs(steps - np.round(steps)) <= EVEN))
+
+
+def _at(base: Track, other: Track) -> np.ndarray:
+    """Values of a track at the instants of the base, NaN outside of its segments."""
+    values = np.full(base.time.size, np.nan)
+    slack = EVEN * other.period
+    for part in other.segments:
+        time = other.time[part]
+        a, b = np.searchsorted(base.time, (time[0] - slack, time[-1] + slack))
+        values[a:b] = np.interp(base.time[a:b], time, other.values[part])
+    return values
+
+
+def _runs(covered: np.ndarray, part: slice) -> list[slice]:
+    """The stretches of a segment where all is covered."""
+    edges = np.flatnonzero(np.diff(np.r_[False, covered[part], False].astype(np.int8)))
+    return [slice(part.start + int(a), part.start + int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]

@@ -1,0 +1,128 @@
+"""TwinCAT Scope CSV export: rows of keys, then a time column and value columns per group of channels.
+
+A row of the file is no instant: groups with different sample times stand side by side and end at different rows.
+Layout after the exports of Scope 3.4 in github CagtayFabry/pytcs (tests/data) and Beckhoff's page "Scope Settings"
+(infosys, tcscope2): a key ("Name", "Unit", ...) is repeated at the head of each time column, or of each channel.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+
+from friso.identify.logs.channel import Channel, Table
+from friso.identify.logs.sniff import Layout, decoded_head, is_number, split_line
+from friso.identify.logs.text import as_numbers, read_frame, unique
+from friso.identify.logs.units import spelled
+from friso.quantities import StageError, quoted
+
+_FILETIME = 1e15
+"""Above this a time is a FILETIME: 100 ns since 1601, 1.3e17 in 2022. In ms it would be 30 000 years. As a double
+it is known to 16 steps, 1.6 us, which the fit of an even time base averages out."""
+_MARKS = ("Starttime of export", "StartRecord", "SampleTime[ms]", "SymbolName", "Data-Type")
+
+
+def is_twincat(lines: list[str]) -> bool:
+    """Whether the first lines are those of a Scope export."""
+    first = lines[0] if lines else ""
+    if first[:4] != "Name" or first[4:5] not in ("\t", ";", ","):
+        return False
+    head = [line for line in lines[:60] if line.strip(first[4] + " ")]
+    named = [i for i, line in enumerate(head) if line.startswith(first[:5])]
+    below = [head[i + 1] for i in named if i + 1 < len(head)]  # numbers where the export has no other rows of keys
+    return any(line.startswith(_MARKS) for line in head) or any(_is_data(split_line(line, first[4])) for line in below)
+
+
+def read_twincat(path: Path) -> Table:
+    """Channels with their own times. Raises StageError."""
+    encoding, lines = decoded_head(path)
+    delimiter = lines[0][4]
+    rows = [split_line(line, delimiter) for line in lines]
+    first = next((i for i, cells in enumerate(rows) if i and _is_data(cells)), None)
+    names_at = max((i for i, cells in enumerate(rows[:first]) if cells and cells[0] == "Name"), default=None)
+    if first is None or names_at is None:
+        raise StageError("log", "a TwinCAT Scope export without rows of numbers", "an export with data", "", str(path))
+    table = {cells[0]: cells for cells in rows[names_at:first] if cells and cells[0]}
+    sample = ";".join(
+        cell for cells in rows[names_at:] for cell in cells if is_number(cell, ",") or is_number(cell, ".")
+    )
+    decimal = "," if delimiter != "," and "," in sample else "."
+    if delimiter != "," and decimal == "." and "." not in sample:
+        decimal = ","  # whole numbers only so far: the export's locale writes a comma unless a point shows
+    columns = max(len(table["Name"]), max(len(cells) for cells in rows[first : first + 50]))
+    form = Layout(encoding, delimiter, decimal, first, columns)
+    frame = _without_end(read_frame(path, form))
+    channels, notes = _channels(path, form, table, frame)
+    return Table(channels, {}, (f"format: TwinCAT Scope CSV, {form.told}", f"{len(frame)} rows", *notes))
+
+
+def _is_data(cells: list[str]) -> bool:
+    filled = [cell for cell in cells if cell]
+    return bool(filled) and all(is_number(cell, ",") or is_number(cell, ".") for cell in filled)
+
+
+def _without_end(frame: Any) -> Any:
+    """Without a last row "EOF" and empty rows below."""
+    marked = frame.iloc[:, 0].astype(str).str.strip().eq("EOF").to_numpy()
+    return frame[~marked] if marked.any() else frame
+
+
+def _channels(
+    path: Path, form: Layout, table: dict[str, list[str]], frame: Any
+) -> tuple[tuple[Channel, ...], list[str]]:
+    """The channels of all groups, and lines that tell of them. Raises StageError."""
+    labels, notes, out = table["Name"], [], []
+    clocks = [i for i, cell in enumerate(labels) if cell == "Name"]
+    names = unique(labels)
+    for start, end in zip(clocks, [*clocks[1:], len(labels)], strict=True):
+        time = _floats(path, form, frame, start)
+        rows = np.flatnonzero(~np.isnan(time))
+        if not rows.size:
+            notes.append(f"left out: {', '.join(labels[start + 1 : end])}, without samples")
+            continue
+        time = time[: rows[-1] + 1]
+        seconds = (time - time[0]) * 1e-7 if time[0] > _FILETIME else time * 1e-3
+        for column in range(start + 1, end):
+            if not labels[column]:
+                continue  # files of old versions end each row with a delimiter
+            values = _floats(path, form, frame, column)[: len(time)]
+            info = {key: cells[column] for key, cells in table.items() if column < len(cells)}
+            out.append(Channel(names[column], spelled(info.get("Unit", "")), values, seconds, _source(column, info)))
+        notes.append(f"group {labels[start + 1 : end]}: {len(time)} samples, {seconds[0]:g} s to {seconds[-1]:g} s")
+    if not out:
+        raise StageError("log", "no channel with samples", "an export with data", "", str(path))
+    return tuple(out), notes + _scaled(table)
+
+
+def _source(column: int, info: dict[str, str]) -> str:
+    told = [info[key] for key in ("SymbolName", "Data-Type") if info.get(key)]
+    return ", ".join([f"column {column + 1}", *told])
+
+
+def _scaled(table: dict[str, list[str]]) -> list[str]:
+    """A line for the channels with an offset or a scale, which the exported values contain."""
+    scaled = []
+    for i, name in enumerate(table["Name"]):
+        offset, scale = (table.get(key, [])[i : i + 1] for key in ("Offset", "ScaleFactor"))
+        if name and name != "Name" and (offset not in ([], ["0"], [""]) or scale not in ([], ["1"], [""])):
+            scaled.append(f"{name} (Offset {''.join(offset)}, ScaleFactor {''.join(scale)})")
+    return [f"taken as already applied to the values: {', '.join(scaled)}"] if scaled else []
+
+
+def _floats(path: Path, form: Layout, frame: Any, column: int) -> np.ndarray:
+    """A column as floats. Raises StageError with the line of a text among the numbers."""
+    cells = frame.iloc[:, column]
+    if pd.api.types.is_numeric_dtype(cells.dtype):
+        return cells.to_numpy(dtype=float)
+    texts = cells.astype(str).str.strip().str.replace(",", ".", regex=False)
+    there = (cells.notna() & (texts != "")).to_numpy()
+    values = as_numbers(texts)
+    wrong = np.flatnonzero(np.isnan(values) & there)
+    if wrong.size:
+        line = form.first + 1 + int(cells.index[wrong[0]])
+        given = f"{quoted(str(cells.iloc[wrong[0]]))} in line {line}, column {column + 1}"
+        raise StageError("log", given, "numbers all the way down", "", str(path))
+    return values

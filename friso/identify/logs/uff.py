@@ -1,0 +1,77 @@
+"""Universal files, dataset 58 (functions at nodal degrees of freedom): time histories and frequency responses."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from friso.identify.logs.channel import Channel, Table
+from friso.identify.logs.instruments import library
+from friso.identify.logs.text import unique
+from friso.quantities import StageError
+
+TIME_RESPONSE, FREQUENCY_RESPONSE, COHERENCE = 1, 4, 6
+"""Function types of record 6."""
+
+
+def is_uff(head: bytes) -> bool:
+    """Whether the first bytes are a universal file: a line with -1 alone, then the number of a dataset."""
+    lines = [line.strip() for line in head[:400].splitlines() if line.strip()]
+    return len(lines) > 1 and lines[0] == b"-1" and lines[1][:4].rstrip(b"bB ").isdigit()
+
+
+def sets_58(path: Path) -> list[dict[str, Any]]:
+    """The datasets 58 of a universal file. Raises StageError for none."""
+    pyuff = library("pyuff", "uff", path)
+    try:
+        file = pyuff.UFF(str(path))
+        numbers = [i for i, kind in enumerate(file.get_set_types()) if kind == 58]
+        sets = [file.read_sets(i) for i in numbers]
+    except Exception as error:  # pyuff lets through whatever a broken file makes it stumble over
+        raise StageError("log", f"a UFF file that cannot be read ({error})", "a whole file", "", str(path)) from None
+    if not sets:
+        raise StageError("log", "a UFF file without a dataset 58", "time histories or responses", "", str(path))
+    return sets
+
+
+def label(data: dict[str, Any], key: str) -> str:
+    """A text of a dataset, "" for NONE."""
+    text = str(data.get(key, "") or "").strip()
+    return "" if text.upper() == "NONE" else text
+
+
+def read_uff(path: Path) -> Table:
+    """The time histories of a universal file. Raises StageError."""
+    times = [data for data in sets_58(path) if data["func_type"] == TIME_RESPONSE]
+    if not times:
+        raise StageError("log", "a UFF file without time histories", "function type 1 in a dataset 58", "", str(path))
+    headings = [label(d, "id1") or f"node {d['rsp_node']} direction {d['rsp_dir']}" for d in times]
+    channels = tuple(
+        Channel(name, label(d, "ordinate_axis_units_lab"), np.real(d["data"]).astype(float), _axis(d), "dataset 58")
+        for name, d in zip(unique(headings), times, strict=True)
+    )
+    return Table(channels, {}, ("format: UFF, dataset 58", f"{len(channels)} time histories"))
+
+
+def _axis(data: dict[str, Any]) -> np.ndarray:
+    """The abscissa: stored, or from its start and step."""
+    stored = np.asarray(data.get("x", ()), dtype=float)
+    if stored.size == np.size(data["data"]):
+        return stored
+    return data["abscissa_min"] + data["abscissa_inc"] * np.arange(np.size(data["data"]))
+
+
+def frequency_sets(path: Path) -> tuple[dict[str, Any], np.ndarray, np.ndarray | None]:
+    """The frequency response of a universal file, its frequencies, and its coherence or None. Raises StageError for
+    none and for several."""
+    sets = sets_58(path)
+    responses = [data for data in sets if data["func_type"] == FREQUENCY_RESPONSE]
+    if len(responses) != 1:
+        given = f"{len(responses)} frequency responses: {', '.join(label(d, 'id1') for d in responses)}".rstrip(": ")
+        raise StageError("log", given, "a file with one frequency response", "", str(path))
+    axis = _axis(responses[0])
+    fitting = [d for d in sets if d["func_type"] == COHERENCE and np.size(d["data"]) == axis.size]
+    coherence = np.real(fitting[0]["data"]).astype(float) if len(fitting) == 1 else None
+    return responses[0], axis, coherence

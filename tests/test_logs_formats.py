@@ -1,0 +1,354 @@
+"""Readers of logs: each format gives back what was written, and tells how it read it."""
+
+import sys
+from pathlib import Path
+
+import log_files
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from scipy.io import savemat
+
+from friso.identify.logs import read as reading
+from friso.identify.logs.channel import Channel, Table
+from friso.identify.logs.read import file_format, is_frequency_response, read_frequency_response, read_table
+from friso.quantities import StageError
+
+M = log_files.motion()
+HEADING = ["time [ms]", "position [mm]", "force [N]"]
+COLUMNS = [M["time"] * 1e3, M["position"] * 1e3, M["force"]]
+
+
+def channel(table: Table, name: str) -> Channel:
+    return next(each for each in table.channels if each.name == name)
+
+
+def check_motion(table: Table, unit: str = "mm", scale: float = 1e3) -> None:
+    position = channel(table, "position")
+    assert position.unit == unit
+    assert position.time is not None
+    assert position.values == pytest.approx(M["position"] * scale, rel=1e-12, abs=1e-15)
+    assert position.time == pytest.approx(M["time"], rel=1e-12, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("delimiter", "decimal"), [(",", "."), (";", "."), (";", ","), ("\t", ","), (" ", "."), (" ", ",")]
+)
+@pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "utf-16", "utf-16-le", "cp1252"])
+def test_text_in_any_writing(tmp_path: Path, delimiter: str, decimal: str, encoding: str) -> None:
+    path = log_files.write_text(
+        tmp_path / "a.csv", HEADING, COLUMNS, delimiter, decimal, encoding, "Prüfstand 3\nµ = 1\n"
+    )
+    table = read_table(path)
+    check_motion(table)
+    assert channel(table, "force").unit == "N"
+    assert f"decimal {'comma' if decimal == ',' else 'point'}" in table.read[0]
+    assert "5 lines before the numbers" in table.read[0] or "4 lines" in table.read[0]
+
+
+@pytest.mark.parametrize(
+    "heading",
+    [
+        ("time (ms)", "position (mm)", "force (N)"),
+        ('"time [ms]"', '"position [mm]"', '"force [N]"'),
+        ("# time [ms]", "position [mm]", "force [N]"),
+    ],
+)
+def test_units_in_the_heading(tmp_path: Path, heading: tuple[str, ...]) -> None:
+    check_motion(read_table(log_files.write_text(tmp_path / "a.txt", heading, COLUMNS, ";")))
+
+
+@pytest.mark.parametrize("units", [("ms", "mm", "N"), ("[ms]", "[mm]", "[N]"), ("(ms)", "(mm)", "(N)")])
+def test_units_in_a_row_of_their_own(tmp_path: Path, units: tuple[str, ...]) -> None:
+    path = log_files.write_text(tmp_path / "a.csv", ["time", "position", "force"], COLUMNS, units=units)
+    check_motion(read_table(path))
+
+
+def test_a_bracket_that_is_no_unit_stays_in_the_name(tmp_path: Path) -> None:
+    path = log_files.write_text(tmp_path / "a.csv", ["pos[1]", "current (filtered) [A]", "i (old)"], COLUMNS)
+    assert [(c.name, c.unit) for c in read_table(path).channels] == [
+        ("pos[1]", ""), ("current (filtered)", "A"), ("i (old)", ""),
+    ]  # fmt: skip
+
+
+def test_a_column_of_words_is_left_out_and_told(tmp_path: Path) -> None:
+    rows = [f"{i},{i}.5,RUN,{-i}" for i in range(20)]
+    (tmp_path / "a.csv").write_text("\n".join(["time [ms],position [mm],state,force [N]", *rows]))
+    table = read_table(tmp_path / "a.csv")
+    assert [c.name for c in table.channels] == ["time", "position", "force"]
+    assert any("left out" in line and "state" in line for line in table.read)
+
+
+def test_headings_of_several_words_between_spaces(tmp_path: Path) -> None:
+    rows = [f"{i}  {i}.5" for i in range(20)]
+    (tmp_path / "a.txt").write_text("\n".join(["Time (s) Stage Position (mm)", *rows]))
+    assert [(c.name, c.unit) for c in read_table(tmp_path / "a.txt").channels] == [
+        ("Time", "s"),
+        ("Stage Position", "mm"),
+    ]
+
+
+def test_one_column_with_a_decimal_comma(tmp_path: Path) -> None:
+    (tmp_path / "a.txt").write_text("pos [mm]\n" + "".join(f"0,{i}\n" for i in range(10, 30)))
+    only = read_table(tmp_path / "a.txt").channels
+    assert only[0].values == pytest.approx(np.arange(10, 30) / 100)
+
+
+def test_one_time_column_per_channel(tmp_path: Path) -> None:
+    slow = 5e-3 * np.arange(80)
+    columns = [M["time"], M["position"], slow * 1e3, np.cos(slow)]
+    table = read_table(
+        log_files.write_text(tmp_path / "a.csv", ["t1 [s]", "x [m]", "t2 [ms]", "F [N]"], columns, ";", ",")
+    )
+    x, force = channel(table, "x"), channel(table, "F")
+    assert x.time == pytest.approx(M["time"])
+    assert force.time == pytest.approx(slow)
+    assert force.values == pytest.approx(np.cos(slow))
+
+
+def test_whole_numbers_first_and_decimal_commas_later(tmp_path: Path) -> None:
+    lines = ["t [ms];x [mm]"] + [f"{i};0" for i in range(60_000)] + [f"{i};0,5" for i in range(60_000, 60_010)]
+    (tmp_path / "a.csv").write_text("\n".join(lines))
+    assert channel(read_table(tmp_path / "a.csv"), "x").values[-1] == 0.5
+
+
+@pytest.mark.parametrize(
+    "stamps",
+    [
+        ["2026-01-31T23:59:59.998", "2026-01-31T23:59:59.999", "2026-02-01T00:00:00.000", "2026-02-01T00:00:00.001"],
+        ["2026-01-31 23:59:59.998Z", "2026-01-31 23:59:59.999Z", "2026-02-01 00:00:00Z", "2026-02-01 00:00:00.001Z"],
+        ["23:59:59.998", "23:59:59.999", "00:00:00.000", "00:00:00.001"],
+    ],
+)
+def test_time_stamps(tmp_path: Path, stamps: list[str]) -> None:
+    rows = [f"{stamp},{i}.5" for i, stamp in enumerate(stamps)]
+    (tmp_path / "a.csv").write_text("\n".join(["time,pos [mm]", *rows]))
+    time = channel(read_table(tmp_path / "a.csv"), "pos").time
+    assert time == pytest.approx([0, 1e-3, 2e-3, 3e-3], abs=1e-9)
+
+
+@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    rows=st.lists(st.tuples(*[st.floats(-1e6, 1e6)] * 3), min_size=3, max_size=30),
+    writing=st.sampled_from([(",", "."), (";", "."), (";", ","), ("\t", ","), ("\t", "."), (" ", ".")]),
+)
+def test_any_numbers_come_back(tmp_path: Path, rows: list[tuple[float, ...]], writing: tuple[str, str]) -> None:
+    columns = list(np.array(rows).T)
+    table = read_table(log_files.write_text(tmp_path / "a.csv", ["a [m]", "b [N]", "c [V]"], columns, *writing))
+    for each, expected in zip(table.channels, columns, strict=True):
+        assert each.values == pytest.approx(expected, rel=1e-15, abs=0)
+
+
+@pytest.mark.parametrize("delimiter", ["\t", ";", ","])
+@pytest.mark.parametrize("full", [True, False])
+def test_twincat_groups_end_at_different_rows(tmp_path: Path, delimiter: str, full: bool) -> None:
+    slow = np.sin(np.arange(100) * 4e-3)
+    groups = [
+        (1.0, [("ActPos", "mm (Length)", M["position"] * 1e3), ("ActVelo", "", M["velocity"])]),
+        (4.0, [("ActTorque", "%", slow)]),
+    ]
+    decimal = "." if delimiter == "," else ","
+    table = read_table(log_files.write_twincat(tmp_path / "a.csv", groups, delimiter, decimal, full=full))
+    assert "TwinCAT" in table.read[0]
+    assert [c.name for c in table.channels] == ["ActPos", "ActVelo", "ActTorque"]
+    position, torque = channel(table, "ActPos"), channel(table, "ActTorque")
+    assert position.values == pytest.approx(M["position"] * 1e3, rel=1e-12)
+    assert position.time == pytest.approx(M["time"], abs=1e-12)
+    assert torque.values == pytest.approx(slow, rel=1e-12)  # Offset 1 and ScaleFactor -1 are applied already
+    assert torque.time == pytest.approx(4e-3 * np.arange(100))
+    if full:
+        assert position.unit == "mm"
+        assert any("already applied" in line for line in table.read)
+
+
+def test_twincat_absolute_times(tmp_path: Path) -> None:
+    groups = [(0.25, [("ActPos", "mm", M["position"])])]
+    table = read_table(log_files.write_twincat(tmp_path / "a.csv", groups, start=132959733843760000))
+    assert channel(table, "ActPos").time == pytest.approx(0.25e-3 * np.arange(400), abs=1.7e-6)  # 16 ticks of 100 ns
+
+
+def test_dspace(tmp_path: Path) -> None:
+    path = log_files.write_dspace(
+        tmp_path / "a.mat", {"position (mm)": M["position"] * 1e3, "input (V)": M["force"]}, M["time"]
+    )
+    check_motion(read_table(path))
+
+
+def test_structure_with_time(tmp_path: Path) -> None:
+    signals = {"position [m]": M["position"], "force [N]": M["force"]}
+    check_motion(read_table(log_files.write_structure_with_time(tmp_path / "a.mat", signals, M["time"])), "m", 1)
+
+
+def test_mat_73(tmp_path: Path) -> None:
+    path = log_files.write_mat73(
+        tmp_path / "a.mat", {"t": M["time"], "fs": np.array(1e3)}, {"position (mm)": M["position"] * 1e3}
+    )
+    table = read_table(path)
+    check_motion(table)
+    assert table.scalars == {"fs": 1000.0}
+    assert channel(table, "t").values == pytest.approx(M["time"])
+    assert any("result (timeseries)" in line and "structure with time" in line for line in table.read)
+
+
+def test_mat_with_objects_only(tmp_path: Path) -> None:
+    path = log_files.write_mat73(tmp_path / "a.mat", {})
+    with pytest.raises(StageError, match="save as structure with time"):
+        read_table(path)
+
+
+def test_two_variables_with_the_same_signals_are_told_apart(tmp_path: Path) -> None:
+    savemat(tmp_path / "a.mat", {k: {"x": M["position"] * i, "n": 3} for i, k in ((1, "run1"), (2, "run2"))})
+    table = read_table(tmp_path / "a.mat")
+    assert [c.name for c in table.channels] == ["run1.x", "run2.x"]
+    assert table.scalars == {"run1.n": 3.0, "run2.n": 3.0}
+
+
+SIGNALS = {"position": ("mm", M["position"] * 1e3), "force": ("N", M["force"])}
+
+
+def test_tdms(tmp_path: Path) -> None:
+    pytest.importorskip("nptdms")
+    check_motion(read_table(log_files.write_tdms(tmp_path / "log.bin", SIGNALS)))
+
+
+def test_uff_time_histories(tmp_path: Path) -> None:
+    pytest.importorskip("pyuff")
+    table = read_table(log_files.write_uff(tmp_path / "a.unv", M["time"], SIGNALS))
+    assert channel(table, "position").values == pytest.approx(M["position"] * 1e3, rel=1e-9, abs=1e-12)
+    assert channel(table, "position").time == pytest.approx(M["time"], abs=1e-9)
+
+
+def test_lvm(tmp_path: Path) -> None:
+    pytest.importorskip("lvm_read")
+    table = read_table(log_files.write_lvm(tmp_path / "a.txt", SIGNALS))
+    assert channel(table, "position").values == pytest.approx(M["position"] * 1e3, abs=1e-8)
+    assert channel(table, "position").time == pytest.approx(M["time"], abs=1e-9)
+    assert channel(table, "force").unit == "N"
+    assert [path.name for path in tmp_path.iterdir()] == ["a.txt"]  # the library leaves a cache unless told not to
+
+
+def test_without_the_library_the_message_says_how_to_get_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "a.tdms").write_bytes(b"TDSm" + bytes(100))
+    monkeypatch.setitem(sys.modules, "nptdms", None)
+    with pytest.raises(StageError, match=r'pip install "friso\[tdms\]"'):
+        read_table(tmp_path / "a.tdms")
+
+
+FREQUENCY = np.linspace(1, 100, 40)
+RESPONSE = 1 / (-2 * (2 * np.pi * FREQUENCY) ** 2 + 40j * FREQUENCY + 1e4)
+
+
+@pytest.mark.parametrize(
+    ("heading", "columns", "unit"),
+    [
+        (["f [Hz]", "mag [dB]", "phase [deg]"], (20 * np.log10(abs(RESPONSE)), np.degrees(np.angle(RESPONSE))), ""),
+        (["f [Hz]", "magnitude [mm/N]", "phase [rad]"], (1e3 * abs(RESPONSE), np.angle(RESPONSE)), "m/N"),
+        (["Frequency (Hz)", "Re [m/N]", "Im [m/N]"], (RESPONSE.real, RESPONSE.imag), "m/N"),
+        (["omega [rad/s]", "real", "imag"], (RESPONSE.real, RESPONSE.imag), ""),
+    ],
+)
+def test_frequency_responses_as_text(
+    tmp_path: Path, heading: list[str], columns: tuple[np.ndarray, ...], unit: str
+) -> None:
+    axis = FREQUENCY * (2 * np.pi if "omega" in heading[0] else 1)
+    path = log_files.write_text(
+        tmp_path / "plant.csv", [*heading, "coherence"], [axis, *columns, 0.9 + 0 * axis], ";", ","
+    )
+    assert is_frequency_response(path)
+    found = read_frequency_response(path)
+    assert found.frequency == pytest.approx(FREQUENCY, rel=1e-12)
+    assert np.allclose(found.response, RESPONSE, rtol=1e-10, atol=0)
+    assert found.coherence == pytest.approx(0.9)
+    assert (found.unit, found.name) == (unit, "plant")
+
+
+def test_frequency_response_of_a_universal_file(tmp_path: Path) -> None:
+    pytest.importorskip("pyuff")
+    axis = np.linspace(0, 100, 41)
+    signals = {"plant": ("mm/N", 1e3 / (1e4 - axis**2 + 1j * axis)), "coherence": ("", 0.8 + 0 * axis)}
+    path = log_files.write_uff(tmp_path / "a.uff", axis, signals, 4)
+    assert is_frequency_response(path)
+    found = read_frequency_response(path)
+    assert found.frequency == pytest.approx(axis[1:])  # the line at 0 Hz is left out
+    assert np.allclose(found.response, (1 / (1e4 - axis**2 + 1j * axis))[1:], rtol=1e-9)
+    assert (found.unit, found.coherence) == ("m/N", pytest.approx(0.8))
+
+
+def test_a_log_is_no_frequency_response(tmp_path: Path) -> None:
+    assert not is_frequency_response(log_files.write_text(tmp_path / "a.csv", HEADING, COLUMNS))
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("f,mag [dB],phase [deg]\n1,2,3\n2,2,3\n3,2,3\n", "f without a unit"),
+        ("f [Hz],mag [dB],phase\n1,2,3\n2,2,3\n3,2,3\n", "phase without a unit"),
+        ("f [Hz],mag [dB],phase [deg]\n1,2,3\n3,2,3\n2,2,3\n", "2 Hz after 3 Hz"),
+        ("f [Hz],mag [dB],phase [deg]\n1,2,3\n2,nan,3\n3,2,3\n", "no number in row 2"),
+        ("f [Hz],mag [dB],phase [deg]\n1,2,3\n2,2,3\n", "2 frequencies"),
+        ("f [Hz],mag A [dB],mag B [dB],phase [deg]\n1,2,3,4\n2,2,3,4\n3,2,3,4\n", "mag A, mag B"),
+    ],
+)
+def test_bad_frequency_responses(tmp_path: Path, text: str, said: str) -> None:
+    (tmp_path / "a.csv").write_text(text)
+    with pytest.raises(StageError, match=said):
+        read_frequency_response(tmp_path / "a.csv")
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (b"", "0 bytes"),
+        (bytes(range(256)) * 40, "neither text nor a known format"),
+        (b"time [s],position [mm]\n", "no row of numbers"),
+        (b"hello\nworld\n", "no row of numbers"),
+        (b"t [s],x [m]\n1,2\n2,3\n3,4,5\n4,5\n", "3 cells in line 4"),
+        (b"t [s],x [m]\n1,2\n2,3\n3\n4,5\n", "1 cells in line 4"),
+        (b"t [s],x [m]\n" + b"1,2\n" * 300 + b"2,oops\n" + b"3,4\n" * 300, '"oops" in line 302, column x'),
+        (b"note\n\nt;x\n1,0;2,5\n2,0;3,5\n\n3,0;bad\n4,0;1,5\n", '"bad" in line 7, column x'),
+        (b"TDSm" + bytes(200), "TDMS file that cannot be read"),
+        (b"MATLAB 5.0 MAT-file" + bytes(300), "MAT file that cannot be read|no arrays"),
+        (b"LabVIEW Measurement\t\n", "LVM file"),
+        (b"    -1\n    58\nrubbish\n    -1\n", "UFF file that cannot be read"),
+        (b"Name\trig\nSampleTime[ms]\t1\n\nName\tpos\n", "without rows of numbers"),
+        (b"Name\trig\nStarttime of export\t1\n\nName\tpos\n\n0\t1\n1\t2\n2\tx\n3\t4\n4\t4\n", '"x" in line 8'),
+    ],
+)
+def test_bad_files_end_in_one_message(tmp_path: Path, content: bytes, said: str) -> None:
+    (tmp_path / "a.log").write_bytes(content)
+    with pytest.raises(StageError, match=said) as caught:
+        read_table(tmp_path / "a.log")
+    assert str(tmp_path / "a.log") in str(caught.value)
+
+
+def test_missing_files_and_folders(tmp_path: Path) -> None:
+    with pytest.raises(StageError, match="cannot be opened"):
+        read_table(tmp_path / "none.csv")
+    with pytest.raises(StageError, match="a folder"):
+        read_table(tmp_path)
+
+
+def test_a_file_too_large_is_refused_with_its_size(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(reading, "decoded_head", lambda path: pytest.fail("read before it was refused"))
+    with (tmp_path / "big.csv").open("wb") as file:
+        file.truncate(10 * 2**30)
+    with pytest.raises(StageError, match="10 GiB"):
+        read_table(tmp_path / "big.csv")
+
+
+def test_format_by_content_not_by_name(tmp_path: Path) -> None:
+    log_files.write_dspace(tmp_path / "a.mat", {"x (mm)": M["position"]}, M["time"])
+    (tmp_path / "a.mat").rename(tmp_path / "a.csv")
+    assert file_format(tmp_path / "a.csv") == "mat"
+
+
+def test_a_matrix_is_a_channel_per_column(tmp_path: Path) -> None:
+    both = np.stack([M["position"], M["force"]], axis=1)
+    savemat(tmp_path / "old.mat", {"y": both, "image": np.zeros((90, 80))})
+    log_files.write_mat73(tmp_path / "new.mat", {"y": both.T})  # HDF5 holds MATLAB's arrays transposed
+    for name in ("old.mat", "new.mat"):
+        table = read_table(tmp_path / name)
+        assert [c.name for c in table.channels] == ["y(:,1)", "y(:,2)"]
+        assert table.channels[1].values == pytest.approx(M["force"])
+    assert any("image, an array of 90 x 80" in line for line in read_table(tmp_path / "old.mat").read)

@@ -1,0 +1,521 @@
+"""From a file to a log: roles, units, scales, one time base, and what is refused or told."""
+
+from pathlib import Path
+
+import log_files
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.io import savemat
+
+from friso.identify.logs import mapping as mappings
+from friso.identify.logs.assemble import read_log
+from friso.identify.logs.checks import clipped_share, held, unwrapped
+from friso.identify.logs.delays import fitted_lag, in_blocks, lag
+from friso.identify.logs.log import ROLES, Log
+from friso.identify.logs.mapping import Mapping, from_options
+from friso.identify.logs.roles import role_of
+from friso.identify.logs.time_base import together, track
+from friso.identify.logs.units import in_si, read_scale, spelled, split_heading
+from friso.quantities import StageError
+
+DATA = Path(__file__).parents[2] / "shared" / "data"
+M = log_files.motion(2000)
+NAMES = ["time [s]", "position [mm]", "velocity [mm/s]", "force [N]"]
+
+
+def columns() -> list[np.ndarray]:
+    return [M["time"], M["position"] * 1e3, M["velocity"] * 1e3, M["force"]]
+
+
+def log_of(
+    tmp_path: Path, names: list[str], values: list[np.ndarray], mapping: Mapping | None = None, strict: bool = True
+) -> Log:
+    return read_log(log_files.write_text(tmp_path / "a.csv", names, values), mapping, strict)
+
+
+def told(lines: tuple[str, ...], text: str) -> bool:
+    return any(text in line for line in lines)
+
+
+def message(tmp_path: Path, names: list[str], values: list[np.ndarray], mapping: Mapping | None = None) -> str:
+    with pytest.raises(StageError) as caught:
+        log_of(tmp_path, names, values, mapping)
+    assert str(tmp_path / "a.csv") in str(caught.value)
+    return str(caught.value)
+
+
+def test_a_log_in_si_units(tmp_path: Path) -> None:
+    log = log_of(tmp_path, NAMES, columns())
+    assert log.name == "a"
+    assert log.sample_time == pytest.approx(1e-3, rel=1e-12)
+    assert log.segments == (slice(0, 2000),)
+    for role in ("position", "velocity", "force"):
+        assert log[role] == pytest.approx(M[role], rel=1e-12, abs=1e-15)
+        assert log.unit(role) == ROLES[role]
+    assert told(log.read, "delimiter comma")
+    assert told(log.read, 'the name says "position"')
+    assert not log.warnings
+
+
+@pytest.mark.parametrize(
+    ("name", "role"),
+    [
+        ("Axis1.NcToPlc.ActPos", "position"), ("Axis1.NcToPlc.ActVelo", "velocity"), ("Axis1.SetPos", "reference"),
+        ("enc2", "position"), ("cart_position", "cart_position"), ("relative position", "relative_position"),
+        ("iq", "force"), ("MotorCurrent", "force"), ("desired", "reference"), ("setpoint", "reference"), ("t", "time"),
+        ("Time", "time"), ("PosDiff", None), ("SetVelo", None), ("following error", None), ("qm", None), ("vir", None),
+        ("position_ref", "reference"), ("stage_pos", "position"), ("total", None), ("composition", None),
+    ],
+)  # fmt: skip
+def test_roles_by_name(name: str, role: str | None) -> None:
+    assert (role_of(name) or (None,))[0] == role
+
+
+def test_two_candidates_are_listed(tmp_path: Path) -> None:
+    text = message(tmp_path, ["time [s]", "enc1 [mm]", "enc2 [mm]", "force [N]"], columns())
+    assert '2 candidates: "enc1" and "enc2"' in text
+    assert '--map position="enc1"' in text
+
+
+def test_no_candidate_lists_the_channels(tmp_path: Path) -> None:
+    text = message(tmp_path, ["time [s]", "a [mm]", "b", "force [N]"], columns())
+    assert "one of the channels time [s], a [mm], b, force [N]" in text
+
+
+def test_a_mapped_name_that_is_not_there(tmp_path: Path) -> None:
+    text = message(tmp_path, NAMES, columns(), from_options(["position=postion"]))
+    assert '"postion"' in text
+    assert '--map position="position"' in text
+
+
+def test_no_units(tmp_path: Path) -> None:
+    text = message(tmp_path, ["time [s]", "position", "velocity [m/s]", "force [N]"], columns())
+    assert '"position", which has no unit' in text
+    assert '--unit "position=mm"' in text
+    log = log_of(
+        tmp_path,
+        ["time [s]", "position", "velocity [mm/s]", "force [N]"],
+        columns(),
+        from_options(units=["position=mm"]),
+    )
+    assert log["position"] == pytest.approx(M["position"])
+    text = message(tmp_path, ["time", "position [mm]", "velocity [mm/s]", "force [N]"], columns())
+    assert '--unit "time=ms"' in text
+
+
+def test_current_needs_a_scale(tmp_path: Path) -> None:
+    names = ["time [s]", "position [mm]", "velocity [mm/s]", "current [mA]"]
+    assert '--scale force="35.1507 N/A"' in message(tmp_path, names, columns())
+    log = log_of(tmp_path, names, columns(), from_options(scales=["force=12 N/A"]))
+    assert log["force"] == pytest.approx(M["force"] * 12e-3)
+    log = log_of(tmp_path, names, columns(), strict=False)
+    assert log.unit("force") == "A"
+    assert log["force"] == pytest.approx(M["force"] * 1e-3)
+
+
+def test_disturbance_in_volts(tmp_path: Path) -> None:
+    pulses = np.where(M["time"] % 0.5 < 0.05, 0.4, 0.0)
+    names = ["time [s]", "position [mm]", "pulses_N", "force [N]"]
+    mapping = from_options(["disturbance=pulses_N"], scales=["disturbance=35.15 N/V"])
+    log = log_of(tmp_path, names, [M["time"], M["position"] * 1e3, pulses, M["force"]], mapping)
+    assert log["disturbance"] == pytest.approx(35.15 * pulses)
+    assert told(log.read, "taken in V as the scale says")
+
+
+def test_unknown_units_are_kept_where_allowed(tmp_path: Path) -> None:
+    names = ["time [s]", "position [deg]", "velocity [deg/s]", "force [counts]"]
+    log = log_of(tmp_path, names, columns(), strict=False)
+    assert log.units == {"position": "rad", "velocity": "rad/s", "force": "count"}
+    assert log["position"] == pytest.approx(np.radians(M["position"] * 1e3))
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "factor"),
+    [
+        ("35.1507 N/V", "", 35.1507),
+        ("35.1507 N/V", "mV", 0.0351507),
+        ("2 kN/V", "V", 2000),
+        ("-3 N/count", "counts", -3),
+    ],
+)
+def test_scales(text: str, unit: str, factor: float) -> None:
+    assert read_scale("force", text, unit)[0] == pytest.approx(factor)
+
+
+@pytest.mark.parametrize(("text", "unit"), [("35", ""), ("35 N", "V"), ("35 m/V", "V"), ("3 N/V", "A"), ("x N/V", "V")])
+def test_wrong_scales(text: str, unit: str) -> None:
+    with pytest.raises(StageError, match="--scale force="):
+        read_scale("force", text, unit)
+
+
+@pytest.mark.parametrize(
+    ("text", "si", "factor"),
+    [
+        ("m/s2", "m/s^2", 1),
+        ("µm", "m", 1e-6),
+        ("Nm", "N", 1),
+        ("msec", "s", 1e-3),
+        ("rpm", "m/s", np.pi / 30),
+        ("°", "m", np.pi / 180),
+    ],
+)
+def test_unit_spellings(text: str, si: str, factor: float) -> None:
+    assert in_si(text, si)[0] == pytest.approx(factor)
+    assert spelled(spelled(text)) == spelled(text)
+
+
+def test_headings() -> None:
+    assert split_heading("enc1 (mm)") == ("enc1", "mm")
+    assert split_heading("x [flurbs]") == ("x", "flurbs")
+    assert split_heading("test space (1)") == ("test space (1)", "")
+    assert split_heading("[m]") == ("[m]", "")
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.integers(8, 24), st.integers(0, 2**24), st.integers(1, 20))
+def test_a_counter_that_overflows_is_unwrapped(bits: int, start: int, turns: int) -> None:
+    size = 2**bits
+    true = start + np.cumsum(np.full(200 * turns, size // 60 + 1))
+    values, found = unwrapped((true % size).astype(float))
+    assert found == bits
+    assert np.diff(values) == pytest.approx(np.diff(true))
+
+
+SQUARE = 1000.0 * (np.arange(3000) % 100 < 50) + np.arange(3000) % 7
+
+
+def test_no_counter_is_left_as_it_is() -> None:
+    for values in (np.array([0.0, 1, 0, 1, 1, 0]), np.round(1e4 * M["position"] * 100), M["force"], SQUARE):
+        assert unwrapped(values)[1] == 0
+
+
+def test_the_log_tells_of_the_counter(tmp_path: Path) -> None:
+    counts = (np.arange(2000.0) * 40) % 65536
+    log = log_of(tmp_path, ["time [s]", "position [mm]"], [M["time"], counts])
+    assert told(log.warnings, "counter of 16 bits")
+    assert log["position"][-1] == pytest.approx(1999 * 40e-3)
+
+
+def test_gaps_split_and_are_not_bridged(tmp_path: Path) -> None:
+    keep = np.r_[0:700, 760:2000]
+    log = log_of(tmp_path, NAMES, [each[keep] for each in columns()])
+    assert log.segments == (slice(0, 700), slice(700, 1940))
+    assert log["position"] == pytest.approx(M["position"][keep])
+    assert log.time == pytest.approx(M["time"][keep])
+
+
+def test_nan_splits_and_is_counted(tmp_path: Path) -> None:
+    values = columns()
+    values[3] = values[3].copy()
+    values[3][500:503] = np.nan
+    log = log_of(tmp_path, NAMES, values)
+    assert log.segments == (slice(0, 500), slice(500, 1997))
+    assert told(log.read, "force: 3 samples that are no numbers")
+    assert all(np.isfinite(each).all() for each in log.signals.values())
+    values[3][100:1400] = np.nan
+    assert "1300 of 2000" in message(tmp_path, NAMES, values)
+
+
+def test_decreasing_time(tmp_path: Path) -> None:
+    time = M["time"].copy()
+    time[900:] -= 0.3
+    assert "decreases" in message(tmp_path, NAMES, [time, *columns()[1:]])
+    assert "at sample 901" in message(tmp_path, NAMES, [time, *columns()[1:]])
+
+
+def test_repeated_rows_are_left_out_and_rounded_stamps_refused(tmp_path: Path) -> None:
+    again = np.sort(np.r_[0:2000, 300, 301])
+    log = log_of(tmp_path, NAMES, [each[again] for each in columns()])
+    assert log.time.size == 2000
+    assert told(log.read, "2 samples repeated")
+    text = message(tmp_path, NAMES, [np.round(M["time"], 2), *columns()[1:]])
+    assert "--dt" in text
+
+
+def test_jitter_is_interpolated_and_told(tmp_path: Path) -> None:
+    rng = np.random.default_rng(1)
+    time = M["time"] + 1e-4 * rng.uniform(-1, 1, 2000)
+    exact = log_files.motion(2000)["position"]
+    late = np.interp(time, M["time"], exact)
+    log = log_of(tmp_path, ["time [s]", "position [m]"], [time, late])
+    assert told(log.warnings, "interpolated onto even instants")
+    assert np.diff(log.time) == pytest.approx(log.sample_time)
+    assert np.abs(log["position"] - np.interp(log.time, M["time"], exact)).max() < 1e-4 * np.abs(M["velocity"]).max()
+
+
+@pytest.mark.parametrize(
+    ("column", "said"), [(1, "position\n  given:    a constant signal, 0.003"), (3, "constant signal, 3.0")]
+)
+def test_constant_signals(tmp_path: Path, column: int, said: str) -> None:
+    values = columns()
+    values[column] = np.full(2000, 3.0)
+    assert said in message(tmp_path, NAMES, values)
+
+
+def test_too_short(tmp_path: Path) -> None:
+    assert "30 samples" in message(tmp_path, NAMES, [each[:30] for each in columns()])
+
+
+def test_saturation_is_told_with_its_share(tmp_path: Path) -> None:
+    values = columns()
+    limit = 0.6 * np.abs(values[3]).max()
+    share = np.mean(np.abs(values[3]) >= limit)
+    log = log_of(tmp_path, NAMES, [*values[:3], np.clip(values[3], -limit, limit)])
+    found = next(line for line in log.warnings if "saturated" in line)
+    assert float(found.split()[1].rstrip("%")) / 100 == pytest.approx(share, rel=0.05)
+    assert clipped_share(values[3]) == 0
+
+
+def test_values_held(tmp_path: Path) -> None:
+    assert held(np.repeat(M["position"][:200], 4)) == 4
+    assert held(M["position"]) == 1
+    log = log_of(tmp_path, NAMES, [*columns()[:3], np.repeat(M["force"][::5], 5)])
+    assert told(log.warnings, "holds each value for 5 samples")
+
+
+@pytest.mark.parametrize(
+    ("factor", "said"), [(1e3, "mm against m"), (-1.0, "the sign"), (1.3, "wrong units or counts")]
+)
+def test_velocity_against_position(tmp_path: Path, factor: float, said: str) -> None:
+    log = log_of(tmp_path, NAMES, [*columns()[:2], factor * columns()[2], columns()[3]])
+    assert told(log.warnings, said)
+
+
+def test_velocity_of_another_body(tmp_path: Path) -> None:
+    rng = np.random.default_rng(2)
+    log = log_of(tmp_path, NAMES, [*columns()[:2], np.cumsum(rng.standard_normal(2000)), columns()[3]])
+    assert told(log.warnings, "does not follow")
+
+
+@pytest.mark.parametrize("true", [-3.4, 0.0, 0.5, 7.25])
+def test_delay_with_its_interval(true: float) -> None:
+    rng = np.random.default_rng(3)
+    t = np.arange(8000.0)
+
+    def signal(at: np.ndarray) -> np.ndarray:
+        return sum(np.sin(0.01 * k * at + 2.1 * k**2) for k in range(1, 30))
+
+    one, two = signal(t), signal(t - true)
+    one, two = (x + 0.3 * rng.standard_normal(t.size) for x in (one, two))
+    value, half = in_blocks(lambda a, b: lag(one[a:b], two[a:b]), t.size)
+    assert abs(value - true) < 2 * half + 0.02
+    assert half < 0.3
+    causes = np.stack([two, np.ones_like(two)], axis=1)
+    value, half = in_blocks(lambda a, b: fitted_lag(one[a:b], causes[a:b]), t.size)
+    assert abs(value - true) < 2 * half + 0.02
+
+
+def test_friction_is_no_delay(tmp_path: Path) -> None:
+    """A force with much viscous friction leads the acceleration; that is not taken for a late instrument."""
+    force = M["force"] + 80 * M["velocity"] + 5 * np.sign(M["velocity"])
+    assert not told(log_of(tmp_path, NAMES, [*columns()[:3], force]).warnings, "come after")
+    late = np.r_[np.zeros(4), force[:-4]]
+    found = [line for line in log_of(tmp_path, NAMES, [*columns()[:3], late]).warnings if "come after" in line]
+    assert len(found) == 1
+    start, _, rest = found[0].partition(" by ")
+    assert start == "the force seems to come after motion"
+    assert float(rest.split()[0]) == pytest.approx(4, abs=0.1)
+
+
+def test_channels_of_different_rates(tmp_path: Path) -> None:
+    fast = 0.25e-3 * np.arange(8000)
+    groups = [
+        (0.25, [("ActPos", "mm", 50 * np.sin(7 * fast))]),
+        (1.0, [("Force", "N", np.cos(7e-3 * np.arange(1800)))]),
+    ]
+    log = read_log(log_files.write_twincat(tmp_path / "a.csv", groups))
+    assert log.sample_time == pytest.approx(1e-3)
+    assert log.time.size == 1800  # the common span
+    assert log["position"] == pytest.approx(0.05 * np.sin(7 * log.time), rel=1e-9, abs=1e-12)
+    assert log["force"] == pytest.approx(np.cos(7 * log.time), rel=1e-9, abs=1e-12)
+    assert told(log.warnings, "without a filter against aliasing")
+
+
+def test_no_common_span() -> None:
+    t = 1e-3 * np.arange(100)
+    with pytest.raises(StageError, match="that all channels share"):
+        together({"a": track("a", t, t), "b": track("b", t + 5, t)})
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    st.lists(st.integers(20, 100), min_size=1, max_size=4),
+    st.lists(st.integers(20, 100), min_size=1, max_size=4),
+    st.floats(0, 1),
+)
+def test_values_between_segments_are_never_made_up(first: list[int], second: list[int], shift: float) -> None:
+    """Whatever the gaps, an instant of the log lies within a segment of each channel."""
+    spans = []
+    for lengths, offset in ((first, 0.0), (second, shift)):
+        starts = np.cumsum([0, *[n + 5 for n in lengths[:-1]]])
+        spans.append(np.concatenate([offset + s + np.arange(n) for s, n in zip(starts, lengths, strict=True)]))
+    tracks = {name: track(name, t, 2 * t) for name, t in zip("ab", spans, strict=True)}
+    try:
+        base, values = together(tracks)
+    except StageError:
+        return
+    for name, t in zip("ab", spans, strict=True):
+        assert values[name] == pytest.approx(2 * base.time, abs=0.02)  # instants a hundredth of a step apart are one
+        assert np.all(np.min(np.abs(base.time[:, None] - t[None, :]), axis=1) <= 0.5 + 1e-9)
+
+
+def test_without_time(tmp_path: Path) -> None:
+    text = message(tmp_path, NAMES[1:], columns()[1:])
+    assert "--dt" in text
+    log = log_of(tmp_path, NAMES[1:], columns()[1:], from_options(dt="2 ms"))
+    assert log.sample_time == pytest.approx(2e-3)
+    savemat(tmp_path / "a.mat", {"position": M["position"], "fs": 2500.0})
+    with pytest.raises(StageError, match=r'--dt "0\.4 ms", if fs = 2500'):
+        read_log(tmp_path / "a.mat")
+
+
+def test_mapping_is_kept_and_overridden(tmp_path: Path) -> None:
+    log = log_files.write_text(tmp_path / "a.csv", NAMES, columns())
+    assert mappings.load(log) is None
+    first = from_options(["position=ä b=c"[:12]], ['x y="mm"'], ["force=35.1507 N/V"], "1 ms", "steps")
+    assert mappings.save(first, log) == tmp_path / "a.csv.friso.toml"
+    assert mappings.load(log) == first
+    second = from_options(["position=other"], dt="2 ms").over(first)
+    assert second.roles == {"position": "other"}
+    assert second.sample_time == 2e-3
+    assert second.scales == first.scales
+
+
+@settings(max_examples=50, deadline=None)
+@given(
+    st.dictionaries(st.sampled_from(list(ROLES)), st.text(st.characters(codec="utf-8"), min_size=1)),
+    st.floats(1e-9, 1e3),
+)
+def test_any_mapping_comes_back(tmp_path_factory: pytest.TempPathFactory, roles: dict[str, str], step: float) -> None:
+    log = tmp_path_factory.mktemp("kept") / "log.csv"
+    mapping = Mapping(roles, dict.fromkeys(roles.values(), "mm"), {}, step)
+    mappings.save(mapping, log)
+    assert mappings.load(log) == mapping
+
+
+def test_mapping_in_another_folder(tmp_path: Path) -> None:
+    log = tmp_path / "gone" / "a.csv"  # a folder that cannot be written: there is none
+    place = mappings.save(Mapping({"position": "x"}), log, tmp_path)
+    assert place == tmp_path / "a.csv.friso.toml"
+    assert mappings.load(log, tmp_path) == Mapping({"position": "x"})
+    with pytest.raises(StageError, match="a folder that can be written"):
+        mappings.save(Mapping(), log)
+
+
+@pytest.mark.parametrize(
+    "text", ["rubbish", "[roles]\nstage = 'x'\n", "[roles]\nposition = 3\n", "nonsense = 1\n", "sample_time = 1\n"]
+)
+def test_a_broken_mapping(tmp_path: Path, text: str) -> None:
+    (tmp_path / "a.csv.friso.toml").write_text(text)
+    with pytest.raises(StageError, match=r"a\.csv\.friso\.toml"):
+        mappings.load(tmp_path / "a.csv")
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        {"maps": ["position"]}, {"maps": ["place=x"]}, {"units": ["x"]}, {"scales": ["time=3 s/V"]}, {"dt": "1"},
+        {"dt": "-1 ms"}, {"maps": ["position="]},
+    ],
+)  # fmt: skip
+def test_wrong_options(options: dict) -> None:
+    with pytest.raises(StageError, match="--"):
+        from_options(**options)
+
+
+def test_a_mapping_that_names_a_channel_that_is_gone(tmp_path: Path) -> None:
+    assert '"gone"' in message(tmp_path, NAMES, columns(), from_options(units=["gone=mm"]))
+    assert '"gone"' in message(tmp_path, NAMES, columns(), from_options(["cart_position=gone"]))
+
+
+def test_the_unit_of_a_time_column_can_be_told(tmp_path: Path) -> None:
+    log = log_of(tmp_path, ["time", *NAMES[1:]], columns(), from_options(units=["time=ms"]))
+    assert log.sample_time == pytest.approx(1e-6)
+    log = log_of(tmp_path, NAMES, columns(), from_options(units=["time=ms"]))  # over what the file says
+    assert log.sample_time == pytest.approx(1e-6)
+    assert told(log.read, "time: time (column 1), in ms")
+
+
+def test_two_time_columns_without_units(tmp_path: Path) -> None:
+    slow = 4.0 * np.arange(500)
+    values = [M["time"] * 1e3, M["position"] * 1e3, slow, np.cos(slow)]
+    names = ["t1", "position [mm]", "t2", "force [N]"]
+    assert '2 candidates: "t1" and "t2"' in message(tmp_path, names, values)
+    log = log_of(tmp_path, names, values, from_options(units=["t1=ms", "t2=ms"]))
+    assert log.sample_time == pytest.approx(4e-3)
+    assert log["position"] == pytest.approx(M["position"][::4])
+
+
+def test_a_damaged_number(tmp_path: Path) -> None:
+    values = columns()
+    values[1] = np.where(np.arange(2000) == 77, 1e200, values[1])
+    assert "values up to 1e+197 m" in message(tmp_path, NAMES, values)
+
+
+def test_a_scale_without_a_channel(tmp_path: Path) -> None:
+    mapping = from_options(scales=["acceleration=9.81 m/s^2/V"])
+    assert "a scale for acceleration, which has no channel" in message(tmp_path, NAMES, columns(), mapping)
+
+
+def record(name: str) -> Path:
+    if not (DATA / name).exists():
+        pytest.skip(f"the measured record {name} is not here")
+    return DATA / name
+
+
+def test_emps() -> None:
+    options = ["time=t", "reference=qg", "position=qm", "force=vir"]
+    log = read_log(record("emps/DATA_EMPS.mat"), from_options(options, scales=["force=35.1507 N/V"]))
+    assert log.time.size == 24841
+    assert log.sample_time == pytest.approx(1e-3, rel=1e-6)
+    assert len(log.segments) == 1
+    assert np.ptp(log["position"]) == pytest.approx(0.2464, abs=1e-4)
+    assert log.scalars["gtau"] == pytest.approx(35.1507, abs=1e-4)
+    assert log.scalars["kp"] == pytest.approx(160.18, abs=0.01)
+    assert told(log.warnings, "qm has no unit")
+
+
+def test_ku_leuven() -> None:
+    path = record("kuleuven_lsb250/exp1.mat")
+    with pytest.raises(StageError, match='"enc1" and "enc2"'):
+        read_log(path)
+    log = read_log(path, from_options(["position=enc2 (mm)", "cart_position=enc1", "force=input (V)"]), strict=False)
+    assert log.units == {"force": "V"}
+    assert np.abs(log["position"]).max() == pytest.approx(0.0652, abs=1e-4)
+    assert np.abs(log["force"]).max() == pytest.approx(0.5, abs=1e-3)
+
+
+def test_tokyo_bench() -> None:
+    path = record("utokyo_motorbench/MultisineTypeA.mat")
+    options = from_options(["position=theta_mx", "force=iq_adx"], ["theta_mx=rad", "iq_adx=A"])
+    with pytest.raises(StageError, match=r'--dt "0\.4 ms", if fs = 2500'):
+        read_log(path, options, strict=False)
+    log = read_log(path, from_options(dt="0.4 ms").over(options), strict=False)
+    assert log.time.size == 50000
+    assert log.units == {"position": "rad", "force": "A"}
+    assert log.scalars["nrofs"] == 2500
+    assert told(log.read, "BA (tf)")
+
+
+def test_twincat_filled_with_the_previous_value(tmp_path: Path) -> None:
+    """Scope can repeat the samples of a slow group, stamp and value, to have all rows full."""
+    again = np.repeat(np.arange(500), 4)
+    slow = np.cos(4e-3 * np.arange(500))
+    rows = [f"{i};{50 * np.sin(7e-3 * i):.12g};{4 * again[i]};{slow[again[i]]:.12g}" for i in range(2000)]
+    head = [
+        "Name;rig",
+        "SampleTime[ms];1",
+        "",
+        "Name;ActPos;Name;Force",
+        "SampleTime[ms];1;SampleTime[ms];4",
+        "Unit;mm;Unit;N",
+        "",
+    ]
+    (tmp_path / "a.csv").write_text("\n".join([*head, *rows, "EOF"]).replace(".", ","))
+    log = read_log(tmp_path / "a.csv")
+    assert log.sample_time == pytest.approx(4e-3)
+    assert log["force"] == pytest.approx(np.cos(log.time))
+    assert log["position"] == pytest.approx(0.05 * np.sin(7 * log.time))
+    assert told(log.read, "1500 samples repeated")
