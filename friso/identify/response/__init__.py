@@ -1,0 +1,1 @@
+"""Frequency responses from measured records, and what they show: mass lines, modes, friction."""

@@ -1,0 +1,124 @@
+"""Modes of a response: resonances and antiresonances with their damping, by a rational fit in the frequency domain."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from friso.identify.estimate import Estimate
+from friso.identify.response.fitting import Fit, refined
+from friso.identify.response.rational import Row, Shape, bounds, orders, rational, roots, simplest
+from friso.identify.response.response import FrequencyResponse
+from friso.quantities import StageError
+
+METHOD = "rational fit of the response"
+
+MOST = 4
+"""Modes at most."""
+
+LEAST = 0.01
+"""Relative error of the response below which no model is trusted; keeps a few strong lines from ruling the fit."""
+
+
+@dataclass(frozen=True)
+class Modes:
+    """The fit over `band` [Hz], its resonances and antiresonances by frequency: ("resonance 1 frequency", ...).
+
+    `order` tells how the number of modes was chosen; `low_level` and `high_level` are the acceleration per input below
+    and above all modes (the mass lines), unknown without a rigid body.
+    """
+
+    shape: Shape
+    fit: Fit
+    scale: float
+    estimates: tuple[Estimate, ...]
+    low_level: Estimate
+    high_level: Estimate
+    order: str
+    band: tuple[float, float]
+    warnings: tuple[str, ...]
+
+    def __getitem__(self, name: str) -> Estimate:
+        return next(each for each in self.estimates if each.name == name)
+
+    def predict(self, frequency: np.ndarray) -> np.ndarray:
+        """The fitted response at frequencies [Hz], complex, same shape."""
+        return rational(self.fit.parameters, self.shape, 1j * frequency / self.scale)
+
+
+def fit_modes(
+    response: FrequencyResponse, band: tuple[float, float] | None = None, rigid: bool | None = None, most: int = MOST
+) -> Modes:
+    """Modes of a force-to-position response in a `band` [Hz] (default: all lines).
+
+    `rigid` tells whether the mass moves freely (default: what fits better). Raises StageError for fewer than 12 lines.
+    """
+    part = response if band is None else response.between(*band)
+    part = part.at(part.frequency > 0)
+    if len(part.frequency) < 12:
+        raise StageError("band", f"{len(part.frequency)} lines", "at least 12 lines for a fit of modes", "3 to 20 Hz")
+    scale = float(np.sqrt(part.frequency[0] * part.frequency[-1]))
+    s = 1j * part.frequency / scale
+    deviation = np.hypot(part.scatter(), LEAST * np.abs(part.response))
+    kinds = (True, False) if rigid is None else (rigid,)
+    rows = [row for kind in kinds for row in orders(s, part.response, deviation, kind, most)]
+    shape, start, *_ = simplest(rows)
+    low, high = bounds(shape, s)
+    fit = refined(lambda p: rational(p, shape, s)[None], start, part.response[None], deviation[None], low, high)
+    limits = (float(part.frequency[0]), float(part.frequency[-1]))
+    low_level, high_level = (_level(fit, shape, scale, which, response) for which in ("low", "high"))
+    warnings = (f"the fit misses by more than the deviations (reduced chi-square {fit.reduced:.3g})",)
+    found = _pairs(fit, shape, scale, limits)
+    return Modes(
+        shape, fit, scale, found, low_level, high_level, _told(shape, rows), limits, warnings if fit.reduced > 3 else ()
+    )
+
+
+def _told(shape: Shape, rows: list[Row]) -> str:
+    """How the order was chosen."""
+    tried = ", ".join(f"{row.shape.words}: {row.bic:.4g}" for row in rows)
+    return f"{shape.words} by the Bayesian information criterion ({tried})"
+
+
+def _pairs(fit: Fit, shape: Shape, scale: float, band: tuple[float, float]) -> tuple[Estimate, ...]:
+    """Frequencies and damping ratios of resonances and antiresonances within the band, by frequency."""
+    found: list[Estimate] = []
+    for kind, which in (("resonance", 0), ("antiresonance", 1)):
+        inside = [
+            root
+            for root in sorted(roots(fit.parameters, shape)[which], key=abs)
+            if band[0] <= abs(root) * scale <= band[1] and -root.real < 0.7 * abs(root)
+        ]
+        for number, root in enumerate(inside, 1):
+            tracked = _tracked(shape, which, root)
+            name = f"{kind} {number}"
+            found += [
+                fit.estimate(f"{name} frequency", "Hz", METHOD, lambda p, t=tracked: abs(t(p)) * scale, positive=True),
+                fit.estimate(f"{name} damping ratio", "1", METHOD, lambda p, t=tracked: -t(p).real / abs(t(p))),
+            ]
+    return tuple(found)
+
+
+def _tracked(shape: Shape, which: int, root: complex) -> Callable[[np.ndarray], complex]:
+    """The root that is nearest to a given one, as a function of the parameters."""
+
+    def nearest(parameters: np.ndarray) -> complex:
+        found = roots(parameters, shape)[which]
+        return complex(found[np.argmin(np.abs(found - root))]) if found.size else complex(np.nan, np.nan)
+
+    return nearest
+
+
+def _level(fit: Fit, shape: Shape, scale: float, which: str, response: FrequencyResponse) -> Estimate:
+    """Acceleration per input below all modes (the rigid body alone) or above all (with their residues)."""
+    unit = f"{response.channels.output_unit}/s^2/{response.channels.input_unit}"
+    name = f"mass line level, {'below' if which == 'low' else 'above'} the modes"
+    if not shape.rigid:
+        return Estimate.unknown(name, unit, METHOD, "no rigid body fits the response in this band")
+    if which == "high" and shape.constant:
+        return Estimate.unknown(name, unit, METHOD, "modes beyond the band still act at its upper end")
+    stop = shape.nonlinear + (1 if which == "low" else 1 + shape.modes)
+    factor = (2 * np.pi * scale) ** 2
+    return fit.estimate(name, unit, METHOD, lambda p: factor * float(np.sum(p[shape.nonlinear : stop])))

@@ -1,0 +1,118 @@
+"""The period of an input: its exact number of samples, and which samples hold whole periods of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import fft
+
+from friso.quantities import StageError
+
+QUIET = 0.01
+"""Share of the input's peak-to-peak value below which a trailing stretch counts as switched off."""
+
+LIKE = 0.2
+"""Mean squared change from one period to the next, in units of twice the variance, of an input that repeats."""
+
+
+@dataclass(frozen=True)
+class Periods:
+    """Whole periods of `samples` each, `count` of them, from sample `start` to `stop`."""
+
+    samples: int
+    start: int
+    stop: int
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def count(self) -> int:
+        return (self.stop - self.start) // self.samples
+
+    def cut(self, signal: np.ndarray) -> np.ndarray:
+        """The signal by periods, shape (periods, samples)."""
+        return signal[self.start : self.stop].reshape(self.count, self.samples)
+
+
+def find_periods(signal: np.ndarray, expected: float | None = None) -> Periods:
+    """The whole periods of an input, shape (n,), counted back from the last sample at which it repeats.
+
+    `expected` is about how many samples a period has: it is then looked for within 2 % of that. Raises StageError
+    where the signal does not repeat, or has fewer than two periods.
+    """
+    if not np.ptp(signal) > 0:
+        raise _not_periodic("an input that is constant")
+    stop = _switched_off(signal)
+    change = repetition(signal[:stop])
+    samples = _shortest(change) if expected is None else _near(change, expected)
+    warnings: tuple[str, ...] = ()
+    if expected is not None and samples != round(expected):
+        warnings = (f"the input repeats every {samples} samples, not every {expected:g}: those are used",)
+    start, stop = _repeating(signal[:stop], samples)
+    start = stop - (stop - start) // samples * samples
+    if (stop - start) // samples < 2:
+        raise _not_periodic(f"{len(signal)} samples, which hold no two whole periods of {samples}")
+    return Periods(samples, start, stop, warnings)
+
+
+def repetition(signal: np.ndarray) -> np.ndarray:
+    """Mean squared change of a signal, shape (n,), over a lag, in units of twice its variance, for lags 0 to n/2."""
+    centred = signal - signal.mean()
+    n, lags = len(centred), np.arange(len(centred) // 2 + 1)
+    size = fft.next_fast_len(2 * n, real=True)
+    correlation = np.fft.irfft(np.abs(np.fft.rfft(centred, size)) ** 2, size)[: len(lags)]
+    squares = np.concatenate([[0.0], np.cumsum(centred**2)])
+    parts = squares[n - lags] + squares[n] - squares[lags]
+    return np.maximum(parts - 2 * correlation, 0.0) / ((n - lags) * 2 * squares[n] / n)
+
+
+def _switched_off(signal: np.ndarray) -> int:
+    """One past the last sample before the input rests for good, if it does so for more than 10 samples."""
+    moving = np.flatnonzero(np.abs(signal - signal[-1]) > QUIET * np.ptp(signal))
+    stop = int(moving[-1]) + 1
+    return stop if len(signal) - stop > max(10, len(signal) // 200) else len(signal)
+
+
+def _shortest(change: np.ndarray) -> int:
+    """The shortest lag at which the signal repeats as well as at any, once it has changed at all."""
+    away = np.flatnonzero(change > 0.5)
+    first = int(away[0]) if away.size else len(change)
+    lags = np.arange(max(first, 2), len(change))
+    if not lags.size or change[lags].min() > LIKE:
+        raise _not_periodic("an input that does not repeat within half the record")
+    good = lags[change[lags] <= 1.5 * change[lags].min() + 1e-9]
+    return int(_lowest(change, int(good[0])))
+
+
+def _lowest(change: np.ndarray, lag: int) -> int:
+    """Down from a lag to the next local minimum."""
+    while lag + 1 < len(change) and change[lag + 1] < change[lag]:
+        lag += 1
+    return lag
+
+
+def _near(change: np.ndarray, expected: float) -> int:
+    low, high = int(0.98 * expected), int(np.ceil(1.02 * expected)) + 1
+    if not 2 <= expected < len(change):
+        raise _not_periodic(f"a period of {expected:g} samples in a record of {2 * len(change) - 2}")
+    lags = np.arange(max(low, 2), min(high, len(change)))
+    best = int(lags[np.argmin(change[lags])])
+    if change[best] > LIKE:
+        raise _not_periodic(f"an input that does not repeat near {expected:g} samples")
+    return best
+
+
+def _repeating(signal: np.ndarray, samples: int) -> tuple[int, int]:
+    """The stretch that repeats: no late start or ragged end, where most samples are unlike those a period off."""
+    change = np.abs(signal[samples:] - signal[:-samples])
+    unlike = change > 8 * 1.4826 * np.median(change) + 1e-5 * np.ptp(signal)
+    width = max(3, samples // 50)
+    mostly = np.flatnonzero(np.convolve(unlike, np.full(width, 1 / width), "same") > 0.5)
+    early, late = mostly[mostly < samples], mostly[mostly >= max(len(change) - samples, samples)]
+    start = int(early[-1]) + width // 2 + 1 if early.size else 0
+    stop = int(late[0]) - width // 2 + samples if late.size else len(signal)
+    return start, stop
+
+
+def _not_periodic(given: str) -> StageError:
+    return StageError("period", given, "an input that repeats at least twice", "a multisine of 5 s, repeated 20 times")

@@ -1,0 +1,119 @@
+"""Responses from periodic excitation: averages over periods and realisations, noise and distortion apart.
+
+The robust method of Pintelon, Schoukens, System Identification (2nd ed., 2012), chapter 4: noise is what differs
+from period to period, nonlinear distortion what differs from one random-phase realisation to another beyond that. With
+an external reference (closed loop, indirect) both spectra are taken relative to it, which makes them comparable.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from friso.identify.response.records import Record, Spectra, spectra
+from friso.identify.response.response import Channels, FrequencyResponse
+from friso.quantities import StageError
+
+LINES = 5
+"""Neighbouring lines that share their relative variance where few realisations would leave it all too uncertain."""
+
+FEW = 10
+"""Real degrees of freedom per line from which a variance stands on its own."""
+
+
+def multisine(
+    records: Sequence[Record], period: float | None = None, channels: Channels | None = None
+) -> FrequencyResponse:
+    """The response on the excited lines, from one or more realisations of a periodic excitation.
+
+    A realisation is a record with phases of its own; if it has a reference, the response is the indirect one, that of
+    output and input to the reference. `period` [s] is about how long a period is (default: found). The deviation covers
+    noise and, with two realisations or lines left free in the excitation, nonlinear distortion. Raises StageError for
+    records that are not periodic or do not belong together.
+    """
+    every = _together([spectra(record, period) for record in records])
+    excited = np.logical_and.reduce([one.excited for one in every])
+    if not excited.any():
+        raise StageError(
+            "records", "realisations without a common line", "the same excited lines", "one period for all"
+        )
+    response, noise = _averaged(every, excited)
+    degrees = np.full(response.shape, 2.0 * sum(len(one.input) - 1 for one in every))
+    if len(every) > 1:
+        total, total_degrees = _total(every, excited, response)
+        distortion, known = np.sqrt(np.maximum(total**2 - noise**2, 0.0)), True
+        degrees = np.where(distortion > 0, total_degrees, degrees)
+    else:
+        distortion = _at_free_lines(every[0], excited, response)
+        known = bool(np.isfinite(distortion).any())
+    deviation = np.hypot(noise, np.nan_to_num(distortion))
+    warnings = dict.fromkeys(text for one in every for text in one.warnings)
+    if not known:
+        warnings["one realisation with all lines excited: the deviation covers noise, not nonlinear distortion"] = None
+    frequency = every[0].frequency[excited]
+    known_channels = channels or Channels()
+    return FrequencyResponse(
+        frequency, response, deviation, noise, distortion, degrees, "multisine", known_channels, None, tuple(warnings)
+    )
+
+
+def _together(every: list[Spectra]) -> list[Spectra]:
+    """The realisations, if they have the same lines. Raises StageError."""
+    if not every:
+        raise StageError("records", "none", "at least one record", "two realisations of a multisine")
+    spacings = [one.frequency[0] for one in every]
+    if np.ptp(spacings) > 1e-6 * spacings[0] or len({len(one.frequency) for one in every}) > 1:
+        given = "periods of " + ", ".join(f"{1 / spacing:.6g} s" for spacing in spacings)
+        raise StageError("records", given, "realisations with the same period and sample time", "5 s each")
+    return every
+
+
+def _averaged(every: list[Spectra], excited: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The response and the deviation of it by noise, each (lines,)."""
+    outputs, inputs = _relative(every, excited)
+    gain = inputs.mean(axis=0)
+    response = outputs.mean(axis=0) / gain
+    variance = np.zeros(len(response))
+    for one in every:
+        residuals = (one.output[:, excited] - response * one.input[:, excited]) / one.reference[excited]
+        variance += np.var(residuals, axis=0, ddof=1) / len(residuals)
+    return response, np.sqrt(variance) / (len(every) * np.abs(gain))
+
+
+def _relative(every: list[Spectra], excited: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Output and input over the external signal, averaged over periods, each (realisations, lines)."""
+    outputs = [one.output[:, excited].mean(axis=0) / one.reference[excited] for one in every]
+    inputs = [one.input[:, excited].mean(axis=0) / one.reference[excited] for one in every]
+    return np.array(outputs), np.array(inputs)
+
+
+def _total(every: list[Spectra], excited: np.ndarray, response: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The deviation of the mean, from how realisations differ, and its degrees of freedom, each (lines,)."""
+    outputs, inputs = _relative(every, excited)
+    count = len(every)
+    squares = np.sum(np.abs(outputs - response * inputs) ** 2, axis=0)
+    relative = squares / (count * (count - 1)) / np.abs(outputs.mean(axis=0)) ** 2
+    own = 2 * (count - 1)
+    width = 1 if own >= FEW else min(LINES, len(relative))
+    window = np.ones(width)
+    shared = np.convolve(np.ones(len(relative)), window, "same")
+    relative = np.convolve(relative, window, "same") / shared
+    return np.sqrt(relative) * np.abs(response), own * shared
+
+
+def _at_free_lines(one: Spectra, excited: np.ndarray, response: np.ndarray) -> np.ndarray:
+    """Distortion (lines,) from what the output holds, beyond noise, at lines in the band that are not excited.
+
+    What the input itself holds there is taken off with the interpolated response. NaN where there are no such lines.
+    """
+    places = np.flatnonzero(excited)
+    free = np.setdiff1d(np.arange(places[0], places[-1] + 1), places)
+    if len(free) < 2:
+        return np.full(len(places), np.nan)
+    parts = [np.interp(free, places, part) for part in (np.real(response), np.imag(response))]
+    left = one.output[:, free] - (parts[0] + 1j * parts[1]) * one.input[:, free]
+    power = np.abs(left.mean(axis=0)) ** 2 - np.var(left, axis=0, ddof=1) / len(left)
+    near = np.argsort(np.abs(free[:, None] - places), axis=0, kind="stable")[:LINES]
+    local = np.maximum(power[near].mean(axis=0), 0.0)
+    return np.sqrt(local) / np.abs(one.input.mean(axis=0)[places])

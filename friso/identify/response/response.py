@@ -1,0 +1,146 @@
+"""The frequency response of a record: complex values on lines, and how far each can be believed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy import stats
+
+from friso.quantities import StageError
+
+if TYPE_CHECKING:
+    from control import FrequencyResponseData
+
+
+NEIGHBOURS = 15
+"""Lines from which the scatter between neighbours is taken."""
+
+
+@dataclass(frozen=True)
+class Channels:
+    """Names and units of input and output."""
+
+    input: str = "force"
+    input_unit: str = "N"
+    output: str = "position"
+    output_unit: str = "m"
+
+
+@dataclass(frozen=True)
+class Band:
+    """Limits at 95 %: magnitude [output unit per input unit] and phase [rad], each of shape (lines,)."""
+
+    magnitude_low: np.ndarray
+    magnitude_high: np.ndarray
+    phase_low: np.ndarray
+    phase_high: np.ndarray
+
+
+@dataclass(frozen=True)
+class FrequencyResponse:
+    """A response on the lines `frequency` [Hz]; all arrays of shape (lines,).
+
+    `response` is complex [output unit per input unit]. `deviation` is its standard deviation, sqrt(E|error|^2), in
+    total; `noise` and `distortion` are what noise (differs from period to period) and nonlinear distortion (differs
+    from realisation to realisation) contribute, deviation^2 = noise^2 + distortion^2 where both are known, NaN where
+    the record cannot tell them. `degrees` is the number of real degrees of freedom behind the deviation. `coherence`
+    is that of input and output, or None. `kind` is "multisine", "welch" or "local polynomial".
+    """
+
+    frequency: np.ndarray
+    response: np.ndarray
+    deviation: np.ndarray
+    noise: np.ndarray
+    distortion: np.ndarray
+    degrees: np.ndarray
+    kind: str
+    channels: Channels = Channels()
+    coherence: np.ndarray | None = None
+    warnings: tuple[str, ...] = ()
+
+    def band(self) -> Band:
+        """The 95 % intervals of magnitude and phase: half the variance lies along the response, half across it."""
+        half = stats.t.ppf(0.975, self.degrees) * self.deviation / np.sqrt(2)
+        size, phase = np.abs(self.response), np.unwrap(np.angle(self.response))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            turn = np.where(half < size, np.arcsin(np.minimum(half / size, 1.0)), np.pi)
+        return Band(np.maximum(size - half, 0.0), size + half, phase - turn, phase + turn)
+
+    def frd(self) -> FrequencyResponseData:
+        """As data of python-control, its frequencies in rad/s; the line at 0 Hz, if any, included."""
+        from control import FrequencyResponseData
+
+        omega = 2 * np.pi * self.frequency
+        return FrequencyResponseData(self.response, omega, inputs=[self.channels.input], outputs=[self.channels.output])
+
+    def times(self, factor: np.ndarray, output: str, output_unit: str) -> FrequencyResponse:
+        """With another output: the old one times a known complex `factor` per line, shape (lines,)."""
+        size = np.abs(factor)
+        return replace(
+            self,
+            response=self.response * factor,
+            deviation=self.deviation * size,
+            noise=self.noise * size,
+            distortion=self.distortion * size,
+            channels=replace(self.channels, output=output, output_unit=output_unit),
+        )
+
+    def accelerations(self) -> FrequencyResponse:
+        """From position to acceleration: times (i omega)^2."""
+        unit = f"{self.channels.output_unit}/s^2"
+        return self.times(-((2 * np.pi * self.frequency) ** 2), "acceleration", unit)
+
+    def at(self, chosen: np.ndarray) -> FrequencyResponse:
+        """The lines chosen by a mask or by numbers."""
+        names = ("frequency", "response", "deviation", "noise", "distortion", "degrees")
+        taken = {name: getattr(self, name)[chosen] for name in names}
+        return replace(self, coherence=None if self.coherence is None else self.coherence[chosen], **taken)
+
+    def between(self, low: float, high: float) -> FrequencyResponse:
+        """The lines from `low` to `high` [Hz], both included. Raises StageError where there are none."""
+        inside = (self.frequency >= low) & (self.frequency <= high)
+        if not inside.any():
+            given = f"{low:g} to {high:g} Hz"
+            held = f"{self.frequency.min():g} to {self.frequency.max():g} Hz" if self.frequency.size else "no lines"
+            raise StageError("band", given, f"a band that holds lines of the response, which has {held}", "3 to 20 Hz")
+        return self.at(inside)
+
+    def usable(self, ratio: float = 3.0, coherence: float = 0.5) -> FrequencyResponse:
+        """The lines whose response is at least `ratio` deviations large and whose coherence, if known, suffices.
+
+        The lines left out are told in the warnings. Raises StageError where none is left: excitation too weak.
+        """
+        enough = np.abs(self.response) >= ratio * self.deviation
+        if self.coherence is not None:
+            enough &= self.coherence >= coherence
+        if not enough.any():
+            best = np.max(np.abs(self.response) / np.maximum(self.deviation, np.finfo(float).tiny), initial=0.0)
+            given = f"no line stands out of the noise (at best {best:.2g} standard deviations)"
+            if self.coherence is not None and self.coherence.size:
+                given += f", coherence at most {np.max(self.coherence):.2g}"
+            expected = f"a response of {ratio:g} deviations and a coherence of {coherence:g} on some line"
+            raise StageError("excitation", given, expected, "a larger force, or a longer record")
+        if enough.all():
+            return self
+        lost = self.frequency[~enough]
+        told = (
+            f"{lost.size} of {enough.size} lines left out, too weakly excited ({lost.min():.3g} to {lost.max():.3g} Hz)"
+        )
+        return replace(self.at(enough), warnings=(*self.warnings, told))
+
+    def scatter(self) -> np.ndarray:
+        """Deviations (lines,) raised to the scatter between neighbouring lines where that is larger.
+
+        Nonlinear distortion makes the lines of one realisation scatter by more than its noise; a smooth system cannot.
+        """
+        size = np.abs(self.response)
+        if len(size) < 3 or not np.all(size > 0):
+            return self.deviation
+        second = np.abs(np.diff(np.log(size), 2)) / np.sqrt(6)
+        width = min(NEIGHBOURS, len(second))
+        medians = np.median(np.lib.stride_tricks.sliding_window_view(second, width), axis=1)
+        places = np.arange(len(size)) - 1 - (width - 1) / 2
+        rough = 1.4826 * np.interp(places, np.arange(len(medians)), medians)  # normal distribution: median to deviation
+        return np.maximum(self.deviation, np.sqrt(2) * rough * size)

@@ -1,0 +1,214 @@
+"""Two masses and a joint from responses at the driven mass and, where it is measured too, at the other one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from friso.identify.estimate import COVERAGE, Estimate
+from friso.identify.response.fitting import Fit, refined
+from friso.identify.response.response import FrequencyResponse
+from friso.quantities import StageError
+
+METHOD = "two-mass model fitted to the response"
+
+RATIOS = (1.05, 1.2, 1.5, 2.0, 3.0)
+"""Resonance over antiresonance from which the fit starts."""
+
+EXPLAINED = 3.0
+"""Sum of squares over degrees of freedom up to which a model counts as right."""
+
+FAR = np.log(30.0)
+"""Logarithm of the factor by which masses and stiffness may move from the start; twice that for damping."""
+
+DRIVEN, OTHER, STIFFNESS, DAMPING, DRAG, OTHER_DRAG, DELAY = range(7)
+"""Places of the parameters: logarithms of two masses, stiffness and damping; viscous friction on each mass; delay."""
+
+
+@dataclass(frozen=True)
+class TwoMass:
+    """A driven mass, a joint and another mass; units follow from the response's: mass is input per acceleration.
+
+    `fit` holds the parameters (see the module); `signs` of the two outputs are -1 where they go against the input.
+    `estimates` hold masses, stiffness, damping, viscous friction, delay, antiresonance and resonance.
+    """
+
+    signs: tuple[float, float]
+    fit: Fit
+    estimates: tuple[Estimate, ...]
+    band: tuple[float, float]
+    warnings: tuple[str, ...] = ()
+
+    def __getitem__(self, name: str) -> Estimate:
+        return next(each for each in self.estimates if each.name == name)
+
+    def predict(self, frequency: np.ndarray, collocated: bool = True) -> np.ndarray:
+        """The response at frequencies [Hz] of the driven mass, or of the other one; complex, same shape."""
+        which = 0 if collocated else 1
+        return self.signs[which] * two_masses(self.fit.parameters, frequency)[which]
+
+
+def two_masses(parameters: np.ndarray, frequency: np.ndarray) -> np.ndarray:
+    """Responses of the driven and the other mass to a force on the former, shape (2, lines); frequency in Hz."""
+    driven, other, stiffness, damping = np.exp(parameters[:DRAG])
+    s = 2j * np.pi * frequency
+    joint = damping * s + stiffness
+    first = driven * s**2 + parameters[DRAG] * s + joint
+    second = other * s**2 + parameters[OTHER_DRAG] * s + joint
+    determinant = first * second - joint**2
+    return np.stack([second, joint]) / determinant * np.exp(-s * parameters[DELAY])
+
+
+def fit_two_mass(
+    collocated: FrequencyResponse,
+    noncollocated: FrequencyResponse | None = None,
+    band: tuple[float, float] | None = None,
+) -> TwoMass:
+    """The two-mass model of force-to-position responses on the same lines, in a `band` [Hz] (default: all of them).
+
+    Raises StageError where there are too few lines or the two responses have different ones.
+    """
+    responses = [collocated] if noncollocated is None else [collocated, noncollocated]
+    if band is not None:
+        responses = [one.between(*band) for one in responses]
+    frequency = responses[0].frequency
+    if len(frequency) < 8:
+        raise StageError("band", f"{len(frequency)} lines", "at least 8 lines for a two-mass model", "3 to 20 Hz")
+    if len(responses) > 1 and not np.array_equal(frequency, responses[1].frequency):
+        raise StageError("response", "responses on different lines", "both outputs of the same records", "one period")
+    values = np.stack([one.response for one in responses])
+    deviation = np.stack([_deviation(one) for one in responses])
+    sign = _sign(values[0])
+    options = [(sign, sign), (sign, -sign)][: len(responses)]
+    fits = [(_best(np.array(pair)[: len(values), None] * values, deviation, frequency), pair) for pair in options]
+    fit, signs = min(fits, key=lambda each: each[0].squares)
+    limits = (float(frequency[0]), float(frequency[-1]))
+    return TwoMass(signs, fit, _estimates(fit, collocated), limits, tuple(_warnings(signs, fit)))
+
+
+def widened(found: TwoMass, apart: Sequence[TwoMass]) -> TwoMass:
+    """The estimates with intervals that also explain how far fits of single realisations, `apart`, lie from each other.
+
+    Where these scatter more than their intervals allow, friction moves the parameters from one realisation to the next,
+    which one response cannot show: the intervals are scaled up by the Birge ratio (Birge 1932,
+    doi:10.1103/PhysRev.40.207). Raises StageError for fewer than two.
+    """
+    if len(apart) < 2:
+        raise StageError("records", f"{len(apart)} single fits", "at least two realisations", "exp1 and exp2")
+    rows = [_scaled(each, [one[each.name] for one in apart]) for each in found.estimates]
+    return replace(found, estimates=tuple(rows))
+
+
+def _scaled(estimate: Estimate, others: Sequence[Estimate]) -> Estimate:
+    """An estimate with its interval scaled by the ratio of external to internal scatter of the others, if above 1."""
+    if not estimate.shown or not all(one.shown and one.half_width > 0 for one in others):
+        return estimate
+    values, weights = (
+        np.array([one.value for one in others]),
+        np.array([(COVERAGE / one.half_width) ** 2 for one in others]),
+    )
+    off = values - np.average(values, weights=weights)
+    ratio = max(float(np.sqrt(np.sum(weights * off**2) / (len(others) - 1))), 1.0)
+    low, high = (
+        estimate.value - ratio * (estimate.value - estimate.low),
+        estimate.value + ratio * (estimate.high - estimate.value),
+    )
+    return replace(estimate, low=low, high=high, method=f"{estimate.method}, scatter of {len(others)} realisations")
+
+
+def _deviation(response: FrequencyResponse) -> np.ndarray:
+    """Deviations as weights: not below a thousandth of the response, which no model is right to."""
+    return np.hypot(response.scatter(), 1e-3 * np.abs(response.response))
+
+
+def _sign(response: np.ndarray) -> float:
+    """1 where the mass follows the force (-180 degrees) on most lines, -1 where it goes against it."""
+    return -1.0 if np.sum(np.cos(np.angle(response))) > 0 else 1.0
+
+
+def _best(values: np.ndarray, deviation: np.ndarray, frequency: np.ndarray) -> Fit:
+    """The best of the fits from the two most promising mass ratios; the first one, where it explains the data."""
+    late = 0.1 / frequency[-1]
+    reach = np.array([FAR] * 3 + [2 * FAR])
+
+    def model(parameters: np.ndarray) -> np.ndarray:
+        return two_masses(parameters, frequency)[: len(values)]
+
+    def misfit(start: np.ndarray) -> float:
+        return float(np.sum(np.abs((model(start) - values) / deviation) ** 2))
+
+    fits = []
+    for start in sorted(_starts(values[0], frequency), key=misfit)[:2]:
+        lower = np.array([*(start[:DRAG] - reach), 0.0, 0.0, -late])
+        upper = np.array([*(start[:DRAG] + reach), np.inf, np.inf, late])
+        fits.append(refined(model, start, values, deviation, lower, upper))
+        if fits[-1].reduced < EXPLAINED:
+            break
+    return min(fits, key=lambda fit: fit.squares)
+
+
+def _starts(response: np.ndarray, frequency: np.ndarray) -> Iterator[np.ndarray]:
+    """Starts at the highest place of the acceleration inside the band, with several mass ratios."""
+    level = np.abs(response) * (2 * np.pi * frequency) ** 2
+    resonance = frequency[1 + int(np.argmax(level[1:-1]))]
+    for ratio in RATIOS:
+        other = 1 - 1 / ratio**2
+        stiffness = other * (2 * np.pi * resonance / ratio) ** 2
+        damping = 0.1 * np.sqrt(stiffness * other)
+        start = np.array([*np.log([1 - other, other, stiffness, damping]), 0.0, 0.0, 0.0])
+        scale = np.exp(np.mean(np.log(np.abs(two_masses(start, frequency)[0]) / np.abs(response))))
+        start[:DRAG] += np.log(scale)
+        yield start
+
+
+def _warnings(signs: tuple[float, float], fit: Fit) -> Iterator[str]:
+    if signs[0] < 0:
+        yield "the driven mass goes against the input: its sign was reversed"
+    if signs[0] != signs[1]:
+        yield "the second output has the opposite sign of the first: it was reversed"
+    if fit.reduced > EXPLAINED:
+        yield f"the model is not right to the precision of the data (reduced chi-square {fit.reduced:.3g})"
+
+
+def _estimates(fit: Fit, response: FrequencyResponse) -> tuple[Estimate, ...]:
+    """Masses and joint, with what follows from them."""
+    into, out = response.channels.input_unit, response.channels.output_unit
+    rate = f"{into} s/{out}"
+
+    rows = [
+        ("driven mass", f"{into} s^2/{out}", lambda p: float(np.exp(p[DRIVEN]))),
+        ("other mass", f"{into} s^2/{out}", lambda p: float(np.exp(p[OTHER]))),
+        ("total mass", f"{into} s^2/{out}", lambda p: float(np.exp(p[DRIVEN]) + np.exp(p[OTHER]))),
+        ("joint stiffness", f"{into}/{out}", lambda p: float(np.exp(p[STIFFNESS]))),
+        ("joint damping", rate, lambda p: float(np.exp(p[DAMPING]))),
+        ("antiresonance frequency", "Hz", lambda p: abs(_root(p, True)) / (2 * np.pi)),
+        ("antiresonance damping ratio", "1", lambda p: -np.cos(np.angle(_root(p, True)))),
+        ("resonance frequency", "Hz", lambda p: abs(_root(p, False)) / (2 * np.pi)),
+        ("resonance damping ratio", "1", lambda p: -np.cos(np.angle(_root(p, False)))),
+    ]
+    positive = [fit.estimate(name, _si(unit), METHOD, of, positive=True) for name, unit, of in rows]
+    plain = [
+        fit.estimate("driven viscous friction", _si(rate), METHOD, lambda p: float(p[DRAG])),
+        fit.estimate("other viscous friction", _si(rate), METHOD, lambda p: float(p[OTHER_DRAG])),
+        fit.estimate("delay", "s", METHOD, lambda p: float(p[DELAY])),
+    ]
+    return (*positive, *plain)
+
+
+def _root(parameters: np.ndarray, zero: bool) -> complex:
+    """The zero of the collocated response, or the pole, that is furthest out above the real axis [rad/s]."""
+    driven, other, stiffness, damping = np.exp(parameters[:DRAG])
+    first = np.array([driven, parameters[DRAG] + damping, stiffness])
+    second = np.array([other, parameters[OTHER_DRAG] + damping, stiffness])
+    joint = np.array([damping, stiffness])
+    whole = second if zero else np.polysub(np.polymul(first, second), np.polymul(joint, joint))
+    roots = np.roots(whole)
+    upper = roots[roots.imag > 0]
+    return complex(upper[np.argmax(np.abs(upper))]) if upper.size else complex(np.nan, np.nan)
+
+
+def _si(unit: str) -> str:
+    """The usual names where input is in newtons and output in metres."""
+    return {"N s^2/m": "kg", "N s/m": "N s/m"}.get(unit, unit)

@@ -1,0 +1,168 @@
+"""Measured benches: KU Leuven linear guide, Univ. of Tokyo two-inertia motor bench (see shared/data/README.md)."""
+
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+import scipy.io
+from scipy import signal
+
+from friso.identify.response.closed_loop import feedback
+from friso.identify.response.departure import departure, friction_from_departure
+from friso.identify.response.limit_cases import visible
+from friso.identify.response.mass_line import mass_lines
+from friso.identify.response.modes import fit_modes
+from friso.identify.response.periodic import multisine
+from friso.identify.response.prediction import relative_error
+from friso.identify.response.records import Record
+from friso.identify.response.response import Channels, FrequencyResponse
+from friso.identify.response.simulated import explained
+from friso.identify.response.two_mass import TwoMass, fit_two_mass, widened
+
+DATA = Path(__file__).parents[2] / "shared" / "data"
+BAND = (3.0, 20.1)
+
+
+def present(name: str) -> Path:
+    if not (DATA / name).exists():
+        pytest.skip(f"{name} is not beside the repository")
+    return DATA / name
+
+
+@cache
+def leuven(number: int) -> tuple[Record, Record]:
+    """Realisation `number`: the records of both encoders [m]."""
+    path = present(f"kuleuven_lsb250/exp{number}.mat")
+    log = scipy.io.loadmat(path, squeeze_me=True, struct_as_record=False)[f"exp{number}"]
+    by_name = {channel.Name: np.asarray(channel.Data, float) for channel in log.Y}
+    given = by_name["input (V)"]
+    first, second = (Record(given, 1e-3 * by_name[f"enc{i} (mm)"], 1e-3) for i in (1, 2))
+    return first, second
+
+
+@cache
+def leuven_response(numbers: tuple[int, ...], output: int) -> FrequencyResponse:
+    return multisine([leuven(one)[output] for one in numbers], 5.0, Channels("voltage", "V", "position", "m"))
+
+
+@cache
+def leuven_model(numbers: tuple[int, ...]) -> TwoMass:
+    return fit_two_mass(leuven_response(numbers, 0), leuven_response(numbers, 1), BAND)
+
+
+@cache
+def tokyo(output: str) -> FrequencyResponse:
+    log = scipy.io.loadmat(present("utokyo_motorbench/MultisineTypeA.mat"), squeeze_me=True)
+    record = Record(log["iq_adx"], log[output], 1 / float(log["fs"]))
+    return multisine([record], channels=Channels("current", "A", "angle", "rad"))
+
+
+# KU Leuven
+
+
+def test_leuven_lines_and_exact_period() -> None:
+    """The README says 5 s; the input repeats after 4999 samples."""
+    found = leuven_response((1, 2), 0)
+    assert len(found.frequency) == 100
+    assert found.frequency[0] == pytest.approx(1 / 4.999)
+    assert "every 4999 samples, not every 5000" in found.warnings[0]
+    assert feedback(leuven(1)[0]) == ()
+
+
+def test_leuven_realisations_lie_in_each_others_bands() -> None:
+    both, single = leuven_response((1, 2), 0), [leuven_response((one,), 0) for one in (1, 2)]
+    apart = np.abs(single[0].response - single[1].response) / 2  # of each from their mean
+    band = (both.frequency > 3) & (both.frequency < 20)
+    assert 0.5 < np.sqrt(np.mean((apart / both.deviation)[band] ** 2)) < 2
+    assert np.median(both.distortion / both.noise) > 3  # friction, not noise, makes them differ
+
+
+def test_leuven_antiresonance_and_resonance() -> None:
+    found = fit_modes(leuven_response((1, 2), 0), BAND)
+    assert (found.shape.modes, found.shape.rigid) == (1, True)
+    assert found["antiresonance 1 frequency"].value == pytest.approx(11, abs=1)
+    assert found["resonance 1 frequency"].value == pytest.approx(14, abs=1)
+    assert 0.02 < found["resonance 1 damping ratio"].low < found["resonance 1 damping ratio"].high < 0.15
+    two = leuven_model((1, 2))
+    for name in ("antiresonance", "resonance"):
+        one, other = found[f"{name} 1 frequency"], two[f"{name} frequency"]
+        assert max(one.low, other.low) < min(one.high, other.high)
+
+
+@pytest.mark.parametrize(("train", "aside"), [(1, 2), (2, 1)])
+def test_leuven_prediction_of_the_other_realisation(train: int, aside: int) -> None:
+    """No worse than the other realisation's own measured response tells it, and for both encoders."""
+    model = leuven_model((train,))
+    for output, collocated in ((0, True), (1, False)):
+        record = leuven(aside)[output]
+        error = relative_error(lambda f, c=collocated: model.predict(f, c), record, (3, 20), 5.0)
+        measured = leuven_response((train,), output)
+        copied = relative_error(
+            lambda f, m=measured: (
+                np.interp(f, m.frequency, m.response.real) + 1j * np.interp(f, m.frequency, m.response.imag)
+            ),
+            record,
+            (3, 20),
+            5.0,
+        )
+        assert error < 0.2
+        assert error < 1.05 * copied
+
+
+def test_leuven_two_masses_agree_between_realisations() -> None:
+    single = [leuven_model((one,)) for one in (1, 2)]
+    both = widened(leuven_model((1, 2)), single)
+    for name in ("driven mass", "other mass", "joint stiffness", "resonance frequency"):
+        for one in single:
+            assert both[name].low < one[name].high
+            assert one[name].low < both[name].high
+        assert both[name].half_width < 0.1 * both[name].value
+
+
+def test_leuven_departure_by_friction() -> None:
+    model = leuven_model((1, 2))
+    found = departure(leuven_response((1, 2), 0), model.predict)
+    assert 1 < found.frequency.value < 4
+    assert found.differ
+    low = signal.butter(4, 40, fs=1000, output="sos")
+    velocities = [signal.sosfiltfilt(low, np.gradient(leuven(one)[0].output, 1e-3)) for one in (1, 2)]
+    drag = friction_from_departure(leuven_response((1, 2), 0), velocities, (0.1, 5.0), model.signs[0])
+    assert 0 < drag.coulomb.low < drag.coulomb.high < 0.5  # below the peak of the input, which moves it
+    assert drag.left < 0.3
+    assert any("a spring acts" in text for text in drag.warnings)
+    once = [leuven(one)[0].input[-4999:] for one in (1, 2)]
+    told = explained(drag, leuven_response((1, 2), 0), once, 1e-3, (0.1, 5.0))
+    assert told.left < 0.5
+    inertia = {factor: np.abs(each.accelerations().response[:8]).mean() for factor, each in told.responses.items()}
+    assert inertia[0.5] < 0.5 * inertia[2.0]
+    total = model["total mass"]
+    assert drag.mass.low < total.high
+    assert total.low < drag.mass.high
+
+
+# Tokyo
+
+
+def test_tokyo_mass_lines() -> None:
+    lower, upper = mass_lines(tokyo("theta_mx"))
+    assert lower.level.value == pytest.approx(107, rel=0.05)
+    assert upper.level.value == pytest.approx(225, rel=0.05)
+    assert lower.high < 55 < 77 < upper.low
+
+
+def test_tokyo_modes() -> None:
+    found = fit_modes(tokyo("theta_mx"))
+    assert found["antiresonance 1 frequency"].value == pytest.approx(55, abs=1)
+    assert found["resonance 1 frequency"].value == pytest.approx(77, abs=1)
+    seen = visible(tokyo("theta_mx"), found)
+    assert seen.case == "sliding"
+    assert seen.words[-1] == "cart sliding: free joint, antiresonance and resonance"
+
+
+def test_tokyo_second_encoder_counts_the_other_way() -> None:
+    found = fit_two_mass(tokyo("theta_mx"), tokyo("theta_my"))
+    assert found.signs == (1.0, -1.0)
+    assert any("opposite sign" in text for text in found.warnings)
+    assert found["total mass"].value == pytest.approx(1 / 107, rel=0.05)
+    assert found["resonance frequency"].value == pytest.approx(77, abs=1)

@@ -1,0 +1,561 @@
+"""Frequency responses from records of known systems, and what is read from them: intervals must hold the truth."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from scipy import signal
+
+from friso.identify.estimate import Estimate
+from friso.identify.logs.log import Log
+from friso.identify.response.arbitrary import local_polynomial, welch
+from friso.identify.response.closed_loop import crossovers, disagreement, feedback, open_loop
+from friso.identify.response.departure import Drag, amplitude_dependence, departure, friction_from_departure
+from friso.identify.response.limit_cases import nearest_case, visible
+from friso.identify.response.mass_line import mass_lines, straight_lines
+from friso.identify.response.modes import fit_modes
+from friso.identify.response.period import find_periods
+from friso.identify.response.periodic import multisine
+from friso.identify.response.prediction import relative_error
+from friso.identify.response.records import Record, drift, from_log
+from friso.identify.response.response import FrequencyResponse
+from friso.identify.response.simulated import explained, slid
+from friso.identify.response.two_mass import fit_two_mass, two_masses, widened
+from friso.quantities import StageError
+from friso.stage import loads
+
+DT, PERIOD = 2e-3, 1000  # period of 2 s: lines at 0.5, 1, ... Hz
+TRUE = np.array([np.log(1.2), np.log(0.5), np.log(2400.0), np.log(2.0), 0.5, 0.1, 1e-3])
+
+Response = Callable[[np.ndarray], np.ndarray]
+
+
+def rig(frequency: np.ndarray, which: int = 0) -> np.ndarray:
+    return two_masses(TRUE, frequency)[which]
+
+
+def played(
+    rng: np.random.Generator,
+    truth: Response,
+    lines: np.ndarray,
+    periods: int = 6,
+    noise: float = 0.0,
+    distortion: float = 0.0,
+) -> Record:
+    """A multisine of unit lines through a linear system, with white noise [output's rms] and, line by line, relative
+    distortion of the realisation."""
+    spectrum = np.zeros(PERIOD // 2 + 1, complex)
+    spectrum[lines] = np.exp(2j * np.pi * rng.random(len(lines))) * PERIOD / 2
+    off = rng.normal(size=(2, len(lines))) / np.sqrt(2)
+    answer = np.zeros_like(spectrum)
+    answer[lines] = spectrum[lines] * truth(lines / (PERIOD * DT)) * (1 + distortion * (off[0] + 1j * off[1]))
+    given, output = (np.tile(np.fft.irfft(each), periods) for each in (spectrum, answer))
+    return Record(given, output + noise * np.std(output) * rng.normal(size=len(output)), DT)
+
+
+def exact(
+    truth: Response, frequency: np.ndarray, relative: float, rng: np.random.Generator | None
+) -> FrequencyResponse:
+    """A response with independent errors of this relative size, known exactly."""
+    values, unknown = truth(frequency), np.full(len(frequency), np.nan)
+    if rng is not None:
+        values = values * (
+            1 + relative * (rng.normal(size=len(values)) + 1j * rng.normal(size=len(values))) / np.sqrt(2)
+        )
+    deviation, many = relative * np.abs(values), np.full(len(frequency), 1e6)
+    return FrequencyResponse(frequency, values, deviation, deviation, unknown, many, "multisine")
+
+
+# The period
+
+
+@pytest.mark.parametrize(("before", "after"), [(0, 0), (137, 0), (0, 300), (613, 2500)])
+def test_exact_period_and_whole_periods_from_the_end(before: int, after: int) -> None:
+    rng = np.random.default_rng(1)
+    once = np.fft.irfft(np.r_[0, np.exp(2j * np.pi * rng.random(40)), np.zeros(459)], 997)
+    ragged = np.tile(once, 6)[997 - before % 997 :] if before else np.tile(once, 5)
+    found = find_periods(np.concatenate([ragged, np.zeros(after)]))
+    assert found.samples == 997
+    assert found.stop == pytest.approx(len(ragged), abs=20)
+    assert found.count == (found.stop // 997)
+    assert found.stop - found.start == found.count * 997
+
+
+def test_a_period_given_roughly_is_corrected_and_that_is_said() -> None:
+    rng = np.random.default_rng(2)
+    record = played(rng, rig, np.arange(1, 40))
+    assert find_periods(record.input, 1004.0).samples == PERIOD
+    assert "every 1000 samples, not every 1004" in find_periods(record.input, 1004.0).warnings[0]
+    assert find_periods(record.input, 1000.0).warnings == ()
+
+
+def test_noise_on_the_input_does_not_move_the_period() -> None:
+    rng = np.random.default_rng(3)
+    record = played(rng, rig, np.arange(1, 40))
+    found = find_periods(record.input + 0.1 * np.std(record.input) * rng.normal(size=len(record.input)))
+    assert (found.samples, found.count) == (PERIOD, 6)
+
+
+def test_what_does_not_repeat_is_refused() -> None:
+    with pytest.raises(StageError, match="does not repeat"):
+        find_periods(np.random.default_rng(4).normal(size=4000))
+    with pytest.raises(StageError, match="constant"):
+        find_periods(np.ones(400))
+
+
+def test_drift_leaves_harmonics_alone_and_takes_ramps_away() -> None:
+    time = np.arange(6 * PERIOD)
+    wave = sum(np.cos(2 * np.pi * k * time / PERIOD + k) for k in (1, 2, 7, 31))
+    assert np.abs(drift(wave, PERIOD)).max() < 1e-10
+    assert drift(wave + 3 + 0.02 * time, PERIOD) == pytest.approx(3 + 0.02 * time, abs=1e-9)
+
+
+# Periodic excitation
+
+
+def test_deviations_hold_the_truth_on_95_percent_of_lines() -> None:
+    rng, lines = np.random.default_rng(5), np.arange(2, 60)
+    inside = {"noise": [], "both": []}
+    for _ in range(40):
+        one = multisine([played(rng, rig, lines, 8, noise=0.05)])
+        three = multisine([played(rng, rig, lines, 6, noise=0.02, distortion=0.05) for _ in range(3)])
+        for name, found in (("noise", one), ("both", three)):
+            band, truth = found.band(), np.abs(rig(found.frequency))
+            inside[name].append(np.mean((band.magnitude_low <= truth) & (truth <= band.magnitude_high)))
+    assert np.mean(inside["noise"]) == pytest.approx(0.95, abs=0.02)
+    assert np.mean(inside["both"]) == pytest.approx(0.95, abs=0.03)
+
+
+def test_noise_and_distortion_are_told_apart() -> None:
+    rng, lines = np.random.default_rng(6), np.arange(2, 60)
+    found = multisine([played(rng, rig, lines, 6, noise=1e-4, distortion=0.1) for _ in range(8)])
+    relative = found.distortion / np.abs(found.response) * np.sqrt(8)
+    assert np.sqrt(np.mean(relative**2)) == pytest.approx(0.1, rel=0.15)
+    quiet = multisine([played(rng, rig, lines, 6, noise=0.02) for _ in range(8)])
+    assert np.median(quiet.distortion / quiet.noise) < 1.0
+    assert np.sqrt(np.mean((found.deviation**2 - found.noise**2 - found.distortion**2) ** 2)) < 1e-12
+
+
+def test_one_realisation_says_that_distortion_is_unknown_unless_lines_are_free() -> None:
+    rng = np.random.default_rng(7)
+    full = multisine([played(rng, rig, np.arange(2, 60), noise=0.01)])
+    assert np.isnan(full.distortion).all()
+    assert "not nonlinear distortion" in full.warnings[-1]
+    odd = played(rng, rig, np.arange(1, 60, 2), noise=1e-6)
+    bent = Record(odd.input, odd.output + 0.2 * odd.output**2 / np.std(odd.output), DT)
+    assert np.isfinite(multisine([bent]).distortion).all()
+    assert np.median(multisine([bent]).distortion) > 100 * np.median(multisine([odd]).distortion)
+
+
+def test_a_transient_is_left_out_and_a_drift_does_not_matter() -> None:
+    rng, lines = np.random.default_rng(8), np.arange(2, 60)
+    record = played(rng, rig, lines, 8, noise=1e-3)
+    time = np.arange(len(record.output)) * DT
+    start = 3 * np.std(record.output) * np.exp(-time / 0.5) * np.cos(60 * time)
+    found = multisine([Record(record.input, record.output + start + 1e-3 * time, DT)])
+    assert any("transient" in text for text in found.warnings)
+    assert np.abs(found.response / rig(found.frequency) - 1).max() < 0.05
+    assert not any("transient" in text for text in multisine([record]).warnings)
+
+
+def test_realisations_that_do_not_belong_together_are_refused() -> None:
+    rng = np.random.default_rng(9)
+    one = played(rng, rig, np.arange(2, 60))
+    with pytest.raises(StageError, match="the same period"):
+        multisine([one, Record(one.input, one.output, 2 * DT)])
+    with pytest.raises(StageError, match="common line"):
+        multisine([one, played(rng, rig, np.arange(80, 99))])
+    with pytest.raises(StageError, match="at least one record"):
+        multisine([])
+
+
+@pytest.mark.parametrize(
+    ("spoilt", "said"),
+    [
+        (
+            lambda one: Record(one.input, np.where(np.arange(6000) == 7, np.nan, one.output), DT),
+            "1 samples that are not",
+        ),
+        (lambda one: Record(one.input, np.zeros(6000), DT), "constant"),
+        (lambda one: Record(one.input[:-1], one.output, DT), "one and the same length"),
+        (lambda one: Record(one.input, one.output, 0.0), "greater than 0 s"),
+        (lambda one: Record(one.input[:5], one.output[:5], DT), "at least 8"),
+    ],
+)
+def test_bad_records_are_refused(spoilt: Callable[[Record], Record], said: str) -> None:
+    with pytest.raises(StageError, match=said):
+        multisine([spoilt(played(np.random.default_rng(10), rig, np.arange(2, 60)))])
+
+
+def test_weak_lines_are_left_out_and_nothing_left_is_an_error() -> None:
+    rng = np.random.default_rng(11)
+    found = multisine([played(rng, rig, np.arange(2, 200), noise=0.3)])
+    strong = found.usable()
+    assert 0 < len(strong.frequency) < len(found.frequency)
+    assert "too weakly excited" in strong.warnings[-1]
+    record = played(rng, rig, np.arange(2, 60))
+    with pytest.raises(StageError, match="no line stands out"):
+        multisine([Record(record.input, rng.normal(size=6000), DT)]).usable(ratio=10)
+
+
+def test_other_forms_of_a_response() -> None:
+    found = multisine([played(np.random.default_rng(12), rig, np.arange(2, 60), noise=0.01)])
+    assert found.accelerations().response == pytest.approx(-((2 * np.pi * found.frequency) ** 2) * found.response)
+    assert found.accelerations().channels.output_unit == "m/s^2"
+    frd = found.frd()
+    assert frd(2j * np.pi * found.frequency[3]) == pytest.approx(found.response[3])
+    with pytest.raises(StageError, match="holds lines"):
+        found.between(400, 500)
+
+
+def test_a_log_becomes_a_record() -> None:
+    one = played(np.random.default_rng(31), rig, np.arange(2, 60))
+    signals = {"force": one.input, "position": one.output}
+    parts = (slice(0, 100), slice(100, 6000))
+    log = Log("a", np.arange(6000) * DT, DT, signals, parts, {"force": "V"})
+    record, channels = from_log(log)
+    assert len(record.input) == 5900
+    assert (channels.input_unit, channels.output_unit) == ("V", "m")
+    with pytest.raises(StageError, match="a channel for the velocity"):
+        from_log(log, output="velocity")
+
+
+# Arbitrary excitation
+
+B, A = signal.zpk2tf([0.5], [0.97 * np.exp(0.5j), 0.97 * np.exp(-0.5j)], 0.05)
+
+
+def filtered(frequency: np.ndarray) -> np.ndarray:
+    return signal.freqz(B, A, 2 * np.pi * frequency * DT)[1]
+
+
+def test_arbitrary_excitation_holds_the_truth() -> None:
+    rng = np.random.default_rng(13)
+    inside: dict[str, list[float]] = {"welch": [], "local polynomial": []}
+    for _ in range(12):
+        given = rng.normal(size=20000)
+        output = signal.lfilter(B, A, given) + 0.05 * rng.normal(size=20000)
+        for found in (welch(Record(given, output, DT), 0.5), local_polynomial(Record(given, output, DT))):
+            band, truth = found.band(), np.abs(filtered(found.frequency))
+            part = (found.frequency < 30) | (found.frequency > 55)  # Welch is biased at the resonance by leakage
+            inside[found.kind].append(np.mean(((band.magnitude_low <= truth) & (truth <= band.magnitude_high))[part]))
+    assert np.mean(inside["welch"]) == pytest.approx(0.95, abs=0.03)
+    assert np.mean(inside["local polynomial"]) == pytest.approx(0.95, abs=0.03)
+
+
+def test_local_polynomials_are_free_of_the_leakage_that_welch_has() -> None:
+    rng = np.random.default_rng(14)
+    given = rng.normal(size=8000)
+    record = Record(given, signal.lfilter(B, A, given), DT)
+    peak = 0.5 / (2 * np.pi * DT)
+    worst = [
+        np.max(np.abs(each.response / filtered(each.frequency) - 1)[np.abs(each.frequency - peak) < 3])
+        for each in (welch(record, 1.0), local_polynomial(record))
+    ]
+    assert worst[1] < 1e-2 < 5e-2 < worst[0]
+
+
+def test_coherence_falls_with_noise_and_short_records_are_refused() -> None:
+    rng = np.random.default_rng(15)
+    given = rng.normal(size=20000)
+    clean, noisy = (
+        welch(Record(given, signal.lfilter(B, A, given) + size * rng.normal(size=20000), DT), 1.0)
+        for size in (0.0, 3.0)
+    )
+    assert clean.coherence is not None
+    assert noisy.coherence is not None
+    assert np.median(clean.coherence) > 0.999 > 0.3 > np.median(noisy.coherence)
+    with pytest.raises(StageError, match="at least 4 segments"):
+        welch(Record(given, given, DT), 0.03)
+
+
+# Closed loop
+
+
+def looped(rng: np.random.Generator, size: int, reference: np.ndarray, noise: float = 1.0) -> Record:
+    """y = G u + v, u = 2 (r - y), G = 0.2 z^-1/(1 - 0.9 z^-1), white noise v."""
+    plant = np.array([0.0, 0.2]), np.array([1.0, -0.9])
+    closed = plant[1] + 2 * plant[0]
+    v = noise * rng.normal(size=size)
+    output = signal.lfilter(2 * plant[0], closed, reference) + signal.lfilter(plant[1], closed, v)
+    return Record(2 * (reference - output), output, DT, reference)
+
+
+def loop_plant(frequency: np.ndarray) -> np.ndarray:
+    return signal.freqz([0.0, 0.2], [1.0, -0.9], 2 * np.pi * frequency * DT)[1]
+
+
+def test_indirect_estimates_are_right_where_direct_ones_are_not() -> None:
+    rng = np.random.default_rng(16)
+    record = looped(rng, 40000, rng.normal(size=40000))
+    direct = Record(record.input, record.output, DT)
+    for method in (lambda one: welch(one, 2.0), local_polynomial):
+        good, bad = method(record), method(direct)
+        off = [np.mean(np.abs(each.response - loop_plant(each.frequency)) / each.deviation) for each in (good, bad)]
+        assert off[0] < 1.1
+        assert off[1] > 2
+        assert disagreement(bad, good)
+
+
+def test_indirect_multisine_holds_the_truth() -> None:
+    rng, inside = np.random.default_rng(17), []
+    for _ in range(15):
+        records = []
+        for _ in range(2):
+            once = played(rng, rig, np.arange(2, 100), 1).input
+            records.append(looped(rng, 8 * PERIOD, np.tile(once, 8) / np.std(once), noise=0.3))
+        found = multisine(records)
+        band, truth = found.band(), np.abs(loop_plant(found.frequency))
+        inside.append(np.mean((band.magnitude_low <= truth) & (truth <= band.magnitude_high)))
+    assert np.mean(inside) == pytest.approx(0.95, abs=0.03)
+
+
+def test_feedback_is_noticed_and_not_imagined() -> None:
+    rng = np.random.default_rng(18)
+    loop = looped(rng, 8000, rng.normal(size=8000))
+    assert "closed loop" in feedback(Record(loop.input, loop.output, DT))[0]
+    once = played(rng, rig, np.arange(2, 100), 1).input
+    periodic = looped(rng, 8 * PERIOD, np.tile(once, 8) / np.std(once), noise=0.1)
+    assert feedback(Record(periodic.input, periodic.output, DT))
+    white = rng.normal(size=8000)
+    coloured = signal.lfilter(*signal.butter(4, 0.2), rng.normal(size=8000))
+    for given in (white, coloured):
+        output = signal.lfilter(B, A, given) + 0.1 * rng.normal(size=8000)
+        assert feedback(Record(given, output, DT), direct=True) == ()
+        later = np.r_[0.0, output[:-1]]
+        assert feedback(Record(given, later, DT)) == ()
+    assert feedback(played(rng, rig, np.arange(2, 60), noise=0.05)) == ()
+
+
+def test_crossover_of_the_open_loop() -> None:
+    frequency, rng, held = np.arange(1.0, 100.0, 0.5), np.random.default_rng(19), 0
+    truth = np.sqrt(40.0 / (2 * np.pi) ** 2 / 1.7) * np.sqrt(100)
+    for _ in range(100):
+        plant = exact(lambda f: -1 / (1.7 * (2 * np.pi * f) ** 2), frequency, 0.02, rng)
+        (found,) = crossovers(open_loop(plant, np.full(len(frequency), 4000.0)))
+        held += found.holds(truth)
+    assert held >= 88
+
+
+# Lines and modes
+
+
+def test_mass_lines_of_both_masses() -> None:
+    rng = np.random.default_rng(20)
+    found = mass_lines(exact(rig, np.arange(0.5, 100, 0.5), 0.01, rng))
+    assert [line.value.holds(mass) for line, mass in zip(found, (1.7, 1.2), strict=True)] == [True, True]
+    assert found[0].high < 8.0 < 13.0 < found[1].low
+
+
+def test_mass_line_intervals_hold_the_mass() -> None:
+    rng, held = np.random.default_rng(21), 0
+    frequency = np.arange(20.0, 200.0, 2.0)
+    for _ in range(100):
+        wiggle = 0.02 * np.convolve(rng.normal(size=len(frequency) + 8), np.ones(9) / 3, "valid")
+        response = exact(lambda f, w=wiggle: -np.exp(w) / (2.5 * (2 * np.pi * f) ** 2), frequency, 0.01, rng)
+        (line,) = mass_lines(response, most=1)
+        held += line.value.holds(2.5)
+    assert held >= 88
+
+
+def test_straight_lines_by_slope_and_sign() -> None:
+    frequency = np.geomspace(0.1, 100, 200)
+    s = 2j * np.pi * frequency
+    for slope, value in ((0, 1 / 300.0), (1, 1 / (5.0 * s)), (2, -1 / (2.0 * s**2))):
+        response = exact(lambda _, v=value: v * np.ones(200, complex), frequency, 0.01, np.random.default_rng(22))
+        kinds = {kind: straight_lines(response, kind) for kind in range(3)}
+        assert [bool(lines) for lines in kinds.values()] == [kind == slope for kind in range(3)]
+        (line,) = kinds[slope]
+        assert line.value.holds((300.0, 5.0, 2.0)[slope])
+        assert line.sign == (-1.0 if slope == 2 else 1.0)
+
+
+def test_modes_and_their_intervals() -> None:
+    rng, held = np.random.default_rng(23), {"resonance": 0, "antiresonance": 0}
+    antiresonance = np.sqrt(2400 / 0.5) / (2 * np.pi)
+    for _ in range(40):
+        found = fit_modes(exact(rig, np.arange(2.0, 40, 1.0), 0.03, rng), rigid=True, most=1)
+        held["resonance"] += found["resonance 1 frequency"].holds(antiresonance * np.sqrt(1.7 / 1.2))
+        held["antiresonance"] += found["antiresonance 1 frequency"].holds(antiresonance)
+    assert min(held.values()) >= 35
+
+
+def test_the_number_of_modes_is_found_and_said() -> None:
+    def three(frequency: np.ndarray) -> np.ndarray:
+        s = 2j * np.pi * frequency
+        modes = ((11.0, 0.02, 0.4), (60.0, 0.01, 0.3))
+        return 0.6 / s**2 + sum(r / (s**2 + 4 * np.pi * f * z * s + (2 * np.pi * f) ** 2) for f, z, r in modes)
+
+    found = fit_modes(exact(three, np.geomspace(3, 100, 150), 0.02, np.random.default_rng(24)))
+    assert (found.shape.modes, found.shape.rigid, found.shape.constant) == (2, True, False)
+    assert found.order.startswith("2 modes + rigid body")
+    for number, (frequency, damping) in enumerate(((11.0, 0.02), (60.0, 0.01)), 1):
+        assert found[f"resonance {number} frequency"].value == pytest.approx(frequency, rel=0.01)
+        assert found[f"resonance {number} damping ratio"].value == pytest.approx(damping, rel=0.2)
+    assert found.low_level.value == pytest.approx(0.6, rel=0.02)
+    assert found.high_level.value == pytest.approx(1.3, rel=0.02)
+    with pytest.raises(StageError, match="at least 12 lines"):
+        fit_modes(exact(three, np.arange(3.0, 10.0), 0.02, None))
+
+
+# Two masses
+
+
+def test_two_mass_intervals_hold_the_truth() -> None:
+    rng, frequency = np.random.default_rng(25), np.arange(3.0, 40.0, 1.0)
+    truth = dict(zip(("driven mass", "other mass", "joint stiffness", "joint damping"), np.exp(TRUE[:4]), strict=True))
+    held = dict.fromkeys(truth, 0)
+    for _ in range(100):
+        both = [exact(lambda f, i=i: rig(f, i), frequency, 0.03, rng) for i in (0, 1)]
+        found = fit_two_mass(*both)
+        for name, value in truth.items():
+            held[name] += found[name].holds(value)
+    assert min(held.values()) >= 88, held
+
+
+def test_two_mass_predicts_another_record_and_signs_are_told() -> None:
+    rng, lines = np.random.default_rng(26), np.arange(6, 80)
+    first, second = (multisine([played(rng, lambda f, i=i: -rig(f, i), lines, noise=0.01)]) for i in (0, 1))
+    found = fit_two_mass(first, second, (3, 40))
+    assert found.signs == (-1.0, -1.0)
+    assert "its sign was reversed" in found.warnings[0]
+    for collocated, which in ((True, 0), (False, 1)):
+        aside = played(rng, lambda f, i=which: -rig(f, i), lines, noise=0.01)
+        assert relative_error(lambda f, c=collocated: found.predict(f, c), aside, (3, 20)) < 0.02
+    assert relative_error(lambda f: 0.0 * f, aside, (3, 20)) == pytest.approx(1.0)
+    with pytest.raises(StageError, match="excited lines"):
+        relative_error(rig, aside, (200, 220))
+
+
+def test_intervals_grow_where_realisations_scatter() -> None:
+    frequency, rng = np.arange(3.0, 40.0, 1.0), np.random.default_rng(27)
+    softer = TRUE + np.array([0, 0, 0.2, 0, 0, 0, 0])
+    alike = [fit_two_mass(exact(rig, frequency, 0.01, rng)) for _ in range(2)]
+    apart = [alike[0], fit_two_mass(exact(lambda f: two_masses(softer, f)[0], frequency, 0.01, rng))]
+    before = alike[0]["joint stiffness"].half_width
+    assert widened(alike[0], apart)["joint stiffness"].half_width > 5 * before
+    assert widened(alike[0], alike)["joint stiffness"].half_width < 3 * before
+    with pytest.raises(StageError, match="at least two"):
+        widened(alike[0], alike[:1])
+
+
+# Friction at low frequency, limit cases
+
+
+def dragged(frequency: np.ndarray) -> np.ndarray:
+    s = 2j * np.pi * frequency
+    return 1 / (1.7 * s**2 + 8.0 * s + 20.0)
+
+
+def test_departure_from_the_mass_line() -> None:
+    rng, frequency = np.random.default_rng(28), np.arange(0.2, 20, 0.2)
+    response = exact(dragged, frequency, 0.05, rng)
+    found = departure(response, lambda f: -1 / (1.7 * (2 * np.pi * f) ** 2))
+    assert found.frequency.shown
+    assert 1.0 < found.frequency.value < 8.0  # damping is a tenth of the inertia force at 7.5 Hz
+    assert found.differ is None
+    straight = exact(lambda f: -1 / (1.7 * (2 * np.pi * f) ** 2), frequency, 0.05, rng)
+    none = departure(straight, lambda f: -1 / (1.7 * (2 * np.pi * f) ** 2))
+    assert not none.frequency.shown
+    assert "down to its lowest line" in none.frequency.reason
+
+
+def test_coulomb_friction_behind_a_departure() -> None:
+    """Simulated: mass with Coulomb friction under a multisine; the level comes back from its response alone."""
+    level, mass, sign = 0.15, 0.5, -1.0
+    rng, lines = np.random.default_rng(29), np.arange(1, 60)
+    inputs = np.stack([played(rng, rig, lines, 1).input for _ in range(2)])
+    inputs /= np.std(inputs)
+    paths, velocities = slid(np.tile(inputs, 8), DT, mass, level, 3.0)
+    records = [Record(sign * np.tile(one, 8), path, DT) for one, path in zip(inputs, paths, strict=True)]
+    response = multisine(records)
+    found = friction_from_departure(response, list(velocities), (0.4, 6.0), sign)
+    assert found.coulomb.holds(level)
+    assert found.coulomb.half_width < 0.5 * level
+    told = explained(found, response, sign * inputs, DT, (0.4, 6.0))
+    assert told.left < 0.4
+    low = {factor: np.mean(np.abs(each.response[1:6])) for factor, each in told.responses.items()}
+    assert low[0.5] < low[1.0] < low[2.0]  # the smaller the force, the more friction holds the mass back
+
+
+def test_sliding_mass_against_its_closed_form() -> None:
+    """A constant force above friction accelerates by the difference, one below does not move."""
+    steps = np.repeat([[2.0], [0.9]], 500, axis=1)
+    position, velocity = slid(steps, 1e-3, 0.5, 1.0, 0.0)
+    assert velocity[:, -1] == pytest.approx([1.0, 0.0])
+    assert position[:, -1] == pytest.approx([0.25, 0.0], rel=0.01)
+    released = np.where(np.arange(4000) < 1000, 5.0, 0.0)[None]
+    end = slid(released, 1e-3, 0.5, 1.0, 20.0)[0][0, -1]
+    assert abs(end) <= 1.0 / 20.0 + 1e-9  # it sticks where friction holds the spring
+
+
+@pytest.mark.parametrize(("value", "factors", "said"), [(0.0, (1.0,), "no level"), (0.1, (0.5, 2.0), "1 among them")])
+def test_explanations_that_cannot_be_given(value: float, factors: tuple[float, ...], said: str) -> None:
+    some = Estimate.normal("x", "N", value, 0.01, "")
+    drag = Drag(some, some, some, some, 1.0, 1.0, 0.1, ())
+    response = exact(dragged, np.arange(1.0, 30), 0.05, None)
+    with pytest.raises(StageError, match=said):
+        explained(drag, response, [np.ones(100)], DT, (1, 20), factors)
+
+
+def test_response_over_the_mass_line_depends_on_the_force() -> None:
+    some = {name: Estimate.normal(name, "", value, 0.01, "") for name, value in (("mass", 0.5), ("coulomb", 0.15))}
+    drag = Drag(some["mass"], some["mass"], some["mass"], some["coulomb"], 1.0, 1.0, 0.1, ())
+    simulated = np.abs(amplitude_dependence(drag, [0.3, 5.0], [2.0]).values[:, 0])
+    assert abs(simulated[1] - 1) < 0.01 < abs(simulated[0] - 1)
+
+
+RIG = """
+[masses]
+cart = "1.2 kg"
+stage = "0.5 kg"
+[friction]
+model = "lugre"
+static = "3 N"
+coulomb = "1 N"
+stribeck_velocity = "1.6 mm/s"
+stribeck_exponent = 2
+bristle_stiffness = "1e5 N/m"
+bristle_damping = "316 N*s/m"
+viscous = "0.5 N*s/m"
+[joint]
+locked = false
+stiffness = "2.4 N/mm"
+damping = "0.5 N*s/m"
+stroke = "1 mm"
+limiter_stiffness = "2e7 N/m"
+limiter_damping = "100 N*s/m"
+[controller]
+kind = "pid"
+crossover = "8 Hz"
+alpha = 0.1
+beta = 2
+[motion]
+kind = "hold"
+duration = "1 s"
+"""
+
+
+@pytest.mark.parametrize(("case", "cart"), [("stuck", "stuck"), ("sliding", "sliding")])
+def test_limit_cases_are_recognised(case: str, cart: str) -> None:
+    from friso.frequency.analysis import linear
+
+    stage = loads(RIG)
+    plant = linear(stage, case)
+    row, column = plant.output_labels.index("stage"), plant.input_labels.index("force")
+
+    def truth(frequency: np.ndarray) -> np.ndarray:
+        return np.asarray(plant(2j * np.pi * frequency, squeeze=False))[row, column]
+
+    response = exact(truth, np.geomspace(1.0, 200, 150), 0.02, np.random.default_rng(30))
+    name, distances = nearest_case(response, stage)
+    assert name == case
+    assert set(distances) == {"stuck", "sliding", "stuck-touched", "sliding-touched"}
+    found = visible(response)
+    assert found.case == cart
+    assert found.words[-1].startswith(f"cart {cart}: ")
+    if cart == "stuck":
+        assert found.lines[0].value.value == pytest.approx(2400 / (1 + 2400 / 1e5), rel=0.05)
+    else:
+        assert found.lines[0].value.value == pytest.approx(1.7, rel=0.05)
+    assert found.lines[-1].value.value == pytest.approx(0.5, rel=0.05)
