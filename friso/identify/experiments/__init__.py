@@ -1,0 +1,25 @@
+"""Experiments in time: what stiffness and friction a log of each kind shows, with intervals and reasons."""
+
+from friso.identify.experiments.break_away import BreakAway, static_from_ramps
+from friso.identify.experiments.common import record
+from friso.identify.experiments.friction_position import FrictionPosition, friction_position
+from friso.identify.experiments.friction_velocity import FrictionVelocity, friction_velocity
+from friso.identify.experiments.hysteresis import HysteresisStiffness, stiffness_from_hysteresis
+from friso.identify.experiments.steps import StepStiffness, stiffness_from_steps
+from friso.identify.experiments.stick_slip import StickSlip, static_from_stick_slip
+
+__all__ = [
+    "BreakAway",
+    "FrictionPosition",
+    "FrictionVelocity",
+    "HysteresisStiffness",
+    "StepStiffness",
+    "StickSlip",
+    "friction_position",
+    "friction_velocity",
+    "record",
+    "static_from_ramps",
+    "static_from_stick_slip",
+    "stiffness_from_hysteresis",
+    "stiffness_from_steps",
+]

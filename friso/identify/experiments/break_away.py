@@ -1,0 +1,97 @@
+"""Break-away force from force ramps: at which a body at rest begins to move, and how that falls with the force rate."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from friso.identify.estimate import Estimate
+from friso.identify.experiments.common import channel, low_pass, on_bearing, ways
+from friso.identify.experiments.rate_effect import BRISTLE_RATE, static_friction
+from friso.identify.experiments.slips import slips
+from friso.identify.logs.log import Log
+
+CUTOFF = 100.0
+"""Low-pass of force and velocity [Hz]."""
+
+SMEARED = 2.0
+"""Periods of the low-pass that the second half of a ramp must last for its break-away to be read."""
+
+
+SAMPLES = 5
+"""Samples of the second half of a ramp from which its rate is read."""
+
+LEAST = 20
+"""Samples of a segment that may hold a ramp."""
+
+
+@dataclass(frozen=True)
+class BreakAway:
+    """Static friction [N] in all and per direction, of break-away forces at rate 0. Per ramp, shape (n,): time [s],
+    place [m], direction, break-away force [N] in that direction, force rate [N/s]; the threshold [m/s] of the speed."""
+
+    static: Estimate
+    forward: Estimate
+    backward: Estimate
+    times: np.ndarray
+    places: np.ndarray
+    directions: np.ndarray
+    forces: np.ndarray
+    rates: np.ndarray
+    threshold: float
+    warnings: tuple[str, ...]
+
+
+def static_from_ramps(
+    log: Log, mass: float = 0.0, bristle_rate: float = BRISTLE_RATE, cutoff: float = CUTOFF
+) -> BreakAway:
+    """Break-away forces of the ramps in a log, each from rest of the body on the bearing, and static friction.
+
+    With the `mass` [kg] that moves, it is the greatest friction, force less inertia, as motion begins (the published
+    definition); without, the force where motion begins to be visible, which contains inertia. See `rate_effect` for the
+    static friction. Raises StageError for a missing channel.
+    """
+    force, body = channel(log, "force"), on_bearing(log)
+    rows: list[tuple[float, ...]] = []
+    threshold, quick = 0.0, 0
+    for part in log.segments:
+        if part.stop - part.start < LEAST:
+            continue
+        found = slips(body[part], log.sample_time, cutoff)
+        threshold = max(threshold, found.threshold)
+        pushed = low_pass(force[part], log.sample_time, cutoff)
+        friction = pushed - mass * np.gradient(found.speed, log.sample_time)
+        marks = zip(found.onsets, found.starts, found.rests, found.directions, strict=True)
+        for onset, start, rest, way in marks:
+            push = way * pushed[rest : start + 1]
+            begin = rest + int(np.flatnonzero(push <= (push[0] + push[-1]) / 2)[-1])
+            if start - begin < max(SMEARED / (cutoff * log.sample_time), SAMPLES):
+                quick += 1
+                continue
+            rising = way * np.polyfit(np.arange(begin, start) * log.sample_time, pushed[begin:start], 1)[0]
+            at = begin + int(np.argmax(way * friction[begin : start + 1])) if mass else onset
+            first = part.start + at
+            level = float(way * friction[at] if mass else way * pushed[at])
+            rows.append((float(log.time[first]), float(body[first]), float(way), level, float(rising)))
+    table = np.array([row for row in rows if row[3] > 0 and row[4] > 0]).reshape(-1, 5).T
+    said = []
+    if quick:
+        said.append(f"{quick} ramps rise too fast for a low-pass at {cutoff:g} Hz (or the sampling) and are left out.")
+    if len(rows) > table.shape[1]:
+        said.append(f"{len(rows) - table.shape[1]} motions did not begin under a rising force and are left out.")
+    return _answer(table, bristle_rate, threshold, said)
+
+
+def _answer(table: np.ndarray, bristle_rate: float, threshold: float, said: list[str]) -> BreakAway:
+    times, places, directions, forces, rates = table
+
+    def static(chosen: np.ndarray) -> Estimate:
+        found = static_friction("friction.static", forces[chosen], rates[chosen], bristle_rate)
+        return found if found.shown else replace(found, reason=" ".join([f"{found.reason}.", *said]).rstrip("."))
+
+    one, other = (static(mask) for _, mask in ways(directions))
+    every = static(np.ones(len(forces), dtype=bool))
+    if one.shown and other.shown and (one.low > other.high or other.low > one.high):
+        said.append(f"The directions differ: {one.value:.3g} N forward, {other.value:.3g} N backward.")
+    return BreakAway(every, one, other, times, places, directions, forces, rates, threshold, tuple(said))

@@ -1,0 +1,205 @@
+"""Friction against velocity from stretches of constant velocity: Coulomb, viscous and, where it shows, Stribeck."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import least_squares
+from scipy.stats import f as fisher
+
+from friso.identify.estimate import COVERAGE, Estimate
+from friso.identify.experiments.common import Mean, by_t, t_value, ways
+from friso.identify.experiments.passes import CUTOFF, Pass, passes
+from friso.identify.logs.log import Log
+
+SPAN = 1.5
+"""Ratio of the greatest to the least speed from which Coulomb and viscous friction can be told apart."""
+
+SPEEDS, DISTINCT = 5, 1.1
+"""Speeds, each so many times the last, from which a curve of four parameters may be fitted."""
+
+SURE = 0.01
+"""Probability by chance below which a Stribeck curve is taken for shown."""
+
+METHOD = "mean forces over stretches of constant velocity"
+
+
+@dataclass(frozen=True)
+class Direction:
+    """One direction: Coulomb [N], viscous [N s/m], static [N] friction and Stribeck velocity [m/s], with the covariance
+    of those fitted (in that order, SI), shape (2, 2) or (4, 4), or (0, 0)."""
+
+    coulomb: Estimate
+    viscous: Estimate
+    static: Estimate
+    stribeck_velocity: Estimate
+    covariance: np.ndarray
+
+
+@dataclass(frozen=True)
+class FrictionVelocity:
+    """The directions "forward" and "backward", each with what constant force there is in its Coulomb friction, both
+    together with that taken out, and the `bias` [N] itself, on top of equal friction. Per steady stretch, shape (n,):
+    velocity [m/s], mean force [N] less inertia, half-width of its 95 % interval [N]; velocities of those that were not
+    steady, shape (m,)."""
+
+    directions: Mapping[str, Direction]
+    both: Direction
+    bias: Estimate
+    velocities: np.ndarray
+    forces: np.ndarray
+    half_widths: np.ndarray
+    unsteady: np.ndarray
+    warnings: tuple[str, ...]
+
+
+def friction_velocity(log: Log, mass: float = 0.0, cutoff: float = CUTOFF) -> FrictionVelocity:
+    """Friction-velocity map from the stretches of constant velocity, `mass` [kg] times what is left of acceleration
+    taken off. What the speeds present cannot show is unknown, with the reason. Raises StageError for missing channels.
+    """
+    every = passes(log, cutoff)
+    used = [each for each in every if each.steady]
+    velocities, forces, errors = np.array([_row(each, mass) for each in used]).reshape(-1, 3).T
+    unsteady = np.array([each.velocity for each in every if not each.steady])
+    sides = {
+        words: _direction(np.abs(velocities[m]), np.sign(velocities[m]) * forces[m], errors[m], words)
+        for words, m in ways(velocities)
+    }
+    bias, both = _together(velocities, forces, errors)
+    warnings = []
+    if len(unsteady):
+        low, high = np.abs(unsteady).min(), np.abs(unsteady).max()
+        warnings.append(f"{len(unsteady)} stretches, {low:.3g} to {high:.3g} m/s, were not steady and are left out.")
+    return FrictionVelocity(sides, both, bias, velocities, forces, errors, unsteady, tuple(warnings))
+
+
+def _row(each: Pass, mass: float) -> tuple[float, float, float]:
+    return each.velocity, each.force.value - mass * each.acceleration, t_value(each.force.freedom) * each.force.error
+
+
+def _together(velocities: np.ndarray, forces: np.ndarray, errors: np.ndarray) -> tuple[Estimate, Direction]:
+    """The bias by least squares of Coulomb, viscous and bias on all stretches, and the friction without it."""
+    name, method = "offset", f"{METHOD}, forward and backward"
+    sign = np.sign(velocities)
+    if min((sign > 0).sum(), (sign < 0).sum()) < 2:
+        reason = "fewer than two steady stretches in one of the directions"
+        return Estimate.unknown(name, "N", method, reason), _nothing(reason)
+    columns = [sign, np.ones_like(sign)]
+    if np.abs(velocities).max() >= SPAN * np.abs(velocities).min():
+        columns.insert(1, velocities)
+    design = np.stack(columns, axis=1)
+    solution, covariance, freedom = _linear(design, forces, errors)
+    if freedom < 1:
+        return Estimate.unknown(name, "N", method, "too few steady stretches"), _nothing("too few steady stretches")
+    bias = by_t(name, "N", Mean(float(solution[-1]), float(covariance[-1, -1] ** 0.5), freedom), method)
+    return bias, _direction(np.abs(velocities), sign * (forces - solution[-1]), errors, "both directions", 1)
+
+
+def _linear(design: np.ndarray, forces: np.ndarray, errors: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
+    """Least squares: solution, covariance by the scatter (friction varies from place to place), which is no less than
+    the half-widths `errors` [N] within the stretches say, degrees of freedom."""
+    solution = np.linalg.lstsq(design, forces, rcond=None)[0]
+    freedom = len(forces) - design.shape[1]
+    spread = float(np.sum((forces - design @ solution) ** 2)) / max(freedom, 1)
+    spread = max(spread, float(np.mean((errors / COVERAGE) ** 2)))
+    return solution, spread * np.linalg.pinv(design.T @ design), freedom
+
+
+def _nothing(reason: str) -> Direction:
+    names = (("coulomb", "N"), ("viscous", "N s/m"), ("static", "N"), ("stribeck_velocity", "m/s"))
+    unknown = [Estimate.unknown(f"friction.{name}", unit, METHOD, reason) for name, unit in names]
+    return Direction(unknown[0], unknown[1], unknown[2], unknown[3], np.empty((0, 0)))
+
+
+def _direction(speeds: np.ndarray, friction: np.ndarray, errors: np.ndarray, words: str, spent: int = 0) -> Direction:
+    """Fit of one direction, friction [N] positive against the motion, with half-widths `errors` [N]; `spent` degrees of
+    freedom are gone before."""
+    method = f"{METHOD}, {words}"
+    if len(speeds) < 3 + spent:
+        return _nothing(f"{len(speeds)} steady stretches {words}: {3 + spent} are needed")
+    slowest = f"no steady motion below {speeds.min() * 1e3:.3g} mm/s"
+    if speeds.max() < SPAN * speeds.min():
+        return _one_speed(speeds, friction, method, spent)
+    solution, covariance, freedom = _linear(np.stack([np.ones_like(speeds), speeds], axis=1), friction, errors)
+    covariance, freedom = covariance * freedom / (freedom - spent), freedom - spent
+    curved = _stribeck(speeds, friction, solution, freedom)
+    if curved is not None:
+        return _curved(*curved, speeds, method)
+    coulomb = _fitted("friction.coulomb", "N", 0, solution, covariance, freedom, method)
+    flat = f"{slowest}: no rise of friction towards rest shows"
+    static = Estimate.unknown("friction.static", "N", method, flat, coulomb.low)
+    speed = Estimate.unknown("friction.stribeck_velocity", "m/s", method, static.reason, 0.0, float(speeds.min()))
+    return Direction(
+        coulomb,
+        _fitted("friction.viscous", "N s/m", 1, solution, covariance, freedom, method),
+        static,
+        speed,
+        covariance,
+    )
+
+
+def _one_speed(speeds: np.ndarray, friction: np.ndarray, method: str, spent: int) -> Direction:
+    """At one speed Coulomb and viscous friction go together: a range for either."""
+    count = len(friction)
+    half = t_value(count - 1 - spent) * float(friction.std(ddof=1)) / count**0.5
+    top = float(friction.mean()) + half
+    reason = f"all speeds about {speeds.mean() * 1e3:.3g} mm/s: Coulomb and viscous friction cannot be told apart"
+    nothing = _nothing(reason)
+    return Direction(
+        Estimate.unknown("friction.coulomb", "N", method, reason, 0.0, top),
+        Estimate.unknown("friction.viscous", "N s/m", method, reason, 0.0, top / float(speeds.mean())),
+        nothing.static,
+        nothing.stribeck_velocity,
+        nothing.covariance,
+    )
+
+
+def _fitted(
+    name: str, unit: str, place: int, solution: np.ndarray, covariance: np.ndarray, freedom: int, method: str
+) -> Estimate:
+    return by_t(name, unit, Mean(float(solution[place]), float(covariance[place, place] ** 0.5), freedom), method)
+
+
+def _stribeck(
+    speeds: np.ndarray, friction: np.ndarray, line: np.ndarray, freedom: int
+) -> tuple[np.ndarray, np.ndarray, int] | None:
+    """The fit of F_c, F_v, F_s, v_s, covariance and degrees of freedom; None where a straight line does as well."""
+    if freedom < 3 or 1 + int((np.diff(np.log(np.sort(speeds))) > np.log(DISTINCT)).sum()) < SPEEDS:
+        return None
+    plain = float(np.sum((friction - line[0] - line[1] * speeds) ** 2))
+    scale = float(np.abs(friction).max())
+
+    def off(p: np.ndarray) -> np.ndarray:
+        rise = (p[2] - p[0]) * np.exp(-((speeds / np.exp(p[3])) ** 2))
+        return (p[0] + p[1] * speeds / speeds.max() + rise) * scale - friction
+
+    def start(at: float) -> list[float]:
+        return [line[0] / scale, line[1] * speeds.max() / scale, float(friction[np.argmin(speeds)]) / scale, np.log(at)]
+
+    tried = [least_squares(off, start(at)) for at in np.geomspace(speeds.min(), speeds.max() / 2, 4)]
+    best = min(tried, key=lambda fit: fit.cost)
+    left, rest = freedom - 2, 2 * best.cost
+    bent = best.x[2] > best.x[0] > 0
+    if not bent or (rest > 0 and fisher.sf((plain - rest) / 2 / (rest / left), 2, left) > SURE):
+        return None
+    units = np.array([scale, scale / speeds.max(), scale, np.exp(best.x[3])])
+    solution = np.array([best.x[0], best.x[1], best.x[2], 1.0]) * units
+    covariance = np.linalg.pinv(best.jac.T @ best.jac) * rest / left * np.outer(units, units)
+    return solution, covariance, left
+
+
+def _curved(solution: np.ndarray, covariance: np.ndarray, freedom: int, speeds: np.ndarray, method: str) -> Direction:
+    """With a Stribeck curve; F_s and v_s are shown only where speeds reach below the Stribeck velocity."""
+    names = ("coulomb", "viscous", "static", "stribeck_velocity")
+    units = ("N", "N s/m", "N", "m/s")
+    fits = [
+        _fitted(f"friction.{name}", unit, i, solution, covariance, freedom, method)
+        for i, (name, unit) in enumerate(zip(names, units, strict=True))
+    ]
+    if solution[3] < speeds.min() or fits[3].half_width > solution[3] or solution[2] < solution[0]:
+        reason = f"friction rises towards rest, but no steady motion below {speeds.min() * 1e3:.3g} mm/s shows how far"
+        fits[2] = Estimate.unknown(fits[2].name, "N", method, reason, float(solution[0]))
+        fits[3] = Estimate.unknown(fits[3].name, "m/s", method, reason, 0.0, float(speeds.max()))
+    return Direction(fits[0], fits[1], fits[2], fits[3], covariance)

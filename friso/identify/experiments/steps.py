@@ -1,0 +1,198 @@
+"""Stiffness of the joint from position steps with the cart fixed (thesis, Sec. 4.2.2, Fig. 19).
+
+At rest the actuator holds the joint alone, so the differences of force over those of deflection are its stiffness,
+whatever constant force there is besides; and they are that even if the cart creeps, where the deflection is measured.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from friso.identify.estimate import Estimate
+from friso.identify.experiments.common import BLOCKS, Mean, block_mean, by_t, cart, channel, deflection, low_pass, runs
+from friso.identify.logs.log import Log
+
+CUTOFF = 25.0
+"""Low-pass of the force [Hz] (Sec. 4.2.2)."""
+
+SETTLED = 0.02
+"""Share of a step by which position or force may still drift within a settled window."""
+
+FIXED = 0.02
+"""Share of the steps of the position by which the cart may follow and still count as fixed."""
+
+STARTS = np.linspace(0.1, 0.7, 7)
+"""Shares of a plateau after which it may have settled, tried in turn."""
+
+KEY, UNIT = "joint.stiffness", "N/m"
+METHOD = "differences of force over differences of deflection between settled position steps"
+
+
+@dataclass(frozen=True)
+class Window:
+    """A settled window: from `start` to `end` [s], mean deflection [m] and force [N], with the standard errors of block
+    means, the rest of a drift included."""
+
+    start: float
+    end: float
+    position: float
+    position_error: float
+    force: float
+    force_error: float
+
+
+@dataclass(frozen=True)
+class StepStiffness:
+    """The stiffness [N/m], of all steps and of those up and down; `hysteresis` [N], by how much more force stands at a
+    deflection reached from below than from above; the settled `windows`; the force [N] low-passed, shape (n,); whether
+    the cart was fixed (None: not measured)."""
+
+    stiffness: Estimate
+    up: Estimate
+    down: Estimate
+    hysteresis: Estimate
+    windows: tuple[Window, ...]
+    time: np.ndarray
+    position: np.ndarray
+    force: np.ndarray
+    cart_fixed: bool | None
+    warnings: tuple[str, ...]
+
+
+def stiffness_from_steps(log: Log, cutoff: float = CUTOFF) -> StepStiffness:
+    """Stiffness from steps of the position with the cart fixed, the force low-passed at `cutoff` [Hz].
+
+    Windows are the plateaus of the reference, or of the position where there is none. Without two steps between settled
+    windows the stiffness is unknown. Raises StageError for a log without position or force in SI units.
+    """
+    position, force = channel(log, "position"), channel(log, "force")
+    measured = deflection(log)
+    deflected = position if measured is None else measured
+    smooth = [
+        np.concatenate([low_pass(x[s], log.sample_time, cutoff) for s in log.segments]) for x in (force, deflected)
+    ]
+    spans = [s for part in log.segments for s in _plateaus(log, part, cutoff)]
+    scale = _scale(position, spans)
+    settled = [_settled(log, span, smooth[0], smooth[1], scale) for span in spans]
+    windows = tuple(w for w in settled if w is not None)
+    fixed, said = _fixed(log, position, windows)
+    warnings = list(said)
+    if len(windows) < len(spans):
+        warnings.append(f"{len(spans) - len(windows)} of {len(spans)} plateaus had not settled and are left out.")
+    steps = np.diff([[w.position, w.force, w.position_error, w.force_error] for w in windows], axis=0).reshape(-1, 4)
+    noise = np.array([np.hypot(a.force_error, b.force_error) for a, b in pairwise(windows)])
+    large = np.abs(steps[:, 0]) > 0.2 * scale
+    every, up, down = (
+        _slope(steps, noise, large & chosen, words, len(spans))
+        for chosen, words in ((steps[:, 0] != 0, ""), (steps[:, 0] > 0, ", upwards"), (steps[:, 0] < 0, ", downwards"))
+    )
+    shown = (log.time, deflected, smooth[0])
+    return StepStiffness(every, up, down, _hysteresis(windows), windows, *shown, fixed, tuple(warnings))
+
+
+def _plateaus(log: Log, part: slice, cutoff: float) -> list[slice]:
+    """Stretches of a segment over which the reference, else the position, keeps its level, long enough to average."""
+    least = int(np.ceil(4 / (cutoff * log.sample_time)))
+    if part.stop - part.start < 2 * least:
+        return []
+    if "reference" in log:
+        level = channel(log, "reference")[part]
+        change = np.abs(np.diff(level, prepend=level[0]))
+        steady = change <= 1e-3 * np.ptp(level)
+    else:
+        level = low_pass(channel(log, "position")[part], log.sample_time, cutoff)
+        half = max(least // 4, 1)
+        moved = np.abs(np.roll(level, -half) - np.roll(level, half))
+        moved[:half] = moved[-half:] = 0.0
+        steady = moved <= 0.02 * np.ptp(level)
+    found = [slice(part.start + s.start, part.start + s.stop) for s in runs(steady)]
+    return [s for s in found if s.stop - s.start >= least]
+
+
+def _scale(position: np.ndarray, spans: list[slice]) -> float:
+    """The size of the larger steps [m]: the median of those that are not small against the largest."""
+    levels = np.array([np.median(position[s][(s.stop - s.start) // 2 :]) for s in spans])
+    sizes = np.abs(np.diff(levels))
+    return float(np.median(sizes[sizes >= 0.3 * sizes.max()])) if len(sizes) else 0.0
+
+
+def _settled(log: Log, span: slice, force: np.ndarray, position: np.ndarray, scale: float) -> Window | None:
+    """The part of a plateau that has settled: neither drifts by more than a share of a step, or than noise explains."""
+    length = span.stop - span.start
+    margin = min(length // 10, int(1 / (CUTOFF * log.sample_time)))
+    for share in STARTS:
+        chosen = slice(span.start + int(share * length), span.stop - margin)
+        if chosen.stop - chosen.start < 2 * BLOCKS:
+            return None
+        means, drifts = zip(*(_drifting(x[chosen]) for x in (position, force)), strict=True)
+        span_force = SETTLED * abs(_force_scale(force))
+        if drifts[0] <= max(SETTLED * scale, 0.0) and drifts[1] <= span_force:
+            errors = [float(np.hypot(m.error, d / 12**0.5)) for m, d in zip(means, drifts, strict=True)]
+            time = log.time[[chosen.start, chosen.stop - 1]]
+            return Window(time[0], time[1], means[0].value, errors[0], means[1].value, errors[1])
+    return None
+
+
+def _force_scale(force: np.ndarray) -> float:
+    return float(np.subtract(*np.percentile(force, [95, 5])))
+
+
+def _drifting(values: np.ndarray) -> tuple[Mean, float]:
+    """The mean, and by how much the values drift over the window beyond what their scatter explains (two errors)."""
+    mean = block_mean(values)
+    shift = values[len(values) // 2 :].mean() - values[: len(values) // 2].mean()
+    return mean, float(max(abs(2 * shift) - 4 * mean.error, 0.0))
+
+
+def _slope(steps: np.ndarray, noise: np.ndarray, chosen: np.ndarray, words: str, plateaus: int) -> Estimate:
+    """Least squares of the differences of force on those of deflection through the origin.
+
+    Neighbouring differences share a window: the variance is the larger of that of independent differences (a force that
+    wanders) and of differences of independent windows (noise), and no less than the noise within the windows says.
+    """
+    method = METHOD + words
+    count = int(chosen.sum())
+    if count < 2:
+        reason = f"{count} step{'s' * (count != 1)}{words} between settled windows ({plateaus} plateaus): 2 are needed"
+        return Estimate.unknown(KEY, UNIT, method, reason)
+    x, y = np.where(chosen, steps[:, 0], 0.0), np.where(chosen, steps[:, 1], 0.0)
+    slope = float(x @ y / (x @ x))
+    off = np.where(chosen, y - slope * x, 0.0)
+    spread = float(off @ off) / (count - 1)
+    shared = float(np.sum(np.diff(np.concatenate(([0.0], x, [0.0]))) ** 2)) / float(x @ x) / 2
+    within = float(np.sum((x * noise) ** 2) / (x @ x) ** 2)
+    variance = max(max(1.0, shared) * spread / float(x @ x), within)
+    return by_t(KEY, UNIT, Mean(slope, variance**0.5, count - 1), method)
+
+
+def _hysteresis(windows: tuple[Window, ...]) -> Estimate:
+    """Force = offset + stiffness * deflection + half the hysteresis * direction of the step before."""
+    name, unit, method = "hysteresis", "N", "force at a deflection reached from below minus from above"
+    x, force = np.array([[w.position, w.force] for w in windows]).reshape(-1, 2).T
+    if len(x) < 5 or len(set(way := np.sign(np.diff(x)))) < 2:
+        return Estimate.unknown(name, unit, method, "no deflections reached from both sides, over 5 windows or more")
+    x, force = x[1:], force[1:]
+    design = np.stack([np.ones_like(x), (x - x.mean()) / np.ptp(x), way / 2], axis=1)
+    solution, rest, rank, _ = np.linalg.lstsq(design, force, rcond=1e-6)
+    if rank < 3 or len(x) == 3:
+        return Estimate.unknown(name, unit, method, "deflection and direction of the steps go together")
+    variance = float(np.sum(rest)) / (len(x) - 3) * np.linalg.inv(design.T @ design)[2, 2]
+    return by_t(name, unit, Mean(float(solution[2]), float(variance**0.5), len(x) - 3), method)
+
+
+def _fixed(log: Log, position: np.ndarray, windows: tuple[Window, ...]) -> tuple[bool | None, tuple[str, ...]]:
+    """Whether the cart stood still between the windows, and what to say of it."""
+    moved = cart(log)
+    if moved is None:
+        return None, ("The cart is taken as fixed: no channel shows whether it is.",)
+    if len(windows) < 2:
+        return None, ()
+    marks = [slice(*np.searchsorted(log.time, (w.start, w.end))) for w in windows]
+    followed, went = (np.ptp([x[m].mean() for m in marks]) for x in (moved, position))
+    if followed <= FIXED * went:
+        return True, ()
+    said = f"The cart is not fixed: it moved by {followed:.3g} m while the stage moved by {went:.3g} m"
+    return False, (f"{said}; the deflection is that of the joint all the same.",)

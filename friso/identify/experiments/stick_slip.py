@@ -1,0 +1,247 @@
+"""Static friction from stick-slip with the sensor of the joint's deflection (thesis, Sec. 4.2.3, Fig. 20).
+
+While the cart sticks the joint pulls at it with k_j times its deflection, and more and more; at the peak the cart
+breaks away, and its velocity shows a spike.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from friso.identify.estimate import COVERAGE, Estimate
+from friso.identify.experiments.common import (
+    Mean,
+    by_t,
+    channel,
+    correlated_mean,
+    deflection,
+    low_pass,
+    on_bearing,
+    rate,
+    ways,
+)
+from friso.identify.experiments.rate_effect import BRISTLE_RATE, static_friction
+from friso.identify.experiments.slips import SLIDING, slips
+from friso.identify.logs.log import Log
+from friso.quantities import StageError
+
+CUTOFF = 100.0
+"""Low-pass of deflection and velocity [Hz]."""
+
+HELD = 0.5
+"""Share of the slips before which the force had stopped rising, from which none shows static friction."""
+
+NEAR, LONG = 0.01, 4.0
+"""Near its peak is within this share of it; a force that is there so many times as long as usual had stopped rising."""
+
+AT_STOP = 0.05
+"""Share of the stroke that is left where the limiter counts as touched: it smears in the filter."""
+
+STOPPED = "the force on the cart stops rising before it slips: the limiter was touched, or the sensor is at its end"
+
+KEY = "friction.static"
+
+
+@dataclass(frozen=True)
+class StickSlip:
+    """Static friction [N], in all and per direction; mean break-away force [N] per direction as measured at its force
+    rate, and its range over the slips (5 to 95 %); a force common to both directions (sensor offset, or unequal
+    friction). Per slip, shape (n,): time [s], place on the rail [m], direction, peak deflection [m] (NaN without
+    sensor), break-away force [N] in that direction, force rate [N/s], highest speed of the cart [m/s]. Over time, shape
+    (samples,): force on the cart [N] and its speed [m/s]."""
+
+    static: Estimate
+    forward: Estimate
+    backward: Estimate
+    break_away_forward: Estimate
+    break_away_backward: Estimate
+    spread: tuple[float, float]
+    offset: Estimate
+    times: np.ndarray
+    places: np.ndarray
+    directions: np.ndarray
+    deflections: np.ndarray
+    forces: np.ndarray
+    rates: np.ndarray
+    speeds: np.ndarray
+    pull: np.ndarray
+    cart_velocity: np.ndarray
+    warnings: tuple[str, ...]
+
+
+def static_from_stick_slip(
+    log: Log,
+    stiffness: Estimate | float | None = None,
+    stage_mass: float = 0.0,
+    stroke: float = np.inf,
+    bristle_rate: float = BRISTLE_RATE,
+    cutoff: float = CUTOFF,
+) -> StickSlip:
+    """Static friction from slow motion that sticks and slips.
+
+    With the joint's `stiffness` [N/m] (an Estimate brings its interval) the force on the cart is that times the
+    deflection measured; without, the actuator force less `stage_mass` [kg] times the acceleration of the position. How
+    far the finite force rate lowers it is extrapolated or bounded, see `rate_effect`, with `bristle_rate` [N/s].
+    Slips from a deflection at the `stroke` [m] of the joint tell nothing of it. What the record cannot show is unknown
+    with its reason. Raises StageError for missing channels or an unusable stiffness.
+    """
+    pull, deflected, relative_error = _pull(log, stiffness, stage_mass, cutoff)
+    body = on_bearing(log)
+    cart_velocity = np.zeros_like(body)
+    rows: list[tuple[float, ...]] = []
+    shares = []
+    for part in log.segments:
+        found = slips(body[part], log.sample_time, cutoff)
+        cart_velocity[part] = found.speed
+        shares.append(found.share)
+        marks = zip(found.onsets, found.starts, found.rests, found.fastest, found.directions, strict=True)
+        for onset, start, rest, top, way in marks:
+            at, force, before, rising, held = _peak(
+                way * pull[part], log.sample_time, cutoff, (rest, onset, start, top)
+            )
+            at += part.start
+            bent = np.nan if deflected is None else float(way * deflected[at])
+            late = max(force - before, 0.0) + abs(rising) / cutoff
+            place = (float(log.time[at]), float(body[at]), float(way))
+            held = held or abs(bent) > (1 - AT_STOP) * stroke
+            rows.append((*place, bent, force, rising, float(abs(found.speed[top])), held, late))
+    table = np.array([row for row in rows if row[5] > 0 or row[7]]).reshape(-1, 9).T
+    return _answer(table, pull, cart_velocity, (relative_error, bristle_rate), _why(shares))
+
+
+def _pull(
+    log: Log, stiffness: Estimate | float | None, stage_mass: float, cutoff: float
+) -> tuple[np.ndarray, np.ndarray | None, float]:
+    """Force on the cart [N], deflection [m] low-passed, and the relative standard deviation of their ratio."""
+
+    def smooth(values: np.ndarray) -> np.ndarray:
+        return np.concatenate([low_pass(values[s], log.sample_time, cutoff) for s in log.segments])
+
+    if stiffness is None:
+        force = smooth(channel(log, "force"))
+        if stage_mass:
+            position = channel(log, "position")
+            velocity = np.concatenate([rate(position[s], log.sample_time, cutoff) for s in log.segments])
+            force = force - stage_mass * np.concatenate(
+                [rate(velocity[s], log.sample_time, cutoff) for s in log.segments]
+            )
+        return force, None, 0.0
+    value, half = (stiffness.value, stiffness.half_width) if isinstance(stiffness, Estimate) else (stiffness, 0.0)
+    if not (np.isfinite(value) and value > 0 and np.isfinite(half)):
+        raise StageError("stiffness", f"{value:g} +/- {half:g} N/m", "a stiffness greater than 0", "2.4 N/mm", log.name)
+    deflected = deflection(log)
+    if deflected is None:
+        channel(log, "relative_position")  # raises: without it the pull of the joint is not known
+    bent = smooth(np.asarray(deflected))
+    return value * bent, bent, half / COVERAGE / value
+
+
+def _peak(
+    pull: np.ndarray, sample_time: float, cutoff: float, marks: tuple[int, int, int, int]
+) -> tuple[int, float, float, float, bool]:
+    """Where the pull peaks between visible motion and top speed, its height, that at the onset of visible motion, the
+    rate at which it rose over the last third of the rest, and whether it had stopped rising: it stayed within a
+    hundredth of its peak for several times as long as its usual rate takes, and the filter smears."""
+    rest, onset, start, top = marks
+    at = start + int(np.argmax(pull[start : top + 1]))
+    begin = max(onset - max((onset - rest) // 3, 5), 0)
+    rising = (pull[onset] - pull[begin]) / ((onset - begin) * sample_time)
+    tenths = np.unique(np.linspace(rest, onset, 11).astype(int))
+    usual = float(np.median(np.diff(pull[tenths]) / (np.diff(tenths) * sample_time)))
+    near = float((pull[rest : at + 1] > (1 - NEAR) * pull[at]).sum()) * sample_time
+    held = near > LONG * (NEAR * abs(pull[at] / usual) + 1 / cutoff) if usual > 0 else True
+    return at, float(pull[at]), float(pull[onset]), float(rising), bool(held)
+
+
+def _why(shares: list[float]) -> str:
+    """Why there are no slips, for a reason."""
+    if shares and min(shares) > SLIDING:
+        return "the cart slides all the time"
+    return "the cart shows no slips out of rest"
+
+
+def _answer(
+    table: np.ndarray, pull: np.ndarray, velocity: np.ndarray, known: tuple[float, float], why: str
+) -> StickSlip:
+    times, places, directions, bent, forces, rates, speeds, held, late = table
+    relative_error, bristle_rate = known
+
+    def static(chosen: np.ndarray, words: str) -> Estimate:
+        if not chosen.any():
+            return Estimate.unknown(KEY, "N", f"stick-slip{words}", f"{why}{words}", 0.0)
+        if held[chosen].mean() > HELD:
+            low = float(forces[chosen].mean() * (1 - relative_error * COVERAGE))
+            return Estimate.unknown(KEY, "N", f"stick-slip{words}", STOPPED, low)
+        return static_friction(KEY, forces[chosen], rates[chosen], bristle_rate, relative_error, late[chosen].mean())
+
+    masks = dict(ways(directions))
+    means = {name: _mean(f"break-away force, {name}", forces[m], relative_error, why) for name, m in masks.items()}
+    one, other = (static(mask, f" {words}") for words, mask in masks.items())
+    every = _both(one, other) if one.shown or other.shown else static(np.ones(len(forces), dtype=bool), "")
+    low, high = np.percentile(forces, [5, 95]) if len(forces) else (np.nan, np.nan)
+    offset = _offset(means["forward"], means["backward"])
+    return StickSlip(
+        every,
+        one,
+        other,
+        means["forward"],
+        means["backward"],
+        (float(low), float(high)),
+        offset,
+        times,
+        places,
+        directions,
+        bent,
+        forces,
+        rates,
+        speeds,
+        pull,
+        velocity,
+        _said(len(forces), offset),
+    )
+
+
+def _said(count: int, offset: Estimate) -> tuple[str, ...]:
+    """What to know before believing it."""
+    said = []
+    if count and not offset.shown:
+        said.append("The zero of the force on the cart is taken as measured; slips in one direction cannot check it.")
+    elif count and not offset.holds(0.0):
+        size = f"{2 * abs(offset.value):.3g} N"
+        said.append(f"The directions differ by {size}: an offset of the sensor, or unequal friction.")
+    if 0 < count < 5:
+        said.append(f"Only {count} slips: the range over the rail is not shown.")
+    return tuple(said)
+
+
+def _mean(name: str, forces: np.ndarray, relative_error: float, why: str) -> Estimate:
+    method = "mean of the peaks of the force on the cart before slips"
+    if len(forces) < 2:
+        return Estimate.unknown(name, "N", method, f"{len(forces)} slips: {why}" if not len(forces) else "1 slip")
+    mean = correlated_mean(forces)
+    return by_t(
+        name, "N", Mean(mean.value, float(np.hypot(mean.error, relative_error * mean.value)), mean.freedom), method
+    )
+
+
+def _both(one: Estimate, other: Estimate) -> Estimate:
+    """The mean of both directions, in which a common offset drops out; of the one that is shown otherwise."""
+    if not (one.shown and other.shown):
+        return one if one.shown else other
+    middle = [(one.low + other.low) / 2, (one.value + other.value) / 2, (one.high + other.high) / 2]
+    return Estimate(KEY, "N", middle[1], middle[0], middle[2], f"mean of both directions: {one.method}")
+
+
+def _offset(one: Estimate, other: Estimate) -> Estimate:
+    """Half of what the forward break-away exceeds the backward one by."""
+    name, method = (
+        "offset of the force on the cart",
+        "half the difference of the break-away forces forward and backward",
+    )
+    if not (one.shown and other.shown):
+        return Estimate.unknown(name, "N", method, "slips in one direction only")
+    half = float(np.hypot(one.half_width, other.half_width)) / 2
+    middle = (one.value - other.value) / 2
+    return Estimate(name, "N", middle, middle - half, middle + half, method)

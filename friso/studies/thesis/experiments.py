@@ -1,0 +1,123 @@
+"""The thesis's experiments in time on its rig (Sec. 4.2.2, 4.2.3, Fig. 19 to 21), simulated, and read as measured.
+
+The simulated rig has the friction of one place all along its rail, and no noise.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from friso.engine.simulate import simulate
+from friso.identify.experiments import (
+    FrictionPosition,
+    StepStiffness,
+    StickSlip,
+    friction_position,
+    record,
+    static_from_stick_slip,
+    stiffness_from_steps,
+)
+from friso.identify.logs.log import Log
+from friso.stage import Stage, loads
+
+SAMPLE_TIME = 1e-3
+"""Of the records [s]: the thesis gives none."""
+
+STEP, STEPS, STANDS = 0.3e-3, (1, 1, -1, -1, 1, -1), 2.0
+"""Size of a step [m] (Sec. 4.2.2), their directions, and the time [s] for which each stands: both our choice."""
+
+FIXED_CART = "1e9 kg"
+"""Mass of a cart that does not move: 1 N displaces it by less than a thousandth of a micrometre in 10 s."""
+
+SLOW, SLOW_TIME = (0.5e-3, 1e-3, 2.5e-3), 20.0
+"""Speeds of slow motion [m/s] and their time [s]: the thesis tells neither; up to the slower one of Fig. 21."""
+
+STROKE = "8 mm"
+"""The limiters in the identification (Sec. 4.2.1)."""
+
+SPEEDS, WAY = (2.5e-3, 10e-3), 0.15
+"""Constant speeds [m/s] and their way [m] (Sec. 4.2.3)."""
+
+
+@dataclass(frozen=True)
+class JointSteps:
+    """Fig. 19: the record, what is found in it, and the joint's stiffness [N/m] that it was simulated with."""
+
+    log: Log
+    found: StepStiffness
+    stiffness: float
+
+
+@dataclass(frozen=True)
+class SlowMotion:
+    """Fig. 20: speed [m/s], the record, what is found in it, and the static friction [N] it was simulated with."""
+
+    speed: float
+    log: Log
+    found: StickSlip
+    static: float
+
+
+@dataclass(frozen=True)
+class ConstantSpeed:
+    """Fig. 21: the speeds [m/s], a record with one segment for each, and what is found in it."""
+
+    speeds: tuple[float, ...]
+    log: Log
+    found: FrictionPosition
+
+
+def joint_steps(stage: Stage) -> JointSteps:
+    """Position steps of 0.3 mm with the cart fixed. The limiter is not touched, so the rig is linear, and the response
+    to all steps is the sum of those to each."""
+    fixed = stage.replace({"masses.cart": FIXED_CART, "joint.stroke": STROKE, "joint.locked": False})
+    duration = STANDS * (len(STEPS) + 1)
+    run = simulate(_moved(fixed, kind="step", size=f"{STEP!r} m", duration=f"{duration} s"), sample_time=SAMPLE_TIME)
+    count, signals = round(STANDS / SAMPLE_TIME), {}
+    for name in ("reference", "position", "force"):
+        one, total = run[name].values, np.zeros(count * (len(STEPS) + 1))
+        for number, way in enumerate(STEPS, start=1):
+            total[number * count :] += way * one[: len(total) - number * count]
+        signals[name] = total
+    log = record("0.3 mm steps, cart fixed", SAMPLE_TIME, **signals)
+    return JointSteps(log, stiffness_from_steps(log), float(stage.flat()["joint.stiffness"]))
+
+
+def slow_motion(stage: Stage, speed: float) -> SlowMotion:
+    """Slow motion at a `speed` [m/s] with the joint free, which sticks and slips; read with the joint's stiffness."""
+    free = stage.replace({"joint.stroke": STROKE, "joint.locked": False})
+    log = _ramp(free, speed, SLOW_TIME)
+    flat = stage.flat()
+    return SlowMotion(speed, log, static_from_stick_slip(log, flat["joint.stiffness"]), float(flat["friction.static"]))
+
+
+def constant_speed(stage: Stage, speeds: tuple[float, ...] = SPEEDS) -> ConstantSpeed:
+    """Constant speeds over 150 mm, one after the other over the same places."""
+    logs = [_ramp(stage, speed, WAY / speed) for speed in speeds]
+    ends = np.cumsum([0, *(len(log.time) for log in logs)])
+    signals = {role: np.concatenate([log[role] for log in logs]) for role in logs[0].signals}
+    parts = tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
+    log = replace(record("constant speed", SAMPLE_TIME, **signals), segments=parts)
+    flat = stage.flat()
+    return ConstantSpeed(speeds, log, friction_position(log, flat["masses.cart"] + flat["masses.stage"]))
+
+
+def _ramp(stage: Stage, speed: float, duration: float) -> Log:
+    run = simulate(
+        _moved(stage, kind="ramp", velocity=f"{speed!r} m/s", duration=f"{duration!r} s"), sample_time=SAMPLE_TIME
+    )
+    roles = {role: run[role].values for role in ("reference", "position", "cart_position", "force")}
+    return record(f"{speed * 1e3:g} mm/s", SAMPLE_TIME, **roles)
+
+
+def _moved(stage: Stage, **motion: Any) -> Stage:
+    """The stage with a motion of another kind, of which other keys are left out."""
+    rows = "\n".join(f'{key} = "{value}"' for key, value in motion.items())
+    text = stage.to_toml()
+    begin = text.index("[motion]")
+    end = text.find("\n[", begin)
+    return loads(f"{text[:begin]}[motion]\n{rows}\n{text[end + 1 :] if end >= 0 else ''}")
