@@ -1,25 +1,43 @@
-"""Ranges of quantities: "1 N .. 3 N", "1.7 kg +/- 5 %", "1.7 kg +/- 0.1 kg", or a single value."""
+"""Quantities with a range: "1 N .. 3 N", "1.7 kg +/- 5 %", "1.7 kg +/- 0.1 kg", or a single value.
+
+One grammar for two uses: a specification allows all of a range (`Span`), a key of a stage file is uncertain in it
+(`uncertain_value`).
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal, Self
 
 from pydantic import GetCoreSchemaHandler
 from pydantic_core import CoreSchema, core_schema
 
-from friso.quantities import Number, Quantity, StageError, non_negative, quoted
+from friso.quantities import Number, Quantity, StageError, Value, non_negative, quoted
+
+Form = Literal["value", "tolerance", "range"]
+
+_MARKS = ("..", "+/-", "±")
+
+COVERAGE = 1.959963984540054
+"""Half-width of a 95 % interval of a normal distribution, in standard deviations."""
+
+_BESIDE = 1e-6
+"""Share of the range beside its centre in which some number has to be allowed: of whole numbers none is."""
 
 
 @dataclass(frozen=True)
 class Interval:
-    """From `low` to `high`, SI, both included; `text` is what the user wrote."""
+    """From `low` to `high`, SI, both included; `text` is what the user wrote, and `form` in which way."""
 
     low: float
     high: float
     text: str
-    single: bool = False
-    """Whether a single value was given, not a range."""
+    form: Form = "range"
+
+    @property
+    def single(self) -> bool:
+        """Whether a single value was given, not a range."""
+        return self.form == "value"
 
     @property
     def centre(self) -> float:
@@ -28,6 +46,20 @@ class Interval:
     def at(self, share: Any) -> Any:
         """The values at shares, from 0 to 1, of the way from low to high."""
         return self.low + share * (self.high - self.low)
+
+
+class UncertainValue(Value):
+    """The centre of an uncertain quantity; `interval` is the range of a ".." or the 95 % interval of a "+/-"."""
+
+    interval: Interval
+
+    def __new__(cls, si: float, text: str, interval: Interval) -> Self:
+        value = super().__new__(cls, si, text)
+        value.interval = interval
+        return value
+
+    def __reduce__(self) -> tuple[type[Self], tuple[float, str, Interval]]:  # type: ignore[override]
+        return type(self), (float(self), self.text, self.interval)
 
 
 @dataclass(frozen=True)
@@ -52,47 +84,88 @@ class Span:
         return f'"{self.example}"'
 
     def read(self, given: Any) -> Interval:
-        """The range of a text. Raises StageError."""
+        """The range of a text, all of it allowed. Raises StageError."""
         if isinstance(given, Interval):
             return given
-        text = given if isinstance(given, str) else ""
         try:
-            if ".." in text:
-                low, high = (self._number(part) for part in text.split("..", 1))
-            elif "+/-" in text or "±" in text:
-                low, high = self._tolerance(*text.replace("±", "+/-").split("+/-", 1))
-            else:
-                low = high = self._number(given)
-        except StageError as error:
-            hint = error.given if error.given != quoted(given) else error.expected
-            raise self._refused(given, f"of which {hint}") from None
-        single = not any(mark in text for mark in ("..", "+/-", "±"))
-        if not low <= high:
-            raise self._refused(given, "a reversed range")
-        if not (self.of.bound.holds(low) and self.of.bound.holds(high)):
-            raise self._refused(given, f"reaches from {low:g} to {high:g} {self.of.unit}".rstrip())
-        return Interval(low, high, str(getattr(given, "text", given)), single)
-
-    def _refused(self, given: Any, hint: str) -> StageError:
-        return StageError("", quoted(given, hint), self.expected, self.written_example)
-
-    def _number(self, given: Any) -> float:
-        if isinstance(self.of, Quantity):
-            return float(self.of.read(given.strip() if isinstance(given, str) else given))
-        return float(self.of.read(_bare(given)))
-
-    def _tolerance(self, value: str, tolerance: str) -> tuple[float, float]:
-        centre, tolerance = self._number(value), tolerance.strip()
-        if tolerance.endswith("%"):
-            off = abs(centre) * _percent(tolerance)
-        elif isinstance(self.of, Quantity):
-            off = float(Quantity(self.of.unit, non_negative, self.example).read(tolerance))
-        else:
-            off = float(_bare(tolerance))
-        return centre - off, centre + off
+            found = _read(given, self.of)[1]
+            if not (self.of.bound.holds(found.low) and self.of.bound.holds(found.high)):
+                raise _Refused(_reach(found, self.of))
+        except _Refused as refused:
+            raise StageError("", quoted(given, str(refused)), self.expected, self.written_example) from None
+        return found
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         return core_schema.no_info_plain_validator_function(self.read)
+
+
+def is_range(given: Any) -> bool:
+    """Whether this is a text with one of the marks of a range."""
+    return isinstance(given, str) and any(mark in given for mark in _MARKS)
+
+
+def uncertain_value(given: str, of: Quantity | Number) -> UncertainValue:
+    """The uncertain value of a text that `is_range`. Raises StageError.
+
+    All of a range "LOW .. HIGH" has to be allowed. Of "VALUE +/- HALF" the value has to be: a normal distribution has
+    no ends, and what reaches beyond the bound is no mistake of the user; it is cut off where values are drawn.
+    """
+    try:
+        centre, found = _read(given, of)
+        asked = (found.low, centre, found.high) if found.form == "range" else (centre,)
+        if not all(of.bound.holds(value) for value in asked):
+            raise _Refused(_reach(found, of))
+        if found.low < found.high and not any(of.bound.holds(found.at(0.5 + side)) for side in (-_BESIDE, _BESIDE)):
+            raise _Refused("none of the numbers beside the centre is allowed")
+    except _Refused as refused:
+        expected = f'{of.expected}; or with its uncertainty, "VALUE +/- HALF-WIDTH" or "LOW .. HIGH"'
+        raise StageError("", quoted(given, str(refused)), expected, f'"{of.example} +/- 5 %"') from None
+    return UncertainValue(centre, given, found)
+
+
+class _Refused(Exception):
+    """Why a text is no range of a quantity; becomes the hint of a StageError."""
+
+
+def _reach(found: Interval, of: Quantity | Number) -> str:
+    return f"reaches from {found.low:g} to {found.high:g} {of.unit}".rstrip()
+
+
+def _read(given: Any, of: Quantity | Number) -> tuple[float, Interval]:
+    """Centre and range of a text, or of a single value; ends beyond the bound of a quantity may come out of a
+    tolerance. Raises _Refused."""
+    text = given if isinstance(given, str) else ""
+    try:
+        if ".." in text:
+            low, high = (_number(part, of) for part in text.split("..", 1))
+            centre, form = (low + high) / 2, "range"
+        elif is_range(text):
+            value, tolerance = text.replace("±", "+/-").split("+/-", 1)
+            centre, form = _number(value, of), "tolerance"
+            off = _half_width(centre, tolerance.strip(), of)
+            low, high = centre - off, centre + off
+        else:
+            low = high = centre = _number(given, of)
+            form = "value"
+    except StageError as error:
+        raise _Refused(f"of which {error.given if error.given != quoted(given) else error.expected}") from None
+    if not low <= high:
+        raise _Refused("a reversed range")
+    return centre, Interval(low, high, str(getattr(given, "text", given)), form)
+
+
+def _number(given: Any, of: Quantity | Number) -> float:
+    if isinstance(of, Quantity):
+        return float(of.read(given.strip() if isinstance(given, str) else given))
+    return float(of.read(_bare(given)))
+
+
+def _half_width(centre: float, tolerance: str, of: Quantity | Number) -> float:
+    if tolerance.endswith("%"):
+        return abs(centre) * _percent(tolerance)
+    if isinstance(of, Quantity):
+        return float(Quantity(of.unit, non_negative, of.example).read(tolerance))
+    return float(Number(non_negative, of.example).read(_bare(tolerance)))
 
 
 def _bare(given: Any) -> Any:

@@ -140,13 +140,17 @@ def test_wrong_input_ends_in_one_message_and_status_2(arguments: list, message: 
 
 
 def test_a_run_that_fails_says_so_and_keeps_what_it_has(tmp_path: Path) -> None:
-    """An unstable loop diverges past what numbers hold: status 1, and the response up to there is written."""
-    wild = ["--set", "controller.ki=1e9 N/(m*s)"]
-    done = run("simulate", STICK_SLIP, "--out", tmp_path, *wild)
+    """An unstable loop diverges past what numbers hold: status 1, and the response up to there is written.
+
+    Without phase lead and with strong integral action van Dijk's controller has a negative phase margin.
+    """
+    settings = ("controller.alpha=0.99", "controller.beta=1", "controller.crossover=40 Hz")
+    wild = [part for text in settings for part in ("--set", text)]
+    done = run("simulate", RIG, "--out", tmp_path, *wild)
     assert done.returncode == 1
     assert "the loop is unstable" in done.stdout
-    with xr.open_dataset(tmp_path / "lugre_stick_slip_response.nc", engine="scipy") as written:
+    with xr.open_dataset(tmp_path / "thesis_rig_response.nc", engine="scipy") as written:
         assert 0 < written.position.notnull().sum() < written.time.size
-    document = json.loads(run("check", STICK_SLIP, "--json", *wild).stdout)
+    document = json.loads(run("check", RIG, "--json", *wild).stdout)
     assert document["cases"]["given"]["verdict"] == "failed"
     assert document["cases"]["given"]["peak_to_peak_m"] is None

@@ -193,15 +193,3 @@ def test_samples_links_and_a_local_cluster(tmp_path: Path) -> None:
         assert found.verdict.shape == (16,)
     again = friso(tmp_path, "map", RIG, *options, *links, "--out", "b.zarr", "--json")
     assert json.loads(again.stdout)["verdicts"] == json.loads(done.stdout)["verdicts"]
-
-
-def test_reproduce_writes_its_page_and_claims(tmp_path: Path) -> None:
-    done = friso(tmp_path, "reproduce", "masses", "--points", "5")
-    assert done.returncode == 2
-    assert "isolator-masses" in done.stderr
-    done = friso(tmp_path, "reproduce", "isolator-masses", "--points", "5", "--out", "rep")
-    assert done.returncode == 0, done.stderr
-    assert (tmp_path / "rep" / "reproduction.html").stat().st_size > 10_000
-    claims = {claim["id"]: claim for claim in json.loads((tmp_path / "rep" / "claims.json").read_text())["claims"]}
-    assert claims["F15A"]["judgement"] in ("holds", "holds in part", "differs")
-    assert claims["F28"]["judgement"] == "not yet covered"

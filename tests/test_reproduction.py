@@ -1,5 +1,7 @@
 """The reproduction of the thesis: its studies as data, its judges on maps made to hold and to fail, its page."""
 
+import json
+import sys
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from importlib.resources import files
@@ -11,6 +13,7 @@ import pytest
 import xarray as xr
 
 import friso
+from friso.cli import main
 from friso.studies.thesis import STUDIES, Evidence, Finding, Part, Reproduction, Response, claims, reproduce, rig
 from friso.studies.thesis.claims import _JUDGES, judges, registered
 from friso.studies.thesis.cycles import cycles
@@ -412,6 +415,27 @@ def test_document_and_page_have_every_claim(small: Reproduction, tmp_path: Path)
     paths = write_reproduction(small, tmp_path / "new" / "folder")
     assert all(path.stat().st_size > 1000 for path in paths)
     assert {path.suffix for path in paths} == {".html", ".json", ".png", ".svg"}
+
+
+def test_the_command_writes_its_page_and_claims(
+    small: Reproduction, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """In this process, which keeps the linear analysis of `small`: it takes longer than all the rest."""
+
+    def run(*arguments: str) -> int:
+        monkeypatch.setattr(sys, "argv", ["friso", "reproduce", *arguments])
+        with pytest.raises(SystemExit) as left:
+            main()
+        return int(left.value.code or 0)
+
+    monkeypatch.chdir(tmp_path)
+    assert run("masses", "--points", "5") == 2
+    assert "isolator-masses" in capsys.readouterr().err
+    assert run("isolator-masses", "--points", "5", "--out", "rep") == 0
+    assert (tmp_path / "rep" / "reproduction.html").stat().st_size > 10_000
+    written = {claim["id"]: claim for claim in json.loads((tmp_path / "rep" / "claims.json").read_text())["claims"]}
+    assert written["F15A"]["judgement"] in ("holds", "holds in part", "differs")
+    assert written["F28"]["judgement"] == "not yet covered"
 
 
 def test_fig_14b_at_both_tolerances(small: Reproduction) -> None:

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
 
 from friso.cli.common import (
     AsJson,
@@ -18,16 +21,32 @@ from friso.cli.common import (
     read_stage,
     read_tolerance,
 )
-from friso.stage import Stage
+from friso.cli.progress import progress_bar
+from friso.quantities import StageError
+from friso.stage import Stage, load, numeric_keys
 
 if TYPE_CHECKING:
     from friso.hunting import Case, Cycle, Judgement, Margin
+    from friso.stage.correlations import Drawn
+    from friso.views.draws import Drawing
+
+Draws = Annotated[
+    int | None,
+    typer.Option(
+        "--draws",
+        metavar="N",
+        help='Draw N stages from the uncertain keys ("20 N +/- 1 N", "1 N .. 3 N"), and tell how many hunt.',
+    ),
+]
+Seed = Annotated[int, typer.Option("--seed", metavar="K", help="Of the draws: the same seed, the same stages.")]
 
 
 def check(
     stage_file: StageFile,
     overrides: Overrides = None,
     rtol: Tolerance = "1e-6",
+    draws: Draws = None,
+    seed: Seed = 0,
     out: OutFolder = None,
     as_json: AsJson = False,
 ) -> None:
@@ -35,27 +54,66 @@ def check(
 
     Example: friso check examples/thesis_rig.toml --set controller.crossover="12 Hz" --out report
     """
-    stage, tolerance = read_stage(stage_file, overrides), read_tolerance(rtol)
+    stage, tolerance = read_stage(stage_file, overrides, drawn=draws is not None), read_tolerance(rtol)
+    drawn = None if draws is None else _drawn(stage, stage_file, draws, seed)
     folder = None if out is None else made_folder(out)
     from friso.hunting import check as check_stage
 
     cases = check_stage(stage, rtol=tolerance, traces=folder is not None)
+    drawing = None if drawn is None else _drawing(cases, drawn, seed, tolerance)
     if folder is not None:
         from friso.views.report import write_report
 
-        write_report(cases, folder / "report.html")
+        write_report(cases, folder / "report.html", drawing)
     if as_json:
-        print(json.dumps(_check_document(stage, cases), allow_nan=False))
+        print(json.dumps(_check_document(stage, cases, drawing), allow_nan=False))
     else:
         _print_cases(stage, cases)
+        if drawing is not None:
+            _print_draws(drawing)
         if folder is not None:
             print(f"report: {folder / 'report.html'}")
     leave(all(case.solver.done for case in cases.values()))
 
 
-def _check_document(stage: Stage, cases: dict[str, Case]) -> dict[str, Any]:
+def _drawn(stage: Stage, path: Path, count: int, seed: int) -> Drawn:
+    """Stages drawn, correlated as a file beside the stage file says. Raises StageError."""
+    from friso.stage.correlations import Correlations, beside, draw, read_correlations
+    from friso.studies.draws import MOST
+
+    for option, value, least, most in (("--draws", count, 1, MOST), ("--seed", seed, 0, 2**32 - 1)):
+        if not least <= value <= most:
+            raise StageError(option, str(value), f"a whole number from {least} to {most}", f"{option} 1000")
+    try:
+        known = read_correlations(beside(path), load(path)) if beside(path).exists() else Correlations()
+        return draw(stage, known.among(stage.uncertain()), count, seed)
+    except StageError as error:
+        raise error if error.origin else error.found_in("--draws") from None
+
+
+def _drawing(cases: dict[str, Case], drawn: Drawn, seed: int, tolerance: float) -> Drawing:
+    """What becomes of the stages drawn."""
+    from friso.studies.draws import different, fates
+    from friso.views.cases import shown_cases
+    from friso.views.draws import Drawing
+
+    stage = cases["given"].stage
+    with progress_bar("draws", drawn.count * len(different(stage))) as advance:
+        found = fates(stage, drawn, tolerance, advance)
+    fields = numeric_keys(stage.flat())
+    labels = {item.key: item.label for item in shown_cases(cases)}
+    return Drawing(drawn, seed, found, labels, {key: fields[key].unit for key in drawn.keys})
+
+
+def _check_document(stage: Stage, cases: dict[str, Case], drawing: Drawing | None) -> dict[str, Any]:
     """The JSON document of `check` (design.md, section 3)."""
-    return {"stage": stage.name, "cases": {name: _case_document(case) for name, case in cases.items()}}
+    document = {"stage": stage.name, "cases": {name: _case_document(case) for name, case in cases.items()}}
+    if drawing is not None:
+        from friso.views.draws import draws_document
+
+        for name, case in document["cases"].items():
+            case["draws"] = draws_document(drawing, name)
+    return document
 
 
 def _case_document(case: Case) -> dict[str, Any]:
@@ -108,6 +166,14 @@ def _kick_document(known: Judgement) -> dict[str, Any] | None:
 
 def _margin_document(edge: Margin) -> dict[str, Any]:
     return {"factor": edge.factor, "crossover_hz": edge.crossover, "certain": edge.certain}
+
+
+def _print_draws(drawing: Drawing) -> None:
+    """The table of the draws, and a sentence per case."""
+    from friso.views.draws import draws_rows, draws_sentences
+
+    title = f"{drawing.drawn.count} stages drawn from the uncertain keys, seed {drawing.seed}"
+    print_table(title, [*drawing.labels.values()], draws_rows(drawing), draws_sentences(drawing))
 
 
 def _print_cases(stage: Stage, cases: dict[str, Case]) -> None:

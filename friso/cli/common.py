@@ -15,6 +15,9 @@ from friso.stage import Stage, load, parse_set
 
 INTERRUPTED = 130
 
+_NAMED = 3
+"""Uncertain keys that are named, at most, where there are more."""
+
 StageFile = Annotated[Path, typer.Argument(metavar="STAGE.toml", help="The stage file.")]
 Overrides = Annotated[
     list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help='Override a key: controller.crossover="12 Hz".')
@@ -54,9 +57,16 @@ def leave(done: bool) -> None:
         raise typer.Exit(1)
 
 
-def read_stage(path: Path, overrides: list[str] | None, with_drive: bool = False) -> Stage:
-    """The stage of the file with the overrides; a drive that the command leaves out is mentioned. Raises StageError."""
+def read_stage(path: Path, overrides: list[str] | None, with_drive: bool = False, drawn: bool = False) -> Stage:
+    """The stage of the file with the overrides; a drive that the command leaves out is mentioned, and that the centres
+    of uncertain keys are used unless they are `drawn`. Raises StageError."""
     stage = with_overrides(load(path), overrides)
+    keys = [] if drawn else [*stage.uncertain()]
+    if keys:
+        several = f"{len(keys)} keys are" if len(keys) > 1 else "1 key is"
+        some = ", ".join([*keys[:_NAMED], *(["..."] if len(keys) > _NAMED else [])])
+        centres = "their centres are" if len(keys) > 1 else "its centre is"
+        say(f"{several} uncertain ({some}): {centres} used; friso check --draws 1000 samples the whole range")
     if stage.drive and not with_drive:
         say("[drive] is left out: simulation is in continuous time; friso bode knows sampling and delay")
     return stage

@@ -30,12 +30,16 @@ def save(stage: Stage, path: str | os.PathLike[str], overwrite: bool = False) ->
 
     Raises StageError where there is a file already (unless `overwrite`) or the place cannot be written to.
     """
-    path = Path(path)
+    write_whole(stage.to_toml(), Path(path), overwrite)
+
+
+def write_whole(text: str, path: Path, overwrite: bool) -> None:
+    """Write a text file, all of it or nothing. Raises StageError as `save` does."""
     if path.exists() and not overwrite:
         raise StageError("", "a file that exists already", "a new file, or leave to overwrite", origin=str(path))
     draft = path.with_name(f".{path.name}.{os.getpid()}")
     try:
-        draft.write_text(stage.to_toml(), encoding="utf-8", newline="\n")
+        draft.write_text(text, encoding="utf-8", newline="\n")
         draft.replace(path)
     except OSError as error:
         raise StageError("", _reason(error), "a place that can be written to", origin=str(path)) from error

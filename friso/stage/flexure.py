@@ -9,7 +9,7 @@ from pydantic import create_model, model_validator
 
 from friso.materials import DENSITY, STRENGTH, YOUNG, materials
 from friso.quantities import Bound, Number, Quantity, StageError, Value, any_sign, at_least_1, positive, quoted
-from friso.stage.section import Rule, Section, nearest
+from friso.stage.section import Rule, UncertainSection, nearest
 
 Derivation = Callable[[Mapping[str, Any]], dict[str, Any]]
 """Flat keys that follow from others, from the flat SI mapping; arrays allowed."""
@@ -50,7 +50,7 @@ _EITHER = (
 )
 
 
-class _Leaves(Section):
+class _Leaves(UncertainSection):
     """Parallel leaf springs between cart and stage (thesis, Fig. 6).
 
     x runs along the leaves from the cart (0) to the stage, y along their width, z along the motion; the origin lies

@@ -5,9 +5,18 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, TypeVar, get_args
 
-from pydantic import BaseModel, ConfigDict, GetCoreSchemaHandler, ValidationError
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    GetCoreSchemaHandler,
+    ValidationError,
+    ValidationInfo,
+    ValidatorFunctionWrapHandler,
+    field_validator,
+)
 from pydantic_core import CoreSchema, core_schema
 
+from friso.intervals import Interval, UncertainValue, is_range, uncertain_value
 from friso.quantities import Number, Quantity, StageError, as_toml, quoted
 
 
@@ -22,7 +31,7 @@ class Rule:
 
 
 class Section(BaseModel):
-    """A table of the stage file. Raises StageError when it is made from wrong data."""
+    """A table of a TOML file. Raises StageError when it is made from wrong data."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
 
@@ -38,6 +47,23 @@ class Section(BaseModel):
         """The keys that the user gave, with the values as written."""
         values = {key: getattr(self, key) for key in type(self).model_fields if key in self.model_fields_set}
         return {key: getattr(value, "text", value) for key, value in values.items()}
+
+
+class UncertainSection(Section):
+    """A table whose quantities may be uncertain, "20 N +/- 1 N" or "1 N .. 3 N": their value is the centre."""
+
+    @field_validator("*", mode="wrap")
+    @classmethod
+    def _read_uncertain(cls, given: Any, read: ValidatorFunctionWrapHandler, info: ValidationInfo) -> Any:
+        text = getattr(given, "text", given)
+        if is_range(text) and (field := numeric_fields(cls).get(str(info.field_name))):
+            return uncertain_value(text, field)
+        return read(given)
+
+    def uncertain(self) -> dict[str, Interval]:
+        """The intervals of the uncertain quantities by key, those without width left out."""
+        values = {key: value.interval for key, value in self if isinstance(value, UncertainValue)}
+        return {key: interval for key, interval in values.items() if interval.low < interval.high}
 
 
 SectionClass = TypeVar("SectionClass", bound=type[Section])

@@ -6,9 +6,10 @@ from typing import Annotated, Any, ClassVar, Self
 import numpy as np
 from pydantic import field_validator, model_validator
 
+from friso.intervals import Interval
 from friso.quantities import Number, Quantity, StageError, as_toml, quoted
 from friso.stage.flexure import Flexure, derived, with_material
-from friso.stage.section import Rule, Section, Table, numeric_fields, unknown_key
+from friso.stage.section import Rule, Section, Table, UncertainSection, numeric_fields, unknown_key
 from friso.stage.tables import (
     FRICTION,
     MOTION,
@@ -134,6 +135,14 @@ class Stage(Section):
             if key not in known:
                 raise unknown_key(key, known)
         return derived(_with_defaults(flat | dict(swept or {})))
+
+    def uncertain(self) -> dict[str, Interval]:
+        """Dotted keys of the uncertain quantities to their intervals; their centres stand in `flat`.
+
+        A "range" holds values all as likely; a "tolerance" is the 95 % interval of a normal distribution.
+        """
+        tables = {name: section.uncertain() for name, section in self if isinstance(section, UncertainSection)}
+        return {f"{name}.{key}": interval for name, table in tables.items() for key, interval in table.items()}
 
     def replace(self, changes: Mapping[str, Any]) -> "Stage":
         """The stage with dotted keys set, or removed by None; checked like a file. Raises StageError."""

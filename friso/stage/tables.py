@@ -16,10 +16,10 @@ from friso.quantities import (
     non_negative,
     positive,
 )
-from friso.stage.section import Rule, Section, Variants
+from friso.stage.section import Rule, Section, UncertainSection, Variants
 
 
-class Masses(Section):
+class Masses(UncertainSection):
     """What moves; with both masses and no joint they move as one rigid mass."""
 
     cart: Annotated[Value | None, Quantity("kg", positive, "1.2 kg")] = None
@@ -32,7 +32,7 @@ class Masses(Section):
         return self
 
 
-class FrictionSection(Section):
+class FrictionSection(UncertainSection):
     """Base of the friction laws, each of which declares its keys, `model: Literal["name"]`, and its equations."""
 
     model: Any
@@ -59,7 +59,7 @@ def friction_law(name: str) -> type[FrictionSection]:
     return cast(type[FrictionSection], FRICTION.classes[name])
 
 
-class Joint(Section):
+class Joint(UncertainSection):
     """The compliant joint between cart and stage; its limiter acts in parallel when touched."""
 
     locked: bool = False
@@ -78,7 +78,7 @@ class Joint(Section):
         return self
 
 
-class Parasitic(Section):
+class Parasitic(UncertainSection):
     """First internal mode of the joint: part of the stage mass on a spring of its own."""
 
     frequency: Annotated[Value, Quantity("Hz", positive, "300 Hz")]
@@ -86,14 +86,14 @@ class Parasitic(Section):
     damping_ratio: Annotated[float, Number(non_negative, "0.01")]
 
 
-class Bias(Section):
+class Bias(UncertainSection):
     """Constant forces, as of a cable or of gravity on a tilted rail."""
 
     cart: Annotated[Value | None, Quantity("N", any_sign, "0.2 N")] = None
     stage: Annotated[Value | None, Quantity("N", any_sign, "0.2 N")] = None
 
 
-class Controller(Section):
+class Controller(UncertainSection):
     """What both forms of the controller share."""
 
     kind: Literal["pid"]
@@ -156,14 +156,14 @@ ROUNDING = 1e-12
 """Relative slack of the limits on times, which are sums of decimal numbers."""
 
 
-class Drive(Section):
+class Drive(UncertainSection):
     """How the controller is carried out; the analysis of the linear loop reads it."""
 
     sample_time: Annotated[Value | None, Quantity("s", positive, "50 us")] = None
     delay: Annotated[Value | None, Quantity("s", non_negative, "50 us")] = None
 
 
-class Motion(Section):
+class Motion(UncertainSection):
     """Base of the motions: what the reference does."""
 
     kind: Any

@@ -1,0 +1,217 @@
+"""How the uncertain keys of a stage hang together, in a file beside it; and stages drawn from them.
+
+`identified.correlations.toml` stands beside `identified.toml` and holds `keys` and their correlation `matrix`:
+that of the normal distributions behind the keys (a normal copula, Nelsen 2006, An Introduction to Copulas, Sec. 2.8).
+For two keys "VALUE +/- HALF-WIDTH" it is their own correlation. Keys that it does not name are independent.
+"""
+
+from __future__ import annotations
+
+import os
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from friso.intervals import COVERAGE
+from friso.quantities import StageError, as_toml, quoted
+from friso.stage.files import parsed, text_of, write_whole
+from friso.stage.section import unknown_key
+from friso.stage.stage import Stage, numeric_keys, violations
+
+_EXPECTED = "a file with keys and the matrix of their correlations"
+_EXAMPLE = 'keys = ["friction.coulomb", "friction.viscous"] and matrix = [[1.0, -0.8], [-0.8, 1.0]]'
+
+ROUNDING = 1e-9
+"""By which a matrix may be asymmetric, its diagonal off 1, or an eigenvalue below 0: it comes from rounded numbers."""
+
+MOST = 100
+"""Draws per stage that is asked for, at most, before it is said that hardly any is allowed."""
+
+
+@dataclass(frozen=True)
+class Correlations:
+    """Keys of a stage file and the correlation matrix of what they are drawn from, shape (keys, keys); without any, all
+    keys are independent.
+
+    Raises StageError where the matrix is none of correlations.
+    """
+
+    keys: tuple[str, ...] = ()
+    matrix: np.ndarray = field(default_factory=lambda: np.zeros((0, 0)))
+
+    def __post_init__(self) -> None:
+        twice = [key for key, times in Counter(self.keys).items() if times > 1]
+        if twice:
+            raise StageError("keys", f"{twice[0]} twice", "every key once", _EXAMPLE)
+        if problem := _problem(self.matrix, len(self.keys)):
+            raise StageError("matrix", problem, "a correlation matrix, one row and one column per key", _EXAMPLE)
+
+    def among(self, keys: Iterable[str]) -> Correlations:
+        """Those of some of the keys."""
+        kept = [k for k, key in enumerate(self.keys) if key in [*keys]]
+        return Correlations(tuple(self.keys[k] for k in kept), self.matrix[np.ix_(kept, kept)])
+
+    def over(self, keys: list[str]) -> np.ndarray:
+        """The matrix of all `keys`, shape (keys, keys); those that this does not name are independent."""
+        matrix = np.eye(len(keys))
+        places = [keys.index(key) for key in self.keys]
+        matrix[np.ix_(places, places)] = self.matrix
+        return matrix
+
+
+def _problem(matrix: np.ndarray, size: int) -> str:
+    """Why this is no correlation matrix of so many keys; "" if it is one."""
+    if matrix.shape != (size, size):
+        return f"{' x '.join(map(str, matrix.shape))} numbers for {size} keys"
+    if not np.isfinite(matrix).all():
+        return "a number that is not finite"
+    if size and np.abs(np.diag(matrix) - 1).max() > ROUNDING:
+        return "a diagonal that is not 1"
+    if size and np.abs(matrix - matrix.T).max() > ROUNDING:
+        return "not symmetric"
+    if size and np.linalg.eigvalsh(matrix).min() < -ROUNDING * size:
+        return "not positive semidefinite: no quantities can be correlated like this"
+    return ""
+
+
+def beside(path: str | os.PathLike[str]) -> Path:
+    """Where the correlations of a stage file stand: stage.toml has stage.correlations.toml."""
+    return Path(path).with_suffix(".correlations.toml")
+
+
+def read_correlations(path: str | os.PathLike[str], stage: Stage) -> Correlations:
+    """The correlations of a file, which are to be of uncertain keys of the stage. Raises StageError."""
+    try:
+        found = _from(parsed(text_of(Path(path), _EXPECTED, _EXAMPLE), _EXPECTED, _EXAMPLE))
+        _belongs(found, stage)
+    except StageError as error:
+        raise error.found_in(str(path)) from None
+    return found
+
+
+def write_correlations(
+    correlations: Correlations, stage: Stage, path: str | os.PathLike[str], overwrite: bool = False
+) -> None:
+    """Write the correlations of uncertain keys of the stage, all of the file or nothing.
+
+    Raises StageError where they do not belong to the stage, where there is a file already (unless `overwrite`) or the
+    place cannot be written to.
+    """
+    _belongs(correlations, stage)
+    rows = [f"  [{', '.join(repr(float(value)) for value in row)}]," for row in correlations.matrix]
+    names = [f"  {as_toml(key)}," for key in correlations.keys]
+    text = "\n".join(["keys = [", *names, "]", "matrix = [", *rows, "]", ""])
+    write_whole(text, Path(path), overwrite)
+
+
+def _from(document: dict[str, Any]) -> Correlations:
+    for key in document:
+        if key not in ("keys", "matrix"):
+            raise unknown_key(key, ("keys", "matrix"), _EXAMPLE)
+    keys, rows = document.get("keys"), document.get("matrix")
+    if not isinstance(keys, list) or not all(isinstance(key, str) for key in keys):
+        raise StageError("keys", quoted(keys), "a list of keys of the stage file", _EXAMPLE)
+    if not isinstance(rows, list) or not all(
+        isinstance(row, list) and all(type(value) in (int, float) for value in row) for row in rows
+    ):
+        raise StageError("matrix", quoted(rows), "a list of rows of numbers", _EXAMPLE)
+    if len({len(row) for row in rows}) > 1:
+        raise StageError("matrix", "rows of different lengths", "one row and one column per key", _EXAMPLE)
+    return Correlations(tuple(keys), np.array(rows, dtype=float).reshape(len(rows), -1))
+
+
+def _belongs(correlations: Correlations, stage: Stage) -> None:
+    """Raises StageError for a key that the stage does not have, or that is not uncertain there."""
+    known, uncertain = numeric_keys(stage.flat()), stage.uncertain()
+    for key in correlations.keys:
+        if key not in known:
+            raise unknown_key(key, known, _EXAMPLE)
+        if key not in uncertain:
+            given = f"{key}, which is not uncertain in the stage file"
+            raise StageError(
+                "keys", given, f"some of {', '.join(uncertain) or 'nothing: no key is uncertain'}", _EXAMPLE
+            )
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """Stages drawn: dotted keys to SI arrays, shape (count,). Draws in which a key was `beyond` its bound, or that
+    broke a rule between keys (`broken`: what was expected, to how many), were left out and others drawn instead."""
+
+    keys: Mapping[str, np.ndarray]
+    count: int
+    beyond: int
+    broken: Mapping[str, int]
+
+    @property
+    def left_out(self) -> int:
+        """Draws that no stage may have."""
+        return self.beyond + sum(self.broken.values())
+
+
+def draw(stage: Stage, correlations: Correlations, count: int, seed: int) -> Drawn:
+    """Draw stages from what is uncertain of one: a scrambled Sobol sequence (Owen 1998), in which the same seed gives
+    the same stages. Raises StageError where no key is uncertain, or hardly any draw is allowed."""
+    from scipy.stats import qmc
+
+    intervals = stage.uncertain()
+    if not intervals:
+        example = 'coulomb = "1 N +/- 0.1 N", or coulomb = "0.8 N .. 1.2 N"'
+        raise StageError("", "a stage file of which no key is uncertain", "an uncertain quantity to draw", example)
+    sampler = qmc.Sobol(len(intervals), rng=seed)
+    matrix, size = correlations.over([*intervals]), 1 << max(0, count - 1).bit_length()
+    parts, found, beyond, broken = [], 0, 0, Counter[str]()
+    for _ in range(MOST):
+        keys = _values(stage, matrix, sampler.random(size))
+        within, why = _allowed(stage, keys, size)
+        enough = np.flatnonzero(np.cumsum(within) == count - found)[:1]
+        seen = slice(0, int(enough[0]) + 1 if enough.size else size)
+        reasons = why[seen][~within[seen]]
+        beyond += int(np.count_nonzero(reasons == ""))
+        broken.update(reasons[reasons != ""].tolist())
+        parts.append({key: values[seen][within[seen]] for key, values in keys.items()})
+        found += int(within[seen].sum())
+        if found == count:
+            joined = {key: np.concatenate([part[key] for part in parts]) for key in intervals}
+            return Drawn(joined, count, beyond, broken)
+    most = broken.most_common(1)
+    given = f"ranges of which {100 * found / (MOST * size):.2g} % are allowed"
+    raise StageError("", given, most[0][0] if most else "ranges within the bounds of their keys")
+
+
+def _values(stage: Stage, matrix: np.ndarray, shares: np.ndarray) -> dict[str, np.ndarray]:
+    """The uncertain keys at shares, shape (count, keys), of independent uniform distributions."""
+    from scipy.special import ndtr, ndtri
+
+    sizes, directions = np.linalg.eigh(matrix)
+    root = directions * np.sqrt(np.maximum(sizes, 0.0))
+    edge = 2.0**-31  # half the step of the sequence: its 0 would be infinitely far out
+    normals = ndtri(np.clip(shares, edge, 1 - edge)) @ root.T
+    flat, values = stage.flat(), {}
+    for (key, interval), column in zip(stage.uncertain().items(), normals.T, strict=True):
+        half = (interval.high - interval.low) / 2
+        values[key] = interval.at(ndtr(column)) if interval.form == "range" else flat[key] + half / COVERAGE * column
+    return values
+
+
+def _allowed(stage: Stage, keys: Mapping[str, np.ndarray], count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Which draws a stage may have, and which rule between keys ("" none) the others break, both of shape (count,)."""
+    fields = numeric_keys(stage.flat())
+    within = np.all([fields[key].bound.holds(values) for key, values in keys.items()], axis=0)
+    why = np.full(count, "", dtype=object)
+    some = np.flatnonzero(within)
+    for wrong, reason in violations(laid_over(stage, {key: values[some] for key, values in keys.items()})):
+        which = some[np.broadcast_to(wrong, some.shape)]
+        why[which[why[which] == ""]] = reason
+    return within & (why == ""), why
+
+
+def laid_over(stage: Stage, keys: Mapping[str, np.ndarray]) -> dict[str, Any]:
+    """The flat keys of drawn stages. The controller is tuned as it is: it does not know the mass that was drawn."""
+    flat = stage.flat()
+    tuned = {key: flat[key] for key in ("controller.tuned_mass",) if key in flat}
+    return stage.flat(tuned | dict(keys))

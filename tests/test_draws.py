@@ -1,0 +1,205 @@
+"""The probability that an uncertain stage hunts: against known edges, single stages and made-up verdicts."""
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.stats import beta
+
+import friso
+from friso.cli import main
+from friso.stage import Stage, save
+from friso.stage.correlations import Correlations, Drawn, draw
+from friso.studies.draws import ATTRACTED, WORDS, Fates, different, fates
+from friso.views.draws import Drawing, draws_document, draws_figure, draws_rows, draws_sentences
+
+pytestmark = pytest.mark.xdist_group("rig")
+
+CROSSOVER = "controller.crossover"
+EDGE = 9.75
+"""Crossover [Hz] at which the rig, its joint locked, stops hunting (tests/test_cli.py)."""
+
+
+def locked(rig: Stage, crossover: str) -> Stage:
+    """The rig with its joint locked as by fixtures that nobody takes off: its one case."""
+    return rig.replace({"joint.locked": True, "joint.stiffness": None, CROSSOVER: crossover})
+
+
+def fate(stage: Stage, count: int, seed: int = 0) -> tuple[Fates, Drawn]:
+    drawn = draw(stage, Correlations(), count, seed)
+    return fates(stage, drawn, 1e-6)["given"], drawn
+
+
+def test_half_of_the_stages_about_the_edge_hunt(rig: Stage) -> None:
+    """Those below it have a cycle that attracts, and no other."""
+    found, drawn = fate(locked(rig, "9.75 Hz +/- 1.5 Hz"), 16)
+    clear = np.abs(drawn.keys[CROSSOVER] - EDGE) > 0.04  # so near, friso check too takes a transient for hunting
+    assert clear.sum() >= 14
+    below = drawn.keys[CROSSOVER] < EDGE
+    assert np.array_equal(np.isin(found.verdicts, ATTRACTED)[clear], below[clear])
+    share = found.share(ATTRACTED)
+    assert share.probability == pytest.approx(0.5, abs=0.1)
+    assert share.low < 0.5 < share.high
+    assert found.separations(drawn.keys)[CROSSOVER] == pytest.approx(-1, abs=0.05)
+
+
+@pytest.mark.parametrize(("crossover", "words"), [("8 Hz +/- 2 %", ATTRACTED), ("20 Hz .. 22 Hz", ("settles",))])
+def test_all_stages_far_from_the_edge_share_their_fate(rig: Stage, crossover: str, words: tuple[str, ...]) -> None:
+    found, drawn = fate(locked(rig, crossover), 8)
+    assert found.share(words).probability == 1
+    assert found.share(words).low == pytest.approx(0.025 ** (1 / 8), rel=1e-6)
+    assert found.share(words).high == 1
+    assert found.separations(drawn.keys) == {}
+
+
+def test_verdicts_are_those_of_single_stages(rig: Stage) -> None:
+    """The slow twin: friso check on each of the stages that were drawn."""
+    stage = locked(rig, "6 Hz .. 14 Hz").replace({"friction.static": "2.5 N +/- 0.5 N"})
+    found, drawn = fate(stage, 3, seed=3)
+    alone = [
+        friso.check(stage.with_numbers({key: float(values[k]) for key, values in drawn.keys.items()}))["given"].verdict
+        for k in range(drawn.count)
+    ]
+    assert found.verdicts.tolist() == alone
+    assert len(set(alone)) > 1
+
+
+def test_cases_and_seeds(rig: Stage) -> None:
+    """The free joint settles where the locked one hunts; "given" is the free one; the same seed, the same verdicts."""
+    stage = rig.replace({CROSSOVER: "8 Hz +/- 1 %"})
+    drawn, seen = draw(stage, Correlations(), 4, seed=1), []
+    found = fates(stage, drawn, 1e-6, seen.append)
+    assert sum(seen) == 4 * len(different(stage)) == 8
+    assert found["given"] is found["free"]
+    assert found["free"].counts["settles"] == 4
+    assert found["locked"].share(ATTRACTED).probability == 1
+    again = fates(stage, draw(stage, Correlations(), 4, seed=1), 1e-6)
+    assert all(np.array_equal(again[name].verdicts, found[name].verdicts) for name in found)
+
+
+def test_a_stage_that_cannot_hunt_settles(rig: Stage) -> None:
+    """Its reference never stands still: it may stick and slip, but hunts about no place."""
+    ramp = {"motion": {"kind": "ramp", "velocity": "0.1 m/s", "duration": "20 s"}}
+    stage = locked(rig, "8 Hz +/- 1 %")
+    found, drawn = fate(stage.replace(ramp), 8)
+    assert found.verdicts[0] == friso.check(stage.replace(ramp)).popitem()[1].verdict
+    assert found.share(ATTRACTED).probability == 0
+    assert drawn.count == 8
+
+
+# what is made of verdicts
+
+
+def made(hunts: int, settles: int, failed: int = 0) -> Fates:
+    return Fates(np.array(["hunts"] * hunts + ["settles"] * settles + ["failed"] * failed, dtype=object))
+
+
+def test_failures_widen_the_interval() -> None:
+    """As if none, and as if all of them hunted (Clopper and Pearson, by the beta distribution)."""
+    share = made(30, 60, 10).share(("hunts",))
+    assert share.probability == pytest.approx(30 / 90)
+    assert share.low == pytest.approx(beta(30, 71).ppf(0.025))
+    assert share.high == pytest.approx(beta(41, 60).ppf(0.975))
+    assert made(0, 5).share(("hunts",)).low == 0
+    assert np.isnan(made(0, 0, 5).share(("hunts",)).probability)
+    assert (made(0, 0, 5).share(("hunts",)).low, made(0, 0, 5).share(("hunts",)).high) == (0, 1)
+
+
+def test_the_decisive_key_comes_first() -> None:
+    found, rng = made(50, 50, 4), np.random.default_rng(0)
+    keys = {
+        "nothing": rng.normal(size=104),
+        "falls": np.arange(104.0),
+        "some": np.r_[rng.normal(0.5, 1, 50), rng.normal(0, 1, 54)],
+    }
+    known = found.separations(keys)
+    assert list(known) == ["falls", "some", "nothing"]
+    assert known["falls"] == -1
+    assert 0.1 < known["some"] < 0.5
+
+
+def drawing(found: Fates) -> Drawing:
+    count = len(found.verdicts)
+    drawn = Drawn({"friction.coulomb": np.linspace(0.5, 1.5, count)}, count, 2, {"a rule": 3})
+    return Drawing(drawn, 7, {"given": found}, {"given": "As given"}, {"friction.coulomb": "N"})
+
+
+def test_document_rows_and_sentences() -> None:
+    shown = drawing(made(6, 3, 1))
+    document = json.loads(json.dumps(draws_document(shown, "given"), allow_nan=False))
+    assert document["verdicts"] == {"hunts": 6, "bistable": 0, "transient": 0, "settles": 3, "failed": 1}
+    assert (document["count"], document["seed"], document["left_out"]) == (10, 7, 5)
+    assert document["hunts"]["probability"] == pytest.approx(2 / 3)
+    assert document["separation"] == {"friction.coulomb": -1.0}
+    rows = dict(draws_rows(shown))
+    assert rows["Verdict hunts"] == ["6"]
+    assert rows["Decided by friction.coulomb"] == ["-1.00"]
+    says = " ".join(draws_sentences(shown))
+    assert "hunts with a probability of 66.7 % (26.2 to 93.3 %)" in says
+    assert "1 draws failed" in says
+    assert "smaller values hunt" in says
+    assert "5 draws that no stage may have were left out (2: a key beyond its bound; 3: a rule)" in says
+    unknown = draws_document(drawing(made(0, 0, 3)), "given")
+    assert unknown["hunts"] == {"probability": None, "low": 0.0, "high": 1.0}
+
+
+def test_the_figure_holds_every_draw() -> None:
+    (panel,) = draws_figure(drawing(made(60, 30, 10))).panels
+    assert [band.label for band in panel.bands] == [word for word in WORDS if word in ("hunts", "settles", "failed")]
+    assert panel.bands[-1].high[::2].sum() == 100
+    assert panel.x.label == "friction.coulomb [N]"
+    assert draws_figure(drawing(made(0, 30))).panels[0].title == "As given: all settles"
+
+
+# the command
+
+
+def run(monkeypatch: pytest.MonkeyPatch, *arguments: object) -> int:
+    monkeypatch.setattr(sys, "argv", ["friso", *map(str, arguments)])
+    with pytest.raises(SystemExit) as left:
+        main()
+    return int(left.value.code or 0)
+
+
+def test_check_draws(
+    rig: Stage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """With correlations from the file beside it; a key made certain by --set leaves them."""
+    path = tmp_path / "stage.toml"
+    friction = {"friction.static": "3 N +/- 1 %", "friction.coulomb": "1 N +/- 1 %"}
+    save(locked(rig, "14 Hz +/- 1 %").replace(friction), path)
+    beside = tmp_path / "stage.correlations.toml"
+    beside.write_text('keys = ["friction.static", "friction.coulomb"]\nmatrix = [[1, 1], [1, 1]]')
+    options = ("--draws", "8", "--json", "--set", "friction.coulomb=1 N", "--out", tmp_path)
+    assert run(monkeypatch, "check", path, *options) == 0
+    said = capsys.readouterr()
+    assert "centre" not in said.err
+    draws = json.loads(said.out)["cases"]["given"]["draws"]
+    assert set(draws["verdicts"]) == set(WORDS)
+    assert sum(draws["verdicts"].values()) == 8
+    assert draws["attracting_cycle"]["probability"] == 0
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "What if the numbers are off?" in page
+    assert "of 8 draws, hunts with a probability of 0.0 %" in page
+    beside.write_text('keys = ["masses.cart"]\nmatrix = [[1]]')
+    assert run(monkeypatch, "check", path, *options) == 2
+    assert "masses.cart, which is not uncertain" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (("--draws", "8"), "no key is uncertain"),
+        (("--draws", "0", "--set", "masses.cart=1 kg +/- 1 %"), "a whole number from 1 to 100000"),
+        (("--draws", "8", "--seed", "-1", "--set", "masses.cart=1 kg +/- 1 %"), "a whole number from 0"),
+    ],
+)
+def test_check_draws_refused(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], options: tuple[str, ...], said: str
+) -> None:
+    assert run(monkeypatch, "check", Path(__file__).parents[1] / "examples" / "thesis_rig.toml", *options) == 2
+    shown = capsys.readouterr()
+    assert shown.out == ""
+    assert said in shown.err

@@ -1,0 +1,268 @@
+"""Stage files whose quantities are uncertain, the correlations beside them, and stages drawn from both."""
+
+import pickle
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.stats import kstest, norm, spearmanr, truncnorm
+
+from friso.cli.common import read_stage
+from friso.intervals import COVERAGE, UncertainValue
+from friso.quantities import StageError
+from friso.stage import Stage, load, numeric_keys, parse_set, save
+from friso.stage.correlations import Correlations, beside, draw, laid_over, read_correlations, write_correlations
+
+EXAMPLE = Path(__file__).parents[1] / "examples" / "thesis_rig.toml"
+COULOMB, STATIC, VISCOUS = "friction.coulomb", "friction.static", "friction.viscous"
+
+
+def uncertain(rig: Stage, **texts: str) -> Stage:
+    """The rig with friction keys written like this."""
+    return rig.replace({f"friction.{key}": text for key, text in texts.items()})
+
+
+# reading
+
+
+@pytest.mark.parametrize(
+    ("text", "centre", "low", "high", "form"),
+    [
+        ("2.4 N +/- 0.1 N", 2.4, 2.3, 2.5, "tolerance"),
+        ("2.4 N ± 100 mN", 2.4, 2.3, 2.5, "tolerance"),
+        ("2.4 N +/- 5 %", 2.4, 2.28, 2.52, "tolerance"),
+        ("2 N .. 3 N", 2.5, 2.0, 3.0, "range"),
+        ("2000 mN..3N", 2.5, 2.0, 3.0, "range"),
+        ("0.1 N +/- 3 N", 0.1, -2.9, 3.1, "tolerance"),
+    ],
+)
+def test_centre_and_interval(rig: Stage, text: str, centre: float, low: float, high: float, form: str) -> None:
+    """The float is the centre, exactly; a normal distribution may reach beyond the bound of its key."""
+    stage = uncertain(rig, coulomb=text)
+    assert stage.flat()[COULOMB] == centre
+    (found,) = stage.uncertain().items()
+    assert found[0] == COULOMB
+    assert (found[1].low, found[1].high) == pytest.approx((low, high), rel=1e-12)
+    assert (found[1].form, found[1].text) == (form, text)
+
+
+def test_a_plain_stage_is_not_uncertain(rig: Stage) -> None:
+    assert rig.uncertain() == {}
+    assert uncertain(rig, coulomb="1 N +/- 0 N", static="3 N .. 3 N").uncertain() == {}
+
+
+def test_every_numeric_key_may_be_uncertain(rig: Stage) -> None:
+    """All keys that the rig gives, dimensionless ones as a text."""
+    given, known = rig.given(), numeric_keys(rig.flat())
+    keys = [key for key in known if key.split(".")[1] in given.get(key.split(".")[0], {})]
+    assert len(keys) == sum(isinstance(value, float) for value in rig.flat().values())
+    texts = {key: f"{given[key.split('.')[0]][key.split('.')[1]]} +/- 1 %" for key in keys}
+    stage = rig.replace(texts)
+    assert set(stage.uncertain()) == set(keys)
+    assert stage.flat() == rig.flat()
+    assert stage == rig
+
+
+@settings(max_examples=25, deadline=None, derandomize=True)
+@given(low=st.floats(0.01, 1), width=st.floats(0.001, 1), percent=st.floats(0.1, 99))
+def test_save_and_load(low: float, width: float, percent: float, tmp_path_factory: pytest.TempPathFactory) -> None:
+    texts = {
+        COULOMB: f"{low!r} N .. {low + width!r} N",
+        "controller.alpha": f"0.1 +/- {percent!r} %",
+        "masses.cart": f"1.2 kg +/- {width!r} kg",
+    }
+    stage, path = load(EXAMPLE).replace(texts), tmp_path_factory.mktemp("s") / "stage.toml"
+    save(stage, path)
+    again = load(path)
+    assert again == stage
+    assert again.given() == stage.given()
+    assert again.uncertain() == stage.uncertain()
+    assert again.to_toml() == path.read_text(encoding="utf-8")
+
+
+def test_value_survives_pickling_and_set(rig: Stage) -> None:
+    key, text = parse_set('friction.coulomb="2 N +/- 1 N"')
+    stage = rig.replace({key: text})
+    value = pickle.loads(pickle.dumps(stage)).friction.coulomb
+    assert isinstance(value, UncertainValue)
+    assert (value, value.text, value.interval) == (2.0, "2 N +/- 1 N", stage.uncertain()[COULOMB])
+    assert stage.replace({"joint.locked": True}).uncertain() == stage.uncertain()
+    assert stage.replace({COULOMB: "2 N"}).uncertain() == {}
+
+
+@pytest.mark.parametrize(
+    ("key", "text", "said"),
+    [
+        (COULOMB, "2 +/- 1 N", "its unit is missing"),
+        (COULOMB, "2 N +/- 1", "its unit is missing"),
+        (COULOMB, "2 N +/- 1 mm", "mm is not convertible to N"),
+        (COULOMB, "2 N .. 1 N", "a reversed range"),
+        (COULOMB, "-1 N .. 2 N", "greater than 0"),
+        (COULOMB, "-1 N +/- 2 N", "greater than 0"),
+        (COULOMB, "2 N +/- -1 N", "0 or greater|-1 N"),
+        (COULOMB, "2 N .. 5 N", "no larger than static"),
+        ("controller.alpha", "0.5 .. 1", "between 0 and 1"),
+        ("controller.alpha", "0.5 +/- nan", "a number|nan"),
+        ("controller.kind", "pid .. pd", 'one of "pid"'),
+        ("joint.locked", "0 .. 1", "true or false"),
+        ("controller.alpha", "0.1", "a bare number without quotes"),
+    ],
+)
+def test_refused(rig: Stage, key: str, text: str, said: str) -> None:
+    with pytest.raises(StageError, match=said) as caught:
+        rig.replace({key: text})
+    assert key in caught.value.key
+
+
+def test_a_number_of_leaves_is_certain() -> None:
+    leaves = load(EXAMPLE.parent / "thesis_leaves.toml")
+    for text in ("2 +/- 1", "2 .. 4"):
+        with pytest.raises(StageError, match="a whole number"):
+            leaves.replace({"flexure.leaves": text})
+
+
+def test_specifications_take_no_uncertain_value() -> None:
+    """One value is meant there, or a range that is allowed: not what is known of a machine."""
+    from friso.design.spec import Machine
+
+    with pytest.raises(StageError, match="bandwidth_limit"):
+        Machine(bandwidth_limit="48 Hz +/- 5 Hz")
+
+
+def test_single_valued_commands_say_that_centres_are_used(
+    rig: Stage, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "a.toml"
+    save(uncertain(rig, coulomb="1 N +/- 5 %", static="3 N +/- 5 %", viscous="0 N*s/m .. 1 N*s/m"), path)
+    read_stage(path, ["masses.cart=1 kg .. 2 kg"])
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "4 keys are uncertain (masses.cart, friction.static, friction.coulomb, ...)" in line
+    assert "their centres are used" in line
+    assert "friso check --draws 1000" in line
+    read_stage(path, None, drawn=True)
+    assert capsys.readouterr().err == ""
+
+
+# correlations
+
+
+def pair(value: float, keys: tuple[str, ...] = (COULOMB, VISCOUS)) -> Correlations:
+    return Correlations(keys, np.array([[1, value], [value, 1]]))
+
+
+def test_correlations_are_written_and_read(rig: Stage, tmp_path: Path) -> None:
+    stage = uncertain(rig, coulomb="1 N +/- 0.1 N", viscous="0.5 N*s/m +/- 0.1 N*s/m")
+    path = beside(tmp_path / "identified.toml")
+    assert path.name == "identified.correlations.toml"
+    write_correlations(pair(-0.8), stage, path)
+    found = read_correlations(path, stage)
+    assert found.keys == (COULOMB, VISCOUS)
+    assert np.array_equal(found.matrix, pair(-0.8).matrix)
+    assert found.among([VISCOUS]).keys == (VISCOUS,)
+    assert found.among([VISCOUS]).matrix.tolist() == [[1.0]]
+    assert found.among([]).over([COULOMB]).tolist() == [[1.0]]
+    with pytest.raises(StageError, match="exists already"):
+        write_correlations(pair(0.1), stage, path)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ('keys = ["friction.coulomb", "friction.viscous"]\nmatrix = [[1, 0.5], [0.4, 1]]', "not symmetric"),
+        ('keys = ["friction.coulomb", "friction.viscous"]\nmatrix = [[1, 1.5], [1.5, 1]]', "not positive semidefinite"),
+        ('keys = ["friction.coulomb", "friction.viscous"]\nmatrix = [[2, 0.5], [0.5, 1]]', "a diagonal that is not 1"),
+        ('keys = ["friction.coulomb", "friction.viscous"]\nmatrix = [[1]]', "1 x 1 numbers for 2 keys"),
+        ('keys = ["friction.coulomb", "friction.viscous"]\nmatrix = [[1, 0], [1]]', "rows of different lengths"),
+        ('keys = ["friction.coulomb", "friction.viscous"]\nmatrix = [[1, nan], [nan, 1]]', "not finite"),
+        ('keys = ["friction.coulomb", "friction.coulomb"]\nmatrix = [[1, 0], [0, 1]]', "friction.coulomb twice"),
+        ('keys = ["friction.static"]\nmatrix = [[1]]', "friction.static, which is not uncertain"),
+        ('keys = ["friction.colomb"]\nmatrix = [[1]]', "did you mean friction.coulomb"),
+        ('keys = "friction.coulomb"\nmatrix = [[1]]', "a list of keys"),
+        ('keys = ["friction.coulomb"]\nmatrix = [["1"]]', "a list of rows of numbers"),
+        ('keys = ["friction.coulomb"]', "a list of rows of numbers"),
+        ('keys = []\nmatrices = []', "did you mean matrix"),
+        ("keys = [", "not TOML"),
+        ("", "an empty file"),
+    ],
+)  # fmt: skip
+def test_correlations_refused(rig: Stage, tmp_path: Path, text: str, said: str) -> None:
+    stage, path = uncertain(rig, coulomb="1 N +/- 0.1 N", viscous="0 N*s/m .. 1 N*s/m"), tmp_path / "c.toml"
+    path.write_text(text)
+    with pytest.raises(StageError, match=said) as caught:
+        read_correlations(path, stage)
+    assert str(path) in str(caught.value)
+
+
+def test_correlations_of_certain_keys_are_not_written(rig: Stage, tmp_path: Path) -> None:
+    with pytest.raises(StageError, match="not uncertain"):
+        write_correlations(pair(0.5), uncertain(rig, coulomb="1 N +/- 0.1 N"), tmp_path / "c.toml")
+    assert not list(tmp_path.iterdir())
+
+
+# drawing
+
+
+def test_margins_are_those_written(rig: Stage) -> None:
+    stage = uncertain(rig, coulomb="1 N +/- 0.1 N", static="2.5 N .. 3.5 N")
+    drawn = draw(stage, Correlations(), 4096, seed=1)
+    assert drawn.left_out == 0
+    assert kstest(drawn.keys[COULOMB], norm(1, 0.1 / COVERAGE).cdf).statistic < 0.005
+    assert kstest(drawn.keys[STATIC], "uniform", args=(2.5, 1.0)).statistic < 0.005
+    assert np.mean(np.abs(drawn.keys[COULOMB] - 1) < 0.1) == pytest.approx(0.95, abs=0.002)
+    assert abs(spearmanr(drawn.keys[COULOMB], drawn.keys[STATIC]).statistic) < 0.02
+
+
+@pytest.mark.parametrize("value", [-1.0, -0.7, 0.3, 1.0])
+def test_correlations_are_those_of_the_file(rig: Stage, value: float) -> None:
+    """Of two normal keys their own; with a range between, Spearman's is that of the copula, 6/pi asin(rho/2)."""
+    stage = uncertain(rig, coulomb="1 N +/- 0.1 N", viscous="0.5 N*s/m +/- 0.1 N*s/m", static="2.9 N .. 3.1 N")
+    drawn = draw(stage, pair(value), 4096, seed=2)
+    assert np.corrcoef(drawn.keys[COULOMB], drawn.keys[VISCOUS])[0, 1] == pytest.approx(value, abs=0.01)
+    mixed = draw(stage, pair(value, (COULOMB, STATIC)), 4096, seed=2)
+    expected = 6 / np.pi * np.arcsin(value / 2)
+    assert spearmanr(mixed.keys[COULOMB], mixed.keys[STATIC]).statistic == pytest.approx(expected, abs=0.01)
+    assert abs(spearmanr(mixed.keys[COULOMB], mixed.keys[VISCOUS]).statistic) < 0.02
+
+
+def test_the_same_seed_gives_the_same_stages(rig: Stage) -> None:
+    stage = uncertain(rig, coulomb="1 N +/- 0.1 N", viscous="0 N*s/m .. 1 N*s/m")
+    first, again, other = (draw(stage, pair(0.5), 100, seed).keys[COULOMB] for seed in (3, 3, 4))
+    assert np.array_equal(first, again)
+    assert not np.array_equal(first, other)
+    assert first.shape == (100,)
+
+
+def test_what_reaches_beyond_the_bound_is_cut_off(rig: Stage) -> None:
+    drawn = draw(uncertain(rig, viscous="0.5 N*s/m +/- 1 N*s/m"), Correlations(), 2000, seed=5)
+    scale = 1 / COVERAGE
+    share = norm.cdf(-0.5 / scale)
+    assert drawn.beyond / (drawn.beyond + 2000) == pytest.approx(share, rel=0.05)
+    found = truncnorm(-0.5 / scale, np.inf, 0.5, scale)
+    assert kstest(drawn.keys[VISCOUS], found.cdf).statistic < 0.01
+    assert drawn.broken == {}
+
+
+def test_draws_that_break_a_rule_are_left_out_and_told(rig: Stage) -> None:
+    """Where 1.8 N to 3 N meet 2 N to 3 N, 0.5 of the area of 1.2 breaks the rule."""
+    drawn = draw(uncertain(rig, coulomb="1.8 N .. 3 N", static="2 N .. 3 N"), Correlations(), 1000, seed=6)
+    assert np.all(drawn.keys[COULOMB] <= drawn.keys[STATIC])
+    ((why, count),) = drawn.broken.items()
+    assert "Coulomb friction no larger than static friction" in why
+    assert count == drawn.left_out
+    assert count / (count + 1000) == pytest.approx(0.5 / 1.2, rel=0.05)
+
+
+def test_nothing_to_draw(rig: Stage) -> None:
+    with pytest.raises(StageError, match="no key is uncertain"):
+        draw(rig, Correlations(), 10, seed=0)
+
+
+def test_the_controller_does_not_know_the_mass_that_was_drawn(rig: Stage) -> None:
+    light = rig.replace({"controller.tuned_mass": None, "masses.cart": "1 kg .. 2 kg"})
+    drawn = draw(light, Correlations(), 8, seed=0)
+    assert laid_over(light, drawn.keys)["controller.tuned_mass"] == 2.0
+    unknown = light.replace({"controller.tuned_mass": "1 kg .. 2 kg"})
+    own = draw(unknown, Correlations(), 8, seed=0)
+    assert np.array_equal(laid_over(unknown, own.keys)["controller.tuned_mass"], own.keys["controller.tuned_mass"])
