@@ -21,7 +21,8 @@ CHUNK = 64
 @dataclass(frozen=True)
 class Inputs:
     """What the runs follow, every `sample_time` [s]: reference [m] and force on the stage besides the controller's [N],
-    both of shape (n,). Between samples the reference is a straight line, and the force held."""
+    both of shape (n,). Between samples the velocity of the reference, at each its central difference, is a straight
+    line, and the force is held."""
 
     reference: np.ndarray
     force: np.ndarray
@@ -34,7 +35,8 @@ class Inputs:
         rows = np.zeros((1, n + 1, 5))
         rows[0, :, 0] = np.arange(n + 1) * self.sample_time
         rows[0, :-1, 1], rows[0, :-1, 4] = self.reference, self.force
-        rows[0, :-2, 2] = np.diff(self.reference) / self.sample_time
+        rows[0, :-1, 2] = np.gradient(self.reference, self.sample_time)
+        rows[0, :-2, 3] = np.diff(rows[0, :-1, 2]) / self.sample_time
         return rows
 
 
