@@ -58,10 +58,11 @@ def follow(
     """
     count, segments = len(inputs.reference), inputs.segments
     options = Options(rtol=rtol, bands=(np.inf, np.inf), record_from=np.inf, least_swing=np.inf, budget=BUDGET * count)
+    size = float(np.abs(inputs.reference - starts[0, kernel.states.index("position")]).max())
     settings = settings_of(replace(options, interval=inputs.sample_time))
     for first in range(0, runs, CHUNK):
         numbers = np.arange(first, min(first + CHUNK, runs))
-        batch = prepare(kernel, _as_motion(flat, numbers, inputs), len(numbers), options, starts[numbers])
+        batch = prepare(kernel, _as_motion(flat, numbers, inputs, size), len(numbers), options, starts[numbers])
         every = np.full(len(numbers), inputs.sample_time)
         batch = batch._replace(segments=segments, first_steps=every, longest=every, windows=np.full(len(numbers), -1))
         results = empty_results(len(numbers), 1, count + 1, len(kernel.states))
@@ -69,9 +70,8 @@ def follow(
         yield Followed(numbers, results.samples[:, :-1], results.samples[:, 1:], results.statuses)
 
 
-def _as_motion(flat: Mapping[str, Any], numbers: np.ndarray, inputs: Inputs) -> dict[str, Any]:
-    """The flat keys of some runs, with a motion as long and as large as the log's."""
+def _as_motion(flat: Mapping[str, Any], numbers: np.ndarray, inputs: Inputs, size: float) -> dict[str, Any]:
+    """The flat keys of some runs, with a motion as long as the log, and as large [m]."""
     part = {key: value[numbers] if np.ndim(value) else value for key, value in flat.items()}
-    size = max(float(np.ptp(inputs.reference)), np.finfo(float).tiny)
     duration = len(inputs.reference) * inputs.sample_time
-    return part | {"motion.kind": "step", "motion.size": size, "motion.duration": duration}
+    return part | {"motion.kind": "step", "motion.size": size or np.finfo(float).tiny, "motion.duration": duration}

@@ -102,7 +102,7 @@ def inverse_model(log: Log, bandwidth: float | None = None, by_direction: bool =
     if len(force) < LEAST:
         given = f"{len(log.time)} samples, {len(force)} after decimation to {DECIMATE * band / PASS * 2:.3g} Hz"
         raise StageError("position", given, f"at least {LEAST} after decimation", "a longer log")
-    solution, *_ = np.linalg.lstsq(columns, force, rcond=None)
+    solution = np.linalg.lstsq(columns, force, rcond=None)[0]
     fitted = columns @ solution
     covariance = spread_of(columns, force - fitted)
     names = _NAMES[by_direction]

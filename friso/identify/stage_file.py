@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 
@@ -31,11 +32,9 @@ def made_up(log: Log, found: InverseModel) -> Stage:
     brisk = max(float(np.abs(part.acceleration).max()) for part in parts)
     time = max(top / brisk, log.sample_time)
     back = max(2.0, 3 * time)
-    return Stage(
-        name=log.name,
-        source=OUR_CHOICE,
-        masses={"cart": f"{mass:.6g} kg"},
-        friction={
+    tables: dict[str, Any] = {
+        "masses": {"cart": f"{mass:.6g} kg"},
+        "friction": {
             "model": "lugre",
             "static": f"{coulomb:.6g} N",
             "coulomb": f"{coulomb:.6g} N",
@@ -45,15 +44,16 @@ def made_up(log: Log, found: InverseModel) -> Stage:
             "bristle_damping": f"{math.sqrt(stiffness * mass):.6g} N*s/m",
             "viscous": f"{viscous:.6g} N*s/m",
         },
-        controller={"kind": "pid", "crossover": "10 Hz", "alpha": 0.1, "beta": 2},
-        motion={
+        "controller": {"kind": "pid", "crossover": "10 Hz", "alpha": 0.1, "beta": 2},
+        "motion": {
             "kind": "there_and_back",
             "acceleration": f"{brisk:.4g} m/s^2",
             "acceleration_time": f"{time:.4g} s",
             "return_at": f"{back:.4g} s",
             "duration": f"{2.5 * back:.4g} s",
         },
-    )
+    }
+    return Stage(name=log.name, source=OUR_CHOICE, **tables)
 
 
 def identified(stage: Stage, estimates: Iterable[Estimate], logs: Iterable[str]) -> Stage:

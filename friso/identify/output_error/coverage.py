@@ -51,7 +51,7 @@ class Coverage:
     def shows_length(self, length: float) -> bool:
         """Whether bristles are seen bending by a length [m], again and again."""
         seen = [np.sum((way > RESOLVED * self.resolution) & (way < length)) for way in self.starts]
-        return sum(count >= SAMPLES for count in seen) >= EPISODES
+        return bool(sum(count >= SAMPLES for count in seen) >= EPISODES)
 
 
 def coverage(position: np.ndarray, moved: Motion, mass: float, coulomb: float, sample_time: float) -> Coverage:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import lmfit
 import numpy as np
@@ -108,7 +109,7 @@ def _polished(problem: Problem, free: tuple[int, ...], inner: np.ndarray, before
     def jacobian(found: lmfit.Parameters) -> np.ndarray:
         return problem.jacobian(numbers(found), free)[1]
 
-    result = lmfit.minimize(residual, given, Dfun=jacobian, max_nfev=FINE * len(free), ftol=1e-6, xtol=1e-6)
+    result: Any = lmfit.minimize(residual, given, Dfun=jacobian, max_nfev=FINE * len(free), ftol=1e-6, xtol=1e-6)
     best = numbers(result.params)
     rest, slopes = problem.jacobian(best, free)
     return Fit(problem, best, free, spread_of(slopes, rest), rest, before, lmfit.fit_report(result))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -78,11 +78,12 @@ class Problem:
             found[numbers] = self.wanted - record.force
         return np.where(np.isfinite(found), found, np.inf)
 
-    def jacobian(self, inner: np.ndarray, free: Sequence[int]) -> tuple[np.ndarray, np.ndarray]:
+    def jacobian(self, inner: np.ndarray, free: Iterable[int]) -> tuple[np.ndarray, np.ndarray]:
         """Residual, shape (n,), and its derivatives to the free numbers, shape (n, free), from runs side by side."""
-        moved = np.tile(inner, (len(free) + 1, 1))
-        steps = np.array([self._step(inner, i) for i in free])
-        moved[np.arange(len(free)), list(free)] += steps
+        which = np.array([*free], dtype=int)
+        moved = np.tile(inner, (len(which) + 1, 1))
+        steps = np.array([self._step(inner, i) for i in which])
+        moved[np.arange(len(which)), which] += steps
         found = self.residuals(moved)
         return found[-1], ((found[:-1] - found[-1]) / steps[:, None]).T
 

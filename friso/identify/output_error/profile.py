@@ -56,15 +56,9 @@ def profile(fit: Fit, number: int, others: tuple[int, ...], best: float) -> Prof
     free[:, list(others)] = True
     cost = refine(fit.problem, starts, free, ROUNDS).cost if others else costs(fit.problem, starts)
     limit = best * (1 + WORSE / fit.independent)
-    ends = _ends(values, cost, limit)
-    return Profile(
-        parameter.name,
-        parameter.outer(values),
-        cost,
-        limit,
-        *(float(parameter.outer(end)) for end in ends[:2]),
-        *ends[2:],
-    )
+    left, right, open_left, open_right = _ends(values, cost, limit)
+    ends = float(parameter.outer(left)), float(parameter.outer(right))
+    return Profile(parameter.name, parameter.outer(values), cost, limit, *ends, open_left, open_right)
 
 
 def _ends(values: np.ndarray, cost: np.ndarray, limit: float) -> tuple[float, float, bool, bool]:
