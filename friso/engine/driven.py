@@ -22,21 +22,24 @@ CHUNK = 64
 class Inputs:
     """What the runs follow, every `sample_time` [s]: reference [m] and force on the stage besides the controller's [N],
     both of shape (n,). Between samples the velocity of the reference, at each its central difference, is a straight
-    line, and the force is held."""
+    line; the force is one too unless it is `held`, as a sampled drive does."""
 
     reference: np.ndarray
     force: np.ndarray
     sample_time: float
+    held: bool = True
 
     @property
     def segments(self) -> np.ndarray:
-        """The pieces of the engine, shape (1, n + 1, 5): a piece per sample, and the end."""
+        """The pieces of the engine, shape (1, n + 1, 6): a piece per sample, and the end."""
         n = len(self.reference)
-        rows = np.zeros((1, n + 1, 5))
+        rows = np.zeros((1, n + 1, 6))
         rows[0, :, 0] = np.arange(n + 1) * self.sample_time
         rows[0, :-1, 1], rows[0, :-1, 4] = self.reference, self.force
         rows[0, :-1, 2] = np.gradient(self.reference, self.sample_time)
         rows[0, :-2, 3] = np.diff(rows[0, :-1, 2]) / self.sample_time
+        if not self.held:
+            rows[0, :-2, 5] = np.diff(self.force) / self.sample_time
         return rows
 
 

@@ -10,10 +10,6 @@ from friso.equations.structure import Structure
 if TYPE_CHECKING:
     from friso.equations.model import Model
 
-INPUTS = 4
-"""What a run is given at every sample: position [m], velocity [m/s] and acceleration [m/s^2] of the reference, and the
-force [N] besides the controller's, which is held until the next sample."""
-
 
 @dataclass(frozen=True)
 class Driven:
@@ -25,11 +21,13 @@ class Driven:
 
 
 def driven(form: Driven) -> Model:
-    """The equations of the stage with what it is given."""
+    """The equations of the stage with what it is given at every sample: position [m], velocity [m/s] and acceleration
+    [m/s^2] of the reference, and the force [N] besides the controller's with its rate [N/s]."""
     from dataclasses import replace
 
-    from friso.equations.component import key
+    from friso.equations.component import TIME, key
     from friso.equations.model import REFERENCE, assemble
 
-    external = key("reference.force")
-    return replace(assemble(form.structure, external, form.velocity_samples), inputs=(*REFERENCE, external))
+    force, rate = key("external.force"), key("external.rate")
+    model = assemble(form.structure, force + rate * TIME, form.velocity_samples)
+    return replace(model, inputs=(*REFERENCE, force, rate))

@@ -11,7 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import butter, cheby1, filtfilt, sosfiltfilt
+from scipy.signal import butter, cheby1, sosfiltfilt
 
 from friso.identify.estimate import Estimate
 from friso.identify.logs.log import Log
@@ -73,8 +73,8 @@ def motion(position: np.ndarray, sample_time: float, cutoff: float) -> Motion:
     """The motion of a measured position, shape (n,) [m], smoothed forward and back at the cut-off frequency [Hz]."""
     smooth = position
     if cutoff < 0.5 / sample_time:
-        b, a = butter(ORDER, 2 * cutoff * sample_time)
-        smooth = filtfilt(b, a, position, padlen=min(3 * ORDER, len(position) - 1))
+        sections = butter(ORDER, 2 * cutoff * sample_time, output="sos")
+        smooth = sosfiltfilt(sections, position, padlen=min(3 * ORDER, len(position) - 1))
     velocity = np.gradient(smooth, sample_time)
     return Motion(smooth, velocity, np.gradient(velocity, sample_time))
 

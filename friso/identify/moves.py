@@ -13,7 +13,7 @@ from friso.identify.estimate import Estimate
 from friso.identify.inverse_model import SMOOTH, InverseModel, inverse_model, motion
 from friso.identify.logs.log import Log
 from friso.identify.output_error.coverage import Coverage, coverage
-from friso.identify.output_error.fit import Fit, fit
+from friso.identify.output_error.fit import Fit, first_values, fit
 from friso.identify.output_error.parameters import LONGEST, RATIO, Parameter, keys_of, parameters_of
 from friso.identify.output_error.problem import Problem, Simulated, closed_loop, tracking
 from friso.identify.output_error.profile import Profile, profile
@@ -23,6 +23,9 @@ METHOD = "output error"
 
 STRIBECK = (RATIO, "friction.stribeck_velocity")
 BRISTLES = ("friction.bristle_stiffness", "friction.bristle_damping")
+
+STEP_OUT = 1.5
+"""A closed loop that leaves so many times the residual of the stage that follows the log has got out of step."""
 
 SHARP = 3.0
 """Factor between the ends of a profile interval within which a parameter counts as shown."""
@@ -74,14 +77,13 @@ def identify_moves(log: Log, flat: Mapping[str, Any], own_loop: bool, bandwidth:
     _has(log, ("position", "force", *(("reference",) if own_loop else ())))
     part = longest(log)
     inverse, by_direction = (inverse_model(log, bandwidth, split) for split in (False, True))
-    problem = _problem(log, part, flat, inverse, own_loop)
+    follows, loop = _problems(log, part, flat, inverse, own_loop)
     moved = motion(log["position"][part], log.sample_time, SMOOTH * inverse.bandwidth)
     mass, coulomb = inverse.value("mass"), inverse.value("coulomb")
     covered = coverage(log["position"][part], moved, mass, coulomb, log.sample_time)
-    found, profiles, shown = _fitted(problem, covered)
+    found, profiles, shown = _fitted(follows, loop, covered)
     estimates, correlation = _estimates(found, profiles, shown, covered)
-    (_, record), *_ = found.problem.simulated(found.inner[None])
-    simulated = Simulated(record.position[0], record.velocity[0], record.force[0])
+    simulated = (loop or follows).record(found.inner)
     return Moves(
         log, part, inverse, by_direction, found, profiles, estimates, correlation, covered, simulated,
         errors_of(log, part, simulated, inverse.bandwidth),
@@ -93,8 +95,7 @@ def predict(found: Moves, log: Log) -> tuple[slice, Simulated, Errors]:
     """Another log of the same axis simulated with what was found: the samples used, the record, its errors."""
     part = longest(log)
     problem = _same_kind(found.fit.problem, log, part)
-    (_, record), *_ = problem.simulated(found.fit.inner[None])
-    simulated = Simulated(record.position[0], record.velocity[0], record.force[0])
+    simulated = problem.record(found.fit.inner)
     return part, simulated, errors_of(log, part, simulated, found.inverse.bandwidth)
 
 
@@ -114,38 +115,54 @@ def _has(log: Log, roles: Sequence[str]) -> None:
             raise StageError(role, f"a channel in {log.unit(role)}", "what one of these is in SI", example, log.name)
 
 
-def _problem(log: Log, part: slice, flat: Mapping[str, Any], inverse: InverseModel, own_loop: bool) -> Problem:
-    """The stage, with all the parameters that may be shown present in its equations."""
+def _problems(
+    log: Log, part: slice, flat: Mapping[str, Any], inverse: InverseModel, own_loop: bool
+) -> tuple[Problem, Problem | None]:
+    """The stage following the log's position, and in its own loop, with all the parameters in its equations."""
     speed = float(np.abs(motion(log["position"][part], log.sample_time, SMOOTH * inverse.bandwidth).velocity).max())
     levels = {name: inverse.value(name) for name in ("mass", "viscous", "coulomb", "offset")}
     levels |= {name: max(levels[name], 1e-6) for name in ("mass", "viscous", "coulomb")}
     parameters = parameters_of(flat, levels, speed, float(np.ptp(log["position"][part])))
-    starts = {each.name: each.start for each in parameters}
-    full = {**flat, **keys_of(flat, starts)}
-    if own_loop:
-        return closed_loop(full, log, part, parameters)
-    return tracking(full, log, part, parameters, inverse.bandwidth)
+    full = {**flat, **keys_of(flat, {each.name: each.start for each in parameters})}
+    follows = tracking(full, log, part, parameters, inverse.bandwidth)
+    return follows, closed_loop(full, log, part, parameters) if own_loop else None
 
 
-def _fitted(problem: Problem, covered: Coverage) -> tuple[Fit, dict[str, Profile], set[str]]:
-    """The fit, the profile of every parameter, and which of those that not every motion shows it does show."""
-    names = [each.name for each in problem.parameters]
-    core = tuple(i for i, each in enumerate(problem.parameters) if each.core)
-    start = np.array([each.inner(each.start) for each in problem.parameters])
-    plain = fit(problem, core, start)
-    every = tuple(range(len(names)))
-    asked = {name for name, each in zip(names, problem.parameters, strict=True) if not each.core}
-    hopeful = {name for name in asked if _may_show(name, covered, problem)}
+def _fitted(follows: Problem, loop: Problem | None, covered: Coverage) -> tuple[Fit, dict[str, Profile], set[str]]:
+    """The fit, the profile of every parameter, and which of those that not every motion shows it does show.
+
+    Which they are is told by the stage that follows the log, since a closed loop that hunts soon gets out of step; the
+    loop then has the last word, unless it cannot follow.
+    """
+    parameters = follows.parameters
+    names = [each.name for each in parameters]
+    core = {each.name for each in parameters if each.core}
+    asked = {*names} - core
+    plain = fit(follows, _numbers(names, core), first_values(parameters))
+    hopeful = {name for name in asked if _may_show(name, covered, follows)}
     shown: set[str] = set()
     found = plain
     if hopeful:
-        whole = fit(problem, tuple(i for i in every if names[i] in hopeful or i in core), plain.inner)
-        shown = {name for name in hopeful if _shows(whole, names.index(name), covered)}
-        shown -= set(STRIBECK) if not set(STRIBECK) <= shown | (set(STRIBECK) - asked) else set()
-        free = tuple(i for i in every if names[i] in shown or i in core)
-        found = fit(problem, free, np.where(np.isin(every, free), whole.inner, plain.inner)) if shown else plain
+        whole = fit(follows, _numbers(names, core | hopeful), plain.inner)
+        shown = _complete({name for name in hopeful if _shows(whole, names.index(name), covered)}, asked)
+        free = _numbers(names, core | shown)
+        neutral = np.where(np.isin(np.arange(len(names)), free), whole.inner, plain.inner)
+        found = fit(follows, free, neutral, search=False) if shown else plain
+    if loop is not None:
+        looped = fit(loop, found.free, found.inner, search=False)
+        found = looped if looped.cost < STEP_OUT**2 * found.cost else found
     profiles = {name: profile(found, i, _others(names, i, found.free), found.cost) for i, name in enumerate(names)}
     return found, profiles, shown
+
+
+def _numbers(names: Sequence[str], wanted: set[str]) -> tuple[int, ...]:
+    return tuple(i for i, name in enumerate(names) if name in wanted)
+
+
+def _complete(shown: set[str], asked: set[str]) -> set[str]:
+    """Without either of the Stribeck effect's parameters, the other one means nothing."""
+    effect = set(STRIBECK) & asked
+    return shown if effect <= shown else shown - effect
 
 
 def _others(names: Sequence[str], number: int, free: Sequence[int]) -> tuple[int, ...]:

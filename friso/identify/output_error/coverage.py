@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.signal import find_peaks
 
 from friso.identify.inverse_model import Motion
 
@@ -26,8 +27,8 @@ SAMPLES, EPISODES = 5, 3
 
 @dataclass(frozen=True)
 class Coverage:
-    """Speeds of steady motion [m/s], ascending, one per stretch, and the way [m] gone since the last rest or reversal
-    at each sample that was slow enough to follow friction, shape (n,), NaN at others. Below `resolution` [m] of
+    """Speeds of steady motion [m/s], ascending, one per stretch, and for each stretch between
+    turning points the ways [m] gone at its samples, NaN where inertia outweighed friction. Below `resolution` [m] of
     position nothing is seen, below `slowest` [m/s] no speed."""
 
     steady: np.ndarray
@@ -67,14 +68,14 @@ def coverage(position: np.ndarray, moved: Motion, mass: float, coulomb: float, s
     stretches = [(a, b) for a, b in zip(edges[::2], edges[1::2], strict=True) if b - a >= length]
     speeds = [_speeds(np.abs(moved.velocity[a:b]), length) for a, b in stretches]
     steady = np.sort(np.concatenate(speeds)) if speeds else np.zeros(0)
-    return Coverage(steady, _starts(position, moved, mass / coulomb, slowest), resolution, slowest)
+    return Coverage(steady, _starts(position, moved, mass / coulomb, RESOLVED * resolution), resolution, slowest)
 
 
-def _starts(position: np.ndarray, moved: Motion, mass_per_force: float, slowest: float) -> tuple[np.ndarray, ...]:
-    """Ways [m] gone from each rest or reversal to the next at the samples at which inertia was small."""
-    at_rest = np.abs(moved.velocity) <= slowest
-    turned = np.diff(np.sign(np.where(at_rest, 0.0, moved.velocity))) != 0
-    ends = np.flatnonzero(turned & ~at_rest[1:])  # the last samples before a motion in one direction
+def _starts(position: np.ndarray, moved: Motion, mass_per_force: float, swing: float) -> tuple[np.ndarray, ...]:
+    """Ways [m] gone from each turning point to the next at the samples at which inertia was small; a swing that is less
+    than `swing` [m] turns nothing."""
+    turns = (find_peaks(sign * position, prominence=swing)[0] for sign in (1, -1))
+    ends = np.unique(np.concatenate([[0], *turns]))
     calm = mass_per_force * np.abs(moved.acceleration) < STEADY
     pieces = zip(ends, [*ends[1:], len(position)], strict=True)
     return tuple(np.where(calm[a:b], np.abs(position[a:b] - position[a]), np.nan) for a, b in pieces)

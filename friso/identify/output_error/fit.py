@@ -64,12 +64,17 @@ def first_values(parameters: Sequence[Parameter]) -> np.ndarray:
     return np.array([each.inner(each.start) for each in parameters])
 
 
-def fit(problem: Problem, free: Sequence[int], neutral: np.ndarray) -> Fit:
-    """Fit the free parameters, given by number, of a problem; the others stay as in `neutral`, shape (parameters,)."""
+def fit(problem: Problem, free: Sequence[int], neutral: np.ndarray, search: bool = True) -> Fit:
+    """Fit the free parameters, given by number, of a problem; the others stay as in `neutral`, shape (parameters,).
+
+    The `search` from thousands of starts finds parameters that not every motion shows; without it, or where none of
+    them is free, the fit starts from `neutral`.
+    """
     mask = np.zeros(len(neutral), bool)
     mask[list(free)] = True
     before = float(costs(problem, neutral[None])[0])
-    kept = _screened(problem, mask, neutral)
+    core = np.array([each.core for each in problem.parameters])
+    kept = _screened(problem, mask, neutral) if search and (mask & ~core).any() else neutral[None]
     refined = refine(problem, kept, np.tile(mask, (len(kept), 1)), ROUGH)
     best = refined.inner[np.argmin(refined.cost)]
     return _polished(problem, tuple(free), best, before)
@@ -79,8 +84,6 @@ def _screened(problem: Problem, free: np.ndarray, neutral: np.ndarray) -> np.nda
     """The best starts, shape (kept, parameters), the neutral one always among them."""
     low, high = bounds_of(problem)
     core = np.array([each.core for each in problem.parameters])
-    if not (free & ~core).any():
-        return neutral[None]
     half = np.array([NARROW if each.logarithmic else NARROW * abs(each.start) for each in problem.parameters])
     low, high = np.where(core, neutral - half, low), np.where(core, neutral + half, high)
     shares = qmc.Sobol(len(neutral), rng=SEED).random(STARTS)
@@ -93,6 +96,7 @@ def _screened(problem: Problem, free: np.ndarray, neutral: np.ndarray) -> np.nda
 def _polished(problem: Problem, free: tuple[int, ...], inner: np.ndarray, before: float) -> Fit:
     """The end of the fit by lmfit, with derivatives from runs side by side."""
     low, high = bounds_of(problem)
+    mask = np.isin(np.arange(len(inner)), free)
     names = [f"p{i}" for i in free]
     given = lmfit.Parameters()
     for name, i in zip(names, free, strict=True):
@@ -107,9 +111,9 @@ def _polished(problem: Problem, free: tuple[int, ...], inner: np.ndarray, before
         return problem.residuals(numbers(found)[None])[0]
 
     def jacobian(found: lmfit.Parameters) -> np.ndarray:
-        return problem.jacobian(numbers(found), free)[1]
+        return problem.jacobians(numbers(found)[None], mask[None])[0][1]
 
     result: Any = lmfit.minimize(residual, given, Dfun=jacobian, max_nfev=FINE * len(free), ftol=1e-6, xtol=1e-6)
     best = numbers(result.params)
-    rest, slopes = problem.jacobian(best, free)
+    ((rest, slopes),) = problem.jacobians(best[None], mask[None])
     return Fit(problem, best, free, spread_of(slopes, rest), rest, before, lmfit.fit_report(result))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -30,7 +30,8 @@ SAME = 1e-3
 
 @dataclass(frozen=True)
 class Simulated:
-    """A simulated record: position, velocity and force of the controller, of shape (n,), SI; NaN after a failure."""
+    """Simulated records: position, velocity and force of the controller, SI, shape (runs, n) or of one run (n,); NaN
+    after a failure."""
 
     position: np.ndarray
     velocity: np.ndarray
@@ -61,7 +62,8 @@ class Problem:
 
     def beginning(self, count: int) -> Problem:
         """The same with the first so many samples alone."""
-        inputs = Inputs(self.inputs.reference[:count], self.inputs.force[:count], self.inputs.sample_time)
+        given = self.inputs
+        inputs = replace(given, reference=given.reference[:count], force=given.force[:count])
         return replace(self, inputs=inputs, wanted=self.wanted[:count])
 
     def simulated(self, inner: np.ndarray) -> Iterator[tuple[np.ndarray, Simulated]]:
@@ -71,6 +73,11 @@ class Problem:
         for runs in follow(self.kernel, flat, len(inner), self.inputs, starts, RTOL):
             yield runs.numbers, self._record(flat, runs)
 
+    def record(self, inner: np.ndarray) -> Simulated:
+        """The record of one run, each of shape (n,)."""
+        ((_, one),) = self.simulated(inner[None])
+        return Simulated(one.position[0], one.velocity[0], one.force[0])
+
     def residuals(self, inner: np.ndarray) -> np.ndarray:
         """Wanted minus simulated force [N], shape (runs, n); infinite for runs that failed."""
         found = np.empty((len(inner), len(self.wanted)))
@@ -78,14 +85,17 @@ class Problem:
             found[numbers] = self.wanted - record.force
         return np.where(np.isfinite(found), found, np.inf)
 
-    def jacobian(self, inner: np.ndarray, free: Iterable[int]) -> tuple[np.ndarray, np.ndarray]:
-        """Residual, shape (n,), and its derivatives to the free numbers, shape (n, free), from runs side by side."""
-        which = np.array([*free], dtype=int)
-        moved = np.tile(inner, (len(which) + 1, 1))
-        steps = np.array([self._step(inner, i) for i in which])
-        moved[np.arange(len(which)), which] += steps
-        found = self.residuals(moved)
-        return found[-1], ((found[:-1] - found[-1]) / steps[:, None]).T
+    def jacobians(self, inner: np.ndarray, free: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+        """For each row of fitted numbers, shape (rows, parameters), the residual, shape (n,), and its derivatives to
+        the numbers that are `free` in this row, shape (n, free); all from runs side by side."""
+        owner, number = np.nonzero(free)
+        steps = np.array([self._step(inner[row], int(i)) for row, i in zip(owner, number, strict=True)])
+        moved = inner[owner].copy()
+        moved[np.arange(len(owner)), number] += steps
+        found = self.residuals(np.vstack([inner, moved]))
+        at, off = found[: len(inner)], found[len(inner) :]
+        slopes = (off - at[owner]) / steps[:, None]
+        return [(at[row], slopes[owner == row].T) for row in range(len(inner))]
 
     def _step(self, inner: np.ndarray, i: int) -> float:
         """The step of a number, away from the nearer end of its range."""
@@ -159,7 +169,7 @@ def tracking(
     return Problem(
         kept | gains,
         Driven(form),
-        Inputs(log["position"][part], log["force"][part], log.sample_time),
+        Inputs(log["position"][part], log["force"][part], log.sample_time, "drive.sample_time" in flat),
         np.zeros(part.stop - part.start),
         tuple(parameters),
         False,

@@ -11,7 +11,7 @@ from friso.identify.output_error.fit import Fit
 from friso.identify.output_error.refine import bounds_of, costs, refine
 
 POINTS = 7
-"""Values of the parameter over its range (or about the fit) at which the others are fitted anew."""
+"""Values of the parameter over its range (or about the fit), besides its own, at which the others are fitted anew."""
 
 WIDE = 4.0
 """Standard deviations about the fit that the values reach, for a parameter whose spread is known."""
@@ -49,8 +49,8 @@ def profile(fit: Fit, number: int, others: tuple[int, ...], best: float) -> Prof
     half = WIDE * np.sqrt(spread)
     if np.isfinite(half):
         low, high = max(low, fit.inner[number] - half), min(high, fit.inner[number] + half)
-    values = np.linspace(low, high, POINTS)
-    starts = np.tile(fit.inner, (POINTS, 1))
+    values = np.unique([*np.linspace(low, high, POINTS), fit.inner[number]])
+    starts = np.tile(fit.inner, (len(values), 1))
     starts[:, number] = values
     free = np.zeros(starts.shape, bool)
     free[:, list(others)] = True

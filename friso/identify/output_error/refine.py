@@ -54,8 +54,7 @@ def refine(problem: Problem, starts: np.ndarray, free: np.ndarray, iterations: i
         if not busy.any():
             break
         trial = inner.copy()
-        for i in np.flatnonzero(busy):
-            trial[i] = _stepped(problem, inner[i], np.flatnonzero(free[i]), damping[i])
+        trial[busy] = _stepped(problem, inner[busy], free[busy], damping[busy])
         trial = np.clip(trial, low + margin, high - margin)
         found = np.full(len(inner), np.inf)
         found[busy] = costs(problem, trial[busy])
@@ -67,13 +66,14 @@ def refine(problem: Problem, starts: np.ndarray, free: np.ndarray, iterations: i
     return Refined(inner, cost)
 
 
-def _stepped(problem: Problem, inner: np.ndarray, free: np.ndarray, damping: float) -> np.ndarray:
-    """One damped Gauss-Newton step of the free numbers."""
-    residual, jacobian = problem.jacobian(inner, free)
-    square = jacobian.T @ jacobian
-    curvature = np.diag(square).copy()
-    curvature[curvature == 0] = 1.0
-    step = np.linalg.solve(square + damping * np.diag(curvature), -jacobian.T @ residual)
+def _stepped(problem: Problem, inner: np.ndarray, free: np.ndarray, damping: np.ndarray) -> np.ndarray:
+    """One damped Gauss-Newton step of the free numbers of every start."""
     moved = inner.copy()
-    moved[free] += step
+    for row, (residual, jacobian) in enumerate(problem.jacobians(inner, free)):
+        if not np.isfinite(jacobian).all():
+            continue
+        square = jacobian.T @ jacobian
+        curvature = np.diag(square).copy()
+        curvature[curvature == 0] = 1.0
+        moved[row, free[row]] += np.linalg.solve(square + damping[row] * np.diag(curvature), -jacobian.T @ residual)
     return moved
