@@ -10,8 +10,9 @@ import numpy as np
 
 class Batch(NamedTuple):
     """Runs of one model: constants (n, constants), start states, absolute tolerances (n, states), modes (n, kinks),
-    first and longest steps [s] (n,), pieces of the reference (n, pieces + 1, 4), of which the last one only ends the
-    run, and the number of the piece that begins the window in which extremes are taken (n,)."""
+    first and longest steps [s] (n,), pieces of the reference (n, pieces + 1, 1 + inputs), of which the last one only
+    ends the run (in the first dimension also 1: shared by all runs), and the number of the piece that begins the window
+    in which extremes are taken (n,)."""
 
     constants: np.ndarray
     starts: np.ndarray

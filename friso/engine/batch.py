@@ -153,7 +153,7 @@ def _run_with_room(
     if options.interval is not None:
         samples = int(np.max(part["motion.duration"]) / options.interval * (1 + 1e-12)) + 1
     results = empty_results(len(numbers), room, samples, len(kernel.states))
-    _run(kernel, batch, _settings(options), results, options.threads)
+    run_batch(kernel, batch, settings_of(options), results, options.threads)
     crowded = results.turn_counts > room
     if room >= MOST_TURNS:
         results.statuses[crowded] = Status.FULL
@@ -170,7 +170,8 @@ def _run_with_room(
         yield from _run_with_room(kernel, flat, again[first : first + fewer], 4 * room, options, starts)
 
 
-def _settings(options: Options) -> Settings:
+def settings_of(options: Options) -> Settings:
+    """The options as the kernel takes them."""
     return Settings(
         rtol=float(options.rtol),
         budget=float(options.budget),
@@ -183,7 +184,7 @@ def _settings(options: Options) -> Settings:
     )
 
 
-def _run(kernel: Kernel, batch: Batch, settings: Settings, results: Results, threads: int | None) -> None:
+def run_batch(kernel: Kernel, batch: Batch, settings: Settings, results: Results, threads: int | None) -> None:
     """Have threads take the runs of a chunk from a queue; the kernel runs without the interpreter's lock."""
     workers = min(threads or len(os.sched_getaffinity(0)), -(-len(batch.starts) // LANES))
     arguments = (new_queue(), batch, settings, results)

@@ -13,19 +13,26 @@ from friso.engine.cache import import_entry
 from friso.engine.kernel import compile_driver
 from friso.engine.module_source import write_module
 from friso.engine.tableaus import TABLEAUS
+from friso.equations.driven import Driven, driven
 from friso.equations.imposed import Imposed, imposed
-from friso.equations.model import assemble
+from friso.equations.model import Model, assemble
+from friso.equations.structure import Structure
 from friso.equations.variational import variational
 
 
 def main(entry: Path, task: bytes) -> None:
     wanted = pickle.loads(task)
-    form = wanted.structure
-    model = imposed(form) if isinstance(form, Imposed) else assemble(form)
+    model = _model(wanted.structure)
     model = variational(model) if wanted.variational else model
     source = write_module(model, TABLEAUS[wanted.method], repr(wanted), wanted.lanes)
     (entry / "kernel.py").write_text(source)
     compile_driver(import_entry(entry))
+
+
+def _model(form: Structure | Imposed | Driven) -> Model:
+    if isinstance(form, Imposed):
+        return imposed(form)
+    return driven(form) if isinstance(form, Driven) else assemble(form)
 
 
 if __name__ == "__main__":

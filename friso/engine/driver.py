@@ -5,7 +5,7 @@ names below the line `GENERATED` bound to those of the model at hand. It is neve
 """
 
 
-# GENERATED: np, LANES, STATES, KINKS, CONSTANTS, DENSE, ROWS, row numbers such as X, OLD, TIME, and step
+# GENERATED: np, LANES, STATES, KINKS, CONSTANTS, INPUTS, DENSE, ROWS, row numbers such as X, OLD, TIME, step, update
 
 
 def between(B, lane, i, theta):
@@ -142,8 +142,9 @@ def enter_segment(B, lane, segments, segment, window, first_step):
     B[START * LANES + lane] = segments[segment, 0]
     B[STOP * LANES + lane] = segments[segment + 1, 0] - segments[segment, 0]
     B[TIME * LANES + lane] = 0.0
-    for i in range(3):
+    for i in range(INPUTS):
         B[(REF + i) * LANES + lane] = segments[segment, 1 + i]
+    update(B, lane)
     if segment == window:
         away = B[(X + POSITION) * LANES + lane] - segments[segment, 1]
         B[DEVIATION_MAX * LANES + lane] = away
@@ -151,6 +152,11 @@ def enter_segment(B, lane, segments, segment, window, first_step):
     else:
         B[TRIAL * LANES + lane] = min(B[TRIAL * LANES + lane], first_step)
     return segment
+
+
+def pieces(batch, j):
+    """The pieces of the reference of run j; all runs may share those of one."""
+    return batch.segments[min(j, batch.segments.shape[0] - 1)]
 
 
 def load_run(B, lane, j, batch, settings):
@@ -166,8 +172,8 @@ def load_run(B, lane, j, batch, settings):
         B[(MODE + k) * LANES + lane] = batch.modes[j, k]
     B[TRIAL * LANES + lane] = batch.first_steps[j]
     B[LONGEST * LANES + lane] = batch.longest[j]
-    B[RECORD_FROM * LANES + lane] = min(settings.record_from, 0.5 * batch.segments[j, -1, 0])
-    return enter_segment(B, lane, batch.segments[j], 0, batch.windows[j], batch.first_steps[j])
+    B[RECORD_FROM * LANES + lane] = min(settings.record_from, 0.5 * pieces(batch, j)[-1, 0])
+    return enter_segment(B, lane, pieces(batch, j), 0, batch.windows[j], batch.first_steps[j])
 
 
 def start_run(B, lane, j, batch, settings, results):
@@ -213,7 +219,7 @@ def answer(B, lane, j, segment, batch, settings, results):
         note_samples(B, lane, fraction, settings.interval, results.samples[j])
     if not at_stop:
         return segment
-    return enter_segment(B, lane, batch.segments[j], segment + 1, batch.windows[j], batch.first_steps[j])
+    return enter_segment(B, lane, pieces(batch, j), segment + 1, batch.windows[j], batch.first_steps[j])
 
 
 def finish(B, lane, j, segment, batch, settings, results):

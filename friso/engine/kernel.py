@@ -19,6 +19,7 @@ from friso.engine.arrays import STATISTICS, Batch, Results, Settings
 from friso.engine.cache import load_or_build, stop_building
 from friso.engine.layout import LANES
 from friso.engine.shared_queue import new_queue
+from friso.equations.driven import Driven
 from friso.equations.imposed import Imposed
 from friso.equations.structure import Structure
 
@@ -53,17 +54,17 @@ class Kernel:
 
 @dataclass(frozen=True)
 class Wanted:
-    """Which kernel: for stages of this structure, or friction under an imposed motion, with their variational equations
-    or without, by the named method, in so many lanes."""
+    """Which kernel: for stages of this structure, stages that follow a log, or friction under an imposed motion, with
+    their variational equations or without, by the named method, in so many lanes."""
 
-    structure: Structure | Imposed
+    structure: Structure | Imposed | Driven
     variational: bool = False
     method: str = "Rodas5P"
     lanes: int = LANES
 
 
 def kernel(
-    structure: Structure | Imposed, variational: bool = False, method: str = "Rodas5P", lanes: int = LANES
+    structure: Structure | Imposed | Driven, variational: bool = False, method: str = "Rodas5P", lanes: int = LANES
 ) -> Kernel:
     """The kernel for stages of this structure, stepping by the named method in so many lanes.
 

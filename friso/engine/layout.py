@@ -44,6 +44,7 @@ class Layout:
     dense: int
     constants: int
     kinks: int
+    inputs: int
 
     @property
     def blocks(self) -> dict[str, int]:
@@ -55,7 +56,7 @@ class Layout:
             "tolerance": self.states,
             "constant": self.constants,
             "mode": self.kinks,
-            "reference": 3,
+            "reference": self.inputs,
         } | dict.fromkeys(SCALARS, 1)
         rows, row = {}, 0
         for name, size in sizes.items():

@@ -17,7 +17,7 @@ from friso.engine.layout import SCALARS, Layout
 from friso.engine.printing import Constants, Rename, print_scalar, reciprocals
 from friso.engine.tableaus.tableau import Tableau
 from friso.equations.component import TIME
-from friso.equations.model import REFERENCE, Model
+from friso.equations.model import Model
 
 THIRDS = (1 / 3, 2 / 3)
 """Where inside a step the kinks are looked at; with both ends they fix a cubic."""
@@ -81,7 +81,8 @@ class StepWriter:
         names = [str(symbol) for symbol in model.symbols]
         self._position, self._velocity = names.index("position"), names.index("velocity")
         self._fixed = {kink.beyond: f"mode{k}" for k, kink in enumerate(model.kinks)}
-        self._fixed |= dict(zip(REFERENCE, ("r_x", "r_v", "r_a"), strict=True))
+        self._inputs = [f"given{i}" for i in range(len(model.inputs))]
+        self._fixed |= dict(zip(model.inputs, self._inputs, strict=True))
         self._jacobian = self._nonzero_jacobian()
         self._drift = {i: d for i, f in enumerate(model.rhs) if (d := sp.diff(f, TIME)) != 0}
         force = model.outputs["force"].expression if "force" in model.outputs else sp.S.Zero
@@ -106,7 +107,9 @@ class StepWriter:
         ]
         free: set[Any] = set().union(*(sp.sympify(e).free_symbols for e in watched.values()))
         self._watched_states = sorted(self._index[s] for s in free & set(self._index))
-        self.layout = Layout(self.size, len(tableau.dense), len(self.constants.index), self.kinks)
+        at_corner = {f"new{self._index[x]}_": e.subs(TIME, 0) for x, e in model.updates.items()}
+        self._updates = Block(at_corner, self.constants)
+        self.layout = Layout(self.size, len(tableau.dense), len(self.constants.index), self.kinks, len(self._inputs))
 
     def _size(self, surface: sp.Expr) -> sp.Expr:
         """Magnitude of a surface that corresponds to the scales of the states."""
@@ -152,6 +155,16 @@ class StepWriter:
         head = "def step(B, rtol, inner, outer, budget):\n    align_stack()\n    for l in range(U(LANES)):\n"
         return head + "".join(f"        {line}\n" for line in body)
 
+    def update_source(self) -> str:
+        """The function `update(B, lane)`: what states that are held between corners become at one."""
+        block, rows = self._updates, self.layout.blocks
+        places = {x: rows["x"] + i for x, i in self._index.items()}
+        places |= {x: rows["reference"] + i for i, x in enumerate(self.model.inputs)}
+        places |= {c: rows["constant"] + i for c, i in self.constants.index.items()}
+        lines = block.code("", lambda symbol: f"B[{places[symbol]} * LANES + lane]")
+        lines += [f"B[{places[x]} * LANES + lane] = new{self._index[x]}_" for x in self.model.updates]
+        return "def update(B, lane):\n" + "".join(f"    {line}\n" for line in lines or ["pass"])
+
     def _row(self, block: str, i: int = 0) -> str:
         return f"B[l + U({self.layout.blocks[block] + i} * LANES)]"
 
@@ -161,7 +174,7 @@ class StepWriter:
             "tolerance": [f"tol{i}" for i in range(self.size)],
             "constant": [str(c) for c in self.constants.index],
             "mode": [f"mode{k}" for k in range(self.kinks)],
-            "reference": ["r_x", "r_v", "r_a"],
+            "reference": self._inputs,
         }
         lines = [f"{name} = {self._row(b, i)}" for b, names in named.items() for i, name in enumerate(names)]
         return lines + [f"{'t' if name == 'time' else name} = {self._row(name)}" for name in SCALARS]

@@ -13,7 +13,8 @@ from friso.equations.friction.common import Friction
 from friso.equations.joint import joint
 from friso.equations.masses import Body, parasitic_force, position_outputs
 from friso.equations.pid import Controller, Loop, controller, loop_stiffness
-from friso.equations.structure import Structure
+from friso.equations.sampled import sampled_controller
+from friso.equations.structure import ControllerForm, Structure
 from friso.stage.tables import friction_law
 
 REFERENCE = tuple(key(f"reference.{name}") for name in ("position", "velocity", "acceleration"))
@@ -36,6 +37,9 @@ class Model:
     the motion from which the solver takes its absolute tolerances, `breakaway` [N] the largest friction force at rest
     and `stiffness` [N/m] the proportional one of the loop. `jumps` tells by how much states jump where a
     kink is crossed, in terms of what holds just before: kinks to states to expressions.
+
+    `inputs` are what a run is given anew at every corner of the reference, in this order; `updates` tells what states
+    that are held between corners become at each, in terms of what holds just before.
     """
 
     states: tuple[State, ...]
@@ -48,6 +52,8 @@ class Model:
     breakaway: sp.Expr
     stiffness: sp.Expr
     jumps: Mapping[Kink, Mapping[sp.Symbol, sp.Expr]] = field(default_factory=dict)
+    inputs: tuple[sp.Symbol, ...] = REFERENCE
+    updates: Mapping[sp.Symbol, sp.Expr] = field(default_factory=dict)
 
     @property
     def symbols(self) -> tuple[sp.Symbol, ...]:
@@ -61,14 +67,17 @@ class Model:
     def parameters(self) -> tuple[sp.Symbol, ...]:
         """The stage-file keys (and the length of the motion) that the equations contain, sorted by name."""
         expressions = [*self.rhs, *(k.surface for k in self.kinks), *(o.expression for o in self.outputs.values())]
-        expressions += [each.scale for each in self.states]
-        others = {*self.symbols, *(k.beyond for k in self.kinks), *REFERENCE, TIME}
+        expressions += [*(each.scale for each in self.states), *self.updates.values()]
+        others = {*self.symbols, *(k.beyond for k in self.kinks), *self.inputs, TIME}
         free: set[Any] = set().union(*(e.free_symbols for e in expressions)) - others
         return tuple(sorted(free, key=str))
 
 
-def assemble(structure: Structure) -> Model:
-    """The equations of every stage with this structure."""
+def assemble(structure: Structure, external: sp.Expr = sp.S.Zero, velocity_samples: int = 0) -> Model:
+    """The equations of every stage with this structure, on which an `external` force [N] acts besides the actuator's.
+
+    With `velocity_samples`, the controller is that of a sampled drive, which takes the velocity over so many samples.
+    """
     cart, stage, parasitic = _bodies(structure)
     friction = friction_law(structure.friction).declare(cart.velocity, structure.friction_variant)
     position, velocity, acceleration = REFERENCE
@@ -77,8 +86,11 @@ def assemble(structure: Structure) -> Model:
     moving = cart.mass + (stage.mass if stage is not cart else 0) + (parasitic.mass if parasitic else 0)
     length, rate = _scales(structure, friction, moving)
     loop = Loop(reference - stage.position, stage.position, stage.velocity, reference_velocity)
-    control = controller(structure.controller, loop, length, rate) if structure.controller else None
-    bodies, parts = _mechanics(structure, (cart, stage, parasitic), friction, control, (length, rate))
+    control = _control(structure.controller, loop, velocity_samples, (length, rate))
+    forces = (control.force if control else sp.S.Zero) + external
+    bodies, parts = _mechanics(structure, (cart, stage, parasitic), friction, forces, (length, rate))
+    if control:
+        parts.append(control.component)
     outputs = {
         "reference": Output(reference, "m", "reference"),
         "error": Output(loop.error, "m", "error"),
@@ -95,7 +107,18 @@ def assemble(structure: Structure) -> Model:
         rate=rate,
         breakaway=friction.breakaway if friction else sp.S.Zero,
         stiffness=loop_stiffness(structure.controller),
+        updates=control.updates if control else {},
     )
+
+
+def _control(
+    form: ControllerForm | None, loop: Loop, velocity_samples: int, scales: tuple[sp.Expr, sp.Expr]
+) -> Controller | None:
+    if form is None:
+        return None
+    if velocity_samples:
+        return sampled_controller(form, loop, velocity_samples, scales[0])
+    return controller(form, loop, *scales)
 
 
 def _bodies(structure: Structure) -> tuple[Body, Body, Body | None]:
@@ -124,14 +147,14 @@ def _mechanics(
     structure: Structure,
     bodies: tuple[Body, Body, Body | None],
     friction: Friction | None,
-    control: Controller | None,
+    force: sp.Expr,
     scales: tuple[sp.Expr, sp.Expr],
 ) -> tuple[list[State], list[Component]]:
-    """Newton's law for every body, and the components that bring the forces."""
+    """Newton's law for every body, a `force` [N] on the stage, and the components that bring the other forces."""
     cart, stage, parasitic = bodies
     bias = {name: key(f"bias.{name}") for name in structure.biased}
     drag = (friction.force if friction else sp.S.Zero) - bias.get("cart", sp.S.Zero)
-    on_stage = (control.force if control else sp.S.Zero) + bias.get("stage", sp.S.Zero)
+    on_stage = force + bias.get("stage", sp.S.Zero)
     parts = [position_outputs("", "stage", stage), position_outputs("cart_", "cart", cart)]
     states: list[State] = []
     if parasitic:
@@ -145,8 +168,6 @@ def _mechanics(
         states[:0] = [*stage.under(on_stage - on_cart, *scales), *cart.under(on_cart - drag, *scales)]
         parts.append(part)
     if friction:
-        force = Component(outputs={"friction_force": Output(friction.force, "N", "friction force")})
-        parts += [friction.component, force]
-    if control:
-        parts.append(control.component)
+        output = Component(outputs={"friction_force": Output(friction.force, "N", "friction force")})
+        parts += [friction.component, output]
     return states, parts

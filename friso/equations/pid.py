@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import sympy as sp
 
@@ -28,10 +29,11 @@ class Loop:
 
 @dataclass(frozen=True)
 class Controller:
-    """Actuator force [N] and its component."""
+    """Actuator force [N], its component, and what its states that are held between samples become at one."""
 
     force: sp.Expr
     component: Component
+    updates: Mapping[sp.Symbol, sp.Expr] = field(default_factory=dict)
 
 
 def controller(form: ControllerForm, loop: Loop, length: sp.Expr, rate: sp.Expr) -> Controller:

@@ -161,6 +161,17 @@ class Drive(UncertainSection):
 
     sample_time: Annotated[Value | None, Quantity("s", positive, "50 us")] = None
     delay: Annotated[Value | None, Quantity("s", non_negative, "50 us")] = None
+    velocity_samples: Annotated[float | None, Number(at_least_1, "1")] = None
+    """Over how many samples the position's difference is taken for its velocity; only a log's simulation reads it."""
+
+    rules: ClassVar[tuple[Rule, ...]] = (
+        Rule(
+            ("drive.velocity_samples",),
+            lambda f: f.get("drive.velocity_samples", 1.0) % 1 == 0,
+            "a whole number of samples",
+            "velocity_samples = 2",
+        ),
+    )
 
 
 class Motion(UncertainSection):

@@ -33,15 +33,16 @@ class Friction:
 
 class Curve(NamedTuple):
     """What the equations of a Stribeck curve depend on: the exponent where it is a small whole number (then it is
-    written out as products), else None; and whether friction differs between the two directions."""
+    written out as products), else None; and whether friction, and viscous friction, differ between the directions."""
 
     exponent: int | None
     asymmetric: bool
+    viscous_asymmetric: bool
 
 
 class StribeckSection(FrictionSection):
     """The keys of the laws with a Stribeck curve; static and Coulomb friction are larger by the share `asymmetry` when
-    moving forward, and smaller by it when moving back."""
+    moving forward, and smaller by it when moving back, viscous friction by the share `viscous_asymmetry`."""
 
     static: Annotated[Value, Quantity("N", positive, "3 N")]
     coulomb: Annotated[Value, Quantity("N", positive, "1 N")]
@@ -49,14 +50,21 @@ class StribeckSection(FrictionSection):
     stribeck_exponent: Annotated[float, Number(positive, "2")]
     viscous: Annotated[Value, Quantity("N*s/m", non_negative, "0.5 N*s/m")]
     asymmetry: Annotated[float | None, Number(inside_minus_1_1, "0.1")] = None
+    viscous_asymmetry: Annotated[float | None, Number(inside_minus_1_1, "0.1")] = None
     rules: ClassVar[tuple[Rule, ...]] = (COULOMB_BELOW_STATIC,)
-    decisive: ClassVar[tuple[str, ...]] = ("friction.stribeck_exponent", "friction.asymmetry")
+    decisive: ClassVar[tuple[str, ...]] = (
+        "friction.stribeck_exponent",
+        "friction.asymmetry",
+        "friction.viscous_asymmetry",
+    )
 
     @staticmethod
     def variant(flat: Mapping[str, Any]) -> Curve:
         exponent = float(flat["friction.stribeck_exponent"])
         return Curve(
-            int(exponent) if exponent in (1.0, 2.0, 3.0, 4.0) else None, flat.get("friction.asymmetry", 0.0) != 0
+            int(exponent) if exponent in (1.0, 2.0, 3.0, 4.0) else None,
+            flat.get("friction.asymmetry", 0.0) != 0,
+            flat.get("friction.viscous_asymmetry", 0.0) != 0,
         )
 
 
@@ -76,3 +84,11 @@ def stribeck_level(velocity: sp.Expr, sign: sp.Expr, curve: Curve) -> sp.Expr:
         power = ratio**exponent if exponent % 2 == 0 else (sign * ratio) ** exponent
     level = coulomb + (static - coulomb) * exp(-power)
     return level * (1 + key("friction.asymmetry") * sign) if curve.asymmetric else level
+
+
+def viscous_force(velocity: sp.Expr, sign: sp.Expr, curve: Curve) -> sp.Expr:
+    """The viscous share [N], smooth in v while the sign is held."""
+    from friso.equations.component import key
+
+    force = key("friction.viscous") * velocity
+    return force * (1 + key("friction.viscous_asymmetry") * sign) if curve.viscous_asymmetric else force

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from friso.equations.friction.common import Curve, Friction, StribeckSection, stribeck_level
+from friso.equations.friction.common import Curve, Friction, StribeckSection, stribeck_level, viscous_force
 from friso.quantities import Quantity, Value, non_negative, positive
 from friso.stage import register_friction
 
@@ -29,7 +29,11 @@ class LuGre(StribeckSection):
         deflection, stiffness = state("bristle_deflection"), key("friction.bristle_stiffness")
         level = stribeck_level(velocity, forward.sign, variant)
         rate = velocity - stiffness * forward.sign * velocity / level * deflection
-        force = stiffness * deflection + key("friction.bristle_damping") * rate + key("friction.viscous") * velocity
+        force = (
+            stiffness * deflection
+            + key("friction.bristle_damping") * rate
+            + viscous_force(velocity, forward.sign, variant)
+        )
         static = key("friction.static")
         bristles = State(deflection, rate, "m", scale=static / stiffness)
         outputs = {"bristle_deflection": Output(deflection, "m", "bristle deflection z")}

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from friso.equations.friction.common import Curve, Friction, StribeckSection, stribeck_level
+from friso.equations.friction.common import Curve, Friction, StribeckSection, stribeck_level, viscous_force
 from friso.quantities import Quantity, Value, positive
 from friso.stage import register_friction
 
@@ -33,4 +33,4 @@ class Stribeck(StribeckSection):
         even = variant.exponent is None or variant.exponent % 2 == 0
         smooth = even and not variant.asymmetric  # at rest
         component = Component(kinks=() if smooth else (forward,))
-        return Friction(force + key("friction.viscous") * velocity, key("friction.static"), component)
+        return Friction(force + viscous_force(velocity, forward.sign, variant), key("friction.static"), component)

@@ -18,9 +18,9 @@ ROLES: Mapping[str, str] = {
     "relative_position": "m",
 }
 """Roles a channel can have, and the SI unit of each. `position` and `velocity` are the stage's (the body that is
-controlled), `cart_position` the other's; `relative_position` is position minus cart position; `force` is the actuator's,
-from a current or a voltage by a scale, with any `disturbance` that is added to the controller's output contained in
-it."""
+controlled), `cart_position` the other's; `relative_position` is position minus cart position; `force` is the
+actuator's, from a current or a voltage by a scale, with any `disturbance` that is added to the controller's output
+contained in it."""
 
 
 @dataclass(frozen=True)

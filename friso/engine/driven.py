@@ -1,0 +1,80 @@
+"""Many runs of stages that follow one log, sample by sample."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from friso.engine.batch import Options, prepare, run_batch, settings_of
+from friso.engine.kernel import Kernel, empty_results
+
+BUDGET = 200
+"""Steps that a run may take per sample on average."""
+
+CHUNK = 64
+"""Runs at a time: their sampled states are kept until they are handed over."""
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """What the runs follow, every `sample_time` [s]: reference [m] and force on the stage besides the controller's [N],
+    both of shape (n,). Between samples the velocity of the reference, at each its central difference, is a straight
+    line; the force is one too unless it is `held`, as a sampled drive does."""
+
+    reference: np.ndarray
+    force: np.ndarray
+    sample_time: float
+    held: bool = True
+
+    @property
+    def segments(self) -> np.ndarray:
+        """The pieces of the engine, shape (1, n + 1, 6): a piece per sample, and the end."""
+        n = len(self.reference)
+        rows = np.zeros((1, n + 1, 6))
+        rows[0, :, 0] = np.arange(n + 1) * self.sample_time
+        rows[0, :-1, 1], rows[0, :-1, 4] = self.reference, self.force
+        rows[0, :-1, 2] = np.gradient(self.reference, self.sample_time)
+        rows[0, :-2, 3] = np.diff(rows[0, :-1, 2]) / self.sample_time
+        if not self.held:
+            rows[0, :-2, 5] = np.diff(self.force) / self.sample_time
+        return rows
+
+
+@dataclass(frozen=True)
+class Followed:
+    """States at the samples, shape (runs, n, states), and at each sample what is held until the next one."""
+
+    numbers: np.ndarray
+    states: np.ndarray
+    held: np.ndarray
+    statuses: np.ndarray
+
+
+def follow(
+    kernel: Kernel, flat: Mapping[str, Any], runs: int, inputs: Inputs, starts: np.ndarray, rtol: float = 1e-5
+) -> Iterator[Followed]:
+    """Runs of stages of one structure, given as flat keys to SI numbers or arrays of shape (runs,), from the states
+    `starts`, shape (runs, states); they come chunk by chunk. A failed run is NaN from there on, and has its status.
+    """
+    count, segments = len(inputs.reference), inputs.segments
+    options = Options(rtol=rtol, bands=(np.inf, np.inf), record_from=np.inf, least_swing=np.inf, budget=BUDGET * count)
+    size = float(np.abs(inputs.reference - starts[0, kernel.states.index("position")]).max())
+    settings = settings_of(replace(options, interval=inputs.sample_time))
+    for first in range(0, runs, CHUNK):
+        numbers = np.arange(first, min(first + CHUNK, runs))
+        batch = prepare(kernel, _as_motion(flat, numbers, inputs, size), len(numbers), options, starts[numbers])
+        every = np.full(len(numbers), inputs.sample_time)
+        batch = batch._replace(segments=segments, first_steps=every, longest=every, windows=np.full(len(numbers), -1))
+        results = empty_results(len(numbers), 1, count + 1, len(kernel.states))
+        run_batch(kernel, batch, settings, results, options.threads)
+        yield Followed(numbers, results.samples[:, :-1], results.samples[:, 1:], results.statuses)
+
+
+def _as_motion(flat: Mapping[str, Any], numbers: np.ndarray, inputs: Inputs, size: float) -> dict[str, Any]:
+    """The flat keys of some runs, with a motion as long as the log, and as large [m]."""
+    part = {key: value[numbers] if np.ndim(value) else value for key, value in flat.items()}
+    duration = len(inputs.reference) * inputs.sample_time
+    return part | {"motion.kind": "step", "motion.size": size or np.finfo(float).tiny, "motion.duration": duration}

@@ -1,0 +1,156 @@
+"""Least squares on the inverse model: force = M a + F_v v + F_c sign(v) + offset, filtered and decimated alike.
+
+The filtering is that of Janot, Gautier, Brunot (EMPS benchmark, nonlinearbenchmark.org, 2019) and, for the method,
+Gautier, Janot, Vandanjon 2013, doi:10.1109/TCST.2012.2185697: position through a Butterworth filter of order 4 forward
+and back, at five times the bandwidth of the motion, derivatives by central differences, and all columns and the force
+decimated to 2.5 times that bandwidth by one more filter.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.signal import butter, cheby1, sosfiltfilt
+
+from friso.identify.estimate import Estimate
+from friso.identify.logs.log import Log
+from friso.identify.spread import spread_of
+from friso.quantities import StageError
+
+SMOOTH, DECIMATE = 5.0, 2.0
+"""Cut-off frequencies, in units of the motion's bandwidth, of the filter of the position and of the decimation, which
+passes the share `PASS` of half the new sampling frequency."""
+
+PASS = 0.8
+ORDER, DECIMATION_ORDER, RIPPLE = 4, 8, 0.05
+"""Order of the Butterworth filter; order and ripple [dB] of the Chebyshev filter before decimation."""
+
+EDGE = 49
+"""Samples left out at the start, where the filters swing in."""
+
+ENERGY = 0.99
+"""Share of the power of the force within the bandwidth of the motion."""
+
+LEAST = 50
+"""Rows that a fit needs at least."""
+
+METHOD = "least squares on the inverse model"
+
+
+@dataclass(frozen=True)
+class InverseModel:
+    """The fit: `estimates` by name (of the mass the key is "mass"; per direction "... forward", "... backward"), the
+    `covariance` of all columns, times [s] and forces [N] of the rows, measured and fitted, of shape (rows,), and the
+    relative `error`, norm of the residual over that of the force. `bandwidth` [Hz] is the motion's."""
+
+    estimates: tuple[Estimate, ...]
+    covariance: np.ndarray
+    time: np.ndarray
+    measured: np.ndarray
+    fitted: np.ndarray
+    bandwidth: float
+
+    @property
+    def error(self) -> float:
+        return float(np.linalg.norm(self.measured - self.fitted) / np.linalg.norm(self.measured))
+
+    def value(self, name: str) -> float:
+        """The value of the estimate called so."""
+        return next(each.value for each in self.estimates if each.name == name)
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Position [m], velocity [m/s] and acceleration [m/s^2] without the noise beyond the cut-off frequency, (n,)."""
+
+    position: np.ndarray
+    velocity: np.ndarray
+    acceleration: np.ndarray
+
+
+def motion(position: np.ndarray, sample_time: float, cutoff: float) -> Motion:
+    """The motion of a measured position, shape (n,) [m], smoothed forward and back at the cut-off frequency [Hz]."""
+    smooth = position
+    if cutoff < 0.5 / sample_time:
+        sections = butter(ORDER, 2 * cutoff * sample_time, output="sos")
+        smooth = sosfiltfilt(sections, position, padlen=min(3 * ORDER, len(position) - 1))
+    velocity = np.gradient(smooth, sample_time)
+    return Motion(smooth, velocity, np.gradient(velocity, sample_time))
+
+
+def bandwidth_of(force: np.ndarray, sample_time: float) -> float:
+    """The bandwidth [Hz] of a motion: that below which its force, shape (n,) [N], has 99 % of its power, its white
+    noise apart."""
+    frequency = np.fft.rfftfreq(len(force), sample_time)
+    spectrum = np.abs(np.fft.rfft((force - force.mean()) * np.hanning(len(force)))) ** 2
+    noise = spectrum[3 * len(spectrum) // 4 :].mean()
+    share = np.cumsum(np.maximum(spectrum - noise, 0.0))
+    return float(frequency[np.searchsorted(share, ENERGY * share[-1])])
+
+
+def inverse_model(log: Log, bandwidth: float | None = None, by_direction: bool = False) -> InverseModel:
+    """Mass, viscous and Coulomb friction and offset of a log with position and force.
+
+    With `by_direction`, both frictions have a value for each direction, and there is no offset, which could not be told
+    from a difference of the Coulomb frictions. `bandwidth` [Hz] is that of the motion, told from the log unless given.
+    Raises StageError for a log too short.
+    """
+    band = bandwidth or bandwidth_of(log["force"], log.sample_time)
+    parts = [_rows(log, part, band, by_direction) for part in log.segments]
+    time, columns, force = (np.concatenate([part[i] for part in parts]) for i in range(3))
+    if len(force) < LEAST:
+        given = f"{len(log.time)} samples, {len(force)} after decimation to {DECIMATE * band / PASS * 2:.3g} Hz"
+        raise StageError("position", given, f"at least {LEAST} after decimation", "a longer log")
+    solution = np.linalg.lstsq(columns, force, rcond=None)[0]
+    fitted = columns @ solution
+    covariance = spread_of(columns, force - fitted)
+    names = _NAMES[by_direction]
+    estimates = tuple(
+        Estimate.normal(name, unit, value, float(np.sqrt(variance)), METHOD)
+        for (name, unit), value, variance in zip(names, solution, np.diag(covariance), strict=True)
+    )
+    return InverseModel(estimates, covariance, time, force, fitted, band)
+
+
+_NAMES = {
+    False: (("mass", "kg"), ("viscous", "N*s/m"), ("coulomb", "N"), ("offset", "N")),
+    True: (
+        ("mass", "kg"),
+        ("viscous forward", "N*s/m"),
+        ("coulomb forward", "N"),
+        ("viscous backward", "N*s/m"),
+        ("coulomb backward", "N"),
+    ),
+}
+
+
+def _rows(log: Log, part: slice, band: float, by_direction: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Times, columns of the inverse model and forces of a segment, decimated."""
+    if part.stop - part.start < 2 * EDGE:
+        return np.zeros(0), np.zeros((0, len(_NAMES[by_direction]))), np.zeros(0)
+    moved = motion(log["position"][part], log.sample_time, SMOOTH * band)
+    v, a = moved.velocity, moved.acceleration
+    sign = np.sign(v)
+    if by_direction:
+        forward, backward = (1 + sign) / 2, (1 - sign) / 2
+        columns = np.stack([a, v * forward, sign * forward, v * backward, sign * backward], axis=1)
+    else:
+        columns = np.stack([a, v, sign, np.ones_like(v)], axis=1)
+    every = max(1, round(PASS / (2 * DECIMATE * band * log.sample_time)))
+    kept = [each[EDGE:] for each in (log.time[part], columns, log["force"][part])]
+    return kept[0][_first(len(kept[0]), every) :: every], _decimated(kept[1], every), _decimated(kept[2], every)
+
+
+def _decimated(columns: np.ndarray, every: int) -> np.ndarray:
+    """Every so many-th row, after a filter forward and back that keeps what is beyond half the new frequency out."""
+    if every == 1:
+        return columns
+    sections = cheby1(DECIMATION_ORDER, RIPPLE, PASS / every, output="sos")
+    low = sosfiltfilt(sections, columns, axis=0, padlen=3 * DECIMATION_ORDER)
+    return low[_first(len(columns), every) :: every]
+
+
+def _first(count: int, every: int) -> int:
+    """The first row kept, so that the last one is."""
+    return (count - 1) % every

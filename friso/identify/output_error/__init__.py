@@ -1,0 +1,1 @@
+"""Output-error fitting: the whole model, friction included, simulated against the log."""

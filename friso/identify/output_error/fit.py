@@ -1,0 +1,119 @@
+"""The fit: thousands of starts, the best of them refined side by side, and the best of those handed to lmfit."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import lmfit
+import numpy as np
+from scipy.stats import qmc
+
+from friso.identify.output_error.parameters import Parameter
+from friso.identify.output_error.problem import Problem
+from friso.identify.output_error.refine import bounds_of, costs, refine
+from friso.identify.spread import correlation_length, spread_of
+
+STARTS, KEPT = 2048, 6
+"""Starts that are simulated, and how many of them are refined."""
+
+NARROW = 0.3
+"""Share by which the starts of core parameters are off the inverse model's values, each way."""
+
+SCREENED = 3e7
+"""Samples that the starts are simulated over, all together: long records are cut for them."""
+
+ROUGH, FINE = 12, 30
+"""Iterations of the refinement of the starts kept, and most evaluations of lmfit times the parameters."""
+
+SEED = 7
+
+
+@dataclass(frozen=True)
+class Fit:
+    """The fitted numbers `inner`, shape (parameters,), of which `free` were fitted; their `covariance`, shape (free,
+    free); the residual [N], shape (n,), and its mean square before (at the first values) and after."""
+
+    problem: Problem
+    inner: np.ndarray
+    free: tuple[int, ...]
+    covariance: np.ndarray
+    residual: np.ndarray
+    before: float
+    report: str
+
+    @property
+    def cost(self) -> float:
+        return float(np.mean(self.residual**2))
+
+    @property
+    def independent(self) -> float:
+        """So many independent samples the residual is worth."""
+        return len(self.residual) / correlation_length(self.residual)
+
+    def value(self, name: str) -> float:
+        """The SI value of a parameter."""
+        names = [each.name for each in self.problem.parameters]
+        i = names.index(name)
+        return float(self.problem.parameters[i].outer(self.inner[i]))
+
+
+def first_values(parameters: Sequence[Parameter]) -> np.ndarray:
+    """The fitted numbers at which the parameters start, shape (parameters,)."""
+    return np.array([each.inner(each.start) for each in parameters])
+
+
+def fit(problem: Problem, free: Sequence[int], neutral: np.ndarray, search: bool = True) -> Fit:
+    """Fit the free parameters, given by number, of a problem; the others stay as in `neutral`, shape (parameters,).
+
+    The `search` from thousands of starts finds parameters that not every motion shows; without it, or where none of
+    them is free, the fit starts from `neutral`.
+    """
+    mask = np.zeros(len(neutral), bool)
+    mask[list(free)] = True
+    before = float(costs(problem, neutral[None])[0])
+    core = np.array([each.core for each in problem.parameters])
+    kept = _screened(problem, mask, neutral) if search and (mask & ~core).any() else neutral[None]
+    refined = refine(problem, kept, np.tile(mask, (len(kept), 1)), ROUGH)
+    best = refined.inner[np.argmin(refined.cost)]
+    return _polished(problem, tuple(free), best, before)
+
+
+def _screened(problem: Problem, free: np.ndarray, neutral: np.ndarray) -> np.ndarray:
+    """The best starts, shape (kept, parameters), the neutral one always among them."""
+    low, high = bounds_of(problem)
+    core = np.array([each.core for each in problem.parameters])
+    half = np.array([NARROW if each.logarithmic else NARROW * abs(each.start) for each in problem.parameters])
+    low, high = np.where(core, neutral - half, low), np.where(core, neutral + half, high)
+    shares = qmc.Sobol(len(neutral), rng=SEED).random(STARTS)
+    starts = np.where(free, low + shares * (high - low), neutral)
+    count = min(len(problem.wanted), int(SCREENED / STARTS))
+    found = costs(problem.beginning(count), starts)
+    return np.vstack([neutral, starts[np.argsort(found)[: KEPT - 1]]])
+
+
+def _polished(problem: Problem, free: tuple[int, ...], inner: np.ndarray, before: float) -> Fit:
+    """The end of the fit by lmfit, with derivatives from runs side by side."""
+    low, high = bounds_of(problem)
+    mask = np.isin(np.arange(len(inner)), free)
+    names = [f"p{i}" for i in free]
+    given = lmfit.Parameters()
+    for name, i in zip(names, free, strict=True):
+        given.add(name, value=inner[i], min=low[i], max=high[i])
+
+    def numbers(found: lmfit.Parameters) -> np.ndarray:
+        full = inner.copy()
+        full[list(free)] = [found[name].value for name in names]
+        return full
+
+    def residual(found: lmfit.Parameters) -> np.ndarray:
+        return problem.residuals(numbers(found)[None])[0]
+
+    def jacobian(found: lmfit.Parameters) -> np.ndarray:
+        return problem.jacobians(numbers(found)[None], mask[None])[0][1]
+
+    result: Any = lmfit.minimize(residual, given, Dfun=jacobian, max_nfev=FINE * len(free), ftol=1e-6, xtol=1e-6)
+    best = numbers(result.params)
+    ((rest, slopes),) = problem.jacobians(best[None], mask[None])
+    return Fit(problem, best, free, spread_of(slopes, rest), rest, before, lmfit.fit_report(result))

@@ -1,0 +1,110 @@
+"""What is fitted: parameters, their ranges, and the stages that their values make."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+MASS, RATIO = "mass", "static friction ratio"
+"""The mass that moves, shared among cart and stage as in the stage given; static over Coulomb friction."""
+
+HIGHEST_RATIO = 4.0
+"""Largest ratio of these that is believed of a bearing; the thesis's rig has 3."""
+
+SHORTEST, LONGEST = 5e-8, 3e-4
+"""Lengths [m] by which bristles are believed to bend at least and at most before they slip."""
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A parameter with its SI unit, start value and range; of a `logarithmic` one the logarithm is fitted.
+
+    `core` ones are shown by any motion; the others are asked about one by one.
+    """
+
+    name: str
+    unit: str
+    start: float
+    low: float
+    high: float
+    logarithmic: bool = True
+    core: bool = True
+
+    def inner(self, value: Any) -> Any:
+        """The number that is fitted."""
+        return np.log(value) if self.logarithmic else value
+
+    def outer(self, inner: Any) -> Any:
+        """The SI value."""
+        return np.exp(inner) if self.logarithmic else inner
+
+
+def parameters_of(flat: Mapping[str, Any], levels: Mapping[str, float], speed: float, travel: float) -> list[Parameter]:
+    """The parameters of a stage given as flat keys, that a log may show.
+
+    `levels` holds first values, of mass, Coulomb and viscous friction and offset, from the inverse model; `speed` [m/s]
+    is the highest of the log, `travel` [m] how far it goes: no Stribeck velocity and no bristle can be beyond them.
+    """
+    mass = levels["mass"]
+    found = [Parameter(MASS, "kg", mass, mass / 5, mass * 5)]
+    if flat["friction.model"] in ("lugre", "dahl", "stribeck"):
+        found += _friction(flat, levels, speed, travel)
+    bias = "bias.cart" if "masses.cart" in flat else "bias.stage"
+    reach = 5 * max(levels["coulomb"], abs(levels["offset"]))
+    found.append(Parameter(bias, "N", -levels["offset"] or 1e-9, -reach, reach, logarithmic=False))
+    if "joint.stiffness" in flat and not flat["joint.locked"]:
+        k, d = flat["joint.stiffness"], max(flat["joint.damping"], 1e-3)
+        found += [
+            Parameter("joint.stiffness", "N/m", k, k / 10, k * 10, core=False),
+            Parameter("joint.damping", "N*s/m", d, d / 100, d * 100, core=False),
+        ]
+    return found
+
+
+def _friction(flat: Mapping[str, Any], levels: Mapping[str, float], speed: float, travel: float) -> list[Parameter]:
+    coulomb, viscous = levels["coulomb"], levels["viscous"]
+    found = [
+        Parameter("friction.coulomb", "N", coulomb, coulomb / 20, coulomb * 5),
+        Parameter("friction.viscous", "N*s/m", viscous, viscous / 1e3, viscous * 20),
+    ]
+    if "friction.stribeck_velocity" in flat:
+        found += [
+            Parameter("friction.viscous_asymmetry", "", 1e-6, -0.9, 0.9, logarithmic=False),
+            Parameter(RATIO, "", 1.0, 1.0, HIGHEST_RATIO, logarithmic=False, core=False),
+            _slow("friction.stribeck_velocity", "m/s", flat, speed / 3e3, speed),
+        ]
+    if "friction.bristle_stiffness" in flat:
+        softest, stiffest = coulomb / min(LONGEST, travel / 10), coulomb / SHORTEST
+        found.append(_slow("friction.bristle_stiffness", "N/m", flat, softest, stiffest))
+    if "friction.bristle_damping" in flat:
+        critical = 2 * np.sqrt(flat["friction.bristle_stiffness"] * levels["mass"])
+        found.append(_slow("friction.bristle_damping", "N*s/m", flat, critical / 50, 10 * critical))
+    return found
+
+
+def _slow(name: str, unit: str, flat: Mapping[str, Any], low: float, high: float) -> Parameter:
+    """A parameter that slow motion alone shows, from what the stage has, in a range that holds that too."""
+    start = float(flat[name])
+    return Parameter(name, unit, start, float(min(low, start)), float(max(high, start)), core=False)
+
+
+def stages(flat: Mapping[str, Any], parameters: Sequence[Parameter], inner: np.ndarray) -> dict[str, Any]:
+    """The flat keys of the stages that the numbers fitted, shape (runs, parameters), make of a stage."""
+    values = {each.name: each.outer(column) for each, column in zip(parameters, inner.T, strict=True)}
+    return {**flat, **keys_of(flat, values)}
+
+
+def keys_of(flat: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:
+    """Keys of the stage file to SI values from values of parameters, numbers or arrays."""
+    keys = {name: value for name, value in values.items() if name not in (MASS, RATIO)}
+    bodies = [name for name in ("masses.cart", "masses.stage") if name in flat]
+    total = sum(flat[name] for name in bodies)
+    if MASS in values:
+        keys |= {name: values[MASS] * (flat[name] / total) for name in bodies}
+    if "friction.static" in flat and (RATIO in values or "friction.coulomb" in values):
+        ratio = values.get(RATIO, flat["friction.static"] / flat["friction.coulomb"])
+        keys["friction.static"] = ratio * values.get("friction.coulomb", flat["friction.coulomb"])
+    return keys

@@ -1,0 +1,177 @@
+"""The fit as a problem: what is simulated for given parameters, and how far it is from the log."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from friso.engine.arrays import Status
+from friso.engine.driven import Followed, Inputs, follow
+from friso.engine.kernel import Kernel, kernel
+from friso.equations.driven import Driven
+from friso.equations.sampled import is_known
+from friso.equations.structure import ControllerForm, structure
+from friso.identify.logs.log import Log
+from friso.identify.output_error.parameters import MASS, Parameter, stages
+
+STEP = 1e-4
+"""Steps of the fitted numbers for derivatives: shares of the value for logarithmic ones."""
+
+RTOL = 1e-5
+"""Relative tolerance of the simulations."""
+
+SAME = 1e-3
+"""Share by which the sample time of the log and that of the drive may differ to count as one."""
+
+
+@dataclass(frozen=True)
+class Simulated:
+    """Simulated records: position, velocity and force of the controller, SI, shape (runs, n) or of one run (n,); NaN
+    after a failure."""
+
+    position: np.ndarray
+    velocity: np.ndarray
+    force: np.ndarray
+
+
+@dataclass(frozen=True)
+class Problem:
+    """A stage as flat keys that follows a log, the parameters, and the force [N] that is `wanted` of the controller.
+
+    In a `closed` loop the stage has the controller of its machine and follows the log's reference; what is wanted is
+    the log's force. Otherwise it follows the log's position under the log's force, held to it by a controller of our
+    own, of whose force nothing is wanted: what it has to add is what the model does not explain. `start` [m] is the
+    position at the beginning.
+    """
+
+    flat: Mapping[str, Any]
+    form: Driven
+    inputs: Inputs
+    wanted: np.ndarray
+    parameters: tuple[Parameter, ...]
+    closed: bool
+    start: float
+
+    @cached_property
+    def kernel(self) -> Kernel:
+        return kernel(self.form)
+
+    def beginning(self, count: int) -> Problem:
+        """The same with the first so many samples alone."""
+        given = self.inputs
+        inputs = replace(given, reference=given.reference[:count], force=given.force[:count])
+        return replace(self, inputs=inputs, wanted=self.wanted[:count])
+
+    def simulated(self, inner: np.ndarray) -> Iterator[tuple[np.ndarray, Simulated]]:
+        """Numbers of the runs and their records, a chunk at a time, for fitted numbers of shape (runs, parameters)."""
+        flat = stages(self.flat, self.parameters, inner)
+        starts = self._starts(flat, len(inner))
+        for runs in follow(self.kernel, flat, len(inner), self.inputs, starts, RTOL):
+            yield runs.numbers, self._record(flat, runs)
+
+    def record(self, inner: np.ndarray) -> Simulated:
+        """The record of one run, each of shape (n,)."""
+        ((_, one),) = self.simulated(inner[None])
+        return Simulated(one.position[0], one.velocity[0], one.force[0])
+
+    def residuals(self, inner: np.ndarray) -> np.ndarray:
+        """Wanted minus simulated force [N], shape (runs, n); infinite for runs that failed."""
+        found = np.empty((len(inner), len(self.wanted)))
+        for numbers, record in self.simulated(inner):
+            found[numbers] = self.wanted - record.force
+        return np.where(np.isfinite(found), found, np.inf)
+
+    def jacobians(self, inner: np.ndarray, free: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+        """For each row of fitted numbers, shape (rows, parameters), the residual, shape (n,), and its derivatives to
+        the numbers that are `free` in this row, shape (n, free); all from runs side by side."""
+        owner, number = np.nonzero(free)
+        steps = np.array([self._step(inner[row], int(i)) for row, i in zip(owner, number, strict=True)])
+        moved = inner[owner].copy()
+        moved[np.arange(len(owner)), number] += steps
+        found = self.residuals(np.vstack([inner, moved]))
+        at, off = found[: len(inner)], found[len(inner) :]
+        slopes = (off - at[owner]) / steps[:, None]
+        return [(at[row], slopes[owner == row].T) for row in range(len(inner))]
+
+    def _step(self, inner: np.ndarray, i: int) -> float:
+        """The step of a number, away from the nearer end of its range."""
+        each = self.parameters[i]
+        size = STEP * (1.0 if each.logarithmic else 0.01 * (each.high - each.low))
+        return size if inner[i] < (each.inner(each.low) + each.inner(each.high)) / 2 else -size
+
+    def _starts(self, flat: Mapping[str, Any], runs: int) -> np.ndarray:
+        """At rest where the log begins, the bristles bent as far as the first force bends them."""
+        states = self.kernel.states
+        starts = np.zeros((runs, len(states)))
+        for i, name in enumerate(states):
+            if name.endswith("position") or name.startswith("position_before"):
+                starts[:, i] = self.start
+        if "bristle_deflection" in states:
+            pull = self.wanted[0] + self.inputs.force[0] + flat.get("bias.cart", 0.0) + flat.get("bias.stage", 0.0)
+            held = flat.get("friction.static", flat["friction.coulomb"])
+            bent = np.clip(pull, -held, held) / flat["friction.bristle_stiffness"]
+            starts[:, states.index("bristle_deflection")] = bent
+        return starts
+
+    def _record(self, flat: Mapping[str, Any], runs: Followed) -> Simulated:
+        names = self.kernel.states
+        position, velocity = (runs.states[:, :, names.index(name)] for name in ("position", "velocity"))
+        held = "held_force" in names
+        force = runs.held[:, :, names.index("held_force")] if held else self._force(flat, runs)
+        failed = runs.statuses != Status.DONE
+        return Simulated(*(np.where(failed[:, None], np.nan, each) for each in (position, velocity, force)))
+
+    def _force(self, flat: Mapping[str, Any], runs: Followed) -> np.ndarray:
+        """The force of a controller in continuous time, from the states at the samples."""
+        count = runs.states.shape[1]
+        part = {key: value[runs.numbers] if np.ndim(value) else value for key, value in flat.items()}
+        part |= {"motion.size": np.nan, "motion.duration": np.nan}
+        values = [np.asarray(each)[:, None] for each in self.kernel.values(part, len(runs.numbers))]
+        given = self.inputs.segments[0, :count, 1:].T[:, None, :]
+        states = np.moveaxis(runs.states, 2, 0)
+        modes = [np.asarray(s > 0, dtype=float) for s in self.kernel.module.surfaces(states, 0.0, given, values)]
+        outputs = self.kernel.module.outputs(states, modes, 0.0, given, values)
+        return np.broadcast_to(outputs[list(self.kernel.outputs).index("force")], runs.states.shape[:2])
+
+
+def closed_loop(flat: Mapping[str, Any], log: Log, part: slice, parameters: Sequence[Parameter]) -> Problem:
+    """The stage with its own controller on the log's reference; a `disturbance` in the log acts beside it."""
+    form = structure(flat)
+    sampled = "drive.sample_time" in flat and form.controller is not None and is_known(form.controller)
+    same = abs(flat.get("drive.sample_time", np.inf) / log.sample_time - 1) < SAME
+    samples = round(flat.get("drive.velocity_samples", 1.0)) if sampled and same else 0
+    count = part.stop - part.start
+    extra = log["disturbance"][part] if "disturbance" in log else np.zeros(count)
+    return Problem(
+        flat,
+        Driven(form, samples),
+        Inputs(log["reference"][part], extra, log.sample_time),
+        log["force"][part] - extra,
+        tuple(parameters),
+        True,
+        float(log["position"][part.start]),
+    )
+
+
+def tracking(
+    flat: Mapping[str, Any], log: Log, part: slice, parameters: Sequence[Parameter], bandwidth: float
+) -> Problem:
+    """The stage under the log's force, held to the log's position by a controller of the given bandwidth [Hz]."""
+    omega = 2 * np.pi * bandwidth
+    mass = next(each.start for each in parameters if each.name == MASS)
+    kept = {key: value for key, value in flat.items() if not key.startswith("controller.")}
+    gains = {"controller.kp": mass * omega**2, "controller.kd": 2 * mass * omega, "controller.ki": 0.0}
+    form = replace(structure(flat), controller=ControllerForm(False, integral=False, filtered=False))
+    return Problem(
+        kept | gains,
+        Driven(form),
+        Inputs(log["position"][part], log["force"][part], log.sample_time, "drive.sample_time" in flat),
+        np.zeros(part.stop - part.start),
+        tuple(parameters),
+        False,
+        float(log["position"][part.start]),
+    )

@@ -1,0 +1,83 @@
+"""Profile intervals: how far a parameter can be moved, all others following, before the fit gets clearly worse."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import chi2
+
+from friso.identify.output_error.fit import Fit
+from friso.identify.output_error.refine import bounds_of, costs, refine
+
+POINTS = 7
+"""Values of the parameter over its range (or about the fit), besides its own, at which the others are fitted anew."""
+
+WIDE = 4.0
+"""Standard deviations about the fit that the values reach, for a parameter whose spread is known."""
+
+ROUNDS = 3
+"""Iterations of each of these fits."""
+
+WORSE = float(chi2.ppf(0.95, 1))
+"""By how much -2 ln(likelihood) grows at the ends of a 95 % interval."""
+
+
+@dataclass(frozen=True)
+class Profile:
+    """Values of a parameter, ascending [SI], the mean squares of the residual with the other ones fitted [N^2], and
+    what that may at most be inside the 95 % interval; `low` and `high` are the interval's ends, those of the range
+    where it ends nowhere before (`open_low`, `open_high`)."""
+
+    name: str
+    values: np.ndarray
+    cost: np.ndarray
+    limit: float
+    low: float
+    high: float
+    open_low: bool
+    open_high: bool
+
+
+def profile(fit: Fit, number: int, others: tuple[int, ...], best: float) -> Profile:
+    """The profile of parameter `number`, with the `others` fitted at each of its values.
+
+    `best` is the mean square [N^2] of the fit that others are compared with.
+    """
+    parameter, (low, high) = fit.problem.parameters[number], (end[number] for end in bounds_of(fit.problem))
+    spread = fit.covariance[fit.free.index(number), fit.free.index(number)] if number in fit.free else np.inf
+    half = WIDE * np.sqrt(spread)
+    if np.isfinite(half):
+        low, high = max(low, fit.inner[number] - half), min(high, fit.inner[number] + half)
+    values = np.unique([*np.linspace(low, high, POINTS), fit.inner[number]])
+    starts = np.tile(fit.inner, (len(values), 1))
+    starts[:, number] = values
+    free = np.zeros(starts.shape, bool)
+    free[:, list(others)] = True
+    cost = refine(fit.problem, starts, free, ROUNDS).cost if others else costs(fit.problem, starts)
+    limit = best * (1 + WORSE / fit.independent)
+    left, right, open_left, open_right = _ends(values, cost, limit)
+    ends = float(parameter.outer(left)), float(parameter.outer(right))
+    return Profile(parameter.name, parameter.outer(values), cost, limit, *ends, open_left, open_right)
+
+
+def _ends(values: np.ndarray, cost: np.ndarray, limit: float) -> tuple[float, float, bool, bool]:
+    """Where the profile crosses the limit, on both sides of its lowest value, and on which side it does not."""
+    lowest = int(np.argmin(cost))
+    left, right = values[0], values[-1]
+    inside = cost <= max(limit, cost[lowest])
+    below, above = np.flatnonzero(~inside[:lowest]), np.flatnonzero(~inside[lowest:])
+    if below.size:
+        left = _crossing(values, cost, limit, below[-1], below[-1] + 1)
+    if above.size:
+        right = _crossing(values, cost, limit, lowest + above[0], lowest + above[0] - 1)
+    return left, right, not below.size, not above.size
+
+
+def _crossing(values: np.ndarray, cost: np.ndarray, limit: float, outside: int, inside: int) -> float:
+    """Where the profile crosses the limit between two values, by the square root of what it is worse."""
+    if not np.isfinite(cost[outside]):
+        return values[inside]
+    base = min(cost[inside], limit)
+    share = np.sqrt((limit - base) / (cost[outside] - base)) if cost[outside] > base else 1.0
+    return values[inside] + min(share, 1.0) * (values[outside] - values[inside])

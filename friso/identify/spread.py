@@ -1,0 +1,53 @@
+"""How uncertain a least-squares fit is whose residuals are not independent: neighbouring errors are alike."""
+
+from __future__ import annotations
+
+import numpy as np
+
+LONGEST = 0.1
+"""Share of the rows over which errors are looked at for likeness at most."""
+
+
+def correlation_length(residual: np.ndarray) -> int:
+    """Rows after which residuals, shape (n,), are no longer alike: twice the integrated autocorrelation up to its first
+    zero."""
+    centred = residual - residual.mean()
+    count = len(centred)
+    spectrum = np.abs(np.fft.rfft(centred, 2 * count)) ** 2
+    correlation = np.fft.irfft(spectrum)[: max(2, int(LONGEST * count))]
+    if correlation[0] <= 0:
+        return 1
+    correlation = correlation / correlation[0]
+    crossing = np.flatnonzero(correlation <= 0)
+    last = crossing[0] if crossing.size else len(correlation)
+    return int(np.ceil(2 * correlation[:last].sum()))
+
+
+def independent_rows(residual: np.ndarray) -> float:
+    """So many independent rows tell as much as the rows of this residual."""
+    return len(residual) / correlation_length(residual)
+
+
+def spread_of(jacobian: np.ndarray, residual: np.ndarray) -> np.ndarray:
+    """Covariance of the parameters of a fit, shape (p, p), from its Jacobian, shape (n, p), and residual, shape (n,).
+
+    Neither equal nor independent errors are assumed: Newey, West 1987, doi:10.2307/1913610, with the window as long as
+    the residuals, or their products with a column, stay alike. Directions in which the fit does not depend on the
+    parameters have an infinite variance.
+    """
+    count, size = jacobian.shape
+    scale = np.linalg.norm(jacobian, axis=0)
+    known = scale > 0
+    columns = jacobian[:, known] / scale[known]
+    inverse = np.linalg.pinv(columns.T @ columns, hermitian=True)
+    scores = columns * residual[:, None]
+    window = max(correlation_length(each) for each in (residual, *scores.T))
+    window = min(max(window, 1), max(2, int(LONGEST * count)))
+    middle = scores.T @ scores
+    for lag in range(1, window):
+        shifted = scores[lag:].T @ scores[:-lag]
+        middle += (1 - lag / window) * (shifted + shifted.T)
+    found = inverse @ middle @ inverse * count / max(count - size, 1)
+    covariance = np.full((size, size), np.inf)
+    covariance[np.ix_(known, known)] = found / np.outer(scale[known], scale[known])
+    return covariance

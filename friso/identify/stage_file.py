@@ -1,0 +1,88 @@
+"""The stage file that identification writes: the stage given (or one made up around a log), with what was found."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from typing import Any
+
+import numpy as np
+
+from friso.identify.estimate import Estimate
+from friso.identify.inverse_model import SMOOTH, InverseModel, motion
+from friso.identify.logs.log import Log
+from friso.stage import Stage
+
+BENDING, STRIBECK_VELOCITY = 5e-6, 1e-3
+"""Length [m] by which bristles bend and Stribeck velocity [m/s] of a stage made up around a log: our choice."""
+
+DIGITS = 2
+"""Significant digits of an uncertainty, and so of its value."""
+
+OUR_CHOICE = "controller, motion, bristles and Stribeck velocity are our choice"
+
+
+def made_up(log: Log, found: InverseModel) -> Stage:
+    """A stage around a log without any: one rigid mass, LuGre friction without Stribeck effect, a controller of our
+    choice, and a move as fast as the log's fastest."""
+    mass, coulomb = (max(found.value(name), 1e-6) for name in ("mass", "coulomb"))
+    viscous, stiffness = max(found.value("viscous"), 0.0), coulomb / BENDING
+    parts = [motion(log["position"][part], log.sample_time, SMOOTH * found.bandwidth) for part in log.segments]
+    top = max(float(np.abs(part.velocity).max()) for part in parts)
+    brisk = max(float(np.abs(part.acceleration).max()) for part in parts)
+    time = max(top / brisk, log.sample_time)
+    back = max(2.0, 3 * time)
+    tables: dict[str, Any] = {
+        "masses": {"cart": f"{mass:.6g} kg"},
+        "friction": {
+            "model": "lugre",
+            "static": f"{coulomb:.6g} N",
+            "coulomb": f"{coulomb:.6g} N",
+            "stribeck_velocity": f"{STRIBECK_VELOCITY:g} m/s",
+            "stribeck_exponent": 2,
+            "bristle_stiffness": f"{stiffness:.6g} N/m",
+            "bristle_damping": f"{math.sqrt(stiffness * mass):.6g} N*s/m",
+            "viscous": f"{viscous:.6g} N*s/m",
+        },
+        "controller": {"kind": "pid", "crossover": "10 Hz", "alpha": 0.1, "beta": 2},
+        "motion": {
+            "kind": "there_and_back",
+            "acceleration": f"{brisk:.4g} m/s^2",
+            "acceleration_time": f"{time:.4g} s",
+            "return_at": f"{back:.4g} s",
+            "duration": f"{2.5 * back:.4g} s",
+        },
+    }
+    return Stage(name=log.name, source=OUR_CHOICE, **tables)
+
+
+def identified(stage: Stage, estimates: Iterable[Estimate], logs: Iterable[str]) -> Stage:
+    """The stage with the estimates of its keys, as values with 95 % intervals or as ranges.
+
+    A stiffness that follows from a [flexure] stays as it follows. Raises StageError where they do not fit together.
+    """
+    changes: dict[str, object] = {}
+    for each in estimates:
+        if "." not in each.name or (stage.flexure and each.name == "joint.stiffness"):
+            continue
+        if np.isfinite([each.low, each.high]).all() and each.high > each.low:
+            changes[each.name] = written(each)
+    source = f"identified by friso from {', '.join(logs)}"
+    return stage.replace({**changes, "source": f"{source}; {stage.source}" if stage.source else source})
+
+
+def written(found: Estimate) -> str:
+    """The text of an estimate in a stage file: "20.4 N +/- 0.1 N", or "1 N .. 2.5 N" for what is not shown."""
+    unit = f" {found.unit}" if found.unit else ""
+    if not found.shown:
+        return f"{found.low:.3g}{unit} .. {found.high:.3g}{unit}"
+    half, digits = rounded(found.half_width)
+    value = f"{found.value:.{digits}f}" if digits > 0 else f"{round(found.value, digits):.0f}"
+    return f"{value}{unit} +/- {half}{unit}"
+
+
+def rounded(half: float) -> tuple[str, int]:
+    """An uncertainty rounded up to two digits, as text, and the decimal places of its value."""
+    digits = DIGITS - 1 - math.floor(math.log10(half))
+    up = math.ceil(round(half * 10**digits, 6)) / 10**digits
+    return (f"{up:.{digits}f}" if digits > 0 else f"{up:.0f}"), digits
