@@ -6,8 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-COVERAGE = 1.959963984540054
-"""Half-width of a 95 % interval of a normal distribution, in standard deviations."""
+from friso.intervals import COVERAGE
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@ from friso.identify.output_error.fit import Fit, first_values, fit
 from friso.identify.output_error.parameters import LONGEST, RATIO, Parameter, keys_of, parameters_of
 from friso.identify.output_error.problem import Problem, Simulated, closed_loop, tracking
 from friso.identify.output_error.profile import Profile, profile
+from friso.intervals import COVERAGE
 from friso.quantities import StageError
 
 METHOD = "output error"
@@ -49,6 +50,11 @@ class Moves:
     simulated: Simulated
     errors: Errors
     residual: Residual
+
+    @property
+    def correlated(self) -> tuple[Estimate, ...]:
+        """The estimates that the rows of `correlation` stand for."""
+        return tuple(each for each in self.estimates if each.shown and each.half_width > 0)
 
     @property
     def flat(self) -> dict[str, Any]:
@@ -201,7 +207,7 @@ def _estimates(
     """The keys of the stage file with their intervals, and the correlation of those shown."""
     parameters = found.problem.parameters
     spread = np.zeros((len(parameters), len(parameters)))
-    spread[np.ix_(found.free, found.free)] = found.covariance
+    spread[np.ix_(found.free, found.free)] = _no_narrower(found, profiles)
     keys, slopes = _slopes(found)
     covariance = slopes @ spread @ slopes.T
     deviation = np.sqrt(np.diag(covariance))
@@ -216,9 +222,21 @@ def _estimates(
             estimates.append(Estimate.unknown(key, unit, METHOD, unknown[owner], low, high))
         else:
             estimates.append(Estimate.normal(key, unit, values[key], deviation[i], METHOD))
-    known = [i for i, each in enumerate(estimates) if each.shown and deviation[i] > 0]
+    known = [i for i, each in enumerate(estimates) if each.shown and each.half_width > 0]
     part = covariance[np.ix_(known, known)] / np.outer(deviation[known], deviation[known])
     return tuple(estimates), part
+
+
+def _no_narrower(found: Fit, profiles: Mapping[str, Profile]) -> np.ndarray:
+    """The covariance of the fitted numbers with spreads that reach as far as the profiles do."""
+    spread = np.sqrt(np.diag(found.covariance))
+    factors = np.ones(len(found.free))
+    for i, number in enumerate(found.free):
+        parameter = found.problem.parameters[number]
+        seen = profiles[parameter.name]
+        half = float(parameter.inner(seen.high) - parameter.inner(seen.low)) / 2
+        factors[i] = max(1.0, half / (COVERAGE * spread[i])) if spread[i] > 0 else 1.0
+    return found.covariance * np.outer(factors, factors)
 
 
 def _core(parameters: Sequence[Parameter], name: str) -> bool:

@@ -12,10 +12,11 @@ from itertools import combinations
 import numpy as np
 from scipy.signal import lfilter, periodogram
 
-from friso.identify.estimate import COVERAGE, Estimate
+from friso.identify.estimate import Estimate
 from friso.identify.experiments.common import block_mean, by_t, channel, low_pass, on_bearing
 from friso.identify.experiments.passes import CUTOFF, STEADY, Pass, passes
 from friso.identify.logs.log import Log
+from friso.intervals import COVERAGE
 
 POINTS = 400
 """Places of a map over the whole travel."""

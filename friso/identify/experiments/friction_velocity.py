@@ -9,10 +9,11 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.stats import f as fisher
 
-from friso.identify.estimate import COVERAGE, Estimate
+from friso.identify.estimate import Estimate
 from friso.identify.experiments.common import Mean, by_t, t_value, ways
 from friso.identify.experiments.passes import CUTOFF, Pass, passes
 from friso.identify.logs.log import Log
+from friso.intervals import COVERAGE
 
 SPAN = 1.5
 """Ratio of the greatest to the least speed from which Coulomb and viscous friction can be told apart."""

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from friso.identify.estimate import COVERAGE, Estimate
+from friso.identify.estimate import Estimate
 from friso.identify.experiments.common import (
     Mean,
     by_t,
@@ -25,6 +25,7 @@ from friso.identify.experiments.common import (
 from friso.identify.experiments.rate_effect import BRISTLE_RATE, static_friction
 from friso.identify.experiments.slips import SLIDING, slips
 from friso.identify.logs.log import Log
+from friso.intervals import COVERAGE
 from friso.quantities import StageError
 
 CUTOFF = 100.0

@@ -16,6 +16,9 @@ POINTS = 7
 WIDE = 4.0
 """Standard deviations about the fit that the values reach, for a parameter whose spread is known."""
 
+WIDER = 5.0
+"""Times as far each time that the interval does not end within."""
+
 ROUNDS = 3
 """Iterations of each of these fits."""
 
@@ -42,23 +45,34 @@ class Profile:
 def profile(fit: Fit, number: int, others: tuple[int, ...], best: float) -> Profile:
     """The profile of parameter `number`, with the `others` fitted at each of its values.
 
-    `best` is the mean square [N^2] of the fit that others are compared with.
+    `best` is the mean square [N^2] of the fit that others are compared with. The values reach as far as the interval,
+    or over the whole range.
     """
-    parameter, (low, high) = fit.problem.parameters[number], (end[number] for end in bounds_of(fit.problem))
+    low, high = (float(end[number]) for end in bounds_of(fit.problem))
+    own = fit.inner[number]
     spread = fit.covariance[fit.free.index(number), fit.free.index(number)] if number in fit.free else np.inf
+    limit = best * (1 + WORSE / fit.independent)
+    parameter = fit.problem.parameters[number]
     half = WIDE * np.sqrt(spread)
-    if np.isfinite(half):
-        low, high = max(low, fit.inner[number] - half), min(high, fit.inner[number] + half)
-    values = np.unique([*np.linspace(low, high, POINTS), fit.inner[number]])
+    while True:
+        near, far = max(low, own - half), min(high, own + half)
+        values = np.unique([*np.linspace(near, far, POINTS), own])
+        cost = _costs(fit, number, others, values)
+        left, right, open_left, open_right = _ends(values, cost, limit)
+        if not ((open_left and near > low) or (open_right and far < high)):
+            break
+        half *= WIDER
+    ends = float(parameter.outer(left)), float(parameter.outer(right))
+    return Profile(parameter.name, parameter.outer(values), cost, limit, *ends, open_left, open_right)
+
+
+def _costs(fit: Fit, number: int, others: tuple[int, ...], values: np.ndarray) -> np.ndarray:
+    """Mean squares [N^2] at values of a parameter, shape (values,), the others fitted."""
     starts = np.tile(fit.inner, (len(values), 1))
     starts[:, number] = values
     free = np.zeros(starts.shape, bool)
     free[:, list(others)] = True
-    cost = refine(fit.problem, starts, free, ROUNDS).cost if others else costs(fit.problem, starts)
-    limit = best * (1 + WORSE / fit.independent)
-    left, right, open_left, open_right = _ends(values, cost, limit)
-    ends = float(parameter.outer(left)), float(parameter.outer(right))
-    return Profile(parameter.name, parameter.outer(values), cost, limit, *ends, open_left, open_right)
+    return refine(fit.problem, starts, free, ROUNDS).cost if others else costs(fit.problem, starts)
 
 
 def _ends(values: np.ndarray, cost: np.ndarray, limit: float) -> tuple[float, float, bool, bool]:

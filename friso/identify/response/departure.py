@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import stats
 
-from friso.identify.estimate import COVERAGE, Estimate
+from friso.identify.estimate import Estimate
 from friso.identify.response.fitting import refined
 from friso.identify.response.response import FrequencyResponse
+from friso.intervals import COVERAGE
 from friso.quantities import StageError
 
 if TYPE_CHECKING:

@@ -12,8 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import stats
 
-from friso.identify.estimate import COVERAGE, Estimate
+from friso.identify.estimate import Estimate
 from friso.identify.response.response import FrequencyResponse
+from friso.intervals import COVERAGE
 
 WIGGLE = 0.02
 """Relative scatter that a straight line may have beyond its noise: drives, guides and cables are never quite straight.

@@ -7,9 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from friso.identify.estimate import COVERAGE, Estimate
+from friso.identify.estimate import Estimate
 from friso.identify.response.fitting import Fit, refined
 from friso.identify.response.response import FrequencyResponse
+from friso.intervals import COVERAGE
 from friso.quantities import StageError
 
 METHOD = "two-mass model fitted to the response"

@@ -1,0 +1,255 @@
+"""From logs of several experiments to one stage: each analysed in its way, and what they agree on."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from friso.identify.combine import combined
+from friso.identify.errors import Errors
+from friso.identify.estimate import Estimate
+from friso.identify.experiments.break_away import BreakAway, static_from_ramps
+from friso.identify.experiments.friction_position import FrictionPosition, friction_position
+from friso.identify.experiments.friction_velocity import FrictionVelocity, friction_velocity
+from friso.identify.experiments.steps import StepStiffness, stiffness_from_steps
+from friso.identify.experiments.stick_slip import StickSlip, static_from_stick_slip
+from friso.identify.inverse_model import inverse_model
+from friso.identify.logs.frequency_text import MeasuredResponse
+from friso.identify.logs.log import Log
+from friso.identify.moves import Moves, identify_moves
+from friso.identify.moves import predict as predict_moves
+from friso.identify.output_error.problem import Simulated
+from friso.identify.response.analysis import Bench, analyse, predicted
+from friso.identify.stage_file import identified, made_up
+from friso.quantities import StageError
+from friso.stage import Stage
+from friso.stage.correlations import Correlations
+
+MOVES, FREQUENCY, STEPS, STICK_SLIP, BREAK_AWAY, CONSTANT = KINDS = (
+    "moves",
+    "frequency",
+    "steps",
+    "stick-slip",
+    "break-away",
+    "constant-speed",
+)
+"""Kinds of experiment, in words of the command line; they are analysed in the order of `ORDER`, since the later ones
+use what the earlier ones found."""
+
+ORDER = (FREQUENCY, STEPS, MOVES, CONSTANT, STICK_SLIP, BREAK_AWAY)
+
+
+@dataclass(frozen=True)
+class ConstantSpeed:
+    """Friction against velocity and against position, of one log."""
+
+    velocity: FrictionVelocity
+    position: FrictionPosition
+
+
+Source = Log | MeasuredResponse
+"""What a file may hold: signals over time, or a frequency response as somebody measured it."""
+
+Result = Moves | Bench | StepStiffness | StickSlip | BreakAway | ConstantSpeed
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """A kind of experiment with its logs, what was found, and the estimates of keys of the stage file."""
+
+    kind: str
+    logs: tuple[Source, ...]
+    result: Result
+    estimates: tuple[Estimate, ...]
+
+
+@dataclass(frozen=True)
+class Options:
+    """What the user chose: bandwidth of the moves [Hz] for the inverse model, band [Hz] and period [s] of frequency
+    responses; None where friso is to find them."""
+
+    bandwidth: float | None = None
+    band: tuple[float, float] | None = None
+    period: float | None = None
+
+
+@dataclass(frozen=True)
+class Identification:
+    """The stage with its uncertain keys, the correlations of these, the experiments behind it, the `estimates` that
+    went into it (one per key), and what the engineer should know (`warnings`)."""
+
+    stage: Stage
+    correlations: Correlations
+    experiments: tuple[Experiment, ...]
+    estimates: tuple[Estimate, ...]
+    warnings: tuple[str, ...]
+
+
+def identify(
+    logs: Sequence[tuple[Source, str]],
+    base: Stage | None = None,
+    options: Options = Options(),
+    progress: Callable[[str, int, int], None] = lambda what, done, total: None,
+) -> Identification:
+    """The stage behind logs, each with its kind of experiment, and what is known of it beforehand, `base`.
+
+    With a base whose controller is the machine's, moves with a reference are simulated in closed loop. Raises
+    StageError for logs that cannot be used.
+    """
+    groups = _groups(logs)
+    stage = base or _around(logs)
+    found: list[Experiment] = []
+    for number, (kind, group) in enumerate(groups):
+        progress(f"{kind}: {', '.join(log.name for log in group)}", number, len(groups))
+        known = combined([found_one for each in found for found_one in each.estimates])[0]
+        result = _analysed(kind, group, stage, base is not None, known, options)
+        found.append(Experiment(kind, group, result, _estimates(kind, result, stage)))
+    every, warnings = combined([one for each in found for one in each.estimates])
+    kept, dropped = _fitting(stage, every)
+    named = [log.name for log, _ in logs]
+    return Identification(
+        identified(stage, kept, named), _correlations(found, kept), tuple(found), tuple(every), (*warnings, *dropped)
+    )
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """Another log predicted by what was found: by moves, the samples used, the simulated record and its `errors`; by
+    frequency responses, the relative errors of the outputs over the band, the driven mass's first."""
+
+    log: Log
+    part: slice | None = None
+    simulated: Simulated | None = None
+    errors: Errors | None = None
+    response_errors: tuple[float, ...] = ()
+
+
+def predict(found: Identification, log: Log, options: Options) -> Prediction:
+    """Another log of the same machine, predicted. Raises StageError where nothing found can predict it."""
+    results = [each.result for each in found.experiments]
+    for result in results:
+        if isinstance(result, Moves) and "reference" in log:
+            return Prediction(log, *predict_moves(result, log))
+    for result in results:
+        if isinstance(result, Bench):
+            return Prediction(log, response_errors=predicted(result, log, options.period))
+    expected = "a log with a reference beside moves, or one of the bench beside frequency responses"
+    raise StageError("--predict", f"a log with {', '.join(log.signals)}", expected, "--map reference=SetPos", log.name)
+
+
+def _groups(logs: Sequence[tuple[Source, str]]) -> list[tuple[str, tuple[Source, ...]]]:
+    """The logs by kind, in the order of analysis; responses of one bench are realisations of one experiment."""
+    groups: list[tuple[str, tuple[Source, ...]]] = []
+    for kind in ORDER:
+        own = tuple(log for log, each in logs if each == kind)
+        times = tuple(log for log in own if isinstance(log, Log))
+        groups += [(kind, times)] if kind == FREQUENCY and times else [(kind, (log,)) for log in times]
+        groups += [(FREQUENCY, (log,)) for log in own if isinstance(log, MeasuredResponse)]
+    return groups
+
+
+def _around(logs: Sequence[tuple[Source, str]]) -> Stage:
+    """A stage around the first log of moves. Raises StageError where there is none."""
+    moves = next((log for log, kind in logs if kind == MOVES and isinstance(log, Log)), None)
+    if moves is None:
+        given = f"logs of {', '.join(dict.fromkeys(kind for _, kind in logs))} alone, and no stage file"
+        expected = "a stage file that tells what the machine is, or a log of moves, from which friso makes one up"
+        raise StageError("--stage", given, expected, "--stage examples/thesis_rig.toml")
+    return made_up(moves, inverse_model(moves))
+
+
+def _analysed(
+    kind: str, logs: tuple[Source, ...], stage: Stage, own: bool, known: Sequence[Estimate], options: Options
+) -> Result:
+    """The analysis of one experiment, with what is known of the machine by now."""
+    flat, log = stage.flat(), logs[0]
+    if isinstance(log, MeasuredResponse):
+        return analyse((), options.band, measured=log)
+    times = [each for each in logs if isinstance(each, Log)]
+    best = {each.name: each for each in known if each.shown}
+    masses = {name: _value(best, flat, f"masses.{name}") for name in ("cart", "stage")}
+    if kind == FREQUENCY:
+        return analyse(times, options.band, options.period)
+    if kind == STEPS:
+        return stiffness_from_steps(log)
+    if kind == MOVES:
+        start = {**flat, **{name: each.value for name, each in best.items() if name in flat}}
+        return identify_moves(log, start, own and "reference" in log, options.bandwidth)
+    if kind == STICK_SLIP:
+        stiffness = best.get("joint.stiffness", flat.get("joint.stiffness"))
+        return static_from_stick_slip(log, stiffness, masses["stage"], flat.get("joint.stroke", np.inf))
+    mass = sum(masses.values())
+    if kind == BREAK_AWAY:
+        return static_from_ramps(log, mass)
+    return ConstantSpeed(friction_velocity(log, mass), friction_position(log, mass, flat.get("controller.crossover")))
+
+
+def _value(best: Mapping[str, Estimate], flat: Mapping[str, Any], key: str) -> float:
+    return best[key].value if key in best else float(flat.get(key, 0.0))
+
+
+def _estimates(kind: str, result: Result, stage: Stage) -> tuple[Estimate, ...]:
+    """What an experiment tells of the keys of the stage file."""
+    if isinstance(result, Moves):
+        return result.estimates
+    if isinstance(result, Bench):
+        return _of_bench(result, stage)
+    if isinstance(result, StepStiffness):
+        return (_named(result.stiffness, "joint.stiffness"),) if stage.joint else ()
+    if isinstance(result, ConstantSpeed):
+        both = result.velocity.both
+        pairs = {"coulomb": both.coulomb, "viscous": both.viscous, "static": both.static}
+        pairs["stribeck_velocity"] = both.stribeck_velocity
+        return tuple(_named(each, f"friction.{name}") for name, each in pairs.items())
+    return (_named(result.static, "friction.static"),)
+
+
+def _of_bench(bench: Bench, stage: Stage) -> tuple[Estimate, ...]:
+    """Masses and joint from a two-mass model in newtons and metres; a mass line alone is the whole mass."""
+    units = (bench.driven.channels.input_unit, bench.driven.channels.output_unit)
+    if units != ("N", "m"):
+        return ()
+    model = bench.two_masses
+    if model is not None and stage.joint and bench.modes is not None and bench.modes.shape.modes:
+        pairs = {"masses.stage": "driven mass", "masses.cart": "other mass"}
+        pairs |= {"joint.stiffness": "joint stiffness", "joint.damping": "joint damping"}
+        return tuple(_named(model[name], key) for key, name in pairs.items())
+    if not bench.lines:
+        return ()
+    return _shared(bench.lines[0].value, stage)
+
+
+def _shared(total: Estimate, stage: Stage) -> tuple[Estimate, ...]:
+    """The whole mass, shared among the masses as in the stage."""
+    given = {f"masses.{name}": value for name, value in stage.masses if value is not None}
+    whole = sum(given.values())
+    return tuple(
+        Estimate(key, "kg", total.value * share, total.low * share, total.high * share, total.method)
+        for key, share in ((key, value / whole) for key, value in given.items())
+    )
+
+
+def _named(found: Estimate, key: str) -> Estimate:
+    return Estimate(key, found.unit, found.value, found.low, found.high, found.method, found.reason)
+
+
+def _fitting(stage: Stage, found: Sequence[Estimate]) -> tuple[list[Estimate], list[str]]:
+    """The estimates that keys of the stage can take, and a sentence for each that cannot stand in it."""
+    known = {*stage.flat(), "bias.cart", "bias.stage", "friction.viscous_asymmetry"}
+    kept = [each for each in found if each.name in known and np.isfinite([each.low, each.high]).all()]
+    lost = [each.name for each in found if each not in kept]
+    return kept, [f"{name}: nothing is known of it, the stage file keeps what it had" for name in lost]
+
+
+def _correlations(found: Sequence[Experiment], kept: Sequence[Estimate]) -> Correlations:
+    """Those of the moves, for keys that the moves alone tell."""
+    moves = next((each.result for each in found if isinstance(each.result, Moves)), None)
+    if moves is None:
+        return Correlations()
+    own = [each.name for each in moves.correlated]
+    alone = {each.name for each in kept if each in moves.estimates and each.shown}
+    places = [i for i, name in enumerate(own) if name in alone]
+    return Correlations(tuple(own[i] for i in places), moves.correlation[np.ix_(places, places)])

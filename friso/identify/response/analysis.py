@@ -1,0 +1,233 @@
+"""What the frequency responses of one bench tell: lines, modes, two masses, and where friction bends them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.signal import butter, sosfiltfilt
+
+from friso.identify.logs.frequency_text import MeasuredResponse
+from friso.identify.logs.log import Log
+from friso.identify.response.arbitrary import local_polynomial
+from friso.identify.response.closed_loop import feedback
+from friso.identify.response.departure import Departure, Drag, departure, friction_from_departure
+from friso.identify.response.limit_cases import Visible, visible
+from friso.identify.response.mass_line import Line, mass_lines
+from friso.identify.response.modes import Modes, fit_modes
+from friso.identify.response.period import find_periods
+from friso.identify.response.periodic import multisine
+from friso.identify.response.prediction import relative_error
+from friso.identify.response.records import Record, from_log
+from friso.identify.response.response import Channels, FrequencyResponse
+from friso.identify.response.simulated import Explanation, explained
+from friso.identify.response.two_mass import TwoMass, fit_two_mass, widened
+from friso.quantities import StageError
+
+ABOVE_FRICTION = 1 / 7
+"""Share of the highest frequency below which friction may bend a response: lines below it are left to a second look."""
+
+RIGID = 0.4
+"""Share of the antiresonance's frequency up to which both masses move as one (to 1/(1 - 0.16) = 1.2)."""
+
+Range = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Bench:
+    """The responses of force to position of the driven mass and, where it is measured, of the other one; what they show
+    between `band` [Hz]; how friction bends the lower end; and `aside`, for every log, the relative errors with which
+    the other logs' model predicts its outputs. `warnings` say what was not found and why."""
+
+    logs: tuple[Log, ...]
+    driven: FrequencyResponse
+    other: FrequencyResponse | None
+    band: Range
+    lines: tuple[Line, ...]
+    modes: Modes | None
+    two_masses: TwoMass | None
+    seen: Visible | None
+    departs: Departure | None
+    drag: Drag | None
+    explanation: Explanation | None
+    aside: tuple[tuple[str, tuple[float, ...]], ...]
+    warnings: tuple[str, ...]
+
+
+def analyse(
+    logs: Sequence[Log],
+    band: Range | None = None,
+    period: float | None = None,
+    measured: MeasuredResponse | None = None,
+) -> Bench:
+    """What the logs of one bench, realisations of one experiment, show; or a response as somebody `measured` it.
+
+    `band` [Hz] is that of the models (default: above where friction bends the response); `period` [s] about that of a
+    periodic excitation (default: found). Raises StageError where no response can be had.
+    """
+    records = {output: [_record(log, output) for log in logs] for output in _outputs(logs)}
+    if measured is not None:
+        driven, other = as_measured(measured), None
+    else:
+        driven, other = _clear([_response(own, logs[0], output, period) for output, own in records.items()])
+    said = [text for own in records.get("position", []) if own.reference is None for text in feedback(own)]
+    first = band or (float(max(driven.frequency[0], driven.frequency[-1] * ABOVE_FRICTION)), _top(driven))
+    model = _attempt(said, "two masses", fit_two_mass, driven, other, first)
+    departs = _attempt(said, "departure", departure, driven, model.predict) if model else None
+    used = band or _above(driven, departs)
+    if model and len(logs) > 1:
+        model = _attempt(said, "two masses", _of_all, records, logs, driven, other, used, period)
+    upper = driven.between(*used)
+    drag, explanation = _friction(said, records.get("position", []), driven, departs, model, period)
+    modes = _attempt(said, "modes", fit_modes, upper)
+    return Bench(
+        tuple(logs), driven, other, used,
+        _attempt(said, "mass lines", mass_lines, upper) or (), modes, model,
+        _attempt(said, "limit cases", visible, upper, modes), departs, drag, explanation,
+        _left_out(said, records, logs, used, period), tuple(dict.fromkeys([*driven.warnings, *said])),
+    )  # fmt: skip
+
+
+def _outputs(logs: Sequence[Log]) -> list[str]:
+    """The roles of the outputs that all logs have: the driven mass, and the other one where it is measured."""
+    if not logs:
+        return []
+    return ["position", *(["cart_position"] if all("cart_position" in log for log in logs) else [])]
+
+
+def as_measured(given: MeasuredResponse) -> FrequencyResponse:
+    """A response that somebody else measured: how far it can be believed is told by its scatter alone."""
+    output, _, unit = given.unit.partition("/")
+    unknown, lines = np.full(len(given.frequency), np.nan), len(given.frequency)
+    return FrequencyResponse(
+        given.frequency, given.response, np.zeros(lines), unknown, unknown, np.full(lines, 2.0), "measured",
+        Channels("force", unit or "1", "position", output or "1"), given.coherence,
+        ("the file tells no deviations: the scatter between neighbouring lines stands for them",),
+    )  # fmt: skip
+
+
+def predicted(found: Bench, log: Log, period: float | None = None) -> tuple[float, ...]:
+    """Relative errors with which the two-mass model predicts the outputs of another log over the band.
+
+    Raises StageError where there is no model.
+    """
+    if found.two_masses is None:
+        raise StageError("--predict", "no two-mass model", "a response with an antiresonance and a resonance")
+    return _errors(found.two_masses, log, found.band, period, found.other is not None)
+
+
+def _attempt(said: list[str], what: str, function, *arguments):
+    """The answer of an analysis, or None and why it has none."""
+    try:
+        return function(*arguments)
+    except StageError as error:
+        said.append(f"no {what}: {error.given}; expected {error.expected}")
+        return None
+
+
+def _record(log: Log, output: str) -> Record:
+    return from_log(log, "force", output, "reference" if "reference" in log else None)[0]
+
+
+def _response(records: Sequence[Record], log: Log, output: str, period: float | None) -> FrequencyResponse:
+    """By averaging over periods, or where nothing repeats by the local polynomial method; names are the log's."""
+    channels = from_log(log, "force", output)[1]
+    external = records[0].input if records[0].reference is None else records[0].reference
+    try:
+        find_periods(external, None if period is None else period / records[0].sample_time)
+    except StageError:
+        if len(records) > 1:
+            raise
+        return local_polynomial(records[0], channels)
+    return multisine(records, period, channels)
+
+
+def _clear(responses: Sequence[FrequencyResponse]) -> tuple[FrequencyResponse, FrequencyResponse | None]:
+    """The responses of the two outputs, or of the one, on the lines on which any of them stands out of the noise.
+
+    Raises StageError where none does.
+    """
+    good = np.unique(np.concatenate([each.usable().frequency for each in responses]))
+    kept = [each.at(np.isin(each.frequency, good)) for each in responses]
+    return kept[0], kept[1] if len(kept) > 1 else None
+
+
+def _above(driven: FrequencyResponse, departs: Departure | None) -> Range:
+    """The band above the departure by friction."""
+    low = departs.frequency.high if departs is not None and departs.frequency.shown else 0.0
+    return max(float(driven.frequency[0]), low), _top(driven)
+
+
+def _top(driven: FrequencyResponse) -> float:
+    """The last line, rounding errors apart."""
+    return float(driven.frequency[-1]) * (1 + 1e-9)
+
+
+def _of_all(
+    records: dict[str, list[Record]],
+    logs: Sequence[Log],
+    driven: FrequencyResponse,
+    other: FrequencyResponse | None,
+    band: Range,
+    period: float | None,
+) -> TwoMass:
+    """The two-mass model of all realisations, its intervals as wide as single ones scatter."""
+    apart = [_single(records, logs, i, band, period) for i in range(len(logs))]
+    return widened(fit_two_mass(driven, other, band), apart)
+
+
+def _single(
+    records: dict[str, list[Record]], logs: Sequence[Log], which: int, band: Range, period: float | None
+) -> TwoMass:
+    """The two-mass model of one realisation."""
+    responses = [_response([own[which]], logs[which], output, period) for output, own in records.items()]
+    return fit_two_mass(responses[0], responses[1] if len(responses) > 1 else None, band)
+
+
+def _friction(
+    said: list[str],
+    records: Sequence[Record],
+    driven: FrequencyResponse,
+    departs: Departure | None,
+    model: TwoMass | None,
+    period: float | None,
+) -> tuple[Drag | None, Explanation | None]:
+    """The friction level that explains the departure, and whether a simulation with it does."""
+    if not records or departs is None or model is None or not departs.frequency.shown:
+        return None, None
+    step = records[0].sample_time
+    rigid = RIGID * model["antiresonance frequency"].value
+    limits = (float(driven.frequency[0]) / 2, min(2 * departs.frequency.high, rigid))
+    smooth = butter(4, min(2 * float(driven.frequency[-1]), 0.45 / step), fs=1 / step, output="sos")
+    speeds = [sosfiltfilt(smooth, np.gradient(record.output, step)) for record in records]
+    drag = _attempt(said, "friction level", friction_from_departure, driven, speeds, limits, model.signs[0])
+    if drag is None or not drag.coulomb.shown or not np.isfinite(drag.coulomb.value):
+        return drag, None
+    expected = None if period is None else period / step
+    found = [find_periods(record.input, expected) for record in records]
+    once = [record.input[each.stop - each.samples : each.stop] for record, each in zip(records, found, strict=True)]
+    return drag, _attempt(said, "explanation", explained, drag, driven, once, step, limits)
+
+
+def _left_out(
+    said: list[str], records: dict[str, list[Record]], logs: Sequence[Log], band: Range, period: float | None
+) -> tuple[tuple[str, tuple[float, ...]], ...]:
+    """For each log, how the model of one other log predicts it."""
+    if len(logs) < 2:
+        return ()
+    rows = []
+    for i, log in enumerate(logs):
+        model = _attempt(said, "two masses", _single, records, logs, (i + 1) % len(logs), band, period)
+        if model is not None:
+            rows.append((log.name, _errors(model, log, band, period, len(records) > 1)))
+    return tuple(rows)
+
+
+def _errors(model: TwoMass, log: Log, band: Range, period: float | None, both: bool) -> tuple[float, ...]:
+    """Relative errors of the driven output and, if asked, of the other one."""
+    outputs = [("position", True), *([("cart_position", False)] if both else [])]
+    return tuple(
+        relative_error(lambda f, c=collocated: model.predict(f, c), _record(log, output), band, period)
+        for output, collocated in outputs
+    )
