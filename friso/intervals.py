@@ -21,6 +21,9 @@ _MARKS = ("..", "+/-", "±")
 COVERAGE = 1.959963984540054
 """Half-width of a 95 % interval of a normal distribution, in standard deviations."""
 
+WIDE = 10.0
+"""Ratio of the ends of a range beyond which its order of magnitude is what is uncertain."""
+
 _BESIDE = 1e-6
 """Share of the range beside its centre in which some number has to be allowed: of whole numbers none is."""
 
@@ -43,13 +46,24 @@ class Interval:
     def centre(self) -> float:
         return (self.low + self.high) / 2
 
+    @property
+    def wide(self) -> bool:
+        """Whether it is a range over orders of magnitude: of such, the logarithm is what is known evenly."""
+        return self.form == "range" and self.low > 0 and self.high > WIDE * self.low
+
     def at(self, share: Any) -> Any:
         """The values at shares, from 0 to 1, of the way from low to high."""
         return self.low + share * (self.high - self.low)
 
+    def evenly(self, share: Any) -> Any:
+        """The values at shares, from 0 to 1, of an uncertain quantity known to be within: of a `wide` range by its
+        logarithm."""
+        return self.low * (self.high / self.low) ** share if self.wide else self.at(share)
+
 
 class UncertainValue(Value):
-    """The centre of an uncertain quantity; `interval` is the range of a ".." or the 95 % interval of a "+/-"."""
+    """The centre of an uncertain quantity (of a range over orders of magnitude, its geometric mean); `interval` is the
+    range of a ".." or the 95 % interval of a "+/-"."""
 
     interval: Interval
 
@@ -120,7 +134,7 @@ def uncertain_value(given: str, of: Quantity | Number) -> UncertainValue:
     except _Refused as refused:
         expected = f'{of.expected}; or with its uncertainty, "VALUE +/- HALF-WIDTH" or "LOW .. HIGH"'
         raise StageError("", quoted(given, str(refused)), expected, f'"{of.example} +/- 5 %"') from None
-    return UncertainValue(centre, given, found)
+    return UncertainValue(found.evenly(0.5) if found.wide else centre, given, found)
 
 
 class _Refused(Exception):

@@ -19,6 +19,7 @@ from friso.cli.common import INTERRUPTED, say
 from friso.cli.design import design
 from friso.cli.flexure import flexure
 from friso.cli.guideline import guideline
+from friso.cli.identify import identify
 from friso.cli.init import init
 from friso.cli.map import map_cells
 from friso.cli.reproduce import reproduce
@@ -42,6 +43,7 @@ for name, command in (
     ("boundary", boundary),
     ("flexure", flexure),
     ("design", design),
+    ("identify", identify),
     ("reproduce", reproduce),
     ("guideline", guideline),
 ):

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+import shutil
 import sys
+import textwrap
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Annotated
@@ -49,6 +51,13 @@ def print_table(title: str, columns: Sequence[str], rows: Iterable[tuple[str, li
     console.print(table)
     for sentence in below:
         console.print(sentence)
+
+
+def print_wrapped(sentence: str, indent: str = "") -> None:
+    """A sentence on the terminal, in lines as wide as that."""
+    width = shutil.get_terminal_size().columns
+    lines = textwrap.wrap(sentence, max(40, width - len(indent)), break_long_words=False, break_on_hyphens=False)
+    print(textwrap.indent("\n".join(lines), indent))
 
 
 def leave(done: bool) -> None:

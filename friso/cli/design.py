@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import json
 import os
-import shutil
-import textwrap
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NoReturn
 
 import typer
 
-from friso.cli.common import AsJson, Overrides, StageFile, made_folder, read_stage, say
+from friso.cli.common import AsJson, Overrides, StageFile, made_folder, print_wrapped, read_stage, say
 from friso.cli.progress import step_bar
 from friso.quantities import StageError
 
@@ -132,19 +130,12 @@ def _print(found: Design, files: list[Path]) -> None:
     from friso.views.design_words import headline
 
     for _, sentence in headline(found):
-        _say(sentence)
+        print_wrapped(sentence)
     for number, step in enumerate(steps(found), 1):
         print(f"\n{number}. {step.title}")
         for sentence in step.sentences:
-            _say(sentence, "   ")
+            print_wrapped(sentence, "   ")
     named, pictures = files[: len(STAGES) + 2], files[len(STAGES) + 2 :]
     figures = len({path.stem for path in pictures})
     print(f"\nwrote {', '.join(map(str, named))}, and {figures} figures as PNG, SVG and PDF")
     print(f"next: friso check {files[0]}")
-
-
-def _say(sentence: str, indent: str = "") -> None:
-    """A sentence on the terminal, in lines as wide as that."""
-    width = shutil.get_terminal_size().columns
-    lines = textwrap.wrap(sentence, max(40, width - len(indent)), break_long_words=False, break_on_hyphens=False)
-    print(textwrap.indent("\n".join(lines), indent))

@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from friso.cli.common import AsJson, Overrides, made_folder, say, with_overrides
+from friso.cli.common import AsJson, Overrides, made_folder, print_wrapped, with_overrides
 from friso.cli.progress import step_bar
 from friso.quantities import Quantity, StageError, positive
-from friso.stage import Stage, load
+from friso.stage import load
 
 if TYPE_CHECKING:
-    from friso.identify.logs.log import Log
-    from friso.identify.logs.mapping import Mapping
-    from friso.identify.method import Identification, Options, Source
+    from friso.identify.method import Identification, Options, Prediction
+    from friso.identify.sources import Given
 
 STAGE, PAGE = "identified.toml", "identify.html"
 
@@ -60,18 +59,117 @@ def identify(
     """
     from friso.identify.logs.mapping import from_options
     from friso.identify.method import identify as found_in
+    from friso.identify.sources import read_all
 
     known = None if stage is None else with_overrides(load(stage), overrides)
     if known is None and overrides:
         raise StageError("--set", overrides[0], "a stage whose keys to override", "--stage stage.toml")
     options = _options(bandwidth, band, period)
-    told = from_options(maps or (), units or (), scales or (), dt, _kind(kind))
-    folder = _checked(out, (stage, *logs, *(predict or ())))
-    sources = _read(logs, told, folder)
-    others = _read(predict or [], told, folder)
-    _warn_unused(told, [*logs, *(predict or [])])
+    told = from_options(maps or (), units or (), scales or (), dt, kind)
+    _check_place(out, [*logs, *(predict or []), *([stage] if stage else [])])
+    given = read_all([*logs, *(predict or [])], told, out)
     with step_bar() as bar:
-        found = found_in(sources, known, options, lambda what, done, total: bar(done, total, what) if bar else None)
-    predictions = _predictions(found, [log for log, _ in others], options)
-    files = _write(found, predictions, folder)
-    _answer(found, predictions, files, as_json)
+
+        def progress(what: str, done: int, total: int) -> None:
+            if bar:
+                bar(done, total, what)
+
+        found = found_in([(each.source, each.kind) for each in given[: len(logs)]], known, options, progress)
+        predictions = _predictions(found, given[len(logs) :], options)
+        files = _write(found, given, predictions, out, progress)
+    _answer(found, given, predictions, files, as_json)
+
+
+def _options(bandwidth: str | None, band: str | None, period: str | None) -> Options:
+    """The options of the analyses. Raises StageError."""
+    from friso.identify.method import Options
+    from friso.intervals import Span
+
+    values = []
+    for name, text, quantity in (("--bandwidth", bandwidth, _HERTZ), ("--period", period, _SECONDS)):
+        try:
+            values.append(None if text is None else float(quantity.read(text)))
+        except StageError as error:
+            raise error.found_in(name) from None
+    try:
+        limits = None if band is None else Span(_HERTZ, "3 Hz .. 20 Hz").read(band)
+    except StageError as error:
+        raise error.found_in("--band") from None
+    return Options(values[0], None if limits is None else (limits.low, limits.high), values[1])
+
+
+def _check_place(folder: Path, given: Sequence[Path]) -> None:
+    """Raises StageError where writing would cost a file that is read, or a stage file that friso did not identify."""
+    place = folder / STAGE
+    made_folder(folder)  # now, not after a minute of computing
+    if not place.exists():
+        return
+    expected = "another folder, or the file moved out of the way"
+    if any(each.exists() and place.samefile(each) for each in given):
+        raise StageError("--out", f"{folder}, where {STAGE} is read", expected, "--out identified-2")
+    if not (folder / PAGE).exists():
+        raise StageError("--out", f"{folder}, with a {STAGE} of no earlier run", expected, "--out identified-2")
+
+
+def _predictions(found: Identification, given: Sequence[Given], options: Options) -> list[Prediction]:
+    """The other logs, predicted. Raises StageError."""
+    from friso.identify.logs.log import Log
+    from friso.identify.method import predict
+
+    for each in given:
+        if not isinstance(each.source, Log):
+            raise StageError(
+                "--predict", f"{each.path}, a frequency response", "a log over time", "--predict other.mat"
+            )
+    return [predict(found, each.source, options) for each in given if isinstance(each.source, Log)]
+
+
+def _write(
+    found: Identification,
+    given: Sequence[Given],
+    predictions: Sequence[Prediction],
+    folder: Path,
+    progress: Callable[[str, int, int], None],
+) -> list[Path]:
+    """The stage file, the correlations beside it, the page, and every figure in all formats."""
+    from friso.stage.correlations import beside, write_correlations
+    from friso.stage.files import save as save_stage
+    from friso.views.identify_figures import identify_figures
+    from friso.views.identify_page import identify_html
+    from friso.views.matplotlib_renderer import FORMATS, save
+
+    figures = identify_figures(found, predictions)
+    page, stage = folder / PAGE, folder / STAGE
+    page.write_text(identify_html(found, given, predictions, figures), encoding="utf-8", newline="\n")
+    save_stage(found.stage, stage, overwrite=True)
+    files = [stage, page]
+    if found.correlations.keys:
+        write_correlations(found.correlations, found.stage, beside(stage), overwrite=True)
+        files.insert(1, beside(stage))
+    else:
+        beside(stage).unlink(missing_ok=True)  # an earlier run's, of other keys
+    pictures = {folder / f"{figure.name}.{form}": figure for figure in figures for form in FORMATS}
+    for number, (path, figure) in enumerate(pictures.items()):
+        progress("figures", number, len(pictures))
+        save(figure, path)
+    return [*files, *pictures]
+
+
+def _answer(
+    found: Identification, given: Sequence[Given], predictions: Sequence[Prediction], files: list[Path], as_json: bool
+) -> None:
+    """What was read and found, on standard output."""
+    if as_json:
+        from friso.views.identify_document import identify_document
+
+        document = identify_document(found, given, predictions) | {"files": [str(file) for file in files]}
+        print(json.dumps(document, allow_nan=False))
+        return
+    from friso.views.identify_words import answer
+
+    for line in answer(found, given, predictions):
+        print_wrapped(line)
+    named = [file for file in files if file.suffix in (".toml", ".html")]
+    print(f"\nwrote {', '.join(map(str, named))}, and {len({file.stem for file in files[len(named) :]})} figures")
+    uncertain = bool(found.stage.uncertain())
+    print(f"next: friso check {files[0]}{' --draws 1000' if uncertain else ''}")

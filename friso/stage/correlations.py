@@ -194,7 +194,9 @@ def _values(stage: Stage, matrix: np.ndarray, shares: np.ndarray) -> dict[str, n
     flat, values = stage.flat(), {}
     for (key, interval), column in zip(stage.uncertain().items(), normals.T, strict=True):
         half = (interval.high - interval.low) / 2
-        values[key] = interval.at(ndtr(column)) if interval.form == "range" else flat[key] + half / COVERAGE * column
+        values[key] = (
+            interval.evenly(ndtr(column)) if interval.form == "range" else flat[key] + half / COVERAGE * column
+        )
     return values
 
 
