@@ -116,12 +116,10 @@ def _predictions(found: Identification, given: Sequence[Given], options: Options
     from friso.identify.logs.log import Log
     from friso.identify.method import predict
 
-    for each in given:
-        if not isinstance(each.source, Log):
-            raise StageError(
-                "--predict", f"{each.path}, a frequency response", "a log over time", "--predict other.mat"
-            )
-    return [predict(found, each.source, options) for each in given if isinstance(each.source, Log)]
+    logs = [each.source for each in given if isinstance(each.source, Log)]
+    if len(logs) < len(given):
+        raise StageError("--predict", "a measured frequency response", "a log over time", "--predict other.mat")
+    return [predict(found, log, options) for log in logs]
 
 
 def _write(

@@ -92,7 +92,7 @@ def save(mapping: Mapping, log: Path, folder: Path | None = None) -> Path:
         lines += ["", f"[{name}]", *rows] if rows else []
     places = [sidecar(log)] + ([sidecar(log, folder)] if folder is not None else [])
     for place in places:
-        if not place.parent.stat().st_mode & stat.S_IWUSR:
+        if place.parent.is_dir() and not place.parent.stat().st_mode & stat.S_IWUSR:
             continue  # kept from writing on purpose: a superuser could all the same
         try:
             place.write_text("\n".join(lines) + "\n", encoding="utf-8")
