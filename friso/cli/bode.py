@@ -17,6 +17,7 @@ from friso.cli.common import (
     made_folder,
     print_table,
     read_stage,
+    say,
 )
 from friso.cli.progress import busy
 from friso.quantities import Bound, Quantity, StageError, quoted
@@ -49,6 +50,8 @@ def bode(
     Example: friso bode examples/thesis_rig.toml --frequencies "0.1 Hz..1 kHz" --out bode
     """
     stage = read_stage(stage_file, overrides, with_drive=True)
+    if stage.drive and stage.drive.velocity_samples is not None:
+        say("drive.velocity_samples is left out: the derivative is that of the bilinear transform")
     shown = None if frequencies is None else _read_frequencies(frequencies, stage)
     folder = None if out is None else made_folder(out)
     from friso.frequency.bode import bode as analysis

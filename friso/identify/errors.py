@@ -18,7 +18,8 @@ BINS = 40
 @dataclass(frozen=True)
 class Errors:
     """Norms of measured minus simulated over norms of the measured signal, of position, velocity, acceleration and
-    force; velocity and acceleration of both by the same filter and differences."""
+    force; velocity and acceleration of both by the same filter and differences. Of a stage that was held to the log's
+    position only the force has one: what the model does not explain."""
 
     position: float
     velocity: float
@@ -54,6 +55,12 @@ def errors_of(log: Log, part: slice, simulated: Simulated, bandwidth: float) -> 
         _relative(measured.acceleration, found.acceleration),
         _relative(log["force"][part], simulated.force + disturbance),
     )
+
+
+def unexplained(log: Log, part: slice, held: Simulated) -> Errors:
+    """The error of a stage that was held to the log's position, by the force that it took."""
+    share = float(np.linalg.norm(held.force) / np.linalg.norm(log["force"][part]))
+    return Errors(np.nan, np.nan, np.nan, share)
 
 
 def residual_of(residual: np.ndarray, moved: Motion, sample_time: float) -> Residual:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from friso.identify.errors import Errors, Residual, errors_of, residual_of
+from friso.identify.errors import Errors, Residual, errors_of, residual_of, unexplained
 from friso.identify.estimate import Estimate
 from friso.identify.inverse_model import SMOOTH, InverseModel, inverse_model, motion
 from friso.identify.logs.log import Log
@@ -36,7 +36,10 @@ SHARP = 3.0
 class Moves:
     """What was found: both fits of the inverse model, the output-error `fit`, the profiles of all parameters by name,
     the estimates by key of the stage file with the `correlation` of the shown ones, what the motion covers, the
-    simulated record of the fit and its errors, and `part`, the samples of the log used."""
+    simulated record of the fit and its errors, and `part`, the samples of the log used.
+
+    `loop` is the machine's own closed loop, which was simulated; without it (None) the stage followed the log, and the
+    simulated force is what it took to hold it there, which the model does not explain."""
 
     log: Log
     part: slice
@@ -50,6 +53,7 @@ class Moves:
     simulated: Simulated
     errors: Errors
     residual: Residual
+    loop: Problem | None
 
     @property
     def correlated(self) -> tuple[Estimate, ...]:
@@ -92,15 +96,21 @@ def identify_moves(log: Log, flat: Mapping[str, Any], own_loop: bool, bandwidth:
     simulated = (loop or follows).record(found.inner)
     return Moves(
         log, part, inverse, by_direction, found, profiles, estimates, correlation, covered, simulated,
-        errors_of(log, part, simulated, inverse.bandwidth),
-        residual_of(found.residual, moved, log.sample_time),
+        errors_of(log, part, simulated, inverse.bandwidth) if loop else unexplained(log, part, simulated),
+        residual_of(found.residual, moved, log.sample_time), loop,
     )  # fmt: skip
 
 
 def predict(found: Moves, log: Log) -> tuple[slice, Simulated, Errors]:
-    """Another log of the same axis simulated with what was found: the samples used, the record, its errors."""
+    """Another log of the same axis simulated with what was found: the samples used, the record, its errors.
+
+    Raises StageError where the machine's own loop is not known.
+    """
+    if found.loop is None:
+        expected = "the machine's own controller, with which another record can be simulated"
+        raise StageError("--predict", "no stage file", expected, "--stage examples/emps_axis.toml", log.name)
     part = longest(log)
-    problem = _same_kind(found.fit.problem, log, part)
+    problem = _same_kind(found.loop, log, part)
     simulated = problem.record(found.fit.inner)
     return part, simulated, errors_of(log, part, simulated, found.inverse.bandwidth)
 

@@ -24,6 +24,9 @@ STEP = 1e-4
 RTOL = 1e-5
 """Relative tolerance of the simulations."""
 
+FIRST = 10
+"""Samples from which the velocity at the beginning is taken."""
+
 SAME = 1e-3
 """Share by which the sample time of the log and that of the drive may differ to count as one."""
 
@@ -44,8 +47,8 @@ class Problem:
 
     In a `closed` loop the stage has the controller of its machine and follows the log's reference; what is wanted is
     the log's force. Otherwise it follows the log's position under the log's force, held to it by a controller of our
-    own, of whose force nothing is wanted: what it has to add is what the model does not explain. `start` [m] is the
-    position at the beginning.
+    own, of whose force nothing is wanted: what it has to add is what the model does not explain. `start` holds position
+    [m] and velocity [m/s] at the beginning.
     """
 
     flat: Mapping[str, Any]
@@ -54,7 +57,7 @@ class Problem:
     wanted: np.ndarray
     parameters: tuple[Parameter, ...]
     closed: bool
-    start: float
+    start: tuple[float, float]
 
     @cached_property
     def kernel(self) -> Kernel:
@@ -104,12 +107,17 @@ class Problem:
         return size if inner[i] < (each.inner(each.low) + each.inner(each.high)) / 2 else -size
 
     def _starts(self, flat: Mapping[str, Any], runs: int) -> np.ndarray:
-        """At rest where the log begins, the bristles bent as far as the first force bends them."""
+        """Where the log begins and as fast, the bristles bent as far as the first force bends them."""
         states = self.kernel.states
         starts = np.zeros((runs, len(states)))
+        position, velocity = self.start
         for i, name in enumerate(states):
-            if name.endswith("position") or name.startswith("position_before"):
-                starts[:, i] = self.start
+            if name.endswith("position"):
+                starts[:, i] = position
+            elif name.endswith("velocity"):
+                starts[:, i] = velocity
+            elif name.startswith("position_before"):
+                starts[:, i] = position - velocity * self.inputs.sample_time * int(name.rsplit("_", 1)[1])
         if "bristle_deflection" in states:
             pull = self.wanted[0] + self.inputs.force[0] + flat.get("bias.cart", 0.0) + flat.get("bias.stage", 0.0)
             held = flat.get("friction.static", flat["friction.coulomb"])
@@ -153,7 +161,7 @@ def closed_loop(flat: Mapping[str, Any], log: Log, part: slice, parameters: Sequ
         log["force"][part] - extra,
         tuple(parameters),
         True,
-        float(log["position"][part.start]),
+        _start(log, part),
     )
 
 
@@ -173,5 +181,12 @@ def tracking(
         np.zeros(part.stop - part.start),
         tuple(parameters),
         False,
-        float(log["position"][part.start]),
+        _start(log, part),
     )
+
+
+def _start(log: Log, part: slice) -> tuple[float, float]:
+    """Position [m] and velocity [m/s] at the beginning, from a straight line through the first samples."""
+    time = np.arange(FIRST) * log.sample_time
+    slope = np.polyfit(time, log["position"][part][:FIRST], 1)[0]
+    return float(log["position"][part.start]), float(slope)
