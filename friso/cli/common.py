@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import shutil
 import sys
 import textwrap
@@ -109,6 +110,25 @@ def made_folder(path: Path) -> Path:
         expected = f"a folder that can be written ({error.strerror})"
         raise StageError("--out", str(path), expected, "--out report") from None
     return path
+
+
+def check_place(folder: Path, written: Sequence[str], page: str, given: Sequence[Path]) -> None:
+    """Raises StageError where one of the files written would cost one that is read here, or that is not of an earlier
+    run (which has left its `page` beside it), and where the folder cannot be written."""
+    for path in (folder / name for name in written):
+        if not path.exists():
+            continue
+        expected = "another folder, or the files moved out of the way"
+        if any(each.exists() and path.samefile(each) for each in given):
+            raise StageError("--out", f"{folder}, where {path.name} is read", expected, f"--out {folder}-2")
+        if not (folder / page).exists():
+            raise StageError("--out", f"{folder}, with a {path.name} of no earlier run", expected, f"--out {folder}-2")
+    was_there = folder.exists()
+    made_folder(folder)  # now, not after a minute of computing
+    if not os.access(folder, os.W_OK):
+        raise StageError("--out", str(folder), "a folder that can be written", f"--out {folder}-2")
+    if not was_there:
+        folder.rmdir()
 
 
 def read_tolerance(text: str) -> float:

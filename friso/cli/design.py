@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 import json
-import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NoReturn
 
 import typer
 
-from friso.cli.common import AsJson, Overrides, StageFile, made_folder, print_wrapped, read_stage, say
+from friso.cli.common import AsJson, Overrides, StageFile, check_place, made_folder, print_wrapped, read_stage, say
 from friso.cli.progress import step_bar
-from friso.quantities import StageError
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
-
     from friso.design.method import Design, NoDesign, Progress
     from friso.design.spec import Spec
     from friso.stage import Stage
@@ -42,7 +38,7 @@ def design(
     spec = load_spec(spec_file)
     if stage.drive:
         say("[drive] counts for the margins; hunting and moves are simulated in continuous time")
-    _check_place(out, (stage_file, spec_file))
+    check_place(out, STAGES, PAGE, (stage_file, spec_file))
     try:
         found, files = _designed(stage, spec, out)
     except NoDesign as failure:
@@ -58,24 +54,6 @@ def design(
 
         say(f"the design does not meet the specification: {shortfall(found)}")
         raise typer.Exit(2)
-
-
-def _check_place(folder: Path, given: Sequence[Path]) -> None:
-    """Raises StageError where writing would cost a file that is not one of an earlier design, or is read here."""
-    for path in (folder / name for name in STAGES):
-        if not path.exists():
-            continue
-        expected = "another folder, or the files moved out of the way"
-        if any(each.exists() and path.samefile(each) for each in given):
-            raise StageError("--out", f"{folder}, where {path.name} is read", expected, "--out design-2")
-        if not (folder / PAGE).exists():
-            raise StageError("--out", f"{folder}, with a {path.name} of no earlier design", expected, "--out design-2")
-    was_there = folder.exists()
-    made_folder(folder)  # now, not after a minute of computing
-    if not os.access(folder, os.W_OK):
-        raise StageError("--out", str(folder), "a folder that can be written", "--out design-2")
-    if not was_there:
-        folder.rmdir()
 
 
 def _designed(stage: Stage, spec: Spec, out: Path) -> tuple[Design, list[Path]]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from friso.cli.common import AsJson, Overrides, made_folder, print_wrapped, with_overrides
+from friso.cli.common import AsJson, Overrides, check_place, made_folder, print_wrapped, with_overrides
 from friso.cli.progress import step_bar
 from friso.quantities import Quantity, StageError, positive
 from friso.stage import load
@@ -66,7 +66,7 @@ def identify(
         raise StageError("--set", overrides[0], "a stage whose keys to override", "--stage stage.toml")
     options = _options(bandwidth, band, period)
     told = from_options(maps or (), units or (), scales or (), dt, kind)
-    _check_place(out, [*logs, *(predict or []), *([stage] if stage else [])])
+    check_place(out, (STAGE,), PAGE, [*logs, *(predict or []), *([stage] if stage else [])])
     given = read_all([*logs, *(predict or [])], told, out)
     with step_bar() as bar:
 
@@ -76,7 +76,7 @@ def identify(
 
         found = found_in([(each.source, each.kind) for each in given[: len(logs)]], known, options, progress)
         predictions = _predictions(found, given[len(logs) :], options)
-        files = _write(found, given, predictions, out, progress)
+        files = _write(found, given, predictions, made_folder(out), progress)
     _answer(found, given, predictions, files, as_json)
 
 
@@ -96,19 +96,6 @@ def _options(bandwidth: str | None, band: str | None, period: str | None) -> Opt
     except StageError as error:
         raise error.found_in("--band") from None
     return Options(values[0], None if limits is None else (limits.low, limits.high), values[1])
-
-
-def _check_place(folder: Path, given: Sequence[Path]) -> None:
-    """Raises StageError where writing would cost a file that is read, or a stage file that friso did not identify."""
-    place = folder / STAGE
-    made_folder(folder)  # now, not after a minute of computing
-    if not place.exists():
-        return
-    expected = "another folder, or the file moved out of the way"
-    if any(each.exists() and place.samefile(each) for each in given):
-        raise StageError("--out", f"{folder}, where {STAGE} is read", expected, "--out identified-2")
-    if not (folder / PAGE).exists():
-        raise StageError("--out", f"{folder}, with a {STAGE} of no earlier run", expected, "--out identified-2")
 
 
 def _predictions(found: Identification, given: Sequence[Given], options: Options) -> list[Prediction]:

@@ -95,6 +95,8 @@ def save(mapping: Mapping, log: Path, folder: Path | None = None) -> Path:
         if place.parent.is_dir() and not place.parent.stat().st_mode & stat.S_IWUSR:
             continue  # kept from writing on purpose: a superuser could all the same
         try:
+            if place != places[0]:
+                place.parent.mkdir(parents=True, exist_ok=True)
             place.write_text("\n".join(lines) + "\n", encoding="utf-8")
         except OSError:
             continue

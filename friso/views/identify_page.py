@@ -1,0 +1,29 @@
+"""The page of `friso identify`: one file that opens offline, prints, and is the same bytes on every run."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from friso.identify.method import Identification, Prediction
+from friso.identify.sources import Given
+from friso.views.figure import Figure
+from friso.views.identify_words import COLUMNS, estimate_rows, headline, parts, prediction, read_rows
+from friso.views.pages import stage_page
+
+
+def identify_html(
+    found: Identification, given: Sequence[Given], predictions: Sequence[Prediction], figures: Sequence[Figure]
+) -> str:
+    """The whole page of an identification and its figures."""
+    return stage_page(
+        "identify.html",
+        found.stage,
+        figures,
+        verdicts=headline(found),
+        columns=COLUMNS,
+        rows=estimate_rows(found),
+        files=read_rows(given),
+        parts=parts(found),
+        predicted=[prediction(each)[1] for each in predictions],
+        warnings=found.warnings,
+    )
