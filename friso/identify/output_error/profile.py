@@ -22,6 +22,9 @@ WIDER = 5.0
 ROUNDS = 3
 """Iterations of each of these fits."""
 
+SPOTS = (0.05, 0.95)
+"""Places in the range of a parameter that is not fitted from where it follows one that is moved."""
+
 WORSE = float(chi2.ppf(0.95, 1))
 """By how much -2 ln(likelihood) grows at the ends of a 95 % interval."""
 
@@ -53,7 +56,7 @@ def profile(fit: Fit, number: int, others: tuple[int, ...], best: float) -> Prof
     spread = fit.covariance[fit.free.index(number), fit.free.index(number)] if number in fit.free else np.inf
     limit = best * (1 + WORSE / fit.independent)
     parameter = fit.problem.parameters[number]
-    half = WIDE * np.sqrt(spread)
+    half = WIDE * np.sqrt(spread) if spread > 0 else np.inf
     while True:
         near, far = max(low, own - half), min(high, own + half)
         values = np.unique([*np.linspace(near, far, POINTS), own])
@@ -67,12 +70,18 @@ def profile(fit: Fit, number: int, others: tuple[int, ...], best: float) -> Prof
 
 
 def _costs(fit: Fit, number: int, others: tuple[int, ...], values: np.ndarray) -> np.ndarray:
-    """Mean squares [N^2] at values of a parameter, shape (values,), the others fitted."""
-    starts = np.tile(fit.inner, (len(values), 1))
-    starts[:, number] = values
+    """Mean squares [N^2] at values of a parameter, shape (values,), the others fitted: the least of those from several
+    starts of the ones that are not part of the fit, whose own values mean nothing."""
+    low, high = bounds_of(fit.problem)
+    spots = [fit.inner]
+    for loose in (i for i in others if i not in fit.free):
+        spots += [np.where(np.arange(len(low)) == loose, low + share * (high - low), fit.inner) for share in SPOTS]
+    starts = np.repeat(np.array(spots), len(values), axis=0)
+    starts[:, number] = np.tile(values, len(spots))
     free = np.zeros(starts.shape, bool)
     free[:, list(others)] = True
-    return refine(fit.problem, starts, free, ROUNDS).cost if others else costs(fit.problem, starts)
+    cost = refine(fit.problem, starts, free, ROUNDS).cost if others else costs(fit.problem, starts)
+    return cost.reshape(len(spots), len(values)).min(axis=0)
 
 
 def _ends(values: np.ndarray, cost: np.ndarray, limit: float) -> tuple[float, float, bool, bool]:
