@@ -126,13 +126,17 @@ def _write(
     figures = identify_figures(found, predictions)
     page, stage = folder / PAGE, folder / STAGE
     page.write_text(identify_html(found, given, predictions, figures), encoding="utf-8", newline="\n")
-    save_stage(found.stage, stage, overwrite=True)
-    files = [stage, page]
-    if found.correlations.keys:
+    files = [page]
+    if found.stage is not None:
+        save_stage(found.stage, stage, overwrite=True)
+        files.insert(0, stage)
+    else:
+        stage.unlink(missing_ok=True)  # an earlier run's, as are the correlations below
+    if found.stage is not None and found.correlations.keys:
         write_correlations(found.correlations, found.stage, beside(stage), overwrite=True)
         files.insert(1, beside(stage))
     else:
-        beside(stage).unlink(missing_ok=True)  # an earlier run's, of other keys
+        beside(stage).unlink(missing_ok=True)
     pictures = {folder / f"{figure.name}.{form}": figure for figure in figures for form in FORMATS}
     for number, (path, figure) in enumerate(pictures.items()):
         progress("figures", number, len(pictures))
@@ -156,5 +160,7 @@ def _answer(
         print_wrapped(line)
     named = [file for file in files if file.suffix in (".toml", ".html")]
     print(f"\nwrote {', '.join(map(str, named))}, and {len({file.stem for file in files[len(named) :]})} figures")
-    uncertain = bool(found.stage.uncertain())
-    print(f"next: friso check {files[0]}{' --draws 1000' if uncertain else ''}")
+    if found.stage is None:
+        print("no stage file: a frequency response or a stiffness alone is no machine; --stage tells what the rest is")
+    else:
+        print(f"next: friso check {files[0]}{' --draws 1000' if found.stage.uncertain() else ''}")
