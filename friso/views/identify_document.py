@@ -1,4 +1,4 @@
-"""The JSON document of an identification: SI, the unit in the key's suffix or beside; not known or not finite is null."""
+"""The JSON document of an identification: SI, the unit in the key's suffix or beside; what is not known is null."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def identify_document(
 ) -> dict[str, Any]:
     """All but the files."""
     document = {
-        "stage": found.stage.name,
+        "stage": found.stage.name if found.stage else None,
         "logs": [_log(each) for each in given],
         "estimates": [_key(each) for each in found.estimates],
         "experiments": [_experiment(each) for each in found.experiments],
@@ -112,7 +112,8 @@ def _moves(it: Moves) -> dict[str, Any]:
         "inverse_model": _inverse(it.inverse),
         "inverse_model_by_direction": _inverse(it.by_direction),
         "output_error": {
-            "loop": "closed" if it.fit.problem.closed else "follows the log",
+            "loop": "follows the log" if it.loop is None else "closed",
+            "fitted_in_loop": it.fit.problem.closed,
             "errors": asdict(it.errors),
             "residual": _residual(it),
             "parameters": parameters,

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from friso.identify.estimate import Estimate
 from friso.identify.experiments.break_away import BreakAway
 from friso.identify.experiments.friction_velocity import Direction
@@ -67,10 +65,13 @@ def _told(result: object) -> tuple[tuple[str, ...], Facts, tuple[str, ...]]:
 def moves_sentences(it: Moves) -> tuple[str, ...]:
     """How it was fitted, and what the motion covers."""
     low, high = it.covered.gap
+    along = "the machine was simulated along the position of the log: what is compared is the force that it takes."
     if it.fit.problem.closed:
         how = "The machine was simulated in its own loop, on the reference of the log."
+    elif it.loop is not None:
+        how = f"In its own loop the simulated machine gets out of step with the log. For the fit, {along}"
     else:
-        how = "The machine was simulated along the position of the log: what is compared is the force that it takes."
+        how = f"{along[0].upper()}{along[1:]}"
     if not it.covered.steady.size:
         return how, "The motion is nowhere steady for long enough to show friction at a speed."
     gap = range_with_unit(low, high, "m/s")
@@ -102,17 +103,12 @@ def moves_facts(it: Moves) -> Facts:
 def moves_errors(it: Moves) -> str:
     """The relative errors of the simulated record; along the log's position, that of the force alone says anything."""
     errors = it.errors
-    if not it.fit.problem.closed:
-        return f"force {percent(left_of_force(it))}"
+    if it.loop is None:
+        return f"force {percent(errors.force)}"
     return (
         f"position {percent(errors.position)}, velocity {percent(errors.velocity)}, acceleration "
         f"{percent(errors.acceleration)}, force {percent(errors.force)}"
     )
-
-
-def left_of_force(it: Moves) -> float:
-    """The norm of what is left of the force, over that of the force."""
-    return float(np.linalg.norm(it.fit.residual) / np.linalg.norm(it.log["force"][it.part]))
 
 
 def _inverse(it: InverseModel) -> str:
@@ -125,7 +121,7 @@ def _listed(several: Sequence[Estimate]) -> str:
 
 def bench_sentences(it: Bench) -> tuple[str, ...]:
     """What the response shows, and whether friction explains its lower end."""
-    said = [f"{text[0].upper()}{text[1:]}." for text in (it.seen.words if it.seen else ())]
+    said = [f"{text[0].upper()}{text[1:]}." for text in (it.seen.words[-1:] if it.seen else ())]
     if it.departs is not None and it.departs.frequency.shown:
         below = digits(it.departs.frequency.value, "Hz")
         said.append(f"Below about {below} the response leaves the linear model.")
@@ -138,7 +134,8 @@ def _friction(it: Bench) -> str:
     assert it.explanation is not None
     share = 1 - it.explanation.left
     verb = "explains" if share > 0.5 else "does not explain"
-    return f"A simulated mass with Coulomb friction on a spring {verb} it: {percent(max(share, 0.0))} of it is accounted for."
+    accounted = percent(max(share, 0.0))
+    return f"A simulated mass with Coulomb friction on a spring {verb} it: {accounted} of it is accounted for."
 
 
 def bench_facts(it: Bench) -> Facts:

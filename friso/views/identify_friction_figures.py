@@ -133,7 +133,7 @@ def _break_away(it: BreakAway, name: str) -> list[Figure]:
         limits,
         bands=bands,
     )
-    caption = f"The quicker the force rises, the earlier motion begins. Static friction, at rate 0: {with_interval(it.static)}."
+    caption = f"Each ramp from rest. Static friction, as of the slowest ramps: {with_interval(it.static)}."
     return [Figure(f"{name}_rates", "Break-away force over force rate", caption, (panel,))]
 
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from friso.identify.inverse_model import SMOOTH, motion
+from friso.identify.experiments.common import cart, on_bearing
+from friso.identify.inverse_model import EDGE, SMOOTH, motion
 from friso.identify.logs.log import Log
 from friso.identify.moves import Moves
 from friso.identify.output_error.parameters import Parameter
@@ -28,9 +29,6 @@ from friso.views.figure import (
 from friso.views.identify_numbers import name_of, unit_of
 from friso.views.prefixes import range_with_unit
 
-POINTS = 4000
-"""Samples, evenly taken, that are drawn as points or as loops."""
-
 WORST = 5.0
 """How much worse a fit is seen in a profile, in units of what ends the 95 % interval."""
 
@@ -44,13 +42,18 @@ PALE = "#dbe9f4"
 def moves_figures(it: Moves, label: str) -> list[Figure]:
     """All figures of one log of moves; their names begin with "identify_" and the label."""
     name = f"identify_{label}"
-    return [_traces(it, name), _residual(it, name), _friction(it, name), _profiles(it, name)]
+    flat = it.fit.problem.flat
+    apart = "joint.stiffness" in flat and not flat["joint.locked"]  # a cart of its own, whose speed has to be measured
+    friction = [_friction(it, name)] if not apart or cart(it.log) is not None else []
+    return [_traces(it, name), _residual(it, name), *friction, _profiles(it, name)]
 
 
 def _traces(it: Moves, name: str) -> Figure:
     """Measured and simulated over time."""
-    if it.fit.problem.closed:
-        caption = "The identified machine in its own loop, on the reference of the log: nothing of the measured motion enters."
+    if it.loop is not None:
+        caption = (
+            "The identified machine in its own loop, on the reference of the log; the measured motion does not enter."
+        )
         panels = record_panels(it.log, it.part, it.simulated)
         return Figure(f"{name}_traces", "Measured and simulated", caption, panels)
     time, force = it.log.time[it.part], it.log["force"][it.part]
@@ -88,27 +91,29 @@ def _left(time: Array, left: Array) -> Panel:
 def _residual(it: Moves, name: str) -> Figure:
     """What is left of the force, over place and speed."""
     moved = motion(it.log["position"][it.part], it.log.sample_time, SMOOTH * it.inverse.bandwidth)
-    every = _picked(len(it.fit.residual))
-    left, axis = it.fit.residual[every], Axis("Force left", "N")
+    left, axis = it.fit.residual, Axis("Force left", "N")
     panels = (
-        Panel("", Axis("Position", "m"), axis, (Series(moved.position[every], left, "", VERMILLION, width=0.5),)),
-        Panel("", Axis("Velocity", "m/s"), axis, (Series(moved.velocity[every], left, "", VERMILLION, width=0.5),)),
+        Panel("", Axis("Position", "m"), axis, (Series(moved.position, left, "", VERMILLION, width=0.5),)),
+        Panel("", Axis("Velocity", "m/s"), axis, (Series(moved.velocity, left, "", VERMILLION, width=0.5),)),
     )
     caption = (
-        "Measured less simulated force. A pattern over the place is of the rail or the screw (cogging, pitch), one over "
-        "the velocity is friction that the model has not."
+        "Measured less simulated force. A pattern over the place comes from the rail or the screw (cogging, pitch), "
+        "one over the velocity from friction that the model does not have."
     )
     return Figure(f"{name}_residual", "What is left of the force", caption, panels, columns=2)
 
 
 def _friction(it: Moves, name: str) -> Figure:
     """Force less inertia over velocity, and the friction found."""
-    moved = motion(it.log["position"][it.part], it.log.sample_time, SMOOTH * it.inverse.bandwidth)
     flat = it.flat
-    mass = sum(flat.get(key, 0.0) for key in ("masses.cart", "masses.stage"))
-    friction = it.log["force"][it.part] - mass * moved.acceleration
-    every = _picked(len(friction))
-    loops = Series(moved.velocity[every], friction[every], "measured force less inertia", GREY, width=0.6)
+    masses = [flat.get(f"masses.{name}", 0.0) for name in ("cart", "stage")]
+    moved, stage = (
+        motion(position[it.part], it.log.sample_time, SMOOTH * it.inverse.bandwidth)
+        for position in (on_bearing(it.log), it.log["position"])
+    )
+    friction = it.log["force"][it.part] - masses[0] * moved.acceleration - masses[1] * stage.acceleration
+    inner = slice(EDGE, -EDGE)  # at the ends of a record the filter swings in
+    loops = Series(moved.velocity[inner], friction[inner], "measured force less inertia", GREY, width=0.6)
     top = float(np.abs(moved.velocity).max())
     reach = 1.1 * float(np.percentile(np.abs(friction), 99.5))
     low, high = it.covered.gap
@@ -121,7 +126,7 @@ def _friction(it: Moves, name: str) -> Figure:
     curve = Series(speeds, steady_friction(flat, speeds), "identified", BLUE, width=1.8)
     axes = Axis("Velocity", "m/s", (-1.05 * top, 1.05 * top)), Axis("Friction", "N", (-reach, reach))
     unshown = any(each.name == "friction.static" and not each.shown for each in it.estimates)
-    caption = "Loops: the measured force less mass times acceleration, swinging where the motion turns."
+    caption = "Loops: the measured force less masses times accelerations; they swing where the motion turns."
     if sides:
         caption += f" Shaded: {range_with_unit(low, high, 'm/s')}, where nothing moves steadily"
         caption += ", so that a Stribeck effect there would not be seen." if unshown else "."
@@ -150,14 +155,14 @@ def _profiles(it: Moves, name: str) -> Figure:
     fitted = {it.fit.problem.parameters[number].name for number in it.fit.free}
     panels = tuple(_profile(each, known[key], best, key in fitted) for key, each in it.profiles.items())
     caption = (
-        "How much worse the best fit gets while one parameter is held at other values and the others follow, in units of "
-        f"what ends the 95 % interval (shaded); drawn up to {WORST:g}. A curve that stays below 1 to the end of the range "
-        "is of a parameter that the record does not show."
+        "How much worse the best fit gets while one parameter is held at other values and the others follow; 1 ends "
+        f"the 95 % interval (shaded), drawn up to {WORST:g}. A curve that stays below 1 to an end of its range is of a "
+        "parameter that the record does not show."
     )
     if any((each.cost < best - (each.limit - best)).any() for each in it.profiles.values()):
         caption += (
-            " Below 0 the fit is better than the one chosen, but with a parameter on whose effect the motion has nothing "
-            "to say: it may take up other errors of the model."
+            " Below 0 the fit is better than the one chosen, by a parameter whose effect the motion does not cover: it "
+            "makes up for other errors of the model."
         )
     return Figure(f"{name}_profiles", "Profiles of the fit", caption, panels, columns=2)
 
@@ -176,8 +181,3 @@ def _profile(it: Profile, parameter: Parameter, best: float, fitted: bool) -> Pa
     line = Series(it.values, np.where(np.isfinite(worse), worse, np.nan), "", colour)
     points = Markers(it.values, np.where(worse <= WORST, worse, np.nan), "", colour)
     return Panel("", x, y, (line,), (points,), (Limit((1.0,), "", INK),), bands=(shade,))
-
-
-def _picked(count: int) -> slice:
-    """Every so many-th sample."""
-    return slice(None, None, max(1, count // POINTS))

@@ -19,11 +19,12 @@ def identify_html(
         "identify.html",
         found.stage,
         figures,
+        ", ".join(each.path.name for each in given),
         verdicts=headline(found),
         columns=COLUMNS,
         rows=estimate_rows(found),
         files=read_rows(given),
         parts=parts(found),
-        predicted=[prediction(each)[1] for each in predictions],
+        predicted=[prediction(each) for each in predictions],
         warnings=found.warnings,
     )

@@ -19,6 +19,7 @@ from friso.views.figure import (
     Array,
     Axis,
     Band,
+    Dash,
     Figure,
     Limit,
     Panel,
@@ -59,7 +60,9 @@ def _column(it: Bench, response: FrequencyResponse, driven: bool) -> tuple[Panel
     hertz = response.frequency
     inside = hertz[(hertz >= it.band[0]) & (hertz <= it.band[1])]
     fine = np.geomspace(inside[0], inside[-1], 400)
-    curves = [("two masses", BLUE, "solid", it.two_masses.predict(fine, driven))] if it.two_masses else []
+    curves: list[tuple[str, str, Dash, Array]] = []
+    if it.two_masses is not None:
+        curves.append(("two masses", BLUE, "solid", it.two_masses.predict(fine, driven)))
     if driven and it.modes is not None:
         curves.append(("modes", ORANGE, "dashed", it.modes.predict(fine)))
     (angle,) = phases([response.response])
@@ -67,7 +70,7 @@ def _column(it: Bench, response: FrequencyResponse, driven: bool) -> tuple[Panel
     band = response.band()
     half = np.degrees((band.phase_high - band.phase_low) / 2)
     lowest = 0.3 * float(np.abs(response.response).min())
-    area = Band(hertz, np.maximum(band.magnitude_low, lowest), band.magnitude_high, "95 %", AREA)
+    area = Band(hertz, np.maximum(band.magnitude_low, lowest), band.magnitude_high, "", AREA)
     measured = Series(hertz, np.abs(response.response), "measured", GREY, width=1.1)
     lines = tuple(Series(fine, np.abs(values), label, colour, dash, 1.5) for label, colour, dash, values in curves)
     masses = tuple(_mass_line(line, hertz, i == 0) for i, line in enumerate(it.lines)) if driven else ()
@@ -165,7 +168,8 @@ def _departure(it: Bench, name: str) -> Figure:
 
 def _amplitudes(it: Bench, name: str) -> Figure:
     """Measured and simulated accelerations per input at low frequency."""
-    assert it.explanation is not None and it.drag is not None
+    assert it.explanation is not None
+    assert it.drag is not None
     top = max(each.frequency[-1] for each in it.explanation.responses.values())
     high = 2 * it.departs.frequency.high if it.departs else top
     measured = _rising(it.driven, high)
@@ -178,9 +182,9 @@ def _amplitudes(it: Bench, name: str) -> Figure:
     size = Axis("Acceleration per input", unit, limits, log=True, prefixed=False)
     panel = Panel("", _frequency(measured[0]), size, tuple(lines), limits=(level,))
     caption = (
-        f"A mass with a Coulomb friction of {with_interval(it.drag.coulomb)} on a spring, simulated with the recorded input "
-        f"and with smaller and larger ones: it accounts for {percent(1 - it.explanation.left)} of the departure. The more "
-        "force, the less friction bends the response."
+        f"A mass with a Coulomb friction of {with_interval(it.drag.coulomb)} on a spring, simulated with the recorded "
+        f"input, a smaller and a larger one: it accounts for {percent(1 - it.explanation.left)} of the departure. The "
+        "response depends on the size of the input: it is not linear."
     )
     return Figure(f"{name}_amplitudes", "Friction at low frequency", caption, (panel,))
 

@@ -23,6 +23,11 @@ COLUMNS = ("Quantity", "Value", "95 % interval", "How, or why there is no value"
 LEFT = "not shown"
 """Stands for the value of what the logs do not show."""
 
+NO_STAGE = (
+    "No stage file is written: without moves, friso cannot make one up around the logs. One that is given (--stage) "
+    "takes over what they show."
+)
+
 POOR = 0.5
 """Relative error of the force, or of a response, from which on little of another log is predicted."""
 
@@ -37,15 +42,18 @@ class Row:
 
 def headline(found: Identification) -> list[tuple[str, str]]:
     """What is shown, what is not and why, and how well other logs are predicted; each with its colour."""
-    shown = [each for each in found.estimates if each.shown]
+    shown = [each for each in ordered(found.estimates) if each.shown]
+    benches = [(GREEN, sentence) for sentence in map(_bench, found.experiments) if sentence]
     said = []
     if shown:
         said.append((GREEN, f"Shown: {'; '.join(f'{within(each.name)} {with_interval(each)}' for each in shown)}."))
-    else:
+    elif not benches:
         said.append((VERMILLION, "No key of the stage file is shown by these logs."))
-    said += [(GREEN, bench) for bench in map(_bench, found.experiments) if bench]
+    said += benches
+    if found.stage is None:
+        said.append((ORANGE, NO_STAGE))
     if len(shown) < len(found.estimates):
-        said.append((ORANGE, f"Not shown: {missing(found.estimates)}."))
+        said.append((ORANGE, f"Not shown: {missing(ordered(found.estimates))}."))
     return said
 
 
@@ -101,7 +109,14 @@ def outputs(errors: Sequence[float]) -> str:
 
 def estimate_rows(found: Identification) -> list[Row]:
     """The table of estimates, in words of `COLUMNS`."""
-    return [_row(each) for each in found.estimates]
+    return [_row(each) for each in ordered(found.estimates)]
+
+
+def ordered(estimates: Sequence[Estimate]) -> list[Estimate]:
+    """The estimates in the order of the stage file's tables; others last."""
+    tables = ("masses", "friction", "bias", "joint")
+    places = {name: number for number, name in enumerate(tables)}
+    return sorted(estimates, key=lambda each: places.get(each.name.split(".")[0], len(tables)))
 
 
 def _row(it: Estimate) -> Row:
@@ -148,7 +163,8 @@ def answer(found: Identification, given: Sequence[Given], predictions: Sequence[
     for part in parts(found):
         lines += ["", part.title, *(f"  {each}" for each in part.sentences)]
         lines += [*(f"  {name}: {text}" for name, text in part.facts), *(f"  note: {each}" for each in part.warnings)]
-    lines += ["", *_aligned(estimate_rows(found)), "", *(sentence for _, sentence in headline(found))]
+    rows = estimate_rows(found)
+    lines += [*(["", *_aligned(rows)] if rows else []), "", *(sentence for _, sentence in headline(found))]
     lines += [prediction(each)[1] for each in predictions]
     return lines + [f"note: {each}" for each in found.warnings]
 

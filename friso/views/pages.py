@@ -31,17 +31,20 @@ def print_image(figure: Figure) -> str:
     return "data:image/svg+xml;base64," + base64.b64encode(svg).decode("ascii")
 
 
-def stage_page(template: str, stage: Stage, figures: Sequence[Figure], **shown: Any) -> str:
-    """The page of a template about a stage and its figures; `shown` are the other values that it names."""
+def stage_page(
+    template: str, stage: Stage | None, figures: Sequence[Figure], name: str = "Unnamed stage", **shown: Any
+) -> str:
+    """The page of a template about a stage (or None) and its figures; `name` is told where the stage has none, `shown`
+    are the other values that the template names."""
     return (
         environment()
         .get_template(template)
         .render(
-            name=stage.name or "Unnamed stage",
-            source=stage.source,
+            name=stage.name if stage and stage.name else name,
+            source=stage.source if stage else "",
             figures=[(figure, Markup(plotly_renderer.fragment(figure)), print_image(figure)) for figure in figures],
             plotly=Markup(plotly_renderer.script()) if figures else None,
-            stage_file=stage.to_toml(),
+            stage_file=stage.to_toml() if stage else "",
             version=VERSION,
             **shown,
         )

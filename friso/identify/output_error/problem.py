@@ -186,7 +186,7 @@ def tracking(
 
 
 def _start(log: Log, part: slice) -> tuple[float, float]:
-    """Position [m] and velocity [m/s] at the beginning, from a straight line through the first samples."""
+    """Position [m] and velocity [m/s] at the beginning, from a parabola through the first samples."""
     time = np.arange(FIRST) * log.sample_time
-    slope = np.polyfit(time, log["position"][part][:FIRST], 1)[0]
+    slope = np.polyfit(time, log["position"][part][:FIRST], 2)[1]
     return float(log["position"][part.start]), float(slope)

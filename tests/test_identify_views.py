@@ -1,0 +1,528 @@
+"""What `friso identify` says, writes and draws, on results made up here: looking at them needs no engine and no fit."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pages import Page
+
+from friso.identify.combine import combined
+from friso.identify.errors import Errors, residual_of
+from friso.identify.estimate import Estimate
+from friso.identify.experiments import (
+    friction_position,
+    friction_velocity,
+    record,
+    static_from_ramps,
+    static_from_stick_slip,
+    stiffness_from_steps,
+)
+from friso.identify.inverse_model import inverse_model, motion
+from friso.identify.logs.frequency_text import MeasuredResponse
+from friso.identify.logs.log import Log
+from friso.identify.method import ConstantSpeed, Experiment, Identification, Prediction, Result
+from friso.identify.moves import Moves
+from friso.identify.output_error.coverage import coverage
+from friso.identify.output_error.fit import Fit, first_values
+from friso.identify.output_error.parameters import parameters_of
+from friso.identify.output_error.problem import Simulated, closed_loop, tracking
+from friso.identify.output_error.profile import Profile
+from friso.identify.response.analysis import analyse
+from friso.identify.response.two_mass import two_masses
+from friso.identify.sources import Given
+from friso.identify.stage_file import identified, made_up, written
+from friso.stage.correlations import Correlations
+from friso.views import plotly_renderer
+from friso.views.figure import Figure, Panel, Series
+from friso.views.identify_document import identify_document
+from friso.views.identify_figures import identify_figures
+from friso.views.identify_moves_figures import moves_figures, record_panels
+from friso.views.identify_numbers import interval_text, unit_of, value_text, with_interval
+from friso.views.identify_page import identify_html
+from friso.views.identify_words import answer, estimate_rows, headline, labels, parts
+
+pytestmark = pytest.mark.xdist_group("identify-views")
+
+DT = 1e-3
+MASS, VISCOUS, COULOMB = 10.0, 50.0, 8.0
+WHY = "no steady motion between 1 and 20 mm/s"
+TWO_MASSES = np.array([np.log(1.2), np.log(0.5), np.log(2400.0), np.log(2.0), 0.5, 0.1, 0.0])
+
+
+def moves_log() -> Log:
+    """A mass that is driven there and back, its force as its friction and inertia ask for."""
+    time = np.arange(4000) * DT
+    phase = 2 * np.pi * 0.5 * time
+    position, velocity = 0.05 * (1 - np.cos(phase)), 0.05 * np.pi * np.sin(phase)
+    force = MASS * 0.05 * np.pi**2 * np.cos(phase) + VISCOUS * velocity + COULOMB * np.sign(velocity)
+    force = force + 0.2 * np.random.default_rng(1).standard_normal(len(time))
+    return record("axis", DT, position=position, force=force, reference=position)
+
+
+def moves(own_loop: bool, fitted_in_loop: bool) -> tuple[Moves, Log]:
+    """The result of a fit that need not be made."""
+    log = moves_log()
+    inverse, part = inverse_model(log, 5.0), log.segments[0]
+    flat = made_up(log, inverse).flat()
+    levels = {name: inverse.value(name) for name in ("mass", "viscous", "coulomb", "offset")}
+    parameters = parameters_of(flat, levels, 0.16, 0.1)
+    follows = tracking(flat, log, part, parameters, 5.0)
+    loop = closed_loop(flat, log, part, parameters) if own_loop else None
+    problem = loop if fitted_in_loop and loop else follows
+    residual = 0.2 * np.random.default_rng(2).standard_normal(len(log.time))
+    core = tuple(i for i, each in enumerate(parameters) if each.core)
+    fit = Fit(problem, first_values(parameters), core, 1e-6 * np.eye(len(core)), residual, 1.0, "")
+    profiles = {each.name: profile_of(each.name, each.low, each.high, each.core, fit.cost) for each in parameters}
+    moved = motion(log["position"], DT, 25.0)
+    known = (
+        Estimate.normal("friction.coulomb", "N", COULOMB, 0.05, "output error"),
+        Estimate.normal("masses.cart", "kg", MASS, 0.02, "output error"),
+        Estimate.unknown("friction.static", "N", "output error", WHY, COULOMB, 4 * COULOMB),
+        Estimate.unknown("friction.stribeck_velocity", "m/s", "output error", WHY, 5e-5, 0.16),
+    )
+    found = Moves(
+        log, part, inverse, inverse_model(log, 5.0, by_direction=True), fit, profiles, known, np.eye(2),
+        coverage(log["position"], moved, MASS, COULOMB, DT),
+        Simulated(log["position"] + 1e-6, np.gradient(log["position"], DT), log["force"] - residual),
+        Errors(1e-5, 2e-3, 0.05, 0.04) if own_loop else Errors(np.nan, np.nan, np.nan, 0.04),
+        residual_of(residual, moved, DT), loop,
+    )  # fmt: skip
+    return found, log
+
+
+def profile_of(name: str, low: float, high: float, closed: bool, best: float) -> Profile:
+    values = np.linspace(max(low, 1e-9), high, 7)
+    cost = best * (1 + 0.1 * (np.arange(7) - 3.0) ** 2) if closed else np.full(7, best)
+    cost[-1] = np.inf if closed else best  # a simulation that failed
+    return Profile(name, values, cost, 1.1 * best, values[2], values[4], not closed, not closed)
+
+
+def bench() -> tuple[Result, MeasuredResponse]:
+    frequency = np.arange(1.0, 60.0, 0.5)
+    rng = np.random.default_rng(3)
+    values = two_masses(TWO_MASSES, frequency)[0] * (1 + 0.003 * rng.standard_normal(len(frequency)))
+    source = MeasuredResponse(frequency, values, None, "bench", ("118 frequencies",), "m/N")
+    return analyse((), measured=source), source
+
+
+def multisine_bench() -> tuple[Result, tuple[Log, ...]]:
+    """Two realisations of a multisine, each with a distortion of its own, in volts."""
+    rng, logs, period = np.random.default_rng(4), [], 1000
+    lines = np.arange(1, 80)
+    for number in range(2):
+        spectrum, answers = (np.zeros(period // 2 + 1, complex) for _ in range(2))
+        spectrum[lines] = np.exp(2j * np.pi * rng.random(len(lines))) * period / 2
+        bent = 1 + 0.02 * rng.standard_normal(len(lines))
+        answers[lines] = spectrum[lines] * two_masses(TWO_MASSES, lines / (period * 2e-3))[0] * bent
+        force, position = (np.tile(np.fft.irfft(each), 5) for each in (spectrum, answers))
+        position = position + 1e-3 * position.std() * rng.standard_normal(len(position))
+        log = record(f"exp{number + 1}", 2e-3, force=force, position=position)
+        logs.append(replace(log, units={"force": "V"}))
+    return analyse(logs), tuple(logs)
+
+
+def steps() -> tuple[Result, Log]:
+    level = np.repeat([0.0, 3e-4, 6e-4, 3e-4, 0.0, 3e-4], 1500)
+    noise = np.random.default_rng(5).standard_normal((2, len(level)))
+    log = record("steps", DT, reference=level, position=level + 1e-7 * noise[0], force=2400 * level + 0.02 * noise[1])
+    return stiffness_from_steps(log), log
+
+
+def stick_slip() -> tuple[Result, Log]:
+    """A joint that is drawn on at 1 mm/s while the cart sticks, and lets it go a millimetre within 20 ms."""
+    time = np.arange(12000) * DT
+    drawn = 1e-3 * time
+    sudden = 1e-3 * np.floor(np.maximum(time - 0.2, 0))
+    smooth = np.convolve(np.pad(sudden, (10, 9), "edge"), np.ones(20) / 20, "valid")
+    noise = 1e-8 * np.random.default_rng(6).standard_normal((2, len(time)))
+    cart = smooth + noise[0]
+    log = record("slow", DT, position=drawn, cart_position=cart, relative_position=drawn - smooth + noise[1])
+    return static_from_stick_slip(log, 2400.0), log
+
+
+def break_away() -> tuple[Result, Log]:
+    """Ramps of several rates to either side, each a segment, of a mass that moves off at 3 N."""
+    signals, spans = {"position": [], "force": []}, []
+    rng, begin = np.random.default_rng(7), 0
+    for number, rate in enumerate((2.0, 4.0, 8.0, 16.0, 3.0, 6.0)):
+        time = np.arange(0, 0.3 + 3.2 / rate, DT)
+        push = np.maximum(rate * (time - 0.3), 0)
+        late = np.maximum(time - (0.3 + 3.0 / rate), 0)
+        way = (-1) ** number
+        signals["position"].append(way * (0.5 * late**2 * 2 + 1e-8 * rng.standard_normal(len(time))))
+        signals["force"].append(way * push + 5e-3 * rng.standard_normal(len(time)))
+        spans.append(slice(begin, begin + len(time)))
+        begin += len(time)
+    arrays = {name: np.concatenate(each) for name, each in signals.items()}
+    log = replace(record("ramps", DT, **arrays), segments=tuple(spans))
+    return static_from_ramps(log), log
+
+
+def constant() -> tuple[Result, Log]:
+    """There and back over 20 mm at several speeds, with friction that falls and then rises with the speed."""
+    legs = [np.zeros(200)]
+    for speed in (0.002, 0.004, 0.008, 0.016, 0.032, 0.064):
+        leg = np.linspace(0, 0.02, int(0.02 / speed / DT))
+        legs += [leg, np.full(200, 0.02), leg[::-1], np.zeros(200)]
+    position = np.concatenate(legs)
+    velocity = np.gradient(position, DT)
+    friction = np.sign(velocity) * (2 + np.exp(-((velocity / 0.006) ** 2))) + 10 * velocity
+    friction = friction + 0.05 * np.sin(position * 3000) * np.sign(velocity)
+    force = friction + 0.02 * np.random.default_rng(8).standard_normal(len(position))
+    log = record("speeds", DT, reference=position, position=position, force=force)
+    return ConstantSpeed(friction_velocity(log), friction_position(log)), log
+
+
+def everything() -> tuple[Identification, list[Given], list[Prediction]]:
+    """An identification with every kind of experiment, and a prediction of each kind."""
+    moved, log = moves(own_loop=True, fitted_in_loop=True)
+    follows, second = moves(own_loop=False, fitted_in_loop=False)
+    response, source = bench()
+    sines, exps = multisine_bench()
+    rows: list[tuple[str, Result, tuple]] = [("frequency", response, (source,)), ("frequency", sines, exps)]
+    rows += [("moves", moved, (log,)), ("moves", follows, (second,))]
+    for kind, made in (("steps", steps()), ("stick-slip", stick_slip()), ("break-away", break_away())):
+        rows.append((kind, made[0], (made[1],)))
+    speeds, slow = constant()
+    rows.append(("constant-speed", speeds, (slow,)))
+    experiments = tuple(Experiment(kind, logs, result, moved.estimates) for kind, result, logs in rows)
+    estimates = tuple(combined(list(moved.estimates))[0])
+    stage = identified(made_up(log, moved.inverse), estimates, ["axis"])
+    found = Identification(stage, Correlations(), experiments, estimates, ("something <to> know",))
+    files = [Given(Path(f"{each.name}.csv"), each, kind, "as told", None) for kind, _, logs in rows for each in logs]
+    predictions = [
+        Prediction(log, moved.part, moved.simulated, moved.errors),
+        Prediction(exps[0], response_errors=(0.1, 0.7)),
+    ]
+    return found, files, predictions
+
+
+@pytest.fixture(scope="module")
+def case() -> tuple[Identification, list[Given], list[Prediction]]:
+    return everything()
+
+
+@pytest.fixture(scope="module")
+def figures(case: tuple[Identification, list[Given], list[Prediction]]) -> list[Figure]:
+    return identify_figures(case[0], case[2])
+
+
+# --- numbers ----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("found", "said"),
+    [
+        (Estimate("masses.cart", "kg", 95.281, 94.84, 95.722, ""), "95.28 kg (94.84 to 95.72)"),
+        (Estimate("joint.stiffness", "N/m", 2400.4, 2386.0, 2414.8, ""), "2400 N/m (2386 to 2415)"),
+        (Estimate("bias.cart", "N", 0.32, -0.12, 0.76, ""), "0.32 N (-0.12 to 0.76)"),
+        (Estimate("friction.viscous", "N s/m", 210.0, 190.0, 230.0, ""), "210 N·s/m (190 to 230)"),
+        (Estimate("delay", "s", 1.17e-3, 0.97e-3, 1.37e-3, ""), "1.17 ms (0.97 to 1.37)"),
+        (Estimate("ratio", "1", 0.0768, 0.0701, 0.0835, ""), "0.0768 (0.0701 to 0.0835)"),
+        (Estimate("mass", "A s^2/rad", 9.53e9, 9.39e9, 9.67e9, ""), "9.530e+09 A·s²/rad (9.390e+09 to 9.670e+09)"),
+        (Estimate("friction.coulomb", "N", 20.0, 20.0, 20.0, ""), "20.00 N (20.00 to 20.00)"),
+        (Estimate("offset", "N", 0.0, -0.001, 0.001, ""), "0.0000 N (-0.0010 to 0.0010)"),
+        (Estimate.unknown("friction.static", "N", "", "too fast", 20.0), "not shown (too fast)"),
+    ],
+)
+def test_a_value_has_the_digits_of_its_interval(found: Estimate, said: str) -> None:
+    assert with_interval(found) == said
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "unit", "said"),
+    [
+        (20.0, 79.0, "N", "20 to 79 N"),
+        (20.0, np.inf, "N", "at least 20.00 N"),
+        (-np.inf, 3e-3, "m", "at most 3.000 mm"),
+        (-np.inf, np.inf, "N", "–"),
+        (4.26e-5, 0.128, "m/s", "42.6 µm/s to 128 mm/s"),
+    ],
+)
+def test_what_is_left_possible(low: float, high: float, unit: str, said: str) -> None:
+    found = Estimate.unknown("x", unit, "", "a reason", low, high)
+    assert interval_text(found) == said
+    assert value_text(found) == "–"
+
+
+@pytest.mark.parametrize(
+    ("unit", "known"),
+    [
+        ("N s/m", "N*s/m"),
+        ("1", ""),
+        ("1 s^2/1", "s^2"),
+        ("m/V", "m/V"),
+        ("1/A", "1/A"),
+        ("V s^2/m", "V*s^2/m"),
+        ("", ""),
+    ],
+)
+def test_units_as_prefixes_know_them(unit: str, known: str) -> None:
+    assert unit_of(unit) == known
+
+
+@given(st.floats(1e-7, 1e7), st.floats(1e-5, 0.9), st.sampled_from(["kg", "N", "m", "N s/m", "Hz"]), st.booleans())
+@settings(max_examples=150, deadline=None)
+def test_rounding_hides_less_than_a_twentieth_of_half_the_interval(
+    size: float, share: float, unit: str, negative: bool
+) -> None:
+    value = -size if negative else size
+    found = Estimate("x", unit, value, value - share * size, value + share * size, "")
+    number, _, told = value_text(found).partition(" ")
+    prefix = {"n": 1e-9, "µ": 1e-6, "m": 1e-3, "k": 1e3, "M": 1e6, "G": 1e9}
+    factor = prefix.get(told[0], 1.0) if unit != "kg" and len(told) > len(unit) else 1.0
+    rounding = share * size / 20 if "e" not in number else 1e-3 * size
+    assert abs(float(number) * factor - value) <= rounding * 1.001
+
+
+# --- words ------------------------------------------------------------------------------------------------------------
+
+
+def test_the_headline_says_what_is_shown_and_why_the_rest_is_not(case: tuple) -> None:
+    shown, response, volts, lost = (sentence for _, sentence in headline(case[0]))
+    assert shown == "Shown: cart mass 10.000 kg (9.961 to 10.039); Coulomb friction 8.000 N (7.902 to 8.098)."
+    assert lost == f"Not shown: static friction, Stribeck velocity ({WHY})."
+    assert "total mass 1.70" in response
+    assert "--scale" not in response
+    assert "The force stands in V" in volts
+    assert "--scale" in volts
+
+
+def test_every_key_has_a_row_with_its_value_or_the_reason(case: tuple) -> None:
+    rows = {row.texts[0]: row for row in estimate_rows(case[0])}
+    assert list(rows) == ["Cart mass", "Coulomb friction", "Static friction", "Stribeck velocity"]
+    assert rows["Cart mass"].texts == ("Cart mass", "10.000 kg", "9.961 to 10.039 kg", "output error")
+    assert not rows["Static friction"].shown
+    assert rows["Static friction"].texts[1:] == ("not shown", "8 to 32 N", WHY)
+
+
+def test_experiments_of_a_kind_are_numbered_and_their_figures_told_apart(case: tuple, figures: list[Figure]) -> None:
+    names = labels(case[0])
+    assert names == [
+        "frequency1", "frequency2", "moves1", "moves2", "steps", "stick_slip", "break_away", "constant_speed"
+    ]  # fmt: skip
+    assert len({figure.name for figure in figures}) == len(figures)
+    for name in names:
+        assert any(figure.name.startswith(f"identify_{name}_") for figure in figures), name
+
+
+def test_the_facts_of_moves_say_how_the_machine_was_simulated() -> None:
+    for own, inside, said in (
+        (True, True, "in its own loop, on the reference"),
+        (True, False, "gets out of step"),
+        (False, False, "The machine was simulated along the position"),
+    ):
+        found, log = moves(own, inside)
+        estimates = found.estimates
+        stage = made_up(log, found.inverse)
+        whole = Identification(stage, Correlations(), (Experiment("moves", (log,), found, ()),), estimates, ())
+        (part,) = parts(whole)
+        assert said in part.sentences[0]
+        errors = dict(part.facts)["Relative errors of the simulation"]
+        assert errors.endswith("force 4 %")
+        assert ("position 0.001 %" in errors) == own
+
+
+def test_the_terminal_hears_all_of_it(case: tuple) -> None:
+    found, files, predictions = case
+    lines = answer(found, files, predictions)
+    text = "\n".join(lines)
+    assert "axis.csv: moves (as told)" in text
+    assert "118 frequencies" in text
+    assert "Joint stiffness: 2" in text
+    assert "note: something <to> know" in text
+    assert "axis, predicted: relative errors of position 0.001 %, velocity 0.2 %, acceleration 5 %, force 4 %." in text
+    assert "exp1, predicted: relative error of the response 10 % (driven mass), 70 % (other mass)." in text
+    assert case[0].experiments[-1].result.position.verdict in text
+    assert not re.search(r"\bnan\b|\binf\b|None", text)
+
+
+def test_logs_that_make_no_stage_have_a_page_all_the_same(case: tuple) -> None:
+    found = replace(case[0], stage=None, experiments=())
+    assert any("No stage file is written" in sentence for _, sentence in headline(found))
+    assert identify_document(found, case[1], [])["stage"] is None
+    text = Page(identify_html(found, case[1][:2], [], [])).text
+    assert "bench.csv, exp1.csv" in text
+    assert "Copy" not in text
+    assert "Copy" in Page(identify_html(case[0], case[1][:2], [], [])).text
+
+
+# --- the document -----------------------------------------------------------------------------------------------------
+
+
+def test_the_document_is_plain_json_and_nothing_unknown_has_a_number(case: tuple) -> None:
+    document = json.loads(json.dumps(identify_document(*case), allow_nan=False))
+    assert [each["kind"] for each in document["logs"]] == [each.kind for each in case[1]]
+    keys = {each["key"]: each for each in document["estimates"]}
+    assert keys["masses.cart"]["value"] == MASS
+    assert keys["masses.cart"]["written"] == written(case[0].estimates[1])
+    assert keys["masses.cart"]["written"] in case[0].stage.to_toml()
+    assert keys["friction.static"]["value"] is None
+    assert keys["friction.static"]["reason"] == WHY
+    assert (keys["friction.static"]["low"], keys["friction.static"]["high"]) == (COULOMB, 4 * COULOMB)
+    assert document["predictions"][0]["errors"]["force"] == 0.04
+    assert document["predictions"][1] == {"log": "exp1", "response_errors": [0.1, 0.7]}
+
+
+def test_the_document_of_each_experiment(case: tuple) -> None:
+    document = identify_document(*case)
+    kinds = [each["kind"] for each in document["experiments"]]
+    own, follows = (document["experiments"][i] for i, kind in enumerate(kinds) if kind == "moves")
+    by = {each["kind"]: each for each in document["experiments"]}
+    inverse = own["inverse_model"]
+    assert inverse["mass_kg"]["low"] < MASS < inverse["mass_kg"]["high"]
+    assert inverse["coulomb_n"]["value"] == pytest.approx(COULOMB, rel=0.02)
+    assert {"mass_kg", "viscous_forward_n_s_per_m", "coulomb_backward_n"} <= own["inverse_model_by_direction"].keys()
+    assert own["output_error"]["loop"] == "closed"
+    assert follows["output_error"]["loop"] == "follows the log"
+    assert follows["output_error"]["errors"]["position"] is None
+    assert own["output_error"]["profiles"]["mass"]["mean_squares_n2"][-1] is None
+    assert own["output_error"]["profiles"]["friction.stribeck_velocity"]["open_low"]
+    assert {each["key"] for each in own["not_shown"]} == {"friction.static", "friction.stribeck_velocity"}
+    assert by["steps"]["stiffness"]["value"] == pytest.approx(2400, rel=0.01)
+    assert by["stick-slip"]["slips"] > 5
+    assert len(by["break-away"]["forces_n"]) == 6
+    assert by["constant-speed"]["directions"]["both"]["coulomb"]["unit"] == "N"
+    response = document["experiments"][0]
+    masses = {each["name"]: each["value"] for each in response["two_masses"]}
+    assert masses["driven mass"] == pytest.approx(1.2, rel=0.05)
+
+
+# --- figures ----------------------------------------------------------------------------------------------------------
+
+
+def named(figures: list[Figure], name: str) -> Figure:
+    return next(figure for figure in figures if figure.name == name)
+
+
+def line(panel: Panel, label: str) -> Series:
+    return next(each for each in panel.series if each.label == label)
+
+
+def test_the_friction_map_shows_force_without_inertia_and_the_curve_found() -> None:
+    found, _ = moves(own_loop=True, fitted_in_loop=True)
+    (panel,) = named(moves_figures(found, "moves"), "identify_moves_friction").panels
+    measured, curve = line(panel, "measured force less inertia"), line(panel, "identified")
+    quick = np.abs(measured.x) > 0.02
+    truth = COULOMB * np.sign(measured.x) + VISCOUS * measured.x
+    assert np.abs(measured.y - truth)[quick].mean() < 0.3  # the noise alone: 0.16
+    ends = curve.y[[0, -1]] * [-1, 1]
+    assert ends == pytest.approx(COULOMB + VISCOUS * 0.05 * np.pi, rel=0.03)
+
+
+def test_profiles_are_1_where_the_interval_ends() -> None:
+    found, _ = moves(own_loop=True, fitted_in_loop=True)
+    figure = named(moves_figures(found, "moves"), "identify_moves_profiles")
+    mass = next(panel for panel in figure.panels if panel.x.quantity == "Mass")
+    assert mass.series[0].y[2:5] == pytest.approx([1, 0, 1])
+    assert np.isnan(mass.series[0].y[-1])
+    assert tuple(mass.bands[0].x) == (found.profiles["mass"].low, found.profiles["mass"].high)
+    assert "Below 0" not in figure.caption
+    better = {**found.profiles, "mass": replace(found.profiles["mass"], cost=found.profiles["mass"].cost * 0.5)}
+    assert "Below 0" in named(moves_figures(replace(found, profiles=better), "m"), "identify_m_profiles").caption
+
+
+def test_traces_with_a_disturbance_and_of_a_stage_that_follows() -> None:
+    found, log = moves(own_loop=True, fitted_in_loop=True)
+    pulses = np.where(log.time > 2, 5.0, 0.0)
+    disturbed = replace(log, signals={**log.signals, "disturbance": pulses})
+    panels = record_panels(disturbed, found.part, replace(found.simulated, force=log["force"] - pulses))
+    assert line(panels[2], "simulated").y == pytest.approx(log["force"])
+    assert np.abs(panels[3].series[0].y).max() < 1e-9
+    follows, _ = moves(own_loop=False, fitted_in_loop=False)
+    above, below = named(moves_figures(follows, "m"), "identify_m_traces").panels
+    assert line(above, "measured").y - line(above, "needed").y == pytest.approx(below.series[0].y)
+
+
+def test_fits_lie_on_the_measured_response_in_size_and_turn(figures: list[Figure]) -> None:
+    for number in (1, 2):
+        above, below = named(figures, f"identify_frequency{number}_bode").panels
+        measured, model = line(above, "measured"), line(above, "two masses")
+        at = np.exp(np.interp(np.log(model.x), np.log(measured.x), np.log(measured.y)))
+        assert np.median(np.abs(model.y / at - 1)) < 0.05
+        phase, fitted = below.series[0], below.series[1]
+        assert np.median(np.abs(np.interp(fitted.x, phase.x, phase.y) - fitted.y)) < 10
+        band = above.bands[0]
+        assert (band.low <= measured.y).all()
+        assert (band.high >= measured.y).all()
+    mass = line(named(figures, "identify_frequency1_bode").panels[0], "mass line")
+    assert 1 / (mass.y * (2 * np.pi * mass.x) ** 2) == pytest.approx(mass.y * 0 + 1.7, rel=0.1)
+
+
+def test_noise_and_distortion_are_drawn_where_the_record_tells_them(figures: list[Figure]) -> None:
+    (panel,) = named(figures, "identify_frequency2_levels").panels
+    noise, distortion = line(panel, "noise"), line(panel, "nonlinear distortion")
+    assert np.nanmedian(noise.y) < np.nanmedian(distortion.y)
+    assert not any(figure.name == "identify_frequency1_levels" for figure in figures)
+
+
+def test_experiments_in_time_are_drawn_with_what_was_found(case: tuple, figures: list[Figure]) -> None:
+    results = {each.kind: each.result for each in case[0].experiments}
+    (panel,) = named(figures, "identify_steps_stiffness").panels
+    (slope,) = panel.series
+    assert np.diff(slope.y) / np.diff(slope.x) == pytest.approx(results["steps"].stiffness.value)
+    assert len(panel.markers[0].x) == len(results["steps"].windows)
+    above = named(figures, "identify_stick_slip_slips").panels[0]
+    assert sum(len(each.x) for each in above.markers) == len(results["stick-slip"].times)
+    (rates,) = named(figures, "identify_break_away_rates").panels
+    assert {each.label for each in rates.markers} == {"forward", "backward"}
+    (speeds,) = named(figures, "identify_constant_speed_velocity").panels
+    assert sum(len(each.x) for each in speeds.markers) == len(results["constant-speed"].velocity.velocities)
+    forward = line(speeds, "fit, forward")
+    truth = 2 + np.exp(-((forward.x / 0.006) ** 2)) + 10 * forward.x
+    assert forward.y == pytest.approx(truth, abs=0.1)
+    (rail,) = named(figures, "identify_constant_speed_position").panels
+    assert len(rail.series) == len(results["constant-speed"].position.passes)
+
+
+def test_the_intervals_are_those_of_the_estimates(case: tuple, figures: list[Figure]) -> None:
+    (panel,) = named(figures, "identify_intervals").panels
+    assert panel.y.words == ("Stribeck", "static", "Coulomb", "cart")
+    shown, lost = panel.markers
+    assert shown.x == pytest.approx([100 * 1.96 * 0.05 / COULOMB, 100 * 1.96 * 0.02 / MASS], rel=1e-3)
+    assert lost.x[1] == pytest.approx(60)
+    one = replace(case[0], estimates=case[0].estimates[:1], experiments=())
+    assert identify_figures(one, []) == []
+
+
+def test_every_figure_can_be_drawn_and_its_axes_have_their_units(figures: list[Figure]) -> None:
+    lengths = {"Position", "Deflection"}
+    for figure in figures:
+        assert figure.caption.endswith(".")
+        assert f'id="figure-{figure.name}"' in plotly_renderer.fragment(figure)
+        for panel in figure.panels:
+            for axis in (panel.x, panel.y):
+                assert (axis.quantity not in lengths) or axis.unit == "m"
+                assert (axis.quantity not in {"Force", "Friction", "Force left"}) or axis.unit == "N"
+
+
+# --- the page ---------------------------------------------------------------------------------------------------------
+
+
+def test_the_page_opens_offline_shows_all_and_is_the_same_bytes_again(case: tuple, figures: list[Figure]) -> None:
+    found, files, predictions = case
+    some = [each for each in figures if each.name.endswith(("intervals", "moves1_friction", "frequency1_bode"))]
+    assert len(some) == 3
+    html = identify_html(found, files, predictions, some)
+    assert html == identify_html(found, files, predictions, some)
+    page = Page(html)
+    assert all(address.startswith("data:") for address in page.loads)
+    text = " ".join(page.text.split())
+    for _, sentence in headline(found):
+        assert sentence in text
+    for part in parts(found):
+        assert part.title in text
+        assert all(sentence in text for sentence in part.sentences)
+    for figure in some:
+        assert html.count(f'id="figure-{figure.name}"') == 1
+    assert "something <to> know" in text
+    assert "exp1, predicted" in text
+    assert "118 frequencies" in text
+    assert found.stage.to_toml().strip() in page.text
