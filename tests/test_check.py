@@ -68,6 +68,8 @@ def test_unusable_tolerance(rig: Stage) -> None:
 
 SPRING = """
 masses.stage = "1 kg"
+friction = {{ model = "lugre", static = "1e-12 N", coulomb = "1e-12 N", stribeck_velocity = "1 mm/s", \
+stribeck_exponent = 2, bristle_stiffness = "1e-6 N/m", bristle_damping = "0 N*s/m", viscous = "0 N*s/m" }}
 controller = {{ kind = "pid", kp = "{kp} N/m", kd = "{kd} N*s/m", derivative_on = "measurement" }}
 motion = {{ kind = "step", size = "1 mm", duration = "20 s" }}
 """
@@ -75,7 +77,8 @@ motion = {{ kind = "step", size = "1 mm", duration = "20 s" }}
 
 @pytest.mark.parametrize(("kp", "kd"), [(1000.0, 15.0), (40.0, 3.0), (300.0, 2.0)])
 def test_settling_time_of_a_damped_spring(kp: float, kd: float) -> None:
-    """Closed form: the last time at which the free oscillation leaves the band, between or beyond its extrema."""
+    """Closed form: the last time at which the free oscillation leaves the band, between or beyond its extrema. Its
+    friction is none to speak of, in the form of the stage below."""
     case = friso.check(friso.loads(SPRING.format(kp=kp, kd=kd)), rtol=1e-9)["given"]
     decay, omega = kd / 2, np.sqrt(kp - kd**2 / 4)
     time = np.arange(0, 20, 1e-5)

@@ -6,10 +6,11 @@ from typing import Any
 import numpy as np
 import plain
 import pytest
+from cycles import by_gains
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 from scipy.optimize import brentq
-from variants import VARIANTS
+from variants import PARASITIC, TOUCHING, VARIANTS, lugre, stage, step, van_dijk
 
 from friso.engine.arrays import Results, Settings, Status
 from friso.engine.batch import Options, prepare, run_chunks
@@ -17,6 +18,7 @@ from friso.engine.kernel import empty_results, kernel
 from friso.engine.shared_queue import new_queue
 from friso.equations import motion
 from friso.equations.structure import structure
+from friso.stage import Stage
 
 LINEAR = VARIANTS["rigid, no friction section"]
 MOVE = {"motion.return_at": 0.1, "motion.duration": 0.3}
@@ -132,22 +134,26 @@ def radau(flat: dict[str, Any], names: tuple[str, ...], scales: np.ndarray, time
     return found
 
 
+TOUCHES = stage(step(), friction=lugre(2), joint=TOUCHING, parasitic=PARASITIC, controller=van_dijk())
+
+
 @pytest.mark.parametrize(
-    ("name", "changes"),
+    ("chosen", "changes"),
     [
-        pytest.param("rigid", {"motion.duration": 3.5}, marks=pytest.mark.xdist_group("rigid")),
-        pytest.param("free, parasitic", {"motion.duration": 0.12}, marks=pytest.mark.xdist_group("free")),
-        pytest.param("rigid, van Dijk, limit", {"motion.duration": 0.5}, marks=pytest.mark.xdist_group("limit")),
-        pytest.param("rigid, Stribeck 1.5, PD measured", {"motion.duration": 0.4}, marks=pytest.mark.xdist_group("st")),
-        pytest.param("touching", {"motion.duration": 0.2}, marks=pytest.mark.xdist_group("touching")),
+        pytest.param(VARIANTS["rigid"], {"motion.duration": 3.5}, id="rigid"),
+        pytest.param(VARIANTS["free, parasitic"], {"motion.duration": 0.12}, id="free, parasitic"),
+        pytest.param(by_gains(8, "6 N"), {"motion.duration": 0.5, "motion.displacement": 1e-2}, id="gains, limit"),
+        pytest.param(VARIANTS["rigid, Stribeck 1.5, PD measured"], {"motion.duration": 0.4}, id="Stribeck, measured"),
+        pytest.param(TOUCHES, {"motion.duration": 0.06}, id="touching, parasitic"),
     ],
 )
-def test_runs_against_radau(name: str, changes: dict[str, Any]) -> None:
-    """Short stretches with stops, reversals, contacts and a force at its limit."""
-    flat = VARIANTS[name].flat() | changes
+def test_runs_against_radau(chosen: Stage, changes: dict[str, Any]) -> None:
+    """Short stretches with stops, reversals, contacts and a force at its limit; but for the law of Stribeck their
+    structures are those of other tests, whose kernels are compiled already."""
+    flat = chosen.flat() | changes
     if "motion.return_at" in flat:
         flat["motion.return_at"] = 0.6 * flat["motion.duration"]
-    shape = kernel(structure(VARIANTS[name].flat()))
+    shape = kernel(structure(flat))
     interval = flat["motion.duration"] / 100
     (runs,) = run_chunks(shape, flat, 1, Options(rtol=1e-11, interval=interval))
     assert runs.results.statuses[0] == Status.DONE

@@ -27,9 +27,18 @@ from friso.identify.experiments.common import block_mean, correlated_mean, low_p
 from friso.identify.experiments.rate_effect import break_away, share_below, static_friction
 from friso.identify.logs.log import Log
 from friso.studies.thesis.claims import Evidence, Finding, registered
-from friso.studies.thesis.experiments import SLOW, constant_speed, joint_steps, slow_motion
-from friso.studies.thesis.judges.identification import judged_line, judged_slips, judged_speeds, judged_steps
+from friso.studies.thesis.experiments import (
+    SLOW,
+    LockedLine,
+    constant_speed,
+    experiments_on,
+    joint_steps,
+    slow_motion,
+)
+from friso.studies.thesis.judges.identified_in_time import judged_slips, judged_speeds, judged_steps
+from friso.studies.thesis.judges.identified_responses import judged_line
 from friso.studies.thesis.linear import analysed
+from friso.studies.thesis.linear.plants import limit_cases_of
 from friso.studies.thesis.studies import rig as rig_of_thesis
 
 pytestmark = pytest.mark.xdist_group("identify-experiments")
@@ -509,7 +518,14 @@ def test_one_pass_shows_no_repeatability_and_a_slow_loop_does_not_follow() -> No
 
 
 def judged(claim: str) -> Finding:
-    return registered()[claim].judge(Evidence({}, {}, analysed(rig_of_thesis())))
+    stage = rig_of_thesis()
+    return registered()[claim].judge(Evidence({}, {}, analysed(stage), experiments_on(stage)))
+
+
+def of_plant(changes: dict[str, str]) -> Finding:
+    """F18 with the limit cases of another rig, which are all that its judge looks at."""
+    plants = limit_cases_of(rig_of_thesis().replace(changes).flat())
+    return registered()["F18"].judge(Evidence({}, {}, replace(analysed(rig_of_thesis()), plants=plants)))
 
 
 @pytest.mark.parametrize(
@@ -534,8 +550,7 @@ def test_the_judges_recognise_what_holds() -> None:
     """Rigs and responses that are as the thesis says."""
     stiff = rig_of_thesis().replace({"joint.stiffness": "2.9 N/mm"})
     assert judged_steps(joint_steps(stiff)).judgement == "holds"
-    heavy = rig_of_thesis().replace({"masses.stage": "0.75 kg", "joint.stiffness": "3.6 N/mm"})
-    assert registered()["F18"].judge(Evidence({}, {}, analysed(heavy))).judgement == "holds"
+    assert of_plant({"masses.stage": "0.75 kg", "joint.stiffness": "3.6 N/mm"}).judgement == "holds"
     slippery = rig_of_thesis().replace({"friction.static": "2.4 N"})
     assert judged_slips(tuple(slow_motion(slippery, speed) for speed in SLOW)).judgement == "holds"
     slow = constant_speed(rig_of_thesis(), (1e-3, 2.5e-3))
@@ -543,7 +558,7 @@ def test_the_judges_recognise_what_holds() -> None:
     magnitude = np.full((4, 9), 1.7 / 2.5)
     magnitude[:, -1] = 0.1
     scatter = np.array([0.01, 0.1, 0.3, 0.2, 0.1, 0.1, 0.01, 0.01, 0.01])
-    assert judged_line(magnitude, scatter).judgement == "holds"
+    assert judged_line(LockedLine(magnitude, scatter)).judgement == "holds"
 
 
 def test_the_judges_recognise_what_does_not_hold() -> None:
@@ -552,11 +567,10 @@ def test_the_judges_recognise_what_does_not_hold() -> None:
     assert judged_slips(runs).pattern[0] is False
     lively = constant_speed(rig_of_thesis().replace({"joint.locked": True, "friction.static": "1 N"}))
     assert judged_speeds(lively, lively).pattern[:2] == (False, False)
-    assert judged_line(np.full((4, 9), 2.0), np.linspace(0.1, 0.5, 9)).judgement == "differs"
+    assert judged_line(LockedLine(np.full((4, 9), 2.0), np.linspace(0.1, 0.5, 9))).judgement == "differs"
     few = replace(joint_steps(rig_of_thesis()), stiffness=5e3)
     assert judged_steps(few).judgement == "differs"
-    springy = analysed(rig_of_thesis().replace({"joint.stiffness": "24 N/mm", "parasitic.frequency": "600 Hz"}))
-    assert registered()["F18"].judge(Evidence({}, {}, springy)).judgement == "differs"
+    assert of_plant({"joint.stiffness": "24 N/mm", "parasitic.frequency": "600 Hz"}).judgement == "differs"
 
 
 # --- what all share ---------------------------------------------------------------------------------------------------

@@ -357,7 +357,7 @@ def test_values_between_segments_are_never_made_up(first: list[int], second: lis
     except StageError:
         return
     for name, t in zip("ab", spans, strict=True):
-        assert values[name] == pytest.approx(2 * base.time, abs=0.02 + 1e-9)  # a hundredth of a step apart is one instant
+        assert values[name] == pytest.approx(2 * base.time, abs=0.02 + 1e-9)  # 0.01 of a step is one instant
         assert np.all(np.min(np.abs(base.time[:, None] - t[None, :]), axis=1) <= 0.5 + 1e-9)
 
 

@@ -2,8 +2,9 @@
 
 import json
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
+from importlib import import_module
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -17,11 +18,12 @@ from friso.cli import main
 from friso.studies.thesis import STUDIES, Evidence, Finding, Part, Reproduction, Response, claims, reproduce, rig
 from friso.studies.thesis.claims import _JUDGES, judges, registered
 from friso.studies.thesis.cycles import cycles
+from friso.studies.thesis.experiments import EXPERIMENTS
 from friso.studies.thesis.judges.shares import NARROW, WIDE
 from friso.studies.thesis.linear import NEEDS
 from friso.studies.thesis.maps import begins, ends, free_square, trend
 from friso.studies.thesis.open_parameters import METHOD, OPEN
-from friso.studies.thesis.reproduce import _changed, _coarser, lasting
+from friso.studies.thesis.reproduce import _changed, _coarser, _enters, lasting
 from friso.studies.thesis.verdicts import not_covered, verdict
 from friso.views.reproduction import claims_document, reproduction_html, write_reproduction
 from friso.views.reproduction_figures import reproduction_figures
@@ -50,6 +52,21 @@ LINEAR = {"E1", "F7", "F8", "F22", "F23"}
 
 LEAVES, RULES = {"S35"}, {"D1"}
 """Claims on the leaf springs, and on the rules of design: tried in test_design_claims.py."""
+
+IDENTIFIED = {"F17", "F18", "F19", "F20", "F21"}
+"""Claims on the identification of the rig: tried in test_identify_experiments.py."""
+
+
+FEW = tuple({each.parameter: each for each in OPEN}.values())
+"""Of every open parameter one value, the last."""
+
+
+@pytest.fixture(scope="module", autouse=True)
+def few_variants() -> Iterator[None]:
+    """The linear analysis of each variant takes longer than all its maps; that all are stages is tried beside."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(import_module("friso.studies.thesis.reproduce"), "OPEN", FEW)
+        yield
 
 
 @pytest.fixture(scope="module")
@@ -103,8 +120,8 @@ def test_every_claim_is_in_the_table() -> None:
 
 def test_what_simulation_alone_decides_has_a_judge() -> None:
     needed = {"F5", "F11A", "F11B", "F12A", "F12B", "F13", "F14A", "F14B", "F15A", "F15B", "F16A", "F16B"}
-    assert needed | LINEAR | LEAVES | RULES == registered().keys()
-    known = STUDIES.keys() | {"locked", WIDE, NARROW} | NEEDS.keys()
+    assert needed | LINEAR | LEAVES | RULES | IDENTIFIED == registered().keys()
+    known = STUDIES.keys() | {"locked", WIDE, NARROW} | NEEDS.keys() | EXPERIMENTS.keys()
     assert all(entry.needs <= known for entry in registered().values())
 
 
@@ -283,7 +300,7 @@ def test_a_limit_is_lower_by_a_cell_at_least() -> None:
 
 
 def test_every_judge_of_maps_is_tried_both_ways() -> None:
-    assert HOLDS.keys() == FAILS.keys() == registered().keys() - LINEAR - LEAVES - RULES
+    assert HOLDS.keys() == FAILS.keys() == registered().keys() - LINEAR - LEAVES - RULES - IDENTIFIED
 
 
 # --- verdicts ---------------------------------------------------------------------------------------------------------
@@ -337,12 +354,18 @@ def test_the_coarser_grid_is_part_of_the_full_one() -> None:
 
 
 def test_values_that_do_not_enter_are_not_counted(small: Reproduction) -> None:
-    tried = {each.claim.id: each.tried for each in small.verdicts if each.finding}
+    needs = {claim: entry.needs for claim, entry in registered().items()}
+    tried = {claim: sum(_enters(variant, own) for variant in OPEN) for claim, own in needs.items()}
+    told = {each.claim.id: each.tried for each in small.verdicts if each.finding}
+    assert told == {claim: sum(_enters(variant, needs[claim]) for variant in FEW) for claim in told}
     alpha_and_beta = 4
     own_path, own_joint = 3, 2
     assert tried["E1"] == tried["F7"] == len(OPEN) - alpha_and_beta - own_path
     assert tried["F8"] == tried["F23"] == len(OPEN) - own_path
     assert tried["F22"] == len(OPEN) - own_path - own_joint
+    assert tried["F17"] == len(OPEN) - alpha_and_beta - own_path - own_joint
+    assert tried["F18"] == len(OPEN) - alpha_and_beta - own_path
+    assert tried["F19"] == tried["F20"] == tried["F21"] == len(OPEN) - own_path
     assert tried["F16B"] == len(OPEN)
     assert tried["F12B"] == len(OPEN) - alpha_and_beta - own_joint
     assert tried["F11A"] == len(OPEN) - own_path - own_joint
@@ -387,7 +410,7 @@ def test_a_part_of_the_studies_covers_its_claims_only() -> None:
     steps: list[tuple[int, int, str]] = []
     found = reproduce(["control"], points=3, progress=lambda *step: steps.append(step), with_cycles=False)
     judged = {each.claim.id for each in found.verdicts if each.finding}
-    assert judged == {"F5", "F12B", "F13"} | LINEAR | LEAVES
+    assert judged == {"F5", "F12B", "F13"} | LINEAR | LEAVES | IDENTIFIED
     assert {each.reason for each in found.verdicts if each.claim.id == "F11A"} == {"not computed in this run: path"}
     assert [step[0] for step in steps] == list(range(len(steps)))
     assert steps[-1][0] < steps[-1][1] <= len(steps)

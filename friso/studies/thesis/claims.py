@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Literal
 if TYPE_CHECKING:
     import xarray as xr
 
+    from friso.studies.thesis.experiments import Experiments
     from friso.studies.thesis.linear import Linear
 
 Judgement = Literal["holds", "holds in part", "differs", "not yet covered"]
@@ -100,12 +101,13 @@ class Response:
 
 @dataclass(frozen=True)
 class Evidence:
-    """What a judge may look at: maps by study name, responses by name, and the linear analysis of the rig, None where
-    that was not made."""
+    """What a judge may look at: maps by study name, responses by name, the linear analysis of the rig, and the
+    identification of it by experiments, each None where that was not made."""
 
     maps: Mapping[str, xr.Dataset]
     responses: Mapping[str, Response]
     linear: Linear | None = None
+    identified: Experiments | None = None
 
     @property
     def analysis(self) -> Linear:
@@ -113,14 +115,20 @@ class Evidence:
         assert self.linear is not None
         return self.linear
 
+    @property
+    def experiments(self) -> Experiments:
+        """The experiments, for a judge that needs one of them."""
+        assert self.identified is not None
+        return self.identified
+
 
 Judge = Callable[[Evidence], Finding]
 
 
 @dataclass(frozen=True)
 class Registered:
-    """A judge, the figure (or equation) that shows its evidence, and the names of the maps, responses and parts of the
-    linear analysis that it needs."""
+    """A judge, the figure (or equation) that shows its evidence, and the names of the maps, responses, parts of the
+    linear analysis and experiments that it needs."""
 
     judge: Judge
     figure: str

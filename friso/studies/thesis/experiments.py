@@ -1,17 +1,21 @@
-"""The thesis's experiments in time on its rig (Sec. 4.2.2, 4.2.3, Fig. 19 to 21), simulated, and read as measured.
+"""The thesis's identification of its rig (Sec. 4.2, Fig. 17 and 19 to 21), simulated, and read as measured.
 
-The simulated rig has the friction of one place all along its rail, and no noise.
+The simulated rig has the friction of one place all along its rail, and no noise; for Fig. 17 alone several places.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import cache
 from itertools import pairwise
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
 from friso.engine.simulate import simulate
+from friso.frequency.describing.mass_line import mass_line
 from friso.identify.experiments import (
     FrictionPosition,
     StepStiffness,
@@ -23,6 +27,19 @@ from friso.identify.experiments import (
 )
 from friso.identify.logs.log import Log
 from friso.stage import Stage, loads
+from friso.studies.thesis.linear import Need
+from friso.studies.thesis.studies import LOCKED
+
+FORCE = 5.0
+"""Amplitude [N] of the identification with the joint locked, which the thesis does not tell: some times the friction
+that it finds."""
+
+RANGE, PLACES, COULOMB = (1.0, 2.5), 4, 1 / 3
+"""Static friction by Fig. 20 [N], over which the places of the rail spread evenly, their number, and the share of it
+that is Coulomb friction (as in Table 2): number and share are our choice."""
+
+FREQUENCIES = (5.0, 10.0, 20.0, 40.0, 60.0, 80.0, 120.0, 160.0, 200.0)
+"""[Hz], at which the response with friction is computed."""
 
 SAMPLE_TIME = 1e-3
 """Of the records [s]: the thesis gives none."""
@@ -41,6 +58,15 @@ STROKE = "8 mm"
 
 SPEEDS, WAY = (2.5e-3, 10e-3), 0.15
 """Constant speeds [m/s] and their way [m] (Sec. 4.2.3)."""
+
+
+@dataclass(frozen=True)
+class LockedLine:
+    """Fig. 17: magnitude over the mass line, shape (places, frequencies), and the scatter of the phase over the places
+    [rad], shape (frequencies,), at FREQUENCIES."""
+
+    magnitude: np.ndarray
+    scatter: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -69,6 +95,54 @@ class ConstantSpeed:
     speeds: tuple[float, ...]
     log: Log
     found: FrictionPosition
+
+
+@dataclass(frozen=True)
+class Experiments:
+    """What all of them find of one rig; the constant speeds with the joint free, and locked."""
+
+    locked_line: LockedLine
+    joint_steps: JointSteps
+    slow_motion: tuple[SlowMotion, ...]
+    constant_speed: tuple[ConstantSpeed, ConstantSpeed]
+
+
+LINE, STEPPED, SLIPS, SPEEDY = "locked_line", "joint_steps", "slow_motion", "constant_speed"
+"""The experiments by name, as a judge needs them."""
+
+EXPERIMENTS: Mapping[str, Need] = MappingProxyType(
+    {
+        LINE: Need(("motion.", "controller.", "friction."), locked=True),
+        STEPPED: Need(("motion.",)),
+        SLIPS: Need(("motion.",)),
+        SPEEDY: Need(("motion.",)),
+    }
+)
+"""What of the stage file plays no part: the first is without its controller, and all have motions of their own."""
+
+
+def experiments_on(stage: Stage) -> Experiments:
+    """All experiments on a rig."""
+    return Experiments(**{name: experiment(name, stage) for name in EXPERIMENTS})
+
+
+def experiment(name: str, stage: Stage) -> Any:
+    """The field `name` of `Experiments`; kept, since every reproduction asks for the same rigs."""
+    return _experiment(name, stage.to_toml())
+
+
+@cache
+def _experiment(name: str, stage_file: str) -> Any:
+    return _RUNS[name](loads(stage_file))
+
+
+def locked_line(stage: Stage) -> LockedLine:
+    """The response of the locked rig to sines of one force at places of other friction."""
+    places = [
+        {"friction.static": f"{f} N", "friction.coulomb": f"{COULOMB * f} N"} for f in np.linspace(*RANGE, PLACES)
+    ]
+    found = mass_line(stage.replace(dict(LOCKED)), places, [FORCE], FREQUENCIES)
+    return LockedLine(found["magnitude"].values[:, 0], found["spread_phase"].values[0])
 
 
 def joint_steps(stage: Stage) -> JointSteps:
@@ -121,3 +195,13 @@ def _moved(stage: Stage, **motion: Any) -> Stage:
     begin = text.index("[motion]")
     end = text.find("\n[", begin)
     return loads(f"{text[:begin]}[motion]\n{rows}\n{text[end + 1 :] if end >= 0 else ''}")
+
+
+_RUNS: Mapping[str, Callable[[Stage], Any]] = MappingProxyType(
+    {
+        LINE: locked_line,
+        STEPPED: joint_steps,
+        SLIPS: lambda stage: tuple(slow_motion(stage, speed) for speed in SLOW),
+        SPEEDY: lambda stage: (constant_speed(stage), constant_speed(stage.replace(dict(LOCKED)))),
+    }
+)

@@ -47,8 +47,9 @@ class Variant:
         decided = own | _OPEN_JOINT_KEYS if locked else own
         return self.kind != "unknown parameter" or not self.changes.keys() <= decided
 
-    def touches_linear(self, need: Need) -> bool:
-        """Whether that part of the linear analysis can be another; it knows neither solver nor metric."""
+    def touches_part(self, need: Need) -> bool:
+        """Whether that part of the linear analysis, or that experiment, can be another: the former knows no solver, the
+        latter keeps its own tolerance, and neither counts peaks."""
         outside = {key for key in self.changes if key.startswith(need.outside)}
         return self.kind == "unknown parameter" and self.changes_more_than(outside, need.locked)
 

@@ -15,6 +15,7 @@ from friso.stage import StageError
 from friso.studies.sweep import sweep
 from friso.studies.thesis.claims import Claim, Evidence, Finding, Registered, Response, claims, registered
 from friso.studies.thesis.cycles import Cycles, cycles
+from friso.studies.thesis.experiments import EXPERIMENTS, experiment, experiments_on
 from friso.studies.thesis.judges.shares import NARROW, WIDE
 from friso.studies.thesis.linear import NEEDS, Linear, analysed
 from friso.studies.thesis.open_parameters import METHOD, OPEN, RTOL, Variant
@@ -42,6 +43,9 @@ RESPONSES: Mapping[str, Mapping[str, object]] = {
 
 SHOWN = (1e-2, 3e3)
 """Frequencies [Hz] of Fig. 7 and 8."""
+
+_PARTS = {**NEEDS, **EXPERIMENTS}
+"""What every evidence has besides maps and responses."""
 
 Progress = Callable[[int, int, str], None]
 
@@ -88,7 +92,8 @@ def reproduce(
     tell = _Teller(progress, 2 + len(variants) + (len(studies) if with_cycles else 0) + 1)
     tell("maps")
     responses = {name: _response(own, NOTHING, rtol) for name, own in RESPONSES.items()}
-    baseline = Evidence(_maps(studies, points, rtol, VERIFIED), responses, analysed(rig()))
+    maps = _maps(studies, points, rtol, VERIFIED)
+    baseline = Evidence(maps, responses, analysed(rig()), experiments_on(rig()))
     tell("Fig. 14B at two tolerances")
     tolerances = {each: _map(s, NOTHING, points, each) for s in studies if s.panel == "14B" for each in (RTOL, TIGHT)}
     entries = _covered(baseline)
@@ -152,8 +157,7 @@ def _covered(evidence: Evidence) -> Mapping[str, Registered]:
 
 
 def _missing(entry: Registered, evidence: Evidence) -> list[str]:
-    linear = NEEDS.keys() if evidence.linear else set[str]()
-    return sorted(entry.needs - evidence.maps.keys() - evidence.responses.keys() - linear)
+    return sorted(entry.needs - evidence.maps.keys() - evidence.responses.keys() - _PARTS.keys())
 
 
 def _findings(entries: Mapping[str, Registered], evidence: Evidence) -> dict[str, Finding]:
@@ -169,10 +173,11 @@ def _varied(studies: Iterable[ThesisStudy], points: int, rtol: float, variant: V
     if variant.kind == "metric":
         maps = {name: lasting(runs) for name, runs in maps.items()}
         responses = {name: Response(lasting(each.cell), each.trace) for name, each in responses.items()}
-    linear = plain.linear
-    if any(variant.touches_linear(need) for need in NEEDS.values()):
-        linear = analysed(rig().replace(dict(variant.changes)))
-    return Evidence(maps, responses, linear)
+    stage, linear = rig().replace(dict(variant.changes)), plain.linear
+    if any(variant.touches_part(need) for need in NEEDS.values()):
+        linear = analysed(stage)
+    other = {name: experiment(name, stage) for name, need in EXPERIMENTS.items() if variant.touches_part(need)}
+    return Evidence(maps, responses, linear, replace(plain.experiments, **other))
 
 
 def _maps(
@@ -243,10 +248,10 @@ def _enters(variant: Variant, needs: Iterable[str]) -> bool:
 
 
 def _changes(variant: Variant, name: str) -> bool:
-    """Whether a variant changes the map, the part of the linear analysis or the response of this name."""
+    """Whether a variant changes the map, the part of the linear analysis, the experiment or the response named."""
     if name in STUDIES:
         return variant.touches(STUDIES[name])
-    if name in NEEDS:
-        return variant.touches_linear(NEEDS[name])
+    if need := _PARTS.get(name):
+        return variant.touches_part(need)
     own = RESPONSES[name]
     return variant.changes_more_than(own.keys(), bool(own.get("joint.locked")))

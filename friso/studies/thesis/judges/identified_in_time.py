@@ -1,0 +1,148 @@
+"""Fig. 19 to 21: stiffness and friction as the thesis identifies them in time, by the same experiments simulated."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from friso.identify.experiments.rate_effect import static_friction
+from friso.studies.thesis.claims import Evidence, Finding, Part, judges
+from friso.studies.thesis.experiments import (
+    RANGE,
+    SLIPS,
+    SLOW_TIME,
+    SPEEDY,
+    STANDS,
+    STEPPED,
+    ConstantSpeed,
+    JointSteps,
+    SlowMotion,
+)
+from friso.studies.thesis.judges.identified_responses import CLOSE, CONSTANTS, FIRST, MEASURED
+
+_STIFFNESS = 2.9e3
+"""By Fig. 19 [N/m] (Sec. 4.2.2)."""
+
+_SPIKE = 0.1
+"""Time [s] within which a spike of the velocity follows a peak of the deflection."""
+
+_UNIFORM = "friction alike all along the rail, no noise"
+"""Of the simulated rig."""
+
+
+@judges("F19", figure="19", needs=(STEPPED,))
+def stiffness_from_position_steps(evidence: Evidence) -> Finding:
+    """The steps of the rig with its cart fixed."""
+    return judged_steps(evidence.experiments.joint_steps)
+
+
+def judged_steps(steps: JointSteps) -> Finding:
+    """The finding from the simulated steps."""
+    read, apparent = steps.found.stiffness, (2 * np.pi * FIRST) ** 2 * MEASURED[1]
+    larger = steps.stiffness * float(np.mean(CONSTANTS))
+    return Finding(
+        (
+            Part(
+                f"read as in Sec. 4.2.2 the steps give the joint's stiffness: the 95 % interval holds it, and is "
+                f"within {CLOSE:.0%} of it",
+                bool(read.holds(steps.stiffness) and read.half_width <= CLOSE * steps.stiffness),
+                f"{read.value / 1e3:.4g} N/mm ({read.low / 1e3:.4g} to {read.high / 1e3:.4g}) of "
+                f"{steps.stiffness / 1e3:.4g}, {len(steps.found.windows)} settled windows. Assumed: steps to and fro, "
+                f"{STANDS:g} s each; no noise",
+                why=read.reason or "method: the interval misses it, or is wide",
+            ),
+            Part(
+                f"it is {_STIFFNESS / 1e3:g} N/mm (within {CLOSE:.0%})",
+                bool(abs(read.value / _STIFFNESS - 1) <= CLOSE),
+                f"{read.value / 1e3:.3g} N/mm, as entered by Sec. 3.5",
+                why=f"not in the model: cables, misalignment, the motor constant (Sec. 4.2.2). The latter alone, wrong "
+                f"as the masses of Fig. 17 and 18 ask for, would make it {larger / 1e3:.3g} N/mm, and {FIRST:g} Hz "
+                f"with {MEASURED[1]:g} kg are {apparent / 1e3:.3g} too: the force was scaled otherwise there, or "
+                "the joint softer. Simulation alone cannot tell",
+            ),
+        )
+    )
+
+
+@judges("F20", figure="20", needs=(SLIPS,))
+def static_friction_from_stick_slip(evidence: Evidence) -> Finding:
+    """Slow motion with the joint free, at several speeds."""
+    return judged_slips(evidence.experiments.slow_motion)
+
+
+def judged_slips(runs: tuple[SlowMotion, ...]) -> Finding:
+    """The finding from simulated slow motion."""
+    slips = sum(len(each.found.forces) for each in runs)
+    forces, rates = (np.concatenate([getattr(each.found, name) for each in runs]) for name in ("forces", "rates"))
+    read = static_friction("friction.static", forces, rates)
+    truth = runs[0].static
+    counts = ", ".join(f"{len(each.found.forces)} slips at {each.speed * 1e3:g} mm/s" for each in runs)
+    range_read = f"{forces.min():.3g} to {forces.max():.3g} N" if slips else "none"
+    return Finding(
+        (
+            Part(
+                f"at every speed the cart sticks and slips, and a spike of its velocity follows every peak of the "
+                f"relative position within {_SPIKE:g} s",
+                all(len(each.found.forces) > 1 and _spikes(each) for each in runs),
+                f"{counts}. Assumed: these speeds, {SLOW_TIME:g} s each (the thesis tells neither); {_UNIFORM}",
+            ),
+            Part(
+                "read from the peaks at all speeds, the 95 % interval holds the static friction of the rig",
+                bool(read.shown and read.holds(truth)),
+                f"{read.value:.3g} N ({read.low:.3g} to {read.high:.3g}) of {truth:.3g}: {read.method}",
+                why=read.reason or "method: the interval misses it",
+            ),
+            Part(
+                f"the peaks themselves lie between {RANGE[0]:g} and {RANGE[1]:g} N",
+                bool(slips and forces.min() >= RANGE[0] and forces.max() <= RANGE[1]),
+                f"{range_read}, lower the faster the motion",
+                why=f"input: Table 2 takes {truth:g} N, more than was measured. Besides, peaks read at a finite speed "
+                f"lie below the static friction, here by up to {1 - forces.min() / truth:.0%}"
+                if slips
+                else "no slips",
+            ),
+        )
+    )
+
+
+def _spikes(run: SlowMotion) -> bool:
+    """Whether the velocity of the cart spikes after every peak, to more than half of the usual."""
+    found, time = run.found, run.log.time
+    after = [(time >= at) & (time <= at + _SPIKE) for at in found.times]
+    return all(np.abs(found.cart_velocity[each]).max() > np.median(found.speeds) / 2 for each in after)
+
+
+@judges("F21", figure="21", needs=(SPEEDY,))
+def force_at_constant_speed(evidence: Evidence) -> Finding:
+    """Both speeds with the joint free and locked."""
+    return judged_speeds(*evidence.experiments.constant_speed)
+
+
+def judged_speeds(free: ConstantSpeed, locked: ConstantSpeed) -> Finding:
+    """The finding from the simulated runs."""
+    named = {"free": free.found, "locked": locked.found}
+    swings = {name: [each.spread / abs(each.mean.value) for each in found.passes] for name, found in named.items()}
+    listed = "; ".join(f"{name} {', '.join(f'{s:.2g}' for s in shares)}" for name, shares in swings.items())
+    repeats = ", ".join(f"{name} {found.repeatability.value:.2f}" for name, found in named.items())
+    return Finding(
+        (
+            Part(
+                f"the force oscillates at both speeds, joint free or locked (by more than {CLOSE:.0%} of its mean)",
+                all(shares and min(shares) > CLOSE for shares in swings.values()),
+                f"standard deviation over mean at {' and '.join(f'{v * 1e3:g}' for v in free.speeds)} mm/s: {listed}. "
+                f"Assumed: {_UNIFORM}",
+                why="locked, the simulated rig slides steadily where it is fast enough",
+            ),
+            Part(
+                "the oscillation goes with the place: passes over the same places repeat it",
+                all(found.repeatability.shown and found.repeatability.low > 0 for found in named.values()),
+                f"correlation of the two speeds: {repeats}",
+                why="not in the model: its friction is alike all along the rail, and what swings is the loop, by "
+                "sticking and slipping. Simulation alone cannot tell",
+            ),
+            Part(
+                "dynamic friction cannot be read off, joint free or locked",
+                not any(found.separated for found in named.values()),
+                f"free: {free.found.verdict} Locked: {locked.found.verdict}",
+            ),
+        )
+    )
