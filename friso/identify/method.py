@@ -78,10 +78,11 @@ class Options:
 
 @dataclass(frozen=True)
 class Identification:
-    """The stage with its uncertain keys, the correlations of these, the experiments behind it, the `estimates` that
-    went into it (one per key), and what the engineer should know (`warnings`)."""
+    """The stage with its uncertain keys (None: neither a stage was given, nor moves, around which one could be made
+    up), the correlations of these, the experiments behind it, the `estimates` that went into it (one per key), and what
+    the engineer should know (`warnings`)."""
 
-    stage: Stage
+    stage: Stage | None
     correlations: Correlations
     experiments: tuple[Experiment, ...]
     estimates: tuple[Estimate, ...]
@@ -106,13 +107,13 @@ def identify(
         progress(f"{kind}: {', '.join(log.name for log in group)}", number, len(groups))
         known = combined([found_one for each in found for found_one in each.estimates])[0]
         result = _analysed(kind, group, stage, base is not None, known, options)
-        found.append(Experiment(kind, group, result, _estimates(kind, result, stage)))
+        found.append(Experiment(kind, group, result, _estimates(result, stage)))
     every, warnings = combined([one for each in found for one in each.estimates])
+    if stage is None:
+        return Identification(None, Correlations(), tuple(found), tuple(every), tuple(warnings))
     kept, dropped = _fitting(stage, every)
-    named = [log.name for log, _ in logs]
-    return Identification(
-        identified(stage, kept, named), _correlations(found, kept), tuple(found), tuple(every), (*warnings, *dropped)
-    )
+    whole = identified(stage, kept, [log.name for log, _ in logs])
+    return Identification(whole, _correlations(found, kept), tuple(found), tuple(every), (*warnings, *dropped))
 
 
 @dataclass(frozen=True)
@@ -151,21 +152,17 @@ def _groups(logs: Sequence[tuple[Source, str]]) -> list[tuple[str, tuple[Source,
     return groups
 
 
-def _around(logs: Sequence[tuple[Source, str]]) -> Stage:
-    """A stage around the first log of moves. Raises StageError where there is none."""
+def _around(logs: Sequence[tuple[Source, str]]) -> Stage | None:
+    """A stage around the first log of moves; None without moves, which alone tell enough of a machine."""
     moves = next((log for log, kind in logs if kind == MOVES and isinstance(log, Log)), None)
-    if moves is None:
-        given = f"logs of {', '.join(dict.fromkeys(kind for _, kind in logs))} alone, and no stage file"
-        expected = "a stage file that tells what the machine is, or a log of moves, from which friso makes one up"
-        raise StageError("--stage", given, expected, "--stage examples/thesis_rig.toml")
-    return made_up(moves, inverse_model(moves))
+    return None if moves is None else made_up(moves, inverse_model(moves))
 
 
 def _analysed(
-    kind: str, logs: tuple[Source, ...], stage: Stage, own: bool, known: Sequence[Estimate], options: Options
+    kind: str, logs: tuple[Source, ...], stage: Stage | None, own: bool, known: Sequence[Estimate], options: Options
 ) -> Result:
     """The analysis of one experiment, with what is known of the machine by now."""
-    flat, log = stage.flat(), logs[0]
+    flat, log = stage.flat() if stage else {}, logs[0]
     if isinstance(log, MeasuredResponse):
         return analyse((), options.band, measured=log)
     times = [each for each in logs if isinstance(each, Log)]
@@ -191,14 +188,14 @@ def _value(best: Mapping[str, Estimate], flat: Mapping[str, Any], key: str) -> f
     return best[key].value if key in best else float(flat.get(key, 0.0))
 
 
-def _estimates(kind: str, result: Result, stage: Stage) -> tuple[Estimate, ...]:
+def _estimates(result: Result, stage: Stage | None) -> tuple[Estimate, ...]:
     """What an experiment tells of the keys of the stage file."""
     if isinstance(result, Moves):
         return result.estimates
     if isinstance(result, Bench):
         return _of_bench(result, stage)
     if isinstance(result, StepStiffness):
-        return (_named(result.stiffness, "joint.stiffness"),) if stage.joint else ()
+        return (_named(result.stiffness, "joint.stiffness"),) if stage is None or stage.joint else ()
     if isinstance(result, ConstantSpeed):
         both = result.velocity.both
         pairs = {"coulomb": both.coulomb, "viscous": both.viscous, "static": both.static}
@@ -207,17 +204,17 @@ def _estimates(kind: str, result: Result, stage: Stage) -> tuple[Estimate, ...]:
     return (_named(result.static, "friction.static"),)
 
 
-def _of_bench(bench: Bench, stage: Stage) -> tuple[Estimate, ...]:
+def _of_bench(bench: Bench, stage: Stage | None) -> tuple[Estimate, ...]:
     """Masses and joint from a two-mass model in newtons and metres; a mass line alone is the whole mass."""
     units = (bench.driven.channels.input_unit, bench.driven.channels.output_unit)
     if units != ("N", "m"):
         return ()
     model = bench.two_masses
-    if model is not None and stage.joint and bench.modes is not None and bench.modes.shape.modes:
+    if model is not None and (stage is None or stage.joint) and bench.modes is not None and bench.modes.shape.modes:
         pairs = {"masses.stage": "driven mass", "masses.cart": "other mass"}
         pairs |= {"joint.stiffness": "joint stiffness", "joint.damping": "joint damping"}
         return tuple(_named(model[name], key) for key, name in pairs.items())
-    if not bench.lines:
+    if not bench.lines or stage is None:
         return ()
     return _shared(bench.lines[0].value, stage)
 

@@ -7,14 +7,16 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.stats import chi2
 
 from friso.identify.errors import Errors, Residual, errors_of, residual_of, unexplained
 from friso.identify.estimate import Estimate
+from friso.identify.experiments.common import low_pass
 from friso.identify.inverse_model import SMOOTH, InverseModel, inverse_model, motion
 from friso.identify.logs.log import Log
 from friso.identify.output_error.coverage import Coverage, coverage
-from friso.identify.output_error.fit import Fit, first_values, fit
-from friso.identify.output_error.parameters import LONGEST, RATIO, Parameter, keys_of, parameters_of
+from friso.identify.output_error.fit import Fit, everywhere, first_values, fit, nearby
+from friso.identify.output_error.parameters import LONGEST, MASS, RATIO, Parameter, keys_of, parameters_of
 from friso.identify.output_error.problem import Problem, Simulated, closed_loop, tracking
 from friso.identify.output_error.profile import Profile, profile
 from friso.intervals import COVERAGE
@@ -27,6 +29,9 @@ BRISTLES = ("friction.bristle_stiffness", "friction.bristle_damping")
 
 STEP_OUT = 1.5
 """A closed loop that leaves so many times the residual of the stage that follows the log has got out of step."""
+
+SURE = 0.99
+"""Probability that parameters which no motion shows one by one improve the fit all the same."""
 
 SHARP = 3.0
 """Factor between the ends of a profile interval within which a parameter counts as shown."""
@@ -86,12 +91,13 @@ def identify_moves(log: Log, flat: Mapping[str, Any], own_loop: bool, bandwidth:
     """
     _has(log, ("position", "force", *(("reference",) if own_loop else ())))
     part = longest(log)
-    inverse, by_direction = (inverse_model(log, bandwidth, split) for split in (False, True))
+    share = _cart_share(log, flat)
+    inverse, by_direction = (inverse_model(log, bandwidth, split, share) for split in (False, True))
     follows, loop = _problems(log, part, flat, inverse, own_loop)
     moved = motion(log["position"][part], log.sample_time, SMOOTH * inverse.bandwidth)
-    mass, coulomb = inverse.value("mass"), inverse.value("coulomb")
+    mass, coulomb = (each.start for each in follows.parameters if each.name in (MASS, "friction.coulomb"))
     covered = coverage(log["position"][part], moved, mass, coulomb, log.sample_time)
-    found, profiles, shown = _fitted(follows, loop, covered)
+    found, profiles, shown = _fitted(follows, loop, covered, inverse.bandwidth)
     estimates, correlation = _estimates(found, profiles, shown, covered)
     simulated = (loop or follows).record(found.inner)
     return Moves(
@@ -136,39 +142,84 @@ def _problems(
 ) -> tuple[Problem, Problem | None]:
     """The stage following the log's position, and in its own loop, with all the parameters in its equations."""
     speed = float(np.abs(motion(log["position"][part], log.sample_time, SMOOTH * inverse.bandwidth).velocity).max())
-    levels = {name: inverse.value(name) for name in ("mass", "viscous", "coulomb", "offset")}
-    levels |= {name: max(levels[name], 1e-6) for name in ("mass", "viscous", "coulomb")}
+    levels = _levels(log, flat, inverse)
     parameters = parameters_of(flat, levels, speed, float(np.ptp(log["position"][part])))
     full = {**flat, **keys_of(flat, {each.name: each.start for each in parameters})}
     follows = tracking(full, log, part, parameters, inverse.bandwidth)
     return follows, closed_loop(full, log, part, parameters) if own_loop else None
 
 
-def _fitted(follows: Problem, loop: Problem | None, covered: Coverage) -> tuple[Fit, dict[str, Profile], set[str]]:
+def _cart_share(log: Log, flat: Mapping[str, Any]) -> float:
+    """The share of the mass that moves with the cart, where that is measured apart from a stage on a free joint."""
+    if not _free(flat) or not ("cart_position" in log or "relative_position" in log):
+        return 0.0
+    return flat["masses.cart"] / (flat["masses.cart"] + flat["masses.stage"])
+
+
+def _free(flat: Mapping[str, Any]) -> bool:
+    return "joint.stiffness" in flat and not flat["joint.locked"]
+
+
+def _levels(log: Log, flat: Mapping[str, Any], inverse: InverseModel) -> dict[str, float]:
+    """Where the fit starts: at the inverse model's values, as far as it shows them and is one of this stage.
+
+    It knows one body. What it does not tell from 0 starts within its interval; all of a stage on a free joint whose
+    cart is not measured starts at the stage given.
+    """
+    if _free(flat) and not _cart_share(log, flat):
+        mass = flat["masses.cart"] + flat["masses.stage"]
+        return {"mass": mass, "coulomb": flat["friction.coulomb"], "viscous": flat["friction.viscous"], "offset": 0.0}
+    levels = {"offset": inverse.value("offset")}
+    for each in inverse.estimates:
+        if each.name in ("mass", "viscous", "coulomb"):
+            levels[each.name] = each.value if each.low > 0 else max(each.high / 2, 1e-6)
+    return levels
+
+
+def _fitted(
+    follows: Problem, loop: Problem | None, covered: Coverage, bandwidth: float
+) -> tuple[Fit, dict[str, Profile], set[str]]:
     """The fit, the profile of every parameter, and which of those that not every motion shows it does show.
 
     Which they are is told by the stage that follows the log, since a closed loop that hunts soon gets out of step; the
-    loop then has the last word, unless it cannot follow.
+    loop then has the last word, unless it cannot follow. Where the fit is clearly better with those that are not shown
+    it keeps them: their effect is there, and without it friction and mass would have to explain it.
     """
     parameters = follows.parameters
     names = [each.name for each in parameters]
     core = {each.name for each in parameters if each.core}
     asked = {*names} - core
-    plain = fit(follows, _numbers(names, core), first_values(parameters))
+    plain = fit(follows, _numbers(names, core), first_values(parameters)[None])
     hopeful = {name for name in asked if _may_show(name, covered, follows)}
     shown: set[str] = set()
     found = plain
     if hopeful:
-        whole = fit(follows, _numbers(names, core | hopeful), plain.inner)
+        every = _numbers(names, core | hopeful)
+        whole = fit(follows, every, everywhere(follows, every, plain.inner))
         shown = _complete({name for name in hopeful if _shows(whole, names.index(name), covered)}, asked)
-        free = _numbers(names, core | shown)
+        kept = hopeful if _pays(whole, plain) else shown
+        free = _numbers(names, core | kept)
         neutral = np.where(np.isin(np.arange(len(names)), free), whole.inner, plain.inner)
-        found = fit(follows, free, neutral, search=False) if shown else plain
+        found = whole if kept == hopeful else fit(follows, free, neutral[None]) if shown else plain
     if loop is not None:
-        looped = fit(loop, found.free, found.inner, search=False)
-        found = looped if looped.cost < STEP_OUT**2 * found.cost else found
+        looped = fit(loop, found.free, nearby(found))
+        found = looped if _in_step(looped, found, bandwidth) else found
     profiles = {name: profile(found, i, _others(names, i, found.free), found.cost) for i, name in enumerate(names)}
     return found, profiles, shown
+
+
+def _pays(whole: Fit, plain: Fit) -> bool:
+    """Whether a fit with more parameters is better by more than chance would make it, with a probability of 99 %."""
+    more = len(whole.free) - len(plain.free)
+    return bool(plain.cost > whole.cost * (1 + chi2.ppf(SURE, more) / whole.independent))
+
+
+def _in_step(looped: Fit, found: Fit, bandwidth: float) -> bool:
+    """Whether a closed loop follows: its residual is no larger than that of the stage that follows the log, both within
+    the motion's bandwidth [Hz], since the latter knows no noise above it."""
+    step = looped.problem.inputs.sample_time
+    rms = [np.std(low_pass(each.residual, step, bandwidth)) for each in (looped, found)]
+    return bool(rms[0] < STEP_OUT * rms[1])
 
 
 def _numbers(names: Sequence[str], wanted: set[str]) -> tuple[int, ...]:

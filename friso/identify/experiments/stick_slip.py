@@ -175,7 +175,8 @@ def _answer(
         if held[chosen].mean() > HELD:
             low = float(forces[chosen].mean() * (1 - relative_error * COVERAGE))
             return Estimate.unknown(KEY, "N", f"stick-slip{words}", STOPPED, low)
-        return static_friction(KEY, forces[chosen], rates[chosen], bristle_rate, relative_error, late[chosen].mean())
+        used = chosen & (rates > 0)  # held ones may have none
+        return static_friction(KEY, forces[used], rates[used], bristle_rate, relative_error, late[used].mean())
 
     masks = dict(ways(directions))
     means = {name: _mean(f"break-away force, {name}", forces[m], relative_error, why) for name, m in masks.items()}

@@ -27,6 +27,10 @@ SCREENED = 3e7
 ROUGH, FINE = 12, 30
 """Iterations of the refinement of the starts kept, and most evaluations of lmfit times the parameters."""
 
+NEARBY, FAR = 255, 3.0
+"""Starts near an earlier fit, and how many times as far as its covariance they are drawn: the loop of a stage that
+hunts has optima of its own, and the fit it starts from is of another problem."""
+
 SEED = 7
 
 
@@ -64,33 +68,52 @@ def first_values(parameters: Sequence[Parameter]) -> np.ndarray:
     return np.array([each.inner(each.start) for each in parameters])
 
 
-def fit(problem: Problem, free: Sequence[int], neutral: np.ndarray, search: bool = True) -> Fit:
-    """Fit the free parameters, given by number, of a problem; the others stay as in `neutral`, shape (parameters,).
-
-    The `search` from thousands of starts finds parameters that not every motion shows; without it, or where none of
-    them is free, the fit starts from `neutral`.
-    """
-    mask = np.zeros(len(neutral), bool)
+def fit(problem: Problem, free: Sequence[int], starts: np.ndarray) -> Fit:
+    """Fit the free parameters, given by number, of a problem, from some starts, shape (starts, parameters), the best of
+    which are refined; the others stay as in the first of them."""
+    mask = np.zeros(starts.shape[1], bool)
     mask[list(free)] = True
-    before = float(costs(problem, neutral[None])[0])
-    core = np.array([each.core for each in problem.parameters])
-    kept = _screened(problem, mask, neutral) if search and (mask & ~core).any() else neutral[None]
+    kept = _screened(problem, starts)
     refined = refine(problem, kept, np.tile(mask, (len(kept), 1)), ROUGH)
     best = refined.inner[np.argmin(refined.cost)]
-    return _polished(problem, tuple(free), best, before)
+    return _polished(problem, tuple(free), best, float(costs(problem, starts[:1])[0]))
 
 
-def _screened(problem: Problem, free: np.ndarray, neutral: np.ndarray) -> np.ndarray:
-    """The best starts, shape (kept, parameters), the neutral one always among them."""
+def everywhere(problem: Problem, free: Sequence[int], first: np.ndarray) -> np.ndarray:
+    """Thousands of starts over the ranges of the free parameters, shape (starts, parameters), behind the `first`: they
+    find parameters that not every motion shows."""
     low, high = bounds_of(problem)
     core = np.array([each.core for each in problem.parameters])
     half = np.array([NARROW if each.logarithmic else NARROW * abs(each.start) for each in problem.parameters])
-    low, high = np.where(core, neutral - half, low), np.where(core, neutral + half, high)
-    shares = qmc.Sobol(len(neutral), rng=SEED).random(STARTS)
-    starts = np.where(free, low + shares * (high - low), neutral)
-    count = min(len(problem.wanted), int(SCREENED / STARTS))
-    found = costs(problem.beginning(count), starts)
-    return np.vstack([neutral, starts[np.argsort(found)[: KEPT - 1]]])
+    low, high = np.where(core, first - half, low), np.where(core, first + half, high)
+    shares = qmc.Sobol(len(first), rng=SEED).random(STARTS)
+    starts = np.where(np.isin(np.arange(len(first)), free), low + shares * (high - low), first)
+    return np.vstack([first, starts])
+
+
+def nearby(found: Fit) -> np.ndarray:
+    """Starts that another problem's fit allows, shape (starts, parameters), itself the first: drawn from its covariance
+    `FAR` times as wide."""
+    low, high = (end[list(found.free)] for end in bounds_of(found.problem))
+    deviation = np.sqrt(np.diag(found.covariance))
+    known = np.isfinite(deviation) & (deviation > 0)
+    correlation = np.eye(len(found.free))
+    part = found.covariance[np.ix_(known, known)]
+    correlation[np.ix_(known, known)] = part / np.outer(deviation[known], deviation[known])
+    spread = np.minimum(FAR * np.where(known, deviation, np.inf), (high - low) / 4)
+    rows = np.random.default_rng(SEED).multivariate_normal(np.zeros(len(spread)), correlation, NEARBY, method="eigh")
+    starts = np.tile(found.inner, (NEARBY + 1, 1))
+    starts[1:, list(found.free)] += rows * spread
+    starts[:, list(found.free)] = np.clip(starts[:, list(found.free)], low, high)
+    return starts
+
+
+def _screened(problem: Problem, starts: np.ndarray) -> np.ndarray:
+    """The best starts, shape (kept, parameters), the first one always among them."""
+    if len(starts) <= KEPT:
+        return starts
+    found = costs(problem.beginning(min(len(problem.wanted), int(SCREENED / len(starts)))), starts[1:])
+    return np.vstack([starts[0], starts[1:][np.argsort(found)[: KEPT - 1]]])
 
 
 def _polished(problem: Problem, free: tuple[int, ...], inner: np.ndarray, before: float) -> Fit:

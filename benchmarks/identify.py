@@ -1,0 +1,157 @@
+"""Identification against known truth: `python -m benchmarks.identify [--machines 100] [--moves 20]`.
+
+Machines drawn at random (tests/machines.py) are simulated, their logs get noise and digits, and are identified again.
+Per method and quantity: how often the 95 % interval holds the truth, how wide it is, and how often the log was said not
+to show the quantity (and the range that is left holds the truth). Fits of moves take minutes per machine, the other
+experiments a second: `--moves` is the number of machines whose moves are fitted.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections import defaultdict
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.report import Goal, print_goals, print_table
+from friso.identify.estimate import Estimate
+from friso.identify.experiments import (
+    friction_velocity,
+    static_from_ramps,
+    static_from_stick_slip,
+    stiffness_from_steps,
+)
+from friso.identify.moves import identify_moves
+from friso.identify.response.analysis import analyse
+from friso.quantities import StageError
+
+sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
+from machines import Machine, break_aways, creeping, drawn, moves, shaken, speeds, steps
+
+WANTED = 0.9
+"""Share of the shown quantities whose intervals have to hold the truth."""
+
+GOALS = ("masses.cart", "friction.coulomb", "friction.static", "joint.stiffness")
+"""Quantities that the goal is about."""
+
+Answer = tuple[str, Estimate, float]
+"""Method, what it found, and the truth."""
+
+
+@dataclass
+class Count:
+    """How often a quantity was held or missed, its half-widths over the truth, and how often it was not shown and its
+    range was right."""
+
+    held: int = 0
+    missed: int = 0
+    widths: list[float] = field(default_factory=list)
+    unshown: int = 0
+    right: int = 0
+
+    def add(self, found: Estimate, truth: float) -> None:
+        if not found.shown:
+            self.unshown += 1
+            self.right += found.holds(truth)
+            return
+        self.held += found.holds(truth)
+        self.missed += not found.holds(truth)
+        self.widths.append(found.half_width / abs(truth) if truth else found.half_width)
+
+
+def mass_of(flat: dict) -> float:
+    return sum(flat[key] for key in ("masses.cart", "masses.stage") if key in flat)
+
+
+def of_rigid(machine: Machine) -> Iterator[Answer]:
+    """Break-away, constant speeds, and the frequency response of a machine without joint."""
+    flat = machine.flat
+    mass = mass_of(flat)
+    yield "break-away", static_from_ramps(break_aways(machine), mass).static, flat["friction.static"]
+    both = friction_velocity(speeds(machine), mass).both
+    for each in (both.coulomb, both.viscous, both.static):
+        yield "constant speed", each, flat[each.name]
+    lines = analyse([shaken(machine)]).lines
+    if lines:
+        value = lines[0].value
+        yield "frequency", Estimate("masses.cart", "kg", value.value, value.low, value.high, value.method), mass
+
+
+def of_jointed(machine: Machine) -> Iterator[Answer]:
+    """Steps with the cart held, and slow motion that sticks and slips, with the stiffness that these gave."""
+    flat = machine.flat
+    stiffness = stiffness_from_steps(steps(machine)).stiffness
+    yield "steps", stiffness, flat["joint.stiffness"]
+    if stiffness.shown:
+        found = static_from_stick_slip(creeping(machine), stiffness, flat["masses.stage"], flat["joint.stroke"])
+        yield "stick-slip", found.static, flat["friction.static"]
+
+
+def of_moves(machine: Machine) -> Iterator[Answer]:
+    """Moves, with and without the machine's own controller."""
+    flat, log = machine.flat, moves(machine)
+    for own, words in ((True, "moves, controller known"), (False, "moves, controller unknown")):
+        for each in identify_moves(log, machine.guess.flat(), own).estimates:
+            yield words, each, flat.get(each.name, 0.0)
+
+
+def run(first: int, machines: int, fitted: int) -> dict[tuple[str, str], Count]:
+    counts: dict[tuple[str, str], Count] = defaultdict(Count)
+    for seed in range(first, first + machines):
+        begin = time.perf_counter()
+        tasks = [of_rigid(drawn(seed, False)), of_jointed(drawn(seed, True))]
+        if seed < first + fitted:
+            tasks.append(of_moves(drawn(seed, False)))
+        for task in tasks:
+            try:
+                for method, found, truth in task:
+                    counts[method, found.name].add(found, truth)
+                    if not found.holds(truth):
+                        shown = "" if found.shown else " (not shown)"
+                        print(f"  machine {seed}, {method}: {found.name} {found.low:.4g} to {found.high:.4g}{shown}, "
+                              f"true {truth:.4g}")  # fmt: skip
+            except StageError as error:
+                print(f"  machine {seed}: refused: {' '.join(str(error).split())}")
+        print(f"machine {seed}: {time.perf_counter() - begin:.0f} s", flush=True)
+    return counts
+
+
+def rows(counts: dict[tuple[str, str], Count]) -> list[list[str]]:
+    table = []
+    for (method, name), count in sorted(counts.items()):
+        width = f"{np.median(count.widths):.2g}" if count.widths else "-"
+        shown = count.held + count.missed
+        table.append([f"{method}: {name}", f"{count.held} of {shown}", width, f"{count.right} of {count.unshown}"])
+    return table
+
+
+def goals(counts: dict[tuple[str, str], Count]) -> list[Goal]:
+    """Of each quantity that the goal is about, by each method that shows it."""
+    found = []
+    for (method, name), count in sorted(counts.items(), key=lambda item: item[0][::-1]):
+        shown = count.held + count.missed
+        if name in GOALS and shown:
+            about = f"{name} by {method}: 95 % intervals hold the truth"
+            found.append(Goal(about, ">= 90 %", f"{count.held} of {shown}", count.held >= WANTED * shown))
+    return found
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--machines", type=int, default=100)
+    parser.add_argument("--moves", type=int, default=None, help="machines whose moves are fitted (default: all)")
+    parser.add_argument("--first", type=int, default=0, help="number of the first machine")
+    given = parser.parse_args()
+    counts = run(given.first, given.machines, given.machines if given.moves is None else given.moves)
+    head = ("method: quantity", "held of shown", "median half-width / truth", "range right of not shown")
+    print_table(head, rows(counts))
+    print_goals(goals(counts), "Goals")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,270 @@
+"""`friso identify` as a user runs it: what it writes, says, predicts and refuses."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+from machines import Machine, drawn, moves
+
+import friso
+from friso.cli.app import main
+from friso.identify import method
+from friso.identify.logs.log import Log
+from friso.identify.output_error import fit as fitting
+from friso.identify.output_error import profile as profiles
+from friso.stage.correlations import beside, read_correlations
+
+pytestmark = pytest.mark.xdist_group("identify-moves")
+
+SMALL: dict[Any, dict[str, Any]] = {
+    profiles: {"POINTS": 3, "ROUNDS": 1},
+    fitting: {"STARTS": 64, "KEPT": 2, "NEARBY": 15},
+}
+"""Sizes with which a log is identified in seconds."""
+
+COUNT = 2000
+"""Samples of the log that are used: the first two moves."""
+
+COLUMNS = {"time": "Time [s]", "reference": "SetPos [mm]", "position": "ActPos [mm]", "force": "Force [N]"}
+Said = tuple[int, str, str]
+
+
+@pytest.fixture(scope="module", autouse=True)
+def small() -> Iterator[None]:
+    with pytest.MonkeyPatch.context() as patch:
+        for module, sizes in SMALL.items():
+            for name, value in sizes.items():
+                patch.setattr(module, name, value)
+        yield
+
+
+@pytest.fixture(scope="module")
+def machine() -> Machine:
+    return drawn(3, False)
+
+
+@pytest.fixture(scope="module")
+def log(machine: Machine) -> Log:
+    return moves(machine)
+
+
+def table(log: Log, count: int = COUNT, **changes: Any) -> pd.DataFrame:
+    """The columns of a log in millimetres, some of them changed, or left out by None."""
+    values = {"time": log.time[:count]}
+    values |= {role: log[role][:count] * (1.0 if role == "force" else 1e3) for role in COLUMNS if role != "time"}
+    values |= changes
+    return pd.DataFrame({COLUMNS.get(role, role): each for role, each in values.items() if each is not None})
+
+
+def run(capsys: pytest.CaptureFixture[str], *arguments: object) -> Said:
+    """Exit status, standard output and standard error of `friso identify`."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys, "argv", ["friso", "identify", *map(str, arguments)])
+        with pytest.raises(SystemExit) as left:
+            main()
+    shown = capsys.readouterr()
+    return int(left.value.code or 0), shown.out, shown.err
+
+
+@pytest.fixture(scope="module")
+def inputs(machine: Machine, log: Log, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """The log and the stage file."""
+    folder = tmp_path_factory.mktemp("given")
+    table(log).to_csv(folder / "log.csv", index=False)
+    friso.save(machine.guess, folder / "stage.toml")
+    return folder / "log.csv", folder / "stage.toml"
+
+
+@pytest.fixture(scope="module")
+def done(inputs: tuple[Path, Path], tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any]]:
+    """A run with --json and a prediction, its folder and its answer."""
+    out = tmp_path_factory.mktemp("done") / "out"
+    log, stage = inputs
+    arguments = ["identify", log, "--stage", stage, "--map", "force=Force", "--predict", log, "--json", "--out", out]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys, "argv", ["friso", *map(str, arguments)])
+        answer = out.parent / "answer.json"
+        with answer.open("w") as stream:
+            patch.setattr(sys, "stdout", stream)
+            with pytest.raises(SystemExit) as left:
+                main()
+    assert not left.value.code
+    return out, json.loads(answer.read_text(), parse_constant=lambda text: pytest.fail(f"{text} is no JSON"))
+
+
+def test_files_are_written_and_listed(done: tuple[Path, dict[str, Any]]) -> None:
+    out, answer = done
+    files = {Path(each) for each in answer["files"]}
+    assert {out / "identified.toml", out / "identify.html", beside(out / "identified.toml")} <= files
+    assert all(each.stat().st_size > 0 for each in files)
+    assert {each.suffix for each in files} >= {".toml", ".html", ".png", ".svg", ".pdf"}
+    page = (out / "identify.html").read_text()
+    assert not re.search(r"<(script|link|img)[^>]*(src|href)=.https?:", page)
+
+
+def test_the_stage_file_has_uncertain_keys_that_hold_the_truth(
+    done: tuple[Path, dict[str, Any]], machine: Machine
+) -> None:
+    stage = friso.load(done[0] / "identified.toml")
+    uncertain = stage.uncertain()
+    assert {"masses.cart", "friction.coulomb", "friction.viscous", "bias.cart"} <= uncertain.keys()
+    low, high = uncertain["masses.cart"].low, uncertain["masses.cart"].high
+    middle, half = (low + high) / 2, (high - low) / 2
+    assert abs(machine.flat["masses.cart"] - middle) < 2 * half
+    assert half < 0.05 * middle
+    assert "log" in stage.source
+    correlations = read_correlations(beside(done[0] / "identified.toml"), stage)
+    assert {*correlations.keys} <= uncertain.keys()
+    assert len(correlations.keys) >= 3
+
+
+def test_friso_check_runs_on_what_was_identified(
+    done: tuple[Path, dict[str, Any]], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys, "argv", ["friso", "check", str(done[0] / "identified.toml"), "--json"])
+    with pytest.raises(SystemExit) as left:
+        main()
+    assert not left.value.code
+    assert json.loads(capsys.readouterr().out)
+
+
+def test_the_answer_has_everything(done: tuple[Path, dict[str, Any]]) -> None:
+    text = json.dumps(done[1])
+    for word in ("masses.cart", "friction.static", "friction.stribeck_velocity", "friction.coulomb", "log.csv"):
+        assert word in text, word
+
+
+def test_a_second_run_needs_no_options_again(
+    inputs: tuple[Path, Path], done: tuple[Path, dict[str, Any]], tmp_path: Path, capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    """The mapping beside the log is used: told of a channel that is not there, it is refused by its name."""
+    kept = inputs[0].with_name("log.csv.friso.toml")
+    assert '"force" = "Force"' in kept.read_text()
+    monkeypatch.setattr(method, "identify", _stopped)
+    kept.write_text(kept.read_text().replace('"Force"', '"Kraft"'))
+    status, _, said = run(capsys, inputs[0], "--stage", inputs[1], "--out", tmp_path / "out")
+    kept.write_text(kept.read_text().replace('"Kraft"', '"Force"'))
+    assert (status, "Kraft" in said) == (2, True)
+    assert run(capsys, inputs[0], "--stage", inputs[1], "--out", tmp_path / "out")[0] == 130
+
+
+def _stopped(*arguments: Any, **named: Any) -> None:
+    raise KeyboardInterrupt
+
+
+def test_ctrl_c_leaves_nothing(
+    inputs: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(method, "identify", _stopped)
+    status, out, said = run(capsys, inputs[0], "--stage", inputs[1], "--out", tmp_path / "out")
+    assert (status, out) == (130, "")
+    assert "interrupted" in said
+    assert not [*tmp_path.rglob("identified.toml"), *tmp_path.rglob("*.html")]
+
+
+BAD_OPTIONS = [
+    (["--map", "position=Nowhere"], "Nowhere"),
+    (["--map", "speed=ActPos"], "one of time, reference"),
+    (["--map", "position"], "two texts with = between"),
+    (["--as", "dance"], "one of moves, frequency"),
+    (["--unit", "ActPos=parrots"], "parrots"),
+    (["--scale", "force=heavy"], "heavy"),
+    (["--bandwidth", "20 kg"], "--bandwidth"),
+    (["--band", "20 Hz .. 3 Hz"], "--band"),
+    (["--period", "0 s"], "--period"),
+    (["--dt", "-1 ms"], "--dt"),
+    (["--predict", "nowhere.csv"], "nowhere.csv"),
+]
+
+
+@pytest.mark.parametrize(("options", "message"), BAD_OPTIONS, ids=lambda each: "".join(each[:2]))
+def test_options_that_do_not_fit_are_refused(
+    options: list[str], message: str, inputs: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log = tmp_path / "log.csv"
+    log.write_bytes(inputs[0].read_bytes())
+    refused(capsys, message, log, "--stage", inputs[1], *options, "--out", tmp_path / "out")
+
+
+def refused(capsys: pytest.CaptureFixture[str], message: str, *arguments: object) -> None:
+    """Exit 2 with one message, and nothing written."""
+    status, out, said = run(capsys, *arguments)
+    plain = " ".join(said.split())
+    assert status == 2, plain
+    assert out == ""
+    assert message in plain
+    assert "Traceback" not in said
+    assert said.count("expected") == 1
+    places = [Path(str(each)) for each in arguments]
+    assert not any((each / "identified.toml").exists() for each in places if each.name == "out")
+
+
+def _bad(log: Log) -> dict[str, tuple[pd.DataFrame, str]]:
+    position, force = log["position"][:COUNT] * 1e3, log["force"][:COUNT]
+    holed = np.where(np.arange(COUNT) == 700, np.nan, force)
+    time = log.time[:COUNT].copy()
+    time[500] = time[400]
+    return {
+        "short": (table(log, 30), "at least 50 samples"),
+        "constant": (table(log, position=np.full(COUNT, 1.0)), "a constant signal"),
+        "nan": (table(log, force=holed), "force"),
+        "two candidates": (table(log, **{"ActPos2 [mm]": position * 1.01}), "position"),
+        "no units": (table(log).rename(columns={"ActPos [mm]": "ActPos"}), "ActPos"),
+        "no force": (table(log, force=None), "force"),
+        "no position": (table(log, position=None), "position"),
+        "backwards": (table(log, time=time), "time"),
+    }
+
+
+@pytest.mark.parametrize(
+    "case", ["short", "constant", "two candidates", "no units", "no force", "no position", "backwards"]
+)
+def test_bad_logs_are_refused(
+    case: str, log: Log, inputs: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    data, message = _bad(log)[case]
+    data.to_csv(tmp_path / "bad.csv", index=False)
+    refused(capsys, message, tmp_path / "bad.csv", "--stage", inputs[1], "--out", tmp_path / "out")
+
+
+def test_missing_and_empty_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "empty.csv").write_text("")
+    refused(capsys, "nowhere.csv", tmp_path / "nowhere.csv", "--out", tmp_path / "out")
+    refused(capsys, "empty.csv", tmp_path / "empty.csv", "--out", tmp_path / "out")
+
+
+def test_set_without_stage(inputs: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = (inputs[0], "--set", "friction.static=2 N", "--out", tmp_path / "out")
+    refused(capsys, "a stage whose keys to override", *arguments)
+
+
+def test_a_foreign_stage_file_is_not_overwritten(
+    inputs: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    own = tmp_path / "identified.toml"
+    own.write_bytes(inputs[1].read_bytes())
+    for given in (inputs[1], own):
+        status, out, said = run(capsys, inputs[0], "--stage", given, "--out", tmp_path)
+        assert (status, out) == (2, "")
+        assert "another folder" in " ".join(said.split())
+    assert own.read_bytes() == inputs[1].read_bytes()
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="nothing is kept from a superuser")
+def test_a_folder_that_cannot_be_written(
+    inputs: tuple[Path, Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    tmp_path.chmod(0o500)
+    status, _, said = run(capsys, inputs[0], "--stage", inputs[1], "--out", tmp_path)
+    tmp_path.chmod(0o700)
+    assert (status, "can be written" in said) == (2, True)

@@ -1,0 +1,230 @@
+"""Logs of moves: known truth from simulated machines, and the EMPS record with what it cannot show."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from machines import drawn, moves
+
+import friso
+from friso.identify import moves as method
+from friso.identify.errors import errors_of
+from friso.identify.logs.assemble import read_log
+from friso.identify.logs.log import Log
+from friso.identify.logs.mapping import from_options
+from friso.identify.moves import BRISTLES, STRIBECK, Moves, identify_moves, predict
+from friso.identify.output_error import fit as fitting
+from friso.identify.output_error import profile as profiles
+from friso.identify.output_error.fit import everywhere, first_values, fit, nearby
+from friso.identify.output_error.parameters import RATIO
+from friso.identify.output_error.problem import closed_loop
+from friso.identify.output_error.refine import bounds_of, costs
+from friso.quantities import StageError
+
+pytestmark = pytest.mark.xdist_group("identify-moves")
+
+ROOT = Path(__file__).parents[1]
+EMPS = ROOT.parent / "shared" / "data" / "emps" / "DATA_EMPS.mat"
+SMALL: dict[Any, dict[str, Any]] = {
+    profiles: {"POINTS": 3, "ROUNDS": 1},
+    fitting: {"STARTS": 256, "KEPT": 3, "NEARBY": 31},
+}
+"""Sizes with which a fit takes seconds: coarser profiles are no narrower, and fewer starts do for quiet logs."""
+
+
+@pytest.fixture(scope="module", autouse=True)
+def small() -> Iterator[None]:
+    with pytest.MonkeyPatch.context() as patch:
+        for module, sizes in SMALL.items():
+            for name, value in sizes.items():
+                patch.setattr(module, name, value)
+        yield
+
+
+# --- known truth ---
+
+
+@pytest.fixture(scope="module")
+def quick() -> tuple[dict[str, Any], Log, Moves]:
+    """A machine at 2 ms, its log, and what is found in it; its controller is known."""
+    machine = drawn(3, False)
+    log = moves(machine)
+    return machine.flat, log, identify_moves(log, machine.guess.flat(), True)
+
+
+def test_intervals_hold_mass_and_friction(quick: tuple[dict[str, Any], Log, Moves]) -> None:
+    truth, _, found = quick
+    by_name = {each.name: each for each in found.estimates}
+    for name in ("masses.cart", "friction.coulomb", "friction.viscous", "bias.cart"):
+        each, true = by_name[name], truth[name]
+        assert each.shown
+        assert abs(each.value - true) < 1.5 * each.half_width, name  # half again: 5 intervals at once
+        assert each.half_width < 0.15 * abs(true)
+    assert by_name["friction.viscous_asymmetry"].value == pytest.approx(0, abs=0.1)
+
+
+def test_the_closed_loop_has_the_last_word_and_leaves_the_noise(quick: tuple[dict[str, Any], Log, Moves]) -> None:
+    found, machine = quick[2], drawn(3, False)
+    assert found.fit.problem.closed
+    noise = np.hypot(machine.force_noise, machine.force_digit / 12**0.5)
+    assert found.residual.rms == pytest.approx(noise, rel=0.05)
+    assert found.errors.position < 1e-3
+
+
+def test_static_friction_is_not_mistaken_for_coulomb_friction(quick: tuple[dict[str, Any], Log, Moves]) -> None:
+    """Slow moves are under the Stribeck effect: a fit without it must not put it into Coulomb friction."""
+    truth, _, found = quick
+    static = next(each for each in found.estimates if each.name == "friction.static")
+    assert static.low < 1.1 * truth["friction.static"]
+    assert static.high > 0.9 * truth["friction.static"]
+    assert found.flat["friction.static"] == pytest.approx(truth["friction.static"], rel=0.15)
+
+
+def test_correlations_are_of_what_is_shown(quick: tuple[dict[str, Any], Log, Moves]) -> None:
+    found = quick[2]
+    size = len(found.correlated)
+    assert found.correlation.shape == (size, size)
+    assert np.diag(found.correlation) == pytest.approx(np.ones(size))
+    assert np.abs(found.correlation).max() <= 1 + 1e-9
+    names = [each.name for each in found.correlated]
+    assert found.correlation[names.index("friction.coulomb"), names.index("friction.viscous")] < -0.3
+
+
+def test_pulses_of_force_are_predicted(quick: tuple[dict[str, Any], Log, Moves]) -> None:
+    """A record of the same machine with pulses beside the controller: predicted with them, not without."""
+    truth, log, found = quick
+    pulses = np.zeros(len(log.time))
+    for start in range(500, len(pulses) - 100, 600):
+        pulses[start : start + 50] = 20 * truth["friction.coulomb"] * (-1) ** (start // 600)
+    given = replace(log, signals={**log.signals, "disturbance": pulses, "force": log["force"] * 0 + pulses})
+    machine = drawn(3, False)
+    full = closed_loop(machine.flat, given, given.segments[0], ()).record(np.zeros(0))
+    pushed = replace(given, signals={**given.signals, "position": full.position, "force": full.force + pulses})
+    part, _, errors = predict(found, machine.measured(pushed))
+    assert part == pushed.segments[0]
+    assert errors.force < 0.05
+    assert errors.position < 5e-3
+    silent = replace(pushed, signals={**pushed.signals, "disturbance": 0 * pulses})
+    assert predict(found, silent)[2].force > 5 * errors.force
+
+
+def test_missing_signals_are_named(quick: tuple[dict[str, Any], Log, Moves]) -> None:
+    _, log, found = quick
+    bare = replace(log, signals={role: log[role] for role in ("position", "force")})
+    with pytest.raises(StageError, match="reference"):
+        predict(found, bare)
+    volts = replace(log, units={"force": "V"})
+    with pytest.raises(StageError, match="N/V"):
+        identify_moves(volts, found.flat, True)
+
+
+def test_starts_stay_in_their_ranges(quick: tuple[dict[str, Any], Log, Moves]) -> None:
+    found = quick[2].fit
+    low, high = bounds_of(found.problem)
+    every = range(len(found.inner))
+    for starts in (nearby(found), everywhere(found.problem, tuple(every), found.inner)):
+        assert starts[0] == pytest.approx(found.inner)
+        free = [i for i in found.free if not found.problem.parameters[i].core]
+        assert np.all((starts[:, free] >= low[free] - 1e-9) & (starts[:, free] <= high[free] + 1e-9))
+        assert np.ptp(starts[:, found.free[0]]) > 0
+
+
+def test_without_noise_the_fit_ends_at_the_truth() -> None:
+    """The inverse crime on purpose: the loop's own record is fitted from values that are 10 % off."""
+    machine = drawn(3, False)
+    log = moves(machine, bare=True)
+    log = replace(log, signals={role: values[:2000] for role, values in log.signals.items()}, time=log.time[:2000])
+    log = replace(log, segments=(slice(0, 2000),))
+    flat = {**machine.flat, "friction.viscous_asymmetry": 0.0}
+    given = method._problems(log, log.segments[0], flat, method.inverse_model(log), True)[1]
+    assert given is not None
+    exact = replace(given, wanted=closed_loop(flat, log, log.segments[0], ()).record(np.zeros(0)).force)
+    names = [each.name for each in given.parameters]
+    core = tuple(i for i, each in enumerate(given.parameters) if each.core)
+    kept = {"static friction ratio": flat["friction.static"] / flat["friction.coulomb"]}
+    first = first_values(given.parameters)
+    for i, each in enumerate(given.parameters):
+        if not each.core:
+            first[i] = each.inner(kept.get(each.name, flat.get(each.name)))
+    first[names.index("mass")] += 0.1
+    found = fit(exact, core, first[None])
+    assert found.cost < 1e-6 * float(costs(exact, first[None])[0])
+    assert found.value("mass") == pytest.approx(flat["masses.cart"], rel=1e-3)
+    assert found.value("friction.coulomb") == pytest.approx(flat["friction.coulomb"], rel=1e-3)
+
+
+# --- the record of the EMPS benchmark ------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def axis() -> friso.Stage:
+    stage = friso.load(ROOT / "examples" / "emps_axis.toml")
+    return stage.replace({"drive.sample_time": "1 ms", "drive.velocity_samples": 2.0})
+
+
+@pytest.fixture(scope="module")
+def emps(tmp_path_factory: pytest.TempPathFactory) -> Log:
+    if not EMPS.exists():
+        pytest.skip(f"the EMPS record is not at {EMPS}")
+    path = tmp_path_factory.mktemp("emps") / EMPS.name
+    shutil.copy(EMPS, path)
+    roles = ["time=t", "reference=qg", "position=qm", "force=vir"]
+    return read_log(path, from_options(roles, ["t=s", "qg=m", "qm=m"], ["force=35.15065188 N/V"]))
+
+
+def cut(log: Log, part: slice) -> Log:
+    signals = {role: values[part] for role, values in log.signals.items()}
+    time = log.time[part]
+    return replace(log, time=time, signals=signals, segments=(slice(0, len(time)),))
+
+
+@pytest.fixture(scope="module")
+def identified(emps: Log, axis: friso.Stage) -> Moves:
+    return identify_moves(emps, axis.flat(), True, 20.0)
+
+
+PUBLISHED = {"position": 0.0138, "velocity": 0.229, "acceleration": 8.60, "force": 5.848}
+"""Relative errors of closed-loop simulation [%]."""
+
+
+def test_emps_in_closed_loop(identified: Moves) -> None:
+    assert identified.fit.problem.closed
+    for name, percent in PUBLISHED.items():
+        assert 100 * getattr(identified.errors, name) < percent, name
+
+
+def test_emps_fits_better_than_the_inverse_model(identified: Moves, emps: Log, axis: friso.Stage) -> None:
+    inverse = identified.inverse
+    flat = axis.flat() | {"masses.cart": inverse.value("mass"), "friction.viscous": inverse.value("viscous")}
+    flat |= dict.fromkeys(("friction.static", "friction.coulomb"), inverse.value("coulomb"))
+    flat |= {"bias.cart": -inverse.value("offset"), "friction.viscous_asymmetry": 0.0}
+    plain = closed_loop(flat, emps, identified.part, ()).record(np.zeros(0))
+    assert identified.errors.force < errors_of(emps, identified.part, plain, 20.0).force
+
+
+def test_emps_shows_mass_and_sliding_friction_alone(identified: Moves) -> None:
+    by_name = {each.name: each for each in identified.estimates}
+    for name in ("friction.static", "friction.stribeck_velocity", *BRISTLES):
+        assert not by_name[name].shown, name
+        assert by_name[name].low < by_name[name].high
+    assert "no steady motion between" in by_name["friction.static"].reason
+    assert by_name["friction.static"].low == pytest.approx(by_name["friction.coulomb"].value, rel=1e-3)
+    assert {RATIO, *STRIBECK[1:], *BRISTLES} <= {*identified.profiles}
+    mass = by_name["masses.cart"]
+    assert mass.shown
+    assert mass.value == pytest.approx(95.1089, rel=5e-3)
+    assert by_name["friction.coulomb"].value == pytest.approx(20.3935, rel=0.05)
+
+
+def test_half_of_emps_predicts_the_other(identified: Moves, emps: Log) -> None:
+    """The latter half alone, simulated with what was found, on its own."""
+    latter = cut(emps, slice(len(emps.time) // 2, None))
+    errors = predict(identified, latter)[2]
+    for name, percent in PUBLISHED.items():
+        assert 100 * getattr(errors, name) < percent, name
