@@ -18,13 +18,14 @@ from friso.identify.errors import errors_of
 from friso.identify.logs.assemble import read_log
 from friso.identify.logs.log import Log
 from friso.identify.logs.mapping import from_options
-from friso.identify.moves import BRISTLES, STRIBECK, Moves, identify_moves, predict
+from friso.identify.moves import Moves, identify_moves, predict
 from friso.identify.output_error import fit as fitting
 from friso.identify.output_error import profile as profiles
 from friso.identify.output_error.fit import everywhere, first_values, fit, nearby
 from friso.identify.output_error.parameters import RATIO
 from friso.identify.output_error.problem import closed_loop
 from friso.identify.output_error.refine import bounds_of, costs
+from friso.identify.output_error.shown import BRISTLES, STRIBECK
 from friso.quantities import StageError
 
 pytestmark = pytest.mark.xdist_group("identify-moves")

@@ -33,10 +33,9 @@ ENERGY, ABOVE_NOISE = 0.9, 10.0
 """Share of the power of the force's rate within the bandwidth of the motion, and by how much a line of the force's
 spectrum stands above the white noise to count. The rate, since a stage that hunts has most of its force below 1 Hz."""
 
-SLIDING = 0.01
-"""Share of the highest speed below which the rows of a fit are left out: at rest, the sign of the velocity is noise,
-and friction is what the controller makes it. What is left of the EMPS record gives the published values all the same
-(within 0.2 %, of the offset 1.1 %)."""
+SLIDING, REST = 0.01, 0.1
+"""Share of the highest speed below which a stage rests, and time [s] from which on a rest is left out of the fit: the
+sign of the velocity is noise then, and friction is what the controller makes it."""
 
 LEAST = 20
 """Rows that a fit needs at least."""
@@ -109,7 +108,7 @@ def inverse_model(
     parts = [_rows(log, part, band, by_direction, cart_share) for part in log.segments]
     time, columns, force = (np.concatenate([part[i] for part in parts]) for i in range(3))
     speed = np.abs(columns[:, 1] + columns[:, 3]) if by_direction else np.abs(columns[:, 1])
-    slides = speed > SLIDING * speed.max(initial=0.0)
+    slides = ~_rests(speed <= SLIDING * speed.max(initial=0.0), time)
     time, columns, force = time[slides], columns[slides], force[slides]
     if len(force) < LEAST:
         given = f"{len(log.time)} samples, {len(force)} of them in motion after decimation to {5 * band:.3g} Hz"
@@ -123,6 +122,15 @@ def inverse_model(
         for (name, unit), value, variance in zip(names, solution, np.diag(covariance), strict=True)
     )
     return InverseModel(estimates, covariance, time, force, fitted, band)
+
+
+def _rests(slow: np.ndarray, time: np.ndarray) -> np.ndarray:
+    """Which rows belong to a stretch of slow ones that lasts, shape (rows,)."""
+    ends = np.flatnonzero(np.diff(np.concatenate([[False], slow, [False]]).astype(int)))
+    rests = np.zeros(len(slow), bool)
+    for first, behind in zip(ends[::2], ends[1::2], strict=True):
+        rests[first:behind] = time[behind - 1] - time[first] >= REST
+    return rests
 
 
 _NAMES = {

@@ -1,0 +1,79 @@
+"""From fitted numbers to keys of the stage file, with their intervals or what is left possible."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from friso.identify.estimate import Estimate
+from friso.identify.output_error.coverage import Coverage
+from friso.identify.output_error.fit import Fit
+from friso.identify.output_error.parameters import RATIO, Parameter, keys_of
+from friso.identify.output_error.profile import Profile
+from friso.identify.output_error.shown import reason
+from friso.intervals import COVERAGE
+
+METHOD = "output error"
+
+
+def estimates_of(
+    found: Fit, profiles: Mapping[str, Profile], shown: set[str], covered: Coverage
+) -> tuple[tuple[Estimate, ...], np.ndarray]:
+    """The keys of the stage file with their intervals, and the correlation of those shown."""
+    parameters = found.problem.parameters
+    spread = np.zeros((len(parameters), len(parameters)))
+    spread[np.ix_(found.free, found.free)] = _no_narrower(found, profiles)
+    keys, slopes = _slopes(found)
+    covariance = slopes @ spread @ slopes.T
+    deviation = np.sqrt(np.diag(covariance))
+    values = _keys_at(found, found.inner)
+    unknown = {name: reason(name, covered) for name in profiles if name not in shown and not _core(parameters, name)}
+    estimates = []
+    for i, key in enumerate(keys):
+        owner = RATIO if key == "friction.static" else key
+        unit = next((each.unit for each in parameters if each.name == key), "N" if key == "friction.static" else "kg")
+        if owner in unknown:
+            low, high = _range(owner, profiles, values)
+            estimates.append(Estimate.unknown(key, unit, METHOD, unknown[owner], low, high))
+        else:
+            estimates.append(Estimate.normal(key, unit, values[key], deviation[i], METHOD))
+    known = [i for i, each in enumerate(estimates) if each.shown and each.half_width > 0]
+    part = covariance[np.ix_(known, known)] / np.outer(deviation[known], deviation[known])
+    return tuple(estimates), part
+
+
+def _no_narrower(found: Fit, profiles: Mapping[str, Profile]) -> np.ndarray:
+    """The covariance of the fitted numbers with spreads that reach as far as the profiles do."""
+    spread = np.sqrt(np.diag(found.covariance))
+    factors = np.ones(len(found.free))
+    for i, number in enumerate(found.free):
+        parameter = found.problem.parameters[number]
+        seen = profiles[parameter.name]
+        half = float(parameter.inner(seen.high) - parameter.inner(seen.low)) / 2
+        factors[i] = max(1.0, half / (COVERAGE * spread[i])) if spread[i] > 0 else 1.0
+    return found.covariance * np.outer(factors, factors)
+
+
+def _core(parameters: Sequence[Parameter], name: str) -> bool:
+    return next(each.core for each in parameters if each.name == name)
+
+
+def _keys_at(found: Fit, inner: np.ndarray) -> dict[str, float]:
+    values = {each.name: each.outer(number) for each, number in zip(found.problem.parameters, inner, strict=True)}
+    return {key: float(value) for key, value in keys_of(found.problem.flat, values).items()}
+
+
+def _slopes(found: Fit) -> tuple[list[str], np.ndarray]:
+    """The keys of the stage file, and their derivatives to the fitted numbers, shape (keys, parameters)."""
+    at = _keys_at(found, found.inner)
+    step = 1e-6
+    moved = [_keys_at(found, found.inner + step * row) for row in np.eye(len(found.inner))]
+    return list(at), np.array([[(each[key] - at[key]) / step for each in moved] for key in at])
+
+
+def _range(owner: str, profiles: Mapping[str, Profile], values: Mapping[str, float]) -> tuple[float, float]:
+    """What is left possible of a key that is not shown."""
+    low, high = profiles[owner].low, profiles[owner].high
+    scale = values["friction.coulomb"] if owner == RATIO else 1.0
+    return low * scale, high * scale

@@ -1,0 +1,125 @@
+"""Which parameters a log shows: the fit with those that any motion shows, with all, and what of the rest to believe."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.stats import chi2
+
+from friso.identify.experiments.common import low_pass
+from friso.identify.output_error.coverage import Coverage
+from friso.identify.output_error.fit import Fit, everywhere, first_values, fit, nearby
+from friso.identify.output_error.parameters import LONGEST, RATIO
+from friso.identify.output_error.problem import Problem
+from friso.identify.output_error.profile import Profile, profile
+
+STRIBECK = (RATIO, "friction.stribeck_velocity")
+BRISTLES = ("friction.bristle_stiffness", "friction.bristle_damping")
+
+STEP_OUT = 1.5
+"""A closed loop that leaves so many times the residual of the stage that follows the log has got out of step."""
+
+SURE = 0.99
+"""Probability that parameters which no motion shows one by one improve the fit all the same."""
+
+SHARP = 3.0
+"""Factor between the ends of a profile interval within which a parameter counts as shown."""
+
+
+def fit_shown(
+    follows: Problem, loop: Problem | None, covered: Coverage, bandwidth: float
+) -> tuple[Fit, dict[str, Profile], set[str]]:
+    """The fit, the profile of every parameter, and which of those that not every motion shows it does show.
+
+    Which they are is told by the stage that follows the log, since a closed loop that hunts soon gets out of step; the
+    loop then has the last word, unless it cannot follow. Where the fit is clearly better with those that are not shown
+    it keeps them: their effect is there, and without it friction and mass would have to explain it.
+    """
+    parameters = follows.parameters
+    names = [each.name for each in parameters]
+    core = {each.name for each in parameters if each.core}
+    asked = {*names} - core
+    plain = fit(follows, _numbers(names, core), first_values(parameters)[None])
+    hopeful = {name for name in asked if _may_show(name, covered, follows)}
+    shown: set[str] = set()
+    found = plain
+    if hopeful:
+        every = _numbers(names, core | hopeful)
+        whole = fit(follows, every, everywhere(follows, every, plain.inner))
+        shown = _complete({name for name in hopeful if _shows(whole, names.index(name), covered)}, asked)
+        kept = hopeful if _pays(whole, plain) else shown
+        free = _numbers(names, core | kept)
+        neutral = np.where(np.isin(np.arange(len(names)), free), whole.inner, plain.inner)
+        found = whole if kept == hopeful else fit(follows, free, neutral[None]) if shown else plain
+    if loop is not None:
+        looped = fit(loop, found.free, nearby(found))
+        found = looped if _in_step(looped, found, bandwidth) else found
+    profiles = {name: profile(found, i, _others(names, i, found.free), found.cost) for i, name in enumerate(names)}
+    return found, profiles, shown
+
+
+def _pays(whole: Fit, plain: Fit) -> bool:
+    """Whether a fit with more parameters is better by more than chance would make it, with a probability of 99 %."""
+    more = len(whole.free) - len(plain.free)
+    return bool(plain.cost > whole.cost * (1 + chi2.ppf(SURE, more) / whole.independent))
+
+
+def _in_step(looped: Fit, found: Fit, bandwidth: float) -> bool:
+    """Whether a closed loop follows: its residual is no larger than that of the stage that follows the log, both within
+    the motion's bandwidth [Hz], since the latter knows no noise above it."""
+    step = looped.problem.inputs.sample_time
+    rms = [np.std(low_pass(each.residual, step, bandwidth)) for each in (looped, found)]
+    return bool(rms[0] < STEP_OUT * rms[1])
+
+
+def _numbers(names: Sequence[str], wanted: set[str]) -> tuple[int, ...]:
+    return tuple(i for i, name in enumerate(names) if name in wanted)
+
+
+def _complete(shown: set[str], asked: set[str]) -> set[str]:
+    """Without either of the Stribeck effect's parameters, the other one means nothing."""
+    effect = set(STRIBECK) & asked
+    return shown if effect <= shown else shown - effect
+
+
+def _others(names: Sequence[str], number: int, free: Sequence[int]) -> tuple[int, ...]:
+    """The parameters that follow one that is moved: those fitted, and the one with which it makes a pair."""
+    pair = next((pair for pair in (STRIBECK, BRISTLES) if names[number] in pair), ())
+    return tuple(i for i, name in enumerate(names) if i != number and (i in free or name in pair))
+
+
+def _may_show(name: str, covered: Coverage, problem: Problem) -> bool:
+    """Whether the motion covers anything that the parameter could show itself in."""
+    each = next(each for each in problem.parameters if each.name == name)
+    if name in STRIBECK:
+        return bool(covered.steady.size) and covered.steady[0] < covered.steady[-1] / 10
+    if name in BRISTLES:
+        return covered.shows_length(min(LONGEST, float(np.ptp(problem.inputs.reference))))
+    return each.unit != ""
+
+
+def _shows(whole: Fit, number: int, covered: Coverage) -> bool:
+    """Whether a parameter has a sharp, closed interval, and the motion covers where it acts."""
+    parameter = whole.problem.parameters[number]
+    others = tuple(i for i in whole.free if i != number)
+    seen = profile(whole, number, others, whole.cost)
+    sharp = not (seen.open_low or seen.open_high) and (not parameter.logarithmic or seen.high < SHARP * seen.low)
+    if parameter.name in STRIBECK:
+        return sharp and covered.shows_speed(whole.value("friction.stribeck_velocity"))
+    if parameter.name in BRISTLES:
+        length = whole.value("friction.coulomb") / whole.value("friction.bristle_stiffness")
+        return sharp and covered.shows_length(length)
+    return sharp
+
+
+def reason(name: str, covered: Coverage) -> str:
+    """Why a parameter is not shown, in a sentence."""
+    if name in STRIBECK:
+        low, high = covered.gap
+        return (
+            f"no steady motion between {low * 1e3:.2g} and {high * 1e3:.3g} mm/s, where the Stribeck effect would show"
+        )
+    if name in BRISTLES:
+        return "the record passes too quickly through the first micrometres of every motion, where the bristles bend"
+    return "the fit hardly changes with it"
