@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import sympy as sp
 
@@ -73,6 +74,14 @@ def van_dijk_gains() -> dict[str, sp.Expr]:
         "tau_i": key("controller.beta") * tau_z,
         "tau_p": 1 / (omega * root),
         "k_p": key("controller.tuned_mass") * omega**2 / root,
+    }
+
+
+def van_dijk_numbers(flat: Mapping[str, Any]) -> dict[str, float]:
+    """The same as numbers [SI], of a stage given as flat keys."""
+    return {
+        name: float(expression.subs({symbol: flat[str(symbol)] for symbol in expression.free_symbols}))
+        for name, expression in van_dijk_gains().items()
     }
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from friso.equations.pid import van_dijk_gains
+from friso.equations.pid import van_dijk_numbers
 from friso.frequency.margins import Margins, margins
 from friso.frequency.members import member
 from friso.quantities import StageError
@@ -43,8 +43,4 @@ def tuning(crossover: float, alpha: float, beta: float, mass: float) -> Tuning:
     for key, item in numeric_keys({**flat, "motion.kind": "hold"}).items():
         if key in flat and not item.bound.holds(flat[key]):
             raise StageError(key.split(".")[1], str(flat[key]), item.bound.text, "friso.tuning(8.0, 0.1, 2.0, 1.7)")
-    gains = {
-        name: float(expression.subs({symbol: flat[str(symbol)] for symbol in expression.free_symbols}))
-        for name, expression in van_dijk_gains().items()
-    }
-    return Tuning(**gains, margins=margins(flat, member()))
+    return Tuning(**van_dijk_numbers(flat), margins=margins(flat, member()))

@@ -8,10 +8,11 @@ decimated to 2.5 times that bandwidth by one more filter.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import butter, cheby1, sosfiltfilt
+from scipy.signal import butter, cheby1, sosfiltfilt, welch
 
 from friso.identify.estimate import Estimate
 from friso.identify.logs.log import Log
@@ -29,9 +30,12 @@ ORDER, DECIMATION_ORDER, RIPPLE = 4, 8, 0.05
 EDGE = 49
 """Samples left out at the start, where the filters swing in."""
 
-ENERGY, ABOVE_NOISE = 0.9, 10.0
-"""Share of the power of the force's rate within the bandwidth of the motion, and by how much a line of the force's
-spectrum stands above the white noise to count. The rate, since a stage that hunts has most of its force below 1 Hz."""
+ENERGY, ABOVE_NOISE, PIECES = 0.95, 4.0, 8
+"""Share of the power of the acceleration within the bandwidth of the motion, by how much the spectrum of the position
+stands above its noise where it counts, and into how many pieces a record is cut for it (Welch's method)."""
+
+ONE_WAY = 0.02
+"""Share of the way that a log goes in one direction at least, for the two directions to be told apart."""
 
 SLIDING, REST = 0.01, 0.1
 """Share of the highest speed below which a stage rests, and time [s] from which on a rest is left out of the fit: the
@@ -45,11 +49,13 @@ METHOD = "least squares on the inverse model"
 
 @dataclass(frozen=True)
 class InverseModel:
-    """The fit: `estimates` by name (of the mass the key is "mass"; per direction "... forward", "... backward"), the
-    `covariance` of all columns, times [s] and forces [N] of the rows, measured and fitted, of shape (rows,), and the
-    relative `error`, norm of the residual over that of the force. `bandwidth` [Hz] is the motion's."""
+    """The fit: `estimates` and the plain `solution` by name (of the mass the name is "mass"; per direction "... forward",
+    "... backward"), the `covariance` of all columns, times [s] and forces [N] of the rows, measured and fitted, of
+    shape (rows,), and the relative `error`, norm of the residual over that of the force. `bandwidth` [Hz] is the
+    motion's."""
 
     estimates: tuple[Estimate, ...]
+    solution: Mapping[str, float]
     covariance: np.ndarray
     time: np.ndarray
     measured: np.ndarray
@@ -61,8 +67,8 @@ class InverseModel:
         return float(np.linalg.norm(self.measured - self.fitted) / np.linalg.norm(self.measured))
 
     def value(self, name: str) -> float:
-        """The value of the estimate called so."""
-        return next(each.value for each in self.estimates if each.name == name)
+        """What least squares made of the column called so, whether the log shows it or not."""
+        return self.solution[name]
 
 
 @dataclass(frozen=True)
@@ -84,14 +90,26 @@ def motion(position: np.ndarray, sample_time: float, cutoff: float) -> Motion:
     return Motion(smooth, velocity, np.gradient(velocity, sample_time))
 
 
-def bandwidth_of(force: np.ndarray, sample_time: float) -> float:
-    """The bandwidth [Hz] of a motion: that below which the rate of its force, shape (n,) [N], has 90 % of its power,
-    its white noise apart."""
-    frequency = np.fft.rfftfreq(len(force), sample_time)
-    spectrum = np.abs(np.fft.rfft((force - force.mean()) * np.hanning(len(force)))) ** 2
-    noise = spectrum[3 * len(spectrum) // 4 :].mean()
-    share = np.cumsum(np.where(spectrum > ABOVE_NOISE * noise, spectrum - noise, 0.0) * frequency**2)
-    return float(frequency[np.searchsorted(share, ENERGY * share[-1])])
+def bandwidth_of(position: np.ndarray, sample_time: float) -> float:
+    """The bandwidth [Hz] of a motion, shape (n,) [m]: that below which its acceleration has 95 % of its power, as far
+    as the position stands out of its noise. Raises StageError where it does nowhere."""
+    pieces = min(len(position), max(256, len(position) // PIECES))
+    frequency, power = welch(position, 1 / sample_time, nperseg=pieces, detrend="linear")
+    noise = np.median(power[3 * len(power) // 4 :])
+    below = np.flatnonzero(power < ABOVE_NOISE * noise)
+    seen = slice(0, below[0] if below.size else len(power))
+    share = np.cumsum((power - noise)[seen] * frequency[seen] ** 4)
+    if not share.size or not share[-1] > 0:
+        raise StageError("position", "nothing but noise", "a motion that stands out of it", "a larger or faster move")
+    return float(frequency[seen][np.searchsorted(share, ENERGY * share[-1])])
+
+
+def directions(position: np.ndarray) -> tuple[bool, bool]:
+    """Whether a motion, shape (n,) [m], goes forward, and whether it goes back."""
+    steps = np.diff(position)
+    ways = np.array([steps[steps > 0].sum(), -steps[steps < 0].sum()])
+    forward, back = ways > ONE_WAY * ways.sum()
+    return bool(forward), bool(back)
 
 
 def inverse_model(
@@ -104,7 +122,7 @@ def inverse_model(
     Of a stage on a joint, `cart_share` is the share of the mass that moves with the measured cart, as does friction.
     Raises StageError for a log too short.
     """
-    band = bandwidth or bandwidth_of(log["force"], log.sample_time)
+    band = bandwidth or bandwidth_of(log["position"], log.sample_time)
     parts = [_rows(log, part, band, by_direction, cart_share) for part in log.segments]
     time, columns, force = (np.concatenate([part[i] for part in parts]) for i in range(3))
     speed = np.abs(columns[:, 1] + columns[:, 3]) if by_direction else np.abs(columns[:, 1])
@@ -113,15 +131,28 @@ def inverse_model(
     if len(force) < LEAST:
         given = f"{len(log.time)} samples, {len(force)} of them in motion after decimation to {5 * band:.3g} Hz"
         raise StageError("position", given, f"at least {LEAST} in motion after decimation", "a longer log")
+    both = all(directions(log["position"]))
+    if not both and not by_direction:
+        columns[:, 3] = 0.0  # with Coulomb friction in one direction, which it is added to
     solution = np.linalg.lstsq(columns, force, rcond=None)[0]
     fitted = columns @ solution
     covariance = spread_of(columns, force - fitted)
     names = _NAMES[by_direction]
     estimates = tuple(
-        Estimate.normal(name, unit, value, float(np.sqrt(variance)), METHOD)
+        _estimate(name, unit, value, variance if both or name != "coulomb" else np.inf)
         for (name, unit), value, variance in zip(names, solution, np.diag(covariance), strict=True)
     )
-    return InverseModel(estimates, covariance, time, force, fitted, band)
+    if estimates[0].high < 0:
+        expected = "a force that accelerates the mass forward where it is positive: give its scale the other sign"
+        raise StageError("force", f"a mass of {solution[0]:.3g} kg", expected, '--scale force="-35 N/V"', log.name)
+    numbers = dict(zip((name for name, _ in names), map(float, solution), strict=True))
+    return InverseModel(estimates, numbers, covariance, time, force, fitted, band)
+
+
+def _estimate(name: str, unit: str, value: float, variance: float) -> Estimate:
+    if np.isfinite(variance):
+        return Estimate.normal(name, unit, value, float(np.sqrt(variance)), METHOD)
+    return Estimate.unknown(name, unit, METHOD, "the motion does not tell it from the others: it goes one way only")
 
 
 def _rests(slow: np.ndarray, time: np.ndarray) -> np.ndarray:

@@ -10,7 +10,7 @@ import numpy as np
 
 from friso.identify.errors import Errors, Residual, errors_of, residual_of, unexplained
 from friso.identify.estimate import Estimate
-from friso.identify.inverse_model import SMOOTH, InverseModel, inverse_model, motion
+from friso.identify.inverse_model import SMOOTH, InverseModel, directions, inverse_model, motion
 from friso.identify.logs.log import Log
 from friso.identify.output_error.answers import estimates_of
 from friso.identify.output_error.coverage import Coverage, coverage
@@ -80,7 +80,8 @@ def identify_moves(log: Log, flat: Mapping[str, Any], own_loop: bool, bandwidth:
     inverse, by_direction = (inverse_model(log, bandwidth, split, share) for split in (False, True))
     follows, loop = _problems(log, part, flat, inverse, own_loop)
     moved = motion(log["position"][part], log.sample_time, SMOOTH * inverse.bandwidth)
-    mass, coulomb = (each.start for each in follows.parameters if each.name in (MASS, "friction.coulomb"))
+    starts = {each.name: each.start for each in follows.parameters}
+    mass, coulomb = starts[MASS], starts.get("friction.coulomb", np.inf)
     covered = coverage(log["position"][part], moved, mass, coulomb, log.sample_time)
     found, profiles, shown = fit_shown(follows, loop, covered, inverse.bandwidth)
     estimates, correlation = estimates_of(found, profiles, shown, covered)
@@ -128,7 +129,8 @@ def _problems(
     """The stage following the log's position, and in its own loop, with all the parameters in its equations."""
     speed = float(np.abs(motion(log["position"][part], log.sample_time, SMOOTH * inverse.bandwidth).velocity).max())
     levels = _levels(log, flat, inverse)
-    parameters = parameters_of(flat, levels, speed, float(np.ptp(log["position"][part])))
+    position = log["position"][part]
+    parameters = parameters_of(flat, levels, speed, float(np.ptp(position)), all(directions(position)))
     full = {**flat, **keys_of(flat, {each.name: each.start for each in parameters})}
     follows = tracking(full, log, part, parameters, inverse.bandwidth)
     return follows, closed_loop(full, log, part, parameters) if own_loop else None
@@ -157,5 +159,7 @@ def _levels(log: Log, flat: Mapping[str, Any], inverse: InverseModel) -> dict[st
     levels = {"offset": inverse.value("offset")}
     for each in inverse.estimates:
         if each.name in ("mass", "viscous", "coulomb"):
-            levels[each.name] = each.value if each.low > 0 else max(each.high / 2, 1e-6)
+            value = inverse.value(each.name)
+            levels[each.name] = value if value > 0 and not each.low <= 0 else max(each.high / 2, 1e-6)
+            levels[each.name] = levels[each.name] if np.isfinite(levels[each.name]) else max(value, 1e-6)
     return levels

@@ -7,10 +7,13 @@ import numpy as np
 LONGEST = 0.1
 """Share of the rows over which errors are looked at for likeness at most."""
 
+COLLINEAR = 1e-6
+"""Share of the largest eigenvalue below which columns of a Jacobian count as one: differences are no more precise."""
+
 
 def correlation_length(residual: np.ndarray) -> int:
-    """Rows after which residuals, shape (n,), are no longer alike: twice the integrated autocorrelation up to its first
-    zero."""
+    """Rows after which residuals, shape (n,), are no longer alike: the integrated autocorrelation up to its first zero,
+    to both sides; 1 of white noise."""
     centred = residual - residual.mean()
     count = len(centred)
     spectrum = np.abs(np.fft.rfft(centred, 2 * count)) ** 2
@@ -20,12 +23,7 @@ def correlation_length(residual: np.ndarray) -> int:
     correlation = correlation / correlation[0]
     crossing = np.flatnonzero(correlation <= 0)
     last = crossing[0] if crossing.size else len(correlation)
-    return int(np.ceil(2 * correlation[:last].sum()))
-
-
-def independent_rows(residual: np.ndarray) -> float:
-    """So many independent rows tell as much as the rows of this residual."""
-    return len(residual) / correlation_length(residual)
+    return max(1, round(2 * correlation[:last].sum() - 1))
 
 
 def spread_of(jacobian: np.ndarray, residual: np.ndarray) -> np.ndarray:
@@ -39,7 +37,7 @@ def spread_of(jacobian: np.ndarray, residual: np.ndarray) -> np.ndarray:
     scale = np.linalg.norm(jacobian, axis=0)
     known = scale > 0
     columns = jacobian[:, known] / scale[known]
-    inverse = np.linalg.pinv(columns.T @ columns, hermitian=True)
+    inverse, alike = _inverse(columns.T @ columns)
     scores = columns * residual[:, None]
     window = max(correlation_length(each) for each in (residual, *scores.T))
     window = min(max(window, 1), max(2, int(LONGEST * count)))
@@ -49,5 +47,15 @@ def spread_of(jacobian: np.ndarray, residual: np.ndarray) -> np.ndarray:
         middle += (1 - lag / window) * (shifted + shifted.T)
     found = inverse @ middle @ inverse * count / max(count - size, 1)
     covariance = np.full((size, size), np.inf)
+    found[alike], found[:, alike] = np.inf, np.inf
     covariance[np.ix_(known, known)] = found / np.outer(scale[known], scale[known])
     return covariance
+
+
+def _inverse(square: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The inverse of columns of length 1 times themselves, and which of these cannot be told from others."""
+    sizes, directions = np.linalg.eigh(square)
+    lost = sizes < COLLINEAR * sizes[-1]
+    kept = directions[:, ~lost]
+    alike = (np.abs(directions[:, lost]) > np.sqrt(COLLINEAR)).any(axis=1)
+    return kept / sizes[~lost] @ kept.T, alike

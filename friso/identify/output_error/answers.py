@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import numpy as np
 
 from friso.identify.estimate import Estimate
 from friso.identify.output_error.coverage import Coverage
 from friso.identify.output_error.fit import Fit
-from friso.identify.output_error.parameters import RATIO, Parameter, keys_of
+from friso.identify.output_error.parameters import MASS, RATIO, SHARE, keys_of
 from friso.identify.output_error.profile import Profile
 from friso.identify.output_error.shown import reason
 from friso.intervals import COVERAGE
@@ -23,24 +23,45 @@ def estimates_of(
     """The keys of the stage file with their intervals, and the correlation of those shown."""
     parameters = found.problem.parameters
     spread = np.zeros((len(parameters), len(parameters)))
-    spread[np.ix_(found.free, found.free)] = _no_narrower(found, profiles)
+    spread[np.ix_(found.free, found.free)] = np.where(np.isfinite(found.covariance), _no_narrower(found, profiles), 0.0)
     keys, slopes = _slopes(found)
     covariance = slopes @ spread @ slopes.T
     deviation = np.sqrt(np.diag(covariance))
     values = _keys_at(found, found.inner)
-    unknown = {name: reason(name, covered) for name in profiles if name not in shown and not _core(parameters, name)}
+    unknown = _reasons(found, profiles, shown, covered)
     estimates = []
     for i, key in enumerate(keys):
-        owner = RATIO if key == "friction.static" else key
-        unit = next((each.unit for each in parameters if each.name == key), "N" if key == "friction.static" else "kg")
-        if owner in unknown:
-            low, high = _range(owner, profiles, values)
-            estimates.append(Estimate.unknown(key, unit, METHOD, unknown[owner], low, high))
+        owner = _OWNERS.get(key, key)
+        unit = next((each.unit for each in parameters if each.name in (key, owner)), "")
+        unit = "N" if key == "friction.static" else unit
+        if key in unknown or owner in unknown:
+            low, high = (-np.inf, np.inf) if key in unknown and owner != key else _range(owner, profiles, values)
+            estimates.append(Estimate.unknown(key, unit, METHOD, unknown.get(key) or unknown[owner], low, high))
         else:
             estimates.append(Estimate.normal(key, unit, values[key], deviation[i], METHOD))
     known = [i for i, each in enumerate(estimates) if each.shown and each.half_width > 0]
     part = covariance[np.ix_(known, known)] / np.outer(deviation[known], deviation[known])
-    return tuple(estimates), part
+    return tuple(estimates), (part + part.T) / 2
+
+
+_OWNERS = {"friction.static": RATIO, "masses.cart": MASS, "masses.stage": MASS}
+"""The parameter behind a key that has another name."""
+
+
+def _reasons(found: Fit, profiles: Mapping[str, Profile], shown: set[str], covered: Coverage) -> dict[str, str]:
+    """Why parameters, or keys that hang on them, are not shown."""
+    parameters = {each.name: each for each in found.problem.parameters}
+    unknown = {name: reason(name, covered) for name, each in parameters.items() if name not in shown and not each.core}
+    for name, each in parameters.items():
+        if each.core and (profiles[name].open_low or profiles[name].open_high):
+            unknown[name] = "the log does not bound it"
+    if SHARE in unknown:
+        why = f"the log shows the sum of both masses, {found.value(MASS):.4g} kg, not how it is shared"
+        unknown |= {"masses.cart": why, "masses.stage": why}
+    if "friction.coulomb" in parameters and not any(name.startswith("bias.") for name in parameters):
+        why = f"the log moves one way only: with a constant force it makes {found.value('friction.coulomb'):.4g} N"
+        unknown |= {"friction.coulomb": why, "friction.static": why}
+    return unknown
 
 
 def _no_narrower(found: Fit, profiles: Mapping[str, Profile]) -> np.ndarray:
@@ -51,12 +72,9 @@ def _no_narrower(found: Fit, profiles: Mapping[str, Profile]) -> np.ndarray:
         parameter = found.problem.parameters[number]
         seen = profiles[parameter.name]
         half = float(parameter.inner(seen.high) - parameter.inner(seen.low)) / 2
-        factors[i] = max(1.0, half / (COVERAGE * spread[i])) if spread[i] > 0 else 1.0
+        if spread[i] > 0 and not (seen.open_low or seen.open_high):
+            factors[i] = max(1.0, half / (COVERAGE * spread[i]))
     return found.covariance * np.outer(factors, factors)
-
-
-def _core(parameters: Sequence[Parameter], name: str) -> bool:
-    return next(each.core for each in parameters if each.name == name)
 
 
 def _keys_at(found: Fit, inner: np.ndarray) -> dict[str, float]:

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-MASS, RATIO = "mass", "static friction ratio"
-"""The mass that moves, shared among cart and stage as in the stage given; static over Coulomb friction."""
+MASS, SHARE, RATIO = "mass", "cart share", "static friction ratio"
+"""The mass that moves; the cart's share of it, which a rigid stage has as given; static over Coulomb friction."""
 
 HIGHEST_RATIO = 4.0
 """Largest ratio of these that is believed of a bearing; the thesis's rig has 3."""
@@ -42,37 +42,46 @@ class Parameter:
         return np.exp(inner) if self.logarithmic else inner
 
 
-def parameters_of(flat: Mapping[str, Any], levels: Mapping[str, float], speed: float, travel: float) -> list[Parameter]:
+def parameters_of(
+    flat: Mapping[str, Any], levels: Mapping[str, float], speed: float, travel: float, both_ways: bool
+) -> list[Parameter]:
     """The parameters of a stage given as flat keys, that a log may show.
 
     `levels` holds first values, of mass, Coulomb and viscous friction and offset, from the inverse model; `speed` [m/s]
     is the highest of the log, `travel` [m] how far it goes: no Stribeck velocity and no bristle can be beyond them.
+    Where it does not go `both_ways`, a constant force and an asymmetry are not told from friction, and left out.
     """
     mass = levels["mass"]
     found = [Parameter(MASS, "kg", mass, mass / 5, mass * 5)]
     if flat["friction.model"] in ("lugre", "dahl", "stribeck"):
-        found += _friction(flat, levels, speed, travel)
+        found += _friction(flat, levels, speed, travel, both_ways)
     bias = "bias.cart" if "masses.cart" in flat else "bias.stage"
     reach = 5 * max(levels["coulomb"], abs(levels["offset"]))
-    found.append(Parameter(bias, "N", -levels["offset"] or 1e-9, -reach, reach, logarithmic=False))
+    if both_ways:
+        found.append(Parameter(bias, "N", -levels["offset"] or 1e-9, -reach, reach, logarithmic=False))
     if "joint.stiffness" in flat and not flat["joint.locked"]:
         k, d = flat["joint.stiffness"], max(flat["joint.damping"], 1e-3)
+        share = flat["masses.cart"] / (flat["masses.cart"] + flat["masses.stage"])
         found += [
+            Parameter(SHARE, "", share, share / 20, 1 - (1 - share) / 20, logarithmic=False, core=False),
             Parameter("joint.stiffness", "N/m", k, k / 10, k * 10, core=False),
             Parameter("joint.damping", "N*s/m", d, d / 100, d * 100, core=False),
         ]
     return found
 
 
-def _friction(flat: Mapping[str, Any], levels: Mapping[str, float], speed: float, travel: float) -> list[Parameter]:
+def _friction(
+    flat: Mapping[str, Any], levels: Mapping[str, float], speed: float, travel: float, both_ways: bool
+) -> list[Parameter]:
     coulomb, viscous = levels["coulomb"], levels["viscous"]
     found = [
         Parameter("friction.coulomb", "N", coulomb, coulomb / 20, coulomb * 5),
         Parameter("friction.viscous", "N*s/m", viscous, viscous / 1e3, viscous * 20),
     ]
     if "friction.stribeck_velocity" in flat:
+        if both_ways:
+            found.append(Parameter("friction.viscous_asymmetry", "", 1e-6, -0.9, 0.9, logarithmic=False))
         found += [
-            Parameter("friction.viscous_asymmetry", "", 1e-6, -0.9, 0.9, logarithmic=False),
             Parameter(RATIO, "", 1.0, 1.0, HIGHEST_RATIO, logarithmic=False, core=False),
             _slow("friction.stribeck_velocity", "m/s", flat, speed / 3e3, speed),
         ]
@@ -99,11 +108,14 @@ def stages(flat: Mapping[str, Any], parameters: Sequence[Parameter], inner: np.n
 
 def keys_of(flat: Mapping[str, Any], values: Mapping[str, Any]) -> dict[str, Any]:
     """Keys of the stage file to SI values from values of parameters, numbers or arrays."""
-    keys = {name: value for name, value in values.items() if name not in (MASS, RATIO)}
+    keys = {name: value for name, value in values.items() if name not in (MASS, SHARE, RATIO)}
     bodies = [name for name in ("masses.cart", "masses.stage") if name in flat]
     total = sum(flat[name] for name in bodies)
     if MASS in values:
-        keys |= {name: values[MASS] * (flat[name] / total) for name in bodies}
+        shares = {name: flat[name] / total for name in bodies}
+        if SHARE in values:
+            shares = {"masses.cart": values[SHARE], "masses.stage": 1 - values[SHARE]}
+        keys |= {name: values[MASS] * share for name, share in shares.items()}
     if "friction.static" in flat and (RATIO in values or "friction.coulomb" in values):
         ratio = values.get(RATIO, flat["friction.static"] / flat["friction.coulomb"])
         keys["friction.static"] = ratio * values.get("friction.coulomb", flat["friction.coulomb"])

@@ -13,8 +13,10 @@ from friso.engine.arrays import Status
 from friso.engine.driven import Followed, Inputs, follow
 from friso.engine.kernel import Kernel, kernel
 from friso.equations.driven import Driven
+from friso.equations.pid import van_dijk_numbers
 from friso.equations.sampled import is_known
 from friso.equations.structure import ControllerForm, structure
+from friso.identify.inverse_model import SMOOTH, motion
 from friso.identify.logs.log import Log
 from friso.identify.output_error.parameters import MASS, Parameter, stages
 
@@ -23,6 +25,9 @@ STEP = 1e-4
 
 RTOL = 1e-5
 """Relative tolerance of the simulations."""
+
+SLOW = 10.0
+"""Bandwidth [Hz] at most of the controller that holds a stage to a log's position."""
 
 FIRST = 10
 """Samples from which the velocity at the beginning is taken."""
@@ -116,6 +121,8 @@ class Problem:
                 starts[:, i] = position
             elif name.endswith("velocity"):
                 starts[:, i] = velocity
+            elif name == "filtered_error":
+                starts[:, i] = float(self.inputs.reference[0]) - position
             elif name.startswith("position_before"):
                 starts[:, i] = position - velocity * self.inputs.sample_time * int(name.rsplit("_", 1)[1])
         if "bristle_deflection" in states:
@@ -123,7 +130,20 @@ class Problem:
             held = flat.get("friction.static", flat["friction.coulomb"])
             bent = np.clip(pull, -held, held) / flat["friction.bristle_stiffness"]
             starts[:, states.index("bristle_deflection")] = bent
+        if self.closed and "integral" in states:
+            starts[:, states.index("integral")] = self._integral(flat, position, velocity)
         return starts
+
+    def _integral(self, flat: Mapping[str, Any], position: float, velocity: float) -> Any:
+        """The integral [m s] with which the controller gives the log's first force, its filters settled."""
+        error, force = float(self.inputs.reference[0]) - position, self.wanted[0]
+        if "controller.crossover" in flat:
+            gains = van_dijk_numbers(flat)
+            return (force / gains["k_p"] - error) * gains["tau_i"] - error * gains["tau_z"]
+        speed = -velocity
+        if flat["controller.derivative_on"] == "error":
+            speed += float(np.gradient(self.inputs.reference[:3], self.inputs.sample_time)[0])
+        return (force - flat["controller.kp"] * error - flat["controller.kd"] * speed) / flat["controller.ki"]
 
     def _record(self, flat: Mapping[str, Any], runs: Followed) -> Simulated:
         names = self.kernel.states
@@ -168,8 +188,10 @@ def closed_loop(flat: Mapping[str, Any], log: Log, part: slice, parameters: Sequ
 def tracking(
     flat: Mapping[str, Any], log: Log, part: slice, parameters: Sequence[Parameter], bandwidth: float
 ) -> Problem:
-    """The stage under the log's force, held to the log's position by a controller of the given bandwidth [Hz]."""
-    omega = 2 * np.pi * bandwidth
+    """The stage under the log's force, held to the log's smoothed position by a slow controller; `bandwidth` [Hz] is
+    that of the motion. A faster one, or the noise itself, would shake the bristles of a stage at rest."""
+    omega = 2 * np.pi * min(bandwidth, SLOW)
+    smooth = motion(log["position"][part], log.sample_time, SMOOTH * bandwidth).position
     mass = next(each.start for each in parameters if each.name == MASS)
     kept = {key: value for key, value in flat.items() if not key.startswith("controller.")}
     gains = {"controller.kp": mass * omega**2, "controller.kd": 2 * mass * omega, "controller.ki": 0.0}
@@ -177,7 +199,7 @@ def tracking(
     return Problem(
         kept | gains,
         Driven(form),
-        Inputs(log["position"][part], log["force"][part], log.sample_time, "drive.sample_time" in flat),
+        Inputs(smooth, log["force"][part], log.sample_time, "drive.sample_time" in flat),
         np.zeros(part.stop - part.start),
         tuple(parameters),
         False,

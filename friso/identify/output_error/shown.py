@@ -10,7 +10,7 @@ from scipy.stats import chi2
 from friso.identify.experiments.common import low_pass
 from friso.identify.output_error.coverage import Coverage
 from friso.identify.output_error.fit import Fit, everywhere, first_values, fit, nearby
-from friso.identify.output_error.parameters import LONGEST, RATIO
+from friso.identify.output_error.parameters import LONGEST, RATIO, SHARE
 from friso.identify.output_error.problem import Problem
 from friso.identify.output_error.profile import Profile, profile
 
@@ -53,7 +53,10 @@ def fit_shown(
         neutral = np.where(np.isin(np.arange(len(names)), free), whole.inner, plain.inner)
         found = whole if kept == hopeful else fit(follows, free, neutral[None]) if shown else plain
     if loop is not None:
-        looped = fit(loop, found.free, nearby(found))
+        starts = nearby(found)
+        if set(found.free) - set(_numbers(names, core)):
+            starts = np.vstack([starts, everywhere(loop, found.free, plain.inner)])
+        looped = fit(loop, found.free, starts)
         found = looped if _in_step(looped, found, bandwidth) else found
     profiles = {name: profile(found, i, _others(names, i, found.free), found.cost) for i, name in enumerate(names)}
     return found, profiles, shown
@@ -96,7 +99,7 @@ def _may_show(name: str, covered: Coverage, problem: Problem) -> bool:
         return bool(covered.steady.size) and covered.steady[0] < covered.steady[-1] / 10
     if name in BRISTLES:
         return covered.shows_length(min(LONGEST, float(np.ptp(problem.inputs.reference))))
-    return each.unit != ""
+    return each.unit != "" or name == SHARE
 
 
 def _shows(whole: Fit, number: int, covered: Coverage) -> bool:
@@ -122,4 +125,4 @@ def reason(name: str, covered: Coverage) -> str:
         )
     if name in BRISTLES:
         return "the record passes too quickly through the first micrometres of every motion, where the bristles bend"
-    return "the fit hardly changes with it"
+    return "the fit hardly changes with it, or its end of the range is the best"
