@@ -9,6 +9,7 @@ import numpy as np
 
 from friso.identify.estimate import Estimate
 from friso.identify.response.fitting import Fit, refined
+from friso.identify.response.modes import fit_modes
 from friso.identify.response.response import FrequencyResponse
 from friso.intervals import COVERAGE
 from friso.quantities import StageError
@@ -17,6 +18,9 @@ METHOD = "two-mass model fitted to the response"
 
 RATIOS = (1.05, 1.2, 1.5, 2.0, 3.0)
 """Resonance over antiresonance from which the fit starts."""
+
+MISSES = 0.4
+"""Root mean square of the logarithm of response over model beyond which a model is none of the response."""
 
 EXPLAINED = 3.0
 """Sum of squares over degrees of freedom up to which a model counts as right."""
@@ -83,8 +87,10 @@ def fit_two_mass(
     deviation = np.stack([_deviation(one) for one in responses])
     sign = _sign(values[0])
     options = [(sign, sign), (sign, -sign)][: len(responses)]
-    fits = [(_best(np.array(pair)[: len(values), None] * values, deviation, frequency), pair) for pair in options]
+    seen = _from_modes(responses[0])
+    fits = [(_best(np.array(pair)[: len(values), None] * values, deviation, frequency, seen), pair) for pair in options]
     fit, signs = min(fits, key=lambda each: each[0].squares)
+    _follows(np.array(signs)[: len(values), None] * values, two_masses(fit.parameters, frequency)[: len(values)])
     limits = (float(frequency[0]), float(frequency[-1]))
     return TwoMass(signs, fit, _estimates(fit, collocated), limits, tuple(_warnings(signs, fit)))
 
@@ -129,8 +135,39 @@ def _sign(response: np.ndarray) -> float:
     return -1.0 if np.sum(np.cos(np.angle(response))) > 0 else 1.0
 
 
-def _best(values: np.ndarray, deviation: np.ndarray, frequency: np.ndarray) -> Fit:
-    """The best of the fits from the two most promising mass ratios; the first one, where it explains the data."""
+def _follows(values: np.ndarray, model: np.ndarray) -> None:
+    """Raises StageError where a model is nowhere near the response, shape (outputs, lines)."""
+    off = float(np.sqrt(np.mean(np.abs(np.log(np.abs(values) / np.abs(model))) ** 2)))
+    if off > MISSES:
+        given = f"a response that two masses and a joint miss by a factor of {np.exp(off):.2g} on average"
+        expected = "the response of a driven mass, and of the other one: are the two positions exchanged?"
+        raise StageError("response", given, expected, '--band "3 Hz .. 20 Hz"')
+
+
+def _from_modes(response: FrequencyResponse) -> list[np.ndarray]:
+    """A start from the first antiresonance and resonance of a rational fit, of whole mass 1; none where it has none."""
+    try:
+        modes = fit_modes(response)
+        zero, pole, damping = (
+            modes[name].value
+            for name in ("antiresonance 1 frequency", "resonance 1 frequency", "resonance 1 damping ratio")
+        )
+    except (StageError, StopIteration, KeyError):
+        return []
+    if not 0 < zero < pole:
+        return []
+    other = 1 - (zero / pole) ** 2
+    stiffness = other * (2 * np.pi * zero) ** 2
+    return [_start(other, stiffness, 4 * np.pi * max(damping, 1e-4) * pole * other * (1 - other))]
+
+
+def _start(other: float, stiffness: float, damping: float) -> np.ndarray:
+    return np.array([*np.log([1 - other, other, stiffness, damping]), 0.0, 0.0, 0.0])
+
+
+def _best(values: np.ndarray, deviation: np.ndarray, frequency: np.ndarray, seen: list[np.ndarray]) -> Fit:
+    """The best of the fits from the modes `seen` and the two most promising mass ratios; the first one, where it
+    explains the data."""
     late = 0.1 / frequency[-1]
     reach = np.array([FAR] * 3 + [2 * FAR])
 
@@ -141,7 +178,10 @@ def _best(values: np.ndarray, deviation: np.ndarray, frequency: np.ndarray) -> F
         return float(np.sum(np.abs((model(start) - values) / deviation) ** 2))
 
     fits = []
-    for start in sorted(_starts(values[0], frequency), key=misfit)[:2]:
+    for start in [
+        *(_scaled_to(each, values[0], frequency) for each in seen),
+        *sorted(_starts(values[0], frequency), key=misfit)[:2],
+    ]:
         lower = np.array([*(start[:DRAG] - reach), 0.0, 0.0, -late])
         upper = np.array([*(start[:DRAG] + reach), np.inf, np.inf, late])
         fits.append(refined(model, start, values, deviation, lower, upper))
@@ -158,10 +198,13 @@ def _starts(response: np.ndarray, frequency: np.ndarray) -> Iterator[np.ndarray]
         other = 1 - 1 / ratio**2
         stiffness = other * (2 * np.pi * resonance / ratio) ** 2
         damping = 0.1 * np.sqrt(stiffness * other)
-        start = np.array([*np.log([1 - other, other, stiffness, damping]), 0.0, 0.0, 0.0])
-        scale = np.exp(np.mean(np.log(np.abs(two_masses(start, frequency)[0]) / np.abs(response))))
-        start[:DRAG] += np.log(scale)
-        yield start
+        yield _scaled_to(_start(other, stiffness, damping), response, frequency)
+
+
+def _scaled_to(start: np.ndarray, response: np.ndarray, frequency: np.ndarray) -> np.ndarray:
+    """A start with masses, stiffness and damping as large as the response asks for."""
+    scale = np.mean(np.log(np.abs(two_masses(start, frequency)[0]) / np.abs(response)))
+    return np.concatenate([start[:DRAG] + scale, start[DRAG:]])
 
 
 def _warnings(signs: tuple[float, float], fit: Fit) -> Iterator[str]:
