@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from machines import break_aways, creeping, drawn
 from numba import njit
 from scipy.io import loadmat
 
@@ -26,6 +27,7 @@ from friso.identify.experiments import (
 from friso.identify.experiments.common import block_mean, correlated_mean, low_pass, runs, t_value
 from friso.identify.experiments.rate_effect import break_away, share_below, static_friction
 from friso.identify.logs.log import Log
+from friso.identify.response.fitting import Fit
 from friso.studies.thesis.claims import Evidence, Finding, registered
 from friso.studies.thesis.experiments import (
     SLOW,
@@ -187,6 +189,18 @@ def test_steps_that_do_not_settle_are_left_out(rig: friso.Stage) -> None:
     assert "2 are needed" in few.stiffness.reason
 
 
+def test_what_needs_no_more_force_to_move_shows_no_stiffness(rig: friso.Stage) -> None:
+    """A cart that is free, or a force of the wrong sign: no stiffness, and none to go on with."""
+    signals = stairs(rig, 2400.0, (1, 1, -1, -1, 1, -1))
+    noise = 0.05 * np.random.default_rng(3).standard_normal(len(signals["force"]))
+    for share, bounded in ((-1.0, False), (0.0, True)):
+        found = stiffness_from_steps(record("free", DT, **{**signals, "force": share * signals["force"] + noise}))
+        assert not found.stiffness.shown
+        assert "is the cart fixed?" in found.stiffness.reason
+        assert found.stiffness.low == 0
+        assert np.isfinite(found.stiffness.high) == bounded
+
+
 # --- stiffness from hysteresis ----------------------------------------------------------------------------------------
 
 
@@ -294,6 +308,31 @@ def test_a_touched_limiter_gives_a_lower_bound_only(rig: friso.Stage) -> None:
         assert 2.3 < known.static.low < 3.0
 
 
+def test_one_direction_alone_is_a_bound_where_the_other_shows_less(rig: friso.Stage) -> None:
+    """With an offset of the sensor, a direction in which the limiter is touched leaves half of the offset unknown."""
+    free = pulled(rig, 0.7e-3, np.random.default_rng(6))
+    touched = pulled(rig, 0.7e-3, np.random.default_rng(7), **{"joint.stroke": "1 mm"})
+    both = {role: np.concatenate([values, -touched[role]]) for role, values in free.signals.items()}
+    both["relative_position"] = both["relative_position"] + 1e-4
+    count = len(free.time)
+    halves = replace(record("both", DT, **both), segments=(slice(0, count), slice(count, len(both["position"]))))
+    found = static_from_stick_slip(halves, 2400.0)
+    assert found.forward.shown
+    assert not found.backward.shown
+    assert not found.static.shown
+    assert "one direction alone" in found.static.reason
+    assert found.static.holds(rig.flat()["friction.static"])
+
+
+def test_motion_hidden_in_noise_widens_the_interval_downwards() -> None:
+    """A cart that speeds up slowly: its peak of the pull holds inertia, which noise on the position may not hide."""
+    machine = drawn(57, True)
+    flat = machine.flat
+    found = static_from_stick_slip(creeping(machine), flat["joint.stiffness"], flat["masses.stage"])
+    assert found.static.shown
+    assert found.static.holds(flat["friction.static"])
+
+
 def test_what_shows_no_slips_says_so() -> None:
     time = np.arange(0, 5, DT)
     rng = np.random.default_rng(0)
@@ -311,8 +350,16 @@ def test_what_shows_no_slips_says_so() -> None:
 # --- break-away ramps -------------------------------------------------------------------------------------------------
 
 
-def ramps(friction: np.ndarray, rates: list[float], mass: float, rng: np.random.Generator, to: float = 1.06) -> Log:
-    """Ramps to either side in turn, `to` so many times the static friction, each a segment that begins at rest."""
+def ramps(
+    friction: np.ndarray,
+    rates: list[float],
+    mass: float,
+    rng: np.random.Generator,
+    to: float = 1.06,
+    noise: tuple[float, float] = (1e-7, 5e-3),
+) -> Log:
+    """Ramps to either side in turn, `to` so many times the static friction, each a segment that begins at rest, with
+    noise on position [m] and force [N]."""
     parts, signals = [], {"position": [], "force": []}
     for i, force_rate in enumerate(rates):
         time = np.arange(0, 0.3 + to * friction[0] / force_rate, DT)
@@ -320,20 +367,48 @@ def ramps(friction: np.ndarray, rates: list[float], mass: float, rng: np.random.
         out = twin(mass, friction, np.zeros(2), push, np.zeros_like(push), DT, 25, *FLAT)
         begin = sum(len(each) for each in signals["force"])
         parts.append(slice(begin, begin + len(time)))
-        signals["position"].append(out[:, 0] + 1e-7 * rng.standard_normal(len(time)))
-        signals["force"].append(push + 5e-3 * rng.standard_normal(len(time)))
+        signals["position"].append(out[:, 0] + noise[0] * rng.standard_normal(len(time)))
+        signals["force"].append(push + noise[1] * rng.standard_normal(len(time)))
     arrays = {name: np.concatenate(each) for name, each in signals.items()}
     return replace(record("ramps", DT, **arrays), segments=tuple(parts))
 
 
 def test_break_away_falls_with_the_rate_as_published() -> None:
     """About 1.42 N at 1 N/s, 1.21 at 10, 1.09 at 20 (Canudas de Wit et al. 1995, read off a figure: 3 %)."""
-    log = ramps(LUGRE, [1.0, 1.0, 10.0, 10.0, 20.0, 20.0], 1.0, np.random.default_rng(1), 1.15)
-    found = static_from_ramps(log, 1.0)
-    published = np.interp(found.rates, [1.0, 10.0, 20.0], [1.42, 1.21, 1.09])
-    assert found.forces == pytest.approx(published, rel=0.03)
-    assert found.rates == pytest.approx([1, 1, 10, 10, 20, 20], rel=0.01)
-    assert found.static.holds(1.5)
+    rates = [1.0, 1.0, 10.0, 10.0, 20.0, 20.0]
+    for noise in ((0.0, 0.0), (1e-7, 5e-3)):
+        found = static_from_ramps(ramps(LUGRE, rates, 1.0, np.random.default_rng(1), 1.15, noise), 1.0)
+        published = np.interp(found.rates, [1.0, 10.0, 20.0], [1.42, 1.21, 1.09])
+        own = found.unsure if any(noise) else 0.0
+        assert np.all(np.abs(found.forces - published) < 0.03 * published + own)
+        assert np.all(found.unsure < 0.05 * found.forces)
+        assert found.rates == pytest.approx(rates, rel=0.01)
+        assert found.static.holds(1.5)
+
+
+def test_noise_does_not_raise_the_break_away() -> None:
+    """A maximum over noise reads high, the more the heavier what moves: noise on mass times acceleration. With and
+    without noise the forces are the same, within what is said to be unsure."""
+    heavy, rates = np.array([2.0, 1.0, 2e-3, 1e5, 632.0, 0.4]), [1.0, 1.0, 2.0, 2.0, 4.0, 4.0]
+    clean, noisy = (
+        static_from_ramps(ramps(heavy, rates, 8.0, np.random.default_rng(4), 1.15, noise), 8.0)
+        for noise in ((0.0, 0.0), (4e-7, 5e-3))
+    )
+    assert len(noisy.forces) == len(clean.forces) == 6
+    assert np.all(np.abs(noisy.forces - clean.forces) <= noisy.unsure + 3 * 5e-3)
+    assert abs(np.mean(noisy.forces / clean.forces) - 1) < 0.01
+    assert noisy.static.holds(2.0)
+    assert noisy.static.half_width < 0.1 * 2.0
+
+
+def test_break_aways_of_drawn_machines_hold_the_static_friction() -> None:
+    """Ten of those on which the benchmark found intervals too high: heavy, with noisy sensors."""
+    held = 0
+    for seed in (38, 42, 43, 45, 51, 55, 56, 57, 64, 67):
+        machine = drawn(seed, False)
+        found = static_from_ramps(break_aways(machine), machine.flat["masses.cart"])
+        held += found.static.shown and found.static.holds(machine.flat["friction.static"])
+    assert held >= 9
 
 
 def test_ramps_hold_the_static_friction() -> None:
@@ -618,6 +693,20 @@ def test_short_and_still_records_show_nothing(length: int) -> None:
     assert not static_from_ramps(log).static.shown
     assert not friction_velocity(log).both.coulomb.shown
     assert not friction_position(log).separated
+
+
+@pytest.mark.parametrize("deviation", [0.1, 1.0, 10.0, 1e6])
+def test_a_positive_parameter_that_is_hardly_known_is_not_shown(deviation: float) -> None:
+    """Its interval is one of the logarithm; beyond a factor of 1000 it tells nothing, and is no overflow."""
+    found = Fit(np.array([2.0]), np.array([[deviation**2]]), 1.0, 10).estimate(
+        "mass", "kg", "fit", lambda p: float(p[0]), positive=True
+    )
+    assert found.shown == (deviation < 5)
+    assert found.low >= 0
+    if found.shown:
+        assert np.log(found.high / 2.0) == pytest.approx(1.96 * deviation / 2.0, rel=1e-3)
+    else:
+        assert "factor of 1000" in found.reason
 
 
 def test_runs_are_the_stretches_of_a_mask() -> None:

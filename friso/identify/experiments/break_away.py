@@ -8,6 +8,7 @@ import numpy as np
 
 from friso.identify.estimate import Estimate
 from friso.identify.experiments.common import channel, low_pass, on_bearing, ways
+from friso.identify.experiments.peaks import peak, smoothed
 from friso.identify.experiments.rate_effect import BRISTLE_RATE, static_friction
 from friso.identify.experiments.slips import slips
 from friso.identify.logs.log import Log
@@ -22,6 +23,9 @@ SMEARED = 2.0
 SAMPLES = 5
 """Samples of the second half of a ramp from which its rate is read."""
 
+BROAD = 40
+"""To see where its second half begins the push is smoothed over one in so many samples of the rest and the ramp."""
+
 LEAST = 20
 """Samples of a segment that may hold a ramp."""
 
@@ -29,7 +33,8 @@ LEAST = 20
 @dataclass(frozen=True)
 class BreakAway:
     """Static friction [N] in all and per direction, of break-away forces at rate 0. Per ramp, shape (n,): time [s],
-    place [m], direction, break-away force [N] in that direction, force rate [N/s]; the threshold [m/s] of the speed."""
+    place [m], direction, break-away force [N] in that direction, force rate [N/s], and by how much [N] noise and
+    smoothing may have moved that force to either side; the threshold [m/s] of the speed."""
 
     static: Estimate
     forward: Estimate
@@ -39,6 +44,7 @@ class BreakAway:
     directions: np.ndarray
     forces: np.ndarray
     rates: np.ndarray
+    unsure: np.ndarray
     threshold: float
     warnings: tuple[str, ...]
 
@@ -61,20 +67,21 @@ def static_from_ramps(
         found = slips(body[part], log.sample_time, cutoff)
         threshold = max(threshold, found.threshold)
         pushed = low_pass(force[part], log.sample_time, cutoff)
-        friction = pushed - mass * np.gradient(found.speed, log.sample_time)
         marks = zip(found.onsets, found.starts, found.rests, found.directions, strict=True)
         for onset, start, rest, way in marks:
-            push = way * pushed[rest : start + 1]
-            begin = rest + int(np.flatnonzero(push <= (push[0] + push[-1]) / 2)[-1])
+            begin = rest + _half(way * force[part][rest : start + 1])
             if start - begin < max(SMEARED / (cutoff * log.sample_time), SAMPLES):
                 quick += 1
                 continue
             rising = way * np.polyfit(np.arange(begin, start) * log.sample_time, pushed[begin:start], 1)[0]
-            at = begin + int(np.argmax(way * friction[begin : start + 1])) if mass else onset
+            at, level, unsure = onset, float(way * pushed[onset]), 0.0
+            if mass and rising > 0:
+                signals = way * force[part], way * body[part]
+                top = peak(*signals, mass, log.sample_time, rising, (begin, start), cutoff)
+                at, level, unsure = top.at, top.level, top.unsure
             first = part.start + at
-            level = float(way * friction[at] if mass else way * pushed[at])
-            rows.append((float(log.time[first]), float(body[first]), float(way), level, float(rising)))
-    table = np.array([row for row in rows if row[3] > 0 and row[4] > 0]).reshape(-1, 5).T
+            rows.append((float(log.time[first]), float(body[first]), float(way), level, float(rising), unsure))
+    table = np.array([row for row in rows if row[3] > 0 and row[4] > 0]).reshape(-1, 6).T
     said = []
     if quick:
         said.append(f"{quick} ramps rise too fast for a low-pass at {cutoff:g} Hz (or the sampling) and are left out.")
@@ -83,15 +90,23 @@ def static_from_ramps(
     return _answer(table, bristle_rate, threshold, said)
 
 
+def _half(push: np.ndarray) -> int:
+    """The sample, of shape (n,), at which a push has last risen through half of its way, seen without noise."""
+    seen = smoothed(push, len(push) / BROAD)
+    return int(np.flatnonzero(seen <= (seen[0] + seen[-1]) / 2)[-1])
+
+
 def _answer(table: np.ndarray, bristle_rate: float, threshold: float, said: list[str]) -> BreakAway:
-    times, places, directions, forces, rates = table
+    times, places, directions, forces, rates, unsure = table
 
     def static(chosen: np.ndarray) -> Estimate:
         found = static_friction("friction.static", forces[chosen], rates[chosen], bristle_rate)
+        off = float(unsure[chosen].mean()) if chosen.any() else 0.0
+        found = replace(found, low=max(found.low - off, 0.0), high=found.high + off)
         return found if found.shown else replace(found, reason=" ".join([f"{found.reason}.", *said]).rstrip("."))
 
     one, other = (static(mask) for _, mask in ways(directions))
     every = static(np.ones(len(forces), dtype=bool))
     if one.shown and other.shown and (one.low > other.high or other.low > one.high):
         said.append(f"The directions differ: {one.value:.3g} N forward, {other.value:.3g} N backward.")
-    return BreakAway(every, one, other, times, places, directions, forces, rates, threshold, tuple(said))
+    return BreakAway(every, one, other, times, places, directions, forces, rates, unsure, threshold, tuple(said))

@@ -28,6 +28,7 @@ STARTS = np.linspace(0.1, 0.7, 7)
 """Shares of a plateau after which it may have settled, tried in turn."""
 
 KEY, UNIT = "joint.stiffness", "N/m"
+SOFT = "moving further does not need more force: is the cart fixed?"
 METHOD = "differences of force over differences of deflection between settled position steps"
 
 
@@ -165,7 +166,10 @@ def _slope(steps: np.ndarray, noise: np.ndarray, chosen: np.ndarray, words: str,
     shared = float(np.sum(np.diff(np.concatenate(([0.0], x, [0.0]))) ** 2)) / float(x @ x) / 2
     within = float(np.sum((x * noise) ** 2) / (x @ x) ** 2)
     variance = max(max(1.0, shared) * spread / float(x @ x), within)
-    return by_t(KEY, UNIT, Mean(slope, variance**0.5, count - 1), method)
+    found = by_t(KEY, UNIT, Mean(slope, variance**0.5, count - 1), method)
+    if found.low > 0:
+        return found
+    return Estimate.unknown(KEY, UNIT, method, SOFT, 0.0, found.high if found.high > 0 else np.inf)
 
 
 def _hysteresis(windows: tuple[Window, ...]) -> Estimate:

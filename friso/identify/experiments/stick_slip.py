@@ -23,7 +23,7 @@ from friso.identify.experiments.common import (
     ways,
 )
 from friso.identify.experiments.rate_effect import BRISTLE_RATE, static_friction
-from friso.identify.experiments.slips import SLIDING, slips
+from friso.identify.experiments.slips import SLIDING, VISIBLE, slips
 from friso.identify.logs.log import Log
 from friso.intervals import COVERAGE
 from friso.quantities import StageError
@@ -104,7 +104,8 @@ def static_from_stick_slip(
             )
             at += part.start
             bent = np.nan if deflected is None else float(way * deflected[at])
-            late = max(force - before, 0.0) + abs(rising) / cutoff
+            unseen = _unseen(way * found.speed[onset + 1 : top + 1]) * log.sample_time
+            late = max(force - before, 0.0) + abs(rising) * (unseen + 1 / cutoff)
             place = (float(log.time[at]), float(body[at]), float(way))
             held = held or abs(bent) > (1 - AT_STOP) * stroke
             rows.append((*place, bent, force, rising, float(abs(found.speed[top])), held, late))
@@ -154,6 +155,17 @@ def _peak(
     near = float((pull[rest : at + 1] > (1 - NEAR) * pull[at]).sum()) * sample_time
     held = near > LONG * (NEAR * abs(pull[at] / usual) + 1 / cutoff) if usual > 0 else True
     return at, float(pull[at]), float(pull[onset]), float(rising), bool(held)
+
+
+def _unseen(speed: np.ndarray) -> float:
+    """For how many samples motion may have been hidden in noise before its speed, from then to its highest, shape (n,),
+    stood out: had it grown by a power of two in the time that its first doubling took. A body that speeds up evenly was
+    hidden for less."""
+    first, top = float(speed[0]), float(speed[-1])
+    if not first > VISIBLE * top:
+        return 0.0
+    doubled = int(np.argmax(speed >= min(2 * first, top)))
+    return doubled * float(np.log2(first / (VISIBLE * top)))
 
 
 def _why(shares: list[float]) -> str:
@@ -229,9 +241,14 @@ def _mean(name: str, forces: np.ndarray, relative_error: float, why: str) -> Est
 
 
 def _both(one: Estimate, other: Estimate) -> Estimate:
-    """The mean of both directions, in which a common offset drops out; of the one that is shown otherwise."""
+    """The mean of both directions, in which a common offset drops out; that of the only one in which the cart slips.
+    What one direction shows and the other bounds is a bound: the offset is not known."""
     if not (one.shown and other.shown):
-        return one if one.shown else other
+        seen, unseen = (one, other) if one.shown else (other, one)
+        if not unseen.low > 0:  # no slips at all
+            return seen
+        low = (one.low + other.low) / 2
+        return Estimate.unknown(KEY, "N", seen.method, f"one direction alone shows it: {unseen.reason}", low)
     middle = [(one.low + other.low) / 2, (one.value + other.value) / 2, (one.high + other.high) / 2]
     return Estimate(KEY, "N", middle[1], middle[0], middle[2], f"mean of both directions: {one.method}")
 

@@ -18,6 +18,10 @@ CLOSE = 1e-6
 """Relative change of the sum of squares, or of the parameters, that ends a fit: far below what noise does to them."""
 
 
+LOOSE = 1e3
+"""Factor to either side from which an interval to first order tells nothing of a positive quantity."""
+
+
 @dataclass(frozen=True)
 class Fit:
     """Parameters (p,), their covariance (p, p), the sum of squares in units of the variance, and the counts of data."""
@@ -50,7 +54,10 @@ class Fit:
         plain = Estimate.normal(name, unit, value, deviation, method)
         if not positive:
             return plain
-        factor = np.exp(plain.half_width / value)
+        factor = np.exp(min(plain.half_width / value, np.log(2 * LOOSE)))
+        if not factor < LOOSE:
+            reason = f"its interval spans more than a factor of {LOOSE:g} to either side"
+            return Estimate.unknown(name, unit, method, reason, 0.0)
         return Estimate(name, unit, value, value / factor, value * factor, method)
 
 

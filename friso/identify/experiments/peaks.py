@@ -1,0 +1,85 @@
+"""The greatest friction before a body breaks away, read out of noise: how far to smooth, and what that leaves unknown.
+
+A maximum over noise reads high, by up to about sqrt(2 ln n) deviations of n independent values; a smoothed peak reads
+low, by what the force rises within the reach of the smoothing. Smoothing is chosen so that both together are least.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import gaussian_filter1d
+
+REACH = 4
+"""Standard deviations of the Gaussian beyond which it is cut off."""
+
+LOSS = 2.2
+"""A ramp that ends in a sudden fall loses at its smoothed peak so many times its rise R w within one deviation w of the
+Gaussian, where it falls by 10 R w (least over k of k Phi(k) + phi(k) + 10 Phi(-k), of the normal distribution; 1.8 for
+a fall by 5 R w, 2.8 for one by 50), and less where it falls gradually."""
+
+SCALES = 12
+"""Widths of the Gaussian among which one is chosen."""
+
+LONGEST = 0.1
+"""Longest deviation of the Gaussian, as a share of the ramp's second half."""
+
+GAUSSIAN = 0.1325
+"""Deviation of a Gaussian in time times the frequency at which it halves the power: sqrt(ln 2) / (2 pi)."""
+
+
+@dataclass(frozen=True)
+class Peak:
+    """Where the friction is greatest (index), its level [N], and by how much [N] that may be off to either side."""
+
+    at: int
+    level: float
+    unsure: float
+
+
+def smoothed(values: np.ndarray, width: float) -> np.ndarray:
+    """Values, shape (n,), under a Gaussian of `width` samples; the ends go on as they came, mirrored about their last
+    value."""
+    more = min(int(REACH * width) + 1, len(values) - 1)
+    longer = np.pad(values, more, mode="reflect", reflect_type="odd")
+    return gaussian_filter1d(longer, width, truncate=REACH)[more : len(longer) - more]
+
+
+def scatter(values: np.ndarray) -> float:
+    """Standard deviation of white noise on values that change slowly, by second differences; 0 of fewer than 3."""
+    return float(np.sqrt(np.mean(np.diff(values, 2) ** 2) / 6)) if len(values) > 2 else 0.0
+
+
+def _second(values: np.ndarray) -> np.ndarray:
+    """Second differences, shape (n,); 0 at the ends."""
+    return np.pad(np.diff(values, 2), 1)
+
+
+def peak(
+    force: np.ndarray,
+    position: np.ndarray,
+    mass: float,
+    sample_time: float,
+    rising: float,
+    marks: tuple[int, int],
+    cutoff: float,
+) -> Peak:
+    """The greatest force [N] less `mass` [kg] times the second derivative of the position [m], both of shape (n,) and
+    in the direction of the motion, between two `marks` (indices), over the first half of which the body rests. The
+    force rises at `rising` [N/s]; nothing above the `cutoff` [Hz] counts."""
+    begin, start = marks
+    still = slice(begin, (begin + start) // 2)
+    noise = scatter(force[still]), mass / sample_time**2 * scatter(position[still])
+    least = max(GAUSSIAN / (cutoff * sample_time), 1.0)
+    widths = np.geomspace(least, max(LONGEST * (start - begin), least), SCALES)
+    # deviations of white noise under a Gaussian, and under its second derivative
+    left = np.hypot(noise[0] / np.sqrt(2 * np.pi**0.5 * widths), noise[1] * np.sqrt(3 / (8 * np.pi**0.5 * widths**5)))
+    high = left * np.sqrt(2 * np.log(1 + (start - begin) / (2 * widths)))
+    low = LOSS * rising * widths * sample_time
+    best = int(np.argmin(high + low))
+    width = float(widths[best])
+    # second differences of what is smoothed: the Gaussian's own derivative, cut off, does not sum to 0
+    friction = smoothed(force, width) - mass / sample_time**2 * _second(smoothed(position, width))
+    at = begin + int(np.argmax(friction[begin : start + 1]))
+    return Peak(at, float(friction[at] + (low[best] - high[best]) / 2), float(low[best] + high[best]) / 2)
