@@ -72,7 +72,7 @@ def moves(own_loop: bool, fitted_in_loop: bool) -> tuple[Moves, Log]:
     inverse, part = inverse_model(log, 5.0), log.segments[0]
     flat = made_up(log, inverse).flat()
     levels = {name: inverse.value(name) for name in ("mass", "viscous", "coulomb", "offset")}
-    parameters = parameters_of(flat, levels, 0.16, 0.1)
+    parameters = parameters_of(flat, levels, 0.16, 0.1, True)
     follows = tracking(flat, log, part, parameters, 5.0)
     loop = closed_loop(flat, log, part, parameters) if own_loop else None
     problem = loop if fitted_in_loop and loop else follows

@@ -1,50 +1,103 @@
-"""One estimate of a quantity from several."""
+"""One estimate of a quantity from several, and how the combined ones hang together."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.stats import chi2
 
 from friso.identify.estimate import Estimate
 from friso.intervals import COVERAGE
 
-AGREE = 3.0
-"""Estimates disagree when one is further from their mean than so many standard deviations of the difference."""
+CHANCE = 0.01
+"""Probability below which a scatter as large as that of estimates which agree is taken for a disagreement."""
+
+Correlated = tuple[Sequence[Estimate], np.ndarray]
+"""What one experiment shows, each with an interval, and its correlation matrix, shape (estimates, estimates)."""
 
 
 def combined(found: Sequence[Estimate]) -> tuple[list[Estimate], list[str]]:
     """One estimate per key from all those found, weighted by their intervals; and a sentence where they disagree.
 
-    Where some disagree, the interval spans all of them. What one experiment shows counts, whatever another cannot show.
+    Where some disagree, the interval spans all of them. What one experiment shows counts, whatever another cannot show;
+    where none does, what all of them leave possible is left.
     """
-    keys = list(dict.fromkeys(each.name for each in found))
     answers, said = [], []
-    for key in keys:
+    for key in dict.fromkeys(each.name for each in found):
         own = [each for each in found if each.name == key]
-        shown = [each for each in own if each.shown and each.half_width > 0]
-        if len(shown) < 2:
-            answers.append(shown[0] if shown else min(own, key=lambda each: each.half_width))
-            continue
-        one, agrees = _weighted(key, shown)
+        shown = [each for each in own if each.shown]
+        sure = _weighty(shown)
+        if len(sure) > 1:
+            one, agrees = _mean(key, sure)
+        elif shown:
+            one, agrees = (sure or shown)[0], True
+        else:
+            one, agrees = _left(key, own)
         answers.append(one)
         if not agrees:
-            texts = "; ".join(
-                f"{each.value:.4g} ({each.low:.4g} to {each.high:.4g}) by {each.method}" for each in shown
-            )
+            texts = "; ".join(_text(each) for each in (sure or own))
             said.append(f"{key}: the experiments disagree, the interval spans them all: {texts}")
+        beyond = [each for each in own if shown and not each.shown and (each.low > one.high or each.high < one.low)]
+        said += [f"{key}: {_text(one)} is shown, but {_text(each)}" for each in beyond]
     return answers, said
 
 
-def _weighted(key: str, shown: Sequence[Estimate]) -> tuple[Estimate, bool]:
-    """The weighted mean, and whether all agree with it."""
-    values = np.array([each.value for each in shown])
-    spreads = np.array([each.half_width for each in shown]) / COVERAGE
-    weights = 1 / spreads**2
+def correlations(found: Sequence[Estimate], groups: Sequence[Correlated]) -> tuple[tuple[str, ...], np.ndarray]:
+    """The keys of the groups and their correlations once combined, shape (keys, keys).
+
+    `found` are the estimates of all experiments. A combined value is a mean of single ones with weights a_i, and the
+    experiments are independent: its covariance is the sum of A_i C_i A_i, with C_i the covariance within one.
+    """
+    keys = tuple(dict.fromkeys(each.name for group, _ in groups for each in group))
+    precision = {key: sum(_weight(each) for each in _weighty(found) if each.name == key) for key in keys}
+    covariance = np.diag([1 / precision[key] for key in keys])
+    for group, matrix in groups:
+        shares = np.array([_weight(each) ** 0.5 / precision[each.name] for each in group])  # a_i times the deviation
+        places = [keys.index(each.name) for each in group]
+        covariance[np.ix_(places, places)] += (matrix - np.eye(len(group))) * np.outer(shares, shares)
+    size = np.sqrt(np.diag(covariance))
+    joint = covariance / np.outer(size, size)
+    return keys, (joint + joint.T) / 2
+
+
+def _weighty(found: Sequence[Estimate]) -> list[Estimate]:
+    """Those that can be weighted: shown, with an interval."""
+    return [each for each in found if each.shown and each.half_width > 0]
+
+
+def _weight(each: Estimate) -> float:
+    return (COVERAGE / each.half_width) ** 2
+
+
+def _mean(key: str, shown: Sequence[Estimate]) -> tuple[Estimate, bool]:
+    """The weighted mean, or the hull where a chi-square test says that not all can be of one value; and which."""
+    values, weights = (
+        np.array(column) for column in zip(*((each.value, _weight(each)) for each in shown), strict=True)
+    )
     mean = float(np.average(values, weights=weights))
-    agrees = bool(np.all(np.abs(values - mean) < AGREE * np.sqrt(spreads**2 + 1 / weights.sum())))
     method = ", ".join(dict.fromkeys(each.method for each in shown))
-    if agrees:
+    if chi2.sf(np.sum(weights * (values - mean) ** 2), len(values) - 1) > CHANCE:
         return Estimate.normal(key, shown[0].unit, mean, float(weights.sum() ** -0.5), method), True
     low, high = min(each.low for each in shown), max(each.high for each in shown)
     return Estimate(key, shown[0].unit, (low + high) / 2, low, high, method), False
+
+
+def _left(key: str, own: Sequence[Estimate]) -> tuple[Estimate, bool]:
+    """What several that do not show it leave possible: what they have in common, or the hull where that is nothing."""
+    bounding = [each for each in own if np.isfinite(each.low) or np.isfinite(each.high)] or own[:1]
+    low, high = max(each.low for each in bounding), min(each.high for each in bounding)
+    agrees = low <= high
+    if not agrees:
+        low, high = min(each.low for each in bounding), max(each.high for each in bounding)
+    method, reason = (
+        joint.join(dict.fromkeys(texts))
+        for joint, texts in ((", ", [each.method for each in bounding]), ("; ", [each.reason for each in bounding]))
+    )
+    return Estimate.unknown(key, own[0].unit, method, reason, low, high), agrees
+
+
+def _text(each: Estimate) -> str:
+    if each.shown:
+        return f"{each.value:.4g} ({each.low:.4g} to {each.high:.4g}) by {each.method}"
+    return f"{each.low:.4g} to {each.high:.4g} is all that is possible by {each.method}"

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from friso.identify.combine import combined
+from friso.identify.combine import Correlated, combined, correlations
 from friso.identify.errors import Errors
 from friso.identify.estimate import Estimate
 from friso.identify.experiments.break_away import BreakAway, static_from_ramps
@@ -16,6 +16,7 @@ from friso.identify.experiments.friction_position import FrictionPosition, frict
 from friso.identify.experiments.friction_velocity import FrictionVelocity, friction_velocity
 from friso.identify.experiments.steps import StepStiffness, stiffness_from_steps
 from friso.identify.experiments.stick_slip import StickSlip, static_from_stick_slip
+from friso.identify.fitting import Fitting, fitting
 from friso.identify.inverse_model import inverse_model
 from friso.identify.logs.frequency_text import MeasuredResponse
 from friso.identify.logs.log import Log
@@ -111,9 +112,11 @@ def identify(
     every, warnings = combined([one for each in found for one in each.estimates])
     if stage is None:
         return Identification(None, Correlations(), tuple(found), tuple(every), tuple(warnings))
-    kept, dropped = _fitting(stage, every)
-    whole = identified(stage, kept, [log.name for log, _ in logs])
-    return Identification(whole, _correlations(found, kept), tuple(found), tuple(every), (*warnings, *dropped))
+    fits = fitting(stage, every)
+    whole = identified(stage, fits.kept, [log.name for log, _ in logs])
+    return Identification(
+        whole, _correlations(found, every, fits, whole), tuple(found), tuple(every), (*warnings, *fits.said)
+    )
 
 
 @dataclass(frozen=True)
@@ -129,7 +132,8 @@ class Prediction:
 
 
 def predict(found: Identification, log: Log, options: Options) -> Prediction:
-    """Another log of the same machine, predicted. Raises StageError where nothing found can predict it."""
+    """Another log of the same machine, predicted by the first experiment that can: the stage as its log alone shows it,
+    not as combined, so that the errors are those of one record on another. Raises StageError where none can."""
     results = [each.result for each in found.experiments]
     for result in results:
         if isinstance(result, Moves) and "reference" in log:
@@ -233,20 +237,30 @@ def _named(found: Estimate, key: str) -> Estimate:
     return Estimate(key, found.unit, found.value, found.low, found.high, found.method, found.reason)
 
 
-def _fitting(stage: Stage, found: Sequence[Estimate]) -> tuple[list[Estimate], list[str]]:
-    """The estimates that keys of the stage can take, and a sentence for each that cannot stand in it."""
-    known = {*stage.flat(), "bias.cart", "bias.stage", "friction.viscous_asymmetry"}
-    kept = [each for each in found if each.name in known and np.isfinite([each.low, each.high]).all()]
-    lost = [each.name for each in found if each not in kept]
-    return kept, [f"{name}: nothing is known of it, the stage file keeps what it had" for name in lost]
+def _correlated(result: Result, estimates: Sequence[Estimate]) -> Correlated:
+    """What an experiment shows of keys that hang together, and their correlations."""
+    own = [each for each in estimates if each.shown and each.half_width > 0]
+    if isinstance(result, Moves):
+        return result.correlated, result.correlation
+    if isinstance(result, ConstantSpeed) and result.velocity.both.covariance.size:
+        covariance = result.velocity.both.covariance
+        places = [i for i, each in enumerate(estimates[: len(covariance)]) if each.shown and each.half_width > 0]
+        size = np.sqrt(np.diag(covariance))
+        return [estimates[i] for i in places], (covariance / np.outer(size, size))[np.ix_(places, places)]
+    if isinstance(result, Bench) and all(each.name.startswith("masses.") for each in estimates):
+        return own, np.ones((len(own), len(own)))  # shared out of one
+    return own, np.eye(len(own))
 
 
-def _correlations(found: Sequence[Experiment], kept: Sequence[Estimate]) -> Correlations:
-    """Those of the moves, for keys that the moves alone tell."""
-    moves = next((each.result for each in found if isinstance(each.result, Moves)), None)
-    if moves is None:
-        return Correlations()
-    own = [each.name for each in moves.correlated]
-    alone = {each.name for each in kept if each in moves.estimates and each.shown}
-    places = [i for i, name in enumerate(own) if name in alone]
-    return Correlations(tuple(own[i] for i in places), moves.correlation[np.ix_(places, places)])
+def _correlations(found: Sequence[Experiment], every: Sequence[Estimate], fits: Fitting, stage: Stage) -> Correlations:
+    """Those of the keys that the stage file has as they were found, and of what moves along with one of these."""
+    keys, matrix = correlations(
+        [one for each in found for one in each.estimates], [_correlated(each.result, each.estimates) for each in found]
+    )
+    uncertain = stage.uncertain()
+    leads = {one.name: one.name for one in fits.kept if one.name in keys and one in every} | {**fits.follows}
+    kept = [key for key, lead in leads.items() if key in uncertain and lead in keys]
+    places = [keys.index(leads[key]) for key in kept]
+    part = matrix[np.ix_(places, places)]
+    alone = np.abs(part - np.eye(len(kept))).max(axis=1, initial=0.0) == 0
+    return Correlations(tuple(kept), part).among([key for key, single in zip(kept, alone, strict=True) if not single])

@@ -6,14 +6,25 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+from scipy.ndimage import maximum_filter1d, minimum_filter1d
+
 from friso.identify.logs.assemble import read_log
 from friso.identify.logs.log import Log
 from friso.identify.logs.mapping import Mapping, load, save
 from friso.identify.logs.read import is_frequency_response, read_frequency_response, read_table
 from friso.identify.logs.roles import find
 from friso.identify.method import FREQUENCY, KINDS, MOVES, STICK_SLIP, Source
+from friso.identify.response.analysis import external
 from friso.identify.response.period import find_periods
 from friso.quantities import StageError, quoted
+
+FEW, BACK = 7.0, 0.1
+"""Harmonics that an excitation has at least, and as many turns in each period, each by such a share of the range: our
+choice. A multisine of 8 equal lines is one; moves have 1 to 7, or narrow peaks that turn less often than that."""
+
+STILL, RESTS = 0.01, 0.1
+"""Share of the travel within which a position rests, and of the time for which an excitation does so at most."""
 
 
 @dataclass(frozen=True)
@@ -68,7 +79,7 @@ def _read(path: Path, told: Mapping, folder: Path) -> Given:
         log = _log(path, mapping, mapping.experiment)
         return Given(path, log, mapping.experiment, "as told", save(mapping, path, folder))
     log = _log(path, mapping, FREQUENCY)
-    kind, reason = _kind(log)
+    kind, reason = _kind(log, path)
     log = log if kind == FREQUENCY else _log(path, mapping, kind)
     return Given(path, log, kind, reason, save(mapping, path, folder) if mapping != Mapping() else None)
 
@@ -79,13 +90,56 @@ def _log(path: Path, mapping: Mapping, kind: str) -> Log:
     return read_log(path, mapping, strict=kind != FREQUENCY, needed=(position, "force"))
 
 
-def _kind(log: Log) -> tuple[str, str]:
-    """A frequency response where a periodic force moves a stage without reference, moves otherwise."""
-    if "reference" in log:
-        return MOVES, "it has a reference"
+def _kind(log: Log, path: Path) -> tuple[str, str]:
+    """A frequency response where a periodic excitation moves a stage whose reference does not move, moves otherwise.
+
+    A move that is repeated is periodic too: it rests in between, or holds few frequencies and turns its force seldom.
+    Raises StageError where the two cannot be told apart.
+    """
     part = max(log.segments, key=lambda each: each.stop - each.start)
+    if "reference" in log and np.ptp(log["reference"][part]) > 0:
+        return MOVES, "it has a reference that moves"
+    signal = external(log) or "force"
     try:
-        found = find_periods(log["force"][part])
+        found = find_periods(log[signal][part])
     except StageError:
-        return MOVES, "the force does not repeat, and there is no reference"
-    return FREQUENCY, f"the force repeats every {found.samples} samples, and there is no reference"
+        return MOVES, f"the {signal} does not repeat, and there is no reference that moves"
+    repeats = f"the {signal} repeats every {found.samples} samples"
+    if _rest(log["position"][part][found.start : found.stop], found.samples) > RESTS:
+        return MOVES, f"{repeats}, but the position rests in between"
+    one = found.cut(log[signal][part]).mean(axis=0)
+    lines, turns = _lines(one), _turns(one)
+    if lines >= FEW and turns >= lines:
+        return FREQUENCY, f"{repeats}, with about {lines:.0f} harmonics"
+    if lines < FEW and turns < FEW:
+        return MOVES, f"{repeats}, but turns seldom and holds few frequencies"
+    given = f"a log in which {repeats}, holds about {lines:.0f} harmonics and turns {turns} times in between"
+    expected = "to be told whether that is a move which is repeated (moves) or an excitation (frequency)"
+    raise StageError("--as", given, expected, f"--as {MOVES}, or --as {FREQUENCY}", str(path))
+
+
+def _lines(period: np.ndarray) -> float:
+    """How many harmonics of equal power would spread as those of a signal over one period, shape (samples,), do."""
+    power = np.abs(np.fft.rfft(period)[1:]) ** 2
+    return float(power.sum() ** 2 / np.sum(power**2))
+
+
+def _rest(position: np.ndarray, samples: int) -> float:
+    """Share of the time in which the position stays within `STILL` of its travel for a tenth of a period.
+
+    A sine does so at no time: about its turning points it moves by 2.4 % of its travel.
+    """
+    size = max(samples // 10, 2)
+    moved = maximum_filter1d(position, size) - minimum_filter1d(position, size)
+    return float(np.mean(moved < STILL * np.ptp(position)))
+
+
+def _turns(period: np.ndarray) -> int:
+    """How often a signal over one period, shape (samples,), turns back by more than `BACK` of its range."""
+    least, turns, way, last = BACK * np.ptp(period), 0, 1.0, period[0]
+    for value in period:
+        if (value - last) * way > 0:
+            last = value
+        elif (last - value) * way > least:
+            way, last, turns = -way, value, turns + 1
+    return turns

@@ -11,6 +11,7 @@ from friso.identify.experiments.friction_velocity import Direction
 from friso.identify.experiments.steps import StepStiffness
 from friso.identify.experiments.stick_slip import StickSlip
 from friso.identify.inverse_model import InverseModel
+from friso.identify.logs.log import Log
 from friso.identify.method import ConstantSpeed, Experiment
 from friso.identify.moves import Moves
 from friso.identify.response.analysis import Bench
@@ -43,7 +44,18 @@ class Part:
 def part_of(it: Experiment, label: str) -> Part:
     """An experiment in words."""
     title = f"{TITLES[it.kind]}: {', '.join(log.name for log in it.logs)}"
-    return Part(label, title, *_told(it.result))
+    sentences, facts, warnings = _told(it.result)
+    return Part(label, title, sentences, (*facts, *_used(it)), warnings)
+
+
+def _used(it: Experiment) -> Facts:
+    """How much is used of logs with gaps, where an analysis takes the longest stretch without any."""
+    gapped = [each for each in it.logs if isinstance(each, Log) and len(each.segments) > 1]
+    if not isinstance(it.result, Moves | Bench) or not gapped:
+        return ()
+    longest = [max(part.stop - part.start for part in each.segments) for each in gapped]
+    texts = [f"{most} of {len(each.time)}" for most, each in zip(longest, gapped, strict=True)]
+    return (("Samples used (longest stretch without gaps)", ", ".join(texts)),)
 
 
 def _told(result: object) -> tuple[tuple[str, ...], Facts, tuple[str, ...]]:

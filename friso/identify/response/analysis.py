@@ -127,15 +127,24 @@ def _attempt(said: list[str], what: str, function, *arguments):
 
 
 def _record(log: Log, output: str) -> Record:
-    return from_log(log, "force", output, "reference" if "reference" in log else None)[0]
+    return from_log(log, "force", output, external(log))[0]
+
+
+def external(log: Log) -> str | None:
+    """The role of what moves a loop from outside: the force injected, else a reference that moves; None without one.
+
+    A reference that is held constant excites nothing.
+    """
+    part = max(log.segments, key=lambda each: each.stop - each.start)
+    return next((role for role in ("disturbance", "reference") if role in log and np.ptp(log[role][part]) > 0), None)
 
 
 def _response(records: Sequence[Record], log: Log, output: str, period: float | None) -> FrequencyResponse:
     """By averaging over periods, or where nothing repeats by the local polynomial method; names are the log's."""
     channels = from_log(log, "force", output)[1]
-    external = records[0].input if records[0].reference is None else records[0].reference
+    driving = records[0].input if records[0].reference is None else records[0].reference
     try:
-        find_periods(external, None if period is None else period / records[0].sample_time)
+        find_periods(driving, None if period is None else period / records[0].sample_time)
     except StageError:
         if len(records) > 1:
             raise
@@ -204,10 +213,17 @@ def _friction(
     drag = _attempt(said, "friction level", friction_from_departure, driven, speeds, limits, model.signs[0])
     if drag is None or not drag.coulomb.shown or not np.isfinite(drag.coulomb.value):
         return drag, None
-    expected = None if period is None else period / step
-    found = [find_periods(record.input, expected) for record in records]
-    once = [record.input[each.stop - each.samples : each.stop] for record, each in zip(records, found, strict=True)]
+    once = _attempt(said, "explanation", lambda: [_last_period(record, period) for record in records])
+    if once is None:
+        return drag, None
     return drag, _attempt(said, "explanation", explained, drag, driven, once, step, limits)
+
+
+def _last_period(record: Record, period: float | None) -> np.ndarray:
+    """The input over the last whole period. Raises StageError where nothing repeats."""
+    driving = record.input if record.reference is None else record.reference
+    found = find_periods(driving, None if period is None else period / record.sample_time)
+    return record.input[found.stop - found.samples : found.stop]
 
 
 def _left_out(

@@ -48,7 +48,7 @@ def feedback(record: Record, direct: bool = False) -> tuple[str, ...]:
     if chance > SURE or share < SHARE:
         return ()
     told = f"the output foretells {100 * share:.0f} % of the news in the input (chance {chance:.1g})"
-    return (f"{told}: closed loop; give the reference or the injected force, a direct estimate is biased",)
+    return (f"{told}: closed loop, a direct estimate is biased; give the force injected, or a reference that moves",)
 
 
 def _surprising(record: Record) -> tuple[np.ndarray | None, np.ndarray | None]:

@@ -148,12 +148,11 @@ def _from_modes(response: FrequencyResponse) -> list[np.ndarray]:
     """A start from the first antiresonance and resonance of a rational fit, of whole mass 1; none where it has none."""
     try:
         modes = fit_modes(response)
-        zero, pole, damping = (
-            modes[name].value
-            for name in ("antiresonance 1 frequency", "resonance 1 frequency", "resonance 1 damping ratio")
-        )
-    except (StageError, StopIteration, KeyError):
+    except StageError:
         return []
+    values = {each.name: each.value for each in modes.estimates}
+    names = ("antiresonance 1 frequency", "resonance 1 frequency", "resonance 1 damping ratio")
+    zero, pole, damping = (values.get(name, np.nan) for name in names)
     if not 0 < zero < pole:
         return []
     other = 1 - (zero / pole) ** 2

@@ -1,0 +1,241 @@
+"""From estimates to a stage: how several are combined, which the stage file takes, and how its keys hang together."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.ndimage import gaussian_filter1d
+
+import friso
+from friso.identify.combine import combined, correlations
+from friso.identify.estimate import Estimate
+from friso.identify.experiments import record
+from friso.identify.fitting import fitting
+from friso.identify.logs.log import Log
+from friso.identify.method import identify
+from friso.identify.response.analysis import analyse, external
+from friso.identify.sources import _kind
+from friso.identify.stage_file import identified
+from friso.quantities import StageError
+from friso.stage import Stage
+from friso.stage.correlations import Correlations, draw
+
+STEP = 1e-3
+STATIC, COULOMB = "friction.static", "friction.coulomb"
+normal, unknown = Estimate.normal, Estimate.unknown
+
+
+@pytest.fixture(scope="module")
+def base() -> Stage:
+    return friso.load(Path(__file__).parents[1] / "examples" / "emps_axis.toml")
+
+
+# several estimates of one key
+
+
+def test_estimates_far_beyond_their_intervals_disagree() -> None:
+    (one,), said = combined([normal("k", "N", 1.0, 0.0102, "a"), normal("k", "N", 1.07, 0.0102, "b")])
+    assert len(said) == 1
+    assert one.low == pytest.approx(0.98, abs=1e-3)
+    assert one.high == pytest.approx(1.09, abs=1e-3)
+
+
+@given(st.integers(0, 2**31), st.integers(2, 6))
+@settings(max_examples=20, deadline=None)
+def test_repeated_measurements_agree_about_as_often_as_they_should(seed: int, count: int) -> None:
+    """1 in 100 disagrees by chance: of 200 cases more than 12 have a probability below 1e-6."""
+    rng = np.random.default_rng(seed)
+    spread = rng.uniform(0.5, 2, count)
+    cases = [[normal("k", "N", rng.normal(5, s), s, "a") for s in spread] for _ in range(200)]
+    answers = [combined(case) for case in cases]
+    assert sum(bool(said) for _, said in answers) <= 14
+    assert sum(found[0].holds(5) for found, _ in answers) > 170
+
+
+def test_bounds_of_what_is_not_shown_are_kept() -> None:
+    (one,), said = combined([unknown(STATIC, "N", "moves", "no"), unknown(STATIC, "N", "stick-slip", "stops", 5.0)])
+    assert (one.low, one.high, one.reason, said) == (5.0, np.inf, "stops", [])
+    (both,), said = combined([one, unknown(STATIC, "N", "ramps", "few", 2.0, 8.0)])
+    assert (both.low, both.high, said) == (5.0, 8.0, [])
+    (hull,), said = combined([one, unknown(STATIC, "N", "ramps", "few", 2.0, 4.0)])
+    assert (hull.low, hull.high, len(said)) == (2.0, np.inf, 1)
+
+
+def test_a_value_beyond_what_another_leaves_possible_is_told() -> None:
+    (one,), said = combined([normal(STATIC, "N", 3.0, 0.1, "moves"), unknown(STATIC, "N", "stick-slip", "stops", 5.0)])
+    assert one.value == 3.0
+    assert len(said) == 1
+
+
+# how they hang together
+
+
+@given(st.integers(0, 2**31))
+@settings(max_examples=30, deadline=None)
+def test_correlations_of_means_are_those_of_drawn_means(seed: int) -> None:
+    """Against weighted means of errors drawn from each log's own distribution."""
+    rng = np.random.default_rng(seed)
+    groups, means, precision = [], 0.0, 0.0
+    for _ in range(2):
+        root = rng.normal(size=(3, 3))
+        covariance = root @ root.T + 0.1 * np.eye(3)
+        size = np.sqrt(np.diag(covariance))
+        groups.append(([normal(f"k{i}", "N", 0.0, size[i], "a") for i in range(3)], covariance / np.outer(size, size)))
+        means = means + rng.multivariate_normal(np.zeros(3), covariance, 20000) / size**2
+        precision = precision + 1 / size**2
+    keys, matrix = correlations([one for group, _ in groups for one in group], groups)
+    assert keys == ("k0", "k1", "k2")
+    assert matrix == pytest.approx(np.corrcoef(np.asarray(means / precision).T), abs=0.05)
+    assert Correlations(keys, matrix).keys == keys
+
+
+def test_masses_shared_out_of_one_stay_so() -> None:
+    """Two logs of moves, each of which shows one mass, that is shared: the shares stay one parameter."""
+    logs = [
+        [normal("masses.cart", "kg", m, 0.01 * m, "a"), normal("masses.stage", "kg", m / 2, 0.005 * m, "a")]
+        for m in (2.0, 2.01)
+    ]
+    every = [one for log in logs for one in log]
+    matrix = correlations(every, [(log, np.ones((2, 2))) for log in logs])[1]
+    assert matrix == pytest.approx(np.ones((2, 2)))
+
+
+# what the stage file takes
+
+ODD = {
+    "Coulomb above the static friction of the stage": [normal(COULOMB, "N", 25.0, 0.1, "x")],
+    "Coulomb of one speed": [unknown(COULOMB, "N", "x", "one speed", 0.0, 7.0)],
+    "negative, but not for sure": [normal(COULOMB, "N", -0.1, 0.3, "x")],
+    "negative": [normal(COULOMB, "N", -0.1, 0.01, "x"), normal("friction.viscous", "N s/m", 5.0, 1.0, "x")],
+    "Stribeck velocity from 0": [unknown("friction.stribeck_velocity", "m/s", "x", "no slow motion", 0.0, 0.015)],
+    "static at least": [unknown(STATIC, "N", "x", "stops", 35.0)],
+    "static below Coulomb": [normal(STATIC, "N", 2.0, 0.1, "x"), normal(COULOMB, "N", 4.0, 0.1, "x")],
+    "static below the stage's Coulomb": [normal(STATIC, "N", 2.0, 0.1, "x")],
+    "range of static about Coulomb": [unknown(STATIC, "N", "x", "r", 10.0, 30.0), normal(COULOMB, "N", 25.0, 0.1, "x")],
+    "asymmetry without any knowledge": [normal("friction.viscous_asymmetry", "", 0.1, 300.0, "x")],
+    "a body that is not there": [normal("bias.stage", "N", 2.0, 0.1, "x"), normal("bias.cart", "N", 2.0, 0.1, "x")],
+    "nothing": [unknown("masses.cart", "kg", "x", "no motion")],
+}
+
+
+@pytest.mark.parametrize("case", ODD)
+def test_the_stage_is_always_written(case: str, base: Stage) -> None:
+    found = fitting(base, ODD[case])
+    stage = identified(base, found.kept, ["log"])
+    flat = stage.flat()
+    assert flat[STATIC] >= flat[COULOMB]
+    assert found.said
+    if stage.uncertain():
+        assert draw(stage, Correlations(), 16, 1).count == 16
+
+
+def test_ranges_begin_above_zero(base: Stage) -> None:
+    (speed,) = fitting(base, ODD["Stribeck velocity from 0"]).kept
+    assert (speed.low, speed.high) == pytest.approx((1.5e-5, 0.015))
+
+
+def test_static_friction_moves_along_with_coulomb(base: Stage) -> None:
+    found = fitting(base, ODD["Coulomb above the static friction of the stage"])
+    assert dict(found.follows) == {STATIC: COULOMB}
+    assert {each.name: each.value for each in found.kept} == {COULOMB: 25.0, STATIC: 25.0}
+
+
+def test_static_friction_is_no_less_than_its_bound(base: Stage) -> None:
+    stage = identified(base, fitting(base, ODD["static at least"]).kept, ["log"])
+    assert stage.uncertain()[STATIC].low == 35.0
+    known = fitting(base, [unknown(STATIC, "N", "x", "stops", 15.0)])
+    assert known.kept == ()
+    assert "at least 15 N" in known.said[0]
+
+
+def steady(speeds: list[float], rng: np.random.Generator) -> Log:
+    """Stretches of constant velocity under Coulomb friction of 5 N and viscous friction of 30 N s/m, of 20 kg."""
+    velocity = gaussian_filter1d(np.repeat(speeds, 600), 20)
+    position = np.cumsum(velocity) * STEP + 1e-7 * rng.standard_normal(velocity.size)
+    force = 20 * np.gradient(velocity, STEP) + 5 * np.sign(velocity) + 30 * velocity
+    return record("steady", STEP, position=position, force=force + 0.02 * rng.standard_normal(velocity.size))
+
+
+@pytest.mark.parametrize("speeds", [[0.05, -0.05], [0.02, -0.02, 0.05, -0.05, 0.1, -0.1]], ids=["one", "three"])
+def test_constant_speed_without_a_stribeck_curve_gives_a_stage(speeds: list[float], base: Stage) -> None:
+    low = base.replace({"masses.cart": "20 kg", STATIC: "2 N", COULOMB: "2 N"})
+    found = identify([(steady(speeds * 4, np.random.default_rng(1)), "constant-speed")], low)
+    assert found.stage is not None
+    interval = found.stage.uncertain()[COULOMB]
+    assert interval.low < 5 < interval.high
+    if len(speeds) > 2:
+        assert {COULOMB, "friction.viscous", STATIC} <= {*found.correlations.keys}
+        matrix, keys = found.correlations.matrix, found.correlations.keys
+        assert matrix[keys.index(COULOMB), keys.index(STATIC)] == pytest.approx(1)
+        assert matrix[keys.index(COULOMB), keys.index("friction.viscous")] < -0.3
+
+
+# which experiment a log is
+
+
+def excited(lines: range, rng: np.random.Generator, periods: int = 6) -> Log:
+    """A mass of 2 kg under a multisine of 2 s."""
+    time, phases = np.arange(2000 * periods) * STEP, rng.uniform(0, 2 * np.pi, len(lines))
+    force = sum(np.cos(np.pi * k * time + phase) for k, phase in zip(lines, phases, strict=True))
+    position = sum(-np.cos(np.pi * k * time + p) / (2 * (np.pi * k) ** 2) for k, p in zip(lines, phases, strict=True))
+    return record("excited", STEP, position=np.asarray(position), force=force + 0.01 * rng.standard_normal(time.size))
+
+
+def repeated(acceleration: float, rest: int, rng: np.random.Generator) -> Log:
+    """A move there and back within 2 s, repeated."""
+    ramp = np.arange(1000 - rest)
+    shape = np.clip(np.minimum(ramp, ramp[-1] - ramp) * STEP * acceleration, 0, 0.1)
+    one = np.concatenate([shape, np.zeros(rest), -shape, np.zeros(rest)])
+    velocity = gaussian_filter1d(np.tile(one, 5), 5, mode="wrap")
+    force = 20 * np.gradient(velocity, STEP) + 30 * velocity + 5 * np.tanh(velocity / 1e-3)
+    return record("moves", STEP, position=np.cumsum(velocity) * STEP, force=force + 0.02 * rng.standard_normal(10000))
+
+
+@pytest.mark.parametrize("lines", [range(1, 9), range(1, 100), range(20, 100), range(10, 20)], ids=str)
+@pytest.mark.parametrize("seed", range(3))
+def test_a_multisine_is_an_excitation(lines: range, seed: int) -> None:
+    assert _kind(excited(lines, np.random.default_rng(seed)), Path("log.csv"))[0] == "frequency"
+
+
+@pytest.mark.parametrize("acceleration", [0.5, 1.0, 5.0])
+@pytest.mark.parametrize("rest", [0, 100, 250, 400])
+def test_a_repeated_move_is_none(acceleration: float, rest: int) -> None:
+    """Or it is asked what it is, where it rests for little time and accelerates hard."""
+    log = repeated(acceleration, rest, np.random.default_rng(2))
+    try:
+        kind = _kind(log, Path("log.csv"))[0]
+    except StageError as error:
+        kind = error.example
+    assert kind in (["moves"] if rest == 400 or acceleration < 5 else ["moves", "--as moves, or --as frequency"])
+
+
+# what moves a loop from outside
+
+
+def test_the_injected_force_makes_the_estimate_indirect() -> None:
+    """A mass of 2 kg in a loop, with forces from elsewhere that bias the direct estimate."""
+    rng = np.random.default_rng(0)
+    injected = np.asarray(excited(range(1, 80), rng, 10)["force"])
+    elsewhere = 4 * gaussian_filter1d(rng.standard_normal(injected.size), 4, mode="wrap") * 4
+    position, force = np.zeros(injected.size), np.zeros(injected.size)
+    x = v = 0.0
+    for i in range(injected.size):
+        position[i], force[i] = x, -2 * 60.0**2 * x - 2 * 80.0 * v + injected[i]
+        v += (force[i] + elsewhere[i]) / 2 * STEP
+        x += v * STEP
+    held = {"position": position, "force": force, "reference": np.zeros(injected.size)}
+    assert external(record("held", STEP, **held)) is None
+    told = record("told", STEP, **held, disturbance=injected)
+    assert external(told) == "disturbance"
+    off = {}
+    for log in (told, record("held", STEP, **held)):
+        found = analyse([log])
+        model = -1 / (2 * (2 * np.pi * found.driven.frequency) ** 2)
+        off[log.name] = np.median(np.abs(found.driven.response / model - 1))
+        if log is told:
+            assert not any("give the" in text for text in found.warnings)
+    assert off["told"] < 0.5 * off["held"]
