@@ -377,7 +377,8 @@ def test_the_document_of_each_experiment(case: tuple) -> None:
     own, follows = (document["experiments"][i] for i, kind in enumerate(kinds) if kind == "moves")
     by = {each["kind"]: each for each in document["experiments"]}
     inverse = own["inverse_model"]
-    assert inverse["mass_kg"]["low"] < MASS < inverse["mass_kg"]["high"]
+    assert inverse["mass_kg"]["low"] < inverse["mass_kg"]["value"] < inverse["mass_kg"]["high"]
+    assert inverse["mass_kg"]["value"] == pytest.approx(MASS, rel=0.01)
     assert inverse["coulomb_n"]["value"] == pytest.approx(COULOMB, rel=0.02)
     assert {"mass_kg", "viscous_forward_n_s_per_m", "coulomb_backward_n"} <= own["inverse_model_by_direction"].keys()
     assert own["output_error"]["loop"] == "closed"

@@ -59,7 +59,7 @@ def identify(
     """
     from friso.identify.logs.mapping import from_options
     from friso.identify.method import identify as found_in
-    from friso.identify.sources import read_all
+    from friso.identify.sources import keep, read_all
 
     known = None if stage is None else with_overrides(load(stage), overrides)
     if known is None and overrides:
@@ -76,6 +76,7 @@ def identify(
 
         found = found_in([(each.source, each.kind) for each in given[: len(logs)]], known, options, progress)
         predictions = _predictions(found, given[len(logs) :], options)
+        given = [keep(each, out) for each in given]
         files = _write(found, given, predictions, made_folder(out), progress)
     _answer(found, given, predictions, files, as_json)
 

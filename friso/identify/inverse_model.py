@@ -49,7 +49,7 @@ METHOD = "least squares on the inverse model"
 
 @dataclass(frozen=True)
 class InverseModel:
-    """The fit: `estimates` and the plain `solution` by name (of the mass the name is "mass"; per direction "... forward",
+    """The fit: `estimates` and the plain `solution` by name (of the mass: "mass"; per direction "... forward" and
     "... backward"), the `covariance` of all columns, times [s] and forces [N] of the rows, measured and fitted, of
     shape (rows,), and the relative `error`, norm of the residual over that of the force. `bandwidth` [Hz] is the
     motion's."""
@@ -123,6 +123,10 @@ def inverse_model(
     Raises StageError for a log too short.
     """
     band = bandwidth or bandwidth_of(log["position"], log.sample_time)
+    longest = max(part.stop - part.start for part in log.segments) * log.sample_time
+    if band * longest < 1:
+        given, expected = f"{band:.3g} Hz for {longest:.3g} s", "at least one period of it in the log"
+        raise StageError("--bandwidth", given, expected, '--bandwidth "20 Hz"', log.name)
     parts = [_rows(log, part, band, by_direction, cart_share) for part in log.segments]
     time, columns, force = (np.concatenate([part[i] for part in parts]) for i in range(3))
     speed = np.abs(columns[:, 1] + columns[:, 3]) if by_direction else np.abs(columns[:, 1])

@@ -29,14 +29,15 @@ STILL, RESTS = 0.01, 0.1
 
 @dataclass(frozen=True)
 class Given:
-    """A file with what it holds, its kind of experiment and why it counts as one, and where its mapping is kept (None:
-    nothing had to be said about it)."""
+    """A file with what it holds, its kind of experiment and why it counts as one, how it was mapped, and where that is
+    kept (None: not yet, or nothing had to be said about it)."""
 
     path: Path
     source: Source
     kind: str
     reason: str
-    kept: Path | None
+    mapping: Mapping = Mapping()  # noqa: RUF009 (frozen)
+    kept: Path | None = None
 
 
 def read_all(paths: Sequence[Path], told: Mapping, folder: Path) -> list[Given]:
@@ -73,15 +74,23 @@ def _has(path: Path, name: str, role: str) -> bool:
 
 def _read(path: Path, told: Mapping, folder: Path) -> Given:
     if is_frequency_response(path):
-        return Given(path, read_frequency_response(path), FREQUENCY, "the file holds a frequency response", None)
+        return Given(path, read_frequency_response(path), FREQUENCY, "the file holds a frequency response")
     mapping = told.over(load(path, folder) or Mapping())
     if mapping.experiment is not None:
         log = _log(path, mapping, mapping.experiment)
-        return Given(path, log, mapping.experiment, "as told", save(mapping, path, folder))
+        return Given(path, log, mapping.experiment, "as told", mapping)
     log = _log(path, mapping, FREQUENCY)
     kind, reason = _kind(log, path)
     log = log if kind == FREQUENCY else _log(path, mapping, kind)
-    return Given(path, log, kind, reason, save(mapping, path, folder) if mapping != Mapping() else None)
+    return Given(path, log, kind, reason, mapping)
+
+
+def keep(given: Given, folder: Path) -> Given:
+    """The file with its mapping kept beside it, or in `folder`, for the next time: once something came of it. Raises
+    StageError."""
+    if given.mapping == Mapping():
+        return given
+    return replace(given, kept=save(given.mapping, given.path, folder))
 
 
 def _log(path: Path, mapping: Mapping, kind: str) -> Log:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 
@@ -87,7 +88,7 @@ def fit_two_mass(
     deviation = np.stack([_deviation(one) for one in responses])
     sign = _sign(values[0])
     options = [(sign, sign), (sign, -sign)][: len(responses)]
-    seen = _from_modes(responses[0])
+    seen = cache(lambda: _from_modes(responses[0]))
     fits = [(_best(np.array(pair)[: len(values), None] * values, deviation, frequency, seen), pair) for pair in options]
     fit, signs = min(fits, key=lambda each: each[0].squares)
     _follows(np.array(signs)[: len(values), None] * values, two_masses(fit.parameters, frequency)[: len(values)])
@@ -164,9 +165,11 @@ def _start(other: float, stiffness: float, damping: float) -> np.ndarray:
     return np.array([*np.log([1 - other, other, stiffness, damping]), 0.0, 0.0, 0.0])
 
 
-def _best(values: np.ndarray, deviation: np.ndarray, frequency: np.ndarray, seen: list[np.ndarray]) -> Fit:
-    """The best of the fits from the modes `seen` and the two most promising mass ratios; the first one, where it
-    explains the data."""
+def _best(
+    values: np.ndarray, deviation: np.ndarray, frequency: np.ndarray, seen: Callable[[], list[np.ndarray]]
+) -> Fit:
+    """The best of the fits from the most promising mass ratio, from the modes `seen` and from the next ratio; the first
+    one that explains the data."""
     late = 0.1 / frequency[-1]
     reach = np.array([FAR] * 3 + [2 * FAR])
 
@@ -176,11 +179,14 @@ def _best(values: np.ndarray, deviation: np.ndarray, frequency: np.ndarray, seen
     def misfit(start: np.ndarray) -> float:
         return float(np.sum(np.abs((model(start) - values) / deviation) ** 2))
 
+    def starts() -> Iterator[np.ndarray]:
+        first, second, *_ = sorted(_starts(values[0], frequency), key=misfit)
+        yield first
+        yield from (_scaled_to(each, values[0], frequency) for each in seen())
+        yield second
+
     fits = []
-    for start in [
-        *(_scaled_to(each, values[0], frequency) for each in seen),
-        *sorted(_starts(values[0], frequency), key=misfit)[:2],
-    ]:
+    for start in starts():
         lower = np.array([*(start[:DRAG] - reach), 0.0, 0.0, -late])
         upper = np.array([*(start[:DRAG] + reach), np.inf, np.inf, late])
         fits.append(refined(model, start, values, deviation, lower, upper))
