@@ -120,8 +120,8 @@ def test_the_cart_of_a_joint_has_the_friction() -> None:
 
 def test_too_little_motion_is_refused() -> None:
     log = swinging(2.0, 1.0, 4.0, 0.5, seconds=0.3)
-    with pytest.raises(StageError, match=r"300 samples, \d+ of them in motion after decimation to 10 Hz"):
-        inverse_model(log, 2.0)
+    with pytest.raises(StageError, match=r"300 samples, \d+ of them in motion after decimation to 20 Hz"):
+        inverse_model(log, 4.0)
 
 
 # --- the record of the EMPS benchmark (Janot, Gautier, Brunot 2019) ------------------------------------------------
