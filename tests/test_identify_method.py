@@ -14,12 +14,12 @@ import friso
 from friso.identify.combine import combined, correlations
 from friso.identify.estimate import Estimate
 from friso.identify.experiments import record
-from friso.identify.fitting import fitting
 from friso.identify.logs.log import Log
 from friso.identify.method import identify
 from friso.identify.response.analysis import analyse, external
 from friso.identify.sources import _kind
 from friso.identify.stage_file import identified
+from friso.identify.stage_keys import fitting
 from friso.quantities import StageError
 from friso.stage import Stage
 from friso.stage.correlations import Correlations, draw

@@ -16,15 +16,15 @@ from friso.identify.experiments.friction_position import FrictionPosition, frict
 from friso.identify.experiments.friction_velocity import FrictionVelocity, friction_velocity
 from friso.identify.experiments.steps import StepStiffness, stiffness_from_steps
 from friso.identify.experiments.stick_slip import StickSlip, static_from_stick_slip
-from friso.identify.fitting import Fitting, fitting
 from friso.identify.inverse_model import inverse_model
 from friso.identify.logs.frequency_text import MeasuredResponse
 from friso.identify.logs.log import Log
 from friso.identify.moves import Moves, identify_moves
 from friso.identify.moves import predict as predict_moves
-from friso.identify.output_error.problem import Simulated
+from friso.identify.output_error.problem import Simulated, why_continuous
 from friso.identify.response.analysis import Bench, analyse, predicted
 from friso.identify.stage_file import identified, made_up
+from friso.identify.stage_keys import Fitting, fitting
 from friso.quantities import StageError
 from friso.stage import Stage
 from friso.stage.correlations import Correlations
@@ -112,11 +112,21 @@ def identify(
     every, warnings = combined([one for each in found for one in each.estimates])
     if stage is None:
         return Identification(None, Correlations(), tuple(found), tuple(every), tuple(warnings))
+    warnings += _continuous(found, base)
     fits = fitting(stage, every)
     whole = identified(stage, fits.kept, [log.name for log, _ in logs])
     return Identification(
         whole, _correlations(found, every, fits, whole), tuple(found), tuple(every), (*warnings, *fits.said)
     )
+
+
+def _continuous(found: Sequence[Experiment], base: Stage | None) -> list[str]:
+    """Where the drive that was given is not the one simulated."""
+    if base is None:
+        return []
+    moves = [each.result for each in found if isinstance(each.result, Moves) and each.result.loop]
+    said = (why_continuous(base.flat(), each.log.sample_time) for each in moves)
+    return [sentence for sentence in dict.fromkeys(said) if sentence]
 
 
 @dataclass(frozen=True)

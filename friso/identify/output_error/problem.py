@@ -26,6 +26,8 @@ STEP = 1e-4
 RTOL = 1e-5
 """Relative tolerance of the simulations."""
 
+CONTINUOUS = "the controller is simulated in continuous time"
+
 SLOW = 10.0
 """Bandwidth [Hz] at most of the controller that holds a stage to a log's position."""
 
@@ -168,21 +170,37 @@ class Problem:
 
 def closed_loop(flat: Mapping[str, Any], log: Log, part: slice, parameters: Sequence[Parameter]) -> Problem:
     """The stage with its own controller on the log's reference; a `disturbance` in the log acts beside it."""
-    form = structure(flat)
-    sampled = "drive.sample_time" in flat and form.controller is not None and is_known(form.controller)
-    same = abs(flat.get("drive.sample_time", np.inf) / log.sample_time - 1) < SAME
-    samples = round(flat.get("drive.velocity_samples", 1.0)) if sampled and same else 0
+    sampled = "drive.sample_time" in flat and not why_continuous(flat, log.sample_time)
+    samples = round(flat.get("drive.velocity_samples", 1.0)) if sampled else 0
     count = part.stop - part.start
     extra = log["disturbance"][part] if "disturbance" in log else np.zeros(count)
     return Problem(
         flat,
-        Driven(form, samples),
+        Driven(structure(flat), samples),
         Inputs(log["reference"][part], extra, log.sample_time),
         log["force"][part] - extra,
         tuple(parameters),
         True,
         _start(log, part),
     )
+
+
+def why_continuous(flat: Mapping[str, Any], sample_time: float) -> str:
+    """Why the controller of a drive that samples is simulated in continuous time all the same, in a sentence; empty
+    where it is not, or where the drive does not tell its sample time. `sample_time` [s] is the log's."""
+    if "drive.sample_time" not in flat:
+        return ""
+    form, step = structure(flat).controller, flat["drive.sample_time"]
+    if form is None or not is_known(form):
+        return f"{CONTINUOUS}: its discrete form is known for gains without a filter alone"
+    if abs(step / sample_time - 1) >= SAME:
+        return f"{CONTINUOUS}: the drive samples each {step:g} s, the log {sample_time:g} s"
+    return ""
+
+
+def _is_held(flat: Mapping[str, Any], log: Log) -> bool:
+    """Whether the force of a log is held from each of its samples to the next."""
+    return abs(flat.get("drive.sample_time", np.inf) / log.sample_time - 1) < SAME
 
 
 def tracking(
@@ -199,7 +217,7 @@ def tracking(
     return Problem(
         kept | gains,
         Driven(form),
-        Inputs(smooth, log["force"][part], log.sample_time, "drive.sample_time" in flat),
+        Inputs(smooth, log["force"][part], log.sample_time, _is_held(flat, log)),
         np.zeros(part.stop - part.start),
         tuple(parameters),
         False,

@@ -1,0 +1,28 @@
+"""When the drive of the stage is the one that is simulated, and when not, which has to be said."""
+
+from pathlib import Path
+
+from friso import load
+from friso.identify.output_error.problem import why_continuous
+
+EMPS = Path(__file__).parents[1] / "examples" / "emps_axis.toml"
+
+
+def axis(**changes: str | float | None) -> dict:
+    return load(EMPS).replace({"drive.sample_time": "1 ms", **changes}).flat()
+
+
+def test_the_log_of_the_drive_itself_is_simulated_sampled() -> None:
+    assert why_continuous(axis(), 0.99998e-3) == ""
+
+
+def test_a_log_at_another_rate_is_not_and_says_so() -> None:
+    assert "the drive samples each 0.001 s, the log 0.002 s" in why_continuous(axis(), 2e-3)
+
+
+def test_a_controller_whose_discrete_form_is_not_known_says_so() -> None:
+    assert "without a filter alone" in why_continuous(axis(**{"controller.tau": "1 ms"}), 1e-3)
+
+
+def test_a_stage_without_sample_time_has_nothing_to_say() -> None:
+    assert why_continuous(load(EMPS).flat(), 1e-3) == ""
