@@ -113,6 +113,7 @@ def identify(
     if stage is None:
         return Identification(None, Correlations(), tuple(found), tuple(every), tuple(warnings))
     warnings += _continuous(found, base)
+    warnings += [FOLLOWED] if any(isinstance(each.result, Moves) and each.result.loop is None for each in found) else []
     fits = fitting(stage, every)
     whole = identified(stage, fits.kept, [log.name for log, _ in logs])
     return Identification(
@@ -127,6 +128,12 @@ def _continuous(found: Sequence[Experiment], base: Stage | None) -> list[str]:
     moves = [each.result for each in found if isinstance(each.result, Moves) and each.result.loop]
     said = (why_continuous(base.flat(), each.log.sample_time) for each in moves)
     return [sentence for sentence in dict.fromkeys(said) if sentence]
+
+
+FOLLOWED = (
+    "without the machine's own controller the intervals of friction are too narrow: of machines drawn at random "
+    "(benchmarks/identify.py) they held the truth less often than not; give the controller with --stage"
+)
 
 
 @dataclass(frozen=True)
