@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 import typer
 from pages import Page
+from patched import patched
 
 import friso
 from friso.cli.app import main
@@ -72,10 +73,7 @@ def spec(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def small() -> Iterator[None]:
-    with pytest.MonkeyPatch.context() as patch:
-        for module, sizes in SMALL.items():
-            for name, value in sizes.items():
-                patch.setattr(module, name, value)
+    with patched(SMALL):
         yield
 
 

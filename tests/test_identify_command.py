@@ -14,6 +14,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from machines import Machine, drawn, moves
+from patched import patched
 
 import friso
 from friso.cli.app import main
@@ -40,10 +41,7 @@ Said = tuple[int, str, str]
 
 @pytest.fixture(scope="module", autouse=True)
 def small() -> Iterator[None]:
-    with pytest.MonkeyPatch.context() as patch:
-        for module, sizes in SMALL.items():
-            for name, value in sizes.items():
-                patch.setattr(module, name, value)
+    with patched(SMALL):
         yield
 
 

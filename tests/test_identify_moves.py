@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -10,14 +9,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from emps import emps_log
 from machines import drawn, moves
+from patched import patched
 
 import friso
 from friso.identify import moves as method
 from friso.identify.errors import errors_of
-from friso.identify.logs.assemble import read_log
 from friso.identify.logs.log import Log
-from friso.identify.logs.mapping import from_options
 from friso.identify.moves import Moves, identify_moves, predict
 from friso.identify.output_error import fit as fitting
 from friso.identify.output_error import profile as profiles
@@ -31,7 +30,6 @@ from friso.quantities import StageError
 pytestmark = pytest.mark.xdist_group("identify-moves")
 
 ROOT = Path(__file__).parents[1]
-EMPS = ROOT.parent / "shared" / "data" / "emps" / "DATA_EMPS.mat"
 SMALL: dict[Any, dict[str, Any]] = {
     profiles: {"POINTS": 3, "ROUNDS": 1},
     fitting: {"STARTS": 256, "KEPT": 3, "NEARBY": 31},
@@ -41,10 +39,7 @@ SMALL: dict[Any, dict[str, Any]] = {
 
 @pytest.fixture(scope="module", autouse=True)
 def small() -> Iterator[None]:
-    with pytest.MonkeyPatch.context() as patch:
-        for module, sizes in SMALL.items():
-            for name, value in sizes.items():
-                patch.setattr(module, name, value)
+    with patched(SMALL):
         yield
 
 
@@ -171,12 +166,7 @@ def axis() -> friso.Stage:
 
 @pytest.fixture(scope="module")
 def emps(tmp_path_factory: pytest.TempPathFactory) -> Log:
-    if not EMPS.exists():
-        pytest.skip(f"the EMPS record is not at {EMPS}")
-    path = tmp_path_factory.mktemp("emps") / EMPS.name
-    shutil.copy(EMPS, path)
-    roles = ["time=t", "reference=qg", "position=qm", "force=vir"]
-    return read_log(path, from_options(roles, ["t=s", "qg=m", "qm=m"], ["force=35.15065188 N/V"]))
+    return emps_log(tmp_path_factory.mktemp("emps"))
 
 
 def cut(log: Log, part: slice) -> Log:

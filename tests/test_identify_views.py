@@ -78,7 +78,7 @@ def moves(own_loop: bool, fitted_in_loop: bool) -> tuple[Moves, Log]:
     problem = loop if fitted_in_loop and loop else follows
     residual = 0.2 * np.random.default_rng(2).standard_normal(len(log.time))
     core = tuple(i for i, each in enumerate(parameters) if each.core)
-    fit = Fit(problem, first_values(parameters), core, 1e-6 * np.eye(len(core)), residual, 1.0, "")
+    fit = Fit(problem, first_values(parameters), core, 1e-6 * np.eye(len(core)), residual)
     profiles = {each.name: profile_of(each.name, each.low, each.high, each.core, fit.cost) for each in parameters}
     moved = motion(log["position"], DT, 25.0)
     known = (

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import shutil
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from emps import emps_log
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from friso.identify.experiments import record
 from friso.identify.inverse_model import bandwidth_of, inverse_model
-from friso.identify.logs.assemble import read_log
 from friso.identify.logs.log import Log
-from friso.identify.logs.mapping import from_options
 from friso.quantities import StageError
 
 EMPS = Path(__file__).parents[2] / "shared" / "data" / "emps" / "DATA_EMPS.mat"
@@ -129,12 +127,7 @@ def test_too_little_motion_is_refused() -> None:
 
 @pytest.fixture(scope="module")
 def emps(tmp_path_factory: pytest.TempPathFactory) -> Log:
-    if not EMPS.exists():
-        pytest.skip(f"the EMPS record is not at {EMPS}")
-    path = tmp_path_factory.mktemp("emps") / EMPS.name
-    shutil.copy(EMPS, path)
-    roles = ["time=t", "reference=qg", "position=qm", "force=vir"]
-    return read_log(path, from_options(roles, ["t=s", "qg=m", "qm=m"], ["force=35.15065188 N/V"]))
+    return emps_log(tmp_path_factory.mktemp("emps"))
 
 
 PUBLISHED = {

@@ -15,6 +15,7 @@ import numpy as np
 from scipy.signal import butter, cheby1, sosfiltfilt, welch
 
 from friso.identify.estimate import Estimate
+from friso.identify.experiments.common import cart
 from friso.identify.logs.log import Log
 from friso.identify.spread import spread_of
 from friso.quantities import StageError
@@ -180,11 +181,6 @@ _NAMES = {
 }
 
 
-def cart_of(log: Log) -> np.ndarray:
-    """The position [m] of the cart, measured or of two sensors, shape (n,)."""
-    return log["cart_position"] if "cart_position" in log else log["position"] - log["relative_position"]
-
-
 def _rows(
     log: Log, part: slice, band: float, by_direction: bool, cart_share: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -193,8 +189,9 @@ def _rows(
         return np.zeros(0), np.zeros((0, len(_NAMES[by_direction]))), np.zeros(0)
     moved = motion(log["position"][part], log.sample_time, SMOOTH * band)
     v, a = moved.velocity, moved.acceleration
-    if cart_share:
-        carried = motion(cart_of(log)[part], log.sample_time, SMOOTH * band)
+    carried_position = cart(log) if cart_share else None
+    if carried_position is not None:
+        carried = motion(carried_position[part], log.sample_time, SMOOTH * band)
         v, a = carried.velocity, cart_share * carried.acceleration + (1 - cart_share) * a
     sign = np.sign(v)
     if by_direction:

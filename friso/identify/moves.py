@@ -62,11 +62,6 @@ def fitted_flat(found: Fit) -> dict[str, Any]:
     return {**found.problem.flat, **keys_of(found.problem.flat, values)}
 
 
-def longest(log: Log) -> slice:
-    """The longest stretch of a log without gaps."""
-    return max(log.segments, key=lambda part: part.stop - part.start)
-
-
 def identify_moves(log: Log, flat: Mapping[str, Any], own_loop: bool, bandwidth: float | None = None) -> Moves:
     """Mass, friction and what else the moves of a log show of a stage given as flat keys.
 
@@ -75,7 +70,7 @@ def identify_moves(log: Log, flat: Mapping[str, Any], own_loop: bool, bandwidth:
     Raises StageError for a log without position or force.
     """
     _has(log, ("position", "force", *(("reference",) if own_loop else ())))
-    part = longest(log)
+    part = log.longest
     share = _cart_share(log, flat)
     inverse, by_direction = (inverse_model(log, bandwidth, split, share) for split in (False, True))
     follows, loop = _problems(log, part, flat, inverse, own_loop)
@@ -101,7 +96,7 @@ def predict(found: Moves, log: Log) -> tuple[slice, Simulated, Errors]:
     if found.loop is None:
         expected = "the machine's own controller, with which another record can be simulated"
         raise StageError("--predict", "no stage file", expected, "--stage examples/emps_axis.toml", log.name)
-    part = longest(log)
+    part = log.longest
     problem = _same_kind(found.loop, log, part)
     simulated = problem.record(found.fit.inner)
     return part, simulated, errors_of(log, part, simulated, found.inverse.bandwidth)

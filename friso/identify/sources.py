@@ -105,7 +105,7 @@ def _kind(log: Log, path: Path) -> tuple[str, str]:
     A move that is repeated is periodic too: it rests in between, or holds few frequencies and turns its force seldom.
     Raises StageError where the two cannot be told apart.
     """
-    part = max(log.segments, key=lambda each: each.stop - each.start)
+    part = log.longest
     if "reference" in log and np.ptp(log["reference"][part]) > 0:
         return MOVES, "it has a reference that moves"
     signal = external(log) or "force"

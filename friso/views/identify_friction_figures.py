@@ -89,13 +89,13 @@ def _steps(it: StepStiffness, name: str) -> list[Figure]:
 
 def _stick_slip(it: StickSlip, log: Log, name: str) -> list[Figure]:
     """Force on the cart with its peaks, and the cart's speed, over time."""
-    pull = Series(log.time, it.pull, "force on the cart", GREY, width=1.0)
+    pull = Series(log.time, _broken(it.pull, log), "force on the cart", GREY, width=1.0)
     peaks = tuple(
         Markers(it.times[chosen], way * it.forces[chosen], f"break-away, {word}", WAYS[word], "triangle")
         for word, way, chosen in (("forward", 1, it.directions > 0), ("backward", -1, it.directions < 0))
         if chosen.any()
     )
-    speed = Series(log.time, it.cart_velocity, "", INK, width=0.9)
+    speed = Series(log.time, _broken(it.cart_velocity, log), "", INK, width=0.9)
     time = replace(TIME, limits=(float(log.time[0]), float(log.time[-1])))
     panels = (
         Panel("", time, Axis("Force on the cart", "N"), (pull,), peaks),
@@ -106,6 +106,13 @@ def _stick_slip(it: StickSlip, log: Log, name: str) -> list[Figure]:
         f"Static friction: {with_interval(it.static)}."
     )
     return [Figure(f"{name}_slips", "Stick-slip", caption, panels)]
+
+
+def _broken(values: np.ndarray, log: Log) -> np.ndarray:
+    """A signal of shape (n,) whose line breaks at the gaps of a log: without the last sample before each."""
+    broken = values.astype(float)
+    broken[[part.stop - 1 for part in log.segments[:-1]]] = np.nan
+    return broken
 
 
 def _break_away(it: BreakAway, name: str) -> list[Figure]:

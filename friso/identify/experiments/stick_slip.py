@@ -185,7 +185,7 @@ def _answer(
         if not chosen.any():
             return Estimate.unknown(KEY, "N", f"stick-slip{words}", f"{why}{words}", 0.0)
         if held[chosen].mean() > HELD:
-            low = float(forces[chosen].mean() * (1 - relative_error * COVERAGE))
+            low = max(0.0, float(forces[chosen].mean() * (1 - relative_error * COVERAGE)))
             return Estimate.unknown(KEY, "N", f"stick-slip{words}", STOPPED, low)
         used = chosen & (rates > 0)  # held ones may have none
         return static_friction(KEY, forces[used], rates[used], bristle_rate, relative_error, late[used].mean())

@@ -49,6 +49,11 @@ class Log:
     def __getitem__(self, role: str) -> np.ndarray:
         return self.signals[role]
 
+    @property
+    def longest(self) -> slice:
+        """The longest stretch without gaps."""
+        return max(self.segments, key=lambda part: part.stop - part.start)
+
     def unit(self, role: str) -> str:
         """The unit in which a role stands."""
         return self.units.get(role, ROLES[role])

@@ -37,15 +37,13 @@ SEED = 7
 @dataclass(frozen=True)
 class Fit:
     """The fitted numbers `inner`, shape (parameters,), of which `free` were fitted; their `covariance`, shape (free,
-    free); the residual [N], shape (n,), and its mean square before (at the first values) and after."""
+    free), and the residual [N], shape (n,)."""
 
     problem: Problem
     inner: np.ndarray
     free: tuple[int, ...]
     covariance: np.ndarray
     residual: np.ndarray
-    before: float
-    report: str
 
     @property
     def cost(self) -> float:
@@ -76,7 +74,7 @@ def fit(problem: Problem, free: Sequence[int], starts: np.ndarray) -> Fit:
     kept = _screened(problem, starts)
     refined = refine(problem, kept, np.tile(mask, (len(kept), 1)), ROUGH)
     best = refined.inner[np.argmin(refined.cost)]
-    return _polished(problem, tuple(free), best, float(costs(problem, starts[:1])[0]))
+    return _polished(problem, tuple(free), best)
 
 
 def everywhere(problem: Problem, free: Sequence[int], first: np.ndarray) -> np.ndarray:
@@ -116,7 +114,7 @@ def _screened(problem: Problem, starts: np.ndarray) -> np.ndarray:
     return np.vstack([starts[0], starts[1:][np.argsort(found)[: KEPT - 1]]])
 
 
-def _polished(problem: Problem, free: tuple[int, ...], inner: np.ndarray, before: float) -> Fit:
+def _polished(problem: Problem, free: tuple[int, ...], inner: np.ndarray) -> Fit:
     """The end of the fit by lmfit, with derivatives from runs side by side."""
     low, high = bounds_of(problem)
     mask = np.isin(np.arange(len(inner)), free)
@@ -139,4 +137,4 @@ def _polished(problem: Problem, free: tuple[int, ...], inner: np.ndarray, before
     result: Any = lmfit.minimize(residual, given, Dfun=jacobian, max_nfev=FINE * len(free), ftol=1e-6, xtol=1e-6)
     best = numbers(result.params)
     ((rest, slopes),) = problem.jacobians(best[None], mask[None])
-    return Fit(problem, best, free, spread_of(slopes, rest), rest, before, lmfit.fit_report(result))
+    return Fit(problem, best, free, spread_of(slopes, rest), rest)

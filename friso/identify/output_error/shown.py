@@ -120,6 +120,8 @@ def reason(name: str, covered: Coverage) -> str:
     """Why a parameter is not shown, in a sentence."""
     if name in STRIBECK:
         low, high = covered.gap
+        if not np.isfinite(high):
+            return "no steady motion at all, in which the Stribeck effect would show"
         return (
             f"no steady motion between {low * 1e3:.2g} and {high * 1e3:.3g} mm/s, where the Stribeck effect would show"
         )

@@ -135,8 +135,8 @@ def external(log: Log) -> str | None:
 
     A reference that is held constant excites nothing.
     """
-    part = max(log.segments, key=lambda each: each.stop - each.start)
-    return next((role for role in ("disturbance", "reference") if role in log and np.ptp(log[role][part]) > 0), None)
+    roles = ("disturbance", "reference")
+    return next((role for role in roles if role in log and np.ptp(log[role][log.longest]) > 0), None)
 
 
 def _response(records: Sequence[Record], log: Log, output: str, period: float | None) -> FrequencyResponse:

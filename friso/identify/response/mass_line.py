@@ -148,7 +148,24 @@ def _flat(response: FrequencyResponse, slope: int, sign: float) -> tuple[np.ndar
 
 
 def _line(response: FrequencyResponse, slope: int, sign: float, band: slice) -> Line:
-    """The level of a band with its interval.
+    """The level of a band with its interval, and what it stands for."""
+    mean, half, independent = _level(response, slope, sign, band)
+    low, high = float(response.frequency[band][0]), float(response.frequency[band][-1])
+    method = f"{KINDS[slope]}, {low:.3g} to {high:.3g} Hz"
+    into, out = response.channels.input_unit, response.channels.output_unit
+    per = ("", "/s", "/s^2")[slope]
+    unit, inverse = f"{out}{per}/{into}", {0: "N/m", 1: "N s/m", 2: "kg"}[slope]
+    if (into, out) != ("N", "m"):
+        inverse = f"{into}{(' ', ' s', ' s^2')[slope].rstrip()}/{out}"
+    down, up = float(np.exp(mean - half)), float(np.exp(mean + half))
+    name = KINDS[slope].removesuffix(" line")
+    level = Estimate(f"{name} line level", unit, float(np.exp(mean)), down, up, method)
+    value = Estimate(name, inverse, float(np.exp(-mean)), 1 / up, 1 / down, method)
+    return Line(KINDS[slope], low, high, level, value, sign, independent)
+
+
+def _level(response: FrequencyResponse, slope: int, sign: float, band: slice) -> tuple[float, float, float]:
+    """Logarithm of the level of a band, the half-width of its interval, and how many independent lines there are.
 
     A line may bend towards a mode above it (with frequency squared) or from one below (with its inverse): where that is
     significant, the level is that of the straight end. The interval covers the noise, the scatter along the band with
@@ -157,7 +174,7 @@ def _line(response: FrequencyResponse, slope: int, sign: float, band: slice) -> 
     friction makes neighbouring lines scatter, it also makes the mass read high, by up to as much: by 0.1 to 1.0 times
     the scatter on 23 machines drawn at random (`benchmarks/identify.py`).
     """
-    frequency, level, phase, relative = (each[band] for each in _flat(response, slope, sign))
+    _, level, phase, relative = (each[band] for each in _flat(response, slope, sign))
     weight = 1 / (relative**2 / 2 + WIGGLE**2)
     columns, found = _bent(_bends(response, slope, band), level, weight)
     inverse = np.linalg.inv(columns.T @ (weight[:, None] * columns))
@@ -170,29 +187,8 @@ def _line(response: FrequencyResponse, slope: int, sign: float, band: slice) -> 
     noise = float(np.sqrt(np.sum(gains**2 * relative**2 / 2)))
     known = stats.t.ppf(0.975, free) * scatter if scatter > noise else COVERAGE * noise
     turned = float(np.average(-np.log(np.cos(phase)), weights=weight))
-    distorted = float(np.median(relative))
-    mean, half = float(found[0]), float(np.hypot(known, np.sum(found[1:] ** 2) / 2)) + max(turned, 0.0) + distorted
-    low, high, method = (
-        float(frequency[0]),
-        float(frequency[-1]),
-        f"{KINDS[slope]}, {frequency[0]:.3g} to {frequency[-1]:.3g} Hz",
-    )
-    into, out = response.channels.input_unit, response.channels.output_unit
-    per = ("", "/s", "/s^2")[slope]
-    unit, inverse = f"{out}{per}/{into}", {0: "N/m", 1: "N s/m", 2: "kg"}[slope]
-    if (into, out) != ("N", "m"):
-        inverse = f"{into}{(' ', ' s', ' s^2')[slope].rstrip()}/{out}"
-    down, up = float(np.exp(mean - half)), float(np.exp(mean + half))
-    name = KINDS[slope].removesuffix(" line")
-    return Line(
-        KINDS[slope],
-        low,
-        high,
-        Estimate(f"{name} line level", unit, float(np.exp(mean)), down, up, method),
-        Estimate(name, inverse, float(np.exp(-mean)), 1 / up, 1 / down, method),
-        sign,
-        independent,
-    )
+    half = float(np.hypot(known, np.sum(found[1:] ** 2) / 2)) + max(turned, 0.0) + float(np.median(relative))
+    return float(found[0]), half, independent
 
 
 def _independent(residual: np.ndarray) -> float:

@@ -60,7 +60,7 @@ def from_log(
             raise StageError(
                 role, f"a log with {', '.join(log.signals)}", f"a channel for the {role}", f'{role}="Axis1"'
             )
-    part = max(log.segments, key=lambda one: one.stop - one.start)
+    part = log.longest
     record = Record(log[given][part], log[output][part], log.sample_time, log[reference][part] if reference else None)
     return record, Channels(given, log.unit(given), output, log.unit(output))
 
