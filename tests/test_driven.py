@@ -39,7 +39,7 @@ def axis(**changes: str) -> Stage:
 def run(stage: Stage, inputs: Inputs, samples: int, rtol: float = 1e-9):
     flat = stage.flat()
     shape = kernel(Driven(structure(flat), samples))
-    starts = np.zeros((1, len(shape.states)))
+    starts = np.zeros((1, len(shape.kept)))
     (runs,) = follow(shape, flat, 1, inputs, starts, rtol)
     assert runs.statuses[0] == 1
     return shape, runs
@@ -73,7 +73,7 @@ def test_sampled_drive_is_that_of_plain_python():
     position, force = twin(reference, extra)
     assert np.abs(force).max() == LIMIT  # the limit is met, and left again
     assert runs.states[0, :, 0] == pytest.approx(position, abs=1e-9)
-    assert runs.held[0, :, shape.states.index("held_force")] == pytest.approx(force, abs=1e-5)
+    assert runs.held[0, :, shape.held.index("held_force")] == pytest.approx(force, abs=1e-5)
 
 
 def test_sampled_drive_approaches_the_continuous_one_in_the_first_order():

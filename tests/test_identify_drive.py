@@ -20,9 +20,5 @@ def test_a_log_at_another_rate_is_not_and_says_so() -> None:
     assert "the drive samples each 0.001 s, the log 0.002 s" in why_continuous(axis(), 2e-3)
 
 
-def test_a_controller_whose_discrete_form_is_not_known_says_so() -> None:
-    assert "without a filter alone" in why_continuous(axis(**{"controller.tau": "1 ms"}), 1e-3)
-
-
 def test_a_stage_without_sample_time_has_nothing_to_say() -> None:
     assert why_continuous(load(EMPS).flat(), 1e-3) == ""

@@ -8,11 +8,24 @@ from typing import NamedTuple
 import numpy as np
 
 
+class Tables(NamedTuple):
+    """What a drive with a clock looks up, evenly spaced: over position (runs or 1, tables, points), its first place
+    and points per metre (runs or 1, 2), over time (runs or 1, tables, points), and its points per second (1,)."""
+
+    places: np.ndarray
+    grid: np.ndarray
+    times: np.ndarray
+    per_second: np.ndarray
+
+
+NO_TABLES = Tables(np.zeros((1, 0, 2)), np.zeros((1, 2)), np.zeros((1, 0, 2)), np.zeros(1))
+
+
 class Batch(NamedTuple):
     """Runs of one model: constants (n, constants), start states, absolute tolerances (n, states), modes (n, kinks),
     first and longest steps [s] (n,), pieces of the reference (n, pieces + 1, 1 + inputs), of which the last one only
-    ends the run (in the first dimension also 1: shared by all runs), and the number of the piece that begins the window
-    in which extremes are taken (n,)."""
+    ends the run (in the first dimension also 1: shared by all runs), the number of the piece that begins the window
+    in which extremes are taken (n,), the period and the lateness of the drive's clock [s] (n, 2), and what is looked up. Start states go on with the numbers that are held."""
 
     constants: np.ndarray
     starts: np.ndarray
@@ -22,6 +35,8 @@ class Batch(NamedTuple):
     longest: np.ndarray
     segments: np.ndarray
     windows: np.ndarray
+    clocks: np.ndarray
+    tables: Tables = NO_TABLES
 
 
 class Settings(NamedTuple):
@@ -41,7 +56,7 @@ class Settings(NamedTuple):
 
 class Results(NamedTuple):
     """What the runs leave: statistics (n, len(STATISTICS)), status (n,), turning points (n, capacity) with their
-    count (n,), sampled states (n, samples, states), and the states at the end (n, states)."""
+    count (n,), sampled states and numbers held (n, samples, states + held), and the same at the end."""
 
     statistics: np.ndarray
     statuses: np.ndarray

@@ -101,16 +101,17 @@ def prepare(
     scales[~((scales > 0) & np.isfinite(scales))] = 1.0  # nothing moves: any tolerance will do
     segments, windows = _segments(flat, runs, options.window)
     starts = _starts(kernel, flat, runs) if starts is None else np.ascontiguousarray(starts, dtype=float)
-    surfaces = kernel.module.surfaces(starts.T, 0.0, segments[:, 0, 1:].T, values)
+    surfaces = kernel.module.surfaces(starts.T[: len(kernel.states)], 0.0, segments[:, 0, 1:].T, values)
     modes = (columns(surfaces) > 0).astype(float)
     first_steps = np.ascontiguousarray(FIRST_STEP / rates)
     longest = LONGEST_SHARE * segments[:, -1, 0]
-    return Batch(constants, starts, options.rtol * scales, modes, first_steps, longest, segments, windows)
+    clocks = columns(kernel.module.clock(values)) if kernel.module.CLOCKED else np.zeros((1, 2))
+    return Batch(constants, starts, options.rtol * scales, modes, first_steps, longest, segments, windows, clocks)
 
 
 def _starts(kernel: Kernel, flat: Mapping[str, Any], runs: int) -> np.ndarray:
     """Everything at rest, the masses (and what has been measured of them) displaced as the motion says."""
-    starts = np.zeros((runs, len(kernel.states)))
+    starts = np.zeros((runs, len(kernel.kept)))
     for i, name in enumerate(kernel.states):
         if name in ("position", "cart_position", "parasitic_position", "filtered_position"):
             starts[:, i] = motion.initial_displacement(flat)
@@ -152,7 +153,7 @@ def _run_with_room(
     samples = 0
     if options.interval is not None:
         samples = int(np.max(part["motion.duration"]) / options.interval * (1 + 1e-12)) + 1
-    results = empty_results(len(numbers), room, samples, len(kernel.states))
+    results = empty_results(len(numbers), room, samples, len(kernel.kept))
     run_batch(kernel, batch, settings_of(options), results, options.threads)
     crowded = results.turn_counts > room
     if room >= MOST_TURNS:

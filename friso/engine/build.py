@@ -10,13 +10,13 @@ import sys
 from pathlib import Path
 
 from friso.engine.cache import import_entry
-from friso.engine.kernel import compile_driver
+from friso.engine.kernel import Form, compile_driver
 from friso.engine.module_source import write_module
 from friso.engine.tableaus import TABLEAUS
+from friso.equations.as_built import AsBuilt, as_built
 from friso.equations.driven import Driven, driven
 from friso.equations.imposed import Imposed, imposed
 from friso.equations.model import Model, assemble
-from friso.equations.structure import Structure
 from friso.equations.variational import variational
 
 
@@ -29,9 +29,11 @@ def main(entry: Path, task: bytes) -> None:
     compile_driver(import_entry(entry))
 
 
-def _model(form: Structure | Imposed | Driven) -> Model:
+def _model(form: Form) -> Model:
     if isinstance(form, Imposed):
         return imposed(form)
+    if isinstance(form, AsBuilt):
+        return as_built(form)
     return driven(form) if isinstance(form, Driven) else assemble(form)
 
 

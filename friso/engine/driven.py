@@ -45,7 +45,7 @@ class Inputs:
 
 @dataclass(frozen=True)
 class Followed:
-    """States at the samples, shape (runs, n, states), and at each sample what is held until the next one."""
+    """States at the samples, shape (runs, n, states), and what is held from each until the next, (runs, n, held)."""
 
     numbers: np.ndarray
     states: np.ndarray
@@ -57,7 +57,7 @@ def follow(
     kernel: Kernel, flat: Mapping[str, Any], runs: int, inputs: Inputs, starts: np.ndarray, rtol: float = 1e-5
 ) -> Iterator[Followed]:
     """Runs of stages of one structure, given as flat keys to SI numbers or arrays of shape (runs,), from the states
-    `starts`, shape (runs, states); they come chunk by chunk. A failed run is NaN from there on, and has its status.
+    `starts`, shape (runs, kept); they come chunk by chunk. A failed run is NaN from there on, and has its status.
     """
     count, segments = len(inputs.reference), inputs.segments
     options = Options(rtol=rtol, bands=(np.inf, np.inf), record_from=np.inf, least_swing=np.inf, budget=BUDGET * count)
@@ -68,9 +68,10 @@ def follow(
         batch = prepare(kernel, _as_motion(flat, numbers, inputs, size), len(numbers), options, starts[numbers])
         every = np.full(len(numbers), inputs.sample_time)
         batch = batch._replace(segments=segments, first_steps=every, longest=every, windows=np.full(len(numbers), -1))
-        results = empty_results(len(numbers), 1, count + 1, len(kernel.states))
+        results = empty_results(len(numbers), 1, count + 1, len(kernel.kept))
         run_batch(kernel, batch, settings, results, options.threads)
-        yield Followed(numbers, results.samples[:, :-1], results.samples[:, 1:], results.statuses)
+        states, held = np.split(results.samples, [len(kernel.states)], axis=2)
+        yield Followed(numbers, states[:, :-1], held[:, 1:], results.statuses)
 
 
 def _as_motion(flat: Mapping[str, Any], numbers: np.ndarray, inputs: Inputs, size: float) -> dict[str, Any]:

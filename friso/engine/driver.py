@@ -5,7 +5,8 @@ names below the line `GENERATED` bound to those of the model at hand. It is neve
 """
 
 
-# GENERATED: np, LANES, STATES, KINKS, CONSTANTS, INPUTS, DENSE, ROWS, row numbers such as X, OLD, TIME, step, update
+# GENERATED: np, LANES, STATES, KINKS, CONSTANTS, INPUTS, HELD, DENSE, ROWS, row numbers such as X, OLD, TIME; CLOCKED,
+# and what a clock's tables are looked up over; step, update
 
 
 def between(B, lane, i, theta):
@@ -125,6 +126,8 @@ def note_samples(B, lane, fraction, interval, samples):
         theta = min((k * interval - start) / h, 1.0)
         for i in range(STATES):
             samples[k, i] = between(B, lane, i, theta)
+        for i in range(HELD):
+            samples[k, STATES + i] = B[(REF + INPUTS + i) * LANES + lane]
         k += 1
     B[NEXT_SAMPLE * LANES + lane] = k * interval if k <= last else np.inf
 
@@ -139,12 +142,14 @@ def enter_segment(B, lane, segments, segment, window, first_step):
         segment += 1
     if segment >= count:
         return count
+    B[DUE * LANES + lane] += B[START * LANES + lane] - segments[segment, 0]
     B[START * LANES + lane] = segments[segment, 0]
     B[STOP * LANES + lane] = segments[segment + 1, 0] - segments[segment, 0]
     B[TIME * LANES + lane] = 0.0
     for i in range(INPUTS):
         B[(REF + i) * LANES + lane] = segments[segment, 1 + i]
-    update(B, lane)
+    if not CLOCKED:
+        B[TICKED * LANES + lane] = 1.0
     if segment == window:
         away = B[(X + POSITION) * LANES + lane] - segments[segment, 1]
         B[DEVIATION_MAX * LANES + lane] = away
@@ -159,6 +164,51 @@ def pieces(batch, j):
     return batch.segments[min(j, batch.segments.shape[0] - 1)]
 
 
+def look_up(B, lane, j, tables):
+    """Look up what a drive finds at its place, and at the time of its sample, in a lane that has just ticked."""
+    run = min(j, tables.places.shape[0] - 1)
+    first, per_metre = tables.grid[min(j, tables.grid.shape[0] - 1)]
+    for i in range(PLACES):
+        place = (B[(X + PLACE_STATES[i]) * LANES + lane] - first) * per_metre
+        B[(REF + TABLED + i) * LANES + lane] = interpolated(tables.places[run, i], place)
+    run = min(j, tables.times.shape[0] - 1)
+    place = B[TICK * LANES + lane] * B[PERIOD * LANES + lane] * tables.per_second[0]
+    for i in range(TIMES):
+        B[(REF + TABLED + PLACES + i) * LANES + lane] = interpolated(tables.times[run, i], place)
+
+
+def interpolated(table, place):
+    """The value of a table between two of its points, which goes on as it ends."""
+    place = min(max(place, 0.0), table.size - 1.0)
+    cell = min(int(place), table.size - 2)
+    return table[cell] + (place - cell) * (table[cell + 1] - table[cell])
+
+
+def note_tick(B, lane, settings, samples):
+    """Write states, and what is held from now on, of every so many samples of the drive's clock."""
+    tick = B[TICK * LANES + lane] - 1.0
+    if tick * B[PERIOD * LANES + lane] < B[NEXT_SAMPLE * LANES + lane] * (1.0 - 1e-12):
+        return
+    k = int(B[NEXT_SAMPLE * LANES + lane] / settings.interval + 0.5)
+    for i in range(STATES):
+        samples[k, i] = B[(X + i) * LANES + lane]
+    for i in range(HELD):
+        samples[k, STATES + i] = B[(REF + INPUTS + i) * LANES + lane]
+    B[NEXT_SAMPLE * LANES + lane] = (k + 1) * settings.interval if k + 1 < samples.shape[0] else np.inf
+
+
+def take_samples(B, who, batch, settings, results):
+    """Let the lanes that have arrived at one take their sample."""
+    for lane in range(LANES):
+        if CLOCKED and B[TICKED * LANES + lane] > 0.0 and who[lane] >= 0:
+            look_up(B, lane, who[lane], batch.tables)
+    update(B)
+    for lane in range(LANES):
+        if CLOCKED and B[TICKED * LANES + lane] > 0.0 and who[lane] >= 0:
+            note_tick(B, lane, settings, results.samples[who[lane]])
+        B[TICKED * LANES + lane] = 0.0
+
+
 def load_run(B, lane, j, batch, settings):
     """Put run j at its start into a lane; the segment of the reference it starts in."""
     for row in range(ROWS):
@@ -168,12 +218,26 @@ def load_run(B, lane, j, batch, settings):
     for i in range(STATES):
         B[(X + i) * LANES + lane] = batch.starts[j, i]
         B[(TOLERANCE + i) * LANES + lane] = batch.tolerances[j, i]
+    for i in range(HELD):
+        B[(REF + INPUTS + i) * LANES + lane] = batch.starts[j, STATES + i]
     for k in range(KINKS):
         B[(MODE + k) * LANES + lane] = batch.modes[j, k]
+    if CLOCKED:
+        start_clock(B, lane, j, batch)
     B[TRIAL * LANES + lane] = batch.first_steps[j]
     B[LONGEST * LANES + lane] = batch.longest[j]
     B[RECORD_FROM * LANES + lane] = min(settings.record_from, 0.5 * pieces(batch, j)[-1, 0])
     return enter_segment(B, lane, pieces(batch, j), 0, batch.windows[j], batch.first_steps[j])
+
+
+def start_clock(B, lane, j, batch):
+    """The first sample is taken at the start; what follows from it acts at once, or a little later."""
+    period, late = batch.clocks[j]
+    B[PERIOD * LANES + lane] = period
+    B[DUE * LANES + lane] = late
+    B[TICKED * LANES + lane] = 1.0 if late == 0.0 else 0.0
+    for i in range(SEEN_STATES.size):
+        B[(SEEN + i) * LANES + lane] = batch.starts[j, SEEN_STATES[i]]
 
 
 def start_run(B, lane, j, batch, settings, results):
@@ -181,9 +245,9 @@ def start_run(B, lane, j, batch, settings, results):
     segment = load_run(B, lane, j, batch, settings)
     B[NEXT_SAMPLE * LANES + lane] = np.inf
     if results.samples.shape[1] > 0:
-        for i in range(STATES):
+        for i in range(STATES + HELD):
             results.samples[j, 0, i] = batch.starts[j, i]
-        B[NEXT_SAMPLE * LANES + lane] = settings.interval
+        B[NEXT_SAMPLE * LANES + lane] = 0.0 if CLOCKED else settings.interval
     return segment
 
 
@@ -199,6 +263,8 @@ def idle(B, lane):
     B[STOP * LANES + lane] = np.inf
     B[RECORD_FROM * LANES + lane] = np.inf
     B[NEXT_SAMPLE * LANES + lane] = np.inf
+    B[DUE * LANES + lane] = np.inf
+    B[TICKED * LANES + lane] = 0.0
     for i in range(STATES):
         B[(X + i) * LANES + lane] = 0.0
 
@@ -215,7 +281,7 @@ def answer(B, lane, j, segment, batch, settings, results):
     count = note_turn(B, lane, fraction, settings, times, values, int(B[TURNS * LANES + lane]))
     B[TURNS * LANES + lane] = count
     at_stop = B[TIME * LANES + lane] >= B[STOP * LANES + lane]
-    if at_stop or moment(B, lane, fraction) >= B[NEXT_SAMPLE * LANES + lane]:
+    if not CLOCKED and (at_stop or moment(B, lane, fraction) >= B[NEXT_SAMPLE * LANES + lane]):
         note_samples(B, lane, fraction, settings.interval, results.samples[j])
     if not at_stop:
         return segment
@@ -237,6 +303,8 @@ def finish(B, lane, j, segment, batch, settings, results):
     results.turn_counts[j] = int(B[TURNS * LANES + lane])
     for i in range(STATES):
         results.ends[j, i] = B[(X + i) * LANES + lane]
+    for i in range(HELD):
+        results.ends[j, STATES + i] = B[(REF + INPUTS + i) * LANES + lane]
     statistics = results.statistics[j]
     for i in range(5):
         statistics[i] = B[(FORCE_PEAK + i) * LANES + lane]
@@ -262,6 +330,8 @@ def run(queue, batch, settings, results):
             load_run(B, lane, 0, batch, settings)
             idle(B, lane)
     while busy > 0:
+        if HELD > 0:
+            take_samples(B, who, batch, settings, results)
         step(B, settings.rtol, settings.inner, settings.outer, settings.budget)
         for lane in range(LANES):
             j = who[lane]

@@ -19,20 +19,34 @@ from friso.engine.arrays import STATISTICS, Batch, Results, Settings
 from friso.engine.cache import load_or_build, stop_building
 from friso.engine.layout import LANES
 from friso.engine.shared_queue import new_queue
+from friso.equations.as_built import AsBuilt
 from friso.equations.driven import Driven
 from friso.equations.imposed import Imposed
 from friso.equations.structure import Structure
 
+Form = Structure | Imposed | Driven | AsBuilt
+"""What a kernel may be made for: stages, friction under an imposed motion, stages that follow a log, and stages with
+their drive as built."""
+
 
 @dataclass(frozen=True)
 class Kernel:
-    """A generated module with its names: states, parameters and outputs."""
+    """A generated module with its names: states, numbers held between samples, parameters and outputs."""
 
     module: ModuleType
 
     @property
     def states(self) -> tuple[str, ...]:
         return self.module.STATE_NAMES
+
+    @property
+    def held(self) -> tuple[str, ...]:
+        return self.module.HELD_NAMES
+
+    @property
+    def kept(self) -> tuple[str, ...]:
+        """All that a run has at an instant: states, then the numbers held."""
+        return self.states + self.held
 
     @property
     def parameters(self) -> tuple[str, ...]:
@@ -54,19 +68,16 @@ class Kernel:
 
 @dataclass(frozen=True)
 class Wanted:
-    """Which kernel: for stages of this structure, stages that follow a log, or friction under an imposed motion, with
-    their variational equations or without, by the named method, in so many lanes."""
+    """Which kernel: for what, with variational equations or without, by the named method, in so many lanes."""
 
-    structure: Structure | Imposed | Driven
+    structure: Form
     variational: bool = False
     method: str = "Rodas5P"
     lanes: int = LANES
 
 
-def kernel(
-    structure: Structure | Imposed | Driven, variational: bool = False, method: str = "Rodas5P", lanes: int = LANES
-) -> Kernel:
-    """The kernel for stages of this structure, stepping by the named method in so many lanes.
+def kernel(structure: Form, variational: bool = False, method: str = "Rodas5P", lanes: int = LANES) -> Kernel:
+    """The kernel for a form, stepping by the named method in so many lanes.
 
     A variational one carries a small deviation beside every state (`friso.equations.variational`). Threads that ask
     for one kernel at the same time get it from the one that is first.
@@ -97,23 +108,23 @@ def kernels(wanted: Iterable[Wanted]) -> list[Kernel]:
             raise
 
 
-def empty_results(runs: int, capacity: int, samples: int, states: int) -> Results:
-    """Room for the results of so many runs, turning points and samples each."""
+def empty_results(runs: int, capacity: int, samples: int, kept: int) -> Results:
+    """Room for the results of so many runs, with turning points, samples, and numbers kept at each of these."""
     return Results(
         statistics=np.zeros((runs, len(STATISTICS))),
         statuses=np.zeros(runs, np.int64),
         turn_times=np.zeros((runs, capacity)),
         turn_values=np.zeros((runs, capacity)),
         turn_counts=np.zeros(runs, np.int64),
-        samples=np.full((runs, samples, states), np.nan),
-        ends=np.full((runs, states), np.nan),
+        samples=np.full((runs, samples, kept), np.nan),
+        ends=np.full((runs, kept), np.nan),
     )
 
 
 def compile_driver(module: ModuleType) -> None:
     """Compile (or load from Numba's cache) the driver for the types it is called with, and for no others."""
     flat, square = np.zeros(1), np.zeros((1, 1))
-    batch = Batch(square, square, square, square, flat, flat, np.zeros((1, 1, 4)), np.zeros(1, np.int64))
+    batch = Batch(square, square, square, square, flat, flat, np.zeros((1, 1, 4)), np.zeros(1, np.int64), square)
     settings = Settings(1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 1.0, np.zeros(1, np.int64))
     arguments = (new_queue(), batch, settings, empty_results(1, 1, 1, 1))
     module.run.compile(tuple(numba.typeof(argument) for argument in arguments))

@@ -35,6 +35,10 @@ corner of the reference, which was at start; trial, longest, taken: step to try 
 fraction: the part of it that was accepted; event: the lane wants attention; turns: number of turning points kept;
 last_kind: of the last one kept, 1 for a maximum, -1 for a minimum."""
 
+CLOCK = ("period", "tick", "due", "ticked")
+"""Further rows, of use to a model that holds numbers between samples. period: time between them; tick: number of the sample to be taken next; due: when what follows
+from it acts, since the last corner of the reference; ticked: 1 where the last step ended there."""
+
 
 @dataclass(frozen=True)
 class Layout:
@@ -44,7 +48,8 @@ class Layout:
     dense: int
     constants: int
     kinks: int
-    inputs: int
+    given: int
+    seen: int
 
     @property
     def blocks(self) -> dict[str, int]:
@@ -56,8 +61,9 @@ class Layout:
             "tolerance": self.states,
             "constant": self.constants,
             "mode": self.kinks,
-            "reference": self.inputs,
-        } | dict.fromkeys(SCALARS, 1)
+            "reference": self.given,
+            "seen": self.seen,
+        } | dict.fromkeys(SCALARS + CLOCK, 1)
         rows, row = {}, 0
         for name, size in sizes.items():
             rows[name] = row

@@ -12,7 +12,7 @@ from collections.abc import Iterable
 import sympy as sp
 
 from friso.engine import driver
-from friso.engine.layout import LANES, SCALARS
+from friso.engine.layout import CLOCK, LANES, SCALARS
 from friso.engine.printing import Rename, print_numpy
 from friso.engine.step_source import StepWriter
 from friso.engine.tableaus.tableau import Tableau
@@ -31,7 +31,7 @@ from numpy import uint64 as U
 from friso.engine.arrays import Status
 from friso.engine.roots import crossing, cubic, first_guess
 from friso.engine.shared_queue import take_next
-from friso.engine.simd_math import align_stack, exp, power, tanh
+from friso.engine.simd_math import align_stack, exp, gaussian, nearest, power, tanh
 
 OPTIONS = {{"nogil": True, "error_model": "numpy", "fastmath": {{"contract", "nsz", "arcp"}}}}
 DONE, BUDGET = int(Status.DONE), int(Status.BUDGET)
@@ -54,8 +54,9 @@ def _numbers(model: Model, writer: StepWriter, lanes: int) -> str:
     rows = writer.layout.blocks
     named = {"X": "x", "OLD": "old", "END": "end", "D0": "dense", "TOLERANCE": "tolerance", "MODE": "mode"}
     named |= {"CONSTANT": "constant", "REF": "reference", "ROWS": "rows"}
-    named |= {name.upper(): name for name in SCALARS}
+    named |= {"SEEN": "seen"} | {name.upper(): name for name in (*SCALARS, *CLOCK)}
     states = [str(symbol) for symbol in model.symbols]
+    given = [str(symbol) for symbol in model.given]
     lines = [
         f"LANES = {lanes}",
         f"STATE_NAMES = {tuple(states)!r}",
@@ -63,22 +64,39 @@ def _numbers(model: Model, writer: StepWriter, lanes: int) -> str:
         f"KINK_NAMES = {tuple(kink.name for kink in model.kinks)!r}",
         f"OUTPUTS = { {name: (each.unit, each.label) for name, each in model.outputs.items()}!r}",
         f"STATES, KINKS, CONSTANTS = {len(states)}, {len(model.kinks)}, {writer.layout.constants}",
-        f"INPUTS = {len(model.inputs)}",
+        f"GIVEN_NAMES = {tuple(given)!r}",
+        f"HELD_NAMES = {tuple(str(each.symbol) for each in model.held)!r}",
+        f"INPUTS, HELD, CLOCKED = {len(model.inputs)}, {len(model.held)}, {model.clock is not None}",
+        *_clock_numbers(model),
         f"DENSE, POSITION, VELOCITY = {writer.layout.dense}, {states.index('position')}, {states.index('velocity')}",
     ]
     return "\n".join(lines + [f"{name} = {rows[block]}" for name, block in named.items()])
+
+
+def _clock_numbers(model: Model) -> list[str]:
+    """Which states a drive with a clock measures and looks up over, and where it puts what it finds."""
+    clock, states, given = model.clock, list(model.symbols), list(model.given)
+    seen = tuple(states.index(x) for x in clock.seen.values()) if clock else ()
+    over = tuple(states.index(x) for x in clock.places.values()) if clock else ()
+    tables = (len(over), len(clock.times), given.index(clock.tabled[0])) if clock else (0, 0, 0)
+    arrays = {"SEEN_STATES": seen, "PLACE_STATES": over}
+    return [
+        *(f"{name} = np.array({values!r}, dtype=np.int64)" for name, values in arrays.items()),
+        f"PLACES, TIMES, TABLED = {tables!r}",
+    ]
 
 
 def _numpy_functions(model: Model, writer: StepWriter) -> str:
     names: dict[sp.Symbol, str] = {p: f"p[{i}]" for i, p in enumerate(model.parameters)}
     names |= {s: f"x[{i}]" for i, s in enumerate(model.symbols)}
     names |= {kink.beyond: f"m[{k}]" for k, kink in enumerate(model.kinks)}
-    names |= {r: f"r[{i}]" for i, r in enumerate(model.inputs)} | {TIME: "t"}
+    names |= {r: f"r[{i}]" for i, r in enumerate(model.given)} | {TIME: "t"}
     rename: Rename = names.__getitem__
     functions = {
         "constants(p)": writer.constants.expressions,
         "scales(p)": [each.scale for each in model.states],
         "rate(p)": [model.rate],
+        "clock(p)": [model.clock.period, model.clock.late] if model.clock else [],
         "breakaway(p)": [model.breakaway],
         "stiffness(p)": [model.stiffness],
         "surfaces(x, t, r, p)": [kink.surface for kink in model.kinks],

@@ -47,6 +47,12 @@ class _KernelPrinter(PythonCodePrinter):
     def _print_tanh(self, expr: sp.tanh) -> str:
         return f"tanh({self._print(expr.args[0])})"
 
+    def _print_gaussian(self, expr: sp.Expr) -> str:
+        return f"gaussian({', '.join(self._print(each) for each in expr.args)})"
+
+    def _print_nearest(self, expr: sp.Expr) -> str:
+        return f"nearest({self._print(expr.args[0])})"
+
     def _print_reciprocal(self, expr: sp.Expr) -> str:
         return f"(1.0 / ({self._print(expr.args[0])}))"
 

@@ -16,7 +16,7 @@ from friso.engine.elimination import eliminate
 from friso.engine.layout import SCALARS, Layout
 from friso.engine.printing import Constants, Rename, print_scalar, reciprocals
 from friso.engine.tableaus.tableau import Tableau
-from friso.equations.component import TIME
+from friso.equations.component import TICK, TIME
 from friso.equations.model import Model
 
 THIRDS = (1 / 3, 2 / 3)
@@ -81,8 +81,8 @@ class StepWriter:
         names = [str(symbol) for symbol in model.symbols]
         self._position, self._velocity = names.index("position"), names.index("velocity")
         self._fixed = {kink.beyond: f"mode{k}" for k, kink in enumerate(model.kinks)}
-        self._inputs = [f"given{i}" for i in range(len(model.inputs))]
-        self._fixed |= dict(zip(model.inputs, self._inputs, strict=True))
+        self._given = [f"given{i}" for i in range(len(model.given))]
+        self._fixed |= dict(zip(model.given, self._given, strict=True))
         self._jacobian = self._nonzero_jacobian()
         self._drift = {i: d for i, f in enumerate(model.rhs) if (d := sp.diff(f, TIME)) != 0}
         force = model.outputs["force"].expression if "force" in model.outputs else sp.S.Zero
@@ -107,9 +107,11 @@ class StepWriter:
         ]
         free: set[Any] = set().union(*(sp.sympify(e).free_symbols for e in watched.values()))
         self._watched_states = sorted(self._index[s] for s in free & set(self._index))
-        at_corner = {f"new{self._index[x]}_": e.subs(TIME, 0) for x, e in model.updates.items()}
-        self._updates = Block(at_corner, self.constants)
-        self.layout = Layout(self.size, len(tableau.dense), len(self.constants.index), self.kinks, len(self._inputs))
+        self._updates = Block({f"held{i}_": each.update for i, each in enumerate(model.held)}, self.constants)
+        clock = {"period_": model.clock.period, "late_": model.clock.late} if model.clock else {}
+        self._clock = Block(clock, self.constants)
+        sizes_of = (self.size, len(tableau.dense), len(self.constants.index), self.kinks, len(self._given))
+        self.layout = Layout(*sizes_of, len(model.clock.seen) if model.clock else 0)
 
     def _size(self, surface: sp.Expr) -> sp.Expr:
         """Magnitude of a surface that corresponds to the scales of the states."""
@@ -150,20 +152,37 @@ class StepWriter:
             *self._crossings(),
             *self._accept(),
             *self._statistics(),
+            *self._seen(),
             *self._store(),
         ]
         head = "def step(B, rtol, inner, outer, budget):\n    align_stack()\n    for l in range(U(LANES)):\n"
         return head + "".join(f"        {line}\n" for line in body)
 
     def update_source(self) -> str:
-        """The function `update(B, lane)`: what states that are held between corners become at one."""
-        block, rows = self._updates, self.layout.blocks
+        """The function `update(B)`: the numbers that are held become what follows from the sample just taken, in the
+        lanes that have `ticked`; and when they will next."""
+        rows, clock = self.layout.blocks, self.model.clock
         places = {x: rows["x"] + i for x, i in self._index.items()}
-        places |= {x: rows["reference"] + i for i, x in enumerate(self.model.inputs)}
+        places |= {x: rows["reference"] + i for i, x in enumerate(self.model.given)}
         places |= {c: rows["constant"] + i for c, i in self.constants.index.items()}
-        lines = block.code("", lambda symbol: f"B[{places[symbol]} * LANES + lane]")
-        lines += [f"B[{places[x]} * LANES + lane] = new{self._index[x]}_" for x in self.model.updates]
-        return "def update(B, lane):\n" + "".join(f"    {line}\n" for line in lines or ["pass"])
+        places |= {x: rows["seen"] + i for i, x in enumerate(clock.seen if clock else ())} | {TICK: rows["tick"]}
+
+        def name(symbol: sp.Symbol) -> str:
+            return "instant" if symbol == TIME else f"B[l + U({places[symbol]} * LANES)]"
+
+        lines = [f"ticked, tick = {self._row('ticked')}, {self._row('tick')}", "instant = 0.0"]
+        if clock:
+            lines += [*self._clock.code("", name), f"instant = tick * period_ - {self._row('start')}"]
+        lines += self._updates.code("", name)
+        for i, each in enumerate(self.model.held):
+            row = f"B[l + U({places[each.symbol]} * LANES)]"
+            lines.append(f"{row} = held{i}_ if ticked > 0.0 else {row}")
+        lines.append(f"{self._row('tick')} = tick + ticked")
+        if clock:
+            due = self._row("due")
+            lines.append(f"{due} = ((tick + 1.0) * period_ + late_) - {self._row('start')} if ticked > 0.0 else {due}")
+        head = "def update(B):\n    align_stack()\n    for l in range(U(LANES)):\n"
+        return head + "".join(f"        {line}\n" for line in lines)
 
     def _row(self, block: str, i: int = 0) -> str:
         return f"B[l + U({self.layout.blocks[block] + i} * LANES)]"
@@ -174,21 +193,31 @@ class StepWriter:
             "tolerance": [f"tol{i}" for i in range(self.size)],
             "constant": [str(c) for c in self.constants.index],
             "mode": [f"mode{k}" for k in range(self.kinks)],
-            "reference": self._inputs,
+            "reference": self._given,
+            "seen": [f"seen{i}" for i in range(self.layout.seen)],
         }
         lines = [f"{name} = {self._row(b, i)}" for b, names in named.items() for i, name in enumerate(names)]
-        return lines + [f"{'t' if name == 'time' else name} = {self._row(name)}" for name in SCALARS]
+        return lines + [f"{'t' if name == 'time' else name} = {self._row(name)}" for name in (*SCALARS, "due")]
 
     def _choose_step(self) -> list[str]:
-        """The next step, at most to the corner of the reference; the last two before it are made equal."""
+        """The next step, at most to the corner of the reference, or to what follows from the next sample; the last two
+        before it are made equal."""
         return [
-            "rest = stop - t",
+            *self._edge(),
+            "rest = edge - t",
             "wanted = min(trial, longest)",
             "last = wanted >= rest * 0.999999999",
             "half = 0.5 * rest",
             "h = rest if last else (half if wanted > half else wanted)",
             "per_h = 1.0 / h",
         ]
+
+    def _edge(self) -> list[str]:
+        """Where the step ends at the latest; a corner and what follows from a sample fall together within rounding."""
+        if not self.model.clock:
+            return ["edge = stop"]
+        lines = [*self._clock.code("", self._rename("x", "t")), "together = abs(stop - due) < 1e-6 * period_"]
+        return [*lines, "edge = stop if together else min(stop, due)"]
 
     def _stages(self) -> list[str]:
         method = self.tableau
@@ -301,8 +330,8 @@ class StepWriter:
                 f"flip{k} = astray{k} | (good & cut & beyond{k})",
             ]
         lines += [
-            "arrived = good & last & (not cut)",
-            "t_n = stop if arrived else (t + fraction * h if good else t)",
+            "arrived = good & last & ((not cut) | (h * (1.0 - fraction) < 1e-9 * h))",
+            "t_n = edge if arrived else (t + fraction * h if good else t)",
             *self._jump(),
         ]
         lines += [f"mode{k} = 1.0 - mode{k} if flip{k} else mode{k}" for k in range(self.kinks)]
@@ -355,12 +384,29 @@ class StepWriter:
             "attempted = attempted + 1.0",
             "rejected_last = 0.0 if good else 1.0",
             "rejected = rejected + rejected_last",
-            "happened = good & (entered | turned | (t_n >= stop) | (now >= next_sample))",
+            "happened = good & ("
+            + ("" if self.model.clock else "entered | turned | (now >= next_sample) | ")
+            + "(t_n >= stop))",
             "failed = (attempted >= budget) | ((not good) & (not (trial >= 1e-15)))",
             f"diverged = abs(deviation_n) * rtol > {DIVERGED!r} * tol{self._position}",
             "event = 2.0 if diverged else (1.0 if happened | failed else 0.0)",
             "fraction = fraction if good else 0.0",
         ]
+
+    def _seen(self) -> list[str]:
+        """What the drive measures at the instant of its sample, which may lie inside the step."""
+        clock = self.model.clock
+        if not clock:
+            return []
+        lines = [
+            "ticked = 1.0 if good & ((t_n >= due) | (together & arrived)) else 0.0",
+            "part = ((due - late_) - t) * per_h",
+            "inside = good & (part >= -1e-9) & ((part <= fraction + 1e-9) | (ticked > 0.0))",
+        ]
+        for i, x in enumerate(clock.seen.values()):
+            lines.append(f"seen{i} = {self._between(self._index[x], 'part')} if inside else seen{i}")
+        stored = [f"{self._row('seen', i)} = seen{i}" for i in range(self.layout.seen)]
+        return [*lines, *stored, f"{self._row('ticked')} = ticked"]
 
     def _store(self) -> list[str]:
         lines = [f"{self._row('old', i)} = x{i}" for i in range(self.size)]

@@ -39,6 +39,51 @@ class State:
 
 
 @dataclass(frozen=True)
+class Held:
+    """A number that is held between samples, and what it becomes at one, in terms of what held just before."""
+
+    symbol: sp.Symbol
+    update: sp.Expr
+
+
+TICK = sp.Symbol("tick", real=True)
+"""Number of the sample that a clock takes, from 0."""
+
+
+@dataclass(frozen=True)
+class Clock:
+    """When a drive samples: every `period` [s]. What it computes at a sample acts a time `late` [s] after it, less than
+    a period; then the numbers that are held change.
+
+    `seen` are the states that are measured at the sample itself, under names of their own. `places` are looked up in
+    tables over the position that a state tells, `times` in tables over the time of the sample; they are held too.
+    """
+
+    period: sp.Expr
+    late: sp.Expr
+    seen: Mapping[sp.Symbol, sp.Symbol]
+    places: Mapping[sp.Symbol, sp.Symbol]
+    times: tuple[sp.Symbol, ...]
+
+    @property
+    def tabled(self) -> tuple[sp.Symbol, ...]:
+        """All that is looked up."""
+        return (*self.places, *self.times)
+
+
+class gaussian(sp.Function):
+    """A normal deviate for a seed and the number of a sample, the same wherever it is asked for (`friso.engine`)."""
+
+    nargs = 2
+
+
+class nearest(sp.Function):
+    """The whole number nearest to a number (`friso.engine`)."""
+
+    nargs = 1
+
+
+@dataclass(frozen=True)
 class Kink:
     """A surface in state space on which a derivative of the right-hand side jumps.
 

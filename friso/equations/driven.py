@@ -8,7 +8,9 @@ from typing import TYPE_CHECKING
 from friso.equations.structure import Structure
 
 if TYPE_CHECKING:
-    from friso.equations.model import Model
+    import sympy as sp
+
+    from friso.equations.model import Control, Model
 
 
 @dataclass(frozen=True)
@@ -29,5 +31,22 @@ def driven(form: Driven) -> Model:
     from friso.equations.model import REFERENCE, assemble
 
     force, rate = key("external.force"), key("external.rate")
-    model = assemble(form.structure, force + rate * TIME, form.velocity_samples)
+    model = assemble(form.structure, force + rate * TIME, _sampled(form) if form.velocity_samples else None)
     return replace(model, inputs=(*REFERENCE, force, rate))
+
+
+def _sampled(form: Driven) -> Control:
+    """The controller as a drive carries it out, whose samples are the corners of the reference."""
+    from friso.equations.component import TIME, Component, Held, Output, state
+    from friso.equations.pid import Controller, Loop
+    from friso.equations.sampled import sampled_controller
+
+    def control(loop: Loop, length: sp.Expr, rate: sp.Expr) -> Controller:
+        assert form.structure.controller is not None
+        now = state("held_force")
+        at_corner = Loop(loop.error.subs(TIME, 0), loop.position, loop.velocity, loop.reference_velocity.subs(TIME, 0))
+        force, held = sampled_controller(form.structure.controller, at_corner, form.velocity_samples)
+        component = Component(outputs={"force": Output(now, "N", "actuator force")})
+        return Controller(now, component, (*held, Held(now, force)))
+
+    return control

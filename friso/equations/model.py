@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 import sympy as sp
 
-from friso.equations.component import TIME, Component, Kink, Output, State, key
+from friso.equations.component import TICK, TIME, Clock, Component, Held, Kink, Output, State, key
 from friso.equations.friction.common import Friction
 from friso.equations.joint import joint
 from friso.equations.masses import Body, parasitic_force, position_outputs
 from friso.equations.pid import Controller, Loop, controller, loop_stiffness
-from friso.equations.sampled import sampled_controller
-from friso.equations.structure import ControllerForm, Structure
+from friso.equations.structure import Structure
 from friso.stage.tables import friction_law
 
 REFERENCE = tuple(key(f"reference.{name}") for name in ("position", "velocity", "acceleration"))
@@ -38,8 +37,8 @@ class Model:
     and `stiffness` [N/m] the proportional one of the loop. `jumps` tells by how much states jump where a
     kink is crossed, in terms of what holds just before: kinks to states to expressions.
 
-    `inputs` are what a run is given anew at every corner of the reference, in this order; `updates` tells what states
-    that are held between corners become at each, in terms of what holds just before.
+    `inputs` are what a run is given anew at every corner of the reference, in this order. Between corners, or between
+    the samples of a `clock` where there is one, the numbers `held` stay as they are.
     """
 
     states: tuple[State, ...]
@@ -53,7 +52,8 @@ class Model:
     stiffness: sp.Expr
     jumps: Mapping[Kink, Mapping[sp.Symbol, sp.Expr]] = field(default_factory=dict)
     inputs: tuple[sp.Symbol, ...] = REFERENCE
-    updates: Mapping[sp.Symbol, sp.Expr] = field(default_factory=dict)
+    held: tuple[Held, ...] = ()
+    clock: Clock | None = None
 
     @property
     def symbols(self) -> tuple[sp.Symbol, ...]:
@@ -64,19 +64,31 @@ class Model:
         return tuple(each.derivative for each in self.states)
 
     @property
+    def given(self) -> tuple[sp.Symbol, ...]:
+        """What the right-hand side finds as it is during a step: inputs, numbers held, and what is looked up."""
+        return (*self.inputs, *(each.symbol for each in self.held), *(self.clock.tabled if self.clock else ()))
+
+    @property
     def parameters(self) -> tuple[sp.Symbol, ...]:
         """The stage-file keys (and the length of the motion) that the equations contain, sorted by name."""
         expressions = [*self.rhs, *(k.surface for k in self.kinks), *(o.expression for o in self.outputs.values())]
-        expressions += [*(each.scale for each in self.states), *self.updates.values()]
-        others = {*self.symbols, *(k.beyond for k in self.kinks), *self.inputs, TIME}
+        expressions += [*(each.scale for each in self.states), *(each.update for each in self.held)]
+        others = {*self.symbols, *(k.beyond for k in self.kinks), *self.given, TIME, TICK}
+        if self.clock:
+            expressions += [self.clock.period, self.clock.late]
+            others |= {*self.clock.seen}
         free: set[Any] = set().union(*(e.free_symbols for e in expressions)) - others
         return tuple(sorted(free, key=str))
 
 
-def assemble(structure: Structure, external: sp.Expr = sp.S.Zero, velocity_samples: int = 0) -> Model:
+Control = Callable[[Loop, sp.Expr, sp.Expr], Controller]
+"""Makes a controller from what it sees, and the scales of its states: a length [m] and a rate [1/s]."""
+
+
+def assemble(structure: Structure, external: sp.Expr = sp.S.Zero, control: Control | None = None) -> Model:
     """The equations of every stage with this structure, on which an `external` force [N] acts besides the actuator's.
 
-    With `velocity_samples`, the controller is that of a sampled drive, which takes the velocity over so many samples.
+    Instead of the structure's controller in continuous time there may be another one.
     """
     cart, stage, parasitic = _bodies(structure)
     friction = friction_law(structure.friction).declare(cart.velocity, structure.friction_variant)
@@ -86,11 +98,12 @@ def assemble(structure: Structure, external: sp.Expr = sp.S.Zero, velocity_sampl
     moving = cart.mass + (stage.mass if stage is not cart else 0) + (parasitic.mass if parasitic else 0)
     length, rate = _scales(structure, friction, moving)
     loop = Loop(reference - stage.position, stage.position, stage.velocity, reference_velocity)
-    control = _control(structure.controller, loop, velocity_samples, (length, rate))
-    forces = (control.force if control else sp.S.Zero) + external
+    form = structure.controller
+    acting = control(loop, length, rate) if control else controller(form, loop, length, rate) if form else None
+    forces = (acting.force if acting else sp.S.Zero) + external
     bodies, parts = _mechanics(structure, (cart, stage, parasitic), friction, forces, (length, rate))
-    if control:
-        parts.append(control.component)
+    if acting:
+        parts.append(acting.component)
     outputs = {
         "reference": Output(reference, "m", "reference"),
         "error": Output(loop.error, "m", "error"),
@@ -107,18 +120,8 @@ def assemble(structure: Structure, external: sp.Expr = sp.S.Zero, velocity_sampl
         rate=rate,
         breakaway=friction.breakaway if friction else sp.S.Zero,
         stiffness=loop_stiffness(structure.controller),
-        updates=control.updates if control else {},
+        held=acting.held if acting else (),
     )
-
-
-def _control(
-    form: ControllerForm | None, loop: Loop, velocity_samples: int, scales: tuple[sp.Expr, sp.Expr]
-) -> Controller | None:
-    if form is None:
-        return None
-    if velocity_samples:
-        return sampled_controller(form, loop, velocity_samples, scales[0])
-    return controller(form, loop, *scales)
 
 
 def _bodies(structure: Structure) -> tuple[Body, Body, Body | None]:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import sympy as sp
 
-from friso.equations.component import Component, Kink, Output, State, key, state
+from friso.equations.component import Component, Held, Kink, Output, State, key, state
 from friso.equations.structure import ControllerForm
 
 UNWINDING_BAND = sp.Rational(1, 1000)
@@ -30,11 +30,11 @@ class Loop:
 
 @dataclass(frozen=True)
 class Controller:
-    """Actuator force [N], its component, and what its states that are held between samples become at one."""
+    """Actuator force [N], its component, and the numbers that it holds between samples."""
 
     force: sp.Expr
     component: Component
-    updates: Mapping[sp.Symbol, sp.Expr] = field(default_factory=dict)
+    held: tuple[Held, ...] = ()
 
 
 def controller(form: ControllerForm, loop: Loop, length: sp.Expr, rate: sp.Expr) -> Controller:

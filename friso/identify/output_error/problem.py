@@ -14,7 +14,6 @@ from friso.engine.driven import Followed, Inputs, follow
 from friso.engine.kernel import Kernel, kernel
 from friso.equations.driven import Driven
 from friso.equations.pid import van_dijk_numbers
-from friso.equations.sampled import is_known
 from friso.equations.structure import ControllerForm, structure
 from friso.identify.inverse_model import SMOOTH, motion
 from friso.identify.logs.log import Log
@@ -115,7 +114,7 @@ class Problem:
 
     def _starts(self, flat: Mapping[str, Any], runs: int) -> np.ndarray:
         """Where the log begins and as fast, the bristles bent as far as the first force bends them."""
-        states = self.kernel.states
+        states = self.kernel.kept
         starts = np.zeros((runs, len(states)))
         position, velocity = self.start
         for i, name in enumerate(states):
@@ -123,8 +122,9 @@ class Problem:
                 starts[:, i] = position
             elif name.endswith("velocity"):
                 starts[:, i] = velocity
-            elif name == "filtered_error":
-                starts[:, i] = float(self.inputs.reference[0]) - position
+            elif name in ("filtered_error", "signal_before", "low_passed"):
+                on_error = flat.get("controller.derivative_on", "error") == "error"
+                starts[:, i] = (float(self.inputs.reference[0]) if on_error else 0.0) - position
             elif name.startswith("position_before"):
                 starts[:, i] = position - velocity * self.inputs.sample_time * int(name.rsplit("_", 1)[1])
         if "bristle_deflection" in states:
@@ -150,8 +150,8 @@ class Problem:
     def _record(self, flat: Mapping[str, Any], runs: Followed) -> Simulated:
         names = self.kernel.states
         position, velocity = (runs.states[:, :, names.index(name)] for name in ("position", "velocity"))
-        held = "held_force" in names
-        force = runs.held[:, :, names.index("held_force")] if held else self._force(flat, runs)
+        held = self.kernel.held
+        force = runs.held[:, :, held.index("held_force")] if held else self._force(flat, runs)
         failed = runs.statuses != Status.DONE
         return Simulated(*(np.where(failed[:, None], np.nan, each) for each in (position, velocity, force)))
 
@@ -190,9 +190,7 @@ def why_continuous(flat: Mapping[str, Any], sample_time: float) -> str:
     where it is not, or where the drive does not tell its sample time. `sample_time` [s] is the log's."""
     if "drive.sample_time" not in flat:
         return ""
-    form, step = structure(flat).controller, flat["drive.sample_time"]
-    if form is None or not is_known(form):
-        return f"{CONTINUOUS}: its discrete form is known for gains without a filter alone"
+    step = flat["drive.sample_time"]
     if abs(step / sample_time - 1) >= SAME:
         return f"{CONTINUOUS}: the drive samples each {step:g} s, the log {sample_time:g} s"
     return ""

@@ -1,0 +1,149 @@
+"""The drive as built: it samples, waits, quantises, saturates; its motor, its cable, its rail and its floor are real."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from friso.equations.structure import Structure, structure
+
+if TYPE_CHECKING:
+    import sympy as sp
+
+    from friso.equations.model import Control, Model
+
+STATIC_FACTOR, COULOMB_FACTOR, MOTOR_FACTOR = PLACES = ("static_factor", "coulomb_factor", "motor_factor")
+"""What is looked up over position, at every sample: factors of static and Coulomb friction over the cart's, and of the
+motor constant over the stage's."""
+
+INJECTED, FLOOR = TIMES = ("injected_force", "floor_acceleration")
+"""What is looked up over time: a force [N] added to the command, and the acceleration [m/s^2] of the floor."""
+
+
+@dataclass(frozen=True)
+class AsBuilt:
+    """The stage's structure; whole samples of delay; whether the current loop lags; and over how many samples a drive
+    without a filter takes the velocity."""
+
+    structure: Structure
+    delay_samples: int
+    current_loop: bool
+    velocity_samples: int
+
+    @classmethod
+    def of(cls, flat: Mapping[str, Any]) -> AsBuilt:
+        """The form of a stage's drive, given as flat keys."""
+        lags = "drive.current_bandwidth" in flat
+        samples = round(flat.get("drive.velocity_samples", 1.0))
+        return cls(structure(flat), whole_samples(flat), lags, samples)
+
+
+def whole_samples(flat: Mapping[str, Any]) -> int:
+    """The delay of a drive in whole samples, what is left of it being `drive.late`."""
+    return int(flat.get("drive.delay", 0.0) / flat["drive.sample_time"] * (1 + 1e-9) + 1e-9)
+
+
+NEUTRAL: Mapping[str, float] = {
+    "drive.delay": 0.0,
+    "drive.encoder_resolution": 0.0,
+    "drive.encoder_noise": 0.0,
+    "drive.motor_constant_ratio": 1.0,
+    "drive.feedforward_mass": 0.0,
+    "drive.feedforward_coulomb": 0.0,
+    "drive.feedforward_viscous": 0.0,
+    "drive.integrator_deadband": 0.0,
+    "drive.integrator_reset": 0.0,
+    "cable.stiffness": 0.0,
+    "cable.drag": 0.0,
+}
+"""A drive without any of its imperfections."""
+
+
+def as_built(form: AsBuilt) -> Model:
+    """The equations of the stage with its drive.
+
+    Over a sample the factors of friction, the ripple of the motor and the acceleration of the floor are held.
+    """
+    from dataclasses import replace
+
+    from friso.equations.component import Clock, key, state
+    from friso.equations.model import assemble
+    from friso.equations.sampled import SAMPLE_TIME
+
+    position, velocity = state("position"), state("velocity")
+    cable = -key("cable.stiffness") * position - key("cable.drag") * velocity
+    model = assemble(form.structure, cable, _drive(form))
+    cart = state("position" if form.structure.joint == "rigid" else "cart_position")
+    places = dict(zip(map(state, PLACES), (cart, cart, position), strict=True))
+    clock = Clock(SAMPLE_TIME, key("drive.late"), {state("seen"): position}, places, tuple(map(state, TIMES)))
+    varied = {key(f"friction.{name}"): key(f"friction.{name}") * state(f"{name}_factor") for name in _LEVELS}
+    states = tuple(replace(each, derivative=_shaken(each).xreplace(varied)) for each in model.states)
+    outputs = {n: replace(each, expression=each.expression.xreplace(varied)) for n, each in model.outputs.items()}
+    return replace(model, states=states, outputs=outputs, clock=clock)
+
+
+_LEVELS = ("static", "coulomb")
+
+
+def _shaken(each: Any) -> sp.Expr:
+    """The derivative of a state in a frame that moves with the floor."""
+    from friso.equations.component import state
+
+    return each.derivative - (state(FLOOR) if str(each.symbol).endswith("velocity") else 0)
+
+
+def _drive(form: AsBuilt) -> Control:
+    """Everything between the encoder and the motor's force."""
+    from friso.equations.component import Component, Held, Output, State, key, state
+    from friso.equations.pid import Controller, Loop
+
+    def control(loop: Loop, length: sp.Expr, rate: sp.Expr) -> Controller:
+        reading, command, kept = _command(form, loop)
+        commanded, waiting = state("commanded"), [state(f"waiting_{n + 1}") for n in range(form.delay_samples)]
+        held = [Held(state("reading"), reading), *kept, Held(commanded, command)]
+        held += [Held(new, old) for new, old in zip(waiting, [command, *waiting], strict=False)]
+        acting = waiting[-1] if waiting else commanded
+        force = key("drive.motor_constant_ratio") * state(MOTOR_FACTOR) * acting
+        states: tuple[State, ...] = ()
+        if form.current_loop:
+            lagging, omega = state("motor_force"), key("drive.current_bandwidth") * 2 * _pi()
+            states = (State(lagging, omega * (force - lagging), "N", scale=key("friction.static")),)
+            force = lagging
+        return Controller(force, Component(states, (), {"force": Output(force, "N", "motor force")}), tuple(held))
+
+    return control
+
+
+def _pi() -> Any:
+    from sympy import pi
+
+    return pi
+
+
+def _command(form: AsBuilt, loop: Any) -> tuple[sp.Expr, sp.Expr, tuple[Any, ...]]:
+    """What the encoder reads [m], what the controller commands [N], and what it keeps for the next sample."""
+    import sympy as sp
+
+    from friso.equations.component import TICK, Held, gaussian, key, nearest, state
+    from friso.equations.model import REFERENCE
+    from friso.equations.pid import Loop
+    from friso.equations.sampled import Rest, sampled_controller
+
+    assert form.structure.controller is not None
+    drive = {name.split(".")[1]: key(name) for name in NEUTRAL}
+    noisy = state("seen") + drive["encoder_noise"] * gaussian(key("drive.seed"), TICK)
+    digit = drive["encoder_resolution"]
+    reading = sp.Piecewise((digit * nearest(noisy / digit), digit > 0), (noisy, True))
+    error = loop.error.xreplace({state("position"): reading})
+    acceleration, speed, before = REFERENCE[2], loop.reference_velocity, state("error_before")
+    ahead = drive["feedforward_mass"] * acceleration + drive["feedforward_viscous"] * speed
+    ahead += drive["feedforward_coulomb"] * sp.Piecewise((1, speed > 0), (-1, speed < 0), (0, True))
+    rest = Rest(
+        rests=sp.Abs(error) < drive["integrator_deadband"],
+        restarts=sp.And(drive["integrator_reset"] > 0, error * before < 0),
+    )
+    known = Loop(error, reading, loop.velocity, speed)
+    extra = ahead + state(INJECTED)
+    command, held = sampled_controller(form.structure.controller, known, form.velocity_samples, extra, rest)
+    return reading, command, (*held, Held(before, error))
