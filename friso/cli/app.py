@@ -23,6 +23,7 @@ from friso.cli.identify import identify
 from friso.cli.init import init
 from friso.cli.map import map_cells
 from friso.cli.reproduce import reproduce
+from friso.cli.rig import rig
 from friso.cli.simulate import simulate
 from friso.quantities import StageError
 from friso.version import VERSION
@@ -44,6 +45,7 @@ for name, command in (
     ("flexure", flexure),
     ("design", design),
     ("identify", identify),
+    ("rig", rig),
     ("reproduce", reproduce),
     ("guideline", guideline),
 ):

@@ -1,4 +1,4 @@
-"""The drive as built: it samples, waits, quantises, saturates; its motor, its cable, its rail and its floor are real."""
+"""The drive as built: it samples, waits, quantises and saturates; motor, cable, rail and floor are real."""
 
 from __future__ import annotations
 

@@ -7,6 +7,7 @@ controller without a filter takes its velocity as a difference of positions and 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import sympy as sp
 
@@ -21,8 +22,8 @@ SAMPLE_TIME = key("drive.sample_time")
 class Rest:
     """When the integrator rests for a sample, and when it begins anew, besides at the limit of the force."""
 
-    rests: sp.Basic = sp.false
-    restarts: sp.Basic = sp.false
+    rests: Any = sp.false
+    restarts: Any = sp.false
 
 
 def sampled_controller(

@@ -9,13 +9,14 @@ from pydantic import field_validator, model_validator
 from friso.intervals import Interval
 from friso.quantities import Number, Quantity, StageError, as_toml, quoted
 from friso.stage.flexure import Flexure, derived, with_material
+from friso.stage.rig import Cable, Drive, Floor, Rail, Values
 from friso.stage.section import Rule, Section, Table, UncertainSection, numeric_fields, unknown_key
 from friso.stage.tables import (
     FRICTION,
     MOTION,
+    ROUNDING,
     Bias,
     Controller,
-    Drive,
     FrictionSection,
     GainsController,
     Joint,
@@ -33,6 +34,9 @@ _PARASITIC = Table(lambda _: Parasitic, '[parasitic] frequency = "300 Hz" ...')
 _BIAS = Table(lambda _: Bias, '[bias] cart = "0.2 N"')
 _CONTROLLER = Table(controller_form, '[controller] kind = "pid", crossover = "8 Hz", alpha = 0.1, beta = 2')
 _DRIVE = Table(lambda _: Drive, '[drive] sample_time = "50 us"')
+_RAIL = Table(lambda _: Rail, '[rail] seed = 1, static_deviation = 0.2, correlation_length = "5 mm" ...')
+_CABLE = Table(lambda _: Cable, '[cable] stiffness = "50 N/m"')
+_FLOOR = Table(lambda _: Floor, '[floor] frequency = ["1 Hz", "100 Hz"] ...')
 _MOTION = Table(MOTION.pick, '[motion] kind = "step", size = "1 mm", duration = "20 s"')
 
 
@@ -49,6 +53,9 @@ class Stage(Section):
     bias: Annotated[Bias | None, _BIAS] = None
     controller: Annotated[Controller, _CONTROLLER]
     drive: Annotated[Drive | None, _DRIVE] = None
+    rail: Annotated[Rail | None, _RAIL] = None
+    cable: Annotated[Cable | None, _CABLE] = None
+    floor: Annotated[Floor | None, _FLOOR] = None
     motion: Annotated[Motion, _MOTION]
 
     rules: ClassVar[tuple[Rule, ...]] = (
@@ -63,9 +70,9 @@ class Stage(Section):
             lambda f: (
                 "drive.sample_time" not in f
                 or "controller.crossover" not in f
-                or f["controller.crossover"] * f["drive.sample_time"] < 1 / 2
+                or f["controller.crossover"] * f["drive.sample_time"] <= 1 / 10 * (1 + ROUNDING)
             ),
-            "a crossover below half the sampling frequency",
+            "a sample time of at most a tenth of the crossover's period",
             '[drive] sample_time = "50 us" (20 kHz) with crossover = "8 Hz"',
         ),
     )
@@ -118,7 +125,8 @@ class Stage(Section):
         return {key: item.given() if isinstance(item, Section) else item for key, item in given.items()}
 
     def flat(self, swept: Mapping[str, Any] | None = None) -> dict[str, Any]:
-        """Dotted keys to SI floats, texts and booleans; defaults filled in, absent optional keys absent.
+        """Dotted keys to SI floats, texts and booleans; defaults filled in, absent optional keys absent, and so are
+        the arrays of [floor].
 
         `swept`, dotted keys to SI numbers or arrays, is laid over the stage before the defaults that follow
         other keys are filled in: tuned_mass follows a swept mass. Raises StageError for an unknown key.
@@ -126,7 +134,7 @@ class Stage(Section):
         flat: dict[str, Any] = {"friction.model": "none"}
         for table, section in self:
             if isinstance(section, Section):
-                given = {key: value for key, value in section if value is not None}
+                given = {key: value for key, value in section if not isinstance(value, Values | None)}
                 flat |= {f"{table}.{key}": _plain(value) for key, value in given.items()}
         known = numeric_keys(flat)
         if self.flexure:
@@ -173,7 +181,7 @@ class Stage(Section):
         lines = [f"{key} = {as_toml(text)}" for key, text in given.items() if isinstance(text, str)]
         for name, table in given.items():
             if isinstance(table, dict):
-                lines += ["", f"[{name}]", *(f"{key} = {as_toml(value)}" for key, value in table.items())]
+                lines += ["", f"[{name}]", *(f"{key} = {_toml(value)}" for key, value in table.items())]
         return "\n".join(lines).lstrip() + "\n"
 
 
@@ -211,11 +219,18 @@ def _tables(flat: Mapping[str, Any]) -> dict[str, type[Section]]:
         "parasitic": Parasitic,
         "bias": Bias,
         "drive": Drive,
+        "rail": Rail,
+        "cable": Cable,
         "controller": TunedController if "controller.crossover" in flat else GainsController,
         "motion": MOTION.classes[flat["motion.kind"]],
     }
     present = {key.split(".")[0] for key in flat}
     return {name: cls for name, cls in classes.items() if name in present}
+
+
+def _toml(value: Any) -> str:
+    """How a key's value, a scalar or a list of them, is written in TOML."""
+    return f"[{', '.join(map(as_toml, value))}]" if isinstance(value, list) else as_toml(value)
 
 
 def _plain(value: Any) -> Any:

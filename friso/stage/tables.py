@@ -156,24 +156,6 @@ ROUNDING = 1e-12
 """Relative slack of the limits on times, which are sums of decimal numbers."""
 
 
-class Drive(UncertainSection):
-    """How the controller is carried out; the analysis of the linear loop reads it."""
-
-    sample_time: Annotated[Value | None, Quantity("s", positive, "50 us")] = None
-    delay: Annotated[Value | None, Quantity("s", non_negative, "50 us")] = None
-    velocity_samples: Annotated[float | None, Number(at_least_1, "1")] = None
-    """Over how many samples the position's difference is taken for its velocity; only a log's simulation reads it."""
-
-    rules: ClassVar[tuple[Rule, ...]] = (
-        Rule(
-            ("drive.velocity_samples",),
-            lambda f: f.get("drive.velocity_samples", 1.0) % 1 == 0,
-            "a whole number of samples",
-            "velocity_samples = 2",
-        ),
-    )
-
-
 class Motion(UncertainSection):
     """Base of the motions: what the reference does."""
 

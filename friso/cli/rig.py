@@ -1,0 +1,112 @@
+"""`friso rig`: the virtual test rig: an experiment on the drive as built, its logs, the truth behind them, a figure."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from friso.cli.common import AsJson, Overrides, StageFile, check_place, made_folder, print_wrapped, read_stage, say
+from friso.cli.progress import step_bar
+from friso.quantities import StageError
+
+if TYPE_CHECKING:
+    from friso.studies.rig.outcome import Outcome, RigLog
+
+PAGE, TRUTH = "rig.html", "truth"
+
+Experiment = Annotated[
+    str,
+    typer.Argument(
+        metavar="EXPERIMENT",
+        help="frf, stiffness, stiction, constant-speed, hunting, stroke-crossover, compare, in-position.",
+    ),
+]
+OutFolder = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder for logs, truth and figures.")]
+Seed = Annotated[int, typer.Option("--seed", metavar="NUMBER", help="Of the noise; the rail has its own, rail.seed.")]
+
+MOST_SEED = 10**15
+
+
+def rig(
+    experiment: Experiment,
+    stage_file: StageFile,
+    overrides: Overrides = None,
+    seed: Seed = 1,
+    out: OutFolder = None,
+    as_json: AsJson = False,
+) -> None:
+    """Rehearse an experiment on the machine as built: sampled, quantised, saturated, on a rail that varies.
+
+    Writes logs that friso identify reads, and apart from them the truth behind each.
+
+    Example: friso rig stiffness examples/thesis_drive.toml --out rig
+    """
+    from friso.studies.rig.outcome import silent
+    from friso.studies.rig.registry import experiment as found_experiment
+
+    run = found_experiment(experiment)
+    stage = read_stage(stage_file, overrides, with_drive=True)
+    if not 0 <= seed < MOST_SEED:
+        raise StageError("--seed", str(seed), f"a whole number from 0, below {MOST_SEED:g}", "--seed 1")
+    if out is not None:
+        check_place(out, [PAGE, f"{TRUTH}/stage.toml"], PAGE, [stage_file])
+    with step_bar() as bar:
+        outcome = run(stage, seed, bar or silent)
+    files = [] if out is None else _written(outcome, made_folder(out))
+    if as_json:
+        from friso.views.rig import document
+
+        print(json.dumps(document(outcome), allow_nan=False))
+    else:
+        _print(outcome, files)
+    failed = [log for log in outcome.logs if log.failure]
+    for log in failed:
+        say(f"{log.name} stopped {log.failure}; the log so far is kept")
+    if failed:
+        raise typer.Exit(1)
+
+
+def _print(outcome: Outcome, files: Sequence[Path]) -> None:
+    from friso.views.rig import sentences
+
+    for sentence in sentences(outcome):
+        print_wrapped(sentence)
+    for note in outcome.notes:
+        print_wrapped(f"note: {note}")
+    for file in files:
+        print(f"wrote {file}")
+
+
+def _written(outcome: Outcome, folder: Path) -> list[Path]:
+    """Logs with how they are to be read, the truth in a folder of its own, figures and page."""
+    from friso.views.matplotlib_renderer import FORMATS, save
+    from friso.views.rig import figures, page
+
+    truth = made_folder(folder / TRUTH)
+    files = [_write_log(log, folder, truth) for log in outcome.logs]
+    (truth / "stage.toml").write_text(outcome.stage.to_toml(), encoding="utf-8", newline="\n")
+    drawn = figures(outcome)
+    pictures = {folder / f"{figure.name}.{form}": figure for figure in drawn for form in FORMATS}
+    for path, figure in pictures.items():
+        save(figure, path)
+    (folder / PAGE).write_text(page(outcome, drawn), encoding="utf-8", newline="\n")
+    return [folder / PAGE, *files, truth / "stage.toml", *pictures]
+
+
+def _write_log(log: RigLog, folder: Path, truth: Path) -> Path:
+    """The log as the drive writes it, how to read it beside it, and the truth in its own folder."""
+    from friso.identify.logs.mapping import Mapping, save
+    from friso.rig.log_files import write_csv
+
+    path = folder / f"{log.name}.csv"
+    said = f"friso rig, seed {log.seed}"
+    write_csv(path, log.interval, log.logged, said)
+    if log.kind is not None:
+        save(Mapping(experiment=log.kind), path)
+    write_csv(truth / path.name, log.interval, log.true, f"{said}: the truth behind {path.name}")
+    (truth / f"{log.name}.toml").write_text(log.stage.to_toml(), encoding="utf-8", newline="\n")
+    return path

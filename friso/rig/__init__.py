@@ -1,0 +1,1 @@
+"""The drive as built, and the experiments of a virtual test rig on it."""

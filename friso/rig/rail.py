@@ -1,0 +1,92 @@
+"""The bearing along the rail: by what it multiplies static and Coulomb friction at each place."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from scipy.special import ndtri
+
+from friso.quantities import StageError
+
+PHASES, FIELD = int.from_bytes(b"phases"), int.from_bytes(b"field")
+"""Which of a seed's random numbers: Philox takes them as the second half of its key."""
+
+HARMONICS = ("first", "second", "third")
+
+CELLS, REACH = 2, 5
+"""Cells of white noise per correlation length, and the lengths after which the kernel over them ends. The sum over the
+cells is then wrong by 2 exp(-(pi CELLS)^2 / 2) = 5e-9 of the integral (Poisson's summation), and by exp(-REACH^2)."""
+
+MOST_CELLS = 10**7
+"""Cells that a rail may have: some 100 MB each time."""
+
+BLOCK = 4
+"""Words that Philox gives for each number that it counts."""
+
+
+def friction_factors(flat: Mapping[str, Any], places: np.ndarray, seed: int | None = None) -> np.ndarray:
+    """Factors of static and of Coulomb friction at places [m], shape (n,), of one run: shape (2, n).
+
+    (1 + offset) (1 + sum of A_n cos(2 pi n x / pitch + phase_n)) exp(s g - s^2 / 2), with s^2 = log(1 + deviation^2):
+    lognormal of mean 1 and of the standard deviation given, hence positive, from one Gaussian field g for both, since
+    both follow the same preload. Flat keys "rail.*" describe it, all 1 without them; `seed` replaces that of the rail.
+    What stands at a place does not depend on the other places. Raises StageError for a correlation length that
+    is no more than a speck of the places' range.
+    """
+    rail = {key.removeprefix("rail."): value for key, value in flat.items() if key.startswith("rail.")}
+    if not rail:
+        return np.ones((2, len(places)))
+    number = int(rail["seed"] if seed is None else seed)
+    deviations = np.array([[rail["static_deviation"]], [rail["coulomb_deviation"]]])
+    common = (1 + rail["offset"]) * _rolling(rail, places, number)
+    if not deviations.any():
+        return np.broadcast_to(common, (2, len(places))).copy()
+    widths = np.sqrt(np.log1p(deviations**2))
+    return common * np.exp(widths * gaussian_field(places, rail["correlation_length"], number) - widths**2 / 2)
+
+
+def gaussian_field(places: np.ndarray, length: float, seed: int) -> np.ndarray:
+    """A Gaussian field at places [m], shape (n,), of mean 0 and variance 1, correlated by exp(-(d / length)^2 / 2).
+
+    White noise in cells that are counted from place 0, smoothed by exp(-(d / length)^2). A random Fourier series needs
+    many more terms than the 21 here until it is Gaussian, and its few longest waves repeat along a rail. Raises
+    StageError.
+    """
+    at = places * (CELLS / length)
+    cell = np.rint(at)
+    reach = CELLS * REACH
+    first = int(cell.min()) - reach
+    noise = _white(first, int(cell.max()) + reach + 1 - first, seed, length)
+    index, beside = (cell - first).astype(np.intp), (at - cell) / CELLS
+    # exp(-(u - k/C)^2) = exp(-u^2) q^k exp(-(k/C)^2) with q = exp(2 u/C): a polynomial of q, by Horner's rule
+    q, field = np.exp(2 * beside / CELLS), np.zeros(len(places))
+    for k in range(reach, -reach - 1, -1):
+        field *= q
+        field += (noise * np.exp(-((k / CELLS) ** 2)))[index + k]
+    return field * q**-reach * np.exp(-(beside**2)) * (2 / np.pi) ** 0.25 / CELLS**0.5
+
+
+def _white(first: int, count: int, seed: int, length: float) -> np.ndarray:
+    """Independent standard normal numbers of cells from number `first`, each a function of its number alone."""
+    if count > MOST_CELLS:
+        least = length * count / MOST_CELLS
+        given, expected = f"{length:.3g} m", f"at least {least:.3g} m for places that far apart"
+        raise StageError("rail.correlation_length", given, expected, 'correlation_length = "5 mm"')
+    block, skipped = divmod(first, BLOCK)
+    words = np.random.Philox(key=[seed, FIELD], counter=block % 2**256).random_raw(skipped + count)[skipped:]
+    return ndtri(((words >> np.uint64(11)) + 0.5) * 2.0**-53)
+
+
+def _rolling(rail: Mapping[str, Any], places: np.ndarray, seed: int) -> np.ndarray | float:
+    """What the rolling elements make of friction at places [m]."""
+    if "rolling_pitch" not in rail:
+        return 1.0
+    phases = np.random.Generator(np.random.Philox(key=[seed, PHASES])).uniform(0, 2 * np.pi, len(HARMONICS))
+    turn = 2 * np.pi / rail["rolling_pitch"] * places
+    waves = [
+        rail[f"{name}_harmonic"] * np.cos(order * turn + phase)
+        for order, (name, phase) in enumerate(zip(HARMONICS, phases, strict=True), 1)
+    ]
+    return 1 + np.sum(waves, axis=0)

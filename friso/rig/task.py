@@ -1,0 +1,83 @@
+"""What a drive is asked to do: a reference in pieces of parabola, and a force injected beside the controller's."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+import numpy as np
+
+from friso.equations import motion
+from friso.stage import Stage
+
+
+@dataclass(frozen=True)
+class Task:
+    """Pieces of the reference, shape (pieces, 4): start [s], position [m], velocity [m/s], acceleration [m/s^2] there;
+    its duration [s]; and the injected force [N] every `injected_each` [s], shape (n,), empty for none.
+
+    The stage starts at rest where the reference does, but displaced from it by `displacement` [m].
+    """
+
+    pieces: np.ndarray
+    duration: float
+    injected: np.ndarray = field(default_factory=lambda: np.zeros(0))
+    injected_each: float = 1.0
+    displacement: float = 0.0
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """The lowest and highest position of the reference [m]."""
+        ends = [*self.pieces[1:, 0], self.duration]
+        places = [*self.pieces[:, 1]]
+        for (start, place, velocity, acceleration), end in zip(self.pieces, ends, strict=True):
+            turn = -velocity / acceleration if acceleration else 0.0
+            for since in (end - start, min(max(turn, 0.0), end - start)):
+                places.append(place + velocity * since + acceleration * since**2 / 2)
+        return min(*places, places[0] + self.displacement), max(*places, places[0] + self.displacement)
+
+
+def own_motion(stage: Stage) -> Task:
+    """The motion of the stage file."""
+    flat = stage.flat()
+    displacement = float(motion.initial_displacement(flat))
+    return Task(motion.pieces(flat, 1)[0], flat["motion.duration"], displacement=displacement)
+
+
+def standing(place: float, duration: float) -> Task:
+    """A reference that stays at a place [m]."""
+    return Task(np.array([[0.0, place, 0.0, 0.0]]), duration)
+
+
+def staircase(steps: Sequence[float], stands: float, start: float = 0.0) -> Task:
+    """Steps of the reference [m], one after the other, before and after each of which it stands for a time [s]."""
+    places = start + np.cumsum([0.0, *steps])
+    rows = [[number * stands, place, 0.0, 0.0] for number, place in enumerate(places)]
+    return Task(np.array(rows), stands * len(places))
+
+
+def legs(start: float, parts: Sequence[tuple[float, float]]) -> Task:
+    """Constant velocities [m/s], each for a time [s], one after the other from a place [m]; 0 is a standstill."""
+    times = np.cumsum([0.0, *(time for _, time in parts)])
+    places = start + np.cumsum([0.0, *(velocity * time for velocity, time in parts)])
+    rows = [[t, p, v, 0.0] for t, p, (v, _) in zip(times[:-1], places[:-1], parts, strict=True)]
+    return Task(np.array(rows), float(times[-1]))
+
+
+def point_to_point(places: Sequence[float], acceleration: float, top_speed: float, stands: float) -> Task:
+    """Moves from place to place [m] with bounded acceleration [m/s^2] and speed [m/s], after each of which the
+    reference stands for a time [s]."""
+    rows, now = [[0.0, places[0], 0.0, 0.0]], stands
+    for start, end in pairwise(places):
+        way, sign = abs(end - start), np.sign(end - start)
+        ramp = min(top_speed / acceleration, np.sqrt(way / acceleration))
+        speed = acceleration * ramp
+        cruise = way / speed - ramp
+        at = start + sign * speed * ramp / 2
+        rows += [[now, start, 0.0, sign * acceleration], [now + ramp, at, sign * speed, 0.0]]
+        rows += [[now + ramp + cruise, end - sign * speed * ramp / 2, sign * speed, -sign * acceleration]]
+        now += 2 * ramp + cruise
+        rows.append([now, end, 0.0, 0.0])
+        now += stands
+    return Task(np.array(rows), now)

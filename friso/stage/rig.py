@@ -1,0 +1,221 @@
+"""The tables of a stage file that describe the drive as built and what surrounds the machine."""
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Annotated, Any, ClassVar, Self
+
+from pydantic import GetCoreSchemaHandler, model_validator
+from pydantic_core import CoreSchema, core_schema
+
+from friso.quantities import (
+    Bound,
+    Number,
+    Quantity,
+    StageError,
+    Value,
+    as_toml,
+    at_least_1,
+    non_negative,
+    positive,
+    quoted,
+)
+from friso.stage.section import Rule, Section, UncertainSection
+
+share = Bound("0 or greater, below 1", lambda value: (value >= 0) & (value < 1))
+above_minus_1 = Bound("greater than -1", lambda value: value > -1)
+seeds = Bound("a whole number from 0, below 1e15", lambda value: (value >= 0) & (value < 1e15) & (value % 1 == 0))
+
+
+class Drive(UncertainSection):
+    """How the controller is carried out: friso bode reads sample_time and delay, friso rig all of it."""
+
+    sample_time: Annotated[Value | None, Quantity("s", positive, "50 us")] = None
+    delay: Annotated[Value | None, Quantity("s", non_negative, "50 us")] = None
+    velocity_samples: Annotated[float | None, Number(at_least_1, "1")] = None
+    """Over how many samples the position's difference is taken for its velocity; only a log's simulation reads it."""
+    current_bandwidth: Annotated[Value | None, Quantity("Hz", positive, "2 kHz")] = None
+    """Of the current loop, a first-order lag between the controller's force and the actuator's."""
+    encoder_resolution: Annotated[Value | None, Quantity("m", positive, "1 nm")] = None
+    encoder_noise: Annotated[Value | None, Quantity("m", non_negative, "0.5 nm")] = None
+    """RMS, of each sample on its own."""
+    relative_noise: Annotated[Value | None, Quantity("m", non_negative, "30 nm")] = None
+    """RMS, of the sensor between cart and stage."""
+    motor_constant_ratio: Annotated[float | None, Number(positive, "1.47")] = None
+    """The motor's true constant over the one that the drive believes."""
+    ripple: Annotated[float | None, Number(share, "0.02")] = None
+    """Amplitude of what the force varies by over position, as a share of the force."""
+    ripple_pitch: Annotated[Value | None, Quantity("m", positive, "24 mm")] = None
+    feedforward_mass: Annotated[Value | None, Quantity("kg", non_negative, "1.7 kg")] = None
+    feedforward_coulomb: Annotated[Value | None, Quantity("N", non_negative, "1 N")] = None
+    feedforward_viscous: Annotated[Value | None, Quantity("N*s/m", non_negative, "0.5 N*s/m")] = None
+    integrator_deadband: Annotated[Value | None, Quantity("m", non_negative, "1 um")] = None
+    """The integrator waits while the error is no larger."""
+    integrator_reset: bool = False
+    """Whether the integrator starts again from 0 where the error changes its sign."""
+
+    rules: ClassVar[tuple[Rule, ...]] = (
+        Rule(
+            ("drive.velocity_samples",),
+            lambda f: f.get("drive.velocity_samples", 1.0) % 1 == 0,
+            "a whole number of samples",
+            "velocity_samples = 2",
+        ),
+        Rule(
+            ("drive.ripple", "drive.ripple_pitch"),
+            lambda f: ("drive.ripple" in f) == ("drive.ripple_pitch" in f),
+            "the force ripple's share together with its pitch",
+            'ripple = 0.02, ripple_pitch = "24 mm"',
+        ),
+    )
+
+
+_DEVIATIONS = ("rail.static_deviation", "rail.coulomb_deviation")
+_HARMONICS = ("rail.first_harmonic", "rail.second_harmonic", "rail.third_harmonic")
+
+
+def _total(flat: Mapping[str, Any], keys: tuple[str, ...]) -> Any:
+    """The sum of some keys."""
+    return sum(flat[key] for key in keys)
+
+
+class Rail(UncertainSection):
+    """How the bearing varies along the rail: factors of position for static and for Coulomb friction.
+
+    Factor = (1 + offset) (1 + harmonics of the rolling elements) (random field of mean 1).
+    """
+
+    seed: Annotated[float, Number(seeds, "1")]
+    offset: Annotated[float, Number(above_minus_1, "0.1")] = 0.0
+    static_deviation: Annotated[float, Number(share, "0.2")] = 0.0
+    coulomb_deviation: Annotated[float, Number(share, "0.2")] = 0.0
+    """Standard deviations of the factors' random fields."""
+    correlation_length: Annotated[Value | None, Quantity("m", positive, "5 mm")] = None
+    """Places d apart correlate by exp(-(d / correlation_length)^2 / 2)."""
+    rolling_pitch: Annotated[Value | None, Quantity("m", positive, "4 mm")] = None
+    first_harmonic: Annotated[float, Number(share, "0.1")] = 0.0
+    second_harmonic: Annotated[float, Number(share, "0.05")] = 0.0
+    third_harmonic: Annotated[float, Number(share, "0.02")] = 0.0
+
+    rules: ClassVar[tuple[Rule, ...]] = (
+        Rule(
+            (*_DEVIATIONS, "rail.correlation_length"),
+            lambda f: ("rail.correlation_length" in f) | (_total(f, _DEVIATIONS) == 0),
+            "the correlation length of friction that deviates along the rail",
+            'correlation_length = "5 mm"',
+        ),
+        Rule(
+            (*_HARMONICS, "rail.rolling_pitch"),
+            lambda f: ("rail.rolling_pitch" in f) | (_total(f, _HARMONICS) == 0),
+            "the pitch of the rolling elements whose harmonics are given",
+            'rolling_pitch = "4 mm"',
+        ),
+        Rule(
+            _HARMONICS,
+            lambda f: _total(f, _HARMONICS) < 1,
+            "harmonics that add up to less than 1, so that friction stays positive",
+            "first_harmonic = 0.1, second_harmonic = 0.05, third_harmonic = 0.02",
+        ),
+    )
+
+
+class Cable(UncertainSection):
+    """What drags on the stage: a spring that is slack at position 0, and a viscous drag."""
+
+    stiffness: Annotated[Value, Quantity("N/m", non_negative, "50 N/m")] = Value(0, "0 N/m")
+    drag: Annotated[Value, Quantity("N*s/m", non_negative, "0.5 N*s/m")] = Value(0, "0 N*s/m")
+
+
+class Values(tuple[Value, ...]):
+    """An array of dimensioned values."""
+
+    @property
+    def text(self) -> list[str]:
+        """What the user wrote."""
+        return [value.text for value in self]
+
+
+@dataclass(frozen=True)
+class Several:
+    """A key that takes an array of at least two quantities; the examples are those of its values."""
+
+    of: Quantity
+    examples: tuple[str, ...]
+
+    @property
+    def expected(self) -> str:
+        """What the key takes, in words."""
+        return f"an array of two or more, each {self.of.expected}"
+
+    @property
+    def written_example(self) -> str:
+        """The example as it stands in a file."""
+        return f"[{', '.join(map(as_toml, self.examples))}]"
+
+    def read(self, given: Any) -> Values:
+        """The values of an array. Raises StageError."""
+        if not isinstance(given, list | tuple) or len(given) < 2:
+            hint = f"of {len(given)}" if isinstance(given, list | tuple) else "not an array"
+            raise StageError("", quoted(given, hint), self.expected, self.written_example)
+        try:
+            return Values(self.of.read(item) for item in given)
+        except StageError as error:
+            raise StageError("", error.given, self.expected, self.written_example) from None
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return core_schema.no_info_plain_validator_function(self.read)
+
+
+_PER_ROOT_HERTZ = re.compile(r"\s*/\s*(Hz(\^|\*\*)0\.5|sqrt\(Hz\)|√Hz)\s*$")
+
+
+@dataclass(frozen=True)
+class Density(Quantity):
+    """A key that takes an amplitude spectral density; `unit` is what the text of a value has before "/Hz^0.5"."""
+
+    @property
+    def expected(self) -> str:
+        """What the key takes, in words."""
+        return f"number and unit in quotes, convertible to {self.unit}, and /Hz^0.5, {self.bound.text}"
+
+    def read(self, given: Any) -> Value:
+        """The SI value of a text (or of the text of a Value). Raises StageError."""
+        text = getattr(given, "text", given)
+        amplitude = _PER_ROOT_HERTZ.sub("", text) if isinstance(text, str) else text
+        if amplitude == text and isinstance(text, str):
+            raise StageError("", quoted(text, "does not end with /Hz^0.5"), self.expected, self.written_example)
+        try:
+            return Value(super().read(amplitude), text)
+        except StageError as error:
+            why = error.given.replace(quoted(amplitude), quoted(text))
+            raise StageError("", why, self.expected, self.written_example) from None
+
+
+class Floor(Section):
+    """Vibration of the floor: the one-sided amplitude spectral density of its acceleration.
+
+    Between its points it is straight in log-log, and nothing beyond their band. Its arrays are not in `Stage.flat`.
+    """
+
+    frequency: Annotated[Values, Several(Quantity("Hz", positive, "1 Hz"), ("1 Hz", "10 Hz", "100 Hz"))]
+    acceleration: Annotated[
+        Values,
+        Several(
+            Density("m/s^2", positive, "1e-4 m/s^2/Hz^0.5"),
+            ("1e-5 m/s^2/Hz^0.5", "1e-4 m/s^2/Hz^0.5", "1e-4 m/s^2/Hz^0.5"),
+        ),
+    ]
+
+    @model_validator(mode="after")
+    def _is_a_curve(self) -> Self:
+        frequencies, densities = len(self.frequency), len(self.acceleration)
+        if frequencies != densities:
+            example = 'frequency = ["1 Hz", "100 Hz"], acceleration = ["1e-5 m/s^2/Hz^0.5", "1e-4 m/s^2/Hz^0.5"]'
+            given = f"{frequencies} frequencies and {densities} densities"
+            raise StageError("acceleration", given, "one density for each frequency", example)
+        for low, high in pairwise(self.frequency):
+            if not low < high:
+                given = f"{quoted(high.text)} after {quoted(low.text)}"
+                raise StageError("frequency", given, "frequencies that rise", 'frequency = ["1 Hz", "10 Hz", "100 Hz"]')
+        return self

@@ -1,0 +1,69 @@
+"""What an experiment of the rig gives: logs, the truth behind each, and what was found in them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from friso.engine.arrays import Status
+from friso.identify.experiments import record
+from friso.identify.logs.log import Log
+from friso.rig.run import Recorded
+from friso.stage import Stage
+
+Progress = Callable[[int, int, str], None]
+"""Is told the number of steps done, of all, and what comes next."""
+
+
+def silent(done: int, total: int, what: str) -> None:
+    """A progress that nobody looks at."""
+
+
+@dataclass(frozen=True)
+class RigLog:
+    """A log as the drive writes it: its name, the kind of experiment for `friso identify` (None: it tells that itself),
+    the sample time [s], what was logged and what is true, SI arrays of shape (n,) by role; the stage that ran, the seed
+    of its noise, and why the run ended early (empty: it did not)."""
+
+    name: str
+    kind: str | None
+    interval: float
+    logged: Mapping[str, np.ndarray]
+    true: Mapping[str, np.ndarray]
+    stage: Stage
+    seed: int
+    failure: str = ""
+
+    @property
+    def log(self) -> Log:
+        """As `friso identify` has it once it has read it."""
+        return record(self.name, self.interval, **self.logged)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """An experiment on a stage: its logs, and its result, a class of its own; `notes` tell what to know of it."""
+
+    experiment: str
+    stage: Stage
+    seed: int
+    logs: tuple[RigLog, ...]
+    result: Any
+    notes: tuple[str, ...] = ()
+
+
+def rig_log(recorded: Recorded, row: int, name: str, kind: str | None, stage: Stage, seed: int) -> RigLog:
+    """One run of a chunk as a log, up to where it failed."""
+    status = int(recorded.statuses[row])
+    count = recorded.logged["position"].shape[1]
+    if status != Status.DONE:
+        count = int(np.isfinite(recorded.logged["position"][row]).sum())
+    logged, true = (
+        {role: np.array(values[row, :count]) for role, values in signals.items()}
+        for signals in (recorded.logged, recorded.true)
+    )
+    why = "" if status == Status.DONE else f"after {count * recorded.interval:.3g} s: {Status(status).text}"
+    return RigLog(name, kind, recorded.interval, logged, true, stage, seed, why)

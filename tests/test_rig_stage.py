@@ -1,0 +1,263 @@
+"""The tables of the drive as built and its surroundings: values, round trip, and what is wrong with them."""
+
+import pickle
+import tomllib
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import friso.equations.friction  # noqa: F401  the friction laws register themselves
+from friso.quantities import as_toml
+from friso.stage import Stage, StageError, load, loads, numeric_keys, violations
+
+EXAMPLE = Path(__file__).parents[1] / "examples" / "thesis_drive.toml"
+FLOOR = {
+    "frequency": ["1 Hz", "10 Hz", "0.1 kHz"],
+    "acceleration": ["1e-5 m/s^2/Hz^0.5", "0.1 mm/s^2/√Hz", "2e-4 m/s^2/sqrt(Hz)"],
+}
+DRIVE = {
+    "sample_time": "50 us",
+    "delay": "5 ms",
+    "current_bandwidth": "2 kHz",
+    "encoder_resolution": "1 nm",
+    "encoder_noise": "0 nm",
+    "relative_noise": "30 nm",
+    "motor_constant_ratio": 1.47,
+    "ripple": 0.02,
+    "ripple_pitch": "24 mm",
+    "feedforward_mass": "1.7 kg",
+    "feedforward_coulomb": "1 N",
+    "feedforward_viscous": "0.5 N*s/m",
+    "integrator_deadband": "1 um",
+    "integrator_reset": True,
+}
+RAIL = {
+    "seed": 7,
+    "offset": -0.1,
+    "static_deviation": 0.2,
+    "coulomb_deviation": 0.3,
+    "correlation_length": "5 mm",
+    "rolling_pitch": "4 mm",
+    "first_harmonic": 0.1,
+    "second_harmonic": 0.05,
+    "third_harmonic": 0.02,
+}
+
+
+@pytest.fixture(scope="module")
+def built() -> Stage:
+    """A stage with every key of the drive as built."""
+    return load(EXAMPLE).replace({"drive": DRIVE, "rail": RAIL, "floor": FLOOR})
+
+
+def test_the_drive_in_si(built: Stage) -> None:
+    flat = built.flat()
+    assert {key.removeprefix("drive."): flat[key] for key in flat if key.startswith("drive.")} == {
+        "sample_time": 5e-5,
+        "delay": 5e-3,
+        "current_bandwidth": 2000.0,
+        "encoder_resolution": 1e-9,
+        "encoder_noise": 0.0,
+        "relative_noise": 3e-8,
+        "motor_constant_ratio": 1.47,
+        "ripple": 0.02,
+        "ripple_pitch": 0.024,
+        "feedforward_mass": 1.7,
+        "feedforward_coulomb": 1.0,
+        "feedforward_viscous": 0.5,
+        "integrator_deadband": 1e-6,
+        "integrator_reset": True,
+    }
+
+
+def test_the_surroundings_in_si(built: Stage) -> None:
+    flat = built.flat()
+    numbers = RAIL | {"correlation_length": 5e-3, "rolling_pitch": 4e-3}
+    assert {key: flat[f"rail.{key}"] for key in RAIL} == numbers
+    assert (flat["cable.stiffness"], flat["cable.drag"]) == (5.0, 0.1)
+    assert {type(value) for value in flat.values()} == {float, bool, str}
+    assert built.floor
+    assert built.floor.frequency == (1.0, 10.0, 100.0)
+    assert built.floor.acceleration == (1e-5, 1e-4, 2e-4)
+    assert not any(key.startswith("floor.") for key in flat)
+
+
+def test_what_is_left_out_does_nothing(built: Stage) -> None:
+    plain = built.replace({"drive": {}, "rail": {"seed": 0}, "cable": {}, "floor": None})
+    flat = plain.flat()
+    assert [key for key in flat if key.startswith("drive.")] == ["drive.integrator_reset"]
+    assert flat["drive.integrator_reset"] is False
+    assert {value for key, value in flat.items() if key.startswith(("rail.", "cable."))} == {0.0}
+
+
+def test_round_trip(built: Stage) -> None:
+    again = loads(built.to_toml())
+    assert again == built
+    assert again.given() == built.given()
+    assert tomllib.loads(built.to_toml())["floor"] == FLOOR
+    assert again.floor
+    assert built.floor
+    assert again.floor.acceleration.text == built.floor.acceleration.text
+    assert pickle.loads(pickle.dumps(built)).to_toml() == built.to_toml()
+    assert hash(again) == hash(built)
+
+
+@st.composite
+def spectra(draw: st.DrawFn) -> dict[str, list[str]]:
+    frequencies = sorted(draw(st.sets(st.integers(1, 10**9), min_size=2, max_size=6)))
+    level = st.floats(1e-12, 1e3, allow_subnormal=False)
+    densities = draw(st.lists(level, min_size=len(frequencies), max_size=len(frequencies)))
+    return {
+        "frequency": [f"{each} uHz" for each in frequencies],
+        "acceleration": [f"{each!r} m/s^2/Hz^0.5" for each in densities],
+    }
+
+
+@settings(max_examples=50, deadline=None)
+@given(spectra())
+def test_floors_come_through(floor: dict[str, list[str]]) -> None:
+    found = loads(load(EXAMPLE).replace({"floor": floor}).to_toml()).floor
+    assert found
+    assert found.given() == floor
+    assert [*found.acceleration] == [float(text.split()[0]) for text in floor["acceleration"]]
+    assert all(low < high for low, high in pairwise(found.frequency))
+
+
+def test_commented_lines_of_the_example_load() -> None:
+    text = EXAMPLE.read_text(encoding="utf-8")
+    for key in ("[floor]", "frequency =", "acceleration = [", "motor_constant_ratio"):
+        assert text.count(f"# {key}") == 1
+        text = text.replace(f"# {key}", key)
+    stage = loads(text)
+    assert stage.floor
+    assert stage.flat()["drive.motor_constant_ratio"] == 0.68
+
+
+def test_uncertain_keys(built: Stage) -> None:
+    stage = built.replace(
+        {"drive.delay": "40 us .. 60 us", "rail.offset": "0.1 +/- 0.05", "cable.drag": "1 N*s/m +/- 5 %"}
+    )
+    assert {*stage.uncertain()} == {"drive.delay", "rail.offset", "cable.drag"}
+    with pytest.raises(StageError, match="none of the numbers beside the centre"):
+        built.replace({"rail.seed": "0 .. 10"})
+
+
+def test_rails_are_swept_over_their_seed(built: Stage) -> None:
+    assert numeric_keys(built.flat())["rail.seed"].unit == ""
+    flat = built.flat({"rail.seed": np.arange(3.0), "rail.first_harmonic": np.array([0.1, 0.95, -0.1])})
+    where = {why.split(":")[0]: np.broadcast_to(broken, 3).tolist() for broken, why in violations(flat)}
+    assert where == {
+        "rail.first_harmonic has to be 0 or greater, below 1": [False, False, True],
+        "rail.first_harmonic, rail.second_harmonic, rail.third_harmonic": [False, True, False],
+    }
+
+
+def message(stage: Stage, changes: dict[str, object]) -> str:
+    with pytest.raises(StageError) as caught:
+        stage.replace(changes)
+    return str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "given", "expected"),
+    [
+        ("drive.encoder_resolution", "0 nm", '"0 nm"', "convertible to m, greater than 0"),
+        ("drive.encoder_resolution", "-1 nm", '"-1 nm"', "convertible to m, greater than 0"),
+        ("drive.encoder_resolution", 1e-9, "1e-09 (a bare number, its unit is missing)", "convertible to m"),
+        ("drive.encoder_noise", "-1 nm", '"-1 nm"', "convertible to m, 0 or greater"),
+        ("drive.relative_noise", "-1 nm", '"-1 nm"', "convertible to m, 0 or greater"),
+        ("drive.current_bandwidth", "0 Hz", '"0 Hz"', "greater than 0"),
+        ("drive.motor_constant_ratio", 0, "0", "a bare number without quotes, greater than 0"),
+        ("drive.motor_constant_ratio", "1.47", '"1.47"', "a bare number without quotes"),
+        ("drive.ripple", 1, "1", "0 or greater, below 1"),
+        ("drive.ripple_pitch", "0 mm", '"0 mm"', "greater than 0"),
+        ("drive.feedforward_mass", "-1 kg", '"-1 kg"', "0 or greater"),
+        ("drive.feedforward_coulomb", 1, "1 (a bare number, its unit is missing)", "convertible to N"),
+        ("drive.feedforward_viscous", "1 N", "N is not convertible to N*s/m", "convertible to N*s/m"),
+        ("drive.integrator_deadband", "-1 um", '"-1 um"', "0 or greater"),
+        ("drive.integrator_reset", 1, "1", "true or false"),
+        ("drive.integrator_resets", True, "did you mean integrator_reset?", "one of sample_time, delay"),
+        ("rail.seed", 1.5, "1.5", "a whole number from 0, below 1e15"),
+        ("rail.seed", -1, "-1", "a whole number from 0"),
+        ("rail.seed", 10**15, "1000000000000000", "below 1e15"),
+        ("rail.seed", "1", '"1"', "a bare number without quotes"),
+        ("rail.offset", -1, "-1", "greater than -1"),
+        ("rail.static_deviation", 1, "1", "0 or greater, below 1"),
+        ("rail.coulomb_deviation", -0.1, "-0.1", "0 or greater, below 1"),
+        ("rail.correlation_length", "0 mm", '"0 mm"', "greater than 0"),
+        ("rail.rolling_pitch", "0 mm", '"0 mm"', "greater than 0"),
+        ("rail.pitch", "4 mm", "an unknown key", "one of seed, offset"),
+        ("cable.stiffness", "-1 N/m", '"-1 N/m"', "0 or greater"),
+        ("cable.drags", "1 N*s/m", "did you mean drag?", "one of stiffness, drag"),
+        ("cable", "5 N/m", '"5 N/m"', "a table of keys"),
+        ("floor.frequency", "1 Hz", '"1 Hz" (not an array)', "an array of two or more, each number and unit in quotes"),
+        ("floor.frequency", ["1 Hz"], "an array (of 1)", "an array of two or more"),
+        ("floor.frequency", [], "an array (of 0)", "an array of two or more"),
+        ("floor.frequency", [1, 10, 100], "1 (a bare number, its unit is missing)", "convertible to Hz"),
+        ("floor.frequency", ["0 Hz", "1 Hz", "2 Hz"], '"0 Hz"', "greater than 0"),
+        ("floor.frequency", ["1 Hz", "9 Hz", "9 Hz"], '"9 Hz" after "9 Hz"', "frequencies that rise"),
+        ("floor.frequency", ["1 Hz", "9 Hz"], "2 frequencies and 3 densities", "one density for each frequency"),
+        ("floor.acceleration", ["1 m/s^2"] * 3, '"1 m/s^2" (does not end with /Hz^0.5)', "and /Hz^0.5, greater"),
+        ("floor.acceleration", ["1 m/Hz^0.5"] * 3, '"1 m/Hz^0.5" (m is not convertible to m/s^2)', "m/s^2, and /Hz^0"),
+        ("floor.acceleration", ["0 m/s^2/Hz^0.5"] * 3, '"0 m/s^2/Hz^0.5"', "greater than 0"),
+        ("floor.acceleration", [1e-4] * 3, "0.0001 (a bare number, its unit is missing)", "number and unit"),
+        ("floor.level", "1", "an unknown key", "one of frequency, acceleration"),
+    ],
+)
+def test_wrong_values(built: Stage, key: str, value: object, given: str, expected: str) -> None:
+    head, *lines = message(built, {key: value}).split("\n")
+    assert key.rsplit(".", 1)[0] in head
+    assert lines[0].startswith("  given:    ")
+    assert given in lines[0]
+    assert expected in lines[1]
+    assert lines[2].startswith("  example:  ")
+
+
+def test_examples_of_arrays_are_right(built: Stage) -> None:
+    for key in ("frequency", "acceleration"):
+        example = message(built, {f"floor.{key}": 1}).split("example:")[1]
+        assert loads(built.replace({"floor": None}).to_toml() + f"[floor]\n{_other(key)}\n{example.strip()}\n").floor
+
+
+def _other(key: str) -> str:
+    other = {"frequency": "acceleration", "acceleration": "frequency"}[key]
+    return f"{other} = [{', '.join(map(as_toml, FLOOR[other]))}]"
+
+
+@pytest.mark.parametrize(
+    ("changes", "keys", "expected"),
+    [
+        ({"drive.ripple_pitch": None}, "drive.ripple, drive.ripple_pitch", "share together with its pitch"),
+        ({"drive.ripple": None}, "drive.ripple, drive.ripple_pitch", "share together with its pitch"),
+        ({"rail.correlation_length": None}, "rail.correlation_length", "the correlation length of friction"),
+        ({"rail.rolling_pitch": None}, "rail.rolling_pitch", "the pitch of the rolling elements"),
+        ({"rail.first_harmonic": 0.93}, "rail.first_harmonic, rail.second_harmonic", "add up to less than 1"),
+        ({"drive.sample_time": "12.6 ms"}, "controller.crossover, drive.sample_time", "a tenth of the crossover's"),
+        ({"controller.crossover": "2.001 kHz"}, "controller.crossover, drive.sample_time", "at most a tenth"),
+    ],
+)
+def test_keys_that_need_each_other(built: Stage, changes: dict[str, object], keys: str, expected: str) -> None:
+    text = message(built, changes)
+    assert keys in text.split("\n")[0]
+    assert expected in text
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"drive.sample_time": "12.5 ms"},
+        {"controller.crossover": "2 kHz"},
+        {"drive.delay": "1 s"},
+        {"rail": {"seed": 0, "correlation_length": "5 mm", "rolling_pitch": "4 mm"}},
+        {"rail": {"seed": 0, "first_harmonic": 0.5, "rolling_pitch": "4 mm"}},
+        {"rail": {"seed": 0, "coulomb_deviation": 0.5, "correlation_length": "4 mm"}},
+        {"floor": None},
+    ],
+)
+def test_what_is_allowed(built: Stage, changes: dict[str, object]) -> None:
+    stage = built.replace(changes)
+    assert loads(stage.to_toml()) == stage
