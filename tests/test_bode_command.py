@@ -515,7 +515,7 @@ def test_frequencies_that_are_refused(text: str, given: str, expected: str) -> N
     ("overrides", "frequencies", "message"),
     [
         (['drive.sample_time="1 ms"'], "1 Hz..600 Hz", "frequencies of up to 500 Hz, half the sampling frequency"),
-        (['drive.sample_time="100 ms"'], None, "a crossover below half the sampling frequency"),
+        (['drive.sample_time="100 ms"'], None, "a sample time of at most a tenth of the crossover's period"),
         (['controller.crosover="8 Hz"'], None, "did you mean crossover"),
         (["crossover"], None, "KEY=VALUE"),
     ],

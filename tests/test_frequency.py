@@ -334,8 +334,8 @@ def test_a_delay_is_lag(rig: Stage) -> None:
     assert (early, late) == (True, False)
 
 
-def test_crossover_has_to_be_below_half_the_sampling_frequency(rig: Stage) -> None:
-    with pytest.raises(StageError, match="a crossover below half the sampling frequency"):
+def test_the_sample_time_is_at_most_a_tenth_of_the_crossovers_period(rig: Stage) -> None:
+    with pytest.raises(StageError, match="a sample time of at most a tenth of the crossover's period"):
         rig.replace({"drive.sample_time": "50 ms", "controller.crossover": "10 Hz"})
 
 

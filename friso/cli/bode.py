@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from friso.cli.common import (
+    AS_BUILT,
     AsJson,
     OutFolder,
     Overrides,
@@ -49,7 +50,7 @@ def bode(
 
     Example: friso bode examples/thesis_rig.toml --frequencies "0.1 Hz..1 kHz" --out bode
     """
-    stage = read_stage(stage_file, overrides, with_drive=True)
+    stage = read_stage(stage_file, overrides, leaves_out=AS_BUILT[1:])
     if stage.drive and stage.drive.velocity_samples is not None:
         say("drive.velocity_samples is left out: the derivative is that of the bilinear transform")
     shown = None if frequencies is None else _read_frequencies(frequencies, stage)

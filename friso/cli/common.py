@@ -21,6 +21,9 @@ INTERRUPTED = 130
 _NAMED = 3
 """Uncertain keys that are named, at most, where there are more."""
 
+AS_BUILT = ("drive", "rail", "cable", "floor")
+"""The tables of the machine as built, which the analyses of the ideal one leave out."""
+
 StageFile = Annotated[Path, typer.Argument(metavar="STAGE.toml", help="The stage file.")]
 Overrides = Annotated[
     list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help='Override a key: controller.crossover="12 Hz".')
@@ -67,8 +70,10 @@ def leave(done: bool) -> None:
         raise typer.Exit(1)
 
 
-def read_stage(path: Path, overrides: list[str] | None, with_drive: bool = False, drawn: bool = False) -> Stage:
-    """The stage of the file with the overrides; a drive that the command leaves out is mentioned, and that the centres
+def read_stage(
+    path: Path, overrides: list[str] | None, leaves_out: Sequence[str] = AS_BUILT, drawn: bool = False
+) -> Stage:
+    """The stage of the file with the overrides; tables that the command leaves out are mentioned, and that the centres
     of uncertain keys are used unless they are `drawn`. Raises StageError."""
     stage = with_overrides(load(path), overrides)
     keys = [] if drawn else [*stage.uncertain()]
@@ -77,8 +82,11 @@ def read_stage(path: Path, overrides: list[str] | None, with_drive: bool = False
         some = ", ".join([*keys[:_NAMED], *(["..."] if len(keys) > _NAMED else [])])
         centres = "their centres are" if len(keys) > 1 else "its centre is"
         say(f"{several} uncertain ({some}): {centres} used; friso check --draws 1000 samples the whole range")
-    if stage.drive and not with_drive:
-        say("[drive] is left out: simulation is in continuous time; friso bode knows sampling and delay")
+    left = [name for name in leaves_out if getattr(stage, name)]
+    if left:
+        tables = ", ".join(f"[{name}]" for name in left)
+        bode = "; friso bode knows sampling and delay" if "drive" in left else ""
+        say(f"{tables} {'are' if len(left) > 1 else 'is'} left out: friso rig simulates the machine as built{bode}")
     return stage
 
 

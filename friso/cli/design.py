@@ -8,7 +8,17 @@ from typing import TYPE_CHECKING, Annotated, NoReturn
 
 import typer
 
-from friso.cli.common import AsJson, Overrides, StageFile, check_place, made_folder, print_wrapped, read_stage, say
+from friso.cli.common import (
+    AS_BUILT,
+    AsJson,
+    Overrides,
+    StageFile,
+    check_place,
+    made_folder,
+    print_wrapped,
+    read_stage,
+    say,
+)
 from friso.cli.progress import step_bar
 
 if TYPE_CHECKING:
@@ -34,7 +44,7 @@ def design(
     from friso.design.method import NoDesign
     from friso.design.spec import load_spec
 
-    stage = read_stage(stage_file, overrides, with_drive=True)
+    stage = read_stage(stage_file, overrides, leaves_out=AS_BUILT[1:])
     spec = load_spec(spec_file)
     if stage.drive:
         say("[drive] counts for the margins; hunting and moves are simulated in continuous time")

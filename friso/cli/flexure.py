@@ -40,7 +40,7 @@ def flexure(
 
     Example: friso flexure rig.toml --stroke "1 mm" --out flexure
     """
-    stage = read_stage(stage_file, overrides, with_drive=True)
+    stage = read_stage(stage_file, overrides, leaves_out=())
     mechanism = _mechanism(stage, str(stage_file))
     deflection = _stroke(stroke, stage, mechanism)
     folder = None if out is None else made_folder(out)

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from friso.cli.common import AsJson, Overrides, StageFile, check_place, made_folder, print_wrapped, read_stage, say
+from friso.cli.common import AsJson, Overrides, StageFile, check_place, made_folder, print_wrapped, say, with_overrides
 from friso.cli.progress import step_bar
 from friso.quantities import StageError
+from friso.stage import Stage, load
 
 if TYPE_CHECKING:
     from friso.studies.rig.outcome import Outcome, RigLog
@@ -29,6 +30,9 @@ OutFolder = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Fo
 Seed = Annotated[int, typer.Option("--seed", metavar="NUMBER", help="Of the noise; the rail has its own, rail.seed.")]
 
 MOST_SEED = 10**15
+
+MANY = 4
+"""Samples from which a delay is worth a word."""
 
 
 def rig(
@@ -49,7 +53,8 @@ def rig(
     from friso.studies.rig.registry import experiment as found_experiment
 
     run = found_experiment(experiment)
-    stage = read_stage(stage_file, overrides, with_drive=True)
+    stage = with_overrides(load(stage_file), overrides)
+    _told(stage)
     if not 0 <= seed < MOST_SEED:
         raise StageError("--seed", str(seed), f"a whole number from 0, below {MOST_SEED:g}", "--seed 1")
     if out is not None:
@@ -68,6 +73,20 @@ def rig(
         say(f"{log.name} stopped {log.failure}; the log so far is kept")
     if failed:
         raise typer.Exit(1)
+
+
+def _told(stage: Stage) -> None:
+    """What to know of the drive before it runs."""
+    from friso.equations.as_built import whole_samples
+    from friso.rig.run import SAMPLE_TIME, as_built_keys
+
+    if stage.drive is None or stage.drive.sample_time is None:
+        say(f"drive.sample_time is not given: {SAMPLE_TIME * 1e6:g} us, as in the thesis")
+    samples = whole_samples(as_built_keys(stage))
+    if samples >= MANY:
+        say(f"drive.delay is {samples} samples: the force acts that much after what it answers")
+    if keys := [*stage.uncertain()]:
+        say(f"uncertain keys ({', '.join(keys[:3])}{', ...' if len(keys) > 3 else ''}) stand at their centres")
 
 
 def _print(outcome: Outcome, files: Sequence[Path]) -> None:

@@ -26,6 +26,9 @@ RTOL, METHOD = 1e-5, "Rodas4"
 BUDGET = 200
 """Steps that a run may take per sample on average."""
 
+MOST_SAMPLES = 64
+"""Longest delay, in samples."""
+
 MEMORY = 2.5e8
 """Bytes that the samples of the runs at hand may take."""
 
@@ -90,7 +93,10 @@ def run(
 
 
 def _check(flat: Mapping[str, Any], interval: float) -> None:
-    """Raises StageError for an interval that is no whole number of samples."""
+    """Raises StageError for an interval that is no whole number of samples, and for a delay of too many."""
+    if whole_samples(flat) > MOST_SAMPLES:
+        given = f"{flat['drive.delay']:g} s, {whole_samples(flat)} samples of {flat['drive.sample_time']:g} s"
+        raise StageError("drive.delay", given, f"at most {MOST_SAMPLES} samples", 'delay = "100 us"')
     samples = interval / flat["drive.sample_time"]
     if samples < 1 - 1e-9 or abs(samples - round(samples)) > 1e-6:
         expected = f"a whole number of samples of the drive, {flat['drive.sample_time']:g} s each"
