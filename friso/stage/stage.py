@@ -96,6 +96,7 @@ class Stage(Section):
             if self.bias and getattr(self.bias, body) is not None and getattr(self.masses, body) is None:
                 example = f'[masses] {body} = "1 kg"'
                 raise StageError(f"bias.{body}", f"a force on the {body}, which has no mass", "its mass", example)
+        self._has_computable_leaves()
         for rule, broken in _broken_rules(self.flat()):
             if broken:
                 raise StageError(", ".join(rule.keys), self._written(rule), rule.expected, rule.example)
@@ -112,6 +113,15 @@ class Stage(Section):
         elif joint and not joint.locked and joint.stiffness is None:
             expected = "the stiffness of the joint, or a [flexure]; only a joint with locked = true can do without"
             raise StageError("joint.stiffness", "nothing", expected, 'stiffness = "2.4 N/mm"')
+
+    def _has_computable_leaves(self) -> None:
+        """Leaf springs of absurd sizes have neither stiffness nor modes."""
+        flat = self.flat() if self.flexure else {}
+        followed = (key for key in flat if key.startswith(("parasitic.", "joint.")))
+        lost = [key for key in followed if not isinstance(flat[key], bool) and not np.isfinite(flat[key])]
+        if lost:
+            given = f"leaf springs of which {lost[0]} cannot be computed"
+            raise StageError("flexure", given, "sizes of leaf springs", 'length = "70 mm", width = "45 mm"')
 
     def _written(self, rule: Rule) -> str:
         """The values that a rule is about, as the user wrote them."""
