@@ -25,7 +25,8 @@ class Batch(NamedTuple):
     """Runs of one model: constants (n, constants), start states, absolute tolerances (n, states), modes (n, kinks),
     first and longest steps [s] (n,), pieces of the reference (n, pieces + 1, 1 + inputs), of which the last one only
     ends the run (in the first dimension also 1: shared by all runs), the number of the piece that begins the window
-    in which extremes are taken (n,), the period and the lateness of the drive's clock [s] (n, 2), and what is looked up. Start states go on with the numbers that are held."""
+    in which extremes are taken (n,), the period and the lateness of the drive's clock [s] (n, 2), and what is looked
+    up. Start states go on with the numbers that are held."""
 
     constants: np.ndarray
     starts: np.ndarray
@@ -78,7 +79,8 @@ STATISTICS = (
     "ended",
 )
 """Largest force [N], extremes of the deviation in the window [m], when it last was outside the two bands [s], steps
-attempted and rejected, and the time reached [s]."""
+attempted and rejected, and the time reached [s]. Extremes and moments are NaN where a drive has a clock: its samples
+tell them."""
 
 
 class Status(IntEnum):

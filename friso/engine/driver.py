@@ -6,7 +6,7 @@ names below the line `GENERATED` bound to those of the model at hand. It is neve
 
 
 # GENERATED: np, LANES, STATES, KINKS, CONSTANTS, INPUTS, HELD, DENSE, ROWS, row numbers such as X, OLD, TIME; CLOCKED,
-# and what a clock's tables are looked up over; step, update
+# and what a clock's tables are looked up over; step, locate, update
 
 
 def between(B, lane, i, theta):
@@ -142,6 +142,10 @@ def enter_segment(B, lane, segments, segment, window, first_step):
         segment += 1
     if segment >= count:
         return count
+    if CLOCKED:
+        B[PIECE_BEFORE * LANES + lane] = segments[segment, 0] - B[START * LANES + lane]
+        for i in range(INPUTS):
+            B[(PIECE_BEFORE + 1 + i) * LANES + lane] = B[(REF + i) * LANES + lane]
     B[DUE * LANES + lane] += B[START * LANES + lane] - segments[segment, 0]
     B[START * LANES + lane] = segments[segment, 0]
     B[STOP * LANES + lane] = segments[segment + 1, 0] - segments[segment, 0]
@@ -164,31 +168,35 @@ def pieces(batch, j):
     return batch.segments[min(j, batch.segments.shape[0] - 1)]
 
 
+def walk(B, lane, w):
+    """Where a lane is on the way that tables are looked up over, in their points: a state's, or the time's."""
+    timed = w == PLACE_STATES.size
+    axis = AXIS + (AXIS_ROWS if timed else 0)
+    where = B[TICK * LANES + lane] * B[PERIOD * LANES + lane] if timed else B[(X + PLACE_STATES[w]) * LANES + lane]
+    place = (where - B[axis * LANES + lane]) * B[(axis + 1) * LANES + lane]
+    return min(max(place, 0.0), B[(axis + 2) * LANES + lane])
+
+
 def look_up(B, lane, j, tables):
-    """Look up what a drive finds at its place, and at the time of its sample, in a lane that has just ticked."""
-    run = min(j, tables.places.shape[0] - 1)
-    first, per_metre = tables.grid[min(j, tables.grid.shape[0] - 1)]
-    for i in range(PLACES):
-        place = (B[(X + PLACE_STATES[i]) * LANES + lane] - first) * per_metre
-        B[(REF + TABLED + i) * LANES + lane] = interpolated(tables.places[run, i], place)
-    run = min(j, tables.times.shape[0] - 1)
-    place = B[TICK * LANES + lane] * B[PERIOD * LANES + lane] * tables.per_second[0]
-    for i in range(TIMES):
-        B[(REF + TABLED + PLACES + i) * LANES + lane] = interpolated(tables.times[run, i], place)
-
-
-def interpolated(table, place):
-    """The value of a table between two of its points, which goes on as it ends."""
-    place = min(max(place, 0.0), table.size - 1.0)
-    cell = min(int(place), table.size - 2)
-    return table[cell] + (place - cell) * (table[cell + 1] - table[cell])
+    """Look up the cells that a lane has come to, those it has not left excepted."""
+    for w in range(PLACE_STATES.size + 1):
+        place, cell = walk(B, lane, w), B[(CELL + w) * LANES + lane]
+        if place >= cell and place <= cell + 1.0:
+            continue
+        axis = AXIS + (AXIS_ROWS if w == PLACE_STATES.size else 0)
+        point = min(int(place), int(B[(axis + 2) * LANES + lane]) - 1)
+        B[(CELL + w) * LANES + lane] = point
+        for i in range(TABLES):
+            if WALKED[i] == w:
+                points = tables.places if i < PLACES else tables.times
+                run, table = min(j, points.shape[0] - 1), i if i < PLACES else i - PLACES
+                base = points[run, table, point]
+                B[(BASE + i) * LANES + lane] = base
+                B[(SLOPE + i) * LANES + lane] = points[run, table, point + 1] - base
 
 
 def note_tick(B, lane, settings, samples):
-    """Write states, and what is held from now on, of every so many samples of the drive's clock."""
-    tick = B[TICK * LANES + lane] - 1.0
-    if tick * B[PERIOD * LANES + lane] < B[NEXT_SAMPLE * LANES + lane] * (1.0 - 1e-12):
-        return
+    """Write states, and what is held from now on, of a sample of the drive's clock."""
     k = int(B[NEXT_SAMPLE * LANES + lane] / settings.interval + 0.5)
     for i in range(STATES):
         samples[k, i] = B[(X + i) * LANES + lane]
@@ -199,14 +207,16 @@ def note_tick(B, lane, settings, samples):
 
 def take_samples(B, who, batch, settings, results):
     """Let the lanes that have arrived at one take their sample."""
-    for lane in range(LANES):
-        if CLOCKED and B[TICKED * LANES + lane] > 0.0 and who[lane] >= 0:
-            look_up(B, lane, who[lane], batch.tables)
+    if CLOCKED:
+        locate(B)
+        for lane in range(LANES):
+            if B[LEFT * LANES + lane] > 0.0:
+                look_up(B, lane, who[lane], batch.tables)
     update(B)
-    for lane in range(LANES):
-        if CLOCKED and B[TICKED * LANES + lane] > 0.0 and who[lane] >= 0:
-            note_tick(B, lane, settings, results.samples[who[lane]])
-        B[TICKED * LANES + lane] = 0.0
+    if CLOCKED:
+        for lane in range(LANES):
+            if B[NOTED * LANES + lane] > 0.0:
+                note_tick(B, lane, settings, results.samples[who[lane]])
 
 
 def load_run(B, lane, j, batch, settings):
@@ -238,6 +248,17 @@ def start_clock(B, lane, j, batch):
     B[TICKED * LANES + lane] = 1.0 if late == 0.0 else 0.0
     for i in range(SEEN_STATES.size):
         B[(SEEN + i) * LANES + lane] = batch.starts[j, SEEN_STATES[i]]
+    tables = batch.tables
+    first, density = tables.grid[min(j, tables.grid.shape[0] - 1)]
+    axes = (first, density, tables.places.shape[2] - 1.0, 0.0, tables.per_second[0], tables.times.shape[2] - 1.0)
+    for i in range(2 * AXIS_ROWS):
+        B[(AXIS + i) * LANES + lane] = axes[i]
+    for w in range(PLACE_STATES.size + 1):
+        B[(CELL + w) * LANES + lane] = -2.0
+    look_up(B, lane, j, tables)
+    for i in range(TABLES):
+        off = walk(B, lane, WALKED[i]) - B[(CELL + WALKED[i]) * LANES + lane]
+        B[(REF + TABLED + i) * LANES + lane] = B[(BASE + i) * LANES + lane] + off * B[(SLOPE + i) * LANES + lane]
 
 
 def start_run(B, lane, j, batch, settings, results):
@@ -274,18 +295,24 @@ def answer(B, lane, j, segment, batch, settings, results):
     fraction = B[FRACTION * LANES + lane]
     if fraction == 0.0:
         return segment
-    start, end = deviation(B, lane, 0.0), deviation(B, lane, fraction)
-    note_entry(B, lane, INNER_EXIT, fraction, start, end, settings.inner)
-    note_entry(B, lane, OUTER_EXIT, fraction, start, end, settings.outer)
-    times, values = results.turn_times[j], results.turn_values[j]
-    count = note_turn(B, lane, fraction, settings, times, values, int(B[TURNS * LANES + lane]))
-    B[TURNS * LANES + lane] = count
+    if not CLOCKED:
+        look_inside(B, lane, j, fraction, settings, results)
     at_stop = B[TIME * LANES + lane] >= B[STOP * LANES + lane]
     if not CLOCKED and (at_stop or moment(B, lane, fraction) >= B[NEXT_SAMPLE * LANES + lane]):
         note_samples(B, lane, fraction, settings.interval, results.samples[j])
     if not at_stop:
         return segment
     return enter_segment(B, lane, pieces(batch, j), segment + 1, batch.windows[j], batch.first_steps[j])
+
+
+def look_inside(B, lane, j, fraction, settings, results):
+    """Record entries into the bands and turning points in the lane's last step."""
+    start, end = deviation(B, lane, 0.0), deviation(B, lane, fraction)
+    note_entry(B, lane, INNER_EXIT, fraction, start, end, settings.inner)
+    note_entry(B, lane, OUTER_EXIT, fraction, start, end, settings.outer)
+    times, values = results.turn_times[j], results.turn_values[j]
+    count = note_turn(B, lane, fraction, settings, times, values, int(B[TURNS * LANES + lane]))
+    B[TURNS * LANES + lane] = count
 
 
 def finish(B, lane, j, segment, batch, settings, results):
@@ -307,7 +334,7 @@ def finish(B, lane, j, segment, batch, settings, results):
         results.ends[j, STATES + i] = B[(REF + INPUTS + i) * LANES + lane]
     statistics = results.statistics[j]
     for i in range(5):
-        statistics[i] = B[(FORCE_PEAK + i) * LANES + lane]
+        statistics[i] = B[(FORCE_PEAK + i) * LANES + lane] if i == 0 or not CLOCKED else np.nan
     statistics[5] = B[ATTEMPTED * LANES + lane]
     statistics[6] = B[REJECTED * LANES + lane]
     statistics[7] = B[START * LANES + lane] + B[TIME * LANES + lane]

@@ -35,14 +35,24 @@ corner of the reference, which was at start; trial, longest, taken: step to try 
 fraction: the part of it that was accepted; event: the lane wants attention; turns: number of turning points kept;
 last_kind: of the last one kept, 1 for a maximum, -1 for a minimum."""
 
-CLOCK = ("period", "tick", "due", "ticked")
-"""Further rows, of use to a model that holds numbers between samples. period: time between them; tick: number of the sample to be taken next; due: when what follows
-from it acts, since the last corner of the reference; ticked: 1 where the last step ended there."""
+CLOCK = ("period", "tick", "due", "ticked", "noted", "left")
+"""Further rows, of use to a model that holds numbers between samples. period: time between them; tick: number of the
+sample to be taken next; due: when what follows from it acts, since the last corner of the reference; ticked: 1 where
+the last step ended there; noted: 1 where that sample is to be written down; left: 1 where a cell of a table has been
+left."""
+
+AXES = ("first", "density", "last")
+"""Of the places and of the times of a table: where it begins, its points per unit, and the number of its last point."""
 
 
 @dataclass(frozen=True)
 class Layout:
-    """Row numbers of the buffer for a model of the given size; the first row of each block."""
+    """Row numbers of the buffer for a model of the given size; the first row of each block.
+
+    `walks` are what tables are looked up over: states, and time. Each is in a `cell` between two points of its tables,
+    in which each of these has a `base` and a `slope`. `piece_before` holds length and inputs of the piece of the
+    reference before: a sample may lie in it whose command acts after the corner.
+    """
 
     states: int
     dense: int
@@ -50,6 +60,8 @@ class Layout:
     kinks: int
     given: int
     seen: int
+    tables: int
+    walks: int
 
     @property
     def blocks(self) -> dict[str, int]:
@@ -63,6 +75,11 @@ class Layout:
             "mode": self.kinks,
             "reference": self.given,
             "seen": self.seen,
+            "axis": self.walks and 2 * len(AXES),
+            "piece_before": self.walks and 4,
+            "cell": self.walks,
+            "base": self.tables,
+            "slope": self.tables,
         } | dict.fromkeys(SCALARS + CLOCK, 1)
         rows, row = {}, 0
         for name, size in sizes.items():

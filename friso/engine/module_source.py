@@ -12,7 +12,7 @@ from collections.abc import Iterable
 import sympy as sp
 
 from friso.engine import driver
-from friso.engine.layout import CLOCK, LANES, SCALARS
+from friso.engine.layout import AXES, CLOCK, LANES, SCALARS
 from friso.engine.printing import Rename, print_numpy
 from friso.engine.step_source import StepWriter
 from friso.engine.tableaus.tableau import Tableau
@@ -31,7 +31,7 @@ from numpy import uint64 as U
 from friso.engine.arrays import Status
 from friso.engine.roots import crossing, cubic, first_guess
 from friso.engine.shared_queue import take_next
-from friso.engine.simd_math import align_stack, exp, gaussian, nearest, power, tanh
+from friso.engine.simd_math import align_stack, exp, gaussian, power, quantised, tanh
 
 OPTIONS = {{"nogil": True, "error_model": "numpy", "fastmath": {{"contract", "nsz", "arcp"}}}}
 DONE, BUDGET = int(Status.DONE), int(Status.BUDGET)
@@ -43,9 +43,9 @@ def write_module(model: Model, tableau: Tableau, title: str, lanes: int = LANES)
     """The source of the module for `model`, stepping by the method of `tableau`."""
     writer = StepWriter(model, tableau)
     compiled = "@njit(**OPTIONS)\n"
-    step, update = compiled + writer.source(), compiled + writer.update_source()
+    kernels = [compiled + each for each in (writer.source(), writer.locate_source(), writer.update_source())]
     parts = [_HEAD.format(title=title, method=tableau.name), _numbers(model, writer, lanes)]
-    parts += [_numpy_functions(model, writer), step, update, _driver()]
+    parts += [_numpy_functions(model, writer), *kernels, _driver()]
     return "\n\n".join(parts)
 
 
@@ -54,7 +54,15 @@ def _numbers(model: Model, writer: StepWriter, lanes: int) -> str:
     rows = writer.layout.blocks
     named = {"X": "x", "OLD": "old", "END": "end", "D0": "dense", "TOLERANCE": "tolerance", "MODE": "mode"}
     named |= {"CONSTANT": "constant", "REF": "reference", "ROWS": "rows"}
-    named |= {"SEEN": "seen"} | {name.upper(): name for name in (*SCALARS, *CLOCK)}
+    named |= {
+        "SEEN": "seen",
+        "AXIS": "axis",
+        "PIECE_BEFORE": "piece_before",
+        "CELL": "cell",
+        "BASE": "base",
+        "SLOPE": "slope",
+    }
+    named |= {name.upper(): name for name in (*SCALARS, *CLOCK)}
     states = [str(symbol) for symbol in model.symbols]
     given = [str(symbol) for symbol in model.given]
     lines = [
@@ -67,22 +75,23 @@ def _numbers(model: Model, writer: StepWriter, lanes: int) -> str:
         f"GIVEN_NAMES = {tuple(given)!r}",
         f"HELD_NAMES = {tuple(str(each.symbol) for each in model.held)!r}",
         f"INPUTS, HELD, CLOCKED = {len(model.inputs)}, {len(model.held)}, {model.clock is not None}",
-        *_clock_numbers(model),
+        *_clock_numbers(model, writer),
         f"DENSE, POSITION, VELOCITY = {writer.layout.dense}, {states.index('position')}, {states.index('velocity')}",
     ]
     return "\n".join(lines + [f"{name} = {rows[block]}" for name, block in named.items()])
 
 
-def _clock_numbers(model: Model) -> list[str]:
+def _clock_numbers(model: Model, writer: StepWriter) -> list[str]:
     """Which states a drive with a clock measures and looks up over, and where it puts what it finds."""
     clock, states, given = model.clock, list(model.symbols), list(model.given)
     seen = tuple(states.index(x) for x in clock.seen.values()) if clock else ()
-    over = tuple(states.index(x) for x in clock.places.values()) if clock else ()
-    tables = (len(over), len(clock.times), given.index(clock.tabled[0])) if clock else (0, 0, 0)
-    arrays = {"SEEN_STATES": seen, "PLACE_STATES": over}
+    walked, places = writer.walked, len(clock.places) if clock else 0
+    over = tuple(dict.fromkeys(states.index(x) for x in clock.places.values())) if clock else ()
+    tables = (places, len(walked), given.index(clock.tabled[0]), len(AXES)) if clock else (0, 0, 0, 0)
+    arrays = {"SEEN_STATES": seen, "PLACE_STATES": over, "WALKED": tuple(walked)}
     return [
         *(f"{name} = np.array({values!r}, dtype=np.int64)" for name, values in arrays.items()),
-        f"PLACES, TIMES, TABLED = {tables!r}",
+        f"PLACES, TABLES, TABLED, AXIS_ROWS = {tables!r}",
     ]
 
 
@@ -115,4 +124,6 @@ def _driver() -> str:
     """The driver's functions, each compiled."""
     source = inspect.getsource(driver)
     inner = re.sub(r"^def ", "@njit(**OPTIONS)\ndef ", source[source.index("\ndef ") + 1 :], flags=re.MULTILINE)
-    return inner.replace("@njit(**OPTIONS)\ndef run(", "@njit(cache=True, **OPTIONS)\ndef run(")
+    inner = inner.replace("@njit(**OPTIONS)\ndef run(", "@njit(cache=True, **OPTIONS)\ndef run(")
+    inlined = '@njit(inline="always", **OPTIONS)\ndef take_samples('  # to hand over the batch costs as much as a sample
+    return inner.replace("@njit(**OPTIONS)\ndef take_samples(", inlined)

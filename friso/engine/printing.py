@@ -48,10 +48,9 @@ class _KernelPrinter(PythonCodePrinter):
         return f"tanh({self._print(expr.args[0])})"
 
     def _print_gaussian(self, expr: sp.Expr) -> str:
-        return f"gaussian({', '.join(self._print(each) for each in expr.args)})"
+        return f"{type(expr).__name__}({', '.join(self._print(each) for each in expr.args)})"
 
-    def _print_nearest(self, expr: sp.Expr) -> str:
-        return f"nearest({self._print(expr.args[0])})"
+    _print_quantised = _print_gaussian
 
     def _print_reciprocal(self, expr: sp.Expr) -> str:
         return f"(1.0 / ({self._print(expr.args[0])}))"

@@ -13,7 +13,7 @@ from typing import Any
 import sympy as sp
 
 from friso.engine.elimination import eliminate
-from friso.engine.layout import SCALARS, Layout
+from friso.engine.layout import AXES, SCALARS, Layout
 from friso.engine.printing import Constants, Rename, print_scalar, reciprocals
 from friso.engine.tableaus.tableau import Tableau
 from friso.equations.component import TICK, TIME
@@ -44,8 +44,14 @@ ROUNDING = 2e-15
 UNCHANGED = ("stop", "start", "longest", "next_sample", "record_from", "turns", "last_kind")
 """Rows that the step leaves as they are."""
 
+UNWATCHED = ("old_time", "taken", "deviation_max", "deviation_min", "inner_exit", "outer_exit")
+"""Rows that are of no use to a model with a clock: its runs are looked at in samples."""
+
 NO_SWING = 1e-6
 """A deviation whose rate stays below this share of the velocity's tolerance turns by rounding noise alone."""
+
+HAPPENED = "entered | turned | (now >= next_sample)"
+"""What wants attention besides the end of a piece of the reference."""
 
 DIVERGED = 1e6
 """A run ends when its deviation is so many times the length scale of the motion."""
@@ -93,11 +99,12 @@ class StepWriter:
         drifts = {f"drift{i}_": e for i, e in self._drift.items()}
         sizes = {f"size{k}_": self._size(kink.surface) for k, kink in enumerate(model.kinks)}
         sizes |= {f"terms{k}_": self._rounding(kink.surface) for k, kink in enumerate(model.kinks)}
-        watched: dict[str, Any] = surfaces | {"force": force}
-        self._start = Block(rates | entries | drifts | watched | sizes | follow, self.constants)
+        watched: dict[str, Any] = surfaces if model.clock else surfaces | {"force": force}
+        start = rates | entries | drifts | surfaces | {"force": force} | sizes
+        self._start = Block(start if model.clock else start | follow, self.constants)
         self._rates = Block(rates, self.constants)
         self._watched = Block(watched, self.constants)
-        self._followed = Block(follow, self.constants)
+        self._followed = Block({"deviation": model.deviation} if model.clock else follow, self.constants)
         self._jumps = [
             (
                 Block({f"jump{self._index[x]}_": e for x, e in jumps.items()}, self.constants),
@@ -110,8 +117,10 @@ class StepWriter:
         self._updates = Block({f"held{i}_": each.update for i, each in enumerate(model.held)}, self.constants)
         clock = {"period_": model.clock.period, "late_": model.clock.late} if model.clock else {}
         self._clock = Block(clock, self.constants)
+        self._walks = [*dict.fromkeys(model.clock.places.values()), TICK] if model.clock else []
         sizes_of = (self.size, len(tableau.dense), len(self.constants.index), self.kinks, len(self._given))
-        self.layout = Layout(*sizes_of, len(model.clock.seen) if model.clock else 0)
+        looked_up = (len(model.clock.seen), len(model.clock.tabled)) if model.clock else (0, 0)
+        self.layout = Layout(*sizes_of, *looked_up, len(self._walks))
 
     def _size(self, surface: sp.Expr) -> sp.Expr:
         """Magnitude of a surface that corresponds to the scales of the states."""
@@ -155,34 +164,80 @@ class StepWriter:
             *self._seen(),
             *self._store(),
         ]
-        head = "def step(B, rtol, inner, outer, budget):\n    align_stack()\n    for l in range(U(LANES)):\n"
-        return head + "".join(f"        {line}\n" for line in body)
+        return _over_lanes("step(B, rtol, inner, outer, budget)", body)
+
+    @property
+    def walked(self) -> list[int]:
+        """Over which of the walks each table is looked up."""
+        clock = self.model.clock
+        return [self._walks.index(x) for x in (*clock.places.values(), *(TICK for _ in clock.times))] if clock else []
+
+    def locate_source(self) -> str:
+        """The function `locate(B)`: in which lanes that have `ticked` a cell of a table has been `left`, and whose
+        sample is to be `noted`."""
+        if not self.model.clock:
+            return "def locate(B):\n    pass\n"
+        lines = [*self._clock.code("", self._in_buffer()), *self._offsets(), f"ticked = {self._row('ticked')} > 0.0"]
+        outside = (f"(off{w} < 0.0) | (off{w} > 1.0)" for w in range(len(self._walks)))
+        return _over_lanes(
+            "locate(B)",
+            [
+                *lines,
+                f"{self._row('left')} = 1.0 if ticked & ({' | '.join(outside)}) else 0.0",
+                f"late_enough = {self._row('tick')} * period_ >= {self._row('next_sample')} * (1.0 - 1e-12)",
+                f"{self._row('noted')} = 1.0 if ticked & late_enough else 0.0",
+            ],
+        )
+
+    def _offsets(self) -> list[str]:
+        """How far each walk is from the point at which its cell begins, in cells."""
+        lines = []
+        for w, x in enumerate(self._walks):
+            first, density, last = (self._row("axis", i + (len(AXES) if x == TICK else 0)) for i in range(len(AXES)))
+            where = f"{self._row('tick')} * period_" if x == TICK else self._row("x", self._index[x])
+            lines.append(f"off{w} = min(max(({where} - {first}) * {density}, 0.0), {last}) - {self._row('cell', w)}")
+        return lines
 
     def update_source(self) -> str:
-        """The function `update(B)`: the numbers that are held become what follows from the sample just taken, in the
-        lanes that have `ticked`; and when they will next."""
-        rows, clock = self.layout.blocks, self.model.clock
-        places = {x: rows["x"] + i for x, i in self._index.items()}
-        places |= {x: rows["reference"] + i for i, x in enumerate(self.model.given)}
-        places |= {c: rows["constant"] + i for c, i in self.constants.index.items()}
-        places |= {x: rows["seen"] + i for i, x in enumerate(clock.seen if clock else ())} | {TICK: rows["tick"]}
-
-        def name(symbol: sp.Symbol) -> str:
-            return "instant" if symbol == TIME else f"B[l + U({places[symbol]} * LANES)]"
-
+        """The function `update(B)`: tables are looked up, and the numbers that are held become what follows from the
+        sample just taken, in the lanes that have `ticked`; and when they will next."""
+        clock, name = self.model.clock, self._in_buffer()
         lines = [f"ticked, tick = {self._row('ticked')}, {self._row('tick')}", "instant = 0.0"]
         if clock:
             lines += [*self._clock.code("", name), f"instant = tick * period_ - {self._row('start')}"]
+            lines += [*self._piece_of_sample(), *self._offsets()]
+        for i, w in enumerate(self.walked):
+            lines.append(f"table{i} = {self._row('base', i)} + off{w} * {self._row('slope', i)}")
         lines += self._updates.code("", name)
-        for i, each in enumerate(self.model.held):
-            row = f"B[l + U({places[each.symbol]} * LANES)]"
-            lines.append(f"{row} = held{i}_ if ticked > 0.0 else {row}")
+        held = {each.symbol: f"held{i}_" for i, each in enumerate(self.model.held)}
+        held |= {x: f"table{i}" for i, x in enumerate(clock.tabled if clock else ())}
+        for symbol, value in held.items():
+            row = self._row("reference", self.model.given.index(symbol))
+            lines.append(f"{row} = {value} if ticked > 0.0 else {row}")
         lines.append(f"{self._row('tick')} = tick + ticked")
         if clock:
             due = self._row("due")
             lines.append(f"{due} = ((tick + 1.0) * period_ + late_) - {self._row('start')} if ticked > 0.0 else {due}")
-        head = "def update(B):\n    align_stack()\n    for l in range(U(LANES)):\n"
-        return head + "".join(f"        {line}\n" for line in lines)
+        return _over_lanes("update(B)", [*lines, f"{self._row('ticked')} = 0.0"])
+
+    def _piece_of_sample(self) -> list[str]:
+        """The piece of the reference in which the sample was taken: the one before, where a corner came in between."""
+        length, *before = (self._row("piece_before", i) for i in range(1 + len(self.model.inputs)))
+        lines = ["earlier = instant < -1e-6 * period_", f"instant = instant + {length} if earlier else instant"]
+        now = (self._row("reference", i) for i in range(len(before)))
+        return lines + [f"input{i} = {b} if earlier else {n}" for i, (b, n) in enumerate(zip(before, now, strict=True))]
+
+    def _in_buffer(self) -> Rename:
+        """Names for what a sample is computed from, most of which is in the buffer."""
+        clock = self.model.clock
+        names = {x: self._row("x", i) for x, i in self._index.items()}
+        names |= {x: self._row("reference", i) for i, x in enumerate(self.model.given)}
+        names |= {x: f"input{i}" for i, x in enumerate(self.model.inputs if clock else ())}
+        names |= {c: self._row("constant", i) for c, i in self.constants.index.items()}
+        names |= {x: self._row("seen", i) for i, x in enumerate(clock.seen if clock else ())}
+        names |= {x: f"table{i}" for i, x in enumerate(clock.tabled if clock else ())}
+        names |= {TICK: self._row("tick"), TIME: "instant"}
+        return names.__getitem__
 
     def _row(self, block: str, i: int = 0) -> str:
         return f"B[l + U({self.layout.blocks[block] + i} * LANES)]"
@@ -363,10 +418,24 @@ class StepWriter:
         return [*lines, "root16 = sqrt(root8)", f"factor = {SAFETY!r} / (root16 * sqrt(root16))"]
 
     def _statistics(self) -> list[str]:
-        """Largest force, extremes of the deviation, when it last left the two bands, and what wants attention."""
-        rename = self._rename("n", "t_n")
-        lines = [*self._followed.code("_n", rename), "now = start + t_n"]
-        lines.append("force_peak = max(force_peak, abs(force_s))")
+        """Largest force, and what wants attention."""
+        return [
+            *self._followed.code("_n", self._rename("n", "t_n")),
+            "force_peak = max(force_peak, abs(force_s))",
+            *([] if self.model.clock else self._between_samples()),
+            "attempted = attempted + 1.0",
+            "rejected_last = 0.0 if good else 1.0",
+            "rejected = rejected + rejected_last",
+            f"happened = good & ({'' if self.model.clock else HAPPENED + ' | '}(t_n >= stop))",
+            "failed = (attempted >= budget) | ((not good) & (not (trial >= 1e-15)))",
+            f"diverged = abs(deviation_n) * rtol > {DIVERGED!r} * tol{self._position}",
+            "event = 2.0 if diverged else (1.0 if happened | failed else 0.0)",
+            "fraction = fraction if good else 0.0",
+        ]
+
+    def _between_samples(self) -> list[str]:
+        """Largest force inside the step, extremes of the deviation, when it last left the two bands, and turned."""
+        lines = ["now = start + t_n"]
         for where, theta in zip(("p0", "p1", "e"), (*THIRDS, 1.0), strict=True):
             reached = f"good & (fraction >= {theta!r})"
             lines.append(f"force_peak = max(force_peak, abs(force_{where})) if {reached} else force_peak")
@@ -381,16 +450,6 @@ class StepWriter:
             "turned = ((turning_s > 0.0) & (turning_n <= 0.0)) | ((turning_s < 0.0) & (turning_n >= 0.0))",
             f"swing = max(abs(turning_s), abs(turning_n)) > {NO_SWING!r} * tol{self._velocity}",
             "turned = turned & swing & ((now >= record_from) | (off <= outer))",  # others change no result
-            "attempted = attempted + 1.0",
-            "rejected_last = 0.0 if good else 1.0",
-            "rejected = rejected + rejected_last",
-            "happened = good & ("
-            + ("" if self.model.clock else "entered | turned | (now >= next_sample) | ")
-            + "(t_n >= stop))",
-            "failed = (attempted >= budget) | ((not good) & (not (trial >= 1e-15)))",
-            f"diverged = abs(deviation_n) * rtol > {DIVERGED!r} * tol{self._position}",
-            "event = 2.0 if diverged else (1.0 if happened | failed else 0.0)",
-            "fraction = fraction if good else 0.0",
         ]
 
     def _seen(self) -> list[str]:
@@ -409,12 +468,23 @@ class StepWriter:
         return [*lines, *stored, f"{self._row('ticked')} = ticked"]
 
     def _store(self) -> list[str]:
+        lines = [] if self.model.clock else self._store_step()
+        lines += [f"{self._row('x', i)} = n{i}" for i in range(self.size)]
+        lines += [f"{self._row('mode', k)} = mode{k}" for k in range(self.kinks)]
+        lines += ["time, old_time, taken = t_n, t, h"]
+        kept = UNCHANGED + UNWATCHED if self.model.clock else UNCHANGED
+        return lines + [f"{self._row(name)} = {name}" for name in SCALARS if name not in kept]
+
+    def _store_step(self) -> list[str]:
+        """What the states inside the step follow from."""
         lines = [f"{self._row('old', i)} = x{i}" for i in range(self.size)]
         lines += [f"{self._row('end', i)} = end{i}" for i in range(self.size)]
         for m in range(len(self.tableau.dense)):
             lines += [f"{self._row('dense', m * self.size + i)} = d{m}_{i}" for i in range(self.size)]
-        lines += [f"{self._row('x', i)} = n{i}" for i in range(self.size)]
-        lines += [f"{self._row('mode', k)} = mode{k}" for k in range(self.kinks)]
-        lines += ["time, old_time, taken = t_n, t, h"]
-        changed = [name for name in SCALARS if name not in UNCHANGED]
-        return lines + [f"{self._row(name)} = {name}" for name in changed]
+        return lines
+
+
+def _over_lanes(call: str, lines: list[str]) -> str:
+    """A function that does the same in every lane."""
+    head = f"def {call}:\n    align_stack()\n    for l in range(U(LANES)):\n"
+    return head + "".join(f"        {line}\n" for line in lines)

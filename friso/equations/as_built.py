@@ -102,7 +102,7 @@ def _drive(form: AsBuilt) -> Control:
         reading, command, kept = _command(form, loop)
         commanded, waiting = state("commanded"), [state(f"waiting_{n + 1}") for n in range(form.delay_samples)]
         held = [Held(state("reading"), reading), *kept, Held(commanded, command)]
-        held += [Held(new, old) for new, old in zip(waiting, [command, *waiting], strict=False)]
+        held += [Held(new, old) for new, old in zip(waiting, [commanded, *waiting], strict=False)]
         acting = waiting[-1] if waiting else commanded
         force = key("drive.motor_constant_ratio") * state(MOTOR_FACTOR) * acting
         states: tuple[State, ...] = ()
@@ -125,7 +125,7 @@ def _command(form: AsBuilt, loop: Any) -> tuple[sp.Expr, sp.Expr, tuple[Any, ...
     """What the encoder reads [m], what the controller commands [N], and what it keeps for the next sample."""
     import sympy as sp
 
-    from friso.equations.component import TICK, Held, gaussian, key, nearest, state
+    from friso.equations.component import TICK, Held, gaussian, key, quantised, state
     from friso.equations.model import REFERENCE
     from friso.equations.pid import Loop
     from friso.equations.sampled import Rest, sampled_controller
@@ -134,7 +134,7 @@ def _command(form: AsBuilt, loop: Any) -> tuple[sp.Expr, sp.Expr, tuple[Any, ...
     drive = {name.split(".")[1]: key(name) for name in NEUTRAL}
     noisy = state("seen") + drive["encoder_noise"] * gaussian(key("drive.seed"), TICK)
     digit = drive["encoder_resolution"]
-    reading = sp.Piecewise((digit * nearest(noisy / digit), digit > 0), (noisy, True))
+    reading = quantised(noisy, digit)
     error = loop.error.xreplace({state("position"): reading})
     acceleration, speed, before = REFERENCE[2], loop.reference_velocity, state("error_before")
     ahead = drive["feedforward_mass"] * acceleration + drive["feedforward_viscous"] * speed

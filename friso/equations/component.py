@@ -77,10 +77,10 @@ class gaussian(sp.Function):
     nargs = 2
 
 
-class nearest(sp.Function):
-    """The whole number nearest to a number (`friso.engine`)."""
+class quantised(sp.Function):
+    """A number in whole digits, the size of which comes second; as it is where that is 0 (`friso.engine`)."""
 
-    nargs = 1
+    nargs = 2
 
 
 @dataclass(frozen=True)

@@ -13,14 +13,14 @@ from friso.engine.batch import Options, prepare, run_batch, settings_of
 from friso.engine.kernel import Kernel, empty_results, kernel
 from friso.equations.as_built import NEUTRAL, AsBuilt, whole_samples
 from friso.quantities import StageError
-from friso.rig.surroundings import tables
+from friso.rig.surroundings import MARGIN, tables
 from friso.rig.task import Task
 from friso.stage import Stage
 
 SAMPLE_TIME = 50e-6
 """Of a drive that does not tell [s]: that of the thesis (Sec. 3.5.2)."""
 
-RTOL, METHOD = 1e-5, "Rodas4"
+RTOL, METHOD = 1e-4, "Rodas4"
 """Relative tolerance and method: a step is at most a sample long."""
 
 BUDGET = 200
@@ -83,7 +83,8 @@ def run(
     """
     flat = as_built_keys(stage, changes)
     _check(flat, interval)
-    shape = kernel(AsBuilt.of(flat), method=METHOD)
+    first_run = {key: value[0] if np.ndim(value) else value for key, value in flat.items()}
+    shape = kernel(AsBuilt.of(first_run), method=METHOD)
     count = int(np.ceil(task.duration / interval * (1 - 1e-12)))
     chunk = max(8, int(MEMORY / (8 * count * len(shape.kept))))
     for first in range(0, len(seeds), chunk):
@@ -117,7 +118,7 @@ def _recorded(
     interval, count, threads = how
     flat = {**flat, "drive.seed": seeds.astype(float)}
     low, high = task.span
-    motion = {"motion.kind": "step", "motion.size": (high - low) or np.inf, "motion.duration": task.duration}
+    motion = {"motion.kind": "step", "motion.size": (high - low) or MARGIN, "motion.duration": task.duration}
     options = Options(
         rtol=RTOL, bands=(np.inf, np.inf), record_from=np.inf, least_swing=np.inf, interval=interval,
         budget=int(BUDGET * task.duration / flat["drive.sample_time"]),

@@ -1,0 +1,308 @@
+"""Drives with a clock: against a twin in plain Python, against the continuous loop, and in any lane."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import pytest
+from numba import njit
+from scipy import stats
+from scipy.linalg import expm
+
+from friso.engine import simd_math
+from friso.engine.arrays import Results, Status, Tables
+from friso.engine.batch import Options, prepare, run_batch, settings_of
+from friso.engine.kernel import Kernel, Wanted, empty_results, kernel, kernels
+from friso.engine.simulate import simulate
+from friso.equations.as_built import NEUTRAL, AsBuilt
+from friso.stage import Stage
+
+MASS, DRAG, KP, KI, KD, LIMIT, TIME = 2.0, 3.0, 4000.0, 9000.0, 60.0, 9.0, 1e-3
+DIGIT, NOISE, LAG, RATIO = 1e-5, 3e-6, 150.0, 0.9
+MOTION = {"kind": "there_and_back", "acceleration": "4 m/s^2", "return_at": "0.2 s", "duration": "0.4 s"}
+DELAYS = (0.0, 0.4, 1.0, 2.6)
+Flat = dict[str, Any]
+
+
+def axis(**changes: str) -> Stage:
+    """A mass with viscous friction alone: its bristles are far too soft to be felt."""
+    friction = {
+        "model": "lugre",
+        "static": "1 N",
+        "coulomb": "1 N",
+        "stribeck_velocity": "1 mm/s",
+        "stribeck_exponent": 2,
+        "bristle_stiffness": "1e-9 N/m",
+        "bristle_damping": "0 N*s/m",
+        "viscous": f"{DRAG} N*s/m",
+    }
+    controller = {"kind": "pid", "kp": f"{KP} N/m", "ki": f"{KI} N/(m*s)", "kd": f"{KD} N*s/m"}
+    controller |= {"derivative_on": "measurement", "force_limit": f"{LIMIT} N"}
+    motion = {**MOTION, "acceleration_time": "30 ms"}
+    masses = {"cart": f"{MASS} kg"}
+    return Stage(masses=masses, friction=friction, controller=controller, motion=motion).replace(changes)
+
+
+def keys(stage: Stage, delay: float = 0.0, **changes: Any) -> Flat:
+    """The flat keys of a stage whose drive waits `delay` samples."""
+    drive = {"sample_time": TIME, "late": (delay - int(delay)) * TIME, "delay": delay * TIME, "seed": 1.0}
+    drive |= {"current_bandwidth": LAG, "velocity_samples": 2.0, **changes}
+    return {**NEUTRAL, **stage.flat(), **{f"drive.{name}": value for name, value in drive.items()}}
+
+
+FLAT_TABLES = Tables(np.ones((1, 3, 2)), np.array([[0.0, 1.0]]), np.zeros((1, 2, 2)), np.ones(1))
+
+SPACING, GRID, POINTS = 2e-3, 0.5e-3, 9
+"""Of the tables over time [s] and over position [m], from -1 mm; the position goes beyond both of their ends."""
+
+
+def surroundings() -> Tables:
+    """A motor whose constant changes along the way, a force that is injected and a floor that shakes."""
+    time = np.arange(201) * SPACING
+    places = np.ones((1, 3, POINTS))
+    places[0, 2] = 1 + 0.2 * np.cos(np.arange(POINTS))
+    times = np.array([[3 * np.sin(40 * time), 0.2 * np.cos(90 * time)]])
+    return Tables(places, np.array([[-1e-3, 1 / GRID]]), times, np.array([1 / SPACING]))
+
+
+@pytest.fixture(scope="module", autouse=True)
+def compiled() -> None:
+    """All that is needed is compiled side by side."""
+    kernels([Wanted(AsBuilt.of(keys(axis(), delay))) for delay in (0.0, 1.0, 2.0)])
+
+
+def run(
+    flat: Mapping[str, Any], runs: int = 1, tables: Tables = FLAT_TABLES, every: int = 1, **options: Any
+) -> tuple[Kernel, Results]:
+    shape = kernel(AsBuilt.of({name: np.ravel(value)[0] for name, value in flat.items()}))
+    threads = options.pop("threads", None)
+    chosen = Options(**{"rtol": 1e-11, "interval": every * TIME, **options})
+    batch = prepare(shape, flat, runs, chosen)._replace(tables=tables)
+    assert chosen.interval is not None
+    results = empty_results(runs, 1, round(0.4 / chosen.interval) + 1, len(shape.kept))
+    run_batch(shape, batch, settings_of(chosen), results, threads)
+    return shape, results
+
+
+@njit
+def deviates(seeds, ticks, out):
+    for i in range(out.size):
+        out[i] = simd_math.gaussian(seeds[i], ticks[i])
+
+
+def noise(seeds: Any, ticks: Any) -> np.ndarray:
+    seeds, ticks = np.broadcast_arrays(np.asarray(seeds, float), np.asarray(ticks, float))
+    out = np.empty(seeds.size)
+    deviates(seeds.ravel(), ticks.ravel(), out)
+    return out.reshape(seeds.shape)
+
+
+def mixed(z: int) -> int:
+    """SplitMix64 in Python's whole numbers."""
+    z = (z ^ (z >> 30)) * 0xBF58476D1CE4E5B9 % 2**64
+    z = (z ^ (z >> 27)) * 0x94D049BB133111EB % 2**64
+    return z ^ (z >> 31)
+
+
+def test_noise_is_that_of_plain_python() -> None:
+    """Box and Muller from the upper 40 and the lower 24 of 64 mixed bits."""
+    golden, of_one = 0x9E3779B97F4A7C15, 0x4330000000000000  # the bits of 2^52
+    rng = np.random.default_rng(5)
+    for seed, tick in [(0, 0), *rng.integers(0, 2**50, (300, 2)).tolist()]:
+        bits = mixed((mixed((of_one + seed) * golden % 2**64) + (of_one + tick) * golden) % 2**64)
+        first, second = ((bits >> 24) + 0.5) / 2**40, ((bits % 2**24) * 2**16 + 0.5) / 2**40
+        expected = np.sqrt(-2 * np.log(first)) * np.sin(2 * np.pi * (abs(second - 0.5) - 0.25))
+        assert noise(seed, tick) == pytest.approx(expected, abs=1e-10)
+
+
+def test_noise_is_normal() -> None:
+    """Moments, distribution and tails of 4 million deviates, each within five of its standard errors."""
+    z = noise(np.arange(40)[:, None], np.arange(100_000)).ravel()
+    n = z.size
+    for power, expected, variance in ((1, 0, 1), (2, 1, 2), (3, 0, 15), (4, 3, 96)):
+        assert np.mean(z**power) == pytest.approx(expected, abs=5 * np.sqrt(variance / n))
+    assert stats.kstest(z[::7], "norm").pvalue > 1e-6
+    for size in (2.0, 3.0, 4.0, 4.75):
+        beyond = n * stats.norm.sf(size)
+        for side in (z, -z):
+            assert np.count_nonzero(side > size) == pytest.approx(beyond, abs=5 * np.sqrt(beyond))
+
+
+@pytest.mark.parametrize("lag", [1, 2, 3, 64])
+@pytest.mark.parametrize("along", [0, 1], ids=["seeds", "ticks"])
+def test_neighbours_are_independent(lag: int, along: int) -> None:
+    """Of neighbouring seeds, and of neighbouring ticks, neither the deviates nor their squares tell of each other."""
+    z = np.moveaxis(noise(np.arange(1000)[:, None], np.arange(1000)), along, 0)
+    for values in (z, (z**2 - 1) / np.sqrt(2)):
+        assert np.mean(values[lag:] * values[:-lag]) == pytest.approx(0, abs=5 / float(np.sqrt(values[lag:].size)))
+
+
+@dataclass
+class Twin:
+    """The drive and its mass, sample by sample: moved exactly while the command, floor and motor constant are held."""
+
+    stage: Stage
+    delay: float
+
+    def _reference(self, t: float) -> float:
+        ramp, back = (self.stage.flat()[f"motion.{name}"] for name in ("acceleration_time", "return_at"))
+
+        def stroke(t: float) -> float:
+            up, down = min(max(t, 0.0), ramp), min(max(t - ramp, 0.0), ramp)
+            return 2.0 * up**2 + 4.0 * ramp * down - 2.0 * down**2
+
+        return stroke(t) - stroke(t - back)
+
+    def run(self, tables: Tables, samples: int) -> tuple[np.ndarray, np.ndarray]:
+        """Position, velocity and the motor's force as each command is carried out, and that command."""
+        late = (self.delay - int(self.delay)) * TIME
+        parts = self._moving(late), self._moving(TIME - late)
+        x, commands, past, integral = np.zeros(3), [0.0] * int(self.delay), [0.0, 0.0], 0.0
+        floor, constant, moved = *self._found(tables, 0, 0.0), []
+        acting = 0.0
+        for n in range(samples):
+            reading = DIGIT * np.round((x[0] + NOISE * float(noise(1, n))) / DIGIT)
+            error = self._reference(n * TIME) - reading
+            extra = np.interp(n * TIME, np.arange(201) * SPACING, tables.times[0, 0])
+            demand = KP * error - KD * (reading - past[1]) / (2 * TIME) + extra
+            wanted = demand + KI * (integral + TIME * error)
+            winding = (wanted > LIMIT and error > 0) or (wanted < -LIMIT and error < 0)
+            integral = integral if winding else integral + TIME * error
+            commands.append(float(np.clip(demand + KI * integral, -LIMIT, LIMIT)))
+            past = [reading, past[0]]
+            x = self._move(parts[0], x, constant * acting, floor)
+            moved.append(x)
+            floor, constant = self._found(tables, n, x[0])
+            acting = commands[n]
+            x = self._move(parts[1], x, constant * acting, floor)
+        return np.array(moved), np.array(commands[int(self.delay) :])
+
+    @staticmethod
+    def _found(tables: Tables, n: int, place: float) -> tuple[float, float]:
+        floor = np.interp(n * TIME, np.arange(201) * SPACING, tables.times[0, 1])
+        return float(floor), RATIO * float(np.interp(place, -1e-3 + GRID * np.arange(POINTS), tables.places[0, 2]))
+
+    @staticmethod
+    def _moving(time: float) -> np.ndarray:
+        """Position, velocity and force, under a held demand and floor."""
+        omega = 2 * np.pi * LAG
+        rows = [[0, 1, 0, 0, 0], [0, -DRAG / MASS, 1 / MASS, 0, -1], [0, 0, -omega, omega, 0], [0] * 5, [0] * 5]
+        return expm(np.array(rows) * time)
+
+    @staticmethod
+    def _move(by: np.ndarray, x: np.ndarray, demand: float, floor: float) -> np.ndarray:
+        return (by @ [*x, demand, floor])[:3]
+
+
+@pytest.mark.parametrize("ramp", ["30 ms", "30.37 ms"], ids=["corner on a sample", "corner between samples"])
+@pytest.mark.parametrize("delay", DELAYS)
+def test_drive_is_that_of_plain_python(delay: float, ramp: str) -> None:
+    """Encoder, controller, limit, queue, current loop, motor, floor, and an injected force."""
+    stage, tables = axis(**{"motion.acceleration_time": ramp}), surroundings()
+    digital = {"encoder_resolution": DIGIT, "encoder_noise": NOISE, "motor_constant_ratio": RATIO}
+    shape, results = run(keys(stage, delay, **digital), tables=tables)
+    assert results.statuses[0] == Status.DONE
+    states, commands = Twin(stage, delay).run(tables, 400)
+    found = results.samples[0, :400, [shape.kept.index(n) for n in ("position", "velocity", "motor_force")]].T
+    assert np.abs(commands).max() == LIMIT  # the limit is met, and left again
+    assert np.mean(np.abs(commands) == LIMIT) < 0.4
+    assert results.samples[0, :400, shape.kept.index("commanded")] == pytest.approx(commands[:400], abs=1e-6)
+    assert found == pytest.approx(states, abs=1e-7, rel=1e-7)
+
+
+def test_delays_act_in_turn() -> None:
+    """Every whole sample of delay lets the first force come a sample later; the first sample asks for none."""
+    first = []
+    for delay in DELAYS:
+        shape, results = run(keys(axis(), delay))
+        moving = np.abs(results.samples[0, :, shape.kept.index("motor_force")]) > 1e-9
+        first.append(int(np.argmax(moving)))
+    assert first == [2 + int(delay) for delay in DELAYS]
+
+
+def test_the_continuous_loop_is_approached_in_the_first_order() -> None:
+    """The error falls with the sample time, and with the lag of the current loop, a share of it."""
+    stage = axis(**{"controller.force_limit": "1 MN"})
+    exact = simulate(stage, 1e-10, 0.01)
+    times, errors = TIME / 2.0 ** np.arange(5), []
+    for time in times:
+        flat = keys(stage, sample_time=time, current_bandwidth=0.5 / time)
+        shape, results = run(flat, every=round(0.01 / TIME), rtol=1e-9)
+        found = results.samples[0, :40, shape.kept.index("position")]
+        errors.append(float(np.abs(found - exact.position.values[:40]).max()))
+    slope = np.polyfit(np.log(times[1:]), np.log(errors[1:]), 1)[0]
+    assert slope == pytest.approx(1, abs=0.1)
+
+
+@pytest.mark.parametrize("every", [2, 5, 40])
+@pytest.mark.parametrize("delay", [0.0, 2.6])
+def test_samples_are_noted_at_their_instants(every: int, delay: float) -> None:
+    """Every so many samples of the drive: the same numbers as when all are noted."""
+    flat = keys(axis(), delay, encoder_noise=NOISE)
+    every_one, some = (run(flat, every=n)[1].samples[0] for n in (1, every))
+    assert np.array_equal(some[:-1], every_one[:-1:every])
+    assert not np.isnan(some[:-1]).any()
+
+
+def test_tables_between_their_points() -> None:
+    """A table that is a straight line is one, whether its points are far apart or closer than samples."""
+    shape, commanded = None, []
+    for count in (2, 5, 401, 3001):
+        line = np.zeros((1, 2, count))
+        line[0, 0] = np.linspace(-4.0, 6.0, count)
+        tables = FLAT_TABLES._replace(times=line, per_second=np.array([(count - 1) / 0.4]))
+        still = {"controller.kp": 1e-9, "controller.ki": 1e-9, "controller.kd": 1e-9}
+        shape, results = run(keys(axis()) | still, tables=tables)
+        commanded.append(results.samples[0, :400, shape.kept.index("commanded")])
+    expected = -4.0 + 10.0 * np.arange(400) * TIME / 0.4
+    for each in commanded:
+        assert each == pytest.approx(expected, abs=1e-9)
+
+
+def test_any_lane_and_any_number_of_threads() -> None:
+    """A run is the same, bit for bit, alone or among others, in any order."""
+    runs = 19
+    rng = np.random.default_rng(3)
+    flat = keys(axis(), 1.0, encoder_noise=NOISE) | {
+        "drive.seed": np.arange(runs) + 1.0,
+        "controller.kp": rng.uniform(1e3, 6e3, runs),
+        "motion.return_at": rng.uniform(0.1, 0.3, runs),
+    }
+    tables = surroundings()
+    times = tables.times * rng.uniform(0, 1, (runs, 1, 1))
+    one = run(flat, runs, tables._replace(times=times), threads=1)[1]
+    assert np.all(one.statuses == Status.DONE)
+    assert len({tuple(row) for row in one.ends}) == runs
+    order = rng.permutation(runs)
+    shuffled = {key: value[order] if np.ndim(value) else value for key, value in flat.items()}
+    several = run(shuffled, runs, tables._replace(times=times[order]), threads=3)[1]
+    assert np.array_equal(several.samples, one.samples[order], equal_nan=True)
+    for j in (0, 7, 18):
+        alone = {key: value[j] if np.ndim(value) else value for key, value in flat.items()}
+        found = run(alone, 1, tables._replace(times=times[j : j + 1]))[1]
+        assert np.array_equal(found.samples[0], one.samples[j], equal_nan=True)
+        assert np.array_equal(found.statistics[0], one.statistics[j], equal_nan=True)
+
+
+def test_a_loop_that_diverges_keeps_its_samples() -> None:
+    """A proportional gain far beyond what the sample time allows, beside a run that is sound."""
+    gains = {"controller.kp": np.array([KP, 1e8]), "controller.force_limit": 1e15}
+    _, results = run(keys(axis()) | gains, 2, rtol=1e-6)
+    assert list(results.statuses) == [Status.DONE, Status.DIVERGED]
+    ended = results.statistics[1, 7]
+    assert TIME < ended < 0.39
+    last = int(ended / TIME * (1 + 1e-9))
+    assert not np.isnan(results.samples[1, :last]).any()
+    assert np.isnan(results.samples[1, last + 1 :]).all()
+    assert not np.isnan(results.samples[0, :-1]).any()
+
+
+def test_what_is_not_watched_is_not_a_number() -> None:
+    """A run with a clock has its largest force, steps and end; extremes and exits are for its samples to tell."""
+    shape, results = run(keys(axis()))
+    statistics = results.statistics[0]
+    assert np.isnan(statistics[1:5]).all()
+    assert statistics[7] == pytest.approx(0.4)
+    force = np.abs(results.samples[0, :, shape.kept.index("motor_force")])
+    assert statistics[0] == pytest.approx(np.nanmax(force), rel=1e-3)
