@@ -606,8 +606,8 @@ def of_plant(changes: dict[str, str]) -> Finding:
 @pytest.mark.parametrize(
     ("claim", "holds"),
     [
-        ("F17", (True, False, True)),
-        ("F18", (True, True, False)),
+        ("F17", (True, False, True, True)),
+        ("F18", (True, True, False, True)),
         ("F19", (True, False)),
         ("F20", (True, True, False)),
         ("F21", (False, False, True)),

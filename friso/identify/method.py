@@ -23,6 +23,7 @@ from friso.identify.moves import Moves, identify_moves
 from friso.identify.moves import predict as predict_moves
 from friso.identify.output_error.problem import Simulated, why_continuous
 from friso.identify.response.analysis import Bench, analyse, predicted
+from friso.identify.response.two_mass import TwoMass
 from friso.identify.stage_file import identified, made_up
 from friso.identify.stage_keys import Fitting, fitting
 from friso.quantities import StageError
@@ -231,6 +232,9 @@ def _of_bench(bench: Bench, stage: Stage | None) -> tuple[Estimate, ...]:
     if units != ("N", "m"):
         return ()
     model = bench.two_masses
+    if model is not None and stage is not None and (mode := _parasitic(model, stage)):
+        why = f"the resonance at {mode:.3g} Hz is nearer the parasitic mode than the joint's: try --band below it"
+        return (Estimate.unknown("joint.stiffness", "N/m", model["joint stiffness"].method, why, 0.0),)
     if model is not None and (stage is None or stage.joint) and bench.modes is not None and bench.modes.shape.modes:
         pairs = {"masses.stage": "driven mass", "masses.cart": "other mass"}
         pairs |= {"joint.stiffness": "joint stiffness", "joint.damping": "joint damping"}
@@ -238,6 +242,18 @@ def _of_bench(bench: Bench, stage: Stage | None) -> tuple[Estimate, ...]:
     if not bench.lines or stage is None:
         return ()
     return _shared(bench.lines[0].value, stage)
+
+
+def _parasitic(model: TwoMass, stage: Stage) -> float | None:
+    """The resonance [Hz] of a two-mass model that is rather the stage's parasitic mode than its joint's; else None."""
+    flat = stage.flat()
+    if "parasitic.frequency" not in flat or "joint.stiffness" not in flat:
+        return None
+    masses = (flat["masses.cart"], flat["masses.stage"])
+    joint = np.sqrt(flat["joint.stiffness"] * sum(masses) / np.prod(masses)) / (2 * np.pi)
+    found = model["resonance frequency"].value
+    away = [abs(np.log(found / each)) for each in (joint, flat["parasitic.frequency"])]
+    return found if away[1] < away[0] else None
 
 
 def _shared(total: Estimate, stage: Stage) -> tuple[Estimate, ...]:

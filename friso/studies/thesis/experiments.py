@@ -27,7 +27,11 @@ from friso.identify.experiments import (
 )
 from friso.identify.logs.log import Log
 from friso.stage import Stage, loads
+from friso.studies.rig.in_position import InPosition
+from friso.studies.rig.stroke_crossover import StrokeCrossover
 from friso.studies.thesis.linear import Need
+from friso.studies.thesis.rig_hunting import Cycles, Moves, cycles, grid, moves, standstill
+from friso.studies.thesis.rig_loops import RigLoops, rig_loops
 from friso.studies.thesis.studies import LOCKED
 
 FORCE = 5.0
@@ -99,16 +103,28 @@ class ConstantSpeed:
 
 @dataclass(frozen=True)
 class Experiments:
-    """What all of them find of one rig; the constant speeds with the joint free, and locked."""
+    """What all of them find of one rig; the constant speeds with the joint free, and locked; the loops with its drive
+    as built."""
 
     locked_line: LockedLine
     joint_steps: JointSteps
     slow_motion: tuple[SlowMotion, ...]
     constant_speed: tuple[ConstantSpeed, ConstantSpeed]
+    moves: Moves
+    grid: StrokeCrossover
+    cycles: Cycles
+    standstill: InPosition
+    rig_loops: RigLoops
 
 
 LINE, STEPPED, SLIPS, SPEEDY = "locked_line", "joint_steps", "slow_motion", "constant_speed"
 """The experiments by name, as a judge needs them."""
+
+BUILT = "rig_loops"
+"""Loops and plants of the rig as built (Sec. 4.2)."""
+
+MOVES, GRID, ON_RAILS, STANDSTILL = "moves", "grid", "cycles", "standstill"
+"""Those of the rig as built (Sec. 4.3.2)."""
 
 EXPERIMENTS: Mapping[str, Need] = MappingProxyType(
     {
@@ -116,6 +132,11 @@ EXPERIMENTS: Mapping[str, Need] = MappingProxyType(
         STEPPED: Need(("motion.",)),
         SLIPS: Need(("motion.",)),
         SPEEDY: Need(("motion.",)),
+        BUILT: Need(()),
+        MOVES: Need(()),
+        GRID: Need(()),
+        ON_RAILS: Need((), locked=True),
+        STANDSTILL: Need(("motion.",)),
     }
 )
 """What of the stage file plays no part: the first is without its controller, and all have motions of their own."""
@@ -203,5 +224,10 @@ _RUNS: Mapping[str, Callable[[Stage], Any]] = MappingProxyType(
         STEPPED: joint_steps,
         SLIPS: lambda stage: tuple(slow_motion(stage, speed) for speed in SLOW),
         SPEEDY: lambda stage: (constant_speed(stage), constant_speed(stage.replace(dict(LOCKED)))),
+        BUILT: rig_loops,
+        MOVES: moves,
+        GRID: grid,
+        ON_RAILS: cycles,
+        STANDSTILL: standstill,
     }
 )

@@ -9,7 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from friso.studies.thesis.claims import ABOUT, Evidence, Finding, Part, judges
-from friso.studies.thesis.experiments import FORCE, FREQUENCIES, LINE, RANGE, LockedLine
+from friso.studies.thesis.experiments import BUILT, FORCE, FREQUENCIES, LINE, RANGE, LockedLine
+from friso.studies.thesis.judges.rig_loops import on_the_rig, weaker_motor
 from friso.studies.thesis.linear import PLANT
 
 MEASURED, WEIGHED = (2.5, 0.75), (1.7, 0.5)
@@ -28,10 +29,11 @@ CLOSE = 0.1
 """Share within which numbers agree that one error is to explain."""
 
 
-@judges("F17", figure="17", needs=(LINE,))
+@judges("F17", figure="17", needs=(LINE, BUILT))
 def mass_line_of_the_locked_rig(evidence: Evidence) -> Finding:
     """The mass line with friction at several places."""
-    return judged_line(evidence.experiments.locked_line)
+    line = judged_line(evidence.experiments.locked_line)
+    return Finding((*line.parts, *on_the_rig(evidence, lambda built: weaker_motor(built, 0, MEASURED[0], WEIGHED[0]))))
 
 
 def judged_line(line: LockedLine) -> Finding:
@@ -73,7 +75,7 @@ def judged_line(line: LockedLine) -> Finding:
     )
 
 
-@judges("F18", figure="18", needs=(PLANT,))
+@judges("F18", figure="18", needs=(PLANT, BUILT))
 def response_of_the_free_joint(evidence: Evidence) -> Finding:
     """Modes and mass line of the free joint, and whether one error would explain both masses."""
     plants = evidence.analysis.plants
@@ -102,5 +104,6 @@ def response_of_the_free_joint(evidence: Evidence) -> Finding:
                 f"{CONSTANTS[0]:.2f}: one error of the motor constant {both} both (to {CLOSE:.0%}), and the first "
                 "mode does not hang on it. Simulation alone cannot tell",
             ),
+            *on_the_rig(evidence, lambda built: weaker_motor(built, 1, MEASURED[1], WEIGHED[1])),
         )
     )

@@ -8,6 +8,8 @@ from friso.frequency.crossover import WANTED
 from friso.frequency.margins import Margins
 from friso.frequency.ranges import Range
 from friso.studies.thesis.claims import ABOUT, ORDER, Evidence, Finding, Part, about, judges
+from friso.studies.thesis.experiments import BUILT
+from friso.studies.thesis.judges.rig_loops import measured_free, measured_locked, on_the_rig
 from friso.studies.thesis.linear import FREE, FURTHER, LOCKED_LOOP, Contact, Linear, Loops, Speeds
 
 _SIMULATED, _MEASURED = 60.0, 48.0
@@ -72,7 +74,7 @@ def _speeds(ranges: tuple[Range, ...]) -> str:
     return " and ".join(f"from {low * 1e3:.2g} to {high * 1e3:.2g} mm/s" for low, high in ranges)
 
 
-@judges("F22", figure="22", needs=(LOCKED_LOOP,))
+@judges("F22", figure="22", needs=(LOCKED_LOOP, BUILT))
 def locked_loops_cross_where_tuned(evidence: Evidence) -> Finding:
     """The crossings of the locked rig, sliding, at the thesis's settings."""
     settings = {f: cases["sliding"] for f, cases in evidence.analysis.locked.margins.items()}
@@ -103,6 +105,7 @@ def locked_loops_cross_where_tuned(evidence: Evidence) -> Finding:
                 why=why,
             ),
             _threatened(settings[highest], highest, further),
+            *on_the_rig(evidence, measured_locked),
         )
     )
 
@@ -134,7 +137,7 @@ def _threatened(known: Margins, setting: float, further: tuple[float, ...]) -> P
     )
 
 
-@judges("F23", figure="23", needs=(FREE, LOCKED_LOOP))
+@judges("F23", figure="23", needs=(FREE, LOCKED_LOOP, BUILT))
 def free_loop_crosses_above(evidence: Evidence) -> Finding:
     """The crossing of the free joint tuned for the whole mass, and its highest stable setting."""
     found = evidence.analysis
@@ -158,6 +161,7 @@ def free_loop_crosses_above(evidence: Evidence) -> Finding:
                 why="idealisation: the simulated controller neither samples nor delays; the rig's does, but the thesis "
                 "gives no delay. Besides, its frame has resonances (Sec. 4.3.1) that the model does not have",
             ),
+            *on_the_rig(evidence, measured_free),
         )
     )
 

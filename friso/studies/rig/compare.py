@@ -1,0 +1,283 @@
+"""Hunting cycles as slow and as irregular as measured (Fig. 27): what friction that varies does to them, and what else.
+
+The thesis gives no numbers for the irregularity; of the period it says that the simulated one is nearly half of the
+measured one, at a similar amplitude.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from friso.rig.rail import friction_factors
+from friso.rig.task import Task
+from friso.stage import Stage
+from friso.studies.draws import Fates, Share
+from friso.studies.rig.hunted import (
+    Hunted,
+    crossover,
+    distance,
+    follow,
+    joined,
+    move,
+    numbers_of,
+    once,
+    rails,
+    released,
+    with_joint,
+)
+from friso.studies.rig.hunting import Trace
+from friso.studies.rig.outcome import Outcome, Progress, rig_log
+
+DEVIATIONS = (0.02, 0.05, 0.1, 0.2, 0.3)
+"""Of static and Coulomb friction alike, over their means: our choice."""
+
+LENGTHS = (2.0, 5.0, 10.0, 20.0)
+"""Correlation lengths over the swing of the cycle on an even rail: our choice."""
+
+HARMONICS = (0.01, 0.02, 0.05, 0.1)
+"""Of the rolling elements, over the mean: our choice."""
+
+PITCH = 4.0
+"""Of the rolling elements over that swing, for a stage that tells none."""
+
+STATIC, COULOMB = (0.75, 1.0, 1.25, 1.5, 2.0), (0.5, 0.75, 1.0, 1.25, 1.5, 1.75, 2.0)
+"""Friction levels over those of the stage, on an even rail: our choice."""
+
+STARTS = (0.0, 0.005, 0.01, 0.02)
+"""What starts a cycle: the move (0), or a release from this share of its distance."""
+
+LONGER = 1.5
+"""Over the time of other runs: slow cycles shall come often enough."""
+
+MASS_FACTOR = 1.47
+"""Of the mass line over the weighed mass (Sec. 4.2.1)."""
+
+MOTORS = (1.0, 1 / MASS_FACTOR)
+"""Motor constants over the stage's: the weaker one would show the measured mass line for the weighed mass."""
+
+AS_SLOW, SIMILAR = 1.8, 1.5
+"""Period over that of the even rail from which it is "nearly twice", and factor within which swings are "similar"."""
+
+BINS = (0.0, 0.01, 0.02, 0.03, 0.05, 0.1, np.inf)
+"""Edges of the asymmetry of friction."""
+
+
+@dataclass(frozen=True)
+class Compared:
+    """Cycles with the joint locked, at the stage's crossover.
+
+    `even`: on an even rail, one run. `field`: of the rails with a random field, shape (deviations, lengths, rails),
+    with their `asymmetry`: what the logarithm of the static friction differs by between the two sides of the target,
+    half the even rail's swing to either side. `rolling` and `rolling_asymmetry`: of rails with a first harmonic, shape
+    (harmonics, rails). `levels`: on an even rail with other static and Coulomb friction, shape (motors, static,
+    coulomb), for the motor that the drive believes and for the weaker one of `MOTORS`.
+    `others`: on an even rail, by what else was changed. Where one start does not lead to a cycle, another was taken.
+    `traces`: the even rail, and the varied one whose cycle is the slowest of a similar swing (None: there is none)
+    with its deviation, length [m] and seed.
+    """
+
+    even: Hunted
+    deviations: np.ndarray
+    lengths: np.ndarray
+    field: Hunted
+    asymmetry: np.ndarray
+    harmonics: np.ndarray
+    pitch: float
+    rolling: Hunted
+    rolling_asymmetry: np.ndarray
+    levels: Hunted
+    others: Mapping[str, Hunted]
+    traces: tuple[Trace, Trace | None]
+    slowest: tuple[float, float, float] | None
+
+    def slower(self, runs: Hunted) -> np.ndarray:
+        """Periods over that of the even rail, NaN of runs that end without a cycle."""
+        return np.where(runs.lives, runs.period, np.nan) / self.even.period[0]
+
+    def larger(self, runs: Hunted) -> np.ndarray:
+        """Swings over that of the even rail, NaN of runs that end without a cycle."""
+        return np.where(runs.lives, runs.swing, np.nan) / self.even.swing[0]
+
+    def as_measured(self, runs: Hunted) -> np.ndarray:
+        """Which runs have nearly twice the period of the even rail at a similar swing."""
+        swing = self.larger(runs)
+        return (self.slower(runs) >= AS_SLOW) & (swing <= SIMILAR) & (swing >= 1 / SIMILAR)
+
+    @property
+    def by_asymmetry(self) -> list[tuple[Share, float]]:
+        """By the bins of `BINS` of the size of the asymmetry on all rails with a field: the share that still swings
+        when the run ends, and the median of the periods over that of the even rail."""
+        size, rows = np.abs(self.asymmetry), []
+        for low, high in pairwise(BINS):
+            inside = (size >= low) & (size < high)
+            words = np.where(self.field.failed, "failed", np.where(self.field.lives, "hunts", "settles"))[inside]
+            share = Fates(words).share(("hunts",)) if len(words) else Share(np.nan, 0.0, 1.0)
+            slower = self.slower(self.field)[inside]
+            rows.append((share, float(np.nanmedian(slower)) if np.isfinite(slower).any() else np.nan))
+        return rows
+
+
+def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
+    """All cycles. Raises StageError without a joint, a crossover or a motion that goes somewhere."""
+    locked = with_joint(stage, locked=True)
+    crossover(stage)
+    result = compared(locked, seed, DEVIATIONS, LENGTHS, HARMONICS, len(rails(on_rail(locked))), progress)
+    logs, notes = [], ()
+    if result.slowest is None:
+        notes = ("no varied rail has a slower cycle of a similar swing",)
+    for name, machine, own in _shown(locked, seed, result.slowest):
+        recorded = once(machine, _longer(move(machine)), [own])
+        logs.append(rig_log(recorded, 0, name, "moves", machine, own))
+    return Outcome("compare", stage, seed, tuple(logs), result, notes)
+
+
+def compared(
+    stage: Stage,
+    seed: int,
+    deviations: Sequence[float],
+    lengths: Sequence[float],
+    harmonics: Sequence[float],
+    machines: int,
+    progress: Progress,
+) -> Compared:
+    """The cycles of a stage with its joint locked, on so many rails of each kind."""
+    even = on_rail(stage)
+    own = started(even, seed, {}, 1, progress, "an even rail")
+    swing = float(own.swing[0]) if own.lives[0] else 0.01 * distance(stage)
+    long = swing * np.array(lengths)
+    seeds = even.flat()["rail.seed"] + np.arange(float(machines))
+    first, second = (each.ravel() for each in np.meshgrid(deviations, long, indexing="ij"))
+    cases = {"rail.static_deviation": first, "rail.coulomb_deviation": first, "rail.correlation_length": second}
+    field, asymmetry = varied(even, seed, cases, seeds, swing, progress, "rails with a random field")
+    shape = (len(deviations), len(long), machines)
+    pitch = stage.flat().get("rail.rolling_pitch", PITCH * swing)
+    rolling = even.replace({"rail.rolling_pitch": f"{pitch!r} m"})
+    waves = {"rail.first_harmonic": np.array(harmonics)}
+    rolled, rolled_asymmetry = varied(rolling, seed, waves, seeds, swing, progress, "rails with rolling elements")
+    result = Compared(
+        own, np.array(deviations), long, field.shaped(*shape), asymmetry.reshape(shape), np.array(harmonics), pitch,
+        rolled.shaped(len(harmonics), machines), rolled_asymmetry.reshape(len(harmonics), machines),
+        levels(even, seed, progress), others(even, seed, progress), (_trace(even, seed), None), None,
+    )  # fmt: skip
+    return _with_slowest(result, even, seed, seeds)
+
+
+def on_rail(stage: Stage) -> Stage:
+    """The stage on a rail with the same friction everywhere, whose keys can be changed."""
+    seed = 1.0 if stage.rail is None else stage.flat()["rail.seed"]
+    level = 0.0 if stage.rail is None else stage.flat()["rail.offset"]
+    bare = stage.replace({"rail": None}) if stage.rail is not None else stage
+    return bare.replace({"rail.seed": seed, "rail.offset": level, "rail.correlation_length": "5 mm"})
+
+
+def _longer(task: Task) -> Task:
+    return replace(task, duration=LONGER * task.duration)
+
+
+def started(stage: Stage, seed: int, changes: Mapping[str, Any], count: int, progress: Progress, what: str) -> Hunted:
+    """What became of machines, shape (count,), at the first start after which each hunts; else after the move."""
+    tasks = [move(stage) if share == 0 else released(stage, share * distance(stage)) for share in STARTS]
+    runs = [follow(stage, _longer(task), [seed] * count, changes, progress, what) for task in tasks]
+    every = joined(runs).shaped(len(tasks), count)
+    first = np.argmax(every.lives, axis=0)
+    return Hunted(**{each.name: getattr(every, each.name)[first, np.arange(count)] for each in fields(Hunted)})
+
+
+def varied(
+    stage: Stage,
+    seed: int,
+    cases: Mapping[str, np.ndarray],
+    seeds: np.ndarray,
+    swing: float,
+    progress: Progress,
+    what: str,
+) -> tuple[Hunted, np.ndarray]:
+    """Moves on all rails of all cases, shape (cases * rails,), and the asymmetry of friction about their targets."""
+    count = len(next(iter(cases.values())))
+    changes = {key: np.repeat(values, len(seeds)) for key, values in cases.items()}
+    changes["rail.seed"] = np.tile(seeds, count)
+    found = follow(stage, _longer(move(stage)), numbers_of(seed, count, len(seeds)), changes, progress, what)
+    sides = distance(stage) + np.array([-swing / 2, swing / 2])
+    flat, runs = stage.flat(), range(count * len(seeds))
+    at = [friction_factors(flat | {key: values[run] for key, values in changes.items()}, sides)[0] for run in runs]
+    return found, np.diff(np.log(at), axis=1)[:, 0]
+
+
+def levels(stage: Stage, seed: int, progress: Progress) -> Hunted:
+    """Cycles with other motors and friction levels, shape (motors, static, coulomb); static friction is at least as
+    large as Coulomb friction."""
+    flat = stage.flat()
+    motor, first, second = (each.ravel() for each in np.meshgrid(MOTORS, STATIC, COULOMB, indexing="ij"))
+    coulomb = second * flat["friction.coulomb"]
+    changes = {"friction.static": np.maximum(first * flat["friction.static"], coulomb), "friction.coulomb": coulomb}
+    changes["drive.motor_constant_ratio"] = motor * flat.get("drive.motor_constant_ratio", 1.0)
+    found = started(stage, seed, changes, len(first), progress, "other friction levels")
+    return found.shaped(len(MOTORS), len(STATIC), len(COULOMB))
+
+
+def others(stage: Stage, seed: int, progress: Progress) -> dict[str, Hunted]:
+    """Cycles with one thing changed, by its name."""
+    flat = stage.flat()
+    motor, mass = {"drive.motor_constant_ratio": 1 / MASS_FACTOR}, flat["controller.tuned_mass"]
+    named = {
+        "motor gives 0.68 of the force, tuned as before": motor,
+        "motor gives 0.68 of the force, tuned for 1.47 times the mass": motor
+        | {"controller.tuned_mass": MASS_FACTOR * mass},
+        "alpha twice as large": {"controller.alpha": 2 * flat["controller.alpha"]},
+        "beta one and a half times as large": {"controller.beta": 1.5 * flat["controller.beta"]},
+        "crossover 0.68 of it": {"controller.crossover": flat["controller.crossover"] / MASS_FACTOR},
+        "cables ten times as stiff, with ten times the drag": {
+            key: 10 * flat[key] for key in ("cable.stiffness", "cable.drag") if key in flat
+        },
+        "current loop of a hundredth of the bandwidth": {
+            key: flat[key] / 100 for key in ("drive.current_bandwidth",) if key in flat
+        },
+    }
+    wanted = {name: changes for name, changes in named.items() if changes}
+    keys = {key for changes in wanted.values() for key in changes}
+    ideal = {"drive.motor_constant_ratio": 1.0, **flat}
+    lanes = {key: np.array([changes.get(key, ideal[key]) for changes in wanted.values()]) for key in keys}
+    found = started(stage, seed, lanes, len(wanted), progress, "other drives")
+    return {
+        name: Hunted(**{each.name: getattr(found, each.name)[[row]] for each in fields(Hunted)})
+        for row, name in enumerate(wanted)
+    }
+
+
+def _with_slowest(result: Compared, even: Stage, seed: int, seeds: np.ndarray) -> Compared:
+    """The slowest of the cycles of a similar swing on the rails with a field, in time."""
+    similar = abs(np.log(result.larger(result.field))) <= np.log(SIMILAR)
+    slower = np.where(similar, np.nan_to_num(result.slower(result.field)), 0.0)
+    if not slower.max(initial=0.0) > 1:
+        return result
+    row, column, rail = map(int, np.unravel_index(np.argmax(slower), slower.shape))
+    slowest = (float(result.deviations[row]), float(result.lengths[column]), float(seeds[rail]))
+    machine = _machine(even, slowest)
+    number = seed + rail
+    return replace(result, traces=(result.traces[0], _trace(machine, number)), slowest=slowest)
+
+
+def _machine(even: Stage, rail: tuple[float, float, float]) -> Stage:
+    deviation, length, seed = rail
+    keys = {"rail.static_deviation": deviation, "rail.coulomb_deviation": deviation, "rail.seed": seed}
+    return even.replace({**keys, "rail.correlation_length": f"{length!r} m"})
+
+
+def _trace(stage: Stage, seed: int) -> Trace:
+    recorded = once(stage, _longer(move(stage)), [seed])
+    return Trace(recorded.time, recorded.logged["position"][0] - recorded.logged["reference"][0, -1])
+
+
+def _shown(stage: Stage, seed: int, slowest: tuple[float, float, float] | None) -> list[tuple[str, Stage, int]]:
+    """Name, stage and seed of the noise of each log."""
+    even = on_rail(stage)
+    own = even.flat()["rail.seed"]
+    found = [("compare_even_rail", even, seed)]
+    if slowest is not None:
+        found.append(("compare_varied_rail", _machine(even, slowest), seed + int(slowest[2] - own)))
+    return found

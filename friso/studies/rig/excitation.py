@@ -1,0 +1,67 @@
+"""A multisine injected into the closed loop at a standstill, and what it shows of plant and open loop."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from friso.identify.response.periodic import multisine
+from friso.identify.response.records import Record, from_log
+from friso.identify.response.response import Channels, FrequencyResponse
+from friso.rig.run import Recorded, as_built_keys, run
+from friso.rig.task import standing
+from friso.stage import Stage
+from friso.studies.rig.outcome import RigLog
+from friso.studies.rig.sizes import friction, interval, pace
+
+STRENGTH = 2.0
+"""RMS of the injected force over static friction: the thesis tells none; it has to move the cart."""
+
+PERIOD, PERIODS = 8.0, 8
+"""Periods of the crossover in one of the multisine, which is the inverse of its lowest line (1 Hz on the thesis's rig),
+and how often it is played."""
+
+TOP, LINES = 100.0, 150
+"""Highest line over the crossover (800 Hz), and about how many lines there are, evenly in the logarithm."""
+
+SAMPLES, FINEST = 625.0, 0.4
+"""Samples of the log per period of the crossover (0.2 ms), and the highest line over its rate at most."""
+
+PHASES = int.from_bytes(b"sines")
+"""Which of a seed's random numbers the phases take."""
+
+
+def excite(stage: Stage, place: float, seed: int, runs: int = 1, changes: Mapping[str, Any] | None = None) -> Recorded:
+    """Runs at a standstill at a place [m] with the multisine of a seed; `changes` are arrays of shape (runs,)."""
+    each, wanted = as_built_keys(stage)["drive.sample_time"], interval(stage, 1 / (SAMPLES * pace(stage)))
+    period = round(PERIOD / pace(stage) / wanted) * wanted
+    lines = np.geomspace(1, min(TOP * PERIOD, FINEST * period / wanted), LINES)
+    force = STRENGTH * friction(stage) * sines(round(period / each), np.unique(np.rint(lines).astype(int)), seed)
+    task = replace(standing(place, PERIODS * period), injected=np.tile(force, PERIODS), injected_each=each)
+    (recorded,) = run(stage, task, [seed] * runs, wanted, changes)
+    return recorded
+
+
+def sines(count: int, lines: np.ndarray, seed: int) -> np.ndarray:
+    """One period of `count` samples of a sum of sines of one amplitude at whole `lines`, of RMS 1, with random
+    phases."""
+    phases = np.random.Generator(np.random.Philox(key=[seed, PHASES])).uniform(0, 2 * np.pi, len(lines))
+    spectrum = np.zeros(count // 2 + 1, complex)
+    spectrum[lines] = np.exp(1j * phases)
+    signal = np.fft.irfft(spectrum, count)
+    return signal / signal.std()
+
+
+def plant(logs: Sequence[RigLog]) -> FrequencyResponse:
+    """From the commanded force to the position, of realisations: the indirect estimate."""
+    return multisine([from_log(each.log, "force", "position", "disturbance")[0] for each in logs])
+
+
+def loop(log: RigLog) -> FrequencyResponse:
+    """The open loop: what the controller answers to the force that is commanded in all, turned round."""
+    injected, commanded = log.logged["disturbance"], log.logged["force"]
+    record = Record(commanded, injected - commanded, log.interval, injected)
+    return multisine([record], None, Channels("error", "1", "loop", "1"))

@@ -1,0 +1,200 @@
+"""Frequency responses by closed-loop excitation: plants locked and free, open loops (Fig. 17, 18, 22, 23, 29)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from friso.equations.bandwidth import faster
+from friso.identify.estimate import Estimate
+from friso.identify.response.closed_loop import crossovers
+from friso.identify.response.mass_line import mass_lines
+from friso.identify.response.response import FrequencyResponse
+from friso.rig.run import run
+from friso.rig.task import standing
+from friso.stage import Stage
+from friso.studies.rig.excitation import excite, loop, plant
+from friso.studies.rig.outcome import Outcome, Progress, RigLog, rig_log
+from friso.studies.rig.sizes import WIDE, freed, interval, jointed, locked, pace, travel
+
+PLACES, FREE_PLACES = 10, 3
+"""Places along the travel at which the plant is identified, locked (Fig. 29) and free (the thesis shows one)."""
+
+SETTINGS = (1.0, 1.5, 2.0, 3.0, 4.0, 6.0)
+"""Crossovers over the stage's: 8 to 48 Hz (Fig. 22)."""
+
+RATIOS = (1.0, 0.68, 1.47)
+"""True motor constants over the believed one that are compared: 1.7 kg weighed over 2.5 kg seen, and its inverse."""
+
+BESIDE = 3.0
+"""The mass line of the free joint is read from so many times its first mode up to the parasitic one over as much."""
+
+FASTER, STEPS = 1.1, 33
+"""Settings that are tried for stability: from the highest of `SETTINGS` over 3 on, each so much faster, so many."""
+
+RELEASED, WAIT = 0.01, 8.0
+"""From so many strokes off its reference the free stage is released, and for so many periods of the stage's crossover;
+a loop whose error in the last quarter is larger than that is not stable."""
+
+
+@dataclass(frozen=True)
+class Plant:
+    """Identifications one by one, and all together; the frequency [Hz] of the first mode of a free joint (NaN:
+    locked), and the mass line with the frequencies [Hz] between which it is read."""
+
+    single: tuple[FrequencyResponse, ...]
+    averaged: FrequencyResponse
+    first_mode: float
+    mass: Estimate
+    band: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Loop:
+    """An open loop at a tuned crossover [Hz], and where it truly crosses 0 dB [Hz]."""
+
+    tuned: float
+    response: FrequencyResponse
+    crossings: tuple[Estimate, ...]
+
+
+@dataclass(frozen=True)
+class Frf:
+    """The plants; the open loops locked at several settings, and free; apparent masses [kg], shape (2, ratios), locked
+    and free, for the motor constants of `RATIOS`; the settings [Hz] tried free, shape (STEPS,), and which of them were
+    stable."""
+
+    locked: Plant
+    free: Plant
+    loops: tuple[Loop, ...]
+    free_loop: Loop
+    apparent: np.ndarray
+    settings: np.ndarray
+    stable: np.ndarray
+
+    @property
+    def highest_stable(self) -> float:
+        """The last setting [Hz] before the first that is not stable; NaN if the first is not."""
+        return highest_stable(self.settings, self.stable)
+
+
+def highest_stable(settings: np.ndarray, stable: np.ndarray) -> float:
+    """The last of rising settings before the first that is not stable, both of shape (n,); NaN if the first is not."""
+    first = len(stable) if stable.all() else int(np.argmin(stable))
+    return float(settings[first - 1]) if first else np.nan
+
+
+def nearest(loop: Loop) -> float:
+    """The crossing of 0 dB [Hz] nearest to where the loop was tuned; NaN without any."""
+    crossed = [each.value for each in loop.crossings]
+    return min(crossed, key=lambda f: abs(np.log(f / loop.tuned)), default=np.nan)
+
+
+def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
+    """All plants and loops, and the stable settings. Raises StageError for a stage without a joint."""
+    fixed, free = locked(jointed(stage)), freed(stage)
+    places = np.linspace(*travel(stage), PLACES)
+    progress(0, 4, f"plant, joint locked, at {PLACES} places")
+    held = [_identified(fixed, f"locked_{n + 1:02d}", place, seed + n) for n, place in enumerate(places)]
+    progress(1, 4, f"plant, joint free, at {FREE_PLACES} places")
+    loose = [_identified(free, f"free_{n + 1:02d}", place, seed + n) for n, place in enumerate(places[:FREE_PLACES])]
+    progress(2, 4, "open loops")
+    logs, loops = open_loops(fixed, places[0], seed)
+    apparent = np.array([apparent_masses(each, places[0], seed) for each in (fixed, free)])
+    progress(3, 4, "highest stable setting, joint free")
+    settings, stable = stable_settings(free, places[0], seed)
+    progress(4, 4, "")
+    free_loop = measured_loop(loose[0], pace(stage))
+    found = Frf(locked_plant(held), free_plant(loose), loops, free_loop, apparent, settings, stable)
+    return Outcome("frf", stage, seed, (*held, *loose, *logs), found, NOTES)
+
+
+NOTES = (
+    "give friso identify one bench at a time: locked_*.csv, free_*.csv, or one loop_*.csv",
+    "the drive knows the force that it commands: what the current loop and the delay make of it is part of the plant",
+)
+
+
+def _identified(stage: Stage, name: str, place: float, seed: int) -> RigLog:
+    return rig_log(excite(stage, place, seed), 0, name, "frequency", stage, seed)
+
+
+def open_loops(stage: Stage, place: float, seed: int) -> tuple[tuple[RigLog, ...], tuple[Loop, ...]]:
+    """Logs of one excitation with the controller at every setting, and what they show."""
+    factors = np.array(SETTINGS)
+    recorded = excite(stage, place, seed, len(factors), _controllers(stage, factors))
+    rows = []
+    for row, factor in enumerate(SETTINGS):
+        own = stage.with_numbers(_controllers(stage, factor))
+        name = f"loop_{factor * pace(stage):.3g}_Hz".replace(".", "_")
+        rows.append(rig_log(recorded, row, name, "frequency", own, seed))
+    tuned = [factor * pace(stage) for factor in SETTINGS]
+    return tuple(rows), tuple(measured_loop(log, setting) for log, setting in zip(rows, tuned, strict=True))
+
+
+def _controllers(stage: Stage, factors: Any) -> dict[str, Any]:
+    """The keys of a controller made faster by factors."""
+    flat = stage.flat()
+    return {key: value for key, value in faster(flat, factors).items() if value is not flat[key]}
+
+
+def measured_loop(log: RigLog, tuned: float) -> Loop:
+    """The open loop of a log of one excitation, tuned to a crossover [Hz]."""
+    response = loop(log)
+    return Loop(tuned, response, crossovers(response))
+
+
+def locked_plant(logs: list[RigLog]) -> Plant:
+    """The averaged response, and its lowest mass line."""
+    averaged = plant(logs)
+    lines = mass_lines(averaged)
+    nothing = Estimate.unknown("mass", "kg", "mass line", "the response shows no mass line")
+    mass, band = (lines[0].value, (lines[0].low, lines[0].high)) if lines else (nothing, (np.nan, np.nan))
+    return Plant(tuple(plant([log]) for log in logs), averaged, np.nan, mass, band)
+
+
+def free_plant(logs: list[RigLog]) -> Plant:
+    """The averaged response; its first mode is where it is the largest against a mass."""
+    averaged, flat = plant(logs), logs[0].stage.flat()
+    above = flat.get("parasitic.frequency", float(averaged.frequency[-1]))
+    level = np.abs(averaged.accelerations().response)
+    low = averaged.frequency < above / BESIDE
+    first = float(averaged.frequency[low][np.argmax(level[low])])
+    band = (BESIDE * first, above / BESIDE)
+    return Plant(tuple(plant([log]) for log in logs), averaged, first, mass_between(averaged, *band), band)
+
+
+def mass_between(response: FrequencyResponse, low: float, high: float) -> Estimate:
+    """The median [kg] of force over acceleration between two frequencies [Hz], with the range of the middle half."""
+    inside = (response.frequency >= low) & (response.frequency <= high)
+    method = f"force over acceleration, {low:.3g} to {high:.3g} Hz"
+    if not inside.any():
+        return Estimate.unknown("mass", "kg", method, "no line between the modes")
+    masses = 1 / np.abs(response.accelerations().response[inside])
+    lower, middle, upper = np.percentile(masses, [25, 50, 75])
+    return Estimate("mass", "kg", float(middle), float(lower), float(upper), method)
+
+
+def apparent_masses(stage: Stage, place: float, seed: int) -> np.ndarray:
+    """Masses [kg] that the mass line shows for the motor constants of `RATIOS`."""
+    ratios = np.array(RATIOS)
+    recorded = excite(stage, place, seed, len(ratios), {"drive.motor_constant_ratio": ratios})
+    logs = [rig_log(recorded, row, "", None, stage, seed) for row in range(len(ratios))]
+    if stage.flat()["joint.locked"]:
+        return np.array([mass_between(plant([log]), 2 * pace(stage), 10 * pace(stage)).value for log in logs])
+    return np.array([free_plant([log]).mass.value for log in logs])
+
+
+def stable_settings(stage: Stage, place: float, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """Crossovers [Hz] that were tried, and which of them brought the stage back to its reference."""
+    factors = SETTINGS[-1] / 3 * FASTER ** np.arange(STEPS)
+    off = RELEASED * stage.flat()["joint.stroke"] / WIDE
+    task = replace(standing(place, WAIT / pace(stage)), displacement=off)
+    (recorded,) = run(
+        stage, task, [seed] * STEPS, interval(stage, 1 / (125 * pace(stage))), _controllers(stage, factors)
+    )
+    late = recorded.true["position"][:, -(recorded.true["position"].shape[1] // 4) :] - place
+    worst = np.abs(late).max(axis=1, initial=0.0)
+    return factors * pace(stage), worst <= off

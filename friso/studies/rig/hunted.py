@@ -1,0 +1,221 @@
+"""Moves of a machine on repeated rails, and the cycles that they end in."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+
+from friso.engine.arrays import Status
+from friso.equations import motion
+from friso.hunting.peaks import COUNTED_ABOVE, SWING, WINDOW, scan
+from friso.quantities import StageError
+from friso.rig.run import Recorded, run
+from friso.rig.task import Task, point_to_point
+from friso.stage import Stage
+from friso.studies.draws import Fates, Share
+from friso.studies.rig.outcome import Progress, silent
+from friso.studies.rig.sizes import interval, jointed
+
+RAILS = 20
+"""Rails on which a machine is repeated: the issue's number, ours."""
+
+DURATION = 20.0
+"""Of a run at least [s], as in the thesis (Sec. 3.2.2), whose peaks count after 10 s."""
+
+INTERVAL = 1e-3
+"""Between the samples of a log, at most [s]: the thesis tells none."""
+
+ENDING = 0.875
+"""Share of a run after which its end begins."""
+
+ROUND = (1.0, 2.0, 5.0, 10.0)
+"""What a length is rounded to, times a power of ten."""
+
+
+def distance(stage: Stage) -> float:
+    """Of the move [m]: that of the stage's own motion, rounded to 1, 2 or 5 times a power of ten: 100 mm for the 90 mm
+    of the thesis's rig (Sec. 4.3.2). Raises StageError for a motion that goes nowhere."""
+    own = float(motion.size(stage.flat()))
+    if not np.isfinite(own):
+        raise StageError("motion.kind", repr(stage.flat()["motion.kind"]), "a motion that goes somewhere", '"step"')
+    power = 10.0 ** np.floor(np.log10(own))
+    return float(power * min(ROUND, key=lambda digit: abs(np.log(digit * power / own))))
+
+
+def duration(stage: Stage) -> float:
+    """Of a run [s]."""
+    return max(DURATION, float(stage.flat()["motion.duration"]))
+
+
+def move(stage: Stage) -> Task:
+    """The move from 0 with the acceleration of the stage's motion, after which it stands; of a motion that tells none,
+    with one that the loop can just follow (a move then takes two of its time constants)."""
+    flat, way = stage.flat(), distance(stage)
+    bandwidth = 2 * np.pi * flat.get("controller.crossover", 1.0)
+    acceleration = flat.get("motion.acceleration", way * bandwidth**2)
+    rows = point_to_point([0.0, way], acceleration, np.inf, 0.0).pieces
+    return Task(rows[1:], duration(stage))
+
+
+def released(stage: Stage, displacement: float) -> Task:
+    """A release at the end of the move, `displacement` [m] beside it."""
+    return Task(np.array([[0.0, distance(stage), 0.0, 0.0]]), duration(stage), displacement=displacement)
+
+
+def with_joint(stage: Stage, locked: bool) -> Stage:
+    """The stage with its joint locked or free. Raises StageError for a stage that has none."""
+    return jointed(stage).replace({"joint.locked": locked})
+
+
+def crossover(stage: Stage) -> float:
+    """Of the stage's controller [Hz]. Raises StageError for one that is given by its gains."""
+    flat = stage.flat()
+    if "controller.crossover" not in flat:
+        given, expected = "gains", "a controller tuned by its crossover, which the experiment varies"
+        raise StageError("controller.crossover", given, expected, 'crossover = "8 Hz"')
+    return float(flat["controller.crossover"])
+
+
+def rails(stage: Stage) -> np.ndarray:
+    """Seeds of the rails, shape (rails,), the stage's own first; of a stage with an even rail there is one, of no
+    seed (NaN)."""
+    if stage.rail is None:
+        return np.array([np.nan])
+    return stage.flat()["rail.seed"] + np.arange(float(RAILS))
+
+
+def on_rails(stage: Stage, cases: Mapping[str, np.ndarray], seeds: np.ndarray) -> dict[str, np.ndarray]:
+    """Changes of cases, each of shape (cases,), repeated on every rail: shape (cases * rails,), rails fastest."""
+    count = len(next(iter(cases.values())))
+    repeated = {key: np.repeat(values, len(seeds)) for key, values in cases.items()}
+    return repeated if stage.rail is None else {**repeated, "rail.seed": np.tile(seeds, count)}
+
+
+def numbers_of(seed: int, cases: int, machines: int) -> list[int]:
+    """Seeds of the noise of cases on machines: that of a machine is the same in all cases."""
+    return [seed + machine for _ in range(cases) for machine in range(machines)]
+
+
+@dataclass(frozen=True)
+class Hunted:
+    """What became of runs, each of shape (runs,).
+
+    By the thesis's metric the `peaks`; over the last quarter `swing` [m] from peak to peak and `period` [s] (NaN: no
+    cycle); over the last eighth `ending` [m] from peak to peak. Of the cycles after half of the run: mean heights of
+    both sides, `above` and `below` the reference [m], shares of the period that a cycle rises (`rising`), and the
+    scatter from cycle to cycle (standard deviation) of the period over its mean (`period_scatter`) and of the heights
+    over the swing (`height_scatter`), NaN of less than three cycles. `failed` runs have NaN, and no peaks.
+    """
+
+    peaks: np.ndarray
+    swing: np.ndarray
+    period: np.ndarray
+    ending: np.ndarray
+    above: np.ndarray
+    below: np.ndarray
+    rising: np.ndarray
+    period_scatter: np.ndarray
+    height_scatter: np.ndarray
+    failed: np.ndarray
+
+    @property
+    def lives(self) -> np.ndarray:
+        """Whether it still swings, by twice the height from which peaks count and as before, when the run ends."""
+        return np.isfinite(self.period) & (self.swing > 2 * COUNTED_ABOVE) & (self.ending > self.swing / 2)
+
+    def shaped(self, *shape: int) -> Hunted:
+        """With arrays of another shape."""
+        return Hunted(**{each.name: getattr(self, each.name).reshape(shape) for each in fields(self)})
+
+    def share(self, which: Any = ...) -> Share:
+        """The share of some runs that hunts, with its 95 % interval."""
+        words = np.where(self.failed, "failed", np.where(self.peaks > 0, "hunts", "settles"))
+        return Fates(np.ravel(words[which])).share(("hunts",))
+
+
+def once(stage: Stage, task: Task, seeds: Sequence[int], changes: Mapping[str, Any] | None = None) -> Recorded:
+    """A few runs, all samples of which are kept."""
+    (recorded,) = run(stage, task, seeds, interval(stage, INTERVAL), changes)
+    return recorded
+
+
+def joined(parts: list[Hunted]) -> Hunted:
+    """What became of several lots of runs, one after the other."""
+    return Hunted(
+        **{each.name: np.concatenate([getattr(part, each.name) for part in parts]) for each in fields(Hunted)}
+    )
+
+
+def follow(
+    stage: Stage,
+    task: Task,
+    seeds: Sequence[int],
+    changes: Mapping[str, Any],
+    progress: Progress = silent,
+    what: str = "",
+) -> Hunted:
+    """Runs of a task and what became of them; the samples are forgotten chunk by chunk."""
+    parts: list[Hunted] = []
+    progress(0, len(seeds), what)
+    for chunk in run(stage, task, seeds, interval(stage, INTERVAL), changes):
+        parts.append(hunted(chunk))
+        progress(int(chunk.numbers[-1]) + 1, len(seeds), what)
+    return joined(parts)
+
+
+def hunted(recorded: Recorded) -> Hunted:
+    """What became of the runs of a chunk, by the position as the drive logs it."""
+    time, failed = recorded.time, recorded.statuses != Status.DONE
+    deviation = recorded.logged["position"] - recorded.logged["reference"]
+    deviation[failed] = 0.0
+    turns = [turning_points(time, row) for row in deviation]
+    counts = np.array([len(each) for each, _ in turns])
+    times, values = np.zeros((2, len(turns), max(1, counts.max(initial=0))))
+    for row, (at, value) in enumerate(turns):
+        times[row, : len(at)], values[row, : len(at)] = at, value
+    swing, ending = (np.ptp(deviation[:, time >= share * time[-1]], axis=1) for share in (WINDOW, ENDING))
+    peaks, period = scan(times, values, counts, np.nan_to_num(swing), np.full(len(turns), time[-1]))
+    shapes = [cycle_shape(*each, size, time[-1]) for each, size in zip(turns, swing, strict=True)]
+    known = np.where(failed, np.nan, 1.0)
+    above, below, rising, periods, heights = np.array(shapes).T * known
+    counted = np.where(failed, 0, peaks.sum(axis=1))
+    return Hunted(
+        counted, swing * known, period * known, ending * known, above, below, rising, periods, heights, failed
+    )
+
+
+def turning_points(time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Times [s] and values [m] at which sampled values turn, those of a flat stretch at its end."""
+    ways = np.sign(np.diff(values))
+    moving = np.flatnonzero(ways)
+    turned = moving[1:][ways[moving[1:]] * ways[moving[:-1]] < 0]
+    return time[turned], values[turned]
+
+
+def cycle_shape(times: np.ndarray, values: np.ndarray, swing: float, ended: float) -> tuple[float, ...]:
+    """Of the cycles in the last half of a run, from its turning points: above, below, rising, scatter of period and of
+    height, as in `Hunted`."""
+    from friso.hunting.turning import zigzag
+
+    nothing = (np.nan,) * 5
+    if not swing > max(SWING, 2 * COUNTED_ABOVE):
+        return nothing
+    late = times >= ended / 2
+    at, value = times[late], values[late]
+    kinds = np.zeros(len(at), np.int64)
+    zigzag(value, len(at), swing / 2, kinds)
+    turned = np.flatnonzero(kinds)[:-1]  # the last swing is not over yet
+    at, value, kinds = at[turned], value[turned], kinds[turned]
+    tops, bottoms = kinds > 0, kinds < 0
+    if tops.sum() < 3 or bottoms.sum() < 3:
+        return nothing
+    periods = np.concatenate([np.diff(at[side]) for side in (tops, bottoms)])
+    halves = np.diff(at)
+    rising = halves[bottoms[:-1]].mean()
+    heights = [float(np.mean(value[side])) for side in (tops, bottoms)]
+    spread = np.concatenate([value[side] - mean for side, mean in zip((tops, bottoms), heights, strict=True)])
+    share = float(rising / periods.mean())
+    return heights[0], -heights[1], share, float(periods.std() / periods.mean()), float(spread.std() / swing)

@@ -1,0 +1,173 @@
+"""A move at several crossovers, the joint locked and free (Fig. 24, 25), on the stage's rail and on repeated ones."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from friso.rig.run import Recorded
+from friso.stage import Stage
+from friso.studies.draws import Share
+from friso.studies.rig.hunted import (
+    Hunted,
+    crossover,
+    distance,
+    follow,
+    joined,
+    move,
+    numbers_of,
+    on_rails,
+    once,
+    rails,
+    released,
+    with_joint,
+)
+from friso.studies.rig.outcome import Outcome, Progress, rig_log
+
+CROSSOVERS = np.array([6.0, 7.0, 8.0, 9.5, 11.0, 12.5, 14.3, 16.0, 20.0]) / 8
+"""Over that of the stage: 8, 9.5 and 14.3 Hz are the thesis's (Sec. 4.3.2), the others ours."""
+
+SHOWN = (2, 3, 6)
+"""The thesis's among them."""
+
+DISPLACEMENTS = (0.005, 0.01, 0.02, 0.05)
+"""Of the releases, over the distance of the move: 0.5 to 5 mm for the thesis's rig, our choice."""
+
+CASES = {"locked": True, "free": False}
+
+
+@dataclass(frozen=True)
+class Trace:
+    """Deviation from the end of the move [m] over `time` [s], both of shape (n,)."""
+
+    time: np.ndarray
+    deviation: np.ndarray
+
+
+@dataclass(frozen=True)
+class Startable:
+    """The same machine `after_move`, where it settles, and `after_release`, where it hunts: the number of its rail, and
+    the displacement [m] of the release."""
+
+    after_move: Trace
+    after_release: Trace
+    rail: int
+    displacement: float
+
+
+@dataclass(frozen=True)
+class HuntingResult:
+    """By `case` (locked, free) what became of the moves, arrays of shape (crossovers, rails), at `crossovers` [Hz] on
+    `rails` (seeds, the stage's own first).
+
+    `started`: of releases with the joint locked at the crossovers `shown` (numbers), shape (displacements, shown,
+    rails), by `displacements` [m]. `rail` is the number of the rail that the `traces` (by case and number of the
+    crossover) and the logs show: the first that hunts locked at the stage's own crossover, or else the stage's own.
+    `startable` is a machine that settles after the move at the second of the crossovers `shown`, None where there is
+    none.
+    """
+
+    distance: float
+    crossovers: np.ndarray
+    rails: np.ndarray
+    cases: Mapping[str, Hunted]
+    displacements: np.ndarray
+    started: Hunted
+    shown: tuple[int, ...]
+    rail: int
+    traces: Mapping[tuple[str, int], Trace]
+    startable: Startable | None
+
+    def shares(self, case: str) -> list[Share]:
+        """The share of rails that hunts, by crossover."""
+        return [self.cases[case].share(row) for row in range(len(self.crossovers))]
+
+    def limit(self, case: str, rail: int | None = None) -> float:
+        """The highest crossover [Hz] at which one rail (None: any) hunts; NaN for none."""
+        peaks = self.cases[case].peaks if rail is None else self.cases[case].peaks[:, [rail]]
+        found = np.flatnonzero((peaks > 0).any(axis=1))
+        return float(self.crossovers[found[-1]]) if len(found) else np.nan
+
+    @property
+    def can_start(self) -> np.ndarray:
+        """Whether a rail hunts, after the move or a release, locked at the crossovers `shown`: (shown, rails)."""
+        return (self.started.peaks > 0).any(axis=0) | (self.cases["locked"].peaks[[*self.shown]] > 0)
+
+
+def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
+    """The move at all crossovers on all rails, and releases with the joint locked. Raises StageError without a joint,
+    a crossover or a motion that goes somewhere."""
+    stages = {case: with_joint(stage, locked) for case, locked in CASES.items()}
+    frequencies, seeds = crossover(stage) * CROSSOVERS, rails(stage)
+    changes = on_rails(stage, {"controller.crossover": frequencies}, seeds)
+    found = {}
+    for case, each in stages.items():
+        numbers = numbers_of(seed, len(frequencies), len(seeds))
+        runs = follow(each, move(stage), numbers, changes, progress, f"moves, joint {case}")
+        found[case] = runs.shaped(len(frequencies), len(seeds))
+    started = _releases(stages["locked"], seed, frequencies[[*SHOWN]], seeds, progress)
+    rail = int(np.argmax(found["locked"].peaks[SHOWN[0]] > 0))
+    machine = on_rails(stage, {"controller.crossover": frequencies}, seeds[[rail]])
+    again = {case: once(each, move(stage), [seed + rail] * len(frequencies), machine) for case, each in stages.items()}
+    traces = {(case, row): _trace(again[case], row) for case in CASES for row in range(len(frequencies))}
+    startable = _startable(stages["locked"], seed, frequencies[SHOWN[1]], seeds, found["locked"], started)
+    displacements = distance(stage) * np.array(DISPLACEMENTS)
+    result = HuntingResult(
+        distance(stage), frequencies, seeds, found, displacements, started, SHOWN, rail, traces, startable
+    )  # fmt: skip
+    logs = []
+    for case, row in product(CASES, SHOWN):
+        name = f"hunting_{case}_{frequencies[row]:.3g}_hz"
+        file = machine_file(stages[case], seeds[rail], {"controller.crossover": f"{frequencies[row]:.6g} Hz"})
+        logs.append(rig_log(again[case], row, name, "moves", file, seed + rail))
+    return Outcome("hunting", stage, seed, tuple(logs), result, _notes(stage, result))
+
+
+def machine_file(stage: Stage, rail: float, changes: Mapping[str, str]) -> Stage:
+    """The stage file of a machine on a rail of another seed, with changes."""
+    return stage.replace(dict(changes) | ({} if stage.rail is None else {"rail.seed": rail}))
+
+
+def _releases(stage: Stage, seed: int, frequencies: np.ndarray, seeds: np.ndarray, progress: Progress) -> Hunted:
+    """Releases at crossovers [Hz] on all rails, shape (displacements, crossovers, rails)."""
+    changes = on_rails(stage, {"controller.crossover": frequencies}, seeds)
+    numbers = numbers_of(seed, len(frequencies), len(seeds))
+    tasks = [released(stage, share * distance(stage)) for share in DISPLACEMENTS]
+    parts = [follow(stage, task, numbers, changes, progress, "releases, joint locked") for task in tasks]
+    return joined(parts).shaped(len(DISPLACEMENTS), len(frequencies), len(seeds))
+
+
+def _startable(
+    stage: Stage, seed: int, frequency: float, seeds: np.ndarray, moved: Hunted, started: Hunted
+) -> Startable | None:
+    """A rail that settles after the move at the second crossover shown, and hunts after a release."""
+    places = np.argwhere((started.peaks[:, 1] > 0) & (moved.peaks[SHOWN[1]] == 0))
+    if not len(places):
+        return None
+    size, rail = map(int, places[0])
+    displacement = DISPLACEMENTS[size] * distance(stage)
+    changes = on_rails(stage, {"controller.crossover": np.array([frequency])}, seeds[[rail]])
+    tasks = (move(stage), released(stage, displacement))
+    quiet, hunts = (_trace(once(stage, task, [seed + rail], changes), 0) for task in tasks)
+    return Startable(quiet, hunts, rail, displacement)
+
+
+def _trace(recorded: Recorded, row: int) -> Trace:
+    end = recorded.logged["reference"][row, -1]
+    return Trace(recorded.time, recorded.logged["position"][row] - end)
+
+
+def _notes(stage: Stage, result: HuntingResult) -> tuple[str, ...]:
+    notes = []
+    if stage.rail is None:
+        notes.append("the stage file has no [rail], so friction is even and there is one machine only")
+    elif result.rail:
+        own, shown = result.rails[0], result.rails[result.rail]
+        notes.append(f"figure and logs show rail {shown:g}: the stage's own, {own:g}, does not hunt locked")
+    failed = sum(int(each.failed.sum()) for each in (*result.cases.values(), result.started))
+    if failed:
+        notes.append(f"{failed} runs failed and count as neither hunting nor settled")
+    return tuple(notes)

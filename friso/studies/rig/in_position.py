@@ -1,0 +1,186 @@
+"""Standstill with the joint locked and free (Fig. 28): which disturbance moves the stage, and what damping recovers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from scipy.signal import welch
+
+from friso.rig.run import Recorded, run
+from friso.rig.task import Task, standing
+from friso.stage import Stage
+from friso.studies.rig.hunted import crossover, move, with_joint
+from friso.studies.rig.outcome import Outcome, Progress, rig_log
+from friso.studies.rig.sizes import interval
+
+FASTER = 2.0
+"""Crossover over that of the stage: 16 Hz for the 8 Hz of the thesis's rig (Sec. 4.3.2)."""
+
+SETTLING, WATCHED = 4.0, 12.0
+"""Time [s] before the stage is watched, and for which it is."""
+
+INTERVAL = 5e-4
+"""Between the samples, at most [s]."""
+
+BITS = 14
+"""Of the drive's force between its limits: our choice. The rounding of uniform steps is the noise of its amplifier."""
+
+LIMIT_FACTOR = 60.0
+"""Largest force over the static friction, for a drive that tells none: that of the thesis's rig, rounded."""
+
+FLOOR = {"frequency": ["1 Hz", "10 Hz", "100 Hz"], "acceleration": [f"{a} m/s^2/Hz^0.5" for a in (1e-5, 1e-4, 1e-4)]}
+"""Of a quiet laboratory, where the stage tells none: our choice. In thirds of an octave its velocity stays below
+2.4 um/s RMS, and so below VC-E (3.1 um/s) of the usual vibration criteria."""
+
+DAMPING_RATIOS = (0.001, 0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0)
+"""Of the joint with the stage's mass, our choice."""
+
+SEGMENTS = 6
+"""Into which what is watched is cut for its spectrum."""
+
+CASES = {"locked": True, "free": False}
+SOURCES = ("encoder", "amplifier", "floor", "all")
+
+
+@dataclass(frozen=True)
+class Standstill:
+    """Deviation from its mean [m] of runs at a standstill: RMS and largest, `true` and as the encoder `read`s it, each
+    of shape (runs, 2); and the amplitude spectral densities of the true position [m/Hz^0.5], shape (runs, n)."""
+
+    true: np.ndarray
+    read: np.ndarray
+    mean: np.ndarray
+    spectrum: np.ndarray
+
+
+@dataclass(frozen=True)
+class InPosition:
+    """Standstills at `crossover` [Hz], by case (locked, free) and source of the disturbance, each of one run, and the
+    spectra's `frequencies` [Hz]. `damped`: free with all disturbances, by `damping` [N s/m]; `own` is the joint's.
+
+    `amplifier` is the RMS [N] of the force noise; `own_floor` tells whether the floor is the stage's. `after_move`: by
+    case, with all disturbances, as soon after the move as others after their start.
+    """
+
+    crossover: float
+    amplifier: float
+    own_floor: bool
+    frequencies: np.ndarray
+    runs: Mapping[tuple[str, str], Standstill]
+    after_move: Mapping[str, Standstill]
+    damping: np.ndarray
+    own: float
+    damped: Standstill
+    traces: Mapping[str, tuple[np.ndarray, np.ndarray]]
+
+    def ratio(self, source: str) -> float:
+        """RMS with the joint free over that with it locked."""
+        return float(self.runs["free", source].true[0, 0] / self.runs["locked", source].true[0, 0])
+
+    @property
+    def recovered(self) -> np.ndarray:
+        """By damping the share of the difference in RMS between the joint free and locked that it takes away."""
+        locked, free = (self.runs[case, "all"].true[0, 0] for case in CASES)
+        return (free - self.damped.true[:, 0]) / (free - locked)
+
+
+def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
+    """All standstills. Raises StageError without a joint or a crossover."""
+    result, kept = in_position(stage, seed, progress)
+    logs = tuple(
+        rig_log(recorded, 0, f"in_position_{case}", None, machine, seed) for case, (recorded, machine) in kept.items()
+    )
+    return Outcome("in-position", stage, seed, logs, result)
+
+
+def in_position(stage: Stage, seed: int, progress: Progress) -> tuple[InPosition, dict[str, tuple[Recorded, Stage]]]:
+    """All standstills, and by case the run with all disturbances and its stage."""
+    fast = with_joint(stage, locked=False).replace({"controller.crossover": f"{FASTER * crossover(stage):.6g} Hz"})
+    shaken = fast if stage.floor is not None else fast.replace({f"floor.{key}": value for key, value in FLOOR.items()})
+    quiet = fast.replace({"floor": None}) if stage.floor is not None else fast
+    force = amplifier_noise(stage)
+    still = standing(0.0, SETTLING + WATCHED)
+    noisy = with_noise(still, force, seed)
+    plans = {"encoder": (quiet, still), "amplifier": (quiet, noisy), "floor": (shaken, still), "all": (shaken, noisy)}
+    runs, kept, after, done, total = {}, {}, {}, 0, len(CASES) * (len(plans) + 1) + 1
+    for case, locked in CASES.items():
+        for source, (machine, task) in plans.items():
+            progress(done, total, f"joint {case}, {source}")
+            done += 1
+            own = machine.replace({"joint.locked": locked})
+            recorded = _recorded(own, task, seed, _silenced(own, source))
+            runs[case, source] = _standstill(recorded, SETTLING)
+            if source == "all":
+                kept[case] = (recorded, own)
+        progress(done, total, f"joint {case}, after a move")
+        done += 1
+        task = with_noise(replace(move(stage), duration=SETTLING + WATCHED), force, seed)
+        after[case] = _standstill(_recorded(shaken.replace({"joint.locked": locked}), task, seed), SETTLING)
+    progress(done, total, "joint free, more and less damping")
+    flat = stage.flat()
+    damping = 2 * np.sqrt(flat["joint.stiffness"] * flat["masses.stage"]) * np.array(DAMPING_RATIOS)
+    damped = _standstill(_recorded(shaken, noisy, seed, {"joint.damping": damping}, len(damping)), SETTLING)
+    progress(total, total, "done")
+    traces = {case: _watched(recorded, SETTLING) for case, (recorded, _) in kept.items()}
+    each = interval(stage, INTERVAL)
+    frequencies = np.fft.rfftfreq(segment(each), each)
+    return InPosition(
+        FASTER * crossover(stage), force, stage.floor is not None, frequencies, runs, after, damping,
+        float(flat["joint.damping"]), damped, traces,
+    ), kept  # fmt: skip
+
+
+def amplifier_noise(stage: Stage) -> float:
+    """RMS [N] of the noise of the drive's force: that of rounding to `BITS` between its limits."""
+    flat = stage.flat()
+    limit = flat.get("controller.force_limit", LIMIT_FACTOR * flat.get("friction.static", 1.0))
+    return float(2 * limit / 2**BITS / np.sqrt(12))
+
+
+def with_noise(task: Task, force: float, seed: int) -> Task:
+    """The task with a force of white noise, of an RMS [N], injected at every sample of the log."""
+    noise = np.random.default_rng(seed).standard_normal(int(np.ceil(task.duration / INTERVAL)) + 1)
+    return replace(task, injected=force * noise, injected_each=INTERVAL)
+
+
+def _silenced(stage: Stage, source: str) -> dict[str, Any]:
+    """The encoder's noise and its resolution are there with its own source, and with all."""
+    if source in ("encoder", "all") or stage.drive is None:
+        return {}
+    return {key: 0.0 for key in ("drive.encoder_noise", "drive.encoder_resolution") if key in stage.flat()}
+
+
+def _recorded(
+    stage: Stage, task: Task, seed: int, changes: Mapping[str, Any] | None = None, count: int = 1
+) -> Recorded:
+    (recorded,) = run(stage, task, [seed] * count, interval(stage, INTERVAL), changes)
+    return recorded
+
+
+def _watched(recorded: Recorded, since: float) -> tuple[np.ndarray, np.ndarray]:
+    """Time [s] and deviation of the true position from the reference [m] of the first run, once watched."""
+    late = recorded.time >= since
+    deviation = recorded.true["position"][0] - recorded.logged["reference"][0]
+    return recorded.time[late] - since, deviation[late]
+
+
+def _standstill(recorded: Recorded, since: float) -> Standstill:
+    late = recorded.time >= since
+    reference = recorded.logged["reference"][:, late]
+    true, read = (signals["position"][:, late] - reference for signals in (recorded.true, recorded.logged))
+    mean = true.mean(axis=1)
+    spectrum = welch(true, 1 / recorded.interval, nperseg=segment(recorded.interval), axis=1)[1]
+    return Standstill(_rms_and_peak(true), _rms_and_peak(read), mean, np.sqrt(spectrum))
+
+
+def segment(each: float) -> int:
+    """Samples in a segment of the spectrum, for so much time between them [s]; segments overlap by half."""
+    return 2 * int(WATCHED / each / (SEGMENTS + 1))
+
+
+def _rms_and_peak(deviation: np.ndarray) -> np.ndarray:
+    varying = deviation - deviation.mean(axis=1, keepdims=True)
+    return np.column_stack([varying.std(axis=1), abs(varying).max(axis=1)])

@@ -1,0 +1,75 @@
+"""How large, how long and where: the sizes of the experiments, all taken from the stage.
+
+Times are in periods of the controller's crossover, ways in those of the stage's own motion, deflections in strokes,
+forces in those of friction: on the thesis's rig (8 Hz, 90 mm, 1 mm, 3 N) they come out as the thesis has them.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from friso.quantities import StageError
+from friso.rig.run import as_built_keys
+from friso.rig.task import own_motion
+from friso.stage import Stage
+
+WIDE = 8.0
+"""Stroke of the identification over that of the stage: 8 mm in the thesis (Sec. 4.2.1), "for safety reasons"."""
+
+ALPHA = 0.1
+"""That of the van Dijk controller to which plain gains are compared, as in the thesis."""
+
+FIXED = 1e9
+"""Mass [kg] of a cart that does not move."""
+
+
+def jointed(stage: Stage) -> Stage:
+    """The stage itself. Raises StageError for one without a joint."""
+    if stage.joint is None:
+        raise StageError("joint", "no [joint]", "a stage with a joint", '[joint] stiffness = "2.4 N/mm"')
+    return stage
+
+
+def freed(stage: Stage) -> Stage:
+    """The stage with its joint free and its limiters far off. Raises StageError where it has no joint, or no stroke."""
+    stroke = jointed(stage).flat()["joint.stroke"]
+    if not stroke > 0:
+        raise StageError("joint.stroke", f"{stroke:g} m", "a stroke greater than 0", 'stroke = "1 mm"')
+    return stage.with_numbers({"joint.stroke": WIDE * stroke}).replace({"joint.locked": False})
+
+
+def locked(stage: Stage) -> Stage:
+    """The stage with its joint held. Raises StageError where it has none."""
+    return jointed(stage).replace({"joint.locked": True})
+
+
+def pace(stage: Stage) -> float:
+    """The controller's crossover [Hz]; for plain gains, that of a van Dijk controller of the same proportional gain."""
+    flat = stage.flat()
+    if "controller.crossover" in flat:
+        return float(flat["controller.crossover"])
+    return float(np.sqrt(flat["controller.kp"] / (moving_mass(stage) * np.sqrt(ALPHA)))) / (2 * np.pi)
+
+
+def moving_mass(stage: Stage) -> float:
+    """Cart and stage [kg]."""
+    return sum(value for key, value in stage.flat().items() if key in ("masses.cart", "masses.stage"))
+
+
+def friction(stage: Stage) -> float:
+    """The largest friction [N]; without any, what moves the mass at 1 m/s^2, our choice."""
+    flat = stage.flat()
+    return float(flat.get("friction.static", flat.get("friction.coulomb", moving_mass(stage))))
+
+
+def travel(stage: Stage) -> tuple[float, float]:
+    """The ends [m] of the stage's own motion; one that does not move has a hundred strokes to either side."""
+    low, high = own_motion(stage).span
+    reach = 0.0 if high > low else 100 * stage.flat().get("joint.stroke", 1e-3)
+    return low - reach, high + reach
+
+
+def interval(stage: Stage, wanted: float) -> float:
+    """Time between the samples of a log [s]: at most `wanted`, a whole number of the drive's samples."""
+    each = as_built_keys(stage)["drive.sample_time"]
+    return max(1, int(wanted / each * (1 + 1e-9))) * each

@@ -1,0 +1,97 @@
+"""Static friction by slow motion that sticks and slips, the joint free (thesis, Sec. 4.2.3, Fig. 20)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from friso.identify.experiments import StickSlip, static_from_stick_slip
+from friso.rig.rail import friction_factors
+from friso.rig.run import Recorded, run
+from friso.rig.task import legs
+from friso.stage import Stage
+from friso.studies.rig.outcome import Outcome, Progress, RigLog, rig_log
+from friso.studies.rig.sizes import freed, friction, interval, pace, travel
+
+RAILS = 10
+"""Stretches of rail, each a rail drawn anew: our choice, the thesis has "multiple experiments"."""
+
+LOADS, STANDS, SAMPLES = 16.0, 16.0, 125.0
+"""Periods of the crossover in which the joint is loaded up to the friction (2 s on the thesis's rig: 0.63 mm/s), for
+which the reference stands between its velocities, and samples of the log per period (1 ms)."""
+
+SLIPS = 8
+"""Loads of the joint that each leg lasts."""
+
+SPEEDS = (1, 2, -1, -2)
+"""Velocities one after the other, over the slow one: forward and back; our choice."""
+
+
+@dataclass(frozen=True)
+class Stiction:
+    """What each log shows, read with the joint's true stiffness; per rail the least and greatest true static friction
+    [N] where the cart went, shape (rails, 2); and the slow velocity [m/s]."""
+
+    found: tuple[StickSlip, ...]
+    true: np.ndarray
+    speed: float
+
+    @property
+    def forces(self) -> np.ndarray:
+        """Break-away forces [N] of all slips, shape (slips,)."""
+        return np.concatenate([each.forces for each in self.found])
+
+
+def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
+    """Slow motion there and back on several rails. Raises StageError for a stage without a joint."""
+    progress(0, 1, f"slow motion on {RAILS} rails")
+    logs = slow_motion(stage, seed)
+    progress(1, 1, "")
+    flat = freed(stage).flat()
+    found = tuple(
+        static_from_stick_slip(each.log, flat["joint.stiffness"], flat["masses.stage"], flat["joint.stroke"])
+        for each in logs
+    )
+    true = np.array([true_range(each) for each in logs])
+    return Outcome("stiction", stage, seed, logs, Stiction(found, true, slow_speed(stage)), (_note(flat),))
+
+
+def _note(flat: Mapping[str, Any]) -> str:
+    """What friso identify needs to be told."""
+    stroke = f"{flat['joint.stroke'] * 1e3:g} mm"
+    return f'the limiters are set to {stroke}: tell friso identify by --set joint.stroke="{stroke}"'
+
+
+def slow_speed(stage: Stage) -> float:
+    """Velocity [m/s] at which friction would be reached in `LOADS` periods while the cart sticks."""
+    return friction(stage) / freed(stage).flat()["joint.stiffness"] * pace(stage) / LOADS
+
+
+def slow_motion(stage: Stage, seed: int, rails: int = RAILS) -> tuple[RigLog, ...]:
+    """Logs of slow legs there and back, on rails drawn from one seed after the other, all from the same place."""
+    free, period, slow = freed(stage), 1 / pace(stage), slow_speed(stage)
+    parts = [(0.0, STANDS * period / 4)]
+    for factor in SPEEDS:
+        parts += [(factor * slow, SLIPS * LOADS * period / abs(factor)), (0.0, STANDS * period)]
+    task = legs(travel(stage)[0], parts)
+    drawn = {"rail.seed": stage.flat()["rail.seed"] + np.arange(rails)} if stage.rail else {}
+    logs: list[RigLog] = []
+    for chunk in run(free, task, [seed + number for number in range(rails)], interval(stage, period / SAMPLES), drawn):
+        logs += [_log(free, chunk, row, int(number), seed) for row, number in enumerate(chunk.numbers)]
+    return tuple(logs)
+
+
+def _log(free: Stage, chunk: Recorded, row: int, number: int, seed: int) -> RigLog:
+    """One rail's log, with the stage that has this rail."""
+    own = free.with_numbers({"rail.seed": free.flat()["rail.seed"] + number}) if free.rail else free
+    return rig_log(chunk, row, f"rail_{number + 1:02d}", "stick-slip", own, seed + number)
+
+
+def true_range(log: RigLog) -> tuple[float, float]:
+    """Least and greatest static friction [N] where the cart went."""
+    flat = log.stage.flat()
+    along = flat["friction.static"] * friction_factors(flat, log.true["cart_position"])[0]
+    return float(along.min()), float(along.max())

@@ -1,0 +1,68 @@
+"""Stiffness of the joint by position steps, the cart fixed (thesis, Sec. 4.2.2, Fig. 19)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from friso.identify.experiments import StepStiffness, stiffness_from_steps
+from friso.rig.run import run
+from friso.rig.task import staircase
+from friso.stage import Stage
+from friso.studies.rig.outcome import Outcome, Progress, RigLog, rig_log
+from friso.studies.rig.sizes import FIXED, freed, interval, moving_mass, pace
+
+STEP, WAYS = 0.3, (1, 1, -1, -1, 1, -1)
+"""A step in strokes, 0.3 mm on the thesis's rig (Sec. 4.2.2), and the directions of the steps, our choice."""
+
+STANDS, SAMPLES = 16.0, 125.0
+"""Periods of the crossover for which each step stands (2 s on the thesis's rig), and samples of the log per period
+(1 ms): our choice, the thesis tells neither."""
+
+
+@dataclass(frozen=True)
+class Stiffness:
+    """What the log shows, the joint's true stiffness [N/m], and the motor's true constant over the believed one: the
+    drive's newtons are so many times smaller than true ones."""
+
+    found: StepStiffness
+    true: float
+    motor_constant_ratio: float
+
+    @property
+    def apparent(self) -> float:
+        """Stiffness [N/m] that the believed force makes of the true one."""
+        return self.true / self.motor_constant_ratio
+
+
+def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
+    """Steps of the reference with the cart fixed. Raises StageError for a stage without a joint."""
+    progress(0, 1, "position steps")
+    log = steps(stage, seed)
+    progress(1, 1, "")
+    flat = stage.flat()
+    found = Stiffness(
+        stiffness_from_steps(log.log), float(flat["joint.stiffness"]), float(flat.get("drive.motor_constant_ratio", 1))
+    )
+    return Outcome("stiffness", stage, seed, (log,), found, _notes(stage))
+
+
+def steps(stage: Stage, seed: int) -> RigLog:
+    """The log of the steps."""
+    free, period = freed(stage), 1 / pace(stage)
+    step = STEP * stage.flat()["joint.stroke"]
+    task = staircase([way * step for way in WAYS], STANDS * period)
+    tuned = stage.flat().get("controller.tuned_mass", moving_mass(stage))
+    held = {"masses.cart": np.array([FIXED])}
+    held |= {"controller.tuned_mass": np.array([tuned])} if "controller.crossover" in stage.flat() else {}
+    (recorded,) = run(free, task, [seed], interval(stage, period / SAMPLES), held)
+    return rig_log(recorded, 0, "steps", "steps", free, seed)
+
+
+def _notes(stage: Stage) -> tuple[str, ...]:
+    """What to know of the result."""
+    said = ["the cart is fixed and the limiters are far off, as an engineer would set them; the joint is free"]
+    if stage.flat().get("cable.stiffness", 0.0) > 0:
+        said.append("the cables move with the stage: their stiffness is contained in what is read")
+    return tuple(said)

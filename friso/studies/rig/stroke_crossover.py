@@ -1,0 +1,93 @@
+"""Which share of rails hunts, over stroke of the joint and crossover (Fig. 26)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from friso.stage import Stage
+from friso.studies.rig.hunted import (
+    Hunted,
+    crossover,
+    follow,
+    move,
+    numbers_of,
+    on_rails,
+    once,
+    rails,
+    with_joint,
+)
+from friso.studies.rig.outcome import Outcome, Progress, rig_log
+
+CROSSOVERS = np.array([3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 14.0]) / 8
+"""Over that of the stage: the thesis's range for its rig (Table 3, Fig. 16), the steps ours."""
+
+STROKES = np.array([0.02, 0.05, 0.1, 0.2, 0.3, 0.6, 1.0])
+"""Over that of the stage: up to 1 mm in Table 3; the steps ours."""
+
+
+@dataclass(frozen=True)
+class StrokeCrossover:
+    """What became of the moves, arrays of shape (strokes, crossovers, rails), at `strokes` [m] and `crossovers` [Hz] on
+    `rails` (seeds); `frequency` [Hz] is the stage's own crossover."""
+
+    strokes: np.ndarray
+    crossovers: np.ndarray
+    rails: np.ndarray
+    frequency: float
+    runs: Hunted
+
+    @property
+    def share(self) -> np.ndarray:
+        """The share of rails that hunts, shape (strokes, crossovers); NaN where all runs failed."""
+        done = ~self.runs.failed
+        count = done.sum(axis=2)
+        hunting = ((self.runs.peaks > 0) & done).sum(axis=2)
+        return np.divide(hunting, count, out=np.full(count.shape, np.nan), where=count > 0)
+
+    @property
+    def own(self) -> int:
+        """Number of the crossover that is the stage's, or the next to it."""
+        return int(np.argmin(abs(self.crossovers - self.frequency)))
+
+    @property
+    def limits(self) -> np.ndarray:
+        """By stroke the crossover [Hz] halfway from the last at which any rail hunts to the next, shape (strokes,): 0
+        where none does, infinite where some do at the highest."""
+        found = np.zeros(len(self.strokes))
+        for row, hunts in enumerate(self.share > 0):
+            if hunts.any():
+                last = int(np.flatnonzero(hunts)[-1])
+                found[row] = np.inf if last + 1 == len(hunts) else self.crossovers[last : last + 2].mean()
+        return found
+
+
+def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
+    """The move at all strokes and crossovers on all rails, the joint free. Raises StageError without a joint."""
+    free = with_joint(stage, locked=False)
+    result = stroke_crossover(free, seed, STROKES, CROSSOVERS, rails(stage), progress)
+    corners = {"joint.stroke": result.strokes[[0, -1]], "controller.crossover": np.full(2, crossover(stage))}
+    recorded = once(free, move(free), [seed, seed], corners)
+    logs = []
+    for row, stroke in enumerate(corners["joint.stroke"]):
+        file = free.replace({"joint.stroke": f"{stroke:.6g} m"})
+        logs.append(rig_log(recorded, row, f"stroke_{stroke * 1e3:.3g}_mm", "moves", file, seed))
+    notes = ("the stage file has no [rail]: friction is even, and a cell is one run",) if stage.rail is None else ()
+    return Outcome("stroke-crossover", stage, seed, tuple(logs), result, notes)
+
+
+def stroke_crossover(
+    stage: Stage, seed: int, strokes: np.ndarray, factors: np.ndarray, seeds: np.ndarray, progress: Progress
+) -> StrokeCrossover:
+    """The grid of strokes and crossovers, both over the stage's own, on rails."""
+    sizes, frequencies = stage.flat()["joint.stroke"] * strokes, crossover(stage) * factors
+    cases = {
+        "joint.stroke": np.repeat(sizes, len(frequencies)),
+        "controller.crossover": np.tile(frequencies, len(sizes)),
+    }
+    numbers = numbers_of(seed, len(sizes) * len(frequencies), len(seeds))
+    runs = follow(stage, move(stage), numbers, on_rails(stage, cases, seeds), progress, "moves, joint free")
+    return StrokeCrossover(
+        sizes, frequencies, seeds, crossover(stage), runs.shaped(len(sizes), len(frequencies), len(seeds))
+    )

@@ -1,0 +1,208 @@
+"""Fig. 24 to 28: hunting and standstill of the rig as built: sampled, delayed, on rails whose friction varies."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from friso.studies.rig.compare import AS_SLOW, SIMILAR
+from friso.studies.rig.hunted import Hunted
+from friso.studies.rig.in_position import BITS, InPosition
+from friso.studies.rig.stroke_crossover import StrokeCrossover
+from friso.studies.thesis.claims import ORDER, TREND, Evidence, Finding, Part, about, judges
+from friso.studies.thesis.experiments import GRID, MOVES, ON_RAILS, STANDSTILL
+from friso.studies.thesis.rig_hunting import AS_BUILT, Cycles, Moves
+
+_ASSUMED = (
+    f"Assumed: friction that varies by {AS_BUILT['rail.static_deviation']:.0%} over "
+    f"{AS_BUILT['rail.correlation_length']} along the rail, one sample of delay"
+)
+
+_DEVIATIONS = 0.1e-6, 1e-6
+"""Peaks by Fig. 28 with the joint locked and free [m]."""
+
+_RECOVERED = 0.5
+"""Share of a difference from which a thing is taken for its cause."""
+
+
+def _hunting(runs: Hunted, which: Any = ...) -> tuple[int, int]:
+    """How many runs hunt, of how many."""
+    done = ~runs.failed[which]
+    return int(((runs.peaks[which] > 0) & done).sum()), int(done.sum())
+
+
+@judges("F24", figure="24", needs=(MOVES,))
+def locked_hunts_and_free_settles(evidence: Evidence) -> Finding:
+    """The move at 8 Hz."""
+    return judged_move(evidence.experiments.moves)
+
+
+def judged_move(moves: Moves) -> Finding:
+    """The finding from the moves on several rails."""
+    locked, free = _hunting(moves.locked, 0), _hunting(moves.free)
+    return Finding(
+        (
+            Part(
+                "with the joint locked it hunts, on at least half of the rails",
+                2 * locked[0] >= locked[1] > 0,
+                f"{locked[0]} of {locked[1]} rails. {_ASSUMED}",
+                why="where friction differs between the two places at which the stage sticks, hunting dies out",
+            ),
+            Part("with the joint free none does", free[0] == 0 < free[1], f"{free[0]} of {free[1]} rails"),
+        )
+    )
+
+
+@judges("F25", figure="25", needs=(MOVES,))
+def locked_needs_crossover(evidence: Evidence) -> Finding:
+    """The move at the crossovers of Fig. 25, and a release at the middle one."""
+    return judged_crossovers(evidence.experiments.moves)
+
+
+def judged_crossovers(moves: Moves) -> Finding:
+    """The finding from moves and releases with the joint locked."""
+    low, middle, high = (_hunting(moves.locked, row) for row in range(3))
+    able = (moves.released.peaks > 0) | (moves.locked.peaks[1] > 0)
+    started = int(able.sum())
+    return Finding(
+        (
+            Part(
+                f"none hunts at {moves.crossovers[2]:g} Hz, some at {moves.crossovers[0]:g} Hz",
+                high[0] == 0 < low[0],
+                f"{low[0]} of {low[1]} rails at {moves.crossovers[0]:g} Hz, {high[0]} of {high[1]} at "
+                f"{moves.crossovers[2]:g} Hz. {_ASSUMED}",
+            ),
+            Part(
+                f"at {moves.crossovers[1]:g} Hz there are rails on which the move starts no hunting, and rails that "
+                "hunt after it or a release",
+                bool(middle[0] < middle[1] and started > 0),
+                f"{middle[0]} of {middle[1]} rails hunt after the move, {started} after it or a release from 2 mm: "
+                "whether one run hunts hangs on the place",
+            ),
+        )
+    )
+
+
+@judges("F26", figure="26", needs=(GRID,))
+def more_stroke_needs_less_crossover(evidence: Evidence) -> Finding:
+    """The share of rails over stroke and crossover."""
+    return judged_grid(evidence.experiments.grid)
+
+
+def judged_grid(grid: StrokeCrossover) -> Finding:
+    """The finding from the grid."""
+    limits, share = grid.limits, grid.share
+    named = ", ".join(
+        f"{limit:.3g} Hz at {stroke * 1e3:.3g} mm" for limit, stroke in zip(limits, grid.strokes, strict=True)
+    )
+    ranked = float(np.corrcoef(np.argsort(np.argsort(grid.crossovers)), share.mean(axis=0))[0, 1])
+    return Finding(
+        (
+            Part(
+                "at the highest crossover none hunts at any stroke, at the lowest some do at every stroke",
+                bool((share[:, -1] == 0).all() and (share[:, 0] > 0).all()),
+                f"none hunts above {named} ({len(grid.rails)} rails a cell). {_ASSUMED}",
+            ),
+            Part(
+                "the limit of the crossover is lower at the largest stroke than at the smallest, as in Fig. 16A",
+                bool(limits[-1] < limits[0]),
+                f"{limits[-1]:.3g} against {limits[0]:.3g} Hz; trend of the share with the crossover {ranked:.2g}, of "
+                f"which at most -{TREND:g} is one",
+            ),
+        )
+    )
+
+
+@judges("F27", figure="27", needs=(ON_RAILS,))
+def simulated_cycles_are_faster(evidence: Evidence) -> Finding:
+    """The cycle of an even rail against those of rails that vary."""
+    return judged_cycles(evidence.experiments.cycles)
+
+
+def judged_cycles(cycles: Cycles) -> Finding:
+    """The finding from the cycles on an even rail, which is the simulation of the thesis, and on rails that vary."""
+    even, rails = cycles.even, cycles.rails
+    hunts, lives = bool(even.lives[0]), rails.lives
+    slower = np.where(lives, rails.period, np.nan) / even.period[0]
+    larger = np.where(lives, rails.swing, np.nan) / even.swing[0]
+    similar = lives & (abs(np.log(larger)) <= np.log(SIMILAR))
+    sides = np.where(lives, rails.above / rails.below, np.nan)
+    lopsided = abs(np.log(sides[np.isfinite(sides)]))
+    found = f"{int(lives.sum())} of {len(lives)} rails still swing at the end"
+    times = f", with {np.nanmin(slower):.3g} to {np.nanmax(slower):.3g} times its period" if similar.any() else ""
+    scatter = float(np.nanmedian(rails.period_scatter)) if np.isfinite(rails.period_scatter).any() else np.nan
+    return Finding(
+        (
+            Part(
+                "on an even rail the cycle is symmetric, of the order of a millimetre from peak to peak",
+                hunts and about(float(even.swing[0]), 1e-3, ORDER) and about(float(even.above[0] / even.below[0]), 1.0),
+                f"{even.swing[0] * 1e3:.3g} mm, period {even.period[0]:.3g} s, one side "
+                f"{even.above[0] / even.below[0]:.3g} times the other",
+                why="no cycle on an even rail",
+            ),
+            Part(
+                f"on a rail that varies its period is nearly twice as long (at least {AS_SLOW:g} times) at a similar "
+                f"swing (within a factor of {SIMILAR:g}), on at least half of those that hunt",
+                bool(similar.any() and 2 * (slower[similar] >= AS_SLOW).sum() >= similar.sum()),
+                f"{found}{times}. {_ASSUMED}",
+                why="not by the rail: friction that differs between the two sides slows a cycle, and ends it before it "
+                "is twice as slow. On an even rail a motor that gives 0.68 of its force, as the mass line asks for, "
+                "with Coulomb friction of 2 N makes it so (friso rig compare)",
+            ),
+            Part(
+                "there its two sides differ (by more than a tenth, on at least half of those that hunt)",
+                bool(len(lopsided) and np.median(lopsided) > np.log(1.1)),
+                f"larger side over the other, median {np.exp(np.median(lopsided)) if len(lopsided) else np.nan:.3g}",
+                why="too few cycles live on",
+            ),
+            Part(
+                "there it is less regular from cycle to cycle (period scatters by more than a twentieth)",
+                scatter > 0.05,
+                f"median scatter of the period {scatter:.2%}",
+                why="the same places do the same in each cycle: what changes from cycle to cycle is not in the model",
+            ),
+        )
+    )
+
+
+@judges("F28", figure="28", needs=(STANDSTILL,))
+def free_joint_stands_less_still(evidence: Evidence) -> Finding:
+    """The standstill with the joint locked and free, and with more damping."""
+    return judged_standstill(evidence.experiments.standstill)
+
+
+def judged_standstill(found: InPosition) -> Finding:
+    """The finding from the standstills."""
+    peaks = [float(found.runs[case, "all"].true[0, 1]) for case in ("locked", "free")]
+    ratio = found.ratio("all")
+    expected = _DEVIATIONS[1] / _DEVIATIONS[0]
+    tenfold = float(np.interp(np.log(10 * found.own), np.log(found.damping), found.recovered))
+    assumed = (
+        f"Assumed: {found.amplifier * 1e3:.2g} mN RMS of noise of the drive's force (rounding to {BITS} bits), a quiet "
+        "laboratory's floor"
+    )
+    return Finding(
+        (
+            Part(
+                f"locked the deviation is of the order of {_DEVIATIONS[0] * 1e6:g} um, free of "
+                f"{_DEVIATIONS[1] * 1e6:g} um",
+                all(about(peak, size, ORDER) for peak, size in zip(peaks, _DEVIATIONS, strict=True)),
+                f"peaks {peaks[0] * 1e6:.2g} and {peaks[1] * 1e6:.2g} um. {assumed}",
+                why="the disturbances are assumed",
+            ),
+            Part(
+                f"free it is of the order of {expected:g} times as large as locked",
+                about(ratio, expected, ORDER),
+                f"{ratio:.2g} times (RMS)",
+            ),
+            Part(
+                f"the joint's damping is what is missing: ten times as much takes away at least {_RECOVERED:.0%} of "
+                "the difference",
+                tenfold >= _RECOVERED,
+                f"{tenfold:.0%} at {10 * found.own:g} N s/m, {found.recovered.max():.0%} at the most tried",
+                why="stiffness: the bearing that sticks holds the locked stage with its bristles, the free one has "
+                "only the joint and the controller",
+            ),
+        )
+    )

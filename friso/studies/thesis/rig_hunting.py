@@ -1,0 +1,127 @@
+"""The thesis's hunting experiments on its rig as built (Sec. 4.3.2), in sizes for a reproduction."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from friso.stage import Stage
+from friso.studies.rig.compare import on_rail, started, varied
+from friso.studies.rig.hunted import (
+    Hunted,
+    crossover,
+    distance,
+    follow,
+    move,
+    numbers_of,
+    on_rails,
+    released,
+    with_joint,
+)
+from friso.studies.rig.in_position import InPosition, in_position
+from friso.studies.rig.outcome import silent
+from friso.studies.rig.stroke_crossover import StrokeCrossover, stroke_crossover
+
+AS_BUILT: Mapping[str, Any] = MappingProxyType(
+    {
+        "controller.force_limit": "200 N",
+        "controller.anti_windup": "clamp",
+        "drive.sample_time": "50 us",
+        "drive.delay": "50 us",
+        "drive.current_bandwidth": "2 kHz",
+        "drive.encoder_resolution": "1 nm",
+        "drive.encoder_noise": "0.5 nm",
+        "rail.seed": 1,
+        "rail.static_deviation": 0.2,
+        "rail.coulomb_deviation": 0.2,
+        "rail.correlation_length": "5 mm",
+        "cable.stiffness": "5 N/m",
+        "cable.drag": "0.1 N*s/m",
+    }
+)
+"""The drive by Sec. 3.5.2 (sample time, resolution, peak force); the rest is our choice, as in the example
+thesis_drive.toml."""
+
+SEED = 1
+RAILS = 8
+"""Of the moves and of the rails that vary."""
+
+CROSSOVERS = np.array([8.0, 9.5, 14.3]) / 8
+"""Over 8 Hz (Sec. 4.3.2)."""
+
+DISPLACEMENT = 0.02
+"""Of the release over the distance of the move: 2 mm."""
+
+STROKES, LOOPS, GRID_RAILS = np.array([0.02, 0.3, 1.0]), np.array([4.0, 6.0, 8.0, 12.0]) / 8, 2
+"""Of Fig. 26, over 1 mm and 8 Hz, and the rails of each cell."""
+
+
+@dataclass(frozen=True)
+class Moves:
+    """Fig. 24, 25: moves with the joint `locked`, shape (crossovers, rails), and `free` at the first crossover, shape
+    (rails,); releases with it locked at the second (rails,). Crossovers [Hz]."""
+
+    crossovers: np.ndarray
+    locked: Hunted
+    free: Hunted
+    released: Hunted
+
+
+@dataclass(frozen=True)
+class Cycles:
+    """Fig. 27: the cycle on an even rail, one run, and those on rails that vary, shape (rails,), with the asymmetry of
+    their friction about the target."""
+
+    even: Hunted
+    rails: Hunted
+    asymmetry: np.ndarray
+
+
+def as_built(stage: Stage) -> Stage:
+    """The rig with its drive."""
+    return stage.replace(dict(AS_BUILT))
+
+
+def moves(stage: Stage) -> Moves:
+    """The moves of Fig. 24 and 25, on several rails."""
+    own = as_built(stage)
+    locked, free = (with_joint(own, held) for held in (True, False))
+    seeds, frequencies = 1.0 + np.arange(float(RAILS)), crossover(own) * CROSSOVERS
+    keys = "controller.crossover"
+    held = follow(
+        locked, move(own), numbers_of(SEED, len(CROSSOVERS), RAILS), on_rails(own, {keys: frequencies}, seeds)
+    )
+    one, two = (on_rails(own, {keys: frequencies[[row]]}, seeds) for row in (0, 1))
+    loose = follow(free, move(own), numbers_of(SEED, 1, RAILS), one)
+    let_go = follow(locked, released(own, DISPLACEMENT * distance(own)), numbers_of(SEED, 1, RAILS), two)
+    return Moves(frequencies, held.shaped(len(CROSSOVERS), RAILS), loose, let_go)
+
+
+def grid(stage: Stage) -> StrokeCrossover:
+    """Fig. 26: a small grid on a few rails."""
+    seeds = 1.0 + np.arange(float(GRID_RAILS))
+    return stroke_crossover(with_joint(as_built(stage), locked=False), SEED, STROKES, LOOPS, seeds, silent)
+
+
+def cycles(stage: Stage) -> Cycles:
+    """Fig. 27: an even rail and rails that vary, the joint locked."""
+    own = as_built(stage)
+    even = on_rail(with_joint(own, locked=True))
+    one = started(even, SEED, {}, 1, silent, "")
+    swing = float(one.swing[0]) if one.lives[0] else 0.01 * distance(own)
+    flat = own.flat()
+    cases = {f"rail.{name}": np.array([flat[f"rail.{name}"]]) for name in _FIELD}
+    rails, asymmetry = varied(even, SEED, cases, 1.0 + np.arange(float(RAILS)), swing, silent, "")
+    return Cycles(one, rails, asymmetry)
+
+
+_FIELD = ("static_deviation", "coulomb_deviation", "correlation_length")
+
+
+def standstill(stage: Stage) -> InPosition:
+    """Fig. 28."""
+    return in_position(as_built(stage), SEED, silent)[0]

@@ -1,0 +1,185 @@
+"""Hunting and standstill on the virtual rig: what becomes of runs, and what the experiments find of the thesis's."""
+
+from dataclasses import fields, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from friso import load
+from friso.engine.arrays import Status
+from friso.quantities import StageError
+from friso.rig.run import Recorded
+from friso.stage import Stage
+from friso.studies.rig import compare, hunting, in_position, stroke_crossover
+from friso.studies.rig.hunted import (
+    Hunted,
+    distance,
+    follow,
+    hunted,
+    move,
+    numbers_of,
+    on_rails,
+    rails,
+    released,
+    turning_points,
+    with_joint,
+)
+from friso.studies.rig.outcome import silent
+from friso.views.rig import document, figures, sentences
+from tests.patched import patched
+
+RIG = load(Path(__file__).parents[1] / "examples" / "thesis_drive.toml")
+
+
+def recorded(*deviations: np.ndarray, each: float = 1e-3) -> Recorded:
+    """Runs whose position deviates so [m] from a reference of 0."""
+    position = np.array(deviations)
+    statuses = np.where(np.isfinite(position).all(axis=1), Status.DONE, Status.DONE + 1)
+    logged = {"position": position, "reference": np.zeros_like(position)}
+    return Recorded(np.arange(len(position)), each, logged, {"position": position}, statuses)
+
+
+def test_a_cycle_of_known_shape() -> None:
+    """A triangle that rises for 0.4 s and falls for 1.2 s, between -0.2 and 0.6 mm."""
+    time = np.arange(0, 20, 1e-3)
+    phase = time % 1.6
+    deviation = np.where(phase < 0.4, -0.2 + 2 * phase, 0.6 - (phase - 0.4) * 2 / 3) * 1e-3
+    found = hunted(recorded(deviation))
+    assert found.lives[0]
+    assert found.swing[0] == pytest.approx(0.8e-3, rel=1e-2)
+    assert found.period[0] == pytest.approx(1.6, rel=1e-3)
+    assert (found.above[0], found.below[0]) == pytest.approx((0.6e-3, 0.2e-3), rel=1e-2)
+    assert found.rising[0] == pytest.approx(0.25, rel=1e-2)
+    assert max(found.period_scatter[0], found.height_scatter[0]) < 1e-2
+    assert found.peaks[0] == 7  # maxima at 10.0, 11.6, ..., 19.6 s
+
+
+def test_a_cycle_that_dies_out_counts_but_does_not_live() -> None:
+    time = np.arange(0, 20, 1e-3)
+    dying = np.where(time < 16.5, 5e-4 * np.sin(2 * np.pi * time), 0.0)
+    found = hunted(recorded(dying))
+    assert found.peaks[0] == 7  # maxima at 10.25, 11.25, ..., 16.25 s
+    assert not found.lives[0]
+
+
+def test_runs_that_failed_neither_hunt_nor_settle() -> None:
+    time = np.arange(0, 20, 1e-3)
+    cycle = 5e-4 * np.sin(2 * np.pi * time)
+    found = hunted(recorded(cycle, np.where(time < 15, cycle, np.nan), np.zeros_like(time)))
+    assert found.failed.tolist() == [False, True, False]
+    assert np.isnan(found.swing[1])
+    share = found.share()
+    assert share.probability == 0.5
+    assert (
+        share.high
+        > replace(found, **{each.name: getattr(found, each.name)[[0, 2]] for each in fields(found)}).share().probability
+    )
+
+
+def test_turning_points_of_a_flat_top() -> None:
+    time, values = np.arange(7.0), np.array([0, 1, 1, 1, 0, 0, 2.0])
+    assert [each.tolist() for each in turning_points(time, values)] == [[3.0, 5.0], [1.0, 0.0]]
+
+
+def test_the_move_is_the_thesis_s() -> None:
+    """Sec. 4.3.2: 100 mm at 100 m/s^2."""
+    task = move(RIG)
+    assert distance(RIG) == pytest.approx(0.1)
+    assert task.pieces[0] == pytest.approx([0, 0, 0, 100])
+    assert task.pieces[-1] == pytest.approx([2 * np.sqrt(0.1 / 100), 0.1, 0, 0])
+    assert task.duration == 20.0
+
+
+def test_a_larger_stage_moves_farther() -> None:
+    assert distance(RIG.replace({"motion.acceleration_time": "0.1 s"})) == pytest.approx(1.0)
+
+
+def test_what_has_no_joint_or_goes_nowhere() -> None:
+    bare = RIG.replace({"joint": None, "parasitic": None})
+    for run_experiment in (hunting, stroke_crossover, compare, in_position):
+        with pytest.raises(StageError, match="no \\[joint\\]"):
+            run_experiment.run_experiment(bare, 1, silent)
+
+
+@pytest.fixture(scope="module")
+def moved() -> Hunted:
+    """The rig with its joint locked at 8 and 14.3 Hz, on eight rails: shape (2, 8)."""
+    locked, seeds = with_joint(RIG, locked=True), rails(RIG)[:8]
+    changes = on_rails(RIG, {"controller.crossover": np.array([8.0, 14.3])}, seeds)
+    return follow(locked, move(RIG), numbers_of(1, 2, 8), changes).shaped(2, 8)
+
+
+def test_hunting_ends_at_more_crossover(moved: Hunted) -> None:
+    """Fig. 25: it hunts at 8 Hz, here on some rails, and no more at 14.3 Hz."""
+    assert 2 <= (moved.peaks[0] > 0).sum() < 8
+    assert not moved.peaks[1].any()
+    lives = moved.lives[0]
+    assert moved.swing[0, lives] == pytest.approx(1e-3, rel=0.5)
+
+
+def test_hunting_can_be_started() -> None:
+    """Fig. 25, 9.5 Hz: rail 12 settles after the move, and hunts once released from 2 mm."""
+    machine = with_joint(RIG, locked=True).replace({"controller.crossover": "9.5 Hz", "rail.seed": 12})
+    after_move, after_release = (follow(machine, task, [12], {}) for task in (move(machine), released(machine, 2e-3)))
+    assert after_move.peaks[0] == 0
+    assert after_release.peaks[0] > 0
+
+
+SMALL = {
+    hunting: {"CROSSOVERS": np.array([8.0, 9.5, 14.3]) / 8, "SHOWN": (0, 1, 2), "DISPLACEMENTS": (0.02,)},
+    stroke_crossover: {"CROSSOVERS": np.array([0.5, 1.0]), "STROKES": np.array([0.02, 1.0])},
+}
+
+
+def small(stage: Stage) -> np.ndarray:
+    return rails(stage)[:2]
+
+
+def test_free_joint_does_not_hunt_and_its_stroke_matters() -> None:
+    """Fig. 24 and 26, and what is told of them."""
+    sizes = {module: {**values, "rails": small} for module, values in SMALL.items()}
+    with patched(sizes):
+        told = hunting.run_experiment(RIG, 1, silent)
+        grid = stroke_crossover.run_experiment(RIG, 1, silent)
+    assert not told.result.cases["free"].peaks.any()
+    assert told.result.cases["locked"].peaks[0].any()
+    assert [log.kind for log in told.logs] == ["moves"] * 6
+    assert grid.result.share[1, 1] == 0
+    assert grid.result.share[0].max() > 0
+    for outcome in (told, grid):
+        assert all(sentences(outcome))
+        assert figures(outcome)
+        assert document(outcome)["found"]
+
+
+def test_an_even_rail_has_a_symmetric_cycle_and_an_uneven_one_has_not() -> None:
+    """Fig. 27."""
+    with patched({compare: {"STARTS": (0.0,)}}):
+        even = compare.on_rail(with_joint(RIG, locked=True))
+        one = compare.started(even, 1, {}, 1, silent, "")
+        cases = {f"rail.{kind}_deviation": np.array([0.0, 0.1]) for kind in ("static", "coulomb")}
+        several, asymmetry = compare.varied(even, 1, cases, np.arange(1.0, 5.0), float(one.swing[0]), silent, "")
+    assert one.above[0] == pytest.approx(one.below[0], rel=0.1)
+    assert asymmetry[:4] == pytest.approx(0.0, abs=1e-12)
+    assert several.swing[:4] == pytest.approx(one.swing[0], rel=0.02)
+    lives = several.lives[4:]
+    larger = (several.above > several.below)[4:][lives]
+    assert lives.any()
+    assert (larger == (asymmetry[4:][lives] < 0)).all()  # it overshoots to where friction is less
+
+
+def test_standstill_adds_up_and_stiffness_holds() -> None:
+    """Fig. 28: variances of independent disturbances add up; the free joint moves more."""
+    with patched({in_position: {"SETTLING": 1.0, "WATCHED": 4.0, "DAMPING_RATIOS": (0.01, 1.0)}}):
+        found, kept = in_position.in_position(RIG, 1, silent)
+    assert set(kept) == {"locked", "free"}
+    for case in in_position.CASES:
+        alone = [found.runs[case, source].true[0, 0] ** 2 for source in in_position.SOURCES[:-1]]
+        assert found.runs[case, "all"].true[0, 0] ** 2 == pytest.approx(sum(alone), rel=0.2)
+        spectrum = found.runs[case, "all"].spectrum[0]
+        step = found.frequencies[1]
+        assert np.sqrt((spectrum**2).sum() * step) == pytest.approx(found.runs[case, "all"].true[0, 0], rel=0.2)
+    assert found.ratio("all") > 3
+    assert found.recovered[1] > found.recovered[0]
+    assert found.amplifier == pytest.approx(400 / 2**14 / np.sqrt(12))

@@ -1,0 +1,123 @@
+"""The thesis's identification on the virtual rig (Sec. 4.2): what the logs show against what the stage truly is."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import friso
+from friso.identify.experiments import static_from_stick_slip
+from friso.quantities import StageError
+from friso.stage import Stage
+from friso.studies.rig import constant_speed, excitation, frf, sizes, stiction, stiffness
+from friso.studies.rig.outcome import rig_log, silent
+
+PLACE = 0.02
+
+
+@pytest.fixture(scope="module")
+def built() -> Stage:
+    """The thesis rig with its drive as built."""
+    return friso.load(Path(__file__).parent.parent / "examples" / "thesis_drive.toml")
+
+
+def test_sizes_on_the_thesis_rig_are_the_thesis_s(built: Stage) -> None:
+    low, high = sizes.travel(built)
+    assert constant_speed.WAY * (high - low) == pytest.approx(0.15)
+    assert constant_speed.speeds(built) == pytest.approx((2.5e-3, 10e-3))
+    assert sizes.freed(built).flat()["joint.stroke"] == pytest.approx(8e-3)
+    assert np.array(frf.SETTINGS) * sizes.pace(built) == pytest.approx([8, 12, 16, 24, 32, 48])
+
+
+def test_steps_show_the_joint_on_its_cables(built: Stage) -> None:
+    found = stiffness.run_experiment(built, 1, silent).result
+    on_cables = found.true + built.flat()["cable.stiffness"]
+    assert found.found.stiffness.holds(on_cables)
+    assert found.found.stiffness.value == pytest.approx(on_cables, rel=1e-3)
+
+
+def test_a_weaker_motor_makes_the_joint_look_stiffer(built: Stage) -> None:
+    weak = built.replace({"drive.motor_constant_ratio": 0.68})
+    found = stiffness.run_experiment(weak, 1, silent).result
+    assert found.found.stiffness.value == pytest.approx(found.apparent, rel=5e-3)
+    assert found.apparent > found.true
+
+
+def test_slips_lie_within_the_static_friction_of_their_rail(built: Stage) -> None:
+    (log,) = stiction.slow_motion(built, 1, 1)
+    flat = log.stage.flat()
+    found = static_from_stick_slip(log.log, flat["joint.stiffness"], flat["masses.stage"], flat["joint.stroke"])
+    low, high = stiction.true_range(log)
+    assert len(found.forces) > 8
+    assert found.forces.max() < high
+    assert found.forces.min() > 0.9 * low
+    assert found.static.holds((low + high) / 2)
+
+
+def test_uneven_friction_at_constant_speed_is_not_read_as_coulomb_friction(
+    built: Stage, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(constant_speed, "WAY", 1 / 6)
+    monkeypatch.setattr(constant_speed, "DURATIONS", (48.0, 12.0))
+    free = constant_speed.run_experiment(built, 1, silent).result.cases[0]
+    assert not free.place.separated
+    assert not free.velocity.both.coulomb.shown
+
+
+@pytest.mark.parametrize(("locked", "mass", "weak_mass"), [(True, 1.7, 2.5), (False, 0.5, 0.75)])
+def test_a_weaker_motor_makes_masses_look_heavier(built: Stage, locked: bool, mass: float, weak_mass: float) -> None:
+    stage = sizes.locked(built) if locked else sizes.freed(built)
+    true, weak, strong = frf.apparent_masses(stage, PLACE, 1)
+    assert true == pytest.approx(mass, rel=0.1)
+    assert weak == pytest.approx(weak_mass, rel=0.1)
+    assert strong < true < weak
+
+
+def test_the_measured_loop_is_the_one_computed_and_crosses_where_tuned(built: Stage) -> None:
+    """Controller times plant, both measured in the same run, against the loop read from the sensitivity alone."""
+    stage = sizes.locked(built)
+    _, loops = frf.open_loops(stage, PLACE, 1)
+    for each in loops[2:]:
+        assert frf.nearest(each) == pytest.approx(each.tuned, rel=0.15)
+    log = rig_log(excitation.excite(stage, PLACE, 1), 0, "", "frequency", stage, 1)
+    plant, loop = excitation.plant([log]), excitation.loop(log)
+    hertz = plant.frequency
+    control = _controller(stage, hertz)
+    inside = (hertz > 4) & (hertz < 150)
+    ratio = loop.response[inside] / (control * plant.response)[inside]
+    assert np.abs(ratio - 1).max() < 0.05
+
+
+def _controller(stage: Stage, hertz: np.ndarray) -> np.ndarray:
+    """Eq. 7 and 8 of the thesis, in continuous time."""
+    flat, s = stage.flat(), 2j * np.pi * hertz
+    omega = 2 * np.pi * flat["controller.crossover"]
+    root = flat["controller.alpha"] ** -0.5
+    tau_z, tau_p = root / omega, 1 / (omega * root)
+    tau_i = flat["controller.beta"] * tau_z
+    gain = flat["controller.tuned_mass"] * omega**2 / root
+    return gain * (1 + s * tau_z) * (1 + 1 / (s * tau_i)) / (1 + s * tau_p)
+
+
+def test_a_free_joint_is_stable_up_to_a_setting_and_not_beyond(built: Stage) -> None:
+    settings, stable = frf.stable_settings(sizes.freed(built), PLACE, 1)
+    highest = frf.highest_stable(settings, stable)
+    assert settings[0] < highest < settings[-1]
+    assert stable[settings <= highest].all()
+    assert not stable[settings > highest].any()
+
+
+def test_an_experiment_on_the_joint_needs_one(built: Stage) -> None:
+    rigid = built.replace({"joint": None, "parasitic": None})
+    for each in (frf, stiffness, stiction, constant_speed):
+        with pytest.raises(StageError, match="joint"):
+            each.run_experiment(rigid, 1, silent)
+
+
+def test_a_standing_stage_is_simulated_as_exactly_as_a_moving_one(built: Stage) -> None:
+    """A motion of no length gave tolerances without bound: the cart's velocity changed its sign unseen."""
+    log = rig_log(excitation.excite(sizes.locked(built), PLACE, 1), 0, "", None, built, 1)
+    flat = built.flat()
+    assert not log.failure
+    deflection = log.true["bristle_deflection"] * flat["friction.bristle_stiffness"]
+    assert np.abs(deflection).max() < 2 * flat["friction.static"]
