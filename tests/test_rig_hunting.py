@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from patched import patched
 
 from friso import load
 from friso.engine.arrays import Status
@@ -27,7 +28,6 @@ from friso.studies.rig.hunted import (
 )
 from friso.studies.rig.outcome import silent
 from friso.views.rig import document, figures, sentences
-from tests.patched import patched
 
 RIG = load(Path(__file__).parents[1] / "examples" / "thesis_drive.toml")
 

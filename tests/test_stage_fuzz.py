@@ -55,7 +55,9 @@ def check(text: str) -> None:
         if key in ("name", "source"):
             assert getattr(stage, key) == value
         elif isinstance(value, str) and key in units:
-            assert flat[key] == pytest.approx(si_value(value, units[key]), rel=1e-12, abs=5e-318)  # the twin rounds subnormals
+            assert flat[key] == pytest.approx(
+                si_value(value, units[key]), rel=1e-12, abs=5e-318
+            )  # the twin rounds subnormals
         else:
             assert flat[key] == (value if isinstance(value, bool | str) else float(value))
             assert isinstance(flat[key], bool) == isinstance(value, bool)

@@ -1,0 +1,368 @@
+"""Isolator or firmware: the drawn machines, the seven options, their measures, statistics, tables and command."""
+
+import json
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from inside import friso_inside
+from pages import Page
+from patched import patched
+
+from friso.frequency import crossover
+from friso.frequency.margins import margins
+from friso.frequency.members import limit_cases, member
+from friso.stage import Stage, StageError, load
+from friso.stage.correlations import Correlations
+from friso.studies.compare import measures, study
+from friso.studies.compare.machines import SPREADS, TOGETHER_BY, Machines, draw_machines
+from friso.studies.compare.measures import lasting_swing, linear_loops, settling_time
+from friso.studies.compare.options import DEADBAND, MODEL_ERROR, Option, Options, linear_flat, options
+from friso.studies.compare.statistics import difference, median, share
+from friso.studies.compare.study import Comparison, compare
+from friso.views.compare_words import sentences, table_rows
+
+EXAMPLE = Path(__file__).parents[1] / "examples" / "thesis_drive.toml"
+COARSE = {"drive.sample_time": "250 us", "drive.delay": "250 us"}
+"""A drive that costs a fifth, with the same equations: one sample of delay."""
+
+QUICK = {crossover: {"STEPS": 21, "BIASES": 3}, study: {"FOLLOWED": 6, "LONGER": 3}}
+COUNT = 20
+RIGID = {"joint": None, "parasitic": None}
+
+
+@pytest.fixture(scope="module")
+def built() -> Stage:
+    return load(EXAMPLE).replace(COARSE)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def quick() -> Iterator[None]:
+    with patched(QUICK):
+        yield
+
+
+@pytest.fixture(scope="module")
+def machines(built: Stage) -> Machines:
+    return draw_machines(built, Correlations(), 1000, 3)
+
+
+@pytest.fixture(scope="module")
+def every(machines: Machines) -> Options:
+    return options(machines, 1e-6)
+
+
+@pytest.fixture(scope="module")
+def found(built: Stage) -> Comparison:
+    return compare(built, COUNT, 1)
+
+
+def test_machines_spread_by_default(machines: Machines, built: Stage) -> None:
+    flat = built.flat()
+    assert {*machines.keys} == {*SPREADS, "rail.seed"}
+    for key, spread in SPREADS.items():
+        within = np.abs(machines.keys[key] / flat[key] - 1) <= spread / 100
+        assert np.mean(within) == pytest.approx(0.95, abs=0.01), key
+        assert np.mean(machines.keys[key]) == pytest.approx(flat[key], rel=0.01)
+    levels = np.corrcoef(machines.keys["friction.static"], machines.keys["friction.coulomb"])
+    assert levels[0, 1] == pytest.approx(TOGETHER_BY, abs=0.02)
+    assert np.abs(np.mean(machines.signs)) < 0.1
+    assert {*machines.signs.tolist()} == {-1.0, 1.0}
+
+
+def test_machines_as_uncertain_as_the_file(built: Stage) -> None:
+    told = {"friction.static": "3 N +/- 0.1 N", "joint.stroke": "0.9 mm .. 1 mm", "masses.cart": "1.2 kg +/- 1e-6 %"}
+    held = {"controller.crossover": "8 Hz +/- 1 Hz", "drive.delay": "200 us .. 300 us"}
+    machines = draw_machines(built.replace(told | held), Correlations(), 200, 3)
+    assert {*machines.from_file} == {*told}
+    assert np.std(machines.keys["friction.static"]) == pytest.approx(0.051, rel=0.05)
+    assert machines.keys["masses.cart"] == pytest.approx(1.2, rel=1e-7)
+    assert not {*held} & {*machines.keys}
+    assert "controller.crossover, drive.delay" in machines.notes[0]
+    assert machines.changes({})["controller.tuned_mass"] == 1.7
+
+
+def test_same_seed_same_machines(built: Stage, machines: Machines) -> None:
+    again = draw_machines(built, Correlations(), 1000, 3)
+    other = draw_machines(built, Correlations(), 1000, 4)
+    assert all(np.array_equal(again.keys[key], values) for key, values in machines.keys.items())
+    assert np.array_equal(again.signs, machines.signs)
+    assert not np.array_equal(other.keys["friction.static"], machines.keys["friction.static"])
+    assert len({*machines.keys["rail.seed"].tolist()}) == len({*machines.seeds.tolist()}) == 1000
+
+
+def test_a_drive_without_a_clock_gets_one(built: Stage) -> None:
+    machines = draw_machines(built.replace({"drive": None, "rail": None}), Correlations(), 20, 1)
+    assert machines.stage.flat()["drive.sample_time"] == 50e-6
+    assert any("50 us" in note for note in machines.notes)
+    assert any("no [rail]" in note for note in machines.notes)
+
+
+def test_the_seven_options(every: Options, machines: Machines) -> None:
+    stages = {each.letter: each.stage.flat() for each in every.every}
+    assert "".join(stages) == "abcdefg"
+    assert [letter for letter, flat in stages.items() if not flat["joint.locked"]] == ["c", "g"]
+    assert stages["d"]["drive.integrator_deadband"] == pytest.approx(DEADBAND * 1e-6)
+    assert [letter for letter, flat in stages.items() if flat["drive.integrator_reset"]] == ["e"]
+    ahead = every.every[5].changes
+    mass = machines.keys["masses.cart"] + machines.keys["masses.stage"]
+    for key, true in (("mass", mass), ("coulomb", machines.keys["friction.coulomb"])):
+        off = ahead[f"drive.feedforward_{key}"] / true
+        assert off == pytest.approx(1 + MODEL_ERROR * machines.signs)
+
+
+@pytest.mark.parametrize("letter", ["b", "g"])
+def test_faster_up_to_the_margin(every: Options, letter: str) -> None:
+    option = next(each for each in every.every if each.letter == letter)
+    assert option.factor > 1.2
+    assert option.stage.flat()["controller.crossover"] == pytest.approx(8 * option.factor)
+    own = linear_flat(option.stage, option.stage.flat())
+    margin = crossover.settled_margin(own)
+    assert margin == pytest.approx(crossover.WANTED, abs=0.01)
+    beyond = crossover.settled_margin({**own, "controller.crossover": 1.1 * own["controller.crossover"]})
+    assert beyond < margin - 0.01
+
+
+def test_margins_of_many_are_those_of_each(every: Options, machines: Machines) -> None:
+    option = every.every[2]
+    loops = linear_loops(option.stage, linear_flat(option.stage, machines.flat(option.stage, {})), machines.count)
+    for number in (0, int(np.where(loops.stable, loops.margin, np.inf).argmin())):
+        own = {key: float(values[number]) for key, values in machines.keys.items()}
+        flat = linear_flat(option.stage, option.stage.flat(own | {"controller.tuned_mass": 1.7}))
+        exact = min(margins(flat, one).modulus_margin for one in limit_cases(flat).values())
+        assert loops.margin[number] == pytest.approx(exact, abs=0.01)
+
+
+def test_unstable_loops_are_told(machines: Machines, every: Options) -> None:
+    fast = every.every[0].stage.replace({"controller.crossover": "390 Hz"})
+    loops = linear_loops(fast, linear_flat(fast, machines.flat(fast, {})), machines.count)
+    assert not loops.stable.any()
+    assert not loops.margin.any()
+    assert not margins(linear_flat(fast, fast.flat()), member(1.6)).stable
+
+
+def test_without_a_joint_it_is_said(built: Stage) -> None:
+    found = options(draw_machines(built.replace(RIGID), Correlations(), 20, 1), 1e-6)
+    assert [each.letter for each in found.every] == ["a", "b", "d", "e", "f"]
+    assert found.left_out == dict.fromkeys("cg", "the stage file has no joint with a stiffness")
+
+
+def test_gains_instead_of_rules(built: Stage) -> None:
+    gains = {"kind": "pid", "kp": "2000 N/m", "kd": "60 N*s/m", "tau": "2 ms"}
+    found = options(draw_machines(built.replace(RIGID | {"controller": gains}), Correlations(), 20, 1), 1e-6)
+    assert {letter: found.left_out[letter] for letter in "de"} == dict.fromkeys(
+        "de", "the controller does not integrate"
+    )
+    faster = found.every[1]
+    assert faster.stage.flat()["controller.kp"] == pytest.approx(2000 * faster.factor**2)
+
+
+def test_no_room_above(built: Stage) -> None:
+    fast = built.replace(RIGID | {"controller.crossover": "90 Hz"})
+    found = options(draw_machines(fast, Correlations(), 20, 1), 1e-6)
+    assert "b" in found.left_out
+    assert "no higher bandwidth keeps" in found.left_out["b"]
+
+
+TIME = np.arange(0, 20, 0.01)
+frequencies, sizes = st.floats(0.25, 5.0), st.floats(1e-5, 1e-2)
+
+
+@settings(max_examples=40, deadline=None)
+@given(frequencies, sizes, st.floats(0.05, 2.0), st.floats(-1e-3, 1e-3))
+def test_what_swings_on_hunts(frequency: float, size: float, within: float, offset: float) -> None:
+    swing = offset + size * np.sin(2 * np.pi * frequency * TIME)[None]
+    assert lasting_swing(TIME, swing, within * 1e-6).all()
+    assert not lasting_swing(TIME, swing, 1.1 * size).any()
+
+
+@settings(max_examples=40, deadline=None)
+@given(frequencies, sizes, st.floats(1.0, 5.0), st.floats(-1e-3, 1e-3))
+def test_what_dies_out_or_creeps_does_not(frequency: float, size: float, decay: float, offset: float) -> None:
+    dying = size * np.exp(-TIME / decay) * np.cos(2 * np.pi * frequency * TIME)
+    creeping = offset - size * TIME
+    assert not lasting_swing(TIME, np.array([dying, creeping, offset + 0 * TIME]), 1e-6).any()
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.floats(0.01, 15.0), st.floats(0.1, 100.0), st.floats(0.0, 4.0))
+def test_settling_time_of_a_step(until: float, factor: float, corner: float) -> None:
+    deviation = factor * np.where(until > TIME, 1.0, 0.5)[None]
+    expected = max(TIME[until <= TIME][0] - corner, 0.0)
+    assert settling_time(TIME, deviation, corner, 0.7 * factor)[0] == pytest.approx(expected)
+    assert settling_time(TIME, -deviation, corner, 2.0 * factor)[0] == 0
+    assert settling_time(TIME, deviation, corner, 0.4 * factor)[0] == np.inf
+    assert settling_time(TIME, np.full((1, len(TIME)), np.nan), corner, factor)[0] == np.inf
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.lists(st.floats(-1e3, 1e3) | st.just(np.inf), min_size=20, max_size=200))
+def test_medians_with_infinite_values(values: list[float]) -> None:
+    found, array = median(np.array(values)), np.array(values)
+    assert found.low <= found.value <= found.high
+    assert np.mean(array <= found.value) >= 0.5 or found.value < np.sort(array)[len(array) // 2]
+    assert median(np.append(array, np.nan)) == found
+    assert {found.low, found.high} <= {*values}
+
+
+def test_intervals_of_medians_hold() -> None:
+    rng = np.random.default_rng(5)
+    known = [median(np.exp(rng.standard_normal(50))) for _ in range(2000)]
+    held = np.mean([each.low <= 1 <= each.high for each in known])
+    assert 0.95 - 0.015 < held < 0.985
+
+
+def test_intervals_of_paired_differences_hold() -> None:
+    rng = np.random.default_rng(6)
+    held = []
+    for _ in range(2000):
+        common, own = rng.random(60), rng.random(60)
+        pair = difference((common < 0.3) & (own < 0.5), common < 0.3)
+        held.append(pair.low <= -0.15 <= pair.high)
+    assert 0.93 < np.mean(held) <= 1
+
+
+def test_differences_are_paired() -> None:
+    before = np.arange(100) < 40
+    better = difference(before & (np.arange(100) >= 20), before)
+    assert better.value == pytest.approx(-0.2)
+    assert better.high < 0
+    back = difference(before, before & (np.arange(100) >= 20))
+    assert (back.value, back.low, back.high) == pytest.approx((0.2, -better.high, -better.low))
+    assert difference(before, before).value == 0
+
+
+def test_runs_that_fail_count_either_way() -> None:
+    flags, done = np.arange(100) < 10, np.arange(100) < 90
+    assert share(flags, done).probability == pytest.approx(10 / 90)
+    assert share(flags, done).low == share(flags, np.ones(100, bool)).low
+    assert share(flags, done).high == share(np.arange(100) < 20, np.ones(100, bool)).high
+
+
+def test_the_isolator_and_bandwidth_stop_what_hunts(found: Comparison) -> None:
+    """Thesis, Sec. 4.3: the locked rig hunts at 8 Hz and not above 15 Hz; the isolated one does not at 8 Hz."""
+    results = {each.letter: each for each in found.results}
+    assert results["a"].hunting.probability > 0.2
+    assert results["b"].option.stage.flat()["controller.crossover"] > 15
+    for letter in "bcg":
+        assert results[letter].settles
+        assert results[letter].in_position_count == COUNT
+        assert results[letter].hunting.probability == 0
+        assert found.paired(results[letter]).hunting.high < 0
+        assert results[letter].settling.high < results["a"].settling.high
+    assert results["b"].margin.value < results["a"].margin.value
+
+
+def test_an_integrator_that_starts_anew_does_not_stay(found: Comparison) -> None:
+    """Without its integral the stage breaks away again, so slowly that only the longer run shows it."""
+    reset = found.results[4]
+    assert reset.hunting.probability < found.results[0].hunting.probability
+    assert not reset.settles
+    assert reset.stays.high < 0.9
+
+
+def test_options_share_their_machines(built: Stage, found: Comparison) -> None:
+    """The first machines come out the same, to the last digit, on their own and among others; and so does an option
+    that changes nothing."""
+    work = study._Work(found.machines, study.own_motion(built), study._corner(built), 1e-6, study.silent, 1)
+    base = found.results[0]
+    again = work.runs(replace(base.option, letter="f"), 0)
+    assert np.array_equal(again.in_position, base.found.in_position)
+    assert np.array_equal(again.force, base.found.force)
+    assert not np.array_equal(found.results[5].found.force, base.found.force)
+
+
+def test_hardly_any_friction_never_hunts(built: Stage) -> None:
+    ideal = {"friction.static": "1 mN +/- 1e-6 %", "friction.coulomb": "1 mN +/- 1e-6 %"}
+    machines = draw_machines(built.replace(ideal), Correlations(), 20, 1)
+    work = study._Work(machines, study.own_motion(built), study._corner(built), 1e-6, study.silent, 1)
+    for letter, variant in (("a", "locked"), ("c", "free")):
+        runs = work.runs(Option(letter, machines.stage.variants()[variant]), 0)
+        assert runs.done.all()
+        assert not runs.hunts.any()
+        assert np.isfinite(runs.settling).all()
+
+
+def test_a_run_that_fails_is_no_hunter(found: Comparison) -> None:
+    base = found.results[0]
+    part = measures.Found(
+        **{name: np.array(getattr(base.found, name)) for name in measures.Found.__dataclass_fields__}
+        | {"done": np.zeros(COUNT, bool), "settling": np.full(COUNT, np.nan)}
+    )
+    result = replace(base, found=part)
+    assert (result.failed, result.hunting.low, result.hunting.high) == (COUNT, 0, 1)
+    assert np.isnan(result.hunting.probability)
+    assert not result.settles
+
+
+def test_words_follow_the_numbers(found: Comparison) -> None:
+    says = " ".join(sentences(found))
+    assert (
+        f"Of {COUNT} machines are in position within 1.00 µm at the end: b faster all (95 %: at least 83.2 %)" in says
+    )
+    assert "settings do what a joint does: b faster" in says
+    no_settings = replace(found, results=tuple(each for each in found.results if each.letter != "b"))
+    assert "the joint is what settles them: c isolator or g b and c" in " ".join(sentences(no_settings))
+    no_joint = replace(found, results=tuple(each for each in found.results if each.letter not in "cg"))
+    assert "settings suffice: b faster." in " ".join(sentences(no_joint))
+    none = replace(found, results=(found.results[0], *found.results[3:6]))
+    assert "No option brings 99 %" in " ".join(sentences(none))
+    assert [label for label, _ in table_rows(found)][::2] == ["a as is", "c isolator", "e reset", "g b and c"]
+
+
+def test_command_writes_page_and_figures(tmp_path: Path, found: Comparison, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(study, "compare", lambda *given: found)
+    done = friso_inside(tmp_path, "compare", EXAMPLE, "--out", "out", "--json")
+    assert done.returncode == 0
+    document = json.loads(done.stdout)
+    assert [*document["options"]] == [*"abcdefg"]
+    for each in document["options"].values():
+        assert each["hunts"]["low"] <= each["hunts"]["probability"] <= each["hunts"]["high"]
+    assert document["options"]["d"]["settling_time_s"]["high"] is None
+    assert {each.name for each in (tmp_path / "out").iterdir()} == {
+        "compare.html", "compare.pdf", "compare.png", "compare.svg",
+    }  # fmt: skip
+    page = Page((tmp_path / "out" / "compare.html").read_text(encoding="utf-8"))
+    assert "b faster all" in page.text
+    text = friso_inside(tmp_path, "compare", EXAMPLE).stdout
+    assert "Against a, machine by machine" in text
+
+
+def test_interrupted_it_leaves_nothing(tmp_path: Path, found: Comparison, monkeypatch: pytest.MonkeyPatch) -> None:
+    def stop(*given: object) -> None:
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(study, "compare", stop)
+        assert friso_inside(tmp_path, "compare", EXAMPLE, "--out", "out").returncode == 130
+    monkeypatch.setattr(study, "compare", lambda *given: found)
+    monkeypatch.setattr("friso.views.matplotlib_renderer.image", stop)
+    assert friso_inside(tmp_path, "compare", EXAMPLE, "--out", "out").returncode == 130
+    assert not [*tmp_path.iterdir()]
+
+
+@pytest.mark.parametrize(
+    ("given", "says"),
+    [
+        (["--machines", 19], "a whole number from 20 to 100000"),
+        (["--seed", -1], "a whole number from 0"),
+        (["--within", "0 um"], "greater than 0"),
+        (["--within", 1], "unit"),
+        (["--set", 'motion={kind="ramp", velocity="1 mm/s", duration="2 s"}'], "a reference that stands in the end"),
+        (["--set", 'motion.duration="8 s"'], "at least 10.12 s"),
+        (["--set", 'drive.sample_time="20 ms"'], "at most a tenth of the crossover's period"),
+    ],
+)
+def test_bad_input(tmp_path: Path, given: list[object], says: str) -> None:
+    done = friso_inside(tmp_path, "compare", EXAMPLE, *given)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert says in done.stderr
+
+
+def test_no_controller_no_comparison(built: Stage) -> None:
+    with pytest.raises(StageError, match="neither crossover nor any of kp, ki, kd"):
+        built.replace({"controller": {"kind": "pid"}})
