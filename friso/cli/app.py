@@ -16,6 +16,7 @@ from friso.cli.bode import bode
 from friso.cli.boundary import boundary
 from friso.cli.check import check
 from friso.cli.common import INTERRUPTED, say
+from friso.cli.compare import compare
 from friso.cli.design import design
 from friso.cli.flexure import flexure
 from friso.cli.guideline import guideline
@@ -46,6 +47,7 @@ for name, command in (
     ("design", design),
     ("identify", identify),
     ("rig", rig),
+    ("compare", compare),
     ("reproduce", reproduce),
     ("guideline", guideline),
 ):

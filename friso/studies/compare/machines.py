@@ -1,0 +1,146 @@
+"""Machines drawn around a stage file: the same numbers, rails and noise for every option."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from scipy.linalg import block_diag
+
+from friso.quantities import StageError
+from friso.rig.run import SAMPLE_TIME
+from friso.stage import Stage, numeric_keys
+from friso.stage.correlations import Correlations, Drawn, draw
+
+LEAST, MOST = 20, 100_000
+"""Machines at least, for an interval to tell anything, and at most, which take hours."""
+
+MOST_SEED = 2**32 - 1
+
+SPREADS: Mapping[str, float] = MappingProxyType(
+    {
+        "masses.cart": 3.0,
+        "masses.stage": 3.0,
+        "friction.static": 30.0,
+        "friction.coulomb": 30.0,
+        "friction.viscous": 30.0,
+        "friction.stribeck_velocity": 50.0,
+        "friction.bristle_stiffness": 50.0,
+        "friction.bristle_damping": 50.0,
+        "joint.stiffness": 5.0,
+        "joint.damping": 50.0,
+        "parasitic.frequency": 5.0,
+        "parasitic.damping_ratio": 50.0,
+        "rail.static_deviation": 30.0,
+        "rail.coulomb_deviation": 30.0,
+    }
+)
+"""Half-widths of the 95 % intervals [%] of keys for which the stage file gives none. They are our choice: friction as
+it differs between bearings of one type and preload, masses as weighed, bristles and Stribeck velocity as badly known as
+they are identified."""
+
+TOGETHER, TOGETHER_BY = ("friction.static", "friction.coulomb"), 0.8
+"""Keys that follow the preload alike, and their correlation, where neither is uncertain in the file: our choice."""
+
+HELD = ("controller.", "motion.", "drive.sample_time", "drive.delay", "drive.velocity_samples")
+"""What is set and not found: alike on all machines, even where the file calls it uncertain."""
+
+FROM_LEAVES = ("joint.stiffness", "parasitic.")
+"""What follows from leaf springs, where the stage has these."""
+
+
+@dataclass(frozen=True)
+class Machines:
+    """The stage whose drive tells a sample time; keys to SI arrays of shape (count,) that differ between the machines;
+    the seeds of their noise; the sign, 1 or -1, with which the model of each is wrong; how they were `drawn`, from
+    which keys of the file and from which default `spreads` [%]; and what to know of that."""
+
+    stage: Stage
+    keys: Mapping[str, np.ndarray]
+    seeds: np.ndarray
+    signs: np.ndarray
+    drawn: Drawn
+    from_file: tuple[str, ...]
+    spreads: Mapping[str, float]
+    notes: tuple[str, ...]
+
+    @property
+    def count(self) -> int:
+        return len(self.seeds)
+
+    def flat(self, stage: Stage, changes: Mapping[str, Any]) -> dict[str, Any]:
+        """Keys of all machines as an option has them, its stage and changes being given; the controller is tuned as it
+        is and does not know the masses that were drawn."""
+        return stage.flat(self.changes(changes))
+
+    def changes(self, changes: Mapping[str, Any]) -> dict[str, Any]:
+        """What an option changes, and what the machines do, of the keys of the stage."""
+        flat = self.stage.flat()
+        tuned = {key: flat[key] for key in ("controller.tuned_mass",) if key in flat}
+        return {**tuned, **self.keys, **changes}
+
+
+def draw_machines(stage: Stage, correlations: Correlations, count: int, seed: int) -> Machines:
+    """Machines drawn from what is uncertain of the stage, and by default spreads from the rest.
+
+    Raises StageError for a number of machines or a seed that is not allowed, and for ranges hardly any of which is.
+    """
+    for option, value, least, most in (("--machines", count, LEAST, MOST), ("--seed", seed, 0, MOST_SEED)):
+        if not least <= value <= most:
+            example = f"{option} {2000 if option == '--machines' else 1}"
+            raise StageError(option, str(value), f"a whole number from {least} to {most}", example)
+    clocked, notes = _with_clock(stage)
+    spreads = _spreads(clocked)
+    drawn = draw(_spread(clocked, spreads), _joined(correlations, spreads), count, seed)
+    held = [key for key in stage.uncertain() if key.startswith(HELD)]
+    if held:
+        notes += [f"not drawn, being set alike on all machines: {', '.join(held)}"]
+    if drawn.left_out:
+        notes += [f"{drawn.left_out} draws that no stage may have were left out and others drawn"]
+    numbers = np.arange(count)
+    keys = {key: values for key, values in drawn.keys.items() if not key.startswith(HELD)}
+    if clocked.rail:
+        keys["rail.seed"] = clocked.rail.seed + numbers
+    else:
+        notes += ["friction is the same all along the rail: the stage file has no [rail]"]
+    signs = np.where(np.random.default_rng(seed).random(count) < 0.5, -1.0, 1.0)
+    known = tuple(key for key in stage.uncertain() if key in keys)
+    return Machines(clocked, keys, seed + numbers, signs, drawn, known, spreads, tuple(notes))
+
+
+def _with_clock(stage: Stage) -> tuple[Stage, list[str]]:
+    """The stage with a sample time, and whether it had to be chosen. Raises StageError where it is too long."""
+    if "drive.sample_time" in stage.flat():
+        return stage, []
+    chosen = stage.with_numbers({"drive.sample_time": SAMPLE_TIME})
+    return chosen, [f"the stage file gives no drive.sample_time: {1e6 * SAMPLE_TIME:g} us are taken"]
+
+
+def _spreads(stage: Stage) -> dict[str, float]:
+    """Default spreads [%] of keys that the stage has, not 0, and calls certain."""
+    flat, given = stage.flat(), stage.uncertain()
+    follow = FROM_LEAVES if stage.flexure else ()
+    return {
+        key: spread
+        for key, spread in SPREADS.items()
+        if flat.get(key) and key not in given and not key.startswith(follow)
+    }
+
+
+def _spread(stage: Stage, spreads: Mapping[str, float]) -> Stage:
+    """The stage with these spreads [%] written into it."""
+    flat = stage.flat()
+    known = numeric_keys(flat)
+    return stage.replace({key: f"{flat[key]!r} {known[key].unit} +/- {part} %" for key, part in spreads.items()})
+
+
+def _joined(correlations: Correlations, spreads: Mapping[str, float]) -> Correlations:
+    """Those given, and those of the keys with default spreads."""
+    if not all(key in spreads for key in TOGETHER):
+        return correlations
+    own = np.array([[1.0, TOGETHER_BY], [TOGETHER_BY, 1.0]])
+    matrix = np.asarray(block_diag(correlations.matrix, own)) if correlations.keys else own
+    return Correlations((*correlations.keys, *TOGETHER), matrix)

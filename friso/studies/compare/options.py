@@ -1,0 +1,131 @@
+"""The seven ways to settle a machine: settings of its controller, a joint, or both."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from friso.equations.bandwidth import faster
+from friso.frequency.crossover import WANTED, limits
+from friso.stage import Stage
+from friso.studies.compare.machines import Machines
+
+DEADBAND = 0.5
+"""Deadband of the integrator, in tolerances for being in position: our choice. It rests while the stage is in position,
+and the edge of the band is not that of the tolerance."""
+
+MODEL_ERROR = 0.2
+"""Share by which mass and friction in the feedforward are off, all of a machine in the same direction."""
+
+PER_PERIOD = 10
+"""Samples that a period of the crossover has at least, as the stage file demands."""
+
+NAMES = {
+    "a": "as is",
+    "b": "faster",
+    "c": "isolator",
+    "d": "deadband",
+    "e": "reset",
+    "f": "feedforward",
+    "g": "b and c",
+}
+
+JOINT: tuple[str, ...] = ("c", "g")
+"""The options for which a joint has to be bought."""
+
+
+@dataclass(frozen=True)
+class Option:
+    """One way: its `letter`, the stage that has it, what it changes of the keys (numbers, or arrays of one for each
+    machine), and by which `factor` its controller is faster."""
+
+    letter: str
+    stage: Stage
+    changes: Mapping[str, Any] = field(default_factory=dict)
+    factor: float = 1.0
+
+    @property
+    def name(self) -> str:
+        return NAMES[self.letter]
+
+    @property
+    def loop(self) -> str:
+        """The option whose linear loop it has: rests of the integrator and feedforward are no part of that."""
+        return "a" if self.letter in "def" else self.letter
+
+
+@dataclass(frozen=True)
+class Options:
+    """Those that the stage can have, a to g; why others are left out; and the deadband of the integrator [m]."""
+
+    every: tuple[Option, ...]
+    left_out: Mapping[str, str]
+    deadband: float
+
+
+def linear_flat(stage: Stage, flat: Mapping[str, Any]) -> dict[str, Any]:
+    """Keys for the linear loop: the lag of the current loop counts as a delay, as it acts well below its bandwidth."""
+    own = stage.flat()
+    late = own.get("drive.delay", 0.0)
+    if "drive.current_bandwidth" in own:
+        late += 1 / (2 * np.pi * own["drive.current_bandwidth"])
+    return {**flat, "drive.delay": late}
+
+
+def options(machines: Machines, within: float) -> Options:
+    """The options of machines that are to be in position `within` a tolerance [m]."""
+    stage = machines.stage
+    variants = stage.variants()
+    locked, free = variants.get("locked", stage), variants.get("free")
+    left_out: dict[str, str] = {} if free else dict.fromkeys(JOINT, "the stage file has no joint with a stiffness")
+    deadband = DEADBAND * within
+    found = [Option("a", locked), *_faster("b", locked, left_out)]
+    if free:
+        found.append(Option("c", free))
+    if _integrates(stage):
+        waiting = locked.with_numbers({"drive.integrator_deadband": deadband})
+        found += [Option("d", waiting), Option("e", locked.replace({"drive.integrator_reset": True}))]
+    else:
+        left_out |= dict.fromkeys("de", "the controller does not integrate")
+    found.append(Option("f", locked, _feedforward(machines)))
+    if free:
+        found += _faster("g", free, left_out)
+    return Options(tuple(found), dict(sorted(left_out.items())), deadband)
+
+
+def _faster(letter: str, stage: Stage, left_out: dict[str, str]) -> list[Option]:
+    """The stage with the highest bandwidth at which the machine of the file keeps its margin: an engineer tunes one
+    machine, and all others get its settings. Nothing, and why not, where it is that fast already."""
+    flat = stage.flat()
+    highest = limits(linear_flat(stage, flat)).highest_comfortable
+    own = flat.get("controller.crossover", 1.0)
+    if "controller.crossover" in flat and highest is not None:
+        highest = min(highest, 1 / (PER_PERIOD * flat["drive.sample_time"]))
+    if highest is None or highest <= own:
+        left_out[letter] = f"no higher bandwidth keeps a modulus margin of {WANTED:g}"
+        return []
+    factor = float(highest / own)
+    scaled = faster(flat, factor)
+    changes = {key: scaled[key] for key in flat if key.startswith("controller.") and scaled[key] != flat[key]}
+    return [Option(letter, stage.with_numbers(changes), factor=factor)]
+
+
+def _integrates(stage: Stage) -> bool:
+    """Whether there is an integrator that could rest."""
+    flat = stage.flat()
+    return "controller.crossover" in flat or flat["controller.ki"] > 0
+
+
+def _feedforward(machines: Machines) -> dict[str, np.ndarray]:
+    """Feedforward of mass, Coulomb and viscous friction of each machine, all wrong by the model error."""
+    flat = machines.flat(machines.stage, {})
+    off = 1 + MODEL_ERROR * machines.signs
+    mass = flat.get("masses.cart", 0.0) + flat.get("masses.stage", 0.0)
+    return {
+        "drive.feedforward_mass": off * mass,
+        "drive.feedforward_coulomb": off * flat.get("friction.coulomb", 0.0),
+        "drive.feedforward_viscous": off * flat.get("friction.viscous", 0.0),
+    }

@@ -1,0 +1,239 @@
+"""The comparison: every option on every machine, all runs of an option in one call."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from friso.equations.motion import last_corner
+from friso.quantities import StageError
+from friso.rig.run import Recorded, run
+from friso.rig.task import Task, own_motion
+from friso.stage import Stage
+from friso.stage.correlations import Correlations
+from friso.studies.compare.machines import Machines, draw_machines
+from friso.studies.compare.measures import Found, Later, Loops, followed, joined, linear_loops, measured
+from friso.studies.compare.options import NAMES, Option, Options, linear_flat, options
+from friso.studies.compare.statistics import Estimate, difference, median, share
+from friso.studies.draws import Share
+from friso.studies.rig.outcome import Progress, silent
+
+INTERVAL = 1e-3
+"""Time [s] between what is looked at, at least: the next whole number of samples."""
+
+FOLLOWED, LONGER = 40, 6
+"""Machines that are run again for so many times as long: an integrator that was reset may hunt that slowly."""
+
+ENOUGH = 0.99
+"""Share of the machines that an option has to bring into position to be called one that settles them."""
+
+LATEST = 0.5
+"""Share of the run by which the reference has to stand: hunting is looked for in what follows."""
+
+
+@dataclass(frozen=True)
+class Result:
+    """An option, what became of each machine with it, of the first of them `later`, and the linear loop of each."""
+
+    option: Option
+    found: Found
+    later: Later
+    loops: Loops
+
+    @property
+    def letter(self) -> str:
+        return self.option.letter
+
+    @property
+    def hunting(self) -> Share:
+        return share(self.found.hunts, self.found.done)
+
+    @property
+    def counted(self) -> Share:
+        """The probability of a peak that counts as in the thesis."""
+        return share(self.found.counted > 0, self.found.done)
+
+    @property
+    def settled(self) -> Share:
+        """The probability of being in position to stay by the end of the run."""
+        return share(np.isfinite(self.found.settling), self.found.done)
+
+    @property
+    def stays(self) -> Share:
+        """The probability of staying in position throughout the last half of a run that is `LONGER`."""
+        return share(self.later.stays, self.later.done)
+
+    @property
+    def settling(self) -> Estimate:
+        """Median [s] over all machines, those that never settle included."""
+        return median(self.found.settling)
+
+    @property
+    def in_position(self) -> Estimate:
+        return median(self.found.in_position)
+
+    @property
+    def force(self) -> Estimate:
+        return median(self.found.force)
+
+    @property
+    def margin(self) -> Estimate:
+        return median(self.loops.margin)
+
+    @property
+    def unstable(self) -> int:
+        return int(np.count_nonzero(~self.loops.stable))
+
+    @property
+    def failed(self) -> int:
+        return int(np.count_nonzero(~self.found.done))
+
+    @property
+    def in_position_count(self) -> int:
+        """Machines that are in position to stay by the end of the run."""
+        return int(np.isfinite(self.found.settling).sum())
+
+    @property
+    def settles(self) -> bool:
+        """Whether `ENOUGH` of the machines are in position by the end, and of those that are followed stay there."""
+        return self.in_position_count >= ENOUGH * len(self.found.settling) and bool(self.later.stays.mean() >= ENOUGH)
+
+
+@dataclass(frozen=True)
+class Paired:
+    """An option against option a on the same machines: by how much hunting is more probable, the share of machines that
+    settle `sooner`, and the medians of what root mean squares in position and of the force are multiplied by."""
+
+    hunting: Estimate
+    sooner: Share
+    in_position: Estimate
+    force: Estimate
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """The results of the options on the machines drawn with a seed, tolerance [m] included; and notes."""
+
+    machines: Machines
+    options: Options
+    results: tuple[Result, ...]
+    within: float
+    seed: int
+    notes: tuple[str, ...]
+
+    @property
+    def stage(self) -> Stage:
+        return self.machines.stage
+
+    def paired(self, result: Result) -> Paired:
+        """An option against a, on the machines whose runs were completed with both."""
+        one, base = result.found, self.results[0].found
+        both = one.done & base.done
+        with np.errstate(invalid="ignore", divide="ignore"):
+            in_position, force = (
+                getattr(one, name)[both] / getattr(base, name)[both] for name in ("in_position", "force")
+            )
+        return Paired(
+            hunting=difference(one.hunts[both], base.hunts[both]),
+            sooner=share(one.settling < base.settling, both),
+            in_position=median(in_position),
+            force=median(force),
+        )
+
+
+def compare(
+    stage: Stage,
+    count: int = 2000,
+    seed: int = 1,
+    within: float = 1e-6,
+    correlations: Correlations | None = None,
+    progress: Progress = silent,
+) -> Comparison:
+    """Settle `count` machines drawn around a stage in up to seven ways, `within` [m] being in position.
+
+    Raises StageError for a number, a seed or a tolerance that is not allowed, and for a motion that ends too late.
+    """
+    if not 0 < within < np.inf:
+        raise StageError("--within", f"{within:g} m", "a length greater than 0", '--within "1 um"')
+    machines = draw_machines(stage, correlations or Correlations(), count, seed)
+    corner = _corner(machines.stage)
+    progress(0, 1, "how fast the controller may be")
+    every = options(machines, within)
+    work = _Work(machines, own_motion(machines.stage), corner, within, progress, len(every.every))
+    results: list[Result] = []
+    for option in every.every:
+        found, later = work.runs(option, len(results)), work.longer(option)
+        known = {result.letter: result.loops for result in results}
+        results.append(Result(option, found, later, known.get(option.loop) or _loops(machines, option)))
+    left_out = [f"{letter} {NAMES[letter]} is left out: {why}" for letter, why in every.left_out.items()]
+    notes = (*machines.notes, *left_out, *_troubles(results, count))
+    return Comparison(machines, every, tuple(results), within, seed, notes)
+
+
+def _corner(stage: Stage) -> float:
+    """From when on the reference stands [s]. Raises StageError where that is too late, or never."""
+    flat = stage.flat()
+    corner, duration = float(last_corner(flat)), flat["motion.duration"]
+    if flat["motion.kind"] == "ramp":
+        example = '[motion] kind = "step", size = "1 mm", duration = "20 s"'
+        raise StageError("motion.kind", '"ramp"', "a reference that stands in the end", example)
+    if corner > LATEST * duration:
+        expected = f"at least {corner / LATEST:g} s: the reference stands by half of it"
+        raise StageError("motion.duration", f"{duration:g} s", expected, f'duration = "{corner / LATEST:g} s"')
+    return corner
+
+
+@dataclass(frozen=True)
+class _Work:
+    """What all options share: the machines, their task, from when on its reference stands [s], the tolerance [m], who
+    is told of the progress, and how many options there are."""
+
+    machines: Machines
+    task: Task
+    corner: float
+    within: float
+    progress: Progress
+    options: int
+
+    def runs(self, option: Option, before: int) -> Found:
+        """An option on all machines, after some other options."""
+        count, parts = self.machines.count, []
+        label, total = f"{option.letter} {option.name}", count * self.options
+        self.progress(before * count, total, label)
+        for recorded in self._recorded(option, self.task, count, 1):
+            parts.append(measured(recorded, self.corner, self.within))
+            self.progress(before * count + int(recorded.numbers[-1]) + 1, total, label)
+        return joined(parts)
+
+    def longer(self, option: Option) -> Later:
+        """An option on the first machines, for longer."""
+        task = replace(self.task, duration=LONGER * self.task.duration)
+        some = min(FOLLOWED, self.machines.count)
+        return joined([followed(recorded, self.within) for recorded in self._recorded(option, task, some, LONGER)])
+
+    def _recorded(self, option: Option, task: Task, count: int, coarser: int) -> Iterator[Recorded]:
+        """The runs of the first machines, chunk by chunk."""
+        sample = self.machines.stage.flat()["drive.sample_time"]
+        interval = coarser * max(1, int(np.ceil(INTERVAL / sample * (1 - 1e-9)))) * sample
+        every = self.machines.changes(option.changes)
+        changes = {key: value[:count] if np.ndim(value) else value for key, value in every.items()}
+        return run(option.stage, task, self.machines.seeds[:count].tolist(), interval, changes)
+
+
+def _loops(machines: Machines, option: Option) -> Loops:
+    flat = linear_flat(option.stage, machines.flat(option.stage, option.changes))
+    return linear_loops(option.stage, flat, machines.count)
+
+
+def _troubles(results: list[Result], count: int) -> list[str]:
+    """Unstable loops and runs that failed, option by option."""
+    unstable = "linear loops are not stable; these machines are simulated and counted like the others"
+    failed = "runs failed; they count either way in the intervals of probabilities and are left out of medians"
+    return [
+        f"{result.letter} {result.option.name}: {number} of {count} {what}"
+        for result in results
+        for number, what in ((result.unstable, unstable), (result.failed, failed))
+        if number
+    ]
