@@ -47,10 +47,10 @@ class _KernelPrinter(PythonCodePrinter):
     def _print_tanh(self, expr: sp.tanh) -> str:
         return f"tanh({self._print(expr.args[0])})"
 
-    def _print_gaussian(self, expr: sp.Expr) -> str:
+    def _print_call(self, expr: sp.Expr) -> str:
         return f"{type(expr).__name__}({', '.join(self._print(each) for each in expr.args)})"
 
-    _print_quantised = _print_gaussian
+    _print_gaussian = _print_quantised = _print_call
 
     def _print_reciprocal(self, expr: sp.Expr) -> str:
         return f"(1.0 / ({self._print(expr.args[0])}))"

@@ -385,7 +385,7 @@ class StepWriter:
                 f"flip{k} = astray{k} | (good & cut & beyond{k})",
             ]
         lines += [
-            "arrived = good & last & ((not cut) | (h * (1.0 - fraction) < 1e-9 * h))",
+            "arrived = good & last & ((not cut) | (1.0 - fraction < 1e-9))",
             "t_n = edge if arrived else (t + fraction * h if good else t)",
             *self._jump(),
         ]

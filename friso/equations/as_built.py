@@ -95,8 +95,10 @@ def _shaken(each: Any) -> sp.Expr:
 
 def _drive(form: AsBuilt) -> Control:
     """Everything between the encoder and the motor's force."""
+    from sympy import pi
+
     from friso.equations.component import Component, Held, Output, State, key, state
-    from friso.equations.pid import Controller, Loop
+    from friso.equations.pid import Controller, Loop, loop_stiffness
 
     def control(loop: Loop, length: sp.Expr, rate: sp.Expr) -> Controller:
         reading, command, kept = _command(form, loop)
@@ -107,18 +109,13 @@ def _drive(form: AsBuilt) -> Control:
         force = key("drive.motor_constant_ratio") * state(MOTOR_FACTOR) * acting
         states: tuple[State, ...] = ()
         if form.current_loop:
-            lagging, omega = state("motor_force"), key("drive.current_bandwidth") * 2 * _pi()
-            states = (State(lagging, omega * (force - lagging), "N", scale=key("friction.static")),)
+            lagging, omega = state("motor_force"), 2 * pi * key("drive.current_bandwidth")
+            scale = loop_stiffness(form.structure.controller) * length
+            states = (State(lagging, omega * (force - lagging), "N", scale=scale),)
             force = lagging
         return Controller(force, Component(states, (), {"force": Output(force, "N", "motor force")}), tuple(held))
 
     return control
-
-
-def _pi() -> Any:
-    from sympy import pi
-
-    return pi
 
 
 def _command(form: AsBuilt, loop: Any) -> tuple[sp.Expr, sp.Expr, tuple[Any, ...]]:
@@ -134,7 +131,7 @@ def _command(form: AsBuilt, loop: Any) -> tuple[sp.Expr, sp.Expr, tuple[Any, ...
     drive = {name.split(".")[1]: key(name) for name in NEUTRAL}
     noisy = state("seen") + drive["encoder_noise"] * gaussian(key("drive.seed"), TICK)
     digit = drive["encoder_resolution"]
-    reading = quantised(noisy, digit)
+    reading: Any = quantised(noisy, digit)
     error = loop.error.xreplace({state("position"): reading})
     acceleration, speed, before = REFERENCE[2], loop.reference_velocity, state("error_before")
     ahead = drive["feedforward_mass"] * acceleration + drive["feedforward_viscous"] * speed
@@ -146,4 +143,5 @@ def _command(form: AsBuilt, loop: Any) -> tuple[sp.Expr, sp.Expr, tuple[Any, ...
     known = Loop(error, reading, loop.velocity, speed)
     extra = ahead + state(INJECTED)
     command, held = sampled_controller(form.structure.controller, known, form.velocity_samples, extra, rest)
-    return reading, command, (*held, Held(before, error))
+    last = sp.Piecewise((error, error**2 > 0), (before, True))  # a reading in whole digits may find none
+    return reading, command, (*held, Held(before, last))

@@ -1,7 +1,7 @@
 """The PID controller as a drive carries it out: a force computed at every sample and held until the next.
 
-Filters and what they feed are discretised by the bilinear transform (Tustin), as in `friso.frequency.drive`. A
-controller without a filter takes its velocity as a difference of positions and its integral as a sum.
+Filters and what they feed are discretised by the bilinear transform (Tustin), as in `friso.frequency.drive`: Eq. 7
+wholly, Eq. 6 but for its integral, which is a sum. Without a filter the velocity is a difference of positions.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ def sampled_controller(
     demand, gain, share, held = terms(form, loop, velocity_samples)
     demand += extra
     if form.integral:
-        integral = _integral(form, gain, share, demand, loop.error, rest)
+        integral = _integral(form, gain, share, demand, rest)
         demand, held = demand + gain * integral.update, (*held, integral)
     limit = key("controller.force_limit")
     return sp.Max(-limit, sp.Min(limit, demand)) if form.limited else demand, held
@@ -77,12 +77,25 @@ def _filtered(form: ControllerForm, loop: Loop, velocity_samples: int) -> Terms:
     return kp * loop.error + kd * (signal - passed) / tau, ki, SAMPLE_TIME * loop.error, held
 
 
-def _integral(form: ControllerForm, gain: sp.Expr, share: sp.Expr, demand: sp.Expr, error: sp.Expr, rest: Rest) -> Held:
+def _integral(form: ControllerForm, gain: sp.Expr, share: sp.Expr, demand: sp.Expr, rest: Rest) -> Held:
     """The integral [m s], which a sample adds a share to unless it rests; `demand` [N] is the rest of the force."""
     old = state("integral")
     new, rests = old + share, rest.rests
     if form.limited:
         wanted, limit = demand + gain * new, key("controller.force_limit")
-        winding = sp.Or(sp.And(wanted > limit, error > 0), sp.And(wanted < -limit, error < 0))
+        winding = sp.Or(sp.And(wanted > limit, share > 0), sp.And(wanted < -limit, share < 0))
         rests = sp.Or(rests, winding)
     return Held(old, sp.Piecewise((share, rest.restarts), (old, rests), (new, True)))
+
+
+def held_at_start(name: str, error: float, position: float, way: float, on_error: bool) -> float:
+    """What a controller holds under a name that has seen a steady motion, so that it begins without a kick.
+
+    `error` and `position` [m] are those of the first sample, `way` [m] is that of the motion per sample; `on_error`
+    tells what the filter acts on.
+    """
+    if name.startswith("position_before"):
+        return position - way * int(name.rsplit("_", 1)[1])
+    if name in ("signal_before", "low_passed"):
+        return error if on_error else -position
+    return {"reading": position, "error_before": error}.get(name, 0.0)

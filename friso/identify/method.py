@@ -241,7 +241,18 @@ def _of_bench(bench: Bench, stage: Stage | None) -> tuple[Estimate, ...]:
         return tuple(_named(model[name], key) for key, name in pairs.items())
     if not bench.lines or stage is None:
         return ()
-    return _shared(bench.lines[0].value, stage)
+    line = bench.lines[0].value
+    return (_named(line, "masses.stage"),) if _of_stage_alone(line.value, stage) else _shared(line, stage)
+
+
+def _of_stage_alone(mass: float, stage: Stage) -> bool:
+    """Whether a mass line [kg] is rather that of the stage above the mode of a free joint than that of all masses:
+    which of the two it is nearer to as they are believed to be."""
+    flat = stage.flat()
+    if stage.joint is None or flat["joint.locked"]:
+        return False
+    alone, whole = flat["masses.stage"], flat["masses.cart"] + flat["masses.stage"]
+    return bool(abs(np.log(mass / alone)) < abs(np.log(mass / whole)))
 
 
 def _parasitic(model: TwoMass, stage: Stage) -> float | None:

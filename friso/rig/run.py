@@ -12,6 +12,7 @@ from friso.engine.arrays import Status
 from friso.engine.batch import Options, prepare, run_batch, settings_of
 from friso.engine.kernel import Kernel, empty_results, kernel
 from friso.equations.as_built import NEUTRAL, AsBuilt, whole_samples
+from friso.equations.sampled import held_at_start
 from friso.quantities import StageError
 from friso.rig.surroundings import MARGIN, tables
 from friso.rig.task import Task
@@ -41,7 +42,8 @@ class Recorded:
     """Numbers of the runs and their records, every `interval` [s].
 
     `logged` are the signals that the drive knows, `true` what really moves, by the names of the roles of a log: SI,
-    shape (runs, n), NaN after a failure; `statuses` tell of failures, shape (runs,).
+    shape (runs, n), NaN after a failure; `statuses` tell of failures, shape (runs,). Where the delay is no whole number
+    of samples, `true` and the relative position stand at the instant of the force, that fraction of a sample later.
     """
 
     numbers: np.ndarray
@@ -124,9 +126,11 @@ def _recorded(
         budget=int(BUDGET * task.duration / flat["drive.sample_time"]),
     )  # fmt: skip
     starts = np.zeros((len(seeds), len(shape.kept)))
-    for i, name in enumerate(shape.states):
-        if name.endswith("position"):
-            starts[:, i] = task.pieces[0, 1] + task.displacement
+    place = float(task.pieces[0, 1]) + task.displacement
+    on_error = flat.get("controller.derivative_on", "error") == "error"
+    for i, name in enumerate(shape.kept):
+        held = held_at_start(name, -task.displacement, place, 0.0, on_error)
+        starts[:, i] = place if name.endswith("position") else held
     batch = prepare(shape, flat | motion, len(seeds), options, starts)
     end = np.array([[task.duration, 0.0, 0.0, 0.0]])
     batch = batch._replace(
@@ -150,7 +154,7 @@ def _signals(
         "position": kept["reading"],
         "force": kept["commanded"],
     }
-    if len(task.injected):
+    if len(task.injected) and not task.unknown:
         places = np.arange(len(task.injected)) * task.injected_each
         logged["disturbance"] = np.broadcast_to(
             np.interp(time, places, task.injected, right=0.0), logged["force"].shape

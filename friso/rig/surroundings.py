@@ -67,10 +67,14 @@ def _over_time(floor: Floor | None, task: Task, seeds: Sequence[int]) -> tuple[n
     injected = len(task.injected) > 0
     if floor is None and not injected:
         return np.zeros((1, 2, 2)), 0.0
-    interval = task.injected_each if injected else 1 / (PER_PERIOD * floor.frequency[-1]) if floor else 1.0
+    fine = [task.injected_each] if injected else []
+    fine += [1 / (PER_PERIOD * floor.frequency[-1])] if floor else []
+    interval = min(fine)
     count = int(np.ceil(task.duration / interval)) + 2
     found = np.zeros((len(seeds) if floor else 1, 2, count))
-    found[:, 0, : len(task.injected)] = task.injected[:count]
+    if injected:
+        given = np.arange(len(task.injected)) * task.injected_each
+        found[:, 0] = np.interp(np.arange(count) * interval, given, task.injected, right=0.0)
     if floor:
         for run, seed in enumerate(seeds):
             shaken = floor_acceleration(floor, count * interval, interval, seed)

@@ -15,7 +15,8 @@ from friso.stage import Stage
 @dataclass(frozen=True)
 class Task:
     """Pieces of the reference, shape (pieces, 4): start [s], position [m], velocity [m/s], acceleration [m/s^2] there;
-    its duration [s]; and the injected force [N] every `injected_each` [s], shape (n,), empty for none.
+    its duration [s]; and the injected force [N] every `injected_each` [s], shape (n,), empty for none; the drive logs
+    it unless it is `unknown` to it.
 
     The stage starts at rest where the reference does, but displaced from it by `displacement` [m].
     """
@@ -24,6 +25,7 @@ class Task:
     duration: float
     injected: np.ndarray = field(default_factory=lambda: np.zeros(0))
     injected_each: float = 1.0
+    unknown: bool = False
     displacement: float = 0.0
 
     @property

@@ -21,6 +21,9 @@ SPAN = 1.5
 SPEEDS, DISTINCT = 5, 1.1
 """Speeds, each so many times the last, from which a curve of four parameters may be fitted."""
 
+STRAIGHT = 3
+"""Speeds, each so many times the last, from which it shows whether friction is a straight line over them."""
+
 SURE = 0.01
 """Probability by chance below which a Stribeck curve is taken for shown."""
 
@@ -125,6 +128,8 @@ def _direction(speeds: np.ndarray, friction: np.ndarray, errors: np.ndarray, wor
         return _one_speed(speeds, friction, method, spent)
     solution, covariance, freedom = _linear(np.stack([np.ones_like(speeds), speeds], axis=1), friction, errors)
     covariance, freedom = covariance * freedom / (freedom - spent), freedom - spent
+    if _distinct(speeds) < STRAIGHT:
+        return _two_speeds(speeds, solution, covariance, freedom, method)
     curved = _stribeck(speeds, friction, solution, freedom)
     if curved is not None:
         return _curved(*curved, speeds, method)
@@ -157,6 +162,32 @@ def _one_speed(speeds: np.ndarray, friction: np.ndarray, method: str, spent: int
     )
 
 
+def _distinct(speeds: np.ndarray) -> int:
+    """How many speeds there are."""
+    return 1 + int((np.diff(np.log(np.sort(speeds))) > np.log(DISTINCT)).sum())
+
+
+def _two_speeds(
+    speeds: np.ndarray, solution: np.ndarray, covariance: np.ndarray, freedom: int, method: str
+) -> Direction:
+    """A straight line goes through any two forces: a Stribeck effect at these speeds makes its start too high and its
+    slope too low, and does not show. Both are bounds."""
+    low, high = speeds.min() * 1e3, speeds.max() * 1e3
+    reason = f"two speeds, {low:.3g} and {high:.3g} mm/s, do not show whether friction is still falling at these"
+    line = [
+        _fitted(name, unit, place, solution, covariance, freedom, method)
+        for place, (name, unit) in enumerate((("friction.coulomb", "N"), ("friction.viscous", "N s/m")))
+    ]
+    nothing = _nothing(reason)
+    return Direction(
+        Estimate.unknown(line[0].name, "N", method, reason, high=line[0].high),
+        Estimate.unknown(line[1].name, "N s/m", method, reason, low=line[1].low),
+        nothing.static,
+        nothing.stribeck_velocity,
+        nothing.covariance,
+    )
+
+
 def _fitted(
     name: str, unit: str, place: int, solution: np.ndarray, covariance: np.ndarray, freedom: int, method: str
 ) -> Estimate:
@@ -167,7 +198,7 @@ def _stribeck(
     speeds: np.ndarray, friction: np.ndarray, line: np.ndarray, freedom: int
 ) -> tuple[np.ndarray, np.ndarray, int] | None:
     """The fit of F_c, F_v, F_s, v_s, covariance and degrees of freedom; None where a straight line does as well."""
-    if freedom < 3 or 1 + int((np.diff(np.log(np.sort(speeds))) > np.log(DISTINCT)).sum()) < SPEEDS:
+    if freedom < 3 or _distinct(speeds) < SPEEDS:
         return None
     plain = float(np.sum((friction - line[0] - line[1] * speeds) ** 2))
     scale = float(np.abs(friction).max())

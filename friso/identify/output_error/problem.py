@@ -14,6 +14,7 @@ from friso.engine.driven import Followed, Inputs, follow
 from friso.engine.kernel import Kernel, kernel
 from friso.equations.driven import Driven
 from friso.equations.pid import van_dijk_numbers
+from friso.equations.sampled import held_at_start
 from friso.equations.structure import ControllerForm, structure
 from friso.identify.inverse_model import SMOOTH, motion
 from friso.identify.logs.log import Log
@@ -117,16 +118,17 @@ class Problem:
         states = self.kernel.kept
         starts = np.zeros((runs, len(states)))
         position, velocity = self.start
+        error = float(self.inputs.reference[0]) - position
+        on_error = flat.get("controller.derivative_on", "error") == "error"
         for i, name in enumerate(states):
             if name.endswith("position"):
                 starts[:, i] = position
             elif name.endswith("velocity"):
                 starts[:, i] = velocity
-            elif name in ("filtered_error", "signal_before", "low_passed"):
-                on_error = flat.get("controller.derivative_on", "error") == "error"
-                starts[:, i] = (float(self.inputs.reference[0]) if on_error else 0.0) - position
-            elif name.startswith("position_before"):
-                starts[:, i] = position - velocity * self.inputs.sample_time * int(name.rsplit("_", 1)[1])
+            elif name == "filtered_error":
+                starts[:, i] = error
+            else:
+                starts[:, i] = held_at_start(name, error, position, velocity * self.inputs.sample_time, on_error)
         if "bristle_deflection" in states:
             pull = self.wanted[0] + self.inputs.force[0] + flat.get("bias.cart", 0.0) + flat.get("bias.stage", 0.0)
             held = flat.get("friction.static", flat["friction.coulomb"])

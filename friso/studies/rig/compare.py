@@ -223,7 +223,8 @@ def levels(stage: Stage, seed: int, progress: Progress) -> Hunted:
 def others(stage: Stage, seed: int, progress: Progress) -> dict[str, Hunted]:
     """Cycles with one thing changed, by its name."""
     flat = stage.flat()
-    motor, mass = {"drive.motor_constant_ratio": 1 / MASS_FACTOR}, flat["controller.tuned_mass"]
+    mass = flat["controller.tuned_mass"]
+    motor = {"drive.motor_constant_ratio": flat.get("drive.motor_constant_ratio", 1.0) / MASS_FACTOR}
     named = {
         "motor gives 0.68 of the force, tuned as before": motor,
         "motor gives 0.68 of the force, tuned for 1.47 times the mass": motor

@@ -63,14 +63,19 @@ def speeds(stage: Stage) -> tuple[float, ...]:
     return tuple(WAY * (high - low) * pace(stage) / periods for periods in DURATIONS)
 
 
-def _passes(name: str, stage: Stage, seed: int) -> Passes:
+def slow_passes(name: str, stage: Stage, seed: int) -> RigLog:
+    """The log of the passes at both speeds, there and back."""
     low, high = travel(stage)
     way, period, parts = WAY * (high - low), 1 / pace(stage), [(0.0, STANDS / pace(stage))]
     for periods in DURATIONS:
         for sign in (1.0, -1.0):
             parts += [(sign * way / (periods * period), periods * period), (0.0, STANDS * period)]
     (recorded,) = run(stage, legs(low, parts), [seed], interval(stage, period / SAMPLES))
-    log, mass = rig_log(recorded, 0, name, "constant-speed", stage, seed), moving_mass(stage)
+    return rig_log(recorded, 0, name, "constant-speed", stage, seed)
+
+
+def _passes(name: str, stage: Stage, seed: int) -> Passes:
+    log, mass = slow_passes(name, stage, seed), moving_mass(stage)
     place = friction_position(log.log, mass, pace(stage))
     return Passes(name, log, place, friction_velocity(log.log, mass), _true(log))
 

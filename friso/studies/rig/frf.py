@@ -97,9 +97,9 @@ def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
     fixed, free = locked(jointed(stage)), freed(stage)
     places = np.linspace(*travel(stage), PLACES)
     progress(0, 4, f"plant, joint locked, at {PLACES} places")
-    held = [_identified(fixed, f"locked_{n + 1:02d}", place, seed + n) for n, place in enumerate(places)]
+    held = [plant_log(fixed, f"locked_{n + 1:02d}", place, seed + n) for n, place in enumerate(places)]
     progress(1, 4, f"plant, joint free, at {FREE_PLACES} places")
-    loose = [_identified(free, f"free_{n + 1:02d}", place, seed + n) for n, place in enumerate(places[:FREE_PLACES])]
+    loose = [plant_log(free, f"free_{n + 1:02d}", place, seed + n) for n, place in enumerate(places[:FREE_PLACES])]
     progress(2, 4, "open loops")
     logs, loops = open_loops(fixed, places[0], seed)
     apparent = np.array([apparent_masses(each, places[0], seed) for each in (fixed, free)])
@@ -117,7 +117,8 @@ NOTES = (
 )
 
 
-def _identified(stage: Stage, name: str, place: float, seed: int) -> RigLog:
+def plant_log(stage: Stage, name: str, place: float, seed: int) -> RigLog:
+    """The log of one excitation of the closed loop at a place [m]."""
     return rig_log(excite(stage, place, seed), 0, name, "frequency", stage, seed)
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.signal import welch
 
-from friso.rig.run import Recorded, run
+from friso.rig.run import Recorded, as_built_keys, run
 from friso.rig.task import Task, standing
 from friso.stage import Stage
 from friso.studies.rig.hunted import crossover, move, with_joint
@@ -103,7 +103,8 @@ def in_position(stage: Stage, seed: int, progress: Progress) -> tuple[InPosition
     quiet = fast.replace({"floor": None}) if stage.floor is not None else fast
     force = amplifier_noise(stage)
     still = standing(0.0, SETTLING + WATCHED)
-    noisy = with_noise(still, force, seed)
+    each = as_built_keys(stage)["drive.sample_time"]
+    noisy = with_noise(still, force, seed, each)
     plans = {"encoder": (quiet, still), "amplifier": (quiet, noisy), "floor": (shaken, still), "all": (shaken, noisy)}
     runs, kept, after, done, total = {}, {}, {}, 0, len(CASES) * (len(plans) + 1) + 1
     for case, locked in CASES.items():
@@ -117,7 +118,7 @@ def in_position(stage: Stage, seed: int, progress: Progress) -> tuple[InPosition
                 kept[case] = (recorded, own)
         progress(done, total, f"joint {case}, after a move")
         done += 1
-        task = with_noise(replace(move(stage), duration=SETTLING + WATCHED), force, seed)
+        task = with_noise(replace(move(stage), duration=SETTLING + WATCHED), force, seed, each)
         after[case] = _standstill(_recorded(shaken.replace({"joint.locked": locked}), task, seed), SETTLING)
     progress(done, total, "joint free, more and less damping")
     flat = stage.flat()
@@ -125,8 +126,8 @@ def in_position(stage: Stage, seed: int, progress: Progress) -> tuple[InPosition
     damped = _standstill(_recorded(shaken, noisy, seed, {"joint.damping": damping}, len(damping)), SETTLING)
     progress(total, total, "done")
     traces = {case: _watched(recorded, SETTLING) for case, (recorded, _) in kept.items()}
-    each = interval(stage, INTERVAL)
-    frequencies = np.fft.rfftfreq(segment(each), each)
+    logged_each = interval(stage, INTERVAL)
+    frequencies = np.fft.rfftfreq(segment(logged_each), logged_each)
     return InPosition(
         FASTER * crossover(stage), force, stage.floor is not None, frequencies, runs, after, damping,
         float(flat["joint.damping"]), damped, traces,
@@ -140,10 +141,10 @@ def amplifier_noise(stage: Stage) -> float:
     return float(2 * limit / 2**BITS / np.sqrt(12))
 
 
-def with_noise(task: Task, force: float, seed: int) -> Task:
-    """The task with a force of white noise, of an RMS [N], injected at every sample of the log."""
-    noise = np.random.default_rng(seed).standard_normal(int(np.ceil(task.duration / INTERVAL)) + 1)
-    return replace(task, injected=force * noise, injected_each=INTERVAL)
+def with_noise(task: Task, force: float, seed: int, each: float) -> Task:
+    """The task with a force of an RMS [N], unknown to the drive, that is another at every sample of it, `each` [s]."""
+    noise = np.random.default_rng(seed).standard_normal(int(np.ceil(task.duration / each)) + 1)
+    return replace(task, injected=force * noise, injected_each=each, unknown=True)
 
 
 def _silenced(stage: Stage, source: str) -> dict[str, Any]:

@@ -1,0 +1,152 @@
+"""The loop from rig to stage file: `python -m benchmarks.rig_loop [--machines 100] [--first 0]`.
+
+Machines drawn at random with their drives as built (tests/rig_machines.py) go through the experiments of `friso rig`:
+frequency responses with the joint locked and free, steps, slow motion, and constant speed with the joint locked. Their
+logs are written as text, read back as `friso identify` does, and identified with what an owner knows as `--stage`. The
+locked response, steps, slow motion and constant speed make one stage file; the free response is identified by itself,
+since one bench at a time can be.
+
+Per experiment and quantity: how often the 95 % interval holds the truth; and how often `friso check` on the identified
+stage gives the verdict that it gives on the machine. What counts as the truth of static and Coulomb friction is their
+mean along the stretches of rail where the cart went in the experiment at hand (in the stage file: the machine's own
+value, which is the mean over all rails), of everything else the machine's own value.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+import time
+from collections import Counter, defaultdict
+from collections.abc import Iterator
+from pathlib import Path
+
+from benchmarks.identify import Answer, Count, goals, rows
+from benchmarks.report import Goal, print_goals, print_table
+from friso.hunting.check import check
+from friso.identify.method import Identification, identify
+from friso.quantities import StageError
+from friso.stage import Stage, load
+from friso.stage.files import save
+from friso.studies.rig.constant_speed import slow_passes
+from friso.studies.rig.frf import plant_log
+from friso.studies.rig.outcome import RigLog
+from friso.studies.rig.sizes import freed, locked, travel
+from friso.studies.rig.stiction import slow_motion
+from friso.studies.rig.stiffness import steps
+
+sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
+from rig_machines import Machine, built, mean_level, sources, through_files
+
+PLACES, RAILS = 3, 3
+"""Places of the frequency responses and stretches of rail of the slow motion; `friso rig` has ten."""
+
+SAME = 0.95
+"""Share of the verdicts that have to be those of the machines."""
+
+LEVELS = ("friction.static", "friction.coulomb")
+
+Verdicts = dict[str, Counter[tuple[str, str]]]
+"""Per case how often which verdict of the machine came back as which."""
+
+
+def benches(machine: Machine, seed: int) -> list[list[RigLog]]:
+    """The logs that are identified together."""
+    stage, noise = machine.truth, 1000 * (seed + 1)
+    low, high = travel(stage)
+    places = [low + (high - low) * number / (PLACES - 1) for number in range(PLACES)]
+
+    def shaken(each: Stage, name: str) -> list[RigLog]:
+        return [plant_log(each, f"{name}_{n + 1}", place, noise + n) for n, place in enumerate(places)]
+
+    slow = slow_motion(stage, noise, RAILS)
+    passes = slow_passes("passes", locked(stage), noise)
+    return [[*shaken(locked(stage), "locked"), steps(stage, noise), *slow, passes], shaken(freed(stage), "free")]
+
+
+def found_in(logs: list[RigLog], machine: Machine) -> tuple[Identification, Stage]:
+    """What the files of logs show, and the stage file that comes of it. The owner tells the stroke of the fixtures."""
+    wide = {"joint.stroke": freed(machine.truth).flat()["joint.stroke"]}
+    with tempfile.TemporaryDirectory() as folder:
+        given = through_files(logs, Path(folder))
+        found = identify(sources(given), machine.guess.with_numbers(wide))
+        assert found.stage is not None
+        file = Path(folder) / "identified.toml"
+        save(found.stage, file)
+        return found, load(file).with_numbers({"joint.stroke": machine.flat["joint.stroke"]})
+
+
+def answers(found: Identification, logs: list[RigLog], machine: Machine) -> Iterator[Answer]:
+    """What each experiment shows, and what all together show, with the truth."""
+    flat = machine.flat
+    for each in found.experiments:
+        own = [log for log in logs if log.name in {source.name.removesuffix(".csv") for source in each.logs}]
+        words = f"{each.kind}, free" if own[0].name.startswith("free") else each.kind
+        for one in each.estimates:
+            yield words, one, mean_level(own, one.name) if one.name in LEVELS else flat[one.name]
+    if len(found.experiments) > 1:
+        for one in found.estimates:
+            yield "stage file", one, flat[one.name]
+
+
+def run(first: int, machines: int) -> tuple[dict[tuple[str, str], Count], Verdicts]:
+    counts: dict[tuple[str, str], Count] = defaultdict(Count)
+    verdicts: Verdicts = defaultdict(Counter)
+    for seed in range(first, first + machines):
+        begin, machine = time.perf_counter(), built(seed)
+        for number, logs in enumerate(benches(machine, seed)):
+            for log in logs:
+                if log.failure:
+                    print(f"  machine {seed}: {log.name} stopped {log.failure}")
+            try:
+                found, stage = found_in(logs, machine)
+            except StageError as error:
+                print(f"  machine {seed}: refused: {' '.join(str(error).split())}")
+                continue
+            for method, one, truth in answers(found, logs, machine):
+                counts[method, one.name].add(one, truth)
+                if not one.holds(truth):
+                    shown = "" if one.shown else " (not shown)"
+                    print(f"  machine {seed}, {method}: {one.name} {one.low:.4g} to {one.high:.4g}{shown}, "
+                          f"true {truth:.4g}")  # fmt: skip
+            if number == 0:
+                _compare(machine, stage, verdicts, seed)
+        print(f"machine {seed}: {time.perf_counter() - begin:.0f} s", flush=True)
+    return counts, verdicts
+
+
+def _compare(machine: Machine, stage: Stage, verdicts: Verdicts, seed: int) -> None:
+    """Count the verdicts on the identified stage against those on the machine, both on an even rail."""
+    true, found = check(machine.truth), check(stage)
+    for case, each in true.items():
+        pair = each.verdict, found[case].verdict
+        verdicts[case][pair] += 1
+        if pair[0] != pair[1]:
+            print(f"  machine {seed}, {case}: {pair[0]}, identified {pair[1]}")
+
+
+def same(verdicts: Verdicts) -> list[Goal]:
+    """The goals about the verdicts."""
+    found = []
+    for case, pairs in verdicts.items():
+        right, total = sum(n for (true, back), n in pairs.items() if true == back), pairs.total()
+        found.append(Goal(f"verdict, {case}", ">= 95 %", f"{right} of {total}", right >= SAME * total))
+    return found
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--machines", type=int, default=100)
+    parser.add_argument("--first", type=int, default=0, help="number of the first machine")
+    given = parser.parse_args()
+    counts, verdicts = run(given.first, given.machines)
+    head = ("method: quantity", "held of shown", "median half-width / truth", "range right of not shown")
+    print_table(head, rows(counts))
+    pairs = [[case, *pair, n] for case, each in verdicts.items() for pair, n in sorted(each.items())]
+    print_table(("case", "verdict of the machine", "identified", "machines"), pairs)
+    print_goals([*goals(counts), *same(verdicts)], "Goals")
+
+
+if __name__ == "__main__":
+    main()

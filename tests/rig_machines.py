@@ -1,0 +1,89 @@
+"""Machines drawn at random with their drives as built, and the way of their rig's logs through files: the known truth
+that the loop from `friso rig` through `friso identify` is tried on, in test and benchmark.
+
+Mass, stiffness and friction are those of machines.py. Sizes that the thesis's rig has besides are scaled with them, in
+the structure of examples/thesis_drive.toml: one set of kernels does for all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from machines import Machine, drawn
+
+import friso
+from friso.identify.logs.mapping import Mapping, save
+from friso.identify.method import Source
+from friso.identify.sources import Given, read_all
+from friso.rig.log_files import write_csv
+from friso.rig.rail import friction_factors
+from friso.studies.rig.outcome import RigLog
+
+EXAMPLE = Path(__file__).parent.parent / "examples" / "thesis_drive.toml"
+
+STROKE = (0.5, 1.5)
+"""Stroke over the deflection at which the joint breaks the cart away (0.8 on the thesis's rig)."""
+
+PARASITIC, RETURN, DURATION = 37.5, 40.0, 160.0
+"""Parasitic mode over the crossover, and periods of that until the move's return and its end: the thesis's 300 Hz, 5 s
+and 20 s at 8 Hz."""
+
+STRONG = 60.0
+"""Peak force over static friction (67 on the thesis's rig), besides twice what the acceleration takes."""
+
+RAIL = {"static_deviation": 0.05, "coulomb_deviation": 0.05, "correlation_length": "5 mm"}
+"""A mild rail, on which the friction differs by 5 % from place to place."""
+
+
+def built(seed: int) -> Machine:
+    """A jointed machine drawn at random, with the drive of the thesis's rig, on a mild rail; no constant force acts."""
+    machine, example = drawn(seed, True), friso.load(EXAMPLE)
+    rng = np.random.default_rng((seed, len("rail")))
+    flat = machine.flat
+    mass, static = flat["masses.cart"] + flat["masses.stage"], flat["friction.static"]
+    tables = machine.truth.given()
+    tables |= {name: example.given()[name] for name in ("drive", "parasitic")}
+    tables |= {"rail": {**RAIL, "seed": seed}, "controller": {**tables["controller"], "anti_windup": "clamp"}}
+    numbers = {
+        "joint.stroke": rng.uniform(*STROKE) * static / flat["joint.stiffness"],
+        "parasitic.frequency": PARASITIC * flat["controller.crossover"],
+        "parasitic.mass": flat["masses.stage"] / 2,
+        "controller.tuned_mass": mass,
+        "controller.force_limit": 2 * mass * flat["motion.acceleration"] + STRONG * static,
+        "motion.return_at": RETURN / flat["controller.crossover"],
+        "motion.duration": DURATION / flat["controller.crossover"],
+    }
+    tables["bias"] = {"cart": "0 N"}
+    limited = {**tables["controller"], "force_limit": "1 N"}
+    return replace(machine, truth=friso.Stage(**{**tables, "controller": limited}).with_numbers(numbers))
+
+
+def through_files(logs: Iterable[RigLog], folder: Path) -> list[Given]:
+    """Logs of the rig written as `friso rig` does, and read back as `friso identify` does."""
+    paths = []
+    for log in logs:
+        paths.append(folder / f"{log.name}.csv")
+        write_csv(paths[-1], log.interval, log.logged, f"friso rig, seed {log.seed}")
+        if log.kind is not None:
+            save(Mapping(experiment=log.kind), paths[-1])
+    return read_all(paths, Mapping(), folder)
+
+
+def sources(given: Iterable[Given]) -> list[tuple[Source, str]]:
+    """What `identify` takes."""
+    return [(each.source, each.kind) for each in given]
+
+
+def mean_level(logs: Iterable[RigLog], key: str) -> float:
+    """Static or Coulomb friction [N] on average over the stretches of rail where the cart went: a log sees no other."""
+    row = ("friction.static", "friction.coulomb").index(key)
+    means = []
+    for log in logs:
+        flat = log.stage.flat()
+        places = log.true.get("cart_position", log.true["position"])
+        along = friction_factors(flat, np.linspace(places.min(), places.max(), 1000))[row]
+        means.append(flat[key] * float(along.mean()))
+    return float(np.mean(means))

@@ -1,0 +1,67 @@
+"""The loop closed: what the rig logs of a drawn machine comes back from files as a stage that holds the truth."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rig_machines import built, mean_level, sources, through_files
+
+from friso.identify.experiments import friction_velocity, record
+from friso.identify.method import _of_stage_alone, identify
+from friso.stage import load
+from friso.stage.files import save
+from friso.studies.rig.sizes import freed
+from friso.studies.rig.stiction import slow_motion
+from friso.studies.rig.stiffness import steps
+
+STIFFNESS, STATIC = "joint.stiffness", "friction.static"
+
+
+def test_rig_logs_come_back_as_a_stage_file_that_holds_the_truth(tmp_path: Path) -> None:
+    machine = built(3)
+    slow = slow_motion(machine.truth, 1, 1)
+    given = through_files([steps(machine.truth, 1), *slow], tmp_path)
+    assert [each.kind for each in given] == ["steps", "stick-slip"]
+    stroke = freed(machine.truth).flat()["joint.stroke"]
+    guess = machine.guess.with_numbers({"joint.stroke": stroke})
+    found = identify(sources(given), guess)
+    assert found.stage is not None
+    save(found.stage, tmp_path / "identified.toml")
+    told = load(tmp_path / "identified.toml").uncertain()
+    assert set(told) == {STIFFNESS, STATIC}
+    for key, truth in ((STIFFNESS, machine.flat[STIFFNESS]), (STATIC, mean_level(slow, STATIC))):
+        assert told[key].low <= truth <= told[key].high
+        assert not told[key].low <= guess.flat()[key] <= told[key].high
+    assert found.stage.flat()[STIFFNESS] == pytest.approx(machine.flat[STIFFNESS], rel=2e-3)
+
+
+def test_the_mass_line_of_a_free_joint_is_not_taken_for_the_whole_mass() -> None:
+    """With the resonance lost in friction the line above it is left, which is the stage's."""
+    for seed in range(20):
+        machine = built(seed)
+        alone, guess = machine.flat["masses.stage"], machine.guess
+        assert _of_stage_alone(alone, guess)
+        assert not _of_stage_alone(alone + machine.flat["masses.cart"], guess)
+        assert not _of_stage_alone(alone, guess.replace({"joint.locked": True}))
+
+
+def test_two_speeds_bound_friction_and_do_not_show_it() -> None:
+    """Both below the Stribeck velocity: a straight line through them starts above Coulomb friction and falls."""
+    coulomb, rise, viscous, stribeck, sample_time = 1.0, 1.0, 10.0, 3e-3, 1e-3
+    legs = []
+    for speed in (1e-3, 2e-3) * 2:
+        way = np.linspace(0.0, 0.01, round(0.01 / speed / sample_time))
+        legs += [way, np.full(500, 0.01), way[::-1], np.zeros(500)]
+    position = np.concatenate(legs)
+    velocity = np.gradient(position, sample_time)
+    friction = np.sign(velocity) * (coulomb + rise * np.exp(-((velocity / stribeck) ** 2))) + viscous * velocity
+    force = friction + 0.01 * np.random.default_rng(1).standard_normal(len(position))
+    both = friction_velocity(record("two", sample_time, reference=position, position=position, force=force)).both
+    assert "two speeds" in both.coulomb.reason
+    for found, truth in ((both.coulomb, coulomb), (both.viscous, viscous), (both.static, coulomb + rise)):
+        assert not found.shown
+        assert found.holds(truth)
+    assert both.coulomb.high < 2.5
+    assert both.stribeck_velocity.holds(stribeck)
