@@ -1,13 +1,15 @@
 """Drives with a clock: against a twin in plain Python, against the continuous loop, and in any lane."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from functools import cache
+from typing import Any, Literal
 
 import numpy as np
 import pytest
+import sympy as sp
 from numba import njit
-from scipy import stats
+from scipy import signal, stats
 from scipy.linalg import expm
 
 from friso.engine import simd_math
@@ -15,7 +17,11 @@ from friso.engine.arrays import Results, Status, Tables
 from friso.engine.batch import Options, prepare, run_batch, settings_of
 from friso.engine.kernel import Kernel, Wanted, empty_results, kernel, kernels
 from friso.engine.simulate import simulate
-from friso.equations.as_built import NEUTRAL, AsBuilt
+from friso.equations.as_built import NEUTRAL, AsBuilt, _command
+from friso.equations.component import Held, key, state
+from friso.equations.pid import Loop
+from friso.equations.sampled import sampled_controller
+from friso.equations.structure import ControllerForm
 from friso.stage import Stage
 
 MASS, DRAG, KP, KI, KD, LIMIT, TIME = 2.0, 3.0, 4000.0, 9000.0, 60.0, 9.0, 1e-3
@@ -306,3 +312,168 @@ def test_what_is_not_watched_is_not_a_number() -> None:
     assert statistics[7] == pytest.approx(0.4)
     force = np.abs(results.samples[0, :, shape.kept.index("motor_force")])
     assert statistics[0] == pytest.approx(np.nanmax(force), rel=1e-3)
+
+
+# --- the controller's expressions, beside plain Python and SciPy ------------------------------------------------------
+
+TUNED = {"controller.crossover": 10.0, "controller.alpha": 0.1, "controller.beta": 2.0, "controller.tuned_mass": MASS}
+TAU = 3e-3
+
+
+@cache
+def stepping(command: sp.Expr, held: tuple[Held, ...]) -> tuple[list[str], Callable[..., list[float]]]:
+    """A sample as a function of numbers with these names; a deviate is the sine of the sum of its arguments."""
+    expressions = [command, *(each.update for each in held)]
+    names = sorted({str(symbol) for each in expressions for symbol in each.free_symbols})
+    plain = {"gaussian": lambda seed, tick: np.sin(seed + tick), "quantised": rounded}
+    return names, sp.lambdify([key(name) for name in names], expressions, [plain, "math"], cse=True)
+
+
+def iterated(command: sp.Expr, held: tuple[Held, ...], flat: Flat, inputs: Mapping[str, np.ndarray]) -> Flat:
+    """What is commanded and held at every sample, all beginning at 0."""
+    names, step = stepping(command, held)
+    kept = [str(each.symbol) for each in held]
+    rows, last = [], [0.0] * len(kept)
+    for values in zip(*inputs.values(), strict=True):
+        known = {**flat, **dict(zip(kept, last, strict=True)), **dict(zip(inputs, values, strict=True))}
+        rows.append(step(*(known[name] for name in names)))
+        last = rows[-1][1:]
+    return dict(zip(["commanded", *kept], np.array(rows).T, strict=True))
+
+
+def rounded(value: float, digit: float) -> float:
+    return digit * round(value / digit) if digit else value
+
+
+def bilinear(upper: list[float], lower: list[float], values: np.ndarray) -> np.ndarray:
+    """The answer of a transfer function, given by its polynomials in s, discretised by SciPy."""
+    discrete: Any = signal.cont2discrete((upper, lower), TIME, method="bilinear")
+    answer: Any = signal.lfilter(np.ravel(discrete[0]), discrete[1], values)
+    return answer
+
+
+def van_dijk() -> tuple[float, float, float, float]:
+    """Eq. 8: gain k_p, time constants tau_z, tau_i and tau_p."""
+    omega, alpha, beta, mass = 2 * np.pi * TUNED["controller.crossover"], *list(TUNED.values())[1:]
+    tau_z = np.sqrt(1 / alpha) / omega
+    return mass * omega**2 / np.sqrt(1 / alpha), tau_z, beta * tau_z, 1 / (omega * np.sqrt(1 / alpha))
+
+
+SEEN = Loop(*(sp.Symbol(name, real=True) for name in ("error", "position", "velocity", "speed")))
+
+
+def test_eq_7_is_its_bilinear_transform() -> None:
+    """The whole controller, its low-pass and the integral of what that lets through (a trapezoid)."""
+    k_p, tau_z, tau_i, tau_p = van_dijk()
+    error = np.random.default_rng(4).normal(0, 1e-3, 300)
+    command, held = sampled_controller(ControllerForm(tuned=True), SEEN, 1)
+    found = iterated(command, held, keys(axis()) | TUNED, {"error": error})
+    force = bilinear([k_p * tau_z * tau_i, k_p * (tau_z + tau_i), k_p], [tau_i * tau_p, tau_i, 0.0], error)
+    assert found["commanded"] == pytest.approx(force, rel=1e-9, abs=1e-9)
+    passed = bilinear([1.0], [tau_p, 1.0], error)
+    assert found["low_passed"] == pytest.approx(passed, abs=1e-14)
+    assert found["integral"] == pytest.approx(bilinear([1.0], [1.0, 0.0], passed), abs=1e-14)
+
+
+@pytest.mark.parametrize("derivative_on", ["error", "measurement"])
+def test_eq_6_with_a_filter_is_its_bilinear_transform(derivative_on: Literal["error", "measurement"]) -> None:
+    """But for its integral, which is a sum."""
+    error, position = np.random.default_rng(5).normal(0, 1e-3, (2, 300))
+    command, held = sampled_controller(ControllerForm(tuned=False, derivative_on=derivative_on), SEEN, 1)
+    inputs = {"error": error, "position": position}
+    found = iterated(command, held, keys(axis()) | {"controller.tau": TAU}, inputs)
+    rate = bilinear([KD, 0.0], [TAU, 1.0], error if derivative_on == "error" else -position)
+    assert found["commanded"] == pytest.approx(KP * error + KI * TIME * np.cumsum(error) + rate, rel=1e-9, abs=1e-9)
+
+
+def shares(flat: Flat, error: np.ndarray, reading: np.ndarray) -> tuple[np.ndarray, float, np.ndarray]:
+    """Force [N] without the integral, whose gain is next and what samples add to it [m s] last."""
+    if "controller.crossover" not in flat:
+        past = np.concatenate([[0.0, 0.0], reading[:-2]])
+        return KP * error - KD * (reading - past) / (2 * TIME), KI, TIME * error
+    k_p, tau_z, tau_i, tau_p = van_dijk()
+    passed = bilinear([1.0], [tau_p, 1.0], error)
+    lead = bilinear([k_p * tau_z, k_p * (1 + tau_z / tau_i)], [tau_p, 1.0], error)
+    return lead, k_p / tau_i, TIME / 2 * (passed + np.concatenate([[0.0], passed[:-1]]))
+
+
+def plain_drive(flat: Flat, inputs: Mapping[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """Commands [N] and integrals [m s] of the drive: encoder, feedforward, deadband, reset, limit."""
+    own = {name.removeprefix("drive."): value for name, value in flat.items() if name.startswith("drive.")}
+    noise = own["encoder_noise"] * np.sin(own["seed"] + inputs["tick"])
+    reading = np.array([rounded(each, own["encoder_resolution"]) for each in inputs["seen"] + noise])
+    error, speed = inputs["reference"] - reading, inputs["speed"]
+    demand, gain, added = shares(flat, error, reading)
+    demand = demand + own["feedforward_mass"] * inputs["reference.acceleration"] + inputs["injected_force"]
+    demand += own["feedforward_viscous"] * speed + own["feedforward_coulomb"] * np.sign(speed)
+    integral, last, commands, integrals = 0.0, 0.0, [], []
+    for n, now in enumerate(error):
+        wanted = demand[n] + gain * (integral + added[n])
+        if own["integrator_reset"] and now * last < 0:
+            integral = added[n]
+        elif abs(now) >= own["integrator_deadband"] and (abs(wanted) <= LIMIT or wanted * added[n] <= 0):
+            integral += added[n]
+        last = now or last
+        integrals.append(integral)
+        commands.append(np.clip(demand[n] + gain * integral, -LIMIT, LIMIT))
+    return np.array(commands), np.array(integrals)
+
+
+def motions() -> dict[str, np.ndarray]:
+    """About a reference: back and forth, farther and nearer, such that the limit is met and zero is crossed."""
+    time = TIME * np.arange(500)
+    seen = 2e-3 * np.sin(50 * time) * np.cos(9 * time) + 1e-3 * np.sin(7 * time)
+    speed = np.where(time < 0.2, 0.05, np.where(time < 0.3, 0.0, -0.02))
+    reference = np.concatenate([[0.0], np.cumsum(speed)[:-1]]) * TIME
+    moving = {"reference": reference, "speed": speed, "reference.acceleration": 2 * np.cos(20 * time)}
+    return {"seen": reference + seen, **moving, "injected_force": np.sin(70 * time), "tick": np.arange(500.0)}
+
+
+@cache
+def commanded(form: AsBuilt) -> tuple[sp.Expr, tuple[Held, ...]]:
+    """What the drive commands and holds, of a reference and its speed."""
+    position = state("position")
+    seen = Loop(sp.Symbol("reference", real=True) - position, position, state("velocity"), SEEN.reference_velocity)
+    return _command(form, seen)[1:]
+
+
+FEATURES: Mapping[str, Flat] = {
+    "encoder": {"encoder_resolution": 2e-4, "encoder_noise": 1e-4},
+    "mass": {"feedforward_mass": 1.5},
+    "friction": {"feedforward_coulomb": 1.2, "feedforward_viscous": 20.0},
+    "deadband": {"integrator_deadband": 7e-4},
+    "reset": {"integrator_reset": 1.0},
+}
+DRIVES = {"plain": {}, **FEATURES, "all": {name: value for each in FEATURES.values() for name, value in each.items()}}
+
+
+@pytest.mark.parametrize("tuned", [{}, TUNED], ids=["eq 6", "eq 7"])
+@pytest.mark.parametrize("feature", DRIVES)
+def test_command_is_that_of_plain_python(feature: str, tuned: Flat) -> None:
+    """One by one and together; each makes a difference, and the limit is met."""
+    flat, inputs = keys(axis(), **DRIVES[feature]) | tuned, motions()
+    found = iterated(*commanded(AsBuilt.of(flat)), flat, inputs)
+    commands, integrals = plain_drive(flat, inputs)
+    assert found["commanded"] == pytest.approx(commands, abs=1e-9)
+    assert found["integral"] == pytest.approx(integrals, abs=1e-12)
+    assert 0.02 < np.mean(np.abs(commands) == LIMIT) < 0.7
+    without = plain_drive(keys(axis()) | tuned, inputs)[0]
+    assert (np.abs(commands - without).max() > 0.01) == (feature != "plain")
+
+
+def settled(error: list[float], **drive: float) -> np.ndarray:
+    """The integral over its gain's time step [m], beside errors [m] from a reference of 0, far from the limit."""
+    values = np.array(error)
+    nothing = dict.fromkeys(("reference", "speed", "reference.acceleration", "injected_force", "tick"), 0 * values)
+    flat = keys(axis(), **drive)
+    return iterated(*commanded(AsBuilt.of(flat)), flat, {**nothing, "seen": -values})["integral"] / TIME
+
+
+def test_the_integrator_rests_and_restarts() -> None:
+    """Below its deadband it keeps what it has; where the error changes sign, at once or over zeros, it begins anew."""
+    micro = 1e-6
+    rests = settled([5 * micro, 2 * micro, -2 * micro, 4 * micro, -3 * micro], integrator_deadband=3 * micro)
+    assert rests / micro == pytest.approx([5, 5, 5, 9, 6])
+    errors = [5 * micro, 2 * micro, 0.0, -3 * micro, -micro, 0.0, 0.0, -micro, 4 * micro]
+    assert settled(errors, integrator_reset=1.0) / micro == pytest.approx([5, 7, 7, -3, -4, -4, -4, -5, 4])
+    assert settled(errors) / micro == pytest.approx([5, 7, 7, 4, 3, 3, 3, 2, 6])

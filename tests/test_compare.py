@@ -23,8 +23,10 @@ from friso.studies.compare.machines import SPREADS, TOGETHER_BY, Machines, draw_
 from friso.studies.compare.measures import lasting_swing, linear_loops, settling_time
 from friso.studies.compare.options import DEADBAND, MODEL_ERROR, Option, Options, linear_flat, options
 from friso.studies.compare.statistics import difference, median, share
-from friso.studies.compare.study import Comparison, compare
-from friso.views.compare_words import sentences, table_rows
+from friso.studies.compare.study import Comparison, Result, compare
+from friso.views.compare_document import document, page
+from friso.views.compare_figures import figures
+from friso.views.compare_words import paired_rows, sentences, table_rows
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "thesis_drive.toml"
 COARSE = {"drive.sample_time": "250 us", "drive.delay": "250 us"}
@@ -74,6 +76,12 @@ def test_machines_spread_by_default(machines: Machines, built: Stage) -> None:
     assert {*machines.signs.tolist()} == {-1.0, 1.0}
 
 
+def test_signs_have_random_numbers_of_their_own(machines: Machines) -> None:
+    scrambling = np.random.default_rng(3).random(machines.count) < 0.5
+    for other in (scrambling, *(machines.keys[key] for key in SPREADS)):
+        assert abs(np.corrcoef(machines.signs, other)[0, 1]) < 0.1
+
+
 def test_machines_as_uncertain_as_the_file(built: Stage) -> None:
     told = {"friction.static": "3 N +/- 0.1 N", "joint.stroke": "0.9 mm .. 1 mm", "masses.cart": "1.2 kg +/- 1e-6 %"}
     held = {"controller.crossover": "8 Hz +/- 1 Hz", "drive.delay": "200 us .. 300 us"}
@@ -109,9 +117,9 @@ def test_the_seven_options(every: Options, machines: Machines) -> None:
     assert stages["d"]["drive.integrator_deadband"] == pytest.approx(DEADBAND * 1e-6)
     assert [letter for letter, flat in stages.items() if flat["drive.integrator_reset"]] == ["e"]
     ahead = every.every[5].changes
-    mass = machines.keys["masses.cart"] + machines.keys["masses.stage"]
-    for key, true in (("mass", mass), ("coulomb", machines.keys["friction.coulomb"])):
-        off = ahead[f"drive.feedforward_{key}"] / true
+    assert {*ahead} == {"drive.feedforward_coulomb", "drive.feedforward_viscous"}
+    for key in ("coulomb", "viscous"):
+        off = ahead[f"drive.feedforward_{key}"] / machines.keys[f"friction.{key}"]
         assert off == pytest.approx(1 + MODEL_ERROR * machines.signs)
 
 
@@ -137,6 +145,34 @@ def test_margins_of_many_are_those_of_each(every: Options, machines: Machines) -
         assert loops.margin[number] == pytest.approx(exact, abs=0.01)
 
 
+GAINS = {"kind": "pid", "kp": "3000 N/m", "ki": "10000 N/(m*s)", "kd": "80 N*s/m", "tau": "2 ms"}
+FORCES = (
+    "masses.cart", "masses.stage", "parasitic.mass", "friction.static", "friction.coulomb", "friction.viscous",
+    "friction.bristle_stiffness", "friction.bristle_damping", "joint.stiffness", "joint.damping",
+    "joint.limiter_stiffness", "joint.limiter_damping",
+)  # fmt: skip
+"""Keys in newtons per something: a motor of less force does to the loop what a plant does that has more of all."""
+
+
+@pytest.mark.parametrize("controller", [None, GAINS], ids=["tuned", "gains"])
+def test_the_motor_is_part_of_the_loop(built: Stage, controller: dict[str, str] | None) -> None:
+    stage = built.replace({"controller": controller} if controller else {}).variants()["free"]
+    flat, ratio = stage.flat(), 0.68
+    weak = linear_loops(stage, linear_flat(stage, {**flat, "drive.motor_constant_ratio": ratio}), 1)
+    heavy = linear_loops(stage, linear_flat(stage, {**flat, **{key: flat[key] / ratio for key in FORCES}}), 1)
+    own = linear_loops(stage, linear_flat(stage, flat), 1)
+    assert own.stable.all()
+    assert weak.stable.all()
+    assert weak.margin == pytest.approx(heavy.margin, rel=1e-6)
+    assert abs(weak.margin[0] - own.margin[0]) > 0.02
+
+
+def test_a_weak_motor_leaves_room_for_bandwidth(built: Stage) -> None:
+    weak = built.replace(RIGID | {"drive.motor_constant_ratio": 0.8})
+    known, other = (options(draw_machines(each, Correlations(), 20, 1), 1e-6) for each in (built.replace(RIGID), weak))
+    assert other.every[1].factor > 1.02 * known.every[1].factor
+
+
 def test_unstable_loops_are_told(machines: Machines, every: Options) -> None:
     fast = every.every[0].stage.replace({"controller.crossover": "390 Hz"})
     loops = linear_loops(fast, linear_flat(fast, machines.flat(fast, {})), machines.count)
@@ -159,6 +195,11 @@ def test_gains_instead_of_rules(built: Stage) -> None:
     )
     faster = found.every[1]
     assert faster.stage.flat()["controller.kp"] == pytest.approx(2000 * faster.factor**2)
+
+
+def test_without_friction_nothing_to_feed_forward(built: Stage) -> None:
+    ideal = draw_machines(built.replace(RIGID | {"friction": {"model": "none"}, "rail": None}), Correlations(), 20, 1)
+    assert "neither Coulomb nor viscous friction" in options(ideal, 1e-6).left_out["f"]
 
 
 def test_no_room_above(built: Stage) -> None:
@@ -312,6 +353,67 @@ def test_words_follow_the_numbers(found: Comparison) -> None:
     none = replace(found, results=(found.results[0], *found.results[3:6]))
     assert "No option brings 99 %" in " ".join(sentences(none))
     assert [label for label, _ in table_rows(found)][::2] == ["a as is", "c isolator", "e reset", "g b and c"]
+
+
+@pytest.fixture
+def made_up(every: Options, machines: Machines) -> Comparison:
+    """Options a and c on 20 machines: c settles 12 sooner, 3 later, and 5 never with either."""
+    still, count = np.ones(COUNT, bool), COUNT
+    settling = {"a": np.full(count, 5.0), "c": np.repeat([2.0, 7.0, np.inf], [12, 3, 5])}
+    settling["a"][15:] = np.inf
+    rms = {"a": np.full(count, 2e-9), "c": np.full(count, 1e-9)}
+    results = tuple(
+        Result(
+            every.every["abc".index(letter)],
+            measures.Found(still, ~still, np.zeros(count, int), settling[letter], rms[letter], np.ones(count)),
+            measures.Later(still, still),
+            measures.Loops(still, np.full(count, 0.6)),
+        )
+        for letter in "ac"
+    )
+    few = replace(machines, seeds=machines.seeds[:count], signs=machines.signs[:count])
+    return Comparison(few, every, results, 1e-6, 3, tuple(study._missing(few.stage)))
+
+
+FLOOR = {"floor": {"frequency": ["1 Hz", "100 Hz"], "acceleration": ["1e-5 m/s^2/Hz^0.5", "1e-5 m/s^2/Hz^0.5"]}}
+
+
+def _shaken(found: Comparison) -> Comparison:
+    stage = found.stage.replace(FLOOR)
+    return replace(found, machines=replace(found.machines, stage=stage), notes=tuple(study._missing(stage)))
+
+
+def test_sooner_later_and_alike(made_up: Comparison) -> None:
+    pair = made_up.paired(made_up.results[1])
+    assert [each.probability for each in (pair.sooner, pair.later, pair.alike)] == [0.6, 0.15, 0.25]
+    when = paired_rows(made_up)[0][1][1]
+    assert [part.split(" (")[0] for part in when.split("; ")] == ["sooner 60.0 %", "later 15.0 %", "alike 25.0 %"]
+    assert document(made_up)["options"]["c"]["against_a"]["later"]["probability"] == 0.15
+
+
+def test_standstill_is_compared_on_a_floor_only(made_up: Comparison) -> None:
+    settled = [replace(each, found=replace(each.found, settling=np.ones(COUNT))) for each in made_up.results]
+    quiet = replace(made_up, results=tuple(settled))
+    shaken = _shaken(quiet)
+    assert "stands still to" not in " ".join(sentences(quiet))
+    assert "not compared: the stage file has no [floor]" in sentences(quiet)[-1]
+    assert "c isolator: settles in 1.00 s (median), stands still to 1.00 nm RMS" in " ".join(sentences(shaken))
+    assert "not compared" not in " ".join(sentences(shaken))
+    assert [paired_rows(each)[0][1][2] for each in (quiet, shaken)] == [
+        "not compared: no [floor]", "0.5 (0.5 to 0.5)",
+    ]  # fmt: skip
+    for each, compared in ((quiet, False), (shaken, True)):
+        known, text = document(each), Page(page(each, [])).text
+        ratio = known["options"]["c"]["against_a"]["in_position_rms"]
+        assert (known["standstill_compared"], ratio is not None) == (compared, compared)
+        assert any("no [floor]" in note for note in known["notes"]) is not compared
+        assert ("nothing shakes these machines" in text) is not compared
+        assert ("No floor shakes them" in figures(each)[0].caption) is not compared
+
+
+def test_the_cable_is_said_to_be_left_out(built: Stage) -> None:
+    assert any("cable" in note for note in study._missing(built))
+    assert not any("cable" in note for note in study._missing(built.replace({"cable": None})))
 
 
 def test_command_writes_page_and_figures(tmp_path: Path, found: Comparison, monkeypatch: pytest.MonkeyPatch) -> None:

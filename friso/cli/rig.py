@@ -58,7 +58,10 @@ def rig(
     if not 0 <= seed < MOST_SEED:
         raise StageError("--seed", str(seed), f"a whole number from 0, below {MOST_SEED:g}", "--seed 1")
     if out is not None:
-        check_place(out, [PAGE, f"{TRUTH}/stage.toml"], PAGE, [stage_file])
+        check_place(out, [f"{TRUTH}/stage.toml"], PAGE, [stage_file])
+        if out.is_dir() and any(out.iterdir()) and not (out / TRUTH / "stage.toml").exists():
+            given, expected = f"{out}, with files of no earlier rig", "an empty folder, or a new one"
+            raise StageError("--out", given, expected, f"--out {out}-2")
     with step_bar() as bar:
         outcome = run(stage, seed, bar or silent)
     files = [] if out is None else _written(outcome, made_folder(out))

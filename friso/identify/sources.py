@@ -112,6 +112,9 @@ def _kind(log: Log, path: Path) -> tuple[str, str]:
     try:
         found = find_periods(log[signal][part])
     except StageError:
+        if "reference" in log:
+            given = "a log whose reference stands still, with nothing periodic in it"
+            raise StageError("--as", given, "a log in which the stage is moved", f"--as {MOVES}", str(path)) from None
         return MOVES, f"the {signal} does not repeat, and there is no reference that moves"
     repeats = f"the {signal} repeats every {found.samples} samples"
     if _rest(log["position"][part][found.start : found.stop], found.samples) > RESTS:

@@ -38,6 +38,7 @@ def document(found: Comparison) -> dict[str, Any]:
             "left_out_draws": machines.drawn.left_out,
             "options": {result.letter: _option(found, result) for result in found.results},
             "left_out": dict(found.options.left_out),
+            "standstill_compared": found.shaken,
             "conclusion": sentences(found),
             "notes": [*found.notes],
         }
@@ -66,7 +67,9 @@ def _option(found: Comparison, result: Result) -> dict[str, Any]:
         "against_a": {
             "hunts": asdict(pair.hunting),
             "sooner": asdict(pair.sooner),
-            "in_position_rms": asdict(pair.in_position),
+            "later": asdict(pair.later),
+            "alike": asdict(pair.alike),
+            "in_position_rms": asdict(pair.in_position) if found.shaken else None,
             "force_rms": asdict(pair.force),
         },
     }
@@ -90,4 +93,5 @@ def page(found: Comparison, drawn: Sequence[Figure]) -> str:
         deadband=DEADBAND,
         model_error=100 * MODEL_ERROR,
         longer=LONGER,
+        shaken=found.shaken,
     )

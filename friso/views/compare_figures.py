@@ -53,6 +53,8 @@ def figures(found: Comparison) -> list[Figure]:
         "below 100 %; of standstill, the thin bars hold 90 % of the machines, the thick ones are 95 % intervals of "
         "the median."
     )
+    if not found.shaken:
+        caption += " No floor shakes them: what rests here need not stand still in a real room."
     panels = (_probabilities(found), _settling(found, within), _standstill(found))
     return [Figure("compare", "Isolator or firmware?", caption, panels, subject=found.stage.name)]
 
@@ -116,7 +118,8 @@ def _standstill(found: Comparison) -> Panel:
         _bars(x, [(each.low, each.high) for each in medians], BLUE, width=4.0),
     )
     y = Axis("In-position RMS", "m", log=True)
-    return Panel("How still they stand", _names(found), y, series, (Markers(x, middle, "median", BLUE),))
+    title = "How still they stand" if found.shaken else "Whether they rest, unshaken"
+    return Panel(title, _names(found), y, series, (Markers(x, middle, "median", BLUE),))
 
 
 def _most(result: Result) -> tuple[float, float]:

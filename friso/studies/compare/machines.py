@@ -48,6 +48,9 @@ TOGETHER, TOGETHER_BY = ("friction.static", "friction.coulomb"), 0.8
 HELD = ("controller.", "motion.", "drive.sample_time", "drive.delay", "drive.velocity_samples")
 """What is set and not found: alike on all machines, even where the file calls it uncertain."""
 
+SIGNS = int.from_bytes(b"signs")
+"""Which of a seed's random numbers: Philox takes them as the second half of its key."""
+
 FROM_LEAVES = ("joint.stiffness", "parasitic.")
 """What follows from leaf springs, where the stage has these."""
 
@@ -106,7 +109,8 @@ def draw_machines(stage: Stage, correlations: Correlations, count: int, seed: in
         keys["rail.seed"] = clocked.rail.seed + numbers
     else:
         notes += ["friction is the same all along the rail: the stage file has no [rail]"]
-    signs = np.where(np.random.default_rng(seed).random(count) < 0.5, -1.0, 1.0)
+    uniform = np.random.Generator(np.random.Philox(key=[seed, SIGNS])).random(count)
+    signs = np.where(uniform < 0.5, -1.0, 1.0)
     known = tuple(key for key in stage.uncertain() if key in keys)
     return Machines(clocked, keys, seed + numbers, signs, drawn, known, spreads, tuple(notes))
 

@@ -18,10 +18,13 @@ DEADBAND = 0.5
 and the edge of the band is not that of the tolerance."""
 
 MODEL_ERROR = 0.2
-"""Share by which mass and friction in the feedforward are off, all of a machine in the same direction."""
+"""Share by which the friction in the feedforward is off, Coulomb and viscous of a machine in the same direction."""
 
 PER_PERIOD = 10
 """Samples that a period of the crossover has at least, as the stage file demands."""
+
+GAINS = ("controller.tuned_mass", "controller.kp", "controller.ki", "controller.kd")
+"""Keys with which the gain of the loop goes, those of either form of the controller."""
 
 NAMES = {
     "a": "as is",
@@ -67,12 +70,14 @@ class Options:
 
 
 def linear_flat(stage: Stage, flat: Mapping[str, Any]) -> dict[str, Any]:
-    """Keys for the linear loop: the lag of the current loop counts as a delay, as it acts well below its bandwidth."""
+    """Keys for the linear loop: the lag of the current loop counts as a delay, as it acts well below its bandwidth, and
+    the motor's constant over the one believed is part of the controller's gains. The cable is left out."""
     own = stage.flat()
     late = own.get("drive.delay", 0.0)
     if "drive.current_bandwidth" in own:
         late += 1 / (2 * np.pi * own["drive.current_bandwidth"])
-    return {**flat, "drive.delay": late}
+    ratio = flat.get("drive.motor_constant_ratio", 1.0)
+    return {**flat, **{key: ratio * flat[key] for key in GAINS if key in flat}, "drive.delay": late}
 
 
 def options(machines: Machines, within: float) -> Options:
@@ -90,7 +95,11 @@ def options(machines: Machines, within: float) -> Options:
         found += [Option("d", waiting), Option("e", locked.replace({"drive.integrator_reset": True}))]
     else:
         left_out |= dict.fromkeys("de", "the controller does not integrate")
-    found.append(Option("f", locked, _feedforward(machines)))
+    ahead = _feedforward(machines)
+    if any(np.any(force) for force in ahead.values()):
+        found.append(Option("f", locked, ahead))
+    else:
+        left_out["f"] = "the stage file has neither Coulomb nor viscous friction"
     if free:
         found += _faster("g", free, left_out)
     return Options(tuple(found), dict(sorted(left_out.items())), deadband)
@@ -120,12 +129,10 @@ def _integrates(stage: Stage) -> bool:
 
 
 def _feedforward(machines: Machines) -> dict[str, np.ndarray]:
-    """Feedforward of mass, Coulomb and viscous friction of each machine, all wrong by the model error."""
+    """Feedforward of Coulomb and viscous friction of each machine, both wrong by the model error."""
     flat = machines.flat(machines.stage, {})
     off = 1 + MODEL_ERROR * machines.signs
-    mass = flat.get("masses.cart", 0.0) + flat.get("masses.stage", 0.0)
     return {
-        "drive.feedforward_mass": off * mass,
         "drive.feedforward_coulomb": off * flat.get("friction.coulomb", 0.0),
         "drive.feedforward_viscous": off * flat.get("friction.viscous", 0.0),
     }

@@ -103,11 +103,14 @@ class Result:
 
 @dataclass(frozen=True)
 class Paired:
-    """An option against option a on the same machines: by how much hunting is more probable, the share of machines that
-    settle `sooner`, and the medians of what root mean squares in position and of the force are multiplied by."""
+    """An option against option a on the same machines: by how much hunting is more probable, the shares of machines
+    that settle `sooner`, `later` and `alike` (never with both, too), and the medians of what root mean squares in
+    position and of the force are multiplied by."""
 
     hunting: Estimate
     sooner: Share
+    later: Share
+    alike: Share
     in_position: Estimate
     force: Estimate
 
@@ -127,6 +130,11 @@ class Comparison:
     def stage(self) -> Stage:
         return self.machines.stage
 
+    @property
+    def shaken(self) -> bool:
+        """Whether a floor shakes the machines: without, their standstill tells whether they rest, and not how still."""
+        return self.stage.floor is not None
+
     def paired(self, result: Result) -> Paired:
         """An option against a, on the machines whose runs were completed with both."""
         one, base = result.found, self.results[0].found
@@ -138,6 +146,8 @@ class Comparison:
         return Paired(
             hunting=difference(one.hunts[both], base.hunts[both]),
             sooner=share(one.settling < base.settling, both),
+            later=share(one.settling > base.settling, both),
+            alike=share(one.settling == base.settling, both),
             in_position=median(in_position),
             force=median(force),
         )
@@ -168,7 +178,7 @@ def compare(
         known = {result.letter: result.loops for result in results}
         results.append(Result(option, found, later, known.get(option.loop) or _loops(machines, option)))
     left_out = [f"{letter} {NAMES[letter]} is left out: {why}" for letter, why in every.left_out.items()]
-    notes = (*machines.notes, *left_out, *_troubles(results, count))
+    notes = (*machines.notes, *_missing(machines.stage), *left_out, *_troubles(results, count))
     return Comparison(machines, every, tuple(results), within, seed, notes)
 
 
@@ -225,6 +235,19 @@ class _Work:
 def _loops(machines: Machines, option: Option) -> Loops:
     flat = linear_flat(option.stage, machines.flat(option.stage, option.changes))
     return linear_loops(option.stage, flat, machines.count)
+
+
+def _missing(stage: Stage) -> list[str]:
+    """What acts on machines in a real room and not on these, and what the linear loops leave out."""
+    notes = []
+    if stage.floor is None:
+        notes.append(
+            "the stage file has no [floor]: in-position RMS is that of a machine that nothing shakes from outside, and "
+            "tells whether it rests, not how still it stands in a real room"
+        )
+    if stage.cable is not None:
+        notes.append("the linear loops leave the cable out: no modulus margin and no raised bandwidth knows of it")
+    return notes
 
 
 def _troubles(results: list[Result], count: int) -> list[str]:

@@ -170,4 +170,7 @@ def _notes(stage: Stage, result: HuntingResult) -> tuple[str, ...]:
     failed = sum(int(each.failed.sum()) for each in (*result.cases.values(), result.started))
     if failed:
         notes.append(f"{failed} runs failed and count as neither hunting nor settled")
+    notes.append(
+        "logs of moves that settle at once may hold too little motion for friso identify: those that hunt do not"
+    )
     return tuple(notes)

@@ -93,7 +93,8 @@ def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
     logs = tuple(
         rig_log(recorded, 0, f"in_position_{case}", None, machine, seed) for case, (recorded, machine) in kept.items()
     )
-    return Outcome("in-position", stage, seed, logs, result)
+    notes = ("the logs are of a standstill, from which friso identify learns nothing",)
+    return Outcome("in-position", stage, seed, logs, result, notes)
 
 
 def in_position(stage: Stage, seed: int, progress: Progress) -> tuple[InPosition, dict[str, tuple[Recorded, Stage]]]:

@@ -65,5 +65,28 @@ def rig_log(recorded: Recorded, row: int, name: str, kind: str | None, stage: St
         {role: np.array(values[row, :count]) for role, values in signals.items()}
         for signals in (recorded.logged, recorded.true)
     )
-    why = "" if status == Status.DONE else f"after {count * recorded.interval:.3g} s: {Status(status).text}"
+    why = "" if status == Status.DONE else Status(status).text
+    if not why and (end := _swings_between_limits(recorded.logged["force"][row], stage)):
+        count, why = end, "the command swings between its limits to the end: the sampled loop is unstable"
+    logged, true = ({role: values[:count] for role, values in each.items()} for each in (logged, true))
+    why = why and f"after {count * recorded.interval:.3g} s: {why}"
     return RigLog(name, kind, recorded.interval, logged, true, stage, seed, why)
+
+
+WINDOWS, SATURATED = 20, 0.1
+"""Parts into which a log is cut to see whether its loop is stable, and the share of a part that its command spends at
+either limit where it is not."""
+
+
+def _swings_between_limits(force: np.ndarray, stage: Stage) -> int:
+    """The number of samples after which a command [N] of shape (n,) does nothing but swing between its limits; 0 where
+    it comes to rest, or has none."""
+    limit = stage.flat().get("controller.force_limit", np.inf)
+    parts = np.array_split(force, WINDOWS)
+    ways = [(np.mean(part >= 0.999 * limit), np.mean(part <= -0.999 * limit)) for part in parts]
+    swings = np.array([min(way) > 0 and sum(way) > SATURATED for way in ways])
+    if not swings[-1]:
+        return 0
+    rests = np.flatnonzero(~swings)
+    first = int(rests[-1]) + 1 if len(rests) else 0
+    return sum(len(part) for part in parts[: first + 1])

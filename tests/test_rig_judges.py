@@ -1,0 +1,232 @@
+"""The judges of the rig as built (F24 to F28, and what it adds to others) on evidence made to hold and to fail."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+from friso.identify.estimate import Estimate
+from friso.identify.response.response import FrequencyResponse
+from friso.studies.rig.frf import Loop
+from friso.studies.rig.hunted import Hunted
+from friso.studies.rig.in_position import InPosition, Standstill
+from friso.studies.rig.stroke_crossover import StrokeCrossover
+from friso.studies.thesis import Evidence, Finding
+from friso.studies.thesis.claims import registered
+from friso.studies.thesis.experiments import BUILT, GRID, MOVES, ON_RAILS, STANDSTILL, Experiments
+from friso.studies.thesis.judges.identified_responses import MEASURED, WEIGHED
+from friso.studies.thesis.judges.rig_loops import measured_free, measured_locked, on_the_rig, weaker_motor
+from friso.studies.thesis.rig_hunting import Cycles, Moves
+from friso.studies.thesis.rig_loops import RigLoops
+
+HUNTS, FAILED = 7, -1
+"""Peaks of a run that hunts; of one that failed, which says nothing."""
+
+
+def hunted(peaks: Any, **given: Any) -> Hunted:
+    """Runs of so many peaks, which swing by 1 mm in 0.5 s, evenly, unless `given` otherwise."""
+    counts = np.array(peaks)
+    every = {"swing": 1e-3, "period": 0.5, "ending": 1e-3, "above": 5e-4, "below": 5e-4, "rising": 0.5}
+    every |= {"period_scatter": 0.0, "height_scatter": 0.0, **given}
+    whole = {name: np.broadcast_to(np.array(value, float), counts.shape) for name, value in every.items()}
+    return Hunted(np.maximum(counts, 0), failed=counts == FAILED, **whole)
+
+
+def moves(first: Any, free: Any = (0, 0, 0, 0), middle: Any = (0, 0, 0, 0), high: Any = (0, 0, 0, 0),
+          released: Any = (0, 0, 0, 0)) -> Moves:  # fmt: skip
+    """On four rails."""
+    return Moves(np.array([8.0, 9.5, 14.3]), hunted([first, middle, high]), hunted(free), hunted(released))
+
+
+def grid(*highest: int, runs: Any = None) -> StrokeCrossover:
+    """At each of three strokes rails hunt up to the crossover of this number, at none by -1; or `runs` as given."""
+    crossovers = np.array([4.0, 6.0, 8.0])
+    hunts = np.arange(3) <= np.array(highest)[:, None] if runs is None else np.array([])
+    peaks = np.repeat(HUNTS * hunts[..., None], 2, axis=2) if runs is None else np.array(runs)
+    return StrokeCrossover(np.array([2e-5, 3e-4, 1e-3]), crossovers, np.array([1.0, 2.0]), 8.0, hunted(peaks))
+
+
+SLOW = {"period": 1.0, "swing": 1.2e-3, "ending": 1.2e-3, "above": 7e-4, "below": 5e-4, "period_scatter": 0.1}
+"""Cycles of a rail that varies, as the thesis has them."""
+
+
+def cycles(even: dict[str, Any] | None = None, **rails: Any) -> Cycles:
+    return Cycles(hunted([HUNTS], **(even or {})), hunted([HUNTS] * 4, **{**SLOW, **rails}), np.zeros(4))
+
+
+def standstill(locked: float = 1e-7, free: float = 1e-6, ratio: float = 10.0, tenfold: float = 0.6) -> InPosition:
+    """Peaks [m], ratio of the RMS, and the share of its difference that ten times the damping takes away."""
+    rms = 3e-8 * np.array([1.0, ratio])
+
+    def still(*true: list[float]) -> Standstill:
+        both = np.array(true)
+        return Standstill(both, both, np.zeros(len(both)), np.zeros((len(both), 2)))
+
+    runs = {("locked", "all"): still([rms[0], locked]), ("free", "all"): still([rms[1], free])}
+    damped = still(*([rms[1] - share * (rms[1] - rms[0]), free] for share in (0.0, tenfold, 0.99)))
+    damping = np.array([0.5, 5.0, 50.0])
+    return InPosition(16.0, 7e-3, False, np.array([1.0, 2.0]), runs, {}, damping, 0.5, damped, {})
+
+
+def loop(tuned: float, *crossings: float) -> Loop:
+    line, none = np.array([tuned, 20 * tuned]), np.zeros(2)
+    response = FrequencyResponse(line, np.array([1.0, 0.1]) + 0j, none, none, none, none + 2, "multisine")
+    return Loop(tuned, response, tuple(Estimate.normal("crossover", "Hz", each, 0.1, "") for each in crossings))
+
+
+def loops(
+    locked: tuple[tuple[float, ...], ...] = ((9.0,), (45.0, 700.0)), free: tuple[float, ...] = (6.0, 21.0),
+    stable: int = 3, weak: tuple[float, float] = (2.4, 0.9),
+) -> RigLoops:  # fmt: skip
+    """Crossings of the loops tuned to 8 and 48 Hz and of the free one [Hz]; how many of the settings 20, 35, 50 and
+    75 Hz are stable; masses that a weaker motor shows locked and free [kg]."""
+    apparent = np.array([[1.7, weak[0], 1.2], [0.5, weak[1], 0.3]])
+    settings = np.array([20.0, 35.0, 50.0, 75.0])
+    held = tuple(loop(tuned, *each) for tuned, each in zip((8.0, 48.0), locked, strict=True))
+    return RigLoops(held, loop(8.0, *free), settings, np.arange(4) < stable, apparent)
+
+
+Y, N = True, False
+H, F = HUNTS, FAILED
+
+MADE: dict[str, list[tuple[Any, tuple[bool, ...]]]] = {
+    "F24": [
+        (moves((H, 0, H, 0)), (Y, Y)),  # half of the rails will do
+        (moves((H, 0, 0, 0)), (N, Y)),
+        (moves((H, F, F, 0)), (Y, Y)),  # one of the two that are known
+        (moves((H, H, H, H), free=(0, 0, 0, 1)), (Y, N)),
+        (moves((0, 0, 0, 0), free=(H, H, H, H)), (N, N)),
+        (moves((F, F, F, F), free=(F, F, F, F)), (N, N)),  # nothing is known
+        (moves((0, 0, 0, 0), middle=(H, H, H, H), high=(H, H, H, H)), (N, Y)),  # the first crossover alone counts
+    ],
+    "F25": [
+        (moves((H, 0, 0, 0), released=(0, H, 0, 0)), (Y, Y)),
+        (moves((H, 0, 0, 0), middle=(H, 0, H, 0), released=(H, 0, H, 0)), (Y, N)),  # no other rail than those of moves
+        (moves((H, 0, 0, 0), middle=(H, H, H, H), released=(H, H, H, H)), (Y, N)),
+        (moves((H, 0, 0, 0), middle=(H, 0, 0, 0)), (Y, N)),
+        (moves((H, 0, 0, 0), middle=(H, 0, 0, 0), released=(0, 0, 0, H)), (Y, Y)),
+        (moves((H, 0, 0, 0), high=(0, 0, 0, 1), released=(0, H, 0, 0)), (N, Y)),
+        (moves((0, 0, 0, 0), released=(0, H, 0, 0)), (N, Y)),
+        (moves((0, 0, 0, 0), high=(H, H, H, H)), (N, N)),
+    ],
+    "F26": [
+        (grid(1, 1, 0), (Y, Y)),
+        (grid(1, 0, 1), (Y, N)),
+        (grid(0, 1, 1), (Y, N)),
+        (grid(2, 1, 0), (N, Y)),  # at the highest crossover one hunts
+        (grid(1, 0, -1), (N, Y)),  # at the largest stroke none does
+        (grid(0, 1, 2), (N, N)),
+        (grid(runs=[[[H, H], [F, H], [F, 0]], [[H, H], [0, 0], [0, 0]], [[0, H], [0, 0], [0, 0]]]), (Y, Y)),
+        (grid(runs=[[[H, H], [H, H], [F, F]], [[H, H], [0, 0], [0, 0]], [[H, H], [0, 0], [0, 0]]]), (N, Y)),
+    ],
+    "F27": [
+        (cycles(), (Y, Y, Y, Y)),
+        (cycles({"swing": 4e-3, "ending": 4e-3}), (N, N, Y, Y)),
+        (cycles({"above": 8e-4, "below": 2e-4}), (N, Y, Y, Y)),
+        (cycles({"ending": 0.0}), (N, Y, Y, Y)),
+        (cycles({"period": np.nan, "swing": 1e-6, "ending": 1e-6}), (N, N, Y, Y)),  # no cycle to compare with
+        (cycles(period=0.8), (Y, N, Y, Y)),
+        (cycles(swing=2e-3, ending=2e-3), (Y, N, Y, Y)),  # slow, but larger
+        (cycles(swing=[1e-3, 1e-3, 3e-3, 3e-3], ending=3e-3), (Y, Y, Y, Y)),  # half of those that live
+        (cycles(swing=[1e-3, 3e-3, 3e-3, 3e-3], ending=3e-3), (Y, N, Y, Y)),  # all that are similar, but one of four
+        (cycles(period=[1.0, 0.5, 0.5, 1.0], ending=[1e-3, 1e-3, 0, 0]), (Y, Y, Y, Y)),  # two of four have died
+        (cycles(period=[0.5, 0.5, 1.0, 1.0], ending=[1e-3, 1e-3, 0, 0]), (Y, N, Y, Y)),
+        (cycles(above=5.2e-4), (Y, Y, N, Y)),
+        (cycles(above=[5e-4, 5e-4, 5e-4, 9e-4]), (Y, Y, N, Y)),
+        (cycles(above=4e-4, below=6e-4), (Y, Y, Y, Y)),  # either side may be the larger
+        (cycles(period_scatter=0.04), (Y, Y, Y, N)),
+        (cycles(period_scatter=[0.1, 0.1, np.nan, 0.0]), (Y, Y, Y, Y)),
+        (cycles(ending=0.0, period_scatter=np.nan), (Y, N, N, N)),  # none lives on
+    ],
+    "F28": [
+        (standstill(), (Y, Y, Y)),
+        (standstill(locked=2e-8), (N, Y, Y)),
+        (standstill(free=5e-6), (N, Y, Y)),
+        (standstill(ratio=2.0), (Y, N, Y)),
+        (standstill(ratio=40.0), (Y, N, Y)),
+        (standstill(tenfold=0.4), (Y, Y, N)),
+        (standstill(tenfold=-0.5), (Y, Y, N)),
+        (standstill(locked=1e-6, ratio=1.5, tenfold=0.1), (N, N, N)),
+    ],
+    "locked": [
+        (loops(), (Y, Y)),
+        (loops(locked=((9.0,), (45.0,))), (Y, N)),
+        (loops(locked=((9.0,), (45.0, 65.0, 300.0))), (Y, N)),
+        (loops(locked=((9.0, 600.0), (45.0,))), (Y, N)),  # of the highest setting
+        (loops(locked=((9.0,), (20.0, 600.0))), (N, Y)),
+        (loops(locked=((16.0,), (45.0, 600.0))), (N, Y)),
+        (loops(locked=((), (45.0, 600.0))), (N, Y)),
+        (loops(locked=((16.0,), ())), (N, N)),
+    ],
+    "free": [
+        (loops(), (Y, Y)),
+        (loops(free=(21.0, 6.0)), (Y, Y)),
+        (loops(free=(6.0, 20.0, 50.0)), (N, Y)),  # the last crossing counts
+        (loops(free=(8.0,)), (N, Y)),
+        (loops(free=()), (N, Y)),
+        (loops(stable=1), (Y, N)),
+        (loops(stable=4), (Y, N)),
+        (loops(free=(8.0,), stable=0), (N, N)),
+    ],
+    "motor, locked": [(loops(), (Y,)), (loops(weak=(2.0, 0.9)), (N,)), (loops(weak=(np.nan, 0.9)), (N,))],
+    "motor, free": [(loops(), (Y,)), (loops(weak=(2.4, 0.6)), (N,))],
+}
+"""Evidence by claim, or by what is added to claims, and which parts hold."""
+
+NEEDS = {"F24": MOVES, "F25": MOVES, "F26": GRID, "F27": ON_RAILS, "F28": STANDSTILL}
+
+ADDED = {
+    "locked": measured_locked,
+    "free": measured_free,
+    "motor, locked": lambda found: weaker_motor(found, 0, MEASURED[0], WEIGHED[0]),
+    "motor, free": lambda found: weaker_motor(found, 1, MEASURED[1], WEIGHED[1]),
+}
+"""Parts that the loops of the rig as built add to F17, F18, F22 and F23."""
+
+
+def evidence(**found: Any) -> Evidence:
+    return Evidence({}, {}, identified=cast(Experiments, SimpleNamespace(**found)))
+
+
+def judged(what: str, made: Any) -> Finding:
+    if what in ADDED:
+        return Finding(on_the_rig(evidence(rig_loops=made), ADDED[what]))
+    return registered()[what].judge(evidence(**{NEEDS[what]: made}))
+
+
+EACH = [
+    pytest.param(what, made, pattern, id=f"{what}-{n}")
+    for what, cases in MADE.items()
+    for n, (made, pattern) in enumerate(cases)
+]
+
+
+@pytest.mark.parametrize(("what", "made", "pattern"), EACH)
+def test_made_evidence(what: str, made: Any, pattern: tuple[bool, ...]) -> None:
+    finding = judged(what, made)
+    assert finding.pattern == pattern, finding
+    assert all(type(part.holds) is bool for part in finding.parts)
+
+
+@pytest.mark.parametrize("what", MADE)
+def test_every_part_is_tried_both_ways(what: str) -> None:
+    patterns = [pattern for _, pattern in MADE[what]]
+    assert all(set(part) == {True, False} for part in zip(*patterns, strict=True))
+
+
+def test_every_judge_of_the_rig_as_built_is_tried() -> None:
+    on_rig = {claim for claim, entry in registered().items() if entry.needs & set(NEEDS.values())}
+    assert on_rig == NEEDS.keys() == MADE.keys() - ADDED.keys()
+    assert all(registered()[claim].needs == {need} for claim, need in NEEDS.items())
+    assert {claim for claim, entry in registered().items() if BUILT in entry.needs} == {"F17", "F18", "F22", "F23"}
+
+
+def test_a_part_is_added_where_the_rig_was_run() -> None:
+    assert on_the_rig(Evidence({}, {}), measured_locked) == ()
+
+
+def test_settings_beyond_one_that_is_not_stable_do_not_count() -> None:
+    island = replace(loops(), stable=np.array([True, False, True, False]))
+    assert judged("free", island).pattern == (True, False)
