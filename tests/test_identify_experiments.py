@@ -5,7 +5,8 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -30,10 +31,12 @@ from friso.identify.logs.log import Log
 from friso.identify.response.fitting import Fit
 from friso.studies.thesis.claims import Evidence, Finding, registered
 from friso.studies.thesis.experiments import (
+    EXPERIMENTS,
     SLOW,
+    Experiments,
     LockedLine,
     constant_speed,
-    experiments_on,
+    experiment,
     joint_steps,
     slow_motion,
 )
@@ -593,8 +596,10 @@ def test_one_pass_shows_no_repeatability_and_a_slow_loop_does_not_follow() -> No
 
 
 def judged(claim: str) -> Finding:
-    stage = rig_of_thesis()
-    return registered()[claim].judge(Evidence({}, {}, analysed(stage), experiments_on(stage)))
+    """The judge's finding from what it needs of the experiments, and no other."""
+    stage, entry = rig_of_thesis(), registered()[claim]
+    made = SimpleNamespace(**{name: experiment(name, stage) for name in entry.needs & EXPERIMENTS.keys()})
+    return entry.judge(Evidence({}, {}, analysed(stage), cast(Experiments, made)))
 
 
 def of_plant(changes: dict[str, str]) -> Finding:

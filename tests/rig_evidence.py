@@ -1,0 +1,80 @@
+"""Evidence on the rig as built (F24 to F28), made up: no simulation."""
+
+from typing import Any
+
+import numpy as np
+
+from friso.identify.estimate import Estimate
+from friso.identify.response.response import FrequencyResponse
+from friso.studies.rig.frf import Loop
+from friso.studies.rig.hunted import Hunted
+from friso.studies.rig.in_position import InPosition, Standstill
+from friso.studies.rig.stroke_crossover import StrokeCrossover
+from friso.studies.thesis.rig_hunting import Cycles, Moves
+from friso.studies.thesis.rig_loops import RigLoops
+
+HUNTS, FAILED = 7, -1
+"""Peaks of a run that hunts; of one that failed, which says nothing."""
+
+
+def hunted(peaks: Any, **given: Any) -> Hunted:
+    """Runs of so many peaks, which swing by 1 mm in 0.5 s, evenly, unless `given` otherwise."""
+    counts = np.array(peaks)
+    every = {"swing": 1e-3, "period": 0.5, "ending": 1e-3, "above": 5e-4, "below": 5e-4, "rising": 0.5}
+    every |= {"period_scatter": 0.0, "height_scatter": 0.0, **given}
+    whole = {name: np.broadcast_to(np.array(value, float), counts.shape) for name, value in every.items()}
+    return Hunted(np.maximum(counts, 0), failed=counts == FAILED, **whole)
+
+
+def moves(first: Any, free: Any = (0, 0, 0, 0), middle: Any = (0, 0, 0, 0), high: Any = (0, 0, 0, 0),
+          released: Any = (0, 0, 0, 0)) -> Moves:  # fmt: skip
+    """On four rails."""
+    return Moves(np.array([8.0, 9.5, 14.3]), hunted([first, middle, high]), hunted(free), hunted(released))
+
+
+def grid(*highest: int, runs: Any = None) -> StrokeCrossover:
+    """At each of three strokes rails hunt up to the crossover of this number, at none by -1; or `runs` as given."""
+    crossovers = np.array([4.0, 6.0, 8.0])
+    hunts = np.arange(3) <= np.array(highest)[:, None] if runs is None else np.array([])
+    peaks = np.repeat(HUNTS * hunts[..., None], 2, axis=2) if runs is None else np.array(runs)
+    return StrokeCrossover(np.array([2e-5, 3e-4, 1e-3]), crossovers, np.array([1.0, 2.0]), 8.0, hunted(peaks))
+
+
+SLOW = {"period": 1.0, "swing": 1.2e-3, "ending": 1.2e-3, "above": 7e-4, "below": 5e-4, "period_scatter": 0.1}
+"""Cycles of a rail that varies, as the thesis has them."""
+
+
+def cycles(even: dict[str, Any] | None = None, **rails: Any) -> Cycles:
+    return Cycles(hunted([HUNTS], **(even or {})), hunted([HUNTS] * 4, **{**SLOW, **rails}), np.zeros(4))
+
+
+def standstill(locked: float = 1e-7, free: float = 1e-6, ratio: float = 10.0, tenfold: float = 0.6) -> InPosition:
+    """Peaks [m], ratio of the RMS, and the share of its difference that ten times the damping takes away."""
+    rms = 3e-8 * np.array([1.0, ratio])
+
+    def still(*true: list[float]) -> Standstill:
+        both = np.array(true)
+        return Standstill(both, both, np.zeros(len(both)), np.zeros((len(both), 2)))
+
+    runs = {("locked", "all"): still([rms[0], locked]), ("free", "all"): still([rms[1], free])}
+    damped = still(*([rms[1] - share * (rms[1] - rms[0]), free] for share in (0.0, tenfold, 0.99)))
+    damping = np.array([0.5, 5.0, 50.0])
+    return InPosition(16.0, 7e-3, False, np.array([1.0, 2.0]), runs, {}, damping, 0.5, damped, {})
+
+
+def loop(tuned: float, *crossings: float) -> Loop:
+    line, none = np.array([tuned, 20 * tuned]), np.zeros(2)
+    response = FrequencyResponse(line, np.array([1.0, 0.1]) + 0j, none, none, none, none + 2, "multisine")
+    return Loop(tuned, response, tuple(Estimate.normal("crossover", "Hz", each, 0.1, "") for each in crossings))
+
+
+def loops(
+    locked: tuple[tuple[float, ...], ...] = ((9.0,), (45.0, 700.0)), free: tuple[float, ...] = (6.0, 21.0),
+    stable: int = 3, weak: tuple[float, float] = (2.4, 0.9),
+) -> RigLoops:  # fmt: skip
+    """Crossings of the loops tuned to 8 and 48 Hz and of the free one [Hz]; how many of the settings 20, 35, 50 and
+    75 Hz are stable; masses that a weaker motor shows locked and free [kg]."""
+    apparent = np.array([[1.7, weak[0], 1.2], [0.5, weak[1], 0.3]])
+    settings = np.array([20.0, 35.0, 50.0, 75.0])
+    held = tuple(loop(tuned, *each) for tuned, each in zip((8.0, 48.0), locked, strict=True))
+    return RigLoops(held, loop(8.0, *free), settings, np.arange(4) < stable, apparent)
