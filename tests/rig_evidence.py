@@ -27,9 +27,10 @@ def hunted(peaks: Any, **given: Any) -> Hunted:
 
 
 def moves(first: Any, free: Any = (0, 0, 0, 0), middle: Any = (0, 0, 0, 0), high: Any = (0, 0, 0, 0),
-          released: Any = (0, 0, 0, 0)) -> Moves:  # fmt: skip
-    """On four rails."""
-    return Moves(np.array([8.0, 9.5, 14.3]), hunted([first, middle, high]), hunted(free), hunted(released))
+          released: Any = (0, 0, 0, 0), **cycle: Any) -> Moves:  # fmt: skip
+    """On four rails; releases to one side start nothing, those to the other a `cycle`."""
+    let_go = hunted([(0, 0, 0, 0), released], **cycle)
+    return Moves(np.array([8.0, 9.5, 14.3]), hunted([first, middle, high]), hunted(free), let_go)
 
 
 def grid(*highest: int, runs: Any = None) -> StrokeCrossover:

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 import sympy as sp
 from numba import njit
+from plain_axis import DRAG, KI, KP, MASS, TIME, plain_axis
 from scipy import signal, stats
 from scipy.linalg import expm
 
@@ -24,7 +25,7 @@ from friso.equations.sampled import sampled_controller
 from friso.equations.structure import ControllerForm
 from friso.stage import Stage
 
-MASS, DRAG, KP, KI, KD, LIMIT, TIME = 2.0, 3.0, 4000.0, 9000.0, 60.0, 9.0, 1e-3
+KD, LIMIT = 60.0, 9.0
 DIGIT, NOISE, LAG, RATIO = 1e-5, 3e-6, 150.0, 0.9
 MOTION = {"kind": "there_and_back", "acceleration": "4 m/s^2", "return_at": "0.2 s", "duration": "0.4 s"}
 DELAYS = (0.0, 0.4, 2.0, 2.6)
@@ -32,22 +33,7 @@ Flat = dict[str, Any]
 
 
 def axis(**changes: str) -> Stage:
-    """A mass with viscous friction alone: its bristles are far too soft to be felt."""
-    friction = {
-        "model": "lugre",
-        "static": "1 N",
-        "coulomb": "1 N",
-        "stribeck_velocity": "1 mm/s",
-        "stribeck_exponent": 2,
-        "bristle_stiffness": "1e-9 N/m",
-        "bristle_damping": "0 N*s/m",
-        "viscous": f"{DRAG} N*s/m",
-    }
-    controller = {"kind": "pid", "kp": f"{KP} N/m", "ki": f"{KI} N/(m*s)", "kd": f"{KD} N*s/m"}
-    controller |= {"derivative_on": "measurement", "force_limit": f"{LIMIT} N"}
-    motion = {**MOTION, "acceleration_time": "30 ms"}
-    masses = {"cart": f"{MASS} kg"}
-    return Stage(masses=masses, friction=friction, controller=controller, motion=motion).replace(changes)
+    return plain_axis(KD, LIMIT, {**MOTION, "acceleration_time": "30 ms"}).replace(changes)
 
 
 def keys(stage: Stage, delay: float = 0.0, **changes: Any) -> Flat:

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from plain_axis import DRAG, KI, KP, MASS, TIME, plain_axis
 
 from friso.engine.driven import Inputs, follow
 from friso.engine.kernel import kernel
@@ -10,30 +11,12 @@ from friso.equations.driven import Driven
 from friso.equations.structure import structure
 from friso.stage import Stage
 
-MASS, DRAG, KP, KI, KD, LIMIT, TIME = 2.0, 3.0, 4000.0, 9000.0, 120.0, 5.0, 1e-3
+KD, LIMIT = 120.0, 5.0
 
 
 def axis(**changes: str) -> Stage:
-    """A mass with viscous friction alone, in a PID loop with a force limit."""
-    friction = {
-        "model": "lugre",
-        "static": "1e-9 N",
-        "coulomb": "1e-9 N",
-        "stribeck_velocity": "1 mm/s",
-        "stribeck_exponent": 2,
-        "bristle_stiffness": "1e-3 N/m",
-        "bristle_damping": "0 N*s/m",
-        "viscous": f"{DRAG} N*s/m",
-    }
-    controller = {"kind": "pid", "kp": f"{KP} N/m", "ki": f"{KI} N/(m*s)", "kd": f"{KD} N*s/m"}
-    controller |= {"derivative_on": "measurement", "force_limit": f"{LIMIT} N"}
-    return Stage(
-        masses={"cart": f"{MASS} kg"},
-        friction=friction,
-        controller=controller,
-        drive={"sample_time": f"{TIME} s", "velocity_samples": 2},
-        motion={"kind": "hold", "duration": "1 s"},
-    ).replace(changes)
+    motion = {"kind": "hold", "duration": "1 s"}
+    return plain_axis(KD, LIMIT, motion, sample_time=f"{TIME} s", velocity_samples=2).replace(changes)
 
 
 def run(stage: Stage, inputs: Inputs, samples: int, rtol: float = 1e-9):

@@ -119,11 +119,12 @@ def test_hunting_ends_at_more_crossover(moved: Hunted) -> None:
 
 
 def test_hunting_can_be_started() -> None:
-    """Fig. 25, 9.5 Hz: rail 12 settles after the move, and hunts once released from 2 mm."""
-    machine = with_joint(RIG, locked=True).replace({"controller.crossover": "9.5 Hz", "rail.seed": 12})
-    after_move, after_release = (follow(machine, task, [12], {}) for task in (move(machine), released(machine, 2e-3)))
+    """Fig. 25: a rail that settles after the move hunts on once released, from several places; here at 11 Hz."""
+    machine = with_joint(RIG, locked=True).replace({"controller.crossover": "11 Hz", "rail.seed": 20})
+    tasks = [move(machine), *(released(machine, place) for place in (-5e-3, -5e-4, 1e-3))]
+    after_move, *after_release = (follow(machine, task, [20], {}) for task in tasks)
     assert after_move.peaks[0] == 0
-    assert after_release.peaks[0] > 0
+    assert sum(bool(each.lives[0]) for each in after_release) >= 2
 
 
 SMALL = {

@@ -28,14 +28,17 @@ MADE: dict[str, list[tuple[Any, tuple[bool, ...]]]] = {
         (moves((0, 0, 0, 0), middle=(H, H, H, H), high=(H, H, H, H)), (N, Y)),  # the first crossover alone counts
     ],
     "F25": [
-        (moves((H, 0, 0, 0), released=(0, H, 0, 0)), (Y, Y)),
-        (moves((H, 0, 0, 0), middle=(H, 0, H, 0), released=(H, 0, H, 0)), (Y, N)),  # no other rail than those of moves
-        (moves((H, 0, 0, 0), middle=(H, H, H, H), released=(H, H, H, H)), (Y, N)),
-        (moves((H, 0, 0, 0), middle=(H, 0, 0, 0)), (Y, N)),
-        (moves((H, 0, 0, 0), middle=(H, 0, 0, 0), released=(0, 0, 0, H)), (Y, Y)),
-        (moves((H, 0, 0, 0), high=(0, 0, 0, 1), released=(0, H, 0, 0)), (N, Y)),
-        (moves((0, 0, 0, 0), released=(0, H, 0, 0)), (N, Y)),
-        (moves((0, 0, 0, 0), high=(H, H, H, H)), (N, N)),
+        (moves((H, 0, 0, 0), middle=(H, 0, 0, 0), released=(0, H, 0, 0)), (Y, Y, Y)),
+        (moves((H, 0, 0, 0), released=(0, H, 0, 0)), (Y, N, Y)),
+        (moves((H, 0, 0, 0), middle=(F, 0, 0, 0), released=(H, 0, 0, 0)), (Y, N, N)),  # what failed did not settle
+        (moves((H, 0, 0, 0), middle=(H, 0, H, 0), released=(H, 0, H, 0)), (Y, Y, N)),  # no other than those of moves
+        (moves((H, 0, 0, 0), middle=(H, H, H, H), released=(H, H, H, H)), (Y, N, N)),
+        (moves((H, 0, 0, 0), middle=(H, 0, 0, 0)), (Y, Y, N)),
+        (moves((H, 0, 0, 0), middle=(H, 0, 0, 0), released=(0, 0, 0, 1), ending=0.0), (Y, Y, N)),  # dies out
+        (moves((H, 0, 0, 0), middle=(H, 0, 0, 0), released=(0, 0, 0, H)), (Y, Y, Y)),
+        (moves((H, 0, 0, 0), high=(0, 0, 0, 1), released=(0, H, 0, 0)), (N, N, Y)),
+        (moves((0, 0, 0, 0), middle=(0, 0, 0, H), released=(0, H, 0, 0)), (N, Y, Y)),
+        (moves((0, 0, 0, 0), high=(H, H, H, H)), (N, N, N)),
     ],
     "F26": [
         (grid(1, 1, 0), (Y, Y)),

@@ -31,7 +31,7 @@ from numpy import uint64 as U
 from friso.engine.arrays import Status
 from friso.engine.roots import crossing, cubic, first_guess
 from friso.engine.shared_queue import take_next
-from friso.engine.simd_math import align_stack, exp, gaussian, power, quantised, tanh
+from friso.engine.simd_math import align_stack, exp, gaussian, power, quantised, select, tanh
 
 OPTIONS = {{"nogil": True, "error_model": "numpy", "fastmath": {{"contract", "nsz", "arcp"}}}}
 DONE, BUDGET = int(Status.DONE), int(Status.BUDGET)

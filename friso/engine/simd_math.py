@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from llvmlite import ir
 from numba import njit, types
-from numba.extending import intrinsic
+from numba.extending import intrinsic, lower_builtin, type_callable
 
 OPTIONS: dict[str, Any] = {"inline": "always", "error_model": "numpy", "fastmath": {"contract", "nsz"}}
 
@@ -50,6 +50,24 @@ def _aligned_stack(typingctx: Any) -> Any:
 align_stack: Any = intrinsic(_aligned_stack)
 """Called in a kernel, aligns its stack to 64 bytes: registers that the compiler puts aside there would otherwise
 straddle two cache lines, at twice the time."""
+
+
+def select(condition, chosen, otherwise):
+    """One of two numbers, or of two truths, both of which are known: a choice without a branch."""
+    return chosen if condition else otherwise
+
+
+@type_callable(select)
+def _type_of_select(context: Any) -> Any:
+    return lambda condition, chosen, otherwise: context.unify_types(chosen, otherwise)
+
+
+@lower_builtin(select, types.Any, types.Any, types.Any)
+def _lower_select(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+    condition, *given = signature.args
+    both = (context.cast(builder, arg, kind, signature.return_type) for arg, kind in zip(args[1:], given, strict=True))
+    return builder.select(context.is_true(builder, condition, args[0]), *both)
+
 
 _bits: Any = intrinsic(_as_bits)
 _number: Any = intrinsic(_as_number)

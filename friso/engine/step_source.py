@@ -7,6 +7,7 @@ smooth; where a kink is crossed the step is accepted up to the crossing alone, w
 
 from __future__ import annotations
 
+import ast
 from collections.abc import Iterable, Mapping
 from typing import Any
 
@@ -487,4 +488,42 @@ class StepWriter:
 def _over_lanes(call: str, lines: list[str]) -> str:
     """A function that does the same in every lane."""
     head = f"def {call}:\n    align_stack()\n    for l in range(U(LANES)):\n"
-    return head + "".join(f"        {line}\n" for line in lines)
+    return head + "".join(f"        {line}\n" for line in _assigned_once(lines))
+
+
+def _assigned_once(lines: list[str]) -> list[str]:
+    """Straight-line code in which what is assigned anew gets a new name, and each choice is a `select`: names assigned
+    twice, and branches, take Numba a third of its time, and branches may stop the vectoriser."""
+    versions = _Versions()
+    return [ast.unparse(versions.visit(ast.parse(line))) for line in lines]
+
+
+class _Versions(ast.NodeTransformer):
+    """Names become those of their last assignment; conditional expressions, `and` and `or` calls of `select`."""
+
+    def __init__(self) -> None:
+        self.times: dict[str, int] = {}
+
+    def visit_Assign(self, node: ast.Assign) -> ast.Assign:
+        value = self.visit(node.value)
+        return ast.Assign([self.visit(target) for target in node.targets], value, lineno=node.lineno)
+
+    def visit_Name(self, node: ast.Name) -> ast.Name:
+        if isinstance(node.ctx, ast.Store):
+            self.times[node.id] = self.times.get(node.id, 0) + 1
+        times = self.times.get(node.id, 0)
+        return ast.Name(f"{node.id}_v{times}" if times > 1 else node.id, node.ctx)
+
+    def visit_IfExp(self, node: ast.IfExp) -> ast.Call:
+        return _select(*(self.visit(each) for each in (node.test, node.body, node.orelse)))
+
+    def visit_BoolOp(self, node: ast.BoolOp) -> ast.expr:
+        first, *others = (self.visit(each) for each in node.values)
+        for other in others:
+            both = isinstance(node.op, ast.And)
+            first = _select(first, other, ast.Constant(False)) if both else _select(first, ast.Constant(True), other)
+        return first
+
+
+def _select(*parts: ast.expr) -> ast.Call:
+    return ast.Call(ast.Name("select", ast.Load()), list(parts), [])

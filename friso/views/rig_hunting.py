@@ -87,17 +87,18 @@ def _limit(it: HuntingResult, case: str) -> str:
 
 def _started(it: HuntingResult) -> list[str]:
     """What a release starts that the move does not."""
-    row, count = it.shown[1], len(it.rails)
-    moved, able = int((it.cases["locked"].peaks[row] > 0).sum()), int(it.can_start[1].sum())
-    listed = ", ".join(with_unit(each, "m") for each in it.displacements)
-    found = [
-        f"At {it.crossovers[row]:.3g} Hz locked, {moved} of {count} rails hunt after the move, and {able} after it "
-        f"or a release from {listed}; at {it.crossovers[it.shown[2]]:.3g} Hz {int(it.can_start[2].sum())}."
+    counts = [
+        f"{int((it.cases['locked'].peaks[row] > 0).sum())} and {int(it.can_start[row].sum())} of {len(it.rails)} at "
+        f"{it.crossovers[row]:.3g} Hz"
+        for row in it.shown
     ]
+    listed = ", ".join(with_unit(each, "m") for each in it.displacements)
+    found = [f"Rails that hunt locked after the move, and after it or a release from {listed}: {'; '.join(counts)}."]
     if it.startable is not None:
         found.append(
-            f"Rail {it.rails[it.startable.rail]:.0f} is one that settles after that move and hunts once released from "
-            f"{with_unit(it.startable.displacement, 'm')}: a run without hunting does not show that there is none."
+            f"At {it.startable.crossover:.3g} Hz rail {it.rails[it.startable.rail]:.0f} settles after the move and "
+            f"hunts until the end once released from {with_unit(it.startable.displacement, 'm')}: a run without "
+            "hunting does not show that there is none."
         )
     return found
 
@@ -174,6 +175,7 @@ def _shares(it: HuntingResult) -> Figure:
         lines.append(Series(it.crossovers, share, f"joint {case}", colour))
     lasting = it.cases["locked"].lives.mean(axis=1)
     lines.append(Series(it.crossovers, lasting, "locked, still swinging at the end", VERMILLION, "dashed"))
+    lines.append(Series(it.crossovers, it.can_start.mean(axis=1), "locked, after it or a release", INK, "dotted"))
     panel = Panel("", Axis("Crossover", "Hz"), Axis("Share of rails", "", (-0.03, 1.03)), tuple(lines))
     return Figure(
         "hunting_shares",
@@ -194,7 +196,7 @@ def _startable(it: HuntingResult) -> Figure:
     reach = _reach([found.after_move, found.after_release])
     return Figure(
         "hunting_started",
-        f"{it.crossovers[it.shown[1]]:.3g} Hz, joint locked, rail {it.rails[found.rail]:.0f}: hunting once started",
+        f"{found.crossover:.3g} Hz, joint locked, rail {it.rails[found.rail]:.0f}: hunting once started",
         "The same machine twice.",
         (Panel("", TIME, Axis("Position minus reference", "m", (-reach, reach)), lines),),
     )
@@ -223,7 +225,7 @@ def numbers(outcome: Outcome) -> dict[str, Any]:
         case: {**runs_document(runs), "hunts": [share_document(each) for each in it.shares(case)]}
         for case, runs in it.cases.items()
     }
-    started = {"displacements_m": it.displacements, "crossovers_hz": it.crossovers[[*it.shown]]}
+    started = {"displacements_m": it.displacements}
     return {
         "distance_m": it.distance,
         "crossovers_hz": it.crossovers,

@@ -33,8 +33,8 @@ CROSSOVERS = np.array([6.0, 7.0, 8.0, 9.5, 11.0, 12.5, 14.3, 16.0, 20.0]) / 8
 SHOWN = (2, 3, 6)
 """The thesis's among them."""
 
-DISPLACEMENTS = (0.005, 0.01, 0.02, 0.05)
-"""Of the releases, over the distance of the move: 0.5 to 5 mm for the thesis's rig, our choice."""
+DISPLACEMENTS = (-0.05, -0.005, 0.005, 0.05)
+"""Of the releases, over the distance of the move: 0.5 and 5 mm to either side for the thesis's rig, our choice."""
 
 CASES = {"locked": True, "free": False}
 
@@ -49,11 +49,12 @@ class Trace:
 
 @dataclass(frozen=True)
 class Startable:
-    """The same machine `after_move`, where it settles, and `after_release`, where it hunts: the number of its rail, and
-    the displacement [m] of the release."""
+    """The same machine `after_move`, where it settles, and `after_release`, where it hunts for as long as it is
+    watched: its crossover [Hz], the number of its rail, and the displacement [m] of the release."""
 
     after_move: Trace
     after_release: Trace
+    crossover: float
     rail: int
     displacement: float
 
@@ -63,11 +64,10 @@ class HuntingResult:
     """By `case` (locked, free) what became of the moves, arrays of shape (crossovers, rails), at `crossovers` [Hz] on
     `rails` (seeds, the stage's own first).
 
-    `started`: of releases with the joint locked at the crossovers `shown` (numbers), shape (displacements, shown,
-    rails), by `displacements` [m]. `rail` is the number of the rail that the `traces` (by case and number of the
-    crossover) and the logs show: the first that hunts locked at the stage's own crossover, or else the stage's own.
-    `startable` is a machine that settles after the move at the second of the crossovers `shown`, None where there is
-    none.
+    `started`: of releases with the joint locked, shape (displacements, crossovers, rails), by `displacements` [m].
+    `rail` is the number of the rail that the `traces` (by case and number of the crossover) and the logs show: the
+    first that hunts locked at the stage's own crossover, or else the stage's own; the crossovers `shown` (numbers) are
+    the thesis's. `startable` is a machine that settles after the move, None where there is none.
     """
 
     distance: float
@@ -93,8 +93,8 @@ class HuntingResult:
 
     @property
     def can_start(self) -> np.ndarray:
-        """Whether a rail hunts, after the move or a release, locked at the crossovers `shown`: (shown, rails)."""
-        return (self.started.peaks > 0).any(axis=0) | (self.cases["locked"].peaks[[*self.shown]] > 0)
+        """Whether a rail hunts after the move or a release with the joint locked, shape (crossovers, rails)."""
+        return (self.started.peaks > 0).any(axis=0) | (self.cases["locked"].peaks > 0)
 
 
 def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
@@ -108,12 +108,12 @@ def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
         numbers = numbers_of(seed, len(frequencies), len(seeds))
         runs = follow(each, move(stage), numbers, changes, progress, f"moves, joint {case}")
         found[case] = runs.shaped(len(frequencies), len(seeds))
-    started = _releases(stages["locked"], seed, frequencies[[*SHOWN]], seeds, progress)
+    started = _releases(stages["locked"], seed, frequencies, seeds, progress)
     rail = int(np.argmax(found["locked"].peaks[SHOWN[0]] > 0))
     machine = on_rails(stage, {"controller.crossover": frequencies}, seeds[[rail]])
     again = {case: once(each, move(stage), [seed + rail] * len(frequencies), machine) for case, each in stages.items()}
     traces = {(case, row): _trace(again[case], row) for case in CASES for row in range(len(frequencies))}
-    startable = _startable(stages["locked"], seed, frequencies[SHOWN[1]], seeds, found["locked"], started)
+    startable = _startable(stages["locked"], seed, frequencies, seeds, found["locked"], started)
     displacements = distance(stage) * np.array(DISPLACEMENTS)
     result = HuntingResult(
         distance(stage), frequencies, seeds, found, displacements, started, SHOWN, rail, traces, startable
@@ -141,18 +141,19 @@ def _releases(stage: Stage, seed: int, frequencies: np.ndarray, seeds: np.ndarra
 
 
 def _startable(
-    stage: Stage, seed: int, frequency: float, seeds: np.ndarray, moved: Hunted, started: Hunted
+    stage: Stage, seed: int, frequencies: np.ndarray, seeds: np.ndarray, moved: Hunted, started: Hunted
 ) -> Startable | None:
-    """A rail that settles after the move at the second crossover shown, and hunts after a release."""
-    places = np.argwhere((started.peaks[:, 1] > 0) & (moved.peaks[SHOWN[1]] == 0))
+    """Of the rails that settle after the move and hunt after a release until the end, one at the lowest crossover."""
+    lasts = (started.peaks > 0) & started.lives & (moved.peaks == 0)
+    places = np.argwhere(lasts.swapaxes(0, 1))
     if not len(places):
         return None
-    size, rail = map(int, places[0])
+    row, size, rail = map(int, places[0])
     displacement = DISPLACEMENTS[size] * distance(stage)
-    changes = on_rails(stage, {"controller.crossover": np.array([frequency])}, seeds[[rail]])
+    changes = on_rails(stage, {"controller.crossover": frequencies[[row]]}, seeds[[rail]])
     tasks = (move(stage), released(stage, displacement))
     quiet, hunts = (_trace(once(stage, task, [seed + rail], changes), 0) for task in tasks)
-    return Startable(quiet, hunts, rail, displacement)
+    return Startable(quiet, hunts, float(frequencies[row]), rail, displacement)
 
 
 def _trace(recorded: Recorded, row: int) -> Trace:

@@ -16,6 +16,7 @@ from friso.studies.rig.hunted import (
     crossover,
     distance,
     follow,
+    joined,
     move,
     numbers_of,
     on_rails,
@@ -47,14 +48,14 @@ AS_BUILT: Mapping[str, Any] = MappingProxyType(
 thesis_drive.toml."""
 
 SEED = 1
-RAILS = 8
+RAILS = 20
 """Of the moves and of the rails that vary."""
 
 CROSSOVERS = np.array([8.0, 9.5, 14.3]) / 8
 """Over 8 Hz (Sec. 4.3.2)."""
 
-DISPLACEMENT = 0.02
-"""Of the release over the distance of the move: 2 mm."""
+DISPLACEMENTS = (-0.05, 0.05)
+"""Of the releases over the distance of the move: 5 mm to either side."""
 
 STROKES, LOOPS, GRID_RAILS = np.array([0.02, 0.3, 1.0]), np.array([4.0, 6.0, 8.0, 12.0]) / 8, 2
 """Of Fig. 26, over 1 mm and 8 Hz, and the rails of each cell."""
@@ -63,7 +64,7 @@ STROKES, LOOPS, GRID_RAILS = np.array([0.02, 0.3, 1.0]), np.array([4.0, 6.0, 8.0
 @dataclass(frozen=True)
 class Moves:
     """Fig. 24, 25: moves with the joint `locked`, shape (crossovers, rails), and `free` at the first crossover, shape
-    (rails,); releases with it locked at the second (rails,). Crossovers [Hz]."""
+    (rails,); releases with it locked at the second, shape (displacements, rails). Crossovers [Hz]."""
 
     crossovers: np.ndarray
     locked: Hunted
@@ -97,8 +98,9 @@ def moves(stage: Stage) -> Moves:
     )
     one, two = (on_rails(own, {keys: frequencies[[row]]}, seeds) for row in (0, 1))
     loose = follow(free, move(own), numbers_of(SEED, 1, RAILS), one)
-    let_go = follow(locked, released(own, DISPLACEMENT * distance(own)), numbers_of(SEED, 1, RAILS), two)
-    return Moves(frequencies, held.shaped(len(CROSSOVERS), RAILS), loose, let_go)
+    tasks = [released(own, share * distance(own)) for share in DISPLACEMENTS]
+    let_go = joined([follow(locked, task, numbers_of(SEED, 1, RAILS), two) for task in tasks])
+    return Moves(frequencies, held.shaped(len(CROSSOVERS), RAILS), loose, let_go.shaped(len(tasks), RAILS))
 
 
 def grid(stage: Stage) -> StrokeCrossover:
