@@ -337,6 +337,20 @@ def test_crossover_of_the_open_loop() -> None:
     assert held >= 88
 
 
+def test_a_noisy_open_loop_crosses_once() -> None:
+    """Lines closer than the noise pass 0 dB several times."""
+    frequency, rng = np.arange(1.0, 100.0, 0.25), np.random.default_rng(28)
+    truth, passed, found = np.sqrt(4000.0 / 1.7) / (2 * np.pi), [], []
+    for _ in range(40):
+        plant = exact(lambda f: -1 / (1.7 * (2 * np.pi * f) ** 2), frequency, 0.1, rng)
+        loop = open_loop(plant, np.full(len(frequency), 4000.0))
+        passed.append(np.count_nonzero(np.diff(np.abs(loop.response) > 1)))
+        found.append(crossovers(loop))
+    assert np.mean(passed) > 1.5
+    assert [len(each) for each in found].count(1) >= 38
+    assert sum(each[0].holds(truth) for each in found) >= 36
+
+
 # Lines and modes
 
 
@@ -405,12 +419,12 @@ def test_two_mass_intervals_hold_the_truth() -> None:
     rng, frequency = np.random.default_rng(25), np.arange(3.0, 40.0, 1.0)
     truth = dict(zip(("driven mass", "other mass", "joint stiffness", "joint damping"), np.exp(TRUE[:4]), strict=True))
     held = dict.fromkeys(truth, 0)
-    for _ in range(100):
+    for _ in range(60):
         both = [exact(lambda f, i=i: rig(f, i), frequency, 0.03, rng) for i in (0, 1)]
         found = fit_two_mass(*both)
         for name, value in truth.items():
             held[name] += found[name].holds(value)
-    assert min(held.values()) >= 88, held
+    assert min(held.values()) >= 53, held
 
 
 def test_two_mass_predicts_another_record_and_signs_are_told() -> None:

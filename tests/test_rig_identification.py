@@ -76,7 +76,7 @@ def test_a_weaker_motor_makes_masses_look_heavier(built: Stage, locked: bool, ma
 def test_the_measured_loop_is_the_one_computed_and_crosses_where_tuned(built: Stage) -> None:
     """Controller times plant, both measured in the same run, against the loop read from the sensitivity alone."""
     stage = sizes.locked(built)
-    _, loops = frf.open_loops(stage, PLACE, 1)
+    _, loops = frf.open_loops(stage, PLACE, 1, frf.SETTINGS)
     for each in loops[2:]:
         assert frf.nearest(each) == pytest.approx(each.tuned, rel=0.15)
     log = rig_log(excitation.excite(stage, PLACE, 1), 0, "", "frequency", stage, 1)

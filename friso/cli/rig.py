@@ -97,6 +97,7 @@ def _print(outcome: Outcome, files: Sequence[Path]) -> None:
 
     for sentence in sentences(outcome):
         print_wrapped(sentence)
+    print(f"seed of the noise: {outcome.seed}")
     for note in outcome.notes:
         print_wrapped(f"note: {note}")
     for file in files:
@@ -110,7 +111,7 @@ def _written(outcome: Outcome, folder: Path) -> list[Path]:
 
     truth = made_folder(folder / TRUTH)
     files = [_write_log(log, folder, truth) for log in outcome.logs]
-    (truth / "stage.toml").write_text(outcome.stage.to_toml(), encoding="utf-8", newline="\n")
+    _write_stage(outcome.stage, truth / "stage.toml", outcome.seed)
     drawn = figures(outcome)
     pictures = {folder / f"{figure.name}.{form}": figure for figure in drawn for form in FORMATS}
     for path, figure in pictures.items():
@@ -130,5 +131,9 @@ def _write_log(log: RigLog, folder: Path, truth: Path) -> Path:
     if log.kind is not None:
         save(Mapping(experiment=log.kind), path)
     write_csv(truth / path.name, log.interval, log.true, f"{said}: the truth behind {path.name}")
-    (truth / f"{log.name}.toml").write_text(log.stage.to_toml(), encoding="utf-8", newline="\n")
+    _write_stage(log.stage, truth / f"{log.name}.toml", log.seed)
     return path
+
+
+def _write_stage(stage: Stage, path: Path, seed: int) -> None:
+    path.write_text(f"# friso rig, seed {seed}\n{stage.to_toml()}", encoding="utf-8", newline="\n")

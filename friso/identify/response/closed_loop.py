@@ -114,22 +114,32 @@ def crossovers(loop: FrequencyResponse) -> tuple[Estimate, ...]:
     """Frequencies [Hz] at which |L| passes 1, by rising frequency, each with its interval; none is an answer too.
 
     Interpolated in logarithms; the interval follows from that of the magnitude and the slope over the lines nearby.
+    Three passages (or five, ...) that the noise does not tell apart are one.
     """
     size, place = np.log(np.abs(loop.response)), np.log(loop.frequency)
     band = loop.band()
-    passed = np.flatnonzero(np.sign(size[:-1]) * np.sign(size[1:]) < 0)
-    found = []
-    for i in passed:
+    groups: list[list[tuple[float, float, float]]] = []
+    for i in np.flatnonzero(np.sign(size[:-1]) * np.sign(size[1:]) < 0):
         part = slice(max(i - 2, 0), i + 4)
         slope = float(np.polyfit(place[part], size[part], 1)[0])
         share = size[i] / (size[i] - size[i + 1])
         centre = place[i] + share * (place[i + 1] - place[i])
-        half_width = np.log(band.magnitude_high[i : i + 2] / np.abs(loop.response[i : i + 2])).max()
-        method = "where the open loop passes 0 dB"
-        half = half_width / max(abs(slope), 1e-3)
-        limits = (float(np.exp(centre - half)), float(np.exp(centre + half)))
-        found.append(Estimate(f"crossover {len(found) + 1}", "Hz", float(np.exp(centre)), *limits, method))
-    return tuple(found)
+        half = np.log(band.magnitude_high[i : i + 2] / np.abs(loop.response[i : i + 2])).max() / max(abs(slope), 1e-3)
+        if not groups or centre - half > max(high for _, _, high in groups[-1]):
+            groups.append([])
+        groups[-1].append((centre - half, centre, centre + half))
+    passages = [passage for group in groups for passage in ([_joined(group)] if len(group) % 2 else group)]
+    return tuple(
+        Estimate(
+            f"crossover {number}", "Hz", *map(float, np.exp([centre, low, high])), "where the open loop passes 0 dB"
+        )
+        for number, (low, centre, high) in enumerate(passages, 1)
+    )
+
+
+def _joined(group: list[tuple[float, float, float]]) -> tuple[float, float, float]:
+    """Low end, centre and high end of passages taken for one: the middle one, and all that they span."""
+    return min(low for low, _, _ in group), group[len(group) // 2][1], max(high for _, _, high in group)
 
 
 def _same_lines(one: FrequencyResponse, other: FrequencyResponse) -> None:

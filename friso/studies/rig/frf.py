@@ -101,7 +101,8 @@ def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
     progress(1, 4, f"plant, joint free, at {FREE_PLACES} places")
     loose = [plant_log(free, f"free_{n + 1:02d}", place, seed + n) for n, place in enumerate(places[:FREE_PLACES])]
     progress(2, 4, "open loops")
-    logs, loops = open_loops(fixed, places[0], seed)
+    logs, loops = open_loops(fixed, places[0], seed, SETTINGS[1:])
+    loops = (measured_loop(held[0], pace(stage)), *loops)
     apparent = np.array([apparent_masses(each, places[0], seed) for each in (fixed, free)])
     progress(3, 4, "highest stable setting, joint free")
     settings, stable = stable_settings(free, places[0], seed)
@@ -122,17 +123,20 @@ def plant_log(stage: Stage, name: str, place: float, seed: int) -> RigLog:
     return rig_log(excite(stage, place, seed), 0, name, "frequency", stage, seed)
 
 
-def open_loops(stage: Stage, place: float, seed: int) -> tuple[tuple[RigLog, ...], tuple[Loop, ...]]:
-    """Logs of one excitation with the controller at every setting, and what they show."""
-    factors = np.array(SETTINGS)
+def open_loops(
+    stage: Stage, place: float, seed: int, settings: tuple[float, ...]
+) -> tuple[tuple[RigLog, ...], tuple[Loop, ...]]:
+    """Logs of one excitation with the controller at each of the settings, crossovers over the stage's, and what they
+    show."""
+    factors = np.array(settings)
     recorded = excite(stage, place, seed, len(factors), _controllers(stage, factors))
     rows = []
-    for row, factor in enumerate(SETTINGS):
+    for row, factor in enumerate(settings):
         own = stage.with_numbers(_controllers(stage, factor))
         name = f"loop_{factor * pace(stage):.3g}_Hz".replace(".", "_")
         rows.append(rig_log(recorded, row, name, "frequency", own, seed))
-    tuned = [factor * pace(stage) for factor in SETTINGS]
-    return tuple(rows), tuple(measured_loop(log, setting) for log, setting in zip(rows, tuned, strict=True))
+    found = (measured_loop(log, factor * pace(stage)) for log, factor in zip(rows, settings, strict=True))
+    return tuple(rows), tuple(found)
 
 
 def _controllers(stage: Stage, factors: Any) -> dict[str, Any]:

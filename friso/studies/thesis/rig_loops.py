@@ -8,7 +8,7 @@ import numpy as np
 
 from friso.stage import Stage
 from friso.studies.rig.excitation import excite
-from friso.studies.rig.frf import Loop, apparent_masses, measured_loop, open_loops, stable_settings
+from friso.studies.rig.frf import SETTINGS, Loop, apparent_masses, measured_loop, open_loops, stable_settings
 from friso.studies.rig.outcome import rig_log
 from friso.studies.rig.sizes import freed, locked, pace, travel
 from friso.studies.thesis.rig_hunting import AS_BUILT, SEED
@@ -33,4 +33,5 @@ def rig_loops(stage: Stage) -> RigLoops:
     log = rig_log(excite(free, place, SEED), 0, "free", "frequency", free, SEED)
     settings, stable = stable_settings(free, place, SEED)
     apparent = np.array([apparent_masses(each, place, SEED) for each in (fixed, free)])
-    return RigLoops(open_loops(fixed, place, SEED)[1], measured_loop(log, pace(built)), settings, stable, apparent)
+    _, loops = open_loops(fixed, place, SEED, SETTINGS)
+    return RigLoops(loops, measured_loop(log, pace(built)), settings, stable, apparent)
