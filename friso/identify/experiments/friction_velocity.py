@@ -102,13 +102,26 @@ def _together(velocities: np.ndarray, forces: np.ndarray, errors: np.ndarray) ->
 
 
 def _linear(design: np.ndarray, forces: np.ndarray, errors: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
-    """Least squares: solution, covariance by the scatter (friction varies from place to place), which is no less than
-    the half-widths `errors` [N] within the stretches say, degrees of freedom."""
-    solution = np.linalg.lstsq(design, forces, rcond=None)[0]
+    """Least squares with Coulomb friction in the first column: solution, covariance, degrees of freedom.
+
+    The variance of each stretch is that of the scatter, but no less than its half-width in `errors` [N] says. Friction
+    varies from place to place, and all stretches lie on the same way: what one of them tells of Coulomb friction is not
+    averaged out over the others.
+    """
+    inverse = np.linalg.pinv(design)
+    solution = inverse @ forces
     freedom = len(forces) - design.shape[1]
     spread = float(np.sum((forces - design @ solution) ** 2)) / max(freedom, 1)
-    spread = max(spread, float(np.mean((errors / COVERAGE) ** 2)))
-    return solution, spread * np.linalg.pinv(design.T @ design), freedom
+    return solution, _covariance(inverse, spread, errors, [0]), freedom
+
+
+def _covariance(inverse: np.ndarray, spread: float, errors: np.ndarray, levels: list[int]) -> np.ndarray:
+    """Of a solution, by the `inverse` of its design, the variance of the scatter and the half-widths of the stretches;
+    `levels` are the places of what is a level of friction."""
+    within = (errors / COVERAGE) ** 2
+    covariance = inverse * np.maximum(spread, within) @ inverse.T
+    covariance[np.ix_(levels, levels)] += within.mean()
+    return covariance
 
 
 def _nothing(reason: str) -> Direction:
@@ -128,22 +141,21 @@ def _direction(speeds: np.ndarray, friction: np.ndarray, errors: np.ndarray, wor
         return _one_speed(speeds, friction, method, spent)
     solution, covariance, freedom = _linear(np.stack([np.ones_like(speeds), speeds], axis=1), friction, errors)
     covariance, freedom = covariance * freedom / (freedom - spent), freedom - spent
+    names = (("friction.coulomb", "N"), ("friction.viscous", "N s/m"))
+    coulomb, viscous = (_fitted(*each, i, solution, covariance, freedom, method) for i, each in enumerate(names))
+    low, high = speeds.min() * 1e3, speeds.max() * 1e3
     if _distinct(speeds) < STRAIGHT:
-        return _two_speeds(speeds, solution, covariance, freedom, method)
-    curved = _stribeck(speeds, friction, solution, freedom)
+        reason = f"two speeds, {low:.3g} and {high:.3g} mm/s, do not show whether friction is still falling at these"
+        return _still_falling(coulomb, viscous, reason)
+    curved = _stribeck(speeds, friction, errors, solution, freedom)
     if curved is not None:
         return _curved(*curved, speeds, method)
-    coulomb = _fitted("friction.coulomb", "N", 0, solution, covariance, freedom, method)
+    if viscous.high < 0:
+        return _still_falling(coulomb, viscous, f"from {low:.3g} to {high:.3g} mm/s friction falls with the speed")
     flat = f"{slowest}: no rise of friction towards rest shows"
     static = Estimate.unknown("friction.static", "N", method, flat, coulomb.low)
     speed = Estimate.unknown("friction.stribeck_velocity", "m/s", method, static.reason, 0.0, float(speeds.min()))
-    return Direction(
-        coulomb,
-        _fitted("friction.viscous", "N s/m", 1, solution, covariance, freedom, method),
-        static,
-        speed,
-        covariance,
-    )
+    return Direction(coulomb, viscous, static, speed, covariance)
 
 
 def _one_speed(speeds: np.ndarray, friction: np.ndarray, method: str, spent: int) -> Direction:
@@ -167,21 +179,13 @@ def _distinct(speeds: np.ndarray) -> int:
     return 1 + int((np.diff(np.log(np.sort(speeds))) > np.log(DISTINCT)).sum())
 
 
-def _two_speeds(
-    speeds: np.ndarray, solution: np.ndarray, covariance: np.ndarray, freedom: int, method: str
-) -> Direction:
-    """A straight line goes through any two forces: a Stribeck effect at these speeds makes its start too high and its
-    slope too low, and does not show. Both are bounds."""
-    low, high = speeds.min() * 1e3, speeds.max() * 1e3
-    reason = f"two speeds, {low:.3g} and {high:.3g} mm/s, do not show whether friction is still falling at these"
-    line = [
-        _fitted(name, unit, place, solution, covariance, freedom, method)
-        for place, (name, unit) in enumerate((("friction.coulomb", "N"), ("friction.viscous", "N s/m")))
-    ]
+def _still_falling(coulomb: Estimate, viscous: Estimate, reason: str) -> Direction:
+    """A Stribeck effect at the speeds at hand makes the start of a straight line through the forces too high and its
+    slope too low: both are bounds."""
     nothing = _nothing(reason)
     return Direction(
-        Estimate.unknown(line[0].name, "N", method, reason, high=line[0].high),
-        Estimate.unknown(line[1].name, "N s/m", method, reason, low=line[1].low),
+        Estimate.unknown(coulomb.name, "N", coulomb.method, reason, high=coulomb.high),
+        Estimate.unknown(viscous.name, "N s/m", viscous.method, reason, low=viscous.low),
         nothing.static,
         nothing.stribeck_velocity,
         nothing.covariance,
@@ -195,7 +199,7 @@ def _fitted(
 
 
 def _stribeck(
-    speeds: np.ndarray, friction: np.ndarray, line: np.ndarray, freedom: int
+    speeds: np.ndarray, friction: np.ndarray, errors: np.ndarray, line: np.ndarray, freedom: int
 ) -> tuple[np.ndarray, np.ndarray, int] | None:
     """The fit of F_c, F_v, F_s, v_s, covariance and degrees of freedom; None where a straight line does as well."""
     if freedom < 3 or _distinct(speeds) < SPEEDS:
@@ -218,8 +222,8 @@ def _stribeck(
         return None
     units = np.array([scale, scale / speeds.max(), scale, np.exp(best.x[3])])
     solution = np.array([best.x[0], best.x[1], best.x[2], 1.0]) * units
-    covariance = np.linalg.pinv(best.jac.T @ best.jac) * rest / left * np.outer(units, units)
-    return solution, covariance, left
+    inverse = units[:, None] * np.linalg.pinv(best.jac)
+    return solution, _covariance(inverse, rest / left, errors, [0, 2]), left
 
 
 def _curved(solution: np.ndarray, covariance: np.ndarray, freedom: int, speeds: np.ndarray, method: str) -> Direction:

@@ -129,12 +129,10 @@ def crossovers(loop: FrequencyResponse) -> tuple[Estimate, ...]:
             groups.append([])
         groups[-1].append((centre - half, centre, centre + half))
     passages = [passage for group in groups for passage in ([_joined(group)] if len(group) % 2 else group)]
-    return tuple(
-        Estimate(
-            f"crossover {number}", "Hz", *map(float, np.exp([centre, low, high])), "where the open loop passes 0 dB"
-        )
-        for number, (low, centre, high) in enumerate(passages, 1)
-    )
+    method, found = "where the open loop passes 0 dB", []
+    for number, (low, centre, high) in enumerate(np.exp(passages).reshape(-1, 3).tolist(), 1):
+        found.append(Estimate(f"crossover {number}", "Hz", centre, low, high, method))
+    return tuple(found)
 
 
 def _joined(group: list[tuple[float, float, float]]) -> tuple[float, float, float]:
