@@ -29,7 +29,7 @@ from friso.identify.method import Identification, identify
 from friso.quantities import StageError
 from friso.stage import Stage, load
 from friso.stage.files import save
-from friso.studies.rig.constant_speed import slow_passes
+from friso.studies.rig.constant_speed import MANY, passes_log
 from friso.studies.rig.frf import plant_log
 from friso.studies.rig.outcome import RigLog
 from friso.studies.rig.sizes import freed, locked, travel
@@ -61,7 +61,7 @@ def benches(machine: Machine, seed: int) -> list[list[RigLog]]:
         return [plant_log(each, f"{name}_{n + 1}", place, noise + n) for n, place in enumerate(places)]
 
     slow = slow_motion(stage, noise, RAILS)
-    passes = slow_passes("passes", locked(stage), noise)
+    passes = passes_log("passes", locked(stage), noise, MANY)
     return [[*shaken(locked(stage), "locked"), steps(stage, noise), *slow, passes], shaken(freed(stage), "free")]
 
 

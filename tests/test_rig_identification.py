@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rig_machines import mean_level
 
 import friso
 from friso.identify.experiments import static_from_stick_slip
@@ -59,9 +60,15 @@ def test_uneven_friction_at_constant_speed_is_not_read_as_coulomb_friction(
 ) -> None:
     monkeypatch.setattr(constant_speed, "WAY", 1 / 6)
     monkeypatch.setattr(constant_speed, "DURATIONS", (48.0, 12.0))
-    free = constant_speed.run_experiment(built, 1, silent).result.cases[0]
+    monkeypatch.setattr(constant_speed, "MANY", tuple(np.geomspace(36.0, 4.5, 6)))
+    found = constant_speed.run_experiment(built, 1, silent).result
+    free, many = found.cases[0], found.many
     assert not free.place.separated
     assert not free.velocity.both.coulomb.shown
+    coulomb = many.velocity.both.coulomb  # shown by faster passes, though friction varies along the way
+    assert coulomb.shown
+    assert coulomb.holds(mean_level([many.log], "friction.coulomb"))
+    assert coulomb.half_width < 0.5 * coulomb.value
 
 
 @pytest.mark.parametrize(("locked", "mass", "weak_mass"), [(True, 1.7, 2.5), (False, 0.5, 0.75)])

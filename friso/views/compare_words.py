@@ -150,8 +150,8 @@ def _who_settles(found: Comparison) -> str:
         )
     parts = [f"{label(each)} {_how_many(each, count)}" for each in settling]
     return (
-        f"Of {count} machines are in position {within} at the end: {listed(parts, 'and')}; so are at least "
-        f"{100 * ENOUGH:g} % of the {some} that were followed {LONGER} times as long."
+        f"Of {count} machines are in position {within} at the end: {listed(parts, 'and')}; of {some} that were "
+        f"followed {LONGER} times as long at least {100 * ENOUGH:g} % stay there."
     )
 
 

@@ -6,9 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from friso.studies.rig.constant_speed import ConstantSpeed, Passes
+from friso.studies.rig.constant_speed import ConstantSpeed, ManySpeeds, Passes
 from friso.studies.rig.outcome import Outcome
-from friso.views.figure import BLUE, VERMILLION, Axis, Figure, Panel, Series
+from friso.views.figure import BLUE, INK, VERMILLION, Axis, Figure, Markers, Panel, Series
+from friso.views.identify_numbers import with_interval
 from friso.views.prefixes import listed, with_unit
 
 
@@ -27,7 +28,20 @@ def sentences(outcome: Outcome) -> list[str]:
         ],
         "and",
     )
-    return [*said, f"The dynamic friction along the way is truly {true} on average."]
+    return [*said, f"The dynamic friction along the way is truly {true} on average.", *_many(found)]
+
+
+def _many(found: ConstantSpeed) -> list[str]:
+    """What the many speeds show."""
+    both, reached = found.many.velocity.both, np.abs(found.many.velocity.velocities)
+    named = (("Coulomb friction", both.coulomb), ("viscous friction", both.viscous))
+    named += (("static friction", both.static), ("the Stribeck velocity", both.stribeck_velocity))
+    shown = [f"{words} {with_interval(each)}" for words, each in named if each.shown]
+    hidden = {each.reason: [words for words, one in named if one.reason == each.reason] for _, each in named}
+    told = [f"not shown: {listed(words, 'and')} ({reason})" for reason, words in hidden.items() if reason]
+    over = f" from {with_unit(float(reached.min()), 'm/s')} to {with_unit(float(reached.max()), 'm/s')}"
+    head = f"{len(reached)} steady passes{over if len(reached) else ''}, joint locked"
+    return [f"{head}: {'; '.join([*shown, *told])}."]
 
 
 def figures(outcome: Outcome) -> list[Figure]:
@@ -46,7 +60,28 @@ def figures(outcome: Outcome) -> list[Figure]:
     title = "Force at constant speed"
     return [
         Figure("rig_constant_speed", title, caption, panels, columns=1, subject=outcome.stage.name),
+        _over_velocity(outcome),
     ]
+
+
+def _over_velocity(outcome: Outcome) -> Figure:
+    """Friction of the many speeds against the speed, and as it truly is."""
+    many: ManySpeeds = outcome.result.many
+    speeds, order = np.abs(many.velocity.velocities), np.argsort(np.abs(many.velocity.velocities))
+    forward, forces = many.velocity.velocities > 0, np.abs(many.velocity.forces)
+    points = (
+        Markers(speeds[forward], forces[forward], "there", BLUE),
+        Markers(speeds[~forward], forces[~forward], "back", VERMILLION),
+    )
+    true = Series(speeds[order], many.true[order], "true, on average over the way", INK)
+    return Figure(
+        "rig_friction_over_velocity",
+        "Friction over velocity, joint locked",
+        "Mean commanded force of each steady pass, the force of inertia taken off. What there and back differ by is a "
+        "force that does not turn with the motion, as that of a cable.",
+        (Panel("", Axis("Speed", "m/s", log=True), Axis("Friction", "N"), (true,), markers=points),),
+        subject=outcome.stage.name,
+    )
 
 
 def _lines(each: Passes, speeds: tuple[float, ...]) -> list[Series]:
@@ -61,7 +96,21 @@ def _lines(each: Passes, speeds: tuple[float, ...]) -> list[Series]:
 def numbers(outcome: Outcome) -> dict[str, Any]:
     """As JSON."""
     found: ConstantSpeed = outcome.result
-    return {"speeds_m_per_s": [*found.speeds], "cases": {each.name: _numbers(each) for each in found.cases}}
+    return {"speeds_m_per_s": [*found.speeds], "cases": {each.name: _numbers(each) for each in found.cases}} | {
+        "many_speeds": _many_numbers(found)
+    }
+
+
+def _many_numbers(found: ConstantSpeed) -> dict[str, Any]:
+    velocity = found.many.velocity
+    both = (velocity.both.coulomb, velocity.both.viscous, velocity.both.static, velocity.both.stribeck_velocity)
+    return {
+        "velocities_m_per_s": velocity.velocities.tolist(),
+        "forces_n": velocity.forces.tolist(),
+        "true_dynamic_friction_n": found.many.true.tolist(),
+        "shown": {e.name: {"value": e.value, "low": e.low, "high": e.high, "unit": e.unit} for e in both if e.shown},
+        "not_shown": {each.name: each.reason for each in both if not each.shown},
+    }
 
 
 def _numbers(each: Passes) -> dict[str, Any]:

@@ -1,4 +1,5 @@
-"""Force at constant speed along the rail (thesis, Sec. 4.2.3, Fig. 21), and what it does not show."""
+"""Force at constant speed along the rail (thesis, Sec. 4.2.3, Fig. 21), what it does not show, and what more speeds
+do."""
 
 from __future__ import annotations
 
@@ -21,6 +22,9 @@ WAY = 5 / 3
 DURATIONS = (480.0, 120.0)
 """Periods of the crossover that the way takes: 2.5 and 10 mm/s on the thesis's rig."""
 
+MANY = tuple(float(periods) for periods in np.geomspace(480.0, 20.0, 10))
+"""The same for ten speeds, 2.5 to 60 mm/s: our choice."""
+
 STANDS, SAMPLES = 16.0, 62.5
 """Periods for which the reference stands between passes, and samples of the log per period (2 ms): our choice."""
 
@@ -38,23 +42,38 @@ class Passes:
 
 
 @dataclass(frozen=True)
+class ManySpeeds:
+    """What passes at many speeds with the joint locked show, and the dynamic friction at the magnitudes of their
+    velocities as it truly is on average over the way [N], shape (passes,)."""
+
+    log: RigLog
+    velocity: FrictionVelocity
+    true: np.ndarray
+
+
+@dataclass(frozen=True)
 class ConstantSpeed:
-    """The speeds [m/s], and the passes with the joint free and locked."""
+    """The two speeds [m/s] of the thesis, the passes at them with the joint free and locked, and those at many."""
 
     speeds: tuple[float, ...]
     cases: tuple[Passes, ...]
+    many: ManySpeeds
 
 
 def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
-    """Passes at two speeds there and back, the joint free and locked. Raises StageError for a stage without joint."""
+    """Passes at two speeds there and back, the joint free and locked, and at many with it locked. Raises StageError
+    for a stage without joint."""
     cases = []
     for number, (name, each) in enumerate((("free", freed(stage)), ("locked", locked(stage)))):
-        progress(number, 2, f"constant speed, joint {name}")
+        progress(number, 3, f"constant speed, joint {name}")
         cases.append(_passes(name, each, seed))
-    progress(2, 2, "")
-    return Outcome(
-        "constant-speed", stage, seed, tuple(each.log for each in cases), ConstantSpeed(speeds(stage), tuple(cases))
-    )
+    progress(2, 3, "many speeds, joint locked")
+    log = passes_log("many_speeds", locked(stage), seed, MANY)
+    velocity = friction_velocity(log.log, moving_mass(stage))
+    many = ManySpeeds(log, velocity, _true(log, np.abs(velocity.velocities)))
+    progress(3, 3, "")
+    logs = (*(each.log for each in cases), log)
+    return Outcome("constant-speed", stage, seed, logs, ConstantSpeed(speeds(stage), tuple(cases), many))
 
 
 def speeds(stage: Stage) -> tuple[float, ...]:
@@ -63,11 +82,11 @@ def speeds(stage: Stage) -> tuple[float, ...]:
     return tuple(WAY * (high - low) * pace(stage) / periods for periods in DURATIONS)
 
 
-def slow_passes(name: str, stage: Stage, seed: int) -> RigLog:
-    """The log of the passes at both speeds, there and back."""
+def passes_log(name: str, stage: Stage, seed: int, durations: tuple[float, ...]) -> RigLog:
+    """The log of passes there and back, which take these `durations` in periods of the crossover."""
     low, high = travel(stage)
     way, period, parts = WAY * (high - low), 1 / pace(stage), [(0.0, STANDS / pace(stage))]
-    for periods in DURATIONS:
+    for periods in durations:
         for sign in (1.0, -1.0):
             parts += [(sign * way / (periods * period), periods * period), (0.0, STANDS * period)]
     (recorded,) = run(stage, legs(low, parts), [seed], interval(stage, period / SAMPLES))
@@ -75,15 +94,15 @@ def slow_passes(name: str, stage: Stage, seed: int) -> RigLog:
 
 
 def _passes(name: str, stage: Stage, seed: int) -> Passes:
-    log, mass = slow_passes(name, stage, seed), moving_mass(stage)
+    log, mass = passes_log(name, stage, seed, DURATIONS), moving_mass(stage)
     place = friction_position(log.log, mass, pace(stage))
-    return Passes(name, log, place, friction_velocity(log.log, mass), _true(log))
+    return Passes(name, log, place, friction_velocity(log.log, mass), _true(log, np.array(speeds(stage))))
 
 
-def _true(log: RigLog) -> np.ndarray:
-    """Mean dynamic friction [N] at the speeds, over the places where the cart went."""
+def _true(log: RigLog, velocities: np.ndarray) -> np.ndarray:
+    """Mean dynamic friction [N] at velocities [m/s], over the places where the cart went."""
     flat, places = log.stage.flat(), log.true["cart_position"]
     factors = friction_factors(flat, np.linspace(places.min(), places.max(), 1000)).mean(axis=1)
     levels = zip(("friction.static", "friction.coulomb"), factors, strict=True)
     along = {key: flat[key] * factor for key, factor in levels if key in flat}
-    return steady_force({**flat, **along}, np.array(speeds(log.stage)), forward=True)
+    return steady_force({**flat, **along}, velocities, forward=True)
