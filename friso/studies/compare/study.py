@@ -252,11 +252,15 @@ def _missing(stage: Stage) -> list[str]:
 
 def _troubles(results: list[Result], count: int) -> list[str]:
     """Unstable loops and runs that failed, option by option."""
-    unstable = "linear loops are not stable; these machines are simulated and counted like the others"
     failed = "runs failed; they count either way in the intervals of probabilities and are left out of medians"
-    return [
-        f"{result.letter} {result.option.name}: {number} of {count} {what}"
-        for result in results
-        for number, what in ((result.unstable, unstable), (result.failed, failed))
-        if number
-    ]
+    found = []
+    for result in results:
+        hunting, both = result.found.hunts, result.found.hunts & ~result.loops.stable
+        unstable = (
+            "linear loops are not stable; these machines are simulated and counted like the others, and are "
+            f"{both.sum()} of the {hunting.sum()} that hunt"
+        )
+        for number, what in ((result.unstable, unstable), (result.failed, failed)):
+            if number:
+                found.append(f"{result.letter} {result.option.name}: {number} of {count} {what}")
+    return found
