@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from rig_evidence import FAILED, HUNTS, cycles, grid, loops, moves, standstill
 
+from friso.studies.rig.frf import measured_loop
 from friso.studies.thesis import Evidence, Finding
 from friso.studies.thesis.claims import registered
 from friso.studies.thesis.experiments import BUILT, GRID, MOVES, ON_RAILS, STANDSTILL, Experiments
@@ -154,6 +155,13 @@ def test_every_judge_of_the_rig_as_built_is_tried() -> None:
 
 def test_a_part_is_added_where_the_rig_was_run() -> None:
     assert on_the_rig(Evidence({}, {}), measured_locked) == ()
+
+
+def test_a_loop_that_was_not_stable_crosses_nowhere() -> None:
+    nothing = SimpleNamespace(failure="after 0.4 s: the sampled loop is unstable")
+    made = loops()
+    unstable = replace(made, locked=(made.locked[0], measured_loop(cast(Any, nothing), 48.0)))
+    assert judged("locked", unstable).pattern == (False, False)
 
 
 def test_settings_beyond_one_that_is_not_stable_do_not_count() -> None:

@@ -35,11 +35,12 @@ COLOURS = (BLUE, SKY, GREEN, ORANGE, VERMILLION, PINK)
 def sentences(outcome: Outcome) -> list[str]:
     """What was found."""
     found: Frf = outcome.result
-    last = found.loops[-1]
+    measured = [each for each in found.loops if each.measured]
+    last = measured[-1]
     others = [each.value for each in last.crossings if each.value > 2 * last.tuned]
-    tuned = listed(
-        [f"{with_unit(each.tuned, 'Hz')} at {with_unit(nearest(each), 'Hz')}" for each in found.loops], "and"
-    )
+    tuned = listed([f"{with_unit(each.tuned, 'Hz')} at {with_unit(nearest(each), 'Hz')}" for each in measured], "and")
+    lost = [f"{each.tuned:.3g} Hz" for each in found.loops if not each.measured]
+    unstable = f" Tuned to {listed(lost, 'and')} the closed loop is not stable." if lost else ""
     above = f"and once more at {with_unit(max(others), 'Hz')}" if others else "and nowhere above"
     return [
         f"Joint locked: the mass line shows {_mass(found.locked.mass)} from {with_unit(found.locked.band[0], 'Hz')} to "
@@ -50,7 +51,7 @@ def sentences(outcome: Outcome) -> list[str]:
         f"{found.apparent[1, 1]:.3g} kg; one that gives {RATIOS[2]:g} times the force makes them "
         f"{found.apparent[0, 2]:.3g} and {found.apparent[1, 2]:.3g} kg: what looks heavier is a motor weaker than "
         "believed.",
-        f"Locked, the open loops cross 0 dB tuned to {tuned}, {above} at the highest setting.",
+        f"Locked, the open loops cross 0 dB tuned to {tuned}, {above} at the highest of these settings.{unstable}",
         f"Free, the loop tuned to {with_unit(found.free_loop.tuned, 'Hz')} crosses at "
         f"{with_unit(found.free_loop.crossings[-1].value if found.free_loop.crossings else None, 'Hz')}; the highest "
         f"stable setting is {with_unit(found.highest_stable, 'Hz')}"
@@ -112,17 +113,16 @@ def _turned(response: Array, average: Array) -> Array:
 
 def _loops(name: str, title: str, loops: tuple[Loop, ...], subject: str) -> Figure:
     """Open loops, magnitude over phase."""
-    colours = COLOURS[: len(loops)]
-    named = list(zip(loops, colours, strict=True))
+    named = [(each, colour) for each, colour in zip(loops, COLOURS, strict=False) if each.measured]
     gains = tuple(
         Series(each.response.frequency, np.abs(each.response.response), f"tuned to {each.tuned:.3g} Hz", colour)
         for each, colour in named
     )
-    turned = phases([each.response.response for each in loops])
+    turned = phases([each.response.response for each, _ in named])
     angles = tuple(
         Series(each.response.frequency, angle, "", colour) for (each, colour), angle in zip(named, turned, strict=True)
     )
-    hertz = loops[0].response.frequency
+    hertz = named[0][0].response.frequency
     panels = (
         Panel(
             "open loop",
@@ -138,6 +138,8 @@ def _loops(name: str, title: str, loops: tuple[Loop, ...], subject: str) -> Figu
 
 
 def _crossings(loop: Loop) -> str:
+    if not loop.measured:
+        return "not stable"
     return ", ".join(f"{each.value:.3g} ({each.low:.3g} to {each.high:.3g})" for each in loop.crossings) or "nowhere"
 
 

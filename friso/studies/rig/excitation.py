@@ -11,6 +11,7 @@ import numpy as np
 from friso.identify.response.periodic import multisine
 from friso.identify.response.records import Record, from_log
 from friso.identify.response.response import Channels, FrequencyResponse
+from friso.quantities import StageError
 from friso.rig.run import Recorded, as_built_keys, run
 from friso.rig.task import standing
 from friso.stage import Stage
@@ -56,7 +57,11 @@ def sines(count: int, lines: np.ndarray, seed: int) -> np.ndarray:
 
 
 def plant(logs: Sequence[RigLog]) -> FrequencyResponse:
-    """From the commanded force to the position, of realisations: the indirect estimate."""
+    """From the commanded force to the position, of realisations: the indirect estimate. Raises StageError for a loop
+    that was not stable."""
+    for log in logs:
+        if log.failure:
+            raise StageError("controller", f"a loop that stopped {log.failure}", "a stable one", 'crossover = "8 Hz"')
     return multisine([from_log(each.log, "force", "position", "disturbance")[0] for each in logs])
 
 

@@ -53,11 +53,16 @@ class Plant:
 
 @dataclass(frozen=True)
 class Loop:
-    """An open loop at a tuned crossover [Hz], and where it truly crosses 0 dB [Hz]."""
+    """An open loop at a tuned crossover [Hz], and where it truly crosses 0 dB [Hz]. Without lines where the closed one
+    was not stable."""
 
     tuned: float
     response: FrequencyResponse
     crossings: tuple[Estimate, ...]
+
+    @property
+    def measured(self) -> bool:
+        return len(self.response.frequency) > 0
 
 
 @dataclass(frozen=True)
@@ -146,7 +151,10 @@ def _controllers(stage: Stage, factors: Any) -> dict[str, Any]:
 
 
 def measured_loop(log: RigLog, tuned: float) -> Loop:
-    """The open loop of a log of one excitation, tuned to a crossover [Hz]."""
+    """The open loop of a log of one excitation, tuned to a crossover [Hz]; of one that was not stable, no lines."""
+    if log.failure:
+        none = np.zeros(0)
+        return Loop(tuned, FrequencyResponse(none, none + 0j, none, none, none, none, "multisine"), ())
     response = loop(log)
     return Loop(tuned, response, crossovers(response))
 

@@ -58,7 +58,9 @@ def _further(found: RigLoops) -> Part:
 
 
 def _peak(loop: Loop, low: float) -> tuple[float, float]:
-    """Frequency [Hz] and magnitude of the open loop's largest value above a frequency [Hz]."""
+    """Frequency [Hz] and magnitude of the open loop's largest value above a frequency [Hz]; NaN of one not measured."""
+    if not loop.measured:
+        return np.nan, np.nan
     size = np.abs(loop.response.response) * (loop.response.frequency > low)
     return float(loop.response.frequency[size.argmax()]), float(size.max())
 
