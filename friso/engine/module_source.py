@@ -26,14 +26,13 @@ from math import sqrt
 
 import numpy as np
 from numba import njit
-from numpy import uint64 as U
 
 from friso.engine.arrays import Status
 from friso.engine.roots import crossing, cubic, first_guess
 from friso.engine.shared_queue import take_next
-from friso.engine.simd_math import align_stack, exp, gaussian, power, quantised, select, tanh
+from friso.engine.simd_math import exp, gaussian, power, quantised, tanh
+from friso.engine.vector_code import OPTIONS, in_lanes
 
-OPTIONS = {{"nogil": True, "error_model": "numpy", "fastmath": {{"contract", "nsz", "arcp"}}}}
 DONE, BUDGET = int(Status.DONE), int(Status.BUDGET)
 UNDERFLOW, DIVERGED = int(Status.UNDERFLOW), int(Status.DIVERGED)
 '''
@@ -42,8 +41,7 @@ UNDERFLOW, DIVERGED = int(Status.UNDERFLOW), int(Status.DIVERGED)
 def write_module(model: Model, tableau: Tableau, title: str, lanes: int = LANES) -> str:
     """The source of the module for `model`, stepping by the method of `tableau`."""
     writer = StepWriter(model, tableau)
-    compiled = "@njit(**OPTIONS)\n"
-    kernels = [compiled + each for each in (writer.source(), writer.locate_source(), writer.update_source())]
+    kernels = (writer.source(), writer.locate_source(), writer.update_source())
     parts = [_HEAD.format(title=title, method=tableau.name), _numbers(model, writer, lanes)]
     parts += [_numpy_functions(model, writer), *kernels, _driver()]
     return "\n\n".join(parts)

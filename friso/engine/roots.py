@@ -1,15 +1,11 @@
-"""The first zero of a kink's surface inside a step, from its values at both ends and at the thirds."""
+"""The first zero of a kink's surface inside a step, from its values at both ends and at the thirds; straight-line code
+(`friso.engine.vector_code`)."""
 
 from __future__ import annotations
 
 from math import sqrt
 
-from numba import njit
 
-from friso.engine.simd_math import OPTIONS
-
-
-@njit(**OPTIONS)
 def cubic(p0, p1, p2, p3, theta):
     """The cubic through p0 at 0, p1 at 1/3, p2 at 2/3 and p3 at 1, at theta."""
     c1 = -5.5 * p0 + 9.0 * p1 - 4.5 * p2 + p3
@@ -18,7 +14,6 @@ def cubic(p0, p1, p2, p3, theta):
     return p0 + theta * (c1 + theta * (c2 + theta * c3))
 
 
-@njit(**OPTIONS)
 def bracket(p0, p1, p2, p3):
     """Where the cubic first is below zero: the ends of an interval with its first zero, and the cubic there.
 
@@ -39,7 +34,6 @@ def bracket(p0, p1, p2, p3):
     return low, high, above, below
 
 
-@njit(**OPTIONS)
 def first_guess(p0, p1, p2, p3):
     """About where the cubic first falls below zero from p0 > 0, by a secant; 2 where it does not."""
     low, high, above, below = bracket(p0, p1, p2, p3)
@@ -47,7 +41,6 @@ def first_guess(p0, p1, p2, p3):
     return guess if high < 2.0 else 2.0
 
 
-@njit(**OPTIONS)
 def crossing(p0, p1, p2, p3, guess):
     """Where the cubic first falls below zero, from `first_guess`.
 

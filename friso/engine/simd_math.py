@@ -1,20 +1,15 @@
-"""exp, log, tanh and powers that the compiler can vectorise: no library call, no branch, no table.
+"""exp, log, tanh, powers and random numbers in straight-line code (`friso.engine.vector_code`): no library call, no
+branch, no table.
 
-A call into a mathematics library stops the vectoriser, so these take the exponent apart by the bits of the number.
-Relative errors are below 1e-15 over the ranges stated; tested against NumPy.
+Mathematics libraries work on one number at a time, so these take the exponent apart by the bits of the number. Relative
+errors are below 1e-15 over the ranges stated; tested against NumPy.
 """
 
 from __future__ import annotations
 
 from math import sqrt
-from typing import Any
 
 import numpy as np
-from llvmlite import ir
-from numba import njit, types
-from numba.extending import intrinsic, lower_builtin, type_callable
-
-OPTIONS: dict[str, Any] = {"inline": "always", "error_model": "numpy", "fastmath": {"contract", "nsz"}}
 
 _ROUNDER = 6755399441055744.0  # 1.5 * 2^52: adding it leaves a whole number in the low bits
 _LOG2_E = 1.4426950408889634
@@ -24,56 +19,16 @@ _TWO52 = 4503599627370496.0
 _TWO52_BITS = 4841369599423283200
 
 
-def _as_bits(typingctx: Any, value: Any) -> Any:
-    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        return builder.bitcast(args[0], ir.IntType(64))
-
-    return types.int64(types.float64), codegen
+def bits_of(x):
+    """The bits of a number as a whole number."""
+    return np.float64(x).view(np.int64)
 
 
-def _as_number(typingctx: Any, bits: Any) -> Any:
-    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        return builder.bitcast(args[0], ir.DoubleType())
-
-    return types.float64(types.int64), codegen
+def number_of(bits):
+    """The number with these bits."""
+    return np.int64(bits).view(np.float64)
 
 
-def _aligned_stack(typingctx: Any) -> Any:
-    def codegen(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        builder.function.attributes.add("noinline")  # the attribute would be lost by inlining
-        builder.function.attributes.alignstack = 64
-        return context.get_dummy_value()
-
-    return types.void(), codegen
-
-
-align_stack: Any = intrinsic(_aligned_stack)
-"""Called in a kernel, aligns its stack to 64 bytes: registers that the compiler puts aside there would otherwise
-straddle two cache lines, at twice the time."""
-
-
-def select(condition, chosen, otherwise):
-    """One of two numbers, or of two truths, both of which are known: a choice without a branch."""
-    return chosen if condition else otherwise
-
-
-@type_callable(select)
-def _type_of_select(context: Any) -> Any:
-    return lambda condition, chosen, otherwise: context.unify_types(chosen, otherwise)
-
-
-@lower_builtin(select, types.Any, types.Any, types.Any)
-def _lower_select(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-    condition, *given = signature.args
-    both = (context.cast(builder, arg, kind, signature.return_type) for arg, kind in zip(args[1:], given, strict=True))
-    return builder.select(context.is_true(builder, condition, args[0]), *both)
-
-
-_bits: Any = intrinsic(_as_bits)
-_number: Any = intrinsic(_as_number)
-
-
-@njit(**OPTIONS)
 def exp(x):
     """e^x for any x; below -300 as at -300 (1e-130: products with it stay normal numbers), above 700 as at 700."""
     x = min(max(x, -300.0), 700.0)
@@ -87,16 +42,15 @@ def exp(x):
     p2 = (1.0 / 40320 + r * (1.0 / 362880)) + r2 * (1.0 / 3628800 + r * (1.0 / 39916800))
     p3 = 1.0 / 479001600 + r * (1.0 / 6227020800)
     p = p0 + r4 * (p1 + r4 * (p2 + r4 * p3))
-    return p * _number((_bits(shifted) + np.int64(1023)) << np.int64(52))
+    return p * number_of((bits_of(shifted) + np.int64(1023)) << np.int64(52))
 
 
-@njit(**OPTIONS)
 def log(x):
     """Natural logarithm of a positive, normal x."""
-    bits = _bits(x)
+    bits = bits_of(x)
     exponent_bits = (bits - np.int64(_THREE_QUARTERS)) >> np.int64(52)  # rounds so that 0.75 <= m < 1.5
-    m = _number(bits - (exponent_bits << np.int64(52)))
-    exponent = _number((exponent_bits + np.int64(2048)) | np.int64(_TWO52_BITS)) - (_TWO52 + 2048.0)
+    m = number_of(bits - (exponent_bits << np.int64(52)))
+    exponent = number_of((exponent_bits + np.int64(2048)) | np.int64(_TWO52_BITS)) - (_TWO52 + 2048.0)
     s = (m - 1.0) / (m + 1.0)
     q = s * s
     p = 1.0 / 15 + q * (1.0 / 17 + q * (1.0 / 19 + q * (1.0 / 21 + q * (1.0 / 23 + q * (1.0 / 25)))))
@@ -104,26 +58,22 @@ def log(x):
     return exponent * _LN2_HIGH + (exponent * _LN2_LOW + 2.0 * (s + s * q * p))
 
 
-@njit(**OPTIONS)
 def power(base, exponent):
     """base^exponent for a positive, normal base."""
     return exp(exponent * log(base))
 
 
-@njit(**OPTIONS)
 def tanh(x):
     """Hyperbolic tangent; absolute error below 1e-15."""
     return 1.0 - 2.0 / (exp(2.0 * x) + 1.0)
 
 
-@njit(**OPTIONS)
 def quantised(x, digit):
     """x in whole digits, below 2^51 of them; as it is where the digit is 0."""
     rounded = digit * ((x / digit + _ROUNDER) - _ROUNDER)
     return rounded if digit > 0.0 else x
 
 
-@njit(**OPTIONS)
 def mixed(z):
     """The bits of z well mixed: SplitMix64 (Steele, Lea, Flood 2014, doi:10.1145/2660193.2660195)."""
     z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
@@ -131,24 +81,21 @@ def mixed(z):
     return z ^ (z >> np.uint64(31))
 
 
-@njit(**OPTIONS)
 def uniform(bits):
     """A number evenly spread over the open interval from 0 to 1, from 40 bits at the top, and a half of the last."""
-    number = _number(np.int64((bits >> np.uint64(12)) | np.uint64(0x3FF0000000000000)))
+    number = number_of(np.int64((bits >> np.uint64(12)) | np.uint64(0x3FF0000000000000)))
     return (number - 1.0) + 4.547473508864641e-13
 
 
-@njit(**OPTIONS)
 def gaussian(seed, tick):
     """A normal deviate for a seed and a tick, whole numbers below 2^51, by Box and Muller (1958,
     doi:10.1214/aoms/1177706645): the same on any thread, in any order; up to 7.5 in size."""
-    key = mixed(np.uint64(_bits(seed + _TWO52)) * np.uint64(0x9E3779B97F4A7C15))
-    bits = mixed(key + np.uint64(_bits(tick + _TWO52)) * np.uint64(0x9E3779B97F4A7C15))
+    key = mixed(np.uint64(bits_of(seed + _TWO52)) * np.uint64(0x9E3779B97F4A7C15))
+    bits = mixed(key + np.uint64(bits_of(tick + _TWO52)) * np.uint64(0x9E3779B97F4A7C15))
     radius = sqrt(-2.0 * log(uniform(bits & np.uint64(0xFFFFFFFFFF000000))))
     return radius * quarter_sine(abs(uniform(bits << np.uint64(40)) - 0.5) - 0.25)
 
 
-@njit(**OPTIONS)
 def quarter_sine(turn):
     """sin(2 pi turn) for up to a quarter of a turn to either side; absolute error below 1e-11."""
     x = 6.283185307179586 * turn

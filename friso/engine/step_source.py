@@ -7,7 +7,6 @@ smooth; where a kink is crossed the step is accepted up to the crossing alone, w
 
 from __future__ import annotations
 
-import ast
 from collections.abc import Iterable, Mapping
 from typing import Any
 
@@ -165,7 +164,7 @@ class StepWriter:
             *self._seen(),
             *self._store(),
         ]
-        return _over_lanes("step(B, rtol, inner, outer, budget)", body)
+        return _over_lanes("step", ", rtol, inner, outer, budget", body)
 
     @property
     def walked(self) -> list[int]:
@@ -177,11 +176,12 @@ class StepWriter:
         """The function `locate(B)`: in which lanes that have `ticked` a cell of a table has been `left`, and whose
         sample is to be `noted`."""
         if not self.model.clock:
-            return "def locate(B):\n    pass\n"
+            return _over_lanes("locate", "", ["pass"])
         lines = [*self._clock.code("", self._in_buffer()), *self._offsets(), f"ticked = {self._row('ticked')} > 0.0"]
         outside = (f"(off{w} < 0.0) | (off{w} > 1.0)" for w in range(len(self._walks)))
         return _over_lanes(
-            "locate(B)",
+            "locate",
+            "",
             [
                 *lines,
                 f"{self._row('left')} = 1.0 if ticked & ({' | '.join(outside)}) else 0.0",
@@ -219,7 +219,7 @@ class StepWriter:
         if clock:
             due = self._row("due")
             lines.append(f"{due} = ((tick + 1.0) * period_ + late_) - {self._row('start')} if ticked > 0.0 else {due}")
-        return _over_lanes("update(B)", [*lines, f"{self._row('ticked')} = 0.0"])
+        return _over_lanes("update", "", [*lines, f"{self._row('ticked')} = 0.0"])
 
     def _piece_of_sample(self) -> list[str]:
         """The piece of the reference in which the sample was taken: the one before, where a corner came in between."""
@@ -241,7 +241,7 @@ class StepWriter:
         return names.__getitem__
 
     def _row(self, block: str, i: int = 0) -> str:
-        return f"B[l + U({self.layout.blocks[block] + i} * LANES)]"
+        return f"B[{self.layout.blocks[block] + i}]"
 
     def _load(self) -> list[str]:
         named = {
@@ -485,45 +485,16 @@ class StepWriter:
         return lines
 
 
-def _over_lanes(call: str, lines: list[str]) -> str:
-    """A function that does the same in every lane."""
-    head = f"def {call}:\n    align_stack()\n    for l in range(U(LANES)):\n"
-    return head + "".join(f"        {line}\n" for line in _assigned_once(lines))
+def _over_lanes(name: str, numbers: str, lines: list[str]) -> str:
+    """A function `NAME(B, ...)` that does the same in every lane as `NAME_of_lane(B, ...)` on a column of its own."""
+    body = "".join(f"    {line}\n" for line in lines)
+    return f"""def {name}_of_lane(B{numbers}):
+{body}
+
+{name}_in_lanes = in_lanes({name}_of_lane, LANES)
 
 
-def _assigned_once(lines: list[str]) -> list[str]:
-    """Straight-line code in which what is assigned anew gets a new name, and each choice is a `select`: names assigned
-    twice, and branches, take Numba a third of its time, and branches may stop the vectoriser."""
-    versions = _Versions()
-    return [ast.unparse(versions.visit(ast.parse(line))) for line in lines]
-
-
-class _Versions(ast.NodeTransformer):
-    """Names become those of their last assignment; conditional expressions, `and` and `or` calls of `select`."""
-
-    def __init__(self) -> None:
-        self.times: dict[str, int] = {}
-
-    def visit_Assign(self, node: ast.Assign) -> ast.Assign:
-        value = self.visit(node.value)
-        return ast.Assign([self.visit(target) for target in node.targets], value, lineno=node.lineno)
-
-    def visit_Name(self, node: ast.Name) -> ast.Name:
-        if isinstance(node.ctx, ast.Store):
-            self.times[node.id] = self.times.get(node.id, 0) + 1
-        times = self.times.get(node.id, 0)
-        return ast.Name(f"{node.id}_v{times}" if times > 1 else node.id, node.ctx)
-
-    def visit_IfExp(self, node: ast.IfExp) -> ast.Call:
-        return _select(*(self.visit(each) for each in (node.test, node.body, node.orelse)))
-
-    def visit_BoolOp(self, node: ast.BoolOp) -> ast.expr:
-        first, *others = (self.visit(each) for each in node.values)
-        for other in others:
-            both = isinstance(node.op, ast.And)
-            first = _select(first, other, ast.Constant(False)) if both else _select(first, ast.Constant(True), other)
-        return first
-
-
-def _select(*parts: ast.expr) -> ast.Call:
-    return ast.Call(ast.Name("select", ast.Load()), list(parts), [])
+@njit(**OPTIONS)
+def {name}(B, *numbers):
+    {name}_in_lanes(B, numbers)
+"""

@@ -1,0 +1,70 @@
+"""Straight-line code: what it computes in all lanes, compiled, is what plain Python does lane by lane."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from compiled import in_all
+
+
+def arithmetic(B, share, least):
+    x, y = B[0], B[1]
+    for power in range(1, 4):
+        x = x + share * y / power
+    high, low = max(x, least), min(x, -y)
+    B[2] = high * low - 1.0
+    B[3] = abs(-x)
+
+
+def choices(B, share, least):
+    above, flag = B[0] > least, False
+    flag = flag | (above & (B[1] <= share))
+    B[2] = 1.0 if flag else (2.0 if not above else -share)
+    B[3] = B[0] if B[1] and (above or B[0] < 0.0) else 3
+
+
+def of_several(B, share, least):
+    """What follows may use what another function returns."""
+    B[2], B[3] = parted(B[0], least)
+
+
+def parted(x, at):
+    beyond = x - at
+    return beyond, 0.5 * beyond
+
+
+CODE = [arithmetic, choices, of_several]
+
+
+@pytest.mark.parametrize("lanes", [1, 2, 8, 12])
+@pytest.mark.parametrize("function", CODE)
+def test_all_lanes_do_what_plain_python_does_in_one(function: Callable[..., None], lanes: int) -> None:
+    rng = np.random.default_rng(lanes)
+    rows = rng.normal(size=(4, lanes))
+    rows[1, ::3] = 0.0
+    plain = rows.copy()
+    for column in plain.T:
+        function(column, 0.3, -0.2)
+    assert in_all(function, rows, 0.3, -0.2, lanes=lanes) == pytest.approx(plain, rel=1e-14, abs=1e-15)
+
+
+def branched(B):
+    if B[0] > 0.0:
+        B[1] = 1.0
+
+
+def looped(B):
+    x = B[0]
+    while x > 1.0:
+        x = 0.5 * x
+    B[1] = x
+
+
+def called_outside(B):
+    B[1] = np.sin(B[0])
+
+
+@pytest.mark.parametrize("function", [branched, looped, called_outside])
+def test_what_the_language_does_not_have_is_refused(function: Callable[..., None]) -> None:
+    with pytest.raises(Exception, match="not in the language of straight-line code"):
+        in_all(function, np.zeros((2, 8)))
