@@ -1,7 +1,7 @@
 """The loop from rig to stage file: `python -m benchmarks.rig_loop [--machines 100] [--first 0]`.
 
 Machines drawn at random with their drives as built (tests/rig_machines.py) go through the experiments of `friso rig`:
-frequency responses with the joint locked and free, steps, slow motion, and constant speed with the joint locked. Their
+frequency responses with the joint locked and free, steps, slow motion, and many speeds with the joint locked. Their
 logs are written as text, read back as `friso identify` does, and identified with what an owner knows as `--stage`. The
 locked response, steps, slow motion and constant speed make one stage file; the free response is identified by itself,
 since one bench at a time can be.
@@ -29,8 +29,8 @@ from friso.identify.method import Identification, identify
 from friso.quantities import StageError
 from friso.stage import Stage, load
 from friso.stage.files import save
-from friso.studies.rig.constant_speed import MANY, passes_log
 from friso.studies.rig.frf import plant_log
+from friso.studies.rig.many_speeds import many_speeds_logs
 from friso.studies.rig.outcome import RigLog
 from friso.studies.rig.sizes import freed, locked, travel
 from friso.studies.rig.stiction import slow_motion
@@ -61,8 +61,8 @@ def benches(machine: Machine, seed: int) -> list[list[RigLog]]:
         return [plant_log(each, f"{name}_{n + 1}", place, noise + n) for n, place in enumerate(places)]
 
     slow = slow_motion(stage, noise, RAILS)
-    passes = passes_log("passes", locked(stage), noise, MANY)
-    return [[*shaken(locked(stage), "locked"), steps(stage, noise), *slow, passes], shaken(freed(stage), "free")]
+    passes = many_speeds_logs(locked(stage), noise)
+    return [[*shaken(locked(stage), "locked"), steps(stage, noise), *slow, *passes], shaken(freed(stage), "free")]
 
 
 def found_in(logs: list[RigLog], machine: Machine) -> tuple[Identification, Stage]:

@@ -4,13 +4,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from rig_machines import mean_level
 
 import friso
 from friso.identify.experiments import static_from_stick_slip
 from friso.quantities import StageError
 from friso.stage import Stage
-from friso.studies.rig import constant_speed, excitation, frf, sizes, stiction, stiffness
+from friso.studies.rig import constant_speed, excitation, frf, many_speeds, sizes, stiction, stiffness
 from friso.studies.rig.outcome import rig_log, silent
 
 PLACE = 0.02
@@ -24,7 +23,8 @@ def built() -> Stage:
 
 def test_sizes_on_the_thesis_rig_are_the_thesis_s(built: Stage) -> None:
     low, high = sizes.travel(built)
-    assert constant_speed.WAY * (high - low) == pytest.approx(0.15)
+    assert high - low == pytest.approx(0.09)
+    assert sizes.longest_way(built) == pytest.approx(0.15)
     assert constant_speed.speeds(built) == pytest.approx((2.5e-3, 10e-3))
     assert sizes.freed(built).flat()["joint.stroke"] == pytest.approx(8e-3)
     assert np.array(frf.SETTINGS) * sizes.pace(built) == pytest.approx([8, 12, 16, 24, 32, 48])
@@ -58,17 +58,18 @@ def test_slips_lie_within_the_static_friction_of_their_rail(built: Stage) -> Non
 def test_uneven_friction_at_constant_speed_is_not_read_as_coulomb_friction(
     built: Stage, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(constant_speed, "WAY", 1 / 6)
+    """Faster passes with a faster controller show it, and the whole curve, though friction varies along the way."""
+    monkeypatch.setattr(sizes, "WAY", 1 / 6)
     monkeypatch.setattr(constant_speed, "DURATIONS", (48.0, 12.0))
-    monkeypatch.setattr(constant_speed, "MANY", tuple(np.geomspace(36.0, 4.5, 6)))
+    monkeypatch.setattr(many_speeds, "PLACES", 1)
     found = constant_speed.run_experiment(built, 1, silent).result
-    free, many = found.cases[0], found.many
+    free, (place,) = found.cases[0], found.many.places
     assert not free.place.separated
     assert not free.velocity.both.coulomb.shown
-    coulomb = many.velocity.both.coulomb  # shown by faster passes, though friction varies along the way
-    assert coulomb.shown
-    assert coulomb.holds(mean_level([many.log], "friction.coulomb"))
-    assert coulomb.half_width < 0.5 * coulomb.value
+    assert place.velocity.both.coulomb.shown
+    steady = place.velocity.velocities > 0
+    assert np.count_nonzero(steady) > 6
+    assert place.velocity.forces[steady] == pytest.approx(place.true[steady], rel=0.1)
 
 
 @pytest.mark.parametrize(("locked", "mass", "weak_mass"), [(True, 1.7, 2.5), (False, 0.5, 0.75)])

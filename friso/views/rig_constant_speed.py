@@ -6,9 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from friso.studies.rig.constant_speed import ConstantSpeed, ManySpeeds, Passes
+from friso.studies.rig.constant_speed import ConstantSpeed, Passes
+from friso.studies.rig.many_speeds import ManySpeeds, Place
 from friso.studies.rig.outcome import Outcome
-from friso.views.figure import BLUE, INK, VERMILLION, Axis, Figure, Markers, Panel, Series
+from friso.views.figure import BLUE, GREEN, VERMILLION, Axis, Figure, Markers, Panel, Series
 from friso.views.identify_numbers import with_interval
 from friso.views.prefixes import listed, with_unit
 
@@ -32,16 +33,23 @@ def sentences(outcome: Outcome) -> list[str]:
 
 
 def _many(found: ConstantSpeed) -> list[str]:
-    """What the many speeds show."""
-    both, reached = found.many.velocity.both, np.abs(found.many.velocity.velocities)
+    """What the many speeds show, at each place."""
+    crossover = with_unit(found.many.crossover, "Hz")
+    head = f"At many speeds, joint locked, with the crossover at {crossover}:"
+    return [head, *(_place(number, each) for number, each in enumerate(found.many.places, start=1))]
+
+
+def _place(number: int, place: Place) -> str:
+    both, reached = place.velocity.both, np.abs(place.velocity.velocities)
     named = (("Coulomb friction", both.coulomb), ("viscous friction", both.viscous))
     named += (("static friction", both.static), ("the Stribeck velocity", both.stribeck_velocity))
     shown = [f"{words} {with_interval(each)}" for words, each in named if each.shown]
     hidden = {each.reason: [words for words, one in named if one.reason == each.reason] for _, each in named}
     told = [f"not shown: {listed(words, 'and')} ({reason})" for reason, words in hidden.items() if reason]
     over = f" from {with_unit(float(reached.min()), 'm/s')} to {with_unit(float(reached.max()), 'm/s')}"
-    head = f"{len(reached)} steady passes{over if len(reached) else ''}, joint locked"
-    return [f"{head}: {'; '.join([*shown, *told])}."]
+    head = f"Place {number}, {len(reached)} steady passes{over if len(reached) else ''}"
+    stopped = [f"the log stopped {place.log.failure}"] if place.log.failure else []
+    return f"{head}: {'; '.join([*stopped, *shown, *told])}."
 
 
 def figures(outcome: Outcome) -> list[Figure]:
@@ -65,21 +73,21 @@ def figures(outcome: Outcome) -> list[Figure]:
 
 
 def _over_velocity(outcome: Outcome) -> Figure:
-    """Friction of the many speeds against the speed, and as it truly is."""
+    """Friction of the many speeds against the speed, and as it truly is, for each place."""
     many: ManySpeeds = outcome.result.many
-    speeds, order = np.abs(many.velocity.velocities), np.argsort(np.abs(many.velocity.velocities))
-    forward, forces = many.velocity.velocities > 0, np.abs(many.velocity.forces)
-    points = (
-        Markers(speeds[forward], forces[forward], "there", BLUE),
-        Markers(speeds[~forward], forces[~forward], "back", VERMILLION),
-    )
-    true = Series(speeds[order], many.true[order], "true, on average over the way", INK)
+    lines, points = [], []
+    for number, (place, colour) in enumerate(zip(many.places, (BLUE, VERMILLION, GREEN), strict=True), start=1):
+        speeds, forces = np.abs(place.velocity.velocities), np.abs(place.velocity.forces)
+        order = np.argsort(speeds)
+        lines.append(Series(speeds[order], place.true[order], f"true, place {number}", colour))
+        points.append(Markers(speeds, forces, f"place {number}", colour))
     return Figure(
         "rig_friction_over_velocity",
         "Friction over velocity, joint locked",
-        "Mean commanded force of each steady pass, the force of inertia taken off. What there and back differ by is a "
-        "force that does not turn with the motion, as that of a cable.",
-        (Panel("", Axis("Speed", "m/s", log=True), Axis("Friction", "N"), (true,), markers=points),),
+        f"Crossover {with_unit(many.crossover, 'Hz')}. Mean commanded force of each steady pass, there and back, the "
+        "force of inertia taken off; the lines are the true friction on average over the stretch that all passes "
+        "share. Speeds without a mark: the stage sticks, slips or hunts there.",
+        (Panel("", Axis("Speed", "m/s", log=True), Axis("Friction", "N"), tuple(lines), markers=tuple(points)),),
         subject=outcome.stage.name,
     )
 
@@ -102,12 +110,16 @@ def numbers(outcome: Outcome) -> dict[str, Any]:
 
 
 def _many_numbers(found: ConstantSpeed) -> dict[str, Any]:
-    velocity = found.many.velocity
+    return {"crossover_hz": found.many.crossover, "places": [_place_numbers(each) for each in found.many.places]}
+
+
+def _place_numbers(place: Place) -> dict[str, Any]:
+    velocity = place.velocity
     both = (velocity.both.coulomb, velocity.both.viscous, velocity.both.static, velocity.both.stribeck_velocity)
     return {
         "velocities_m_per_s": velocity.velocities.tolist(),
         "forces_n": velocity.forces.tolist(),
-        "true_dynamic_friction_n": found.many.true.tolist(),
+        "true_dynamic_friction_n": place.true.tolist(),
         "shown": {e.name: {"value": e.value, "low": e.low, "high": e.high, "unit": e.unit} for e in both if e.shown},
         "not_shown": {each.name: each.reason for each in both if not each.shown},
     }

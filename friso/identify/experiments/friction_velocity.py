@@ -11,7 +11,7 @@ from scipy.stats import f as fisher
 
 from friso.identify.estimate import Estimate
 from friso.identify.experiments.common import Mean, by_t, t_value, ways
-from friso.identify.experiments.passes import CUTOFF, Pass, passes
+from friso.identify.experiments.passes import CUTOFF, Pass, on_common_way, passes
 from friso.identify.logs.log import Log
 from friso.intervals import COVERAGE
 
@@ -23,6 +23,9 @@ SPEEDS, DISTINCT = 5, 1.1
 
 STRAIGHT = 3
 """Speeds, each so many times the last, from which it shows whether friction is a straight line over them."""
+
+ROUNDING = 1e-9
+"""Of the greatest force: no mean is known better."""
 
 SURE = 0.01
 """Probability by chance below which a Stribeck curve is taken for shown."""
@@ -60,11 +63,12 @@ class FrictionVelocity:
 
 
 def friction_velocity(log: Log, mass: float = 0.0, cutoff: float = CUTOFF) -> FrictionVelocity:
-    """Friction-velocity map from the stretches of constant velocity, `mass` [kg] times what is left of acceleration
-    taken off. What the speeds present cannot show is unknown, with the reason. Raises StageError for missing channels.
+    """Friction-velocity map from the stretches of constant velocity, on the way that all of them share if they share
+    one, `mass` [kg] times what is left of acceleration taken off. What the speeds present cannot show is unknown, with
+    the reason. Raises StageError for missing channels.
     """
     every = passes(log, cutoff)
-    used = [each for each in every if each.steady]
+    used = on_common_way(log, [each for each in every if each.steady], cutoff)
     velocities, forces, errors = np.array([_row(each, mass) for each in used]).reshape(-1, 3).T
     unsteady = np.array([each.velocity for each in every if not each.steady])
     sides = {
@@ -101,26 +105,35 @@ def _together(velocities: np.ndarray, forces: np.ndarray, errors: np.ndarray) ->
     return bias, _direction(np.abs(velocities), sign * (forces - solution[-1]), errors, "both directions", 1)
 
 
-def _linear(design: np.ndarray, forces: np.ndarray, errors: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
-    """Least squares with Coulomb friction in the first column: solution, covariance, degrees of freedom.
+def _deviations(forces: np.ndarray, errors: np.ndarray) -> np.ndarray:
+    """Standard deviation [N] of each stretch by its half-width in `errors` [N], but no less than the median: one where
+    the velocity swings counts less, one that happens to be even does not count for more than the others."""
+    least = max(float(np.median(errors)), ROUNDING * float(np.abs(forces).max()))
+    return np.maximum(errors, least) / COVERAGE
 
-    The variance of each stretch is that of the scatter, but no less than its half-width in `errors` [N] says. Friction
-    varies from place to place, and all stretches lie on the same way: what one of them tells of Coulomb friction is not
-    averaged out over the others.
+
+def _linear(design: np.ndarray, forces: np.ndarray, errors: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
+    """Weighted least squares with Coulomb friction in the first column: solution, covariance, degrees of freedom.
+
+    Friction varies from place to place, and all stretches lie on the same way: what one of them tells of Coulomb
+    friction is not averaged out over the others.
     """
-    inverse = np.linalg.pinv(design)
+    deviations = _deviations(forces, errors)
+    inverse = np.linalg.pinv(design / deviations[:, None]) / deviations
     solution = inverse @ forces
     freedom = len(forces) - design.shape[1]
-    spread = float(np.sum((forces - design @ solution) ** 2)) / max(freedom, 1)
-    return solution, _covariance(inverse, spread, errors, [0]), freedom
+    squares = float(np.sum(((forces - design @ solution) / deviations) ** 2))
+    return solution, _covariance(inverse, deviations, squares / max(freedom, 1), errors, [0]), freedom
 
 
-def _covariance(inverse: np.ndarray, spread: float, errors: np.ndarray, levels: list[int]) -> np.ndarray:
-    """Of a solution, by the `inverse` of its design, the variance of the scatter and the half-widths of the stretches;
-    `levels` are the places of what is a level of friction."""
-    within = (errors / COVERAGE) ** 2
-    covariance = inverse * np.maximum(spread, within) @ inverse.T
-    covariance[np.ix_(levels, levels)] += within.mean()
+def _covariance(
+    inverse: np.ndarray, deviations: np.ndarray, scatter: float, errors: np.ndarray, levels: list[int]
+) -> np.ndarray:
+    """Of a solution, by the `inverse` of its design; `scatter` is the variance over that of the `deviations` [N], which
+    counts where it is greater than 1; `levels` are the places of what is a level of friction."""
+    variances = deviations**2 * max(scatter, 1.0)
+    covariance = inverse * variances @ inverse.T
+    covariance[np.ix_(levels, levels)] += float(np.mean((errors / COVERAGE) ** 2))
     return covariance
 
 
@@ -204,12 +217,12 @@ def _stribeck(
     """The fit of F_c, F_v, F_s, v_s, covariance and degrees of freedom; None where a straight line does as well."""
     if freedom < 3 or _distinct(speeds) < SPEEDS:
         return None
-    plain = float(np.sum((friction - line[0] - line[1] * speeds) ** 2))
-    scale = float(np.abs(friction).max())
+    deviations, scale = _deviations(friction, errors), float(np.abs(friction).max())
+    plain = float(np.sum(((friction - line[0] - line[1] * speeds) / deviations) ** 2))
 
     def off(p: np.ndarray) -> np.ndarray:
         rise = (p[2] - p[0]) * np.exp(-((speeds / np.exp(p[3])) ** 2))
-        return (p[0] + p[1] * speeds / speeds.max() + rise) * scale - friction
+        return ((p[0] + p[1] * speeds / speeds.max() + rise) * scale - friction) / deviations
 
     def start(at: float) -> list[float]:
         return [line[0] / scale, line[1] * speeds.max() / scale, float(friction[np.argmin(speeds)]) / scale, np.log(at)]
@@ -222,8 +235,8 @@ def _stribeck(
         return None
     units = np.array([scale, scale / speeds.max(), scale, np.exp(best.x[3])])
     solution = np.array([best.x[0], best.x[1], best.x[2], 1.0]) * units
-    inverse = units[:, None] * np.linalg.pinv(best.jac)
-    return solution, _covariance(inverse, rest / left, errors, [0, 2]), left
+    inverse = units[:, None] * np.linalg.pinv(best.jac) / deviations
+    return solution, _covariance(inverse, deviations, rest / left, errors, [0, 2]), left
 
 
 def _curved(solution: np.ndarray, covariance: np.ndarray, freedom: int, speeds: np.ndarray, method: str) -> Direction:

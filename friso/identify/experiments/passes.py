@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.signal import detrend
 
 from friso.identify.experiments.common import Mean, block_mean, channel, low_pass, on_bearing, rate, robust, runs
 from friso.identify.logs.log import Log
@@ -15,8 +17,15 @@ CUTOFF = 25.0
 LEAST = 0.1
 """Shortest stretch [s], and at least 40 samples."""
 
-STEADY = 0.3
-"""Standard deviation of the velocity over its mean from which a motion is not steady: it hunts, sticks or swings."""
+STEADY, QUICK = 0.3, 0.05
+"""Standard deviation of the velocity over its mean from which a motion is not steady: it hunts, sticks or swings; the
+second holds for swings quicker than the cutoff that stand clear of noise."""
+
+CLEAR = 20.0
+"""Power over the median from which a line of a spectrum is no noise."""
+
+LEAST_COMMON = 16
+"""Samples of the way that all passes share, from which it is enough for each of them."""
 
 CORNER = 0.02
 """Share of the largest acceleration of the reference below which its velocity is constant."""
@@ -24,18 +33,19 @@ CORNER = 0.02
 
 @dataclass(frozen=True)
 class Pass:
-    """A stretch of constant velocity: where it is in the log, mean velocity [m/s] and its standard deviation, the mean
-    force [N] by blocks, and the mean acceleration [m/s^2]."""
+    """A stretch of constant velocity: where it is in the log, mean velocity [m/s] and its standard deviation, below and
+    above the cutoff, the mean force [N] by blocks, and the mean acceleration [m/s^2]."""
 
     span: slice
     velocity: float
-    unsteady: float
+    swing: float
+    quick_swing: float
     force: Mean
     acceleration: float
 
     @property
     def steady(self) -> bool:
-        return self.unsteady <= STEADY * abs(self.velocity)
+        return self.swing <= STEADY * abs(self.velocity) and self.quick_swing <= QUICK * abs(self.velocity)
 
 
 def passes(log: Log, cutoff: float = CUTOFF) -> tuple[Pass, ...]:
@@ -43,19 +53,46 @@ def passes(log: Log, cutoff: float = CUTOFF) -> tuple[Pass, ...]:
 
     With a reference the motion may be unsteady, which each tells. Raises StageError for missing position or force.
     """
-    position, force = on_bearing(log), channel(log, "force")
+    position, velocity = on_bearing(log), _velocity(log, cutoff)
+    channel(log, "force")
     found = []
     for part in log.segments:
         if part.stop - part.start < 40:
             continue
-        velocity = rate(position[part], log.sample_time, cutoff)
-        spans = (
-            _of_reference(log, part, cutoff) if "reference" in log else _of_motion(velocity, log.sample_time, cutoff)
-        )
+        if "reference" in log:
+            spans = _of_reference(log, part, cutoff)
+        else:
+            spans = _of_motion(velocity[part], log.sample_time, cutoff)
         for each in spans:
-            if np.ptp(position[part][each]) > 0 and velocity[each].mean() != 0:
-                found.append(_pass(part.start, each, velocity, force[part], log.sample_time))
+            span = slice(part.start + each.start, part.start + each.stop)
+            if np.ptp(position[span]) > 0 and velocity[span].mean() != 0:
+                found.append(_pass(log, span, velocity, cutoff))
     return tuple(found)
+
+
+def on_common_way(log: Log, found: Sequence[Pass], cutoff: float = CUTOFF) -> tuple[Pass, ...]:
+    """Passes of a log, each cut to the way that all of them go, where friction is that of the same places; as they are
+    where that is too little of one of them."""
+    position, velocity = on_bearing(log), _velocity(log, cutoff)
+    low = max((position[each.span].min() for each in found), default=0.0)
+    high = min((position[each.span].max() for each in found), default=0.0)
+    cut = []
+    for each in found:
+        inside = each.span.start + np.flatnonzero((position[each.span] >= low) & (position[each.span] <= high))
+        if len(inside) < LEAST_COMMON:
+            return tuple(found)
+        cut.append(_pass(log, slice(int(inside[0]), int(inside[-1]) + 1), velocity, cutoff))
+    return tuple(cut)
+
+
+def _velocity(log: Log, cutoff: float) -> np.ndarray:
+    """Velocity [m/s] of the body on the bearing, shape (n,); NaN in segments that are too short."""
+    position = on_bearing(log)
+    velocity = np.full(len(position), np.nan)
+    for part in log.segments:
+        if part.stop - part.start >= 40:
+            velocity[part] = rate(position[part], log.sample_time, cutoff)
+    return velocity
 
 
 def _of_reference(log: Log, part: slice, cutoff: float) -> list[slice]:
@@ -88,8 +125,22 @@ def _trimmed(mask: np.ndarray, sample_time: float, cutoff: float, share: float) 
     return found
 
 
-def _pass(first: int, each: slice, velocity: np.ndarray, force: np.ndarray, sample_time: float) -> Pass:
-    went = velocity[each]
-    acceleration = float((went[-1] - went[0]) / ((each.stop - each.start - 1) * sample_time))
-    span = slice(first + each.start, first + each.stop)
-    return Pass(span, float(went.mean()), float(went.std()), block_mean(force[each]), acceleration)
+def _pass(log: Log, span: slice, velocity: np.ndarray, cutoff: float) -> Pass:
+    went, force = velocity[span], block_mean(channel(log, "force")[span])
+    acceleration = float((went[-1] - went[0]) / ((span.stop - span.start - 1) * log.sample_time))
+    quick = _quick_swing(on_bearing(log)[span], log.sample_time, cutoff)
+    return Pass(span, float(went.mean()), float(went.std()), quick, force, acceleration)
+
+
+def _quick_swing(position: np.ndarray, sample_time: float, cutoff: float) -> float:
+    """Standard deviation of the velocity [m/s] in the lines of its spectrum above the cutoff [Hz] that stand clear of
+    noise: a stage that hunts quickly goes smoothly for the filter. What is less than a digit is no motion."""
+    window = np.hanning(len(position))
+    lines = np.abs(np.fft.rfft(detrend(position) * window)) ** 2 * 2 / (len(position) * np.sum(window**2))
+    frequency = np.fft.rfftfreq(len(position), sample_time)
+    above = frequency > cutoff
+    power = np.where(above & (lines > CLEAR * np.median(lines[above])), lines, 0.0) if above.any() else np.zeros(1)
+    steps = np.abs(np.diff(position))
+    if power.sum() < float(steps[steps > 0].min(initial=0.0)) ** 2:
+        return 0.0
+    return float(np.sqrt(np.sum(power * (2 * np.pi * frequency) ** 2)))

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
-from friso.equations.bandwidth import faster
 from friso.identify.estimate import Estimate
 from friso.identify.response.closed_loop import crossovers
 from friso.identify.response.mass_line import mass_lines
@@ -17,7 +15,7 @@ from friso.rig.task import standing
 from friso.stage import Stage
 from friso.studies.rig.excitation import excite, loop, plant
 from friso.studies.rig.outcome import Outcome, Progress, RigLog, rig_log
-from friso.studies.rig.sizes import WIDE, freed, interval, jointed, locked, pace, travel
+from friso.studies.rig.sizes import WIDE, freed, interval, jointed, locked, pace, quicker, travel
 
 PLACES, FREE_PLACES = 10, 3
 """Places along the travel at which the plant is identified, locked (Fig. 29) and free (the thesis shows one)."""
@@ -134,20 +132,14 @@ def open_loops(
     """Logs of one excitation with the controller at each of the settings, crossovers over the stage's, and what they
     show."""
     factors = np.array(settings)
-    recorded = excite(stage, place, seed, len(factors), _controllers(stage, factors))
+    recorded = excite(stage, place, seed, len(factors), quicker(stage, factors))
     rows = []
     for row, factor in enumerate(settings):
-        own = stage.with_numbers(_controllers(stage, factor))
+        own = stage.with_numbers(quicker(stage, factor))
         name = f"loop_{factor * pace(stage):.3g}_Hz".replace(".", "_")
         rows.append(rig_log(recorded, row, name, "frequency", own, seed))
     found = (measured_loop(log, factor * pace(stage)) for log, factor in zip(rows, settings, strict=True))
     return tuple(rows), tuple(found)
-
-
-def _controllers(stage: Stage, factors: Any) -> dict[str, Any]:
-    """The keys of a controller made faster by factors."""
-    flat = stage.flat()
-    return {key: value for key, value in faster(flat, factors).items() if value is not flat[key]}
 
 
 def measured_loop(log: RigLog, tuned: float) -> Loop:
@@ -205,9 +197,7 @@ def stable_settings(stage: Stage, place: float, seed: int) -> tuple[np.ndarray, 
     factors = SETTINGS[-1] / 3 * FASTER ** np.arange(STEPS)
     off = RELEASED * stage.flat()["joint.stroke"] / WIDE
     task = replace(standing(place, WAIT / pace(stage)), displacement=off)
-    (recorded,) = run(
-        stage, task, [seed] * STEPS, interval(stage, 1 / (125 * pace(stage))), _controllers(stage, factors)
-    )
+    (recorded,) = run(stage, task, [seed] * STEPS, interval(stage, 1 / (125 * pace(stage))), quicker(stage, factors))
     late = recorded.true["position"][:, -(recorded.true["position"].shape[1] // 4) :] - place
     worst = np.abs(late).max(axis=1, initial=0.0)
     return factors * pace(stage), worst <= off

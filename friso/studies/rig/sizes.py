@@ -6,8 +6,11 @@ forces in those of friction: on the thesis's rig (8 Hz, 90 mm, 1 mm, 3 N) they c
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
+from friso.equations.bandwidth import faster
 from friso.quantities import StageError
 from friso.rig.run import as_built_keys
 from friso.rig.task import own_motion
@@ -15,6 +18,9 @@ from friso.stage import Stage
 
 WIDE = 8.0
 """Stroke of the identification over that of the stage: 8 mm in the thesis (Sec. 4.2.1), "for safety reasons"."""
+
+WAY = 5 / 3
+"""Way at constant speed over that of the stage's own motion: 150 mm for 90 mm (Sec. 4.2.3)."""
 
 ALPHA = 0.1
 """That of the van Dijk controller to which plain gains are compared, as in the thesis."""
@@ -67,6 +73,18 @@ def travel(stage: Stage) -> tuple[float, float]:
     low, high = own_motion(stage).span
     reach = 0.0 if high > low else 100 * stage.flat().get("joint.stroke", 1e-3)
     return low - reach, high + reach
+
+
+def longest_way(stage: Stage) -> float:
+    """The way at constant speed [m]."""
+    low, high = travel(stage)
+    return WAY * (high - low)
+
+
+def quicker(stage: Stage, factors: Any) -> dict[str, Any]:
+    """The keys of a controller made faster by factors."""
+    flat = stage.flat()
+    return {key: value for key, value in faster(flat, factors).items() if value is not flat[key]}
 
 
 def interval(stage: Stage, wanted: float) -> float:

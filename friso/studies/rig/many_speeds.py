@@ -1,0 +1,108 @@
+"""Passes at many speeds, the joint locked and the controller made faster: the whole curve of friction over velocity.
+
+Where friction falls with the speed a slow loop sticks and slips, and what its passes show is no steady friction. The
+faster the controller, the more it damps: the highest of a few settings that is stable is taken. All passes go the same
+stretch, so that what differs between them is the speed and not the place; quick ones begin before it and end behind.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from friso.frequency.friction import steady_force
+from friso.identify.experiments import FrictionVelocity, friction_velocity
+from friso.rig.rail import friction_factors
+from friso.rig.run import run
+from friso.rig.task import legs
+from friso.stage import Stage
+from friso.studies.rig.outcome import RigLog, rig_log
+from friso.studies.rig.sizes import interval, longest_way, moving_mass, pace, quicker, travel
+
+FASTER = (4.0, 3.0, 2.0, 1.5, 1.0)
+"""Crossovers over the stage's own that are tried, one after the other: our choice."""
+
+SPEEDS, RATIO = 14, 500.0
+"""Number of speeds, and the greatest over the least: 0.48 to 240 mm/s on the thesis's rig, at four times its
+crossover."""
+
+SHORTEST = 20.0
+"""Periods of the crossover that the longest way takes at the greatest speed."""
+
+SHARED, PLACES = 1 / 8, 3
+"""Share of the longest way that all of them go, and places along the travel where they do: our choice."""
+
+STANDS, SAMPLES = 16.0, 62.5
+"""Periods of the crossover for which the reference stands between passes, and samples of the log per period of the
+stage's own (2 ms)."""
+
+
+@dataclass(frozen=True)
+class Place:
+    """Passes on one stretch: the log, what it shows, and the dynamic friction [N] at the magnitudes of its velocities,
+    as it truly is on average over the stretch, shape (passes,)."""
+
+    log: RigLog
+    velocity: FrictionVelocity
+    true: np.ndarray
+
+
+@dataclass(frozen=True)
+class ManySpeeds:
+    """The crossover [Hz] at which the passes went, and what they show at each of the places."""
+
+    crossover: float
+    places: tuple[Place, ...]
+
+
+def many_speeds(stage: Stage, seed: int) -> ManySpeeds:
+    """The passes of a stage whose joint is locked, or which has none."""
+    logs = many_speeds_logs(stage, seed)
+    places = []
+    for log, low in zip(logs, _begins(stage), strict=True):
+        velocity = friction_velocity(log.log, moving_mass(stage))
+        stretch = np.linspace(low, low + SHARED * longest_way(stage), 1000)
+        places.append(Place(log, velocity, mean_friction(log.stage, np.abs(velocity.velocities), stretch)))
+    return ManySpeeds(pace(logs[0].stage), tuple(places))
+
+
+def many_speeds_logs(stage: Stage, seed: int) -> tuple[RigLog, ...]:
+    """The logs, one for each place, at the fastest setting at which all of them come to their end; else at the
+    stage's own."""
+    logs: tuple[RigLog, ...] = ()
+    for factor in FASTER:
+        quick = stage.with_numbers(quicker(stage, factor))
+        logs = tuple(_log(quick, pace(stage), n, low, seed + n) for n, low in enumerate(_begins(stage)))
+        if not any(log.failure for log in logs):
+            break
+    return logs
+
+
+def mean_friction(stage: Stage, speeds: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """Mean dynamic friction [N] at speeds [m/s], shape (n,), over places [m] on the rail."""
+    flat: Mapping[str, Any] = stage.flat()
+    levels = zip(("friction.static", "friction.coulomb"), friction_factors(flat, places).mean(axis=1), strict=True)
+    along = {key: flat[key] * factor for key, factor in levels if key in flat}
+    return steady_force({**flat, **along}, speeds, forward=True)
+
+
+def _begins(stage: Stage) -> np.ndarray:
+    """Where the stretches begin [m]."""
+    return np.linspace(*travel(stage), PLACES)
+
+
+def _log(stage: Stage, own_pace: float, number: int, low: float, seed: int) -> RigLog:
+    """The passes over the stretch that begins at a place [m], ever faster."""
+    period, longest = 1 / pace(stage), longest_way(stage)
+    top, shared = longest / (SHORTEST * period), SHARED * longest
+    parts, before = [(0.0, STANDS * period)], 0.0
+    for speed in np.geomspace(top / RATIO, top, SPEEDS):
+        run_up = max(0.0, speed * SHORTEST * period - shared) / 2
+        for way in (shared + run_up + before, -(shared + 2 * run_up)):
+            parts += [(float(np.sign(way) * speed), abs(way) / speed), (0.0, STANDS * period)]
+        before = run_up
+    (recorded,) = run(stage, legs(low, parts), [seed], interval(stage, 1 / (SAMPLES * own_pace)))
+    return rig_log(recorded, 0, f"many_speeds_{number + 1}", "constant-speed", stage, seed)
