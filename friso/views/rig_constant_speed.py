@@ -77,16 +77,14 @@ def _over_velocity(outcome: Outcome) -> Figure:
     many: ManySpeeds = outcome.result.many
     lines, points = [], []
     for number, (place, colour) in enumerate(zip(many.places, (BLUE, VERMILLION, GREEN), strict=True), start=1):
-        speeds, forces = np.abs(place.velocity.velocities), np.abs(place.velocity.forces)
-        order = np.argsort(speeds)
-        lines.append(Series(speeds[order], place.true[order], f"true, place {number}", colour))
-        points.append(Markers(speeds, forces, f"place {number}", colour))
+        lines.append(Series(place.speeds, place.true, f"true, place {number}", colour))
+        points.append(Markers(np.abs(place.velocity.velocities), place.friction, f"place {number}", colour))
     return Figure(
         "rig_friction_over_velocity",
         "Friction over velocity, joint locked",
         f"Crossover {with_unit(many.crossover, 'Hz')}. Mean commanded force of each steady pass, there and back, the "
-        "force of inertia taken off; the lines are the true friction on average over the stretch that all passes "
-        "share. Speeds without a mark: the stage sticks, slips or hunts there.",
+        "forces of inertia and of cables taken off; the lines are the true friction on average over the stretch that "
+        "all passes share. Speeds without a mark: the stage sticks, slips or hunts there.",
         (Panel("", Axis("Speed", "m/s", log=True), Axis("Friction", "N"), tuple(lines), markers=tuple(points)),),
         subject=outcome.stage.name,
     )
@@ -119,6 +117,8 @@ def _place_numbers(place: Place) -> dict[str, Any]:
     return {
         "velocities_m_per_s": velocity.velocities.tolist(),
         "forces_n": velocity.forces.tolist(),
+        "friction_n": place.friction.tolist(),
+        "true_speeds_m_per_s": place.speeds.tolist(),
         "true_dynamic_friction_n": place.true.tolist(),
         "shown": {e.name: {"value": e.value, "low": e.low, "high": e.high, "unit": e.unit} for e in both if e.shown},
         "not_shown": {each.name: each.reason for each in both if not each.shown},

@@ -29,6 +29,9 @@ SPEEDS, RATIO = 14, 500.0
 """Number of speeds, and the greatest over the least: 0.48 to 240 mm/s on the thesis's rig, at four times its
 crossover."""
 
+CURVE = 200
+"""Points of the true curve."""
+
 SHORTEST = 20.0
 """Periods of the crossover that the longest way takes at the greatest speed."""
 
@@ -42,12 +45,20 @@ stage's own (2 ms)."""
 
 @dataclass(frozen=True)
 class Place:
-    """Passes on one stretch: the log, what it shows, and the dynamic friction [N] at the magnitudes of its velocities,
-    as it truly is on average over the stretch, shape (passes,)."""
+    """Passes on one stretch: the log, what it shows, and the dynamic friction [N] at speeds [m/s] as it truly is on
+    average over the stretch, both of shape (n,)."""
 
     log: RigLog
     velocity: FrictionVelocity
+    speeds: np.ndarray
     true: np.ndarray
+
+    @property
+    def friction(self) -> np.ndarray:
+        """Friction [N] of the steady passes, shape (passes,), less what does not turn with the motion, as the pull of a
+        cable."""
+        bias = self.velocity.bias.value if self.velocity.bias.shown else 0.0
+        return np.abs(self.velocity.forces - bias)
 
 
 @dataclass(frozen=True)
@@ -63,9 +74,10 @@ def many_speeds(stage: Stage, seed: int) -> ManySpeeds:
     logs = many_speeds_logs(stage, seed)
     places = []
     for log, low in zip(logs, _begins(stage), strict=True):
-        velocity = friction_velocity(log.log, moving_mass(stage))
+        speeds = np.geomspace(*_range(log.stage), CURVE)
         stretch = np.linspace(low, low + SHARED * longest_way(stage), 1000)
-        places.append(Place(log, velocity, mean_friction(log.stage, np.abs(velocity.velocities), stretch)))
+        true = mean_friction(log.stage, speeds, stretch)
+        places.append(Place(log, friction_velocity(log.log, moving_mass(stage)), speeds, true))
     return ManySpeeds(pace(logs[0].stage), tuple(places))
 
 
@@ -94,12 +106,17 @@ def _begins(stage: Stage) -> np.ndarray:
     return np.linspace(*travel(stage), PLACES)
 
 
+def _range(stage: Stage) -> tuple[float, float]:
+    """The least and the greatest speed [m/s] of a stage with its controller made faster."""
+    top = longest_way(stage) * pace(stage) / SHORTEST
+    return top / RATIO, top
+
+
 def _log(stage: Stage, own_pace: float, number: int, low: float, seed: int) -> RigLog:
     """The passes over the stretch that begins at a place [m], ever faster."""
-    period, longest = 1 / pace(stage), longest_way(stage)
-    top, shared = longest / (SHORTEST * period), SHARED * longest
+    period, shared = 1 / pace(stage), SHARED * longest_way(stage)
     parts, before = [(0.0, STANDS * period)], 0.0
-    for speed in np.geomspace(top / RATIO, top, SPEEDS):
+    for speed in np.geomspace(*_range(stage), SPEEDS):
         run_up = max(0.0, speed * SHORTEST * period - shared) / 2
         for way in (shared + run_up + before, -(shared + 2 * run_up)):
             parts += [(float(np.sign(way) * speed), abs(way) / speed), (0.0, STANDS * period)]
