@@ -252,15 +252,19 @@ def _missing(stage: Stage) -> list[str]:
 
 def _troubles(results: list[Result], count: int) -> list[str]:
     """Unstable loops and runs that failed, option by option."""
-    failed = "runs failed; they count either way in the intervals of probabilities and are left out of medians"
+    failed = "they count either way in the intervals of probabilities and are left out of medians"
     found = []
     for result in results:
         hunting, both = result.found.hunts, result.found.hunts & ~result.loops.stable
         unstable = (
-            "linear loops are not stable; these machines are simulated and counted like the others, and are "
-            f"{both.sum()} of the {hunting.sum()} that hunt"
+            "these are simulated and counted like the others; among the machines that hunt they are "
+            f"{both.sum()} of {hunting.sum()}"
         )
-        for number, what in ((result.unstable, unstable), (result.failed, failed)):
+        troubles = (
+            ("linear loops that are not stable", result.unstable, unstable),
+            ("failed runs", result.failed, failed),
+        )
+        for what, number, told in troubles:
             if number:
-                found.append(f"{result.letter} {result.option.name}: {number} of {count} {what}")
+                found.append(f"{result.letter} {result.option.name}, {what}: {number} of {count}; {told}")
     return found
