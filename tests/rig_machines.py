@@ -15,6 +15,7 @@ import numpy as np
 from machines import Machine, drawn
 
 import friso
+from friso.identify.experiments import friction_velocity
 from friso.identify.logs.mapping import Mapping, save
 from friso.identify.method import Source
 from friso.identify.sources import Given, read_all
@@ -78,13 +79,13 @@ def sources(given: Iterable[Given]) -> list[tuple[Source, str]]:
 
 
 def mean_level(logs: Iterable[RigLog], key: str) -> float:
-    """Static or Coulomb friction [N] on average over the places where the cart was, those where it was for long having
-    more weight: a log sees no others."""
+    """Static or Coulomb friction [N] on average over the stretches of rail on which it was read: a log sees no
+    others."""
     row = ("friction.static", "friction.coulomb").index(key)
     means = []
     for log in logs:
         flat = log.stage.flat()
         places = log.true.get("cart_position", log.true["position"])
-        along = friction_factors(flat, places[:: 1 + len(places) // 10_000])[row]
-        means.append(flat[key] * float(along.mean()))
+        way = friction_velocity(log.log).way if log.kind == "constant-speed" else (places.min(), places.max())
+        means.append(flat[key] * float(friction_factors(flat, np.linspace(*way, 1000))[row].mean()))
     return float(np.mean(means))

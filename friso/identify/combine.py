@@ -8,6 +8,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from friso.identify.estimate import Estimate
+from friso.identify.experiments.common import t_value
 from friso.intervals import COVERAGE
 
 CHANCE = 0.01
@@ -71,15 +72,25 @@ def _weight(each: Estimate) -> float:
 
 
 def _mean(key: str, shown: Sequence[Estimate]) -> tuple[Estimate, bool]:
-    """The weighted mean, or the hull where a chi-square test says that not all can be of one value; and which."""
+    """The weighted mean where a chi-square test allows that all are of one value, and whether it does.
+
+    Its interval is wider by the Birge ratio (Birge 1932, doi:10.1103/PhysRev.40.207) where they scatter more than their
+    own intervals say. Where the test does not allow it, as for friction at several places, the interval spans all of
+    them, and what their scatter leaves open about the mean of all places (Student's t, from three on).
+    """
     values, weights = (
         np.array(column) for column in zip(*((each.value, _weight(each)) for each in shown), strict=True)
     )
-    mean = float(np.average(values, weights=weights))
+    mean, freedom = float(np.average(values, weights=weights)), len(values) - 1
+    squares = float(np.sum(weights * (values - mean) ** 2))
     method = ", ".join(dict.fromkeys(each.method for each in shown))
-    if chi2.sf(np.sum(weights * (values - mean) ** 2), len(values) - 1) > CHANCE:
-        return Estimate.normal(key, shown[0].unit, mean, float(weights.sum() ** -0.5), method), True
+    if chi2.sf(squares, freedom) > CHANCE:
+        deviation = float(np.sqrt(max(squares / freedom, 1.0) / weights.sum()))
+        return Estimate.normal(key, shown[0].unit, mean, deviation, method), True
     low, high = min(each.low for each in shown), max(each.high for each in shown)
+    if freedom > 1:
+        center, half = float(values.mean()), t_value(freedom) * float(values.std(ddof=1)) / len(values) ** 0.5
+        low, high = min(low, center - half), max(high, center + half)
     return Estimate(key, shown[0].unit, (low + high) / 2, low, high, method), False
 
 

@@ -11,7 +11,7 @@ from scipy.stats import f as fisher
 
 from friso.identify.estimate import Estimate
 from friso.identify.experiments.common import Mean, by_t, t_value, ways
-from friso.identify.experiments.passes import CUTOFF, Pass, on_common_way, passes
+from friso.identify.experiments.passes import CUTOFF, Pass, on_common_way, passes, way_of
 from friso.identify.logs.log import Log
 from friso.intervals import COVERAGE
 
@@ -50,7 +50,7 @@ class FrictionVelocity:
     """The directions "forward" and "backward", each with what constant force there is in its Coulomb friction, both
     together with that taken out, and the `bias` [N] itself, on top of equal friction. Per steady stretch, shape (n,):
     velocity [m/s], mean force [N] less inertia, half-width of its 95 % interval [N]; velocities of those that were not
-    steady, shape (m,)."""
+    steady, shape (m,); and the `way` [m] from end to end over which the steady ones were read."""
 
     directions: Mapping[str, Direction]
     both: Direction
@@ -59,6 +59,7 @@ class FrictionVelocity:
     forces: np.ndarray
     half_widths: np.ndarray
     unsteady: np.ndarray
+    way: tuple[float, float]
     warnings: tuple[str, ...]
 
 
@@ -80,7 +81,7 @@ def friction_velocity(log: Log, mass: float = 0.0, cutoff: float = CUTOFF) -> Fr
     if len(unsteady):
         low, high = np.abs(unsteady).min(), np.abs(unsteady).max()
         warnings.append(f"{len(unsteady)} stretches, {low:.3g} to {high:.3g} m/s, were not steady and are left out.")
-    return FrictionVelocity(sides, both, bias, velocities, forces, errors, unsteady, tuple(warnings))
+    return FrictionVelocity(sides, both, bias, velocities, forces, errors, unsteady, way_of(log, used), tuple(warnings))
 
 
 def _row(each: Pass, mass: float) -> tuple[float, float, float]:

@@ -85,6 +85,12 @@ def on_common_way(log: Log, found: Sequence[Pass], cutoff: float = CUTOFF) -> tu
     return tuple(cut)
 
 
+def way_of(log: Log, found: Sequence[Pass]) -> tuple[float, float]:
+    """The lowest and highest position [m] in passes of a log; NaN without any."""
+    places = [on_bearing(log)[each.span] for each in found]
+    return (min(each.min() for each in places), max(each.max() for each in places)) if places else (np.nan, np.nan)
+
+
 def _velocity(log: Log, cutoff: float) -> np.ndarray:
     """Velocity [m/s] of the body on the bearing, shape (n,); NaN in segments that are too short."""
     position = on_bearing(log)

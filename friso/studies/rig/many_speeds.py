@@ -46,7 +46,7 @@ stage's own (2 ms)."""
 @dataclass(frozen=True)
 class Place:
     """Passes on one stretch: the log, what it shows, and the dynamic friction [N] at speeds [m/s] as it truly is on
-    average over the stretch, both of shape (n,)."""
+    average over the way on which it was read, both of shape (n,)."""
 
     log: RigLog
     velocity: FrictionVelocity
@@ -71,13 +71,12 @@ class ManySpeeds:
 
 def many_speeds(stage: Stage, seed: int) -> ManySpeeds:
     """The passes of a stage whose joint is locked, or which has none."""
-    logs = many_speeds_logs(stage, seed)
-    places = []
-    for log, low in zip(logs, _begins(stage), strict=True):
-        speeds = np.geomspace(*_range(log.stage), CURVE)
-        stretch = np.linspace(low, low + SHARED * longest_way(stage), 1000)
-        true = mean_friction(log.stage, speeds, stretch)
-        places.append(Place(log, friction_velocity(log.log, moving_mass(stage)), speeds, true))
+    logs, places = many_speeds_logs(stage, seed), []
+    for log, begin in zip(logs, _begins(stage), strict=True):
+        velocity, speeds = friction_velocity(log.log, moving_mass(stage)), np.geomspace(*_range(log.stage), CURVE)
+        way = velocity.way if len(velocity.velocities) else (begin, begin + SHARED * longest_way(stage))
+        true = mean_friction(log.stage, speeds, np.linspace(*way, 1000))
+        places.append(Place(log, velocity, speeds, true))
     return ManySpeeds(pace(logs[0].stage), tuple(places))
 
 
