@@ -46,12 +46,12 @@ def built(seed: int) -> Machine:
     flat = machine.flat
     mass, static = flat["masses.cart"] + flat["masses.stage"], flat["friction.static"]
     tables = machine.truth.given()
-    tables |= {name: example.given()[name] for name in ("drive", "parasitic")}
+    tables["drive"] = example.given()["drive"]
+    tables["parasitic"] = {**example.given()["parasitic"], "mass": f"{flat['masses.stage'] / 2} kg"}
     tables |= {"rail": {**RAIL, "seed": seed}, "controller": {**tables["controller"], "anti_windup": "clamp"}}
     numbers = {
         "joint.stroke": rng.uniform(*STROKE) * static / flat["joint.stiffness"],
         "parasitic.frequency": PARASITIC * flat["controller.crossover"],
-        "parasitic.mass": flat["masses.stage"] / 2,
         "controller.tuned_mass": mass,
         "controller.force_limit": 2 * mass * flat["motion.acceleration"] + STRONG * static,
         "motion.return_at": RETURN / flat["controller.crossover"],
