@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -668,6 +669,45 @@ def test_means_of_correlated_samples_are_not_too_sure() -> None:
         found = [mean(row[200::step]) for row in rows]
         held = sum(abs(each.value) <= t_value(each.freedom) * each.error for each in found)
         assert 180 <= held <= 199
+
+
+def ramps_there_and_back(speeds: Sequence[float], way: float, sample_time: float, digit: float = 0.0) -> Log:
+    """Perfect motion at constant speeds, a friction of 1 N, and a position in whole digits."""
+    legs = [np.zeros(500)]
+    for speed in speeds:
+        leg = np.linspace(0.0, way, round(way / speed / sample_time))
+        legs += [leg, np.full(500, way), leg[::-1], np.zeros(500)]
+    position = np.concatenate(legs)
+    force = np.sign(np.gradient(position)) + 1e-3 * np.random.default_rng(0).standard_normal(len(position))
+    read = np.round(position / digit) * digit if digit else position
+    return record("ramps", sample_time, reference=position, position=read, force=force)
+
+
+@pytest.mark.parametrize("sample_time", [1e-3, 2e-4])
+def test_the_digits_of_an_encoder_are_no_hunting(sample_time: float) -> None:
+    found = friction_velocity(ramps_there_and_back((3e-3, 5e-3, 9e-3, 15e-3, 29e-3), 0.02, sample_time, 1e-6))
+    assert not len(found.unsteady)
+    assert found.both.coulomb.holds(1.0)
+
+
+@pytest.mark.parametrize(("swing", "steady"), [(0.01, True), (0.2, False)])
+def test_hunting_quicker_than_the_filter_is_seen(swing: float, steady: bool) -> None:
+    log = ramps_there_and_back((3e-3, 9e-3, 29e-3), 0.02, 1e-3)
+    rate = 2 * np.pi * 60.0  # Hz, above the filter of the velocity
+    moved = log["position"] + swing * 9e-3 / rate * np.sin(rate * log.time)
+    signals = {**log.signals, "position": moved}
+    found = friction_velocity(record("hunting", log.sample_time, **signals))
+    middle = np.abs(np.abs(found.unsteady) - 9e-3) < 1e-3
+    assert bool(middle.any()) != steady
+
+
+def test_passes_that_hardly_overlap_are_read_whole() -> None:
+    """What they share is too little to speak for them."""
+    log = ramps_there_and_back((3e-3, 9e-3, 29e-3), 0.02, 1e-3)
+    shift = np.where(log.time > log.time[-1] / 2, 0.017, 0.0)
+    signals = {**log.signals, "position": log["position"] + shift, "reference": log["reference"] + shift}
+    low, high = friction_velocity(record("apart", log.sample_time, **signals)).way
+    assert high - low > 0.02
 
 
 def test_what_is_no_record_is_refused() -> None:

@@ -129,3 +129,14 @@ def test_first_crossing_of_a_cubic(seed: int) -> None:
             assert there <= 0.01 * p[0] + 1e-12
             assert inside[0] - 0.02 <= found <= 1.0 or there > 0
     assert dips > 20
+
+
+@pytest.mark.parametrize("bend", [0.0, 1e-9, 1e-3, 0.3])
+def test_crossing_of_a_surface_that_is_almost_straight(bend: float) -> None:
+    """Over long steps the secant hits the zero at once; what has been found must not be lost again by bisection."""
+    rng = np.random.default_rng(0)
+    zero, size = rng.uniform(0.01, 0.99, 2000), 10 ** rng.uniform(-9, 0, 2000)
+    rows = np.zeros((7, 2000))
+    for row, theta in enumerate((0, 1 / 3, 2 / 3, 1)):
+        rows[row] = size * (zero - theta) * (1 + bend * (theta - zero) ** 2)
+    assert in_all(first_crossing, rows)[5] == pytest.approx(zero, abs=1e-9)

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from compiled import in_all
 
+from friso.engine.simd_math import number_of
+
 
 def arithmetic(B, share, least):
     x, y = B[0], B[1]
@@ -23,6 +25,12 @@ def choices(B, share, least):
     B[3] = B[0] if B[1] and (above or B[0] < 0.0) else 3
 
 
+def of_known_truths(B, share, least):
+    x = y = 2.0 * B[0]
+    B[2] = x if 0.5 else y
+    B[3] = 1.0 if not B[1] else y
+
+
 def of_several(B, share, least):
     """What follows may use what another function returns."""
     B[2], B[3] = parted(B[0], least)
@@ -33,7 +41,7 @@ def parted(x, at):
     return beyond, 0.5 * beyond
 
 
-CODE = [arithmetic, choices, of_several]
+CODE = [arithmetic, choices, of_known_truths, of_several]
 
 
 @pytest.mark.parametrize("lanes", [1, 2, 8, 12])
@@ -64,7 +72,39 @@ def called_outside(B):
     B[1] = np.sin(B[0])
 
 
-@pytest.mark.parametrize("function", [branched, looped, called_outside])
+def chained(B):
+    B[1] = 1.0 if 0.0 < B[0] < 1.0 else 0.0
+
+
+def compared_for_equality(B):
+    B[1] = 1.0 if B[0] == 1.0 else 0.0
+
+
+def stored_by_another(B):
+    put(B, B[0])
+
+
+def put(B, x):
+    B[1] = x
+
+
+def with_a_keyword(B):
+    B[1] = max(B[0], -3.0, key=abs)
+
+
+def before_the_first_row(B):
+    B[1] = B[-1]
+
+
+def number_as_bits(B):
+    B[1] = number_of(np.int64(B[0]))
+
+
+REFUSED = [branched, looped, called_outside, chained, compared_for_equality, stored_by_another, with_a_keyword]
+REFUSED += [before_the_first_row, number_as_bits]
+
+
+@pytest.mark.parametrize("function", REFUSED)
 def test_what_the_language_does_not_have_is_refused(function: Callable[..., None]) -> None:
     with pytest.raises(Exception, match="not in the language of straight-line code"):
         in_all(function, np.zeros((2, 8)))

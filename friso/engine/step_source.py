@@ -1,7 +1,6 @@
-"""Writes the step of a model: one Rosenbrock step for all lanes, as straight-line code that vectorises.
+"""Writes the step of a model: one Rosenbrock step, as straight-line code for one lane (`friso.engine.vector_code`).
 
-What the vectoriser needs: one flat buffer, unsigned indices (no wrap-around), a constant lane count, selects instead
-of branches, no library call. Modes (on which side of each kink) are held during a step, so that the right-hand side is
+Modes (on which side of each kink) are held during a step, so that the right-hand side is
 smooth; where a kink is crossed the step is accepted up to the crossing alone, which the dense output locates.
 """
 

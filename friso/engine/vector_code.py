@@ -111,6 +111,8 @@ class _Column:
         self.builder.store(given.value, self._pointer(row), align=8)
 
     def _pointer(self, row: int) -> ir.Value:
+        if row < 0:
+            raise TypeError(f"not in the language of straight-line code: row {row}")
         pointer = self.builder.gep(self.data, [ir.Constant(ir.IntType(64), row * self.lanes)], inbounds=True)
         return self.builder.bitcast(pointer, ir.PointerType(ir.VectorType(_FLOAT.element, self.lanes)))
 
@@ -139,6 +141,8 @@ class _Writer:
                 raise TypeError(f"{given.kind} where {kind} is expected")
             return given
         known = float(given) if kind is _FLOAT else int(given)
+        if known != given:
+            raise TypeError(f"not in the language of straight-line code: {given} where a whole number is expected")
         return _Vector(ir.Constant(self._type(kind), [ir.Constant(kind.element, known)] * self.lanes), kind)
 
     def together(self, *given: Any) -> tuple[list[ir.Value], _Kind]:
@@ -169,7 +173,7 @@ class _Writer:
         if isinstance(given, _Vector) and given.kind is _FLOAT:
             zero = self.vector(0.0, _FLOAT).value
             return _Vector(self.builder.fcmp_unordered("!=", given.value, zero), _TRUTH)
-        return self.vector(given, _TRUTH)
+        return given if isinstance(given, _Vector) else self.vector(bool(given), _TRUTH)
 
     def least(self, left: Any, right: Any) -> _Vector:
         return self.select(self.compare("<", right, left), right, left)
@@ -197,10 +201,15 @@ class _Writer:
         return _Vector(self.builder.bitcast(given.value, self._type(_FLOAT)), _FLOAT)
 
     def signed(self, given: Any) -> _Vector:
-        return _Vector(given.value, _SIGNED)
+        return self._same_bits(given, _SIGNED)
 
     def unsigned(self, given: Any) -> _Vector:
-        return _Vector(given.value, _UNSIGNED)
+        return self._same_bits(given, _UNSIGNED)
+
+    def _same_bits(self, given: _Vector, kind: _Kind) -> _Vector:
+        if given.kind.element != kind.element:
+            raise TypeError(f"not in the language of straight-line code: a {given.kind.element} as a whole number")
+        return _Vector(given.value, kind)
 
     def _type(self, kind: _Kind) -> ir.VectorType:
         return ir.VectorType(kind.element, self.lanes)
@@ -229,15 +238,21 @@ class _Frame(ast.NodeVisitor):
         raise TypeError(f"not in the language of straight-line code: {ast.unparse(node)}")
 
     def visit_Expr(self, node: ast.Expr) -> None:
-        """A docstring."""
+        """A docstring, and no other."""
+        if not isinstance(node.value, ast.Constant):
+            self.generic_visit(node)
 
     def visit_Pass(self, node: ast.Pass) -> None:
         pass
 
     def visit_Assign(self, node: ast.Assign) -> None:
-        self._assign(node.targets[0], self.visit(node.value))
+        value = self.visit(node.value)
+        for target in node.targets:
+            self._assign(target, value)
 
     def visit_For(self, node: ast.For) -> None:
+        if node.orelse:
+            self.generic_visit(node)
         for each in self.visit(node.iter):
             self._assign(node.target, each)
             for statement in node.body:
@@ -275,7 +290,9 @@ class _Frame(ast.NodeVisitor):
         return self._writer.operate(node.op, self.visit(node.left), self.visit(node.right))
 
     def visit_UnaryOp(self, node: ast.UnaryOp) -> Any:
-        return self._writer.operate(node.op, self.visit(node.operand))
+        operand = self.visit(node.operand)
+        known = not isinstance(operand, _Vector) or not isinstance(node.op, ast.Not)
+        return self._writer.operate(node.op, operand if known else self._writer.truth(operand))
 
     def visit_BoolOp(self, node: ast.BoolOp) -> Any:
         sign = ast.BitAnd() if isinstance(node.op, ast.And) else ast.BitOr()
@@ -283,8 +300,10 @@ class _Frame(ast.NodeVisitor):
         return reduce(lambda left, right: self._writer.operate(sign, left, right), truths)
 
     def visit_Compare(self, node: ast.Compare) -> _Vector:
-        (sign,), (right,) = node.ops, node.comparators
-        return self._writer.compare(_COMPARISONS[type(sign)], self.visit(node.left), self.visit(right))
+        if len(node.ops) > 1 or type(node.ops[0]) not in _COMPARISONS:
+            self.generic_visit(node)
+        left, right = self.visit(node.left), self.visit(node.comparators[0])
+        return self._writer.compare(_COMPARISONS[type(node.ops[0])], left, right)
 
     def visit_IfExp(self, node: ast.IfExp) -> _Vector:
         return self._writer.select(*(self.visit(each) for each in (node.test, node.body, node.orelse)))
@@ -293,9 +312,9 @@ class _Frame(ast.NodeVisitor):
         function, arguments = self.visit(node.func), [self.visit(each) for each in node.args]
         if not any(isinstance(each, _Vector) for each in arguments):
             return function(*arguments)
-        if function in _LIBRARY:
+        if function in _LIBRARY and not node.keywords:
             return _LIBRARY[function](self._writer, *arguments)
-        if not inspect.isfunction(function):
+        if not inspect.isfunction(function) or node.keywords:
             self.generic_visit(node)
         return self._writer.inlined(function, arguments)
 

@@ -9,9 +9,12 @@ import numpy as np
 from friso.studies.rig.constant_speed import ConstantSpeed, Passes
 from friso.studies.rig.many_speeds import ManySpeeds, Place
 from friso.studies.rig.outcome import Outcome
-from friso.views.figure import BLUE, GREEN, VERMILLION, Axis, Figure, Markers, Panel, Series
+from friso.views.figure import BLUE, GREEN, ORANGE, PINK, VERMILLION, Axis, Figure, Markers, Panel, Series
 from friso.views.identify_numbers import with_interval
 from friso.views.prefixes import listed, with_unit
+
+COLOURS = (BLUE, VERMILLION, GREEN, ORANGE, PINK)
+"""Of the places."""
 
 
 def sentences(outcome: Outcome) -> list[str]:
@@ -76,15 +79,15 @@ def _over_velocity(outcome: Outcome) -> Figure:
     """Friction of the many speeds against the speed, and as it truly is, for each place."""
     many: ManySpeeds = outcome.result.many
     lines, points = [], []
-    for number, (place, colour) in enumerate(zip(many.places, (BLUE, VERMILLION, GREEN), strict=True), start=1):
+    for number, (place, colour) in enumerate(zip(many.places, COLOURS, strict=False), start=1):
         lines.append(Series(place.speeds, place.true, f"true, place {number}", colour))
         points.append(Markers(np.abs(place.velocity.velocities), place.friction, f"place {number}", colour))
     return Figure(
         "rig_friction_over_velocity",
         "Friction over velocity, joint locked",
         f"Crossover {with_unit(many.crossover, 'Hz')}. Mean commanded force of each steady pass, there and back, the "
-        "forces of inertia and of cables taken off; the lines are the true friction on average over the stretch that "
-        "all passes share. Speeds without a mark: the stage sticks, slips or hunts there.",
+        "force of inertia and the constant pull of the cables taken off; the lines are the true friction, with the "
+        "drag of the cables, on average over the stretch that all passes share. Speeds without a mark were not steady.",
         (Panel("", Axis("Speed", "m/s", log=True), Axis("Friction", "N"), tuple(lines), markers=tuple(points)),),
         subject=outcome.stage.name,
     )

@@ -14,7 +14,7 @@ from scipy.signal import lfilter, periodogram
 
 from friso.identify.estimate import Estimate
 from friso.identify.experiments.common import block_mean, by_t, channel, low_pass, on_bearing
-from friso.identify.experiments.passes import CUTOFF, STEADY, Pass, passes
+from friso.identify.experiments.passes import CUTOFF, Pass, passes
 from friso.identify.logs.log import Log
 from friso.intervals import COVERAGE
 
@@ -223,7 +223,7 @@ def _verdict(maps: tuple[PassMap, ...], repeatability: Estimate, crossover: floa
     rough = [m for m in maps if not m.steady]
     if rough:
         speeds = ", ".join(sorted({f"{abs(m.velocity) * 1e3:.3g}" for m in rough}))
-        reasons.append(f"the motion at {speeds} mm/s is not steady (its speed varies by more than {STEADY:.0%})")
+        reasons.append(f"the motion at {speeds} mm/s is not steady (it hunts, sticks or swings)")
     if not repeatability.shown:
         reasons.append(f"whether it repeats is not shown ({repeatability.reason})")
     elif repeatability.value < REPEATS:

@@ -77,11 +77,14 @@ def friction_velocity(log: Log, mass: float = 0.0, cutoff: float = CUTOFF) -> Fr
         for words, m in ways(velocities)
     }
     bias, both = _together(velocities, forces, errors)
+    way = way_of(log, used)
     warnings = []
+    if used and way != way_of(log, [each for each in every if each.steady]):
+        warnings.append(f"Read on the way that all passes go, {way[0] * 1e3:.4g} to {way[1] * 1e3:.4g} mm.")
     if len(unsteady):
         low, high = np.abs(unsteady).min(), np.abs(unsteady).max()
         warnings.append(f"{len(unsteady)} stretches, {low:.3g} to {high:.3g} m/s, were not steady and are left out.")
-    return FrictionVelocity(sides, both, bias, velocities, forces, errors, unsteady, way_of(log, used), tuple(warnings))
+    return FrictionVelocity(sides, both, bias, velocities, forces, errors, unsteady, way, tuple(warnings))
 
 
 def _row(each: Pass, mass: float) -> tuple[float, float, float]:
@@ -99,7 +102,8 @@ def _together(velocities: np.ndarray, forces: np.ndarray, errors: np.ndarray) ->
     if np.abs(velocities).max() >= SPAN * np.abs(velocities).min():
         columns.insert(1, velocities)
     design = np.stack(columns, axis=1)
-    solution, covariance, freedom = _linear(design, forces, errors)
+    even = np.full_like(errors, np.sqrt(np.mean(errors**2)))  # a curve that the line lacks cancels, there and back
+    solution, covariance, freedom = _linear(design, forces, even)
     if freedom < 1:
         return Estimate.unknown(name, "N", method, "too few steady stretches"), _nothing("too few steady stretches")
     bias = by_t(name, "N", Mean(float(solution[-1]), float(covariance[-1, -1] ** 0.5), freedom), method)
@@ -134,7 +138,7 @@ def _covariance(
     counts where it is greater than 1; `levels` are the places of what is a level of friction."""
     variances = deviations**2 * max(scatter, 1.0)
     covariance = inverse * variances @ inverse.T
-    covariance[np.ix_(levels, levels)] += float(np.mean((errors / COVERAGE) ** 2))
+    covariance[np.ix_(levels, levels)] += float(np.average((errors / COVERAGE) ** 2, weights=deviations**-2))
     return covariance
 
 

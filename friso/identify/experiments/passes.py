@@ -21,11 +21,16 @@ STEADY, QUICK = 0.3, 0.05
 """Standard deviation of the velocity over its mean from which a motion is not steady: it hunts, sticks or swings; the
 second holds for swings quicker than the cutoff that stand clear of noise."""
 
+ROUNDING, WHOLE = 1e-6, 0.1
+"""Share of the largest step of a position up to which steps are rounding of numbers, and how far those in digits may
+be from whole numbers."""
+
 CLEAR = 20.0
 """Power over the median from which a line of a spectrum is no noise."""
 
-LEAST_COMMON = 16
-"""Samples of the way that all passes share, from which it is enough for each of them."""
+LEAST_COMMON, COMMON = 16, 0.5
+"""Samples of each pass on the way that all of them share, and the share of this in the way of the shortest, from which
+it is enough."""
 
 CORNER = 0.02
 """Share of the largest acceleration of the reference below which its velocity is constant."""
@@ -72,10 +77,12 @@ def passes(log: Log, cutoff: float = CUTOFF) -> tuple[Pass, ...]:
 
 def on_common_way(log: Log, found: Sequence[Pass], cutoff: float = CUTOFF) -> tuple[Pass, ...]:
     """Passes of a log, each cut to the way that all of them go, where friction is that of the same places; as they are
-    where that is too little of one of them."""
+    where that is too little."""
     position, velocity = on_bearing(log), _velocity(log, cutoff)
-    low = max((position[each.span].min() for each in found), default=0.0)
-    high = min((position[each.span].max() for each in found), default=0.0)
+    ways = [(float(position[each.span].min()), float(position[each.span].max())) for each in found]
+    low, high = max((way[0] for way in ways), default=0.0), min((way[1] for way in ways), default=0.0)
+    if high - low < COMMON * min((way[1] - way[0] for way in ways), default=np.inf):
+        return tuple(found)
     cut = []
     for each in found:
         inside = each.span.start + np.flatnonzero((position[each.span] >= low) & (position[each.span] <= high))
@@ -134,19 +141,31 @@ def _trimmed(mask: np.ndarray, sample_time: float, cutoff: float, share: float) 
 def _pass(log: Log, span: slice, velocity: np.ndarray, cutoff: float) -> Pass:
     went, force = velocity[span], block_mean(channel(log, "force")[span])
     acceleration = float((went[-1] - went[0]) / ((span.stop - span.start - 1) * log.sample_time))
-    quick = _quick_swing(on_bearing(log)[span], log.sample_time, cutoff)
+    position = on_bearing(log)
+    quick = _quick_swing(position[span], log.sample_time, cutoff, _digit(position))
     return Pass(span, float(went.mean()), float(went.std()), quick, force, acceleration)
 
 
-def _quick_swing(position: np.ndarray, sample_time: float, cutoff: float) -> float:
+def _digit(position: np.ndarray) -> float:
+    """The digit [m] of which all steps of a position are whole numbers; 0 if there is none."""
+    steps = np.abs(np.diff(position))
+    steps = steps[steps > ROUNDING * steps.max(initial=0.0)]
+    if not len(steps):
+        return 0.0
+    digits = steps / steps.min()
+    return float(steps.min()) if np.abs(digits - np.rint(digits)).max() < WHOLE else 0.0
+
+
+def _quick_swing(position: np.ndarray, sample_time: float, cutoff: float, digit: float) -> float:
     """Standard deviation of the velocity [m/s] in the lines of its spectrum above the cutoff [Hz] that stand clear of
-    noise: a stage that hunts quickly goes smoothly for the filter. What is less than a digit is no motion."""
+    noise: a stage that hunts quickly goes smoothly for the filter. What is less than a digit [m] is no motion."""
     window = np.hanning(len(position))
     lines = np.abs(np.fft.rfft(detrend(position) * window)) ** 2 * 2 / (len(position) * np.sum(window**2))
     frequency = np.fft.rfftfreq(len(position), sample_time)
-    above = frequency > cutoff
-    power = np.where(above & (lines > CLEAR * np.median(lines[above])), lines, 0.0) if above.any() else np.zeros(1)
-    steps = np.abs(np.diff(position))
-    if power.sum() < float(steps[steps > 0].min(initial=0.0)) ** 2:
+    above = frequency > cutoff + 2 / (len(position) * sample_time)  # by half a main lobe of the window
+    if not above.any():
+        return 0.0
+    power = np.where(above & (lines > CLEAR * np.median(lines[above])), lines, 0.0)
+    if power.sum() < digit**2:
         return 0.0
     return float(np.sqrt(np.sum(power * (2 * np.pi * frequency) ** 2)))
