@@ -44,6 +44,20 @@ def test_estimates_far_beyond_their_intervals_disagree() -> None:
     assert one.high == pytest.approx(1.09, abs=1e-3)
 
 
+@given(st.integers(0, 2**31), st.integers(3, 8))
+@settings(max_examples=20, deadline=None)
+def test_places_that_differ_show_the_mean_of_all_places(seed: int, count: int) -> None:
+    """Places that scatter by far more than their own errors, one known much less: the mean of all is held as often as
+    95 % intervals should, and the one that is not known does not widen it."""
+    rng = np.random.default_rng(seed)
+    cases = [[normal("k", "N", rng.normal(5, 0.5), 0.02, "a") for _ in range(count)] for _ in range(200)]
+    answers = [combined(case)[0][0] for case in cases]
+    assert sum(each.holds(5) for each in answers) > 170
+    vague = [combined([*case, normal("k", "N", 55.0, 50.0, "b")])[0][0] for case in cases]
+    wider = [more.half_width / each.half_width for more, each in zip(vague, answers, strict=True)]
+    assert np.median(wider) == pytest.approx(1, abs=0.02)
+
+
 @given(st.integers(0, 2**31), st.integers(2, 6))
 @settings(max_examples=20, deadline=None)
 def test_repeated_measurements_agree_about_as_often_as_they_should(seed: int, count: int) -> None:

@@ -104,13 +104,7 @@ class StepWriter:
         self._rates = Block(rates, self.constants)
         self._watched = Block(watched, self.constants)
         self._followed = Block({"deviation": model.deviation} if model.clock else follow, self.constants)
-        self._jumps = [
-            (
-                Block({f"jump{self._index[x]}_": e for x, e in jumps.items()}, self.constants),
-                [*map(self._index.get, jumps)],
-            )
-            for jumps in (model.jumps.get(kink, {}) for kink in model.kinks)
-        ]
+        self._jumps = [self._jumping(model.jumps.get(kink, {})) for kink in model.kinks]
         free: set[Any] = set().union(*(sp.sympify(e).free_symbols for e in watched.values()))
         self._watched_states = sorted(self._index[s] for s in free & set(self._index))
         self._updates = Block({f"held{i}_": each.update for i, each in enumerate(model.held)}, self.constants)
@@ -120,6 +114,11 @@ class StepWriter:
         sizes_of = (self.size, len(tableau.dense), len(self.constants.index), self.kinks, len(self._given))
         looked_up = (len(model.clock.seen), len(model.clock.tabled)) if model.clock else (0, 0)
         self.layout = Layout(*sizes_of, *looked_up, len(self._walks))
+
+    def _jumping(self, jumps: Mapping[sp.Symbol, sp.Expr]) -> tuple[Block, list[int]]:
+        """By how much states jump at a kink, and the numbers of these."""
+        named = {f"jump{self._index[x]}_": jump for x, jump in jumps.items()}
+        return Block(named, self.constants), [self._index[x] for x in jumps]
 
     def _size(self, surface: sp.Expr) -> sp.Expr:
         """Magnitude of a surface that corresponds to the scales of the states."""

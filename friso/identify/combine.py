@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from scipy.optimize import brentq
 from scipy.stats import chi2
 
 from friso.identify.estimate import Estimate
-from friso.identify.experiments.common import t_value
+from friso.identify.experiments.common import Mean, by_t
 from friso.intervals import COVERAGE
 
 CHANCE = 0.01
@@ -21,7 +22,7 @@ Correlated = tuple[Sequence[Estimate], np.ndarray]
 def combined(found: Sequence[Estimate]) -> tuple[list[Estimate], list[str]]:
     """One estimate per key from all those found, weighted by their intervals; and a sentence where they disagree.
 
-    Where some disagree, the interval spans all of them. What one experiment shows counts, whatever another cannot show;
+    Where some disagree, the interval allows for that. What one experiment shows counts, whatever another cannot show;
     where none does, what all of them leave possible is left.
     """
     answers, said = [], []
@@ -38,7 +39,7 @@ def combined(found: Sequence[Estimate]) -> tuple[list[Estimate], list[str]]:
         answers.append(one)
         if not agrees:
             texts = "; ".join(_text(each) for each in (sure or own))
-            said.append(f"{key}: the experiments disagree, the interval spans them all: {texts}")
+            said.append(f"{key}: the experiments disagree, the interval allows for that: {texts}")
         beyond = [each for each in own if shown and not each.shown and (each.low > one.high or each.high < one.low)]
         said += [f"{key}: {_text(one)} is shown, but {_text(each)}" for each in beyond]
     return answers, said
@@ -75,8 +76,8 @@ def _mean(key: str, shown: Sequence[Estimate]) -> tuple[Estimate, bool]:
     """The weighted mean where a chi-square test allows that all are of one value, and whether it does.
 
     Its interval is wider by the Birge ratio (Birge 1932, doi:10.1103/PhysRev.40.207) where they scatter more than their
-    own intervals say. Where the test does not allow it, as for friction at several places, the interval spans all of
-    them, and what their scatter leaves open about the mean of all places (Student's t, from three on).
+    own intervals say. Where the test does not allow it, as for friction at several places, each counts with a scatter
+    from place to place besides its own (`_between`); of two, which hardly show a scatter, the interval spans both.
     """
     values, weights = (
         np.array(column) for column in zip(*((each.value, _weight(each)) for each in shown), strict=True)
@@ -87,11 +88,24 @@ def _mean(key: str, shown: Sequence[Estimate]) -> tuple[Estimate, bool]:
     if chi2.sf(squares, freedom) > CHANCE:
         deviation = float(np.sqrt(max(squares / freedom, 1.0) / weights.sum()))
         return Estimate.normal(key, shown[0].unit, mean, deviation, method), True
-    low, high = min(each.low for each in shown), max(each.high for each in shown)
-    if freedom > 1:
-        center, half = float(values.mean()), t_value(freedom) * float(values.std(ddof=1)) / len(values) ** 0.5
-        low, high = min(low, center - half), max(high, center + half)
-    return Estimate(key, shown[0].unit, (low + high) / 2, low, high, method), False
+    if freedom == 1:
+        low, high = min(each.low for each in shown), max(each.high for each in shown)
+        return Estimate(key, shown[0].unit, (low + high) / 2, low, high, method), False
+    return by_t(key, shown[0].unit, _between(values, 1 / weights), method), False
+
+
+def _between(values: np.ndarray, variances: np.ndarray) -> Mean:
+    """The mean of values, shape (n,), that scatter by more than their variances: a variance from one to the next is
+    added with which they scatter as they do (Paule, Mandel 1982, doi:10.6028/jres.087.022). The degrees of freedom are
+    those of as many values as count equally: one that is hardly known tells little of the scatter."""
+
+    def excess(added: float) -> float:
+        weights = 1 / (variances + added)
+        return float(np.sum(weights * (values - np.average(values, weights=weights)) ** 2)) - (len(values) - 1)
+
+    weights = 1 / (variances + brentq(excess, 0.0, float(np.ptp(values)) ** 2))
+    equal = weights.sum() ** 2 / (weights @ weights)
+    return Mean(float(np.average(values, weights=weights)), float(weights.sum() ** -0.5), max(round(equal) - 1, 1))
 
 
 def _left(key: str, own: Sequence[Estimate]) -> tuple[Estimate, bool]:

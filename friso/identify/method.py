@@ -198,12 +198,21 @@ def _analysed(
         start = {**flat, **{name: each.value for name, each in best.items() if name in flat}}
         return identify_moves(log, start, own and "reference" in log, options.bandwidth)
     if kind == STICK_SLIP:
-        stiffness = best.get("joint.stiffness", flat.get("joint.stiffness"))
-        return static_from_stick_slip(log, stiffness, masses["stage"], flat.get("joint.stroke", np.inf))
+        return _stick_slip(log, best.get("joint.stiffness"), flat, masses["stage"])
     mass = sum(masses.values())
     if kind == BREAK_AWAY:
         return static_from_ramps(log, mass)
     return ConstantSpeed(friction_velocity(log, mass), friction_position(log, mass, flat.get("controller.crossover")))
+
+
+def _stick_slip(log: Log, stiffness: Estimate | None, flat: Mapping[str, Any], stage_mass: float) -> StickSlip:
+    """Slow motion, with the joint's stiffness as other experiments show it; else as this log does; else as the stage
+    file has it."""
+    stroke = flat.get("joint.stroke", np.inf)
+    found = static_from_stick_slip(log, stiffness or flat.get("joint.stiffness"), stage_mass, stroke)
+    if stiffness is None and found.stiffness.shown:
+        return static_from_stick_slip(log, found.stiffness, stage_mass, stroke)
+    return found
 
 
 def _value(best: Mapping[str, Estimate], flat: Mapping[str, Any], key: str) -> float:
@@ -223,6 +232,9 @@ def _estimates(result: Result, stage: Stage | None) -> tuple[Estimate, ...]:
         pairs = {"coulomb": both.coulomb, "viscous": both.viscous, "static": both.static}
         pairs["stribeck_velocity"] = both.stribeck_velocity
         return tuple(_named(each, f"friction.{name}") for name, each in pairs.items())
+    if isinstance(result, StickSlip):
+        jointed = stage is not None and stage.joint and result.stiffness.shown
+        return (result.static, *([result.stiffness] if jointed else ()))
     return (_named(result.static, "friction.static"),)
 
 

@@ -195,6 +195,7 @@ def _stick_slip(it: StickSlip) -> dict[str, Any]:
         "break_away_forward": it.break_away_forward,
         "break_away_backward": it.break_away_backward,
         "offset": it.offset,
+        "stiffness": it.stiffness,
     }
     told = {name: _estimate(each) for name, each in several.items()}
     return {**told, "slips": len(it.times), "spread_n": list(it.spread), "warnings": list(it.warnings)}

@@ -191,6 +191,7 @@ def _stick_slip(it: StickSlip) -> tuple[tuple[str, ...], Facts, tuple[str, ...]]
         ("Break-away force as measured, forward", with_interval(it.break_away_forward)),
         ("Break-away force as measured, backward", with_interval(it.break_away_backward)),
         ("Force common to both directions", with_interval(it.offset)),
+        ("Stiffness of the joint", with_interval(it.stiffness)),
         ("Slips", str(len(it.times))),
     ]
     if len(it.times):

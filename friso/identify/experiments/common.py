@@ -23,6 +23,10 @@ BLOCKS = 8
 NORMAL_MAD = 1.4826
 """Standard deviation over median absolute deviation, of a normal distribution."""
 
+LINEARITY = 1e-3
+"""Share by which the ratio of two channels may be off, however often it is read: the linearity of good sensors and
+amplifiers."""
+
 _EXAMPLES = {"force": '--scale force="35.1507 N/V"', "position": '--unit position="mm"'}
 
 

@@ -14,8 +14,8 @@ from friso.identify.logs.log import Log
 CUTOFF = 25.0
 """Low-pass of the velocity [Hz] by which constant stretches are found."""
 
-LEAST = 0.1
-"""Shortest stretch [s], and at least 40 samples."""
+LEAST, LEAST_SAMPLES = 0.1, 40
+"""Shortest stretch, in seconds and in samples."""
 
 STEADY, QUICK = 0.3, 0.05
 """Standard deviation of the velocity over its mean from which a motion is not steady: it hunts, sticks or swings; the
@@ -62,7 +62,7 @@ def passes(log: Log, cutoff: float = CUTOFF) -> tuple[Pass, ...]:
     channel(log, "force")
     found = []
     for part in log.segments:
-        if part.stop - part.start < 40:
+        if part.stop - part.start < LEAST_SAMPLES:
             continue
         if "reference" in log:
             spans = _of_reference(log, part, cutoff)
@@ -103,7 +103,7 @@ def _velocity(log: Log, cutoff: float) -> np.ndarray:
     position = on_bearing(log)
     velocity = np.full(len(position), np.nan)
     for part in log.segments:
-        if part.stop - part.start >= 40:
+        if part.stop - part.start >= LEAST_SAMPLES:
             velocity[part] = rate(position[part], log.sample_time, cutoff)
     return velocity
 
@@ -129,7 +129,7 @@ def _of_motion(velocity: np.ndarray, sample_time: float, cutoff: float) -> list[
 
 def _trimmed(mask: np.ndarray, sample_time: float, cutoff: float, share: float) -> list[slice]:
     """The stretches of a mask without their ends: what the filter smears, and a share of the start to settle."""
-    edge, least = int(1 / (cutoff * sample_time)), max(int(LEAST / sample_time), 40)
+    edge, least = int(1 / (cutoff * sample_time)), max(int(LEAST / sample_time), LEAST_SAMPLES)
     found = []
     for each in runs(mask):
         begin, end = each.start + edge + int(share * (each.stop - each.start)), each.stop - edge

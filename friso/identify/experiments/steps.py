@@ -7,19 +7,31 @@ whatever constant force there is besides; and they are that even if the cart cre
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import pairwise, product
 
 import numpy as np
 
 from friso.identify.estimate import Estimate
-from friso.identify.experiments.common import BLOCKS, Mean, block_mean, by_t, cart, channel, deflection, low_pass, runs
+from friso.identify.experiments.common import (
+    BLOCKS,
+    LINEARITY,
+    Mean,
+    block_mean,
+    by_t,
+    cart,
+    channel,
+    deflection,
+    low_pass,
+    runs,
+)
 from friso.identify.logs.log import Log
 
 CUTOFF = 25.0
 """Low-pass of the force [Hz] (Sec. 4.2.2)."""
 
-SETTLED = 0.02
-"""Share of a step by which position or force may still drift within a settled window."""
+SETTLED, CREEPING = 0.02, 0.1
+"""Share of a step by which, within a settled window, the force may still drift beyond what goes with the deflection,
+and by which the deflection may, where none drifts less: a slow integrator takes long to pull a spring all the way."""
 
 FIXED = 0.02
 """Share of the steps of the position by which the cart may follow and still count as fixed."""
@@ -34,13 +46,12 @@ METHOD = "differences of force over differences of deflection between settled po
 
 @dataclass(frozen=True)
 class Window:
-    """A settled window: from `start` to `end` [s], mean deflection [m] and force [N], with the standard errors of block
-    means, the rest of a drift included."""
+    """A settled window: from `start` to `end` [s], mean deflection [m] and force [N], with the standard error of the
+    force at that deflection by block means, the rest of a drift included."""
 
     start: float
     end: float
     position: float
-    position_error: float
     force: float
     force_error: float
 
@@ -76,14 +87,14 @@ def stiffness_from_steps(log: Log, cutoff: float = CUTOFF) -> StepStiffness:
         np.concatenate([low_pass(x[s], log.sample_time, cutoff) for s in log.segments]) for x in (force, deflected)
     ]
     spans = [s for part in log.segments for s in _plateaus(log, part, cutoff)]
-    scale = _scale(position, spans)
-    settled = [_settled(log, span, smooth[0], smooth[1], scale) for span in spans]
+    scale, secant = _scale(position, spans), _secant(smooth[1], smooth[0], spans)
+    settled = [_settled(log, span, smooth[0], smooth[1], scale, secant) for span in spans]
     windows = tuple(w for w in settled if w is not None)
     fixed, said = _fixed(log, position, windows)
     warnings = list(said)
     if len(windows) < len(spans):
         warnings.append(f"{len(spans) - len(windows)} of {len(spans)} plateaus had not settled and are left out.")
-    steps = np.diff([[w.position, w.force, w.position_error, w.force_error] for w in windows], axis=0).reshape(-1, 4)
+    steps = np.diff([[w.position, w.force] for w in windows], axis=0).reshape(-1, 2)
     noise = np.array([np.hypot(a.force_error, b.force_error) for a, b in pairwise(windows)])
     large = np.abs(steps[:, 0]) > 0.2 * scale
     every, up, down = (
@@ -120,20 +131,31 @@ def _scale(position: np.ndarray, spans: list[slice]) -> float:
     return float(np.median(sizes[sizes >= 0.3 * sizes.max()])) if len(sizes) else 0.0
 
 
-def _settled(log: Log, span: slice, force: np.ndarray, position: np.ndarray, scale: float) -> Window | None:
-    """The part of a plateau that has settled: neither drifts by more than a share of a step, or than noise explains."""
+def _secant(position: np.ndarray, force: np.ndarray, spans: list[slice]) -> float:
+    """About how much force [N/m] goes with the deflection, by the later half of each plateau; 0 without two of them."""
+    levels = np.array([[np.median(x[s][(s.stop - s.start) // 2 :]) for x in (position, force)] for s in spans])
+    if len(levels) < 2 or not np.ptp(levels[:, 0]) > 0:
+        return 0.0
+    return float(np.polyfit(levels[:, 0], levels[:, 1], 1)[0])
+
+
+def _settled(
+    log: Log, span: slice, force: np.ndarray, position: np.ndarray, scale: float, secant: float
+) -> Window | None:
+    """The part of a plateau that has settled: the deflection hardly drifts, and the force drifts by no more than goes
+    with that, but for a share of a step or what noise explains."""
     length = span.stop - span.start
     margin = min(length // 10, int(1 / (CUTOFF * log.sample_time)))
-    for share in STARTS:
+    for allowed, share in product((SETTLED, CREEPING), STARTS):
         chosen = slice(span.start + int(share * length), span.stop - margin)
         if chosen.stop - chosen.start < 2 * BLOCKS:
             return None
-        means, drifts = zip(*(_drifting(x[chosen]) for x in (position, force)), strict=True)
-        span_force = SETTLED * abs(_force_scale(force))
-        if drifts[0] <= max(SETTLED * scale, 0.0) and drifts[1] <= span_force:
-            errors = [float(np.hypot(m.error, d / 12**0.5)) for m, d in zip(means, drifts, strict=True)]
+        bent, creep = _drifting(position[chosen])
+        beyond, drift = _drifting(force[chosen] - secant * position[chosen])
+        if creep <= allowed * scale and drift <= SETTLED * abs(_force_scale(force)):
             time = log.time[[chosen.start, chosen.stop - 1]]
-            return Window(time[0], time[1], means[0].value, errors[0], means[1].value, errors[1])
+            level = beyond.value + secant * bent.value
+            return Window(time[0], time[1], bent.value, level, float(np.hypot(beyond.error, drift / 12**0.5)))
     return None
 
 
@@ -166,7 +188,8 @@ def _slope(steps: np.ndarray, noise: np.ndarray, chosen: np.ndarray, words: str,
     shared = float(np.sum(np.diff(np.concatenate(([0.0], x, [0.0]))) ** 2)) / float(x @ x) / 2
     within = float(np.sum((x * noise) ** 2) / (x @ x) ** 2)
     variance = max(max(1.0, shared) * spread / float(x @ x), within)
-    found = by_t(KEY, UNIT, Mean(slope, variance**0.5, count - 1), method)
+    linear = LINEARITY * abs(slope)
+    found = by_t(KEY, UNIT, Mean(slope, variance**0.5, count - 1), method, linear, linear)
     if found.low > 0:
         return found
     return Estimate.unknown(KEY, UNIT, method, SOFT, 0.0, found.high if found.high > 0 else np.inf)

@@ -22,6 +22,8 @@ from friso.identify.experiments.common import (
     rate,
     ways,
 )
+from friso.identify.experiments.loading import METHOD as LOADED
+from friso.identify.experiments.loading import stiffness_of_loading
 from friso.identify.experiments.rate_effect import BRISTLE_RATE, static_friction
 from friso.identify.experiments.slips import SLIDING, VISIBLE, slips
 from friso.identify.logs.log import Log
@@ -49,9 +51,10 @@ KEY = "friction.static"
 class StickSlip:
     """Static friction [N], in all and per direction; mean break-away force [N] per direction as measured at its force
     rate, and its range over the slips (5 to 95 %); a force common to both directions (sensor offset, or unequal
-    friction). Per slip, shape (n,): time [s], place on the rail [m], direction, peak deflection [m] (NaN without
-    sensor), break-away force [N] in that direction, force rate [N/s], highest speed of the cart [m/s]. Over time, shape
-    (samples,): force on the cart [N] and its speed [m/s]."""
+    friction); the joint's `stiffness` [N/m] as force and deflection of this log show it. Per slip, shape (n,): time
+    [s], place on the rail [m], direction, peak deflection [m] (NaN without sensor), break-away force [N] in that
+    direction, force rate [N/s], highest speed of the cart [m/s]. Over time, shape (samples,): force on the cart [N] and
+    its speed [m/s]."""
 
     static: Estimate
     forward: Estimate
@@ -60,6 +63,7 @@ class StickSlip:
     break_away_backward: Estimate
     spread: tuple[float, float]
     offset: Estimate
+    stiffness: Estimate
     times: np.ndarray
     places: np.ndarray
     directions: np.ndarray
@@ -88,11 +92,12 @@ def static_from_stick_slip(
     Slips from a deflection at the `stroke` [m] of the joint tell nothing of it. What the record cannot show is unknown
     with its reason. Raises StageError for missing channels or an unusable stiffness.
     """
-    pull, deflected, relative_error = _pull(log, stiffness, stage_mass, cutoff)
+    deflected, pushed = _deflection(log, cutoff), _actuator(log, stage_mass, cutoff)
+    pull, relative_error = _pull(log, stiffness, deflected, pushed)
     body = on_bearing(log)
     cart_velocity = np.zeros_like(body)
     rows: list[tuple[float, ...]] = []
-    shares = []
+    shares, loads = [], []
     for part in log.segments:
         found = slips(body[part], log.sample_time, cutoff)
         cart_velocity[part] = found.speed
@@ -108,36 +113,56 @@ def static_from_stick_slip(
             late = max(force - before, 0.0) + abs(rising) * (unseen + 1 / cutoff)
             place = (float(log.time[at]), float(body[at]), float(way))
             held = held or abs(bent) > (1 - AT_STOP) * stroke
+            loads += [] if held else [slice(part.start + rest, part.start + onset)]
             rows.append((*place, bent, force, rising, float(abs(found.speed[top])), held, late))
     table = np.array([row for row in rows if row[5] > 0 or row[7]]).reshape(-1, 9).T
-    return _answer(table, pull, cart_velocity, (relative_error, bristle_rate), _why(shares))
+    shown = _stiffness(log, deflected, pushed, loads)
+    return _answer(table, pull, cart_velocity, (relative_error, bristle_rate), shown, _why(shares))
+
+
+def _smooth(log: Log, values: np.ndarray, cutoff: float) -> np.ndarray:
+    return np.concatenate([low_pass(values[s], log.sample_time, cutoff) for s in log.segments])
+
+
+def _deflection(log: Log, cutoff: float) -> np.ndarray | None:
+    """Deflection of the joint [m], low-passed; None where it is not measured."""
+    measured = deflection(log)
+    return None if measured is None else _smooth(log, measured, cutoff)
+
+
+def _actuator(log: Log, stage_mass: float, cutoff: float) -> np.ndarray | None:
+    """Force of the actuator less the stage's inertia [N], low-passed; None where it is not measured."""
+    if "force" not in log:
+        return None
+    force = _smooth(log, channel(log, "force"), cutoff)
+    if not stage_mass:
+        return force
+    signal = channel(log, "position")
+    for _ in range(2):
+        signal = np.concatenate([rate(signal[s], log.sample_time, cutoff) for s in log.segments])
+    return force - stage_mass * signal
 
 
 def _pull(
-    log: Log, stiffness: Estimate | float | None, stage_mass: float, cutoff: float
-) -> tuple[np.ndarray, np.ndarray | None, float]:
-    """Force on the cart [N], deflection [m] low-passed, and the relative standard deviation of their ratio."""
-
-    def smooth(values: np.ndarray) -> np.ndarray:
-        return np.concatenate([low_pass(values[s], log.sample_time, cutoff) for s in log.segments])
-
+    log: Log, stiffness: Estimate | float | None, deflected: np.ndarray | None, pushed: np.ndarray | None
+) -> tuple[np.ndarray, float]:
+    """Force on the cart [N], low-passed, and the relative standard deviation of its scale."""
     if stiffness is None:
-        force = smooth(channel(log, "force"))
-        if stage_mass:
-            position = channel(log, "position")
-            velocity = np.concatenate([rate(position[s], log.sample_time, cutoff) for s in log.segments])
-            force = force - stage_mass * np.concatenate(
-                [rate(velocity[s], log.sample_time, cutoff) for s in log.segments]
-            )
-        return force, None, 0.0
+        return channel(log, "force") if pushed is None else pushed, 0.0  # raises: neither of the two is known
     value, half = (stiffness.value, stiffness.half_width) if isinstance(stiffness, Estimate) else (stiffness, 0.0)
     if not (np.isfinite(value) and value > 0 and np.isfinite(half)):
         raise StageError("stiffness", f"{value:g} +/- {half:g} N/m", "a stiffness greater than 0", "2.4 N/mm", log.name)
-    deflected = deflection(log)
     if deflected is None:
-        channel(log, "relative_position")  # raises: without it the pull of the joint is not known
-    bent = smooth(np.asarray(deflected))
-    return value * bent, bent, half / COVERAGE / value
+        deflected = channel(log, "relative_position")  # raises: without it the pull of the joint is not known
+    return value * deflected, half / COVERAGE / value
+
+
+def _stiffness(log: Log, deflected: np.ndarray | None, pushed: np.ndarray | None, loads: list[slice]) -> Estimate:
+    """The joint's stiffness as this log shows it."""
+    if deflected is None or pushed is None:
+        return Estimate.unknown("joint.stiffness", "N/m", LOADED, "force and deflection are not both measured")
+    speed = np.concatenate([np.gradient(deflected[s], log.sample_time) for s in log.segments])
+    return stiffness_of_loading(deflected, pushed, speed, loads)
 
 
 def _peak(
@@ -176,7 +201,12 @@ def _why(shares: list[float]) -> str:
 
 
 def _answer(
-    table: np.ndarray, pull: np.ndarray, velocity: np.ndarray, known: tuple[float, float], why: str
+    table: np.ndarray,
+    pull: np.ndarray,
+    velocity: np.ndarray,
+    known: tuple[float, float],
+    stiffness: Estimate,
+    why: str,
 ) -> StickSlip:
     times, places, directions, bent, forces, rates, speeds, held, late = table
     relative_error, bristle_rate = known
@@ -204,6 +234,7 @@ def _answer(
         means["backward"],
         (float(low), float(high)),
         offset,
+        stiffness,
         times,
         places,
         directions,

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from friso.equations.pid import van_dijk_numbers
 from friso.identify.experiments import StepStiffness, stiffness_from_steps
 from friso.rig.run import run
 from friso.rig.task import staircase
@@ -16,9 +17,9 @@ from friso.studies.rig.sizes import FIXED, freed, interval, moving_mass, pace
 STEP, WAYS = 0.3, (1, 1, -1, -1, 1, -1)
 """A step in strokes, 0.3 mm on the thesis's rig (Sec. 4.2.2), and the directions of the steps, our choice."""
 
-STANDS, SAMPLES = 16.0, 125.0
-"""Periods of the crossover for which each step stands (2 s on the thesis's rig), and samples of the log per period
-(1 ms): our choice, the thesis tells neither."""
+STANDS, SETTLED, SAMPLES = 16.0, 5.0, 125.0
+"""Periods of the crossover for which each step stands (2 s on the thesis's rig), and at least so many time constants of
+the integrator against the joint; samples of the log per period (1 ms): our choice, the thesis tells neither."""
 
 
 @dataclass(frozen=True)
@@ -52,12 +53,25 @@ def steps(stage: Stage, seed: int) -> RigLog:
     """The log of the steps."""
     free, period = freed(stage), 1 / pace(stage)
     step = STEP * stage.flat()["joint.stroke"]
-    task = staircase([way * step for way in WAYS], STANDS * period)
+    task = staircase([way * step for way in WAYS], max(STANDS * period, SETTLED * pulling_time(free)))
     tuned = stage.flat().get("controller.tuned_mass", moving_mass(stage))
     held = {"masses.cart": np.array([FIXED])}
     held |= {"controller.tuned_mass": np.array([tuned])} if "controller.crossover" in stage.flat() else {}
     (recorded,) = run(free, task, [seed], interval(stage, period / SAMPLES), held)
     return rig_log(recorded, 0, "steps", "steps", free, seed)
+
+
+def pulling_time(stage: Stage) -> float:
+    """Time constant [s] with which the integrator pulls the joint the last bit of the way, the cart fixed:
+    proportional gain plus the joint's stiffness over the integral gain; 0 without an integrator."""
+    flat = stage.flat()
+    if "controller.crossover" in flat:
+        gains = van_dijk_numbers({"controller.tuned_mass": moving_mass(stage), **flat})
+        integral = gains["k_p"] / gains["tau_i"]
+        proportional = gains["k_p"] + integral * gains["tau_z"]
+    else:
+        proportional, integral = flat["controller.kp"], flat["controller.ki"]
+    return float((proportional + flat["joint.stiffness"]) / integral) if integral > 0 else 0.0
 
 
 def _notes(stage: Stage) -> tuple[str, ...]:
