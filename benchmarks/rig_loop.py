@@ -1,10 +1,10 @@
 """The loop from rig to stage file: `python -m benchmarks.rig_loop [--machines 100] [--first 0]`.
 
 Machines drawn at random with their drives as built (tests/rig_machines.py) go through the experiments of `friso rig`:
-frequency responses with the joint locked and free, steps, slow motion, and many speeds with the joint locked. Their
-logs are written as text, read back as `friso identify` does, and identified with what an owner knows as `--stage`. The
-locked response, steps, slow motion and constant speed make one stage file; the free response is identified by itself,
-since one bench at a time can be.
+frequency responses with the joint locked and free, steps, slow motion, and with the joint locked many speeds and small
+motion before sliding. Their logs are written as text, read back as `friso identify` does, and identified with what an
+owner knows as `--stage`. All but the free response make one stage file; that is identified by itself, since one bench
+at a time can be.
 
 Per experiment and quantity: how often the 95 % interval holds the truth; and how often `friso check` on the identified
 stage gives the verdict that it gives on the machine. What counts as the truth of static and Coulomb friction is their
@@ -32,6 +32,7 @@ from friso.stage.files import save
 from friso.studies.rig.frf import plant_log
 from friso.studies.rig.many_speeds import many_speeds_logs
 from friso.studies.rig.outcome import RigLog
+from friso.studies.rig.presliding import presliding_log
 from friso.studies.rig.sizes import freed, locked, travel
 from friso.studies.rig.stiction import slow_motion
 from friso.studies.rig.stiffness import steps
@@ -61,8 +62,12 @@ def benches(machine: Machine, seed: int) -> list[list[RigLog]]:
         return [plant_log(each, f"{name}_{n + 1}", place, noise + n) for n, place in enumerate(places)]
 
     slow = slow_motion(stage, noise, RAILS)
+    small = [presliding_log(locked(stage), f"presliding_{n + 1}", place, noise + n) for n, place in enumerate(places)]
     passes = many_speeds_logs(locked(stage), noise)
-    return [[*shaken(locked(stage), "locked"), steps(stage, noise), *slow, *passes], shaken(freed(stage), "free")]
+    return [
+        [*shaken(locked(stage), "locked"), steps(stage, noise), *slow, *small, *passes],
+        shaken(freed(stage), "free"),
+    ]
 
 
 def found_in(logs: list[RigLog], machine: Machine) -> tuple[Identification, Stage]:

@@ -32,7 +32,11 @@ def identify(
     overrides: Overrides = None,
     kind: Annotated[
         str | None,
-        typer.Option("--as", metavar="KIND", help="moves, frequency, steps, stick-slip, break-away, constant-speed."),
+        typer.Option(
+            "--as",
+            metavar="KIND",
+            help="moves, frequency, steps, stick-slip, break-away, constant-speed, presliding.",
+        ),
     ] = None,
     maps: Annotated[Many, typer.Option("--map", metavar="ROLE=CHANNEL", help='position="Axis1.ActPos"')] = None,
     units: Annotated[Many, typer.Option("--unit", metavar="CHANNEL=UNIT", help='Axis1.ActPos="mm"')] = None,

@@ -14,6 +14,7 @@ from friso.identify.estimate import Estimate
 from friso.identify.experiments.break_away import BreakAway, static_from_ramps
 from friso.identify.experiments.friction_position import FrictionPosition, friction_position
 from friso.identify.experiments.friction_velocity import FrictionVelocity, friction_velocity
+from friso.identify.experiments.presliding import Between, Presliding, bristles_from_presliding
 from friso.identify.experiments.steps import StepStiffness, stiffness_from_steps
 from friso.identify.experiments.stick_slip import StickSlip, static_from_stick_slip
 from friso.identify.inverse_model import inverse_model
@@ -30,18 +31,19 @@ from friso.quantities import StageError
 from friso.stage import Stage
 from friso.stage.correlations import Correlations
 
-MOVES, FREQUENCY, STEPS, STICK_SLIP, BREAK_AWAY, CONSTANT = KINDS = (
+MOVES, FREQUENCY, STEPS, STICK_SLIP, BREAK_AWAY, CONSTANT, PRESLIDING = KINDS = (
     "moves",
     "frequency",
     "steps",
     "stick-slip",
     "break-away",
     "constant-speed",
+    "presliding",
 )
 """Kinds of experiment, in words of the command line; they are analysed in the order of `ORDER`, since the later ones
 use what the earlier ones found."""
 
-ORDER = (FREQUENCY, STEPS, MOVES, CONSTANT, STICK_SLIP, BREAK_AWAY)
+ORDER = (FREQUENCY, STEPS, MOVES, CONSTANT, STICK_SLIP, BREAK_AWAY, PRESLIDING)
 
 
 @dataclass(frozen=True)
@@ -55,7 +57,7 @@ class ConstantSpeed:
 Source = Log | MeasuredResponse
 """What a file may hold: signals over time, or a frequency response as somebody measured it."""
 
-Result = Moves | Bench | StepStiffness | StickSlip | BreakAway | ConstantSpeed
+Result = Moves | Bench | StepStiffness | StickSlip | BreakAway | ConstantSpeed | Presliding
 
 
 @dataclass(frozen=True)
@@ -197,6 +199,8 @@ def _analysed(
     if kind == MOVES:
         start = {**flat, **{name: each.value for name, each in best.items() if name in flat}}
         return identify_moves(log, start, own and "reference" in log, options.bandwidth)
+    if kind == PRESLIDING:
+        return bristles_from_presliding(log, between({**flat, **{key: each.value for key, each in best.items()}}))
     if kind == STICK_SLIP:
         return _stick_slip(log, best.get("joint.stiffness"), flat, masses["stage"])
     mass = sum(masses.values())
@@ -213,6 +217,16 @@ def _stick_slip(log: Log, stiffness: Estimate | None, flat: Mapping[str, Any], s
     if stiffness is None and found.stiffness.shown:
         return static_from_stick_slip(log, found.stiffness, stage_mass, stroke)
     return found
+
+
+def between(flat: Mapping[str, Any]) -> Between:
+    """What lies between the commanded force and the bristles of a stage given as flat keys, a joint being held by its
+    limiter."""
+    lag = flat.get("drive.delay", 0.0) + flat.get("drive.sample_time", 0.0) / 2
+    if "drive.current_bandwidth" in flat:
+        lag += 1 / (2 * np.pi * flat["drive.current_bandwidth"])
+    contact, beyond = flat.get("joint.limiter_stiffness", np.inf), flat.get("masses.stage", 0.0)
+    return Between(lag, contact, beyond, flat.get("friction.viscous", 0.0))
 
 
 def _value(best: Mapping[str, Estimate], flat: Mapping[str, Any], key: str) -> float:
@@ -232,6 +246,9 @@ def _estimates(result: Result, stage: Stage | None) -> tuple[Estimate, ...]:
         pairs = {"coulomb": both.coulomb, "viscous": both.viscous, "static": both.static}
         pairs["stribeck_velocity"] = both.stribeck_velocity
         return tuple(_named(each, f"friction.{name}") for name, each in pairs.items())
+    if isinstance(result, Presliding):
+        masses = _shared(result.mass, stage) if stage is not None and result.mass.shown else ()
+        return (result.stiffness, result.damping, *masses)
     if isinstance(result, StickSlip):
         jointed = stage is not None and stage.joint and result.stiffness.shown
         return (result.static, *([result.stiffness] if jointed else ()))
@@ -303,8 +320,9 @@ def _correlated(result: Result, estimates: Sequence[Estimate]) -> Correlated:
         places = [i for i, each in enumerate(estimates[: len(covariance)]) if each.shown and each.half_width > 0]
         size = np.sqrt(np.diag(covariance))
         return [estimates[i] for i in places], (covariance / np.outer(size, size))[np.ix_(places, places)]
-    if isinstance(result, Bench) and all(each.name.startswith("masses.") for each in estimates):
-        return own, np.ones((len(own), len(own)))  # shared out of one
+    shared = np.array([each.name.startswith("masses.") for each in own])
+    if isinstance(result, Presliding) or (isinstance(result, Bench) and shared.all()):
+        return own, np.maximum(np.eye(len(own)), np.outer(shared, shared))  # shared out of one
     return own, np.eye(len(own))
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from friso.identify.estimate import Estimate
 from friso.identify.experiments.break_away import BreakAway
 from friso.identify.experiments.friction_velocity import Direction
+from friso.identify.experiments.presliding import Presliding
 from friso.identify.experiments.steps import StepStiffness
 from friso.identify.experiments.stick_slip import StickSlip
 from friso.identify.inverse_model import InverseModel
@@ -99,6 +100,8 @@ def _result(it: Result) -> dict[str, Any]:
         return _steps(it)
     if isinstance(it, StickSlip):
         return _stick_slip(it)
+    if isinstance(it, Presliding):
+        return _presliding(it)
     return _break_away(it) if isinstance(it, BreakAway) else _constant(it)
 
 
@@ -206,6 +209,11 @@ def _break_away(it: BreakAway) -> dict[str, Any]:
     told = {name: _estimate(each) for name, each in several.items()}
     ramps = {"forces_n": it.forces, "rates_n_per_s": it.rates, "directions": it.directions}
     return {**told, **ramps, "warnings": list(it.warnings)}
+
+
+def _presliding(it: Presliding) -> dict[str, Any]:
+    several = {"stiffness": it.stiffness, "damping": it.damping, "mass": it.mass}
+    return {**{name: _estimate(each) for name, each in several.items()}, "unexplained": it.unexplained}
 
 
 def _constant(it: ConstantSpeed) -> dict[str, Any]:

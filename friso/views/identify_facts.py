@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from friso.identify.estimate import Estimate
 from friso.identify.experiments.break_away import BreakAway
 from friso.identify.experiments.friction_velocity import Direction
+from friso.identify.experiments.presliding import Presliding
 from friso.identify.experiments.steps import StepStiffness
 from friso.identify.experiments.stick_slip import StickSlip
 from friso.identify.inverse_model import InverseModel
@@ -27,6 +28,7 @@ TITLES = {
     "stick-slip": "Stick-slip",
     "break-away": "Break-away ramps",
     "constant-speed": "Constant speed",
+    "presliding": "Motion before sliding",
 }
 
 
@@ -70,6 +72,8 @@ def _told(result: object) -> tuple[tuple[str, ...], Facts, tuple[str, ...]]:
         return _stick_slip(result)
     if isinstance(result, BreakAway):
         return _break_away(result)
+    if isinstance(result, Presliding):
+        return _presliding(result)
     assert isinstance(result, ConstantSpeed)
     return _constant(result)
 
@@ -209,6 +213,17 @@ def _break_away(it: BreakAway) -> tuple[tuple[str, ...], Facts, tuple[str, ...]]
     if len(it.rates):
         facts.append(("Force rates", range_with_unit(float(it.rates.min()), float(it.rates.max()), "N/s")))
     return (), tuple(facts), it.warnings
+
+
+def _presliding(it: Presliding) -> tuple[tuple[str, ...], Facts, tuple[str, ...]]:
+    facts = [
+        ("Stiffness of the bristles", with_interval(it.stiffness)),
+        ("Damping of the bristles", with_interval(it.damping)),
+        ("Moving mass", with_interval(it.mass)),
+    ]
+    if len(it.time):
+        facts += [("Force left unexplained", f"{it.unexplained:.1%} of its standard deviation")]
+    return (), tuple(facts), ()
 
 
 def _constant(it: ConstantSpeed) -> tuple[tuple[str, ...], Facts, tuple[str, ...]]:

@@ -10,6 +10,7 @@ import numpy as np
 from friso.identify.experiments.break_away import BreakAway
 from friso.identify.experiments.friction_position import FrictionPosition
 from friso.identify.experiments.friction_velocity import Direction, FrictionVelocity
+from friso.identify.experiments.presliding import Presliding
 from friso.identify.experiments.steps import StepStiffness
 from friso.identify.experiments.stick_slip import StickSlip
 from friso.identify.logs.log import Log
@@ -48,6 +49,8 @@ def friction_figures(it: Result, log: Log, label: str) -> list[Figure]:
         return _stick_slip(it, log, name)
     if isinstance(it, BreakAway):
         return _break_away(it, name)
+    if isinstance(it, Presliding):
+        return _presliding(it, name)
     if isinstance(it, ConstantSpeed):
         return [*_velocity(it.velocity, name), *_position(it.position, name)]
     raise TypeError(f"no figures of a {type(it).__name__}")
@@ -113,6 +116,35 @@ def _broken(values: np.ndarray, log: Log) -> np.ndarray:
     broken = values.astype(float)
     broken[[part.stop - 1 for part in log.segments[:-1]]] = np.nan
     return broken
+
+
+def _presliding(it: Presliding, name: str) -> list[Figure]:
+    """Force and model, and the motion, over the last tenth of the record."""
+    if not len(it.model):
+        return []
+    return [Figure(f"{name}_presliding", "Motion before sliding", presliding_caption(it), presliding_panels(it))]
+
+
+def presliding_caption(it: Presliding) -> str:
+    """What the bristles are, and how much of the force they explain."""
+    return (
+        f"The last tenth of the record. Stiffness of the bristles: {with_interval(it.stiffness)}; damping: "
+        f"{with_interval(it.damping)}. {it.unexplained:.1%} of the force are left unexplained."
+    )
+
+
+def presliding_panels(it: Presliding) -> tuple[Panel, ...]:
+    """Force and model, and the motion, over the last tenth of the record."""
+    late = slice(-(len(it.time) // 10), None)
+    time, motion = it.time[late], it.position[late] - it.position[late].mean()
+    lines = (
+        Series(time, it.force[late], "force, low-passed", INK, width=1.6),
+        Series(time, it.model[late], "mass and bristles", ORANGE, "dashed", 1.2),
+    )
+    return (
+        Panel("", TIME, Axis("Force", "N"), lines),
+        Panel("", TIME, Axis("Position about its mean", "m"), (Series(time, motion, "", BLUE, width=1.0),)),
+    )
 
 
 def _break_away(it: BreakAway, name: str) -> list[Figure]:

@@ -5,6 +5,7 @@ from friso.identify.experiments.common import record
 from friso.identify.experiments.friction_position import FrictionPosition, friction_position
 from friso.identify.experiments.friction_velocity import FrictionVelocity, friction_velocity
 from friso.identify.experiments.hysteresis import HysteresisStiffness, stiffness_from_hysteresis
+from friso.identify.experiments.presliding import Presliding, bristles_from_presliding
 from friso.identify.experiments.steps import StepStiffness, stiffness_from_steps
 from friso.identify.experiments.stick_slip import StickSlip, static_from_stick_slip
 
@@ -13,8 +14,10 @@ __all__ = [
     "FrictionPosition",
     "FrictionVelocity",
     "HysteresisStiffness",
+    "Presliding",
     "StepStiffness",
     "StickSlip",
+    "bristles_from_presliding",
     "friction_position",
     "friction_velocity",
     "record",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -18,29 +18,45 @@ from friso.stage import Stage
 from friso.studies.rig.outcome import RigLog
 from friso.studies.rig.sizes import friction, interval, pace
 
-STRENGTH = 2.0
-"""RMS of the injected force over static friction: the thesis tells none; it has to move the cart."""
-
 PERIOD, PERIODS = 8.0, 8
 """Periods of the crossover in one of the multisine, which is the inverse of its lowest line (1 Hz on the thesis's rig),
 and how often it is played."""
 
-TOP, LINES = 100.0, 150
-"""Highest line over the crossover (800 Hz), and about how many lines there are, evenly in the logarithm."""
-
-SAMPLES, FINEST = 625.0, 0.4
-"""Samples of the log per period of the crossover (0.2 ms), and the highest line over its rate at most."""
+FINEST = 0.4
+"""The highest line over the log's rate at most."""
 
 PHASES = int.from_bytes(b"sines")
 """Which of a seed's random numbers the phases take."""
 
 
-def excite(stage: Stage, place: float, seed: int, runs: int = 1, changes: Mapping[str, Any] | None = None) -> Recorded:
+@dataclass(frozen=True)
+class Excitation:
+    """RMS of the injected force over static friction, highest line over the crossover, about how many lines there are,
+    evenly in the logarithm, and samples of the log per period of the crossover: our choice."""
+
+    strength: float
+    top: float
+    lines: int
+    samples: float
+
+
+SLIDING = Excitation(2.0, 100.0, 150, 625.0)
+"""It moves the cart, up to 800 Hz on the thesis's rig, logged every 0.2 ms; the thesis tells no strength."""
+
+
+def excite(
+    stage: Stage,
+    place: float,
+    seed: int,
+    runs: int = 1,
+    changes: Mapping[str, Any] | None = None,
+    kind: Excitation = SLIDING,
+) -> Recorded:
     """Runs at a standstill at a place [m] with the multisine of a seed; `changes` are arrays of shape (runs,)."""
-    each, wanted = as_built_keys(stage)["drive.sample_time"], interval(stage, 1 / (SAMPLES * pace(stage)))
+    each, wanted = as_built_keys(stage)["drive.sample_time"], interval(stage, 1 / (kind.samples * pace(stage)))
     period = round(PERIOD / pace(stage) / wanted) * wanted
-    lines = np.geomspace(1, min(TOP * PERIOD, FINEST * period / wanted), LINES)
-    force = STRENGTH * friction(stage) * sines(round(period / each), np.unique(np.rint(lines).astype(int)), seed)
+    lines = np.geomspace(1, min(kind.top * PERIOD, FINEST * period / wanted), kind.lines)
+    force = kind.strength * friction(stage) * sines(round(period / each), np.unique(np.rint(lines).astype(int)), seed)
     task = replace(standing(place, PERIODS * period), injected=np.tile(force, PERIODS), injected_each=each)
     (recorded,) = run(stage, task, [seed] * runs, wanted, changes)
     return recorded

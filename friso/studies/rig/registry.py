@@ -15,6 +15,7 @@ EXPERIMENTS: Mapping[str, str] = MappingProxyType(
         "frf": "frequency responses of the plant, locked at ten places and free; open loops over the crossover",
         "stiffness": "stiffness of the joint by position steps, the cart fixed",
         "stiction": "static friction by stick-slip in slow motion",
+        "presliding": "stiffness and damping of the bearing's bristles by small motion before it slides",
         "constant-speed": "force at constant speed along the rail",
         "hunting": "a move at several crossovers, the joint locked and free",
         "stroke-crossover": "which share of rails hunts, over stroke and crossover",

@@ -1,0 +1,55 @@
+"""The bearing's bristles by small motion before it slides, the joint locked: the thesis has no such experiment, but the
+bristles decide whether a machine near the boundary of hunting hunts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from friso.identify.experiments import Presliding, bristles_from_presliding
+from friso.identify.method import between
+from friso.quantities import StageError
+from friso.stage import Stage
+from friso.studies.rig.excitation import Excitation, excite
+from friso.studies.rig.outcome import Outcome, Progress, RigLog, rig_log
+from friso.studies.rig.sizes import locked, travel
+
+PLACES = 3
+"""Places along the travel: our choice."""
+
+GENTLE = Excitation(0.05, 8.0, 60, 160.0)
+"""A twentieth of static friction, RMS, up to 64 Hz on the thesis's rig, logged every 0.75 ms."""
+
+
+@dataclass(frozen=True)
+class Bristles:
+    """What the log of each place shows, and the bristles' true stiffness [N/m] and damping [N s/m]."""
+
+    found: tuple[Presliding, ...]
+    stiffness: float
+    damping: float
+
+
+def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
+    """A small multisine at each place. Raises StageError for a stage whose friction has no bristles."""
+    flat = stage.flat()
+    if "friction.bristle_stiffness" not in flat:
+        given = f"model = {flat.get('friction.model', 'none')!r}"
+        raise StageError("friction.model", given, "friction with bristles", 'model = "lugre"')
+    held = locked(stage) if stage.joint else stage
+    places = np.linspace(*travel(stage), PLACES)
+    logs = []
+    for number, place in enumerate(places):
+        progress(number, PLACES, f"place {number + 1} of {PLACES}")
+        logs.append(presliding_log(held, f"presliding_{number + 1}", place, seed + number))
+    progress(PLACES, PLACES, "")
+    known = between(flat)
+    found = tuple(bristles_from_presliding(each.log, known) for each in logs)
+    true = (flat["friction.bristle_stiffness"], flat["friction.bristle_damping"])
+    return Outcome("presliding", stage, seed, tuple(logs), Bristles(found, *map(float, true)))
+
+
+def presliding_log(stage: Stage, name: str, place: float, seed: int) -> RigLog:
+    """The log of one small excitation at a place [m]."""
+    return rig_log(excite(stage, place, seed, kind=GENTLE), 0, name, "presliding", stage, seed)
