@@ -356,7 +356,7 @@ def test_what_shows_no_slips_says_so() -> None:
     found = static_from_stick_slip(log)
     assert not found.static.shown
     assert "slides all the time" in found.static.reason
-    assert "not both measured" in found.stiffness.reason
+    assert "not all measured" in found.stiffness.reason
     assert found.static.low == 0
     with pytest.raises(friso.StageError, match="--map relative_position"):
         static_from_stick_slip(log, 2400.0)

@@ -58,6 +58,14 @@ def test_places_that_differ_show_the_mean_of_all_places(seed: int, count: int) -
     assert np.median(wider) == pytest.approx(1, abs=0.02)
 
 
+def test_what_is_systematic_does_not_average_out() -> None:
+    """Nine readings whose intervals of 0.3 are by a third noise: the noise becomes a third, the rest stays."""
+    each = Estimate("k", "N", 5.0, 4.7, 5.3, "a", systematic=0.2)
+    (one,), _ = combined([each] * 9)
+    assert one.half_width == pytest.approx(0.2 + 0.1 / 3)
+    assert one.systematic == pytest.approx(0.2)
+
+
 @given(st.integers(0, 2**31), st.integers(2, 6))
 @settings(max_examples=20, deadline=None)
 def test_repeated_measurements_agree_about_as_often_as_they_should(seed: int, count: int) -> None:

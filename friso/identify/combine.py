@@ -76,22 +76,26 @@ def _mean(key: str, shown: Sequence[Estimate]) -> tuple[Estimate, bool]:
     """The weighted mean where a chi-square test allows that all are of one value, and whether it does.
 
     Its interval is wider by the Birge ratio (Birge 1932, doi:10.1103/PhysRev.40.207) where they scatter more than their
-    own intervals say. Where the test does not allow it, as for friction at several places, each counts with a scatter
-    from place to place besides its own (`_between`); of two, which hardly show a scatter, the interval spans both.
+    own intervals say; what is systematic in these does not average out. Where the test does not allow it, as for
+    friction at several places, each counts with a scatter from place to place besides its own (`_between`); of two,
+    which hardly show a scatter, the interval spans both.
     """
     values, weights = (
         np.array(column) for column in zip(*((each.value, _weight(each)) for each in shown), strict=True)
     )
     mean, freedom = float(np.average(values, weights=weights)), len(values) - 1
+    shared = float(np.average([each.systematic for each in shown], weights=weights))
     squares = float(np.sum(weights * (values - mean) ** 2))
     method = ", ".join(dict.fromkeys(each.method for each in shown))
     if chi2.sf(squares, freedom) > CHANCE:
-        deviation = float(np.sqrt(max(squares / freedom, 1.0) / weights.sum()))
-        return Estimate.normal(key, shown[0].unit, mean, deviation, method), True
+        own = np.array([(each.half_width - each.systematic) / COVERAGE for each in shown])
+        deviation = max(squares / freedom, 1.0) ** 0.5 * float(np.linalg.norm(weights * own)) / float(weights.sum())
+        half = COVERAGE * deviation + shared
+        return Estimate(key, shown[0].unit, mean, mean - half, mean + half, method, systematic=shared), True
     if freedom == 1:
         low, high = min(each.low for each in shown), max(each.high for each in shown)
         return Estimate(key, shown[0].unit, (low + high) / 2, low, high, method), False
-    return by_t(key, shown[0].unit, _between(values, 1 / weights), method), False
+    return by_t(key, shown[0].unit, _between(values, 1 / weights), method, shared, shared), False
 
 
 def _between(values: np.ndarray, variances: np.ndarray) -> Mean:

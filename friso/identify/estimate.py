@@ -15,7 +15,8 @@ class Estimate:
 
     `name` is a key of the stage file ("friction.coulomb") where it is one, else what it is ("resonance 1 frequency").
     `low` to `high` is the 95 % interval of the `value`. Where the data cannot show the quantity, `value` is NaN,
-    `reason` says why, and `low`, `high` are what is left possible (infinite where nothing is known).
+    `reason` says why, and `low`, `high` are what is left possible (infinite where nothing is known). `systematic` is
+    the part of the interval's half-width that repeating the experiment does not make smaller.
     """
 
     name: str
@@ -25,6 +26,7 @@ class Estimate:
     high: float
     method: str
     reason: str = ""
+    systematic: float = 0.0
 
     @classmethod
     def normal(cls, name: str, unit: str, value: float, deviation: float, method: str) -> Estimate:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -301,13 +301,21 @@ def _shared(total: Estimate, stage: Stage) -> tuple[Estimate, ...]:
     given = {f"masses.{name}": value for name, value in stage.masses if value is not None}
     whole = sum(given.values())
     return tuple(
-        Estimate(key, "kg", total.value * share, total.low * share, total.high * share, total.method)
+        Estimate(
+            key,
+            "kg",
+            total.value * share,
+            total.low * share,
+            total.high * share,
+            total.method,
+            systematic=total.systematic * share,
+        )
         for key, share in ((key, value / whole) for key, value in given.items())
     )
 
 
 def _named(found: Estimate, key: str) -> Estimate:
-    return Estimate(key, found.unit, found.value, found.low, found.high, found.method, found.reason)
+    return replace(found, name=key)
 
 
 def _correlated(result: Result, estimates: Sequence[Estimate]) -> Correlated:

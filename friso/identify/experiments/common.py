@@ -150,7 +150,8 @@ def t_value(freedom: float) -> float:
 def by_t(name: str, unit: str, mean: Mean, method: str, low: float = 0.0, high: float = 0.0) -> Estimate:
     """An estimate with Student's interval, widened by what is systematic: `low` below and `high` above."""
     half = t_value(mean.freedom) * mean.error
-    return Estimate(name, unit, mean.value, mean.value - half - low, mean.value + half + high, method)
+    ends = (mean.value - half - low, mean.value + half + high)
+    return Estimate(name, unit, mean.value, *ends, method, systematic=(low + high) / 2)
 
 
 def ways(directions: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:

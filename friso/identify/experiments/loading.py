@@ -9,21 +9,24 @@ from friso.identify.experiments.common import LINEARITY, Mean, by_t
 
 KEY, UNIT = "joint.stiffness", "N/m"
 METHOD = "force over deflection while the cart sticks"
-LEAST = 3
+LEAST, TINY = 3, 1e-300
 SOFT = "more deflection does not need more force"
 
 
-def stiffness_of_loading(deflection: np.ndarray, force: np.ndarray, rate: np.ndarray, loads: list[slice]) -> Estimate:
-    """The stiffness [N/m] from low-passed deflection [m], force on the joint [N] and rate of the deflection [m/s],
-    shape (n,), over the `loads`, each between two slips.
+def stiffness_of_loading(
+    deflection: np.ndarray, rate: np.ndarray, acceleration: np.ndarray, force: np.ndarray, loads: list[slice]
+) -> Estimate:
+    """The stiffness [N/m] from the deflection [m] and its rate [m/s], the acceleration of the stage [m/s^2] and the
+    actuator's force [N], all low-passed, shape (n,), over the `loads`, each between two slips.
 
-    Least squares of a spring and a damper, with an offset for each load; the error is that of the jackknife over loads.
-    What is common to all loads drops out, as does the cart's creep. Of fewer than three loads it is unknown.
+    Least squares of a spring, a damper and a mass, with an offset for each load: after a slip the stage swings on its
+    joint. The error is that of the jackknife over loads. The cart's creep drops out. Of fewer than three loads it is
+    unknown.
     """
     count = len(loads)
     if count < LEAST:
         return Estimate.unknown(KEY, UNIT, METHOD, f"{count} loads between slips: {LEAST} are needed")
-    signals = [np.stack([x[s] - x[s].mean() for x in (deflection, rate, force)]) for s in loads]
+    signals = [np.stack([x[s] - x[s].mean() for x in (deflection, rate, acceleration, force)]) for s in loads]
     products = np.array([x @ x.T for x in signals])
     if not products[:, 0, 0].sum() > 0:
         return Estimate.unknown(KEY, UNIT, METHOD, "the deflection stays the same")
@@ -35,5 +38,7 @@ def stiffness_of_loading(deflection: np.ndarray, force: np.ndarray, rate: np.nda
 
 
 def _spring(products: np.ndarray) -> float:
-    """Coefficient of the first of three signals in a fit of the third by the first two, from their scalar products."""
-    return float(np.linalg.lstsq(products[:2, :2], products[:2, 2], rcond=None)[0][0])
+    """Coefficient of the first signal in a fit of the last by the others, from the scalar products of all."""
+    size = np.sqrt(np.diag(products)) + TINY
+    scaled = products / np.outer(size, size)
+    return float(np.linalg.lstsq(scaled[:-1, :-1], scaled[:-1, -1], rcond=None)[0][0] * size[-1] / size[0])

@@ -17,7 +17,7 @@ from scipy.interpolate import CubicSpline
 from scipy.optimize import minimize_scalar
 
 from friso.identify.estimate import Estimate
-from friso.identify.experiments.common import LINEARITY, channel, deflection, low_pass, robust, t_value
+from friso.identify.experiments.common import LINEARITY, Mean, by_t, channel, deflection, low_pass, robust
 from friso.identify.logs.log import Log
 
 CUTOFF, CHECKED, MOTION = 50.0, 2.0, 5.0
@@ -111,9 +111,10 @@ def bristles_from_presliding(log: Log, between: Between = Between(), cutoff: flo
     best, higher, later = fitted(between, cutoff), fitted(between, CHECKED * cutoff), fitted(unsure, cutoff)
     left = float((best.force - best.model).std() / best.force.std())
     changes = np.abs(higher.values - best.values) + np.abs(later.values - best.values)
-    half = t_value(BLOCKS - 1) * best.errors + changes + (left + LINEARITY) * np.abs(best.values)
+    systematic = changes + (left + LINEARITY) * np.abs(best.values)
     mass, damping, stiffness = (
-        _estimate(key, value, width, left) for key, value, width in zip(KEYS, best.values, half, strict=True)
+        _estimate(key, Mean(float(value), float(error), BLOCKS - 1), float(more), left)
+        for key, value, error, more in zip(KEYS, best.values, best.errors, systematic, strict=True)
     )
     return Presliding(stiffness, damping, mass, best.time, best.position, best.force, best.model, left)
 
@@ -138,14 +139,15 @@ def _nothing(why: str) -> Presliding:
     return Presliding(stiffness, damping, mass, none, none, none, none, np.nan)
 
 
-def _estimate(key: str, value: float, half: float, left: float) -> Estimate:
+def _estimate(key: str, mean: Mean, systematic: float, left: float) -> Estimate:
+    found = by_t(key, UNITS[key], mean, METHOD, systematic, systematic)
     if left > EXPLAINED:
         why = f"{left:.0%} of the force is not explained: the bearing slides, or moves otherwise"
         return Estimate.unknown(key, UNITS[key], METHOD, why)
-    if not value > half:
+    if not found.low > 0:
         why = "the motion is too slow to show it" if key != STIFFNESS else "no force holds the bearing: does it stick?"
-        return Estimate.unknown(key, UNITS[key], METHOD, why, 0.0, max(value + half, 0.0) or np.inf)
-    return Estimate(key, UNITS[key], float(value), float(value - half), float(value + half), METHOD)
+        return Estimate.unknown(key, UNITS[key], METHOD, why, 0.0, max(found.high, 0.0) or np.inf)
+    return found
 
 
 def _fit(time: np.ndarray, position: np.ndarray, force: np.ndarray, between: Between, cutoff: float) -> _Fit:

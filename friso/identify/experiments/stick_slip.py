@@ -116,7 +116,7 @@ def static_from_stick_slip(
             loads += [] if held else [slice(part.start + rest, part.start + onset)]
             rows.append((*place, bent, force, rising, float(abs(found.speed[top])), held, late))
     table = np.array([row for row in rows if row[5] > 0 or row[7]]).reshape(-1, 9).T
-    shown = _stiffness(log, deflected, pushed, loads)
+    shown = _stiffness(log, deflected, loads, cutoff)
     return _answer(table, pull, cart_velocity, (relative_error, bristle_rate), shown, _why(shares))
 
 
@@ -137,10 +137,11 @@ def _actuator(log: Log, stage_mass: float, cutoff: float) -> np.ndarray | None:
     force = _smooth(log, channel(log, "force"), cutoff)
     if not stage_mass:
         return force
-    signal = channel(log, "position")
-    for _ in range(2):
-        signal = np.concatenate([rate(signal[s], log.sample_time, cutoff) for s in log.segments])
-    return force - stage_mass * signal
+    return force - stage_mass * _rate(log, _rate(log, channel(log, "position"), cutoff), cutoff)
+
+
+def _rate(log: Log, values: np.ndarray, cutoff: float) -> np.ndarray:
+    return np.concatenate([rate(values[s], log.sample_time, cutoff) for s in log.segments])
 
 
 def _pull(
@@ -157,12 +158,15 @@ def _pull(
     return value * deflected, half / COVERAGE / value
 
 
-def _stiffness(log: Log, deflected: np.ndarray | None, pushed: np.ndarray | None, loads: list[slice]) -> Estimate:
+def _stiffness(log: Log, deflected: np.ndarray | None, loads: list[slice], cutoff: float) -> Estimate:
     """The joint's stiffness as this log shows it."""
-    if deflected is None or pushed is None:
-        return Estimate.unknown("joint.stiffness", "N/m", LOADED, "force and deflection are not both measured")
-    speed = np.concatenate([np.gradient(deflected[s], log.sample_time) for s in log.segments])
-    return stiffness_of_loading(deflected, pushed, speed, loads)
+    pushed = _actuator(log, 0.0, cutoff)
+    if deflected is None or pushed is None or "position" not in log:
+        reason = "force, position and deflection are not all measured"
+        return Estimate.unknown("joint.stiffness", "N/m", LOADED, reason)
+    bending = np.concatenate([np.gradient(deflected[s], log.sample_time) for s in log.segments])
+    acceleration = _rate(log, _rate(log, channel(log, "position"), cutoff), cutoff)
+    return stiffness_of_loading(deflected, bending, acceleration, pushed, loads)
 
 
 def _peak(

@@ -29,14 +29,14 @@ def velocity_line(position: np.ndarray, velocity: np.ndarray, period: float, par
 def force_line(position: np.ndarray, force: np.ndarray, period: float, parts: list[slice]) -> str:
     """A line that offers the delay of the motion behind the force, "" for none.
 
-    For each lag the force is fitted by acceleration, velocity, its sign and a constant: against acceleration alone
-    friction would look like a delay. The lag with the least residual counts.
+    For each lag the force is fitted by acceleration, velocity, its sign, position and a constant: against acceleration
+    alone friction would look like a delay, and so would a spring. The lag with the least residual counts.
     """
     part = max(parts, key=lambda each: each.stop - each.start)
-    velocity, acceleration = (_smoothed(position[part], order, period) for order in (1, 2))
+    place, velocity, acceleration = (_smoothed(position[part], order, period) for order in (0, 1, 2))
     push = _smoothed(force[part], 0, period)
     sign = np.sign(velocity) * (np.abs(velocity) > 0.01 * np.abs(velocity).max())
-    causes = np.stack([acceleration, velocity, sign, np.ones_like(push)], axis=1)
+    causes = np.stack([acceleration, velocity, sign, place - place.mean(), np.ones_like(push)], axis=1)
     return _line("motion", "the force", in_blocks(lambda a, b: fitted_lag(push[a:b], causes[a:b]), push.size), period)
 
 
@@ -74,7 +74,8 @@ def _peak(heights: np.ndarray, least: float) -> float:
 
 
 def in_blocks(estimate: Callable[[int, int], float], size: int) -> tuple[float, float]:
-    """Mean of the estimates of the blocks of a record and half its 95 % interval (Student); NaN for fewer than 3."""
+    """Mean of the estimates of the blocks of a record and half its 95 % interval (Student); NaN where fewer than
+    half of them show one."""
     from scipy.stats import t as student
 
     each = size // BLOCKS
@@ -82,16 +83,17 @@ def in_blocks(estimate: Callable[[int, int], float], size: int) -> tuple[float, 
         return np.nan, np.nan
     found = np.array([estimate(k * each, (k + 1) * each) for k in range(BLOCKS)])
     found = found[np.isfinite(found)]
-    if found.size < 3:
+    if found.size < BLOCKS / 2:
         return np.nan, np.nan
     half = student.ppf(0.975, found.size - 1) * np.std(found, ddof=1) / np.sqrt(found.size)
     return float(found.mean()), float(half)
 
 
 def _line(late: str, early: str, estimate: tuple[float, float], period: float) -> str:
-    """The words for an estimate in samples, "" where its interval holds 0 or it is below a tenth of a sample."""
+    """The words for an estimate in samples, "" where its interval holds 0, it is below a tenth of a sample, or the
+    blocks differ by samples: then the motion does not show a delay."""
     value, half = estimate
-    if not np.isfinite(value) or abs(value) <= max(half, 0.1):
+    if not np.isfinite(value) or abs(value) <= max(half, 0.1) or half > 1:
         return ""
     late, early = (late, early) if value > 0 else (early, late)
     size = f"{abs(value) * period * 1e3:.3g} ms +/- {half * period * 1e3:.2g} ms (95 %)"

@@ -1,0 +1,162 @@
+"""Bristles from small motion before sliding: against logs of known bristles, and against the rig's machines."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from rig_machines import built
+from scipy.integrate import solve_ivp
+
+import friso
+from friso.identify.experiments import Presliding, bristles_from_presliding, record
+from friso.identify.experiments.presliding import Between, deflected
+from friso.identify.logs.log import Log
+from friso.identify.method import between, identify
+from friso.studies.rig.presliding import presliding_log
+from friso.studies.rig.sizes import locked, travel
+
+DT, SECONDS = 5e-4, 6.0
+LINES = np.array([0.7, 1.3, 2.9, 5.3, 9.7, 17.3, 23.9, 31.1, 37.7])
+MASS, STIFFNESS, DAMPING, STATIC = 1.7, 1e5, 300.0, 3.0
+
+
+def shaken(
+    size: float = 2e-7,
+    bending: float = STIFFNESS / STATIC,
+    noise: float = 0.0,
+    top: int = len(LINES),
+    step: float = DT,
+    **more: Any,
+) -> Log:
+    """Motion by several sines of this size [m] each, and the force of a mass on bristles, computed in fine steps."""
+    fine = 10
+    time = np.arange(0, SECONDS, step / fine)
+    phases = 2 * np.pi * LINES[:top, None] * time + np.arange(top)[:, None] ** 2
+    omega = 2 * np.pi * LINES[:top, None]
+    position = size * np.sin(phases).sum(axis=0)
+    acceleration = -size * (omega**2 * np.sin(phases)).sum(axis=0)
+    z = deflected(position, bending)
+    force = MASS * acceleration + STIFFNESS * z + DAMPING * np.gradient(z, step / fine) + 0.2
+    rng = np.random.default_rng(1)
+    signals = {"position": position[::fine], "force": force[::fine]}
+    signals["position"] = signals["position"] + noise * rng.standard_normal(len(signals["position"]))
+    return record("small", step, **signals, **more)
+
+
+def shown(found: Presliding) -> list[float]:
+    return [found.stiffness.value, found.damping.value, found.mass.value]
+
+
+@given(st.integers(0, 2**31), st.floats(1.0, 1e6))
+@settings(max_examples=20, deadline=None)
+def test_bristles_bend_as_the_differential_equation_says(seed: int, bending: float) -> None:
+    """Against scipy; the path being straight between samples, the closed form is exact."""
+    rng = np.random.default_rng(seed)
+    position = np.cumsum(rng.standard_normal(8)) / bending
+    moves = np.diff(position, prepend=position[0])
+    z = [0.0]
+    for move in moves[1:]:
+        run = solve_ivp(lambda _, y, m=move: m * (1 - bending * y * np.sign(m)), (0, 1), z[-1:], rtol=1e-9, atol=1e-15)
+        z.append(run.y[0, -1])
+    assert deflected(position, bending) == pytest.approx(np.array(z), rel=1e-6, abs=1e-8 / bending)
+    assert np.all(np.abs(z) <= 1 / bending)
+
+
+def test_known_bristles_are_found_and_a_lag_is_taken_off() -> None:
+    plain = bristles_from_presliding(shaken())
+    assert shown(plain) == pytest.approx([STIFFNESS, DAMPING, MASS], rel=2e-3)
+    assert plain.unexplained < 1e-3
+    log = shaken()
+    late = 2 * DT
+    delayed = replace(log, signals={**log.signals, "force": np.roll(log["force"], -2)})
+    found = bristles_from_presliding(delayed, Between(lag=late))
+    assert shown(found) == pytest.approx([STIFFNESS, DAMPING, MASS], rel=0.02)
+    misled = bristles_from_presliding(delayed)
+    assert abs(misled.damping.value / DAMPING - 1) > 0.1
+
+
+def test_a_held_joint_gives_way_in_series() -> None:
+    """The position is that of a stage beyond a contact of 2e6 N/m; its own mass acts beside it."""
+    log = shaken()
+    beyond, contact = 0.5, 2e6
+    force = log["force"]
+    position = log["position"]
+    for _ in range(3):  # the acceleration of the stage is that of its own position
+        acceleration = np.gradient(np.gradient(position, DT), DT)
+        bent = (force + beyond * acceleration) / contact
+        position = log["position"] + bent
+    whole = replace(log, signals={**log.signals, "position": position, "force": force + beyond * acceleration})
+    found = bristles_from_presliding(whole, Between(contact=contact, beyond=beyond))
+    assert found.stiffness.value == pytest.approx(STIFFNESS, rel=5e-3)
+    soft = bristles_from_presliding(whole)
+    assert soft.stiffness.value == pytest.approx(1 / (1 / STIFFNESS + 1 / contact), rel=0.01)
+
+
+def test_noise_of_the_sensor_does_not_matter_until_motion_is_lost_in_it() -> None:
+    found = bristles_from_presliding(shaken(noise=2e-9))
+    assert found.stiffness.holds(STIFFNESS)
+    assert found.damping.holds(DAMPING)
+    lost = bristles_from_presliding(shaken(noise=2e-7))
+    assert "stand out of the noise" in lost.stiffness.reason
+
+
+def test_what_a_log_cannot_show_is_told() -> None:
+    slow = bristles_from_presliding(shaken(top=1, noise=1e-8))
+    assert slow.stiffness.holds(STIFFNESS)
+    assert slow.mass.holds(MASS)
+    assert slow.mass.half_width > 0.5 * MASS
+    coarse = bristles_from_presliding(shaken(step=5e-3))
+    assert "2 ms or less" in coarse.stiffness.reason.replace("0.002 s", "2 ms")
+    short = shaken()
+    short = record("short", DT, **{role: values[:500] for role, values in short.signals.items()})
+    assert "lasts 0.25 s" in bristles_from_presliding(short).stiffness.reason
+    loose = shaken(relative_position=shaken()["position"])
+    assert "has to be held" in bristles_from_presliding(loose).stiffness.reason
+    with pytest.raises(friso.StageError, match="force"):
+        bristles_from_presliding(record("x", DT, position=np.zeros(10000)))
+
+
+def test_sliding_is_not_taken_for_bristles() -> None:
+    """A mass that slides on Coulomb friction: what is left of the force is no straight line of anything."""
+    time = np.arange(0, SECONDS, DT)
+    rng = np.random.default_rng(3)
+    position = 1e-3 * np.sin(2 * np.pi * time)
+    force = np.sign(np.cos(2 * np.pi * time)) + 0.5 * np.sign(np.sin(2 * np.pi * 3.7 * time))
+    found = bristles_from_presliding(
+        record("slides", DT, position=position, force=force + rng.normal(0, 0.01, len(time)))
+    )
+    assert not found.stiffness.shown
+    assert "not explained" in found.stiffness.reason
+
+
+def test_drawn_machines_show_their_bristles_on_the_rig() -> None:
+    """12 machines with their drives as built: 36 intervals of stiffness, damping and mass; of 95 % intervals, 31 or
+    fewer of 36 hold with a probability of 2 %."""
+    held, widths = 0, []
+    for seed in range(12):
+        machine = built(seed)
+        stage, flat = locked(machine.truth), machine.flat
+        log = presliding_log(stage, "presliding", travel(stage)[0], seed).log
+        found = bristles_from_presliding(log, between({**flat, "masses.stage": 1.2 * flat["masses.stage"]}))
+        mass = flat["masses.cart"] + flat["masses.stage"]
+        held += found.stiffness.holds(flat["friction.bristle_stiffness"])
+        held += found.damping.holds(flat["friction.bristle_damping"]) + found.mass.holds(mass)
+        widths.append([found.stiffness.half_width / flat["friction.bristle_stiffness"]])
+    assert held >= 32
+    assert np.median(widths) < 0.02
+
+
+def test_the_stage_file_takes_bristles_and_masses() -> None:
+    machine = built(3)
+    stage = locked(machine.truth)
+    logs = [presliding_log(stage, f"small_{n}", travel(stage)[0], n).log for n in (1, 2)]
+    found = identify([(log, "presliding") for log in logs], machine.guess)
+    assert found.stage is not None
+    flat = found.stage.flat()
+    for key in ("friction.bristle_stiffness", "friction.bristle_damping", "masses.cart", "masses.stage"):
+        assert flat[key] == pytest.approx(machine.flat[key], rel=0.03)
+    places = [found.correlations.keys.index(f"masses.{name}") for name in ("cart", "stage")]
+    assert found.correlations.matrix[places[0], places[1]] == pytest.approx(1)
