@@ -7,9 +7,10 @@ owner knows as `--stage`. All but the free response make one stage file; that is
 at a time can be.
 
 Per experiment and quantity: how often the 95 % interval holds the truth; and how often `friso check` on the identified
-stage gives the verdict that it gives on the machine. What counts as the truth of static and Coulomb friction is their
-mean along the stretches of rail where the cart went in the experiment at hand (in the stage file: the machine's own
-value, which is the mean over all rails), of everything else the machine's own value.
+stage gives the verdict that it gives on the machine. A machine has one rail: what counts as the truth of static and
+Coulomb friction is their mean along the stretches of it where the cart went in the experiment at hand; in the stage
+file and for the verdict, along the travel of the machine's own motion. Of everything else it is the machine's own
+value.
 """
 
 from __future__ import annotations
@@ -22,11 +23,14 @@ from collections import Counter, defaultdict
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
+
 from benchmarks.identify import Answer, Count, goals, rows
 from benchmarks.report import Goal, print_goals, print_table
 from friso.hunting.check import check
 from friso.identify.method import Identification, identify
 from friso.quantities import StageError
+from friso.rig.rail import friction_factors
 from friso.stage import Stage, load
 from friso.stage.files import save
 from friso.studies.rig.frf import plant_log
@@ -40,8 +44,8 @@ from friso.studies.rig.stiffness import steps
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 from rig_machines import Machine, built, mean_level, sources, through_files
 
-PLACES, RAILS = 3, 3
-"""Places of the frequency responses and stretches of rail of the slow motion; `friso rig` has ten."""
+PLACES, POINTS = 3, 1000
+"""Places of the frequency responses and of the motion before sliding; points of the travel for its mean friction."""
 
 SAME = 0.95
 """Share of the verdicts that have to be those of the machines."""
@@ -61,7 +65,7 @@ def benches(machine: Machine, seed: int) -> list[list[RigLog]]:
     def shaken(each: Stage, name: str) -> list[RigLog]:
         return [plant_log(each, f"{name}_{n + 1}", place, noise + n) for n, place in enumerate(places)]
 
-    slow = slow_motion(stage, noise, RAILS)
+    slow = slow_motion(stage, noise, 1)
     small = [presliding_log(locked(stage), f"presliding_{n + 1}", place, noise + n) for n, place in enumerate(places)]
     passes = many_speeds_logs(locked(stage), noise)
     return [
@@ -82,9 +86,15 @@ def found_in(logs: list[RigLog], machine: Machine) -> tuple[Identification, Stag
         return found, load(file).with_numbers({"joint.stroke": machine.flat["joint.stroke"]})
 
 
+def on_its_rail(machine: Machine) -> Stage:
+    """The machine on an even rail that has the mean friction of its own along the travel."""
+    factors = friction_factors(machine.flat, np.linspace(*travel(machine.truth), POINTS)).mean(axis=1)
+    return machine.truth.with_numbers({key: machine.flat[key] * by for key, by in zip(LEVELS, factors, strict=True)})
+
+
 def answers(found: Identification, logs: list[RigLog], machine: Machine) -> Iterator[Answer]:
     """What each experiment shows, and what all together show, with the truth."""
-    flat = machine.flat
+    flat, travelled = machine.flat, on_its_rail(machine).flat()
     for each in found.experiments:
         own = [log for log in logs if log.name in {source.name.removesuffix(".csv") for source in each.logs}]
         words = f"{each.kind}, free" if own[0].name.startswith("free") else each.kind
@@ -92,7 +102,7 @@ def answers(found: Identification, logs: list[RigLog], machine: Machine) -> Iter
             yield words, one, mean_level(own, one.name) if one.name in LEVELS else flat[one.name]
     if len(found.experiments) > 1:
         for one in found.estimates:
-            yield "stage file", one, flat[one.name]
+            yield "stage file", one, travelled[one.name]
 
 
 def run(first: int, machines: int) -> tuple[dict[tuple[str, str], Count], Verdicts]:
@@ -123,7 +133,7 @@ def run(first: int, machines: int) -> tuple[dict[tuple[str, str], Count], Verdic
 
 def _compare(machine: Machine, stage: Stage, verdicts: Verdicts, seed: int) -> None:
     """Count the verdicts on the identified stage against those on the machine, both on an even rail."""
-    true, found = check(machine.truth), check(stage)
+    true, found = check(on_its_rail(machine)), check(stage)
     for case, each in true.items():
         pair = each.verdict, found[case].verdict
         verdicts[case][pair] += 1
