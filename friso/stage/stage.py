@@ -173,7 +173,9 @@ class Stage(Section):
         """The stage with SI numbers for dotted keys, written such that they are read again as the same ones, and
         without some tables. Raises StageError."""
         known = numeric_keys({**self.flat(), **numbers})
-        texts = {key: f"{value!r} {known[key].unit}" if known[key].unit else value for key, value in numbers.items()}
+        texts = {
+            key: f"{float(value)!r} {known[key].unit}" if known[key].unit else value for key, value in numbers.items()
+        }
         return self.replace(texts | dict.fromkeys(without))
 
     def variants(self) -> "Mapping[str, Stage]":
