@@ -154,6 +154,14 @@ def by_t(name: str, unit: str, mean: Mean, method: str, low: float = 0.0, high: 
     return Estimate(name, unit, mean.value, *ends, method, systematic=(low + high) / 2)
 
 
+def solved(square: np.ndarray, product: np.ndarray) -> np.ndarray:
+    """The solution of normal equations, shape (p, p) and (p,), whose columns are of very different size; 0 for one that
+    is empty."""
+    size = np.sqrt(np.diag(square))
+    size = np.where(size > 0, size, 1.0)
+    return np.linalg.lstsq(square / np.outer(size, size), product / size, rcond=None)[0] / size
+
+
 def ways(directions: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:
     """Either direction by name, with the mask of what belongs to it."""
     yield "forward", directions > 0

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from friso.identify.estimate import Estimate
-from friso.identify.experiments.common import LINEARITY, Mean, by_t
+from friso.identify.experiments.common import LINEARITY, Mean, by_t, solved
 
 KEY, UNIT = "joint.stiffness", "N/m"
 METHOD = "force over deflection while the cart sticks"
-LEAST, TINY = 3, 1e-300
+LEAST = 3
 SOFT = "more deflection does not need more force"
 
 
@@ -39,6 +39,4 @@ def stiffness_of_loading(
 
 def _spring(products: np.ndarray) -> float:
     """Coefficient of the first signal in a fit of the last by the others, from the scalar products of all."""
-    size = np.sqrt(np.diag(products)) + TINY
-    scaled = products / np.outer(size, size)
-    return float(np.linalg.lstsq(scaled[:-1, :-1], scaled[:-1, -1], rcond=None)[0][0] * size[-1] / size[0])
+    return float(solved(products[:-1, :-1], products[:-1, -1])[0])

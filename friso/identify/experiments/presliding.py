@@ -17,7 +17,7 @@ from scipy.interpolate import CubicSpline
 from scipy.optimize import minimize_scalar
 
 from friso.identify.estimate import Estimate
-from friso.identify.experiments.common import LINEARITY, Mean, by_t, channel, deflection, low_pass, robust
+from friso.identify.experiments.common import LINEARITY, Mean, by_t, channel, deflection, low_pass, robust, solved
 from friso.identify.logs.log import Log
 
 CUTOFF, CHECKED, MOTION = 50.0, 2.0, 5.0
@@ -154,7 +154,8 @@ def _fit(time: np.ndarray, position: np.ndarray, force: np.ndarray, between: Bet
     """Least squares of the force at a low-pass; the bending, in which it is not linear, is looked for."""
     acceleration = _rate(time, _rate(time, position))
     force = force - between.lag * _rate(time, force)
-    body = position - (force - between.beyond * acceleration) / between.contact
+    force = force - between.beyond * acceleration
+    body = position - force / between.contact
     force = force - between.viscous * _rate(time, body)
     interval, span = float(time[1] - time[0]), float(np.ptp(body))
     inside = slice(edge := int(2 / (cutoff * interval)), len(time) - edge)
@@ -170,28 +171,23 @@ def _fit(time: np.ndarray, position: np.ndarray, force: np.ndarray, between: Bet
 
     def off(logarithm: float) -> float:
         x = columns(float(np.exp(logarithm)) / span)
-        return float(np.sum((target - x @ _solved(x.T @ x, x.T @ target)) ** 2))
+        return float(np.sum((target - x @ solved(x.T @ x, x.T @ target)) ** 2))
 
-    target = passed(force)
+    acceleration, target = _rate(time, _rate(time, body)), passed(force)
     best: Any = minimize_scalar(off, bounds=tuple(np.log(BENDING)), method="bounded", options={"xatol": 1e-3})
     x = columns(float(np.exp(best.x)) / span)
-    solution = _solved(x.T @ x, x.T @ target)
+    solution = solved(x.T @ x, x.T @ target)
     without = [
-        _solved(x.T @ x - part.T @ part, x.T @ target - part.T @ own)[:3]
+        solved(x.T @ x - part.T @ part, x.T @ target - part.T @ own)[:3]
         for part, own in zip(np.array_split(x, BLOCKS), np.array_split(target, BLOCKS), strict=True)
     ]
     errors = np.std(without, axis=0) * np.sqrt(BLOCKS - 1)
-    return _Fit(solution[:3], errors, time[inside], passed(body), target, x @ solution)
+    values = solution[:3] + np.array([between.beyond, 0.0, 0.0])
+    return _Fit(values, errors, time[inside], passed(body), target, x @ solution)
 
 
 def _rate(time: np.ndarray, signal: np.ndarray) -> np.ndarray:
     return CubicSpline(time, signal)(time, 1)
-
-
-def _solved(square: np.ndarray, product: np.ndarray) -> np.ndarray:
-    """The solution of normal equations, shape (p, p) and (p,), whose columns are of very different size."""
-    size = np.sqrt(np.diag(square))
-    return np.linalg.lstsq(square / np.outer(size, size), product / size, rcond=None)[0] / size
 
 
 def deflected(position: np.ndarray, bending: float) -> np.ndarray:
