@@ -23,7 +23,7 @@ Experiment = Annotated[
     str,
     typer.Argument(
         metavar="EXPERIMENT",
-        help="frf, stiffness, stiction, constant-speed, hunting, stroke-crossover, compare, in-position.",
+        help="frf, stiffness, stiction, presliding, constant-speed, hunting, stroke-crossover, compare, in-position.",
     ),
 ]
 OutFolder = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder for logs, truth and figures.")]

@@ -9,7 +9,7 @@ from scipy.optimize import brentq
 from scipy.stats import chi2
 
 from friso.identify.estimate import Estimate
-from friso.identify.experiments.common import Mean, by_t
+from friso.identify.experiments.common import Mean, by_t, t_value
 from friso.intervals import COVERAGE
 
 CHANCE = 0.01
@@ -75,10 +75,10 @@ def _weight(each: Estimate) -> float:
 def _mean(key: str, shown: Sequence[Estimate]) -> tuple[Estimate, bool]:
     """The weighted mean where a chi-square test allows that all are of one value, and whether it does.
 
-    Its interval is wider by the Birge ratio (Birge 1932, doi:10.1103/PhysRev.40.207) where they scatter more than their
-    own intervals say; what is systematic in these does not average out. Where the test does not allow it, as for
-    friction at several places, each counts with a scatter from place to place besides its own (`_between`); of two,
-    which hardly show a scatter, the interval spans both.
+    Its interval is wider by the Birge ratio (Birge 1932, doi:10.1103/PhysRev.40.207), by Student's t of three and more,
+    where they scatter more than their own intervals say; what is systematic in these does not average out. Where the
+    test does not allow it, as for friction at several places, each counts with a scatter from place to place besides
+    its own (`_between`); of two, which hardly show a scatter, the interval spans both.
     """
     values, weights = (
         np.array(column) for column in zip(*((each.value, _weight(each)) for each in shown), strict=True)
@@ -89,8 +89,10 @@ def _mean(key: str, shown: Sequence[Estimate]) -> tuple[Estimate, bool]:
     method = ", ".join(dict.fromkeys(each.method for each in shown))
     if chi2.sf(squares, freedom) > CHANCE:
         own = np.array([(each.half_width - each.systematic) / COVERAGE for each in shown])
-        deviation = max(squares / freedom, 1.0) ** 0.5 * float(np.linalg.norm(weights * own)) / float(weights.sum())
-        half = COVERAGE * deviation + shared
+        error = float(np.linalg.norm(weights * own)) / float(weights.sum())
+        ratio = (squares / freedom) ** 0.5
+        wider = ratio * t_value(freedom) if ratio > 1 and freedom > 1 else COVERAGE * max(ratio, 1.0)
+        half = wider * error + shared
         return Estimate(key, shown[0].unit, mean, mean - half, mean + half, method, systematic=shared), True
     if freedom == 1:
         low, high = min(each.low for each in shown), max(each.high for each in shown)
@@ -109,7 +111,7 @@ def _between(values: np.ndarray, variances: np.ndarray) -> Mean:
 
     weights = 1 / (variances + brentq(excess, 0.0, float(np.ptp(values)) ** 2))
     equal = weights.sum() ** 2 / (weights @ weights)
-    return Mean(float(np.average(values, weights=weights)), float(weights.sum() ** -0.5), max(round(equal) - 1, 1))
+    return Mean(float(np.average(values, weights=weights)), float(weights.sum() ** -0.5), max(float(equal) - 1, 1.0))
 
 
 def _left(key: str, own: Sequence[Estimate]) -> tuple[Estimate, bool]:

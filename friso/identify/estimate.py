@@ -52,4 +52,4 @@ class Estimate:
 
     def holds(self, truth: float) -> bool:
         """Whether the interval holds a value."""
-        return self.low <= truth <= self.high
+        return bool(self.low <= truth <= self.high)

@@ -46,6 +46,10 @@ use what the earlier ones found."""
 ORDER = (FREQUENCY, STEPS, MOVES, CONSTANT, STICK_SLIP, BREAK_AWAY, PRESLIDING)
 
 
+FAR_BELOW = 0.1
+"""Share of the limiter's stiffness up to which a stiffness is the joint's."""
+
+
 @dataclass(frozen=True)
 class ConstantSpeed:
     """Friction against velocity and against position, of one log."""
@@ -222,11 +226,18 @@ def _stick_slip(log: Log, stiffness: Estimate | None, flat: Mapping[str, Any], s
 def between(flat: Mapping[str, Any]) -> Between:
     """What lies between the commanded force and the bristles of a stage given as flat keys, a joint being held by its
     limiter."""
-    lag = flat.get("drive.delay", 0.0) + flat.get("drive.sample_time", 0.0) / 2
-    if "drive.current_bandwidth" in flat:
-        lag += 1 / (2 * np.pi * flat["drive.current_bandwidth"])
-    contact, beyond = flat.get("joint.limiter_stiffness", np.inf), flat.get("masses.stage", 0.0)
-    return Between(lag, contact, beyond, flat.get("friction.viscous", 0.0))
+    drive, joint = (
+        {key.removeprefix(name): value for key, value in flat.items() if key.startswith(name)}
+        for name in ("drive.", "joint.")
+    )
+    return Between(
+        delay=drive.get("delay", 0.0) + drive["sample_time"] / 2 if "sample_time" in drive else None,
+        bandwidth=drive.get("current_bandwidth", np.inf),
+        contact=joint.get("limiter_stiffness", np.inf),
+        beyond=flat.get("masses.stage", 0.0),
+        joint=joint.get("stiffness", 0.0),
+        viscous=flat.get("friction.viscous", 0.0),
+    )
 
 
 def _value(best: Mapping[str, Estimate], flat: Mapping[str, Any], key: str) -> float:
@@ -250,9 +261,15 @@ def _estimates(result: Result, stage: Stage | None) -> tuple[Estimate, ...]:
         masses = _shared(result.mass, stage) if stage is not None and result.mass.shown else ()
         return (result.stiffness, result.damping, *masses)
     if isinstance(result, StickSlip):
-        jointed = stage is not None and stage.joint and result.stiffness.shown
-        return (result.static, *([result.stiffness] if jointed else ()))
+        return (result.static, *([result.stiffness] if _of_joint(result.stiffness, stage) else ()))
     return (_named(result.static, "friction.static"),)
+
+
+def _of_joint(stiffness: Estimate, stage: Stage | None) -> bool:
+    """Whether a stiffness is that of the stage's joint, and not of the limiter that holds it."""
+    if stage is None or stage.joint is None or not stiffness.shown:
+        return False
+    return bool(stiffness.value < FAR_BELOW * stage.flat()["joint.limiter_stiffness"])
 
 
 def _of_bench(bench: Bench, stage: Stage | None) -> tuple[Estimate, ...]:
@@ -328,9 +345,11 @@ def _correlated(result: Result, estimates: Sequence[Estimate]) -> Correlated:
         places = [i for i, each in enumerate(estimates[: len(covariance)]) if each.shown and each.half_width > 0]
         size = np.sqrt(np.diag(covariance))
         return [estimates[i] for i in places], (covariance / np.outer(size, size))[np.ix_(places, places)]
-    shared = np.array([each.name.startswith("masses.") for each in own])
-    if isinstance(result, Presliding) or (isinstance(result, Bench) and shared.all()):
-        return own, np.maximum(np.eye(len(own)), np.outer(shared, shared))  # shared out of one
+    if isinstance(result, Presliding):
+        places = [result.order(each.name) for each in own]
+        return own, result.correlation[np.ix_(places, places)]
+    if isinstance(result, Bench) and all(each.name.startswith("masses.") for each in estimates):
+        return own, np.ones((len(own), len(own)))  # shared out of one
     return own, np.eye(len(own))
 
 

@@ -213,7 +213,11 @@ def _break_away(it: BreakAway) -> dict[str, Any]:
 
 def _presliding(it: Presliding) -> dict[str, Any]:
     several = {"stiffness": it.stiffness, "damping": it.damping, "mass": it.mass}
-    return {**{name: _estimate(each) for name, each in several.items()}, "unexplained": it.unexplained}
+    return {
+        **{name: _estimate(each) for name, each in several.items()},
+        "unexplained": it.unexplained,
+        "warnings": list(it.warnings),
+    }
 
 
 def _constant(it: ConstantSpeed) -> dict[str, Any]:

@@ -222,8 +222,8 @@ def _presliding(it: Presliding) -> tuple[tuple[str, ...], Facts, tuple[str, ...]
         ("Moving mass", with_interval(it.mass)),
     ]
     if len(it.time):
-        facts += [("Force left unexplained", f"{it.unexplained:.1%} of its standard deviation")]
-    return (), tuple(facts), ()
+        facts += [("Friction left unexplained", f"{it.unexplained:.1%} of its standard deviation")]
+    return (), tuple(facts), it.warnings
 
 
 def _constant(it: ConstantSpeed) -> tuple[tuple[str, ...], Facts, tuple[str, ...]]:

@@ -129,7 +129,7 @@ def presliding_caption(it: Presliding) -> str:
     """What the bristles are, and how much of the force they explain."""
     return (
         f"The last tenth of the record. Stiffness of the bristles: {with_interval(it.stiffness)}; damping: "
-        f"{with_interval(it.damping)}. {it.unexplained:.1%} of the force are left unexplained."
+        f"{with_interval(it.damping)}. {it.unexplained:.1%} of the friction are left unexplained."
     )
 
 

@@ -102,7 +102,8 @@ def _answer(table: np.ndarray, bristle_rate: float, threshold: float, said: list
     def static(chosen: np.ndarray) -> Estimate:
         found = static_friction("friction.static", forces[chosen], rates[chosen], bristle_rate)
         off = float(unsure[chosen].mean()) if chosen.any() else 0.0
-        found = replace(found, low=max(found.low - off, 0.0), high=found.high + off)
+        ends = {"low": max(found.low - off, 0.0), "high": found.high + off}
+        found = replace(found, **ends, systematic=found.systematic + off)
         return found if found.shown else replace(found, reason=" ".join([f"{found.reason}.", *said]).rstrip("."))
 
     one, other = (static(mask) for _, mask in ways(directions))

@@ -119,7 +119,7 @@ class Mean:
 
     value: float
     error: float
-    freedom: int
+    freedom: float
 
 
 def block_mean(values: np.ndarray) -> Mean:
@@ -157,7 +157,7 @@ def by_t(name: str, unit: str, mean: Mean, method: str, low: float = 0.0, high: 
 def solved(square: np.ndarray, product: np.ndarray) -> np.ndarray:
     """The solution of normal equations, shape (p, p) and (p,), whose columns are of very different size; 0 for one that
     is empty."""
-    size = np.sqrt(np.diag(square))
+    size = np.sqrt(np.maximum(np.diag(square), 0.0))
     size = np.where(size > 0, size, 1.0)
     return np.linalg.lstsq(square / np.outer(size, size), product / size, rcond=None)[0] / size
 

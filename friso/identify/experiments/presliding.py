@@ -15,9 +15,19 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.optimize import minimize_scalar
+from scipy.signal import lfilter, lfilter_zi
 
 from friso.identify.estimate import Estimate
-from friso.identify.experiments.common import LINEARITY, Mean, by_t, channel, deflection, low_pass, robust, solved
+from friso.identify.experiments.common import (
+    LINEARITY,
+    Mean,
+    by_t,
+    channel,
+    deflection,
+    low_pass,
+    robust,
+    solved,
+)
 from friso.identify.logs.log import Log
 
 CUTOFF, CHECKED, MOTION = 50.0, 2.0, 5.0
@@ -30,132 +40,193 @@ BLOCKS = 8
 LEAST, FINE = 20, 40
 """Periods of the low-pass that a record lasts at least, and samples per period of it that are enough."""
 
-BENDING = (1e-3, 5.0)
+UNKNOWN = 1e-3
+"""Delay [s] that is allowed for where none is given."""
+
+BENDING = (1e-6, 5.0)
 """Of the bending q over the range of the motion: from a straight line to bristles that are at their end long before."""
 
 EXPLAINED = 0.2
-"""Share of the force's standard deviation that the model may leave unexplained."""
+"""Share of the friction's standard deviation that the model may leave unexplained."""
 
-SEEN = 10.0
-"""Standard deviations of the noise that those of the motion have to reach."""
+SEEN, ROUNDING = 10.0, 1e-9
+"""Standard deviations of the noise that those of the motion have to reach, and the same over the largest position."""
 
-YIELDS = 0.5
-"""Share of the motion by which a joint may give way that counts as held."""
+MOVES, STANDS_OUT = 0.02, 3.0
+"""A joint bends where its deflection reaches this share of the motion, and so many times its sensor's noise."""
+
+SPRING = 3.0
+"""Stiffness over that of the joint up to which it may well be the joint that is seen."""
 
 KEYS = MASS, DAMPING, STIFFNESS = "moving mass", "friction.bristle_damping", "friction.bristle_stiffness"
 UNITS = {MASS: "kg", DAMPING: "N*s/m", STIFFNESS: "N/m"}
 METHOD = "small motion before sliding: force over inertia, bristles' deflection and its rate"
+SLIDES = "the bearing slides, or noise is as large as the force"
+LATE = f"No delay of the drive is given: up to {UNKNOWN * 1e3:g} ms are allowed for, which widens damping and mass."
+HELD = "The joint is taken as held by its limiter: no channel shows that it bends."
 
 
 @dataclass(frozen=True)
 class Between:
-    """What lies between the force that is commanded and the bristles: the time [s] by which the force comes later, the
-    stiffness [N/m] of a joint that is held and the mass [kg] beyond it; and the viscous friction [N s/m]."""
+    """What lies between the force that is commanded and the bristles: its `delay` [s] (None: not known) and the
+    `bandwidth` of the current loop [Hz]; the stiffness [N/m] of the `contact` that holds a joint, the mass [kg]
+    `beyond` it and the stiffness [N/m] of the `joint` itself; the viscous friction [N s/m]."""
 
-    lag: float = 0.0
+    delay: float | None = None
+    bandwidth: float = np.inf
     contact: float = np.inf
     beyond: float = 0.0
+    joint: float = 0.0
     viscous: float = 0.0
 
 
 @dataclass(frozen=True)
 class Presliding:
-    """Stiffness [N/m] and damping [N s/m] of the bristles and the moving mass [kg]. Over time [s], shape (n,): the
-    position [m] of the body on the bearing, the force [N], low-passed, and that of the model (empty where there is
-    none); the share of the force's standard deviation that it leaves unexplained."""
+    """Moving mass [kg], damping [N s/m] and stiffness [N/m] of the bristles, and the `correlation` of the three, shape
+    (3, 3). Over time [s], shape (n,): the position [m] of the body on the bearing, the force [N], low-passed, and that
+    of the model (empty where there is none); the share of the friction's standard deviation that it leaves
+    unexplained."""
 
-    stiffness: Estimate
-    damping: Estimate
     mass: Estimate
+    damping: Estimate
+    stiffness: Estimate
+    correlation: np.ndarray
     time: np.ndarray
     position: np.ndarray
     force: np.ndarray
     model: np.ndarray
     unexplained: float
+    warnings: tuple[str, ...] = ()
+
+    def order(self, key: str) -> int:
+        """The row of a key of the stage file in the `correlation`."""
+        return KEYS.index(key) if key in KEYS else KEYS.index(MASS)
 
 
 @dataclass(frozen=True)
 class _Fit:
-    """Mass, damping and stiffness, and their standard errors by the jackknife, each of shape (3,); over time [s], shape
-    (n,), the position of the body on the bearing, its force and that of the model, low-passed."""
+    """Mass, damping and stiffness, shape (3,), and their covariance by the jackknife; whether the bristles are at their
+    end, and the share of the friction that is left; over time [s], shape (n,), the position of the body on the
+    bearing, its force and that of the model, low-passed."""
 
     values: np.ndarray
-    errors: np.ndarray
+    covariance: np.ndarray
+    ends: bool
+    left: float
     time: np.ndarray
     position: np.ndarray
     force: np.ndarray
     model: np.ndarray
 
 
-def bristles_from_presliding(log: Log, between: Between = Between(), cutoff: float = CUTOFF) -> Presliding:
-    """Bristles from a log of position and force whose motion is small beside their break-away, a joint being held.
+@dataclass(frozen=True)
+class _Record:
+    """Time [s], position of the body on which the force acts, deflection of the joint that carries it [m] (None: it
+    is held), and force [N], shape (n,)."""
 
-    The intervals contain by how much the answer changes up to twice the `cutoff` [Hz] and with half of the lag (that
-    of one sample where none is given), and the share of the force that is left unexplained: friction falls with speed,
-    which the model leaves out. Where that is large, nothing is shown. Raises StageError for missing channels.
+    time: np.ndarray
+    position: np.ndarray
+    bent: np.ndarray | None
+    force: np.ndarray
+
+    def seen(self, cutoff: float) -> _Record:
+        """Low-passed at a frequency [Hz], with no more samples than that needs."""
+        each = float(self.time[1] - self.time[0])
+        step = max(int(MOTION / (FINE * cutoff * each)), 1)
+        place, force = (low_pass(signal, each, cutoff)[::step] for signal in (self.position, self.force))
+        bent = None if self.bent is None else low_pass(self.bent, each, cutoff)[::step]
+        return _Record(self.time[::step], place - place[0], bent, force)
+
+
+def bristles_from_presliding(log: Log, between: Between = Between(), cutoff: float = CUTOFF) -> Presliding:
+    """Bristles from a log of position and force whose motion is small beside their break-away. Of a log with gaps the
+    longest stretch is used.
+
+    A joint is held, or its deflection is measured. The intervals contain by how much the answer changes up to twice the
+    `cutoff` [Hz] and with half of the delay and of the current loop's lag (`UNKNOWN` where no delay is given), and the
+    share of the friction that is left unexplained: it falls with speed, which the model leaves out. Where that share is
+    large, nothing is shown. Raises StageError for missing channels.
     """
-    part = max(log.segments, key=lambda each: each.stop - each.start)
+    part, each = log.longest, log.sample_time
     position, force = channel(log, "position")[part], channel(log, "force")[part]
-    bent = deflection(log)
-    why = _why_not(position, None if bent is None else bent[part], log.sample_time, cutoff)
+    why = _why_not(position, each, cutoff)
     if why:
         return _nothing(why)
-    step = max(int(1 / (FINE * cutoff * log.sample_time)), 1)
-    time = log.time[part][::step]
-    unsure = replace(between, lag=between.lag / 2 if between.lag else log.sample_time)
-
-    def fitted(known: Between, top: float) -> _Fit:
-        x, f = (low_pass(signal, log.sample_time, MOTION * top)[::step] for signal in (position, force))
-        return _fit(time, x - x[0], f, known, top)
-
-    best, higher, later = fitted(between, cutoff), fitted(between, CHECKED * cutoff), fitted(unsure, cutoff)
-    left = float((best.force - best.model).std() / best.force.std())
-    changes = np.abs(higher.values - best.values) + np.abs(later.values - best.values)
-    systematic = changes + (left + LINEARITY) * np.abs(best.values)
-    mass, damping, stiffness = (
-        _estimate(key, Mean(float(value), float(error), BLOCKS - 1), float(more), left)
-        for key, value, error, more in zip(KEYS, best.values, best.errors, systematic, strict=True)
+    bent = _bends(log, part, position, cutoff)
+    record = _Record(log.time[part], position, bent, force)
+    unsure = replace(between, bandwidth=2 * between.bandwidth, delay=between.delay / 2 if between.delay else UNKNOWN)
+    best, *others = (
+        _fit(record.seen(MOTION * top), known, top)
+        for known, top in ((between, cutoff), (between, CHECKED * cutoff), (unsure, cutoff))
     )
-    return Presliding(stiffness, damping, mass, best.time, best.position, best.force, best.model, left)
+    changes = np.array([other.values - best.values for other in others])
+    systematic = np.abs(changes).sum(axis=0) + (best.left + LINEARITY) * np.abs(best.values)
+    why = _no_bristles(best, between, bent is None)
+    mass, damping, stiffness = (
+        Estimate.unknown(key, UNITS[key], METHOD, why) if why else _estimate(key, *map(float, numbers))
+        for key, *numbers in zip(KEYS, best.values, np.diag(best.covariance) ** 0.5, systematic, strict=True)
+    )
+    whole = best.covariance + changes.T @ changes / 4
+    size = np.sqrt(np.diag(whole))
+    said = (*([LATE] if between.delay is None else []), *([HELD] if bent is None and between.joint else []))
+    shown = (best.time, best.position, best.force, best.model)
+    return Presliding(mass, damping, stiffness, whole / np.outer(size, size), *shown, best.left, said)
 
 
-def _why_not(position: np.ndarray, bent: np.ndarray | None, sample_time: float, cutoff: float) -> str:
+def _why_not(position: np.ndarray, sample_time: float, cutoff: float) -> str:
     """Why a record cannot show bristles; empty where it can."""
     if len(position) * sample_time < LEAST / cutoff:
         return f"the record lasts {len(position) * sample_time:.3g} s: {LEAST / cutoff:.3g} s are needed"
     if sample_time * CHECKED * cutoff > 0.2:
         return f"one sample in {sample_time:.3g} s: {0.2 / (CHECKED * cutoff):.3g} s or less is needed"
     motion, noise = low_pass(position, sample_time, cutoff).std(), robust(np.diff(position, 2)) / 6**0.5
-    if not motion > SEEN * noise:
+    if not motion > max(SEEN * noise, ROUNDING * float(np.abs(position).max())):
         return f"the motion, {motion:.2g} m RMS, does not stand out of the noise"
-    if bent is not None and low_pass(bent, sample_time, cutoff).std() > YIELDS * motion:
-        return "the joint gives way: it has to be held"
     return ""
+
+
+def _bends(log: Log, part: slice, position: np.ndarray, cutoff: float) -> np.ndarray | None:
+    """The measured deflection [m] of a joint that bends; None where it is held, or not measured."""
+    measured = deflection(log)
+    if measured is None:
+        return None
+    bent = measured[part]
+    size = low_pass(bent, log.sample_time, cutoff).std()
+    noise = low_pass(np.random.default_rng(0).standard_normal(len(bent)), log.sample_time, cutoff).std()
+    noise *= robust(np.diff(bent, 2)) / 6**0.5
+    return bent if size > max(STANDS_OUT * noise, MOVES * low_pass(position, log.sample_time, cutoff).std()) else None
 
 
 def _nothing(why: str) -> Presliding:
     mass, damping, stiffness = (Estimate.unknown(key, UNITS[key], METHOD, why) for key in KEYS)
     none = np.empty(0)
-    return Presliding(stiffness, damping, mass, none, none, none, none, np.nan)
+    return Presliding(mass, damping, stiffness, np.eye(len(KEYS)), none, none, none, none, np.nan)
 
 
-def _estimate(key: str, mean: Mean, systematic: float, left: float) -> Estimate:
-    found = by_t(key, UNITS[key], mean, METHOD, systematic, systematic)
-    if left > EXPLAINED:
-        why = f"{left:.0%} of the force is not explained: the bearing slides, or moves otherwise"
-        return Estimate.unknown(key, UNITS[key], METHOD, why)
-    if not found.low > 0:
-        why = "the motion is too slow to show it" if key != STIFFNESS else "no force holds the bearing: does it stick?"
-        return Estimate.unknown(key, UNITS[key], METHOD, why, 0.0, max(found.high, 0.0) or np.inf)
-    return found
+def _no_bristles(fit: _Fit, between: Between, held: bool) -> str:
+    """Why what was found are no bristles; empty where they are."""
+    if fit.left > EXPLAINED:
+        return f"{fit.left:.0%} of the friction are not explained: {SLIDES}"
+    if fit.ends:
+        return f"the bristles are at their end: {SLIDES}"
+    if held and 0 < fit.values[KEYS.index(STIFFNESS)] < SPRING * between.joint:
+        return "the stiffness is like that of the joint: is it held?"
+    return ""
 
 
-def _fit(time: np.ndarray, position: np.ndarray, force: np.ndarray, between: Between, cutoff: float) -> _Fit:
+def _estimate(key: str, value: float, error: float, systematic: float) -> Estimate:
+    found = by_t(key, UNITS[key], Mean(value, error, BLOCKS - 1), METHOD, systematic, systematic)
+    if found.low > 0:
+        return found
+    why = "the motion is too slow to show it" if key != STIFFNESS else "no force holds the bearing: does it stick?"
+    return Estimate.unknown(key, UNITS[key], METHOD, why, 0.0, max(found.high, 0.0) or np.inf)
+
+
+def _fit(record: _Record, between: Between, cutoff: float) -> _Fit:
     """Least squares of the force at a low-pass; the bending, in which it is not linear, is looked for."""
-    acceleration = _rate(time, _rate(time, position))
-    force = force - between.lag * _rate(time, force)
-    force = force - between.beyond * acceleration
-    body = position - force / between.contact
+    time, force = record.time, _arrived(record.time, record.force, between)
+    force = force - between.beyond * _rate(time, _rate(time, record.position))
+    body = record.position - (force / between.contact if record.bent is None else record.bent)
     force = force - between.viscous * _rate(time, body)
     interval, span = float(time[1] - time[0]), float(np.ptp(body))
     inside = slice(edge := int(2 / (cutoff * interval)), len(time) - edge)
@@ -166,24 +237,43 @@ def _fit(time: np.ndarray, position: np.ndarray, force: np.ndarray, between: Bet
     def columns(bending: float) -> np.ndarray:
         """Inertia, rate and deflection of the bristles, how a deflection at the start dies away, a constant."""
         z, path = deflected(body, bending), np.concatenate(([0.0], np.cumsum(np.abs(np.diff(body)))))
-        each = (acceleration, _rate(time, z), z, np.exp(-bending * path))
-        return np.stack([*map(passed, each), np.ones(len(target))], axis=1)
+        turned = (passed(each) for each in (_rate(time, z), z, np.exp(-bending * path)))
+        return np.stack([inertia, *turned, np.ones(len(target))], axis=1)
 
     def off(logarithm: float) -> float:
         x = columns(float(np.exp(logarithm)) / span)
         return float(np.sum((target - x @ solved(x.T @ x, x.T @ target)) ** 2))
 
-    acceleration, target = _rate(time, _rate(time, body)), passed(force)
+    inertia, target = passed(_rate(time, _rate(time, body))), passed(force)
     best: Any = minimize_scalar(off, bounds=tuple(np.log(BENDING)), method="bounded", options={"xatol": 1e-3})
-    x = columns(float(np.exp(best.x)) / span)
+    bending = float(np.exp(best.x)) / span
+    x = columns(bending)
     solution = solved(x.T @ x, x.T @ target)
-    without = [
-        solved(x.T @ x - part.T @ part, x.T @ target - part.T @ own)[:3]
-        for part, own in zip(np.array_split(x, BLOCKS), np.array_split(target, BLOCKS), strict=True)
-    ]
-    errors = np.std(without, axis=0) * np.sqrt(BLOCKS - 1)
+    bends = (columns(1.01 * bending) - columns(bending / 1.01)) @ solution
+    covariance = _jackknife(np.column_stack([x, bends]), target)[:3, :3]
     values = solution[:3] + np.array([between.beyond, 0.0, 0.0])
-    return _Fit(values, errors, time[inside], passed(body), target, x @ solution)
+    left = float((target - x @ solution).std() / (target - x[:, 0] * solution[0]).std())
+    ends = bending * span > 0.99 * BENDING[1]
+    return _Fit(values, covariance, ends, left, time[inside], passed(body), target, x @ solution)
+
+
+def _jackknife(columns: np.ndarray, target: np.ndarray) -> np.ndarray:
+    """Covariance of the coefficients, shape (p, p), of a fit of the target, shape (n,), by columns, shape (n, p)."""
+    parts = zip(np.array_split(columns, BLOCKS), np.array_split(target, BLOCKS), strict=True)
+    square, product = columns.T @ columns, columns.T @ target
+    without = np.array([solved(square - x.T @ x, product - x.T @ y) for x, y in parts])
+    off = without - without.mean(axis=0)
+    return off.T @ off * (BLOCKS - 1) / BLOCKS
+
+
+def _arrived(time: np.ndarray, command: np.ndarray, between: Between) -> np.ndarray:
+    """The force [N] that a command [N], shape (n,), has become: late by the delay and by the current loop."""
+    late = CubicSpline(time, command)(np.maximum(time - (between.delay or 0.0), time[0]))
+    if not np.isfinite(between.bandwidth):
+        return late
+    ratio = 1 / (np.pi * between.bandwidth * (time[1] - time[0]))
+    b, a = np.array([1.0, 1.0]) / (1 + ratio), np.array([1.0, (1 - ratio) / (1 + ratio)])
+    return lfilter(b, a, late, zi=lfilter_zi(b, a) * late[0])[0]
 
 
 def _rate(time: np.ndarray, signal: np.ndarray) -> np.ndarray:

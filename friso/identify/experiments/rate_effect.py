@@ -74,7 +74,7 @@ def static_friction(
         found = _extrapolated(name, forces, rates, bristle_rate, relative_error)
     else:
         found = _bounded(name, forces, rates, bristle_rate, relative_error)
-    return replace(found, low=max(float(found.low - late), 0.0))
+    return replace(found, low=max(float(found.low - late), 0.0), systematic=found.systematic + late / 2)
 
 
 def _bounded(name: str, forces: np.ndarray, rates: np.ndarray, bristle_rate: float, relative_error: float) -> Estimate:
@@ -82,13 +82,15 @@ def _bounded(name: str, forces: np.ndarray, rates: np.ndarray, bristle_rate: flo
     mean = correlated_mean(forces)
     share = share_below(float(np.median(rates)), bristle_rate)
     method = f"mean break-away force at {np.median(rates):.3g} N/s; at rate 0 up to {share:.0%} higher is allowed for"
-    half = t_value(mean.freedom) * float(np.hypot(mean.error, relative_error * mean.value))
+    scatter = t_value(mean.freedom) * mean.error
+    half = float(np.hypot(scatter, t_value(mean.freedom) * relative_error * mean.value))
     low, high = mean.value - half, (mean.value + half) / (1 - share) if share < 1 else np.inf
     low, high = float(low), float(high)
     if share > 2 * FAR:
         reason = f"the force rises at {np.median(rates):.3g} N/s: too fast, break-away may be {share:.0%} below it"
         return Estimate.unknown(name, "N", method, reason, low, high)
-    return Estimate(name, "N", float(mean.value * (1 + share / (1 - share) / 2)), low, high, method)
+    value = float(mean.value * (1 + share / (1 - share) / 2))
+    return Estimate(name, "N", value, low, high, method, systematic=(high - low) / 2 - scatter)
 
 
 def _extrapolated(

@@ -149,7 +149,7 @@ def _settled(
     for allowed, share in product((SETTLED, CREEPING), STARTS):
         chosen = slice(span.start + int(share * length), span.stop - margin)
         if chosen.stop - chosen.start < 2 * BLOCKS:
-            return None
+            continue
         bent, creep = _drifting(position[chosen])
         beyond, drift = _drifting(force[chosen] - secant * position[chosen])
         if creep <= allowed * scale and drift <= SETTLED * abs(_force_scale(force)):

@@ -164,7 +164,7 @@ def _stiffness(log: Log, deflected: np.ndarray | None, loads: list[slice], cutof
     if deflected is None or pushed is None or "position" not in log:
         reason = "force, position and deflection are not all measured"
         return Estimate.unknown("joint.stiffness", "N/m", LOADED, reason)
-    bending = np.concatenate([np.gradient(deflected[s], log.sample_time) for s in log.segments])
+    bending = _rate(log, deflected, cutoff)
     acceleration = _rate(log, _rate(log, channel(log, "position"), cutoff), cutoff)
     return stiffness_of_loading(deflected, bending, acceleration, pushed, loads)
 
@@ -285,7 +285,9 @@ def _both(one: Estimate, other: Estimate) -> Estimate:
         low = (one.low + other.low) / 2
         return Estimate.unknown(KEY, "N", seen.method, f"one direction alone shows it: {unseen.reason}", low)
     middle = [(one.low + other.low) / 2, (one.value + other.value) / 2, (one.high + other.high) / 2]
-    return Estimate(KEY, "N", middle[1], middle[0], middle[2], f"mean of both directions: {one.method}")
+    systematic = (one.systematic + other.systematic) / 2
+    method = f"mean of both directions: {one.method}"
+    return Estimate(KEY, "N", middle[1], middle[0], middle[2], method, systematic=systematic)
 
 
 def _offset(one: Estimate, other: Estimate) -> Estimate:

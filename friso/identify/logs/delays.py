@@ -58,6 +58,7 @@ def fitted_lag(effect: np.ndarray, causes: np.ndarray) -> float:
     shares = []
     for k in range(-MOST, MOST + 1):
         shifted = causes[MOST + k : effect.size - MOST + k]
+        shifted = shifted / np.maximum(np.abs(shifted).max(axis=0), np.finfo(float).tiny)
         fit = np.linalg.lstsq(shifted.T @ shifted, shifted.T @ middle, rcond=None)[0]
         shares.append(float(fit @ (shifted.T @ middle)) / whole if whole > 0 else 0.0)
     return _peak(np.array(shares), 0.5)

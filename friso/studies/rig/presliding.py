@@ -3,23 +3,25 @@ bristles decide whether a machine near the boundary of hunting hunts."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from friso.identify.experiments import Presliding, bristles_from_presliding
 from friso.identify.method import between
 from friso.quantities import StageError
+from friso.rig.run import as_built_keys
 from friso.stage import Stage
 from friso.studies.rig.excitation import Excitation, excite
 from friso.studies.rig.outcome import Outcome, Progress, RigLog, rig_log
-from friso.studies.rig.sizes import locked, travel
+from friso.studies.rig.sizes import locked, pace, travel
 
 PLACES = 3
 """Places along the travel: our choice."""
 
-GENTLE = Excitation(0.05, 8.0, 60, 160.0)
-"""A twentieth of static friction, RMS, up to 64 Hz on the thesis's rig, logged every 0.75 ms."""
+GENTLE, LONGEST = Excitation(0.05, 8.0, 60, 160.0), 1e-3
+"""A twentieth of static friction, RMS, up to 64 Hz on the thesis's rig, logged every 0.75 ms; longest time [s] from
+sample to sample on slower ones."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +46,7 @@ def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
         progress(number, PLACES, f"place {number + 1} of {PLACES}")
         logs.append(presliding_log(held, f"presliding_{number + 1}", place, seed + number))
     progress(PLACES, PLACES, "")
-    known = between(flat)
+    known = between(as_built_keys(stage))
     found = tuple(bristles_from_presliding(each.log, known) for each in logs)
     true = (flat["friction.bristle_stiffness"], flat["friction.bristle_damping"])
     return Outcome("presliding", stage, seed, tuple(logs), Bristles(found, *map(float, true)))
@@ -52,4 +54,5 @@ def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
 
 def presliding_log(stage: Stage, name: str, place: float, seed: int) -> RigLog:
     """The log of one small excitation at a place [m]."""
-    return rig_log(excite(stage, place, seed, kind=GENTLE), 0, name, "presliding", stage, seed)
+    kind = replace(GENTLE, samples=max(GENTLE.samples, 1 / (LONGEST * pace(stage))))
+    return rig_log(excite(stage, place, seed, kind=kind), 0, name, "presliding", stage, seed)

@@ -17,9 +17,10 @@ from friso.studies.rig.sizes import FIXED, freed, interval, moving_mass, pace
 STEP, WAYS = 0.3, (1, 1, -1, -1, 1, -1)
 """A step in strokes, 0.3 mm on the thesis's rig (Sec. 4.2.2), and the directions of the steps, our choice."""
 
-STANDS, SETTLED, SAMPLES = 16.0, 5.0, 125.0
-"""Periods of the crossover for which each step stands (2 s on the thesis's rig), and at least so many time constants of
-the integrator against the joint; samples of the log per period (1 ms): our choice, the thesis tells neither."""
+STANDS, LONGEST, SETTLED, SAMPLES = 16.0, 64.0, 5.0, 125.0
+"""Periods of the crossover for which each step stands (2 s on the thesis's rig) and at most may; so many time constants
+of the integrator against the joint, if it is not longer; samples of the log per period (1 ms): our choice, the thesis
+tells neither."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +54,8 @@ def steps(stage: Stage, seed: int) -> RigLog:
     """The log of the steps."""
     free, period = freed(stage), 1 / pace(stage)
     step = STEP * stage.flat()["joint.stroke"]
-    task = staircase([way * step for way in WAYS], max(STANDS * period, SETTLED * pulling_time(free)))
+    stands = np.clip(SETTLED * pulling_time(free), STANDS * period, LONGEST * period)
+    task = staircase([way * step for way in WAYS], float(stands))
     tuned = stage.flat().get("controller.tuned_mass", moving_mass(stage))
     held = {"masses.cart": np.array([FIXED])}
     held |= {"controller.tuned_mass": np.array([tuned])} if "controller.crossover" in stage.flat() else {}
