@@ -4,9 +4,11 @@ A stand-in of a few lines takes a kernel's place, so that compiling it takes a f
 """
 
 import os
+import shutil
 import stat
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -40,12 +42,28 @@ print(sum(stats.cache_hits.values()), sum(stats.cache_misses.values()))
 COMPILING = "compiling; the next run"
 
 
-@pytest.fixture(autouse=True)
-def builder(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.fixture(scope="module", autouse=True)
+def builder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     """A builder that makes the stand-in, where the processes find it."""
     folder = tmp_path_factory.mktemp("builder")
     (folder / "stand_in_builder.py").write_text(BUILDER)
-    monkeypatch.setenv("PYTHONPATH", str(folder))
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setenv("PYTHONPATH", str(folder))
+        yield
+
+
+@pytest.fixture(scope="module")
+def whole(builder: None, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with one built entry; tests damage copies of it."""
+    folder = tmp_path_factory.mktemp("whole")
+    assert built(folder)
+    return folder
+
+
+@pytest.fixture
+def copied(whole: Path, tmp_path: Path) -> Path:
+    """A copy of the folder with one built entry, which is found in it."""
+    return Path(shutil.copytree(whole, tmp_path / "copied"))
 
 
 def start(folder: Path, name: str = "stand-in", **more: str) -> subprocess.Popen[str]:
@@ -95,9 +113,8 @@ def test_permissions_are_mended(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("damage", ["truncate", "alter", "remove"])
 @pytest.mark.parametrize("pattern", ["kernel.py", "manifest.json", "**/*.nbi", "**/*.nbc"])
-def test_a_damaged_entry_is_rebuilt(tmp_path: Path, pattern: str, damage: str) -> None:
-    assert built(tmp_path)
-    (file,) = entry(tmp_path).glob(pattern)
+def test_a_damaged_entry_is_rebuilt(copied: Path, pattern: str, damage: str) -> None:
+    (file,) = entry(copied).glob(pattern)
     content = file.read_bytes()
     middle = len(content) // 2
     if damage == "remove":
@@ -106,23 +123,25 @@ def test_a_damaged_entry_is_rebuilt(tmp_path: Path, pattern: str, damage: str) -
         file.write_bytes(content[:middle])
     else:
         file.write_bytes(content[:middle] + bytes([content[middle] ^ 1]) + content[middle + 1 :])
-    assert built(tmp_path)
-    assert not built(tmp_path)
+    assert built(copied)
+    assert not built(copied)
 
 
-def test_a_file_that_does_not_belong_is_not_run(tmp_path: Path) -> None:
+def test_a_copied_folder_is_as_good(copied: Path) -> None:
+    assert not built(copied)
+
+
+def test_a_file_that_does_not_belong_is_not_run(copied: Path) -> None:
     """One more file of machine code beside the others is an altered entry too."""
-    assert built(tmp_path)
-    (file,) = entry(tmp_path).glob("**/*.nbc")
+    (file,) = entry(copied).glob("**/*.nbc")
     file.with_name("other.nbc").write_bytes(b"anything")
-    assert built(tmp_path)
+    assert built(copied)
 
 
-def test_an_interrupted_build_is_built_again(tmp_path: Path) -> None:
+def test_an_interrupted_build_is_built_again(copied: Path) -> None:
     """Without a manifest, which is written last."""
-    assert built(tmp_path)
-    (entry(tmp_path) / "manifest.json").unlink()
-    assert built(tmp_path)
+    (entry(copied) / "manifest.json").unlink()
+    assert built(copied)
 
 
 def test_processes_at_the_same_time_build_once(tmp_path: Path) -> None:

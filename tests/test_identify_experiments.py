@@ -14,8 +14,10 @@ import pytest
 from machines import break_aways, creeping, drawn
 from numba import njit
 from scipy.io import loadmat
+from scipy.signal import lfilter
 
 import friso
+from friso.identify.combine import combined
 from friso.identify.estimate import Estimate
 from friso.identify.experiments import (
     friction_position,
@@ -29,6 +31,7 @@ from friso.identify.experiments import (
 from friso.identify.experiments.common import block_mean, correlated_mean, low_pass, runs, t_value
 from friso.identify.experiments.rate_effect import break_away, share_below, static_friction
 from friso.identify.logs.log import Log
+from friso.identify.method import identify
 from friso.identify.response.fitting import Fit
 from friso.studies.thesis.claims import Evidence, Finding, registered
 from friso.studies.thesis.experiments import (
@@ -188,6 +191,16 @@ def test_a_slow_integrator_need_not_have_settled(rig: friso.Stage) -> None:
     assert found.stiffness.half_width < 0.01 * 2400
 
 
+def test_drifting_plateaus_of_few_samples_count_too() -> None:
+    """20 ms a sample, 1 s a plateau that is approached with a time constant of 0.3 s."""
+    step, tau = 0.02, 0.3
+    reference = np.repeat(np.cumsum([0, 1, 1, -1, -1, 1, -1]) * 0.3e-3, 50)
+    level = lfilter([1 - np.exp(-step / tau)], [1, -np.exp(-step / tau)], reference)
+    found = stiffness_from_steps(record("steps", step, reference=reference, position=level, force=2400 * level))
+    assert len(found.windows) >= 6
+    assert found.stiffness.holds(2400)
+
+
 def test_steps_that_do_not_settle_are_left_out(rig: friso.Stage) -> None:
     signals = stairs(rig, 2400.0, (1, -1, 1, -1))
     quarter = 2 * round(2.0 / DT)
@@ -286,6 +299,29 @@ def test_stick_slip_holds_the_static_friction(rig: friso.Stage) -> None:
     assert held >= 38
     assert below >= 38
     assert stiff >= 34  # of 95 %, 33 or fewer have a probability of 1 %
+
+
+def test_nine_logs_at_one_force_rate_hold_the_static_friction() -> None:
+    """How far the force rate lowers break-away is the same in each: it does not average out."""
+    static, rng = 3.0, np.random.default_rng(3)
+    lowered = break_away(3.0, static, 1.0, 2e5, 5e-3)
+    logs = [
+        static_friction("friction.static", lowered * (1 + 0.01 * rng.standard_normal(20)), np.full(20, 3.0))
+        for _ in range(9)
+    ]
+    assert all(each.holds(static) for each in logs)
+    (one,), said = combined(logs)
+    assert not said
+    assert one.holds(static)
+
+
+def test_slow_motion_with_the_joint_locked_shows_no_joint(rig: friso.Stage) -> None:
+    time = np.arange(0, 8, DT)
+    pull = 3 * (time % 1.0)
+    way = np.floor(time) * 1e-3
+    log = record("held", DT, position=way + pull / 2e7, relative_position=pull / 2e7, force=pull)
+    found = identify([(log, "stick-slip")], rig)
+    assert "joint.stiffness" not in [each.name for each in found.estimates if each.shown]
 
 
 def test_peaks_come_before_velocity_spikes_and_the_actuator_says_the_same(rig: friso.Stage) -> None:
