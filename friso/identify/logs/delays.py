@@ -10,6 +10,8 @@ BLOCKS = 8
 """Parts of the record whose separate estimates give the interval."""
 MOST = 20
 """Longest delay looked for, in samples."""
+LEAST = 0.25
+"""Shortest delay told, in samples: derivatives are smoothed more than what they are compared with."""
 WINDOW = 11
 """Samples over which derivatives are smoothed (Savitzky-Golay, no delay of its own)."""
 
@@ -91,10 +93,10 @@ def in_blocks(estimate: Callable[[int, int], float], size: int) -> tuple[float, 
 
 
 def _line(late: str, early: str, estimate: tuple[float, float], period: float) -> str:
-    """The words for an estimate in samples, "" where its interval holds 0, it is below a tenth of a sample, or the
+    """The words for an estimate in samples, "" where its interval holds 0, it is below a quarter of a sample, or the
     blocks differ by samples: then the motion does not show a delay."""
     value, half = estimate
-    if not np.isfinite(value) or abs(value) <= max(half, 0.1) or half > 1:
+    if not np.isfinite(value) or abs(value) <= max(half, LEAST) or half > 1:
         return ""
     late, early = (late, early) if value > 0 else (early, late)
     size = f"{abs(value) * period * 1e3:.3g} ms +/- {half * period * 1e3:.2g} ms (95 %)"
