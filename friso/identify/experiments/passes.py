@@ -17,9 +17,10 @@ CUTOFF = 25.0
 LEAST, LEAST_SAMPLES = 0.1, 40
 """Shortest stretch, in seconds and in samples."""
 
-STEADY, QUICK = 0.3, 0.05
+STEADY, QUICK = 0.3, 0.02
 """Standard deviation of the velocity over its mean from which a motion is not steady: it hunts, sticks or swings; the
-second holds for swings quicker than the cutoff that stand clear of noise."""
+second holds for swings quicker than the cutoff that stand clear of noise, and is so small since a swing above half the
+sampling rate looks slower than it is: one of 940 Hz, sampled at 1 kHz, like one of a seventeenth of its velocity."""
 
 ROUNDING, WHOLE = 1e-6, 0.1
 """Share of the largest step of a position up to which steps are rounding of numbers, and how far those in digits may
