@@ -110,7 +110,7 @@ def _written(outcome: Outcome, folder: Path) -> list[Path]:
     from friso.views.rig import figures, page
 
     truth = made_folder(folder / TRUTH)
-    files = [_write_log(log, folder, truth) for log in outcome.logs]
+    files = [_write_log(log, outcome.stage, folder, truth) for log in outcome.logs]
     _write_stage(outcome.stage, truth / "stage.toml", outcome.seed)
     drawn = figures(outcome)
     pictures = {folder / f"{figure.name}.{form}": figure for figure in drawn for form in FORMATS}
@@ -120,7 +120,7 @@ def _written(outcome: Outcome, folder: Path) -> list[Path]:
     return [folder / PAGE, *files, truth / "stage.toml", *pictures]
 
 
-def _write_log(log: RigLog, folder: Path, truth: Path) -> Path:
+def _write_log(log: RigLog, stage: Stage, folder: Path, truth: Path) -> Path:
     """The log as the drive writes it, how to read it beside it, and the truth in its own folder."""
     from friso.identify.logs.mapping import Mapping, save
     from friso.rig.log_files import write_csv
@@ -129,10 +129,21 @@ def _write_log(log: RigLog, folder: Path, truth: Path) -> Path:
     said = f"friso rig, seed {log.seed}"
     write_csv(path, log.interval, log.logged, said)
     if log.kind is not None:
-        save(Mapping(experiment=log.kind), path)
+        save(Mapping(experiment=log.kind, setup=_setup(log.stage, stage)), path)
     write_csv(truth / path.name, log.interval, log.true, f"{said}: the truth behind {path.name}")
     _write_stage(log.stage, truth / f"{log.name}.toml", log.seed)
     return path
+
+
+def _setup(own: Stage, stage: Stage) -> dict[str, str]:
+    """What of joint and controller was set otherwise for a log than in the stage file, as texts with units."""
+    was, now = stage.given(), own.given()
+    return {
+        f"{table}.{key}": text
+        for table in ("joint", "controller")
+        for key, text in now.get(table, {}).items()
+        if isinstance(text, str) and text != was.get(table, {}).get(key)
+    }
 
 
 def _write_stage(stage: Stage, path: Path, seed: int) -> None:

@@ -190,9 +190,10 @@ def _analysed(
     kind: str, logs: tuple[Source, ...], stage: Stage | None, own: bool, known: Sequence[Estimate], options: Options
 ) -> Result:
     """The analysis of one experiment, with what is known of the machine by now."""
-    flat, log = stage.flat() if stage else {}, logs[0]
+    log = logs[0]
     if isinstance(log, MeasuredResponse):
         return analyse((), options.band, measured=log)
+    flat = _as_set_up(stage, log) if stage else {}
     times = [each for each in logs if isinstance(each, Log)]
     best = {each.name: each for each in known if each.shown}
     masses = {name: _value(best, flat, f"masses.{name}") for name in ("cart", "stage")}
@@ -211,6 +212,16 @@ def _analysed(
     if kind == BREAK_AWAY:
         return static_from_ramps(log, mass)
     return ConstantSpeed(friction_velocity(log, mass), friction_position(log, mass, flat.get("controller.crossover")))
+
+
+def _as_set_up(stage: Stage, log: Log) -> dict[str, Any]:
+    """The flat keys of the stage as it was set up for a log; what the stage does not have is left out. Raises
+    StageError."""
+    given = stage.flat()
+    try:
+        return stage.replace({key: text for key, text in log.setup.items() if key in given}).flat()
+    except StageError as error:
+        raise error.found_in(f"{log.name}, [setup]") from None
 
 
 def _stick_slip(log: Log, stiffness: Estimate | None, flat: Mapping[str, Any], stage_mass: float) -> StickSlip:
@@ -324,7 +335,7 @@ def _shared(total: Estimate, stage: Stage) -> tuple[Estimate, ...]:
             total.value * share,
             total.low * share,
             total.high * share,
-            total.method,
+            f"{total.method}, shared as in the stage file",
             systematic=total.systematic * share,
         )
         for key, share in ((key, value / whole) for key, value in given.items())

@@ -49,8 +49,8 @@ def _place(number: int, place: Place) -> str:
     shown = [f"{words} {with_interval(each)}" for words, each in named if each.shown]
     hidden = {each.reason: [words for words, one in named if one.reason == each.reason] for _, each in named}
     told = [f"not shown: {listed(words, 'and')} ({reason})" for reason, words in hidden.items() if reason]
-    over = f" from {with_unit(float(reached.min()), 'm/s')} to {with_unit(float(reached.max()), 'm/s')}"
-    head = f"Place {number}, {len(reached)} steady passes{over if len(reached) else ''}"
+    ends = [with_unit(float(end(reached)), "m/s") for end in (np.min, np.max) if len(reached)]
+    head = f"Place {number}, {len(reached)} steady passes{' from ' if ends else ''}{' to '.join(ends)}"
     stopped = [f"the log stopped {place.log.failure}"] if place.log.failure else []
     return f"{head}: {'; '.join([*stopped, *shown, *told])}."
 

@@ -63,7 +63,7 @@ UNITS = {MASS: "kg", DAMPING: "N*s/m", STIFFNESS: "N/m"}
 METHOD = "small motion before sliding: force over inertia, bristles' deflection and its rate"
 SLIDES = "the bearing slides, or noise is as large as the force"
 LATE = f"No delay of the drive is given: up to {UNKNOWN * 1e3:g} ms are allowed for, which widens damping and mass."
-HELD = "The joint is taken as held by its limiter: no channel shows that it bends."
+HELD = "The joint is taken as held, with the limiter's stiffness: it is not seen to bend."
 
 
 @dataclass(frozen=True)

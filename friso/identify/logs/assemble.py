@@ -47,7 +47,7 @@ def read_log(
     told.read.append(_spans(base))
     return Log(
         path.stem, base.time, base.period, signals, tuple(base.segments), told.units, dict(table.scalars),
-        tuple(told.read), tuple(told.warnings),
+        tuple(told.read), tuple(told.warnings), dict(mapping.setup),
     )  # fmt: skip
 
 

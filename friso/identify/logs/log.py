@@ -31,6 +31,7 @@ class Log:
     a role whose channel could not be turned into the SI unit of the role (a force in volts without a scale, an angle
     instead of a length), the unit in which it stands. `scalars` are single numbers that stood in the file, by name.
     `read` tells line by line what was read and how, `warnings` what the engineer should know before believing it.
+    `setup` are keys of the stage file that were otherwise while this log was taken ({"joint.stroke": "8 mm"}).
     """
 
     name: str
@@ -42,6 +43,7 @@ class Log:
     scalars: Mapping[str, float] = field(default_factory=dict)
     read: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
+    setup: Mapping[str, str] = field(default_factory=dict)
 
     def __contains__(self, role: str) -> bool:
         return role in self.signals

@@ -16,19 +16,22 @@ from friso.quantities import Quantity, StageError, as_toml, positive, quoted
 SUFFIX = ".friso.toml"
 MAPPABLE = ("time", *ROLES)
 """What a channel can be mapped to."""
+TABLES = ("roles", "units", "scales", "setup")
 _SAMPLE_TIME = Quantity("s", positive, "1 ms")
 
 
 @dataclass(frozen=True)
 class Mapping:
     """Roles ({role: channel name}), units ({channel name: unit}), scales ({role: "35.1507 N/V"}), the sample time [s]
-    where the file tells none, and the kind of experiment where the user named it."""
+    where the file tells none, and the kind of experiment where the user named it; and how the stage was set up for this
+    log, otherwise than in its file ({dotted key: "8 mm"})."""
 
     roles: Table[str, str] = field(default_factory=dict)
     units: Table[str, str] = field(default_factory=dict)
     scales: Table[str, str] = field(default_factory=dict)
     sample_time: float | None = None
     experiment: str | None = None
+    setup: Table[str, str] = field(default_factory=dict)
 
     def over(self, older: Mapping) -> Mapping:
         """This mapping, and what an older one says where this one is silent."""
@@ -38,6 +41,7 @@ class Mapping:
             {**older.scales, **self.scales},
             older.sample_time if self.sample_time is None else self.sample_time,
             older.experiment if self.experiment is None else self.experiment,
+            {**older.setup, **self.setup},
         )
 
 
@@ -86,7 +90,7 @@ def save(mapping: Mapping, log: Path, folder: Path | None = None) -> Path:
         lines.append(f'sample_time = "{mapping.sample_time!r} s"')
     if mapping.experiment is not None:
         lines.append(f"experiment = {as_toml(mapping.experiment)}")
-    for name in ("roles", "units", "scales"):
+    for name in TABLES:
         table = getattr(mapping, name)
         rows = [f"{as_toml(key)} = {as_toml(value)}" for key, value in table.items()]
         lines += ["", f"[{name}]", *rows] if rows else []
@@ -122,11 +126,10 @@ def _parsed(place: Path) -> Mapping:
             "", str(error), "a mapping kept by friso; remove the file to map anew", "", str(place)
         ) from None
     known = {each.name for each in fields(Mapping)}
-    tables = ("roles", "units", "scales")
     for key, value in document.items():
-        if key not in known or (key in tables) != isinstance(value, dict):
-            raise StageError(key, quoted(value), f"tables {', '.join(tables)}; sample_time", "", str(place))
-    texts = {key: _texts(document.get(key, {}), key, place) for key in tables}
+        if key not in known or (key in TABLES) != isinstance(value, dict):
+            raise StageError(key, quoted(value), f"tables {', '.join(TABLES)}; sample_time", "", str(place))
+    texts = {key: _texts(document.get(key, {}), key, place) for key in TABLES}
     try:
         options = from_options(dt=document.get("sample_time"), experiment=document.get("experiment"))
         for group, allowed in (("roles", MAPPABLE), ("scales", tuple(ROLES))):

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from friso.identify.experiments import FrictionPosition, FrictionVelocity, friction_position, friction_velocity
+from friso.quantities import StageError
 from friso.rig.run import run
 from friso.rig.task import legs
 from friso.stage import Stage
@@ -61,7 +62,10 @@ def speeds(stage: Stage) -> tuple[float, ...]:
 
 def _passes(name: str, stage: Stage, seed: int) -> Passes:
     log, mass = _passes_log(name, stage, seed), moving_mass(stage)
-    place, cart = friction_position(log.log, mass, pace(stage)), log.true["cart_position"]
+    cart = log.true["cart_position"]
+    if not len(cart):
+        raise StageError("controller", f"a loop that stopped {log.failure}", "a stable one", 'crossover = "8 Hz"')
+    place = friction_position(log.log, mass, pace(stage))
     true = mean_friction(stage, np.array(speeds(stage)), np.linspace(cart.min(), cart.max(), 1000))
     return Passes(name, log, place, friction_velocity(log.log, mass), true)
 

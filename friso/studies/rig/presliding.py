@@ -48,8 +48,13 @@ def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
     progress(PLACES, PLACES, "")
     known = between(as_built_keys(stage))
     found = tuple(bristles_from_presliding(each.log, known) for each in logs)
-    true = (flat["friction.bristle_stiffness"], flat["friction.bristle_damping"])
-    return Outcome("presliding", stage, seed, tuple(logs), Bristles(found, *map(float, true)))
+    true = (flat["friction.bristle_stiffness"], flat.get("friction.bristle_damping", 0.0))
+    return Outcome("presliding", stage, seed, tuple(logs), Bristles(found, *map(float, true)), _notes(stage))
+
+
+def _notes(stage: Stage) -> tuple[str, ...]:
+    """How the stage was set up."""
+    return ("the joint is held by its limiter, as an engineer would clamp it",) if stage.joint else ()
 
 
 def presliding_log(stage: Stage, name: str, place: float, seed: int) -> RigLog:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from friso.identify.experiments import StickSlip, static_from_stick_slip
+from friso.quantities import StageError
 from friso.rig.rail import friction_factors
 from friso.rig.run import Recorded, run
 from friso.rig.task import legs
@@ -46,7 +47,11 @@ class Stiction:
 
 
 def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
-    """Slow motion there and back on several rails. Raises StageError for a stage without a joint."""
+    """Slow motion there and back on several rails. Raises StageError for a stage without a joint, or static
+    friction."""
+    if "friction.static" not in stage.flat():
+        given = f"model = {stage.flat().get('friction.model', 'none')!r}"
+        raise StageError("friction.model", given, "friction with a static level", 'model = "lugre"')
     progress(0, 1, f"slow motion on {RAILS} rails")
     logs = slow_motion(stage, seed)
     progress(1, 1, "")
@@ -60,9 +65,9 @@ def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
 
 
 def _note(flat: Mapping[str, Any]) -> str:
-    """What friso identify needs to be told."""
+    """How the stage was set up."""
     stroke = f"{flat['joint.stroke'] * 1e3:g} mm"
-    return f'the limiters are set to {stroke}: tell friso identify by --set joint.stroke="{stroke}"'
+    return f"the limiters are set to {stroke}, which is kept beside the logs for friso identify"
 
 
 def slow_speed(stage: Stage) -> float:

@@ -1,0 +1,65 @@
+"""What the rig tells `friso identify` beside its logs, and what it refuses."""
+
+from pathlib import Path
+
+import pytest
+
+import friso
+from friso.identify.logs.mapping import Mapping, load, save
+from friso.identify.method import _as_set_up
+from friso.identify.sources import read_all
+from friso.quantities import StageError
+from friso.rig.log_files import write_csv
+from friso.stage import Stage
+from friso.studies.rig import constant_speed, presliding, stiction
+from friso.studies.rig.outcome import silent
+from friso.studies.rig.stiffness import steps
+from friso.views.rig import sentences
+
+
+@pytest.fixture(scope="module")
+def built() -> Stage:
+    return friso.load(Path(__file__).parent.parent / "examples" / "thesis_drive.toml")
+
+
+def test_how_the_stage_was_set_up_goes_with_the_log(built: Stage, tmp_path: Path) -> None:
+    """For the analysis of that log alone: the stage file keeps its own stroke."""
+    log, path = steps(built, 1), tmp_path / "steps.csv"
+    write_csv(path, log.interval, log.logged, "")
+    save(Mapping(experiment="steps", setup={"joint.stroke": "8 mm", "cable.drag": "1 N*s/m"}), path)
+    assert load(path) == Mapping(experiment="steps", setup={"joint.stroke": "8 mm", "cable.drag": "1 N*s/m"})
+    (given,) = read_all([path], Mapping(), tmp_path)
+    flat = _as_set_up(built, given.source)
+    assert flat["joint.stroke"] == pytest.approx(8e-3)
+    assert built.flat()["joint.stroke"] == pytest.approx(1e-3)
+    save(Mapping(experiment="steps", setup={"joint.stroke": "8 volts"}), path)
+    (wrong,) = read_all([path], Mapping(), tmp_path)
+    with pytest.raises(StageError, match="setup"):
+        _as_set_up(built, wrong.source)
+
+
+def test_a_log_has_its_name_once_it_is_whole(built: Stage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("numpy.savetxt", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        write_csv(tmp_path / "log.csv", 1e-3, {"position": [0.0, 1.0]}, "")  # type: ignore[dict-item]
+    assert not (tmp_path / "log.csv").exists()
+
+
+def test_friction_without_what_is_looked_for_is_refused(built: Stage) -> None:
+    bare = {f"friction.{key}": None for key in built.given()["friction"]}
+    bare |= {"rail": None}
+    none = built.replace({**bare, "friction.model": "none"})
+    with pytest.raises(StageError, match="static level"):
+        stiction.run_experiment(none, 1, silent)
+    with pytest.raises(StageError, match="bristles"):
+        presliding.run_experiment(none, 1, silent)
+
+
+def test_a_loop_that_swings_between_its_limits_is_told(built: Stage) -> None:
+    """Logs that end at once show no passes: their page is written all the same."""
+    outcome = constant_speed.run_experiment(built.replace({"controller.crossover": "500 Hz"}), 1, silent)
+    assert all(log.failure for log in outcome.logs)
+    assert "0 steady passes: the log stopped after" in " ".join(sentences(outcome))
