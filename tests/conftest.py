@@ -1,4 +1,5 @@
-"""Kernels of the test run are compiled into a folder of its own, which its worker processes share."""
+"""Kernels of the test run are compiled into a folder of its own, which its worker processes share; each of these has a
+core to itself, so that its BLAS takes no more."""
 
 import os
 import shutil
@@ -12,10 +13,12 @@ from friso.stage import Stage
 
 FOLDER = "FRISO_CACHE_DIR"
 MADE = "FRISO_TEST_CACHE_DIR"
+BLAS = "OPENBLAS_NUM_THREADS"
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Before the workers start, so that they inherit the variable; a folder already chosen is kept and left."""
+    """Before the workers start, so that they inherit the variables; a folder already chosen is kept and left."""
+    os.environ.setdefault(BLAS, "1")
     if FOLDER not in os.environ:
         os.environ[FOLDER] = os.environ[MADE] = tempfile.mkdtemp(prefix="friso-tests-")
 
