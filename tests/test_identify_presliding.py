@@ -76,11 +76,12 @@ def test_known_bristles_are_found_and_a_lag_is_taken_off() -> None:
     delayed = replace(log, signals={**log.signals, "force": np.roll(log["force"], -2)})
     found = bristles_from_presliding(delayed, Between(delay=late))
     assert shown(found) == pytest.approx([STIFFNESS, DAMPING, MASS], rel=5e-3)
-    unknown = bristles_from_presliding(delayed)
-    assert abs(unknown.damping.value / DAMPING - 1) > 0.1
-    assert unknown.damping.holds(DAMPING)
-    assert unknown.mass.holds(MASS)
-    assert "No delay" in unknown.warnings[0]
+    unknown = bristles_from_presliding(delayed)  # looked for: what came 1 ms late would add 100 N s/m to the damping
+    assert shown(unknown) == pytest.approx([STIFFNESS, DAMPING, MASS], rel=5e-3)
+    wrong = bristles_from_presliding(delayed, Between(delay=late / 2))
+    assert abs(wrong.damping.value / DAMPING - 1) > 0.05
+    assert wrong.damping.holds(DAMPING)
+    assert wrong.mass.holds(MASS)
 
 
 def test_a_held_joint_gives_way_in_series() -> None:
@@ -94,7 +95,7 @@ def test_a_held_joint_gives_way_in_series() -> None:
         bent = (force + beyond * acceleration) / contact
         position = log["position"] + bent
     whole = replace(log, signals={**log.signals, "position": position, "force": force + beyond * acceleration})
-    found = bristles_from_presliding(whole, Between(contact=contact, beyond=beyond))
+    found = bristles_from_presliding(whole, Between(contact=contact, beyond=beyond / (MASS + beyond)))
     assert found.stiffness.value == pytest.approx(STIFFNESS, rel=5e-3)
     soft = bristles_from_presliding(whole)
     assert soft.stiffness.value == pytest.approx(1 / (1 / STIFFNESS + 1 / contact), rel=0.01)
@@ -113,11 +114,11 @@ def test_what_a_log_cannot_show_is_told() -> None:
     assert slow.stiffness.holds(STIFFNESS)
     assert slow.mass.holds(MASS)
     assert slow.mass.half_width > 0.5 * MASS
-    coarse = bristles_from_presliding(shaken(step=5e-3))
-    assert "2 ms or less" in coarse.stiffness.reason.replace("0.002 s", "2 ms")
+    coarse = bristles_from_presliding(shaken(step=5.5e-3))
+    assert "one sample in 0.00" in coarse.stiffness.reason
     short = shaken()
     short = record("short", DT, **{role: values[:500] for role, values in short.signals.items()})
-    assert "lasts 0.25 s" in bristles_from_presliding(short).stiffness.reason
+    assert "500 samples" in bristles_from_presliding(short).stiffness.reason
     still = record("still", DT, position=np.full(12000, 0.5), force=np.zeros(12000))
     assert "stand out of the noise" in bristles_from_presliding(still).stiffness.reason
     with pytest.raises(friso.StageError, match="force"):

@@ -241,11 +241,12 @@ def between(flat: Mapping[str, Any]) -> Between:
         {key.removeprefix(name): value for key, value in flat.items() if key.startswith(name)}
         for name in ("drive.", "joint.")
     )
+    masses = [flat.get(f"masses.{name}", 0.0) for name in ("cart", "stage")]
     return Between(
         delay=drive.get("delay", 0.0) + drive["sample_time"] / 2 if "sample_time" in drive else None,
         bandwidth=drive.get("current_bandwidth", np.inf),
         contact=joint.get("limiter_stiffness", np.inf),
-        beyond=flat.get("masses.stage", 0.0),
+        beyond=masses[1] / sum(masses) if any(masses) else 0.0,
         joint=joint.get("stiffness", 0.0),
         viscous=flat.get("friction.viscous", 0.0),
     )

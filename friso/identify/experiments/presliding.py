@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.optimize import minimize_scalar
-from scipy.signal import lfilter, lfilter_zi
+from scipy.signal import lfilter, lfilter_zi, welch
 
 from friso.identify.estimate import Estimate
 from friso.identify.experiments.common import (
@@ -30,18 +30,26 @@ from friso.identify.experiments.common import (
 )
 from friso.identify.logs.log import Log
 
-CUTOFF, CHECKED, MOTION = 50.0, 2.0, 5.0
-"""Low-pass of the equation [Hz]; that of a second fit by which the first one is checked, and of the motion itself, both
-over it: friction depends on the whole motion, not on what a low-pass leaves of it."""
+CHECKED, MOTION = 0.7, 5.0
+"""Low-pass of a second fit by which the first one is checked, and of the motion itself, both over that of the first:
+friction depends on the whole motion, not on what a low-pass leaves of it."""
+
+CLEAR, STRONG, FLOOR, RESOLVED = 100.0, 1e-3, 0.25, 1000
+"""Power over that of the noise, and over the largest of the acceleration, from which motion is seen; the share of the
+spectrum, at its top, which is taken for noise; and lines of the spectrum."""
 
 BLOCKS = 8
 """Blocks of the record that are left out in turn, for the errors."""
 
-LEAST, FINE = 20, 40
-"""Periods of the low-pass that a record lasts at least, and samples per period of it that are enough."""
+LEAST, FINE, SAMPLED = 20, 40, 0.2
+"""Periods of the low-pass that a record lasts at least, samples per period of it that are enough, and the highest
+frequency of the motion over that of the samples."""
 
-UNKNOWN = 1e-3
-"""Delay [s] that is allowed for where none is given."""
+FEWEST = 1000
+"""Samples of a record at least."""
+
+ROUNDS = 2
+"""Fits by which the mass beyond the contact becomes that share of the mass which it was given to be."""
 
 BENDING = (1e-6, 5.0)
 """Of the bending q over the range of the motion: from a straight line to bristles that are at their end long before."""
@@ -62,15 +70,14 @@ KEYS = MASS, DAMPING, STIFFNESS = "moving mass", "friction.bristle_damping", "fr
 UNITS = {MASS: "kg", DAMPING: "N*s/m", STIFFNESS: "N/m"}
 METHOD = "small motion before sliding: force over inertia, bristles' deflection and its rate"
 SLIDES = "the bearing slides, or noise is as large as the force"
-LATE = f"No delay of the drive is given: up to {UNKNOWN * 1e3:g} ms are allowed for, which widens damping and mass."
 HELD = "The joint is taken as held, with the limiter's stiffness: it is not seen to bend."
 
 
 @dataclass(frozen=True)
 class Between:
     """What lies between the force that is commanded and the bristles: its `delay` [s] (None: not known) and the
-    `bandwidth` of the current loop [Hz]; the stiffness [N/m] of the `contact` that holds a joint, the mass [kg]
-    `beyond` it and the stiffness [N/m] of the `joint` itself; the viscous friction [N s/m]."""
+    `bandwidth` of the current loop [Hz]; the stiffness [N/m] of the `contact` that holds a joint, the share of the
+    moving mass that is `beyond` it, and the stiffness [N/m] of the `joint` itself; the viscous friction [N s/m]."""
 
     delay: float | None = None
     bandwidth: float = np.inf
@@ -105,12 +112,13 @@ class Presliding:
 
 @dataclass(frozen=True)
 class _Fit:
-    """Mass, damping and stiffness, shape (3,), and their covariance by the jackknife; whether the bristles are at their
-    end, and the share of the friction that is left; over time [s], shape (n,), the position of the body on the
+    """Mass, damping and stiffness, shape (3,), and their covariance by the jackknife; by how much later [s] the force
+    comes than was taken; whether the bristles are at their end, and the share of the friction that is left; over time [s], shape (n,), the position of the body on the
     bearing, its force and that of the model, low-passed."""
 
     values: np.ndarray
     covariance: np.ndarray
+    late: float
     ends: bool
     left: float
     time: np.ndarray
@@ -138,26 +146,30 @@ class _Record:
         return _Record(self.time[::step], place - place[0], bent, force)
 
 
-def bristles_from_presliding(log: Log, between: Between = Between(), cutoff: float = CUTOFF) -> Presliding:
+def bristles_from_presliding(log: Log, between: Between = Between()) -> Presliding:
     """Bristles from a log of position and force whose motion is small beside their break-away. Of a log with gaps the
     longest stretch is used.
 
     A joint is held, or its deflection is measured. The intervals contain by how much the answer changes up to twice the
-    `cutoff` [Hz] and with half of the delay and of the current loop's lag (`UNKNOWN` where no delay is given), and the
-    share of the friction that is left unexplained: it falls with speed, which the model leaves out. Where that share is
-    large, nothing is shown. Raises StageError for missing channels.
+    low-pass and with the delay that fits best (which is taken where none is given), and the share of the friction that
+    is left unexplained: it falls with speed, which the model leaves out. Where that share is large, nothing is shown.
+    Raises StageError for missing channels.
     """
     part, each = log.longest, log.sample_time
     position, force = channel(log, "position")[part], channel(log, "force")[part]
+    if len(position) < FEWEST:
+        return _nothing(f"the record has {len(position)} samples: {FEWEST} are needed")
+    cutoff = _reach(position, each)
     why = _why_not(position, each, cutoff)
     if why:
         return _nothing(why)
+    cutoff = min(cutoff, SAMPLED / (2 * each))
     bent = _bends(log, part, position, cutoff)
     record = _Record(log.time[part], position, bent, force)
-    unsure = replace(between, bandwidth=2 * between.bandwidth, delay=between.delay / 2 if between.delay else UNKNOWN)
+    own = between.delay is None
     best, *others = (
-        _fit(record.seen(MOTION * top), known, top)
-        for known, top in ((between, cutoff), (between, CHECKED * cutoff), (unsure, cutoff))
+        _settled(record.seen(MOTION * top), between, top, late)
+        for top, late in ((cutoff, own), (CHECKED * cutoff, own), *([] if own else [(cutoff, True)]))
     )
     changes = np.array([other.values - best.values for other in others])
     systematic = np.abs(changes).sum(axis=0) + (best.left + LINEARITY) * np.abs(best.values)
@@ -168,17 +180,27 @@ def bristles_from_presliding(log: Log, between: Between = Between(), cutoff: flo
     )
     whole = best.covariance + changes.T @ changes / 4
     size = np.sqrt(np.diag(whole))
-    said = (*([LATE] if between.delay is None else []), *([HELD] if bent is None and between.joint else []))
+    said = (HELD,) if bent is None and between.joint else ()
     shown = (best.time, best.position, best.force, best.model)
     return Presliding(mass, damping, stiffness, whole / np.outer(size, size), *shown, best.left, said)
 
 
+def _reach(position: np.ndarray, sample_time: float) -> float:
+    """The highest frequency [Hz] up to which a position moves, and stands out of its noise, which is taken to be
+    white; not below what `LEAST` asks of the record."""
+    rate, density = welch(np.diff(position, 2), 1 / sample_time, nperseg=min(len(position) // BLOCKS, 2 * RESOLVED))
+    white = np.sin(np.pi * rate * sample_time) ** 4
+    top = slice(-int(np.ceil(FLOOR * len(rate))), None)
+    noise = white * float(np.median(density[top] / white[top]))
+    clear = np.flatnonzero(density > np.maximum(CLEAR * noise, STRONG * density.max()))
+    return float(rate[clear].max(initial=LEAST / (len(position) * sample_time)))
+
+
 def _why_not(position: np.ndarray, sample_time: float, cutoff: float) -> str:
     """Why a record cannot show bristles; empty where it can."""
-    if len(position) * sample_time < LEAST / cutoff:
-        return f"the record lasts {len(position) * sample_time:.3g} s: {LEAST / cutoff:.3g} s are needed"
-    if sample_time * CHECKED * cutoff > 0.2:
-        return f"one sample in {sample_time:.3g} s: {0.2 / (CHECKED * cutoff):.3g} s or less is needed"
+    if sample_time * cutoff > SAMPLED:
+        needed = SAMPLED / cutoff
+        return f"the motion goes up to {cutoff:.3g} Hz: one sample in {needed:.3g} s or less is needed"
     motion, noise = low_pass(position, sample_time, cutoff).std(), robust(np.diff(position, 2)) / 6**0.5
     if not motion > max(SEEN * noise, ROUNDING * float(np.abs(position).max())):
         return f"the motion, {motion:.2g} m RMS, does not stand out of the noise"
@@ -222,10 +244,25 @@ def _estimate(key: str, value: float, error: float, systematic: float) -> Estima
     return Estimate.unknown(key, UNITS[key], METHOD, why, 0.0, max(found.high, 0.0) or np.inf)
 
 
-def _fit(record: _Record, between: Between, cutoff: float) -> _Fit:
-    """Least squares of the force at a low-pass; the bending, in which it is not linear, is looked for."""
+def _settled(record: _Record, between: Between, cutoff: float, late: bool) -> _Fit:
+    """The fit once the mass beyond the contact is that share of the mass found and, if it is to be looked for (`late`),
+    the delay that which fits best."""
+    delay, mass = between.delay or 0.0, 0.0
+    for _ in range(ROUNDS):
+        fit = _fit(record, replace(between, delay=delay), cutoff, between.beyond * mass, late)
+        mass, delay = float(fit.values[0]), delay + fit.late
+    return fit
+
+
+def _fit(record: _Record, between: Between, cutoff: float, beyond: float, late: bool) -> _Fit:
+    """Least squares of the force at a low-pass; the bending, in which it is not linear, is looked for. `beyond` is the
+    mass [kg] beyond the contact; with `late`, what a little more delay would do is among the columns.
+
+    The first mode of the structure, whose mass m moves on its own spring at a frequency w, adds m/w^2 times the fourth
+    derivative of the position.
+    """
     time, force = record.time, _arrived(record.time, record.force, between)
-    force = force - between.beyond * _rate(time, _rate(time, record.position))
+    force = force - beyond * _rate(time, _rate(time, record.position))
     body = record.position - (force / between.contact if record.bent is None else record.bent)
     force = force - between.viscous * _rate(time, body)
     interval, span = float(time[1] - time[0]), float(np.ptp(body))
@@ -235,26 +272,30 @@ def _fit(record: _Record, between: Between, cutoff: float) -> _Fit:
         return low_pass(signal, interval, cutoff)[inside]
 
     def columns(bending: float) -> np.ndarray:
-        """Inertia, rate and deflection of the bristles, how a deflection at the start dies away, a constant."""
+        """Inertia, rate and deflection of the bristles, how a deflection at the start dies away, and the rest."""
         z, path = deflected(body, bending), np.concatenate(([0.0], np.cumsum(np.abs(np.diff(body)))))
         turned = (passed(each) for each in (_rate(time, z), z, np.exp(-bending * path)))
-        return np.stack([inertia, *turned, np.ones(len(target))], axis=1)
+        return np.stack([inertia, *turned, *rest], axis=1)
 
     def off(logarithm: float) -> float:
         x = columns(float(np.exp(logarithm)) / span)
         return float(np.sum((target - x @ solved(x.T @ x, x.T @ target)) ** 2))
 
-    inertia, target = passed(_rate(time, _rate(time, body))), passed(force)
+    acceleration = _rate(time, _rate(time, body))
+    inertia, target = passed(acceleration), passed(force)
+    rest = [np.ones(len(target)), passed(_rate(time, _rate(time, acceleration)))]
+    rest += [passed(_rate(time, force))] if late else []
     best: Any = minimize_scalar(off, bounds=tuple(np.log(BENDING)), method="bounded", options={"xatol": 1e-3})
     bending = float(np.exp(best.x)) / span
     x = columns(bending)
     solution = solved(x.T @ x, x.T @ target)
     bends = (columns(1.01 * bending) - columns(bending / 1.01)) @ solution
     covariance = _jackknife(np.column_stack([x, bends]), target)[:3, :3]
-    values = solution[:3] + np.array([between.beyond, 0.0, 0.0])
+    values = solution[:3] + np.array([beyond, 0.0, 0.0])
     left = float((target - x @ solution).std() / (target - x[:, 0] * solution[0]).std())
     ends = bending * span > 0.99 * BENDING[1]
-    return _Fit(values, covariance, ends, left, time[inside], passed(body), target, x @ solution)
+    more = float(solution[-1]) if late else 0.0
+    return _Fit(values, covariance, more, ends, left, time[inside], passed(body), target, x @ solution)
 
 
 def _jackknife(columns: np.ndarray, target: np.ndarray) -> np.ndarray:

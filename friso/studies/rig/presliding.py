@@ -19,8 +19,8 @@ from friso.studies.rig.sizes import locked, pace, travel
 PLACES = 3
 """Places along the travel: our choice."""
 
-GENTLE, LONGEST = Excitation(0.05, 8.0, 60, 160.0), 1e-3
-"""A twentieth of static friction, RMS, up to 64 Hz on the thesis's rig, logged every 0.75 ms; longest time [s] from
+GENTLE, LONGEST = Excitation(0.05, 12.0, 60, 160.0), 1e-3
+"""A twentieth of static friction, RMS, up to 96 Hz on the thesis's rig, logged every 0.75 ms; longest time [s] from
 sample to sample on slower ones."""
 
 
