@@ -1,10 +1,10 @@
 """The loop from rig to stage file: `python -m benchmarks.rig_loop [--machines 100] [--first 0]`.
 
 Machines drawn at random with their drives as built (tests/rig_machines.py) go through the experiments of `friso rig`:
-frequency responses with the joint locked and free, steps, slow motion, and with the joint locked many speeds and small
-motion before sliding. Their logs are written as text, read back as `friso identify` does, and identified with what an
-owner knows as `--stage`. All but the free response make one stage file; that is identified by itself, since one bench
-at a time can be.
+frequency responses with the joint locked and free, steps, slow motion, and with the joint locked many speeds, slow
+sliding and small motion before sliding. Their logs are written as text, read back as `friso identify` does, and
+identified with what an owner knows as `--stage`. All but the free response make one stage file; that is identified by
+itself, since one bench at a time can be.
 
 Per experiment and quantity: how often the 95 % interval holds the truth; and how often `friso check` on the identified
 stage gives the verdict that it gives on the machine. A machine has one rail: what counts as the truth of static and
@@ -38,6 +38,7 @@ from friso.studies.rig.many_speeds import many_speeds_logs
 from friso.studies.rig.outcome import RigLog
 from friso.studies.rig.presliding import presliding_log
 from friso.studies.rig.sizes import freed, locked, travel
+from friso.studies.rig.slow_sliding import slow_sliding_logs
 from friso.studies.rig.stiction import slow_motion
 from friso.studies.rig.stiffness import steps
 
@@ -68,8 +69,9 @@ def benches(machine: Machine, seed: int) -> list[list[RigLog]]:
     slow = slow_motion(stage, noise, 1)
     small = [presliding_log(locked(stage), f"presliding_{n + 1}", place, noise + n) for n, place in enumerate(places)]
     passes = many_speeds_logs(locked(stage), noise)
+    sliding = slow_sliding_logs(locked(stage), passes, noise)
     return [
-        [*shaken(locked(stage), "locked"), steps(stage, noise), *slow, *small, *passes],
+        [*shaken(locked(stage), "locked"), steps(stage, noise), *slow, *small, *passes, *sliding],
         shaken(freed(stage), "free"),
     ]
 

@@ -11,10 +11,12 @@ import numpy as np
 from friso.identify.combine import Correlated, combined, correlations
 from friso.identify.errors import Errors
 from friso.identify.estimate import Estimate
+from friso.identify.experiments.at_bearing import Between, Mode
 from friso.identify.experiments.break_away import BreakAway, static_from_ramps
 from friso.identify.experiments.friction_position import FrictionPosition, friction_position
 from friso.identify.experiments.friction_velocity import FrictionVelocity, friction_velocity
-from friso.identify.experiments.presliding import Between, Presliding, bristles_from_presliding
+from friso.identify.experiments.presliding import Presliding, bristles_from_presliding
+from friso.identify.experiments.slow_sliding import Known, SlowSliding, stribeck_from_slow_sliding
 from friso.identify.experiments.steps import StepStiffness, stiffness_from_steps
 from friso.identify.experiments.stick_slip import StickSlip, static_from_stick_slip
 from friso.identify.inverse_model import inverse_model
@@ -31,7 +33,7 @@ from friso.quantities import StageError
 from friso.stage import Stage
 from friso.stage.correlations import Correlations
 
-MOVES, FREQUENCY, STEPS, STICK_SLIP, BREAK_AWAY, CONSTANT, PRESLIDING = KINDS = (
+MOVES, FREQUENCY, STEPS, STICK_SLIP, BREAK_AWAY, CONSTANT, PRESLIDING, SLOW_SLIDING = KINDS = (
     "moves",
     "frequency",
     "steps",
@@ -39,12 +41,12 @@ MOVES, FREQUENCY, STEPS, STICK_SLIP, BREAK_AWAY, CONSTANT, PRESLIDING = KINDS = 
     "break-away",
     "constant-speed",
     "presliding",
+    "slow-sliding",
 )
 """Kinds of experiment, in words of the command line; they are analysed in the order of `ORDER`, since the later ones
 use what the earlier ones found."""
 
-ORDER = (FREQUENCY, STEPS, MOVES, CONSTANT, STICK_SLIP, BREAK_AWAY, PRESLIDING)
-
+ORDER = (FREQUENCY, STEPS, MOVES, CONSTANT, STICK_SLIP, BREAK_AWAY, PRESLIDING, SLOW_SLIDING)
 
 FAR_BELOW = 0.1
 """Share of the limiter's stiffness up to which a stiffness is the joint's."""
@@ -61,7 +63,7 @@ class ConstantSpeed:
 Source = Log | MeasuredResponse
 """What a file may hold: signals over time, or a frequency response as somebody measured it."""
 
-Result = Moves | Bench | StepStiffness | StickSlip | BreakAway | ConstantSpeed | Presliding
+Result = Moves | Bench | StepStiffness | StickSlip | BreakAway | ConstantSpeed | Presliding | SlowSliding
 
 
 @dataclass(frozen=True)
@@ -204,8 +206,11 @@ def _analysed(
     if kind == MOVES:
         start = {**flat, **{name: each.value for name, each in best.items() if name in flat}}
         return identify_moves(log, start, own and "reference" in log, options.bandwidth)
-    if kind == PRESLIDING:
-        return bristles_from_presliding(log, between({**flat, **{key: each.value for key, each in best.items()}}))
+    if kind in (PRESLIDING, SLOW_SLIDING):
+        believed = between({**flat, **{key: each.value for key, each in best.items()}})
+        if kind == PRESLIDING:
+            return bristles_from_presliding(log, believed)
+        return stribeck_from_slow_sliding(log, believed, _known(best))
     if kind == STICK_SLIP:
         return _stick_slip(log, best.get("joint.stiffness"), flat, masses["stage"])
     mass = sum(masses.values())
@@ -234,21 +239,32 @@ def _stick_slip(log: Log, stiffness: Estimate | None, flat: Mapping[str, Any], s
     return found
 
 
+def _known(best: Mapping[str, Estimate]) -> Known | None:
+    """The mass and the bristles that other experiments show; None where they do not."""
+    masses = [each for key, each in best.items() if key.startswith("masses.")]
+    bristles = [best.get(key) for key in ("friction.bristle_stiffness", "friction.bristle_damping")]
+    if not masses or None in bristles:
+        return None
+    whole = sum(each.value for each in masses), sum(each.half_width for each in masses)
+    return Known(whole, *((each.value, each.half_width) for each in bristles if each is not None))
+
+
 def between(flat: Mapping[str, Any]) -> Between:
-    """What lies between the commanded force and the bristles of a stage given as flat keys, a joint being held by its
+    """What lies between the commanded force and the bearing of a stage given as flat keys, a joint being held by its
     limiter."""
-    drive, joint = (
+    drive, joint, mode = (
         {key.removeprefix(name): value for key, value in flat.items() if key.startswith(name)}
-        for name in ("drive.", "joint.")
+        for name in ("drive.", "joint.", "parasitic.")
     )
     masses = [flat.get(f"masses.{name}", 0.0) for name in ("cart", "stage")]
     return Between(
         delay=drive.get("delay", 0.0) + drive["sample_time"] / 2 if "sample_time" in drive else None,
         bandwidth=drive.get("current_bandwidth", np.inf),
         contact=joint.get("limiter_stiffness", np.inf),
-        beyond=masses[1] / sum(masses) if any(masses) else 0.0,
+        beyond=masses[1] / sum(masses) if joint else 0.0,
         joint=joint.get("stiffness", 0.0),
         viscous=flat.get("friction.viscous", 0.0),
+        mode=Mode(mode["mass"] / sum(masses), mode["frequency"], mode["damping_ratio"]) if mode else None,
     )
 
 
@@ -272,6 +288,8 @@ def _estimates(result: Result, stage: Stage | None) -> tuple[Estimate, ...]:
     if isinstance(result, Presliding):
         masses = _shared(result.mass, stage) if stage is not None and result.mass.shown else ()
         return (result.stiffness, result.damping, *masses)
+    if isinstance(result, SlowSliding):
+        return result.estimates
     if isinstance(result, StickSlip):
         return (result.static, *([result.stiffness] if _of_joint(result.stiffness, stage) else ()))
     return (_named(result.static, "friction.static"),)
@@ -357,6 +375,9 @@ def _correlated(result: Result, estimates: Sequence[Estimate]) -> Correlated:
         places = [i for i, each in enumerate(estimates[: len(covariance)]) if each.shown and each.half_width > 0]
         size = np.sqrt(np.diag(covariance))
         return [estimates[i] for i in places], (covariance / np.outer(size, size))[np.ix_(places, places)]
+    if isinstance(result, SlowSliding):
+        places = [result.estimates.index(each) for each in own]
+        return own, result.correlation[np.ix_(places, places)]
     if isinstance(result, Presliding):
         places = [result.order(each.name) for each in own]
         return own, result.correlation[np.ix_(places, places)]

@@ -6,6 +6,7 @@ from friso.identify.experiments.friction_position import FrictionPosition, frict
 from friso.identify.experiments.friction_velocity import FrictionVelocity, friction_velocity
 from friso.identify.experiments.hysteresis import HysteresisStiffness, stiffness_from_hysteresis
 from friso.identify.experiments.presliding import Presliding, bristles_from_presliding
+from friso.identify.experiments.slow_sliding import SlowSliding, stribeck_from_slow_sliding
 from friso.identify.experiments.steps import StepStiffness, stiffness_from_steps
 from friso.identify.experiments.stick_slip import StickSlip, static_from_stick_slip
 
@@ -15,6 +16,7 @@ __all__ = [
     "FrictionVelocity",
     "HysteresisStiffness",
     "Presliding",
+    "SlowSliding",
     "StepStiffness",
     "StickSlip",
     "bristles_from_presliding",
@@ -25,4 +27,5 @@ __all__ = [
     "static_from_stick_slip",
     "stiffness_from_hysteresis",
     "stiffness_from_steps",
+    "stribeck_from_slow_sliding",
 ]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.signal import butter, sosfiltfilt
+from scipy.signal import butter, sosfiltfilt, welch
 from scipy.stats import t as student
 
 from friso.identify.estimate import Estimate
@@ -26,6 +26,10 @@ NORMAL_MAD = 1.4826
 LINEARITY = 1e-3
 """Share by which the ratio of two channels may be off, however often it is read: the linearity of good sensors and
 amplifiers."""
+
+CLEAR, STRONG, FLOOR, RESOLVED = 100.0, 1e-3, 0.25, 1000
+"""Power over that of the noise, and over the largest of the acceleration, from which motion is seen; the share of the
+spectrum, at its top, which is taken for noise; and lines of the spectrum."""
 
 _EXAMPLES = {"force": '--scale force="35.1507 N/V"', "position": '--unit position="mm"'}
 
@@ -100,6 +104,16 @@ def rate(values: np.ndarray, sample_time: float, cutoff: float) -> np.ndarray:
     return np.gradient(low_pass(values, sample_time, cutoff), sample_time)
 
 
+def reach(position: np.ndarray, sample_time: float) -> float:
+    """The highest frequency [Hz] up to which a position, shape (n,), moves, and stands out of its noise, which is taken
+    to be white; 0 where it does nowhere."""
+    rates, density = welch(np.diff(position, 2), 1 / sample_time, nperseg=min(len(position) // BLOCKS, 2 * RESOLVED))
+    white = np.sin(np.pi * rates * sample_time) ** 4
+    top = slice(-int(np.ceil(FLOOR * len(rates))), None)
+    noise = white * float(np.median(density[top] / white[top]))
+    return float(rates[density > np.maximum(CLEAR * noise, STRONG * density.max())].max(initial=0.0))
+
+
 def robust(values: np.ndarray) -> float:
     """Standard deviation of what most values are like, by the median absolute deviation; 0 of none."""
     if not len(values):
@@ -160,6 +174,15 @@ def solved(square: np.ndarray, product: np.ndarray) -> np.ndarray:
     size = np.sqrt(np.maximum(np.diag(square), 0.0))
     size = np.where(size > 0, size, 1.0)
     return np.linalg.lstsq(square / np.outer(size, size), product / size, rcond=None)[0] / size
+
+
+def jackknife(columns: np.ndarray, target: np.ndarray) -> np.ndarray:
+    """Covariance of the coefficients, shape (p, p), of a fit of the target, shape (n,), by columns, shape (n, p)."""
+    parts = zip(np.array_split(columns, BLOCKS), np.array_split(target, BLOCKS), strict=True)
+    square, product = columns.T @ columns, columns.T @ target
+    without = np.array([solved(square - x.T @ x, product - x.T @ y) for x, y in parts])
+    off = without - without.mean(axis=0)
+    return off.T @ off * (BLOCKS - 1) / BLOCKS
 
 
 def ways(directions: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:

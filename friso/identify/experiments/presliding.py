@@ -13,18 +13,19 @@ from itertools import accumulate
 from typing import Any
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 from scipy.optimize import minimize_scalar
-from scipy.signal import lfilter, lfilter_zi, welch
 
 from friso.identify.estimate import Estimate
+from friso.identify.experiments.at_bearing import DIRECT, Between, at_bearing, rate_of
 from friso.identify.experiments.common import (
     LINEARITY,
     Mean,
     by_t,
     channel,
     deflection,
+    jackknife,
     low_pass,
+    reach,
     robust,
     solved,
 )
@@ -33,10 +34,6 @@ from friso.identify.logs.log import Log
 CHECKED, MOTION = 0.7, 5.0
 """Low-pass of a second fit by which the first one is checked, and of the motion itself, both over that of the first:
 friction depends on the whole motion, not on what a low-pass leaves of it."""
-
-CLEAR, STRONG, FLOOR, RESOLVED = 100.0, 1e-3, 0.25, 1000
-"""Power over that of the noise, and over the largest of the acceleration, from which motion is seen; the share of the
-spectrum, at its top, which is taken for noise; and lines of the spectrum."""
 
 BLOCKS = 8
 """Blocks of the record that are left out in turn, for the errors."""
@@ -49,7 +46,7 @@ FEWEST = 1000
 """Samples of a record at least."""
 
 ROUNDS = 2
-"""Fits by which the mass beyond the contact becomes that share of the mass which it was given to be."""
+"""Fits by which the mass that is believed to move becomes the one that is found."""
 
 BENDING = (1e-6, 5.0)
 """Of the bending q over the range of the motion: from a straight line to bristles that are at their end long before."""
@@ -71,20 +68,6 @@ UNITS = {MASS: "kg", DAMPING: "N*s/m", STIFFNESS: "N/m"}
 METHOD = "small motion before sliding: force over inertia, bristles' deflection and its rate"
 SLIDES = "the bearing slides, or noise is as large as the force"
 HELD = "The joint is taken as held, with the limiter's stiffness: it is not seen to bend."
-
-
-@dataclass(frozen=True)
-class Between:
-    """What lies between the force that is commanded and the bristles: its `delay` [s] (None: not known) and the
-    `bandwidth` of the current loop [Hz]; the stiffness [N/m] of the `contact` that holds a joint, the share of the
-    moving mass that is `beyond` it, and the stiffness [N/m] of the `joint` itself; the viscous friction [N s/m]."""
-
-    delay: float | None = None
-    bandwidth: float = np.inf
-    contact: float = np.inf
-    beyond: float = 0.0
-    joint: float = 0.0
-    viscous: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -113,8 +96,8 @@ class Presliding:
 @dataclass(frozen=True)
 class _Fit:
     """Mass, damping and stiffness, shape (3,), and their covariance by the jackknife; by how much later [s] the force
-    comes than was taken; whether the bristles are at their end, and the share of the friction that is left; over time [s], shape (n,), the position of the body on the
-    bearing, its force and that of the model, low-passed."""
+    comes than was taken; whether the bristles are at their end, and the share of the friction that is left; over time
+    [s], shape (n,), the position of the body on the bearing, its force and that of the model, low-passed."""
 
     values: np.ndarray
     covariance: np.ndarray
@@ -146,20 +129,20 @@ class _Record:
         return _Record(self.time[::step], place - place[0], bent, force)
 
 
-def bristles_from_presliding(log: Log, between: Between = Between()) -> Presliding:
+def bristles_from_presliding(log: Log, between: Between = DIRECT) -> Presliding:
     """Bristles from a log of position and force whose motion is small beside their break-away. Of a log with gaps the
     longest stretch is used.
 
     A joint is held, or its deflection is measured. The intervals contain by how much the answer changes up to twice the
-    low-pass and with the delay that fits best (which is taken where none is given), and the share of the friction that
-    is left unexplained: it falls with speed, which the model leaves out. Where that share is large, nothing is shown.
-    Raises StageError for missing channels.
+    low-pass and with the delay that fits best (which is taken where none is given), the viscous friction that is
+    taken off the damping, and the share of the friction that is left unexplained: it falls with speed, which the model
+    leaves out. Where that share is large, nothing is shown. Raises StageError for missing channels.
     """
     part, each = log.longest, log.sample_time
     position, force = channel(log, "position")[part], channel(log, "force")[part]
     if len(position) < FEWEST:
         return _nothing(f"the record has {len(position)} samples: {FEWEST} are needed")
-    cutoff = _reach(position, each)
+    cutoff = max(reach(position, each), LEAST / (len(position) * each))
     why = _why_not(position, each, cutoff)
     if why:
         return _nothing(why)
@@ -173,6 +156,7 @@ def bristles_from_presliding(log: Log, between: Between = Between()) -> Preslidi
     )
     changes = np.array([other.values - best.values for other in others])
     systematic = np.abs(changes).sum(axis=0) + (best.left + LINEARITY) * np.abs(best.values)
+    systematic[KEYS.index(DAMPING)] += between.viscous
     why = _no_bristles(best, between, bent is None)
     mass, damping, stiffness = (
         Estimate.unknown(key, UNITS[key], METHOD, why) if why else _estimate(key, *map(float, numbers))
@@ -183,17 +167,6 @@ def bristles_from_presliding(log: Log, between: Between = Between()) -> Preslidi
     said = (HELD,) if bent is None and between.joint else ()
     shown = (best.time, best.position, best.force, best.model)
     return Presliding(mass, damping, stiffness, whole / np.outer(size, size), *shown, best.left, said)
-
-
-def _reach(position: np.ndarray, sample_time: float) -> float:
-    """The highest frequency [Hz] up to which a position moves, and stands out of its noise, which is taken to be
-    white; not below what `LEAST` asks of the record."""
-    rate, density = welch(np.diff(position, 2), 1 / sample_time, nperseg=min(len(position) // BLOCKS, 2 * RESOLVED))
-    white = np.sin(np.pi * rate * sample_time) ** 4
-    top = slice(-int(np.ceil(FLOOR * len(rate))), None)
-    noise = white * float(np.median(density[top] / white[top]))
-    clear = np.flatnonzero(density > np.maximum(CLEAR * noise, STRONG * density.max()))
-    return float(rate[clear].max(initial=LEAST / (len(position) * sample_time)))
 
 
 def _why_not(position: np.ndarray, sample_time: float, cutoff: float) -> str:
@@ -245,26 +218,25 @@ def _estimate(key: str, value: float, error: float, systematic: float) -> Estima
 
 
 def _settled(record: _Record, between: Between, cutoff: float, late: bool) -> _Fit:
-    """The fit once the mass beyond the contact is that share of the mass found and, if it is to be looked for (`late`),
+    """The fit once the mass that is believed to move is the one found and, if it is to be looked for (`late`),
     the delay that which fits best."""
     delay, mass = between.delay or 0.0, 0.0
     for _ in range(ROUNDS):
-        fit = _fit(record, replace(between, delay=delay), cutoff, between.beyond * mass, late)
+        fit = _fit(record, replace(between, delay=delay), cutoff, mass, late)
         mass, delay = float(fit.values[0]), delay + fit.late
     return fit
 
 
-def _fit(record: _Record, between: Between, cutoff: float, beyond: float, late: bool) -> _Fit:
-    """Least squares of the force at a low-pass; the bending, in which it is not linear, is looked for. `beyond` is the
-    mass [kg] beyond the contact; with `late`, what a little more delay would do is among the columns.
+def _fit(record: _Record, between: Between, cutoff: float, mass: float, late: bool) -> _Fit:
+    """Least squares of the force at a low-pass; the bending, in which it is not linear, is looked for. `mass` [kg] is
+    believed to move; with `late`, what a little more delay would do is among the columns.
 
     The first mode of the structure, whose mass m moves on its own spring at a frequency w, adds m/w^2 times the fourth
     derivative of the position.
     """
-    time, force = record.time, _arrived(record.time, record.force, between)
-    force = force - beyond * _rate(time, _rate(time, record.position))
-    body = record.position - (force / between.contact if record.bent is None else record.bent)
-    force = force - between.viscous * _rate(time, body)
+    time = record.time
+    body, force = at_bearing(time, record.position, record.force, between, mass, record.bent)
+    force = force - between.viscous * rate_of(time, body)
     interval, span = float(time[1] - time[0]), float(np.ptp(body))
     inside = slice(edge := int(2 / (cutoff * interval)), len(time) - edge)
 
@@ -274,51 +246,28 @@ def _fit(record: _Record, between: Between, cutoff: float, beyond: float, late: 
     def columns(bending: float) -> np.ndarray:
         """Inertia, rate and deflection of the bristles, how a deflection at the start dies away, and the rest."""
         z, path = deflected(body, bending), np.concatenate(([0.0], np.cumsum(np.abs(np.diff(body)))))
-        turned = (passed(each) for each in (_rate(time, z), z, np.exp(-bending * path)))
+        turned = (passed(each) for each in (rate_of(time, z), z, np.exp(-bending * path)))
         return np.stack([inertia, *turned, *rest], axis=1)
 
     def off(logarithm: float) -> float:
         x = columns(float(np.exp(logarithm)) / span)
         return float(np.sum((target - x @ solved(x.T @ x, x.T @ target)) ** 2))
 
-    acceleration = _rate(time, _rate(time, body))
+    acceleration = rate_of(time, rate_of(time, body))
     inertia, target = passed(acceleration), passed(force)
-    rest = [np.ones(len(target)), passed(_rate(time, _rate(time, acceleration)))]
-    rest += [passed(_rate(time, force))] if late else []
+    rest = [np.ones(len(target)), passed(rate_of(time, rate_of(time, acceleration)))]
+    rest += [passed(rate_of(time, force))] if late else []
     best: Any = minimize_scalar(off, bounds=tuple(np.log(BENDING)), method="bounded", options={"xatol": 1e-3})
     bending = float(np.exp(best.x)) / span
     x = columns(bending)
     solution = solved(x.T @ x, x.T @ target)
     bends = (columns(1.01 * bending) - columns(bending / 1.01)) @ solution
-    covariance = _jackknife(np.column_stack([x, bends]), target)[:3, :3]
-    values = solution[:3] + np.array([beyond, 0.0, 0.0])
+    covariance = jackknife(np.column_stack([x, bends]), target)[:3, :3]
+    values = solution[:3] + np.array([between.beyond * mass, 0.0, 0.0])
     left = float((target - x @ solution).std() / (target - x[:, 0] * solution[0]).std())
     ends = bending * span > 0.99 * BENDING[1]
     more = float(solution[-1]) if late else 0.0
     return _Fit(values, covariance, more, ends, left, time[inside], passed(body), target, x @ solution)
-
-
-def _jackknife(columns: np.ndarray, target: np.ndarray) -> np.ndarray:
-    """Covariance of the coefficients, shape (p, p), of a fit of the target, shape (n,), by columns, shape (n, p)."""
-    parts = zip(np.array_split(columns, BLOCKS), np.array_split(target, BLOCKS), strict=True)
-    square, product = columns.T @ columns, columns.T @ target
-    without = np.array([solved(square - x.T @ x, product - x.T @ y) for x, y in parts])
-    off = without - without.mean(axis=0)
-    return off.T @ off * (BLOCKS - 1) / BLOCKS
-
-
-def _arrived(time: np.ndarray, command: np.ndarray, between: Between) -> np.ndarray:
-    """The force [N] that a command [N], shape (n,), has become: late by the delay and by the current loop."""
-    late = CubicSpline(time, command)(np.maximum(time - (between.delay or 0.0), time[0]))
-    if not np.isfinite(between.bandwidth):
-        return late
-    ratio = 1 / (np.pi * between.bandwidth * (time[1] - time[0]))
-    b, a = np.array([1.0, 1.0]) / (1 + ratio), np.array([1.0, (1 - ratio) / (1 + ratio)])
-    return lfilter(b, a, late, zi=lfilter_zi(b, a) * late[0])[0]
-
-
-def _rate(time: np.ndarray, signal: np.ndarray) -> np.ndarray:
-    return CubicSpline(time, signal)(time, 1)
 
 
 def deflected(position: np.ndarray, bending: float) -> np.ndarray:

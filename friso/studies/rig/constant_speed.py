@@ -15,6 +15,7 @@ from friso.stage import Stage
 from friso.studies.rig.many_speeds import SAMPLES, STANDS, ManySpeeds, many_speeds, mean_friction
 from friso.studies.rig.outcome import Outcome, Progress, RigLog, rig_log
 from friso.studies.rig.sizes import freed, interval, locked, longest_way, moving_mass, pace, travel
+from friso.studies.rig.slow_sliding import Slow, slow_sliding
 
 DURATIONS = (480.0, 120.0)
 """Periods of the crossover that the way takes: 2.5 and 10 mm/s on the thesis's rig."""
@@ -34,11 +35,13 @@ class Passes:
 
 @dataclass(frozen=True)
 class ConstantSpeed:
-    """The two speeds [m/s] of the thesis, the passes at them with the joint free and locked, and those at many."""
+    """The two speeds [m/s] of the thesis, the passes at them with the joint free and locked, those at many, and slow
+    sliding where some of these are not steady."""
 
     speeds: tuple[float, ...]
     cases: tuple[Passes, ...]
     many: ManySpeeds
+    slow: tuple[Slow, ...]
 
 
 def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
@@ -46,13 +49,15 @@ def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
     for a stage without joint."""
     cases = []
     for number, (name, each) in enumerate((("free", freed(stage)), ("locked", locked(stage)))):
-        progress(number, 3, f"constant speed, joint {name}")
+        progress(number, 4, f"constant speed, joint {name}")
         cases.append(_passes(name, each, seed))
-    progress(2, 3, "many speeds, joint locked, faster controller")
+    progress(2, 4, "many speeds, joint locked, faster controller")
     many = many_speeds(locked(stage), seed)
-    progress(3, 3, "")
-    logs = (*(each.log for each in cases), *(each.log for each in many.places))
-    return Outcome("constant-speed", stage, seed, logs, ConstantSpeed(speeds(stage), tuple(cases), many))
+    progress(3, 4, "slow sliding, joint locked")
+    slow = slow_sliding(locked(stage), [each.log for each in many.places], seed)
+    progress(4, 4, "")
+    logs = tuple(each.log for each in (*cases, *many.places, *slow))
+    return Outcome("constant-speed", stage, seed, logs, ConstantSpeed(speeds(stage), tuple(cases), many, slow))
 
 
 def speeds(stage: Stage) -> tuple[float, ...]:

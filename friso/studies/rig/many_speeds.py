@@ -78,7 +78,8 @@ def many_speeds(stage: Stage, seed: int) -> ManySpeeds:
     """The passes of a stage whose joint is locked, or which has none."""
     logs, places = many_speeds_logs(stage, seed), []
     for log, begin in zip(logs, _begins(stage), strict=True):
-        velocity, speeds = friction_velocity(log.log, moving_mass(stage)), np.geomspace(*_range(log.stage), CURVE)
+        velocity = friction_velocity(log.log, moving_mass(stage))
+        speeds = np.geomspace(*speeds_of(log.stage)[[0, -1]], CURVE)
         way = velocity.way if len(velocity.velocities) else (begin, begin + SHARED * longest_way(stage))
         drag = log.stage.flat().get("cable.drag", 0.0)
         true = mean_friction(log.stage, speeds, np.linspace(*way, 1000)) + drag * speeds
@@ -114,17 +115,17 @@ def _begins(stage: Stage) -> np.ndarray:
     return np.linspace(low, high - SHARED * longest_way(stage), PLACES)
 
 
-def _range(stage: Stage) -> tuple[float, float]:
-    """The least and the greatest speed [m/s] of a stage with its controller made faster."""
+def speeds_of(stage: Stage) -> np.ndarray:
+    """The speeds [m/s], shape (`SPEEDS`,), of a stage with its controller made faster."""
     top = longest_way(stage) * pace(stage) / SHORTEST
-    return top / RATIO, top
+    return np.geomspace(top / RATIO, top, SPEEDS)
 
 
 def _log(stage: Stage, own_pace: float, number: int, low: float, seed: int) -> RigLog:
     """The passes over the stretch that begins at a place [m], ever faster."""
     period, shared = 1 / pace(stage), SHARED * longest_way(stage)
     parts, before = [(0.0, STANDS * period)], 0.0
-    for speed in np.geomspace(*_range(stage), SPEEDS):
+    for speed in speeds_of(stage):
         run_up = max(0.0, speed * SHORTEST * period - shared) / 2
         for way in (shared + run_up + before, -(shared + 2 * run_up)):
             parts += [(float(np.sign(way) * speed), abs(way) / speed), (0.0, STANDS * period)]

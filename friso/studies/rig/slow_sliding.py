@@ -1,0 +1,84 @@
+"""Slow sliding, the joint locked: friction that falls so steeply that no controller holds a constant speed.
+
+After the passes of `many_speeds`, short ones at speeds at the edge of what is steady, logged finely: there the motion
+swings through the whole of the falling branch.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from friso.identify.experiments import SlowSliding, stribeck_from_slow_sliding
+from friso.identify.experiments.passes import passes
+from friso.identify.experiments.slow_sliding import Known
+from friso.identify.method import between
+from friso.rig.run import as_built_keys, run
+from friso.rig.task import legs
+from friso.stage import Stage
+from friso.studies.rig.many_speeds import speeds_of
+from friso.studies.rig.outcome import RigLog, rig_log
+from friso.studies.rig.sizes import interval, moving_mass, pace, travel
+
+UNSTEADY, STEADY, PLACES = 2, 1, 8
+"""How many of the fastest speeds that were not steady it goes, and of the slowest that were; at so many places along
+the travel, since each log shows the friction of a few millimetres alone."""
+
+APART = 4
+"""Where all were steady, it goes every fourth of their speeds, from the least on."""
+
+LASTS, STANDS, SAMPLES = 3.0, 1.0, 1000.0
+"""Periods of the stage's own crossover that each speed takes, and for which it stands before; samples per period (0.4
+s, 0.125 s and 0.125 ms on the thesis's rig)."""
+
+
+@dataclass(frozen=True)
+class Slow:
+    """The log of a place and what it shows, mass and bristles being known as they are."""
+
+    log: RigLog
+    found: SlowSliding
+
+
+def slow_sliding(stage: Stage, passed: Sequence[RigLog], seed: int) -> tuple[Slow, ...]:
+    """Slow sliding of a stage whose joint is locked, or which has none, after the logs of its passes at many speeds."""
+    return tuple(Slow(log, _found(log)) for log in slow_sliding_logs(stage, passed, seed))
+
+
+def slow_sliding_logs(stage: Stage, passed: Sequence[RigLog], seed: int) -> tuple[RigLog, ...]:
+    """The logs, one for each place; none where the friction has no bristles."""
+    speeds, quick = _edge(passed), passed[0].stage
+    if "friction.bristle_stiffness" not in quick.flat():
+        return ()
+    period = 1 / pace(stage)
+    parts = [(0.0, STANDS * period), *((float(way * each), LASTS * period) for each in speeds for way in (1, -1))]
+    logs = []
+    for number, low in enumerate(np.linspace(*travel(stage), PLACES)):
+        (recorded,) = run(quick, legs(low, parts), [seed + number], interval(quick, period / SAMPLES))
+        logs.append(rig_log(recorded, 0, f"slow_sliding_{number + 1}", "slow-sliding", quick, seed + number))
+    return tuple(logs)
+
+
+def _edge(passed: Sequence[RigLog]) -> np.ndarray:
+    """Speeds [m/s] at the edge of what was steady; where all were, some from the least on."""
+    speeds = speeds_of(passed[0].stage)
+    unsteady = {
+        int(np.argmin(np.abs(np.log(speeds / abs(each.velocity)))))
+        for log in passed
+        if not log.failure
+        for each in passes(log.log)
+        if not each.steady
+    }
+    if not unsteady:
+        return speeds[::APART][: UNSTEADY + STEADY]
+    fastest = max(unsteady)
+    return speeds[max(fastest + 1 - UNSTEADY, 0) : fastest + 1 + STEADY]
+
+
+def _found(log: RigLog) -> SlowSliding:
+    flat = as_built_keys(log.stage)
+    stiffness, damping = flat["friction.bristle_stiffness"], flat.get("friction.bristle_damping", 0.0)
+    known = Known(*((value, 0.0) for value in (moving_mass(log.stage), stiffness, damping)))
+    return stribeck_from_slow_sliding(log.log, between(flat), known)
