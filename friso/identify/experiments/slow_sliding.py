@@ -18,7 +18,7 @@ from scipy.optimize import least_squares
 
 from friso.identify.estimate import Estimate
 from friso.identify.experiments.at_bearing import Between, at_bearing, rate_of
-from friso.identify.experiments.common import BLOCKS, Mean, by_t, channel, jackknife, low_pass, reach
+from friso.identify.experiments.common import BLOCKS, LINEARITY, Mean, by_t, channel, jackknife, low_pass, reach
 from friso.identify.logs.log import Log
 
 CUTOFF, CHECKED, MOTION = 0.25, 0.7, 8.0
@@ -102,8 +102,8 @@ def stribeck_from_slow_sliding(log: Log, between: Between, known: Known | None) 
     """Static and Coulomb friction and Stribeck velocity from a log of position and force in which the bearing slides
     slowly, there and back. Of a log with gaps the longest stretch is used, and of that no more than `MOST` samples.
 
-    A joint is held. The intervals contain what a lower low-pass changes, and what the intervals of the known mass and
-    bristles do. Raises StageError for missing channels.
+    A joint is held. The intervals contain what a lower low-pass changes, what the intervals of the known mass and
+    bristles do, and the share of the friction that is left unexplained. Raises StageError for missing channels.
     """
     part = slice(log.longest.start, min(log.longest.stop, log.longest.start + MOST))
     position, force = channel(log, "position")[part], channel(log, "force")[part]
@@ -125,9 +125,9 @@ def stribeck_from_slow_sliding(log: Log, between: Between, known: Known | None) 
     for other in known.off():
         changed = _residual(_motion(*signals, other.mass[0], cutoff), other, best) - residual
         shifts.append(-np.linalg.lstsq(jacobian, changed, rcond=None)[0])
-    found, correlation = _estimates(best, jackknife(jacobian, -residual)[:3, :3], np.array(shifts)[:, :3])
     friction, velocity = motion.passed(motion.friction), motion.passed(motion.velocity)
     left = float(residual.std() / friction.std())
+    found, correlation = _estimates(best, jackknife(jacobian, -residual)[:3, :3], np.array(shifts)[:, :3], left)
     time = log.time[part][motion.inside]
     return SlowSliding(_judged(found, left, velocity), correlation, time, velocity, friction, model, left)
 
@@ -201,9 +201,11 @@ def _fitted(motion: _Motion, known: Known, starts: Sequence[np.ndarray]) -> tupl
     return best, _model(motion, known, best)
 
 
-def _estimates(best: np.ndarray, covariance: np.ndarray, shifts: np.ndarray) -> tuple[tuple[Estimate, ...], np.ndarray]:
+def _estimates(
+    best: np.ndarray, covariance: np.ndarray, shifts: np.ndarray, left: float
+) -> tuple[tuple[Estimate, ...], np.ndarray]:
     """The three quantities and their correlation, by the logarithms that were fitted, their covariance, shape (3, 3),
-    and `shifts` of them, shape (m, 3)."""
+    and `shifts` of them, shape (m, 3), and the share of the friction that is `left`."""
     coulomb, more, stribeck = np.exp(best[:3])
     values = (coulomb, coulomb + more, stribeck)
     turned = np.array([[coulomb, 0, 0], [coulomb, more, 0], [0, 0, stribeck]])  # derivatives by the logarithms
@@ -212,11 +214,9 @@ def _estimates(best: np.ndarray, covariance: np.ndarray, shifts: np.ndarray) -> 
     size = np.sqrt(np.diag(whole))
     found = []
     for i, (name, unit) in enumerate(zip(NAMES, UNITS, strict=True)):
-        mean, more = (
-            Mean(float(values[i]), float(covariance[i, i] ** 0.5), BLOCKS - 1),
-            float(np.abs(shifts[:, i]).sum()),
-        )
-        found.append(by_t(name, unit, mean, METHOD, more, more))
+        mean = Mean(float(values[i]), float(covariance[i, i] ** 0.5), BLOCKS - 1)
+        systematic = float(np.abs(shifts[:, i]).sum()) + (left + LINEARITY) * mean.value
+        found.append(by_t(name, unit, mean, METHOD, systematic, systematic))
     return tuple(found), whole / np.outer(size, size)
 
 
