@@ -35,7 +35,7 @@ def identify(
         typer.Option(
             "--as",
             metavar="KIND",
-            help="moves, frequency, steps, stick-slip, break-away, constant-speed, presliding.",
+            help="moves, frequency, steps, stick-slip, break-away, constant-speed, presliding, slow-sliding.",
         ),
     ] = None,
     maps: Annotated[Many, typer.Option("--map", metavar="ROLE=CHANNEL", help='position="Axis1.ActPos"')] = None,

@@ -12,6 +12,7 @@ from friso.identify.estimate import Estimate
 from friso.identify.experiments.break_away import BreakAway
 from friso.identify.experiments.friction_velocity import Direction
 from friso.identify.experiments.presliding import Presliding
+from friso.identify.experiments.slow_sliding import SlowSliding
 from friso.identify.experiments.steps import StepStiffness
 from friso.identify.experiments.stick_slip import StickSlip
 from friso.identify.inverse_model import InverseModel
@@ -102,6 +103,8 @@ def _result(it: Result) -> dict[str, Any]:
         return _stick_slip(it)
     if isinstance(it, Presliding):
         return _presliding(it)
+    if isinstance(it, SlowSliding):
+        return _slow_sliding(it)
     return _break_away(it) if isinstance(it, BreakAway) else _constant(it)
 
 
@@ -218,6 +221,11 @@ def _presliding(it: Presliding) -> dict[str, Any]:
         "unexplained": it.unexplained,
         "warnings": list(it.warnings),
     }
+
+
+def _slow_sliding(it: SlowSliding) -> dict[str, Any]:
+    named = {each.name.removeprefix("friction."): _estimate(each) for each in it.estimates}
+    return {**named, "unexplained": it.unexplained}
 
 
 def _constant(it: ConstantSpeed) -> dict[str, Any]:

@@ -9,6 +9,7 @@ from friso.identify.estimate import Estimate
 from friso.identify.experiments.break_away import BreakAway
 from friso.identify.experiments.friction_velocity import Direction
 from friso.identify.experiments.presliding import Presliding
+from friso.identify.experiments.slow_sliding import SlowSliding
 from friso.identify.experiments.steps import StepStiffness
 from friso.identify.experiments.stick_slip import StickSlip
 from friso.identify.inverse_model import InverseModel
@@ -29,6 +30,7 @@ TITLES = {
     "break-away": "Break-away ramps",
     "constant-speed": "Constant speed",
     "presliding": "Motion before sliding",
+    "slow-sliding": "Slow sliding",
 }
 
 
@@ -74,6 +76,8 @@ def _told(result: object) -> tuple[tuple[str, ...], Facts, tuple[str, ...]]:
         return _break_away(result)
     if isinstance(result, Presliding):
         return _presliding(result)
+    if isinstance(result, SlowSliding):
+        return _slow_sliding(result)
     assert isinstance(result, ConstantSpeed)
     return _constant(result)
 
@@ -224,6 +228,14 @@ def _presliding(it: Presliding) -> tuple[tuple[str, ...], Facts, tuple[str, ...]
     if len(it.time):
         facts += [("Friction left unexplained", f"{it.unexplained:.1%} of its standard deviation")]
     return (), tuple(facts), it.warnings
+
+
+def _slow_sliding(it: SlowSliding) -> tuple[tuple[str, ...], Facts, tuple[str, ...]]:
+    names = ("Coulomb friction", "Static friction", "Stribeck velocity")
+    facts = [(name, with_interval(each)) for name, each in zip(names, it.estimates, strict=True)]
+    if len(it.time):
+        facts += [("Friction left unexplained", f"{it.unexplained:.1%} of its standard deviation")]
+    return (), tuple(facts), ()
 
 
 def _constant(it: ConstantSpeed) -> tuple[tuple[str, ...], Facts, tuple[str, ...]]:

@@ -11,6 +11,7 @@ from friso.identify.experiments.break_away import BreakAway
 from friso.identify.experiments.friction_position import FrictionPosition
 from friso.identify.experiments.friction_velocity import Direction, FrictionVelocity
 from friso.identify.experiments.presliding import Presliding
+from friso.identify.experiments.slow_sliding import SlowSliding
 from friso.identify.experiments.steps import StepStiffness
 from friso.identify.experiments.stick_slip import StickSlip
 from friso.identify.logs.log import Log
@@ -39,6 +40,9 @@ AREA = "#cfdfee"
 WAYS = {"forward": BLUE, "backward": ORANGE}
 TIME = Axis("Time", "s")
 
+POINTS = 5000
+"""Of a record of slow sliding that are drawn."""
+
 
 def friction_figures(it: Result, log: Log, label: str) -> list[Figure]:
     """All figures of one experiment in time; their names begin with "identify_" and the label."""
@@ -51,6 +55,8 @@ def friction_figures(it: Result, log: Log, label: str) -> list[Figure]:
         return _break_away(it, name)
     if isinstance(it, Presliding):
         return _presliding(it, name)
+    if isinstance(it, SlowSliding):
+        return _slow_sliding(it, name)
     if isinstance(it, ConstantSpeed):
         return [*_velocity(it.velocity, name), *_position(it.position, name)]
     raise TypeError(f"no figures of a {type(it).__name__}")
@@ -145,6 +151,38 @@ def presliding_panels(it: Presliding) -> tuple[Panel, ...]:
         Panel("", TIME, Axis("Force", "N"), lines),
         Panel("", TIME, Axis("Position about its mean", "m"), (Series(time, motion, "", BLUE, width=1.0),)),
     )
+
+
+def _slow_sliding(it: SlowSliding, name: str) -> list[Figure]:
+    """Friction over velocity as it was and as the model has it, and both over time at its end."""
+    if not len(it.model):
+        return []
+    caption, panels = slow_sliding_caption(it), slow_sliding_panels(it)
+    return [Figure(f"{name}_slow_sliding", "Friction in slow sliding", caption, panels)]
+
+
+def slow_sliding_caption(it: SlowSliding) -> str:
+    """What the friction is, and how much of it the model explains."""
+    coulomb, static, stribeck = (with_interval(each) for each in it.estimates)
+    return (
+        "Force less inertia, and the friction of LuGre's bristles in the motion that was measured. Coulomb friction: "
+        f"{coulomb}; static friction: {static}; Stribeck velocity: {stribeck}. {it.unexplained:.1%} of the friction "
+        "are left unexplained."
+    )
+
+
+def slow_sliding_panels(it: SlowSliding) -> tuple[Panel, ...]:
+    """Friction over time, and over velocity, as it was and as the model has it."""
+    friction = Axis("Friction, low-passed", "N")
+    some = slice(None, None, max(len(it.time) // POINTS, 1))
+
+    def both(x: np.ndarray) -> tuple[Series, ...]:
+        return (
+            Series(x[some], it.friction[some], "force less inertia", INK, width=1.4),
+            Series(x[some], it.model[some], "LuGre's bristles", ORANGE, "dashed", 1.0),
+        )
+
+    return Panel("", TIME, friction, both(it.time)), Panel("", Axis("Velocity", "m/s"), friction, both(it.velocity))
 
 
 def _break_away(it: BreakAway, name: str) -> list[Figure]:

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
+from friso.identify.estimate import Estimate
+from friso.identify.experiments import SlowSliding
 from friso.studies.rig.constant_speed import ConstantSpeed, Passes
 from friso.studies.rig.many_speeds import ManySpeeds, Place
 from friso.studies.rig.outcome import Outcome
 from friso.views.figure import BLUE, GREEN, ORANGE, PINK, VERMILLION, Axis, Figure, Markers, Panel, Series
+from friso.views.identify_friction_figures import slow_sliding_caption, slow_sliding_panels
 from friso.views.identify_numbers import with_interval
 from friso.views.prefixes import listed, with_unit
 
@@ -32,7 +36,23 @@ def sentences(outcome: Outcome) -> list[str]:
         ],
         "and",
     )
-    return [*said, f"The dynamic friction along the way is truly {true} on average.", *_many(found)]
+    return [*said, f"The dynamic friction along the way is truly {true} on average.", *_many(found), *_slow(found)]
+
+
+def _slow(found: ConstantSpeed) -> list[str]:
+    """What slow sliding shows."""
+    if not found.slow:
+        return []
+    head = "In slow sliding, joint locked, at the edge of what is steady, mass and bristles being known:"
+    return [head, *(_slow_place(number, each.found) for number, each in enumerate(found.slow, start=1))]
+
+
+def _slow_place(number: int, it: SlowSliding) -> str:
+    if not any(each.shown for each in it.estimates):
+        return f"Place {number}: not shown ({it.estimates[0].reason})."
+    names = ("Coulomb friction", "static friction", "the Stribeck velocity")
+    told = [f"{name} {with_interval(each)}" for name, each in zip(names, it.estimates, strict=True)]
+    return f"Place {number}: {listed(told, 'and')}."
 
 
 def _many(found: ConstantSpeed) -> list[str]:
@@ -72,7 +92,18 @@ def figures(outcome: Outcome) -> list[Figure]:
     return [
         Figure("rig_constant_speed", title, caption, panels, columns=1, subject=outcome.stage.name),
         _over_velocity(outcome),
+        *_in_slow_sliding(outcome),
     ]
+
+
+def _in_slow_sliding(outcome: Outcome) -> list[Figure]:
+    """The friction at the first place."""
+    found: ConstantSpeed = outcome.result
+    places = [each.found for each in found.slow if len(each.found.model)]
+    if not places:
+        return []
+    caption, panels = slow_sliding_caption(places[0]), slow_sliding_panels(places[0])
+    return [Figure("rig_slow_sliding", "Friction in slow sliding", caption, panels, subject=outcome.stage.name)]
 
 
 def _over_velocity(outcome: Outcome) -> Figure:
@@ -106,7 +137,8 @@ def numbers(outcome: Outcome) -> dict[str, Any]:
     """As JSON."""
     found: ConstantSpeed = outcome.result
     return {"speeds_m_per_s": [*found.speeds], "cases": {each.name: _numbers(each) for each in found.cases}} | {
-        "many_speeds": _many_numbers(found)
+        "many_speeds": _many_numbers(found),
+        "slow_sliding": [_shown(each.found.estimates) for each in found.slow],
     }
 
 
@@ -123,8 +155,14 @@ def _place_numbers(place: Place) -> dict[str, Any]:
         "friction_n": place.friction.tolist(),
         "true_speeds_m_per_s": place.speeds.tolist(),
         "true_dynamic_friction_n": place.true.tolist(),
-        "shown": {e.name: {"value": e.value, "low": e.low, "high": e.high, "unit": e.unit} for e in both if e.shown},
-        "not_shown": {each.name: each.reason for each in both if not each.shown},
+        **_shown(both),
+    }
+
+
+def _shown(every: Sequence[Estimate]) -> dict[str, Any]:
+    return {
+        "shown": {e.name: {"value": e.value, "low": e.low, "high": e.high, "unit": e.unit} for e in every if e.shown},
+        "not_shown": {each.name: each.reason for each in every if not each.shown},
     }
 
 

@@ -45,9 +45,6 @@ frequency of the motion over that of the samples."""
 FEWEST = 1000
 """Samples of a record at least."""
 
-ROUNDS = 2
-"""Fits by which the mass that is believed to move becomes the one that is found."""
-
 BENDING = (1e-6, 5.0)
 """Of the bending q over the range of the motion: from a straight line to bristles that are at their end long before."""
 
@@ -220,11 +217,9 @@ def _estimate(key: str, value: float, error: float, systematic: float) -> Estima
 def _settled(record: _Record, between: Between, cutoff: float, late: bool) -> _Fit:
     """The fit once the mass that is believed to move is the one found and, if it is to be looked for (`late`),
     the delay that which fits best."""
-    delay, mass = between.delay or 0.0, 0.0
-    for _ in range(ROUNDS):
-        fit = _fit(record, replace(between, delay=delay), cutoff, mass, late)
-        mass, delay = float(fit.values[0]), delay + fit.late
-    return fit
+    fit = _fit(record, replace(between, delay=between.delay or 0.0), cutoff, 0.0, late)
+    delay = (between.delay or 0.0) + fit.late
+    return _fit(record, replace(between, delay=delay), cutoff, float(fit.values[0]), late)
 
 
 def _fit(record: _Record, between: Between, cutoff: float, mass: float, late: bool) -> _Fit:

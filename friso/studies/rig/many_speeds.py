@@ -79,7 +79,8 @@ def many_speeds(stage: Stage, seed: int) -> ManySpeeds:
     logs, places = many_speeds_logs(stage, seed), []
     for log, begin in zip(logs, _begins(stage), strict=True):
         velocity = friction_velocity(log.log, moving_mass(stage))
-        speeds = np.geomspace(*speeds_of(log.stage)[[0, -1]], CURVE)
+        low, *_, high = speeds_of(log.stage)
+        speeds = np.geomspace(low, high, CURVE)
         way = velocity.way if len(velocity.velocities) else (begin, begin + SHARED * longest_way(stage))
         drag = log.stage.flat().get("cable.drag", 0.0)
         true = mean_friction(log.stage, speeds, np.linspace(*way, 1000)) + drag * speeds
