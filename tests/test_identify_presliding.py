@@ -12,7 +12,8 @@ from scipy.integrate import solve_ivp
 
 import friso
 from friso.identify.experiments import Presliding, bristles_from_presliding, record
-from friso.identify.experiments.presliding import Between, _jackknife, deflected
+from friso.identify.experiments.at_bearing import Between, Mode
+from friso.identify.experiments.common import deflections, jackknife
 from friso.identify.logs.log import Log
 from friso.identify.method import between, identify
 from friso.studies.rig.excitation import excite
@@ -40,7 +41,8 @@ def shaken(
     omega = 2 * np.pi * LINES[:top, None]
     position = size * np.sin(phases).sum(axis=0)
     acceleration = -size * (omega**2 * np.sin(phases)).sum(axis=0)
-    z = deflected(position, bending)
+    moves = np.diff(position)
+    z = deflections(moves, np.full(len(moves), 1 / bending))
     force = MASS * acceleration + STIFFNESS * z + DAMPING * np.gradient(z, step / fine) + 0.2
     rng = np.random.default_rng(1)
     signals = {"position": position[::fine], "force": force[::fine]}
@@ -63,7 +65,7 @@ def test_bristles_bend_as_the_differential_equation_says(seed: int, bending: flo
     for move in moves[1:]:
         run = solve_ivp(lambda _, y, m=move: m * (1 - bending * y * np.sign(m)), (0, 1), z[-1:], rtol=1e-9, atol=1e-15)
         z.append(run.y[0, -1])
-    assert deflected(position, bending) == pytest.approx(np.array(z), rel=1e-6, abs=1e-8 / bending)
+    assert deflections(moves[1:], np.full(7, 1 / bending)) == pytest.approx(np.array(z), rel=1e-6, abs=1e-8 / bending)
     assert np.all(np.abs(z) <= 1 / bending)
 
 
@@ -99,6 +101,21 @@ def test_a_held_joint_gives_way_in_series() -> None:
     assert found.stiffness.value == pytest.approx(STIFFNESS, rel=5e-3)
     soft = bristles_from_presliding(whole)
     assert soft.stiffness.value == pytest.approx(1 / (1 / STIFFNESS + 1 / contact), rel=0.01)
+
+
+def test_a_mode_of_the_structure_is_told_from_the_mass() -> None:
+    """A third of the mass on a spring at 150 Hz, its force added in closed form to sines of up to 37.7 Hz: known, and
+    not known."""
+    share, mode = 1 / 3, 150.0
+    log, time = shaken(), np.arange(0, SECONDS, DT)
+    omega = 2 * np.pi * LINES[:, None]
+    phases = omega * time + np.arange(len(LINES))[:, None] ** 2
+    more = (omega / (2 * np.pi * mode)) ** 2
+    extra = -2e-7 * share * MASS * (more / (1 - more) * omega**2 * np.sin(phases)).sum(axis=0)
+    shaking = replace(log, signals={**log.signals, "force": log["force"] + extra})
+    assert bristles_from_presliding(shaking).mass.value == pytest.approx(MASS, rel=2e-3)
+    known = Between(delay=0.0, mode=Mode(share, mode, 1e-6))
+    assert bristles_from_presliding(shaking, known).mass.value == pytest.approx(MASS, rel=1e-3)
 
 
 def test_noise_of_the_sensor_does_not_matter_until_motion_is_lost_in_it() -> None:
@@ -168,7 +185,7 @@ def test_the_jackknife_is_the_covariance_of_least_squares() -> None:
     rng, count = np.random.default_rng(5), 800
     columns = rng.standard_normal((count, 3)) @ np.array([[1, 0.8, 0], [0, 0.6, 0], [0, 0, 1e-5]])
     known = np.linalg.inv(columns.T @ columns)
-    found = np.mean([_jackknife(columns, rng.standard_normal(count)) for _ in range(400)], axis=0)
+    found = np.mean([jackknife(columns, rng.standard_normal(count)) for _ in range(400)], axis=0)
     size = np.sqrt(np.diag(known))
     assert found / np.outer(size, size) == pytest.approx(known / np.outer(size, size), abs=0.15)
 

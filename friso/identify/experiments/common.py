@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import accumulate
 from typing import Any
 
 import numpy as np
@@ -183,6 +184,14 @@ def jackknife(columns: np.ndarray, target: np.ndarray) -> np.ndarray:
     without = np.array([solved(square - x.T @ x, product - x.T @ y) for x, y in parts])
     off = without - without.mean(axis=0)
     return off.T @ off * (BLOCKS - 1) / BLOCKS
+
+
+def deflections(moves: np.ndarray, ends: np.ndarray) -> np.ndarray:
+    """Deflection [m] of bristles, shape (n,), under a body that makes these moves [m], at whose velocities the bristles
+    come to rest at `ends` [m], both of shape (n - 1,); straight at first, exact in each move."""
+    kept = np.exp(-np.abs(moves) / ends)
+    steps = zip((np.sign(moves) * ends).tolist(), kept.tolist(), strict=True)
+    return np.array([*accumulate(steps, lambda z, step: step[0] + (z - step[0]) * step[1], initial=0.0)])
 
 
 def ways(directions: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:

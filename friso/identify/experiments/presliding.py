@@ -9,7 +9,6 @@ hysteresis of slow loops, see `hysteresis`, shows the stiffness alone.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from itertools import accumulate
 from typing import Any
 
 import numpy as np
@@ -23,6 +22,7 @@ from friso.identify.experiments.common import (
     by_t,
     channel,
     deflection,
+    deflections,
     jackknife,
     low_pass,
     reach,
@@ -58,7 +58,8 @@ MOVES, STANDS_OUT = 0.02, 3.0
 """A joint bends where its deflection reaches this share of the motion, and so many times its sensor's noise."""
 
 SPRING = 3.0
-"""Stiffness over that of the joint up to which it may well be the joint that is seen."""
+"""Stiffness over that of the joint up to which it may well be the joint that is seen, and deflection over that of the
+contact up to which it may well be the contact."""
 
 KEYS = MASS, DAMPING, STIFFNESS = "moving mass", "friction.bristle_damping", "friction.bristle_stiffness"
 UNITS = {MASS: "kg", DAMPING: "N*s/m", STIFFNESS: "N/m"}
@@ -144,7 +145,7 @@ def bristles_from_presliding(log: Log, between: Between = DIRECT) -> Presliding:
     if why:
         return _nothing(why)
     cutoff = min(cutoff, SAMPLED / (2 * each))
-    bent = _bends(log, part, position, cutoff)
+    bent = _bends(log, part, position, cutoff, SPRING * float(force.std()) / between.contact)
     record = _Record(log.time[part], position, bent, force)
     own = between.delay is None
     best, *others = (
@@ -177,8 +178,9 @@ def _why_not(position: np.ndarray, sample_time: float, cutoff: float) -> str:
     return ""
 
 
-def _bends(log: Log, part: slice, position: np.ndarray, cutoff: float) -> np.ndarray | None:
-    """The measured deflection [m] of a joint that bends; None where it is held, or not measured."""
+def _bends(log: Log, part: slice, position: np.ndarray, cutoff: float, gives: float) -> np.ndarray | None:
+    """The measured deflection [m] of a joint that bends; None where it is not measured, or held and no more than what
+    its contact `gives` [m]."""
     measured = deflection(log)
     if measured is None:
         return None
@@ -186,7 +188,8 @@ def _bends(log: Log, part: slice, position: np.ndarray, cutoff: float) -> np.nda
     size = low_pass(bent, log.sample_time, cutoff).std()
     noise = low_pass(np.random.default_rng(0).standard_normal(len(bent)), log.sample_time, cutoff).std()
     noise *= robust(np.diff(bent, 2)) / 6**0.5
-    return bent if size > max(STANDS_OUT * noise, MOVES * low_pass(position, log.sample_time, cutoff).std()) else None
+    least = max(STANDS_OUT * noise, MOVES * low_pass(position, log.sample_time, cutoff).std(), gives)
+    return bent if size > least else None
 
 
 def _nothing(why: str) -> Presliding:
@@ -224,52 +227,63 @@ def _settled(record: _Record, between: Between, cutoff: float, late: bool) -> _F
 
 def _fit(record: _Record, between: Between, cutoff: float, mass: float, late: bool) -> _Fit:
     """Least squares of the force at a low-pass; the bending, in which it is not linear, is looked for. `mass` [kg] is
-    believed to move; with `late`, what a little more delay would do is among the columns.
-
-    The first mode of the structure, whose mass m moves on its own spring at a frequency w, adds m/w^2 times the fourth
-    derivative of the position.
-    """
-    time = record.time
-    body, force = at_bearing(time, record.position, record.force, between, mass, record.bent)
-    force = force - between.viscous * rate_of(time, body)
-    interval, span = float(time[1] - time[0]), float(np.ptp(body))
-    inside = slice(edge := int(2 / (cutoff * interval)), len(time) - edge)
-
-    def passed(signal: np.ndarray) -> np.ndarray:
-        return low_pass(signal, interval, cutoff)[inside]
-
-    def columns(bending: float) -> np.ndarray:
-        """Inertia, rate and deflection of the bristles, how a deflection at the start dies away, and the rest."""
-        z, path = deflected(body, bending), np.concatenate(([0.0], np.cumsum(np.abs(np.diff(body)))))
-        turned = (passed(each) for each in (rate_of(time, z), z, np.exp(-bending * path)))
-        return np.stack([inertia, *turned, *rest], axis=1)
+    believed to move; with `late`, what a little more delay would do is among the columns."""
+    equation = _equation(record, between, cutoff, mass, late)
+    target, span = equation.target, float(np.ptp(equation.body))
 
     def off(logarithm: float) -> float:
-        x = columns(float(np.exp(logarithm)) / span)
+        x = equation.columns(float(np.exp(logarithm)) / span)
         return float(np.sum((target - x @ solved(x.T @ x, x.T @ target)) ** 2))
 
-    acceleration = rate_of(time, rate_of(time, body))
-    inertia, target = passed(acceleration), passed(force)
-    rest = [np.ones(len(target)), passed(rate_of(time, rate_of(time, acceleration)))]
-    rest += [passed(rate_of(time, force))] if late else []
     best: Any = minimize_scalar(off, bounds=tuple(np.log(BENDING)), method="bounded", options={"xatol": 1e-3})
     bending = float(np.exp(best.x)) / span
-    x = columns(bending)
+    x = equation.columns(bending)
     solution = solved(x.T @ x, x.T @ target)
-    bends = (columns(1.01 * bending) - columns(bending / 1.01)) @ solution
+    bends = (equation.columns(1.01 * bending) - equation.columns(bending / 1.01)) @ solution
     covariance = jackknife(np.column_stack([x, bends]), target)[:3, :3]
     values = solution[:3] + np.array([between.beyond * mass, 0.0, 0.0])
     left = float((target - x @ solution).std() / (target - x[:, 0] * solution[0]).std())
-    ends = bending * span > 0.99 * BENDING[1]
-    more = float(solution[-1]) if late else 0.0
-    return _Fit(values, covariance, more, ends, left, time[inside], passed(body), target, x @ solution)
+    ends, more = bending * span > 0.99 * BENDING[1], float(solution[-1]) if late else 0.0
+    shown = (equation.time[equation.inside], equation.passed(equation.body), target, x @ solution)
+    return _Fit(values, covariance, more, ends, left, *shown)
 
 
-def deflected(position: np.ndarray, bending: float) -> np.ndarray:
-    """Deflection [m] of bristles of that `bending` q [1/m] under a body at these positions [m], shape (n,), straight at
-    first: exact between any two samples, dz = dx (1 - q z sign dx)."""
-    moves = np.diff(position)
-    ends = np.sign(moves) / bending
-    kept = np.exp(-bending * np.abs(moves))
-    steps = zip(ends.tolist(), kept.tolist(), strict=True)
-    return np.array([*accumulate(steps, lambda z, step: step[0] + (z - step[0]) * step[1], initial=0.0)])
+@dataclass(frozen=True)
+class _Equation:
+    """Time [s] and position [m] of the body on the bearing, shape (n,); the low-pass [Hz], and the samples `inside`,
+    which its ends do not touch; the force [N] and its columns that do not depend on the bristles, inside, shape (m,)
+    each."""
+
+    time: np.ndarray
+    body: np.ndarray
+    cutoff: float
+    inside: slice
+    target: np.ndarray
+    inertia: np.ndarray
+    rest: tuple[np.ndarray, ...]
+
+    def passed(self, signal: np.ndarray) -> np.ndarray:
+        return low_pass(signal, float(self.time[1] - self.time[0]), self.cutoff)[self.inside]
+
+    def columns(self, bending: float) -> np.ndarray:
+        """Inertia, rate and deflection of bristles of a bending q [1/m], how a deflection at the start dies away, and
+        the rest, shape (m, p)."""
+        moves = np.diff(self.body)
+        z = deflections(moves, np.full(len(moves), 1 / bending))
+        path = np.concatenate(([0.0], np.cumsum(np.abs(moves))))
+        turned = (self.passed(each) for each in (rate_of(self.time, z), z, np.exp(-bending * path)))
+        return np.stack([self.inertia, *turned, *self.rest], axis=1)
+
+
+def _equation(record: _Record, between: Between, cutoff: float, mass: float, late: bool) -> _Equation:
+    """The equation of a record. A mode of the structure, whose mass m moves on its own spring at a frequency w, adds
+    m/w^2 times the fourth derivative of the position: what of it `between` does not know is among the rest."""
+    time = record.time
+    body, force = at_bearing(time, record.position, record.force, between, mass, record.bent)
+    force = force - between.viscous * rate_of(time, body)
+    interval = float(time[1] - time[0])
+    inside = slice(edge := int(2 / (cutoff * interval)), len(time) - edge)
+    acceleration = rate_of(time, rate_of(time, body))
+    rest = [np.ones(len(time)), rate_of(time, rate_of(time, acceleration)), *([rate_of(time, force)] if late else [])]
+    target, inertia, *others = (low_pass(each, interval, cutoff)[inside] for each in (force, acceleration, *rest))
+    return _Equation(time, body, cutoff, inside, target, inertia, tuple(others))

@@ -11,28 +11,38 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import accumulate
 
 import numpy as np
 from scipy.optimize import least_squares
 
 from friso.identify.estimate import Estimate
 from friso.identify.experiments.at_bearing import Between, at_bearing, rate_of
-from friso.identify.experiments.common import BLOCKS, LINEARITY, Mean, by_t, channel, jackknife, low_pass, reach
+from friso.identify.experiments.common import (
+    BLOCKS,
+    LINEARITY,
+    Mean,
+    by_t,
+    channel,
+    deflections,
+    jackknife,
+    low_pass,
+    reach,
+)
 from friso.identify.logs.log import Log
 
-CUTOFF, CHECKED, MOTION = 0.25, 0.7, 8.0
-"""Low-pass of the equation, over the highest frequency of the motion; that of a second fit by which the first one is
-checked, and of the motion itself, both over that of the first."""
+BELOW_MODE, CHECKED, MOTION = 1 / 3, 0.7, 8.0
+"""Low-pass of the equation over the frequency of the structure's mode, at most; that of a second fit by which the first
+one is checked, and of the motion itself, both over that of the first."""
 
 MOST, FEWEST = 60_000, 2000
 """Samples that are used at most, and that are needed."""
 
-LEAST, SAMPLED = 100, 0.2
-"""Periods of the highest frequency of the motion that a record lasts at least, and that frequency over the samples'."""
+LEAST, SAMPLED = 20, 0.2
+"""Periods of the low-pass that a record lasts at least, and the highest frequency of the motion over the samples'."""
 
-STARTS = (0.2, 0.5)
-"""Stribeck velocities from which the fit starts, over the RMS velocity."""
+STARTS, BOUNDS = (0.2, 0.5), (0.01, 10.0)
+"""Stribeck velocities from which the fit starts, over the RMS velocity; and bounds of all that is fitted, over that and
+over the mean friction."""
 
 STEP = 1e-3
 """Of the logarithms, for derivatives."""
@@ -112,12 +122,13 @@ def stribeck_from_slow_sliding(log: Log, between: Between, known: Known | None) 
     if len(position) < FEWEST:
         return _nothing(f"the record has {len(position)} samples: {FEWEST} are needed")
     highest = reach(position, log.sample_time)
-    if not highest * len(position) * log.sample_time > LEAST:
+    cutoff = min(highest, BELOW_MODE * between.mode.frequency) if between.mode else highest
+    if not cutoff * len(position) * log.sample_time > LEAST:
         return _nothing("the motion does not stand out of the noise")
     if highest * log.sample_time > SAMPLED:
         needed = SAMPLED / highest
         return _nothing(f"the motion goes up to {highest:.3g} Hz: one sample in {needed:.3g} s or less is needed")
-    signals, cutoff = (log.time[part], position, force, between), CUTOFF * highest
+    signals = (log.time[part], position, force, between)
     motion = _motion(*signals, known.mass[0], cutoff)
     best, model = _fitted(motion, known, _starts(motion))
     jacobian, residual = _derivatives(motion, known, best), _residual(motion, known, best)
@@ -160,6 +171,13 @@ def _starts(motion: _Motion) -> list[np.ndarray]:
     return [np.array([np.log(level), np.log(level / 2), np.log(share * speed), 0.0]) for share in STARTS]
 
 
+def _bounds(motion: _Motion) -> tuple[np.ndarray, np.ndarray]:
+    """Least and greatest parameters."""
+    level, speed = float(np.abs(motion.friction).mean()), float(motion.velocity.std())
+    low, high = (np.log(np.array([level, level, speed]) * by) for by in BOUNDS)
+    return np.append(low, -level), np.append(high, level)
+
+
 def _model(motion: _Motion, known: Known, p: np.ndarray) -> np.ndarray:
     """Friction [N] at the low-pass, of bristles in the motion."""
     moves = np.diff(motion.position)
@@ -168,14 +186,6 @@ def _model(motion: _Motion, known: Known, p: np.ndarray) -> np.ndarray:
     z = deflections(moves, level / known.stiffness[0])
     rate = np.gradient(z, motion.interval)
     return motion.passed(known.stiffness[0] * z + known.damping[0] * rate) + p[3]
-
-
-def deflections(moves: np.ndarray, ends: np.ndarray) -> np.ndarray:
-    """Deflection [m] of bristles, shape (n,), under a body that makes these moves [m], at whose velocities the bristles
-    come to rest at `ends` [m], both of shape (n - 1,); straight at first, exact in each move."""
-    kept = np.exp(-np.abs(moves) / ends)
-    steps = zip((np.sign(moves) * ends).tolist(), kept.tolist(), strict=True)
-    return np.array([*accumulate(steps, lambda z, step: step[0] + (z - step[0]) * step[1], initial=0.0)])
 
 
 def _residual(motion: _Motion, known: Known, p: np.ndarray) -> np.ndarray:
@@ -196,7 +206,9 @@ def _fitted(motion: _Motion, known: Known, starts: Sequence[np.ndarray]) -> tupl
     def off(p: np.ndarray) -> np.ndarray:
         return (_model(motion, known, p) - target) / scale
 
-    fits = [least_squares(off, start, x_scale=(0.1, 0.1, 0.1, scale), diff_step=STEP) for start in starts]
+    size, bounds = (0.1, 0.1, 0.1, scale), _bounds(motion)
+    inside = [np.clip(start, *bounds) for start in starts]
+    fits = [least_squares(off, start, bounds=bounds, x_scale=size, diff_step=STEP) for start in inside]
     best = min(fits, key=lambda fit: fit.cost).x
     return best, _model(motion, known, best)
 
@@ -211,7 +223,7 @@ def _estimates(
     turned = np.array([[coulomb, 0, 0], [coulomb, more, 0], [0, 0, stribeck]])  # derivatives by the logarithms
     covariance, shifts = turned @ covariance @ turned.T, shifts @ turned.T
     whole = covariance + shifts.T @ shifts / 4
-    size = np.sqrt(np.diag(whole))
+    size = np.sqrt(np.maximum(np.diag(whole), np.finfo(float).tiny))
     found = []
     for i, (name, unit) in enumerate(zip(NAMES, UNITS, strict=True)):
         mean = Mean(float(values[i]), float(covariance[i, i] ** 0.5), BLOCKS - 1)

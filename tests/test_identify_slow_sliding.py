@@ -1,0 +1,172 @@
+"""Friction that falls with the speed, from slow sliding: against logs of known bristles, and on the rig's machines."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from rig_machines import built
+
+import friso
+from friso.identify.experiments import SlowSliding, record, stribeck_from_slow_sliding
+from friso.identify.experiments.at_bearing import Between, Mode
+from friso.identify.experiments.common import deflections
+from friso.identify.experiments.slow_sliding import Known
+from friso.identify.logs.log import Log
+from friso.identify.method import identify
+from friso.rig.rail import friction_factors
+from friso.studies.rig import many_speeds, slow_sliding
+from friso.studies.rig.sizes import locked
+
+DT, SECONDS, FINE = 2e-4, 4.0, 10
+MASS, STIFFNESS, DAMPING, VISCOUS = 1.7, 1e5, 300.0, 2.0
+COULOMB, STATIC, STRIBECK = 1.0, 2.2, 1.5e-3
+KNOWN = Known((MASS, 0.0), (STIFFNESS, 0.0), (DAMPING, 0.0))
+TRUE = [COULOMB, STATIC, STRIBECK]
+THERE = Between(delay=0.0, viscous=VISCOUS)
+
+
+def sliding(
+    swing: float = 4e-3, mean: float = 1.5e-3, coulomb: float = COULOMB, stribeck: float = STRIBECK, noise: float = 0.0
+) -> Log:
+    """Motion at a mean velocity [m/s] that swings by `swing` [m/s], there and back, and the force of a mass on LuGre's
+    bristles, computed in fine steps."""
+    each = DT / FINE
+    time = np.arange(0, SECONDS, each)
+    way = np.tanh(20 * (SECONDS / 2 - time))
+    omega = 2 * np.pi * 9.0
+    velocity = mean * way + swing * np.sin(omega * time) * (1 + 0.3 * np.sin(0.37 * omega * time))
+    position = np.cumsum(velocity) * each
+    acceleration = np.gradient(velocity, each)
+    moves = np.diff(position)
+    level = coulomb + (STATIC - coulomb) * np.exp(-((moves / each / stribeck) ** 2))
+    z = deflections(moves, level / STIFFNESS)
+    force = MASS * acceleration + STIFFNESS * z + DAMPING * np.gradient(z, each) + VISCOUS * velocity + 0.2
+    rng = np.random.default_rng(1)
+    seen = position[::FINE]
+    return record("slow", DT, position=seen + noise * rng.standard_normal(len(seen)), force=force[::FINE])
+
+
+def values(found: SlowSliding) -> list[float]:
+    return [each.value for each in found.estimates]
+
+
+def holds(found: SlowSliding) -> list[bool]:
+    return [each.holds(true) for each, true in zip(found.estimates, TRUE, strict=True)]
+
+
+@given(st.floats(0.4, 1.8), st.floats(0.7e-3, 2.5e-3))
+@settings(max_examples=8, deadline=None)
+def test_known_friction_is_found(coulomb: float, stribeck: float) -> None:
+    found = stribeck_from_slow_sliding(sliding(coulomb=coulomb, stribeck=stribeck), THERE, KNOWN)
+    assert values(found) == pytest.approx([coulomb, STATIC, stribeck], rel=0.02)
+    assert found.unexplained < 0.01
+
+
+def test_noise_of_the_sensor_and_doubt_about_the_bristles_widen_the_intervals() -> None:
+    plain = stribeck_from_slow_sliding(sliding(), THERE, KNOWN)
+    noisy = stribeck_from_slow_sliding(sliding(noise=2e-9), THERE, KNOWN)
+    assert all(holds(plain))
+    assert all(holds(noisy))
+    doubtful = replace(KNOWN, damping=(1.03 * DAMPING, 0.04 * DAMPING), mass=(1.01 * MASS, 0.01 * MASS))
+    doubted = stribeck_from_slow_sliding(sliding(), THERE, doubtful)
+    assert all(holds(doubted))
+    pairs = zip(doubted.estimates, plain.estimates, strict=True)
+    assert all(one.half_width > other.half_width for one, other in pairs)
+
+
+def test_contact_and_mode_are_taken_off() -> None:
+    """A stage of a third of the mass beyond a contact of 5e6 N/m, of which half is on a spring at 400 Hz: the log as
+    the sensor on the stage sees it, by a few rounds of what the stage does to the force and the motion."""
+    log, time = sliding(), np.arange(0, SECONDS, DT)
+    share, contact = 1 / 3, 5e6
+    position, force = log["position"], log["force"]
+    for _ in range(4):
+        jerks = np.gradient(np.gradient(position, time), time)
+        carried = share * MASS * jerks
+        position = log["position"] + (force - carried) / contact
+        force = log["force"] + share * MASS * (jerks - np.gradient(np.gradient(log["position"], time), time))
+    seen = replace(log, signals={"position": position, "force": force})
+    stiff = replace(THERE, contact=contact, beyond=share)
+    assert values(stribeck_from_slow_sliding(seen, stiff, KNOWN)) == pytest.approx(TRUE, rel=0.02)
+    rigid = replace(THERE, mode=Mode(0.2, 400.0, 0.01))
+    assert values(stribeck_from_slow_sliding(log, rigid, KNOWN)) == pytest.approx(TRUE, rel=0.02)
+
+
+def reason(log: Log, known: Known | None = KNOWN) -> str:
+    found = stribeck_from_slow_sliding(log, THERE, known)
+    assert not found.estimates[2].shown
+    return found.estimates[2].reason
+
+
+def test_what_a_log_cannot_show_is_told() -> None:
+    assert "--as presliding" in reason(sliding(), None)
+    short = record("x", DT, **{role: signal[:1500] for role, signal in sliding().signals.items()})
+    assert "1500 samples" in reason(short)
+    still = record("x", DT, position=np.full(5000, 0.1), force=np.zeros(5000))
+    assert "stand out of the noise" in reason(still)
+    quick = record("x", DT, position=1e-6 * np.sin(2 * np.pi * 1500 * DT * np.arange(9000)), force=np.zeros(9000))
+    assert "or less is needed" in reason(quick)
+    assert "no faster than" in reason(sliding(swing=0.4e-3, mean=0.4e-3))
+    unlike = sliding()
+    unlike = replace(unlike, signals={**unlike.signals, "force": np.roll(unlike["force"], 150)})
+    assert "not explained" in reason(unlike)
+    with pytest.raises(friso.StageError, match="force"):
+        stribeck_from_slow_sliding(record("x", DT, position=np.zeros(9000)), THERE, KNOWN)
+
+
+def test_level_friction_shows_its_level_alone() -> None:
+    found = stribeck_from_slow_sliding(sliding(coulomb=STATIC), THERE, KNOWN)
+    coulomb, static, stribeck = found.estimates
+    assert coulomb.value == pytest.approx(STATIC, rel=0.02)
+    assert "no rise" in static.reason
+    assert not stribeck.shown
+
+
+@pytest.fixture
+def one_place(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(many_speeds, "PLACES", 1)
+    monkeypatch.setattr(slow_sliding, "PLACES", 2)
+
+
+@pytest.mark.usefixtures("one_place")
+def test_a_machine_on_which_no_slow_pass_is_steady_shows_its_friction_on_the_rig() -> None:
+    """Drawn machine 93: its passes tell no Stribeck velocity, at whatever setting; friction as at the place."""
+    machine = built(93)
+    stage, flat = locked(machine.truth), machine.flat
+    passes = many_speeds.many_speeds(stage, 1)
+    assert not passes.places[0].velocity.both.stribeck_velocity.shown
+    for each in slow_sliding.slow_sliding(stage, [place.log for place in passes.places], 1):
+        places = each.log.true["cart_position"]
+        there = friction_factors(flat, np.linspace(places.min(), places.max(), 500)).mean(axis=1)
+        coulomb, static, stribeck = each.found.estimates
+        assert coulomb.value == pytest.approx(flat["friction.coulomb"] * there[1], rel=0.02)
+        assert static.value == pytest.approx(flat["friction.static"] * there[0], rel=0.02)
+        assert stribeck.value == pytest.approx(flat["friction.stribeck_velocity"], rel=0.03)
+        assert stribeck.holds(flat["friction.stribeck_velocity"])
+
+
+@pytest.mark.usefixtures("one_place")
+def test_the_stage_file_takes_it_with_what_presliding_shows() -> None:
+    from friso.studies.rig.presliding import presliding_log
+
+    machine = built(93)
+    stage, flat = locked(machine.truth), machine.flat
+    passed = many_speeds.many_speeds_logs(stage, 1)
+    slow: list[tuple[Any, str]] = [
+        (each.log, "slow-sliding") for each in slow_sliding.slow_sliding_logs(stage, passed, 1)
+    ]
+    alone = identify(slow, machine.guess)
+    assert alone.stage is not None
+    assert alone.stage.flat()["friction.stribeck_velocity"] == machine.guess.flat()["friction.stribeck_velocity"]
+    small = presliding_log(stage, "small", 0.01, 1).log
+    found = identify([*slow, (small, "presliding")], machine.guess)
+    assert found.stage is not None
+    for key in ("friction.static", "friction.coulomb"):
+        assert found.stage.flat()[key] == pytest.approx(flat[key], rel=0.15)
+    assert found.stage.flat()["friction.stribeck_velocity"] == pytest.approx(
+        flat["friction.stribeck_velocity"], rel=0.03
+    )
+    assert found.correlations.keys
