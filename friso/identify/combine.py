@@ -38,8 +38,7 @@ def combined(found: Sequence[Estimate]) -> tuple[list[Estimate], list[str]]:
             one, agrees = _left(key, own)
         answers.append(one)
         if not agrees:
-            texts = "; ".join(_text(each) for each in (sure or own))
-            said.append(f"{key}: the experiments disagree, the interval allows for that: {texts}")
+            said.append(f"{key}: the experiments disagree, the interval allows for that: {_texts(sure or own)}")
         beyond = [each for each in own if shown and not each.shown and (each.low > one.high or each.high < one.low)]
         said += [f"{key}: {_text(one)} is shown, but {_text(each)}" for each in beyond]
     return answers, said
@@ -129,6 +128,17 @@ def _left(key: str, own: Sequence[Estimate]) -> tuple[Estimate, bool]:
 
 
 def _text(each: Estimate) -> str:
+    return f"{_value(each)} by {each.method}"
+
+
+def _texts(every: Sequence[Estimate]) -> str:
+    """The values by method."""
+    methods = dict.fromkeys(each.method for each in every)
+    own = ([_value(each) for each in every if each.method == method] for method in methods)
+    return "; ".join(f"{', '.join(values)} by {method}" for method, values in zip(methods, own, strict=True))
+
+
+def _value(each: Estimate) -> str:
     if each.shown:
-        return f"{each.value:.4g} ({each.low:.4g} to {each.high:.4g}) by {each.method}"
-    return f"{each.low:.4g} to {each.high:.4g} is all that is possible by {each.method}"
+        return f"{each.value:.4g} ({each.low:.4g} to {each.high:.4g})"
+    return f"{each.low:.4g} to {each.high:.4g} is all that is possible"

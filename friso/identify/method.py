@@ -346,18 +346,11 @@ def _parasitic(model: TwoMass, stage: Stage) -> float | None:
 def _shared(total: Estimate, stage: Stage) -> tuple[Estimate, ...]:
     """The whole mass, shared among the masses as in the stage."""
     given = {f"masses.{name}": value for name, value in stage.masses if value is not None}
-    whole = sum(given.values())
+    method, sizes = f"{total.method}, shared as in the stage file", ("value", "low", "high", "systematic")
+    shares = {key: value / sum(given.values()) for key, value in given.items()}
     return tuple(
-        Estimate(
-            key,
-            "kg",
-            total.value * share,
-            total.low * share,
-            total.high * share,
-            f"{total.method}, shared as in the stage file",
-            systematic=total.systematic * share,
-        )
-        for key, share in ((key, value / whole) for key, value in given.items())
+        replace(total, name=key, unit="kg", method=method, **{size: getattr(total, size) * share for size in sizes})
+        for key, share in shares.items()
     )
 
 

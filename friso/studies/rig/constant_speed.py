@@ -8,12 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from friso.identify.experiments import FrictionPosition, FrictionVelocity, friction_position, friction_velocity
-from friso.quantities import StageError
 from friso.rig.run import run
 from friso.rig.task import legs
 from friso.stage import Stage
 from friso.studies.rig.many_speeds import SAMPLES, STANDS, ManySpeeds, many_speeds, mean_friction
-from friso.studies.rig.outcome import Outcome, Progress, RigLog, rig_log
+from friso.studies.rig.outcome import Outcome, Progress, RigLog, rig_log, stopped
 from friso.studies.rig.sizes import freed, interval, locked, longest_way, moving_mass, pace, travel
 from friso.studies.rig.slow_sliding import Slow, slow_sliding
 
@@ -69,7 +68,7 @@ def _passes(name: str, stage: Stage, seed: int) -> Passes:
     log, mass = _passes_log(name, stage, seed), moving_mass(stage)
     cart = log.true["cart_position"]
     if not len(cart):
-        raise StageError("controller", f"a loop that stopped {log.failure}", "a stable one", 'crossover = "8 Hz"')
+        raise stopped(log)
     place = friction_position(log.log, mass, pace(stage))
     true = mean_friction(stage, np.array(speeds(stage)), np.linspace(cart.min(), cart.max(), 1000))
     return Passes(name, log, place, friction_velocity(log.log, mass), true)

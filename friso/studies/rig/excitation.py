@@ -11,11 +11,10 @@ import numpy as np
 from friso.identify.response.periodic import multisine
 from friso.identify.response.records import Record, from_log
 from friso.identify.response.response import Channels, FrequencyResponse
-from friso.quantities import StageError
 from friso.rig.run import Recorded, as_built_keys, run
 from friso.rig.task import standing
 from friso.stage import Stage
-from friso.studies.rig.outcome import RigLog
+from friso.studies.rig.outcome import RigLog, stopped
 from friso.studies.rig.sizes import friction, interval, pace
 
 PERIOD, PERIODS = 8.0, 8
@@ -77,7 +76,7 @@ def plant(logs: Sequence[RigLog]) -> FrequencyResponse:
     that was not stable."""
     for log in logs:
         if log.failure:
-            raise StageError("controller", f"a loop that stopped {log.failure}", "a stable one", 'crossover = "8 Hz"')
+            raise stopped(log)
     return multisine([from_log(each.log, "force", "position", "disturbance")[0] for each in logs])
 
 

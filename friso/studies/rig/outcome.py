@@ -11,6 +11,7 @@ import numpy as np
 from friso.engine.arrays import Status
 from friso.identify.experiments import record
 from friso.identify.logs.log import Log
+from friso.quantities import StageError
 from friso.rig.run import Recorded
 from friso.stage import Stage
 
@@ -71,6 +72,11 @@ def rig_log(recorded: Recorded, row: int, name: str, kind: str | None, stage: St
     logged, true = ({role: values[:count] for role, values in each.items()} for each in (logged, true))
     why = why and f"after {count * recorded.interval:.3g} s: {why}"
     return RigLog(name, kind, recorded.interval, logged, true, stage, seed, why)
+
+
+def stopped(log: RigLog) -> StageError:
+    """The error of a log that stopped before it shows anything."""
+    return StageError("controller", f"a loop that stopped {log.failure}", "a stable one", 'crossover = "8 Hz"')
 
 
 WINDOWS, SATURATED = 20, 0.1
