@@ -97,7 +97,9 @@ def test_a_held_joint_gives_way_in_series() -> None:
         bent = (force + beyond * acceleration) / contact
         position = log["position"] + bent
     whole = replace(log, signals={**log.signals, "position": position, "force": force + beyond * acceleration})
-    found = bristles_from_presliding(whole, Between(contact=contact, beyond=beyond / (MASS + beyond)))
+    found = bristles_from_presliding(
+        whole, Between(contact=contact, mass=MASS + beyond, beyond=beyond / (MASS + beyond))
+    )
     assert found.stiffness.value == pytest.approx(STIFFNESS, rel=5e-3)
     soft = bristles_from_presliding(whole)
     assert soft.stiffness.value == pytest.approx(1 / (1 / STIFFNESS + 1 / contact), rel=0.01)
@@ -113,9 +115,10 @@ def test_a_mode_of_the_structure_is_told_from_the_mass() -> None:
     more = (omega / (2 * np.pi * mode)) ** 2
     extra = -2e-7 * share * MASS * (more / (1 - more) * omega**2 * np.sin(phases)).sum(axis=0)
     shaking = replace(log, signals={**log.signals, "force": log["force"] + extra})
-    assert bristles_from_presliding(shaking).mass.value == pytest.approx(MASS, rel=2e-3)
-    known = Between(delay=0.0, mode=Mode(share, mode, 1e-6))
-    assert bristles_from_presliding(shaking, known).mass.value == pytest.approx(MASS, rel=1e-3)
+    found = bristles_from_presliding(shaking)
+    assert found.mass.value == pytest.approx(MASS, rel=2e-3)
+    known = bristles_from_presliding(shaking, Between(delay=0.0, mode=Mode(share, mode, 1e-6)))
+    assert known.mass.value == pytest.approx(MASS, rel=1e-3)
 
 
 def test_noise_of_the_sensor_does_not_matter_until_motion_is_lost_in_it() -> None:
@@ -136,7 +139,7 @@ def test_what_a_log_cannot_show_is_told() -> None:
     short = shaken()
     short = record("short", DT, **{role: values[:500] for role, values in short.signals.items()})
     assert "500 samples" in bristles_from_presliding(short).stiffness.reason
-    still = record("still", DT, position=np.full(12000, 0.5), force=np.zeros(12000))
+    still = record("still", DT, position=np.full(12000, 0.5), force=np.arange(12000.0))
     assert "stand out of the noise" in bristles_from_presliding(still).stiffness.reason
     with pytest.raises(friso.StageError, match="force"):
         bristles_from_presliding(record("x", DT, position=np.zeros(10000)))
@@ -168,13 +171,17 @@ def test_a_slow_current_loop_is_taken_off() -> None:
 
 
 def test_a_free_joint_is_seen_by_its_sensor_or_by_its_stiffness() -> None:
-    """With the deflection measured it need not be held; without, its stiffness is not taken for the bristles'."""
-    stage = friso.load(EXAMPLE).replace({"drive.relative_noise": "1 nm"})
+    """With the deflection measured it need not be held; without, its stiffness is not taken for the bristles'. Cables
+    pull at the stage, which moves ten times as far as the cart then: there are none here."""
+    none = {"cable.stiffness": "0 N/m", "cable.drag": "0 N*s/m"}
+    stage = friso.load(EXAMPLE).replace({"drive.relative_noise": "1 nm", **none})
     flat = stage.flat()
     log = presliding_log(stage, "free", 0.02, 1).log
     found = bristles_from_presliding(log, between(flat))
-    if found.stiffness.shown:
-        assert found.stiffness.holds(flat["friction.bristle_stiffness"])
+    assert found.stiffness.holds(flat["friction.bristle_stiffness"])
+    assert found.damping.holds(flat["friction.bristle_damping"])
+    assert found.mass.holds(1.7)
+    assert found.stiffness.half_width < 0.1 * found.stiffness.value
     blind = replace(log, signals={role: log.signals[role] for role in ("position", "force")})
     assert "joint: is it held?" in bristles_from_presliding(blind, between(flat)).stiffness.reason
 

@@ -7,15 +7,15 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from rig_machines import built
+from rig_machines import EXAMPLE, built
 
 import friso
 from friso.identify.experiments import SlowSliding, record, stribeck_from_slow_sliding
-from friso.identify.experiments.at_bearing import Between, Mode
+from friso.identify.experiments.at_bearing import Between, Record, at_bearing
 from friso.identify.experiments.common import deflections
 from friso.identify.experiments.slow_sliding import Known
 from friso.identify.logs.log import Log
-from friso.identify.method import identify
+from friso.identify.method import between, identify
 from friso.rig.rail import friction_factors
 from friso.studies.rig import many_speeds, slow_sliding
 from friso.studies.rig.sizes import locked
@@ -25,14 +25,20 @@ MASS, STIFFNESS, DAMPING, VISCOUS = 1.7, 1e5, 300.0, 2.0
 COULOMB, STATIC, STRIBECK = 1.0, 2.2, 1.5e-3
 KNOWN = Known((MASS, 0.0), (STIFFNESS, 0.0), (DAMPING, 0.0))
 TRUE = [COULOMB, STATIC, STRIBECK]
-THERE = Between(delay=0.0, viscous=VISCOUS)
+THERE = Between(delay=0.0, mass=MASS, viscous=(VISCOUS, 0.0))
 
 
 def sliding(
-    swing: float = 4e-3, mean: float = 1.5e-3, coulomb: float = COULOMB, stribeck: float = STRIBECK, noise: float = 0.0
+    swing: float = 4e-3,
+    mean: float = 1.5e-3,
+    coulomb: float = COULOMB,
+    stribeck: float = STRIBECK,
+    noise: float = 0.0,
+    start: float = 0.0,
+    exponent: float = 2.0,
 ) -> Log:
     """Motion at a mean velocity [m/s] that swings by `swing` [m/s], there and back, and the force of a mass on LuGre's
-    bristles, computed in fine steps."""
+    bristles, computed in fine steps from a deflection at the `start` [m] on."""
     each = DT / FINE
     time = np.arange(0, SECONDS, each)
     way = np.tanh(20 * (SECONDS / 2 - time))
@@ -41,8 +47,8 @@ def sliding(
     position = np.cumsum(velocity) * each
     acceleration = np.gradient(velocity, each)
     moves = np.diff(position)
-    level = coulomb + (STATIC - coulomb) * np.exp(-((moves / each / stribeck) ** 2))
-    z = deflections(moves, level / STIFFNESS)
+    level = coulomb + (STATIC - coulomb) * np.exp(-(np.abs(moves / each / stribeck) ** exponent))
+    z = deflections(moves, level / STIFFNESS, start)
     force = MASS * acceleration + STIFFNESS * z + DAMPING * np.gradient(z, each) + VISCOUS * velocity + 0.2
     rng = np.random.default_rng(1)
     seen = position[::FINE]
@@ -77,9 +83,47 @@ def test_noise_of_the_sensor_and_doubt_about_the_bristles_widen_the_intervals() 
     assert all(one.half_width > other.half_width for one, other in pairs)
 
 
-def test_contact_and_mode_are_taken_off() -> None:
-    """A stage of a third of the mass beyond a contact of 5e6 N/m, of which half is on a spring at 400 Hz: the log as
-    the sensor on the stage sees it, by a few rounds of what the stage does to the force and the motion."""
+def test_strained_bristles_at_the_start_and_another_exponent_do_not_matter() -> None:
+    for start in (-1.5e-5, 1e-5):
+        assert values(stribeck_from_slow_sliding(sliding(start=start), THERE, KNOWN)) == pytest.approx(TRUE, rel=0.02)
+    other = replace(KNOWN, exponent=1.0)
+    found = stribeck_from_slow_sliding(sliding(exponent=1.0), THERE, other)
+    assert values(found) == pytest.approx(TRUE, rel=0.03)
+    assert not all(holds(stribeck_from_slow_sliding(sliding(exponent=1.0), THERE, KNOWN)))
+
+
+def test_doubt_about_viscous_friction_and_delay_is_in_the_intervals() -> None:
+    viscous = replace(THERE, viscous=(3 * VISCOUS, 2 * VISCOUS))
+    assert all(holds(stribeck_from_slow_sliding(sliding(), viscous, KNOWN)))
+    log = sliding()
+    late = replace(log, signals={**log.signals, "force": np.roll(log["force"], -1)})
+    assert values(stribeck_from_slow_sliding(late, replace(THERE, delay=DT), KNOWN)) == pytest.approx(TRUE, rel=0.02)
+    assert all(holds(stribeck_from_slow_sliding(late, replace(THERE, delay=0.8 * DT), KNOWN)))
+
+
+def test_a_stage_with_a_mode_is_what_its_two_masses_do() -> None:
+    """Against the steady vibration of two masses on a spring, whose frequency is that of both against each other."""
+    stage = friso.load(EXAMPLE)
+    flat = stage.flat()
+    part, whole, time = flat["parasitic.mass"], flat["masses.stage"], np.arange(0, 2.0, 1e-4)
+    reduced = part * (whole - part) / whole
+    pair = 2 * np.pi * flat["parasitic.frequency"]
+    spring, damping = reduced * pair**2, 2 * flat["parasitic.damping_ratio"] * reduced * pair
+    for hertz in (40.0, 90.0, 150.0):
+        s = 2j * np.pi * hertz
+        followed = (spring + s * damping) / (spring + s * damping + part * s**2)
+        turning = np.exp(s * time)
+        record = Record(time, 1e-6 * turning.real, np.zeros(len(time)), 0 * time)
+        total = flat["masses.cart"] + whole
+        _, _, inertia = at_bearing(record, between(flat), total)
+        true = ((total - part + part * followed) * s**2 * 1e-6 * turning).real
+        inside = slice(len(time) // 2, -200)
+        assert total * inertia[inside] == pytest.approx(true[inside], abs=0.01 * np.abs(true).max())
+
+
+def test_a_contact_is_taken_off() -> None:
+    """A stage of a third of the mass beyond a contact of 5e6 N/m: the log as the sensor on it sees it, by a few rounds
+    of what the stage does to the force and the motion."""
     log, time = sliding(), np.arange(0, SECONDS, DT)
     share, contact = 1 / 3, 5e6
     position, force = log["position"], log["force"]
@@ -91,8 +135,6 @@ def test_contact_and_mode_are_taken_off() -> None:
     seen = replace(log, signals={"position": position, "force": force})
     stiff = replace(THERE, contact=contact, beyond=share)
     assert values(stribeck_from_slow_sliding(seen, stiff, KNOWN)) == pytest.approx(TRUE, rel=0.02)
-    rigid = replace(THERE, mode=Mode(0.2, 400.0, 0.01))
-    assert values(stribeck_from_slow_sliding(log, rigid, KNOWN)) == pytest.approx(TRUE, rel=0.02)
 
 
 def reason(log: Log, known: Known | None = KNOWN) -> str:
@@ -103,11 +145,15 @@ def reason(log: Log, known: Known | None = KNOWN) -> str:
 
 def test_what_a_log_cannot_show_is_told() -> None:
     assert "--as presliding" in reason(sliding(), None)
+    assert "delay" in stribeck_from_slow_sliding(sliding(), replace(THERE, delay=None), KNOWN).estimates[0].reason
     short = record("x", DT, **{role: signal[:1500] for role, signal in sliding().signals.items()})
     assert "1500 samples" in reason(short)
-    still = record("x", DT, position=np.full(5000, 0.1), force=np.zeros(5000))
+    still = record("x", DT, position=np.full(5000, 0.1), force=np.arange(5000.0))
     assert "stand out of the noise" in reason(still)
-    quick = record("x", DT, position=1e-6 * np.sin(2 * np.pi * 1500 * DT * np.arange(9000)), force=np.zeros(9000))
+    assert "force does not change" in reason(
+        replace(sliding(), signals={**sliding().signals, "force": np.zeros(20000)})
+    )
+    quick = record("x", DT, position=1e-6 * np.sin(2 * np.pi * 1500 * DT * np.arange(9000)), force=np.arange(9000.0))
     assert "or less is needed" in reason(quick)
     assert "no faster than" in reason(sliding(swing=0.4e-3, mean=0.4e-3))
     unlike = sliding()

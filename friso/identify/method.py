@@ -207,10 +207,10 @@ def _analysed(
         start = {**flat, **{name: each.value for name, each in best.items() if name in flat}}
         return identify_moves(log, start, own and "reference" in log, options.bandwidth)
     if kind in (PRESLIDING, SLOW_SLIDING):
-        believed = between({**flat, **{key: each.value for key, each in best.items()}})
+        believed = _believed(flat, best)
         if kind == PRESLIDING:
             return bristles_from_presliding(log, believed)
-        return stribeck_from_slow_sliding(log, believed, _known(best))
+        return stribeck_from_slow_sliding(log, believed, _known(flat, best))
     if kind == STICK_SLIP:
         return _stick_slip(log, best.get("joint.stiffness"), flat, masses["stage"])
     mass = sum(masses.values())
@@ -239,32 +239,49 @@ def _stick_slip(log: Log, stiffness: Estimate | None, flat: Mapping[str, Any], s
     return found
 
 
-def _known(best: Mapping[str, Estimate]) -> Known | None:
+def _believed(flat: Mapping[str, Any], best: Mapping[str, Estimate]) -> Between:
+    """What lies between force and bearing, as other experiments show it or else the stage file has it, which tells no
+    viscous friction better than to its whole size."""
+    found = between({**flat, **{key: each.value for key, each in best.items()}})
+    viscous = best.get("friction.viscous")
+    return replace(found, viscous=(found.viscous[0], viscous.half_width if viscous else found.viscous[0]))
+
+
+def _known(flat: Mapping[str, Any], best: Mapping[str, Estimate]) -> Known | None:
     """The mass and the bristles that other experiments show; None where they do not."""
-    masses = [each for key, each in best.items() if key.startswith("masses.")]
-    bristles = [best.get(key) for key in ("friction.bristle_stiffness", "friction.bristle_damping")]
-    if not masses or None in bristles:
+    masses = [key for key in flat if key.startswith("masses.")]
+    bristles = ["friction.bristle_stiffness", "friction.bristle_damping"]
+    if not masses or not all(key in best for key in (*masses, *bristles)):
         return None
-    whole = sum(each.value for each in masses), sum(each.half_width for each in masses)
-    return Known(whole, *((each.value, each.half_width) for each in bristles if each is not None))
+    mass = sum(best[key].value for key in masses), sum(best[key].half_width for key in masses)
+    stiffness, damping = ((best[key].value, best[key].half_width) for key in bristles)
+    return Known(mass, stiffness, damping, flat.get("friction.stribeck_exponent", 2.0))
 
 
 def between(flat: Mapping[str, Any]) -> Between:
     """What lies between the commanded force and the bearing of a stage given as flat keys, a joint being held by its
-    limiter."""
+    limiter.
+
+    The frequency of the parasitic mode is that of both parts of the stage's mass against each other; with the other one
+    held, that of the part on the spring is lower.
+    """
     drive, joint, mode = (
         {key.removeprefix(name): value for key, value in flat.items() if key.startswith(name)}
         for name in ("drive.", "joint.", "parasitic.")
     )
-    masses = [flat.get(f"masses.{name}", 0.0) for name in ("cart", "stage")]
+    cart, held = (flat.get(f"masses.{name}", 0.0) for name in ("cart", "stage"))
+    lower = np.sqrt(1 - mode["mass"] / held) if mode else 1.0
     return Between(
         delay=drive.get("delay", 0.0) + drive["sample_time"] / 2 if "sample_time" in drive else None,
         bandwidth=drive.get("current_bandwidth", np.inf),
+        mass=cart + held,
+        beyond=held / (cart + held) if joint and held else 0.0,
         contact=joint.get("limiter_stiffness", np.inf),
-        beyond=masses[1] / sum(masses) if joint else 0.0,
         joint=joint.get("stiffness", 0.0),
-        viscous=flat.get("friction.viscous", 0.0),
-        mode=Mode(mode["mass"] / sum(masses), mode["frequency"], mode["damping_ratio"]) if mode else None,
+        mode=Mode(mode["mass"] / (cart + held), *(lower * mode[key] for key in ("frequency", "damping_ratio")))
+        if mode
+        else None,
+        viscous=(flat.get("friction.viscous", 0.0), 0.0),
     )
 
 

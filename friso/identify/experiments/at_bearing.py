@@ -1,4 +1,8 @@
-"""From what the drive commands and the sensor sees to the bearing: force and motion of the body that rides on it."""
+"""From what the drive commands and the sensor sees to the bearing: force and motion of the body that rides on it.
+
+What of a record is looked at is held at a low-pass; friction depends on the whole motion, though, and so the motion is
+seen up to a few times that frequency.
+"""
 
 from __future__ import annotations
 
@@ -8,14 +12,33 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.signal import bilinear, lfilter, lfilter_zi
 
+from friso.identify.experiments.common import channel, deflection, low_pass, motion_bandwidth, robust
+from friso.identify.logs.log import Log
+
 FINER = 8
 """Points per sample for what a mode of the structure does: a mode of a tenth of the sampling rate is off by 0.05 %."""
+
+LEAST, SAMPLED = 20, 0.2
+"""Periods of the low-pass that a record lasts at least, and the highest frequency of the motion over that of the
+samples."""
+
+EDGE = 2.0
+"""Periods of the low-pass at either end of a record that its start and end touch."""
+
+SEEN, ROUNDING = 10.0, 1e-9
+"""Standard deviations of the noise that those of the motion have to reach, and the same over the largest position."""
+
+MOVES, STANDS_OUT, GIVES = 0.02, 3.0, 3.0
+"""A joint bends where its deflection reaches this share of the motion, so many times its sensor's noise, and so many
+times what the contact that holds it gives."""
+
+HELD = "The joint is taken as held, with the limiter's stiffness: it is not seen to bend."
 
 
 @dataclass(frozen=True)
 class Mode:
-    """The first mode of a structure: a `share` of the moving mass on a spring of its own, its frequency [Hz] and
-    damping ratio."""
+    """The first mode of a structure on the side of the force and the sensor: a `share` of the moving mass on a spring
+    of its own, and the frequency [Hz] and damping ratio that it has there, the rest being held."""
 
     share: float
     frequency: float
@@ -25,46 +48,129 @@ class Mode:
 @dataclass(frozen=True)
 class Between:
     """What lies between the force that is commanded and the bearing: its `delay` [s] (None: not known) and the
-    `bandwidth` of the current loop [Hz]; the stiffness [N/m] of the `contact` that holds a joint, the share of the
-    moving mass that is `beyond` it, and the stiffness [N/m] of the `joint` itself; the viscous friction [N s/m]; the
-    `mode` of the structure, on the side of the force and the sensor."""
+    `bandwidth` of the current loop [Hz]; the `mass` [kg] that is believed to move and the share of it that is `beyond`
+    the joint; the stiffness [N/m] of the `contact` that holds the joint, and of the `joint` itself; the `mode` of the
+    structure; the viscous friction [N s/m] and the half-width of its interval."""
 
     delay: float | None = None
     bandwidth: float = np.inf
-    contact: float = np.inf
+    mass: float = 0.0
     beyond: float = 0.0
+    contact: float = np.inf
     joint: float = 0.0
-    viscous: float = 0.0
     mode: Mode | None = None
+    viscous: tuple[float, float] = (0.0, 0.0)
 
 
 DIRECT = Between()
 """Nothing lies between; the delay is not known."""
 
 
-def at_bearing(
-    time: np.ndarray,
-    position: np.ndarray,
-    command: np.ndarray,
-    between: Between,
-    mass: float,
-    bent: np.ndarray | None = None,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Position [m] of the body on the bearing and the force [N] that reaches it, from the position of the sensor and
-    the commanded force over time [s], all of shape (n,), of a machine that moves a mass [kg]: the force less the
-    inertia of what it moves before, its mode included. `bent` is the deflection of the joint where it is measured; else
-    the contact gives way."""
-    acceleration = rate_of(time, rate_of(time, position))
-    force = _arrived(time, command, between) - between.beyond * mass * acceleration
+@dataclass(frozen=True)
+class Record:
+    """Time [s], position of the body on which the force acts, deflection of the joint that carries it [m] (None: it
+    is held), and force [N], shape (n,)."""
+
+    time: np.ndarray
+    position: np.ndarray
+    bent: np.ndarray | None
+    force: np.ndarray
+
+    @property
+    def interval(self) -> float:
+        """Between samples [s]."""
+        return float(self.time[1] - self.time[0])
+
+    @property
+    def body(self) -> np.ndarray:
+        """About where the body on the bearing is [m], shape (n,)."""
+        return self.position if self.bent is None else self.position - self.bent
+
+    def seen(self, cutoff: float, step: int = 1) -> Record:
+        """With the motion low-passed at a frequency [Hz], about its start, and every `step`th sample."""
+        place = low_pass(self.position, self.interval, cutoff)
+        bent = None if self.bent is None else low_pass(self.bent, self.interval, cutoff)[::step]
+        force = self.force if step == 1 else low_pass(self.force, self.interval, cutoff)
+        return Record(self.time[::step], (place - place[0])[::step], bent, force[::step])
+
+
+@dataclass(frozen=True)
+class LowPass:
+    """At a `cutoff` [Hz] over time [s], shape (n,)."""
+
+    time: np.ndarray
+    cutoff: float
+
+    @property
+    def inside(self) -> slice:
+        """The samples which the ends of the record do not touch."""
+        edge = int(EDGE / (self.cutoff * (self.time[1] - self.time[0])))
+        return slice(edge, len(self.time) - edge)
+
+    def __call__(self, signal: np.ndarray) -> np.ndarray:
+        """The signal, shape (n,), low-passed, inside."""
+        return low_pass(signal, float(self.time[1] - self.time[0]), self.cutoff)[self.inside]
+
+
+def record_of(log: Log, part: slice, between: Between) -> Record:
+    """A part of a log. Raises StageError for missing channels."""
+    position, force = channel(log, "position")[part], channel(log, "force")[part]
+    return Record(log.time[part], position, _bent(log, part, position, float(force.std()) / between.contact), force)
+
+
+def why_unseen(record: Record, fewest: int) -> str:
+    """Why nothing can be read from a record, of which so many samples are needed; empty where it can."""
+    if len(record.time) < fewest:
+        return f"the record has {len(record.time)} samples: {fewest} are needed"
+    if not np.ptp(record.force) > 0:
+        return "the force does not change"
+    highest = motion_bandwidth(record.body, record.interval)
+    if highest * record.interval > SAMPLED:
+        needed = SAMPLED / highest
+        return f"the motion goes up to {highest:.3g} Hz: one sample in {needed:.3g} s or less is needed"
+    cutoff = max(highest, LEAST / (len(record.time) * record.interval))
+    motion = float(low_pass(record.position, record.interval, cutoff).std())
+    noise = robust(np.diff(record.position, 2)) / 6**0.5
+    if not motion > max(SEEN * noise, ROUNDING * float(np.abs(record.position).max())):
+        return f"the motion, {motion:.2g} m RMS, does not stand out of the noise"
+    return ""
+
+
+def cutoff_of(record: Record) -> float:
+    """The low-pass [Hz] for a record: where its motion ends, but no slower than its length allows."""
+    highest = motion_bandwidth(record.body, record.interval)
+    return max(min(highest, SAMPLED / (2 * record.interval)), LEAST / (len(record.time) * record.interval))
+
+
+def at_bearing(record: Record, between: Between, mass: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Position [m] of the body on the bearing, the force [N] that has arrived, and the acceleration [m/s^2] that it
+    gives to the whole moving mass, shape (n,) each: inertia is the mass times that. `mass` [kg] counts where a contact
+    gives way, by the force that goes through it."""
+    time, acceleration = record.time, rate_of(record.time, rate_of(record.time, record.position))
+    force, before = _arrived(time, record.force, between), between.beyond * acceleration
     if between.mode is not None:
-        lag = _followed(time, acceleration, between.mode) - acceleration
-        force = force - between.mode.share * mass * lag
-    return position - (force / between.contact if bent is None else bent), force
+        before = before + between.mode.share * (_followed(time, acceleration, between.mode) - acceleration)
+    gives = (force - mass * before) / between.contact if record.bent is None else record.bent
+    body = record.position - gives
+    return body, force, before + (1 - between.beyond) * rate_of(time, rate_of(time, body))
 
 
 def rate_of(time: np.ndarray, signal: np.ndarray) -> np.ndarray:
     """Time derivative of a signal, shape (n,), by a spline."""
     return CubicSpline(time, signal)(time, 1)
+
+
+def _bent(log: Log, part: slice, position: np.ndarray, gives: float) -> np.ndarray | None:
+    """The measured deflection [m] of a joint that bends; None where it is not measured, or held and about what its
+    contact `gives` [m]."""
+    measured = deflection(log)
+    if measured is None or len(position) < LEAST:
+        return None
+    bent, cutoff = measured[part], SAMPLED / log.sample_time / 4
+    size = low_pass(bent, log.sample_time, cutoff).std()
+    noise = low_pass(np.random.default_rng(0).standard_normal(len(bent)), log.sample_time, cutoff).std()
+    noise *= robust(np.diff(bent, 2)) / 6**0.5
+    return bent if size > max(STANDS_OUT * noise, MOVES * position.std(), GIVES * gives) else None
 
 
 def _arrived(time: np.ndarray, command: np.ndarray, between: Between) -> np.ndarray:

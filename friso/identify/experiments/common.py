@@ -13,6 +13,7 @@ from scipy.stats import t as student
 
 from friso.identify.estimate import Estimate
 from friso.identify.logs.log import ROLES, Log
+from friso.intervals import COVERAGE
 from friso.quantities import StageError
 
 ORDER = 2
@@ -27,10 +28,6 @@ NORMAL_MAD = 1.4826
 LINEARITY = 1e-3
 """Share by which the ratio of two channels may be off, however often it is read: the linearity of good sensors and
 amplifiers."""
-
-CLEAR, STRONG, FLOOR, RESOLVED = 100.0, 1e-3, 0.25, 1000
-"""Power over that of the noise, and over the largest of the acceleration, from which motion is seen; the share of the
-spectrum, at its top, which is taken for noise; and lines of the spectrum."""
 
 _EXAMPLES = {"force": '--scale force="35.1507 N/V"', "position": '--unit position="mm"'}
 
@@ -105,7 +102,12 @@ def rate(values: np.ndarray, sample_time: float, cutoff: float) -> np.ndarray:
     return np.gradient(low_pass(values, sample_time, cutoff), sample_time)
 
 
-def reach(position: np.ndarray, sample_time: float) -> float:
+CLEAR, STRONG, FLOOR, RESOLVED = 100.0, 1e-3, 0.25, 1000
+"""Power over that of the noise, and over the largest of the acceleration, from which motion is seen; the share of the
+spectrum, at its top, which is taken for noise; and lines of the spectrum."""
+
+
+def motion_bandwidth(position: np.ndarray, sample_time: float) -> float:
     """The highest frequency [Hz] up to which a position, shape (n,), moves, and stands out of its noise, which is taken
     to be white; 0 where it does nowhere."""
     rates, density = welch(np.diff(position, 2), 1 / sample_time, nperseg=min(len(position) // BLOCKS, 2 * RESOLVED))
@@ -186,12 +188,20 @@ def jackknife(columns: np.ndarray, target: np.ndarray) -> np.ndarray:
     return off.T @ off * (BLOCKS - 1) / BLOCKS
 
 
-def deflections(moves: np.ndarray, ends: np.ndarray) -> np.ndarray:
+def correlation_of(covariance: np.ndarray, shifts: np.ndarray, even: np.ndarray) -> np.ndarray:
+    """Correlation, shape (p, p), of quantities of that covariance, which systematic `shifts`, shape (m, p), move
+    together, and doubts of half-width `even`, shape (p,), each by itself."""
+    whole = covariance + (shifts.T @ shifts + np.diag(even**2)) / COVERAGE**2
+    size = np.sqrt(np.maximum(np.diag(whole), np.finfo(float).tiny))
+    return whole / np.outer(size, size)
+
+
+def deflections(moves: np.ndarray, ends: np.ndarray, start: float = 0.0) -> np.ndarray:
     """Deflection [m] of bristles, shape (n,), under a body that makes these moves [m], at whose velocities the bristles
-    come to rest at `ends` [m], both of shape (n - 1,); straight at first, exact in each move."""
+    come to rest at `ends` [m], both of shape (n - 1,), from a deflection at the `start` [m] on; exact in each move."""
     kept = np.exp(-np.abs(moves) / ends)
     steps = zip((np.sign(moves) * ends).tolist(), kept.tolist(), strict=True)
-    return np.array([*accumulate(steps, lambda z, step: step[0] + (z - step[0]) * step[1], initial=0.0)])
+    return np.array([*accumulate(steps, lambda z, step: step[0] + (z - step[0]) * step[1], initial=start)])
 
 
 def ways(directions: np.ndarray) -> Iterator[tuple[str, np.ndarray]]:

@@ -15,35 +15,35 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from friso.identify.estimate import Estimate
-from friso.identify.experiments.at_bearing import DIRECT, Between, at_bearing, rate_of
+from friso.identify.experiments.at_bearing import (
+    DIRECT,
+    HELD,
+    Between,
+    LowPass,
+    Record,
+    at_bearing,
+    cutoff_of,
+    rate_of,
+    record_of,
+    why_unseen,
+)
 from friso.identify.experiments.common import (
+    BLOCKS,
     LINEARITY,
     Mean,
     by_t,
-    channel,
-    deflection,
+    correlation_of,
     deflections,
     jackknife,
-    low_pass,
-    reach,
-    robust,
     solved,
 )
 from friso.identify.logs.log import Log
 
 CHECKED, MOTION = 0.7, 5.0
-"""Low-pass of a second fit by which the first one is checked, and of the motion itself, both over that of the first:
-friction depends on the whole motion, not on what a low-pass leaves of it."""
+"""Low-pass of a second fit by which the first one is checked, and of the motion, both over that of the first."""
 
-BLOCKS = 8
-"""Blocks of the record that are left out in turn, for the errors."""
-
-LEAST, FINE, SAMPLED = 20, 40, 0.2
-"""Periods of the low-pass that a record lasts at least, samples per period of it that are enough, and the highest
-frequency of the motion over that of the samples."""
-
-FEWEST = 1000
-"""Samples of a record at least."""
+FINE, FEWEST = 40, 1000
+"""Samples per period of the low-pass that are enough; and of a record at least."""
 
 BENDING = (1e-6, 5.0)
 """Of the bending q over the range of the motion: from a straight line to bristles that are at their end long before."""
@@ -51,21 +51,13 @@ BENDING = (1e-6, 5.0)
 EXPLAINED = 0.2
 """Share of the friction's standard deviation that the model may leave unexplained."""
 
-SEEN, ROUNDING = 10.0, 1e-9
-"""Standard deviations of the noise that those of the motion have to reach, and the same over the largest position."""
-
-MOVES, STANDS_OUT = 0.02, 3.0
-"""A joint bends where its deflection reaches this share of the motion, and so many times its sensor's noise."""
-
 SPRING = 3.0
-"""Stiffness over that of the joint up to which it may well be the joint that is seen, and deflection over that of the
-contact up to which it may well be the contact."""
+"""Stiffness over that of the joint up to which it may well be the joint that is seen."""
 
 KEYS = MASS, DAMPING, STIFFNESS = "moving mass", "friction.bristle_damping", "friction.bristle_stiffness"
 UNITS = {MASS: "kg", DAMPING: "N*s/m", STIFFNESS: "N/m"}
 METHOD = "small motion before sliding: force over inertia, bristles' deflection and its rate"
 SLIDES = "the bearing slides, or noise is as large as the force"
-HELD = "The joint is taken as held, with the limiter's stiffness: it is not seen to bend."
 
 
 @dataclass(frozen=True)
@@ -108,88 +100,39 @@ class _Fit:
     model: np.ndarray
 
 
-@dataclass(frozen=True)
-class _Record:
-    """Time [s], position of the body on which the force acts, deflection of the joint that carries it [m] (None: it
-    is held), and force [N], shape (n,)."""
-
-    time: np.ndarray
-    position: np.ndarray
-    bent: np.ndarray | None
-    force: np.ndarray
-
-    def seen(self, cutoff: float) -> _Record:
-        """Low-passed at a frequency [Hz], with no more samples than that needs."""
-        each = float(self.time[1] - self.time[0])
-        step = max(int(MOTION / (FINE * cutoff * each)), 1)
-        place, force = (low_pass(signal, each, cutoff)[::step] for signal in (self.position, self.force))
-        bent = None if self.bent is None else low_pass(self.bent, each, cutoff)[::step]
-        return _Record(self.time[::step], place - place[0], bent, force)
-
-
 def bristles_from_presliding(log: Log, between: Between = DIRECT) -> Presliding:
     """Bristles from a log of position and force whose motion is small beside their break-away. Of a log with gaps the
     longest stretch is used.
 
-    A joint is held, or its deflection is measured. The intervals contain by how much the answer changes up to twice the
-    low-pass and with the delay that fits best (which is taken where none is given), the viscous friction that is
-    taken off the damping, and the share of the friction that is left unexplained: it falls with speed, which the model
-    leaves out. Where that share is large, nothing is shown. Raises StageError for missing channels.
+    A joint is held, or its deflection is measured. The intervals contain by how much the answer changes with a lower
+    low-pass and with the delay that fits best (which is taken where none is given), the doubt about the viscous
+    friction that is taken off the damping, and the share of the friction that is left unexplained: it falls with speed,
+    which the model leaves out. Where that share is large, nothing is shown. Raises StageError for missing channels.
     """
-    part, each = log.longest, log.sample_time
-    position, force = channel(log, "position")[part], channel(log, "force")[part]
-    if len(position) < FEWEST:
-        return _nothing(f"the record has {len(position)} samples: {FEWEST} are needed")
-    cutoff = max(reach(position, each), LEAST / (len(position) * each))
-    why = _why_not(position, each, cutoff)
-    if why:
+    record = record_of(log, log.longest, between)
+    if why := why_unseen(record, FEWEST):
         return _nothing(why)
-    cutoff = min(cutoff, SAMPLED / (2 * each))
-    bent = _bends(log, part, position, cutoff, SPRING * float(force.std()) / between.contact)
-    record = _Record(log.time[part], position, bent, force)
-    own = between.delay is None
-    best, *others = (
-        _settled(record.seen(MOTION * top), between, top, late)
-        for top, late in ((cutoff, own), (CHECKED * cutoff, own), *([] if own else [(cutoff, True)]))
-    )
+    cutoff, looked_for = cutoff_of(record), between.delay is None
+    tried = [(cutoff, looked_for), (CHECKED * cutoff, looked_for), *([] if looked_for else [(cutoff, True)])]
+    best, *others = (_settled(_seen(record, top), between, top, late) for top, late in tried)
     changes = np.array([other.values - best.values for other in others])
-    systematic = np.abs(changes).sum(axis=0) + (best.left + LINEARITY) * np.abs(best.values)
-    systematic[KEYS.index(DAMPING)] += between.viscous
-    why = _no_bristles(best, between, bent is None)
+    even = (best.left + LINEARITY) * np.abs(best.values)
+    even[KEYS.index(DAMPING)] += between.viscous[1]
+    systematic = np.abs(changes).sum(axis=0) + even
+    why = _no_bristles(best, between, record.bent is None)
     mass, damping, stiffness = (
         Estimate.unknown(key, UNITS[key], METHOD, why) if why else _estimate(key, *map(float, numbers))
         for key, *numbers in zip(KEYS, best.values, np.diag(best.covariance) ** 0.5, systematic, strict=True)
     )
-    whole = best.covariance + changes.T @ changes / 4
-    size = np.sqrt(np.diag(whole))
-    said = (HELD,) if bent is None and between.joint else ()
+    correlation = correlation_of(best.covariance, changes, even)
+    said = (HELD,) if record.bent is None and between.joint else ()
     shown = (best.time, best.position, best.force, best.model)
-    return Presliding(mass, damping, stiffness, whole / np.outer(size, size), *shown, best.left, said)
+    return Presliding(mass, damping, stiffness, correlation, *shown, best.left, said)
 
 
-def _why_not(position: np.ndarray, sample_time: float, cutoff: float) -> str:
-    """Why a record cannot show bristles; empty where it can."""
-    if sample_time * cutoff > SAMPLED:
-        needed = SAMPLED / cutoff
-        return f"the motion goes up to {cutoff:.3g} Hz: one sample in {needed:.3g} s or less is needed"
-    motion, noise = low_pass(position, sample_time, cutoff).std(), robust(np.diff(position, 2)) / 6**0.5
-    if not motion > max(SEEN * noise, ROUNDING * float(np.abs(position).max())):
-        return f"the motion, {motion:.2g} m RMS, does not stand out of the noise"
-    return ""
-
-
-def _bends(log: Log, part: slice, position: np.ndarray, cutoff: float, gives: float) -> np.ndarray | None:
-    """The measured deflection [m] of a joint that bends; None where it is not measured, or held and no more than what
-    its contact `gives` [m]."""
-    measured = deflection(log)
-    if measured is None:
-        return None
-    bent = measured[part]
-    size = low_pass(bent, log.sample_time, cutoff).std()
-    noise = low_pass(np.random.default_rng(0).standard_normal(len(bent)), log.sample_time, cutoff).std()
-    noise *= robust(np.diff(bent, 2)) / 6**0.5
-    least = max(STANDS_OUT * noise, MOVES * low_pass(position, log.sample_time, cutoff).std(), gives)
-    return bent if size > least else None
+def _seen(record: Record, cutoff: float) -> Record:
+    """With the motion that belongs to a low-pass [Hz], and no more samples than that needs."""
+    return record.seen(MOTION * cutoff, max(int(1 / (FINE * cutoff * record.interval)), 1))
 
 
 def _nothing(why: str) -> Presliding:
@@ -217,15 +160,15 @@ def _estimate(key: str, value: float, error: float, systematic: float) -> Estima
     return Estimate.unknown(key, UNITS[key], METHOD, why, 0.0, max(found.high, 0.0) or np.inf)
 
 
-def _settled(record: _Record, between: Between, cutoff: float, late: bool) -> _Fit:
-    """The fit once the mass that is believed to move is the one found and, if it is to be looked for (`late`),
-    the delay that which fits best."""
-    fit = _fit(record, replace(between, delay=between.delay or 0.0), cutoff, 0.0, late)
-    delay = (between.delay or 0.0) + fit.late
-    return _fit(record, replace(between, delay=delay), cutoff, float(fit.values[0]), late)
+def _settled(record: Record, between: Between, cutoff: float, late: bool) -> _Fit:
+    """The fit once the mass that is believed to move is the one found and, if it is to be looked for (`late`), the
+    delay is that which fits best."""
+    fit = _fit(record, between, cutoff, between.mass, late)
+    delayed = replace(between, delay=(between.delay or 0.0) + fit.late)
+    return _fit(record, delayed, cutoff, float(fit.values[0]), late)
 
 
-def _fit(record: _Record, between: Between, cutoff: float, mass: float, late: bool) -> _Fit:
+def _fit(record: Record, between: Between, cutoff: float, mass: float, late: bool) -> _Fit:
     """Least squares of the force at a low-pass; the bending, in which it is not linear, is looked for. `mass` [kg] is
     believed to move; with `late`, what a little more delay would do is among the columns."""
     equation = _equation(record, between, cutoff, mass, late)
@@ -241,29 +184,22 @@ def _fit(record: _Record, between: Between, cutoff: float, mass: float, late: bo
     solution = solved(x.T @ x, x.T @ target)
     bends = (equation.columns(1.01 * bending) - equation.columns(bending / 1.01)) @ solution
     covariance = jackknife(np.column_stack([x, bends]), target)[:3, :3]
-    values = solution[:3] + np.array([between.beyond * mass, 0.0, 0.0])
     left = float((target - x @ solution).std() / (target - x[:, 0] * solution[0]).std())
     ends, more = bending * span > 0.99 * BENDING[1], float(solution[-1]) if late else 0.0
-    shown = (equation.time[equation.inside], equation.passed(equation.body), target, x @ solution)
-    return _Fit(values, covariance, more, ends, left, *shown)
+    shown = (record.time[equation.low_pass.inside], equation.low_pass(equation.body), target, x @ solution)
+    return _Fit(solution[:3], covariance, more, ends, left, *shown)
 
 
 @dataclass(frozen=True)
 class _Equation:
-    """Time [s] and position [m] of the body on the bearing, shape (n,); the low-pass [Hz], and the samples `inside`,
-    which its ends do not touch; the force [N] and its columns that do not depend on the bristles, inside, shape (m,)
-    each."""
+    """The low-pass; the position [m] of the body on the bearing, shape (n,); the force [N] and its columns that do not
+    depend on the bristles, at the low-pass, shape (m,) each."""
 
-    time: np.ndarray
+    low_pass: LowPass
     body: np.ndarray
-    cutoff: float
-    inside: slice
     target: np.ndarray
     inertia: np.ndarray
     rest: tuple[np.ndarray, ...]
-
-    def passed(self, signal: np.ndarray) -> np.ndarray:
-        return low_pass(signal, float(self.time[1] - self.time[0]), self.cutoff)[self.inside]
 
     def columns(self, bending: float) -> np.ndarray:
         """Inertia, rate and deflection of bristles of a bending q [1/m], how a deflection at the start dies away, and
@@ -271,19 +207,15 @@ class _Equation:
         moves = np.diff(self.body)
         z = deflections(moves, np.full(len(moves), 1 / bending))
         path = np.concatenate(([0.0], np.cumsum(np.abs(moves))))
-        turned = (self.passed(each) for each in (rate_of(self.time, z), z, np.exp(-bending * path)))
+        turned = map(self.low_pass, (rate_of(self.low_pass.time, z), z, np.exp(-bending * path)))
         return np.stack([self.inertia, *turned, *self.rest], axis=1)
 
 
-def _equation(record: _Record, between: Between, cutoff: float, mass: float, late: bool) -> _Equation:
+def _equation(record: Record, between: Between, cutoff: float, mass: float, late: bool) -> _Equation:
     """The equation of a record. A mode of the structure, whose mass m moves on its own spring at a frequency w, adds
     m/w^2 times the fourth derivative of the position: what of it `between` does not know is among the rest."""
-    time = record.time
-    body, force = at_bearing(time, record.position, record.force, between, mass, record.bent)
-    force = force - between.viscous * rate_of(time, body)
-    interval = float(time[1] - time[0])
-    inside = slice(edge := int(2 / (cutoff * interval)), len(time) - edge)
-    acceleration = rate_of(time, rate_of(time, body))
-    rest = [np.ones(len(time)), rate_of(time, rate_of(time, acceleration)), *([rate_of(time, force)] if late else [])]
-    target, inertia, *others = (low_pass(each, interval, cutoff)[inside] for each in (force, acceleration, *rest))
-    return _Equation(time, body, cutoff, inside, target, inertia, tuple(others))
+    time, low_pass = record.time, LowPass(record.time, cutoff)
+    body, force, inertia = at_bearing(record, between, mass)
+    target = force - between.viscous[0] * rate_of(time, body)
+    rest = [np.ones(len(time)), rate_of(time, rate_of(time, inertia)), *([rate_of(time, force)] if late else [])]
+    return _Equation(low_pass, body, low_pass(target), low_pass(inertia), tuple(map(low_pass, rest)))

@@ -9,71 +9,73 @@ and damping of the bristles come from other experiments, see `presliding`.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy.optimize import least_squares
 
 from friso.identify.estimate import Estimate
-from friso.identify.experiments.at_bearing import Between, at_bearing, rate_of
+from friso.identify.experiments.at_bearing import (
+    Between,
+    LowPass,
+    Record,
+    at_bearing,
+    cutoff_of,
+    rate_of,
+    record_of,
+    why_unseen,
+)
 from friso.identify.experiments.common import (
     BLOCKS,
     LINEARITY,
     Mean,
     by_t,
-    channel,
+    correlation_of,
     deflections,
     jackknife,
-    low_pass,
-    reach,
 )
 from friso.identify.logs.log import Log
 
 BELOW_MODE, CHECKED, MOTION = 1 / 3, 0.7, 8.0
 """Low-pass of the equation over the frequency of the structure's mode, at most; that of a second fit by which the first
-one is checked, and of the motion itself, both over that of the first."""
+one is checked, and of the motion, both over that of the first."""
 
 MOST, FEWEST = 60_000, 2000
 """Samples that are used at most, and that are needed."""
-
-LEAST, SAMPLED = 20, 0.2
-"""Periods of the low-pass that a record lasts at least, and the highest frequency of the motion over the samples'."""
 
 STARTS, BOUNDS = (0.2, 0.5), (0.01, 10.0)
 """Stribeck velocities from which the fit starts, over the RMS velocity; and bounds of all that is fitted, over that and
 over the mean friction."""
 
 STEP = 1e-3
-"""Of the logarithms, for derivatives."""
+"""Of what is fitted, over its size, for derivatives."""
 
 EXPLAINED = 0.2
 """Share of the friction's standard deviation that the model may leave unexplained."""
 
-REACH = 1.5
-"""Stribeck velocities which the motion has to reach: at this one a tenth of the fall is left."""
+FASTEST = 1.5
+"""Stribeck velocities which the motion has to go: at this one a tenth of the fall is left."""
 
 NAMES = ("friction.coulomb", "friction.static", "friction.stribeck_velocity")
 UNITS = ("N", "N", "m/s")
 METHOD = "LuGre in the motion of slow sliding"
 BRISTLES = (
-    "mass and bristles have to be known: give a log of small motion before sliding too, --as presliding, and one that "
-    "shows the mass"
+    "mass and bristles have to be known: give a stage file, --stage, and a log of small motion before sliding, --as "
+    "presliding"
 )
+DELAY = "the drive's delay has to be known: give it in [drive] of the stage file, --stage"
 
 
 @dataclass(frozen=True)
 class Known:
     """Moving mass [kg], stiffness [N/m] and damping [N s/m] of the bristles as other experiments show them, each with
-    the half-width of its interval."""
+    the half-width of its interval; the exponent of the Stribeck curve."""
 
     mass: tuple[float, float]
     stiffness: tuple[float, float]
     damping: tuple[float, float]
-
-    def off(self) -> list[Known]:
-        """With each of the three in turn at the end of its interval."""
-        return [replace(self, **{key: (sum(value), value[1])}) for key, value in vars(self).items()]
+    exponent: float = 2.0
 
 
 @dataclass(frozen=True)
@@ -93,54 +95,79 @@ class SlowSliding:
 
 
 @dataclass(frozen=True)
-class _Motion:
-    """Interval [s] of the samples; position [m] and velocity [m/s] of the body on the bearing and force [N] less
-    inertia and viscous friction, shape (n,); low-pass [Hz], and the samples which its ends do not touch."""
+class _Equation:
+    """The low-pass; the moves [m] of the body on the bearing between samples, shape (n - 1,), and its velocity [m/s],
+    shape (n,); the friction [N] at the low-pass without the viscous, and what a later force does to it, per second,
+    shape (m,); what is known of the bristles; the `sizes` of what is fitted: of Coulomb friction, of what static
+    friction is more, of the Stribeck velocity, of the constant force and of that of the bristles at the start."""
 
-    interval: float
-    position: np.ndarray
+    low_pass: LowPass
+    moves: np.ndarray
     velocity: np.ndarray
     friction: np.ndarray
-    cutoff: float
-    inside: slice
+    late: np.ndarray
+    known: Known
+    sizes: np.ndarray
 
-    def passed(self, signal: np.ndarray) -> np.ndarray:
-        return low_pass(signal, self.interval, self.cutoff)[self.inside]
+    def model(self, p: np.ndarray) -> np.ndarray:
+        """Friction [N] at the low-pass, shape (m,), of the logarithms of the first three over their `sizes`, and of the
+        other two over theirs."""
+        coulomb, more, stribeck, constant, start = np.append(np.exp(p[:3]), p[3:]) * self.sizes
+        time, stiffness = self.low_pass.time, self.known.stiffness[0]
+        fall = np.exp(-((np.abs(self.moves) / (time[1] - time[0]) / stribeck) ** self.known.exponent))
+        z = deflections(self.moves, (coulomb + more * fall) / stiffness, start / stiffness)
+        return self.low_pass(stiffness * z + self.known.damping[0] * rate_of(time, z)) + constant
+
+    def residual(self, p: np.ndarray) -> np.ndarray:
+        return self.model(p) - self.friction
+
+    def derivatives(self, p: np.ndarray) -> np.ndarray:
+        """Of the residual, shape (m, 5)."""
+        here = self.model(p)
+        return np.stack([(self.model(p + step) - here) / STEP for step in STEP * np.eye(len(p))], axis=1)
 
 
 def stribeck_from_slow_sliding(log: Log, between: Between, known: Known | None) -> SlowSliding:
     """Static and Coulomb friction and Stribeck velocity from a log of position and force in which the bearing slides
     slowly, there and back. Of a log with gaps the longest stretch is used, and of that no more than `MOST` samples.
 
-    A joint is held. The intervals contain what a lower low-pass changes, what the intervals of the known mass and
-    bristles do, and the share of the friction that is left unexplained. Raises StageError for missing channels.
+    A joint is held, or its deflection is measured. The intervals contain what a lower low-pass changes, what the
+    intervals of the known mass, bristles and viscous friction do, what the delay does that fits best, and the share of
+    the friction that is left unexplained; contact, mode and exponent are taken as given. Raises StageError for missing
+    channels.
     """
-    part = slice(log.longest.start, min(log.longest.stop, log.longest.start + MOST))
-    position, force = channel(log, "position")[part], channel(log, "force")[part]
-    if known is None:
-        return _nothing(BRISTLES)
-    if len(position) < FEWEST:
-        return _nothing(f"the record has {len(position)} samples: {FEWEST} are needed")
-    highest = reach(position, log.sample_time)
-    cutoff = min(highest, BELOW_MODE * between.mode.frequency) if between.mode else highest
-    if not cutoff * len(position) * log.sample_time > LEAST:
-        return _nothing("the motion does not stand out of the noise")
-    if highest * log.sample_time > SAMPLED:
-        needed = SAMPLED / highest
-        return _nothing(f"the motion goes up to {highest:.3g} Hz: one sample in {needed:.3g} s or less is needed")
-    signals = (log.time[part], position, force, between)
-    motion = _motion(*signals, known.mass[0], cutoff)
-    best, model = _fitted(motion, known, _starts(motion))
-    jacobian, residual = _derivatives(motion, known, best), _residual(motion, known, best)
-    shifts = [_fitted(_motion(*signals, known.mass[0], CHECKED * cutoff), known, [best])[0] - best]
-    for other in known.off():
-        changed = _residual(_motion(*signals, other.mass[0], cutoff), other, best) - residual
-        shifts.append(-np.linalg.lstsq(jacobian, changed, rcond=None)[0])
-    friction, velocity = motion.passed(motion.friction), motion.passed(motion.velocity)
-    left = float(residual.std() / friction.std())
-    found, correlation = _estimates(best, jackknife(jacobian, -residual)[:3, :3], np.array(shifts)[:, :3], left)
-    time = log.time[part][motion.inside]
-    return SlowSliding(_judged(found, left, velocity), correlation, time, velocity, friction, model, left)
+    record = record_of(log, slice(log.longest.start, min(log.longest.stop, log.longest.start + MOST)), between)
+    why = BRISTLES if known is None else DELAY if between.delay is None else why_unseen(record, FEWEST)
+    if why or known is None:
+        return _nothing(why)
+    cutoff = cutoff_of(record)
+    cutoff = min(cutoff, BELOW_MODE * between.mode.frequency) if between.mode else cutoff
+    sizes = _sizes(record, cutoff)
+    equation = _equation(record, between, known, cutoff, sizes)
+    best = _fitted(equation, [np.log([1.0, 0.5, share]) for share in STARTS])
+    jacobian, residual = equation.derivatives(best), equation.residual(best)
+    lower = _fitted(_equation(record, between, known, CHECKED * cutoff, sizes), [best])
+    shifts = [lower - best, _moved(np.column_stack([jacobian, equation.late]), residual)[:5]]
+    for other in _off(between, known):
+        shifts.append(_moved(jacobian, _equation(record, *other, cutoff, sizes).residual(best) - residual))
+    left = float(residual.std() / equation.friction.std())
+    covariance = jackknife(jacobian, -residual)[:3, :3]
+    found, correlation = _estimates(best[:3] + np.log(sizes[:3]), covariance, np.array(shifts)[:, :3], left)
+    inside = equation.low_pass.inside
+    shown = (record.time[inside], equation.low_pass(equation.velocity), equation.friction, equation.model(best), left)
+    return SlowSliding(_judged(found, left, shown[1]), correlation, *shown)
+
+
+def _off(between: Between, known: Known) -> list[tuple[Between, Known]]:
+    """What is known, with each in turn at the end of its interval."""
+    doubted = {key: getattr(known, key) for key in ("mass", "stiffness", "damping")}
+    others = [(between, replace(known, **{key: (sum(value), value[1])})) for key, value in doubted.items()]
+    return [*others, (replace(between, viscous=(sum(between.viscous), between.viscous[1])), known)]
+
+
+def _moved(jacobian: np.ndarray, residual: np.ndarray) -> np.ndarray:
+    """By how much a residual, shape (m,), moves what is fitted, whose derivatives are of shape (m, p)."""
+    return -np.linalg.lstsq(jacobian, residual, rcond=None)[0]
 
 
 def _nothing(why: str) -> SlowSliding:
@@ -152,65 +179,39 @@ def _unknown(why: str) -> tuple[Estimate, ...]:
     return tuple(Estimate.unknown(*each, METHOD, why) for each in zip(NAMES, UNITS, strict=True))
 
 
-def _motion(
-    time: np.ndarray, position: np.ndarray, force: np.ndarray, between: Between, mass: float, cutoff: float
-) -> _Motion:
-    interval = float(time[1] - time[0])
-    seen = low_pass(position - position[0], interval, MOTION * cutoff)
-    body, force = at_bearing(time, seen, force, between, mass)
-    velocity = rate_of(time, body)
-    carried = mass * (1 - between.beyond) * rate_of(time, velocity) + between.viscous * velocity
-    edge = int(2 / (cutoff * interval))
-    return _Motion(interval, body, velocity, force - carried, cutoff, slice(edge, len(time) - edge))
+def _sizes(record: Record, cutoff: float) -> np.ndarray:
+    """Of what is fitted: the mean force [N], and the RMS velocity [m/s]."""
+    level, low_pass = float(np.abs(record.force - record.force.mean()).mean()), LowPass(record.time, cutoff)
+    return np.array([level, level, float(low_pass(rate_of(record.time, record.body)).std()), level, level])
 
 
-def _starts(motion: _Motion) -> list[np.ndarray]:
-    """Logarithms of Coulomb friction [N], of what static friction is more [N], and of the Stribeck velocity [m/s], and
-    the constant force [N], from which the fit starts."""
-    level, speed = float(np.abs(motion.friction).mean()), float(motion.velocity.std())
-    return [np.array([np.log(level), np.log(level / 2), np.log(share * speed), 0.0]) for share in STARTS]
+def _equation(record: Record, between: Between, known: Known, cutoff: float, sizes: np.ndarray) -> _Equation:
+    """The equation of a record at a low-pass [Hz]."""
+    seen, low_pass = record.seen(MOTION * cutoff), LowPass(record.time, cutoff)
+    body, force, inertia = at_bearing(seen, between, known.mass[0])
+    velocity = rate_of(record.time, body)
+    friction = force - known.mass[0] * inertia - between.viscous[0] * velocity
+    late = low_pass(rate_of(record.time, force))
+    return _Equation(low_pass, np.diff(body), velocity, low_pass(friction), late, known, sizes)
 
 
-def _bounds(motion: _Motion) -> tuple[np.ndarray, np.ndarray]:
-    """Least and greatest parameters."""
-    level, speed = float(np.abs(motion.friction).mean()), float(motion.velocity.std())
-    low, high = (np.log(np.array([level, level, speed]) * by) for by in BOUNDS)
-    return np.append(low, -level), np.append(high, level)
-
-
-def _model(motion: _Motion, known: Known, p: np.ndarray) -> np.ndarray:
-    """Friction [N] at the low-pass, of bristles in the motion."""
-    moves = np.diff(motion.position)
-    coulomb, more, stribeck = np.exp(p[:3])
-    level = coulomb + more * np.exp(-((moves / motion.interval / stribeck) ** 2))
-    z = deflections(moves, level / known.stiffness[0])
-    rate = np.gradient(z, motion.interval)
-    return motion.passed(known.stiffness[0] * z + known.damping[0] * rate) + p[3]
-
-
-def _residual(motion: _Motion, known: Known, p: np.ndarray) -> np.ndarray:
-    return _model(motion, known, p) - motion.passed(motion.friction)
-
-
-def _derivatives(motion: _Motion, known: Known, p: np.ndarray) -> np.ndarray:
-    """Of the residual by the parameters, shape (n, 4)."""
-    steps = STEP * np.eye(len(p))
-    return np.stack([(_model(motion, known, p + e) - _model(motion, known, p - e)) / (2 * STEP) for e in steps], axis=1)
-
-
-def _fitted(motion: _Motion, known: Known, starts: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """The parameters that fit best from any start, and the friction they make [N]."""
-    target = motion.passed(motion.friction)
-    scale = float(target.std()) or 1.0
+def _fitted(equation: _Equation, starts: list[np.ndarray]) -> np.ndarray:
+    """What fits best from any start, shape (5,)."""
+    far = np.array([0.0, 0.0, 0.0, BOUNDS[1], BOUNDS[1]])
+    low, high = (np.log([bound] * 3 + [1.0] * 2) for bound in BOUNDS)
+    low, high = low - far, high + far
+    scale = float(equation.friction.std())
 
     def off(p: np.ndarray) -> np.ndarray:
-        return (_model(motion, known, p) - target) / scale
+        return equation.residual(p) / scale
 
-    size, bounds = (0.1, 0.1, 0.1, scale), _bounds(motion)
-    inside = [np.clip(start, *bounds) for start in starts]
-    fits = [least_squares(off, start, bounds=bounds, x_scale=size, diff_step=STEP) for start in inside]
-    best = min(fits, key=lambda fit: fit.cost).x
-    return best, _model(motion, known, best)
+    def derivatives(p: np.ndarray) -> np.ndarray:
+        return equation.derivatives(p) / scale
+
+    derived: Any = derivatives
+    whole = [np.clip(np.append(start, np.zeros(len(low) - len(start))), low, high) for start in starts]
+    fits: Any = [least_squares(off, start, jac=derived, bounds=(low, high)) for start in whole]
+    return min(fits, key=lambda fit: fit.cost).x
 
 
 def _estimates(
@@ -222,14 +223,12 @@ def _estimates(
     values = (coulomb, coulomb + more, stribeck)
     turned = np.array([[coulomb, 0, 0], [coulomb, more, 0], [0, 0, stribeck]])  # derivatives by the logarithms
     covariance, shifts = turned @ covariance @ turned.T, shifts @ turned.T
-    whole = covariance + shifts.T @ shifts / 4
-    size = np.sqrt(np.maximum(np.diag(whole), np.finfo(float).tiny))
-    found = []
+    even, found = (left + LINEARITY) * np.array(values), []
     for i, (name, unit) in enumerate(zip(NAMES, UNITS, strict=True)):
         mean = Mean(float(values[i]), float(covariance[i, i] ** 0.5), BLOCKS - 1)
-        systematic = float(np.abs(shifts[:, i]).sum()) + (left + LINEARITY) * mean.value
+        systematic = float(np.abs(shifts[:, i]).sum() + even[i])
         found.append(by_t(name, unit, mean, METHOD, systematic, systematic))
-    return tuple(found), whole / np.outer(size, size)
+    return tuple(found), correlation_of(covariance, shifts, even)
 
 
 def _judged(found: tuple[Estimate, ...], left: float, velocity: np.ndarray) -> tuple[Estimate, ...]:
@@ -240,7 +239,7 @@ def _judged(found: tuple[Estimate, ...], left: float, velocity: np.ndarray) -> t
         return _unknown(f"{left:.0%} of the friction are not explained by LuGre's bristles")
     if not coulomb.low > 0:
         return _unknown("the force does not show friction")
-    if fastest < REACH * stribeck.value:
+    if fastest < FASTEST * stribeck.value:
         return _unknown(f"no faster than {fastest:.3g} m/s, the motion does not show where friction ceases to fall")
     if not (static.low > coulomb.value and stribeck.low > 0):
         why = "no rise of friction towards rest shows"

@@ -80,5 +80,5 @@ def _edge(passed: Sequence[RigLog]) -> np.ndarray:
 def _found(log: RigLog) -> SlowSliding:
     flat = as_built_keys(log.stage)
     stiffness, damping = flat["friction.bristle_stiffness"], flat.get("friction.bristle_damping", 0.0)
-    known = Known(*((value, 0.0) for value in (moving_mass(log.stage), stiffness, damping)))
+    known = Known((moving_mass(log.stage), 0.0), (stiffness, 0.0), (damping, 0.0), flat["friction.stribeck_exponent"])
     return stribeck_from_slow_sliding(log.log, between(flat), known)
