@@ -35,7 +35,7 @@ class Passes:
 @dataclass(frozen=True)
 class ConstantSpeed:
     """The two speeds [m/s] of the thesis, the passes at them with the joint free and locked, those at many, and slow
-    sliding where some of these are not steady."""
+    sliding (nothing where friction has no bristles)."""
 
     speeds: tuple[float, ...]
     cases: tuple[Passes, ...]
@@ -44,8 +44,8 @@ class ConstantSpeed:
 
 
 def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
-    """Passes at two speeds there and back, the joint free and locked, and at many with it locked. Raises StageError
-    for a stage without joint."""
+    """Passes at two speeds there and back, the joint free and locked; at many, and slow sliding, with it locked. Raises
+    StageError for a stage without joint."""
     cases = []
     for number, (name, each) in enumerate((("free", freed(stage)), ("locked", locked(stage)))):
         progress(number, 4, f"constant speed, joint {name}")

@@ -31,7 +31,7 @@ APART = 4
 
 LASTS, STANDS, SAMPLES = 3.0, 1.0, 1000.0
 """Periods of the stage's own crossover that each speed takes, and for which it stands before; samples per period (0.4
-s, 0.125 s and 0.125 ms on the thesis's rig)."""
+s, 0.125 s and 0.1 ms on the thesis's rig)."""
 
 
 @dataclass(frozen=True)
