@@ -24,7 +24,11 @@ from friso.identify.experiments import (
     static_from_ramps,
     static_from_stick_slip,
     stiffness_from_steps,
+    stribeck_from_slow_sliding,
 )
+from friso.identify.experiments.at_bearing import Between
+from friso.identify.experiments.common import deflections
+from friso.identify.experiments.slow_sliding import Known
 from friso.identify.inverse_model import inverse_model, motion
 from friso.identify.logs.frequency_text import MeasuredResponse
 from friso.identify.logs.log import Log
@@ -192,6 +196,16 @@ def presliding() -> tuple[Result, Log]:
     return bristles_from_presliding(log), log
 
 
+def slow_sliding() -> tuple[Result, Log]:
+    """A mass that swings slowly on bristles; nothing else is known to be true of it."""
+    step = 2e-4
+    time = np.arange(0, 3, step)
+    position = 1e-3 * time + 6e-5 * np.sin(60 * time)
+    z = deflections(np.diff(position), np.full(len(time) - 1, 1e-5))
+    log = record("slow", step, position=position, force=1e5 * z)
+    return stribeck_from_slow_sliding(log, Between(delay=0.0), Known((1e-3, 0.0), (1e5, 0.0), (0.0, 0.0))), log
+
+
 def everything() -> tuple[Identification, list[Given], list[Prediction]]:
     """An identification with every kind of experiment, and a prediction of each kind."""
     moved, log = moves(own_loop=True, fitted_in_loop=True)
@@ -206,6 +220,7 @@ def everything() -> tuple[Identification, list[Given], list[Prediction]]:
         ("break-away", break_away()),
         ("constant-speed", constant()),
         ("presliding", presliding()),
+        ("slow-sliding", slow_sliding()),
     )
     rows += [(kind, result, (log,)) for kind, (result, log) in others]
     experiments = tuple(Experiment(kind, logs, result, moved.estimates) for kind, result, logs in rows)
@@ -323,7 +338,7 @@ def test_experiments_of_a_kind_are_numbered_and_their_figures_told_apart(case: t
     names = labels(case[0])
     assert names == [
         "frequency1", "frequency2", "moves1", "moves2", "steps", "stick_slip", "break_away", "constant_speed",
-            "presliding",
+            "presliding", "slow_sliding",
     ]  # fmt: skip
     assert len({figure.name for figure in figures}) == len(figures)
     for name in names:
@@ -357,7 +372,7 @@ def test_the_terminal_hears_all_of_it(case: tuple) -> None:
     assert "note: something <to> know" in text
     assert "axis, predicted: relative errors of position 0.001 %, velocity 0.2 %, acceleration 5 %, force 4 %." in text
     assert "exp1, predicted: relative error of the response 10 % (driven mass), 70 % (other mass)." in text
-    assert case[0].experiments[-2].result.position.verdict in text
+    assert case[0].experiments[-3].result.position.verdict in text
     assert not re.search(r"\bnan\b|\binf\b|None", text)
 
 

@@ -22,6 +22,9 @@ LEAST, SAMPLED = 20, 0.2
 """Periods of the low-pass that a record lasts at least, and the highest frequency of the motion over that of the
 samples."""
 
+EXPLAINED = 0.2
+"""Share of the friction's standard deviation that a model may leave unexplained."""
+
 EDGE = 2.0
 """Periods of the low-pass at either end of a record that its start and end touch."""
 

@@ -17,6 +17,7 @@ from scipy.optimize import minimize_scalar
 from friso.identify.estimate import Estimate
 from friso.identify.experiments.at_bearing import (
     DIRECT,
+    EXPLAINED,
     HELD,
     Between,
     LowPass,
@@ -47,9 +48,6 @@ FINE, FEWEST = 40, 1000
 
 BENDING = (1e-6, 5.0)
 """Of the bending q over the range of the motion: from a straight line to bristles that are at their end long before."""
-
-EXPLAINED = 0.2
-"""Share of the friction's standard deviation that the model may leave unexplained."""
 
 SPRING = 3.0
 """Stiffness over that of the joint up to which it may well be the joint that is seen."""

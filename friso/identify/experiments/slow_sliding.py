@@ -17,6 +17,7 @@ from scipy.optimize import least_squares
 
 from friso.identify.estimate import Estimate
 from friso.identify.experiments.at_bearing import (
+    EXPLAINED,
     Between,
     LowPass,
     Record,
@@ -48,11 +49,11 @@ STARTS, BOUNDS = (0.2, 0.5), (0.01, 10.0)
 """Stribeck velocities from which the fit starts, over the RMS velocity; and bounds of all that is fitted, over that and
 over the mean friction."""
 
+CLOSE = 1e-6
+"""Share of its squares, and of what is fitted, to which the fit comes: far within any interval."""
+
 STEP = 1e-3
 """Of what is fitted, over its size, for derivatives."""
-
-EXPLAINED = 0.2
-"""Share of the friction's standard deviation that the model may leave unexplained."""
 
 FASTEST = 1.5
 """Stribeck velocities which the motion has to go: at this one a tenth of the fall is left."""
@@ -113,10 +114,11 @@ class _Equation:
         """Friction [N] at the low-pass, shape (m,), of the logarithms of the first three over their `sizes`, and of the
         other two over theirs."""
         coulomb, more, stribeck, constant, start = np.append(np.exp(p[:3]), p[3:]) * self.sizes
-        time, stiffness = self.low_pass.time, self.known.stiffness[0]
-        fall = np.exp(-((np.abs(self.moves) / (time[1] - time[0]) / stribeck) ** self.known.exponent))
-        z = deflections(self.moves, (coulomb + more * fall) / stiffness, start / stiffness)
-        return self.low_pass(stiffness * z + self.known.damping[0] * rate_of(time, z)) + constant
+        stiffness, damping = self.known.stiffness[0], self.known.damping[0]
+        speed = np.abs(self.velocity)
+        ends = (coulomb + more * np.exp(-((speed / stribeck) ** self.known.exponent))) / stiffness
+        z = deflections(self.moves, (ends[1:] + ends[:-1]) / 2, start / stiffness)
+        return self.low_pass(stiffness * z + damping * (self.velocity - speed * z / ends)) + constant
 
     def residual(self, p: np.ndarray) -> np.ndarray:
         return self.model(p) - self.friction
@@ -210,7 +212,7 @@ def _fitted(equation: _Equation, starts: list[np.ndarray]) -> np.ndarray:
 
     derived: Any = derivatives
     whole = [np.clip(np.append(start, np.zeros(len(low) - len(start))), low, high) for start in starts]
-    fits: Any = [least_squares(off, start, jac=derived, bounds=(low, high)) for start in whole]
+    fits: Any = [least_squares(off, start, jac=derived, bounds=(low, high), ftol=CLOSE, xtol=CLOSE) for start in whole]
     return min(fits, key=lambda fit: fit.cost).x
 
 

@@ -48,9 +48,10 @@ def slow_sliding(stage: Stage, passed: Sequence[RigLog], seed: int) -> tuple[Slo
 
 
 def slow_sliding_logs(stage: Stage, passed: Sequence[RigLog], seed: int) -> tuple[RigLog, ...]:
-    """The logs, one for each place; none where the friction has no bristles."""
+    """The logs, one for each place; none where the friction has no bristles, or no loop was
+    stable."""
     speeds, quick = _edge(passed), passed[0].stage
-    if "friction.bristle_stiffness" not in quick.flat():
+    if "friction.bristle_stiffness" not in quick.flat() or all(each.failure for each in passed):
         return ()
     period = 1 / pace(stage)
     parts = [(0.0, STANDS * period), *((float(way * each), LASTS * period) for each in speeds for way in (1, -1))]
