@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from difflib import get_close_matches
 from pathlib import Path
 
 import numpy as np
@@ -46,7 +47,8 @@ def read_all(paths: Sequence[Path], told: Mapping, folder: Path) -> list[Given]:
     Of several files, each takes what is told about channels that it has.
     """
     if told.experiment is not None and told.experiment not in KINDS:
-        raise StageError("--as", quoted(told.experiment), f"one of {', '.join(KINDS)}", f"--as {MOVES}")
+        like = next(iter(get_close_matches(told.experiment, KINDS, 1)), MOVES)
+        raise StageError("--as", quoted(told.experiment), f"one of {', '.join(KINDS)}", f"--as {like}")
     return [_read(path, _applicable(told, path, paths), folder) for path in paths]
 
 
@@ -75,10 +77,12 @@ def _has(path: Path, name: str, role: str) -> bool:
 def _read(path: Path, told: Mapping, folder: Path) -> Given:
     if is_frequency_response(path):
         return Given(path, read_frequency_response(path), FREQUENCY, "the file holds a frequency response")
-    mapping = told.over(load(path, folder) or Mapping())
+    kept = load(path, folder) or Mapping()
+    mapping = told.over(kept)
     if mapping.experiment is not None:
         log = _log(path, mapping, mapping.experiment)
-        return Given(path, log, mapping.experiment, "as told", mapping)
+        before = "" if kept.experiment in (None, mapping.experiment) else f", in place of {kept.experiment} as kept"
+        return Given(path, log, mapping.experiment, f"as told{before}", mapping)
     log = _log(path, mapping, FREQUENCY)
     kind, reason = _kind(log, path)
     log = log if kind == FREQUENCY else _log(path, mapping, kind)

@@ -18,7 +18,10 @@ def write_csv(path: Path, interval: float, signals: Mapping[str, np.ndarray], he
     count = len(next(iter(signals.values())))
     columns = np.column_stack([np.arange(count) * interval, *signals.values()])
     unfinished = path.with_name(f"{path.name}.unfinished")
-    with unfinished.open("w", encoding="utf-8", newline="\n") as file:
-        file.write(f"# {heading}\n{','.join(names)}\n")
-        np.savetxt(file, columns, fmt="%.12g", delimiter=",")
-    unfinished.replace(path)
+    try:
+        with unfinished.open("w", encoding="utf-8", newline="\n") as file:
+            file.write(f"# {heading}\n{','.join(names)}\n")
+            np.savetxt(file, columns, fmt="%.12g", delimiter=",")
+        unfinished.replace(path)
+    finally:
+        unfinished.unlink(missing_ok=True)

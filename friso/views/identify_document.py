@@ -225,7 +225,7 @@ def _presliding(it: Presliding) -> dict[str, Any]:
 
 def _slow_sliding(it: SlowSliding) -> dict[str, Any]:
     named = {each.name.removeprefix("friction."): _estimate(each) for each in it.estimates}
-    return {**named, "unexplained": it.unexplained}
+    return {**named, "unexplained": it.unexplained, "warnings": list(it.warnings)}
 
 
 def _constant(it: ConstantSpeed) -> dict[str, Any]:

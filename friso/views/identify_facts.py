@@ -235,7 +235,7 @@ def _slow_sliding(it: SlowSliding) -> tuple[tuple[str, ...], Facts, tuple[str, .
     facts = [(name, with_interval(each)) for name, each in zip(names, it.estimates, strict=True)]
     if len(it.time):
         facts += [("Friction left unexplained", f"{it.unexplained:.1%} of its standard deviation")]
-    return (), tuple(facts), ()
+    return (), tuple(facts), it.warnings
 
 
 def _constant(it: ConstantSpeed) -> tuple[tuple[str, ...], Facts, tuple[str, ...]]:

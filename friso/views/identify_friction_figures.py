@@ -40,8 +40,8 @@ AREA = "#cfdfee"
 WAYS = {"forward": BLUE, "backward": ORANGE}
 TIME = Axis("Time", "s")
 
-POINTS = 5000
-"""Of a record of slow sliding that are drawn."""
+POINTS, CURVE = 5000, 200
+"""Points of a record of slow sliding, and of the curve at steady velocities, that are drawn."""
 
 
 def friction_figures(it: Result, log: Log, label: str) -> list[Figure]:
@@ -128,7 +128,7 @@ def _presliding(it: Presliding, name: str) -> list[Figure]:
     """Force and model, and the motion, over the last tenth of the record."""
     if not len(it.model):
         return []
-    return [Figure(f"{name}_presliding", "Motion before sliding", presliding_caption(it), presliding_panels(it))]
+    return [Figure(f"{name}_force", "Motion before sliding", presliding_caption(it), presliding_panels(it))]
 
 
 def presliding_caption(it: Presliding) -> str:
@@ -158,7 +158,7 @@ def _slow_sliding(it: SlowSliding, name: str) -> list[Figure]:
     if not len(it.model):
         return []
     caption, panels = slow_sliding_caption(it), slow_sliding_panels(it)
-    return [Figure(f"{name}_slow_sliding", "Friction in slow sliding", caption, panels)]
+    return [Figure(f"{name}_friction", "Friction in slow sliding", caption, panels)]
 
 
 def slow_sliding_caption(it: SlowSliding) -> str:
@@ -182,7 +182,19 @@ def slow_sliding_panels(it: SlowSliding) -> tuple[Panel, ...]:
             Series(x[some], it.model[some], "LuGre's bristles", ORANGE, "dashed", 1.0),
         )
 
-    return Panel("", TIME, friction, both(it.time)), Panel("", Axis("Velocity", "m/s"), friction, both(it.velocity))
+    over = Panel("", Axis("Velocity", "m/s"), friction, (*both(it.velocity), *_steady_friction(it)))
+    return Panel("", TIME, friction, both(it.time)), over
+
+
+def _steady_friction(it: SlowSliding) -> tuple[Series, ...]:
+    """The friction at steady velocities without the viscous, either way."""
+    coulomb, static, stribeck = (each.value for each in it.estimates)
+    if not all(each.shown for each in it.estimates):
+        return ()
+    speeds = np.linspace(0, float(np.abs(it.velocity).max()), CURVE)
+    level = coulomb + (static - coulomb) * np.exp(-((speeds / stribeck) ** it.exponent))
+    velocities, forces = (np.concatenate([-values[::-1], [np.nan], values]) for values in (speeds, level))
+    return (Series(velocities, forces, "at steady velocity", BLUE, width=2.0),)
 
 
 def _break_away(it: BreakAway, name: str) -> list[Figure]:

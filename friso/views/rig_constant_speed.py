@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from friso.identify.estimate import Estimate
-from friso.identify.experiments import SlowSliding
 from friso.studies.rig.constant_speed import ConstantSpeed, Passes
 from friso.studies.rig.many_speeds import ManySpeeds, Place
-from friso.studies.rig.outcome import Outcome
+from friso.studies.rig.outcome import Outcome, RigLog
+from friso.studies.rig.slow_sliding import Slow
 from friso.views.figure import BLUE, GREEN, ORANGE, PINK, VERMILLION, Axis, Figure, Markers, Panel, Series
 from friso.views.identify_friction_figures import slow_sliding_caption, slow_sliding_panels
 from friso.views.identify_numbers import with_interval
@@ -43,16 +43,26 @@ def _slow(found: ConstantSpeed) -> list[str]:
     """What slow sliding shows."""
     if not found.slow:
         return []
-    head = "In slow sliding, joint locked, at the edge of what is steady, mass and bristles being known:"
-    return [head, *(_slow_place(number, each.found) for number, each in enumerate(found.slow, start=1))]
+    head = "In slow sliding, joint locked, at the edge of what is steady, mass and bristles being known as they are:"
+    return [head, *map(_slow_place, found.slow)]
 
 
-def _slow_place(number: int, it: SlowSliding) -> str:
-    if not any(each.shown for each in it.estimates):
-        return f"Place {number}: not shown ({it.estimates[0].reason})."
+def _slow_place(it: Slow) -> str:
     names = ("Coulomb friction", "static friction", "the Stribeck velocity")
-    told = [f"{name} {with_interval(each)}" for name, each in zip(names, it.estimates, strict=True)]
-    return f"Place {number}: {listed(told, 'and')}."
+    flat = it.log.stage.flat()
+    true = [*it.true, flat["friction.stribeck_velocity"]]
+    shown = [with_interval(each) if each.shown else f"not shown ({each.reason})" for each in it.found.estimates]
+    told = [
+        f"{name} {text}, truly {with_unit(float(one), unit)}"
+        for name, text, one, unit in zip(names, shown, true, ("N", "N", "m/s"), strict=True)
+    ]
+    return f"From {_start(it.log)} on: {'; '.join(told)}."
+
+
+def _start(log: RigLog) -> str:
+    """The place where a log begins."""
+    places = log.true.get("cart_position", log.true["position"])
+    return with_unit(float(places[0]), "m") if len(places) else "nowhere"
 
 
 def _many(found: ConstantSpeed) -> list[str]:
@@ -70,7 +80,8 @@ def _place(number: int, place: Place) -> str:
     hidden = {each.reason: [words for words, one in named if one.reason == each.reason] for _, each in named}
     told = [f"not shown: {listed(words, 'and')} ({reason})" for reason, words in hidden.items() if reason]
     ends = [with_unit(float(end(reached)), "m/s") for end in (np.min, np.max) if len(reached)]
-    head = f"Place {number}, {len(reached)} steady passes{' from ' if ends else ''}{' to '.join(ends)}"
+    passed = f"{len(reached)} steady passes{' from ' if ends else ''}{' to '.join(ends)}"
+    head = f"Place {number}, from {_start(place.log)} on, {passed}"
     stopped = [f"the log stopped {place.log.failure}"] if place.log.failure else []
     return f"{head}: {'; '.join([*stopped, *shown, *told])}."
 

@@ -130,7 +130,8 @@ def why_unseen(record: Record, fewest: int) -> str:
     highest = motion_bandwidth(record.body, record.interval)
     if highest * record.interval > SAMPLED:
         needed = SAMPLED / highest
-        return f"the motion goes up to {highest:.3g} Hz: one sample in {needed:.3g} s or less is needed"
+        each = f"one sample in {record.interval:.3g} s"
+        return f"{each}, and the motion goes up to {highest:.3g} Hz: one in {needed:.3g} s or less is needed"
     cutoff = max(highest, LEAST / (len(record.time) * record.interval))
     motion = float(low_pass(record.position, record.interval, cutoff).std())
     noise = robust(np.diff(record.position, 2)) / 6**0.5

@@ -18,6 +18,7 @@ from scipy.optimize import least_squares
 from friso.identify.estimate import Estimate
 from friso.identify.experiments.at_bearing import (
     EXPLAINED,
+    HELD,
     Between,
     LowPass,
     Record,
@@ -61,10 +62,8 @@ FASTEST = 1.5
 NAMES = ("friction.coulomb", "friction.static", "friction.stribeck_velocity")
 UNITS = ("N", "N", "m/s")
 METHOD = "LuGre in the motion of slow sliding"
-BRISTLES = (
-    "mass and bristles have to be known: give a stage file, --stage, and a log of small motion before sliding, --as "
-    "presliding"
-)
+BRISTLES = "mass and bristles have to be known: give a log of small motion before sliding too, --as presliding"
+RIGID = "Without [parasitic] in the stage file the structure is taken for rigid."
 DELAY = "the drive's delay has to be known: give it in [drive] of the stage file, --stage"
 
 
@@ -84,7 +83,7 @@ class SlowSliding:
     """Coulomb and static friction [N] and Stribeck velocity [m/s], and the `correlation` of the three, shape (3, 3).
     Over time [s], shape (n,): the velocity [m/s] of the body on the bearing, its friction [N], low-passed, and that of
     the model (empty where there is none); and the share of the friction's standard deviation that it leaves
-    unexplained."""
+    unexplained; the exponent of its Stribeck curve."""
 
     estimates: tuple[Estimate, ...]
     correlation: np.ndarray
@@ -93,6 +92,8 @@ class SlowSliding:
     friction: np.ndarray
     model: np.ndarray
     unexplained: float
+    exponent: float = 2.0
+    warnings: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -139,9 +140,9 @@ def stribeck_from_slow_sliding(log: Log, between: Between, known: Known | None) 
     channels.
     """
     record = record_of(log, slice(log.longest.start, min(log.longest.stop, log.longest.start + MOST)), between)
-    why = BRISTLES if known is None else DELAY if between.delay is None else why_unseen(record, FEWEST)
+    why = why_unseen(record, FEWEST) or (DELAY if between.delay is None else "")
     if why or known is None:
-        return _nothing(why)
+        return _nothing(why or BRISTLES)
     cutoff = cutoff_of(record)
     cutoff = min(cutoff, BELOW_MODE * between.mode.frequency) if between.mode else cutoff
     sizes = _sizes(record, cutoff)
@@ -157,7 +158,9 @@ def stribeck_from_slow_sliding(log: Log, between: Between, known: Known | None) 
     found, correlation = _estimates(best[:3] + np.log(sizes[:3]), covariance, np.array(shifts)[:, :3], left)
     inside = equation.low_pass.inside
     shown = (record.time[inside], equation.low_pass(equation.velocity), equation.friction, equation.model(best), left)
-    return SlowSliding(_judged(found, left, shown[1]), correlation, *shown)
+    held = [HELD] if record.bent is None and between.joint else []
+    said = (*held, *([] if between.mode else [RIGID]))
+    return SlowSliding(_judged(found, left, shown[1]), correlation, *shown, known.exponent, said)
 
 
 def _off(between: Between, known: Known) -> list[tuple[Between, Known]]:
@@ -240,7 +243,7 @@ def _judged(found: tuple[Estimate, ...], left: float, velocity: np.ndarray) -> t
     if left > EXPLAINED:
         return _unknown(f"{left:.0%} of the friction are not explained by LuGre's bristles")
     if not coulomb.low > 0:
-        return _unknown("the force does not show friction")
+        return _unknown("the force does not show friction: does the bearing slide?")
     if fastest < FASTEST * stribeck.value:
         return _unknown(f"no faster than {fastest:.3g} m/s, the motion does not show where friction ceases to fall")
     if not (static.low > coulomb.value and stribeck.low > 0):

@@ -15,6 +15,7 @@ from friso.identify.experiments import SlowSliding, stribeck_from_slow_sliding
 from friso.identify.experiments.passes import passes
 from friso.identify.experiments.slow_sliding import Known
 from friso.identify.method import between
+from friso.rig.rail import friction_factors
 from friso.rig.run import as_built_keys, run
 from friso.rig.task import legs
 from friso.stage import Stage
@@ -29,6 +30,9 @@ the travel, since each log shows the friction of a few millimetres alone."""
 APART = 4
 """Where all were steady, it goes every fourth of their speeds, from the least on."""
 
+POINTS = 500
+"""Of a way, for its mean friction."""
+
 LASTS, STANDS, SAMPLES = 3.0, 1.0, 1000.0
 """Periods of the stage's own crossover that each speed takes, and for which it stands before; samples per period (0.4
 s, 0.125 s and 0.1 ms on the thesis's rig)."""
@@ -36,15 +40,17 @@ s, 0.125 s and 0.1 ms on the thesis's rig)."""
 
 @dataclass(frozen=True)
 class Slow:
-    """The log of a place and what it shows, mass and bristles being known as they are."""
+    """The log of a place, what it shows, mass and bristles being known as they are, and Coulomb and static friction [N]
+    as they truly are on average over its way, shape (2,)."""
 
     log: RigLog
     found: SlowSliding
+    true: np.ndarray
 
 
 def slow_sliding(stage: Stage, passed: Sequence[RigLog], seed: int) -> tuple[Slow, ...]:
     """Slow sliding of a stage whose joint is locked, or which has none, after the logs of its passes at many speeds."""
-    return tuple(Slow(log, _found(log)) for log in slow_sliding_logs(stage, passed, seed))
+    return tuple(Slow(log, _found(log), _true(log)) for log in slow_sliding_logs(stage, passed, seed))
 
 
 def slow_sliding_logs(stage: Stage, passed: Sequence[RigLog], seed: int) -> tuple[RigLog, ...]:
@@ -83,3 +89,10 @@ def _found(log: RigLog) -> SlowSliding:
     stiffness, damping = flat["friction.bristle_stiffness"], flat.get("friction.bristle_damping", 0.0)
     known = Known((moving_mass(log.stage), 0.0), (stiffness, 0.0), (damping, 0.0), flat["friction.stribeck_exponent"])
     return stribeck_from_slow_sliding(log.log, between(flat), known)
+
+
+def _true(log: RigLog) -> np.ndarray:
+    places = log.true.get("cart_position", log.true["position"])
+    way = np.linspace(places.min(), places.max(), POINTS) if len(places) else np.full(1, np.nan)
+    levels = [log.stage.flat()[key] for key in ("friction.coulomb", "friction.static")]
+    return levels * friction_factors(log.stage.flat(), way).mean(axis=1)[::-1]
