@@ -18,6 +18,7 @@ from friso.identify.logs.log import Log
 from friso.identify.method import between, identify
 from friso.rig.rail import friction_factors
 from friso.studies.rig import many_speeds, slow_sliding
+from friso.studies.rig.outcome import RigLog
 from friso.studies.rig.sizes import locked
 
 DT, SECONDS, FINE = 2e-4, 4.0, 10
@@ -169,6 +170,13 @@ def test_level_friction_shows_its_level_alone() -> None:
     assert coulomb.value == pytest.approx(STATIC, rel=0.02)
     assert "no rise" in static.reason
     assert not stribeck.shown
+
+
+def test_friction_without_a_falling_curve_is_not_slid_on_the_rig() -> None:
+    friction = {"model": "dahl", "coulomb": "1 N", "bristle_stiffness": "1e5 N/m", "viscous": "0 N*s/m"}
+    stage = friso.Stage(**{**friso.load(EXAMPLE).given(), "friction": friction, "rail": None})
+    still = {"position": np.zeros(200), "force": np.zeros(200)}
+    assert slow_sliding.slow_sliding_logs(stage, [RigLog("x", None, DT, still, {}, stage, 1)], 1) == ()
 
 
 @pytest.fixture

@@ -202,9 +202,8 @@ def _equation(record: Record, between: Between, known: Known, cutoff: float, siz
 
 def _fitted(equation: _Equation, starts: list[np.ndarray]) -> np.ndarray:
     """What fits best from any start, shape (5,)."""
-    far = np.array([0.0, 0.0, 0.0, BOUNDS[1], BOUNDS[1]])
-    low, high = (np.log([bound] * 3 + [1.0] * 2) for bound in BOUNDS)
-    low, high = low - far, high + far
+    least, most = BOUNDS
+    low, high = np.array([*np.log([least] * 3), -most, -most]), np.array([*np.log([most] * 3), most, most])
     scale = float(equation.friction.std())
 
     def off(p: np.ndarray) -> np.ndarray:

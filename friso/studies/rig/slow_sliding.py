@@ -54,10 +54,10 @@ def slow_sliding(stage: Stage, passed: Sequence[RigLog], seed: int) -> tuple[Slo
 
 
 def slow_sliding_logs(stage: Stage, passed: Sequence[RigLog], seed: int) -> tuple[RigLog, ...]:
-    """The logs, one for each place; none where the friction has no bristles, or no loop was
+    """The logs, one for each place; none where the friction has no bristles and Stribeck curve, or no loop was
     stable."""
     speeds, quick = _edge(passed), passed[0].stage
-    if "friction.bristle_stiffness" not in quick.flat() or all(each.failure for each in passed):
+    if not _has_falling_bristles(quick) or all(each.failure for each in passed):
         return ()
     period = 1 / pace(stage)
     parts = [(0.0, STANDS * period), *((float(way * each), LASTS * period) for each in speeds for way in (1, -1))]
@@ -66,6 +66,10 @@ def slow_sliding_logs(stage: Stage, passed: Sequence[RigLog], seed: int) -> tupl
         (recorded,) = run(quick, legs(low, parts), [seed + number], interval(quick, period / SAMPLES))
         logs.append(rig_log(recorded, 0, f"slow_sliding_{number + 1}", "slow-sliding", quick, seed + number))
     return tuple(logs)
+
+
+def _has_falling_bristles(stage: Stage) -> bool:
+    return {"friction.bristle_stiffness", "friction.stribeck_velocity"} <= stage.flat().keys()
 
 
 def _edge(passed: Sequence[RigLog]) -> np.ndarray:
