@@ -2,7 +2,7 @@
 
 from html.parser import HTMLParser
 
-from friso.views import plotly_renderer
+from friso.views.drawing import plotly_renderer
 
 
 class Page(HTMLParser):

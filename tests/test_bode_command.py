@@ -20,13 +20,13 @@ from friso.cli.bode import bode_document
 from friso.frequency.bode import Bode, Unstable, bode
 from friso.quantities import StageError
 from friso.stage import Stage
-from friso.views import matplotlib_renderer, plotly_renderer
-from friso.views.bode_figures import bode_figures, phases
-from friso.views.bode_states import shown_states
-from friso.views.bode_table import rows
-from friso.views.bode_words import caveats, crossovers, sentences, stability
-from friso.views.drawable import drawable
-from friso.views.figure import Axis, Band, Figure, Panel, Series
+from friso.views.bode.figures import bode_figures, phases
+from friso.views.bode.states import shown_states
+from friso.views.bode.table import rows
+from friso.views.bode.words import caveats, crossovers, sentences, stability
+from friso.views.drawing import matplotlib_renderer, plotly_renderer
+from friso.views.drawing.drawable import drawable
+from friso.views.drawing.figure import Axis, Band, Figure, Panel, Series
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 RIG, EMPS = EXAMPLES / "thesis_rig.toml", EXAMPLES / "emps_axis.toml"

@@ -15,10 +15,10 @@ from friso.hunting.boundary import Branch, Curve, Diagram, Found, Kind, Plane, P
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import NOT_CLOSED, Cycles, symmetric_cycles
 from friso.stage import Stage
-from friso.views import matplotlib_renderer, plotly_renderer
-from friso.views.boundary_data import corner_verdicts, end_verdicts, lines
-from friso.views.boundary_figures import boundary_figure
-from friso.views.boundary_words import Shown, sentences
+from friso.views.boundary.data import corner_verdicts, end_verdicts, lines
+from friso.views.boundary.figures import boundary_figure
+from friso.views.boundary.words import Shown, sentences
+from friso.views.drawing import matplotlib_renderer, plotly_renderer
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 RIG, STICK_SLIP = EXAMPLES / "thesis_rig.toml", EXAMPLES / "lugre_stick_slip.toml"

@@ -24,9 +24,9 @@ from friso.studies.compare.measures import lasting_swing, linear_loops, settling
 from friso.studies.compare.options import DEADBAND, MODEL_ERROR, Option, Options, linear_flat, options
 from friso.studies.compare.statistics import difference, median, share
 from friso.studies.compare.study import Comparison, Result, compare
-from friso.views.compare_document import document, page
-from friso.views.compare_figures import figures
-from friso.views.compare_words import paired_rows, sentences, table_rows
+from friso.views.compare.document import document, page
+from friso.views.compare.figures import figures
+from friso.views.compare.words import paired_rows, sentences, table_rows
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "thesis_drive.toml"
 COARSE = {"drive.sample_time": "250 us", "drive.delay": "250 us"}
@@ -442,7 +442,7 @@ def test_interrupted_it_leaves_nothing(tmp_path: Path, found: Comparison, monkey
         patch.setattr(study, "compare", stop)
         assert friso_inside(tmp_path, "compare", EXAMPLE, "--out", "out").returncode == 130
     monkeypatch.setattr(study, "compare", lambda *given: found)
-    monkeypatch.setattr("friso.views.matplotlib_renderer.image", stop)
+    monkeypatch.setattr("friso.views.drawing.matplotlib_renderer.image", stop)
     assert friso_inside(tmp_path, "compare", EXAMPLE, "--out", "out").returncode == 130
     assert not [*tmp_path.iterdir()]
 

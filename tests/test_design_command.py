@@ -29,15 +29,15 @@ from friso.design.relax import Relaxation
 from friso.design.spec import Position, Spec, load_spec
 from friso.quantities import StageError
 from friso.stage import Stage
-from friso.views import matplotlib_renderer, plotly_renderer
-from friso.views.design_control import controller_step, moves_step, parallel_gains
-from friso.views.design_document import design_document, refused_document
-from friso.views.design_figures import design_figures
-from friso.views.design_leaves import leaves_step, requirement_rows
-from friso.views.design_steps import isolator_step, joint_step, steps
-from friso.views.design_window import lower, stiffest, upper
-from friso.views.design_words import brings, edge, headline, outwards, refusal, settling
-from friso.views.figure import Figure
+from friso.views.design.control import controller_step, moves_step, parallel_gains
+from friso.views.design.document import design_document, refused_document
+from friso.views.design.figures import design_figures
+from friso.views.design.leaves import leaves_step, requirement_rows
+from friso.views.design.steps import isolator_step, joint_step, steps
+from friso.views.design.window import lower, stiffest, upper
+from friso.views.design.words import brings, edge, headline, outwards, refusal, settling
+from friso.views.drawing import matplotlib_renderer, plotly_renderer
+from friso.views.drawing.figure import Figure
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 RIG, SPEC = EXAMPLES / "thesis_rig.toml", EXAMPLES / "specs" / "thesis.toml"

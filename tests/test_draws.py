@@ -13,7 +13,7 @@ from friso.cli import main
 from friso.stage import Stage, save
 from friso.stage.correlations import Correlations, Drawn, draw
 from friso.studies.draws import ATTRACTED, WORDS, Fates, different, fates
-from friso.views.draws import Drawing, draws_document, draws_figure, draws_rows, draws_sentences
+from friso.views.check.draws import Drawing, draws_document, draws_figure, draws_rows, draws_sentences
 
 pytestmark = pytest.mark.xdist_group("rig")
 

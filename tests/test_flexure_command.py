@@ -25,17 +25,17 @@ from friso.flexure.evaluation import Mode
 from friso.flexure.mechanism import Mechanism
 from friso.quantities import StageError
 from friso.stage import Stage
-from friso.views import matplotlib_renderer, plotly_renderer
-from friso.views.figure import Figure
-from friso.views.flexure_document import flexure_document
-from friso.views.flexure_figures import flexure_figures
-from friso.views.flexure_found import BEAMS, CLOSED, Found, interferes
-from friso.views.flexure_layout import SCALES, WIDTH, block_size
-from friso.views.flexure_modes import VIEWS, best_view, modes_figure
-from friso.views.flexure_page import flexure_html
-from friso.views.flexure_table import rows
-from friso.views.flexure_words import assumptions, findings, sentences, warnings
-from friso.views.leaf_drawing import drawing_svg
+from friso.views.drawing import matplotlib_renderer, plotly_renderer
+from friso.views.drawing.figure import Figure
+from friso.views.flexure.document import flexure_document
+from friso.views.flexure.drawing import drawing_svg
+from friso.views.flexure.figures import flexure_figures
+from friso.views.flexure.findings import BEAMS, CLOSED, Found, interferes
+from friso.views.flexure.layout import SCALES, WIDTH, block_size
+from friso.views.flexure.modes import VIEWS, best_view, modes_figure
+from friso.views.flexure.page import flexure_html
+from friso.views.flexure.table import rows
+from friso.views.flexure.words import assumptions, findings, sentences, warnings
 
 RIG = Path(__file__).parent.parent / "examples" / "thesis_rig.toml"
 FIGURES = ("flexure_force", "flexure_support", "flexure_modes")

@@ -425,7 +425,7 @@ def test_parasitic_rows_say_what_the_page_says_of_them(quick: compute.Guideline)
 
 
 def test_page_renders_with_its_charts(quick: compute.Guideline, tmp_path: Path) -> None:
-    from friso.views.guideline import guideline_document, write_guideline
+    from friso.views.guideline.page import guideline_document, write_guideline
 
     files = {path.name: path for path in write_guideline(quick, tmp_path)}
     page = files["guideline.md"].read_text()

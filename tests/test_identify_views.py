@@ -44,14 +44,14 @@ from friso.identify.response.two_mass import two_masses
 from friso.identify.sources import Given
 from friso.identify.stage_file import identified, made_up, written
 from friso.stage.correlations import Correlations
-from friso.views import plotly_renderer
-from friso.views.figure import Figure, Panel, Series
-from friso.views.identify_document import identify_document
-from friso.views.identify_figures import identify_figures
-from friso.views.identify_moves_figures import moves_figures, record_panels
-from friso.views.identify_numbers import interval_text, unit_of, value_text, with_interval
-from friso.views.identify_page import identify_html
-from friso.views.identify_words import answer, estimate_rows, headline, labels, parts
+from friso.views.drawing import plotly_renderer
+from friso.views.drawing.figure import Figure, Panel, Series
+from friso.views.identify.document import identify_document
+from friso.views.identify.figures import identify_figures
+from friso.views.identify.moves_figures import moves_figures, record_panels
+from friso.views.identify.numbers import interval_text, unit_of, value_text, with_interval
+from friso.views.identify.page import identify_html
+from friso.views.identify.words import answer, estimate_rows, headline, labels, parts
 
 pytestmark = pytest.mark.xdist_group("identify-views")
 

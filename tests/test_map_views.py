@@ -18,15 +18,15 @@ import xarray as xr
 from matplotlib.colors import to_hex
 from pages import Page
 
-from friso.views import matplotlib_renderer, plotly_renderer
-from friso.views.colours import painted, ramp, scale
-from friso.views.drawable import cell_edges, colour_key, drawable
-from friso.views.figure import Cloud, Figure, Kind, Map
-from friso.views.map_cells import axes_of, look, pick
-from friso.views.map_data import MOST, NONE
-from friso.views.map_figures import SLICES, map_figure, map_panel
-from friso.views.map_page import map_html, write_map_page
-from friso.views.map_words import FAILED, INFERRED, INVALID, NOT_RUN, QUIET, VERDICTS, quantity, statement, verification
+from friso.views.drawing import matplotlib_renderer, plotly_renderer
+from friso.views.drawing.colours import painted, ramp, scale
+from friso.views.drawing.drawable import cell_edges, colour_key, drawable
+from friso.views.drawing.figure import Cloud, Figure, Kind, Map
+from friso.views.map.cells import axes_of, look, pick
+from friso.views.map.data import MOST, NONE
+from friso.views.map.figures import SLICES, map_figure, map_panel
+from friso.views.map.page import map_html, write_map_page
+from friso.views.map.words import FAILED, INFERRED, INVALID, NOT_RUN, QUIET, VERDICTS, quantity, statement, verification
 
 CROSSOVER, STROKE, DAMPING, LOCKED = (
     "controller.crossover",

@@ -40,8 +40,8 @@ from friso.studies.thesis.maps import begins, ends, free_square, trend
 from friso.studies.thesis.open_parameters import METHOD, OPEN
 from friso.studies.thesis.reproduce import _changed, _coarser, _enters, lasting
 from friso.studies.thesis.verdicts import not_covered, verdict
-from friso.views.reproduction import claims_document, reproduction_html, write_reproduction
-from friso.views.reproduction_figures import reproduction_figures
+from friso.views.reproduce.figures import reproduction_figures
+from friso.views.reproduce.page import claims_document, reproduction_html, write_reproduction
 
 ROOT = Path(__file__).parent.parent
 POINTS = 21

@@ -27,7 +27,7 @@ from friso.studies.rig.hunted import (
     with_joint,
 )
 from friso.studies.rig.outcome import silent
-from friso.views.rig import document, figures, sentences
+from friso.views.rig.page import document, figures, sentences
 
 RIG = load(Path(__file__).parents[1] / "examples" / "thesis_drive.toml")
 

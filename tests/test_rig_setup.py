@@ -14,7 +14,7 @@ from friso.stage import Stage
 from friso.studies.rig import constant_speed, presliding, stiction
 from friso.studies.rig.outcome import silent
 from friso.studies.rig.stiffness import steps
-from friso.views.rig import sentences
+from friso.views.rig.page import sentences
 
 
 @pytest.fixture(scope="module")

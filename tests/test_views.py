@@ -24,15 +24,15 @@ from pages import Page
 from friso.hunting import Cycle, Hunting, Judgement, Kick, Margin, Moves
 from friso.hunting.cycle.return_map import ReturnMap
 from friso.version import VERSION
-from friso.views import matplotlib_renderer, plotly_renderer
-from friso.views.cases import COLOURS, Shown, shown_cases
-from friso.views.check_figures import check_figures, response_figure
-from friso.views.check_table import rows
-from friso.views.drawable import drawable
-from friso.views.figure import Axis, Figure, Limit, Map, Markers, Panel, Series
-from friso.views.prefixes import choose, plus_minus, pretty, range_with_unit, with_unit
-from friso.views.report import conclusion, report_html, verdict_sentence, write_report
-from friso.views.thinning import BUCKETS, KEPT, thin
+from friso.views.check.cases import COLOURS, Shown, shown_cases
+from friso.views.check.figures import check_figures, response_figure
+from friso.views.check.page import conclusion, report_html, verdict_sentence, write_report
+from friso.views.check.table import rows
+from friso.views.drawing import matplotlib_renderer, plotly_renderer
+from friso.views.drawing.drawable import drawable
+from friso.views.drawing.figure import Axis, Figure, Limit, Map, Markers, Panel, Series
+from friso.views.drawing.prefixes import choose, plus_minus, pretty, range_with_unit, with_unit
+from friso.views.drawing.thinning import BUCKETS, KEPT, thin
 
 UNITS = {
     "reference": "m",
@@ -416,7 +416,7 @@ SCRIPT = """
 import hashlib, sys
 sys.path.insert(0, {tests!r})
 import test_views as t
-from friso.views import matplotlib_renderer as m
+from friso.views.drawing import matplotlib_renderer as m
 for figure in (t.small_figure(), t.check_figures(t.both_joints())[-1]):
     for form in m.FORMATS:
         print(hashlib.sha256(m.image(figure, form)).hexdigest())

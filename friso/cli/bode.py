@@ -134,7 +134,7 @@ def _at(found: Bode, one: Members, known: Margins) -> dict[str, Any]:
 
 
 def _limiter(found: Bode, touched: bool) -> str | None:
-    from friso.views.bode_states import has_limiter, side
+    from friso.views.bode.states import has_limiter, side
 
     return side(touched) if has_limiter(found) else None
 
@@ -150,9 +150,9 @@ def _limits(known: Limits, unit: str) -> dict[str, Any]:
 
 
 def _print(found: Bode) -> None:
-    from friso.views.bode_states import shown_states
-    from friso.views.bode_table import rows
-    from friso.views.bode_words import sentences
+    from friso.views.bode.states import shown_states
+    from friso.views.bode.table import rows
+    from friso.views.bode.words import sentences
 
     shown = shown_states(found)
     print_table(found.stage.name, [item.label for item in shown], rows(shown), sentences(found))
@@ -160,9 +160,9 @@ def _print(found: Bode) -> None:
 
 def _write(found: Bode, folder: Path) -> list[Path]:
     """The page, and every figure in all formats."""
-    from friso.views.bode_figures import bode_figures
-    from friso.views.bode_page import bode_html
-    from friso.views.matplotlib_renderer import FORMATS, save
+    from friso.views.bode.figures import bode_figures
+    from friso.views.bode.page import bode_html
+    from friso.views.drawing.matplotlib_renderer import FORMATS, save
 
     figures = bode_figures(found)
     pictures = {folder / f"{figure.name}.{form}": figure for figure in figures for form in FORMATS}

@@ -29,8 +29,8 @@ if TYPE_CHECKING:
     import numpy as np
 
     from friso.hunting.boundary import Diagram, Plane, Range
-    from friso.views.boundary_data import Line
-    from friso.views.boundary_words import Shown
+    from friso.views.boundary.data import Line
+    from friso.views.boundary.words import Shown
 
 RANGE = 'KEY="FIRST..LAST"'
 
@@ -65,14 +65,14 @@ def boundary(
     if as_json:
         print(json.dumps(_document(found, shown), allow_nan=False))
     else:
-        from friso.views.boundary_words import sentences
+        from friso.views.boundary.words import sentences
 
         print("\n".join([*sentences(found, shown), *(f"wrote {file}" for file in files)]))
 
 
 def _shown(one: Range, text: str) -> Shown:
     """A key in the unit in which its range was given, that of the last value."""
-    from friso.views.boundary_words import Shown
+    from friso.views.boundary.words import Shown
 
     match = re.search(r"\.\.\s*[-+.\deE]*\s*([^:]*)", text)
     unit = match[1].strip() if match else ""
@@ -87,7 +87,7 @@ def _document(found: Diagram | Plane, shown: tuple[Shown, ...]) -> dict[str, Any
 
 
 def _of_diagram(found: Diagram, key: Shown) -> dict[str, Any]:
-    from friso.views.boundary_data import end_verdicts, lines
+    from friso.views.boundary.data import end_verdicts, lines
 
     branches = lines(found)
     points = [_point(line, k, key) for line in branches for k in line.special]
@@ -125,7 +125,7 @@ def _branch(line: Line, key: Shown) -> dict[str, Any]:
 
 
 def _of_plane(found: Plane, shown: tuple[Shown, ...]) -> dict[str, Any]:
-    from friso.views.boundary_data import corner_verdicts, lines, lost_places
+    from friso.views.boundary.data import corner_verdicts, lines, lost_places
 
     x, y = shown
     verdicts = [verdict for _, _, verdict in corner_verdicts(found)]
@@ -157,8 +157,8 @@ def _numbers(values: np.ndarray, shown: tuple[Shown, ...]) -> list[list[float | 
 
 def _write(found: Diagram | Plane, shown: tuple[Shown, ...], name: str, stem: Path) -> list[Path]:
     """The figure in all formats, and the table of its points."""
-    from friso.views.boundary_figures import boundary_figure
-    from friso.views.matplotlib_renderer import FORMATS, save
+    from friso.views.boundary.figures import boundary_figure
+    from friso.views.drawing.matplotlib_renderer import FORMATS, save
 
     figure = boundary_figure(found, shown, name)
     pictures = [stem.with_name(f"{stem.name}.{form}") for form in FORMATS]
@@ -173,7 +173,7 @@ def _write_table(found: Diagram | Plane, path: Path) -> None:
     """One row per point of a line: special ones have a kind and an error."""
     import pandas as pd
 
-    from friso.views.boundary_data import lines
+    from friso.views.boundary.data import lines
 
     keys = [f"{one.key} [{one.unit}]" if one.unit else one.key for one in found.space.ranges]
     header = ["line", "cycle", "kind", *keys, *(f"error of {key}" for key in keys)]

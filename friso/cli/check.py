@@ -28,7 +28,7 @@ from friso.stage import Stage, load, numeric_keys
 if TYPE_CHECKING:
     from friso.hunting import Case, Cycle, Judgement, Margin
     from friso.stage.correlations import Drawn
-    from friso.views.draws import Drawing
+    from friso.views.check.draws import Drawing
 
 Draws = Annotated[
     int | None,
@@ -62,7 +62,7 @@ def check(
     cases = check_stage(stage, rtol=tolerance, traces=folder is not None)
     drawing = None if drawn is None else _drawing(cases, drawn, seed, tolerance)
     if folder is not None:
-        from friso.views.report import write_report
+        from friso.views.check.page import write_report
 
         write_report(cases, folder / "report.html", drawing)
     if as_json:
@@ -94,8 +94,8 @@ def _drawn(stage: Stage, path: Path, count: int, seed: int) -> Drawn:
 def _drawing(cases: dict[str, Case], drawn: Drawn, seed: int, tolerance: float) -> Drawing:
     """What becomes of the stages drawn."""
     from friso.studies.draws import different, fates
-    from friso.views.cases import shown_cases
-    from friso.views.draws import Drawing
+    from friso.views.check.cases import shown_cases
+    from friso.views.check.draws import Drawing
 
     stage = cases["given"].stage
     with progress_bar("draws", drawn.count * len(different(stage))) as advance:
@@ -109,7 +109,7 @@ def _check_document(stage: Stage, cases: dict[str, Case], drawing: Drawing | Non
     """The JSON document of `check` (design.md, section 3)."""
     document = {"stage": stage.name, "cases": {name: _case_document(case) for name, case in cases.items()}}
     if drawing is not None:
-        from friso.views.draws import draws_document
+        from friso.views.check.draws import draws_document
 
         for name, case in document["cases"].items():
             case["draws"] = draws_document(drawing, name)
@@ -170,7 +170,7 @@ def _margin_document(edge: Margin) -> dict[str, Any]:
 
 def _print_draws(drawing: Drawing) -> None:
     """The table of the draws, and a sentence per case."""
-    from friso.views.draws import draws_rows, draws_sentences
+    from friso.views.check.draws import draws_rows, draws_sentences
 
     title = f"{drawing.drawn.count} stages drawn from the uncertain keys, seed {drawing.seed}"
     print_table(title, [*drawing.labels.values()], draws_rows(drawing), draws_sentences(drawing))
@@ -178,9 +178,9 @@ def _print_draws(drawing: Drawing) -> None:
 
 def _print_cases(stage: Stage, cases: dict[str, Case]) -> None:
     """The short table of `check`, and a sentence per case."""
-    from friso.views.cases import shown_cases
-    from friso.views.check_table import rows
-    from friso.views.summary import conclusion, verdict_sentence
+    from friso.views.check.cases import shown_cases
+    from friso.views.check.table import rows
+    from friso.views.check.words import conclusion, verdict_sentence
 
     shown = shown_cases(cases)
     sentences = [f"{item.label}: {verdict_sentence(item, cases)}" for item in shown]

@@ -62,7 +62,7 @@ def compare(
         found = compared(stage, machines, seed, tolerance, known, bar or silent)
     files = [] if out is None else _written(found, out)
     if as_json:
-        from friso.views.compare_document import document
+        from friso.views.compare.document import document
 
         print(json.dumps(document(found), allow_nan=False))
     else:
@@ -87,7 +87,7 @@ def _correlations(path: Path, stage: Stage) -> Correlations:
 
 
 def _print(found: Comparison, files: Sequence[Path]) -> None:
-    from friso.views.compare_words import (
+    from friso.views.compare.words import (
         COLUMNS,
         PAIRED,
         options_rows,
@@ -108,9 +108,9 @@ def _print(found: Comparison, files: Sequence[Path]) -> None:
 
 def _written(found: Comparison, folder: Path) -> list[Path]:
     """Figures and page, drawn before any of them is written."""
-    from friso.views.compare_document import page
-    from friso.views.compare_figures import figures
-    from friso.views.matplotlib_renderer import FORMATS, image
+    from friso.views.compare.document import page
+    from friso.views.compare.figures import figures
+    from friso.views.drawing.matplotlib_renderer import FORMATS, image
 
     drawn = figures(found)
     contents = {f"{figure.name}.{form}": image(figure, form) for figure in drawn for form in FORMATS}

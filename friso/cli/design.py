@@ -54,13 +54,13 @@ def design(
     except NoDesign as failure:
         _refuse(failure, stage, spec, as_json)
     if as_json:
-        from friso.views.design_document import design_document
+        from friso.views.design.document import design_document
 
         print(json.dumps(design_document(found) | {"files": [str(file) for file in files]}, allow_nan=False))
     else:
         _print(found, files)
     if not found.meets:
-        from friso.views.design_words import shortfall
+        from friso.views.design.words import shortfall
 
         say(f"the design does not meet the specification: {shortfall(found)}")
         raise typer.Exit(2)
@@ -83,9 +83,9 @@ def _designed(stage: Stage, spec: Spec, out: Path) -> tuple[Design, list[Path]]:
 def _write(found: Design, folder: Path, progress: Progress) -> list[Path]:
     """The stages, the page, the drawing, and every figure in all formats."""
     from friso.stage.files import save as save_stage
-    from friso.views.design_figures import design_figures
-    from friso.views.design_page import design_html, drawing
-    from friso.views.matplotlib_renderer import FORMATS, save
+    from friso.views.design.figures import design_figures
+    from friso.views.design.page import design_html, drawing
+    from friso.views.drawing.matplotlib_renderer import FORMATS, save
 
     figures = design_figures(found)
     page, sheet = folder / PAGE, folder / "design_drawing.svg"
@@ -103,8 +103,8 @@ def _write(found: Design, folder: Path, progress: Progress) -> list[Path]:
 
 def _refuse(failure: NoDesign, stage: Stage, spec: Spec, as_json: bool) -> NoReturn:
     """Say why there is no design, and leave."""
-    from friso.views.design_document import refused_document
-    from friso.views.design_words import refusal
+    from friso.views.design.document import refused_document
+    from friso.views.design.words import refusal
 
     if as_json:
         print(json.dumps(refused_document(stage.name, spec.name, failure), allow_nan=False))
@@ -114,8 +114,8 @@ def _refuse(failure: NoDesign, stage: Stage, spec: Spec, as_json: bool) -> NoRet
 
 def _print(found: Design, files: list[Path]) -> None:
     """The summary, step by step, and what to do next."""
-    from friso.views.design_steps import steps
-    from friso.views.design_words import headline
+    from friso.views.design.steps import steps
+    from friso.views.design.words import headline
 
     for _, sentence in headline(found):
         print_wrapped(sentence)

@@ -15,7 +15,7 @@ from friso.stage import Stage
 
 if TYPE_CHECKING:
     from friso.flexure.mechanism import Mechanism
-    from friso.views.flexure_found import Found
+    from friso.views.flexure.findings import Found
 
 STROKE = Quantity("m", positive, "1 mm")
 EXAMPLE = """[flexure]
@@ -48,7 +48,7 @@ def flexure(
         found = _evaluate(stage, mechanism, deflection)
         files = [] if folder is None else _write(found, folder)
     if as_json:
-        from friso.views.flexure_document import flexure_document
+        from friso.views.flexure.document import flexure_document
 
         print(json.dumps(flexure_document(found), allow_nan=False))
     else:
@@ -92,7 +92,7 @@ def _evaluate(stage: Stage, mechanism: Mechanism, stroke: float) -> Found:
     """Both models; a failure of the beams is kept as such."""
     from friso.flexure.beams import BeamFailure, beams
     from friso.flexure.closed_model import closed
-    from friso.views.flexure_found import Found
+    from friso.views.flexure.findings import Found
 
     simple = closed(mechanism, stroke)
     try:
@@ -102,17 +102,17 @@ def _evaluate(stage: Stage, mechanism: Mechanism, stroke: float) -> Found:
 
 
 def _print(found: Found) -> None:
-    from friso.views.flexure_table import rows
-    from friso.views.flexure_words import sentences
+    from friso.views.flexure.table import rows
+    from friso.views.flexure.words import sentences
 
     print_table(found.stage.name, list(found.models), rows(found), sentences(found))
 
 
 def _write(found: Found, folder: Path) -> list[Path]:
     """The page, the drawing, and every figure in all formats."""
-    from friso.views.flexure_figures import flexure_figures
-    from friso.views.flexure_page import drawing, flexure_html
-    from friso.views.matplotlib_renderer import FORMATS, save
+    from friso.views.drawing.matplotlib_renderer import FORMATS, save
+    from friso.views.flexure.figures import flexure_figures
+    from friso.views.flexure.page import drawing, flexure_html
 
     figures = flexure_figures(found)
     pictures = {folder / f"{figure.name}.{form}": figure for figure in figures for form in FORMATS}

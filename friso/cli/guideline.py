@@ -33,8 +33,8 @@ def guideline(
     checked_samples(samples)
     folder = made_folder(out or Path("guideline"))
     from friso.studies.guideline.sweeps import Keep
-    from friso.views.guideline import guideline_document, write_guideline
-    from friso.views.guideline_words import percent
+    from friso.views.guideline.page import guideline_document, write_guideline
+    from friso.views.guideline.words import percent
 
     keep = Keep(folder / UNFINISHED)
     try:

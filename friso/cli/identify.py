@@ -124,9 +124,9 @@ def _write(
     """The stage file, the correlations beside it, the page, and every figure in all formats."""
     from friso.stage.correlations import beside, write_correlations
     from friso.stage.files import save as save_stage
-    from friso.views.identify_figures import identify_figures
-    from friso.views.identify_page import identify_html
-    from friso.views.matplotlib_renderer import FORMATS, save
+    from friso.views.drawing.matplotlib_renderer import FORMATS, save
+    from friso.views.identify.figures import identify_figures
+    from friso.views.identify.page import identify_html
 
     figures = identify_figures(found, predictions)
     page, stage = folder / PAGE, folder / STAGE
@@ -154,12 +154,12 @@ def _answer(
 ) -> None:
     """What was read and found, on standard output."""
     if as_json:
-        from friso.views.identify_document import identify_document
+        from friso.views.identify.document import identify_document
 
         document = identify_document(found, given, predictions) | {"files": [str(file) for file in files]}
         print(json.dumps(document, allow_nan=False))
         return
-    from friso.views.identify_words import answer
+    from friso.views.identify.words import answer
 
     for line in answer(found, given, predictions):
         print_wrapped(line)

@@ -110,7 +110,7 @@ def _too_large(runs: int, trial: Study, crew: Crew) -> StageError:
 
 def write_views(runs: xr.Dataset, store: Path, metric: str) -> list[Path]:
     """The figure and the page of a map, beside its store."""
-    from friso.views.map_page import write_map_page
+    from friso.views.map.page import write_map_page
 
     paths = _view_paths(store)
     _save_figure(runs, metric, paths[:-1])
@@ -119,8 +119,8 @@ def write_views(runs: xr.Dataset, store: Path, metric: str) -> list[Path]:
 
 
 def _save_figure(runs: xr.Dataset, metric: str, paths: list[Path]) -> None:
-    from friso.views.map_figures import map_figure
-    from friso.views.matplotlib_renderer import save
+    from friso.views.drawing.matplotlib_renderer import save
+    from friso.views.map.figures import map_figure
 
     figure = map_figure(runs, metric)
     for path in paths:
@@ -137,7 +137,7 @@ def refuse_overwriting(store: Path, exports: list[Path]) -> None:
 
 
 def _view_paths(store: Path) -> list[Path]:
-    from friso.views.matplotlib_renderer import FORMATS
+    from friso.views.drawing.matplotlib_renderer import FORMATS
 
     stem = store.with_suffix("") if store.suffix == ".zarr" else store
     return [stem.with_name(f"{stem.name}.{form}") for form in (*FORMATS, "html")]
@@ -154,7 +154,7 @@ def write_exports(runs: xr.Dataset, paths: list[Path]) -> list[Path]:
 
 def sentences(runs: xr.Dataset, study: Study) -> list[str]:
     """What was found, for the terminal."""
-    from friso.views.map_words import caveats, failures, verdict_counts, verification
+    from friso.views.map.words import caveats, failures, verdict_counts, verification
 
     counts = verdict_counts(runs)
     found = ", ".join(f"{count} {verdict}" for verdict, count in counts.items())
@@ -166,7 +166,7 @@ def sentences(runs: xr.Dataset, study: Study) -> list[str]:
 
 def document(runs: xr.Dataset, study: Study, store: Path, files: list[Path]) -> dict[str, Any]:
     """The JSON document of `map`."""
-    from friso.views.map_words import verdict_counts
+    from friso.views.map.words import verdict_counts
 
     verified = {name: runs.attrs[f"verified_{name}"] for name in ("cells", "surviving", "rtol") if _verified(runs)}
     return {

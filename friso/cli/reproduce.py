@@ -30,7 +30,7 @@ def reproduce(
     tolerance = read_tolerance(rtol)
     folder = made_folder(out or Path("reproduction"))
     from friso.studies.thesis.reproduce import reproduce as reproduce_thesis
-    from friso.views.reproduction import claims_document, write_reproduction
+    from friso.views.reproduce.page import claims_document, write_reproduction
 
     with step_bar() as progress:
         found = reproduce_thesis(names, points, tolerance, progress)

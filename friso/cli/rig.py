@@ -66,7 +66,7 @@ def rig(
         outcome = run(stage, seed, bar or silent)
     files = [] if out is None else _written(outcome, made_folder(out))
     if as_json:
-        from friso.views.rig import document
+        from friso.views.rig.page import document
 
         print(json.dumps(document(outcome), allow_nan=False))
     else:
@@ -93,7 +93,7 @@ def _told(stage: Stage) -> None:
 
 
 def _print(outcome: Outcome, files: Sequence[Path]) -> None:
-    from friso.views.rig import sentences
+    from friso.views.rig.page import sentences
 
     for sentence in sentences(outcome):
         print_wrapped(sentence)
@@ -106,8 +106,8 @@ def _print(outcome: Outcome, files: Sequence[Path]) -> None:
 
 def _written(outcome: Outcome, folder: Path) -> list[Path]:
     """Logs with how they are to be read, the truth in a folder of its own, figures and page."""
-    from friso.views.matplotlib_renderer import FORMATS, save
-    from friso.views.rig import figures, page
+    from friso.views.drawing.matplotlib_renderer import FORMATS, save
+    from friso.views.rig.page import figures, page
 
     truth = made_folder(folder / TRUTH)
     files = [_write_log(log, outcome.stage, folder, truth) for log in outcome.logs]

@@ -89,8 +89,8 @@ def _cell(store: Path, given: list[str], overrides: list[str] | None) -> tuple[S
 
 def _write_response(response: xr.Dataset, stem: Path) -> list[Path]:
     """NetCDF with everything, CSV with the samples, PNG with the plot."""
-    from friso.views.check_figures import response_figure
-    from friso.views.matplotlib_renderer import save as save_figure
+    from friso.views.check.figures import response_figure
+    from friso.views.drawing.matplotlib_renderer import save as save_figure
 
     paths = [stem.with_name(f"{stem.name}.{ending}") for ending in ("nc", "csv", "png")]
     response.to_netcdf(paths[0], engine="scipy")

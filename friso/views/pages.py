@@ -11,8 +11,8 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
 from friso.version import VERSION
-from friso.views import matplotlib_renderer, plotly_renderer
-from friso.views.figure import Figure
+from friso.views.drawing import matplotlib_renderer, plotly_renderer
+from friso.views.drawing.figure import Figure
 
 if TYPE_CHECKING:
     from friso.stage import Stage

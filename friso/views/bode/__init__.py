@@ -1,0 +1,1 @@
+"""What `friso bode` shows: words, figures, document and page."""

@@ -1,0 +1,264 @@
+"""The figures of a linear analysis: plant, open loop, Nyquist and sensitivity, in all limit cases and the family."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from friso.frequency.bode import Bode, Case
+from friso.frequency.crossover import WANTED
+from friso.views.bode.states import SERIES, colour, dash, has_family, has_limiter, label
+from friso.views.bode.table import decibels
+from friso.views.drawing.colours import ramp
+from friso.views.drawing.figure import (
+    INK,
+    LIGHT,
+    Array,
+    Axis,
+    Band,
+    Dash,
+    Figure,
+    Limit,
+    Markers,
+    Panel,
+    Series,
+)
+from friso.views.drawing.prefixes import with_unit
+
+QUARTER = 90.0
+"""Phases are read in quarters of a turn [deg]."""
+
+STARTS = -315.0
+"""The first phase [deg] begins in the turn above this one, between those of whole numbers of integrations."""
+
+LEAST_PHASE = -720.0
+"""Phases [deg] below this one, as of a delay at high frequencies, are left out of view."""
+
+NEAR = ((-3.0, 1.5), (-1.5, 1.5))
+"""What is seen of the complex plane about -1."""
+
+KEPT = (0.02, 5.0)
+"""Sizes of the loop that are drawn of the family in it."""
+
+DRAWN = {True: 40, False: 12}
+"""Members of the family that are drawn there, of the stable ones and of the others."""
+
+SIZES = (-90.0, 90.0)
+"""Sizes of the open loop [dB] that are in view at most."""
+
+LEAST_SENSITIVITY = -40.0
+"""Sensitivities [dB] from which on they are in view."""
+
+WIDTHS = {False: 2.6, True: 1.3}
+"""Widths of lines, of a free and a touched limiter: where both do the same, both are seen."""
+
+LOST = "#eeb48f"
+
+
+def bode_figures(found: Bode) -> tuple[Figure, ...]:
+    """All figures, in the order in which they are read."""
+    figures = (_plant(found), _loop(found), _speeds(found), _nyquist(found), _sensitivity(found))
+    return tuple(replace(figure, subject=found.stage.name) for figure in figures if figure.panels)
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A complex frequency response, shape (k,), as a Bode plot draws it."""
+
+    response: np.ndarray
+    label: str
+    colour: str
+    dash: Dash = "solid"
+    width: float = 1.4
+
+
+def phases(responses: Sequence[np.ndarray]) -> list[Array]:
+    """Phases [deg], each of shape (k,), without jumps of a turn: the first begins between -315 and 45 degrees, and the
+    others lie in the same turn at high frequencies, where all of them do the same."""
+    angles = [np.angle(response) for response in responses]
+    lagging = [np.where(angle > np.pi - 1e-9, angle - 2 * np.pi, angle) for angle in angles]  # half a turn is a lag
+    first, *others = [np.degrees(np.unwrap(angle)) for angle in lagging]
+    first = first - 360 * np.floor((first[0] - STARTS) / 360)
+    high = slice(len(first) // 2, None)
+    return [first, *(one + 360 * np.round(np.median(first[high] - one[high]) / 360) for one in others)]
+
+
+def size(response: np.ndarray) -> Array:
+    """Absolute value [dB]."""
+    return 20 * np.log10(np.abs(response))
+
+
+def _plant(found: Bode) -> Figure:
+    """Stage position over actuator force, with the mass lines (thesis, Fig. 7)."""
+    curves = [_curve(name, case.plant) for name, case in found.cases.items()]
+    sizes = np.concatenate([np.abs(curve.response) for curve in curves])
+    axis = Axis("Magnitude", "m/N", (float(sizes.min()) / 2, float(sizes.max()) * 2), log=True, prefixed=False)
+    above = _magnitudes(_hertz(found), curves, axis, np.abs)
+    lines = tuple(
+        Series(_hertz(found), 1 / (mass * found.omega**2), f"mass of {mass:.4g} kg", INK, style, 0.9)
+        for mass, style in zip(_masses(found), ("dashed", "dotted"), strict=False)
+    )
+    caption = (
+        "Stage position over actuator force, at small motions in the limit cases of Table 1 of the thesis (its Fig. 7)"
+        " and on the mass lines. A stuck cart rests on its bristles, a sliding one feels its viscous friction."
+    )
+    if has_limiter(found):
+        caption += " A touched limiter acts beside the joint" + (
+            "; dashed: one behind the other, as Table 1 prints it." if _any_series(found) else "."
+        )
+    panels = (replace(above, series=(*above.series, *lines)), _phases(_hertz(found), curves))
+    return Figure("bode_plant", "Plant", caption, panels)
+
+
+def _loop(found: Bode) -> Figure:
+    """The open loop in the limit cases."""
+    caption = (
+        "The loop cut at the actuator: controller, plant and, if the stage file has one, the drive. The phase margin is"
+        " the way to −180° where the magnitude passes 0 dB."
+    )
+    panels = loop_panels(_hertz(found), [_loop_of(name, case) for name, case in found.cases.items()])
+    return Figure("bode_loop", "Open loop, limit cases", caption, panels)
+
+
+def _speeds(found: Bode) -> Figure:
+    """The open loop at prescribed speeds of the cart (thesis, Fig. 8); no panels without friction."""
+    caption = (
+        "The same while the cart slides at a prescribed speed"
+        f"{', limiter free' if has_limiter(found) else ''} (thesis, Fig. 8): the faster, the sooner the bristles give"
+        " way. Where friction falls as the speed rises, the loop may be unstable (dashed)."
+    )
+    count = len(found.prescribed)
+    styles = zip(ramp(count + 1)[:count], np.linspace(2.6, 1.2, count), strict=True)  # the last shade is light
+    curves = [
+        _marked(Curve(at.loop, with_unit(at.speed, "m/s", 1) if at.speed else "stuck", shade, width=width), at.stable)
+        for at, (shade, width) in zip(found.prescribed, styles, strict=True)
+    ]
+    return Figure("bode_speeds", "Open loop, prescribed cart speeds", caption, loop_panels(_hertz(found), curves))
+
+
+def _marked(curve: Curve, stable: bool) -> Curve:
+    """The curve of a loop; dashed, and labelled so, if it is not stable."""
+    return curve if stable else replace(curve, label=f"{curve.label} (unstable)", dash="dashed")
+
+
+def _nyquist(found: Bode) -> Figure:
+    """The loop about -1: limit cases, and the family behind them."""
+    family = [
+        *_family(found, True, "stable states of the family", LIGHT),
+        *_family(found, False, "unstable states of the family", LOST),
+    ]
+    cases = [
+        Series(np.real(curve.response), np.imag(curve.response), curve.label, curve.colour, curve.dash, curve.width)
+        for curve in (_loop_of(name, case) for name, case in found.cases.items())
+    ]
+    turn = np.linspace(0, 2 * np.pi, 181)
+    name = f"modulus margin {WANTED:g}"
+    circle = Series(-1 + WANTED * np.cos(turn), WANTED * np.sin(turn), name, INK, "dashed", 1.0)
+    point = Markers(np.array([-1.0]), np.array([0.0]), "−1", INK, "cross")
+    x, y = (Axis(f"{part} part of L", "", limits) for part, limits in zip(("Real", "Imaginary"), NEAR, strict=True))
+    panel = Panel("", x, y, (*family, *cases, circle), (point,), equal=True)
+    caption = (
+        "The loop for positive frequencies. Its least distance from −1 is the modulus margin: one above 0.5 stays out "
+        "of the circle."
+    )
+    if family:
+        caption += " Light lines: a selection of the family, stuck under bias forces and sliding at all speeds."
+    return Figure("bode_nyquist", "Nyquist plot", caption, (panel,))
+
+
+def _family(found: Bode, stable: bool, name: str, shade: str) -> list[Series]:
+    """Evenly picked members that are stable, or those that are not, where they are in view."""
+    numbers = np.flatnonzero(found.scan.stable == stable) if has_family(found) else np.empty(0, int)
+    picked = numbers[np.linspace(0, len(numbers) - 1, min(DRAWN[stable], len(numbers))).round().astype(int)]
+    lines = []
+    for k, loop in enumerate(found.loops[picked]):
+        seen = (np.abs(loop) > KEPT[0]) & (np.abs(loop) < KEPT[1])
+        shown = np.where(seen, loop, np.nan)[np.convolve(seen, np.ones(3), "same") > 0]
+        lines.append(Series(np.real(shown), np.imag(shown), "" if k else name, shade, width=0.9))
+    return lines
+
+
+def _sensitivity(found: Bode) -> Figure:
+    """Sensitivity of the limit cases that are stable, and the band of the family."""
+    stable = found.scan.stable
+    lines = tuple(
+        Series(_hertz(found), -size(1 + curve.response), curve.label, curve.colour, curve.dash, curve.width)
+        for curve in (_loop_of(name, case) for name, case in found.cases.items() if case.margins.stable)
+    )
+    bands = ()
+    if stable.any() and has_family(found):
+        all_ = -size(1 + found.loops[stable])
+        name = "stable states of the family"
+        bands = (Band(_hertz(found), all_.min(axis=0), all_.max(axis=0), name, LIGHT),)
+    if not (lines or bands):
+        return Figure("bode_sensitivity", "", "", ())
+    largest = max(float(np.max(part)) for part in (*(line.y for line in lines), *(band.high for band in bands)))
+    wanted = Limit((-decibels(WANTED),), f"{-decibels(WANTED):.0f} dB: modulus margin {WANTED:g}", INK)
+    axis = Axis("|1/(1 + L)|", "dB", (LEAST_SENSITIVITY, max(10.0, 1.08 * largest)))
+    caption = "How much of a disturbance is left: above 0 dB the controller makes it worse."
+    lost = f"; {(~stable).sum()} unstable ones are left out, and close to them it reaches any height"
+    note = f"Band: least to greatest of {stable.sum()} stable states{'' if stable.all() else lost}." if bands else ""
+    panel = Panel("", _frequency(_hertz(found)), axis, lines, limits=(wanted,), bands=bands)
+    return Figure("bode_sensitivity", "Sensitivity", caption, (panel,), note=note)
+
+
+def loop_panels(hertz: Array, curves: Sequence[Curve]) -> tuple[Panel, ...]:
+    """Magnitude [dB] and phase [deg] of loops over frequencies (k,) [Hz], with the lines at 0 dB and half a turn; none
+    of no loops."""
+    if not curves:
+        return ()
+    sizes = np.concatenate([size(curve.response) for curve in curves])
+    view = max(float(sizes.min()) - 5, SIZES[0]), min(float(sizes.max()) + 5, SIZES[1])
+    above = _magnitudes(hertz, curves, Axis("Magnitude", "dB", view, step=30.0), size)
+    below = _phases(hertz, curves)
+    low, high = below.y.limits or (-180.0, 180.0)
+    halves = tuple(turn for turn in (-540.0, -180.0, 180.0) if low < turn < high)
+    return replace(above, limits=(Limit((0.0,), "", INK),)), replace(below, limits=(Limit(halves, "", INK),))
+
+
+def _magnitudes(hertz: Array, curves: Sequence[Curve], axis: Axis, of: Callable[[np.ndarray], Array]) -> Panel:
+    lines = (Series(hertz, of(one.response), one.label, one.colour, one.dash, one.width) for one in curves)
+    return Panel("", _frequency(hertz), axis, tuple(lines))
+
+
+def _phases(hertz: Array, curves: Sequence[Curve]) -> Panel:
+    """The phases, without labels: those stand above the magnitudes."""
+    known = zip(curves, phases([one.response for one in curves]), strict=True)
+    lines = tuple(Series(hertz, y, "", one.colour, one.dash, one.width) for one, y in known)
+    least = QUARTER * np.floor((min(line.y.min() for line in lines) + 1) / QUARTER)
+    most = QUARTER * np.ceil((max(line.y.max() for line in lines) - 1) / QUARTER)
+    if most == least:
+        least, most = least - QUARTER, most + QUARTER
+    view = max(float(least), LEAST_PHASE) - 10, float(most) + 10
+    step = QUARTER if view[1] - view[0] < 6 * QUARTER else 2 * QUARTER
+    return Panel("", _frequency(hertz), Axis("Phase", "°", view, step=step), lines)
+
+
+def _curve(name: str, response: np.ndarray) -> Curve:
+    """A response of a limit case."""
+    return Curve(response, label(name), colour(name), dash(name), WIDTHS["touched" in name])
+
+
+def _loop_of(name: str, case: Case) -> Curve:
+    return _marked(_curve(name, case.loop), case.margins.stable)
+
+
+def _masses(found: Bode) -> list[float]:
+    """All that moves, and the stage alone, if it can move alone [kg]."""
+    flat = found.stage.flat()
+    known = [float(flat[key]) for key in ("masses.cart", "masses.stage") if key in flat]
+    return [sum(known), *(known[1:] if "joint.locked" in flat and not flat["joint.locked"] else [])]
+
+
+def _any_series(found: Bode) -> bool:
+    return any(name.endswith(SERIES) for name in found.cases)
+
+
+def _hertz(found: Bode) -> Array:
+    return found.omega / (2 * np.pi)
+
+
+def _frequency(hertz: Array) -> Axis:
+    return Axis("Frequency", "Hz", (float(hertz[0]), float(hertz[-1])), log=True)

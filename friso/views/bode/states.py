@@ -1,0 +1,96 @@
+"""How the states of a linear analysis are named and coloured: the same in every figure, sentence and table."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from friso.frequency.bode import Bode
+from friso.frequency.margins import Margins
+from friso.frequency.members import Members
+from friso.views.drawing.figure import BLUE, GREY, ORANGE, SKY, VERMILLION, Dash
+from friso.views.drawing.prefixes import with_unit
+
+SERIES = "-series"
+"""Ends the name of a case whose limiter acts by the formula that Table 1 of the thesis prints."""
+
+COLOURS = {"given": BLUE, "stuck": BLUE, "sliding": VERMILLION, "stuck-touched": SKY, "sliding-touched": ORANGE}
+_ENDINGS = {"touched": "limiter touched", "touched-series": "limiter in series"}
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A state with its margins, always under this label, in this colour; `where` says which state it is, if the label
+    does not."""
+
+    label: str
+    colour: str
+    where: str
+    margins: Margins
+
+
+def shown_states(found: Bode) -> tuple[Shown, ...]:
+    """The limit cases, the worst of all settled states, and the worst of the whole family, if that is another one."""
+    cases = [Shown(label(name), colour(name), _speed(case.members), case.margins) for name, case in found.cases.items()]
+    if not has_family(found):
+        return tuple(cases)
+    (settled, known), (worst, lost) = found.settled, found.worst
+    cases.append(Shown("Worst settled", GREY, place(settled, found), known))
+    if worst != settled:
+        cases.append(Shown("Worst of the family", GREY, place(worst, found), lost))
+    return tuple(cases)
+
+
+def label(name: str) -> str:
+    """A limit case in words: "stuck-touched" is "Stuck, limiter touched"."""
+    move, _, rest = name.partition("-")
+    first = {"given": "As given"}.get(move, move.capitalize())
+    return ", ".join([first, *([_ENDINGS[rest]] if rest else [])])
+
+
+def colour(name: str) -> str:
+    return COLOURS[name.removesuffix(SERIES)]
+
+
+def dash(name: str) -> Dash:
+    return "dashed" if name.endswith(SERIES) else "solid"
+
+
+def place(one: Members, found: Bode) -> str:
+    """A state in words, as far as states differ: "sliding at 1.78 mm/s, limiter free"."""
+    return in_words(cart(one) if has_friction(found) else "", bool(one.touched[0]), has_limiter(found))
+
+
+def in_words(cart: str, touched: bool, limited: bool) -> str:
+    """What the cart does and, if there are two possibilities, whether the limiter is touched."""
+    return ", ".join([*([cart] if cart else []), *([f"limiter {side(touched)}"] if limited else [])]) or "as given"
+
+
+def cart(one: Members) -> str:
+    """What the cart does."""
+    if not one.stuck[0]:
+        return f"sliding{'' if one.forward[0] else ' backwards'} at {with_unit(one.speed[0], 'm/s')}"
+    return f"stuck under a bias force of {with_unit(one.bias[0], 'N')}" if one.bias[0] else "stuck"
+
+
+def side(touched: bool) -> str:
+    return "touched" if touched else "free"
+
+
+def has_limiter(found: Bode) -> bool:
+    """Whether the limiter may be touched or not; it is always the same where the joint is locked or has no stroke."""
+    return bool(np.ptp(found.scan.members.touched.astype(int)))
+
+
+def has_family(found: Bode) -> bool:
+    """Whether there are states behind the limit cases: only friction makes some."""
+    return len(found.scan.members) > len(found.cases)
+
+
+def has_friction(found: Bode) -> bool:
+    return found.stage.flat()["friction.model"] != "none"
+
+
+def _speed(one: Members) -> str:
+    return "" if one.stuck[0] else f"at {with_unit(one.speed[0], 'm/s')}"

@@ -1,0 +1,1 @@
+"""What `friso boundary` shows: words, figures, document and page."""

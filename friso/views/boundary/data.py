@@ -1,0 +1,155 @@
+"""Boundaries of hunting as numbers: branches and curves point by point, and the verdict at stages between them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from friso.hunting.boundary import Branch, Curve, Diagram, Found, Plane, Space
+from friso.hunting.cycle.find import Cycles
+from friso.views.drawing.figure import Array
+
+Shape = Literal["symmetric", "asymmetric", "whole"]
+"""A cycle that is its own mirror image; one that is not, of a stage that is; one of a stage that is not."""
+
+ATTRACTS, REPELS, UNKNOWN, INVALID = "attracting cycle", "no attracting cycle", "unknown", "invalid"
+"""The verdicts of a boundary: the last two where an orbit could not be closed, and where no stage may be."""
+
+
+@dataclass(frozen=True)
+class Line:
+    """A branch of cycles over one key, or a curve in two: its n points in order.
+
+    `at` [SI], shape (n, keys), and `error`, by how much it changes at a hundredth of the tolerance (NaN but at special
+    points); `kinds` of the special points ("" for others); `amplitude` [m], `period` [s] and `multiplier`, each (n,);
+    and how the line ends on either side.
+    """
+
+    shape: Shape
+    at: Array
+    error: Array
+    kinds: tuple[str, ...]
+    amplitude: Array
+    period: Array
+    multiplier: Array
+    ends: tuple[str, str]
+
+    @property
+    def special(self) -> np.ndarray:
+        """The numbers of the special points."""
+        return np.flatnonzero([bool(kind) for kind in self.kinds])
+
+    @property
+    def ordinary(self) -> np.ndarray:
+        """The numbers of the others."""
+        return np.flatnonzero([not kind for kind in self.kinds])
+
+    @property
+    def attracts(self) -> np.ndarray:
+        """Whether the cycle attracts from each point to the next, shape (n - 1,)."""
+        return np.abs(self.multiplier[1:] + self.multiplier[:-1]) < 2
+
+
+class _Row(NamedTuple):
+    """A point of a line: its place in the box of the keys, by how much that may be wrong, its cycle and its kind."""
+
+    at: Array
+    error: Array
+    cycle: Cycles
+    kind: str
+
+
+def lines(found: Diagram | Plane) -> tuple[Line, ...]:
+    """All branches of a diagram, each with its special points where they lie on it; or all curves of a plane."""
+    if isinstance(found, Diagram):
+        pairs = zip(found.branches, found.special, strict=True)
+        return tuple(_line(found, branch, _of_branch(branch, special)) for branch, special in pairs)
+    return tuple(_line(found, curve, _of_curve(curve)) for curve in found.curves)
+
+
+def _of_branch(branch: Branch, special: tuple[Found, ...]) -> list[_Row]:
+    """The points of a branch with those of its special points that are inside the range, in order."""
+    path = np.array([point.vector for point in branch.points])
+    placed = [(float(k), point, np.nan, "") for k, point in enumerate(branch.points)]
+    placed += [
+        (_along(path, each.point.vector), each.point, each.error, each.kind)
+        for each in special
+        if 0 <= each.point.place <= 1
+    ]
+    return [
+        _Row(np.array([point.place]), np.array([error]), point.cycle, kind)
+        for _, point, error, kind in sorted(placed, key=lambda row: row[0])
+    ]
+
+
+def _of_curve(curve: Curve) -> list[_Row]:
+    return [_Row(spot.at, spot.error, spot.found.point.cycle, spot.found.kind) for spot in curve.spots]
+
+
+def _along(path: Array, vector: Array) -> float:
+    """How far along a path, in legs, a point on it lies."""
+    before, after = (np.linalg.norm(end - vector, axis=1) for end in (path[:-1], path[1:]))
+    leg = int(np.argmin(before + after - np.linalg.norm(path[1:] - path[:-1], axis=1)))
+    return leg + before[leg] / (before[leg] + after[leg])
+
+
+def _line(found: Diagram | Plane, traced: Branch | Curve, rows: list[_Row]) -> Line:
+    at = np.array([row.at for row in rows])
+    values = _values(found.space, at)
+    return Line(
+        "symmetric" if traced.sign < 0 else "asymmetric" if found.cycles.sign < 0 else "whole",
+        values,
+        np.abs(_values(found.space, at + np.array([row.error for row in rows])) - values),
+        tuple(row.kind for row in rows),
+        np.array([row.cycle.amplitude[0] for row in rows]),
+        np.array([row.cycle.period[0] for row in rows]),
+        np.array([row.cycle.multiplier[0] for row in rows]),
+        traced.ends,
+    )
+
+
+def _values(space: Space, at: Array) -> Array:
+    return np.stack(list(space.values(at).values()), axis=1)
+
+
+def end_verdicts(found: Diagram) -> tuple[str, str]:
+    """The verdicts at both ends of the range, by all branches that reach them."""
+    known = dict(zip(found.places.tolist(), _verdicts(found.cycles), strict=True))
+    low, high = (
+        ATTRACTS if place in known and _attracts_at(found, place) else known.get(place, INVALID) for place in (0.0, 1.0)
+    )
+    return low, high
+
+
+def _attracts_at(found: Diagram, place: float) -> bool:
+    """Whether any cycle attracts on both sides of a place."""
+    pairs = [pair for branch in found.branches for pair in pairwise(branch.points)]
+    across = [(a, b) for a, b in pairs if (a.place - place) * (b.place - place) <= 0]
+    return any(max(abs(a.multiplier), abs(b.multiplier)) < 1 for a, b in across)
+
+
+def node_verdicts(found: Plane) -> list[tuple[float, float, str]]:
+    """The values [SI] of both keys at every node of the grid, the first key the slowest, and the verdict there."""
+    verdicts = np.full(found.nodes**2, INVALID, object)
+    verdicts[found.allowed] = _verdicts(found.cycles)
+    values = _values(found.space, found.space.grid(found.nodes)).tolist()
+    return [(x, y, verdict) for (x, y), verdict in zip(values, verdicts.tolist(), strict=True)]
+
+
+def corner_verdicts(found: Plane) -> list[tuple[float, float, str]]:
+    """The same at the corners: both keys low, the second high, the first high, both high."""
+    nodes, last = node_verdicts(found), found.nodes - 1
+    return [nodes[k] for k in (0, last, found.nodes * last, -1)]
+
+
+def lost_places(found: Plane) -> Array:
+    """Where a change was seen that no curve could be begun at [SI], shape (places, 2)."""
+    return _values(found.space, np.reshape(found.lost, (-1, 2)))
+
+
+def _verdicts(cycles: Cycles) -> list[str]:
+    """The verdicts of stages by their hunting cycles."""
+    return np.select([cycles.attracting, cycles.uncertain], [ATTRACTS, UNKNOWN], REPELS).tolist()

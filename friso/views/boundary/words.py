@@ -1,0 +1,168 @@
+"""What is said about a boundary of hunting: each special point, branch and curve in a sentence, and the verdicts."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from friso.hunting.boundary import Diagram, Plane, Range, Space
+from friso.views.boundary.data import (
+    ATTRACTS,
+    INVALID,
+    REPELS,
+    UNKNOWN,
+    Line,
+    Shape,
+    corner_verdicts,
+    end_verdicts,
+    lines,
+    lost_places,
+)
+from friso.views.drawing.figure import Array
+from friso.views.drawing.prefixes import plus_minus, pretty, with_unit
+
+VERDICTS = {
+    ATTRACTS: "an attracting cycle (hunting is possible)",
+    REPELS: "none (no hunting)",
+    UNKNOWN: "not known (there should be a cycle, but its orbit could not be closed)",
+    INVALID: "no stage may have these values",
+}
+CYCLES: dict[Shape, str] = {
+    "symmetric": "the hunting cycle",
+    "asymmetric": "an asymmetric cycle",
+    "whole": "the hunting cycle",
+}
+MEANINGS = {
+    "flip": "it still exists, but repels",
+    "fold": "it has merged with another cycle, and neither exists",
+    "torus": "it still exists, but motions spiral away from it",
+}
+"""What has become of a cycle on the other side of a special point."""
+BASIN = "Asymmetric cycles bound the basin of the hunting cycle."
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A key, and the unit in which its values are told: its name, and its value in SI."""
+
+    key: str
+    unit: str = ""
+    factor: float = 1.0
+
+    def number(self, value: float) -> float:
+        """A value [SI] in the unit."""
+        return float(f"{value / self.factor:.15g}")
+
+    def text(self, value: float, digits: int = 6) -> str:
+        """A value [SI] with its unit."""
+        return self._with_unit(f"{self.number(value):.{digits}g}")
+
+    def uncertain(self, value: float, error: float) -> str:
+        """A value with its error [SI]."""
+        if not math.isfinite(error):
+            return f"{self.text(value)} (error not known)"
+        return self._with_unit(f"{self.number(value):.6g} ± {self.number(error):.1g}")
+
+    def extent(self, values: Array, one: Range) -> str:
+        """From the lowest value [SI] to the highest inside a range."""
+        low, high = self.number(max(one.low, float(values.min()))), self.number(min(one.high, float(values.max())))
+        return self._with_unit(f"{low:.6g} to {high:.6g}")
+
+    def _with_unit(self, numbers: str) -> str:
+        return f"{numbers} {pretty(self.unit)}".rstrip()
+
+
+def sentences(found: Diagram | Plane, shown: tuple[Shown, ...]) -> list[str]:
+    """What was found, for the terminal."""
+    return _of_diagram(found, shown[0]) if isinstance(found, Diagram) else _of_plane(found, shown)
+
+
+def _of_diagram(found: Diagram, key: Shown) -> list[str]:
+    branches = lines(found)
+    turns = sorted((line.at[k, 0], _turn(line, k, key)) for line in branches for k in line.special)
+    said = [text for _, text in turns] or [_no_boundary(found.space, (key,))]
+    return [end_sentence(found, key), *said, *(_followed(line, key, found.space) for line in branches)]
+
+
+def _turn(line: Line, k: int, key: Shown) -> str:
+    """What happens to a cycle at a special point of its branch as the key rises."""
+    value = float(line.at[k, 0])
+    above = [j for j in (k - 1, k + 1) if 0 <= j < len(line.at) and line.at[j, 0] > value]
+    goes_on = bool(above) if line.kinds[k] == "fold" else any(line.attracts[min(j, k)] for j in above)
+    verb = _VERBS[line.kinds[k] == "fold", goes_on]
+    size = f"{plus_minus(line.amplitude[k], 'm')} every {with_unit(line.period[k], 's')}"
+    where = f"{key.key} = {key.uncertain(value, float(line.error[k, 0]))}"
+    meaning = f"{line.kinds[k]}: {'below' if goes_on else 'above'}, {MEANINGS[line.kinds[k]]}"
+    return f"{CYCLES[line.shape].capitalize()} ({size}) {verb} at {where} ({meaning})."
+
+
+_VERBS = {
+    (True, True): "appears",
+    (True, False): "vanishes",
+    (False, True): "begins to attract",
+    (False, False): "stops attracting",
+}
+
+
+def _followed(line: Line, key: Shown, space: Space) -> str:
+    """Over which values a branch was followed, and how it ends."""
+    pair = "Asymmetric cycles, which bound the basin of the hunting cycle where they repel,"
+    name = pair if line.shape == "asymmetric" else "Hunting cycles"
+    return f"{name} were followed over {key.extent(line.at[:, 0], space.ranges[0])}; ends: {_ends(line)}."
+
+
+def end_sentence(found: Diagram, key: Shown) -> str:
+    """The verdicts at both ends of the range."""
+    one = found.space.ranges[0]
+    first, last = end_verdicts(found)
+    return f"At {key.text(one.low)}: {VERDICTS[first]}; at {key.text(one.high)}: {VERDICTS[last]}."
+
+
+def _of_plane(found: Plane, shown: tuple[Shown, ...]) -> list[str]:
+    curves = lines(found)
+    said = [_curve(line, shown, found.space) for line in curves] or [_no_boundary(found.space, shown)]
+    said += [
+        f"{kind.capitalize()}: beyond, {MEANINGS[kind]}." for kind in dict.fromkeys(line.kinds[0] for line in curves)
+    ]
+    said += [BASIN] if any(line.shape == "asymmetric" for line in curves) else []
+    return [*said, *_corners(found, shown), *_lost(found, shown)]
+
+
+def _curve(line: Line, shown: tuple[Shown, ...], space: Space) -> str:
+    """How many points a curve has, where it runs, how it ends, and its largest errors."""
+    sides = zip(shown, line.at.T, space.ranges, strict=True)
+    extents = ", ".join(f"{key.key} {key.extent(values, one)}" for key, values, one in sides)
+    errors = ", ".join(key.text(error, 1) for key, error in zip(shown, line.error.max(axis=0), strict=True))
+    head = f"{line.kinds[0].capitalize()} of {CYCLES[line.shape]}: {len(line.at)} points, {extents}"
+    return f"{head}; ends: {_ends(line)}; largest error: {errors}."
+
+
+def _corners(found: Plane, shown: tuple[Shown, ...]) -> list[str]:
+    """The verdicts at the corners, in one sentence where they agree."""
+    corners = corner_verdicts(found)
+    if len({verdict for _, _, verdict in corners}) == 1:
+        return [f"At all four corners: {VERDICTS[corners[0][2]]}."]
+    return [f"At {_place((x, y), shown)}: {VERDICTS[verdict]}." for x, y, verdict in corners]
+
+
+def _lost(found: Plane, shown: tuple[Shown, ...]) -> list[str]:
+    places = [_place(values, shown) for values in lost_places(found).tolist()]
+    return [f"A change was seen near {'; '.join(places)}, but no curve could be begun there."] if places else []
+
+
+def _place(values: Sequence[float], shown: tuple[Shown, ...]) -> str:
+    return ", ".join(f"{key.key} = {key.text(value)}" for key, value in zip(shown, values, strict=True))
+
+
+def _no_boundary(space: Space, shown: tuple[Shown, ...]) -> str:
+    between = (
+        f"{key.key} {key.text(each.low)} to {key.text(each.high)}"
+        for key, each in zip(shown, space.ranges, strict=True)
+    )
+    return f"No boundary of hunting over {', '.join(between)}."
+
+
+def _ends(line: Line) -> str:
+    """How a line ends, once if both sides end alike."""
+    return "; ".join(dict.fromkeys(line.ends))

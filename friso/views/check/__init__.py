@@ -1,0 +1,1 @@
+"""What `friso check` shows: words, figures, document and page."""

@@ -1,0 +1,123 @@
+"""The table of a check: what is named, and its text for each case."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from friso.hunting import COUNTED_ABOVE, COUNTED_AFTER
+from friso.views.check.cases import BANDS, Shown
+from friso.views.check.words import at_the_end
+from friso.views.drawing.prefixes import NOTHING, plus_minus, range_with_unit, window_with_unit, with_unit
+
+if TYPE_CHECKING:
+    from friso.hunting import Case, Cycle, Kick
+
+_WINDOWS = 4  # windows of kicks that are listed, at most
+
+
+def rows(shown: tuple[Shown, ...]) -> list[tuple[str, list[str]]]:
+    """The rows of which some case has something to say."""
+    texts = [(name, [text(item.case) for item in shown]) for name, text in _COLUMNS.items()]
+    return [(name, row) for name, row in texts if set(row) != {NOTHING}]
+
+
+def _of_the_cycle(text: Callable[[Cycle], str]) -> Callable[[Case], str]:
+    def of_the_case(case: Case) -> str:
+        cycle = case.judgement.cycle
+        return text(cycle) if cycle else NOTHING
+
+    return of_the_case
+
+
+def _amplitude(cycle: Cycle) -> str:
+    return f"{plus_minus(cycle.amplitude, 'm', 4)}{'' if cycle.attracts else ' (repels)'}"
+
+
+def _multiplier(cycle: Cycle) -> str:
+    simulated = f" (simulated: {cycle.growth:.4f})" if cycle.growth == cycle.growth else ""
+    return f"{cycle.multiplier:.4f}{simulated}"
+
+
+def _decided(cycle: Cycle) -> str:
+    how = "slope of the returns" if cycle.multiplier == cycle.slope else "Floquet"
+    return f"{'half a' if cycle.symmetric else 'a whole'} period ({how})"
+
+
+def _others(case: Case) -> str:
+    known = case.judgement
+    return "; ".join(_other(cycle) for cycle in known.hunting.cycles if cycle is not known.cycle) or NOTHING
+
+
+def _other(cycle: Cycle) -> str:
+    kind = "symmetric" if cycle.symmetric else "asymmetric"
+    return f"{kind}, {plus_minus(cycle.amplitude, 'm', 4)}, {'attracts' if cycle.attracts else 'repels'}"
+
+
+def _edge(case: Case) -> str:
+    edge = case.judgement.margin
+    if edge is None:
+        return NOTHING
+    return f"{edge.factor:.3g} × as fast" if edge.crossover is None else with_unit(edge.crossover, "Hz")
+
+
+def _kicks(kick: Kick | None, unit: str) -> str:
+    if kick is None:
+        return NOTHING
+    if not kick.windows:
+        return f"none from {range_with_unit(*kick.searched, unit)}"
+    texts = [window_with_unit(*window, kick.searched, unit) for window in kick.windows[:_WINDOWS]]
+    more = len(kick.windows) - len(texts)
+    return ", ".join([*texts, *([f"and {more} more ranges"] if more else [])])
+
+
+def _moves(case: Case) -> str:
+    moves = case.judgement.moves
+    if moves is None:
+        return NOTHING
+    low, high = moves.interval
+    return f"{100 * moves.fraction:.0f} % ({100 * low:.0f} to {100 * high:.0f} %) of {moves.drawn} moves"
+
+
+def _peaks(case: Case) -> str:
+    """The peak count, and why it contradicts the verdict where it does."""
+    remarks = {
+        ("hunts", False): f" (only those after {COUNTED_AFTER:g} s, above {with_unit(COUNTED_ABOVE, 'm')}, count)",
+        ("bistable", False): " (another motion hunts)",
+        ("bistable", True): " (a long transient)",
+        ("transient", True): " (a long transient)",
+        ("settles", True): " (a long transient)",
+    }
+    return f"{case.peaks}{remarks.get((case.verdict, case.peaks > 0), '')}"
+
+
+def _settled_within(band: float) -> Callable[[Case], str]:
+    def text(case: Case) -> str:
+        time = case.settling_time.get(band)
+        if time is not None:
+            return with_unit(time, "s")
+        return "never" if case.verdict == "hunts" else "not in this run"
+
+    return text
+
+
+_COLUMNS: dict[str, Callable[[Case], str]] = {
+    "Verdict": lambda case: case.verdict,
+    "Hunting cycle, amplitude": _of_the_cycle(_amplitude),
+    "Hunting cycle, period": _of_the_cycle(lambda cycle: with_unit(cycle.period, "s", 4)),
+    "Hunting multiplier": _of_the_cycle(_multiplier),
+    "Multiplier taken over": _of_the_cycle(_decided),
+    "Other hunting cycles": _others,
+    "Time constant of transients": _of_the_cycle(lambda cycle: with_unit(cycle.time_constant, "s")),
+    "Edge of hunting": _edge,
+    "Displacements that hunt": lambda case: _kicks(case.judgement.displacement, "m"),
+    "Pushes that hunt": lambda case: _kicks(case.judgement.push, "m/s"),
+    "Moves that end in hunting": _moves,
+    "Counted peaks": _peaks,
+    "Peak to peak, last quarter": at_the_end,
+    "Period, last quarter": lambda case: with_unit(case.period, "s"),
+    **{f"Settling time into {text}": _settled_within(band) for band, text in BANDS.items()},
+    "Largest actuator force": lambda case: with_unit(case.largest_force, "N"),
+    "Solver status": lambda case: case.solver.status,
+    "Steps (rejected)": lambda case: f"{case.solver.steps} ({case.solver.rejected})",
+}

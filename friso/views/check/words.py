@@ -1,0 +1,160 @@
+"""What a check found, in words: the sentence per case, and the conclusion."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from friso.equations.bandwidth import faster
+from friso.hunting.basin import SHARES
+from friso.hunting.margin import FARTHEST
+from friso.hunting.verdict import LONG
+from friso.views.check.cases import BANDS, Shown
+from friso.views.drawing.prefixes import listed, plus_minus, with_unit
+
+if TYPE_CHECKING:
+    from friso.hunting import Case, Margin
+
+_MICRON, _TEN_MICRON = BANDS
+_GAINS = ("kp", "ki", "kd", "tau")
+
+
+def verdict_sentence(item: Shown, cases: Mapping[str, Case]) -> str:
+    """What a case does, and what to do about it, for the engineer who decides; `cases` are all of the check."""
+    case = item.case
+    says = {"hunts": _hunting, "bistable": _bistable, "transient": _transient, "settles": _settling}
+    if case.verdict not in says:
+        return f"{case.verdict} (solver: {case.solver.status})."
+    after = _remedy(item, cases) if case.verdict in ("hunts", "bistable") else _outlook(case)
+    return " ".join([says[case.verdict](case), *after])
+
+
+def conclusion(cases: Mapping[str, Case]) -> str | None:
+    """What the joint does to the hunting, where both of its cases were run to a known verdict."""
+    words = [cases[key].verdict for key in ("locked", "free") if key in cases]
+    if len(words) < 2 or "failed" in words:
+        return None
+    locked, free = (word in ("hunts", "bistable") for word in words)
+    if not free:
+        certain = cases["free"].judgement.hunting.certain
+        return "The free joint stops the hunting." if locked and certain else None
+    if words == ["hunts", "bistable"]:
+        return "The free joint stops the hunting after this move, but does not rule it out."
+    return "The free joint does not stop the hunting." if locked else "The stage hunts only with its joint free."
+
+
+def at_the_end(case: Case) -> str:
+    """Peak to peak; below a nanometre the digits would be those of the solver, not of the stage."""
+    return "< 1 nm" if case.peak_to_peak < 1e-9 else with_unit(case.peak_to_peak, "m")
+
+
+def _hunting(case: Case) -> str:
+    if not case.judgement.observed:
+        return f"hunts, {_swing(case)}."
+    seen = f"No cycle could be computed ({case.judgement.hunting.reason}); the verdict is that of a long simulation."
+    return f"hunts, {at_the_end(case)} peak to peak{_every(case)}. {seen}"
+
+
+def _bistable(case: Case) -> str:
+    kicks = (("displacement", case.judgement.displacement, "m"), ("push", case.judgement.push, "m/s"))
+    starts = [f"a {name} of {with_unit(kick.smallest, unit)}" for name, kick, unit in kicks if kick and kick.smallest]
+    if (moves := case.judgement.moves) and moves.hunting:
+        like = f"like this one, {SHARES[0]:g} to {SHARES[1]:g} times its acceleration and time"
+        starts.append(f"{100 * moves.fraction:.0f} % of the moves tried ({like})")
+    if not starts:
+        return f"settles after this move, and none of the kicks and moves tried starts hunting ({_swing(case)})."
+    return f"settles after this move, but {listed(starts, 'or')} can start hunting, {_swing(case)}."
+
+
+def _transient(case: Case) -> str:
+    known, end = case.judgement, _end(case)
+    if known.hunting.returns is None:
+        return f"cannot hunt, as {known.hunting.reason}; but this motion has not settled at its end ({end})."
+    says = [f"transient, as no cycle attracts, but this motion has not settled at its end ({end})."]
+    if known.cycle:
+        says.append(f"Transients change slowly, by the factor e in {with_unit(known.cycle.time_constant, 's')}.")
+    if known.settled_after is None:
+        says.append(f"It does not settle to within {BANDS[_TEN_MICRON]} in {with_unit(LONG, 's')} either.")
+    else:
+        says.append(f"It settles to within {BANDS[_TEN_MICRON]} in {with_unit(known.settled_after, 's')}.")
+    return " ".join(says)
+
+
+def _settling(case: Case) -> str:
+    fine, coarse = case.settling_time.get(_MICRON), case.settling_time.get(_TEN_MICRON)
+    if fine is not None:
+        says = f"settles to within {BANDS[_MICRON]} in {with_unit(fine, 's')}."
+    elif coarse is not None:
+        within = f"settles to within {BANDS[_TEN_MICRON]} in {with_unit(coarse, 's')}"
+        says = f"{within}, but does not stay within {BANDS[_MICRON]}."
+    else:
+        says = f"settles, but not to within {BANDS[_TEN_MICRON]} ({_end(case)})."
+    hunting = case.judgement.hunting
+    return says if hunting.returns else f"{says} It cannot hunt, as {hunting.reason}."
+
+
+def _outlook(case: Case) -> list[str]:
+    """Where hunting begins, and whether the verdict is certain, of a case that need not hunt."""
+    known = case.judgement
+    says = [] if known.hunting.certain else [f"This is not certain: {known.hunting.reason}; other motions may hunt."]
+    if known.margin:
+        least = "" if known.margin.certain else "at least "
+        says.append(f"Hunting is possible {least}{_below(known.margin)}.")
+    elif known.hunting.returns:
+        says.append(f"No hunting was found down to 1/{FARTHEST:g} of this bandwidth.")
+    return says
+
+
+def _below(edge: Margin) -> str:
+    if edge.crossover is None:
+        return f"with a controller more than {1 / edge.factor:.3g} times slower"
+    return f"below {with_unit(edge.crossover, 'Hz')}"
+
+
+def _remedy(item: Shown, cases: Mapping[str, Case]) -> list[str]:
+    """What keeps a case from hunting."""
+    known = item.case.judgement
+    ways = [_faster(item.case, known.margin)] if known.margin else []
+    ways += ["free the joint"] if _freeing_helps(item, cases) else []
+    says = [f"{ways[0][0].upper()}{listed(ways, 'or')[1:]}."] if ways else []
+    if known.margin or known.observed or not known.hunting.cycles[0].attracts:
+        return says
+    return [f"No bandwidth up to {FARTHEST:g} times this one was found to stop it.", *says]
+
+
+def _faster(case: Case, edge: Margin) -> str:
+    controller = case.stage.controller
+    if edge.crossover is not None:
+        more = edge.crossover * (1 - 1 / edge.factor)
+        about = "" if edge.certain else "about "
+        return f"raise the crossover by {about}{with_unit(more, 'Hz')} (to {with_unit(edge.crossover, 'Hz')})"
+    changes = faster({f"controller.{name}": 1.0 for name in _GAINS}, np.array(edge.factor))
+    gains = [f"{name} × {changes[f'controller.{name}']:.3g}" for name in _GAINS if getattr(controller, name)]
+    return f"make the controller {edge.factor:.3g} times faster ({', '.join(gains)})"
+
+
+def _freeing_helps(item: Shown, cases: Mapping[str, Case]) -> bool:
+    joint, free = item.case.stage.joint, cases.get("free")
+    if free is None or joint is None or not joint.locked:
+        return False
+    return free.verdict in ("settles", "transient") and free.judgement.hunting.certain
+
+
+def _swing(case: Case) -> str:
+    """The size of the hunting cycle, e.g. "±0.52 mm every 1.63 s"."""
+    cycle = case.judgement.cycle
+    assert cycle  # one that attracts, or the verdict were another
+    return f"{plus_minus(cycle.amplitude, 'm')} every {with_unit(cycle.period, 's')}"
+
+
+def _end(case: Case) -> str:
+    """What is left of the motion in its last quarter."""
+    if case.peak_to_peak < _TEN_MICRON:
+        return "at rest, but off its reference"
+    return f"still {at_the_end(case)} peak to peak{_every(case)}"
+
+
+def _every(case: Case) -> str:
+    return f" every {with_unit(case.period, 's')}" if case.period else ""

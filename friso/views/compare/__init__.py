@@ -1,0 +1,1 @@
+"""What `friso compare` shows: words, figures, document and page."""

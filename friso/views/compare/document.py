@@ -1,0 +1,97 @@
+"""Isolator or firmware: the JSON document and the page."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Any
+
+from friso.studies.compare.options import DEADBAND, MODEL_ERROR
+from friso.studies.compare.study import LONGER, Comparison, Result
+from friso.views.compare.words import (
+    COLUMNS,
+    PAIRED,
+    options_rows,
+    paired_rows,
+    population,
+    sentences,
+    table_rows,
+)
+from friso.views.documents import plain_json
+from friso.views.drawing.figure import Figure
+from friso.views.pages import stage_page
+
+
+def document(found: Comparison) -> dict[str, Any]:
+    """The JSON document: SI units, the unit in the key's suffix; an infinite time (never) is null."""
+    machines = found.machines
+    return plain_json(
+        {
+            "stage": found.stage.name,
+            "seed": found.seed,
+            "machines": machines.count,
+            "within_m": found.within,
+            "deadband_m": found.options.deadband,
+            "sample_time_s": found.stage.flat()["drive.sample_time"],
+            "from_file": [*machines.from_file],
+            "spreads_percent": dict(machines.spreads),
+            "left_out_draws": machines.drawn.left_out,
+            "options": {result.letter: _option(found, result) for result in found.results},
+            "left_out": dict(found.options.left_out),
+            "standstill_compared": found.shaken,
+            "conclusion": sentences(found),
+            "notes": [*found.notes],
+        }
+    )
+
+
+def _option(found: Comparison, result: Result) -> dict[str, Any]:
+    pair = found.paired(result)
+    crossover = result.option.stage.flat().get("controller.crossover")
+    return {
+        "name": result.option.name,
+        "crossover_hz": crossover,
+        "bandwidth_factor": result.option.factor,
+        "hunts": asdict(result.hunting),
+        "counted": asdict(result.counted),
+        "in_position": asdict(result.settled),
+        "stays": asdict(result.stays),
+        "settling_time_s": asdict(result.settling),
+        "in_position_rms_m": asdict(result.in_position),
+        "force_rms_n": asdict(result.force),
+        "modulus_margin": asdict(result.margin) | {"least": float(result.loops.margin.min())},
+        "unstable": result.unstable,
+        "failed": result.failed,
+        "machines_in_position": result.in_position_count,
+        "settles": result.settles,
+        "against_a": {
+            "hunts": asdict(pair.hunting),
+            "sooner": asdict(pair.sooner),
+            "later": asdict(pair.later),
+            "alike": asdict(pair.alike),
+            "in_position_rms": asdict(pair.in_position) if found.shaken else None,
+            "force_rms": asdict(pair.force),
+        },
+    }
+
+
+def page(found: Comparison, drawn: Sequence[Figure]) -> str:
+    """The page with its figures."""
+    return stage_page(
+        "compare.html",
+        found.stage,
+        drawn,
+        sentences=sentences(found),
+        population=population(found),
+        notes=found.notes,
+        options=options_rows(found),
+        columns=COLUMNS,
+        rows=table_rows(found),
+        paired_columns=PAIRED,
+        paired=paired_rows(found),
+        seed=found.seed,
+        deadband=DEADBAND,
+        model_error=100 * MODEL_ERROR,
+        longer=LONGER,
+        shaken=found.shaken,
+    )

@@ -1,0 +1,247 @@
+"""Isolator or firmware, in words: what the options are, the tables, and what follows from them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from friso.frequency.crossover import WANTED
+from friso.studies.compare.options import JOINT, MODEL_ERROR, Option
+from friso.studies.compare.statistics import Estimate
+from friso.studies.compare.study import ENOUGH, FOLLOWED, LONGER, Comparison, Paired, Result
+from friso.studies.draws import Share
+from friso.views.drawing.prefixes import NOTHING, listed, range_with_unit, with_unit
+
+COLUMNS = (
+    "Hunts at the end",
+    "Counted as in the thesis",
+    "In position at the end",
+    "Stays there later",
+    "Settling time",
+    "In-position RMS",
+    "Force RMS",
+    "Modulus margin",
+)
+
+PAIRED = ("Hunts more often by", "Settles sooner, later, alike", "In-position RMS times", "Force RMS times")
+
+UNSHAKEN = "not compared: no [floor]"
+
+Row = tuple[str, list[str]]
+
+
+def label(result: Result) -> str:
+    return f"{result.letter} {result.option.name}"
+
+
+def options_rows(found: Comparison) -> list[tuple[str, str]]:
+    """What each option is."""
+    return [(label(result), _about(result.option, found)) for result in found.results]
+
+
+def _about(option: Option, found: Comparison) -> str:
+    joint = "the joint free" if option.letter in JOINT else "the joint locked" if found.stage.joint else "no joint"
+    deadband = with_unit(found.options.deadband, "m")
+    what = {
+        "a": "the controller as in the file",
+        "b": _bandwidth(option, found),
+        "c": "the controller as in the file",
+        "d": f"the integrator waits while the error is below {deadband}",
+        "e": "the integrator starts anew where the error changes its sign",
+        "f": f"feedforward of Coulomb and viscous friction, both {100 * MODEL_ERROR:g} % too large, or both too small, "
+        "machine by machine",
+        "g": _bandwidth(option, found),
+    }
+    return f"{joint}; {what[option.letter]}"
+
+
+def _bandwidth(option: Option, found: Comparison) -> str:
+    own = found.stage.flat().get("controller.crossover")
+    to = f"a crossover of {with_unit(own * option.factor, 'Hz')} instead of {with_unit(own, 'Hz')}" if own else ""
+    faster = to or f"a controller {option.factor:.3g} times as fast"
+    return f"{faster}, the highest at which the machine of the file keeps a modulus margin of {WANTED:g}"
+
+
+def table_rows(found: Comparison) -> list[Row]:
+    """A row for each option, its texts under `COLUMNS`; 95 % intervals in brackets."""
+    return [
+        (
+            label(each),
+            [
+                *(percent(share) for share in (each.hunting, each.counted, each.settled, each.stays)),
+                _time(each.settling),
+                *(_length(value, unit) for value, unit in ((each.in_position, "m"), (each.force, "N"))),
+                _margin(each, found),
+            ],
+        )
+        for each in found.results
+    ]
+
+
+def paired_rows(found: Comparison) -> list[Row]:
+    """A row for each option but a, its texts under `PAIRED`."""
+    rows = []
+    for each in found.results[1:]:
+        pair = found.paired(each)
+        points = [100 * value for value in (pair.hunting.value, pair.hunting.low, pair.hunting.high)]
+        more = f"{points[0]:+.1f} points ({points[1]:+.1f} to {points[2]:+.1f})"
+        still = _ratio(pair.in_position) if found.shaken else UNSHAKEN
+        rows.append((label(each), [more, _when(pair), still, _ratio(pair.force)]))
+    return rows
+
+
+def _when(pair: Paired) -> str:
+    shares = {"sooner": pair.sooner, "later": pair.later, "alike": pair.alike}
+    return "; ".join(f"{word} {percent(share)}" for word, share in shares.items())
+
+
+def percent(share: Share) -> str:
+    middle = f"{_percent(share.probability)} %" if share.probability == share.probability else "unknown"
+    return f"{middle} ({_percent(share.low)} to {_percent(share.high)} %)"
+
+
+def _percent(part: float) -> str:
+    """A percentage; one that is not 0 or 100 does not look like that."""
+    digits = 1 if part in (0, 1) or 0.001 <= part <= 0.999 else 2
+    return f"{100 * part:.{digits}f}"
+
+
+def _time(found: Estimate) -> str:
+    """A median of settling times, of which more than half may never come."""
+    if math.isfinite(found.high):
+        return f"{with_unit(found.value, 's')} ({range_with_unit(found.low, found.high, 's')})"
+    middle, low = ("never" if value == math.inf else with_unit(value, "s") for value in (found.value, found.low))
+    return middle if middle == low else f"{middle} ({low} to never)"
+
+
+def _length(found: Estimate, unit: str) -> str:
+    if not all(map(math.isfinite, (found.value, found.low, found.high))):
+        return NOTHING
+    return f"{with_unit(found.value, unit)} ({range_with_unit(found.low, found.high, unit)})"
+
+
+def _ratio(found: Estimate) -> str:
+    if not all(map(math.isfinite, (found.value, found.low, found.high))):
+        return NOTHING
+    return f"{found.value:.3g} ({found.low:.3g} to {found.high:.3g})"
+
+
+def _margin(result: Result, found: Comparison) -> str:
+    least = f"least {result.loops.margin.min():.2f}"
+    if result.unstable:
+        least = f"{result.unstable} of {found.machines.count} not stable"
+    return f"{result.margin.value:.2f} ({least})"
+
+
+def sentences(found: Comparison) -> list[str]:
+    """What follows for the one who has to choose between a joint and settings."""
+    return [_who_settles(found), *_costs(found), *_others(found), _choice(found), *_standstill(found)]
+
+
+def _who_settles(found: Comparison) -> str:
+    count, settling = found.machines.count, _settling(found)
+    within = f"within {with_unit(found.within, 'm')}"
+    some = min(FOLLOWED, count)
+    if not settling:
+        best = max(found.results, key=lambda each: each.in_position_count)
+        return (
+            f"No option brings {100 * ENOUGH:g} % of the {count} machines into position {within} and keeps them there: "
+            f"{label(best)} has the most there at the end, {percent(best.settled)}."
+        )
+    parts = [f"{label(each)} {_how_many(each, count)}" for each in settling]
+    return (
+        f"Of {count} machines are in position {within} at the end: {listed(parts, 'and')}; of {some} that were "
+        f"followed {LONGER} times as long at least {100 * ENOUGH:g} % stay there."
+    )
+
+
+def _how_many(result: Result, count: int) -> str:
+    number = "all" if result.in_position_count == count else str(result.in_position_count)
+    return f"{number} (95 %: at least {_percent(result.settled.low)} %)"
+
+
+def _costs(found: Comparison) -> list[str]:
+    """The price of each option that settles all machines."""
+    own = found.results[0].margin.value
+    return [
+        f"{label(each)}: settles in {with_unit(each.settling.value, 's')} (median), {_still(each, found)}takes "
+        f"{found.paired(each).force.value:.3g} times the force RMS of a, and has a modulus margin of "
+        f"{each.margin.value:.2f} instead of {own:.2f}{_robust(each, found)}."
+        for each in _settling(found)
+        if each.letter != "a"
+    ]
+
+
+def _still(result: Result, found: Comparison) -> str:
+    return f"stands still to {with_unit(result.in_position.value, 'm')} RMS, " if found.shaken else ""
+
+
+def _standstill(found: Comparison) -> list[str]:
+    """Why standstill is no part of the conclusions."""
+    if found.shaken:
+        return []
+    joint = (
+        " On the thesis's rig, with a quiet floor and the amplifier's noise, friso rig in-position shows that the free "
+        "joint moves several times as much as the locked one."
+    )
+    return [
+        "How still they stand is not compared: the stage file has no [floor]. In-position RMS is then that of a "
+        "machine that nothing shakes from outside; it tells whether the machine rests, not how still it stands in a "
+        "real room." + (joint if any(each.letter in JOINT for each in found.results) else "")
+    ]
+
+
+def _robust(result: Result, found: Comparison) -> str:
+    if result.unstable:
+        return f"; the linear loop of {result.unstable} of {found.machines.count} machines is not stable"
+    return f", {result.loops.margin.min():.2f} in the worst machine"
+
+
+def _others(found: Comparison) -> list[str]:
+    """What is left of hunting with the other options."""
+    return [
+        f"{label(each)} does not settle them: {percent(each.hunting)} hunt at the end, {percent(each.settled)} are in "
+        f"position then, and {percent(each.stays)} stay there later."
+        for each in found.results
+        if not each.settles
+    ]
+
+
+def _choice(found: Comparison) -> str:
+    settling = _settling(found)
+    joint, settings = ([each for each in settling if (each.letter in JOINT) is bought] for bought in (True, False))
+    if joint and settings:
+        return (
+            f"On these machines settings do what a joint does: {_names(settings)} settles them without one, "
+            f"{_names(joint)} with one. The joint is for machines that cannot have what the settings ask."
+        )
+    if joint:
+        return f"On these machines the joint is what settles them: {_names(joint)}; no change of settings alone does."
+    if settings:
+        said = "and no option with a joint does" if any(each.letter in JOINT for each in found.results) else ""
+        return f"On these machines settings suffice: {_names(settings)}{', ' + said if said else ''}."
+    return "On these machines neither a joint nor settings settle enough of them: see the table for what each leaves."
+
+
+def _names(some: Sequence[Result]) -> str:
+    return listed([label(each) for each in some], "or")
+
+
+def _settling(found: Comparison) -> list[Result]:
+    return [each for each in found.results if each.settles]
+
+
+def population(found: Comparison) -> list[str]:
+    """How the machines were drawn."""
+    machines = found.machines
+    says = [
+        f"{machines.count} machines drawn with seed {found.seed}, each the same in all options: numbers, rail, noise."
+    ]
+    if machines.from_file:
+        says.append(f"As uncertain as the file says: {', '.join(machines.from_file)}.")
+    if machines.spreads:
+        spreads = ", ".join(f"{key} ±{spread:g} %" for key, spread in machines.spreads.items())
+        says.append(f"By default spreads (95 % of the machines), the file giving none: {spreads}.")
+    if "rail.seed" in machines.keys:
+        says.append("Each has a rail of its own.")
+    return says

@@ -1,0 +1,1 @@
+"""What `friso design` shows: words, figures, document and page."""

@@ -1,0 +1,42 @@
+"""The page of `friso design`: one file that opens offline, prints, and is the same bytes on every run."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from markupsafe import Markup
+
+from friso.design.method import Design
+from friso.materials import materials
+from friso.views.design.leaves import requirement_rows
+from friso.views.design.steps import steps
+from friso.views.design.words import headline
+from friso.views.drawing.figure import Figure
+from friso.views.flexure.drawing import drawing_svg
+from friso.views.pages import stage_page
+
+LEAVES = 2
+"""The step that shows the drawing and the requirements."""
+
+
+def design_html(found: Design, figures: Sequence[Figure]) -> str:
+    """The whole page of a design and its figures."""
+    return stage_page(
+        "design.html",
+        found.stage,
+        figures,
+        spec=found.spec,
+        verdicts=headline(found),
+        steps=steps(found),
+        leaves=LEAVES,
+        drawing=Markup(drawing(found)),
+        requirements=requirement_rows(found),
+    )
+
+
+def drawing(found: Design) -> str:
+    """The dimensioned drawing of the leaf springs, SVG."""
+    choice = found.fitted.choice
+    known = materials()[choice.geometry.sheet.material]
+    material = f"{known.name}, {known.grade}"
+    return drawing_svg(choice.beams.mechanism, found.fitted.task.stroke, title=found.stage.name, material=material)

@@ -1,0 +1,210 @@
+"""What a design is called and how it ends, in words that the terminal, the page and messages share."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from friso.design.edges import Corners
+from friso.design.geometry import Geometry
+from friso.design.method import Design, NoDesign
+from friso.design.relax import Relaxation
+from friso.design.verification import Outcome
+from friso.stage.stage import numeric_keys
+from friso.views.drawing.figure import GREEN, ORANGE, VERMILLION
+from friso.views.drawing.prefixes import choose, pretty, with_unit
+from friso.views.map.words import quantity
+
+SHOWN = 5
+"""Requirements whose relaxation is told in a message."""
+
+
+@dataclass(frozen=True)
+class Step:
+    """A step of the method: its result as a title, the reasons, its numbers by name, and the names of its figures."""
+
+    title: str
+    sentences: tuple[str, ...]
+    facts: tuple[tuple[str, str], ...]
+    figures: tuple[str, ...]
+
+
+def headline(found: Design) -> list[tuple[str, str]]:
+    """The verdicts, each with its colour: isolator or not, what it is, whether it holds."""
+    return [
+        (ORANGE if found.needed else GREEN, need(found)),
+        (
+            GREEN,
+            f"The isolator: {leaves(found)}; stroke {size(found.fitted.task.stroke)} mm to each side, crossover "
+            f"{hertz(found.controller.crossover)}.",
+        ),
+        _verified(found),
+    ]
+
+
+def need(found: Design) -> str:
+    """Whether the machine needs an isolator, and why."""
+    limit, factor, without = hertz(found.spec.limit), found.spec.safety.hunting, found.without
+    if not without.hunts:
+        return f"No isolator is needed: without one the machine {edge(without)}."
+    above = f"{_at_least(factor * without.highest)}, {factor:g} times the edge of hunting"
+    if found.needed:
+        return f"An isolator is needed: without one the crossover has to be {above}; the machine allows {limit}."
+    return f"No isolator is needed: without one the crossover has to be {above}, and the machine allows {limit}."
+
+
+def brings(found: Design) -> str:
+    """What an isolator brings and costs where none is needed."""
+    tried, crossover, limit = found.verification, found.controller.crossover, found.spec.limit
+    slower = f" It costs crossover: {hertz(crossover)} instead of {hertz(limit)}." if crossover < 0.97 * limit else ""
+    return (
+        f"All the same, this is what one brings: with it the machine {edge(found.edges)}. Moves settle in "
+        f"{seconds(tried.free.slower_than(0.5))} instead of {seconds(tried.locked.slower_than(0.5))} (median), 95 % "
+        f"of them in {seconds(tried.free.slower_than(0.05))} instead of "
+        f"{seconds(tried.locked.slower_than(0.05))}, at the same crossover.{slower}"
+    )
+
+
+def leaves(found: Design) -> str:
+    """The leaf springs chosen."""
+    return leaf_words(found.fitted.choice.geometry)
+
+
+def leaf_words(it: Geometry) -> str:
+    """Leaf springs in words."""
+    return (
+        f"{it.sheet.leaves:g} leaves of {size(it.length)} x {size(it.width)} x {size(it.sheet.thickness)} mm, "
+        f"{size(it.spacing)} mm apart, of {it.sheet.material}"
+    )
+
+
+def _verified(found: Design) -> tuple[str, str]:
+    free, locked, wanted = found.verification.free, found.verification.locked, found.spec.position.settling_time
+    held = f" (with the joint locked, {hunting(locked)})" if locked.hunting else ""
+    said = f"Of {free.tried} simulated moves {hunting(free)}{held}: {probability(free)}. {settling(free)}"
+    if wanted is None:
+        return (VERMILLION if free.hunting else GREEN), f"{said}."
+    met = free.slower_than(0.05) <= wanted
+    colour = VERMILLION if free.hunting or not met else GREEN
+    return colour, f"{said}; {'as' if met else 'not as'} specified ({seconds(float(wanted))})."
+
+
+def hunting(outcome: Outcome) -> str:
+    """How many moves hunt."""
+    return {0: "none hunts", 1: "one hunts"}.get(outcome.hunting, f"{outcome.hunting} hunt")
+
+
+def probability(outcome: Outcome) -> str:
+    """The interval of the probability of hunting."""
+    low, high = outcome.interval
+    within = f"below {percent(high)}" if not outcome.hunting else f"{percent(low)} to {percent(high)}"
+    return f"the probability of hunting is {within} (with 95 % confidence)"
+
+
+def settling(outcome: Outcome) -> str:
+    """Within what time moves settle."""
+    half, most = outcome.slower_than(0.5), outcome.slower_than(0.05)
+    if not math.isfinite(half):
+        return "Fewer than half of them settle"
+    rest = f"95 % in {seconds(most)}" if math.isfinite(most) else "fewer than 95 % at all"
+    return f"Half of them settle in {seconds(half)}, {rest}"
+
+
+def edge(corners: Corners) -> str:
+    """Up to where the machine hunts, as what it does."""
+    low, high = corners.searched
+    if not corners.hunts:
+        return f"hunts in no corner at any crossover from {hertz(low)} to {hertz(high)}"
+    if not math.isfinite(corners.highest):
+        return f"hunts, in its worst corner, up to {hertz(high)} and beyond"
+    return f"hunts, in its worst corner, up to {hertz(corners.highest)}"
+
+
+def corner(corners: Corners, flat: Mapping[str, Any]) -> str:
+    """The corner that hunts up to the highest crossover."""
+    keys = corners.population.of(corners.worst)
+    units = {key: item.unit for key, item in numeric_keys(flat).items()}
+    order = sorted(keys, key=lambda key: (not key.startswith("friction."), key != "friction.static"))
+    return ", ".join(f"{_name(key)} {plain(keys[key], units[key])}" for key in order)
+
+
+def _name(key: str) -> str:
+    """A key inside a sentence: names of people stay as they are."""
+    name = quantity(key)
+    return name if name.startswith(("Coulomb", "Stribeck")) else name[0].lower() + name[1:]
+
+
+def gaps(corners: Corners, flat: Mapping[str, Any]) -> np.ndarray | None:
+    """Static less Coulomb friction in the corners [N], shape (n,); None of a friction law that has not both."""
+    if not {"friction.static", "friction.coulomb"} <= flat.keys():
+        return None
+    static, coulomb = (corners.population.over(flat)[f"friction.{name}"] for name in ("static", "coulomb"))
+    return np.broadcast_to(static - coulomb, (corners.population.count,))
+
+
+def refusal(failure: NoDesign) -> str:
+    """Why no design meets a specification, and what to relax."""
+    if not failure.relaxed:
+        tail = "no requirement is known that, relaxed alone, is enough: relax several"
+        return f"{failure.reason}\n  {tail}"
+    later = any(each.geometry for each in failure.relaxed)
+    tail = ["(each alone; this is of the leaf springs, the steps after them were not tried)"] if later else []
+    return "\n  ".join([failure.reason, *map(relaxation, failure.relaxed[:SHOWN]), *tail])
+
+
+def shortfall(found: Design) -> str:
+    """What of the specification the design does not meet."""
+    free = found.verification.free
+    hunts = [f"of {free.tried} moves {hunting(free)}"] if free.hunting else []
+    return "; ".join([*hunts, *map(relaxation, found.unmet)])
+
+
+def relaxation(it: Relaxation) -> str:
+    needed = outwards(it.needed, it.needed > it.value)
+    said = f"relax {it.key} from {plain(it.value, it.unit)} to {plain(needed, it.unit)} ({it.requirement})"
+    if it.geometry is None:
+        return said
+    return f"{said}: then {leaf_words(it.geometry)} do"
+
+
+def outwards(value: float, larger: bool) -> float:
+    """Three digits of a value, so that it is not met more tightly than it has to be."""
+    if value <= 0:
+        return value
+    step = 10.0 ** (math.floor(math.log10(value)) - 2)
+    whole = math.ceil(value / step - 1e-9) if larger else math.floor(value / step + 1e-9)
+    return float(f"{whole * step:.6g}")
+
+
+def plain(value: float, unit: str) -> str:
+    """A value with its unit, without zeros that say nothing: "70 mm", "0.3 N"."""
+    if unit.startswith("N") and abs(value) < 1000:
+        return f"{value:.4g} {pretty(unit)}"
+    factor, text = choose(np.array([value]), unit)
+    return f"{value * factor:.4g} {text if factor != 1 else pretty(unit)}".rstrip()
+
+
+def size(length: float) -> str:
+    """A length [m] in mm as it stands on a drawing."""
+    return f"{1e3 * length:.{4 if length >= 0.1 else 3}g}"
+
+
+def hertz(frequency: float) -> str:
+    return with_unit(frequency, "Hz") if math.isfinite(frequency) else "not found"
+
+
+def seconds(time: float) -> str:
+    """A settling time."""
+    return with_unit(time, "s") if math.isfinite(time) else "never"
+
+
+def percent(share: float) -> str:
+    return f"{100 * share:.2g} %"
+
+
+def _at_least(frequency: float) -> str:
+    return f"{hertz(frequency)} or more" if math.isfinite(frequency) else "higher than was searched"

@@ -1,0 +1,216 @@
+"""Figures on paper: PNG, SVG and PDF through matplotlib, the same bytes on every run.
+
+The user's matplotlibrc does not matter: everything is drawn under matplotlib's defaults and the style below.
+Texts are drawn as they stand: a dollar sign in a stage's name starts no formula.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure as Canvas
+from matplotlib.ticker import (
+    Locator,
+    LogFormatterMathtext,
+    LogLocator,
+    MaxNLocator,
+    MultipleLocator,
+    NullFormatter,
+    ScalarFormatter,
+)
+
+from friso.views.drawing.drawable import drawable, word_ticks
+from friso.views.drawing.figure import GREY, INK, Figure, Panel
+from friso.views.drawing.matplotlib_maps import add_colour_bars, add_footer, draw_coloured, footer_height
+
+FORMATS = ("png", "svg", "pdf")
+WIDTH = 9.0  # [inch]
+ROW_HEIGHT = 2.7  # [inch] axes, labels, title and legend of one row of panels
+MAP_HEIGHTS = {1: 4.9, 2: 3.7}  # [inch] the same of one or two columns of maps: their two axes matter alike
+EQUAL_HEIGHTS = {1: 5.9, 2: 3.6}  # [inch] the same of panels with equal scales, which need height for their width
+HEADER_HEIGHT = 0.35  # [inch] the figure's own title
+
+# No dates and no version numbers in the files, so that a rerun gives the same bytes.
+_METADATA = {
+    "png": {"Software": None},
+    "svg": {"Date": None, "Creator": None},
+    "pdf": {"CreationDate": None, "Creator": None, "Producer": None},
+}
+_STYLE: dict[Any, Any] = {
+    "font.family": "DejaVu Sans",  # comes with matplotlib
+    "font.size": 9,
+    "axes.titlesize": 9.5,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.labelsize": 9,
+    "axes.labelcolor": INK,
+    "axes.edgecolor": GREY,
+    "axes.linewidth": 0.8,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "axes.xmargin": 0.01,
+    "axes.ymargin": 0.06,
+    "grid.color": "#e3e3e3",
+    "grid.linewidth": 0.7,
+    "xtick.color": GREY,
+    "ytick.color": GREY,
+    "xtick.labelcolor": INK,
+    "ytick.labelcolor": INK,
+    "legend.frameon": False,
+    "legend.fontsize": 8.5,
+    "lines.solid_joinstyle": "round",
+    "savefig.dpi": 150,
+    "svg.hashsalt": "friso",
+    "svg.fonttype": "path",
+    "pdf.fonttype": 42,
+}
+_DASHES = {"solid": "-", "dashed": (0, (5, 2.5)), "dotted": (0, (1.2, 1.6))}
+_SYMBOLS: dict[str, dict[str, Any]] = {
+    "circle": {"marker": "o", "markersize": 6},
+    "triangle": {"marker": "v", "markersize": 6},
+    "cross": {"marker": "x", "markersize": 6},
+    "target": {"marker": "o", "markersize": 9, "markeredgecolor": "white", "markeredgewidth": 1.6},
+    "patch": {"marker": "s", "markersize": 6, "markeredgecolor": GREY, "markeredgewidth": 0.6},
+}
+
+
+def render(figure: Figure) -> Canvas:
+    """The figure on a matplotlib canvas; its lines carry the arrays of `drawable(figure)`, in its order."""
+    with _style():
+        prepared = drawable(figure)
+        heading = ": ".join(text for text in (prepared.subject, prepared.title) if text)
+        footer = footer_height(prepared, WIDTH)
+        height = _row_height(prepared) * prepared.rows + (HEADER_HEIGHT if heading else 0) + footer
+        canvas = Canvas(figsize=(WIDTH, height), layout="constrained", facecolor="white")
+        area = (0, footer / height, 1, 1 - footer / height)
+        canvas.get_layout_engine().set(w_pad=0.08, h_pad=0.08, rect=area)  # type: ignore[union-attr]
+        if heading:
+            canvas.suptitle(heading, x=0.01, ha="left", fontsize=11.5, fontweight="bold", parse_math=False)
+        for number, panel in enumerate(prepared.panels):
+            axes = canvas.add_subplot(prepared.rows, prepared.columns, number + 1)
+            _draw(axes, panel, WIDTH / prepared.columns)
+        add_colour_bars(canvas, list(canvas.axes), prepared.panels)
+        add_footer(canvas, prepared, _SYMBOLS, _DASHES, WIDTH)
+        return canvas
+
+
+def image(figure: Figure, form: str) -> bytes:
+    """The figure as the bytes of a file; `form` is one of FORMATS (ValueError otherwise)."""
+    if form not in FORMATS:
+        raise ValueError(f"figure format: got {form!r}, expected one of {', '.join(FORMATS)}, e.g. 'png'")
+    canvas = render(figure)
+    stream = io.BytesIO()
+    with _style():
+        canvas.savefig(stream, format=form, metadata=_METADATA[form])
+    return stream.getvalue()
+
+
+def save(figure: Figure, path: Path) -> None:
+    """Write the figure to `path`, in the format of its suffix (ValueError for others than FORMATS)."""
+    path.write_bytes(image(figure, path.suffix.removeprefix(".").lower()))
+
+
+@contextmanager
+def _style() -> Iterator[None]:
+    with mpl.rc_context():
+        mpl.rcdefaults()
+        mpl.rcParams.update(_STYLE)
+        yield
+
+
+def _row_height(figure: Figure) -> float:
+    if any(panel.equal for panel in figure.panels):
+        return EQUAL_HEIGHTS.get(figure.columns, ROW_HEIGHT)
+    mapped = any(panel.coloured for panel in figure.panels)
+    return MAP_HEIGHTS.get(figure.columns, ROW_HEIGHT) if mapped else ROW_HEIGHT
+
+
+def _draw(axes: Axes, panel: Panel, width: float) -> None:
+    """Everything of one panel, which is `width` [inch] wide."""
+    _scale(axes, panel, width)
+    draw_coloured(axes, panel)
+    handles: list[Artist] = []
+    for band in panel.bands:
+        handles += axes.fill(*band.outline, color=band.colour, linewidth=0)
+    for line in panel.series:
+        style = {"color": line.colour, "linestyle": _DASHES[line.dash], "linewidth": line.width}
+        handles += axes.plot(line.x, line.y, **style)
+    for marker in panel.markers:
+        style = {"color": marker.colour, "linestyle": "none", "zorder": 3, **_SYMBOLS[marker.symbol]}
+        handles += axes.plot(marker.x, marker.y, **style)
+    if panel.x.limits:
+        axes.set_xlim(panel.x.limits)
+    if panel.y.limits:
+        axes.set_ylim(panel.y.limits)
+    if panel.equal:
+        axes.set_aspect("equal")
+    _annotate(axes, panel, handles, width)
+
+
+def _scale(axes: Axes, panel: Panel, width: float) -> None:
+    """Scales and ticks: plain numbers, never a factor or an offset beside the axis."""
+    axes.set_xscale("log" if panel.x.log else "linear")
+    axes.set_yscale("log" if panel.y.log else "linear")
+    if panel.markers and panel.x.limits is None:
+        axes.margins(x=0.03)
+    bins = (min(9, int(2 * width)), [1, 2, 5, 10]), (6, [1, 2, 2.5, 5, 10])
+    for axis, declared, (most, steps) in zip((axes.xaxis, axes.yaxis), (panel.x, panel.y), bins, strict=True):
+        if declared.words:
+            positions, words = word_ticks(declared)
+            axis.set_ticks(positions, words, parse_math=False)
+        elif declared.log:
+            _decades(axis, declared.limits or (0.0, np.inf), MaxNLocator(nbins=most, steps=steps))
+        else:
+            plain = ScalarFormatter(useOffset=False)
+            plain.set_scientific(False)
+            even = MaxNLocator(nbins=most, steps=steps)
+            axis.set_major_formatter(plain)
+            axis.set_major_locator(MultipleLocator(declared.step) if declared.step else even)
+
+
+def _decades(axis: Any, limits: tuple[float, float], even: Locator) -> None:
+    """Ticks of a logarithmic axis: at powers of ten, also at 2 and 5 over a few decades, even ones within a decade."""
+    low, high = limits
+    few = high < 1000 * low
+    fine = even if high < 10 * low else LogLocator(subs=(1.0, 2.0, 5.0))
+    axis.set_major_locator(fine if few else LogLocator(numticks=8))
+    axis.set_major_formatter("{x:g}" if few else LogFormatterMathtext())
+    axis.set_minor_formatter(NullFormatter())
+
+
+def _annotate(axes: Axes, panel: Panel, handles: list[Artist], width: float) -> None:
+    """Labels, and title over legend above the axes, where the legend covers no data."""
+    axes.set_xlabel(panel.x.label, parse_math=False)
+    axes.set_ylabel(panel.y.label, parse_math=False)
+    labels = [item.label for item in (*panel.bands, *panel.series, *panel.markers)]
+    handles = [handle for handle, label in zip(handles, labels, strict=True) if label]
+    labels = [label for label in labels if label]
+    rows = 0
+    if len(labels) > 1 and not panel.coloured:
+        rows = -(-len(labels) // _legend_columns(labels, width))
+        columns = -(-len(labels) // rows)  # matplotlib fills them one after the other
+        place = {"loc": "lower left", "bbox_to_anchor": (0, 1), "borderaxespad": 0.1, "borderpad": 0.2}
+        legend = axes.legend(handles, labels, ncols=columns, columnspacing=1.4, labelspacing=0.25, **place)
+        for text in legend.get_texts():
+            text.set_parse_math(False)
+    axes.set_title(panel.title, pad=5 + 13 * rows, parse_math=False)
+
+
+def _legend_columns(labels: list[str], width: float) -> int:
+    """As many columns as fit into `width` [inch]: 12 letters to the inch, 7 of them for line and gap."""
+    room = 12 * (width - 0.9)
+    for columns in range(len(labels), 1, -1):
+        rows = -(-len(labels) // columns)
+        if sum(max(map(len, labels[i : i + rows])) + 7 for i in range(0, len(labels), rows)) <= room:
+            return columns
+    return 1

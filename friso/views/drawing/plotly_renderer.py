@@ -1,0 +1,209 @@
+"""Figures on a page: interactive HTML through plotly, readable without a network.
+
+A page holds plotly's script once (`script()`) and any number of fragments (`fragment(figure)`), whose
+elements are named after the figure, so that the same figures give the same bytes.
+"""
+
+from __future__ import annotations
+
+import html
+import math
+from typing import Any
+
+import plotly.graph_objects as go
+from plotly.offline import get_plotlyjs
+
+from friso.views.drawing.drawable import drawable, word_ticks
+from friso.views.drawing.figure import GREY, INK, Axis, Band, Figure, Markers, Panel, Series
+from friso.views.drawing.plotly_maps import BAR, DASHES, SYMBOLS, bar_panels, coloured_traces, footer, key_traces
+
+HEADER = 54  # [px] title and legend above the axes
+PLOT = 230  # [px] height of the axes
+MAP_PLOTS = {1: 430, 2: 320}  # [px] the same of one or two columns of maps: their two axes matter alike
+EQUAL_PLOTS = {1: 520, 2: 290}  # [px] the same of panels with equal scales
+FOOTER = 54  # [px] tick labels and axis label
+LEFT, RIGHT, TOP = 72, 14, 26  # [px]; the buttons stand in the top margin
+GAP = 0.09  # between two panels of a row, as a fraction of the width
+
+# The buttons are listed, since plotly's own choice has one that sends the data to a server.
+_BUTTONS = [["toImage"], ["zoom2d", "pan2d"], ["zoomIn2d", "zoomOut2d", "resetScale2d"]]
+_CONFIG = {
+    "displaylogo": False,
+    "responsive": True,
+    "modeBarButtons": _BUTTONS,
+    "showSendToCloud": False,
+    "plotlyServerURL": "",
+}
+
+
+def script() -> str:
+    """plotly.js of the installed package, to stand once in a page inside a script element."""
+    return get_plotlyjs()
+
+
+def fragment(figure: Figure) -> str:
+    """The figure as one HTML element and the script that fills it; the page holds `script()` before it."""
+    return render(figure).to_html(
+        full_html=False, include_plotlyjs=False, div_id=f"figure-{figure.name}", config=_CONFIG
+    )
+
+
+def render(figure: Figure) -> go.Figure:
+    """The figure for plotly; its traces carry the arrays of `drawable(figure)`, in the same order."""
+    prepared = drawable(figure)
+    plot = _plot_height(prepared)
+    row = HEADER + plot + FOOTER
+    height = row * prepared.rows
+    key = f"legend{len(prepared.panels) + 1}"  # the panels have the numbers before
+    below, legend, note = footer(prepared, key)
+    layout: dict[str, Any] = {
+        "template": "none",
+        "height": height + TOP + below,
+        "margin": {"l": LEFT, "r": RIGHT, "t": TOP, "b": below},
+        "font": {"family": "system-ui, sans-serif", "size": 12, "color": INK},
+        "hovermode": "closest",
+        "annotations": note,
+        **legend,
+    }
+    traces: list[Any] = []
+    links: dict[Axis, str] = {}
+    with_bar, shared_bar = bar_panels(prepared.panels)
+    for number, panel in enumerate(prepared.panels):
+        top = height - (number // prepared.columns) * row
+        y_domain = ((top - HEADER - plot) / height, (top - HEADER) / height)
+        x_domain = _columns(number % prepared.columns, prepared.columns)
+        bar = None
+        if shared_bar and number in with_bar:
+            bar = {"x": 1.0, "y": (FOOTER + height - HEADER) / 2 / height, "len": 1 - (FOOTER + HEADER) / height}
+        elif number in with_bar:
+            x_domain = (x_domain[0], x_domain[1] - BAR)
+            bar = {"x": x_domain[1], "y": sum(y_domain) / 2, "len": y_domain[1] - y_domain[0]}
+        _add_panel(layout, panel, number, x_domain, y_domain, HEADER / height, links)
+        traces += _traces(panel, number, bar)
+    return go.Figure(data=traces + key_traces(prepared, key), layout=layout)
+
+
+def _plot_height(figure: Figure) -> int:
+    if any(panel.equal for panel in figure.panels):
+        return EQUAL_PLOTS.get(figure.columns, PLOT)
+    mapped = any(panel.coloured for panel in figure.panels)
+    return MAP_PLOTS.get(figure.columns, PLOT) if mapped else PLOT
+
+
+def _columns(column: int, columns: int) -> tuple[float, float]:
+    """Left and right end of a column, as fractions of the width."""
+    width = (1 - GAP * (columns - 1)) / columns
+    left = column * (width + GAP)
+    return left, min(1.0, left + width)
+
+
+def _add_panel(
+    layout: dict[str, Any],
+    panel: Panel,
+    number: int,
+    x_domain: tuple[float, float],
+    y_domain: tuple[float, float],
+    header: float,
+    links: dict[Axis, str],
+) -> None:
+    """Axes, legend and title of one panel; panels with equal x axes are zoomed together."""
+    suffix = _suffix(number)
+    shape = {"constrain": "domain"} if panel.equal else {}
+    x_axis = _axis(panel.x) | {"domain": x_domain, "anchor": f"y{suffix}"} | shape
+    if panel.x in links:
+        x_axis["matches"] = links[panel.x]
+    links.setdefault(panel.x, f"x{suffix}")
+    layout[f"xaxis{suffix}"] = x_axis
+    shape |= {"scaleanchor": f"x{suffix}"} if panel.equal else {}
+    layout[f"yaxis{suffix}"] = _axis(panel.y) | {"domain": y_domain, "anchor": f"x{suffix}"} | shape
+    layout[f"legend{suffix}"] = {
+        "orientation": "h",
+        "x": x_domain[0],
+        "xanchor": "left",
+        "y": y_domain[1],
+        "yanchor": "bottom",
+        "bgcolor": "rgba(0,0,0,0)",
+    }
+    layout["annotations"].append(
+        {
+            "text": f"<b>{html.escape(panel.title)}</b>",
+            "x": x_domain[0],
+            "xref": "paper",
+            "xanchor": "left",
+            "y": y_domain[1] + header * 0.62,
+            "yref": "paper",
+            "yanchor": "bottom",
+            "showarrow": False,
+            "font": {"size": 13},
+        }
+    )
+
+
+def _axis(axis: Axis) -> dict[str, Any]:
+    settings: dict[str, Any] = {
+        "title": {"text": html.escape(axis.label), "standoff": 8},
+        "type": "log" if axis.log else "linear",
+        "exponentformat": "power" if axis.log else "none",
+        "gridcolor": "#e3e3e3",
+        "zeroline": False,
+        "showline": True,
+        "linecolor": GREY,
+        "ticks": "outside",
+        "tickcolor": GREY,
+    }
+    if axis.words:
+        positions, words = word_ticks(axis)
+        settings |= {"tickmode": "array", "tickvals": positions, "ticktext": [html.escape(word) for word in words]}
+    if axis.log:
+        decades = math.log10(axis.limits[1] / axis.limits[0]) if axis.limits else math.inf
+        settings["dtick"] = "D2" if decades < 2 else 1  # 1, 2, 5, 10 where decades alone are too few
+    if axis.step:
+        settings |= {"tick0": 0, "dtick": axis.step}
+    if axis.limits:
+        settings["range"] = [math.log10(limit) for limit in axis.limits] if axis.log else list(axis.limits)
+    return settings
+
+
+def _traces(panel: Panel, number: int, bar: dict[str, Any] | None) -> list[Any]:
+    """What is drawn in a panel, maps first, in the order of `drawable`."""
+    suffix = _suffix(number)
+    place = {"xaxis": f"x{suffix}", "yaxis": f"y{suffix}"}
+    count = sum(bool(item.label) for item in (*panel.bands, *panel.series, *panel.markers))
+    key = count > 1 and not panel.coloured
+    named = place | {"legend": f"legend{suffix}"}
+    return [
+        *coloured_traces(panel, place, bar),
+        *(_area(band, named | {"showlegend": key and bool(band.label)}) for band in panel.bands),
+        *(_line(line, panel, named | {"showlegend": key and bool(line.label)}) for line in panel.series),
+        *(_points(marker, panel, named | {"showlegend": key and bool(marker.label)}) for marker in panel.markers),
+    ]
+
+
+def _area(band: Band, place: dict[str, Any]) -> go.Scatter:
+    x, y = band.outline
+    style = {"mode": "lines", "line": {"width": 0}, "fill": "toself", "fillcolor": band.colour, "hoverinfo": "skip"}
+    return go.Scatter(x=x, y=y, name=html.escape(band.label), **style, **place)
+
+
+def _line(line: Series, panel: Panel, place: dict[str, Any]) -> go.Scatter:
+    style = {"color": line.colour, "width": line.width, "dash": DASHES[line.dash], "simplify": False}
+    return go.Scatter(
+        x=line.x, y=line.y, mode="lines", line=style, connectgaps=False, **_text(line.label, panel), **place
+    )
+
+
+def _points(marker: Markers, panel: Panel, place: dict[str, Any]) -> go.Scatter:
+    style = {"color": marker.colour, **SYMBOLS[marker.symbol]}
+    return go.Scatter(x=marker.x, y=marker.y, mode="markers", marker=style, **_text(marker.label, panel), **place)
+
+
+def _text(label: str, panel: Panel) -> dict[str, Any]:
+    """Name and hover text; plotly reads both as HTML."""
+    x_unit, y_unit = html.escape(panel.x.unit), html.escape(panel.y.unit)
+    hover = f"%{{x:.5~g}} {x_unit}, %{{y:.5~g}} {y_unit}"
+    return {"name": html.escape(label), "hovertemplate": hover}
+
+
+def _suffix(number: int) -> str:
+    """plotly counts axes x, x2, x3, ..."""
+    return "" if number == 0 else str(number + 1)

@@ -1,0 +1,1 @@
+"""What `friso flexure` shows: words, figures, document and page."""

@@ -1,0 +1,170 @@
+"""Pictures of the modes of a leaf-spring mechanism: leaves and stage at rest and deformed, seen where most moves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from friso.flexure.evaluation import Evaluation, Mode
+from friso.flexure.mechanism import Mechanism
+from friso.views.drawing.figure import BLUE, LIGHT, VERMILLION, Array, Axis, Figure, Panel, Series
+from friso.views.drawing.prefixes import with_unit
+from friso.views.flexure.layout import block_size
+
+SHOWN = 8
+"""Modes that are drawn."""
+
+LARGE = 0.16
+"""Amplitude of the largest motion over the size of the picture."""
+
+ASPECT = 1.45
+"""Width of a picture over its height."""
+
+HALF = 0.5
+"""Share of the energy from which on a mode can be drawn by what is known of it."""
+
+ENOUGH = 0.9
+"""Share of all motion from which on a view shows a mode."""
+
+FINE = 65
+"""Places along a leaf between which lines are drawn."""
+
+VIEWS = {"from the side": (0, 2), "from above": (0, 1), "along the leaves": (1, 2)}
+"""The two axes of each view, the more usual ones first."""
+
+
+@dataclass(frozen=True)
+class Shape:
+    """Lines on the mechanism: their points [m] at rest, shape (n, 3), and how far a mode moves them."""
+
+    rest: Array
+    moved: Array
+
+
+def modes_figure(it: Evaluation) -> Figure:
+    """The first modes, a panel each."""
+    drawn = [mode for mode in it.modes if mode.interferes or drawable_share(it.mechanism, mode) > HALF][:SHOWN]
+    panels = tuple(_panel(it.mechanism, mode, mode is it.modes[0] or mode.interferes) for mode in drawn)
+    caption = (
+        "The first modes with the cart held and the leaves straight, at a size to be seen. Grey: at rest. The stage is "
+        "drawn as the block of its mass and moments of inertia. A mode that actuator and sensor both see limits the "
+        "crossover. Torsion of the leaves about their middle lines is not drawn."
+    )
+    return Figure("flexure_modes", "Modes", caption, panels, columns=2)
+
+
+def _panel(it: Mechanism, mode: Mode, seen: bool) -> Panel:
+    view = best_view(it, mode)
+    axes = VIEWS[view]
+    shapes = [*_leaves(it, mode, axes), _block(it, mode, axes)]
+    corners = np.concatenate([shape.rest[:, axes] for shape in shapes])
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    largest = max(float(np.abs(shape.moved[:, axes]).max()) for shape in shapes)
+    size = float(np.max(high - low))
+    gain = LARGE * size / largest
+    colour, label = (VERMILLION, "seen by actuator and sensor") if seen else (BLUE, "not seen by both")
+    rest = _joined([shape.rest[:, axes] for shape in shapes])
+    moved = _joined([(shape.rest + gain * shape.moved)[:, axes] for shape in shapes])
+    lines = (Series(*rest, f"at rest, {view}", LIGHT, width=1.6), Series(*moved, label, colour, width=1.6))
+    x, y = _limits(low - LARGE * size * 1.1, high + LARGE * size * 1.1)
+    title = f"{mode.name}, {with_unit(mode.frequency, 'Hz')}"
+    return Panel(title, Axis("xyz"[axes[0]], "m", x), Axis("xyz"[axes[1]], "m", y), lines, equal=True)
+
+
+def best_view(it: Mechanism, mode: Mode) -> str:
+    """The first view in which nearly all motion takes place, or the one with most of it."""
+    everything = np.concatenate([mode.leaves.reshape(-1, 3), _corners_moved(it, mode)])
+    shares = np.sum(everything**2, axis=0) / max(float(np.sum(everything**2)), np.finfo(float).tiny)
+    seen = {view: float(sum(shares[axis] for axis in axes)) for view, axes in VIEWS.items()}
+    return next((view for view, share in seen.items() if share > ENOUGH), max(seen, key=seen.__getitem__))
+
+
+def drawable_share(it: Mechanism, mode: Mode) -> float:
+    """Share of the kinetic energy that is in the stage and the middle lines: the rest is torsion of the leaves."""
+    speed = _rigid(it, mode, _centre(it)[None, :])[0]
+    stage = it.body.mass * np.sum(speed**2) + np.sum(np.array(it.body.inertia, dtype=float) * mode.stage[3:] ** 2)
+    middle = (mode.leaves[:, 1:] ** 2 + mode.leaves[:, :-1] ** 2).mean(axis=1) / 2
+    return float(stage + it.leaf_mass * np.sum(middle))
+
+
+def _corners_moved(it: Mechanism, mode: Mode) -> Array:
+    signs = np.array([[a, b, c] for a in (-1, 1) for b in (-1, 1) for c in (-1, 1)])
+    return _rigid(it, mode, _centre(it) + signs * np.array(block_size(it)) / 2)
+
+
+def _centre(it: Mechanism) -> Array:
+    return np.array([float(each) for each in it.body.centre])
+
+
+def _rigid(it: Mechanism, mode: Mode, points: Array) -> Array:
+    """How points of the stage, (n, 3), move with it."""
+    arm = points - np.array([float(it.length), 0.0, 0.0])
+    return mode.stage[:3] + np.cross(mode.stage[3:], arm)
+
+
+def _block(it: Mechanism, mode: Mode, axes: tuple[int, int]) -> Shape:
+    """The outline of the stage, halfway through it."""
+    half = np.array(block_size(it)) / 2
+    rest = np.tile(_centre(it), (5, 1))
+    for axis, signs in zip(axes, ((-1, 1, 1, -1, -1), (-1, -1, 1, 1, -1)), strict=True):
+        rest[:, axis] += half[axis] * np.array(signs)
+    return Shape(rest, _rigid(it, mode, rest))
+
+
+def _leaves(it: Mechanism, mode: Mode, axes: tuple[int, int]) -> list[Shape]:
+    """Middle lines from the side, outlines from above, cross-sections along the leaves."""
+    draw = {(0, 2): _middle, (0, 1): _outline, (1, 2): _sections}[axes]
+    return [shape for k, offset in enumerate(it.offsets) for shape in draw(it, mode, mode.leaves[k], float(offset))]
+
+
+def _middle(it: Mechanism, mode: Mode, leaf: Array, offset: float) -> list[Shape]:
+    x, leaf = _smooth(it, leaf)
+    return [Shape(np.stack([x, np.zeros_like(x), np.full_like(x, offset)], axis=1), leaf)]
+
+
+def _outline(it: Mechanism, mode: Mode, leaf: Array, offset: float) -> list[Shape]:
+    """Both long edges and both ends: cross-sections turn as the middle line does."""
+    x, leaf = _smooth(it, leaf)
+    turn = np.gradient(leaf[:, 1], x)
+    turn -= turn[0]  # what is left at the clamp is shear, of nearly the same size all along the leaf
+    sides = []
+    for y in (-it.width / 2, it.width / 2):
+        rest = np.stack([x, np.full_like(x, y), np.full_like(x, offset)], axis=1)
+        sides.append((rest, leaf + np.stack([-y * turn, 0 * turn, 0 * turn], axis=1)))
+    around = [np.concatenate([one, other[::-1], one[:1]]) for one, other in zip(*sides, strict=True)]
+    return [Shape(*around)]
+
+
+def _smooth(it: Mechanism, leaf: Array) -> tuple[Array, Array]:
+    """More places along a leaf [m] and the displacement there, by a cubic spline."""
+    known, fine = (np.linspace(0.0, float(it.length), count) for count in (len(leaf), FINE))
+    return fine, CubicSpline(known, leaf)(fine)
+
+
+def _sections(it: Mechanism, mode: Mode, leaf: Array, offset: float) -> list[Shape]:
+    """A few cross-sections between cart and stage: they turn evenly more, up to the stage's own turn."""
+    shapes = []
+    for k in np.linspace(0, len(leaf) - 1, 5).astype(int):
+        share = k / (len(leaf) - 1)
+        ends = np.array([[share * float(it.length), y, offset] for y in (-it.width / 2, it.width / 2)])
+        lift = share * mode.stage[3] * ends[:, 1]
+        shapes.append(Shape(ends, leaf[k] + np.stack([0 * lift, 0 * lift, lift], axis=1)))
+    return shapes
+
+
+def _joined(lines: list[Array]) -> tuple[Array, Array]:
+    """All lines as one, with gaps between them, shapes (n,)."""
+    gap = np.full((1, 2), np.nan)
+    whole = np.concatenate([part for line in lines for part in (line, gap)])
+    return whole[:, 0], whole[:, 1]
+
+
+def _limits(low: Array, high: Array) -> tuple[tuple[float, float], tuple[float, float]]:
+    """Limits of both axes about what is drawn, wider than high by the usual aspect."""
+    width, height = high - low
+    middle = (low + high) / 2
+    half = np.array([max(width, ASPECT * height), max(height, width / ASPECT)]) / 2
+    (x1, y1), (x2, y2) = middle - half, middle + half
+    return (float(x1), float(x2)), (float(y1), float(y2))

@@ -1,0 +1,85 @@
+"""The table of a leaf-spring mechanism: what is named, and its text for each model."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from friso.flexure.evaluation import Evaluation, Mode
+from friso.views.drawing.prefixes import NOTHING, with_unit
+from friso.views.flexure.findings import Found, interferes, named_modes
+
+INTERFERES = "interferes"
+"""Marks a mode that disturbs control: actuator and sensor both see it."""
+
+UNKNOWN = "unknown"
+"""Stands where a number of the material is not known."""
+
+
+def rows(found: Found) -> list[tuple[str, list[str]]]:
+    """The rows: stiffnesses, eigenfrequencies, and what the leaves bear."""
+    models = list(found.models.values())
+    above, below = ([(name, [text(it) for it in models]) for name, text in part.items()] for part in (_STIFF, _BORNE))
+    return [*above, *_modes(found), *below]
+
+
+def newtons_per(value: float, length: str) -> str:
+    """A stiffness [N/m] per "mm" or "µm", as the drive and the supports are read."""
+    return f"{_plain(value / {'mm': 1e3, 'µm': 1e6}[length])} N/{length}"
+
+
+def megapascals(value: float) -> str:
+    """A stress [Pa]."""
+    return f"{_plain(value / 1e6)} MPa" if math.isfinite(value) else UNKNOWN
+
+
+def factor(value: float) -> str:
+    """A margin as a factor."""
+    return f"{_plain(value)} times" if math.isfinite(value) else UNKNOWN
+
+
+def percent(share: float) -> str:
+    return f"{100 * share:.2g} %"
+
+
+def _plain(value: float) -> str:
+    """Three digits without a unit."""
+    return with_unit(value, "").strip()
+
+
+def _modes(found: Found) -> list[tuple[str, list[str]]]:
+    """A row for each mode that some model knows, by name and in the order of frequency, the drive mode first."""
+    known = [(it, named_modes(it)) for it in found.models.values()]
+    frequencies: dict[str, float] = {}
+    for _, modes in known:
+        frequencies = {name: mode.frequency for name, mode in modes.items()} | frequencies
+    drive = next(iter(known[0][1]))
+    names = [drive, *sorted(frequencies.keys() - {drive}, key=frequencies.__getitem__)]
+    return [(f"Mode: {name}", [_mode(it, modes.get(name)) for it, modes in known]) for name in names]
+
+
+def _mode(it: Evaluation, mode: Mode | None) -> str:
+    if mode is None:
+        return NOTHING
+    return with_unit(mode.frequency, "Hz") + (f" ({INTERFERES})" if interferes(it, mode) else "")
+
+
+_STIFF: dict[str, Callable[[Evaluation], str]] = {
+    "Drive stiffness": lambda it: newtons_per(it.drive[0], "mm"),
+    "Drive stiffness under the load": lambda it: newtons_per(it.loaded_drive, "mm"),
+    "Departure from linear over the stroke": lambda it: percent(it.nonlinearity),
+    "Support stiffness x, straight": lambda it: newtons_per(it.support_x[0], "µm"),
+    "Support stiffness x, at full stroke": lambda it: newtons_per(it.support_x[-1], "µm"),
+    "Support stiffness y, straight": lambda it: newtons_per(it.support_y[0], "µm"),
+    "Support stiffness y, at full stroke": lambda it: newtons_per(it.support_y[-1], "µm"),
+}
+_BORNE: dict[str, Callable[[Evaluation], str]] = {
+    "Largest stress at full stroke": lambda it: megapascals(it.stress),
+    "Concentration factor at the clamp": lambda it: f"{it.mechanism.stress_concentration:g}",
+    "Stress at the clamp": lambda it: megapascals(it.clamp_stress),
+    "Margin to yield": lambda it: factor(it.yield_margin),
+    "Margin to fatigue": lambda it: factor(it.fatigue_margin),
+    "Shortening at full stroke": lambda it: with_unit(it.shortening, "m"),
+    "Buckling load": lambda it: with_unit(it.buckling, "N"),
+    "Buckling load over the load": lambda it: factor(it.buckling_margin),
+}

@@ -1,0 +1,211 @@
+"""What a leaf-spring mechanism is, allows and endangers, in sentences."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from friso.flexure.evaluation import Evaluation
+from friso.flexure.mechanism import AXES, GRAVITY
+from friso.stage import Stage
+from friso.views.drawing.prefixes import listed, with_unit
+from friso.views.flexure.findings import Found, interferes
+from friso.views.flexure.table import megapascals, newtons_per, percent
+
+RULE = 0.1
+"""Highest crossover over the first interfering frequency (thesis, Section 5: parasitic modes ten times higher)."""
+
+AGREE = 0.1
+"""Share by which the models may differ before that is said."""
+
+
+def sentences(found: Found) -> list[str]:
+    """All that is said, in order."""
+    joint, *further = findings(found)
+    return [joint, *warnings(found), *further, *assumptions(found.stage)]
+
+
+def findings(found: Found) -> list[str]:
+    """What the joint is, and what it allows."""
+    return [_joint(found.best), _control(found.best), _endurance(found.best)]
+
+
+def warnings(found: Found) -> list[str]:
+    """What is wrong with it."""
+    failed = f"The beam model found no answer: {found.failure.rstrip('.')}. All this is by closed forms."
+    return [
+        *([failed] if found.beams is None else []),
+        *_borne(found.best),
+        *_loaded(found.best),
+        *_breaks_away(found),
+        *_against(found.best),
+        *_differences(found),
+    ]
+
+
+def assumptions(stage: Stage) -> list[str]:
+    """What stands in for keys that the stage file leaves out."""
+    flat = stage.flat()
+    said = [_centre(flat), _inertia(flat, flat["masses.stage"]), _points(flat), _load(flat)]
+    parts = [part for part in said if part]
+    return [f"Assumed, since [flexure] does not say: {'; '.join(parts)}."] if parts else []
+
+
+def _joint(it: Evaluation) -> str:
+    own, drive = it.mechanism, it.modes[0]
+    return (
+        f"The joint: {own.leaves:g} leaves of {_size(own.length)} x {_size(own.width)} x {_size(own.thickness)} mm, "
+        f"{newtons_per(it.drive[0], 'mm')}; with the cart held the stage of {own.body.mass:g} kg swings at "
+        f"{with_unit(drive.frequency, 'Hz')}. Over {_stroke(it)} the force departs from linear by "
+        f"{percent(it.nonlinearity)} and takes {with_unit(it.forces[-1], 'N')} at its end."
+    )
+
+
+def _control(it: Evaluation) -> str:
+    first = it.interfering
+    if first is None:
+        return (
+            f"None of the {len(it.modes) - 1} modes above the drive mode that are known is seen by both actuator and "
+            f"sensor (highest: {with_unit(it.modes[-1].frequency, 'Hz')}); the leaves set no limit to the crossover."
+        )
+    return (
+        f"The first mode that interferes with control is {first.name}, at {with_unit(first.frequency, 'Hz')}: by the "
+        f"thesis's rule (ten times the crossover) the crossover may be {with_unit(RULE * first.frequency, 'Hz')} at "
+        "most."
+    )
+
+
+def _endurance(it: Evaluation) -> str:
+    bent = f"At the clamp the leaves bear {megapascals(it.clamp_stress)} at full stroke"
+    if math.isnan(it.fatigue_margin):
+        return f"{bent}; how much they bear for ever is not known (flexure.fatigue), so neither is the largest stroke."
+    largest = with_unit(it.stroke * it.fatigue_margin, "m")
+    bounds = f" More than half the length, {with_unit(it.mechanism.length / 2, 'm')}, is beyond both models."
+    beyond = bounds if it.stroke * it.fatigue_margin > it.mechanism.length / 2 else ""
+    return (
+        f"{bent} and would bear {megapascals(it.mechanism.fatigue)} for ever: "
+        f"by fatigue the stroke may be about {largest}.{beyond}"
+    )
+
+
+def _borne(it: Evaluation) -> list[str]:
+    """Stresses and loads beyond what the leaves bear."""
+    said, own = [], it.mechanism
+    if it.yield_margin < 1:
+        said.append(
+            f"The leaves yield: {megapascals(it.clamp_stress)} at the clamp at {_stroke(it)}, the material bears "
+            f"{megapascals(own.yield_strength)}. Longer or thinner leaves, or less stroke, mend it."
+        )
+    elif it.fatigue_margin < 1:
+        said.append(
+            f"The leaves break in the long run: {megapascals(it.clamp_stress)} at the clamp at {_stroke(it)}, for ever "
+            f"they bear {megapascals(own.fatigue)}. Longer or thinner leaves, or less stroke, mend it."
+        )
+    if it.buckling_margin < 1:
+        said.append(
+            f"A stage that stands on its leaves buckles them: it weighs {with_unit(own.weight, 'N')} "
+            f"(g = {GRAVITY} m/s²), they bear {with_unit(it.buckling, 'N')} along their length."
+        )
+    return said
+
+
+def _loaded(it: Evaluation) -> list[str]:
+    """What a load along the leaves does."""
+    load = float(it.mechanism.load)
+    if not load:
+        return []
+    first = it.modes[0].frequency * math.sqrt(max(it.loaded_drive / it.drive[0], 0.0))
+    close = f" That is {it.buckling_margin:.2g} times below buckling: stiffness hangs on it." if load > 0 else ""
+    return [
+        f"Under the load of {with_unit(load, 'N')} along the leaves the drive stiffness is "
+        f"{newtons_per(it.loaded_drive, 'mm')} and the drive mode at {with_unit(first, 'Hz')}; all else is told "
+        f"without it.{close}"
+    ]
+
+
+def _breaks_away(found: Found) -> list[str]:
+    static, force = found.stage.flat().get("friction.static"), float(found.best.forces[-1])
+    if static is None or force <= static:
+        return []
+    return [
+        f"The cart breaks away inside the stroke: the leaves push with {with_unit(force, 'N')} at "
+        f"{_stroke(found.best)}, static friction holds {with_unit(static, 'N')}. The joint cannot use its stroke "
+        f"beyond about {with_unit(found.best.stroke * static / force, 'm')}."
+    ]
+
+
+def _against(it: Evaluation) -> list[str]:
+    """Modes in which the sensor sees the opposite of what the actuator does."""
+    modes = [mode for mode in it.modes if interferes(it, mode) and mode.actuator * mode.sensor < 0]
+    if not modes:
+        return []
+    named = listed([f"{mode.name} ({with_unit(mode.frequency, 'Hz')})" for mode in modes], "and")
+    return [
+        f"In {named} actuator and sensor move against each other. A controller cannot damp that by phase, and "
+        "[parasitic], which knows only the size of a mode, makes the loop look better than it is: actuate and measure "
+        "at the same point."
+    ]
+
+
+def _differences(found: Found) -> list[str]:
+    """Where the two models differ so much that one of them is beyond its range."""
+    if found.beams is None:
+        return []
+    shares = {name: get(found.closed) / get(found.beams) - 1 for name, get in _COMPARED.items()}
+    far = [f"{name} by {100 * share:+.0f} %" for name, share in shares.items() if abs(share) > AGREE]
+    if not far:
+        return []
+    return [
+        f"Closed forms differ from beams in {listed(far, 'and')}: there the leaves are outside the range of the "
+        "former, and the beams count."
+    ]
+
+
+_COMPARED: Mapping[str, Callable[[Evaluation], float]] = {
+    "drive stiffness": lambda it: float(it.drive[0]),
+    "force at full stroke": lambda it: float(it.forces[-1]),
+    "support stiffness x": lambda it: float(it.support_x[0]),
+    "support stiffness x at full stroke": lambda it: float(it.support_x[-1]),
+    "support stiffness y": lambda it: float(it.support_y[0]),
+    "support stiffness y at full stroke": lambda it: float(it.support_y[-1]),
+    "drive frequency": lambda it: it.modes[0].frequency,
+    "first interfering frequency": lambda it: it.interfering.frequency if it.interfering else math.nan,
+    "stress": lambda it: it.stress,
+    "buckling load": lambda it: it.buckling,
+}
+
+
+def _centre(flat: Mapping[str, Any]) -> str:
+    return "" if "flexure.centre_x" in flat else "centre of mass in the middle of the leaf ends"
+
+
+def _inertia(flat: Mapping[str, Any], mass: float) -> str:
+    if all(f"flexure.inertia_{axis}" in flat for axis in AXES):
+        return ""
+    return f"moments of inertia of an aluminium cube of {mass:g} kg"
+
+
+def _points(flat: Mapping[str, Any]) -> str:
+    places = {"actuation": "the centre of mass of the stage", "sensor": "the point of actuation"}
+    return ", ".join(_point(flat, name, place) for name, place in places.items() if f"flexure.{name}_x" not in flat)
+
+
+def _point(flat: Mapping[str, Any], name: str, place: str) -> str:
+    """Where something is whose place along x is left out."""
+    partly = any(f"flexure.{name}_{axis}" in flat for axis in AXES)
+    return f"{name}{' along x' if partly else ''} at {place}"
+
+
+def _load(flat: Mapping[str, Any]) -> str:
+    said = "no load on the leaves, but the weight of the stage for the margin to buckling"
+    return "" if "flexure.load" in flat else said
+
+
+def _stroke(it: Evaluation) -> str:
+    return f"a stroke of {with_unit(it.stroke, 'm')}"
+
+
+def _size(length: float) -> str:
+    """A length [m] in mm as it stands on a drawing."""
+    return f"{1e3 * length:.4g}"

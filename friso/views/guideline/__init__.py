@@ -1,0 +1,1 @@
+"""What `friso guideline` shows: words, figures, document and page."""

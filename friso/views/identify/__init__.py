@@ -1,0 +1,1 @@
+"""What `friso identify` shows: words, figures, document and page."""

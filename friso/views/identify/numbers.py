@@ -1,0 +1,124 @@
+"""Numbers of an identification with their uncertainty, in words: as many digits as the interval allows."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from friso.identify.estimate import Estimate
+from friso.views.drawing.prefixes import NOTHING, choose, pretty
+from friso.views.map.words import quantity
+
+DIGITS = 2
+"""Significant digits of half an interval that are shown, and so of its value."""
+
+MOST = 4
+"""Significant digits of a number without interval."""
+
+LARGE, SMALL = 4, 7
+"""Zeros before, and places behind the decimal point, from which on a number has an exponent."""
+
+FORCES = (1e-2, 1e4)
+"""Between these, forces [N], and what is in newtons per something, have no prefix: they are compared with others."""
+
+_NAMES = {
+    "bias.cart": "Constant force on the cart",
+    "bias.stage": "Constant force on the stage",
+    "friction.viscous_asymmetry": "Asymmetry of viscous friction",
+    "viscous": "Viscous friction",
+    "coulomb": "Coulomb friction",
+    "viscous forward": "Viscous friction, forward",
+    "viscous backward": "Viscous friction, backward",
+    "coulomb forward": "Coulomb friction, forward",
+    "coulomb backward": "Coulomb friction, backward",
+    "static friction ratio": "Static over Coulomb friction",
+}
+
+
+def name_of(key: str) -> str:
+    """A key of the stage file, or another quantity found, in words."""
+    return _NAMES.get(key) or quantity(key)
+
+
+def within(key: str) -> str:
+    """The same inside a sentence: names of people stay as they are."""
+    name = name_of(key)
+    return name if name.startswith(("Coulomb", "Stribeck")) else name[0].lower() + name[1:]
+
+
+def unit_of(unit: str) -> str:
+    """A unit as prefixes know it: "N s/m" is "N*s/m", and ones are left out, "1 s^2/1" is "s^2"."""
+    top, *below = unit.split("/")
+    factors = [each for each in top.replace("*", " ").split() if each != "1"]
+    below = [each for each in below if each != "1"]
+    return "/".join(["*".join(factors) or ("1" if below else ""), *below])
+
+
+def value_text(it: Estimate) -> str:
+    """A value with its unit, e.g. "95.28 kg"; a dash where there is none."""
+    if not math.isfinite(it.value):
+        return NOTHING
+    factor, unit = _scale(it)
+    return f"{_written(it.value, factor, _places(it, factor))} {unit}".rstrip()
+
+
+def interval_text(it: Estimate) -> str:
+    """The interval, e.g. "94.84 to 95.72 kg"; of what is not shown, what is left possible."""
+    low, high = math.isfinite(it.low), math.isfinite(it.high)
+    if not (low or high):
+        return NOTHING
+    factor, unit = _scale(it)
+    if low and high and 0 < it.low < 1e-2 * it.high:  # a range over decades: each end has digits of its own
+        return f"{digits(it.low, unit_of(it.unit))} to {digits(it.high, unit_of(it.unit))}"
+    places = _places(it, factor)
+    ends = [_written(each, factor, places) for each in (it.low, it.high)]
+    if low and high:
+        return f"{ends[0]} to {ends[1]} {unit}".rstrip()
+    return f"{'at least' if low else 'at most'} {ends[0] if low else ends[1]} {unit}".rstrip()
+
+
+def with_interval(it: Estimate) -> str:
+    """Both in a sentence, e.g. "95.28 kg (94.84 to 95.72)"."""
+    if not it.shown:
+        return f"not shown ({it.reason})"
+    unit = _scale(it)[1]
+    return f"{value_text(it)} ({interval_text(it).removesuffix(unit).rstrip()})"
+
+
+def digits(value: float, unit: str, count: int = 3) -> str:
+    """A value [unit] to so many digits, with a prefix of its own: "2.1 µm"."""
+    if not math.isfinite(value):
+        return NOTHING
+    factor, text = choose(np.array([value]), unit)
+    return f"{value * factor:.{count}g} {text}".rstrip()
+
+
+def percent(share: float) -> str:
+    """A share, to three digits."""
+    return f"{100 * share:.3g} %" if math.isfinite(share) else NOTHING
+
+
+def _scale(it: Estimate) -> tuple[float, str]:
+    """Factor and unit with prefix that suit the value, or what is left possible."""
+    known = [it.value] if math.isfinite(it.value) else [it.low, it.high]
+    unit, size = unit_of(it.unit), max((abs(each) for each in known if math.isfinite(each)), default=0.0)
+    if unit.startswith("N") and FORCES[0] < size < FORCES[1]:
+        return 1.0, pretty(unit)
+    return choose(np.array(known), unit)
+
+
+def _places(it: Estimate, factor: float) -> int:
+    """Decimal places that the interval allows."""
+    half = it.half_width * factor
+    if not (math.isfinite(half) and half > 0):
+        known = [abs(each) * factor for each in (it.value, it.low, it.high) if math.isfinite(each) and each != 0]
+        return MOST - 1 - math.floor(math.log10(max(known))) if known else 0
+    return DIGITS - 1 - math.floor(math.log10(half))
+
+
+def _written(value: float, factor: float, places: int) -> str:
+    if not -LARGE <= places <= SMALL:
+        return f"{value * factor:.{MOST - 1}e}"
+    rounded = round(value * factor, places)
+    return f"{rounded + 0.0:.{max(places, 0)}f}"  # + 0.0: no minus before a zero

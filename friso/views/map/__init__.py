@@ -1,0 +1,1 @@
+"""What `friso map` shows: words, figures, document and page."""

@@ -1,0 +1,139 @@
+"""What a map page knows of its runs: axes, variables and colours, packed for the page's script."""
+
+from __future__ import annotations
+
+import base64
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from friso.views.drawing.colours import scale
+from friso.views.drawing.drawable import colour_prefix
+from friso.views.drawing.figure import Array, Cloud, Kind
+from friso.views.drawing.prefixes import choose
+from friso.views.map.cells import SAMPLE, CellAxis, axes_of, look, metrics, pick, plane_first
+from friso.views.map.words import variable, words_of
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+MOST = 250_000  # cells in a page: more would take a browser seconds to open and to colour
+
+NONE = 255  # in bytes of codes: no kind, the number counts
+
+
+def packed(runs: xr.Dataset, metric: str, rerun: str) -> dict[str, Any]:
+    """Everything the page's script reads, ready for JSON; arrays are base64 of little-endian numbers, cell by cell in
+    the order of the axes, the last one fastest. Raises ValueError as `look` and `axes_of` do."""
+    axes = axes_of(runs)
+    sampled = SAMPLE in runs.dims
+    chosen = picked(runs)
+    cells = _Cells(axes, chosen, sampled)
+    order = list(axes) if sampled or len(axes) == 1 else plane_first(axes)
+    return {
+        "metric": metric,
+        "rerun": rerun,
+        "sampled": sampled,
+        "indices": [[int(i) for i in places] for places in cells.indices()],
+        "axes": [_axis(axis, positions) for axis, positions in zip(axes, cells.positions(), strict=True)],
+        "order": [axes.index(axis) for axis in order],
+        "variables": [_coloured(runs, name, cells) for name in metrics(runs)],
+        "texts": [_text(runs, str(name), cells) for name, array in runs.data_vars.items() if array.dtype.kind in "OUT"],
+    }
+
+
+def picked(runs: xr.Dataset) -> tuple[np.ndarray, ...]:
+    """Which positions along each axis (of samples: which samples) are in the page: all, or evenly picked ones."""
+    if SAMPLE in runs.dims:
+        return pick([runs.sizes[SAMPLE]], MOST)
+    return pick([len(axis.places) for axis in axes_of(runs)], MOST)
+
+
+class _Cells:
+    """The picked cells: takes them out of arrays of the runs."""
+
+    def __init__(self, axes: tuple[CellAxis, ...], chosen: tuple[np.ndarray, ...], sampled: bool) -> None:
+        self.axes, self.chosen, self.sampled = axes, chosen, sampled
+
+    def indices(self) -> list[np.ndarray]:
+        """Per dimension of the runs, the index of each picked cell."""
+        if self.sampled:
+            return list(self.chosen)
+        return [axis.places[at] for axis, at in zip(self.axes, self.chosen, strict=True)]
+
+    def positions(self) -> list[np.ndarray]:
+        """Per axis, the places (in the axis) of what the page needs: one per cell along it, or one per sample."""
+        return [self.chosen[0]] * len(self.axes) if self.sampled else list(self.chosen)
+
+    def take(self, array: xr.DataArray) -> np.ndarray:
+        """The values of the picked cells, shape (cells,)."""
+        dims = (SAMPLE,) if self.sampled else tuple(axis.key for axis in self.axes)
+        return np.asarray(array.transpose(*dims).values)[np.ix_(*self.indices())].ravel()
+
+
+def _axis(axis: CellAxis, positions: np.ndarray) -> dict[str, Any]:
+    values = axis.positions[positions]
+    factor, unit = choose(axis.positions, axis.unit, log=axis.log)
+    return {
+        "key": axis.key,
+        "label": axis.axis(None).quantity,
+        "unit": unit,
+        "log": axis.log,
+        "words": list(axis.words),
+        "values": [_rounded(value * factor) for value in values],
+    }
+
+
+def _coloured(runs: xr.Dataset, name: str, cells: _Cells) -> dict[str, Any]:
+    """A variable that the page can colour: its numbers, its kinds, and its scale."""
+    shown = look(runs, name)
+    numbers = shown.numbers.values.ravel().astype(float)
+    none = np.zeros(numbers.size)
+    field = Cloud(none, none, numbers, shown.quantity, shown.unit, shown.limits, shown.log, shown.colours)
+    factor, unit = colour_prefix(field)
+    limits = None if shown.limits is None else (shown.limits[0] * factor, shown.limits[1] * factor)
+    drawn = scale(Cloud(none, none, numbers * factor, shown.quantity, unit, limits, shown.log, shown.colours))
+    codes = cells.take(shown.codes)
+    own = runs[name] if name != "verdict" else shown.numbers
+    kinds = [_kind(kind) for kind in shown.kinds]
+    return {
+        "name": name,
+        "label": shown.quantity,
+        "unit": unit,
+        "log": shown.log,
+        "low": drawn.low,
+        "high": drawn.high,
+        "stops": [[_rounded(place), colour] for place, colour in drawn.stops],
+        "ticks": list(drawn.ticks),
+        "texts": list(drawn.texts),
+        "kinds": kinds,
+        "codes": _base64(np.where(np.isnan(codes), NONE, codes).astype(np.uint8)),
+        "numbers": _base64(_short(cells.take(own).astype(float) * factor)),
+    }
+
+
+def _text(runs: xr.Dataset, name: str, cells: _Cells) -> dict[str, Any]:
+    """A variable of texts: each text once, and their numbers."""
+    codes, words = words_of(runs, name)
+    taken = cells.take(runs[name].copy(data=codes)).astype("<u4")
+    return {"name": name, "label": variable(name), "words": words, "codes": _base64(taken)}
+
+
+def _kind(kind: Kind) -> dict[str, str]:
+    return {"label": kind.label, "colour": kind.colour}
+
+
+def _short(values: Array) -> np.ndarray:
+    """Six significant digits, as float32 (which holds seven)."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        size = np.floor(np.log10(np.abs(values)))
+    scaled = 10.0 ** (5 - np.where(np.isfinite(size), size, 0.0))
+    return (np.round(values * scaled) / scaled).astype("<f4")
+
+
+def _rounded(value: float) -> float:
+    return float(f"{value:.6g}")
+
+
+def _base64(array: np.ndarray) -> str:
+    return base64.b64encode(np.ascontiguousarray(array).tobytes()).decode("ascii")

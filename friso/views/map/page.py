@@ -1,0 +1,93 @@
+"""The page of a map: one file that opens offline, where a click on a cell shows its run and how to repeat it."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from importlib import resources
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from markupsafe import Markup
+
+from friso.views.drawing import plotly_renderer
+from friso.views.map.cells import SAMPLE, axes_of
+from friso.views.map.data import packed, picked
+from friso.views.map.figures import map_figure
+from friso.views.map.words import MEANINGS, caveats, failures, grouped, verdict_counts, verification
+from friso.views.pages import environment, print_image
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+def write_map_page(runs: xr.Dataset, path: Path, metric: str, rerun: str) -> None:
+    """Write `map_html(runs, metric, rerun)` to `path` (OSError where that is impossible)."""
+    path.write_text(map_html(runs, metric, rerun), encoding="utf-8", newline="\n")
+
+
+def map_html(runs: xr.Dataset, metric: str, rerun: str) -> str:
+    """The whole page of the runs of a sweep, which opens with the variable `metric`.
+
+    `rerun`: the command that repeats one run, with {indices} where the indices of its cell go, in the order of the
+    axes: "friso simulate --cell map.zarr {indices}". Raises ValueError where that is missing, and as `map_figure`.
+    """
+    if "{indices}" not in rerun:
+        raise ValueError(
+            f"rerun: got {rerun!r}, expected {{indices}} in it, e.g. 'friso simulate --cell x {{indices}}'"
+        )
+    figure = map_figure(runs, metric)
+    return (
+        environment()
+        .get_template("map.html")
+        .render(
+            name=runs.attrs.get("name") or "Unnamed stage",
+            verification=verification(runs),
+            facts=_facts(runs),
+            thinned=_thinned(runs),
+            data=_json(packed(runs, metric, rerun)),
+            figure=figure,
+            printed=print_image(replace(figure, note="")),
+            plotly=Markup(plotly_renderer.script()),
+            script=Markup((resources.files("friso.views") / "templates" / "map.js").read_text(encoding="utf-8")),
+            stage_file=runs.attrs.get("stage", ""),
+            version=runs.attrs.get("friso", ""),
+            rtol=f"{float(runs.attrs['rtol']):g}",
+        )
+    )
+
+
+def _facts(runs: xr.Dataset) -> list[tuple[str, str]]:
+    """The table under the map: what was varied, how well it was computed, and what came out."""
+    facts = [("Stage", str(runs.attrs.get("name", "")))]
+    facts += [(axis.quantity, f"{axis.span()} ({axis.key})") for axis in axes_of(runs)]
+    facts.append(("Relative tolerance", f"{float(runs.attrs['rtol']):g}"))
+    facts.append(("Verification", verification(runs)))
+    verdicts = ", ".join(f"{label} {grouped(number)}" for label, number in verdict_counts(runs).items())
+    facts += [("Verdicts", verdicts)] if verdicts else []
+    facts += [(f"{label}", MEANINGS[label]) for label in verdict_counts(runs) if label in MEANINGS]
+    facts += [("Mind", " ".join(found))] if (found := caveats(runs)) else []
+    links = json.loads(runs.attrs.get("links", "{}"))
+    facts += [("Links", "; ".join(f"{key} = {text}" for key, text in links.items()))] if links else []
+    facts += [(f"Without result: {grouped(number)}", reason) for reason, number in failures(runs).items()]
+    return facts
+
+
+def _thinned(runs: xr.Dataset) -> str:
+    """Which part of a map too large for a page is in it."""
+    sizes = [runs.sizes[SAMPLE]] if SAMPLE in runs.dims else [len(axis.places) for axis in axes_of(runs)]
+    names = ["samples"] if SAMPLE in runs.dims else [axis.quantity for axis in axes_of(runs)]
+    parts = [
+        f"{len(kept)} of the {size} values of {name}" if name != "samples" else f"{len(kept)} of the {size} samples"
+        for name, size, kept in zip(names, sizes, picked(runs), strict=True)
+        if len(kept) < size
+    ]
+    return (
+        f"In this page: {' and '.join(parts)}, evenly picked; the files of the map hold all of them." if parts else ""
+    )
+
+
+def _json(data: object) -> Markup:
+    """JSON that can stand in a script element whatever texts it holds."""
+    text = json.dumps(data, separators=(",", ":"), allow_nan=False, ensure_ascii=True)
+    return Markup(text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026"))

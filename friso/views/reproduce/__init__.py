@@ -1,0 +1,1 @@
+"""What `friso reproduce` shows: words, figures, document and page."""

@@ -1,0 +1,1 @@
+"""What `friso rig` shows: words, figures, document and page."""

@@ -1,0 +1,239 @@
+"""What `friso rig compare` shows: Fig. 27 of the thesis, and what makes simulated cycles as slow as measured ones."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from friso.studies.rig.compare import AS_SLOW, BINS, COULOMB, MOTORS, SIMILAR, STATIC, Compared
+from friso.studies.rig.hunted import Hunted
+from friso.studies.rig.outcome import Outcome
+from friso.views.drawing.figure import BLUE, INK, VERMILLION, Axis, Band, Figure, Limit, Map, Markers, Panel, Series
+from friso.views.drawing.prefixes import with_unit
+from friso.views.rig.hunting import runs_document, share_document
+
+AREA = "#cfdfee"
+LATE = 10.0
+"""From where the cycles are shown [s], as those that count."""
+
+ASYMMETRY = "Friction's difference between the two sides"
+
+
+def sentences(outcome: Outcome) -> list[str]:
+    """The even rail's cycle, what rails that vary make of it, and what else makes it as slow."""
+    it: Compared = outcome.result
+    even = it.even
+    if not even.lives[0]:
+        return ["On an even rail this stage is in no cycle when the run ends: there is nothing to compare with."]
+    return [
+        f"On an even rail the cycle swings by {with_unit(float(even.swing[0]), 'm')} from peak to peak with a period "
+        f"of {with_unit(float(even.period[0]), 's')}; from cycle to cycle its period scatters by "
+        f"{float(even.period_scatter[0]):.1%}.",
+        _field(it),
+        _asymmetry(it),
+        _rolling(it),
+        _irregular(it),
+        _levels(it),
+        _others(it),
+    ]
+
+
+def _field(it: Compared) -> str:
+    found, done = it.as_measured(it.field), int((~it.field.failed).sum())
+    lives = int(it.field.lives.sum())
+    slowest = np.nanmax(it.slower(it.field)) if lives else np.nan
+    return (
+        f"On rails with a random field {lives} of {done} runs still swing at their end; {int(found.sum())} of them "
+        f"have at least {AS_SLOW:g} times that period at a similar swing (within a factor of {SIMILAR:g}); the slowest "
+        f"has {slowest:.3g} times."
+    )
+
+
+def _asymmetry(it: Compared) -> str:
+    """What ends hunting on rails that vary."""
+    rows = [(low, high, *row) for low, high, row in zip(BINS[:-1], BINS[1:], it.by_asymmetry, strict=True)]
+    low, high, even, slow = rows[0]
+    parts = [f"{even.probability:.0%} swing on where it differs by less than {high:.0%} (period {slow:.3g} times)"]
+    for low, high, share, slow in rows[1:]:
+        if np.isfinite(share.probability):
+            upper = f"{low:.0%} to {high:.0%}" if np.isfinite(high) else f"more than {low:.0%}"
+            times = f" ({slow:.3g} times)" if np.isfinite(slow) else ""
+            parts.append(f"{share.probability:.0%} at {upper}{times}")
+    return (
+        "What slows a cycle, and ends it, is friction that differs between the two places where the stage sticks: "
+        f"{', '.join(parts)}."
+    )
+
+
+def _rolling(it: Compared) -> str:
+    lives = (it.rolling.lives & ~it.rolling.failed).mean(axis=1)
+    parts = [f"{share:.0%} at {size:.0%}" for share, size in zip(lives, it.harmonics, strict=True)]
+    return (
+        f"With rolling elements of {with_unit(it.pitch, 'm')} pitch, of so large a first harmonic, swing on: "
+        f"{', '.join(parts)}."
+    )
+
+
+def _irregular(it: Compared) -> str:
+    """How the cycles of varied rails are irregular."""
+    lives = it.field.lives & np.isfinite(it.field.rising)
+    if not lives.any():
+        return "No cycle on a varied rail is long enough to tell how regular it is."
+    above, below = it.field.above[lives], it.field.below[lives]
+    sides = np.median(np.maximum(above, below) / np.minimum(above, below))
+    scatter, heights = (np.median(each[lives]) for each in (it.field.period_scatter, it.field.height_scatter))
+    return (
+        f"Such cycles are lopsided: the one side is {sides:.2g} times as high as the other (median). From cycle to "
+        f"cycle they repeat: the period scatters by {scatter:.1%}, the heights by {heights:.1%} of the swing. "
+        "The same places do the same each time, so a rail that varies does not make a cycle irregular; what changes "
+        "from cycle to cycle is not in the model."
+    )
+
+
+def _levels(it: Compared) -> str:
+    """Whether other friction levels make the cycle as slow."""
+    slow, swing = it.slower(it.levels), it.larger(it.levels)
+    found = np.argwhere(it.as_measured(it.levels))
+    if not len(found):
+        best = np.unravel_index(np.nanargmax(slow), slow.shape)
+        return (
+            f"On an even rail no friction levels tried do that; the slowest has {slow[best]:.3g} times the period at "
+            f"{swing[best]:.3g} times the swing ({_level(*best)})."
+        )
+    closest = sorted(map(tuple, found), key=lambda cell: abs(np.log(swing[cell])) + abs(np.log(slow[cell] / 2)))
+    named = [f"{_level(*cell)} ({slow[cell]:.3g} and {swing[cell]:.3g})" for cell in closest[:3]]
+    return (
+        f"On an even rail {len(found)} of {slow.size} other motors and friction levels do, closest to twice the period "
+        "at the same swing (period and swing over those of the file): "
+        f"{'; '.join(named)}."
+    )
+
+
+def _level(motor: Any, row: Any, column: Any) -> str:
+    named = f"static friction times {STATIC[row]:g}, Coulomb friction times {COULOMB[column]:g}"
+    return named if MOTORS[motor] == 1 else f"motor giving {MOTORS[motor]:.2g} of its force, {named}"
+
+
+def _others(it: Compared) -> str:
+    parts = []
+    for name, runs in it.others.items():
+        slow, swing = float(it.slower(runs)[0]), float(it.larger(runs)[0])
+        parts.append(f"{name}: {f'{slow:.3g} and {swing:.3g}' if np.isfinite(slow) else 'no cycle'}")
+    return f"Else on an even rail, period and swing over those of the file: {'; '.join(parts)}."
+
+
+def figures(outcome: Outcome) -> list[Figure]:
+    """Fig. 27, the maps of the rails with a field, the cycles by their asymmetry, and the friction levels."""
+    it: Compared = outcome.result
+    if not it.even.lives[0]:
+        return [_cycles(it)]
+    return [_cycles(it), _maps(it), _by_asymmetry(it), _level_maps(it)]
+
+
+def _cycles(it: Compared) -> Figure:
+    even, varied = it.traces
+    lines = [Series(*_late(even.time, even.deviation), "even rail", BLUE)]
+    if varied is not None:
+        assert it.slowest is not None
+        label = f"deviation {it.slowest[0]:.0%} over {with_unit(it.slowest[1], 'm')}, rail {it.slowest[2]:.0f}"
+        lines.append(Series(*_late(varied.time, varied.deviation), label, VERMILLION))
+    panel = Panel("", Axis("Time", "s"), Axis("Position minus reference", "m"), tuple(lines))
+    caption = "The slowest cycle of a similar swing among the rails that vary (Fig. 27: measured and simulated)."
+    return Figure("compare_cycles", "Cycles on an even rail and on one that varies", caption, (panel,))
+
+
+def _late(time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    late = time >= LATE
+    return time[late], values[late]
+
+
+def _maps(it: Compared) -> Figure:
+    lengths, deviations = ([with_unit(each, "m") for each in it.lengths], [f"{each:.0%}" for each in it.deviations])
+    x, y = Axis("Correlation length", "", words=(*lengths,)), Axis("Deviation of friction", "", words=(*deviations,))
+    columns, rows = (np.arange(float(len(words))) for words in (lengths, deviations))
+    shares = it.field.lives.mean(axis=2)
+    slow = _medians(it.slower(it.field))
+    quantities = (("Share of rails still swinging", shares, (0.0, 1.0)), ("Period over even rail's", slow, None))
+    panels = tuple(
+        Panel("", x, y, maps=(Map(columns, rows, values, name, "", limits=limits),))
+        for name, values, limits in quantities
+    )
+    caption = f"{it.field.lives.shape[2]} rails in each cell; the period is the median of those that swing on."
+    return Figure("compare_rails", "Rails with a random field of friction", caption, panels, columns=2)
+
+
+def _medians(values: np.ndarray) -> np.ndarray:
+    """Medians over the last axis of what is known, NaN of nothing."""
+    known = np.asarray(np.isfinite(values).any(axis=-1))
+    return np.where(known, np.nanmedian(np.where(known[..., None], values, 0.0), axis=-1), np.nan)
+
+
+def _by_asymmetry(it: Compared) -> Figure:
+    size, slow = np.abs(it.asymmetry).ravel(), it.slower(it.field).ravel()
+    alive = np.isfinite(slow)
+    largest = float(size.max())
+    points = Markers(size[alive], slow[alive], "rails that swing on", BLUE)
+    known = [(low, min(high, largest), row[0]) for low, high, row in zip(BINS, BINS[1:], it.by_asymmetry, strict=False)]
+    known = [row for row in known if np.isfinite(row[2].probability)]
+    middle = np.array([(low + high) / 2 for low, high, _ in known])
+    ends = ("probability", "low", "high")
+    share, low, high = (np.array([getattr(each, name) for *_, each in known]) for name in ends)
+    axis = Axis(ASYMMETRY, "")
+    shares = Panel(
+        "share that swings on", axis, Axis("Share of rails", "", (-0.03, 1.03)),
+        (Series(middle, share, "in each class", BLUE),), bands=(Band(middle, low, high, "95 % interval", AREA),),
+    )  # fmt: skip
+    periods = Panel(
+        "period of those", axis, Axis("Period over that of the even rail", ""), markers=(points,),
+        limits=(Limit((AS_SLOW,), "nearly twice", INK),),
+    )  # fmt: skip
+    caption = "The natural logarithm of static friction, half a swing to one side of the target less to the other."
+    return Figure("compare_asymmetry", "What slows a cycle and ends it", caption, (shares, periods), columns=2)
+
+
+def _level_maps(it: Compared) -> Figure:
+    x, y = Axis("Static friction over the file's", ""), Axis("Coulomb friction over the file's", "")
+    quantities = (("Period over the file's", it.slower(it.levels)), ("Swing over the file's", it.larger(it.levels)))
+    panels = tuple(
+        Panel(_motor(motor), x, y, maps=(Map(np.array(STATIC), np.array(COULOMB), values[row].T, name, ""),))
+        for row, motor in enumerate(MOTORS)
+        for name, values in quantities
+    )
+    return Figure(
+        "compare_levels",
+        "Even rail, other friction levels",
+        "Empty: no cycle after the move or any of the releases tried.",
+        panels,
+        columns=2,
+    )
+
+
+def _motor(share: float) -> str:
+    return "motor as believed" if share == 1 else f"motor giving {share:.2g} of its force"
+
+
+def numbers(outcome: Outcome) -> dict[str, Any]:
+    """All that was found; arrays of runs have the shapes of `Compared`."""
+    it: Compared = outcome.result
+    classes = [
+        {"from": low, "to": high, **share_document(share), "period_over_even": slow}
+        for low, high, (share, slow) in zip(BINS, BINS[1:], it.by_asymmetry, strict=False)
+    ]
+    field = {"deviations": it.deviations, "correlation_lengths_m": it.lengths, "asymmetry": it.asymmetry}
+    rolling = {"harmonics": it.harmonics, "pitch_m": it.pitch, "asymmetry": it.rolling_asymmetry}
+    levels = {"motors": np.array(MOTORS), "static_over_file": np.array(STATIC), "coulomb_over_file": np.array(COULOMB)}
+    return {
+        "even_rail": _cycle_document(it.even),
+        "field": field | _cycle_document(it.field),
+        "by_asymmetry": classes,
+        "rolling": rolling | _cycle_document(it.rolling),
+        "levels": levels | _cycle_document(it.levels),
+        "others": {name: _cycle_document(runs) for name, runs in it.others.items()},
+    }
+
+
+def _cycle_document(runs: Hunted) -> dict[str, Any]:
+    sides = {"above_m": runs.above, "below_m": runs.below, "rising_share": runs.rising}
+    scatter = {"period_scatter": runs.period_scatter, "height_scatter": runs.height_scatter}
+    return runs_document(runs) | sides | scatter

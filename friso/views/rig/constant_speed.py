@@ -1,0 +1,193 @@
+"""What constant speed on the rig shows of dynamic friction, and what it does not (thesis, Fig. 21)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from friso.identify.estimate import Estimate
+from friso.studies.rig.constant_speed import ConstantSpeed, Passes
+from friso.studies.rig.many_speeds import ManySpeeds, Place
+from friso.studies.rig.outcome import Outcome, RigLog
+from friso.studies.rig.slow_sliding import Slow
+from friso.views.drawing.figure import BLUE, GREEN, ORANGE, PINK, VERMILLION, Axis, Figure, Markers, Panel, Series
+from friso.views.drawing.prefixes import listed, with_unit
+from friso.views.identify.friction_figures import slow_sliding_caption, slow_sliding_panels
+from friso.views.identify.numbers import with_interval
+
+COLOURS = (BLUE, VERMILLION, GREEN, ORANGE, PINK)
+"""Of the places."""
+
+
+def sentences(outcome: Outcome) -> list[str]:
+    """What was found."""
+    found: ConstantSpeed = outcome.result
+    said = [f"Joint {each.name}: {each.place.verdict}" for each in found.cases]
+    for each in found.cases:
+        coulomb = each.velocity.both.coulomb
+        told = with_unit(coulomb.value, "N") if coulomb.shown else f"not shown ({coulomb.reason})"
+        said.append(f"Joint {each.name}: Coulomb friction {told}.")
+    true = listed(
+        [
+            f"{with_unit(float(force), 'N')} at {with_unit(speed, 'm/s')}"
+            for force, speed in zip(found.cases[0].true, found.speeds, strict=True)
+        ],
+        "and",
+    )
+    return [*said, f"The dynamic friction along the way is truly {true} on average.", *_many(found), *_slow(found)]
+
+
+def _slow(found: ConstantSpeed) -> list[str]:
+    """What slow sliding shows."""
+    if not found.slow:
+        return []
+    head = "In slow sliding, joint locked, at the edge of what is steady, mass and bristles being known as they are:"
+    return [head, *map(_slow_place, found.slow)]
+
+
+def _slow_place(it: Slow) -> str:
+    names = ("Coulomb friction", "static friction", "the Stribeck velocity")
+    flat = it.log.stage.flat()
+    true = [*it.true, flat["friction.stribeck_velocity"]]
+    shown = [with_interval(each) if each.shown else f"not shown ({each.reason})" for each in it.found.estimates]
+    told = [
+        f"{name} {text}, truly {with_unit(float(one), unit)}"
+        for name, text, one, unit in zip(names, shown, true, ("N", "N", "m/s"), strict=True)
+    ]
+    return f"From {_start(it.log)} on: {'; '.join(told)}."
+
+
+def _start(log: RigLog) -> str:
+    """The place where a log begins."""
+    places = log.true.get("cart_position", log.true["position"])
+    return with_unit(float(places[0]), "m") if len(places) else "nowhere"
+
+
+def _many(found: ConstantSpeed) -> list[str]:
+    """What the many speeds show, at each place."""
+    crossover = with_unit(found.many.crossover, "Hz")
+    head = f"At many speeds, joint locked, with the crossover at {crossover}:"
+    return [head, *(_place(number, each) for number, each in enumerate(found.many.places, start=1))]
+
+
+def _place(number: int, place: Place) -> str:
+    both, reached = place.velocity.both, np.abs(place.velocity.velocities)
+    named = (("Coulomb friction", both.coulomb), ("viscous friction", both.viscous))
+    named += (("static friction", both.static), ("the Stribeck velocity", both.stribeck_velocity))
+    shown = [f"{words} {with_interval(each)}" for words, each in named if each.shown]
+    hidden = {each.reason: [words for words, one in named if one.reason == each.reason] for _, each in named}
+    told = [f"not shown: {listed(words, 'and')} ({reason})" for reason, words in hidden.items() if reason]
+    ends = [with_unit(float(end(reached)), "m/s") for end in (np.min, np.max) if len(reached)]
+    passed = f"{len(reached)} steady passes{' from ' if ends else ''}{' to '.join(ends)}"
+    head = f"Place {number}, from {_start(place.log)} on, {passed}"
+    stopped = [f"the log stopped {place.log.failure}"] if place.log.failure else []
+    return f"{head}: {'; '.join([*stopped, *shown, *told])}."
+
+
+def figures(outcome: Outcome) -> list[Figure]:
+    """Force against position at both speeds, a column for each state of the joint."""
+    found: ConstantSpeed = outcome.result
+    panels = tuple(
+        Panel(
+            f"joint {each.name}",
+            Axis("Position", "m"),
+            Axis("Force", "N"),
+            tuple(_lines(each, found.speeds)),
+        )
+        for each in found.cases
+    )
+    caption = "Commanded force, averaged over places, on the way there; the way back goes with it in the log."
+    title = "Force at constant speed"
+    return [
+        Figure("rig_constant_speed", title, caption, panels, columns=1, subject=outcome.stage.name),
+        _over_velocity(outcome),
+        *_in_slow_sliding(outcome),
+    ]
+
+
+def _in_slow_sliding(outcome: Outcome) -> list[Figure]:
+    """The friction at the first place."""
+    found: ConstantSpeed = outcome.result
+    places = [each.found for each in found.slow if len(each.found.model)]
+    if not places:
+        return []
+    caption, panels = slow_sliding_caption(places[0]), slow_sliding_panels(places[0])
+    return [Figure("rig_slow_sliding", "Friction in slow sliding", caption, panels, subject=outcome.stage.name)]
+
+
+def _over_velocity(outcome: Outcome) -> Figure:
+    """Friction of the many speeds against the speed, and as it truly is, for each place."""
+    many: ManySpeeds = outcome.result.many
+    lines, points = [], []
+    for number, (place, colour) in enumerate(zip(many.places, COLOURS, strict=False), start=1):
+        lines.append(Series(place.speeds, place.true, f"true, place {number}", colour))
+        points.append(Markers(np.abs(place.velocity.velocities), place.friction, f"place {number}", colour))
+    return Figure(
+        "rig_friction_over_velocity",
+        "Friction over velocity, joint locked",
+        f"Crossover {with_unit(many.crossover, 'Hz')}. Mean commanded force of each steady pass, there and back, the "
+        "force of inertia and the constant pull of the cables taken off; the lines are the true friction, with the "
+        "drag of the cables, on average over the stretch that all passes share. Speeds without a mark were not steady.",
+        (Panel("", Axis("Speed", "m/s", log=True), Axis("Friction", "N"), tuple(lines), markers=tuple(points)),),
+        subject=outcome.stage.name,
+    )
+
+
+def _lines(each: Passes, speeds: tuple[float, ...]) -> list[Series]:
+    """The forward passes."""
+    forward = [one for one in each.place.passes if one.velocity > 0]
+    return [
+        Series(one.places, one.force, with_unit(speed, "m/s"), colour)
+        for one, speed, colour in zip(forward, speeds, (BLUE, VERMILLION), strict=False)
+    ]
+
+
+def numbers(outcome: Outcome) -> dict[str, Any]:
+    """As JSON."""
+    found: ConstantSpeed = outcome.result
+    return {"speeds_m_per_s": [*found.speeds], "cases": {each.name: _numbers(each) for each in found.cases}} | {
+        "many_speeds": _many_numbers(found),
+        "slow_sliding": [_shown(each.found.estimates) for each in found.slow],
+    }
+
+
+def _many_numbers(found: ConstantSpeed) -> dict[str, Any]:
+    return {"crossover_hz": found.many.crossover, "places": [_place_numbers(each) for each in found.many.places]}
+
+
+def _place_numbers(place: Place) -> dict[str, Any]:
+    velocity = place.velocity
+    both = (velocity.both.coulomb, velocity.both.viscous, velocity.both.static, velocity.both.stribeck_velocity)
+    return {
+        "velocities_m_per_s": velocity.velocities.tolist(),
+        "forces_n": velocity.forces.tolist(),
+        "friction_n": place.friction.tolist(),
+        "true_speeds_m_per_s": place.speeds.tolist(),
+        "true_dynamic_friction_n": place.true.tolist(),
+        **_shown(both),
+    }
+
+
+def _shown(every: Sequence[Estimate]) -> dict[str, Any]:
+    return {
+        "shown": {e.name: {"value": e.value, "low": e.low, "high": e.high, "unit": e.unit} for e in every if e.shown},
+        "not_shown": {each.name: each.reason for each in every if not each.shown},
+    }
+
+
+def _numbers(each: Passes) -> dict[str, Any]:
+    coulomb = each.velocity.both.coulomb
+    return {
+        "separated": each.place.separated,
+        "verdict": each.place.verdict,
+        "repeatability": each.place.repeatability.value,
+        "passes": [
+            {"velocity_m_per_s": one.velocity, "mean_force_n": one.mean.value, "deviation_n": one.spread}
+            for one in each.place.passes
+        ],
+        "coulomb_n": coulomb.value,
+        "coulomb_reason": coulomb.reason,
+        "true_dynamic_friction_n": np.asarray(each.true).tolist(),
+    }

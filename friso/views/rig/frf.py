@@ -1,0 +1,185 @@
+"""What frequency responses on the rig show: plants, mass lines, open loops, the highest stable setting."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from friso.identify.estimate import Estimate
+from friso.identify.response.response import FrequencyResponse
+from friso.studies.rig.frf import RATIOS, Frf, Loop, Plant, nearest
+from friso.studies.rig.outcome import Outcome
+from friso.views.bode.figures import phases
+from friso.views.drawing.figure import (
+    BLUE,
+    GREEN,
+    INK,
+    LIGHT,
+    ORANGE,
+    PINK,
+    SKY,
+    VERMILLION,
+    Array,
+    Axis,
+    Figure,
+    Limit,
+    Panel,
+    Series,
+)
+from friso.views.drawing.prefixes import listed, with_unit
+
+COLOURS = (BLUE, SKY, GREEN, ORANGE, VERMILLION, PINK)
+
+
+def sentences(outcome: Outcome) -> list[str]:
+    """What was found."""
+    found: Frf = outcome.result
+    measured = [each for each in found.loops if each.measured]
+    last = measured[-1]
+    others = [each.value for each in last.crossings if each.value > 2 * last.tuned]
+    tuned = listed([f"{with_unit(each.tuned, 'Hz')} at {with_unit(nearest(each), 'Hz')}" for each in measured], "and")
+    lost = [f"{each.tuned:.3g} Hz" for each in found.loops if not each.measured]
+    unstable = f" Tuned to {listed(lost, 'and')} the closed loop is not stable." if lost else ""
+    above = f"and once more at {with_unit(max(others), 'Hz')}" if others else "and nowhere above"
+    return [
+        f"Joint locked: the mass line shows {_mass(found.locked.mass)} from {with_unit(found.locked.band[0], 'Hz')} to "
+        f"{with_unit(found.locked.band[1], 'Hz')}.",
+        f"Joint free: first mode near {with_unit(found.free.first_mode, 'Hz')}, above it a mass of "
+        f"{_mass(found.free.mass)}.",
+        f"A motor that gives {RATIOS[1]:g} of the force believed makes these masses {found.apparent[0, 1]:.3g} and "
+        f"{found.apparent[1, 1]:.3g} kg; one that gives {RATIOS[2]:g} times the force makes them "
+        f"{found.apparent[0, 2]:.3g} and {found.apparent[1, 2]:.3g} kg: what looks heavier is a motor weaker than "
+        "believed.",
+        f"Locked, the open loops cross 0 dB tuned to {tuned}, {above} at the highest of these settings.{unstable}",
+        f"Free, the loop tuned to {with_unit(found.free_loop.tuned, 'Hz')} crosses at "
+        f"{with_unit(found.free_loop.crossings[-1].value if found.free_loop.crossings else None, 'Hz')}; the highest "
+        f"stable setting is {with_unit(found.highest_stable, 'Hz')}"
+        + (", the highest tried." if found.stable.all() else "."),
+    ]
+
+
+def figures(outcome: Outcome) -> list[Figure]:
+    """Fig. 17 and 29, 18, 22 and 23 of the thesis."""
+    found: Frf = outcome.result
+    subject = outcome.stage.name
+    return [
+        _plant("locked", "Plant, joint locked", found.locked, subject),
+        _plant("free", "Plant, joint free", found.free, subject),
+        _loops("loops", "Open loops, joint locked", found.loops, subject),
+        _loops("free_loop", "Open loop, joint free", (found.free_loop,), subject),
+    ]
+
+
+def _plant(name: str, title: str, plant: Plant, subject: str) -> Figure:
+    """All identifications, their average and the mass line, as magnitude over phase."""
+    hertz, average = plant.averaged.frequency, plant.averaged.response
+    singles = [each.response for each in plant.single]
+    angles = [_turned(each, average) for each in singles]
+    lines = [
+        Series(each.frequency, np.abs(each.response), "single identifications" * (n == 0), LIGHT, width=0.8)
+        for n, each in enumerate(plant.single)
+    ]
+    lines.append(Series(hertz, np.abs(average), f"average of {len(singles)}", BLUE))
+    if plant.mass.shown:
+        reach = np.array([max(plant.band[0] / 2, hertz[0]), min(plant.band[1] * 2, hertz[-1])])
+        lines.append(
+            Series(
+                reach,
+                1 / (plant.mass.value * (2 * np.pi * reach) ** 2),
+                f"mass line, {plant.mass.value:.3g} kg",
+                INK,
+                "dashed",
+            )
+        )
+    below = [
+        Series(each.frequency, angle, "", LIGHT, width=0.8) for each, angle in zip(plant.single, angles, strict=True)
+    ]
+    below.append(Series(hertz, phases([average])[0], "", BLUE))
+    gain = Axis("Magnitude", "m/N", log=True, prefixed=False)
+    panels = (
+        Panel("position over commanded force", _frequency(hertz), gain, tuple(lines)),
+        Panel("", _frequency(hertz), Axis("Phase", "°", step=90.0), tuple(below)),
+    )
+    caption = f"Mass line {_mass(plant.mass)}, read from {plant.band[0]:.3g} to {plant.band[1]:.3g} Hz."
+    return Figure(f"rig_frf_{name}", title, caption, panels, subject=subject)
+
+
+def _turned(response: Array, average: Array) -> Array:
+    """The phase [deg] of a response in the turns in which that of the average is."""
+    angle = phases([average])[0]
+    return angle + np.degrees(np.angle(response / average))
+
+
+def _loops(name: str, title: str, loops: tuple[Loop, ...], subject: str) -> Figure:
+    """Open loops, magnitude over phase."""
+    named = [(each, colour) for each, colour in zip(loops, COLOURS, strict=False) if each.measured]
+    gains = tuple(
+        Series(each.response.frequency, np.abs(each.response.response), f"tuned to {each.tuned:.3g} Hz", colour)
+        for each, colour in named
+    )
+    turned = phases([each.response.response for each, _ in named])
+    angles = tuple(
+        Series(each.response.frequency, angle, "", colour) for (each, colour), angle in zip(named, turned, strict=True)
+    )
+    hertz = named[0][0].response.frequency
+    panels = (
+        Panel(
+            "open loop",
+            _frequency(hertz),
+            Axis("Magnitude", "", log=True, prefixed=False),
+            gains,
+            limits=(Limit((1.0,), "0 dB", INK),),
+        ),
+        Panel("", _frequency(hertz), Axis("Phase", "°", step=90.0), angles, limits=(Limit((-180.0,), "", INK),)),
+    )
+    told = "; ".join(f"{each.tuned:.3g} Hz: {_crossings(each)}" for each in loops)
+    return Figure(f"rig_frf_{name}", title, f"Tuned, and where 0 dB is crossed: {told}.", panels, subject=subject)
+
+
+def _crossings(loop: Loop) -> str:
+    if not loop.measured:
+        return "not stable"
+    return ", ".join(f"{each.value:.3g} ({each.low:.3g} to {each.high:.3g})" for each in loop.crossings) or "nowhere"
+
+
+def _frequency(hertz: Array) -> Axis:
+    return Axis("Frequency", "Hz", (float(hertz[0]), float(hertz[-1])), log=True)
+
+
+def _mass(mass: Estimate) -> str:
+    return f"{mass.value:.3g} kg ({mass.low:.3g} to {mass.high:.3g})" if mass.shown else f"nothing ({mass.reason})"
+
+
+def numbers(outcome: Outcome) -> dict[str, Any]:
+    """As JSON."""
+    found: Frf = outcome.result
+    plants = {"locked": found.locked, "free": found.free}
+    return {
+        **{name: _numbers(plant) for name, plant in plants.items()},
+        "motor_constant_ratios": [*RATIOS],
+        "apparent_mass_locked_kg": found.apparent[0].tolist(),
+        "apparent_mass_free_kg": found.apparent[1].tolist(),
+        "loops": [_loop_numbers(each) for each in found.loops],
+        "free_loop": _loop_numbers(found.free_loop),
+        "settings_hz": found.settings.tolist(),
+        "stable": found.stable.tolist(),
+        "highest_stable_hz": found.highest_stable,
+    }
+
+
+def _numbers(plant: Plant) -> dict[str, Any]:
+    averaged: FrequencyResponse = plant.averaged
+    return {
+        "mass_kg": plant.mass.value,
+        "mass_interval_kg": [plant.mass.low, plant.mass.high],
+        "band_hz": [*plant.band],
+        "first_mode_hz": plant.first_mode,
+        "frequency_hz": averaged.frequency.tolist(),
+        "magnitude_m_per_n": np.abs(averaged.response).tolist(),
+        "phase_rad": np.angle(averaged.response).tolist(),
+    }
+
+
+def _loop_numbers(loop: Loop) -> dict[str, Any]:
+    return {"tuned_hz": loop.tuned, "crossings_hz": [each.value for each in loop.crossings]}

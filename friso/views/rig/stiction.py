@@ -1,0 +1,98 @@
+"""What slow motion on the rig shows of static friction (thesis, Fig. 20)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from friso.studies.rig.outcome import Outcome
+from friso.studies.rig.stiction import SPEEDS, Stiction
+from friso.views.drawing.figure import BLUE, GREEN, INK, VERMILLION, Array, Axis, Band, Figure, Markers, Panel, Series
+from friso.views.drawing.prefixes import range_with_unit, with_unit
+
+
+def sentences(outcome: Outcome) -> list[str]:
+    """What was found."""
+    found: Stiction = outcome.result
+    forces, shown = found.forces, held(found)
+    rails = len(found.found)
+    truth = range_with_unit(float(found.true.min()), float(found.true.max()), "N")
+    if not len(forces):
+        return [f"On {rails} stretches of rail the cart shows no slips; static friction there is truly {truth}."]
+    return [
+        f"At {with_unit(found.speed, 'm/s')} and {with_unit(SPEEDS[1] * found.speed, 'm/s')} the cart breaks away "
+        f"{len(forces)} times on {rails} stretches of rail, at "
+        f"{range_with_unit(float(forces.min()), float(forces.max()), 'N')}.",
+        f"Static friction there is truly {truth}; the mean where the cart went lies in the 95 % interval on "
+        f"{int(shown.sum())} of {rails}.",
+    ]
+
+
+def held(found: Stiction) -> np.ndarray:
+    """On which rails the interval holds the middle of the true static friction, shape (rails,)."""
+    middles = found.true.mean(axis=1)
+    return np.array([each.static.holds(middle) for each, middle in zip(found.found, middles, strict=True)])
+
+
+def figures(outcome: Outcome) -> list[Figure]:
+    """Position, relative position and velocity against time on the first rail; break-away forces on all."""
+    found: Stiction = outcome.result
+    log, first = outcome.logs[0], found.found[0]
+    time: Array = np.arange(len(first.pull), dtype=np.float64) * log.interval
+    seconds = Axis("Time", "s")
+    reference, start = log.logged["reference"], log.logged["reference"][0]
+    panels = (
+        Panel(
+            "",
+            seconds,
+            Axis("Position", "m"),
+            (
+                Series(time, log.logged["position"] - start, "measured", BLUE),
+                Series(time, reference - start, "reference", VERMILLION, "dashed", 1.0),
+            ),
+        ),
+        Panel(
+            "",
+            seconds,
+            Axis("Relative position", "m"),
+            (Series(time, log.logged["relative_position"], "", GREEN, width=1.0),),
+            (Markers(first.times, first.directions * first.deflections, "break-away", INK),),
+        ),
+        Panel("", seconds, Axis("Cart velocity", "m/s"), (Series(time, first.cart_velocity, "", BLUE, width=1.0),)),
+    )
+    caption = "The joint deflects while the cart sticks; where it peaks the cart breaks away, and its velocity spikes."
+    typical = Figure("rig_stiction", "Slow motion with stick-slip", caption, panels, subject=outcome.stage.name)
+    return [typical, _rails(found, outcome.stage.name)]
+
+
+def _rails(found: Stiction, subject: str) -> Figure:
+    """Break-away forces by rail, over the true static friction."""
+    numbers_ = np.arange(1.0, len(found.found) + 1)
+    rows = np.concatenate([np.full(len(each.forces), n) for n, each in zip(numbers_, found.found, strict=True)])
+    truth = Band(numbers_, found.true[:, 0], found.true[:, 1], "true static friction where the cart went", "#cfdfee")
+    top = 1.1 * max(float(found.true.max()), float(found.forces.max(initial=0.0)))
+    panel = Panel(
+        "",
+        Axis("Stretch of rail", "", (0.5, len(numbers_) + 0.5), step=1.0),
+        Axis("Break-away force", "N", (0.0, top)),
+        markers=(Markers(rows, found.forces, "read at a slip", INK),),
+        bands=(truth,),
+    )
+    caption = "A finite force rate lets the cart break away somewhat before its static friction is reached."
+    return Figure("rig_stiction_rails", "Break-away along the rail", caption, (panel,), subject=subject)
+
+
+def numbers(outcome: Outcome) -> dict[str, Any]:
+    """As JSON."""
+    found: Stiction = outcome.result
+    rows = [
+        {
+            "static_n": each.static.value,
+            "interval_n": [each.static.low, each.static.high],
+            "break_away_n": each.forces.tolist(),
+            "true_range_n": true.tolist(),
+        }
+        for each, true in zip(found.found, found.true, strict=True)
+    ]
+    return {"speed_m_per_s": found.speed, "rails": rows}

@@ -1,0 +1,70 @@
+"""What position steps on the rig show of the joint's stiffness (thesis, Fig. 19)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from friso.studies.rig.outcome import Outcome
+from friso.studies.rig.stiffness import Stiffness
+from friso.views.drawing.figure import BLUE, LIGHT, VERMILLION, Axis, Figure, Panel, Series
+from friso.views.drawing.prefixes import range_with_unit, with_unit
+
+
+def sentences(outcome: Outcome) -> list[str]:
+    """What was found."""
+    found: Stiffness = outcome.result
+    read = found.found.stiffness
+    if not read.shown:
+        return [f"The steps do not show the joint's stiffness: {read.reason}."]
+    said = [
+        f"The steps show {with_unit(read.value, 'N/m', 4)} ({range_with_unit(read.low, read.high, 'N/m', 4)}) of the "
+        f"joint's {with_unit(found.true, 'N/m', 4)}."
+    ]
+    if found.motor_constant_ratio != 1:
+        said.append(
+            f"The motor gives {found.motor_constant_ratio:g} of the force believed, which alone makes it look like "
+            f"{with_unit(found.apparent, 'N/m', 4)}."
+        )
+    return said
+
+
+def figures(outcome: Outcome) -> list[Figure]:
+    """Position over force against time."""
+    found: Stiffness = outcome.result
+    (log,) = outcome.logs
+    time, seconds = found.found.time, Axis("Time", "s")
+    panels = (
+        Panel(
+            "",
+            seconds,
+            Axis("Position", "m"),
+            (
+                Series(time, log.logged["position"], "measured", BLUE),
+                Series(time, log.logged["reference"], "reference", VERMILLION, "dashed", 1.0),
+            ),
+        ),
+        Panel(
+            "",
+            seconds,
+            Axis("Force", "N"),
+            (
+                Series(time, log.logged["force"], "commanded", LIGHT, width=0.8),
+                Series(time, found.found.force, "low-passed", BLUE),
+            ),
+        ),
+    )
+    caption = "Position steps with the cart fixed; differences of the settled levels are the stiffness."
+    return [Figure("rig_stiffness", "Joint stiffness by steps", caption, panels, subject=outcome.stage.name)]
+
+
+def numbers(outcome: Outcome) -> dict[str, Any]:
+    """As JSON."""
+    found: Stiffness = outcome.result
+    read = found.found.stiffness
+    return {
+        "stiffness_n_per_m": read.value,
+        "interval_n_per_m": [read.low, read.high],
+        "true_n_per_m": found.true,
+        "motor_constant_ratio": found.motor_constant_ratio,
+        "apparent_n_per_m": found.apparent,
+    }
