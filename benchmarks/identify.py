@@ -19,6 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.report import Goal, print_goals, print_table
+from friso.errors import InputError
 from friso.identify.estimate import Estimate
 from friso.identify.experiments import (
     friction_velocity,
@@ -28,7 +29,6 @@ from friso.identify.experiments import (
 )
 from friso.identify.moves import identify_moves
 from friso.identify.response.analysis import analyse
-from friso.quantities import StageError
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 from machines import Machine, break_aways, creeping, drawn, moves, shaken, speeds, steps
@@ -115,7 +115,7 @@ def run(first: int, machines: int, fitted: int) -> dict[tuple[str, str], Count]:
                         shown = "" if found.shown else " (not shown)"
                         print(f"  machine {seed}, {method}: {found.name} {found.low:.4g} to {found.high:.4g}{shown}, "
                               f"true {truth:.4g}")  # fmt: skip
-            except StageError as error:
+            except InputError as error:
                 print(f"  machine {seed}: refused: {' '.join(str(error).split())}")
         print(f"machine {seed}: {time.perf_counter() - begin:.0f} s", flush=True)
     return counts

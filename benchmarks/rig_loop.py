@@ -27,9 +27,9 @@ import numpy as np
 
 from benchmarks.identify import Answer, Count, goals, rows
 from benchmarks.report import Goal, print_goals, print_table
+from friso.errors import InputError
 from friso.hunting.check import check
 from friso.identify.method import Identification, identify
-from friso.quantities import StageError
 from friso.rig.rail import friction_factors
 from friso.stage import Stage, load
 from friso.stage.files import save
@@ -118,7 +118,7 @@ def run(first: int, machines: int) -> tuple[dict[tuple[str, str], Count], Verdic
                     print(f"  machine {seed}: {log.name} stopped {log.failure}")
             try:
                 found, stage = found_in(logs, machine)
-            except StageError as error:
+            except InputError as error:
                 print(f"  machine {seed}: refused: {' '.join(str(error).split())}")
                 continue
             for method, one, truth in answers(found, logs, machine):

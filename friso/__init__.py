@@ -5,7 +5,8 @@ from typing import TYPE_CHECKING, Any
 
 import friso.equations.friction  # registers the friction laws with the stage file
 import friso.flexure.joint  # noqa: F401 (and what follows from leaf springs)
-from friso.stage import Stage, StageError, load, loads, save
+from friso.errors import InputError, LogError, SpecError, StageError, StoreError
+from friso.stage import Stage, load, loads, save
 from friso.version import VERSION as __version__
 
 if TYPE_CHECKING:
@@ -50,10 +51,14 @@ _LAZY = {
 __all__ = [
     "Bode",
     "Case",
+    "InputError",
+    "LogError",
     "Members",
     "Samples",
+    "SpecError",
     "Stage",
     "StageError",
+    "StoreError",
     "Tuning",
     "__version__",
     "bode",

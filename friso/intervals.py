@@ -12,7 +12,8 @@ from typing import Any, Literal, Self
 from pydantic import GetCoreSchemaHandler
 from pydantic_core import CoreSchema, core_schema
 
-from friso.quantities import Number, Quantity, StageError, Value, non_negative, quoted
+from friso.errors import InputError
+from friso.quantities import Number, Quantity, Value, non_negative, quoted
 
 Form = Literal["value", "tolerance", "range"]
 
@@ -98,7 +99,7 @@ class Span:
         return f'"{self.example}"'
 
     def read(self, given: Any) -> Interval:
-        """The range of a text, all of it allowed. Raises StageError."""
+        """The range of a text, all of it allowed. Raises InputError."""
         if isinstance(given, Interval):
             return given
         try:
@@ -106,7 +107,7 @@ class Span:
             if not (self.of.bound.holds(found.low) and self.of.bound.holds(found.high)):
                 raise _Refused(_reach(found, self.of))
         except _Refused as refused:
-            raise StageError("", quoted(given, str(refused)), self.expected, self.written_example) from None
+            raise InputError("", quoted(given, str(refused)), self.expected, self.written_example) from None
         return found
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
@@ -119,7 +120,7 @@ def is_range(given: Any) -> bool:
 
 
 def uncertain_value(given: str, of: Quantity | Number) -> UncertainValue:
-    """The uncertain value of a text that `is_range`. Raises StageError.
+    """The uncertain value of a text that `is_range`. Raises InputError.
 
     All of a range "LOW .. HIGH" has to be allowed. Of "VALUE +/- HALF" the value has to be: a normal distribution has
     no ends, and what reaches beyond the bound is no mistake of the user; it is cut off where values are drawn.
@@ -133,12 +134,12 @@ def uncertain_value(given: str, of: Quantity | Number) -> UncertainValue:
             raise _Refused("none of the numbers beside the centre is allowed")
     except _Refused as refused:
         expected = f'{of.expected}; or with its uncertainty, "VALUE +/- HALF-WIDTH" or "LOW .. HIGH"'
-        raise StageError("", quoted(given, str(refused)), expected, f'"{of.example} +/- 5 %"') from None
+        raise InputError("", quoted(given, str(refused)), expected, f'"{of.example} +/- 5 %"') from None
     return UncertainValue(found.evenly(0.5) if found.wide else centre, given, found)
 
 
 class _Refused(Exception):
-    """Why a text is no range of a quantity; becomes the hint of a StageError."""
+    """Why a text is no range of a quantity; becomes the hint of a InputError."""
 
 
 def _reach(found: Interval, of: Quantity | Number) -> str:
@@ -161,7 +162,7 @@ def _read(given: Any, of: Quantity | Number) -> tuple[float, Interval]:
         else:
             low = high = centre = _number(given, of)
             form = "value"
-    except StageError as error:
+    except InputError as error:
         raise _Refused(f"of which {error.given if error.given != quoted(given) else error.expected}") from None
     if not low <= high:
         raise _Refused("a reversed range")
@@ -189,11 +190,11 @@ def _bare(given: Any) -> Any:
     try:
         return float(given)
     except ValueError:
-        raise StageError("", quoted(given, "not a number"), "a number") from None
+        raise InputError("", quoted(given, "not a number"), "a number") from None
 
 
 def _percent(text: str) -> float:
     number = _bare(text.rstrip("%").strip())
     if not 0 <= number < 100:
-        raise StageError("", quoted(text, "not a share below 100 %"), "0 % or more, below 100 %")
+        raise InputError("", quoted(text, "not a share below 100 %"), "0 % or more, below 100 %")
     return number / 100

@@ -1,4 +1,4 @@
-"""Numbers with units: what a user writes, checked and turned into SI. Every refusal is a `StageError`.
+"""Numbers with units: what a user writes, checked and turned into SI. Every refusal is a `InputError`.
 
 A dimensioned value is a text, number and unit ("2.4 N/mm"); `pint` knows the units.
 """
@@ -16,27 +16,7 @@ from typing import Any, Self
 from pydantic import GetCoreSchemaHandler
 from pydantic_core import CoreSchema, core_schema
 
-
-class StageError(ValueError):
-    """A wrong input: which key, what was given, what was expected, a correct example, and which file."""
-
-    def __init__(self, key: str, given: str, expected: str, example: str = "", origin: str = "") -> None:
-        super().__init__(key, given, expected, example, origin)
-        self.key, self.given, self.expected, self.example, self.origin = key, given, expected, example, origin
-
-    def __str__(self) -> str:
-        head = ": ".join(part for part in (self.origin, self.key) if part)
-        rows = {"given:": self.given, "expected:": self.expected, "example:": self.example}
-        return "\n".join([head, *(f"  {name:<9} {text}" for name, text in rows.items() if text)]).lstrip("\n")
-
-    def under(self, table: str) -> "StageError":
-        """The same error, its key seen from one level further out."""
-        key = ".".join(part for part in (table, self.key) if part)
-        return StageError(key, self.given, self.expected, self.example, self.origin)
-
-    def found_in(self, origin: str) -> "StageError":
-        """The same error, saying which file or option it comes from."""
-        return StageError(self.key, self.given, self.expected, self.example, origin)
+from friso.errors import InputError
 
 
 def as_toml(given: Any) -> str:
@@ -117,21 +97,21 @@ class Quantity:
         return as_toml(self.example)
 
     def factor(self, unit: str) -> float:
-        """SI value of 1 `unit`, to convert arrays with. Raises StageError for a unit of another kind."""
+        """SI value of 1 `unit`, to convert arrays with. Raises InputError for a unit of another kind."""
         try:
             return _factor(_checked_unit(unit), self.unit)
         except _Refused as refused:
-            raise StageError("", quoted(unit, str(refused)), f"a unit convertible to {self.unit}") from None
+            raise InputError("", quoted(unit, str(refused)), f"a unit convertible to {self.unit}") from None
 
     def read(self, given: Any) -> Value:
-        """The SI value of a text (or of the text of a Value). Raises StageError."""
+        """The SI value of a text (or of the text of a Value). Raises InputError."""
         text = getattr(given, "text", given)
         try:
             value = _read(text, self.unit)
         except _Refused as refused:
-            raise StageError("", quoted(text, str(refused)), self.expected, self.written_example) from None
+            raise InputError("", quoted(text, str(refused)), self.expected, self.written_example) from None
         if not self.bound.holds(value):
-            raise StageError("", quoted(text), self.expected, self.written_example)
+            raise InputError("", quoted(text), self.expected, self.written_example)
         return value
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
@@ -158,10 +138,10 @@ class Number:
         return self.example
 
     def read(self, given: Any) -> float:
-        """What was given, checked. Raises StageError."""
+        """What was given, checked. Raises InputError."""
         is_number = isinstance(given, int | float) and not isinstance(given, bool)
         if not is_number or not self.bound.holds(given):
-            raise StageError("", quoted(given), self.expected, self.written_example)
+            raise InputError("", quoted(given), self.expected, self.written_example)
         return given
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
@@ -169,7 +149,7 @@ class Number:
 
 
 class _Refused(Exception):
-    """Why a text is no value of a unit; becomes the hint of a StageError."""
+    """Why a text is no value of a unit; becomes the hint of a InputError."""
 
 
 # A strict grammar before pint sees anything: its parser would compute "m^(9^9^9)" and take "N;N" for N^2.

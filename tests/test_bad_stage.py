@@ -1,11 +1,12 @@
-"""Stage files that are wrong, as a table: each ends in one StageError with key, given, expected, example."""
+"""Stage files that are wrong, as a table: each ends in one InputError with key, given, expected, example."""
 
 from pathlib import Path
 
 import pytest
 
 import friso.equations.friction  # noqa: F401  the friction laws register themselves
-from friso.stage import Stage, StageError, load, loads, parse_set
+from friso.errors import InputError
+from friso.stage import Stage, load, loads, parse_set
 from friso.stage.tables import Masses
 
 RIG = (Path(__file__).parents[1] / "examples" / "thesis_rig.toml").read_text(encoding="utf-8")
@@ -14,7 +15,7 @@ TABLE_OF_GAINS = RIG[: RIG.index("[controller]")] + "[controller]\n{}\n\n" + RIG
 
 
 def message(text: str) -> str:
-    with pytest.raises(StageError) as caught:
+    with pytest.raises(InputError) as caught:
         loads(text, origin="rig.toml")
     return str(caught.value)
 
@@ -412,7 +413,7 @@ def test_parasitic_mode_needs_a_joint() -> None:
 def test_contents(content: bytes, expected: str, tmp_path: Path) -> None:
     path = tmp_path / "rig.toml"
     path.write_bytes(content)
-    with pytest.raises(StageError) as caught:
+    with pytest.raises(InputError) as caught:
         load(path)
     assert str(caught.value).startswith(f"{path}")
     assert expected in str(caught.value)
@@ -420,12 +421,12 @@ def test_contents(content: bytes, expected: str, tmp_path: Path) -> None:
 
 def test_no_file_and_folder(tmp_path: Path) -> None:
     with pytest.raises(
-        StageError, match=r"missing\.toml\n  given:    no such file or directory\n  expected: a stage f"
+        InputError, match=r"missing\.toml\n  given:    no such file or directory\n  expected: a stage f"
     ):
         load(tmp_path / "missing.toml")
-    with pytest.raises(StageError, match="given:    a folder"):
+    with pytest.raises(InputError, match="given:    a folder"):
         load(tmp_path)
-    with pytest.raises(StageError, match="null byte"):
+    with pytest.raises(InputError, match="null byte"):
         load("rig\0.toml")
 
 
@@ -452,21 +453,21 @@ def test_no_file_and_folder(tmp_path: Path) -> None:
     ],
 )
 def test_changes(changes: dict[str, object], fragments: list[str]) -> None:
-    with pytest.raises(StageError) as caught:
+    with pytest.raises(InputError) as caught:
         loads(RIG).replace(changes)
     assert all(fragment in str(caught.value) for fragment in fragments)
 
 
 @pytest.mark.parametrize("text", ["controller.crossover", "=12 Hz", "", " = 3"])
 def test_set_without_key_or_value(text: str) -> None:
-    with pytest.raises(StageError, match=r"--set\n  given: .*\n  expected: KEY=VALUE\n  example:  controller"):
+    with pytest.raises(InputError, match=r"--set\n  given: .*\n  expected: KEY=VALUE\n  example:  controller"):
         parse_set(text)
 
 
 def test_wrong_sections_from_python() -> None:
-    with pytest.raises(StageError, match="cart\n"):
+    with pytest.raises(InputError, match="cart\n"):
         Masses(cart="3 m")  # pyright: ignore[reportArgumentType]
     masses = Masses(cart="3 kg")  # pyright: ignore[reportArgumentType]
     tables = loads(RIG).given()
-    with pytest.raises(StageError, match=r"motion\n.*\n  expected: a table \[motion\]"):
+    with pytest.raises(InputError, match=r"motion\n.*\n  expected: a table \[motion\]"):
         Stage(**{**tables, "motion": masses})

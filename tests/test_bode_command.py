@@ -17,8 +17,8 @@ from pages import Page
 import friso
 from friso.cli.bode import bode as command
 from friso.cli.bode import bode_document
+from friso.errors import InputError
 from friso.frequency.bode import Bode, Unstable, bode
-from friso.quantities import StageError
 from friso.stage import Stage
 from friso.views.bode.figures import bode_figures, phases
 from friso.views.bode.states import shown_states
@@ -507,7 +507,7 @@ def test_a_band_with_gaps_or_of_two_lengths_is_refused() -> None:
     ],
 )
 def test_frequencies_that_are_refused(text: str, given: str, expected: str) -> None:
-    with pytest.raises(StageError, match=rf"(?s)--frequencies\n.*{given}.*{expected}.*0\.1 Hz\.\.1 kHz"):
+    with pytest.raises(InputError, match=rf"(?s)--frequencies\n.*{given}.*{expected}.*0\.1 Hz\.\.1 kHz"):
         command(RIG, frequencies=text)
 
 
@@ -521,7 +521,7 @@ def test_frequencies_that_are_refused(text: str, given: str, expected: str) -> N
     ],
 )
 def test_overrides_that_are_refused(overrides: list[str], frequencies: str | None, message: str) -> None:
-    with pytest.raises(StageError, match=message):
+    with pytest.raises(InputError, match=message):
         command(RIG, overrides=overrides, frequencies=frequencies)
 
 
@@ -532,7 +532,7 @@ def test_half_the_sampling_frequency_itself_is_shown(tmp_path: Path, capsys: pyt
 
 def test_a_folder_that_is_a_file_is_refused(tmp_path: Path) -> None:
     (tmp_path / "taken").write_text("")
-    with pytest.raises(StageError, match="a folder that can be written"):
+    with pytest.raises(InputError, match="a folder that can be written"):
         command(RIG, out=tmp_path / "taken")
 
 

@@ -8,10 +8,10 @@ import pytest
 from variants import VARIANTS
 
 import friso
+from friso.errors import InputError
 from friso.hunting.boundary import Diagram, Found, Plane, Range, Space, diagram, plane
 from friso.hunting.boundary.branch import Point, Tracer
 from friso.hunting.cycle.find import symmetric_cycles
-from friso.quantities import StageError
 from friso.stage import Stage
 
 pytestmark = pytest.mark.xdist_group("rigid")
@@ -191,5 +191,5 @@ NO_INTEGRAL = VARIANTS["rigid cart, P"]
     ],
 )
 def test_what_has_no_boundary_is_refused(stage: Stage, axes: dict[str, str], words: str) -> None:
-    with pytest.raises(StageError, match=words):
+    with pytest.raises(InputError, match=words):
         friso.boundary(stage, axes)

@@ -13,10 +13,11 @@ from inside import friso_inside
 from pages import Page
 from patched import patched
 
+from friso.errors import InputError
 from friso.frequency import crossover
 from friso.frequency.margins import margins
 from friso.frequency.members import limit_cases, member
-from friso.stage import Stage, StageError, load
+from friso.stage import Stage, load
 from friso.stage.correlations import Correlations
 from friso.studies.compare import measures, study
 from friso.studies.compare.machines import SPREADS, TOGETHER_BY, Machines, draw_machines
@@ -466,5 +467,5 @@ def test_bad_input(tmp_path: Path, given: list[object], says: str) -> None:
 
 
 def test_no_controller_no_comparison(built: Stage) -> None:
-    with pytest.raises(StageError, match="neither crossover nor any of kp, ki, kd"):
+    with pytest.raises(InputError, match="neither crossover nor any of kp, ki, kd"):
         built.replace({"controller": {"kind": "pid"}})

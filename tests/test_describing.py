@@ -15,12 +15,13 @@ from variants import DAHL, HOLD, NO_FRICTION, free, lugre, stage, stribeck, van_
 
 from friso.engine.kernel import Wanted, kernels
 from friso.equations.imposed import imposed_form
+from friso.errors import InputError
 from friso.frequency.describing.function import describing, dynamic_stiffness
 from friso.frequency.describing.loop import TOUCHES
 from friso.frequency.describing.mass_line import mass_line
 from friso.frequency.describing.response import MISSING, NOT_FOUND, plant_response
 from friso.frequency.describing.steady import Imposition, steady
-from friso.stage import Stage, StageError
+from friso.stage import Stage
 from friso.stage.tables import FRICTION
 
 LAWS = {"lugre": lugre(2), "dahl": DAHL, "stribeck": stribeck(2) + "asymmetry = 0.2\n"}
@@ -282,7 +283,7 @@ def test_friction_may_differ_from_pair_to_pair() -> None:
     ],
 )
 def test_bad_input(ask: Callable[[], object], text: str) -> None:
-    with pytest.raises(StageError, match=text):
+    with pytest.raises(InputError, match=text):
         ask()
 
 

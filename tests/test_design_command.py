@@ -27,7 +27,7 @@ from friso.design.geometry import Geometry, Sheet
 from friso.design.method import Design, NoDesign, Progress
 from friso.design.relax import Relaxation
 from friso.design.spec import Position, Spec, load_spec
-from friso.quantities import StageError
+from friso.errors import InputError
 from friso.stage import Stage
 from friso.views.design.control import controller_step, moves_step, parallel_gains
 from friso.views.design.document import design_document, refused_document
@@ -472,19 +472,19 @@ def test_relaxations_are_rounded_to_be_enough(value: float, larger: bool, expect
 @pytest.mark.parametrize("name", ["design.toml", "worst.toml"])
 def test_files_of_no_design_are_not_overwritten(finished: list[str], tmp_path: Path, name: str) -> None:
     (tmp_path / name).write_text("mine")
-    with pytest.raises(StageError, match=rf"--out\n.*{name} of no earlier run"):
+    with pytest.raises(InputError, match=rf"--out\n.*{name} of no earlier run"):
         command(RIG, SPEC, out=tmp_path)
     assert (tmp_path / name).read_text() == "mine"
 
 
 def test_the_stage_that_is_read_is_not_overwritten(finished: list[str], folder: Path) -> None:
-    with pytest.raises(StageError, match=r"(?s)design\.toml is read.*another folder.*--out .*-2"):
+    with pytest.raises(InputError, match=r"(?s)design\.toml is read.*another folder.*--out .*-2"):
         command(folder / "design.toml", SPEC, out=folder)
 
 
 def test_a_folder_that_is_a_file_is_refused(finished: list[str], tmp_path: Path) -> None:
     (tmp_path / "taken").write_text("")
-    with pytest.raises(StageError, match="a folder that can be written"):
+    with pytest.raises(InputError, match="a folder that can be written"):
         command(RIG, SPEC, out=tmp_path / "taken")
 
 
@@ -494,7 +494,7 @@ def test_overrides_are_of_the_stage(
     command(RIG, spec, overrides=['name="Another"', 'drive.delay="1 ms"'], out=folder)
     assert finished[-1] == "Another"
     assert "[drive] counts for the margins" in capsys.readouterr().err
-    with pytest.raises(StageError, match="did you mean crossover"):
+    with pytest.raises(InputError, match="did you mean crossover"):
         command(RIG, spec, overrides=['controller.crosover="8 Hz"'], out=folder)
 
 

@@ -76,17 +76,17 @@ def test_a_single_length_is_the_largest() -> None:
     ],
 )
 def test_what_is_refused(table: str, keys: dict[str, Any], words: str) -> None:
-    with pytest.raises(friso.StageError) as caught:
+    with pytest.raises(friso.InputError) as caught:
         changed(table, **keys)
     assert words in str(caught.value)
     assert caught.value.key.startswith(table)
 
 
 def test_a_missing_file_and_an_empty_one(tmp_path: Path) -> None:
-    with pytest.raises(friso.StageError, match=r"specs/thesis\.toml"):
+    with pytest.raises(friso.InputError, match=r"specs/thesis\.toml"):
         load_spec(tmp_path / "none.toml")
     (tmp_path / "empty.toml").write_text("")
-    with pytest.raises(friso.StageError, match="an empty file"):
+    with pytest.raises(friso.InputError, match="an empty file"):
         load_spec(tmp_path / "empty.toml")
 
 
@@ -128,7 +128,7 @@ def test_the_typical_move_is_in_the_middle() -> None:
 def test_a_range_the_friction_law_does_not_have(rig: friso.Stage) -> None:
     dahl = {"model": "dahl", "coulomb": "1 N", "bristle_stiffness": "1e5 N/m", "viscous": "0.5 N*s/m"}
     stage = rig.replace({"friction": dahl})
-    with pytest.raises(friso.StageError, match="dahl friction"):
+    with pytest.raises(friso.InputError, match="dahl friction"):
         corners(load_spec(SPEC), stage.flat())
 
 
@@ -141,13 +141,13 @@ def test_a_range_the_friction_law_does_not_have(rig: friso.Stage) -> None:
     ],
 )
 def test_stages_that_cannot_be_isolated(rig: friso.Stage, change: dict[str, Any], words: str) -> None:
-    with pytest.raises(friso.StageError, match=words):
+    with pytest.raises(friso.InputError, match=words):
         prepared(rig.replace(change), load_spec(SPEC))
 
 
 def test_gains_instead_of_a_crossover(rig: friso.Stage) -> None:
     gains = {"kind": "pid", "kp": "3 N/m", "ki": "4 N/(m*s)", "kd": "6 N*s/m", "tau": "1 ms"}
-    with pytest.raises(friso.StageError, match="van Dijk"):
+    with pytest.raises(friso.InputError, match="van Dijk"):
         prepared(rig.replace({"controller": gains}), load_spec(SPEC))
 
 

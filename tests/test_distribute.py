@@ -12,7 +12,8 @@ import xarray as xr
 from distributed import LocalCluster
 
 import friso
-from friso.stage import Stage, StageError
+from friso.errors import InputError
+from friso.stage import Stage
 from friso.studies import distribute
 from friso.studies.distribute import connected, local_cluster
 from friso.studies.request import Request
@@ -103,7 +104,7 @@ def test_a_killed_worker_costs_only_its_blocks(rig: Stage, tmp_path: Path) -> No
 
 def test_a_worker_with_another_friso_is_refused(cluster: LocalCluster, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(distribute, "equations_version", lambda: "9.9.9 (0123456789ab)")
-    with pytest.raises(StageError, match=r"has friso 0\.1\.0 .*") as error, connected(cluster.scheduler_address):
+    with pytest.raises(InputError, match=r"has friso 0\.1\.0 .*") as error, connected(cluster.scheduler_address):
         pass
     assert "9.9.9 (0123456789ab)" in str(error.value)
 
@@ -111,7 +112,7 @@ def test_a_worker_with_another_friso_is_refused(cluster: LocalCluster, monkeypat
 def test_a_worker_that_joins_later_with_another_friso_is_refused(rig: Stage, cluster: LocalCluster) -> None:
     with connected(cluster.scheduler_address) as crew:
         crew.arguments["expected"] = "9.9.9 (0123456789ab)"
-        with pytest.raises(StageError, match="a worker has friso"):
+        with pytest.raises(InputError, match="a worker has friso"):
             run_in_memory([Request(rig, AXES).study()], crew)
 
 
@@ -145,14 +146,14 @@ def test_kernels_are_compiled_once_per_worker(rig: Stage, cluster: LocalCluster)
 def test_a_scheduler_that_does_not_answer(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(distribute, "PATIENCE", 0.3)
     for address in ("tcp://127.0.0.1:9", "nonsense", "tcp://no.such.host.invalid:8786"):
-        with pytest.raises(StageError, match="a Dask scheduler that answers"), connected(address):
+        with pytest.raises(InputError, match="a Dask scheduler that answers"), connected(address):
             pass
 
 
 def test_a_scheduler_without_workers() -> None:
     with (
         LocalCluster(n_workers=0, dashboard_address=":0") as empty,
-        pytest.raises(StageError, match="without workers"),
+        pytest.raises(InputError, match="without workers"),
         connected(empty.scheduler_address),
     ):
         pass

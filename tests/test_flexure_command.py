@@ -19,11 +19,11 @@ from pages import Page
 import friso
 from friso.cli.flexure import EXAMPLE
 from friso.cli.flexure import flexure as command
+from friso.errors import InputError
 from friso.flexure.beams import BeamFailure, beams
 from friso.flexure.closed_model import closed
 from friso.flexure.evaluation import Mode
 from friso.flexure.mechanism import Mechanism
-from friso.quantities import StageError
 from friso.stage import Stage
 from friso.views.drawing import matplotlib_renderer, plotly_renderer
 from friso.views.drawing.figure import Figure
@@ -433,7 +433,7 @@ def test_the_block_of_the_stage_has_its_moments_of_inertia(stage: Stage) -> None
 
 
 def test_a_stage_without_leaves_is_shown_a_table_that_works() -> None:
-    with pytest.raises(StageError, match=r"(?s)thesis_rig.toml: flexure\n.*no \[flexure\].*leave these out") as refused:
+    with pytest.raises(InputError, match=r"(?s)thesis_rig.toml: flexure\n.*no \[flexure\].*leave these out") as refused:
         command(RIG)
     table = refused.value.example
     assert table == EXAMPLE
@@ -454,19 +454,19 @@ def test_a_stage_without_leaves_is_shown_a_table_that_works() -> None:
     ],
 )
 def test_strokes_that_are_refused(path: Path, stroke: str, given: str, expected: str) -> None:
-    with pytest.raises(StageError, match=rf'(?s)--stroke\n.*{given}.*{expected}.*--stroke "1 mm"'):
+    with pytest.raises(InputError, match=rf'(?s)--stroke\n.*{given}.*{expected}.*--stroke "1 mm"'):
         command(path, stroke=stroke)
 
 
 def test_a_stroke_of_the_stage_file_is_refused_alike(path: Path) -> None:
-    with pytest.raises(StageError, match=r"(?s)joint.stroke\n.*36 mm.*at most half the length of the leaves, 35 mm"):
+    with pytest.raises(InputError, match=r"(?s)joint.stroke\n.*36 mm.*at most half the length of the leaves, 35 mm"):
         command(path, overrides=['joint.stroke="36 mm"'])
 
 
 def test_a_locked_joint_without_a_stroke_needs_one(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
     file = tmp_path / "locked.toml"
     file.write_text(with_leaves().replace("locked = false", "locked = true").replace('stroke = "1 mm"\n', ""))
-    with pytest.raises(StageError, match=r"(?s)--stroke\n.*nothing.*the joint has none"):
+    with pytest.raises(InputError, match=r"(?s)--stroke\n.*nothing.*the joint has none"):
         command(file)
     command(file, stroke="1 mm", as_json=True)
     assert _strict(capsys.readouterr().out)["stroke_m"] == 1e-3
@@ -481,7 +481,7 @@ def test_a_locked_joint_without_a_stroke_needs_one(tmp_path: Path, capsys: pytes
     ],
 )
 def test_overrides_that_are_refused(path: Path, overrides: list[str], message: str) -> None:
-    with pytest.raises(StageError, match=message):
+    with pytest.raises(InputError, match=message):
         command(path, overrides=overrides)
 
 
@@ -489,7 +489,7 @@ def test_an_unknown_material_names_the_nearest(tmp_path: Path) -> None:
     file = tmp_path / "material.toml"
     start = LEAVES.index("young")
     file.write_text(with_leaves(LEAVES[:start] + 'material = "titanum"\n'))
-    with pytest.raises(StageError, match="did you mean titanium"):
+    with pytest.raises(InputError, match="did you mean titanium"):
         command(file)
 
 

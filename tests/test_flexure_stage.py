@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 
 import friso
+from friso.errors import InputError
 from friso.flexure import closed_forms
 from friso.flexure.beams import beams
 from friso.flexure.joint import parasitic_mode
 from friso.flexure.mechanism import Mechanism
 from friso.materials import materials
-from friso.stage import Stage, StageError, load, loads, save, violations
+from friso.stage import Stage, load, loads, save, violations
 from friso.studies.cells import allowed, flat_cells
 
 RIG = Path(__file__).parents[1] / "examples" / "thesis_rig.toml"
@@ -33,8 +34,8 @@ def stage() -> Stage:
     return loads(text_with())
 
 
-def refused(table: str) -> StageError:
-    with pytest.raises(StageError) as caught:
+def refused(table: str) -> InputError:
+    with pytest.raises(InputError) as caught:
         loads(text_with(table), origin="rig.toml")
     return caught.value
 
@@ -145,7 +146,7 @@ def test_load_along_the_leaves(stage: Stage, share: float) -> None:
 
 
 def test_leaves_that_buckle(stage: Stage) -> None:
-    with pytest.raises(StageError, match=r"less than the buckling load of the leaves, 135\.9 N"):
+    with pytest.raises(InputError, match=r"less than the buckling load of the leaves, 135\.9 N"):
         stage.replace({"flexure.load": "140 N"})
     loads_along = np.array([0.0, 130.0, 140.0])
     assert allowed(stage, {}, {"flexure.load": loads_along}).tolist() == [True, True, False]
@@ -239,7 +240,7 @@ def test_the_reason_names_what_was_swept(stage: Stage) -> None:
 
 def test_what_follows_cannot_be_swept(stage: Stage) -> None:
     for key in ("joint.stiffness", "parasitic.frequency"):
-        with pytest.raises(StageError, match=key.replace(".", r"\.")):
+        with pytest.raises(InputError, match=key.replace(".", r"\.")):
             stage.flat({key: 1.0})
 
 
@@ -296,11 +297,11 @@ def test_refused(table: str, key: str, said: str) -> None:
 
 
 def test_stiffness_given_twice_or_not_at_all(stage: Stage) -> None:
-    with pytest.raises(StageError, match=r"joint\.stiffness together with \[flexure\]"):
+    with pytest.raises(InputError, match=r"joint\.stiffness together with \[flexure\]"):
         stage.replace({"joint.stiffness": "2.4 N/mm"})
-    with pytest.raises(StageError, match="the stiffness of the joint, or a \\[flexure\\]"):
+    with pytest.raises(InputError, match="the stiffness of the joint, or a \\[flexure\\]"):
         stage.replace({"flexure": None})
-    with pytest.raises(StageError, match=r"leaf springs, but no \[joint\]"):
+    with pytest.raises(InputError, match=r"leaf springs, but no \[joint\]"):
         stage.replace({"joint": None})
     locked: dict[str, Any] = {"flexure": None, "joint.locked": True}
     assert "joint.stiffness" not in stage.replace(locked).flat()

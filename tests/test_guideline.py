@@ -18,12 +18,12 @@ from variants import VARIANTS
 from friso.cli import main
 from friso.equations.model import assemble
 from friso.equations.structure import structure
+from friso.errors import InputError
 from friso.hunting import persistence
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import hunting_cycles
 from friso.hunting.edges import ABOVE, BELOW, FLIP, JUMP, LOST, UNKNOWN, Edges, find_edges
 from friso.hunting.persistence import hunts_somehow
-from friso.quantities import StageError
 from friso.stage import Stage
 from friso.studies.guideline import checks, compute, parasitic, sweeps, worked
 from friso.studies.guideline.claims import claims, least_gap
@@ -128,7 +128,7 @@ def test_equal_groups_equal_multiplier_with_a_free_joint() -> None:
 
 def test_groups_of_another_controller_or_friction_are_refused() -> None:
     for name in ("rigid, LuGre 3, P", "rigid, Stribeck 3"):
-        with pytest.raises(StageError, match="van Dijk's rules, for which the groups are derived"):
+        with pytest.raises(InputError, match="van Dijk's rules, for which the groups are derived"):
             values_of(VARIANTS[name].flat())
 
 

@@ -9,6 +9,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from variants import DAHL, HOLD, LOCKED, MEASURED, NO_FRICTION, PARASITIC, gains, lugre, stage, stribeck, van_dijk
 
+from friso.errors import InputError
 from friso.frequency.describing import balance
 from friso.frequency.describing.balance import FREQUENCIES, single_harmonic
 from friso.frequency.describing.function import dynamic_stiffness
@@ -17,7 +18,7 @@ from friso.frequency.describing.multi import DONE, OPEN, REST, Series, balanced
 from friso.frequency.describing.waveform import Law, friction_answer
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import hunting_cycles
-from friso.stage import Stage, StageError
+from friso.stage import Stage
 from friso.studies.harmonic_balance import harmonic_balance
 
 pytestmark = pytest.mark.xdist_group("describing")
@@ -262,5 +263,5 @@ def one_period(one: Stage) -> tuple[np.ndarray, np.ndarray]:
     ],
 )
 def test_bad_input(ask: Callable[[], object], text: str) -> None:
-    with pytest.raises(StageError, match=text):
+    with pytest.raises(InputError, match=text):
         ask()

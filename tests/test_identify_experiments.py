@@ -260,7 +260,7 @@ def test_a_spring_has_one_slope_and_a_few_branches_are_not_enough() -> None:
     assert found.stiffness.name == "joint.stiffness"
     half = record("half", DT, position=x[:1500], force=2400 * x[:1500])
     assert not stiffness_from_hysteresis(half, "joint").stiffness.shown
-    with pytest.raises(friso.StageError, match="bristles"):
+    with pytest.raises(friso.InputError, match="bristles"):
         stiffness_from_hysteresis(half, "cable")  # type: ignore[arg-type]
 
 
@@ -394,9 +394,9 @@ def test_what_shows_no_slips_says_so() -> None:
     assert "slides all the time" in found.static.reason
     assert "not all measured" in found.stiffness.reason
     assert found.static.low == 0
-    with pytest.raises(friso.StageError, match="--map relative_position"):
+    with pytest.raises(friso.InputError, match="--map relative_position"):
         static_from_stick_slip(log, 2400.0)
-    with pytest.raises(friso.StageError, match="greater than 0"):
+    with pytest.raises(friso.InputError, match="greater than 0"):
         static_from_stick_slip(log, -1.0)
 
 
@@ -761,20 +761,20 @@ def test_passes_that_hardly_overlap_are_read_whole() -> None:
 
 def test_what_is_no_record_is_refused() -> None:
     ones = np.ones(100)
-    with pytest.raises(friso.StageError, match="no role"):
+    with pytest.raises(friso.InputError, match="no role"):
         record("x", DT, speed=ones)
-    with pytest.raises(friso.StageError, match="arrays of one length"):
+    with pytest.raises(friso.InputError, match="arrays of one length"):
         record("x", DT, position=ones, force=ones[1:])
-    with pytest.raises(friso.StageError, match="greater than 0 s"):
+    with pytest.raises(friso.InputError, match="greater than 0 s"):
         record("x", 0.0, position=ones)
-    with pytest.raises(friso.StageError, match="--map force"):
+    with pytest.raises(friso.InputError, match="--map force"):
         stiffness_from_steps(record("x", DT, position=ones))
     bad = record("x", DT, position=ones, force=np.where(np.arange(100) == 5, np.nan, 1.0))
     for analysis in (stiffness_from_steps, static_from_stick_slip, static_from_ramps, friction_velocity):
-        with pytest.raises(friso.StageError, match="1 of 100 values"):
+        with pytest.raises(friso.InputError, match="1 of 100 values"):
             analysis(bad)
     volts = replace(record("x", DT, position=ones, force=ones), units={"force": "V"})
-    with pytest.raises(friso.StageError, match="N/V"):
+    with pytest.raises(friso.InputError, match="N/V"):
         friction_position(volts)
 
 

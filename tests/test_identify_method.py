@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from scipy.ndimage import gaussian_filter1d
 
 import friso
+from friso.errors import InputError
 from friso.identify.combine import combined, correlations
 from friso.identify.estimate import Estimate
 from friso.identify.experiments import record
@@ -20,7 +21,6 @@ from friso.identify.response.analysis import analyse, external
 from friso.identify.sources import _kind
 from friso.identify.stage_file import identified
 from friso.identify.stage_keys import fitting
-from friso.quantities import StageError
 from friso.stage import Stage
 from friso.stage.correlations import Correlations, draw
 
@@ -230,7 +230,7 @@ def test_a_repeated_move_is_none(acceleration: float, rest: int) -> None:
     log = repeated(acceleration, rest, np.random.default_rng(2))
     try:
         kind = _kind(log, Path("log.csv"))[0]
-    except StageError as error:
+    except InputError as error:
         kind = error.example
     assert kind in (["moves"] if rest == 400 or acceleration < 5 else ["moves", "--as moves, or --as frequency"])
 

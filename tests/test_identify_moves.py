@@ -14,6 +14,7 @@ from machines import drawn, moves
 from patched import patched
 
 import friso
+from friso.errors import InputError
 from friso.identify import moves as method
 from friso.identify.errors import errors_of
 from friso.identify.logs.log import Log
@@ -25,7 +26,6 @@ from friso.identify.output_error.parameters import RATIO
 from friso.identify.output_error.problem import closed_loop
 from friso.identify.output_error.refine import bounds_of, costs
 from friso.identify.output_error.shown import BRISTLES, STRIBECK
-from friso.quantities import StageError
 
 pytestmark = pytest.mark.xdist_group("identify-moves")
 
@@ -113,10 +113,10 @@ def test_pulses_of_force_are_predicted(quick: tuple[dict[str, Any], Log, Moves])
 def test_missing_signals_are_named(quick: tuple[dict[str, Any], Log, Moves]) -> None:
     _, log, found = quick
     bare = replace(log, signals={role: log[role] for role in ("position", "force")})
-    with pytest.raises(StageError, match="reference"):
+    with pytest.raises(InputError, match="reference"):
         predict(found, bare)
     volts = replace(log, units={"force": "V"})
-    with pytest.raises(StageError, match="N/V"):
+    with pytest.raises(InputError, match="N/V"):
         identify_moves(volts, found.flat, True)
 
 

@@ -141,7 +141,7 @@ def test_what_a_log_cannot_show_is_told() -> None:
     assert "500 samples" in bristles_from_presliding(short).stiffness.reason
     still = record("still", DT, position=np.full(12000, 0.5), force=np.arange(12000.0))
     assert "stand out of the noise" in bristles_from_presliding(still).stiffness.reason
-    with pytest.raises(friso.StageError, match="force"):
+    with pytest.raises(friso.InputError, match="force"):
         bristles_from_presliding(record("x", DT, position=np.zeros(10000)))
 
 

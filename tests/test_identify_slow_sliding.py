@@ -160,7 +160,7 @@ def test_what_a_log_cannot_show_is_told() -> None:
     unlike = sliding()
     unlike = replace(unlike, signals={**unlike.signals, "force": np.roll(unlike["force"], 150)})
     assert "not explained" in reason(unlike)
-    with pytest.raises(friso.StageError, match="force"):
+    with pytest.raises(friso.InputError, match="force"):
         stribeck_from_slow_sliding(record("x", DT, position=np.zeros(9000)), THERE, KNOWN)
 
 

@@ -4,8 +4,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from friso.errors import InputError
 from friso.intervals import Interval, Span
-from friso.quantities import Bound, Number, Quantity, StageError, positive
+from friso.quantities import Bound, Number, Quantity, positive
 
 FORCE = Span(Quantity("N", positive, "3 N"), "1 N .. 3 N")
 SHARE = Span(Number(Bound("0 to 1", lambda value: (value >= 0) & (value <= 1)), "0.5"), "0.3 .. 0.8")
@@ -70,7 +71,7 @@ def test_numbers(given_text: str | float, low: float, high: float) -> None:
     ],
 )
 def test_refused_quantities(given_text: object, said: str) -> None:
-    with pytest.raises(StageError) as caught:
+    with pytest.raises(InputError) as caught:
         FORCE.read(given_text)
     assert said in str(caught.value)
 
@@ -79,7 +80,7 @@ def test_refused_quantities(given_text: object, said: str) -> None:
     "given_text", ["0.3 .. 1.8", "-0.1 .. 0.5", "0.8 .. 0.3", "a .. b", "0.5 N", True, None, "0.9 +/- 0.2"]
 )
 def test_refused_numbers(given_text: object) -> None:
-    with pytest.raises(StageError, match=r"0 to 1|a number"):
+    with pytest.raises(InputError, match=r"0 to 1|a number"):
         SHARE.read(given_text)
 
 

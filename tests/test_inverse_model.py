@@ -11,10 +11,10 @@ from emps import emps_log
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from friso.errors import InputError
 from friso.identify.experiments import record
 from friso.identify.inverse_model import bandwidth_of, inverse_model
 from friso.identify.logs.log import Log
-from friso.quantities import StageError
 
 EMPS = Path(__file__).parents[2] / "shared" / "data" / "emps" / "DATA_EMPS.mat"
 DT = 1e-3
@@ -118,7 +118,7 @@ def test_the_cart_of_a_joint_has_the_friction() -> None:
 
 def test_too_little_motion_is_refused() -> None:
     log = swinging(2.0, 1.0, 4.0, 0.5, seconds=0.3)
-    with pytest.raises(StageError, match=r"300 samples, \d+ of them in motion after decimation to 20 Hz"):
+    with pytest.raises(InputError, match=r"300 samples, \d+ of them in motion after decimation to 20 Hz"):
         inverse_model(log, 4.0)
 
 

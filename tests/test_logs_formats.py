@@ -10,10 +10,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from scipy.io import savemat
 
+from friso.errors import InputError
 from friso.identify.logs import read as reading
 from friso.identify.logs.channel import Channel, Table
 from friso.identify.logs.read import file_format, is_frequency_response, read_frequency_response, read_table
-from friso.quantities import StageError
 
 M = log_files.motion()
 HEADING = ["time [ms]", "position [mm]", "force [N]"]
@@ -193,7 +193,7 @@ def test_mat_73(tmp_path: Path) -> None:
 
 def test_mat_with_objects_only(tmp_path: Path) -> None:
     path = log_files.write_mat73(tmp_path / "a.mat", {})
-    with pytest.raises(StageError, match="save as structure with time"):
+    with pytest.raises(InputError, match="save as structure with time"):
         read_table(path)
 
 
@@ -231,7 +231,7 @@ def test_lvm(tmp_path: Path) -> None:
 def test_without_the_library_the_message_says_how_to_get_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "a.tdms").write_bytes(b"TDSm" + bytes(100))
     monkeypatch.setitem(sys.modules, "nptdms", None)
-    with pytest.raises(StageError, match=r'pip install "friso\[tdms\]"'):
+    with pytest.raises(InputError, match=r'pip install "friso\[tdms\]"'):
         read_table(tmp_path / "a.tdms")
 
 
@@ -292,7 +292,7 @@ def test_a_log_is_no_frequency_response(tmp_path: Path) -> None:
 )
 def test_bad_frequency_responses(tmp_path: Path, text: str, said: str) -> None:
     (tmp_path / "a.csv").write_text(text)
-    with pytest.raises(StageError, match=said):
+    with pytest.raises(InputError, match=said):
         read_frequency_response(tmp_path / "a.csv")
 
 
@@ -317,15 +317,15 @@ def test_bad_frequency_responses(tmp_path: Path, text: str, said: str) -> None:
 )
 def test_bad_files_end_in_one_message(tmp_path: Path, content: bytes, said: str) -> None:
     (tmp_path / "a.log").write_bytes(content)
-    with pytest.raises(StageError, match=said) as caught:
+    with pytest.raises(InputError, match=said) as caught:
         read_table(tmp_path / "a.log")
     assert str(tmp_path / "a.log") in str(caught.value)
 
 
 def test_missing_files_and_folders(tmp_path: Path) -> None:
-    with pytest.raises(StageError, match="cannot be opened"):
+    with pytest.raises(InputError, match="cannot be opened"):
         read_table(tmp_path / "none.csv")
-    with pytest.raises(StageError, match="a folder"):
+    with pytest.raises(InputError, match="a folder"):
         read_table(tmp_path)
 
 
@@ -333,7 +333,7 @@ def test_a_file_too_large_is_refused_with_its_size(tmp_path: Path, monkeypatch: 
     monkeypatch.setattr(reading, "decoded_head", lambda path: pytest.fail("read before it was refused"))
     with (tmp_path / "big.csv").open("wb") as file:
         file.truncate(10 * 2**30)
-    with pytest.raises(StageError, match="10 GiB"):
+    with pytest.raises(InputError, match="10 GiB"):
         read_table(tmp_path / "big.csv")
 
 

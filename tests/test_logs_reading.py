@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.io import savemat
 
+from friso.errors import InputError
 from friso.identify.logs import mapping as mappings
 from friso.identify.logs.assemble import read_log
 from friso.identify.logs.checks import clipped_share, held, unwrapped
@@ -18,7 +19,6 @@ from friso.identify.logs.mapping import Mapping, from_options
 from friso.identify.logs.roles import role_of
 from friso.identify.logs.time_base import together, track
 from friso.identify.logs.units import in_si, read_scale, spelled, split_heading
-from friso.quantities import StageError
 
 DATA = Path(__file__).parents[2] / "shared" / "data"
 M = log_files.motion(2000)
@@ -40,7 +40,7 @@ def told(lines: tuple[str, ...], text: str) -> bool:
 
 
 def message(tmp_path: Path, names: list[str], values: list[np.ndarray], mapping: Mapping | None = None) -> str:
-    with pytest.raises(StageError) as caught:
+    with pytest.raises(InputError) as caught:
         log_of(tmp_path, names, values, mapping)
     assert str(tmp_path / "a.csv") in str(caught.value)
     return str(caught.value)
@@ -146,7 +146,7 @@ def test_scales(text: str, unit: str, factor: float) -> None:
 
 @pytest.mark.parametrize(("text", "unit"), [("35", ""), ("35 N", "V"), ("35 m/V", "V"), ("3 N/V", "A"), ("x N/V", "V")])
 def test_wrong_scales(text: str, unit: str) -> None:
-    with pytest.raises(StageError, match="--scale force="):
+    with pytest.raises(InputError, match="--scale force="):
         read_scale("force", text, unit)
 
 
@@ -335,7 +335,7 @@ def test_channels_of_different_rates(tmp_path: Path) -> None:
 
 def test_no_common_span() -> None:
     t = 1e-3 * np.arange(100)
-    with pytest.raises(StageError, match="that all channels share"):
+    with pytest.raises(InputError, match="that all channels share"):
         together({"a": track("a", t, t), "b": track("b", t + 5, t)})
 
 
@@ -354,7 +354,7 @@ def test_values_between_segments_are_never_made_up(first: list[int], second: lis
     tracks = {name: track(name, t, 2 * t) for name, t in zip("ab", spans, strict=True)}
     try:
         base, values = together(tracks)
-    except StageError:
+    except InputError:
         return
     for name, t in zip("ab", spans, strict=True):
         assert values[name] == pytest.approx(2 * base.time, abs=0.02 + 1e-9)  # 0.01 of a step is one instant
@@ -367,7 +367,7 @@ def test_without_time(tmp_path: Path) -> None:
     log = log_of(tmp_path, NAMES[1:], columns()[1:], from_options(dt="2 ms"))
     assert log.sample_time == pytest.approx(2e-3)
     savemat(tmp_path / "a.mat", {"position": M["position"], "fs": 2500.0})
-    with pytest.raises(StageError, match=r'--dt "0\.4 ms", if fs = 2500'):
+    with pytest.raises(InputError, match=r'--dt "0\.4 ms", if fs = 2500'):
         read_log(tmp_path / "a.mat")
 
 
@@ -400,7 +400,7 @@ def test_mapping_in_another_folder(tmp_path: Path) -> None:
     place = mappings.save(Mapping({"position": "x"}), log, tmp_path)
     assert place == tmp_path / "a.csv.friso.toml"
     assert mappings.load(log, tmp_path) == Mapping({"position": "x"})
-    with pytest.raises(StageError, match="a folder that can be written"):
+    with pytest.raises(InputError, match="a folder that can be written"):
         mappings.save(Mapping(), log)
 
 
@@ -409,7 +409,7 @@ def test_mapping_in_another_folder(tmp_path: Path) -> None:
 )
 def test_a_broken_mapping(tmp_path: Path, text: str) -> None:
     (tmp_path / "a.csv.friso.toml").write_text(text)
-    with pytest.raises(StageError, match=r"a\.csv\.friso\.toml"):
+    with pytest.raises(InputError, match=r"a\.csv\.friso\.toml"):
         mappings.load(tmp_path / "a.csv")
 
 
@@ -421,7 +421,7 @@ def test_a_broken_mapping(tmp_path: Path, text: str) -> None:
     ],
 )  # fmt: skip
 def test_wrong_options(options: dict) -> None:
-    with pytest.raises(StageError, match="--"):
+    with pytest.raises(InputError, match="--"):
         from_options(**options)
 
 
@@ -479,7 +479,7 @@ def test_emps() -> None:
 
 def test_ku_leuven() -> None:
     path = record("kuleuven_lsb250/exp1.mat")
-    with pytest.raises(StageError, match='"enc1" and "enc2"'):
+    with pytest.raises(InputError, match='"enc1" and "enc2"'):
         read_log(path)
     log = read_log(path, from_options(["position=enc2 (mm)", "cart_position=enc1", "force=input (V)"]), strict=False)
     assert log.units == {"force": "V"}
@@ -490,7 +490,7 @@ def test_ku_leuven() -> None:
 def test_tokyo_bench() -> None:
     path = record("utokyo_motorbench/MultisineTypeA.mat")
     options = from_options(["position=theta_mx", "force=iq_adx"], ["theta_mx=rad", "iq_adx=A"])
-    with pytest.raises(StageError, match=r'--dt "0\.4 ms", if fs = 2500'):
+    with pytest.raises(InputError, match=r'--dt "0\.4 ms", if fs = 2500'):
         read_log(path, options, strict=False)
     log = read_log(path, from_options(dt="0.4 ms").over(options), strict=False)
     assert log.time.size == 50000

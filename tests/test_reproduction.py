@@ -440,7 +440,7 @@ def test_a_part_of_the_studies_covers_its_claims_only() -> None:
 
 @pytest.mark.parametrize(("names", "points", "message"), [(["paths"], 11, "isolator-damping"), (None, 2, "3 or more")])
 def test_wrong_orders_are_refused(names: list[str] | None, points: int, message: str) -> None:
-    with pytest.raises(friso.StageError, match=message):
+    with pytest.raises(friso.InputError, match=message):
         reproduce(names, points=points)
 
 

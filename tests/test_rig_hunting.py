@@ -9,7 +9,7 @@ from patched import patched
 
 from friso import load
 from friso.engine.arrays import Status
-from friso.quantities import StageError
+from friso.errors import InputError
 from friso.rig.run import Recorded
 from friso.stage import Stage
 from friso.studies.rig import compare, hunting, in_position, stroke_crossover
@@ -98,7 +98,7 @@ def test_a_larger_stage_moves_farther() -> None:
 def test_what_has_no_joint_or_goes_nowhere() -> None:
     bare = RIG.replace({"joint": None, "parasitic": None})
     for run_experiment in (hunting, stroke_crossover, compare, in_position):
-        with pytest.raises(StageError, match="no \\[joint\\]"):
+        with pytest.raises(InputError, match="no \\[joint\\]"):
             run_experiment.run_experiment(bare, 1, silent)
 
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import friso
+from friso.errors import InputError
 from friso.identify.experiments import static_from_stick_slip
-from friso.quantities import StageError
 from friso.stage import Stage
 from friso.studies.rig import constant_speed, excitation, frf, many_speeds, sizes, stiction, stiffness
 from friso.studies.rig.outcome import rig_log, silent
@@ -118,7 +118,7 @@ def test_a_free_joint_is_stable_up_to_a_setting_and_not_beyond(built: Stage) -> 
 def test_an_experiment_on_the_joint_needs_one(built: Stage) -> None:
     rigid = built.replace({"joint": None, "parasitic": None})
     for each in (frf, stiffness, stiction, constant_speed):
-        with pytest.raises(StageError, match="joint"):
+        with pytest.raises(InputError, match="joint"):
             each.run_experiment(rigid, 1, silent)
 
 

@@ -5,10 +5,10 @@ from pathlib import Path
 import pytest
 
 import friso
+from friso.errors import InputError
 from friso.identify.logs.mapping import Mapping, load, save
 from friso.identify.method import _as_set_up
 from friso.identify.sources import read_all
-from friso.quantities import StageError
 from friso.rig.log_files import write_csv
 from friso.stage import Stage
 from friso.studies.rig import constant_speed, presliding, stiction
@@ -34,7 +34,7 @@ def test_how_the_stage_was_set_up_goes_with_the_log(built: Stage, tmp_path: Path
     assert built.flat()["joint.stroke"] == pytest.approx(1e-3)
     save(Mapping(experiment="steps", setup={"joint.stroke": "8 volts"}), path)
     (wrong,) = read_all([path], Mapping(), tmp_path)
-    with pytest.raises(StageError, match="setup"):
+    with pytest.raises(InputError, match="setup"):
         _as_set_up(built, wrong.source)
 
 
@@ -52,9 +52,9 @@ def test_friction_without_what_is_looked_for_is_refused(built: Stage) -> None:
     bare = {f"friction.{key}": None for key in built.given()["friction"]}
     bare |= {"rail": None}
     none = built.replace({**bare, "friction.model": "none"})
-    with pytest.raises(StageError, match="static level"):
+    with pytest.raises(InputError, match="static level"):
         stiction.run_experiment(none, 1, silent)
-    with pytest.raises(StageError, match="bristles"):
+    with pytest.raises(InputError, match="bristles"):
         presliding.run_experiment(none, 1, silent)
 
 

@@ -11,8 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import friso.equations.friction  # noqa: F401  the friction laws register themselves
+from friso.errors import InputError
 from friso.quantities import as_toml
-from friso.stage import Stage, StageError, load, loads, numeric_keys, violations
+from friso.stage import Stage, load, loads, numeric_keys, violations
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "thesis_drive.toml"
 FLOOR = {
@@ -142,7 +143,7 @@ def test_uncertain_keys(built: Stage) -> None:
         {"drive.delay": "40 us .. 60 us", "rail.offset": "0.1 +/- 0.05", "cable.drag": "1 N*s/m +/- 5 %"}
     )
     assert {*stage.uncertain()} == {"drive.delay", "rail.offset", "cable.drag"}
-    with pytest.raises(StageError, match="none of the numbers beside the centre"):
+    with pytest.raises(InputError, match="none of the numbers beside the centre"):
         built.replace({"rail.seed": "0 .. 10"})
 
 
@@ -157,7 +158,7 @@ def test_rails_are_swept_over_their_seed(built: Stage) -> None:
 
 
 def message(stage: Stage, changes: dict[str, object]) -> str:
-    with pytest.raises(StageError) as caught:
+    with pytest.raises(InputError) as caught:
         stage.replace(changes)
     return str(caught.value)
 

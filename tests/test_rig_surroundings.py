@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from scipy.signal import welch
 from scipy.stats import norm
 
-from friso.quantities import StageError
+from friso.errors import InputError
 from friso.rig.floor import floor_acceleration, variance_below
 from friso.rig.rail import friction_factors, gaussian_field
 from friso.stage.rig import Floor
@@ -173,7 +173,7 @@ def test_a_rail_without_variation_is_even() -> None:
 def test_a_field_too_fine_for_its_rail() -> None:
     flat = rail(static_deviation=0.1, correlation_length=1e-9)
     with pytest.raises(
-        StageError, match=r"rail\.correlation_length\n  given:    1e-09 m\n  expected: at least 2e-08 m"
+        InputError, match=r"rail\.correlation_length\n  given:    1e-09 m\n  expected: at least 2e-08 m"
     ):
         friction_factors(flat, np.linspace(0, 0.1, 100))
 
@@ -235,5 +235,5 @@ def test_a_floor_is_sampled_from_start_to_end(seed: int, steps: int, interval: f
 
 
 def test_a_floor_faster_than_it_is_sampled() -> None:
-    with pytest.raises(StageError, match=r"floor\.frequency\n  given:    '100 Hz'\n  expected: at most 50 Hz"):
+    with pytest.raises(InputError, match=r"floor\.frequency\n  given:    '100 Hz'\n  expected: at most 50 Hz"):
         floor_acceleration(spectrum((1, 1e-4), (100, 1e-4)), 1.0, 0.01, 0)

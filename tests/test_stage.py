@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 import friso.equations.friction  # noqa: F401  the friction laws register themselves
-from friso.quantities import Quantity, StageError, Value, any_sign, positive
+from friso.errors import InputError
+from friso.quantities import Quantity, Value, any_sign, positive
 from friso.stage import Stage, load, loads, numeric_keys, parse_set, save, violations
 
 ROOT = Path(__file__).parents[1]
@@ -137,7 +138,7 @@ def test_units(text: str, unit: str, si: float) -> None:
 def test_unit_factor_converts_arrays() -> None:
     assert Quantity("m", positive, "1 mm").factor("mm") == 1e-3
     assert Quantity("Hz", positive, "8 Hz").factor("rad/s") == 1 / (2 * math.pi)
-    with pytest.raises(StageError, match="kg is not convertible to m"):
+    with pytest.raises(InputError, match="kg is not convertible to m"):
         Quantity("m", positive, "1 mm").factor("kg")
 
 
@@ -181,7 +182,7 @@ def test_byte_order_mark_and_windows_line_ends(tmp_path: Path, rig: Stage) -> No
 def test_save_keeps_an_existing_file(tmp_path: Path, rig: Stage) -> None:
     path = tmp_path / "rig.toml"
     path.write_text("precious", encoding="utf-8")
-    with pytest.raises(StageError, match=r"rig\.toml\n.*a file that exists"):
+    with pytest.raises(InputError, match=r"rig\.toml\n.*a file that exists"):
         save(rig, path)
     assert path.read_text(encoding="utf-8") == "precious"
     save(rig, path, overwrite=True)
@@ -190,7 +191,7 @@ def test_save_keeps_an_existing_file(tmp_path: Path, rig: Stage) -> None:
 
 
 def test_save_into_nowhere(tmp_path: Path, rig: Stage) -> None:
-    with pytest.raises(StageError, match="no such file"):
+    with pytest.raises(InputError, match="no such file"):
         save(rig, tmp_path / "missing" / "rig.toml")
 
 
@@ -248,7 +249,7 @@ def test_swept_values_move_the_defaults_that_follow_them(rig: Stage) -> None:
     stage = rig.replace({"controller.tuned_mass": None})
     np.testing.assert_array_equal(stage.flat({"masses.cart": cart})["controller.tuned_mass"], cart + 0.5)
     assert rig.flat({"masses.cart": cart})["controller.tuned_mass"] == 1.7
-    with pytest.raises(StageError, match=r"controller\.crossovr\n.*did you mean controller\.crossover\?"):
+    with pytest.raises(InputError, match=r"controller\.crossovr\n.*did you mean controller\.crossover\?"):
         rig.flat({"controller.crossovr": cart})
 
 
@@ -285,7 +286,7 @@ def test_numeric_keys_have_units(rig: Stage) -> None:
 def test_stages_copy_and_pickle(rig: Stage) -> None:
     assert pickle.loads(pickle.dumps(rig)).to_toml() == rig.to_toml()
     assert copy.deepcopy(Value(0.03, "30 ms")).text == "30 ms"
-    error = pickle.loads(pickle.dumps(StageError("key", "given", "expected", "example", "origin")))
+    error = pickle.loads(pickle.dumps(InputError("key", "given", "expected", "example", "origin")))
     assert str(error) == "origin: key\n  given:    given\n  expected: expected\n  example:  example"
 
 

@@ -1,4 +1,4 @@
-"""Mutated example files: no exception but StageError, and whatever loads holds the values of the file."""
+"""Mutated example files: no exception but InputError, and whatever loads holds the values of the file."""
 
 import math
 import tomllib
@@ -11,8 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import friso.equations.friction  # noqa: F401  the friction laws register themselves
+from friso.errors import InputError
 from friso.quantities import as_toml
-from friso.stage import Stage, StageError, loads, numeric_keys, parse_set
+from friso.stage import Stage, loads, numeric_keys, parse_set
 
 FOLDER = Path(__file__).parents[1]
 FILES = [*sorted((FOLDER / "examples").glob("*.toml")), FOLDER / "friso" / "templates" / "stage.toml"]
@@ -47,7 +48,7 @@ def check(text: str) -> None:
     """Load, and compare every key of the file with what the stage holds."""
     try:
         stage = loads(text)
-    except StageError:
+    except InputError:
         return
     file, flat = tomllib.loads(text.removeprefix("\ufeff")), stage.flat()
     units = {key: field.unit for key, field in numeric_keys(flat).items()}
@@ -211,7 +212,7 @@ def test_changes(place: tuple[str, str, str], value: object) -> None:
     for name in (f"{table}.{key}", table, f"{table}.{key}.x", key):
         try:
             changed = stage.replace({name: value})
-        except StageError:
+        except InputError:
             continue
         assert isinstance(changed, Stage)
         check(changed.to_toml())

@@ -14,7 +14,8 @@ import pytest
 import xarray as xr
 
 import friso
-from friso.stage import Stage, StageError
+from friso.errors import InputError
+from friso.stage import Stage
 from friso.studies import refine
 from friso.studies import store as storing
 from friso.studies.execute import local_crew
@@ -159,7 +160,7 @@ def test_a_store_of_another_study_is_refused(rig: Stage, tmp_path: Path, change:
         pass
     before = sorted((file, file.read_bytes()) for file in path.rglob("*") if file.is_file())
     stage = rig.replace(change.pop("stage", {}))
-    with pytest.raises(StageError, match=message) as error:
+    with pytest.raises(InputError, match=message) as error:
         friso.sweep(stage, change.pop("axes", AXES), store=path, **change)
     assert "nothing was overwritten" in str(error.value)
     assert before == sorted((file, file.read_bytes()) for file in path.rglob("*") if file.is_file())
@@ -191,7 +192,7 @@ def test_a_store_of_nearly_the_same_study_is_refused(
     """Other sampled keys with the same values, fewer of them, the same links in another order."""
     with Store.opened(tmp_path / "a.zarr", Request(rig, **{"axes": {}, **first}).study()):
         pass
-    with pytest.raises(StageError, match=message):
+    with pytest.raises(InputError, match=message):
         friso.sweep(rig, **{"axes": {}, **second}, store=tmp_path / "a.zarr")
 
 
@@ -229,7 +230,7 @@ def test_a_store_of_other_equations_is_refused(rig: Stage, tmp_path: Path, monke
     with Store.opened(tmp_path / "a.zarr", Request(rig, AXES).study()):
         pass
     monkeypatch.undo()
-    with pytest.raises(StageError, match="version of the equations"):
+    with pytest.raises(InputError, match="version of the equations"):
         friso.sweep(rig, AXES, store=tmp_path / "a.zarr")
 
 
@@ -240,12 +241,12 @@ def test_anything_else_is_refused(rig: Stage, tmp_path: Path) -> None:
     file.write_text("precious")
     xr.Dataset({"verdict": ("x", np.zeros(3))}).to_zarr(tmp_path / "foreign.zarr", zarr_format=2)
     for path in (folder, file, tmp_path / "foreign.zarr"):
-        with pytest.raises(StageError, match="nothing was overwritten"):
+        with pytest.raises(InputError, match="nothing was overwritten"):
             friso.sweep(rig, AXES, store=path)
     assert (folder / "thesis.txt").read_text() == file.read_text() == "precious"
-    with pytest.raises(StageError, match="can be written"):
+    with pytest.raises(InputError, match="can be written"):
         friso.sweep(rig, AXES, store=file / "below.zarr")
-    with pytest.raises(StageError, match="nothing there"):
+    with pytest.raises(InputError, match="nothing there"):
         read_store(tmp_path / "absent.zarr")
 
 
@@ -269,7 +270,7 @@ def test_two_processes_on_one_store_are_refused(rig: Stage, tmp_path: Path) -> N
     with subprocess.Popen(command, stdout=subprocess.PIPE) as process:
         assert process.stdout is not None
         process.stdout.readline()
-        with pytest.raises(StageError, match="another friso is writing"):
+        with pytest.raises(InputError, match="another friso is writing"):
             friso.sweep(rig, AXES, store=path)
         process.send_signal(signal.SIGKILL)
     with Store.opened(path, Request(rig, AXES).study()):  # the lock went with its process
@@ -282,7 +283,7 @@ def test_a_store_is_there_whole_or_not_at_all(rig: Stage, tmp_path: Path, monkey
 
     monkeypatch.setattr(xr.Dataset, "to_zarr", fails)
     with (
-        pytest.raises(StageError, match="No space left"),
+        pytest.raises(InputError, match="No space left"),
         Store.opened(tmp_path / "a.zarr", Request(rig, AXES).study()),
     ):
         pass

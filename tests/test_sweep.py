@@ -12,11 +12,12 @@ import friso
 from friso.engine.batch import run_chunks
 from friso.engine.kernel import kernel
 from friso.equations.structure import structure
+from friso.errors import InputError
 from friso.hunting.basin import ends_hunting
 from friso.hunting.cycle.hunting import hunting
 from friso.hunting.measures import Measures, measure, options
 from friso.hunting.verdict import judge
-from friso.stage import Stage, StageError
+from friso.stage import Stage
 from friso.studies.request import Request
 from friso.studies.samples import Samples
 from friso.studies.study import study_of
@@ -201,7 +202,7 @@ def test_results_do_not_depend_on_threads(rig: Stage) -> None:
     ],
 )
 def test_wrong_axes_are_refused(rig: Stage, axes: dict, message: str) -> None:
-    with pytest.raises(StageError, match=message):
+    with pytest.raises(InputError, match=message):
         friso.sweep(rig, axes)
 
 
@@ -219,7 +220,7 @@ def test_wrong_axes_are_refused(rig: Stage, axes: dict, message: str) -> None:
     ],
 )
 def test_wrong_links_are_refused(rig: Stage, links: dict, message: str) -> None:
-    with pytest.raises(StageError, match=message):
+    with pytest.raises(InputError, match=message):
         friso.sweep(rig, {"mass": ["1 kg", "2 kg"], "controller.crossover": ["8 Hz"]}, links=links)
 
 
@@ -234,12 +235,12 @@ def test_wrong_links_are_refused(rig: Stage, links: dict, message: str) -> None:
     ],
 )
 def test_wrong_samples_are_refused(rig: Stage, samples: Samples, message: str) -> None:
-    with pytest.raises(StageError, match=message):
+    with pytest.raises(InputError, match=message):
         friso.sweep(rig, {}, samples)
 
 
 def test_an_unknown_metric_is_refused(rig: Stage) -> None:
-    with pytest.raises(StageError, match="peak_to_peak"):
+    with pytest.raises(InputError, match="peak_to_peak"):
         friso.sweep(rig, {"controller.crossover": ["8 Hz"]}, metrics=["loudness"])
 
 

@@ -10,7 +10,8 @@ from hypothesis import strategies as st
 from scipy.ndimage import binary_fill_holes, distance_transform_edt, label
 
 import friso
-from friso.stage import Stage, StageError
+from friso.errors import InputError
+from friso.stage import Stage
 from friso.studies import verify
 from friso.studies.cells import UNITS, USUAL, Columns
 from friso.studies.execute import local_crew
@@ -113,7 +114,7 @@ def test_inferred_verdicts_are_checked_apart(rig: Stage) -> None:
 
 @pytest.mark.parametrize("share", [-0.1, 1.1])
 def test_a_share_that_is_none_is_refused(rig: Stage, share: float) -> None:
-    with pytest.raises(StageError, match="from 0 to 1"):
+    with pytest.raises(InputError, match="from 0 to 1"):
         friso.sweep(rig, {"controller.crossover": ["8 Hz"]}, verify=share)
 
 
@@ -200,6 +201,6 @@ def test_the_boundary_of_the_locked_rig(rig: Stage) -> None:
 def test_what_cannot_be_refined_is_refused(rig: Stage) -> None:
     for axes in ({"joint.locked": [True, False]}, {}):
         samples = None if axes else friso.Samples({"joint.stroke": "0 m..1 mm"}, 8)
-        with pytest.raises(StageError, match="one to three axes of numbers"):
+        with pytest.raises(InputError, match="one to three axes of numbers"):
             friso.sweep(rig, axes, samples, refine=True)
     assert replace(Request(rig, {"joint.stroke": "0 m..1 mm:3"}).study(), refined=True).refined

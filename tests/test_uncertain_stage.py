@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 from scipy.stats import kstest, norm, spearmanr, truncnorm
 
 from friso.cli.common import read_stage
+from friso.errors import InputError
 from friso.intervals import COVERAGE, UncertainValue
-from friso.quantities import StageError
 from friso.stage import Stage, load, numeric_keys, parse_set, save
 from friso.stage.correlations import Correlations, beside, draw, laid_over, read_correlations, write_correlations
 
@@ -111,7 +111,7 @@ def test_value_survives_pickling_and_set(rig: Stage) -> None:
     ],
 )
 def test_refused(rig: Stage, key: str, text: str, said: str) -> None:
-    with pytest.raises(StageError, match=said) as caught:
+    with pytest.raises(InputError, match=said) as caught:
         rig.replace({key: text})
     assert key in caught.value.key
 
@@ -119,7 +119,7 @@ def test_refused(rig: Stage, key: str, text: str, said: str) -> None:
 def test_a_number_of_leaves_is_certain() -> None:
     leaves = load(EXAMPLE.parent / "thesis_leaves.toml")
     for text in ("2 +/- 1", "2 .. 4"):
-        with pytest.raises(StageError, match="a whole number"):
+        with pytest.raises(InputError, match="a whole number"):
             leaves.replace({"flexure.leaves": text})
 
 
@@ -127,7 +127,7 @@ def test_specifications_take_no_uncertain_value() -> None:
     """One value is meant there, or a range that is allowed: not what is known of a machine."""
     from friso.design.spec import Machine
 
-    with pytest.raises(StageError, match="bandwidth_limit"):
+    with pytest.raises(InputError, match="bandwidth_limit"):
         Machine(bandwidth_limit="48 Hz +/- 5 Hz")
 
 
@@ -163,7 +163,7 @@ def test_correlations_are_written_and_read(rig: Stage, tmp_path: Path) -> None:
     assert found.among([VISCOUS]).keys == (VISCOUS,)
     assert found.among([VISCOUS]).matrix.tolist() == [[1.0]]
     assert found.among([]).over([COULOMB]).tolist() == [[1.0]]
-    with pytest.raises(StageError, match="exists already"):
+    with pytest.raises(InputError, match="exists already"):
         write_correlations(pair(0.1), stage, path)
 
 
@@ -190,13 +190,13 @@ def test_correlations_are_written_and_read(rig: Stage, tmp_path: Path) -> None:
 def test_correlations_refused(rig: Stage, tmp_path: Path, text: str, said: str) -> None:
     stage, path = uncertain(rig, coulomb="1 N +/- 0.1 N", viscous="0 N*s/m .. 1 N*s/m"), tmp_path / "c.toml"
     path.write_text(text)
-    with pytest.raises(StageError, match=said) as caught:
+    with pytest.raises(InputError, match=said) as caught:
         read_correlations(path, stage)
     assert str(path) in str(caught.value)
 
 
 def test_correlations_of_certain_keys_are_not_written(rig: Stage, tmp_path: Path) -> None:
-    with pytest.raises(StageError, match="not uncertain"):
+    with pytest.raises(InputError, match="not uncertain"):
         write_correlations(pair(0.5), uncertain(rig, coulomb="1 N +/- 0.1 N"), tmp_path / "c.toml")
     assert not list(tmp_path.iterdir())
 
@@ -255,7 +255,7 @@ def test_draws_that_break_a_rule_are_left_out_and_told(rig: Stage) -> None:
 
 
 def test_nothing_to_draw(rig: Stage) -> None:
-    with pytest.raises(StageError, match="no key is uncertain"):
+    with pytest.raises(InputError, match="no key is uncertain"):
         draw(rig, Correlations(), 10, seed=0)
 
 

@@ -26,7 +26,7 @@ from friso.cli.map import map_cells
 from friso.cli.reproduce import reproduce
 from friso.cli.rig import rig
 from friso.cli.simulate import simulate
-from friso.quantities import StageError
+from friso.errors import InputError
 from friso.version import VERSION
 
 app = typer.Typer(
@@ -77,7 +77,7 @@ def main() -> NoReturn:
     except BrokenPipeError:
         sys.stderr.close()
         sys.exit(1)
-    except StageError as error:
+    except InputError as error:
         say(str(error))
         sys.exit(2)
     except Exception as error:

@@ -21,7 +21,8 @@ from friso.cli.common import (
     say,
 )
 from friso.cli.progress import busy
-from friso.quantities import Bound, Quantity, StageError, quoted
+from friso.errors import InputError
+from friso.quantities import Bound, Quantity, quoted
 from friso.stage import Stage
 
 if TYPE_CHECKING:
@@ -69,21 +70,21 @@ def bode(
 
 
 def _read_frequencies(text: str, stage: Stage) -> tuple[float, float]:
-    """Both ends [Hz] of a range of frequencies that the drive knows. Raises StageError."""
+    """Both ends [Hz] of a range of frequencies that the drive knows. Raises InputError."""
     first, _, last = text.partition("..")
     if not (first.strip() and last.strip()):
-        raise StageError("--frequencies", quoted(text), "a range of frequencies, FIRST..LAST", EXAMPLE)
+        raise InputError("--frequencies", quoted(text), "a range of frequencies, FIRST..LAST", EXAMPLE)
     try:
         low, high = float(FREQUENCY.read(first)), float(FREQUENCY.read(last))
-    except StageError as error:
-        raise StageError("--frequencies", error.given, error.expected, EXAMPLE) from None
+    except InputError as error:
+        raise InputError("--frequencies", error.given, error.expected, EXAMPLE) from None
     if not low < high:
         order = "empty" if low == high else "reversed"
-        raise StageError("--frequencies", quoted(text, f"{order} range"), "a range that rises", EXAMPLE)
+        raise InputError("--frequencies", quoted(text, f"{order} range"), "a range that rises", EXAMPLE)
     sample_time = stage.flat().get("drive.sample_time")
     if sample_time and high > 0.5 / sample_time:
         half = f"frequencies of up to {0.5 / sample_time:g} Hz, half the sampling frequency (drive.sample_time)"
-        raise StageError("--frequencies", quoted(text), half, f'--frequencies "0.1 Hz..{0.5 / sample_time:g} Hz"')
+        raise InputError("--frequencies", quoted(text), half, f'--frequencies "0.1 Hz..{0.5 / sample_time:g} Hz"')
     return low, high
 
 

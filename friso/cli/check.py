@@ -22,7 +22,7 @@ from friso.cli.common import (
     read_tolerance,
 )
 from friso.cli.progress import progress_bar
-from friso.quantities import StageError
+from friso.errors import InputError
 from friso.stage import Stage, load, numeric_keys
 
 if TYPE_CHECKING:
@@ -77,17 +77,17 @@ def check(
 
 
 def _drawn(stage: Stage, path: Path, count: int, seed: int) -> Drawn:
-    """Stages drawn, correlated as a file beside the stage file says. Raises StageError."""
+    """Stages drawn, correlated as a file beside the stage file says. Raises InputError."""
     from friso.stage.correlations import Correlations, beside, draw, read_correlations
     from friso.studies.draws import MOST
 
     for option, value, least, most in (("--draws", count, 1, MOST), ("--seed", seed, 0, 2**32 - 1)):
         if not least <= value <= most:
-            raise StageError(option, str(value), f"a whole number from {least} to {most}", f"{option} 1000")
+            raise InputError(option, str(value), f"a whole number from {least} to {most}", f"{option} 1000")
     try:
         known = read_correlations(beside(path), load(path)) if beside(path).exists() else Correlations()
         return draw(stage, known.among(stage.uncertain()), count, seed)
-    except StageError as error:
+    except InputError as error:
         raise error if error.origin else error.found_in("--draws") from None
 
 

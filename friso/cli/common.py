@@ -13,7 +13,8 @@ from typing import Annotated
 
 import typer
 
-from friso.quantities import Quantity, StageError, positive
+from friso.errors import InputError
+from friso.quantities import Quantity, positive
 from friso.stage import Stage, load, parse_set
 
 INTERRUPTED = 130
@@ -74,7 +75,7 @@ def read_stage(
     path: Path, overrides: list[str] | None, leaves_out: Sequence[str] = AS_BUILT, drawn: bool = False
 ) -> Stage:
     """The stage of the file with the overrides; tables that the command leaves out are mentioned, and that the centres
-    of uncertain keys are used unless they are `drawn`. Raises StageError."""
+    of uncertain keys are used unless they are `drawn`. Raises InputError."""
     stage = with_overrides(load(path), overrides)
     keys = [] if drawn else [*stage.uncertain()]
     if keys:
@@ -91,50 +92,50 @@ def read_stage(
 
 
 def with_overrides(stage: Stage, overrides: list[str] | None) -> Stage:
-    """The stage with the KEY=VALUE of --set. Raises StageError."""
+    """The stage with the KEY=VALUE of --set. Raises InputError."""
     changes = dict(parse_set(text) for text in overrides or [])
     return stage.replace(changes) if changes else stage
 
 
 def key_values(given: list[tuple[str, str]], example: str) -> dict[str, str]:
-    """Keys to values from options with their KEY=VALUE. Raises StageError."""
+    """Keys to values from options with their KEY=VALUE. Raises InputError."""
     pairs: dict[str, str] = {}
     for option, text in given:
         key, equals, value = text.partition("=")
         key = key.strip()
         if not (equals and key and value.strip()):
-            raise StageError(option, text, "KEY=VALUE", example)
+            raise InputError(option, text, "KEY=VALUE", example)
         if key in pairs:
-            raise StageError(option, f"{key} a second time", "every key once", example)
+            raise InputError(option, f"{key} a second time", "every key once", example)
         pairs[key] = value.strip()
     return pairs
 
 
 def made_folder(path: Path) -> Path:
-    """The folder, made if it is not there. Raises StageError."""
+    """The folder, made if it is not there. Raises InputError."""
     try:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         expected = f"a folder that can be written ({error.strerror})"
-        raise StageError("--out", str(path), expected, "--out report") from None
+        raise InputError("--out", str(path), expected, "--out report") from None
     return path
 
 
 def check_place(folder: Path, written: Sequence[str], page: str, given: Sequence[Path]) -> None:
-    """Raises StageError where one of the files written would cost one that is read here, or that is not of an earlier
+    """Raises InputError where one of the files written would cost one that is read here, or that is not of an earlier
     run (which has left its `page` beside it), and where the folder cannot be written."""
     for path in (folder / name for name in written):
         if not path.exists():
             continue
         expected = "another folder, or the files moved out of the way"
         if any(each.exists() and path.samefile(each) for each in given):
-            raise StageError("--out", f"{folder}, where {path.name} is read", expected, f"--out {folder}-2")
+            raise InputError("--out", f"{folder}, where {path.name} is read", expected, f"--out {folder}-2")
         if not (folder / page).exists():
-            raise StageError("--out", f"{folder}, with a {path.name} of no earlier run", expected, f"--out {folder}-2")
+            raise InputError("--out", f"{folder}, with a {path.name} of no earlier run", expected, f"--out {folder}-2")
     was_there = folder.exists()
     made_folder(folder)  # now, not after a minute of computing
     if not os.access(folder, os.W_OK):
-        raise StageError("--out", str(folder), "a folder that can be written", f"--out {folder}-2")
+        raise InputError("--out", str(folder), "a folder that can be written", f"--out {folder}-2")
     if not was_there:
         folder.rmdir()
 
@@ -145,11 +146,11 @@ def read_tolerance(text: str) -> float:
     try:
         return checked_rtol(float(text))
     except ValueError:
-        raise StageError("--rtol", text, "a number from 1e-12 to 1e-2", "--rtol 1e-6") from None
+        raise InputError("--rtol", text, "a number from 1e-12 to 1e-2", "--rtol 1e-6") from None
 
 
 def read_sample_time(text: str) -> float:
     try:
         return Quantity("s", positive, "1 ms").read(text)
-    except StageError as error:
+    except InputError as error:
         raise error.under("--sample-time") from None

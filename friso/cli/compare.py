@@ -22,7 +22,8 @@ from friso.cli.common import (
     read_stage,
 )
 from friso.cli.progress import step_bar
-from friso.quantities import Quantity, StageError, positive
+from friso.errors import InputError
+from friso.quantities import Quantity, positive
 from friso.stage import Stage, load
 
 if TYPE_CHECKING:
@@ -74,12 +75,12 @@ def compare(
 def _tolerance(text: str) -> float:
     try:
         return float(Quantity("m", positive, "1 um").read(text))
-    except StageError as error:
+    except InputError as error:
         raise error.under("--within") from None
 
 
 def _correlations(path: Path, stage: Stage) -> Correlations:
-    """Those beside the stage file. Raises StageError."""
+    """Those beside the stage file. Raises InputError."""
     from friso.stage.correlations import Correlations, beside, read_correlations
 
     known = read_correlations(beside(path), load(path)) if beside(path).exists() else Correlations()

@@ -67,7 +67,7 @@ def design(
 
 
 def _designed(stage: Stage, spec: Spec, out: Path) -> tuple[Design, list[Path]]:
-    """The design and its files, with progress on a terminal. Raises StageError, NoDesign."""
+    """The design and its files, with progress on a terminal. Raises InputError, NoDesign."""
     from friso.design.method import design as method
 
     with step_bar() as bar:

@@ -10,7 +10,8 @@ import typer
 
 from friso.cli.common import AsJson, OutFolder, Overrides, StageFile, leave, made_folder, print_table, read_stage, say
 from friso.cli.progress import busy
-from friso.quantities import Quantity, StageError, positive, quoted
+from friso.errors import InputError
+from friso.quantities import Quantity, positive, quoted
 from friso.stage import Stage
 
 if TYPE_CHECKING:
@@ -61,30 +62,30 @@ def flexure(
 
 
 def _mechanism(stage: Stage, origin: str) -> Mechanism:
-    """The leaf springs of the stage. Raises StageError without [flexure]."""
+    """The leaf springs of the stage. Raises InputError without [flexure]."""
     from friso.flexure.mechanism import Mechanism
 
     if stage.flexure is None:
         expected = "a table of leaf springs, from which joint.stiffness and [parasitic] follow (leave these out)"
-        raise StageError("flexure", "no [flexure]", expected, EXAMPLE, origin)
+        raise InputError("flexure", "no [flexure]", expected, EXAMPLE, origin)
     return Mechanism.of(stage.flat())
 
 
 def _stroke(text: str | None, stage: Stage, mechanism: Mechanism) -> float:
-    """The stroke [m], of the option or else of the joint, which leaves can bend by. Raises StageError."""
+    """The stroke [m], of the option or else of the joint, which leaves can bend by. Raises InputError."""
     key, example = ("joint.stroke", 'stroke = "1 mm"') if text is None else ("--stroke", '--stroke "1 mm"')
     if text is None:
         given = stage.joint and stage.joint.stroke
         if given is None:
-            raise StageError("--stroke", "nothing", "the stroke, since the joint has none", '--stroke "1 mm"')
+            raise InputError("--stroke", "nothing", "the stroke, since the joint has none", '--stroke "1 mm"')
     else:
         try:
             given = STROKE.read(text)
-        except StageError as error:
-            raise StageError(key, error.given, error.expected, example) from None
+        except InputError as error:
+            raise InputError(key, error.given, error.expected, example) from None
     if given > mechanism.length / 2:
         expected = f"at most half the length of the leaves, {1e3 * mechanism.length / 2:g} mm"
-        raise StageError(key, quoted(getattr(given, "text", given)), expected, example)
+        raise InputError(key, quoted(getattr(given, "text", given)), expected, example)
     return float(given)
 
 

@@ -11,7 +11,8 @@ import typer
 
 from friso.cli.common import AsJson, Overrides, check_place, made_folder, print_wrapped, with_overrides
 from friso.cli.progress import step_bar
-from friso.quantities import Quantity, StageError, positive
+from friso.errors import InputError
+from friso.quantities import Quantity, positive
 from friso.stage import load
 
 if TYPE_CHECKING:
@@ -67,7 +68,7 @@ def identify(
 
     known = None if stage is None else with_overrides(load(stage), overrides)
     if known is None and overrides:
-        raise StageError("--set", overrides[0], "a stage whose keys to override", "--stage stage.toml")
+        raise InputError("--set", overrides[0], "a stage whose keys to override", "--stage stage.toml")
     options = _options(bandwidth, band, period)
     told = from_options(maps or (), units or (), scales or (), dt, kind)
     check_place(out, (STAGE,), PAGE, [*logs, *(predict or []), *([stage] if stage else [])])
@@ -86,7 +87,7 @@ def identify(
 
 
 def _options(bandwidth: str | None, band: str | None, period: str | None) -> Options:
-    """The options of the analyses. Raises StageError."""
+    """The options of the analyses. Raises InputError."""
     from friso.identify.method import Options
     from friso.intervals import Span
 
@@ -94,23 +95,23 @@ def _options(bandwidth: str | None, band: str | None, period: str | None) -> Opt
     for name, text, quantity in (("--bandwidth", bandwidth, _HERTZ), ("--period", period, _SECONDS)):
         try:
             values.append(None if text is None else float(quantity.read(text)))
-        except StageError as error:
+        except InputError as error:
             raise error.found_in(name) from None
     try:
         limits = None if band is None else Span(_HERTZ, "3 Hz .. 20 Hz").read(band)
-    except StageError as error:
+    except InputError as error:
         raise error.found_in("--band") from None
     return Options(values[0], None if limits is None else (limits.low, limits.high), values[1])
 
 
 def _predictions(found: Identification, given: Sequence[Given], options: Options) -> list[Prediction]:
-    """The other logs, predicted. Raises StageError."""
+    """The other logs, predicted. Raises InputError."""
     from friso.identify.logs.log import Log
     from friso.identify.method import predict
 
     logs = [each.source for each in given if isinstance(each.source, Log)]
     if len(logs) < len(given):
-        raise StageError("--predict", "a measured frequency response", "a log over time", "--predict other.mat")
+        raise InputError("--predict", "a measured frequency response", "a log over time", "--predict other.mat")
     return [predict(found, log, options) for log in logs]
 
 

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from friso.quantities import StageError
+from friso.errors import InputError
 
 
 def init(
@@ -24,5 +24,5 @@ def init(
             file.write(template)
     except OSError as error:
         expected = f"a new file in a folder that can be written ({error.strerror}); nothing was overwritten"
-        raise StageError("STAGE.toml", str(path), expected, "friso init new.toml") from None
+        raise InputError("STAGE.toml", str(path), expected, "friso init new.toml") from None
     print(f"wrote {path}; edit it, then: friso check {path}")

@@ -14,7 +14,7 @@ import typer
 
 from friso.cli.common import AsJson, Overrides, read_stage, read_tolerance, say
 from friso.cli.progress import progress_bar
-from friso.quantities import StageError
+from friso.errors import InputError
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -89,7 +89,7 @@ def map_cells(
         if source.is_dir():
             if varied != Varied() or overrides or rtol or refine or out:
                 given = "a store together with what makes another study of it"
-                raise StageError(str(source), given, "a store alone: it knows its study", f"friso map {source}")
+                raise InputError(str(source), given, "a store alone: it knows its study", f"friso map {source}")
             store, study = source, stored_study(source, metric)
         else:
             stage = read_stage(source, overrides)
@@ -125,11 +125,11 @@ def _chosen_rtol(text: str, study: Study, crew: Crew) -> float:
 @contextmanager
 def _crew(workers: int | None, scheduler: str | None) -> Iterator[Crew]:
     if workers is not None and scheduler is not None:
-        raise StageError("--workers", "--workers and --scheduler", "one of the two", "--workers 4")
+        raise InputError("--workers", "--workers and --scheduler", "one of the two", "--workers 4")
     most = os.cpu_count() or 1
     if workers is not None and not 1 <= workers <= most:
         expected = f"1 worker or more, up to the {most} processors"
-        raise StageError("--workers", str(workers), expected, "--workers 1")
+        raise InputError("--workers", str(workers), expected, "--workers 1")
     if scheduler is not None:
         from friso.studies.distribute import connected
 
@@ -170,9 +170,9 @@ def _run(study: Study, store: Path, crew: Crew, share: float) -> xr.Dataset:
 def _checked_exports(export: list[Path] | None) -> list[Path]:
     for path in export or []:
         if path.suffix not in (".nc", ".csv"):
-            raise StageError("--export", str(path), "a file that ends in .nc or .csv", "--export map.nc")
+            raise InputError("--export", str(path), "a file that ends in .nc or .csv", "--export map.nc")
         if not path.parent.is_dir():
-            raise StageError("--export", str(path), "a file in a folder that is there", "--export map.nc")
+            raise InputError("--export", str(path), "a file in a folder that is there", "--export map.nc")
     return list(export or [])
 
 

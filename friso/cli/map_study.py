@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from friso.cli.common import key_values
-from friso.quantities import StageError
+from friso.errors import InputError
 from friso.stage import Stage
 from friso.studies.cells import CYCLE_UNITS, USUAL
 from friso.studies.execute import Crew
@@ -43,28 +43,28 @@ class Varied:
 
     @property
     def axes(self) -> dict[str, str]:
-        """Name to range of every axis. Raises StageError."""
+        """Name to range of every axis. Raises InputError."""
         named = {"--x": self.x, "--y": self.y} | {f"--axis {k + 1}": text for k, text in enumerate(self.more)}
         return key_values([(option, text) for option, text in named.items() if text is not None], AXIS_EXAMPLE)
 
     @property
     def linked(self) -> dict[str, str]:
-        """Key to expression of every link. Raises StageError."""
+        """Key to expression of every link. Raises InputError."""
         return key_values([("--link", text) for text in self.links], '--link masses.cart="0.7 * mass"')
 
 
 def study_for(stage: Stage, varied: Varied, metric: str, refine: bool, most: int | None, crew: Crew) -> Study:
-    """The study asked for. Raises StageError, also if it has more than `most` cells: then with what it would cost."""
+    """The study asked for. Raises InputError, also if it has more than `most` cells: then with what it would cost."""
     axes, links = varied.axes, varied.linked
     if not axes:
-        raise StageError("--x", "no axis", "one axis or more", AXIS_EXAMPLE)
+        raise InputError("--x", "no axis", "one axis or more", AXIS_EXAMPLE)
     samples = None
     if varied.samples is not None and len(axes) == 1:
-        raise StageError("--samples", "samples of one key", "two keys or more; for one, a range with its points")
+        raise InputError("--samples", "samples of one key", "two keys or more; for one, a range with its points")
     if varied.samples is not None:
         axes, samples = {}, Samples(axes, varied.samples, "latin" if varied.latin else "sobol")
     elif varied.latin:
-        raise StageError("--latin", "no --samples beside it", "how many samples", "--samples 1024 --latin")
+        raise InputError("--latin", "no --samples beside it", "how many samples", "--samples 1024 --latin")
     request = Request(stage, axes, samples, links, varied.log)
     runs = int(request.size() * (SHARE * FINER ** len(axes) if refine else 1))
     if most is not None and runs > most:
@@ -75,7 +75,7 @@ def study_for(stage: Stage, varied: Varied, metric: str, refine: bool, most: int
 
 
 def stored_study(store: Path, metric: str) -> Study:
-    """The study of a store that is gone on with. Raises StageError."""
+    """The study of a store that is gone on with. Raises InputError."""
     from friso.studies.store import read_store
 
     with read_store(store) as runs:
@@ -83,10 +83,10 @@ def stored_study(store: Path, metric: str) -> Study:
 
 
 def _with_metric(study: Study, metric: str) -> Study:
-    """The study, if it has that metric. Raises StageError."""
+    """The study, if it has that metric. Raises InputError."""
     if metric not in study.metrics or metric == "status":
         expected = f"one of {', '.join(name for name in study.metrics if name != 'status')}"
-        raise StageError("--metric", metric, expected, "--metric peak_to_peak")
+        raise InputError("--metric", metric, expected, "--metric peak_to_peak")
     return study
 
 
@@ -95,7 +95,7 @@ def coloured_by(study: Study, metric: str) -> str:
     return "cycle_period" if metric == "period" and study.cycles else metric
 
 
-def _too_large(runs: int, trial: Study, crew: Crew) -> StageError:
+def _too_large(runs: int, trial: Study, crew: Crew) -> InputError:
     """What a study of so many runs would cost, by a trial of a few of its cells."""
     from friso.studies.execute import run_scattered
 
@@ -105,7 +105,7 @@ def _too_large(runs: int, trial: Study, crew: Crew) -> StageError:
     hours = (time.perf_counter() - start) / trial.cells * runs / 3600
     gigabytes = BYTES * len(trial.metrics) * runs / 1e9
     given = f"{runs:.3g} runs: about {hours:.2g} hours on this machine, and up to {gigabytes:.2g} GB of disk"
-    return StageError("--yes", given, "--yes, or fewer points; nothing was run", "--yes")
+    return InputError("--yes", given, "--yes, or fewer points; nothing was run", "--yes")
 
 
 def write_views(runs: xr.Dataset, store: Path, metric: str) -> list[Path]:
@@ -128,10 +128,10 @@ def _save_figure(runs: xr.Dataset, metric: str, paths: list[Path]) -> None:
 
 
 def refuse_overwriting(store: Path, exports: list[Path]) -> None:
-    """Refuse to write over files that are no earlier result of this study. Raises StageError."""
+    """Refuse to write over files that are no earlier result of this study. Raises InputError."""
     for path in exports if store.exists() else [*_view_paths(store), *exports]:
         if path.exists() or path == store:
-            raise StageError(
+            raise InputError(
                 "--out", f"{path} is there already", "another name; nothing was overwritten", "--out new.zarr"
             )
 

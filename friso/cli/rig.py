@@ -11,7 +11,7 @@ import typer
 
 from friso.cli.common import AsJson, Overrides, StageFile, check_place, made_folder, print_wrapped, say, with_overrides
 from friso.cli.progress import step_bar
-from friso.quantities import StageError
+from friso.errors import InputError
 from friso.stage import Stage, load
 
 if TYPE_CHECKING:
@@ -56,12 +56,12 @@ def rig(
     stage = with_overrides(load(stage_file), overrides)
     _told(stage)
     if not 0 <= seed < MOST_SEED:
-        raise StageError("--seed", str(seed), f"a whole number from 0, below {MOST_SEED:g}", "--seed 1")
+        raise InputError("--seed", str(seed), f"a whole number from 0, below {MOST_SEED:g}", "--seed 1")
     if out is not None:
         check_place(out, [f"{TRUTH}/stage.toml"], PAGE, [stage_file])
         if out.is_dir() and any(out.iterdir()) and not (out / TRUTH / "stage.toml").exists():
             given, expected = f"{out}, with files of no earlier rig", "an empty folder, or a new one"
-            raise StageError("--out", given, expected, f"--out {out}-2")
+            raise InputError("--out", given, expected, f"--out {out}-2")
     with step_bar() as bar:
         outcome = run(stage, seed, bar or silent)
     files = [] if out is None else _written(outcome, made_folder(out))

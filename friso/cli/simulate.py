@@ -20,7 +20,7 @@ from friso.cli.common import (
     read_tolerance,
     with_overrides,
 )
-from friso.quantities import StageError
+from friso.errors import InputError
 from friso.stage import Stage, save
 
 if TYPE_CHECKING:
@@ -66,14 +66,14 @@ def simulate(
 
 
 def _given(given: list[str], overrides: list[str] | None) -> tuple[Stage, str, float]:
-    """The stage of the one file given, a name for it, and the usual tolerance. Raises StageError."""
+    """The stage of the one file given, a name for it, and the usual tolerance. Raises InputError."""
     if len(given) != 1:
-        raise StageError("STAGE.toml", " ".join(given), "one stage file", "friso simulate rig.toml")
+        raise InputError("STAGE.toml", " ".join(given), "one stage file", "friso simulate rig.toml")
     return read_stage(Path(given[0]), overrides), Path(given[0]).stem, 1e-6
 
 
 def _cell(store: Path, given: list[str], overrides: list[str] | None) -> tuple[Stage, str, float]:
-    """The stage of a cell, a name for it, and the tolerance it was run at. Raises StageError."""
+    """The stage of a cell, a name for it, and the tolerance it was run at. Raises InputError."""
     from friso.studies.store import read_store
     from friso.studies.study import study_of
 
@@ -82,7 +82,7 @@ def _cell(store: Path, given: list[str], overrides: list[str] | None) -> tuple[S
     index = [int(text) if text.isascii() and text.isdigit() else -1 for text in given]
     inside = len(index) == len(study.shape) and all(0 <= k < n for k, n in zip(index, study.shape, strict=True))
     if not inside:
-        raise StageError(f"--cell {store}", " ".join(given), f"one number per axis: {sizes}", "3 4")
+        raise InputError(f"--cell {store}", " ".join(given), f"one number per axis: {sizes}", "3 4")
     name = f"{store.with_suffix('').name}_cell_{'_'.join(given)}"
     return with_overrides(study.cell_stage(index), overrides), name, study.rtol
 

@@ -116,7 +116,7 @@ class Design:
 
 
 def design(stage: Stage, spec: Spec, progress: Progress = lambda what, done, total: None) -> Design:
-    """Carry the method out. Raises StageError for input that cannot be used, NoDesign if nothing meets the
+    """Carry the method out. Raises InputError for input that cannot be used, NoDesign if nothing meets the
     specification."""
     base = prepared(stage, spec)
     flat, population, limit = base.flat(), corners(spec, base.flat()), spec.limit

@@ -11,8 +11,8 @@ import numpy as np
 from scipy.stats import qmc
 
 from friso.design.spec import Spec
+from friso.errors import InputError
 from friso.intervals import Interval
-from friso.quantities import StageError
 
 LEVELS = (0.0, 0.5, 1.0)
 """Shares of each range of static friction and gap that the corners take: hunting is not monotonous in them."""
@@ -44,7 +44,7 @@ def corners(spec: Spec, flat: Mapping[str, Any]) -> Population:
     """The ends of all ranges of friction and masses, and the middle of those of static friction and gap.
 
     Static friction and gap are combined with each other and with masses that are all light or all heavy; the rest of
-    the friction goes together, viscous friction against it, since it is what damps. Raises StageError where friction
+    the friction goes together, viscous friction against it, since it is what damps. Raises InputError where friction
     never falls.
     """
     friction, masses = _friction(spec, flat), _masses(spec)
@@ -66,12 +66,12 @@ def corners(spec: Spec, flat: Mapping[str, Any]) -> Population:
 
 
 def _falls(found: Population, flat: Mapping[str, Any]) -> None:
-    """Raises StageError where sliding friction is nowhere below the static one although there are both."""
+    """Raises InputError where sliding friction is nowhere below the static one although there are both."""
     static, coulomb = (found.keys.get(f"friction.{name}") for name in ("static", "coulomb"))
     if static is not None and coulomb is not None and np.all(coulomb >= static):
         given = f"static friction up to {static.max():g} N with Coulomb friction from {coulomb.min():g} N on"
         expected = "static friction above Coulomb friction, which is the stage file's where the specification has none"
-        raise StageError("friction.static", given, expected, 'static = "1 N .. 3 N", gap = "0.3 .. 0.85"')
+        raise InputError("friction.static", given, expected, 'static = "1 N .. 3 N", gap = "0.3 .. 0.85"')
 
 
 def drawn(spec: Spec, flat: Mapping[str, Any], count: int, softening: float) -> Population:
@@ -111,7 +111,7 @@ def _moves(spec: Spec, travel: np.ndarray, acceleration: np.ndarray) -> dict[str
 
 
 def _friction(spec: Spec, flat: Mapping[str, Any]) -> dict[str, Interval]:
-    """The ranges of friction by key. Raises StageError for one that the stage's friction law does not have."""
+    """The ranges of friction by key. Raises InputError for one that the stage's friction law does not have."""
     given = {name: getattr(spec.friction, name) for name in type(spec.friction).model_fields}
     ranges = {name: interval for name, interval in given.items() if interval is not None}
     for name in ranges:
@@ -119,7 +119,7 @@ def _friction(spec: Spec, flat: Mapping[str, Any]) -> dict[str, Interval]:
         if key not in flat:
             law = flat["friction.model"]
             expected = "a range of what the friction law of the stage has"
-            raise StageError(f"friction.{name}", f"a range, but the stage has {law} friction", expected)
+            raise InputError(f"friction.{name}", f"a range, but the stage has {law} friction", expected)
     return ranges
 
 

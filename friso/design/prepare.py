@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from friso.design.geometry import Geometry, moved_along
 from friso.design.spec import Spec
-from friso.quantities import StageError
+from friso.errors import InputError
 from friso.stage import Stage
 
 JOINT = '[joint] locked = true, damping = "0.5 N*s/m", limiter_stiffness = "2e7 N/m", limiter_damping = "100 N*s/m"'
@@ -13,7 +13,7 @@ JOINT = '[joint] locked = true, damping = "0.5 N*s/m", limiter_stiffness = "2e7 
 def prepared(stage: Stage, spec: Spec) -> Stage:
     """The stage with a free joint of leaf springs, the largest that the specification allows, to be replaced; masses in
     the middle of their ranges, which the controller is tuned for. Points of the stage stay where they are from the leaf
-    ends; a load is the specification's. Raises StageError for a stage that cannot be given an isolator."""
+    ends; a load is the specification's. Raises InputError for a stage that cannot be given an isolator."""
     _can_be_isolated(stage)
     own = spec.leaves
     low, high = (min(map(float, own.thickness)), own.stroke.high)
@@ -53,12 +53,12 @@ def with_leaves(base: Stage, geometry: Geometry, stroke: float) -> Stage:
 def _can_be_isolated(stage: Stage) -> None:
     if stage.masses.cart is None or stage.masses.stage is None:
         expected = "both masses: the isolator goes between cart and stage"
-        raise StageError("masses", "a single mass", expected, 'cart = "1.2 kg", stage = "0.5 kg"')
+        raise InputError("masses", "a single mass", expected, 'cart = "1.2 kg", stage = "0.5 kg"')
     if stage.joint is None or stage.joint.damping is None:
         expected = "a [joint] with its damping and its limiter; its stiffness is what is sought"
-        raise StageError("joint", "nothing" if stage.joint is None else "no damping", expected, JOINT)
+        raise InputError("joint", "nothing" if stage.joint is None else "no damping", expected, JOINT)
     if stage.friction is None or stage.friction.model == "none":
-        raise StageError("friction", "none", "friction, which the isolator is for", '[friction] model = "lugre" ...')
+        raise InputError("friction", "none", "friction, which the isolator is for", '[friction] model = "lugre" ...')
     if "controller.crossover" not in stage.flat():
         expected = "a controller by van Dijk's rules, whose crossover is sought"
-        raise StageError("controller", "gains", expected, 'crossover = "8 Hz", alpha = 0.1, beta = 2')
+        raise InputError("controller", "gains", expected, 'crossover = "8 Hz", alpha = 0.1, beta = 2')

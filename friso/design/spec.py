@@ -6,17 +6,17 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import GetCoreSchemaHandler, model_validator
 from pydantic_core import CoreSchema, core_schema
 
+from friso.errors import InputError, SpecError
 from friso.intervals import Interval, Span
 from friso.materials import materials
 from friso.quantities import (
     Number,
     Quantity,
-    StageError,
     Value,
     at_least_1,
     inside_0_1,
@@ -31,7 +31,7 @@ from friso.stage.section import Section, Table
 
 @dataclass(frozen=True)
 class Choice:
-    """A key that takes one item or a list of them, each read by `read_one`, which raises StageError."""
+    """A key that takes one item or a list of them, each read by `read_one`, which raises SpecError."""
 
     of: Quantity | Number | None
     example: str
@@ -47,18 +47,18 @@ class Choice:
         return self.example
 
     def read(self, given: Any) -> tuple[Any, ...]:
-        """The items. Raises StageError."""
+        """The items. Raises SpecError."""
         items = given if isinstance(given, list | tuple) else [given]
         if not items:
-            raise StageError("", "an empty list", self.expected, self.example)
+            raise SpecError("", "an empty list", self.expected, self.example)
         return tuple(self._one(item) for item in items)
 
     def _one(self, given: Any) -> Any:
         if self.of:
             try:
                 return self.of.read(given)
-            except StageError as error:
-                raise StageError("", error.given, self.expected, self.example) from None
+            except InputError as error:
+                raise SpecError("", error.given, self.expected, self.example) from None
         if not isinstance(given, str) or given not in materials():
             raise unknown_material(given if isinstance(given, str) else str(given))
         return given
@@ -76,7 +76,7 @@ class Gauges(Choice):
     """A list of thicknesses, or a range that stands for the usual gauges in it."""
 
     def read(self, given: Any) -> tuple[Any, ...]:
-        """The thicknesses. Raises StageError."""
+        """The thicknesses. Raises SpecError."""
         if not (isinstance(given, str) and ".." in given):
             return super().read(given)
         assert isinstance(self.of, Quantity)
@@ -84,7 +84,7 @@ class Gauges(Choice):
         found = [f"{each:g} mm" for each in GAUGES if among.low <= each * 1e-3 * (1 + 1e-9) <= among.high * (1 + 1e-8)]
         if not found:
             expected = f"a range with a usual gauge in it ({', '.join(f'{each:g}' for each in GAUGES)} mm)"
-            raise StageError("", quoted(given), expected, 'thickness = "0.1 mm .. 0.5 mm"')
+            raise SpecError("", quoted(given), expected, 'thickness = "0.1 mm .. 0.5 mm"')
         return super().read(found)
 
 
@@ -110,7 +110,7 @@ class Machine(Section):
         if (self.bandwidth_limit is None) == (self.parasitic_frequencies is None):
             given = "both" if self.bandwidth_limit else "neither"
             example = 'bandwidth_limit = "48 Hz" or parasitic_frequencies = ["480 Hz"]'
-            raise StageError("", given, "the bandwidth limit, or the parasitic frequencies that decide it", example)
+            raise SpecError("", given, "the bandwidth limit, or the parasitic frequencies that decide it", example)
         return self
 
 
@@ -132,10 +132,10 @@ class Friction(Section):
     @model_validator(mode="after")
     def _is_not_contradictory(self) -> Self:
         if self.coulomb and self.gap:
-            raise StageError("", "coulomb together with gap", "one of the two", 'gap = "0.3 .. 0.85"')
+            raise SpecError("", "coulomb together with gap", "one of the two", 'gap = "0.3 .. 0.85"')
         if self.static and self.coulomb and self.coulomb.high > self.static.high:
             given = f"coulomb = {quoted(self.coulomb.text)}, static = {quoted(self.static.text)}"
-            raise StageError("", given, "Coulomb friction below the static friction", 'coulomb = "0.5 N .. 1 N"')
+            raise SpecError("", given, "Coulomb friction below the static friction", 'coulomb = "0.5 N .. 1 N"')
         return self
 
 
@@ -197,15 +197,15 @@ class Leaves(Section):
         thickest = max(self.thickness)
         if 2 * self.stroke.low > self.length.high:
             given = f"stroke = {quoted(self.stroke.text)}, length = {quoted(self.length.text)}"
-            raise StageError("stroke", given, "a stroke of at most half the length of the leaves", 'stroke = "1 mm"')
+            raise SpecError("stroke", given, "a stroke of at most half the length of the leaves", 'stroke = "1 mm"')
         for name in ("length", "width"):
             longest = getattr(self, name)
             if min(self.thickness) >= longest.high:
                 given = f"thickness = {quoted(self.thickness[0].text)}, {name} = {quoted(longest.text)}"
-                raise StageError("thickness", given, f"sheets thinner than the {name} of the leaves", _GAUGES)
+                raise SpecError("thickness", given, f"sheets thinner than the {name} of the leaves", _GAUGES)
         if thickest >= self.spacing.high:
             given = f"thickness up to {thickest:g} m, spacing = {quoted(self.spacing.text)}"
-            raise StageError("spacing", given, "leaves farther apart than they are thick", 'spacing = "20 mm .. 60 mm"')
+            raise SpecError("spacing", given, "leaves farther apart than they are thick", 'spacing = "20 mm .. 60 mm"')
         return self
 
 
@@ -241,6 +241,8 @@ _SAFETY = Table(lambda _: Safety, "[safety] buckling = 3")
 class Spec(Section):
     """A specification, as its file describes it."""
 
+    refusal: ClassVar[type[InputError]] = SpecError
+
     name: str = ""
     source: str = ""
     machine: Annotated[Machine, _MACHINE]
@@ -266,8 +268,8 @@ EXPECTED = "a specification; examples/specs/thesis.toml is one"
 
 
 def load_spec(path: str | os.PathLike[str]) -> Spec:
-    """The specification in a TOML file. Raises StageError."""
+    """The specification in a TOML file. Raises SpecError."""
     try:
         return Spec(**parsed(text_of(Path(path), EXPECTED, EXAMPLE), EXPECTED, EXAMPLE))
-    except StageError as error:
-        raise error.found_in(str(path)) from None
+    except InputError as error:
+        raise SpecError.of(error).found_in(str(path)) from None

@@ -12,7 +12,8 @@ from friso.engine.kernel import Kernel, kernel
 from friso.engine.tolerance import checked_rtol
 from friso.equations import motion
 from friso.equations.structure import structure
-from friso.stage import Stage, StageError
+from friso.errors import InputError
+from friso.stage import Stage
 from friso.version import VERSION
 
 if TYPE_CHECKING:
@@ -33,7 +34,7 @@ def simulate(stage: Stage, rtol: float = 1e-6, sample_time: float | None = None)
     as the stage has them; and the extrema of position minus reference over `turning_point`. `attrs` hold the stage
     as TOML text, rtol, status, steps and rejected steps. `sample_time` [s] defaults to a 20 000th of the duration;
     samples are taken from the method's dense output. A run that fails has NaN from there on, and the reason in
-    `status`. Raises StageError for a sample time and ValueError for a tolerance
+    `status`. Raises InputError for a sample time and ValueError for a tolerance
     that is not usable.
     """
     flat = stage.flat()
@@ -41,7 +42,7 @@ def simulate(stage: Stage, rtol: float = 1e-6, sample_time: float | None = None)
     interval = duration / SAMPLES if sample_time is None else sample_time
     if not duration / MOST_SAMPLES <= interval <= duration:
         given, expected = f"{interval:g} s", f"from {duration / MOST_SAMPLES:g} s to the duration, {duration:g} s"
-        raise StageError("sample_time", given, expected, "1 ms")
+        raise InputError("sample_time", given, expected, "1 ms")
     shape = kernel(structure(flat))
     (runs,) = run_chunks(shape, flat, 1, Options(rtol=checked_rtol(rtol), interval=interval))
     time = np.arange(runs.results.samples.shape[1]) * interval

@@ -10,7 +10,7 @@ from collections.abc import Hashable, Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
-from friso.quantities import StageError
+from friso.errors import InputError
 from friso.stage.tables import FrictionSection, friction_law
 
 if TYPE_CHECKING:
@@ -37,11 +37,11 @@ class Imposed:
 
 
 def imposed_form(flat: Mapping[str, Any]) -> Imposed:
-    """The law of a stage given as flat mapping. Raises StageError where it has no force."""
+    """The law of a stage given as flat mapping. Raises InputError where it has no force."""
     name = flat["friction.model"]
     law = friction_law(name)
     if law.declare is FrictionSection.declare:
-        raise StageError("friction.model", f'"{name}", without a force', "a friction law", 'model = "lugre"')
+        raise InputError("friction.model", f'"{name}", without a force', "a friction law", 'model = "lugre"')
     return Imposed(name, law.variant(flat))
 
 

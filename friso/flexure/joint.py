@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from friso.errors import InputError
 from friso.flexure import closed_forms
 from friso.flexure.evaluation import VISIBLE
 from friso.flexure.mechanism import Mechanism, along_motion
-from friso.quantities import StageError
 from friso.stage.flexure import register_derivation
 
 LEAST = 1e-9
@@ -21,14 +21,14 @@ LEAST = 1e-9
 @register_derivation("flexure")
 def joint_keys(flat: Mapping[str, Any]) -> dict[str, Any]:
     """`joint.stiffness` and the keys of [parasitic] of a stage whose leaves are given, by closed forms. Raises
-    StageError where a single mechanism buckles under its load."""
+    InputError where a single mechanism buckles under its load."""
     with np.errstate(all="ignore"):  # numbers that make no mechanism are found out by the rules of the stage file
         it = Mechanism.of(flat)
         frequency, share = parasitic_mode(it)
         stiffness, buckling = closed_forms.loaded_drive_stiffness(it), closed_forms.buckling_load(it)
     if np.ndim(stiffness) == 0 and it.load >= buckling > 0:
         expected = f"less than the buckling load of the leaves, {float(buckling):.4g} N"
-        raise StageError("flexure.load", f"{float(it.load):.4g} N", expected, f'load = "{float(buckling) / 3:.2g} N"')
+        raise InputError("flexure.load", f"{float(it.load):.4g} N", expected, f'load = "{float(buckling) / 3:.2g} N"')
     found = {
         "joint.stiffness": stiffness,
         "parasitic.frequency": frequency,

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any
 
+from friso.errors import InputError
 from friso.frequency.friction import level
 from friso.frequency.loops import closed_loop, open_loop
 from friso.frequency.members import Members, limit_cases, limiter_states
 from friso.frequency.parts import FORCE, REFERENCE, STAGE, VELOCITY, compensator, plant
 from friso.frequency.stiffness import limiter_in_series
 from friso.frequency.system import System
-from friso.quantities import StageError, quoted
+from friso.quantities import quoted
 from friso.stage import Stage
 
 if TYPE_CHECKING:
@@ -35,7 +36,7 @@ def linear(stage: Stage, case: str | Members | None = None, part: str = "plant",
     All are in continuous time, without the sampling and delay of a drive. With `series`, a touched limiter acts by
     the formula that Table 1 of the thesis prints instead of beside the joint. Where the cart is stuck, its bristles
     follow it and are no states; a derivative of the measured velocity does not see the noise of the sensor, which has
-    none. Raises StageError for an unknown case or part, and for a state that the stage cannot be in.
+    none. Raises InputError for an unknown case or part, and for a state that the stage cannot be in.
     """
     flat: Mapping[str, Any] = stage.flat()
     cases = limit_cases(flat)
@@ -47,16 +48,16 @@ def linear(stage: Stage, case: str | Members | None = None, part: str = "plant",
 
 
 def _checked(flat: Mapping[str, Any], one: Members) -> Members:
-    """A single state, if the stage can be in it. Raises StageError."""
+    """A single state, if the stage can be in it. Raises InputError."""
     if len(one) != 1:
-        raise StageError("case", f"{len(one)} states", "a single one", "friso.linear(stage, friso.member(speed=1e-3))")
+        raise InputError("case", f"{len(one)} states", "a single one", "friso.linear(stage, friso.member(speed=1e-3))")
     if bool(one.touched[0]) not in limiter_states(flat):
         given = f"a limiter that is {'' if one.touched[0] else 'not '}touched"
-        raise StageError("case", given, "what the joint allows: free with a stroke, it may be both", "touched=False")
+        raise InputError("case", given, "what the joint allows: free with a stroke, it may be both", "touched=False")
     least, most = -level(flat, not one.forward[0]), level(flat, bool(one.forward[0]))
     if one.bias[0] and not least < one.bias[0] < most:
         expected = f"between {least:g} N and {most:g} N, at which the cart breaks away"
-        raise StageError("case", f"a bias of {one.bias[0]:g} N", expected, "friso.member(bias=0.5)")
+        raise InputError("case", f"a bias of {one.bias[0]:g} N", expected, "friso.member(bias=0.5)")
     return one
 
 
@@ -97,5 +98,5 @@ _PARTS: dict[str, Callable[[Mapping[str, Any], Members], System]] = {
 def _chosen(what: str, name: str, known: Mapping[str, Any]) -> Any:
     if name not in known:
         first = next(iter(known))
-        raise StageError(what, quoted(name), f"one of {', '.join(known)}", f'friso.linear(stage, {what}="{first}")')
+        raise InputError(what, quoted(name), f"one of {', '.join(known)}", f'friso.linear(stage, {what}="{first}")')
     return known[name]

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from friso.errors import InputError
 from friso.frequency.crossover import Limits, limits
 from friso.frequency.drive import Drive
 from friso.frequency.family import Scan, closed, loops, modes, scan, spectral_abscissa
@@ -19,7 +20,7 @@ from friso.frequency.parts import FORCE, STAGE, plant
 from friso.frequency.ranges import Range, ranges_below
 from friso.frequency.stiffness import limiter_in_series
 from friso.frequency.system import Complex
-from friso.stage import Stage, StageError
+from friso.stage import Stage
 
 AROUND = 5.0
 """Factor by which the frequencies shown reach beyond all crossovers and resonances."""
@@ -93,10 +94,10 @@ class Bode:
 
 def bode(stage: Stage, shown: Range | None = None, series: bool = False) -> Bode:
     """The linear analysis of a stage, its curves over frequencies `shown` [Hz] (default: those that matter); with
-    `series`, the thesis's formula for a touched limiter is shown beside. Raises StageError for frequencies that are not
+    `series`, the thesis's formula for a touched limiter is shown beside. Raises InputError for frequencies that are not
     usable, a controller that exerts no force, and a delay that is too long (see `Drive`)."""
     if shown is not None and not 0 < shown[0] < shown[1] < np.inf:
-        raise StageError("shown", repr(shown), "two rising frequencies [Hz]", "friso.bode(stage, (0.1, 1000.0))")
+        raise InputError("shown", repr(shown), "two rising frequencies [Hz]", "friso.bode(stage, (0.1, 1000.0))")
     flat = stage.flat()
     states = {name: (flat, one) for name, one in limit_cases(flat).items()} | (_in_series(flat) if series else {})
     known = {name: margins(*each) for name, each in states.items()}

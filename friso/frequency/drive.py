@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from scipy.signal import tf2ss
 
+from friso.errors import InputError
 from friso.frequency.system import Complex, System
-from friso.quantities import StageError
 
 LIGHT = 0.3
 """Damping ratio below which a pole is a resonance."""
@@ -43,11 +43,11 @@ class Drive:
 
     @classmethod
     def of(cls, flat: Mapping[str, Any]) -> Drive:
-        """The drive of a stage. Raises StageError for a delay of more samples than are followed."""
+        """The drive of a stage. Raises InputError for a delay of more samples than are followed."""
         drive = cls(flat.get("drive.sample_time", 0.0), flat.get("drive.delay", 0.0))
         if drive.sample_time and drive.delay > MOST_SAMPLES * drive.sample_time * (1 + 1e-9):
             given = f"{drive.delay:g} s, {drive.delay / drive.sample_time:.3g} samples of {drive.sample_time:g} s"
-            raise StageError("drive.delay", given, f"at most {MOST_SAMPLES} samples", 'delay = "100 us"')
+            raise InputError("drive.delay", given, f"at most {MOST_SAMPLES} samples", 'delay = "100 us"')
         return drive
 
     @property
@@ -125,13 +125,13 @@ def waited(machine: System, samples: int) -> System:
 
 def delayed(machine: System, delay: float, loop: float) -> System:
     """A plant with one input behind a delay [s], as a row of rational functions (Pade), whose closed loop without delay
-    has resonances of up to `loop` [rad/s]. Raises StageError where the plant's own turn too often in the delay."""
+    has resonances of up to `loop` [rad/s]. Raises InputError where the plant's own turn too often in the delay."""
     own = fastest(np.linalg.eigvals(machine.a).astype(complex)) * delay
     sections = int(np.ceil(max(LEAST_TURN, own, min(loop * delay, MOST_TURN)) / TURN))
     if sections > MOST_SECTIONS:
         expected = f"at most {MOST_SECTIONS * TURN / (2 * np.pi):.3g} periods, or a drive.sample_time"
         given = f"{delay:g} s, {own / (2 * np.pi):.3g} periods of the fastest mode"
-        raise StageError("drive.delay", given, expected, 'delay = "100 us"')
+        raise InputError("drive.delay", given, expected, 'delay = "100 us"')
     from control import pade
 
     for k in range(sections):

@@ -99,7 +99,7 @@ class Poles:
 
 def poles(flat: Mapping[str, Any], members: Members, drive: Drive) -> Poles:
     """Poles of the loop, of members all of which are stuck or none; those of a delay in continuous time are of rational
-    functions that stand for it. Raises StageError for a delay that is too long for these."""
+    functions that stand for it. Raises InputError for a delay that is too long for these."""
     machine, control = plant(flat, members).take((FORCE,), (STAGE, VELOCITY)), compensator(flat, len(members))
     bare = _cut(machine, control)
     if drive.sample_time:

@@ -77,7 +77,7 @@ class Margins:
 
 
 def margins(flat: Mapping[str, Any], one: Members) -> Margins:
-    """The margins of a stage in one of its states. Raises StageError for a delay that is too long (see `Drive`)."""
+    """The margins of a stage in one of its states. Raises InputError for a delay that is too long (see `Drive`)."""
     drive = Drive.of(flat)
     known, at = poles(flat, one, drive), response(flat, one, drive)
     closed = known.in_s[0]

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from friso.equations.structure import structure
+from friso.errors import InputError
 from friso.frequency.friction import level, speeds
-from friso.quantities import StageError
 
 BIASES, SPEEDS = 65, 257
 """Bias forces and speeds of the family, of each state of the limiter."""
@@ -63,12 +63,12 @@ class Members:
 
 
 def member(speed: float = 0.0, bias: float = 0.0, touched: bool = False, forward: bool = True) -> Members:
-    """A single state: sliding at a speed [m/s], or, at 0, stuck under a bias force [N]. Raises StageError for a speed
+    """A single state: sliding at a speed [m/s], or, at 0, stuck under a bias force [N]. Raises InputError for a speed
     that is negative and for a bias of a cart that slides."""
     if not 0 <= speed < np.inf:
-        raise StageError("speed", f"{speed} m/s", "0 or greater; forward=False for the other direction", "speed=1e-3")
+        raise InputError("speed", f"{speed} m/s", "0 or greater; forward=False for the other direction", "speed=1e-3")
     if bias and speed:
-        raise StageError("bias", f"{bias} N at {speed} m/s", "a bias of a cart that is stuck", "member(bias=1.0)")
+        raise InputError("bias", f"{bias} N at {speed} m/s", "a bias of a cart that is stuck", "member(bias=1.0)")
     return Members(np.array([speed]), np.array([bias]), np.array([touched]), np.array([forward]))
 
 

@@ -13,11 +13,11 @@ import sympy as sp
 from friso.equations.model import assemble
 from friso.equations.pid import Loop, controller
 from friso.equations.structure import ControllerForm, Structure, shared_structure
+from friso.errors import InputError
 from friso.frequency.declared import Declared
 from friso.frequency.friction import law_of, operating_point
 from friso.frequency.members import Members
 from friso.frequency.system import System
-from friso.quantities import StageError
 
 FORCE, DISTURBANCE, REFERENCE, NOISE = "force", "disturbance on cart", "reference", "sensor noise"
 STAGE, CART, DEFLECTION, VELOCITY = "stage", "cart", "joint deflection", "stage velocity"
@@ -47,13 +47,13 @@ def mechanics(flat: Mapping[str, Any], touched: np.ndarray) -> System:
 
 
 def compensator(flat: Mapping[str, Any], members: int) -> System:
-    """The controller: from reference, position [m] and velocity [m/s] of the stage to the force [N]. Raises StageError
+    """The controller: from reference, position [m] and velocity [m/s] of the stage to the force [N]. Raises InputError
     for one that exerts none."""
     form = shared_structure(flat).controller
     assert form is not None  # a stage file has a controller
     found = _compensator(replace(form, limited=False)).at(flat, members)
     if not (found.c.any() or found.d.any()):
-        raise StageError("controller", "gains that are all 0", "a controller that acts", 'kp = "3 N/m"')
+        raise InputError("controller", "gains that are all 0", "a controller that acts", 'kp = "3 N/m"')
     return found
 
 

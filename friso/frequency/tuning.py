@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from friso.equations.pid import van_dijk_numbers
+from friso.errors import InputError
 from friso.frequency.margins import Margins, margins
 from friso.frequency.members import member
-from friso.quantities import StageError
 from friso.stage.stage import numeric_keys
 
 
@@ -30,7 +30,7 @@ class Tuning:
 
 def tuning(crossover: float, alpha: float, beta: float, mass: float) -> Tuning:
     """The controller for a mass [kg] at a crossover [Hz], by van Dijk's rules, and how it does on that mass. Raises
-    StageError for numbers that no stage file may have."""
+    InputError for numbers that no stage file may have."""
     flat = {
         "friction.model": "none",
         "masses.stage": mass,
@@ -42,5 +42,5 @@ def tuning(crossover: float, alpha: float, beta: float, mass: float) -> Tuning:
     }
     for key, item in numeric_keys({**flat, "motion.kind": "hold"}).items():
         if key in flat and not item.bound.holds(flat[key]):
-            raise StageError(key.split(".")[1], str(flat[key]), item.bound.text, "friso.tuning(8.0, 0.1, 2.0, 1.7)")
+            raise InputError(key.split(".")[1], str(flat[key]), item.bound.text, "friso.tuning(8.0, 0.1, 2.0, 1.7)")
     return Tuning(**van_dijk_numbers(flat), margins=margins(flat, member()))

@@ -14,11 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import butter, cheby1, sosfiltfilt, welch
 
+from friso.errors import InputError
 from friso.identify.estimate import Estimate
 from friso.identify.experiments.common import cart
 from friso.identify.logs.log import Log
 from friso.identify.spread import spread_of
-from friso.quantities import StageError
 
 SMOOTH, DECIMATE = 5.0, 2.0
 """Cut-off frequencies, in units of the motion's bandwidth, of the filter of the position and of the decimation, which
@@ -93,7 +93,7 @@ def motion(position: np.ndarray, sample_time: float, cutoff: float) -> Motion:
 
 def bandwidth_of(position: np.ndarray, sample_time: float) -> float:
     """The bandwidth [Hz] of a motion, shape (n,) [m]: that below which its acceleration has 95 % of its power, as far
-    as the position stands out of its noise. Raises StageError where it does nowhere."""
+    as the position stands out of its noise. Raises InputError where it does nowhere."""
     pieces = min(len(position), max(256, len(position) // PIECES))
     frequency, power = welch(position, 1 / sample_time, nperseg=pieces, detrend="linear")
     noise = np.median(power[3 * len(power) // 4 :])
@@ -101,7 +101,7 @@ def bandwidth_of(position: np.ndarray, sample_time: float) -> float:
     seen = slice(0, below[0] if below.size else len(power))
     share = np.cumsum((power - noise)[seen] * frequency[seen] ** 4)
     if not share.size or not share[-1] > 0:
-        raise StageError("position", "nothing but noise", "a motion that stands out of it", "a larger or faster move")
+        raise InputError("position", "nothing but noise", "a motion that stands out of it", "a larger or faster move")
     return float(frequency[seen][np.searchsorted(share, ENERGY * share[-1])])
 
 
@@ -121,13 +121,13 @@ def inverse_model(
     With `by_direction`, both frictions have a value for each direction, and there is no offset, which could not be told
     from a difference of the Coulomb frictions. `bandwidth` [Hz] is that of the motion, told from the log unless given.
     Of a stage on a joint, `cart_share` is the share of the mass that moves with the measured cart, as does friction.
-    Raises StageError for a log too short.
+    Raises InputError for a log too short.
     """
     band = bandwidth or bandwidth_of(log["position"], log.sample_time)
     longest = max(part.stop - part.start for part in log.segments) * log.sample_time
     if band * longest < 1:
         given, expected = f"{band:.3g} Hz for {longest:.3g} s", "at least one period of it in the log"
-        raise StageError("--bandwidth", given, expected, '--bandwidth "20 Hz"', log.name)
+        raise InputError("--bandwidth", given, expected, '--bandwidth "20 Hz"', log.name)
     parts = [_rows(log, part, band, by_direction, cart_share) for part in log.segments]
     time, columns, force = (np.concatenate([part[i] for part in parts]) for i in range(3))
     speed = np.abs(columns[:, 1] + columns[:, 3]) if by_direction else np.abs(columns[:, 1])
@@ -135,7 +135,7 @@ def inverse_model(
     time, columns, force = time[slides], columns[slides], force[slides]
     if len(force) < LEAST:
         given = f"{len(log.time)} samples, {len(force)} of them in motion after decimation to {5 * band:.3g} Hz"
-        raise StageError("position", given, f"at least {LEAST} in motion after decimation", "a longer log")
+        raise InputError("position", given, f"at least {LEAST} in motion after decimation", "a longer log")
     both = all(directions(log["position"]))
     if not both and not by_direction:
         columns[:, 3] = 0.0  # with Coulomb friction in one direction, which it is added to
@@ -149,7 +149,7 @@ def inverse_model(
     )
     if estimates[0].high < 0:
         expected = "a force that accelerates the mass forward where it is positive: give its scale the other sign"
-        raise StageError("force", f"a mass of {solution[0]:.3g} kg", expected, '--scale force="-35 N/V"', log.name)
+        raise InputError("force", f"a mass of {solution[0]:.3g} kg", expected, '--scale force="-35 N/V"', log.name)
     numbers = dict(zip((name for name, _ in names), map(float, solution), strict=True))
     return InverseModel(estimates, numbers, covariance, time, force, fitted, band)
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from friso.errors import InputError
 from friso.identify.combine import Correlated, combined, correlations
 from friso.identify.errors import Errors
 from friso.identify.estimate import Estimate
@@ -29,7 +30,6 @@ from friso.identify.response.analysis import Bench, analyse, predicted
 from friso.identify.response.two_mass import TwoMass
 from friso.identify.stage_file import identified, made_up
 from friso.identify.stage_keys import Fitting, fitting
-from friso.quantities import StageError
 from friso.stage import Stage
 from friso.stage.correlations import Correlations
 
@@ -108,7 +108,7 @@ def identify(
     """The stage behind logs, each with its kind of experiment, and what is known of it beforehand, `base`.
 
     With a base whose controller is the machine's, moves with a reference are simulated in closed loop. Raises
-    StageError for logs that cannot be used.
+    InputError for logs that cannot be used.
     """
     groups = _groups(logs)
     stage = base or _around(logs)
@@ -159,7 +159,7 @@ class Prediction:
 
 def predict(found: Identification, log: Log, options: Options) -> Prediction:
     """Another log of the same machine, predicted by the first experiment that can: the stage as its log alone shows it,
-    not as combined, so that the errors are those of one record on another. Raises StageError where none can."""
+    not as combined, so that the errors are those of one record on another. Raises InputError where none can."""
     results = [each.result for each in found.experiments]
     for result in results:
         if isinstance(result, Moves) and "reference" in log:
@@ -168,7 +168,7 @@ def predict(found: Identification, log: Log, options: Options) -> Prediction:
         if isinstance(result, Bench):
             return Prediction(log, response_errors=predicted(result, log, options.period))
     expected = "a log with a reference beside moves, or one of the bench beside frequency responses"
-    raise StageError("--predict", f"a log with {', '.join(log.signals)}", expected, "--map reference=SetPos", log.name)
+    raise InputError("--predict", f"a log with {', '.join(log.signals)}", expected, "--map reference=SetPos", log.name)
 
 
 def _groups(logs: Sequence[tuple[Source, str]]) -> list[tuple[str, tuple[Source, ...]]]:
@@ -221,11 +221,11 @@ def _analysed(
 
 def _as_set_up(stage: Stage, log: Log) -> dict[str, Any]:
     """The flat keys of the stage as it was set up for a log; what the stage does not have is left out. Raises
-    StageError."""
+    InputError."""
     given = stage.flat()
     try:
         return stage.replace({key: text for key, text in log.setup.items() if key in given}).flat()
-    except StageError as error:
+    except InputError as error:
         raise error.found_in(f"{log.name}, [setup]") from None
 
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from friso.errors import InputError
 from friso.identify.errors import Errors, Residual, errors_of, residual_of, unexplained
 from friso.identify.estimate import Estimate
 from friso.identify.inverse_model import SMOOTH, InverseModel, directions, inverse_model, motion
@@ -19,7 +20,6 @@ from friso.identify.output_error.parameters import MASS, keys_of, parameters_of
 from friso.identify.output_error.problem import Problem, Simulated, closed_loop, tracking
 from friso.identify.output_error.profile import Profile
 from friso.identify.output_error.shown import fit_shown
-from friso.quantities import StageError
 
 
 @dataclass(frozen=True)
@@ -67,7 +67,7 @@ def identify_moves(log: Log, flat: Mapping[str, Any], own_loop: bool, bandwidth:
 
     With `own_loop` the stage's controller is the machine's, and the closed loop is simulated on the log's reference;
     else the model follows the log's position. `bandwidth` [Hz] is the motion's, told from the force unless given.
-    Raises StageError for a log without position or force.
+    Raises InputError for a log without position or force.
     """
     _has(log, ("position", "force", *(("reference",) if own_loop else ())))
     part = log.longest
@@ -91,11 +91,11 @@ def identify_moves(log: Log, flat: Mapping[str, Any], own_loop: bool, bandwidth:
 def predict(found: Moves, log: Log) -> tuple[slice, Simulated, Errors]:
     """Another log of the same axis simulated with what was found: the samples used, the record, its errors.
 
-    Raises StageError where the machine's own loop is not known.
+    Raises InputError where the machine's own loop is not known.
     """
     if found.loop is None:
         expected = "the machine's own controller, with which another record can be simulated"
-        raise StageError("--predict", "no stage file", expected, "--stage examples/emps_axis.toml", log.name)
+        raise InputError("--predict", "no stage file", expected, "--stage examples/emps_axis.toml", log.name)
     part = log.longest
     problem = _same_kind(found.loop, log, part)
     simulated = problem.record(found.fit.inner)
@@ -112,10 +112,10 @@ def _has(log: Log, roles: Sequence[str]) -> None:
     for role in roles:
         if role not in log:
             given = f"a log with {', '.join(log.signals) or 'no signals'}"
-            raise StageError(role, given, f"its {role}", f'--map {role}="NAME OF THE CHANNEL"', log.name)
+            raise InputError(role, given, f"its {role}", f'--map {role}="NAME OF THE CHANNEL"', log.name)
         if role in log.units:
             example = f'--scale {role}="35 {"N" if role == "force" else "mm"}/{log.unit(role)}"'
-            raise StageError(role, f"a channel in {log.unit(role)}", "what one of these is in SI", example, log.name)
+            raise InputError(role, f"a channel in {log.unit(role)}", "what one of these is in SI", example, log.name)
 
 
 def _problems(

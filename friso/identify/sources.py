@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
+from friso.errors import InputError
 from friso.identify.logs.assemble import read_log
 from friso.identify.logs.log import Log
 from friso.identify.logs.mapping import Mapping, load, save
@@ -18,7 +19,7 @@ from friso.identify.logs.roles import find
 from friso.identify.method import FREQUENCY, KINDS, MOVES, STICK_SLIP, Source
 from friso.identify.response.analysis import external
 from friso.identify.response.period import find_periods
-from friso.quantities import StageError, quoted
+from friso.quantities import quoted
 
 FEW, BACK = 7.0, 0.1
 """Harmonics that an excitation has at least, and as many turns in each period, each by such a share of the range: our
@@ -42,13 +43,13 @@ class Given:
 
 
 def read_all(paths: Sequence[Path], told: Mapping, folder: Path) -> list[Given]:
-    """The files, mapped as told, or as kept from an earlier time beside them or in `folder`. Raises StageError.
+    """The files, mapped as told, or as kept from an earlier time beside them or in `folder`. Raises InputError.
 
     Of several files, each takes what is told about channels that it has.
     """
     if told.experiment is not None and told.experiment not in KINDS:
         like = next(iter(get_close_matches(told.experiment, KINDS, 1)), MOVES)
-        raise StageError("--as", quoted(told.experiment), f"one of {', '.join(KINDS)}", f"--as {like}")
+        raise InputError("--as", quoted(told.experiment), f"one of {', '.join(KINDS)}", f"--as {like}")
     return [_read(path, _applicable(told, path, paths), folder) for path in paths]
 
 
@@ -69,7 +70,7 @@ def _has(path: Path, name: str, role: str) -> bool:
         return False
     try:
         find(read_table(path), name, role)
-    except StageError:
+    except InputError:
         return False
     return True
 
@@ -91,7 +92,7 @@ def _read(path: Path, told: Mapping, folder: Path) -> Given:
 
 def keep(given: Given, folder: Path) -> Given:
     """The file with its mapping kept beside it, or in `folder`, for the next time: once something came of it. Raises
-    StageError."""
+    InputError."""
     if given.mapping == Mapping():
         return given
     return replace(given, kept=save(given.mapping, given.path, folder))
@@ -107,7 +108,7 @@ def _kind(log: Log, path: Path) -> tuple[str, str]:
     """A frequency response where a periodic excitation moves a stage whose reference does not move, moves otherwise.
 
     A move that is repeated is periodic too: it rests in between, or holds few frequencies and turns its force seldom.
-    Raises StageError where the two cannot be told apart.
+    Raises InputError where the two cannot be told apart.
     """
     part = log.longest
     if "reference" in log and np.ptp(log["reference"][part]) > 0:
@@ -115,10 +116,10 @@ def _kind(log: Log, path: Path) -> tuple[str, str]:
     signal = external(log) or "force"
     try:
         found = find_periods(log[signal][part])
-    except StageError:
+    except InputError:
         if "reference" in log:
             given = "a log whose reference stands still, with nothing periodic in it"
-            raise StageError("--as", given, "a log in which the stage is moved", f"--as {MOVES}", str(path)) from None
+            raise InputError("--as", given, "a log in which the stage is moved", f"--as {MOVES}", str(path)) from None
         return MOVES, f"the {signal} does not repeat, and there is no reference that moves"
     repeats = f"the {signal} repeats every {found.samples} samples"
     if _rest(log["position"][part][found.start : found.stop], found.samples) > RESTS:
@@ -131,7 +132,7 @@ def _kind(log: Log, path: Path) -> tuple[str, str]:
         return MOVES, f"{repeats}, but turns seldom and holds few frequencies"
     given = f"a log in which {repeats}, holds about {lines:.0f} harmonics and turns {turns} times in between"
     expected = "to be told whether that is a move which is repeated (moves) or an excitation (frequency)"
-    raise StageError("--as", given, expected, f"--as {MOVES}, or --as {FREQUENCY}", str(path))
+    raise InputError("--as", given, expected, f"--as {MOVES}, or --as {FREQUENCY}", str(path))
 
 
 def _lines(period: np.ndarray) -> float:

@@ -59,7 +59,7 @@ def made_up(log: Log, found: InverseModel) -> Stage:
 def identified(stage: Stage, estimates: Iterable[Estimate], logs: Iterable[str]) -> Stage:
     """The stage with the estimates of its keys, as values with 95 % intervals or as ranges.
 
-    A stiffness that follows from a [flexure] stays as it follows. Raises StageError where they do not fit together,
+    A stiffness that follows from a [flexure] stays as it follows. Raises InputError where they do not fit together,
     which those of `fitting` do.
     """
     changes: dict[str, object] = {}

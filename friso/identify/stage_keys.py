@@ -7,11 +7,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from friso.errors import InputError
 from friso.identify.estimate import Estimate
 from friso.identify.output_error.parameters import HIGHEST_RATIO
 from friso.identify.stage_file import identified, written
 from friso.intervals import uncertain_value
-from friso.quantities import Number, Quantity, StageError
+from friso.quantities import Number, Quantity
 from friso.stage import Stage
 from friso.stage.stage import numeric_keys
 
@@ -105,7 +106,7 @@ def _allowed(each: Estimate, field: Quantity | Number) -> bool:
     """Whether the key takes the text of the estimate."""
     try:
         uncertain_value(written(each), field)
-    except StageError:
+    except InputError:
         return False
     return True
 
@@ -147,7 +148,7 @@ def _together(stage: Stage, kept: dict[str, Estimate], said: list[str]) -> tuple
     for unit in units:
         try:
             identified(stage, [*fine, *(kept[key] for key in unit)], ())
-        except StageError as error:
+        except InputError as error:
             for key in unit:
                 del kept[key]
             said.append(f"{', '.join(unit)}: left out, since the stage file takes {error.expected}")

@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.special import exprel
 
-from friso.quantities import StageError
+from friso.errors import InputError
 from friso.stage.rig import Floor
 
 FLOOR = int.from_bytes(b"floor")
@@ -18,13 +18,13 @@ def floor_acceleration(floor: Floor, duration: float, interval: float, seed: int
     """A Gaussian realisation of the floor's acceleration [m/s^2] at 0, `interval`, ... up to `duration` [s].
 
     Shape (n,). One wave per frequency of the Fourier transform, with the variance that the spectrum has in the band
-    around it; so the variance is that of the spectrum however short the record is. Raises StageError for a
+    around it; so the variance is that of the spectrum however short the record is. Raises InputError for a
     spectrum that reaches beyond half the sampling frequency.
     """
     highest = floor.frequency[-1]
     if highest * interval > 0.5:
         expected = f"at most {0.5 / interval:g} Hz, half the sampling frequency"
-        raise StageError("floor.frequency", f"{highest.text!r}", expected, 'frequency = ["1 Hz", "100 Hz"]')
+        raise InputError("floor.frequency", f"{highest.text!r}", expected, 'frequency = ["1 Hz", "100 Hz"]')
     count = int(duration / interval * (1 + 1e-12)) + 1
     size = 1 << count.bit_length()
     step = 1 / (size * interval)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from scipy.special import ndtri
 
-from friso.quantities import StageError
+from friso.errors import InputError
 
 PHASES, FIELD = int.from_bytes(b"phases"), int.from_bytes(b"field")
 """Which of a seed's random numbers: Philox takes them as the second half of its key."""
@@ -32,7 +32,7 @@ def friction_factors(flat: Mapping[str, Any], places: np.ndarray, seed: int | No
     (1 + offset) (1 + sum of A_n cos(2 pi n x / pitch + phase_n)) exp(s g - s^2 / 2), with s^2 = log(1 + deviation^2):
     lognormal of mean 1 and of the standard deviation given, hence positive, from one Gaussian field g for both, since
     both follow the same preload. Flat keys "rail.*" describe it, all 1 without them; `seed` replaces that of the rail.
-    What stands at a place does not depend on the other places. Raises StageError for a correlation length that
+    What stands at a place does not depend on the other places. Raises InputError for a correlation length that
     is no more than a speck of the places' range.
     """
     rail = {key.removeprefix("rail."): value for key, value in flat.items() if key.startswith("rail.")}
@@ -52,7 +52,7 @@ def gaussian_field(places: np.ndarray, length: float, seed: int) -> np.ndarray:
 
     White noise in cells that are counted from place 0, smoothed by exp(-(d / length)^2). A random Fourier series needs
     many more terms than the 21 here until it is Gaussian, and its few longest waves repeat along a rail. Raises
-    StageError.
+    InputError.
     """
     at = places * (CELLS / length)
     cell = np.rint(at)
@@ -73,7 +73,7 @@ def _white(first: int, count: int, seed: int, length: float) -> np.ndarray:
     if count > MOST_CELLS:
         least = length * count / MOST_CELLS
         given, expected = f"{length:.3g} m", f"at least {least:.3g} m for places that far apart"
-        raise StageError("rail.correlation_length", given, expected, 'correlation_length = "5 mm"')
+        raise InputError("rail.correlation_length", given, expected, 'correlation_length = "5 mm"')
     block, skipped = divmod(first, BLOCK)
     words = np.random.Philox(key=[seed, FIELD], counter=block % 2**256).random_raw(skipped + count)[skipped:]
     return ndtri(((words >> np.uint64(11)) + 0.5) * 2.0**-53)

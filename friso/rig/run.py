@@ -13,7 +13,7 @@ from friso.engine.batch import Options, prepare, run_batch, settings_of
 from friso.engine.kernel import Kernel, empty_results, kernel
 from friso.equations.as_built import NEUTRAL, AsBuilt, whole_samples
 from friso.equations.sampled import held_at_start
-from friso.quantities import StageError
+from friso.errors import InputError
 from friso.rig.surroundings import MARGIN, tables
 from friso.rig.task import Task
 from friso.stage import Stage
@@ -80,7 +80,7 @@ def run(
     """Runs of a stage, each with noise of its own seed, logged every `interval` [s], a whole number of samples.
 
     `changes` are flat keys to SI numbers, or arrays of one for each run: of a sweep, or of machines drawn at random.
-    The runs come chunk by chunk; they are the same for any number of threads. Raises StageError for an interval that
+    The runs come chunk by chunk; they are the same for any number of threads. Raises InputError for an interval that
     does not fit the samples.
     """
     flat = as_built_keys(stage, changes)
@@ -96,14 +96,14 @@ def run(
 
 
 def _check(flat: Mapping[str, Any], interval: float) -> None:
-    """Raises StageError for an interval that is no whole number of samples, and for a delay of too many."""
+    """Raises InputError for an interval that is no whole number of samples, and for a delay of too many."""
     if whole_samples(flat) > MOST_SAMPLES:
         given = f"{flat['drive.delay']:g} s, {whole_samples(flat)} samples of {flat['drive.sample_time']:g} s"
-        raise StageError("drive.delay", given, f"at most {MOST_SAMPLES} samples", 'delay = "100 us"')
+        raise InputError("drive.delay", given, f"at most {MOST_SAMPLES} samples", 'delay = "100 us"')
     samples = interval / flat["drive.sample_time"]
     if samples < 1 - 1e-9 or abs(samples - round(samples)) > 1e-6:
         expected = f"a whole number of samples of the drive, {flat['drive.sample_time']:g} s each"
-        raise StageError(
+        raise InputError(
             "interval", f"{interval:g} s", expected, f"{max(1, round(samples)) * flat['drive.sample_time']:g} s"
         )
 

@@ -1,6 +1,6 @@
 """The stage file: a positioning stage, its controller and its motion, with units, checked."""
 
-from friso.quantities import Number, Quantity, StageError, Value
+from friso.quantities import Number, Quantity, Value
 from friso.stage.files import load, loads, parse_set, save
 from friso.stage.section import Rule, Section
 from friso.stage.stage import Stage, numeric_keys, violations
@@ -13,7 +13,6 @@ __all__ = [
     "Rule",
     "Section",
     "Stage",
-    "StageError",
     "Value",
     "load",
     "loads",

@@ -16,8 +16,9 @@ from typing import Any
 
 import numpy as np
 
+from friso.errors import InputError, StageError
 from friso.intervals import COVERAGE
-from friso.quantities import StageError, as_toml, quoted
+from friso.quantities import as_toml, quoted
 from friso.stage.files import parsed, text_of, write_whole
 from friso.stage.section import unknown_key
 from friso.stage.stage import Stage, numeric_keys, violations
@@ -88,7 +89,7 @@ def read_correlations(path: str | os.PathLike[str], stage: Stage) -> Correlation
     try:
         found = _from(parsed(text_of(Path(path), _EXPECTED, _EXAMPLE), _EXPECTED, _EXAMPLE))
         _belongs(found, stage)
-    except StageError as error:
+    except InputError as error:
         raise error.found_in(str(path)) from None
     return found
 

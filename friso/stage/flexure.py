@@ -7,8 +7,9 @@ from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import create_model, model_validator
 
+from friso.errors import StageError
 from friso.materials import DENSITY, STRENGTH, YOUNG, materials
-from friso.quantities import Bound, Number, Quantity, StageError, Value, any_sign, at_least_1, positive, quoted
+from friso.quantities import Bound, Number, Quantity, Value, any_sign, at_least_1, positive, quoted
 from friso.stage.section import Rule, UncertainSection, nearest
 
 Derivation = Callable[[Mapping[str, Any]], dict[str, Any]]

@@ -9,11 +9,11 @@ from typing import Annotated, Any, ClassVar, Self
 from pydantic import GetCoreSchemaHandler, model_validator
 from pydantic_core import CoreSchema, core_schema
 
+from friso.errors import InputError, StageError
 from friso.quantities import (
     Bound,
     Number,
     Quantity,
-    StageError,
     Value,
     as_toml,
     at_least_1,
@@ -160,7 +160,7 @@ class Several:
             raise StageError("", quoted(given, hint), self.expected, self.written_example)
         try:
             return Values(self.of.read(item) for item in given)
-        except StageError as error:
+        except InputError as error:
             raise StageError("", error.given, self.expected, self.written_example) from None
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
@@ -187,7 +187,7 @@ class Density(Quantity):
             raise StageError("", quoted(text, "does not end with /Hz^0.5"), self.expected, self.written_example)
         try:
             return Value(super().read(amplitude), text)
-        except StageError as error:
+        except InputError as error:
             why = error.given.replace(quoted(amplitude), quoted(text))
             raise StageError("", why, self.expected, self.written_example) from None
 

@@ -16,8 +16,9 @@ from pydantic import (
 )
 from pydantic_core import CoreSchema, core_schema
 
+from friso.errors import InputError
 from friso.intervals import Interval, UncertainValue, is_range, uncertain_value
-from friso.quantities import Number, Quantity, StageError, as_toml, quoted
+from friso.quantities import Number, Quantity, as_toml, quoted
 
 
 @dataclass(frozen=True)
@@ -31,17 +32,19 @@ class Rule:
 
 
 class Section(BaseModel):
-    """A table of a TOML file. Raises StageError when it is made from wrong data."""
+    """A table of a TOML file. Raises its `refusal` when it is made from wrong data."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", strict=True)
 
     rules: ClassVar[tuple[Rule, ...]] = ()
+    refusal: ClassVar[type[InputError]] = InputError
+    """What is raised by it, and by the sections in it."""
 
     def __init__(self, /, **data: Any) -> None:
         try:
             super().__init__(**data)
         except ValidationError as error:
-            raise _first_problem(type(self), error) from None
+            raise self.refusal.of(_first_problem(type(self), error)) from None
 
     def given(self) -> dict[str, Any]:
         """The keys that the user gave, with the values as written."""
@@ -77,11 +80,11 @@ class Table:
     example: str
 
     def read(self, given: Any) -> Any:
-        """The section for a table; a section is left as it is. Raises StageError."""
+        """The section for a table; a section is left as it is. Raises InputError."""
         if isinstance(given, Section):
             return given
         if not isinstance(given, dict):
-            raise StageError("", quoted(given), "a table of keys", self.example)
+            raise InputError("", quoted(given), "a table of keys", self.example)
         return self.pick(given)(**given)
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
@@ -101,13 +104,13 @@ class Variants:
         return cls
 
     def pick(self, table: dict[str, Any]) -> type[Section]:
-        """The class for a table. Raises StageError when the tag is missing or unknown."""
+        """The class for a table. Raises InputError when the tag is missing or unknown."""
         name = table.get(self.tag)
         if isinstance(name, str) and name in self.classes:
             return self.classes[name]
         example = nearest(name, self.classes) or next(iter(self.classes))
         expected = f"one of {', '.join(map(as_toml, self.classes))}"
-        raise StageError(self.tag, quoted(name), expected, f"{self.tag} = {as_toml(example)}")
+        raise InputError(self.tag, quoted(name), expected, f"{self.tag} = {as_toml(example)}")
 
 
 def numeric_fields(cls: type[Section]) -> dict[str, Quantity | Number]:
@@ -121,33 +124,33 @@ def nearest(name: Any, known: Iterable[str]) -> str | None:
     return next(iter(difflib.get_close_matches(str(name).lower(), [*known], n=1, cutoff=0.7)), None)
 
 
-def unknown_key(key: str, known: Iterable[str], example: str = "") -> StageError:
+def unknown_key(key: str, known: Iterable[str], example: str = "") -> InputError:
     """The error for a key that does not exist, naming the nearest that does."""
     near = nearest(key, known)
     hint = f"an unknown key; did you mean {near}?" if near else "an unknown key"
-    return StageError(key, hint, f"one of {', '.join(known)}", example)
+    return InputError(key, hint, f"one of {', '.join(known)}", example)
 
 
-def _first_problem(cls: type[Section], error: ValidationError) -> StageError:
-    """One StageError from pydantic's list: an unknown key first, since it often explains a missing one."""
+def _first_problem(cls: type[Section], error: ValidationError) -> InputError:
+    """One InputError from pydantic's list: an unknown key first, since it often explains a missing one."""
     problems = sorted(error.errors(include_url=False), key=lambda problem: problem["type"] != "extra_forbidden")
     problem = problems[0]
     key = ".".join(map(str, problem["loc"]))
     cause = problem.get("ctx", {}).get("error")
-    if isinstance(cause, StageError):
+    if isinstance(cause, InputError):
         return _complete(cause, key)
     if problem["type"] == "extra_forbidden":
         near = nearest(key, cls.model_fields) or next(iter(cls.model_fields))
         return unknown_key(key, cls.model_fields, _described(cls, near)[1])
     given = "nothing" if problem["type"] == "missing" else quoted(problem["input"])
-    return StageError(key, given, *_described(cls, key))
+    return InputError(key, given, *_described(cls, key))
 
 
-def _complete(error: StageError, key: str) -> StageError:
+def _complete(error: InputError, key: str) -> InputError:
     """The error seen from the table: below `key`, which also goes before an example that is a mere value."""
     is_value = not error.key and error.example and "=" not in error.example
     example = f"{key} = {error.example}" if is_value else error.example
-    return StageError(error.key, error.given, error.expected, example).under(key)
+    return InputError(error.key, error.given, error.expected, example).under(key)
 
 
 def _described(cls: type[Section], key: str) -> tuple[str, str]:

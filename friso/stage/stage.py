@@ -6,8 +6,9 @@ from typing import Annotated, Any, ClassVar, Self
 import numpy as np
 from pydantic import field_validator, model_validator
 
+from friso.errors import InputError, StageError
 from friso.intervals import Interval
-from friso.quantities import Number, Quantity, StageError, as_toml, quoted
+from friso.quantities import Number, Quantity, as_toml, quoted
 from friso.stage.flexure import Flexure, derived, with_material
 from friso.stage.rig import Cable, Drive, Floor, Rail, Values
 from friso.stage.section import Rule, Section, Table, UncertainSection, numeric_fields, unknown_key
@@ -42,6 +43,8 @@ _MOTION = Table(MOTION.pick, '[motion] kind = "step", size = "1 mm", duration = 
 
 class Stage(Section):
     """A positioning stage with its controller and motion, as a stage file describes them."""
+
+    refusal: ClassVar[type[InputError]] = StageError
 
     name: str = ""
     source: str = ""
@@ -151,7 +154,7 @@ class Stage(Section):
             known = {key: item for key, item in known.items() if not key.startswith(("parasitic.", "joint.stiffness"))}
         for key in swept or {}:
             if key not in known:
-                raise unknown_key(key, known)
+                raise StageError.of(unknown_key(key, known))
         return derived(_with_defaults(flat | dict(swept or {})))
 
     def uncertain(self) -> dict[str, Interval]:

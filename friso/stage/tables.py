@@ -5,10 +5,10 @@ from typing import Annotated, Any, ClassVar, Literal, Self, cast
 
 from pydantic import model_validator
 
+from friso.errors import StageError
 from friso.quantities import (
     Number,
     Quantity,
-    StageError,
     Value,
     any_sign,
     at_least_1,

@@ -9,7 +9,8 @@ from typing import Any, Literal, cast
 
 import numpy as np
 
-from friso.quantities import Number, Quantity, StageError, any_sign, quoted
+from friso.errors import InputError
+from friso.quantities import Number, Quantity, any_sign, quoted
 from friso.stage import Stage, numeric_keys, parse_set
 
 Values = str | Sequence[Any] | np.ndarray | tuple[Any, str]
@@ -62,7 +63,7 @@ def read_axis(stage: Stage, name: str, values: Values, free: bool, log: bool = F
     """An axis of a stage from a text, a list or an array with a unit; a range stays a `Range`.
 
     `free` tells that links use the name, so that it needs to be no key. With `log` a range that does not say how
-    it is spaced is logarithmic. Raises StageError.
+    it is spaced is logarithmic. Raises InputError.
     """
     field = numeric_keys(stage.flat()).get(name)
     if field is None and not free:
@@ -72,7 +73,7 @@ def read_axis(stage: Stage, name: str, values: Values, free: bool, log: bool = F
         if isinstance(values, str) and ".." in values:
             return _range(name, values, reader, log)
         return _listed(name, values, reader)
-    except StageError as error:
+    except InputError as error:
         raise error.under(name) from None
 
 
@@ -104,7 +105,7 @@ class _Reader:
         if isinstance(self.field, Quantity):
             return self.field.factor(unit)
         if unit:
-            raise StageError("", f"the unit {unit}", "bare numbers, since the key has no unit", "[0.1, 0.2, 0.3]")
+            raise InputError("", f"the unit {unit}", "bare numbers, since the key has no unit", "[0.1, 0.2, 0.3]")
         return 1.0
 
     @staticmethod
@@ -112,10 +113,10 @@ class _Reader:
         for unit in ("kg", "N", "m", "s", "Hz", "m/s", "m/s^2", "N/m", "N*s/m", "N/(m*s)"):
             try:
                 Quantity(unit, any_sign, "").read(given)
-            except StageError:
+            except InputError:
                 continue
             return Quantity(unit, any_sign, f"1 {unit}")
-        raise StageError("", quoted(given), "a number with a unit that some key of the stage file has", '"1.7 kg"')
+        raise InputError("", quoted(given), "a number with a unit that some key of the stage file has", '"1.7 kg"')
 
 
 def _number(given: Any) -> float | None:
@@ -131,15 +132,15 @@ def _number(given: Any) -> float | None:
 def _range(name: str, text: str, reader: _Reader, log: bool) -> Range:
     match = _RANGE.fullmatch(text)
     if match is None:
-        raise StageError("", quoted(text), "FIRST..LAST:POINTS, with :log behind it if so wanted", RANGE_EXAMPLE)
+        raise InputError("", quoted(text), "FIRST..LAST:POINTS, with :log behind it if so wanted", RANGE_EXAMPLE)
     first, last = reader.text(match["first"]), reader.text(match["last"])
     if not first < last:
         order = "empty" if first == last else "reversed"
-        raise StageError("", quoted(text, f"{order} range"), "a range that rises", RANGE_EXAMPLE)
+        raise InputError("", quoted(text, f"{order} range"), "a range that rises", RANGE_EXAMPLE)
     scale: Scale = cast(Scale, match["scale"] or ("log" if log else "linear"))
     if scale == "log" and first <= 0:
         given = quoted(text, "a logarithmic axis never reaches 0")
-        raise StageError("", given, "a logarithmic range that begins above 0", '"10 um..1 cm:41:log"')
+        raise InputError("", given, "a logarithmic range that begins above 0", '"10 um..1 cm:41:log"')
     return Range(name, first, last, reader.unit, _count(text, match["count"]), scale)
 
 
@@ -149,7 +150,7 @@ def _count(text: str, digits: str | None) -> int | None:
     count = int(digits) if digits.strip().isascii() and digits.strip().isdigit() and len(digits) < 20 else 0
     if not 2 <= count <= MOST_POINTS:
         expected = f"2 points or more, at most {MOST_POINTS:,}"
-        raise StageError("", quoted(text, f"{digits.strip()} points"), expected, RANGE_EXAMPLE)
+        raise InputError("", quoted(text, f"{digits.strip()} points"), expected, RANGE_EXAMPLE)
     return count
 
 
@@ -159,13 +160,13 @@ def _listed(name: str, values: Values, reader: _Reader) -> Axis:
     elif isinstance(values, str):
         si = np.array([reader.text(value) for value in values.split(",")])
         if len(si) < 2:
-            raise StageError("", quoted(values, "one point"), "a range or a list of 2 points or more", RANGE_EXAMPLE)
+            raise InputError("", quoted(values, "one point"), "a range or a list of 2 points or more", RANGE_EXAMPLE)
     else:
         si = np.array([reader.text(value) for value in values], dtype=float)
     if si.ndim != 1 or not si.size:
-        raise StageError("", "no values", "a list or one-dimensional array of values", '["4 Hz", "8 Hz"]')
+        raise InputError("", "no values", "a list or one-dimensional array of values", '["4 Hz", "8 Hz"]')
     if not np.all(np.isfinite(si)):
-        raise StageError("", "values that are not finite", "finite numbers", '(np.linspace(1, 40, 41), "Hz")')
+        raise InputError("", "values that are not finite", "finite numbers", '(np.linspace(1, 40, 41), "Hz")')
     return Axis(name, si, reader.unit)
 
 
@@ -175,19 +176,19 @@ def _words(stage: Stage, key: str, values: Values) -> Axis:
     table, _, rest = key.partition(".")
     if rest and getattr(stage, table, 0) is None:
         given = f"a key of [{table}], which this stage does not have"
-        raise StageError(key, given, "a key of the stage, or a stage with that table")
+        raise InputError(key, given, "a key of the stage, or a stage with that table")
     if not rest or table not in type(stage).model_fields:
         expected = "a key of the stage file, or a name that a link uses"
-        raise StageError(key, "a name that nothing depends on", expected, 'with the link masses.cart = "0.7 * mass"')
+        raise InputError(key, "a name that nothing depends on", expected, 'with the link masses.cart = "0.7 * mass"')
     for value in options:
         stage.replace({key: value})
     if not options:
-        raise StageError(key, "no values", "a list of values", "[true, false]")
+        raise InputError(key, "no values", "a list of values", "[true, false]")
     return Axis(key, np.array(options), numeric=False)
 
 
 def read_axes(
     stage: Stage, axes: Mapping[str, Values], free: frozenset[str], log: bool = False
 ) -> tuple[Axis | Range, ...]:
-    """All axes, as `read_axis` reads them. Raises StageError."""
+    """All axes, as `read_axis` reads them. Raises InputError."""
     return tuple(read_axis(stage, name, values, name in free, log) for name, values in axes.items())

@@ -6,10 +6,10 @@ from collections.abc import Mapping
 
 from friso.engine.kernel import Wanted, kernels
 from friso.engine.tolerance import checked_rtol
+from friso.errors import InputError
 from friso.hunting.boundary import Diagram, Plane, Range, Space, diagram, plane
 from friso.hunting.cycle.find import RTOL
 from friso.hunting.cycle.hunting import cannot_hunt
-from friso.quantities import StageError
 from friso.stage import Stage, numeric_keys, violations
 from friso.studies.axes import Axis, read_axis
 from friso.studies.cells import flat_cells
@@ -36,23 +36,23 @@ def boundary(
     An axis is a key with a range, ``{"controller.crossover": "1 Hz..40 Hz"}``, logarithmic if ":log" is behind it or
     with `log`; `links` are SI expressions for keys that follow, as in `friso.sweep`. With one axis the result is a
     `Diagram`: all branches of cycles over the range and the points at which they flip or fold; with two it is a
-    `Plane`: the curves on which they do. The motion of the stage file plays no part. Raises StageError for a wrong
+    `Plane`: the curves on which they do. The motion of the stage file plays no part. Raises InputError for a wrong
     range, link or stage (one that cannot hunt), ValueError for a tolerance that is not usable.
     """
     checked_rtol(rtol)
     followers = dict(links or {})
     ranges = tuple(_range(stage, name, text, names(followers), log) for name, text in axes.items())
     if len(ranges) not in (1, 2):
-        raise StageError("axes", f"{len(ranges)} keys", "one key or two", EXAMPLE)
+        raise InputError("axes", f"{len(ranges)} keys", "one key or two", EXAMPLE)
     check_links(stage, followers, frozenset(each.key for each in ranges))
     if reason := cannot_hunt(stage):
-        raise StageError("stage", f"one that cannot hunt: {reason}", "friction and integral action", EXAMPLE)
+        raise InputError("stage", f"one that cannot hunt: {reason}", "friction and integral action", EXAMPLE)
     for each in ranges:
         if each.key.startswith("motion."):
             given = "a key of the motion, which plays no part"
-            raise StageError(each.key, given, "a key of the stage or its controller", EXAMPLE)
+            raise InputError(each.key, given, "a key of the stage or its controller", EXAMPLE)
     if rtol > LOOSEST:
-        raise StageError("rtol", f"{rtol:g}", f"at most {LOOSEST:g}, since multipliers are derivatives", "1e-9")
+        raise InputError("rtol", f"{rtol:g}", f"at most {LOOSEST:g}, since multipliers are derivatives", "1e-9")
     space = Space(ranges, lambda values: flat_cells(stage, followers, values))
     _refuse_impossible(space)
     kernels([Wanted(space.form, variational) for variational in (False, True)])
@@ -60,18 +60,18 @@ def boundary(
 
 
 def _refuse_impossible(space: Space) -> None:
-    """Raises StageError if no stage may have the values of the ranges."""
+    """Raises InputError if no stage may have the values of the ranges."""
     points = space.grid(TRIED)
     if not space.allowed(points).any():
         key, why = space.ranges[0].key, violations(space.flat(space.values(points)))[0][1]
-        raise StageError(key, "ranges that no stage may have", why, EXAMPLE)
+        raise InputError(key, "ranges that no stage may have", why, EXAMPLE)
 
 
 def _range(stage: Stage, name: str, text: str, free: frozenset[str], log: bool) -> Range:
     read = read_axis(stage, name, text, name in free, log)
     if isinstance(read, Axis) or read.count is not None:
-        raise StageError(name, repr(text), "a range FIRST..LAST, without a number of points", EXAMPLE)
+        raise InputError(name, repr(text), "a range FIRST..LAST, without a number of points", EXAMPLE)
     field = numeric_keys(stage.flat()).get(name)
     if field is not None and not (field.bound.holds(read.first) and field.bound.holds(read.last)):
-        raise StageError(name, repr(text), f"values {field.bound.text}", EXAMPLE)
+        raise InputError(name, repr(text), f"values {field.bound.text}", EXAMPLE)
     return Range(name, read.first, read.last, read.scale == "log", read.unit)

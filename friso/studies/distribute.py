@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from friso.quantities import StageError
+from friso.errors import InputError
 from friso.stage import Stage
 from friso.studies.cells import Columns, run_cells
 from friso.studies.execute import Crew
@@ -37,7 +37,7 @@ def local_cluster(workers: int) -> Iterator[Crew]:
 def connected(scheduler: str) -> Iterator[Crew]:
     """A crew made of the workers of the scheduler at an address such as "tcp://10.0.0.1:8786".
 
-    Every thread of a worker computes one block at a time, in that thread alone. Raises StageError if the scheduler
+    Every thread of a worker computes one block at a time, in that thread alone. Raises InputError if the scheduler
     does not answer, has no workers, or one with another version of friso.
     """
     from distributed import Client, KilledWorker
@@ -48,7 +48,7 @@ def connected(scheduler: str) -> Iterator[Crew]:
         client: Any = Client(scheduler, timeout=PATIENCE, set_as_default=False)
     except (OSError, ValueError) as error:
         expected = f"the address of a Dask scheduler that answers ({error})"
-        raise StageError("--scheduler", scheduler, expected, "--scheduler tcp://10.0.0.1:8786") from None
+        raise InputError("--scheduler", scheduler, expected, "--scheduler tcp://10.0.0.1:8786") from None
     with client:
         _refuse_strangers(client)
         threads = sum(client.nthreads().values())
@@ -80,9 +80,9 @@ def run_checked(
 
 
 def _refuse_strangers(client: Any) -> None:
-    """Raises StageError unless every worker has the same friso as this process."""
+    """Raises InputError unless every worker has the same friso as this process."""
     if not client.nthreads():
-        raise StageError("--scheduler", "a scheduler without workers", "workers: dask worker tcp://...")
+        raise InputError("--scheduler", "a scheduler without workers", "workers: dask worker tcp://...")
 
     def version() -> str:  # sent as it is, not by name: an older friso, or none, has no such function
         try:
@@ -96,6 +96,6 @@ def _refuse_strangers(client: Any) -> None:
             raise _stranger(f"the worker {address}", found)
 
 
-def _stranger(who: str, version: str) -> StageError:
+def _stranger(who: str, version: str) -> InputError:
     given = f"{who} has friso {version}"
-    return StageError("--scheduler", given, f"friso {equations_version()}, as here, on every worker")
+    return InputError("--scheduler", given, f"friso {equations_version()}, as here, on every worker")

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from friso.errors import InputError
 from friso.frequency.describing.balance import single_harmonic
 from friso.frequency.describing.function import checked_positive
 from friso.frequency.describing.multi import DONE, balanced
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import RTOL, Cycles, hunting_cycles
-from friso.quantities import StageError
 from friso.stage import Stage
 
 if TYPE_CHECKING:
@@ -37,7 +37,7 @@ def harmonic_balance(
     number of cycles that single-harmonic balance predicts, and `least_residual`, the least residual of that balance
     (see `friso.frequency.describing.balance`). Over ("crossover", "highest"), `highest` being the highest harmonic of a
     multi-harmonic balance that starts from the simulated cycle: `period_error` and `amplitude_error`, relative, NaN
-    where it does not close on a motion; and `status`. Raises StageError for a stage without friction, one whose
+    where it does not close on a motion; and `status`. Raises InputError for a stage without friction, one whose
     controller has no crossover, and one that has no cycle that is its own mirror image.
     """
     import xarray as xr
@@ -45,7 +45,7 @@ def harmonic_balance(
     rates = checked_positive("crossovers", crossovers, "4 Hz")
     flat = stage.flat()
     if "controller.crossover" not in flat:
-        raise StageError("controller", "gains", "a crossover", 'crossover = "8 Hz", alpha = 0.1, beta = 2')
+        raise InputError("controller", "gains", "a crossover", 'crossover = "8 Hz", alpha = 0.1, beta = 2')
     stages = Ensemble.held({**flat, "controller.crossover": rates}, len(rates))
     cycles = _symmetric(stages, rtol)
     singles = [single_harmonic(stage.replace({"controller.crossover": f"{rate!r} Hz"})) for rate in map(float, rates)]
@@ -67,11 +67,11 @@ def harmonic_balance(
 
 
 def _symmetric(stages: Ensemble, rtol: float) -> Cycles:
-    """The cycle of every stage that is its own mirror image. Raises StageError where one has none."""
+    """The cycle of every stage that is its own mirror image. Raises InputError where one has none."""
     cycles = hunting_cycles(stages, rtol)
     if cycles.sign >= 0 or not cycles.found.all():
         why = "; ".join({str(reason) for reason in cycles.reasons if reason}) or "a cycle that is not symmetric"
-        raise StageError("crossovers", why, "a stage with a symmetric hunting cycle at each", "4 Hz")
+        raise InputError("crossovers", why, "a stage with a symmetric hunting cycle at each", "4 Hz")
     return cycles
 
 

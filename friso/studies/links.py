@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from friso.quantities import StageError, quoted
+from friso.errors import InputError
+from friso.quantities import quoted
 from friso.stage import Stage, numeric_keys
 
 EXAMPLE = 'masses.stage = "0.3 * mass" or friction.static = "max(friction.static, friction.coulomb)"'
@@ -28,7 +29,7 @@ _ARGUMENTS = {"min": 2, "max": 2, "sqrt": 1, "abs": 1}
 
 
 def names(links: Mapping[str, str]) -> frozenset[str]:
-    """Every name that the expressions use. Raises StageError."""
+    """Every name that the expressions use. Raises InputError."""
     trees = [_parsed(key, text) for key, text in links.items()]
     called = {id(node.func) for tree in trees for node in ast.walk(tree) if isinstance(node, ast.Call)}
     found = set()
@@ -41,17 +42,17 @@ def names(links: Mapping[str, str]) -> frozenset[str]:
 
 
 def check_links(stage: Stage, links: Mapping[str, str], axes: frozenset[str]) -> None:
-    """Refuse links to no key, and expressions with names that are neither keys nor `axes`. Raises StageError."""
+    """Refuse links to no key, and expressions with names that are neither keys nor `axes`. Raises InputError."""
     known = numeric_keys(stage.flat())
     for key in links:
         if key not in known:
             stage.flat({key: 0.0})  # raises, and names the nearest key
         if key in axes and key not in names({key: links[key]}):
             given = f"{key} = {links[key]}, which does not follow the axis {key}"
-            raise StageError("link", given, "an axis or a link, or a link in which the axis occurs", EXAMPLE)
+            raise InputError("link", given, "an axis or a link, or a link in which the axis occurs", EXAMPLE)
     for name in sorted(names(links) - axes):
         if name not in known or name not in stage.flat():
-            raise StageError("link", f"the name {name}", "axes and numeric keys that the stage has", EXAMPLE)
+            raise InputError("link", f"the name {name}", "axes and numeric keys that the stage has", EXAMPLE)
 
 
 def linked(links: Mapping[str, str], values: Mapping[str, Any]) -> dict[str, Any]:
@@ -68,7 +69,7 @@ def _parsed(key: str, text: str) -> ast.expr:
         tree = ast.parse(text.strip(), mode="eval").body
         _check(tree)
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
-        raise StageError(key, quoted(text), "numbers, names, + - * / **, min, max, sqrt, abs", EXAMPLE) from error
+        raise InputError(key, quoted(text), "numbers, names, + - * / **, min, max, sqrt, abs", EXAMPLE) from error
     return tree
 
 

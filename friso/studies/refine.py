@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from scipy.ndimage import distance_transform_edt
 
-from friso.quantities import StageError
+from friso.errors import InputError
 from friso.studies.axes import Axis
 from friso.studies.cells import INFERRED, UNITS, Columns
 from friso.studies.samples import SAMPLE
@@ -43,10 +43,10 @@ Ask = Callable[[np.ndarray], Columns]
 
 
 def finer(study: Study) -> Study:
-    """The study on the fine grid. Raises StageError where there is no such grid."""
+    """The study on the fine grid. Raises InputError where there is no such grid."""
     if len(study.shape) > 3 or not all(axis.numeric for axis in study.axes) or SAMPLE in study.names:
         expected = "one to three axes of numbers on a grid"
-        raise StageError("--refine", f"axes: {', '.join(study.names)}", expected)
+        raise InputError("--refine", f"axes: {', '.join(study.names)}", expected)
     dimensions = tuple(Dimension(each.name, (_finer(each.axes[0]),)) for each in study.dimensions)
     return replace(study, dimensions=dimensions, refined=True)
 

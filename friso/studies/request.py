@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from friso.engine.tolerance import checked_rtol
-from friso.quantities import StageError
+from friso.errors import InputError
 from friso.stage import Stage
 from friso.studies import links as linking
 from friso.studies.axes import Axis, Range, Values, read_axes
@@ -36,12 +36,12 @@ class Request:
         return read_axes(self.stage, axes, linking.names(self.links), self.log)
 
     def size(self) -> int:
-        """The number of cells, without any array being made. Raises StageError as `study` does."""
+        """The number of cells, without any array being made. Raises InputError as `study` does."""
         samples = 1 if self.samples is None or self.samples.count is None else self.samples.count
         return math.prod(_points(axis) for axis in self._read(self.axes)) * samples
 
     def trial(self) -> Study:
-        """A few cells drawn evenly from a study that may be too large to be made. Raises StageError."""
+        """A few cells drawn evenly from a study that may be too large to be made. Raises InputError."""
         rng = np.random.default_rng(0)
         drawn = []
         for axis in self._read({**self.axes, **(self.samples.ranges if self.samples else {})}):
@@ -52,12 +52,12 @@ class Request:
         return Study(self.stage, (Dimension(SAMPLE, tuple(drawn)),), dict(self.links), USUAL, 1e-6)
 
     def study(self, metrics: Sequence[str] | None = None, rtol: float = 1e-6) -> Study:
-        """The study. Raises StageError, and ValueError for a tolerance that is not usable."""
+        """The study. Raises InputError, and ValueError for a tolerance that is not usable."""
         checked_rtol(rtol)
         read = self._read(self.axes)
         if not read and self.samples is None:
             example = '{"controller.crossover": ["4 Hz", "8 Hz"]}'
-            raise StageError("axes", "none", "at least one key with its values", example)
+            raise InputError("axes", "none", "at least one key with its values", example)
         dimensions = [Dimension(axis.name, (_gridded(axis),)) for axis in read]
         if self.samples is not None:
             free = linking.names(self.links)
@@ -65,7 +65,7 @@ class Request:
         names = [axis.name for dimension in dimensions for axis in dimension.axes]
         for name in names:
             if names.count(name) > 1 or name in (*METRICS, SAMPLE):
-                raise StageError(name, "a name that is taken", "every axis once, under a name of its own")
+                raise InputError(name, "a name that is taken", "every axis once, under a name of its own")
         linking.check_links(self.stage, self.links, frozenset(names))
         return Study(self.stage, tuple(dimensions), dict(self.links), _checked_metrics(metrics), rtol)
 
@@ -75,14 +75,14 @@ def _points(axis: Axis | Range) -> int:
         return len(axis.values)
     if axis.count is None:
         given = f"{axis.first:g}..{axis.last:g} {axis.unit}, without a number of points"
-        raise StageError(axis.name, given, "FIRST..LAST:POINTS", '"1 Hz..40 Hz:41"')
+        raise InputError(axis.name, given, "FIRST..LAST:POINTS", '"1 Hz..40 Hz:41"')
     return axis.count
 
 
 def _gridded(axis: Axis | Range) -> Axis:
     if isinstance(axis, Axis):
         if len(np.unique(axis.values)) < len(axis.values):
-            raise StageError(axis.name, "values that occur twice", "every value once", '["4 Hz", "8 Hz"]')
+            raise InputError(axis.name, "values that occur twice", "every value once", '["4 Hz", "8 Hz"]')
         return axis
     _points(axis)
     return axis.axis()
@@ -92,6 +92,6 @@ def _checked_metrics(metrics: Sequence[str] | None) -> tuple[str, ...]:
     """The metrics asked for, with verdict and status, in their usual order."""
     for name in metrics or ():
         if name not in METRICS:
-            raise StageError("metrics", name, f"some of {', '.join(METRICS)}", '["peaks", "period"]')
+            raise InputError("metrics", name, f"some of {', '.join(METRICS)}", '["peaks", "period"]')
     wanted = metrics or USUAL
     return tuple(name for name in METRICS if name in wanted or name not in UNITS)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from friso.quantities import StageError
+from friso.errors import InputError
 from friso.stage import Stage
 from friso.studies.axes import Axis, Range, Values, read_axes
 
@@ -30,16 +30,16 @@ class Samples:
 
 
 def sampled(stage: Stage, samples: Samples, free: frozenset[str], log: bool = False) -> tuple[Axis, ...]:
-    """The sampled axes, all of one length. Raises StageError."""
+    """The sampled axes, all of one length. Raises InputError."""
     read = read_axes(stage, samples.ranges, free, log)
     ranges = [axis for axis in read if isinstance(axis, Range)]
     if not ranges:
         return _given(read)
     if len(ranges) < len(read):
-        raise StageError("samples", "ranges together with lists", "one or the other", '{"joint.stroke": "0 m..1 mm"}')
+        raise InputError("samples", "ranges together with lists", "one or the other", '{"joint.stroke": "0 m..1 mm"}')
     for axis in ranges:
         if axis.count is not None:
-            raise StageError(axis.name, f"a range with {axis.count} points", "for samples, FIRST..LAST alone")
+            raise InputError(axis.name, f"a range with {axis.count} points", "for samples, FIRST..LAST alone")
     points = _points(len(ranges), samples)
     return tuple(Axis(axis.name, axis.at(points[:, i]), axis.unit, axis.scale) for i, axis in enumerate(ranges))
 
@@ -48,7 +48,7 @@ def _given(read: tuple[Axis | Range, ...]) -> tuple[Axis, ...]:
     axes = tuple(axis for axis in read if isinstance(axis, Axis))
     if len({len(axis.values) for axis in axes}) != 1:
         lengths = ", ".join(f"{axis.name} {len(axis.values)}" for axis in axes) or "none"
-        raise StageError("samples", f"lengths: {lengths}", "keys with equally many values each")
+        raise InputError("samples", f"lengths: {lengths}", "keys with equally many values each")
     return axes
 
 
@@ -57,11 +57,11 @@ def _points(dimensions: int, samples: Samples) -> np.ndarray:
     from scipy.stats import qmc
 
     if samples.count is None or samples.count < 2:
-        raise StageError("samples", f"{samples.count} points", "2 points or more", "1024")
+        raise InputError("samples", f"{samples.count} points", "2 points or more", "1024")
     if samples.method == "sobol":
         sampler = qmc.Sobol(dimensions, rng=samples.seed)
         whole = sampler.random_base2(int(np.ceil(np.log2(samples.count))))
         return whole[: samples.count]
     if samples.method == "latin":
         return qmc.LatinHypercube(dimensions, rng=samples.seed).random(samples.count)
-    raise StageError("samples", samples.method, f"one of {', '.join(METHODS)}", "sobol")
+    raise InputError("samples", samples.method, f"one of {', '.join(METHODS)}", "sobol")

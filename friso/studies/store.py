@@ -23,7 +23,7 @@ import numpy as np
 from filelock import FileLock, Timeout
 
 from friso.engine.cache import machine
-from friso.quantities import StageError
+from friso.errors import StoreError
 from friso.studies.cells import UNITS, WORDS, Columns, attributes_of
 from friso.studies.refine import Ask
 from friso.studies.study import Block, Study, study_of
@@ -57,7 +57,7 @@ class Store:
     def opened(cls, path: Path, study: Study) -> Iterator[Store]:
         """The store of a study, made if it is not there.
 
-        Raises StageError if the folder holds anything else, another study, or is in use by another process.
+        Raises StoreError if the folder holds anything else, another study, or is in use by another process.
         """
         store = cls(path, study)
         if not path.exists() or (path.is_dir() and not any(path.iterdir())):
@@ -95,7 +95,7 @@ class Store:
             if self.path.exists():
                 return  # another process was quicker; whose study it is will be seen
             expected = f"a folder that can be written ({error.strerror or error})"
-            raise StageError("--out", str(self.path), expected, "--out study.zarr") from None
+            raise StoreError("--out", str(self.path), expected, "--out study.zarr") from None
         finally:
             shutil.rmtree(draft, ignore_errors=True)
 
@@ -175,7 +175,7 @@ class Store:
 def read_store(path: str | os.PathLike[str]) -> xr.Dataset:
     """The study in a store, finished or not, as a dataset whose values are read when they are looked at.
 
-    Raises StageError if there is none.
+    Raises StoreError if there is none.
     """
     import xarray as xr
 
@@ -214,12 +214,12 @@ def _answer(file: Path, cells: np.ndarray) -> Columns | None:
 
 
 def _refuse_foreign(path: Path) -> None:
-    """Raises StageError for anything but a store that friso has made."""
+    """Raises StoreError for anything but a store that friso has made."""
     import xarray as xr
 
     expected = "a store made by friso map, or a new name"
     if not path.exists():
-        raise StageError("", "nothing there", expected, "friso map STAGE.toml ... --out study.zarr", str(path))
+        raise StoreError("", "nothing there", expected, "friso map STAGE.toml ... --out study.zarr", str(path))
     try:
         with xr.open_zarr(path, chunks=None, zarr_format=_FORMAT) as found:
             if "verdict" in found and "equations" in found.attrs:
@@ -227,17 +227,17 @@ def _refuse_foreign(path: Path) -> None:
     except (OSError, ValueError, KeyError):
         pass
     given = "a folder with other things in it" if path.is_dir() else "a file"
-    raise StageError("", f"{given}; nothing was overwritten", expected, "--out study.zarr", str(path))
+    raise StoreError("", f"{given}; nothing was overwritten", expected, "--out study.zarr", str(path))
 
 
 def _refuse_other(path: Path, study: Study) -> None:
-    """Raises StageError if the store holds another study than this."""
+    """Raises StoreError if the store holds another study than this."""
     with read_store(path) as found:
         differences = study.differences(study_of(found), found.attrs["equations"])
     if differences:
         given = "a store of another study:\n            " + "\n            ".join(differences)
         expected = "the same study to go on with, or another --out; nothing was overwritten"
-        raise StageError("", given, expected, origin=str(path))
+        raise StoreError("", given, expected, origin=str(path))
 
 
 def _warn_of_another_machine(path: Path) -> None:
@@ -249,17 +249,17 @@ def _warn_of_another_machine(path: Path) -> None:
 
 @contextmanager
 def _locked(path: Path) -> Iterator[None]:
-    """Keep other processes out. Raises StageError if one is in."""
+    """Keep other processes out. Raises StoreError if one is in."""
     lock = FileLock(path / ".friso.lock")
     try:
         lock.acquire(timeout=0)
     except Timeout:
-        raise StageError(
+        raise StoreError(
             "", "a store that another friso is writing to", "to wait, or another --out", origin=str(path)
         ) from None
     except OSError as error:
         expected = f"a store that can be written to ({error.strerror})"
-        raise StageError("", "a store that cannot be written to", expected, origin=str(path)) from None
+        raise StoreError("", "a store that cannot be written to", expected, origin=str(path)) from None
     try:
         yield
     finally:

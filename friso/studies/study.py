@@ -107,7 +107,7 @@ class Study:
             yield tuple(slice(k, min(k + step, size)) for k, step, size in zip(corner, shape, self.shape, strict=True))
 
     def cell_stage(self, index: Sequence[int]) -> Stage:
-        """The stage of one cell, which run alone gives the same numbers. Raises StageError for an invalid cell."""
+        """The stage of one cell, which run alone gives the same numbers. Raises InputError for an invalid cell."""
         columns = self.columns(np.array([np.ravel_multi_index(tuple(index), self.shape)]))
         numeric = {axis.name: axis for axis in self.axes if axis.numeric}
         words = {name: column[0].item() for name, column in columns.items() if name not in numeric}

@@ -56,7 +56,7 @@ def sweep(
     attributes verified_cells, verified_surviving and verified_rtol tell how many verdicts survived. With `refine` the
     grid is made four times finer, of which a fifth is run, along the changes of verdict; the other cells are
     inferred, which their status says. With `store`, a folder, results are written there in Zarr as they come, and a
-    study that was interrupted resumes. Raises StageError for a wrong axis, link or store, ValueError for a tolerance
+    study that was interrupted resumes. Raises InputError for a wrong axis, link or store, ValueError for a tolerance
     that is not usable.
     """
     study = Request(stage, axes, samples, links or {}).study(metrics, rtol)
@@ -96,7 +96,7 @@ def _room(study: Study) -> Columns:
 def run_in_store(
     study: Study, path: Path, crew: Crew, verify: float = 0.0, progress: Progress = lambda cells: None
 ) -> xr.Dataset:
-    """Run what a store lacks of its study, block by block, and verify a share; the opened store. Raises StageError."""
+    """Run what a store lacks of its study, block by block, and verify a share; the opened store. Raises InputError."""
     with Store.opened(path, study) as store:
         missing = list(store.missing())
         progress(study.cells - sum(map(cells_of, missing)))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from friso.engine.tolerance import TIGHTEST
-from friso.quantities import StageError
+from friso.errors import InputError
 from friso.studies.cells import INFERRED, WORDS, allowed
 from friso.studies.execute import Crew, run_scattered
 from friso.studies.study import Study
@@ -34,9 +34,9 @@ TRIED = 400
 
 
 def checked_share(share: float) -> float:
-    """The share of cells to verify. Raises StageError for one that is none."""
+    """The share of cells to verify. Raises InputError for one that is none."""
     if not 0 <= share <= 1:
-        raise StageError("verify", f"{share:g}", "a share of the cells, from 0 to 1", "--verify 0.05")
+        raise InputError("verify", f"{share:g}", "a share of the cells, from 0 to 1", "--verify 0.05")
     return share
 
 

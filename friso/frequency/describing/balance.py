@@ -76,7 +76,7 @@ def single_harmonic(
 ) -> Balance:
     """Solve the balance of a stage with friction, within a grid of amplitudes [m] of the cart and frequencies [Hz],
     each in ascending order; more frequencies are put between those from one to the next of which the loop turns by a
-    right angle or more. Two solutions in one cell escape it. Raises StageError for a stage without friction and for a
+    right angle or more. Two solutions in one cell escape it. Raises InputError for a stage without friction and for a
     grid that is not usable."""
     loop = _Loop(stage, checked_rtol(rtol))
     sizes = checked_positive("amplitudes", amplitudes, "1e-5 m, 1e-4 m")

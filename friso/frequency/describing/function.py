@@ -19,8 +19,9 @@ import numpy as np
 from friso.engine.arrays import Status
 from friso.engine.tolerance import checked_rtol
 from friso.equations.imposed import HARMONIC
+from friso.errors import InputError
 from friso.frequency.describing.steady import RTOL, Imposition, Steady, closed, share_of_period, steady
-from friso.stage import Stage, StageError
+from friso.stage import Stage
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -64,7 +65,7 @@ def describing(
     harmonic from the samples differs from the integrated one, as a share of it (NaN if nothing was sampled, which is so
     for `harmonics` = 1: then F_0 is NaN unless the law is symmetric).
 
-    Raises StageError for a stage without friction and for amplitudes, frequencies, harmonics or samples that are not
+    Raises InputError for a stage without friction and for amplitudes, frequencies, harmonics or samples that are not
     usable, ValueError for a tolerance that is not. A pair that fails has NaN and a reason in `status`.
     """
     import xarray as xr
@@ -73,7 +74,7 @@ def describing(
     rates = checked_positive("frequencies", frequencies, "10 Hz")
     if not 1 <= harmonics < samples / 4:
         expected = f"from 1 to less than a quarter of the samples, {samples}"
-        raise StageError("harmonics", str(harmonics), expected, "harmonics = 9")
+        raise InputError("harmonics", str(harmonics), expected, "harmonics = 9")
     pairs = (np.repeat(sizes, len(rates)), np.tile(rates, len(sizes)))
     friction = Imposition.of(stage.flat(), *pairs, checked_rtol(rtol))
     found = steady(friction)
@@ -121,10 +122,10 @@ def _variables(
 
 
 def checked_positive(name: str, values: Sequence[float] | np.ndarray, example: str) -> np.ndarray:
-    """Positive numbers as an array. Raises StageError."""
+    """Positive numbers as an array. Raises InputError."""
     array = np.atleast_1d(np.asarray(values, dtype=float))
     if array.ndim != 1 or not array.size or not np.all(np.isfinite(array) & (array > 0)):
-        raise StageError(name, str(values), "positive numbers in one row", example)
+        raise InputError(name, str(values), "positive numbers in one row", example)
     return array
 
 

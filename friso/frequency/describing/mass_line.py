@@ -28,7 +28,7 @@ def mass_line(
     Variables over ("place", "force", "frequency"): `ratio`, the response of an analyser that steps upwards (see
     `plant_response`) over that line, complex and 1 on it; `magnitude`, its absolute value; `phase` [rad], that of the
     response over -180 degrees. The `spread_magnitude` and `spread_phase` over ("force", "frequency") are standard
-    deviations over the places. Raises StageError for places that no stage may have, and as `plant_response`.
+    deviations over the places. Raises InputError for places that no stage may have, and as `plant_response`.
     """
     import xarray as xr
 

@@ -111,7 +111,7 @@ def balanced(
 
     `time` [s] and `position` [m] of the cart, shape (samples,), are one period of the known motion, the last sample one
     interval before the first comes again. A `mirrored` motion is its own mirror image after half a period. Raises
-    StageError for a stage without friction or for a law with more than one state of its own.
+    InputError for a stage without friction or for a law with more than one state of its own.
     """
     law, size = Law.of(flat), intervals or max(FINEST, OVERSAMPLED * harmonics)
     basis = Basis.of(harmonics, mirrored, 2 * (size // 2))

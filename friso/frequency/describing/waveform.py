@@ -19,7 +19,7 @@ from scipy.linalg import solve_banded
 
 from friso.equations.component import Kink, state
 from friso.equations.imposed import Imposed, imposed_form
-from friso.quantities import StageError
+from friso.errors import InputError
 from friso.stage.tables import friction_law
 
 STEPS, CLOSE = 30, 1e-12
@@ -38,7 +38,7 @@ class Law:
 
     @classmethod
     def of(cls, flat: Mapping[str, Any]) -> Law:
-        """The law of a stage. Raises StageError for a stage without friction, or a law with more states."""
+        """The law of a stage. Raises InputError for a stage without friction, or a law with more states."""
         form = imposed_form(flat)
         function, names, remembers = _compiled(form)
         return cls({name: flat[name] for name in names}, function, names, remembers)
@@ -56,7 +56,7 @@ def _compiled(form: Imposed) -> tuple[Callable[..., list[Any]], tuple[str, ...],
     inner = friction.component.states
     if len(inner) > 1:
         given = f'"{form.friction}", with {len(inner)} states of its own'
-        raise StageError("friction.model", given, "a law with at most one", 'model = "lugre"')
+        raise InputError("friction.model", given, "a law with at most one", 'model = "lugre"')
     z, rate = (inner[0].symbol, inner[0].derivative) if inner else (none, sp.S.Zero)
     forward = Kink("forward", velocity).beyond
     parts = [e for f in (rate, friction.force) for e in (f, sp.diff(f, z), sp.diff(f, velocity))]

@@ -116,7 +116,7 @@ class LowPass:
 
 
 def record_of(log: Log, part: slice, between: Between) -> Record:
-    """A part of a log. Raises StageError for missing channels."""
+    """A part of a log. Raises InputError for missing channels."""
     position, force = channel(log, "position")[part], channel(log, "force")[part]
     return Record(log.time[part], position, _bent(log, part, position, float(force.std()) / between.contact), force)
 

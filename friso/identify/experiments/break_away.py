@@ -56,7 +56,7 @@ def static_from_ramps(
 
     With the `mass` [kg] that moves, it is the greatest friction, force less inertia, as motion begins (the published
     definition); without, the force where motion begins to be visible, which contains inertia. See `rate_effect` for the
-    static friction. Raises StageError for a missing channel.
+    static friction. Raises InputError for a missing channel.
     """
     force, body = channel(log, "force"), on_bearing(log)
     rows: list[tuple[float, ...]] = []

@@ -11,10 +11,10 @@ import numpy as np
 from scipy.signal import butter, sosfiltfilt, welch
 from scipy.stats import t as student
 
+from friso.errors import InputError
 from friso.identify.estimate import Estimate
 from friso.identify.logs.log import ROLES, Log
 from friso.intervals import COVERAGE
-from friso.quantities import StageError
 
 ORDER = 2
 """Order of the low-pass filter, which goes over the record forth and back: 4 in all."""
@@ -33,31 +33,31 @@ _EXAMPLES = {"force": '--scale force="35.1507 N/V"', "position": '--unit positio
 
 
 def record(name: str, sample_time: float, **signals: Any) -> Log:
-    """A log of plain SI arrays by role, without gaps, `sample_time` [s] apart. Raises StageError for what is none."""
+    """A log of plain SI arrays by role, without gaps, `sample_time` [s] apart. Raises InputError for what is none."""
     arrays = {role: np.asarray(values, dtype=float) for role, values in signals.items()}
     for role, values in arrays.items():
         if role not in ROLES:
-            raise StageError(role, "no role", f"one of {', '.join(ROLES)}", "position", name)
+            raise InputError(role, "no role", f"one of {', '.join(ROLES)}", "position", name)
         if values.ndim != 1 or values.shape != next(iter(arrays.values())).shape:
-            raise StageError(role, f"an array of shape {values.shape}", "arrays of one length", "1000 values", name)
+            raise InputError(role, f"an array of shape {values.shape}", "arrays of one length", "1000 values", name)
     if not (np.isfinite(sample_time) and sample_time > 0):
-        raise StageError("sample_time", f"{sample_time!r}", "a time greater than 0 s", "1 ms", name)
+        raise InputError("sample_time", f"{sample_time!r}", "a time greater than 0 s", "1 ms", name)
     count = len(next(iter(arrays.values()))) if arrays else 0
     return Log(name, np.arange(count) * sample_time, float(sample_time), arrays, (slice(0, count),))
 
 
 def channel(log: Log, role: str) -> np.ndarray:
-    """The values of a role, in its SI unit and finite, shape (n,). Raises StageError otherwise."""
+    """The values of a role, in its SI unit and finite, shape (n,). Raises InputError otherwise."""
     if role not in log:
         given = f"channels for {', '.join(log.signals) or 'nothing'}"
-        raise StageError(role, given, f"a channel for the {role.replace('_', ' ')}", f'--map {role}="NAME"', log.name)
+        raise InputError(role, given, f"a channel for the {role.replace('_', ' ')}", f'--map {role}="NAME"', log.name)
     if log.unit(role) != ROLES[role]:
         example = _EXAMPLES.get(role, f'--unit {role}="mm"')
-        raise StageError(role, f"a channel in {log.unit(role)}", f"one in {ROLES[role]}", example, log.name)
+        raise InputError(role, f"a channel in {log.unit(role)}", f"one in {ROLES[role]}", example, log.name)
     values = log[role]
     if not np.isfinite(values).all():
         given = f"{int((~np.isfinite(values)).sum())} of {len(values)} values are no finite numbers"
-        raise StageError(role, given, "finite values, gaps being told in the segments", "", log.name)
+        raise InputError(role, given, "finite values, gaps being told in the segments", "", log.name)
     return values
 
 

@@ -77,7 +77,7 @@ def friction_position(
     """Friction along the rail from the passes at constant velocity, `mass` [kg] times acceleration taken off.
 
     With the loop's `crossover` [Hz] the verdict also asks whether it is quick enough for the oscillations seen. Raises
-    StageError for missing channels.
+    InputError for missing channels.
     """
     found = passes(log, cutoff)
     position, force = on_bearing(log), channel(log, "force")

@@ -16,6 +16,7 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.signal import find_peaks
 
+from friso.errors import InputError
 from friso.identify.estimate import Estimate
 from friso.identify.experiments.common import (
     by_t,
@@ -28,7 +29,6 @@ from friso.identify.experiments.common import (
     ways,
 )
 from friso.identify.logs.log import Log
-from friso.quantities import StageError
 
 CUTOFF = 50.0
 """Low-pass of position and force [Hz]: loops are driven slowly, inertia must not enter."""
@@ -76,10 +76,10 @@ def stiffness_from_hysteresis(log: Log, spring: Spring = "bristles", cutoff: flo
     """Stiffness from the slopes after reversals, of force over the position of the body on the bearing ("bristles") or
     over the deflection of the joint ("joint", the position where that is not measured), low-passed at `cutoff` [Hz].
 
-    Fewer than two branches leave it unknown. Raises StageError for a missing channel or another spring.
+    Fewer than two branches leave it unknown. Raises InputError for a missing channel or another spring.
     """
     if spring not in _KEYS:
-        raise StageError("spring", repr(spring), '"bristles" or "joint"', "bristles", log.name)
+        raise InputError("spring", repr(spring), '"bristles" or "joint"', "bristles", log.name)
     force = channel(log, "force")
     measured = deflection(log) if spring == "joint" else on_bearing(log)
     position = channel(log, "position") if measured is None else measured

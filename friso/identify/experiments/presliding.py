@@ -105,7 +105,7 @@ def bristles_from_presliding(log: Log, between: Between = DIRECT) -> Presliding:
     A joint is held, or its deflection is measured. The intervals contain by how much the answer changes with a lower
     low-pass and with the delay that fits best (which is taken where none is given), the doubt about the viscous
     friction that is taken off the damping, and the share of the friction that is left unexplained: it falls with speed,
-    which the model leaves out. Where that share is large, nothing is shown. Raises StageError for missing channels.
+    which the model leaves out. Where that share is large, nothing is shown. Raises InputError for missing channels.
     """
     record = record_of(log, log.longest, between)
     if why := why_unseen(record, FEWEST):

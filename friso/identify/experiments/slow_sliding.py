@@ -136,7 +136,7 @@ def stribeck_from_slow_sliding(log: Log, between: Between, known: Known | None) 
 
     A joint is held, or its deflection is measured. The intervals contain what a lower low-pass changes, what the
     intervals of the known mass, bristles and viscous friction do, what the delay does that fits best, and the share of
-    the friction that is left unexplained; contact, mode and exponent are taken as given. Raises StageError for missing
+    the friction that is left unexplained; contact, mode and exponent are taken as given. Raises InputError for missing
     channels.
     """
     record = record_of(log, slice(log.longest.start, min(log.longest.stop, log.longest.start + MOST)), between)

@@ -78,7 +78,7 @@ def stiffness_from_steps(log: Log, cutoff: float = CUTOFF) -> StepStiffness:
     """Stiffness from steps of the position with the cart fixed, the force low-passed at `cutoff` [Hz].
 
     Windows are the plateaus of the reference, or of the position where there is none. Without two steps between settled
-    windows the stiffness is unknown. Raises StageError for a log without position or force in SI units.
+    windows the stiffness is unknown. Raises InputError for a log without position or force in SI units.
     """
     position, force = channel(log, "position"), channel(log, "force")
     measured = deflection(log)

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from friso.errors import InputError
 from friso.identify.estimate import Estimate
 from friso.identify.experiments.common import (
     Mean,
@@ -28,7 +29,6 @@ from friso.identify.experiments.rate_effect import BRISTLE_RATE, static_friction
 from friso.identify.experiments.slips import SLIDING, VISIBLE, slips
 from friso.identify.logs.log import Log
 from friso.intervals import COVERAGE
-from friso.quantities import StageError
 
 CUTOFF = 100.0
 """Low-pass of deflection and velocity [Hz]."""
@@ -90,7 +90,7 @@ def static_from_stick_slip(
     deflection measured; without, the actuator force less `stage_mass` [kg] times the acceleration of the position. How
     far the finite force rate lowers it is extrapolated or bounded, see `rate_effect`, with `bristle_rate` [N/s].
     Slips from a deflection at the `stroke` [m] of the joint tell nothing of it. What the record cannot show is unknown
-    with its reason. Raises StageError for missing channels or an unusable stiffness.
+    with its reason. Raises InputError for missing channels or an unusable stiffness.
     """
     deflected, pushed = _deflection(log, cutoff), _actuator(log, stage_mass, cutoff)
     pull, relative_error = _pull(log, stiffness, deflected, pushed)
@@ -152,7 +152,7 @@ def _pull(
         return channel(log, "force") if pushed is None else pushed, 0.0  # raises: neither of the two is known
     value, half = (stiffness.value, stiffness.half_width) if isinstance(stiffness, Estimate) else (stiffness, 0.0)
     if not (np.isfinite(value) and value > 0 and np.isfinite(half)):
-        raise StageError("stiffness", f"{value:g} +/- {half:g} N/m", "a stiffness greater than 0", "2.4 N/mm", log.name)
+        raise InputError("stiffness", f"{value:g} +/- {half:g} N/m", "a stiffness greater than 0", "2.4 N/mm", log.name)
     if deflected is None:
         deflected = channel(log, "relative_position")  # raises: without it the pull of the joint is not known
     return value * deflected, half / COVERAGE / value

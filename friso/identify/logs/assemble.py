@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from friso.errors import InputError, LogError
 from friso.identify.logs import checks, delays
 from friso.identify.logs.log import ROLES, Log
 from friso.identify.logs.mapping import Mapping
@@ -14,7 +15,7 @@ from friso.identify.logs.read import file_format, read_table
 from friso.identify.logs.roles import Choice, choose, role_of
 from friso.identify.logs.signals import Reading, Told, instants, no_time, signal, unused, with_told_units
 from friso.identify.logs.time_base import Track, together, track
-from friso.quantities import StageError, quoted
+from friso.quantities import quoted
 
 LEAST_SAMPLES = 50
 """Fewer samples than this are refused (our choice: no interval on anything would be worth its name)."""
@@ -26,7 +27,7 @@ def read_log(
     """The log in a file: signals by role, SI, on one time base; what was read and what is doubtful told line by line.
 
     With `strict`, every signal must be in the SI unit of its role; without, others are kept and listed in `Log.units`.
-    `needed` are the roles that must be there. Raises StageError (one message) for what cannot be read or used.
+    `needed` are the roles that must be there. Raises LogError (one message) for what cannot be read or used.
     """
     path, mapping = Path(path), mapping or Mapping()
     form = file_format(path)
@@ -41,7 +42,7 @@ def read_log(
         told.read += base.read
         told.warnings += base.warnings
         _check(base, signals, needed)
-    except StageError as error:
+    except InputError as error:
         raise error.found_in(str(path)) from None
     told.warnings += _doubts(base, signals, told)
     told.read.append(_spans(base))
@@ -53,7 +54,7 @@ def read_log(
 
 def _tracks(chosen: dict[str, Choice], reading: Reading, told: Told, needed: Sequence[str]) -> dict[str, Track]:
     """Each role's channel on even instants in the unit of the role. A channel that was only proposed and that nobody
-    needs is left out, which is told, where it has no instants or no unit; others raise StageError."""
+    needs is left out, which is told, where it has no instants or no unit; others raise LogError."""
     clock = chosen.get("time")
     tracks: dict[str, Track] = {}
     sizes = [choice.channel.values.size for role, choice in chosen.items() if role in needed or choice.told]
@@ -69,13 +70,13 @@ def _tracks(chosen: dict[str, Choice], reading: Reading, told: Told, needed: Seq
             raise no_time(choice.channel, reading)
         try:
             values = signal(choice, reading, told)
-        except StageError as error:
+        except InputError as error:
             if not optional or role == "force":
                 raise
             told.warnings.append(f"{role}: {error.given} left out; to use it: {error.example}")
             continue
         if time.size != values.size:
-            raise StageError(
+            raise LogError(
                 role, f"{values.size} values at {time.size} instants", "one value at each", "", reading.origin
             )
         tracks[role] = _track(role, choice, time, values, told)
@@ -109,13 +110,13 @@ def _track(role: str, choice: Choice, time: np.ndarray, values: np.ndarray, told
 
 
 def _check(base: Track, signals: dict[str, np.ndarray], needed: Sequence[str]) -> None:
-    """Raises StageError for a log that is too short and for a signal that does not change and should."""
+    """Raises LogError for a log that is too short and for a signal that does not change and should."""
     if base.time.size < LEAST_SAMPLES:
-        raise StageError("log", f"{base.time.size} samples", f"at least {LEAST_SAMPLES} samples", "")
+        raise LogError("log", f"{base.time.size} samples", f"at least {LEAST_SAMPLES} samples", "")
     for role in {*needed, "position", "force"} & set(signals):
         if checks.constant(role, signals[role]):
             value = quoted(float(signals[role][0]))
-            raise StageError(
+            raise LogError(
                 role, f"a constant signal, {value} throughout", "a signal that changes", f'--map {role}="CHANNEL"'
             )
 

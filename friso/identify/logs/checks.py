@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from friso.quantities import StageError
+from friso.errors import LogError
 
 CLIPPED = 1e-3
 """Share of the samples in flat tops above which a signal is reported as clipped."""
@@ -13,14 +13,14 @@ CLIPPED = 1e-3
 def repeated_stamps(name: str, time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
     """A channel without samples that repeat the one before, stamp and value; and how many there were.
 
-    Raises StageError for time that decreases and for another value at the same stamp.
+    Raises LogError for time that decreases and for another value at the same stamp.
     """
     steps = np.diff(time)
     back = np.flatnonzero(steps < 0)
     if back.size:
         i = int(back[0])
         given = f"time that decreases, from {time[i]:.9g} s to {time[i + 1]:.9g} s at sample {i + 2}"
-        raise StageError(name, given, "time that grows", "")
+        raise LogError(name, given, "time that grows", "")
     again = np.flatnonzero(steps == 0)
     if again.size == 0:
         return time, values, 0
@@ -28,10 +28,10 @@ def repeated_stamps(name: str, time: np.ndarray, values: np.ndarray) -> tuple[np
     if other.size:
         i = int(other[0])
         given = f"two values at {time[i]:.9g} s ({values[i]:.6g} and {values[i + 1]:.6g}), at {other.size} instants"
-        raise StageError(name, given, "one value at each instant; stamps rounded too far need --dt", '--dt "1 ms"')
+        raise LogError(name, given, "one value at each instant; stamps rounded too far need --dt", '--dt "1 ms"')
     keep = np.r_[True, steps > 0]
     if keep.sum() < 2:
-        raise StageError(name, f"the same time stamp {time[0]:.9g} s throughout", "time that grows", '--dt "1 ms"')
+        raise LogError(name, f"the same time stamp {time[0]:.9g} s throughout", "time that grows", '--dt "1 ms"')
     return time[keep], values[keep], int(again.size)
 
 

@@ -9,12 +9,13 @@ from pathlib import Path
 
 import numpy as np
 
+from friso.errors import LogError
 from friso.identify.logs.channel import Channel
 from friso.identify.logs.roles import words
 from friso.identify.logs.text import read_text
 from friso.identify.logs.uff import frequency_sets, label
 from friso.identify.logs.units import factor, spelled
-from friso.quantities import Quantity, StageError, any_sign
+from friso.quantities import Quantity, any_sign
 
 _KEYS = {
     "frequency": frozenset(["f", "freq", "frequency", "frequenz", "w", "omega"]),
@@ -54,7 +55,7 @@ def is_response(names: Iterable[str]) -> bool:
 
 
 def read_response_text(path: Path) -> MeasuredResponse:
-    """The response in a text file. Raises StageError."""
+    """The response in a text file. Raises LogError."""
     table = read_text(path)
     found: dict[str, list[Channel]] = {}
     for channel in table.channels:
@@ -63,11 +64,11 @@ def read_response_text(path: Path) -> MeasuredResponse:
     for kind, channels in found.items():
         if len(channels) > 1:
             names = ", ".join(channel.name for channel in channels)
-            raise StageError(kind, f"{len(channels)} columns: {names}", "one column", "", str(path))
+            raise LogError(kind, f"{len(channels)} columns: {names}", "one column", "", str(path))
     if not is_response(channel.name for channel in table.channels):
         names = ", ".join(channel.name for channel in table.channels)
         expected = "frequency, and magnitude and phase or real and imaginary part"
-        raise StageError("log", names, expected, "f [Hz];magnitude [dB];phase [deg]", str(path))
+        raise LogError("log", names, expected, "f [Hz];magnitude [dB];phase [deg]", str(path))
     columns = {kind: channels[0] for kind, channels in found.items()}
     frequency = _frequency(columns["frequency"], path)
     if {"real", "imaginary"} <= set(columns):
@@ -82,7 +83,7 @@ def read_response_text(path: Path) -> MeasuredResponse:
 
 
 def read_response_uff(path: Path) -> MeasuredResponse:
-    """The response in a universal file. Raises StageError."""
+    """The response in a universal file. Raises LogError."""
     data, frequency, coherence = frequency_sets(path)
     above, below = label(data, "ordinate_axis_units_lab"), label(data, "orddenom_axis_units_lab")
     scale, unit, told = _unit(f"{above}/({below})" if above and below else above)
@@ -93,19 +94,19 @@ def read_response_uff(path: Path) -> MeasuredResponse:
 
 
 def _frequency(column: Channel, path: Path) -> np.ndarray:
-    """Frequencies in Hz. Raises StageError for a column without a unit."""
+    """Frequencies in Hz. Raises LogError for a column without a unit."""
     value = factor(column.unit, "Hz") if column.unit else None
     if value is None:
         given = f"{column.name} in {column.unit}" if column.unit else f"{column.name} without a unit"
-        raise StageError("frequency", given, "Hz or rad/s in the heading", "f [Hz]", str(path))
+        raise LogError("frequency", given, "Hz or rad/s in the heading", "f [Hz]", str(path))
     return column.values * value
 
 
 def _polar(magnitude: Channel, phase: Channel, path: Path) -> tuple[np.ndarray, float, str, str]:
-    """Response from magnitude and phase; its scale, unit and words. Raises StageError for a phase without a unit."""
+    """Response from magnitude and phase; its scale, unit and words. Raises LogError for a phase without a unit."""
     turn = factor(phase.unit, "rad") if phase.unit else None
     if turn is None:
-        raise StageError("phase", f"{phase.name} without a unit", "deg or rad in the heading", "phase [deg]", str(path))
+        raise LogError("phase", f"{phase.name} without a unit", "deg or rad in the heading", "phase [deg]", str(path))
     angle = np.exp(1j * turn * phase.values)
     unit = spelled(magnitude.unit)
     if unit.lower().startswith("db") or "db" in words(magnitude.name):
@@ -126,7 +127,7 @@ def _unit(text: str) -> tuple[float, str, str]:
 
 
 def _checked(measured: MeasuredResponse, path: Path) -> MeasuredResponse:
-    """The response without its line at 0 Hz, checked. Raises StageError for too few or falling frequencies and NaN."""
+    """The response without its line at 0 Hz, checked. Raises LogError for too few or falling frequencies and NaN."""
     positive = measured.frequency > 0
     if not positive.all():
         kept = [a if a is None else a[positive] for a in (measured.frequency, measured.response, measured.coherence)]
@@ -134,13 +135,13 @@ def _checked(measured: MeasuredResponse, path: Path) -> MeasuredResponse:
         measured = replace(measured, frequency=kept[0], response=kept[1], coherence=kept[2], read=read)
     frequency = measured.frequency
     if frequency.size < 3:
-        raise StageError("log", f"{frequency.size} frequencies", "at least 3", "", str(path))
+        raise LogError("log", f"{frequency.size} frequencies", "at least 3", "", str(path))
     for name, values in (("frequency", frequency), ("response", measured.response), ("coherence", measured.coherence)):
         if values is not None and not np.isfinite(values).all():
             row = int(np.flatnonzero(~np.isfinite(values))[0]) + 1
-            raise StageError(name, f"no number in row {row}", "finite numbers in every row", "", str(path))
+            raise LogError(name, f"no number in row {row}", "finite numbers in every row", "", str(path))
     falling = np.flatnonzero(np.diff(frequency) <= 0)
     if falling.size:
         given = f"{frequency[falling[0] + 1]:g} Hz after {frequency[falling[0]]:g} Hz"
-        raise StageError("frequency", given, "rising frequencies", "", str(path))
+        raise LogError("frequency", given, "rising frequencies", "", str(path))
     return measured

@@ -9,23 +9,23 @@ from typing import Any
 
 import numpy as np
 
+from friso.errors import LogError
 from friso.identify.logs.channel import Channel, Table
 from friso.identify.logs.text import unique
 from friso.identify.logs.units import split_heading
-from friso.quantities import StageError
 
 
 def library(module: str, extra: str, path: Path) -> Any:
-    """An optional library. Raises StageError that says how to install it."""
+    """An optional library. Raises LogError that says how to install it."""
     try:
         return import_module(module)
     except ImportError:
         given = f"a {extra.upper()} file, and the library {module} is not installed"
-        raise StageError("log", given, "the library", f'pip install "friso[{extra}]"', str(path)) from None
+        raise LogError("log", given, "the library", f'pip install "friso[{extra}]"', str(path)) from None
 
 
 def read_tdms(path: Path) -> Table:
-    """National Instruments TDMS. Raises StageError."""
+    """National Instruments TDMS. Raises LogError."""
     nptdms = library("nptdms", "tdms", path)
     channels, notes = [], []
     heard, logger = _Heard(), logging.getLogger("nptdms")
@@ -63,7 +63,7 @@ class _Heard(logging.Handler):
 
 
 def read_lvm(path: Path) -> Table:
-    """LabVIEW measurement text. Raises StageError."""
+    """LabVIEW measurement text. Raises LogError."""
     lvm_read = library("lvm_read", "lvm", path)
     channels = []
     try:
@@ -102,15 +102,15 @@ def _even(start: list[float], step: list[float], n: int) -> np.ndarray | None:
     return start[0] + step[0] * np.arange(n) if start and step and step[0] > 0 else None
 
 
-def _broken(kind: str, error: Exception, path: Path) -> StageError:
-    return StageError("log", f"a {kind} file that cannot be read ({error})", f"a whole {kind} file", "", str(path))
+def _broken(kind: str, error: Exception, path: Path) -> LogError:
+    return LogError("log", f"a {kind} file that cannot be read ({error})", f"a whole {kind} file", "", str(path))
 
 
 def _table(kind: str, channels: list[Channel], notes: list[str], path: Path) -> Table:
-    """The channels under names of their own. Raises StageError for none."""
+    """The channels under names of their own. Raises LogError for none."""
     filled = [channel for channel in channels if channel.values.size]
     if not filled:
-        raise StageError("log", f"a {kind} file without numbers", "a file with channels", "", str(path))
+        raise LogError("log", f"a {kind} file without numbers", "a file with channels", "", str(path))
     names = unique([channel.name for channel in filled])
     renamed = tuple(Channel(name, c.unit, c.values, c.time, c.source) for name, c in zip(names, filled, strict=True))
     return Table(renamed, {}, (f"format: {kind}", f"{len(renamed)} channels", *notes))

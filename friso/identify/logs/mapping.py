@@ -10,8 +10,9 @@ from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
+from friso.errors import InputError, LogError
 from friso.identify.logs.log import ROLES
-from friso.quantities import Quantity, StageError, as_toml, positive, quoted
+from friso.quantities import Quantity, as_toml, positive, quoted
 
 SUFFIX = ".friso.toml"
 MAPPABLE = ("time", *ROLES)
@@ -53,13 +54,13 @@ def from_options(
     experiment: str | None = None,
 ) -> Mapping:
     """From the texts of `--map ROLE=CHANNEL`, `--unit CHANNEL=UNIT`, `--scale ROLE=SCALE`, `--dt "1 ms"`.
-    Raises StageError."""
+    Raises LogError."""
     roles = dict(_pair(text, "--map", 'position="Axis1.ActPos"', MAPPABLE) for text in maps)
     channel_units = dict(_pair(text, "--unit", 'Axis1.ActPos="mm"', last=True) for text in units)
     factors = dict(_pair(text, "--scale", 'force="35.1507 N/V"', tuple(ROLES)) for text in scales)
     try:
         sample_time = None if dt is None else float(_SAMPLE_TIME.read(dt))
-    except StageError as error:
+    except InputError as error:
         raise error.found_in("--dt") from None
     return Mapping(roles, channel_units, factors, sample_time, experiment)
 
@@ -67,13 +68,13 @@ def from_options(
 def _pair(
     text: str, option: str, example: str, left: tuple[str, ...] | None = None, last: bool = False
 ) -> tuple[str, str]:
-    """What stands left and right of the first (or last) equals sign. Raises StageError."""
+    """What stands left and right of the first (or last) equals sign. Raises LogError."""
     first, sign, second = text.rpartition("=") if last else text.partition("=")
     first, second = first.strip(), second.strip().strip('"')
     if not sign or not first or not second:
-        raise StageError(option, quoted(text), "two texts with = between", f"{option} {example}")
+        raise LogError(option, quoted(text), "two texts with = between", f"{option} {example}")
     if left is not None and first not in left:
-        raise StageError(option, quoted(first), f"one of {', '.join(left)}", f"{option} {example}")
+        raise LogError(option, quoted(first), f"one of {', '.join(left)}", f"{option} {example}")
     return first, second
 
 
@@ -84,7 +85,7 @@ def sidecar(log: Path, folder: Path | None = None) -> Path:
 
 def save(mapping: Mapping, log: Path, folder: Path | None = None) -> Path:
     """Write the mapping beside the log, or into the folder where that cannot be written; the path written to.
-    Raises StageError."""
+    Raises LogError."""
     lines = ["# How this log was read by `friso identify`: reused next time, options override it."]
     if mapping.sample_time is not None:
         lines.append(f'sample_time = "{mapping.sample_time!r} s"')
@@ -105,11 +106,11 @@ def save(mapping: Mapping, log: Path, folder: Path | None = None) -> Path:
         except OSError:
             continue
         return place
-    raise StageError("mapping", str(log.parent), "a folder that can be written", "--out results")
+    raise LogError("mapping", str(log.parent), "a folder that can be written", "--out results")
 
 
 def load(log: Path, folder: Path | None = None) -> Mapping | None:
-    """The mapping kept for a log: that beside it, else that in the folder; None where there is none. Raises StageError
+    """The mapping kept for a log: that beside it, else that in the folder; None where there is none. Raises LogError
     for a file that is not one."""
     for place in [sidecar(log)] + ([sidecar(log, folder)] if folder is not None else []):
         if place.is_file():
@@ -118,32 +119,30 @@ def load(log: Path, folder: Path | None = None) -> Mapping | None:
 
 
 def _parsed(place: Path) -> Mapping:
-    """The mapping in a file. Raises StageError."""
+    """The mapping in a file. Raises LogError."""
     try:
         document = tomllib.loads(place.read_text(encoding="utf-8"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError) as error:
-        raise StageError(
-            "", str(error), "a mapping kept by friso; remove the file to map anew", "", str(place)
-        ) from None
+        raise LogError("", str(error), "a mapping kept by friso; remove the file to map anew", "", str(place)) from None
     known = {each.name for each in fields(Mapping)}
     for key, value in document.items():
         if key not in known or (key in TABLES) != isinstance(value, dict):
-            raise StageError(key, quoted(value), f"tables {', '.join(TABLES)}; sample_time", "", str(place))
+            raise LogError(key, quoted(value), f"tables {', '.join(TABLES)}; sample_time", "", str(place))
     texts = {key: _texts(document.get(key, {}), key, place) for key in TABLES}
     try:
         options = from_options(dt=document.get("sample_time"), experiment=document.get("experiment"))
         for group, allowed in (("roles", MAPPABLE), ("scales", tuple(ROLES))):
             for key in texts[group]:
                 if key not in allowed:
-                    raise StageError(group, quoted(key), f"one of {', '.join(allowed)}")
-    except StageError as error:
+                    raise LogError(group, quoted(key), f"one of {', '.join(allowed)}")
+    except InputError as error:
         raise error.found_in(str(place)) from None
     return replace(options, **texts)
 
 
 def _texts(table: dict[str, Any], key: str, place: Path) -> dict[str, str]:
-    """A table of texts. Raises StageError."""
+    """A table of texts. Raises LogError."""
     for name, value in table.items():
         if not isinstance(value, str):
-            raise StageError(f"{key}.{name}", quoted(value), "a text", "", str(place))
+            raise LogError(f"{key}.{name}", quoted(value), "a text", "", str(place))
     return table

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from friso.errors import LogError
 from friso.identify.logs.channel import Channel, Table
 from friso.identify.logs.text import unique
 from friso.identify.logs.units import split_heading
-from friso.quantities import StageError
 
 MOST_COLUMNS = 64
 """A matrix with more columns is no set of channels (an image, a response matrix)."""
@@ -36,16 +36,14 @@ class _Found:
 
 
 def read_mat(path: Path) -> Table:
-    """The channels and single numbers of a MAT file of any version. Raises StageError for a file that holds none."""
+    """The channels and single numbers of a MAT file of any version. Raises LogError for a file that holds none."""
     with path.open("rb") as file:
         head = file.read(520)
     newer = head.startswith(HDF5) or HDF5 in head[504:]
     try:
         tree = _read_hdf5(path) if newer else _read_old(path)
     except Exception as error:  # scipy and h5py let through whatever a broken file makes them stumble over
-        raise StageError(
-            "log", f"a MAT file that cannot be read ({error})", "a whole MAT file", "", str(path)
-        ) from None
+        raise LogError("log", f"a MAT file that cannot be read ({error})", "a whole MAT file", "", str(path)) from None
     found = _Found()
     for name, node in tree.items():
         _walk(node, name, found)
@@ -55,7 +53,7 @@ def read_mat(path: Path) -> Table:
         )
     if not found.channels:
         given = f"no arrays, but objects: {', '.join(found.objects)}" if found.objects else "no arrays of numbers"
-        raise StageError("log", given, "signals: save as structure with time", "", str(path))
+        raise LogError("log", given, "signals: save as structure with time", "", str(path))
     name = "MATLAB 7.3 (HDF5)" if newer else "MATLAB up to 7"
     channels = _plainly_named(found.channels)
     return Table(channels, found.scalars, (f"format: {name}", f"{len(channels)} channels", *found.notes))

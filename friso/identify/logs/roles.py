@@ -8,9 +8,10 @@ from collections.abc import Mapping as Names
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from friso.errors import LogError
 from friso.identify.logs.channel import Channel, Table
 from friso.identify.logs.units import split_heading
-from friso.quantities import StageError, quoted
+from friso.quantities import quoted
 
 _SET = frozenset(["ref", "reference", "set", "setpoint", "desired", "target", "cmd", "command", "commanded", "demand"])
 _NOT_MEASURED = frozenset(
@@ -66,7 +67,7 @@ def role_of(name: str) -> tuple[str, str] | None:
 
 
 def find(table: Table, wanted: str, role: str, origin: str = "") -> Channel:
-    """The channel of this name, with or without its unit in brackets. Raises StageError that lists the channels."""
+    """The channel of this name, with or without its unit in brackets. Raises LogError that lists the channels."""
     plain = split_heading(wanted)[0]
     for matches in ([c for c in table.channels if c.name == wanted], [c for c in table.channels if c.name == plain]):
         if len(matches) == 1:
@@ -74,7 +75,7 @@ def find(table: Table, wanted: str, role: str, origin: str = "") -> Channel:
     names = [channel.name for channel in table.channels]
     near = difflib.get_close_matches(wanted, names, 1, 0.6)
     example = f'--map {role}="{near[0] if near else names[0]}"'
-    raise StageError(role, f"{quoted(wanted)}, which the log does not hold", listing(table), example, origin)
+    raise LogError(role, f"{quoted(wanted)}, which the log does not hold", listing(table), example, origin)
 
 
 def listing(table: Table) -> str:
@@ -88,7 +89,7 @@ def listing(table: Table) -> str:
 def choose(table: Table, told: Names[str, str], needed: Sequence[str], origin: str = "") -> dict[str, Choice]:
     """Roles with their channels: first what the user told, then what the names tell.
 
-    Raises StageError for a name that is not there, for two candidates, and for a role that is needed and not found.
+    Raises LogError for a name that is not there, for two candidates, and for a role that is needed and not found.
     """
     chosen = {role: Choice(role, find(table, name, role, origin), "as told", True) for role, name in told.items()}
     taken = {id(choice.channel) for choice in chosen.values()}
@@ -102,7 +103,7 @@ def choose(table: Table, told: Names[str, str], needed: Sequence[str], origin: s
             continue
         if len(found) > 1:
             names = " and ".join(quoted(channel.name) for channel, _ in found)
-            raise StageError(
+            raise LogError(
                 role, f"{len(found)} candidates: {names}", "one channel", f'--map {role}="{found[0][0].name}"', origin
             )
         channel, word = found[0]
@@ -110,7 +111,7 @@ def choose(table: Table, told: Names[str, str], needed: Sequence[str], origin: s
     for role in needed:
         if role not in chosen:
             example = f'--map {role}="{table.channels[0].name}"'
-            raise StageError(role, "no channel whose name tells it", listing(table), example, origin)
+            raise LogError(role, "no channel whose name tells it", listing(table), example, origin)
     return chosen
 
 

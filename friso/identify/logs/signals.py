@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from friso.errors import InputError, LogError
 from friso.identify.logs.channel import Channel, Table
 from friso.identify.logs.checks import unwrapped
 from friso.identify.logs.log import ROLES
@@ -14,7 +15,7 @@ from friso.identify.logs.mapping import Mapping
 from friso.identify.logs.roles import Choice, find
 from friso.identify.logs.text import with_times
 from friso.identify.logs.units import factor, in_si, read_scale
-from friso.quantities import StageError, quoted
+from friso.quantities import quoted
 
 LARGEST = 1e30
 """No instrument measures more in any unit; beyond it, squares of squares overflow."""
@@ -44,7 +45,7 @@ class Reading:
 
 
 def with_told_units(table: Table, mapping: Mapping, form: str, origin: str) -> Table:
-    """The table with the units that the user said, and with the times that follow from them. Raises StageError."""
+    """The table with the units that the user said, and with the times that follow from them. Raises LogError."""
     if not mapping.units:
         return table
     told = {id(find(table, name, "unit", origin)): unit for name, unit in mapping.units.items()}
@@ -57,7 +58,7 @@ def with_told_units(table: Table, mapping: Mapping, form: str, origin: str) -> T
 
 
 def signal(choice: Choice, reading: Reading, told: Told) -> np.ndarray:
-    """Values of a channel in the unit of its role, with what was done to them told. Raises StageError."""
+    """Values of a channel in the unit of its role, with what was done to them told. Raises LogError."""
     channel, role = choice.channel, choice.role
     values, bits = unwrapped(channel.values) if ROLES[role] == "m" else (channel.values, 0)  # encoders overflow
     if bits:
@@ -83,34 +84,32 @@ def signal(choice: Choice, reading: Reading, told: Told) -> np.ndarray:
         most = np.abs(values[np.isfinite(values)]).max(initial=0.0)
     if most > LARGEST:
         given = f"values up to {most:.3g} {told.units.get(role, ROLES[role])}"
-        raise StageError(role, given, "values that an instrument measures; is the file damaged?", "", reading.origin)
+        raise LogError(role, given, "values that an instrument measures; is the file damaged?", "", reading.origin)
     return values
 
 
 def _scaled(role: str, scale: str, unit: str, origin: str) -> tuple[float, str]:
     try:
         return read_scale(role, scale, unit)
-    except StageError as error:
+    except InputError as error:
         raise error.found_in(origin) from None
 
 
-def _wrong_unit(choice: Choice, unit: str, si: str, reading: Reading) -> StageError:
+def _wrong_unit(choice: Choice, unit: str, si: str, reading: Reading) -> LogError:
     """The error for a channel whose unit is none of the role's kind, or that has none."""
     role, name = choice.role, choice.channel.name
     if not unit:
         usual = {"m": "mm", "m/s": "mm/s", "N": "N"}.get(ROLES[role], ROLES[role])
         given = f"{quoted(name)}, which has no unit"
-        return StageError(
-            role, given, f"a unit convertible to {ROLES[role]}", f'--unit "{name}={usual}"', reading.origin
-        )
+        return LogError(role, given, f"a unit convertible to {ROLES[role]}", f'--unit "{name}={usual}"', reading.origin)
     number = "35.1507" if role in ("force", "disturbance") else "1.5"
     example = f'--scale {role}="{number} {ROLES[role]}/{si}"'
-    return StageError(role, f"{quoted(name)} in {unit}", f"a scale to {ROLES[role]}", example, reading.origin)
+    return LogError(role, f"{quoted(name)} in {unit}", f"a scale to {ROLES[role]}", example, reading.origin)
 
 
 def instants(choice: Choice, clock: Choice | None, reading: Reading, told: Told) -> np.ndarray | None:
     """Instants of a channel [s]: from the sample time that the user said, the time channel, or the file; None where
-    there are none. Raises StageError."""
+    there are none. Raises LogError."""
     channel = choice.channel
     if reading.mapping.sample_time is not None:
         return reading.mapping.sample_time * np.arange(channel.values.size)
@@ -120,7 +119,7 @@ def instants(choice: Choice, clock: Choice | None, reading: Reading, told: Told)
 
 
 def _seconds(clock: Choice, reading: Reading, told: Told) -> float:
-    """Seconds in the unit of the time channel. Raises StageError for none."""
+    """Seconds in the unit of the time channel. Raises LogError for none."""
     name, unit = clock.channel.name, clock.channel.unit
     if not unit and clock.told and reading.bare:
         line = f"time: {name} has no unit (this format has none): taken in s"
@@ -130,14 +129,14 @@ def _seconds(clock: Choice, reading: Reading, told: Told) -> float:
     if value is None:
         given = f"{quoted(name)} in {unit}" if unit else f"{quoted(name)}, which has no unit"
         example = "; or ".join(each for each in (f'--unit "{name}=ms"', _offers(reading.table)) if each)
-        raise StageError("time", given, "a unit convertible to s", example, reading.origin)
+        raise LogError("time", given, "a unit convertible to s", example, reading.origin)
     return value
 
 
-def no_time(channel: Channel, reading: Reading) -> StageError:
+def no_time(channel: Channel, reading: Reading) -> LogError:
     """The error for a channel without instants."""
     example = _offers(reading.table) or '--map time="CHANNEL", or --dt "1 ms"'
-    return StageError(
+    return LogError(
         "time", f"no instants for {quoted(channel.name)}", "a time channel or a sample time", example, reading.origin
     )
 
@@ -155,8 +154,8 @@ def _offers(table: Table) -> str:
 
 
 def unused(mapping: Mapping, chosen: Roles[str, Choice], origin: str) -> None:
-    """Raises StageError for a scale of a role that has no channel."""
+    """Raises LogError for a scale of a role that has no channel."""
     for role in mapping.scales:
         if role not in chosen:
-            raise StageError("scale", f"a scale for {role}, which has no channel", "a channel for it",
+            raise LogError("scale", f"a scale for {role}, which has no channel", "a channel for it",
                              f'--map {role}="CHANNEL"', origin)  # fmt: skip

@@ -9,8 +9,8 @@ from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 
+from friso.errors import LogError
 from friso.identify.logs.units import is_unit, split_heading
-from friso.quantities import StageError
 
 HEAD_BYTES = 1 << 18
 """How much of a file is looked at to find how it is written."""
@@ -49,7 +49,7 @@ class Layout:
 
 
 def decoded_head(path: Path) -> tuple[str, list[str]]:
-    """Encoding and the first lines of a text file. Raises StageError for what is no text."""
+    """Encoding and the first lines of a text file. Raises LogError for what is no text."""
     with path.open("rb") as file:
         head = file.read(HEAD_BYTES)
     encoding = next((name for mark, name in _BYTE_ORDER_MARKS if head.startswith(mark)), "")
@@ -72,8 +72,8 @@ def decoded_head(path: Path) -> tuple[str, list[str]]:
     return encoding, lines[:-1] if len(head) == HEAD_BYTES or not lines[-1] else lines
 
 
-def _no_text(path: Path) -> StageError:
-    return StageError(
+def _no_text(path: Path) -> LogError:
+    return LogError(
         "log", f"{path.stat().st_size} bytes that are neither text nor a known format",
         "CSV, TXT, TSV, TwinCAT Scope CSV, MAT, TDMS, UFF or LVM", "", str(path),
     )  # fmt: skip
@@ -106,7 +106,7 @@ def _is_row(cells: list[str], decimal: str, words: bool) -> bool:
 
 
 def layout(path: Path) -> Layout:
-    """How a text with one table of numbers is written. Raises StageError where there is none."""
+    """How a text with one table of numbers is written. Raises LogError where there is none."""
     encoding, lines = decoded_head(path)
     lines = lines[:HEAD_LINES]
     for words in (False, True):
@@ -115,7 +115,7 @@ def layout(path: Path) -> Layout:
         if fits:
             return max(fits, key=lambda fit: fit[0])[1]
     given = "no row of numbers" + (f" after the heading {lines[0][:60]!r}" if lines else "")
-    raise StageError("log", given, "a heading and rows of numbers", "time [s];position [mm];force [N]", str(path))
+    raise LogError("log", given, "a heading and rows of numbers", "time [s];position [mm];force [N]", str(path))
 
 
 def _fit(

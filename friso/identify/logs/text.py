@@ -11,15 +11,16 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from friso.errors import LogError
 from friso.identify.logs.channel import Channel, Table
 from friso.identify.logs.roles import role_of
 from friso.identify.logs.sniff import STAMP, Layout, layout, split_line
 from friso.identify.logs.units import factor
-from friso.quantities import StageError, quoted
+from friso.quantities import quoted
 
 
 def read_text(path: Path) -> Table:
-    """The table of a text file. Raises StageError for ragged rows and for a text among the numbers, with its line."""
+    """The table of a text file. Raises LogError for ragged rows and for a text among the numbers, with its line."""
     form = layout(path)
     if not form.certain and form.delimiter != "," and _has_comma(path, form):
         form = replace(form, decimal=",")
@@ -46,7 +47,7 @@ def read_text(path: Path) -> Table:
 
 
 def read_frame(path: Path, form: Layout) -> Any:
-    """All cells from the first row of numbers on; columns without text are floats. Raises StageError.
+    """All cells from the first row of numbers on; columns without text are floats. Raises LogError.
 
     The lines before are skipped here, not by pandas, which would take a lone quotation mark in them for an open one.
     """
@@ -66,19 +67,19 @@ def read_frame(path: Path, form: Layout) -> Any:
         raise ragged(path, form, str(error)) from None
 
 
-def ragged(path: Path, form: Layout, why: str = "") -> StageError:
+def ragged(path: Path, form: Layout, why: str = "") -> LogError:
     """The error for the first line with more cells than columns; the parser's own words where there is none."""
     with path.open(encoding=form.encoding, errors="replace") as file:
         for number, line in enumerate(file, 1):
             cells = split_line(line.rstrip("\r\n"), form.delimiter) if number > form.first else []
             if len(cells) > form.columns and any(cells[form.columns :]):
                 given = f"{len(cells)} cells in line {number}"
-                return StageError("log", given, f"{form.columns} cells in every row", "", str(path))
-    return StageError("log", why.strip(), f"rows of {form.columns} numbers", "", str(path))
+                return LogError("log", given, f"{form.columns} cells in every row", "", str(path))
+    return LogError("log", why.strip(), f"rows of {form.columns} numbers", "", str(path))
 
 
 def _no_short_rows(path: Path, form: Layout, frame: Any) -> None:
-    """Raises StageError for a row with fewer cells than columns above others that have them all."""
+    """Raises LogError for a row with fewer cells than columns above others that have them all."""
     there = frame.iloc[:, -1].notna().to_numpy()
     missing = np.flatnonzero(~there[: int(np.flatnonzero(there)[-1])]) if there.any() else np.empty(0, dtype=int)
     if not missing.size:
@@ -89,7 +90,7 @@ def _no_short_rows(path: Path, form: Layout, frame: Any) -> None:
             cells = split_line(line.rstrip("\r\n"), form.delimiter) if number in suspects and line.strip() else []
             if 0 < len(cells) < form.columns:
                 given = f"{len(cells)} cells in line {number}"
-                raise StageError("log", given, f"{form.columns} cells in every row", "", str(path))
+                raise LogError("log", given, f"{form.columns} cells in every row", "", str(path))
 
 
 def _has_comma(path: Path, form: Layout) -> bool:
@@ -113,7 +114,7 @@ def unique(names: list[str]) -> list[str]:
 
 def _numbers(path: Path, form: Layout, cells: Any, name: str) -> tuple[np.ndarray, str] | None:
     """Values of a column, with "s" for the unit of time stamps; None for a column of texts.
-    Raises StageError for a text among numbers."""
+    Raises LogError for a text among numbers."""
     if cells.dtype == bool or pd.api.types.is_numeric_dtype(cells.dtype):
         values = cells.to_numpy(dtype=float)
         return None if np.isnan(values).all() else (values, "")
@@ -131,7 +132,7 @@ def _numbers(path: Path, form: Layout, cells: Any, name: str) -> tuple[np.ndarra
         row = int(np.flatnonzero(wrong)[0])
         line = form.first + 1 + int(cells.index[row])
         given = f"{quoted(str(texts.iloc[row]))} in line {line}, column {name or 'without a name'}"
-        raise StageError("log", given, "numbers all the way down", "", str(path))
+        raise LogError("log", given, "numbers all the way down", "", str(path))
     return values, ""
 
 
@@ -155,7 +156,7 @@ def _stamped(path: Path, texts: Any, there: Any, form: Layout) -> np.ndarray:
             seconds = stamps.dt.total_seconds().to_numpy(dtype=float)
             seconds = seconds + 86400.0 * np.cumsum(np.r_[0.0, np.nan_to_num(np.diff(seconds)) < -43200.0])
     except ValueError as error:
-        raise StageError(
+        raise LogError(
             "log", str(error), "dates and times as in ISO 8601", "2026-01-31T12:00:00.001", str(path)
         ) from None
     return seconds - seconds[int(np.flatnonzero(there)[0])]
@@ -174,7 +175,7 @@ def _same_ends(path: Path, form: Layout, columns: list[Channel], frame: Any) -> 
         if missing <= 2 and missing < 0.01 * len(frame):
             line = form.first + 1 + int(frame.index[len(shortest.values)])
             given = f"a row in line {line} that ends before {shortest.name}"
-            raise StageError("log", given, f"{form.columns} cells in every row", "", str(path))
+            raise LogError("log", given, f"{form.columns} cells in every row", "", str(path))
     return out
 
 

@@ -8,8 +8,8 @@ from itertools import pairwise
 
 import numpy as np
 
+from friso.errors import LogError
 from friso.identify.logs.checks import repeated_stamps
-from friso.quantities import StageError
 
 GAP = 1.5
 """A step of time above this many sample times is a gap: at least one sample is missing (one missing makes 2)."""
@@ -37,7 +37,7 @@ class Track:
 def track(name: str, time: np.ndarray, values: np.ndarray) -> Track:
     """A channel cleaned of what is no number and of repeated stamps, split at gaps, on even instants.
 
-    Raises StageError for too little, for time that decreases, for stamps that are repeated with other values, and for
+    Raises LogError for too little, for time that decreases, for stamps that are repeated with other values, and for
     sampling that is not even.
     """
     read: list[str] = []
@@ -51,7 +51,7 @@ def track(name: str, time: np.ndarray, values: np.ndarray) -> Track:
     gaps = steps > GAP * np.median(steps)
     if gaps.mean() > MOST_GAPS:
         given = f"time stamps with {gaps.mean():.0%} of the steps over {GAP} times the usual {np.median(steps):.4g} s"
-        raise StageError(name, given, "even sampling, or the true sample time", '--dt "1 ms"')
+        raise LogError(name, given, "even sampling, or the true sample time", '--dt "1 ms"')
     period = float(steps[~gaps].mean())
     edges = [0, *(np.flatnonzero(gaps) + 1).tolist(), time.size]
     segments = [slice(a, b) for a, b in pairwise(edges)]
@@ -59,11 +59,11 @@ def track(name: str, time: np.ndarray, values: np.ndarray) -> Track:
 
 
 def _numbers_only(name: str, time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
-    """The samples that are numbers, and how many are not between the first and the last. Raises StageError."""
+    """The samples that are numbers, and how many are not between the first and the last. Raises LogError."""
     there = np.isfinite(time) & np.isfinite(values)
     if there.sum() < max(2, 0.5 * there.size):
         given = f"{there.size - there.sum()} of {there.size} samples that are no numbers (NaN)"
-        raise StageError(name, given, "at least half of the samples", "")
+        raise LogError(name, given, "at least half of the samples", "")
     inside = np.flatnonzero(there)
     return time[there], values[there], int(np.count_nonzero(~there[inside[0] : inside[-1]]))
 
@@ -100,7 +100,7 @@ def _evened(name: str, raw: Track) -> Track:
 
 def together(tracks: Mapping[str, Track]) -> tuple[Track, dict[str, np.ndarray]]:
     """All tracks at the instants of the coarsest one that all of them cover: these instants as a track, and the values
-    by name. Others are interpolated linearly within their own segments only. Raises StageError where nothing is
+    by name. Others are interpolated linearly within their own segments only. Raises LogError where nothing is
     covered by all."""
     base_name = max(tracks, key=lambda name: round(np.log(tracks[name].period), 4))
     base = tracks[base_name]
@@ -126,7 +126,7 @@ def together(tracks: Mapping[str, Track]) -> tuple[Track, dict[str, np.ndarray]]
     segments = [run for run in segments if run.stop - run.start >= SHORTEST]
     if not segments:
         spans = ", ".join(f"{name} {each.time[0]:.6g} s to {each.time[-1]:.6g} s" for name, each in tracks.items())
-        raise StageError("log", f"no {SHORTEST} samples in a row that all channels share: {spans}", "a common span", "")
+        raise LogError("log", f"no {SHORTEST} samples in a row that all channels share: {spans}", "a common span", "")
     if short:
         read.append(f"{len(short)} segments shorter than {SHORTEST} samples left out")
     kept, start = [], 0

@@ -13,11 +13,12 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
+from friso.errors import LogError
 from friso.identify.logs.channel import Channel, Table
 from friso.identify.logs.sniff import Layout, decoded_head, is_number, split_line
 from friso.identify.logs.text import as_numbers, read_frame, unique
 from friso.identify.logs.units import spelled
-from friso.quantities import StageError, quoted
+from friso.quantities import quoted
 
 _FILETIME = 1e15
 """Above this a time is a FILETIME: 100 ns since 1601, 1.3e17 in 2022. In ms it would be 30 000 years. As a double
@@ -37,14 +38,14 @@ def is_twincat(lines: list[str]) -> bool:
 
 
 def read_twincat(path: Path) -> Table:
-    """Channels with their own times. Raises StageError."""
+    """Channels with their own times. Raises LogError."""
     encoding, lines = decoded_head(path)
     delimiter = lines[0][4]
     rows = [split_line(line, delimiter) for line in lines]
     first = next((i for i, cells in enumerate(rows) if i and _is_data(cells)), None)
     names_at = max((i for i, cells in enumerate(rows[:first]) if cells and cells[0] == "Name"), default=None)
     if first is None or names_at is None:
-        raise StageError("log", "a TwinCAT Scope export without rows of numbers", "an export with data", "", str(path))
+        raise LogError("log", "a TwinCAT Scope export without rows of numbers", "an export with data", "", str(path))
     table = {cells[0]: cells for cells in rows[names_at:first] if cells and cells[0]}
     sample = ";".join(
         cell for cells in rows[names_at:] for cell in cells if is_number(cell, ",") or is_number(cell, ".")
@@ -73,7 +74,7 @@ def _without_end(frame: Any) -> Any:
 def _channels(
     path: Path, form: Layout, table: dict[str, list[str]], frame: Any
 ) -> tuple[tuple[Channel, ...], list[str]]:
-    """The channels of all groups, and lines that tell of them. Raises StageError."""
+    """The channels of all groups, and lines that tell of them. Raises LogError."""
     labels, notes, out = table["Name"], [], []
     clocks = [i for i, cell in enumerate(labels) if cell == "Name"]
     names = unique(labels)
@@ -93,7 +94,7 @@ def _channels(
             out.append(Channel(names[column], spelled(info.get("Unit", "")), values, seconds, _source(column, info)))
         notes.append(f"group {labels[start + 1 : end]}: {len(time)} samples, {seconds[0]:g} s to {seconds[-1]:g} s")
     if not out:
-        raise StageError("log", "no channel with samples", "an export with data", "", str(path))
+        raise LogError("log", "no channel with samples", "an export with data", "", str(path))
     return tuple(out), notes + _scaled(table)
 
 
@@ -113,7 +114,7 @@ def _scaled(table: dict[str, list[str]]) -> list[str]:
 
 
 def _floats(path: Path, form: Layout, frame: Any, column: int) -> np.ndarray:
-    """A column as floats. Raises StageError with the line of a text among the numbers."""
+    """A column as floats. Raises LogError with the line of a text among the numbers."""
     cells = frame.iloc[:, column]
     if pd.api.types.is_numeric_dtype(cells.dtype):
         return cells.to_numpy(dtype=float)
@@ -124,5 +125,5 @@ def _floats(path: Path, form: Layout, frame: Any, column: int) -> np.ndarray:
     if wrong.size:
         line = form.first + 1 + int(cells.index[wrong[0]])
         given = f"{quoted(str(cells.iloc[wrong[0]]))} in line {line}, column {column + 1}"
-        raise StageError("log", given, "numbers all the way down", "", str(path))
+        raise LogError("log", given, "numbers all the way down", "", str(path))
     return values

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from friso.errors import LogError
 from friso.identify.logs.channel import Channel, Table
 from friso.identify.logs.instruments import library
 from friso.identify.logs.text import unique
-from friso.quantities import StageError
 
 TIME_RESPONSE, FREQUENCY_RESPONSE, COHERENCE = 1, 4, 6
 """Function types of record 6."""
@@ -23,16 +23,16 @@ def is_uff(head: bytes) -> bool:
 
 
 def sets_58(path: Path) -> list[dict[str, Any]]:
-    """The datasets 58 of a universal file. Raises StageError for none."""
+    """The datasets 58 of a universal file. Raises LogError for none."""
     pyuff = library("pyuff", "uff", path)
     try:
         file = pyuff.UFF(str(path))
         numbers = [i for i, kind in enumerate(file.get_set_types()) if kind == 58]
         sets = [file.read_sets(i) for i in numbers]
     except Exception as error:  # pyuff lets through whatever a broken file makes it stumble over
-        raise StageError("log", f"a UFF file that cannot be read ({error})", "a whole file", "", str(path)) from None
+        raise LogError("log", f"a UFF file that cannot be read ({error})", "a whole file", "", str(path)) from None
     if not sets:
-        raise StageError("log", "a UFF file without a dataset 58", "time histories or responses", "", str(path))
+        raise LogError("log", "a UFF file without a dataset 58", "time histories or responses", "", str(path))
     return sets
 
 
@@ -43,10 +43,10 @@ def label(data: dict[str, Any], key: str) -> str:
 
 
 def read_uff(path: Path) -> Table:
-    """The time histories of a universal file. Raises StageError."""
+    """The time histories of a universal file. Raises LogError."""
     times = [data for data in sets_58(path) if data["func_type"] == TIME_RESPONSE]
     if not times:
-        raise StageError("log", "a UFF file without time histories", "function type 1 in a dataset 58", "", str(path))
+        raise LogError("log", "a UFF file without time histories", "function type 1 in a dataset 58", "", str(path))
     headings = [label(d, "id1") or f"node {d['rsp_node']} direction {d['rsp_dir']}" for d in times]
     channels = tuple(
         Channel(name, label(d, "ordinate_axis_units_lab"), np.real(d["data"]).astype(float), _axis(d), "dataset 58")
@@ -64,13 +64,13 @@ def _axis(data: dict[str, Any]) -> np.ndarray:
 
 
 def frequency_sets(path: Path) -> tuple[dict[str, Any], np.ndarray, np.ndarray | None]:
-    """The frequency response of a universal file, its frequencies, and its coherence or None. Raises StageError for
+    """The frequency response of a universal file, its frequencies, and its coherence or None. Raises LogError for
     none and for several."""
     sets = sets_58(path)
     responses = [data for data in sets if data["func_type"] == FREQUENCY_RESPONSE]
     if len(responses) != 1:
         given = f"{len(responses)} frequency responses: {', '.join(label(d, 'id1') for d in responses)}".rstrip(": ")
-        raise StageError("log", given, "a file with one frequency response", "", str(path))
+        raise LogError("log", given, "a file with one frequency response", "", str(path))
     axis = _axis(responses[0])
     fitting = [d for d in sets if d["func_type"] == COHERENCE and np.size(d["data"]) == axis.size]
     coherence = np.real(fitting[0]["data"]).astype(float) if len(fitting) == 1 else None

@@ -5,8 +5,9 @@ from __future__ import annotations
 import re
 from functools import lru_cache
 
+from friso.errors import InputError, LogError
 from friso.identify.logs.log import ROLES
-from friso.quantities import Quantity, StageError, any_sign, quoted
+from friso.quantities import Quantity, any_sign, quoted
 
 COUNTS = frozenset({"count", "counts", "cnt", "cnts", "inc", "incs", "increments", "lsb", "digit", "digits", "ticks"})
 """Texts that mean the steps of a sensor."""
@@ -58,7 +59,7 @@ def factor(unit: str, si_unit: str) -> float | None:
     """SI value of 1 `unit`, or None where it is not of the kind of `si_unit`."""
     try:
         return Quantity(si_unit, any_sign, "").factor(spelled(unit))
-    except StageError:
+    except InputError:
         return None
 
 
@@ -113,11 +114,11 @@ def in_si(unit: str, role_unit: str) -> tuple[float, str]:
 
 def read_scale(role: str, text: str, channel_unit: str) -> tuple[float, str]:
     """Factor of a scale such as "35.1507 N/V" for a channel of this unit, to the SI unit of the role; and what was
-    taken for the channel's unit. A channel without a unit has the one below the scale's stroke. Raises StageError."""
+    taken for the channel's unit. A channel without a unit has the one below the scale's stroke. Raises LogError."""
     match = re.fullmatch(r"\s*([+-]?[0-9.]+(?:[eE][+-]?[0-9]+)?)\s*(\S.*?)\s*/\s*([^/]+)\s*", text)
     role_unit, example = ROLES[role], f'--scale {role}="35.1507 {ROLES[role]}/V"'
     if match is None:
-        raise StageError("scale", quoted(text), f"number and unit, {role_unit} over the unit of the channel", example)
+        raise LogError("scale", quoted(text), f"number and unit, {role_unit} over the unit of the channel", example)
     below = spelled(match[3].strip("() "))
     above = _scale_part(f"{match[1]} {match[2]}", role_unit, text, example)
     unit = spelled(channel_unit) or below
@@ -130,12 +131,12 @@ def read_scale(role: str, text: str, channel_unit: str) -> tuple[float, str]:
     if unit == below:
         return above, unit
     given = f"{quoted(text)}, and the channel is in {unit}"
-    raise StageError("scale", given, f"a scale from {unit} to {role_unit}", f'--scale {role}="1.5 {role_unit}/{unit}"')
+    raise LogError("scale", given, f"a scale from {unit} to {role_unit}", f'--scale {role}="1.5 {role_unit}/{unit}"')
 
 
 def _scale_part(text: str, role_unit: str, whole: str, example: str) -> float:
-    """The SI value above the stroke. Raises StageError."""
+    """The SI value above the stroke. Raises LogError."""
     try:
         return float(Quantity(role_unit, any_sign, "").read(text))
-    except StageError:
-        raise StageError("scale", quoted(whole), f"number and unit, {role_unit} over a unit", example) from None
+    except InputError:
+        raise LogError("scale", quoted(whole), f"number and unit, {role_unit} over a unit", example) from None

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
+from friso.errors import InputError
 from friso.identify.logs.frequency_text import MeasuredResponse
 from friso.identify.logs.log import Log
 from friso.identify.response.arbitrary import local_polynomial
@@ -23,7 +24,6 @@ from friso.identify.response.records import Record, from_log
 from friso.identify.response.response import Channels, FrequencyResponse
 from friso.identify.response.simulated import Explanation, explained
 from friso.identify.response.two_mass import TwoMass, fit_two_mass, widened
-from friso.quantities import StageError
 
 ABOVE_FRICTION = 1 / 7
 """Share of the highest frequency below which friction may bend a response: lines below it are left to a second look."""
@@ -64,7 +64,7 @@ def analyse(
     """What the logs of one bench, realisations of one experiment, show; or a response as somebody `measured` it.
 
     `band` [Hz] is that of the models (default: above where friction bends the response); `period` [s] about that of a
-    periodic excitation (default: found). Raises StageError where no response can be had.
+    periodic excitation (default: found). Raises InputError where no response can be had.
     """
     records = {output: [_record(log, output) for log in logs] for output in _outputs(logs)}
     if measured is not None:
@@ -110,10 +110,10 @@ def as_measured(given: MeasuredResponse) -> FrequencyResponse:
 def predicted(found: Bench, log: Log, period: float | None = None) -> tuple[float, ...]:
     """Relative errors with which the two-mass model predicts the outputs of another log over the band.
 
-    Raises StageError where there is no model.
+    Raises InputError where there is no model.
     """
     if found.two_masses is None:
-        raise StageError("--predict", "no two-mass model", "a response with an antiresonance and a resonance")
+        raise InputError("--predict", "no two-mass model", "a response with an antiresonance and a resonance")
     return _errors(found.two_masses, log, found.band, period, found.other is not None)
 
 
@@ -121,7 +121,7 @@ def _attempt(said: list[str], what: str, function, *arguments):
     """The answer of an analysis, or None and why it has none."""
     try:
         return function(*arguments)
-    except StageError as error:
+    except InputError as error:
         said.append(f"no {what}: {error.given}; expected {error.expected}")
         return None
 
@@ -145,7 +145,7 @@ def _response(records: Sequence[Record], log: Log, output: str, period: float | 
     driving = records[0].input if records[0].reference is None else records[0].reference
     try:
         find_periods(driving, None if period is None else period / records[0].sample_time)
-    except StageError:
+    except InputError:
         if len(records) > 1:
             raise
         return local_polynomial(records[0], channels)
@@ -155,7 +155,7 @@ def _response(records: Sequence[Record], log: Log, output: str, period: float | 
 def _clear(responses: Sequence[FrequencyResponse]) -> tuple[FrequencyResponse, FrequencyResponse | None]:
     """The responses of the two outputs, or of the one, on the lines on which any of them stands out of the noise.
 
-    Raises StageError where none does.
+    Raises InputError where none does.
     """
     good = np.unique(np.concatenate([each.usable().frequency for each in responses]))
     kept = [each.at(np.isin(each.frequency, good)) for each in responses]
@@ -220,7 +220,7 @@ def _friction(
 
 
 def _last_period(record: Record, period: float | None) -> np.ndarray:
-    """The input over the last whole period. Raises StageError where nothing repeats."""
+    """The input over the last whole period. Raises InputError where nothing repeats."""
     driving = record.input if record.reference is None else record.reference
     found = find_periods(driving, None if period is None else period / record.sample_time)
     return record.input[found.stop - found.samples : found.stop]

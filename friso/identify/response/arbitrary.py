@@ -9,9 +9,9 @@ from __future__ import annotations
 import numpy as np
 from scipy import signal
 
+from friso.errors import InputError
 from friso.identify.response.records import Record
 from friso.identify.response.response import Channels, FrequencyResponse
-from friso.quantities import StageError
 
 OVERLAP = 1 / 36
 """Squared correlation of neighbouring Hann segments that overlap by half (Welch 1967, doi:10.1109/TAU.1967.1161901)."""
@@ -31,14 +31,14 @@ def welch(record: Record, resolution: float, channels: Channels | None = None) -
 
     H1 where the record has no reference. Its variance is that of the output not coherent with the external signal
     (Bendat, Piersol, Random Data, 4th ed., ch. 9), over the effective number of segments. Leakage is no part of it: a
-    mode sharper than the resolution comes out too low. Raises StageError for fewer than 4 segments.
+    mode sharper than the resolution comes out too low. Raises InputError for fewer than 4 segments.
     """
     record = record.checked()
     length = round(1 / (resolution * record.sample_time))
     count = (2 * len(record.input)) // max(length, 1) - 1
     if length < 8 or count < 4:
         given = f"{resolution:g} Hz: {count} segments of {length} samples"
-        raise StageError("resolution", given, "at least 4 segments of at least 8 samples", "0.5 Hz")
+        raise InputError("resolution", given, "at least 4 segments of at least 8 samples", "0.5 Hz")
     external = record.input if record.reference is None else record.reference
 
     def spectrum(one: np.ndarray, other: np.ndarray) -> np.ndarray:
@@ -66,7 +66,7 @@ def local_polynomial(record: Record, channels: Channels | None = None) -> Freque
 
     About every line, response and transient are polynomials of order 2 in the frequency over 17 lines of the spectrum
     of the whole record; what these leave over is the noise. One line in 9 is given, so that neighbours share little.
-    Raises StageError for a record of fewer than 200 samples.
+    Raises InputError for a record of fewer than 200 samples.
     """
     record = record.checked(200)
     external = record.input if record.reference is None else record.reference

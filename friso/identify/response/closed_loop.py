@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from scipy import stats
 
+from friso.errors import InputError
 from friso.identify.estimate import Estimate
 from friso.identify.response.period import find_periods
 from friso.identify.response.records import Record, drift
 from friso.identify.response.response import Channels, FrequencyResponse
-from friso.quantities import StageError
 
 OWN, OTHER = 60, 8
 """Past samples of the input, and of the output, from which the input is foretold. Its own past is looked at much
@@ -55,7 +55,7 @@ def _surprising(record: Record) -> tuple[np.ndarray | None, np.ndarray | None]:
     """Input and output without their periodic part, if they have one; None where nothing is left of the input."""
     try:
         periods = find_periods(record.input)
-    except StageError:
+    except InputError:
         return record.input, record.output
     parts = []
     for values in (record.input, record.output):
@@ -142,4 +142,4 @@ def _joined(group: list[tuple[float, float, float]]) -> tuple[float, float, floa
 
 def _same_lines(one: FrequencyResponse, other: FrequencyResponse) -> None:
     if not np.array_equal(one.frequency, other.frequency):
-        raise StageError("response", "responses on different lines", "the same lines", "both from the same record")
+        raise InputError("response", "responses on different lines", "the same lines", "both from the same record")

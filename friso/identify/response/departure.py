@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import stats
 
+from friso.errors import InputError
 from friso.identify.estimate import Estimate
 from friso.identify.response.fitting import refined
 from friso.identify.response.response import FrequencyResponse
 from friso.intervals import COVERAGE
-from friso.quantities import StageError
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -53,7 +53,7 @@ def departure(response: FrequencyResponse, model: Callable[[np.ndarray], np.ndar
     """
     frequency = response.frequency
     if len(frequency) < 4 * WINDOW:
-        raise StageError(
+        raise InputError(
             "response", f"{len(frequency)} lines", f"at least {4 * WINDOW} lines", "a multisine of 100 lines"
         )
     ratio = response.response / model(frequency)
@@ -113,11 +113,11 @@ def friction_from_departure(
     Coulomb friction F acts as a damper sqrt(2/pi) F/standard deviation of the velocity: 1/(m s^2 + d s + k) is fitted.
     The interval covers that of the damping and the difference between two distributions of the velocity, normal and
     sinusoidal (gain 4/pi over the amplitude). Valid while the body slides most of the time. `sign` is -1 where the
-    output goes against the input. Raises StageError for fewer than 8 lines.
+    output goes against the input. Raises InputError for fewer than 8 lines.
     """
     part = response.between(*limits)
     if len(part.frequency) < 8:
-        raise StageError("limits", f"{len(part.frequency)} lines", "at least 8 lines", "0.2 to 5 Hz")
+        raise InputError("limits", f"{len(part.frequency)} lines", "at least 8 lines", "0.2 to 5 Hz")
     s = 2j * np.pi * part.frequency
     values, deviation = sign * part.response, np.hypot(part.scatter(), 0.01 * np.abs(part.response))
 
@@ -166,13 +166,13 @@ def amplitude_dependence(drag: Drag, forces: Sequence[float], frequencies: Seque
     """The simulated response, over its mass line, to sinusoids of amplitudes `forces` at `frequencies` [Hz].
 
     Complex, over ("force", "frequency"), 1 on the line: a mass with the Coulomb friction found, one unit of input taken
-    as a newton and one of output as a metre (see `friso.mass_line`). Raises StageError where no level was found.
+    as a newton and one of output as a metre (see `friso.mass_line`). Raises InputError where no level was found.
     """
     from friso.frequency.describing.mass_line import mass_line
     from friso.stage import loads
 
     if not drag.coulomb.value > 0:
-        raise StageError("friction.coulomb", "no level found in the departure", "a level above 0", "0.087 V")
+        raise InputError("friction.coulomb", "no level found in the departure", "a level above 0", "0.087 V")
     force, mass = float(drag.coulomb.value), float(drag.mass.value)
     stiffness, damping = force / BRISTLES, float(2 * np.sqrt(force / BRISTLES * mass))
     stage = loads(

@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from friso.errors import InputError
 from friso.identify.response.mass_line import KINDS, Line, straight_lines
 from friso.identify.response.modes import Modes, fit_modes
 from friso.identify.response.response import FrequencyResponse
-from friso.quantities import StageError
 
 if TYPE_CHECKING:
     from friso.stage import Stage
@@ -104,14 +104,14 @@ def nearest_case(response: FrequencyResponse, stage: Stage) -> tuple[str, Mappin
     """The limit case of `stage` nearest to a measured response [m/N], and the distance to each.
 
     Distance: root mean square of the complex logarithm of the ratio, over the lines; it weighs all lines the same. The
-    name is "" where the second best is not clearly further. Raises StageError for other units than m and N.
+    name is "" where the second best is not clearly further. Raises InputError for other units than m and N.
     """
     from friso.frequency.analysis import linear
     from friso.frequency.members import limit_cases
 
     units = (response.channels.input_unit, response.channels.output_unit)
     if units != ("N", "m"):
-        raise StageError(
+        raise InputError(
             "response", f"in {units[1]}/{units[0]}", "a response from force to position, in m/N", "a scale in N/V"
         )
     distances = {}

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from friso.errors import InputError
 from friso.identify.estimate import Estimate
 from friso.identify.response.fitting import Fit, refined
 from friso.identify.response.rational import Row, Shape, bounds, orders, rational, roots, simplest
 from friso.identify.response.response import FrequencyResponse
-from friso.quantities import StageError
 
 METHOD = "rational fit of the response"
 
@@ -53,12 +53,12 @@ def fit_modes(
 ) -> Modes:
     """Modes of a force-to-position response in a `band` [Hz] (default: all lines).
 
-    `rigid` tells whether the mass moves freely (default: what fits better). Raises StageError for fewer than 12 lines.
+    `rigid` tells whether the mass moves freely (default: what fits better). Raises InputError for fewer than 12 lines.
     """
     part = response if band is None else response.between(*band)
     part = part.at(part.frequency > 0)
     if len(part.frequency) < 12:
-        raise StageError("band", f"{len(part.frequency)} lines", "at least 12 lines for a fit of modes", "3 to 20 Hz")
+        raise InputError("band", f"{len(part.frequency)} lines", "at least 12 lines for a fit of modes", "3 to 20 Hz")
     scale = float(np.sqrt(part.frequency[0] * part.frequency[-1]))
     s = 1j * part.frequency / scale
     deviation = np.hypot(part.scatter(), LEAST * np.abs(part.response))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy import fft
 
-from friso.quantities import StageError
+from friso.errors import InputError
 
 QUIET = 0.01
 """Share of the input's peak-to-peak value below which a trailing stretch counts as switched off."""
@@ -37,7 +37,7 @@ class Periods:
 def find_periods(signal: np.ndarray, expected: float | None = None) -> Periods:
     """The whole periods of an input, shape (n,), counted back from the last sample at which it repeats.
 
-    `expected` is about how many samples a period has: it is then looked for within 2 % of that. Raises StageError
+    `expected` is about how many samples a period has: it is then looked for within 2 % of that. Raises InputError
     where the signal does not repeat, or has fewer than two periods.
     """
     if not np.ptp(signal) > 0:
@@ -114,5 +114,5 @@ def _repeating(signal: np.ndarray, samples: int) -> tuple[int, int]:
     return start, stop
 
 
-def _not_periodic(given: str) -> StageError:
-    return StageError("period", given, "an input that repeats at least twice", "a multisine of 5 s, repeated 20 times")
+def _not_periodic(given: str) -> InputError:
+    return InputError("period", given, "an input that repeats at least twice", "a multisine of 5 s, repeated 20 times")

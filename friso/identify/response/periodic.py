@@ -11,9 +11,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from friso.errors import InputError
 from friso.identify.response.records import Record, Spectra, spectra
 from friso.identify.response.response import Channels, FrequencyResponse
-from friso.quantities import StageError
 
 LINES = 5
 """Neighbouring lines that share their relative variance where few realisations would leave it all too uncertain."""
@@ -29,13 +29,13 @@ def multisine(
 
     A realisation is a record with phases of its own; if it has a reference, the response is the indirect one, that of
     output and input to the reference. `period` [s] is about how long a period is (default: found). The deviation covers
-    noise and, with two realisations or lines left free in the excitation, nonlinear distortion. Raises StageError for
+    noise and, with two realisations or lines left free in the excitation, nonlinear distortion. Raises InputError for
     records that are not periodic or do not belong together.
     """
     every = _together([spectra(record, period) for record in records])
     excited = np.logical_and.reduce([one.excited for one in every])
     if not excited.any():
-        raise StageError(
+        raise InputError(
             "records", "realisations without a common line", "the same excited lines", "one period for all"
         )
     response, noise = _averaged(every, excited)
@@ -59,13 +59,13 @@ def multisine(
 
 
 def _together(every: list[Spectra]) -> list[Spectra]:
-    """The realisations, if they have the same lines. Raises StageError."""
+    """The realisations, if they have the same lines. Raises InputError."""
     if not every:
-        raise StageError("records", "none", "at least one record", "two realisations of a multisine")
+        raise InputError("records", "none", "at least one record", "two realisations of a multisine")
     spacings = [one.frequency[0] for one in every]
     if np.ptp(spacings) > 1e-6 * spacings[0] or len({len(one.frequency) for one in every}) > 1:
         given = "periods of " + ", ".join(f"{1 / spacing:.6g} s" for spacing in spacings)
-        raise StageError("records", given, "realisations with the same period and sample time", "5 s each")
+        raise InputError("records", given, "realisations with the same period and sample time", "5 s each")
     return every
 
 

@@ -6,8 +6,8 @@ from collections.abc import Callable
 
 import numpy as np
 
+from friso.errors import InputError
 from friso.identify.response.records import Record, spectra
-from friso.quantities import StageError
 
 
 def relative_error(
@@ -19,11 +19,11 @@ def relative_error(
     """||G U - Y|| / ||Y|| over the excited lines in `band` [Hz] of a periodic record that the model has not seen.
 
     `model` gives complex responses at frequencies [Hz]; U and Y are averaged over periods. `period` [s] is about how
-    long one is (default: found). Raises StageError where the record is not periodic or no line lies in the band.
+    long one is (default: found). Raises InputError where the record is not periodic or no line lies in the band.
     """
     found = spectra(record, period)
     inside = found.excited & (found.frequency >= band[0]) & (found.frequency <= band[1])
     if not inside.any():
-        raise StageError("band", f"{band[0]:g} to {band[1]:g} Hz", "a band that holds excited lines", "3 to 20 Hz")
+        raise InputError("band", f"{band[0]:g} to {band[1]:g} Hz", "a band that holds excited lines", "3 to 20 Hz")
     given, reaction = found.input.mean(axis=0)[inside], found.output.mean(axis=0)[inside]
     return float(np.linalg.norm(model(found.frequency[inside]) * given - reaction) / np.linalg.norm(reaction))

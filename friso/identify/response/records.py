@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from friso.errors import InputError
 from friso.identify.logs.log import Log
 from friso.identify.response.period import Periods, find_periods
 from friso.identify.response.response import Channels
-from friso.quantities import StageError
 
 WEAK = 0.01
 """Amplitude, over that of the strongest line, below which a line does not count as excited (-40 dB)."""
@@ -35,16 +35,16 @@ class Record:
     reference: np.ndarray | None = None
 
     def checked(self, least: int = 8) -> Record:
-        """The record as floats. Raises StageError for NaN, unequal lengths, constant signals, too few samples."""
+        """The record as floats. Raises InputError for NaN, unequal lengths, constant signals, too few samples."""
         named = {"input": self.input, "output": self.output}
         if self.reference is not None:
             named["reference"] = self.reference
         arrays = {name: np.asarray(values, float) for name, values in named.items()}
         lengths = {name: values.shape for name, values in arrays.items()}
         if len(set(lengths.values())) > 1 or any(values.ndim != 1 for values in arrays.values()):
-            raise StageError("record", f"shapes {lengths}", "signals of one and the same length", "20 000 samples each")
+            raise InputError("record", f"shapes {lengths}", "signals of one and the same length", "20 000 samples each")
         if not self.sample_time > 0:
-            raise StageError("sample_time", f"{self.sample_time}", "a time greater than 0 s", "0.001")
+            raise InputError("sample_time", f"{self.sample_time}", "a time greater than 0 s", "0.001")
         for name, values in arrays.items():
             _check_signal(name, values, least)
         return Record(arrays["input"], arrays["output"], self.sample_time, arrays.get("reference"))
@@ -53,11 +53,11 @@ class Record:
 def from_log(
     log: Log, given: str = "force", output: str = "position", reference: str | None = None
 ) -> tuple[Record, Channels]:
-    """The longest segment of a log as a record, by roles, with names and units. Raises StageError for a missing one."""
+    """The longest segment of a log as a record, by roles, with names and units. Raises InputError for a missing one."""
     roles = [given, output] + ([reference] if reference else [])
     for role in roles:
         if role not in log:
-            raise StageError(
+            raise InputError(
                 role, f"a log with {', '.join(log.signals)}", f"a channel for the {role}", f'{role}="Axis1"'
             )
     part = log.longest
@@ -67,14 +67,14 @@ def from_log(
 
 def _check_signal(name: str, values: np.ndarray, least: int) -> None:
     if len(values) < least:
-        raise StageError(name, f"{len(values)} samples", f"at least {least}", "20 000 samples")
+        raise InputError(name, f"{len(values)} samples", f"at least {least}", "20 000 samples")
     bad = int(np.count_nonzero(~np.isfinite(values)))
     if bad:
-        raise StageError(
+        raise InputError(
             name, f"{bad} samples that are not numbers", "finite samples", "a log cut into segments at gaps"
         )
     if not np.ptp(values) > 0:
-        raise StageError(name, f"a constant signal ({values[0]:g})", "a signal that moves", "a multisine")
+        raise InputError(name, f"a constant signal ({values[0]:g})", "a signal that moves", "a multisine")
 
 
 @dataclass(frozen=True)
@@ -97,7 +97,7 @@ def spectra(record: Record, period: float | None = None) -> Spectra:
     """Spectra of whole periods without transient, by the external signal: the reference if there is one, or the input.
 
     `period` [s] is about how long a period is. What drifts from period to period is taken out beforehand.
-    Raises StageError for what does not repeat and for fewer than two periods that are left.
+    Raises InputError for what does not repeat and for fewer than two periods that are left.
     """
     record = record.checked()
     external = record.input if record.reference is None else record.reference
@@ -107,12 +107,12 @@ def spectra(record: Record, period: float | None = None) -> Spectra:
     alike = _alike(driving)
     excited = _excited(driving[alike])
     if not excited.any():
-        raise StageError("excitation", "no line above the noise", "a periodic input with lines", "a multisine")
+        raise InputError("excitation", "no line above the noise", "a periodic input with lines", "a multisine")
     first = _settled(reaction[alike][:, excited])
     kept = np.flatnonzero(alike)[first:]
     warnings = (*periods.warnings, *_left_out(alike, first))
     if len(kept) < 2:
-        raise StageError("period", f"{len(kept)} period without transient", "at least two", "a longer record")
+        raise InputError("period", f"{len(kept)} period without transient", "at least two", "a longer record")
     frequency = np.arange(1, given.shape[1] + 1) / (periods.samples * record.sample_time)
     return Spectra(frequency, driving[kept].mean(axis=0), given[kept], reaction[kept], excited, warnings)
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy import stats
 
-from friso.quantities import StageError
+from friso.errors import InputError
 
 if TYPE_CHECKING:
     from control import FrequencyResponseData
@@ -99,18 +99,18 @@ class FrequencyResponse:
         return replace(self, coherence=None if self.coherence is None else self.coherence[chosen], **taken)
 
     def between(self, low: float, high: float) -> FrequencyResponse:
-        """The lines from `low` to `high` [Hz], both included. Raises StageError where there are none."""
+        """The lines from `low` to `high` [Hz], both included. Raises InputError where there are none."""
         inside = (self.frequency >= low) & (self.frequency <= high)
         if not inside.any():
             given = f"{low:g} to {high:g} Hz"
             held = f"{self.frequency.min():g} to {self.frequency.max():g} Hz" if self.frequency.size else "no lines"
-            raise StageError("band", given, f"a band that holds lines of the response, which has {held}", "3 to 20 Hz")
+            raise InputError("band", given, f"a band that holds lines of the response, which has {held}", "3 to 20 Hz")
         return self.at(inside)
 
     def usable(self, ratio: float = 3.0, coherence: float = 0.5) -> FrequencyResponse:
         """The lines whose response is at least `ratio` deviations large and whose coherence, if known, suffices.
 
-        The lines left out are told in the warnings. Raises StageError where none is left: excitation too weak.
+        The lines left out are told in the warnings. Raises InputError where none is left: excitation too weak.
         """
         enough = np.abs(self.response) >= ratio * self.deviation
         if self.coherence is not None:
@@ -121,7 +121,7 @@ class FrequencyResponse:
             if self.coherence is not None and self.coherence.size:
                 given += f", coherence at most {np.max(self.coherence):.2g}"
             expected = f"a response of {ratio:g} deviations and a coherence of {coherence:g} on some line"
-            raise StageError("excitation", given, expected, "a larger force, or a longer record")
+            raise InputError("excitation", given, expected, "a larger force, or a longer record")
         if enough.all():
             return self
         lost = self.frequency[~enough]

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from friso.errors import InputError
 from friso.identify.response.departure import Drag
 from friso.identify.response.periodic import multisine
 from friso.identify.response.records import Record
 from friso.identify.response.response import FrequencyResponse
-from friso.quantities import StageError
 
 PERIODS = 10
 """Simulated, of which the first four are left out: the start from rest is forgotten by friction within one or two."""
@@ -40,12 +40,12 @@ def explained(
     """What Coulomb friction, spring and mass of `drag` make of one period of each realisation's input, (n,) each.
 
     Compared with the `measured` response between `limits` [Hz]; the factors, of which 1 must be one, show how the
-    response depends on the amplitude. Raises StageError where `drag` has no friction level or 1 is missing.
+    response depends on the amplitude. Raises InputError where `drag` has no friction level or 1 is missing.
     """
     if not drag.coulomb.value > 0:
-        raise StageError("friction.coulomb", "no level found in the departure", "a level above 0", "0.087 V")
+        raise InputError("friction.coulomb", "no level found in the departure", "a level above 0", "0.087 V")
     if 1.0 not in factors:
-        raise StageError("factors", f"{list(factors)}", "factors with 1 among them, the recorded input", "(0.5, 1, 2)")
+        raise InputError("factors", f"{list(factors)}", "factors with 1 among them, the recorded input", "(0.5, 1, 2)")
     forces = np.concatenate([factor * drag.sign * np.stack(inputs) for factor in factors])
     spring = max(drag.stiffness.value, 0.0)
     positions = slid(np.tile(forces, PERIODS), sample_time, drag.mass.value, drag.coulomb.value, spring)[0]

@@ -8,12 +8,12 @@ from functools import cache
 
 import numpy as np
 
+from friso.errors import InputError
 from friso.identify.estimate import Estimate
 from friso.identify.response.fitting import Fit, refined
 from friso.identify.response.modes import fit_modes
 from friso.identify.response.response import FrequencyResponse
 from friso.intervals import COVERAGE
-from friso.quantities import StageError
 
 METHOD = "two-mass model fitted to the response"
 
@@ -74,16 +74,16 @@ def fit_two_mass(
 ) -> TwoMass:
     """The two-mass model of force-to-position responses on the same lines, in a `band` [Hz] (default: all of them).
 
-    Raises StageError where there are too few lines or the two responses have different ones.
+    Raises InputError where there are too few lines or the two responses have different ones.
     """
     responses = [collocated] if noncollocated is None else [collocated, noncollocated]
     if band is not None:
         responses = [one.between(*band) for one in responses]
     frequency = responses[0].frequency
     if len(frequency) < 8:
-        raise StageError("band", f"{len(frequency)} lines", "at least 8 lines for a two-mass model", "3 to 20 Hz")
+        raise InputError("band", f"{len(frequency)} lines", "at least 8 lines for a two-mass model", "3 to 20 Hz")
     if len(responses) > 1 and not np.array_equal(frequency, responses[1].frequency):
-        raise StageError("response", "responses on different lines", "both outputs of the same records", "one period")
+        raise InputError("response", "responses on different lines", "both outputs of the same records", "one period")
     values = np.stack([one.response for one in responses])
     deviation = np.stack([_deviation(one) for one in responses])
     sign = _sign(values[0])
@@ -101,10 +101,10 @@ def widened(found: TwoMass, apart: Sequence[TwoMass]) -> TwoMass:
 
     Where these scatter more than their intervals allow, friction moves the parameters from one realisation to the next,
     which one response cannot show: the intervals are scaled up by the Birge ratio (Birge 1932,
-    doi:10.1103/PhysRev.40.207). Raises StageError for fewer than two.
+    doi:10.1103/PhysRev.40.207). Raises InputError for fewer than two.
     """
     if len(apart) < 2:
-        raise StageError("records", f"{len(apart)} single fits", "at least two realisations", "exp1 and exp2")
+        raise InputError("records", f"{len(apart)} single fits", "at least two realisations", "exp1 and exp2")
     rows = [_scaled(each, [one[each.name] for one in apart]) for each in found.estimates]
     return replace(found, estimates=tuple(rows))
 
@@ -137,19 +137,19 @@ def _sign(response: np.ndarray) -> float:
 
 
 def _follows(values: np.ndarray, model: np.ndarray) -> None:
-    """Raises StageError where a model is nowhere near the response, shape (outputs, lines)."""
+    """Raises InputError where a model is nowhere near the response, shape (outputs, lines)."""
     off = float(np.sqrt(np.mean(np.abs(np.log(np.abs(values) / np.abs(model))) ** 2)))
     if off > MISSES:
         given = f"a response that two masses and a joint miss by a factor of {np.exp(off):.2g} on average"
         expected = "the response of a driven mass, and of the other one: are the two positions exchanged?"
-        raise StageError("response", given, expected, '--band "3 Hz .. 20 Hz"')
+        raise InputError("response", given, expected, '--band "3 Hz .. 20 Hz"')
 
 
 def _from_modes(response: FrequencyResponse) -> list[np.ndarray]:
     """A start from the first antiresonance and resonance of a rational fit, of whole mass 1; none where it has none."""
     try:
         modes = fit_modes(response)
-    except StageError:
+    except InputError:
         return []
     values = {each.name: each.value for each in modes.estimates}
     names = ("antiresonance 1 frequency", "resonance 1 frequency", "resonance 1 damping ratio")

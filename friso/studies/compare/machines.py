@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.linalg import block_diag
 
-from friso.quantities import StageError
+from friso.errors import InputError
 from friso.rig.run import SAMPLE_TIME
 from friso.stage import Stage, numeric_keys
 from friso.stage.correlations import Correlations, Drawn, draw
@@ -89,12 +89,12 @@ class Machines:
 def draw_machines(stage: Stage, correlations: Correlations, count: int, seed: int) -> Machines:
     """Machines drawn from what is uncertain of the stage, and by default spreads from the rest.
 
-    Raises StageError for a number of machines or a seed that is not allowed, and for ranges hardly any of which is.
+    Raises InputError for a number of machines or a seed that is not allowed, and for ranges hardly any of which is.
     """
     for option, value, least, most in (("--machines", count, LEAST, MOST), ("--seed", seed, 0, MOST_SEED)):
         if not least <= value <= most:
             example = f"{option} {2000 if option == '--machines' else 1}"
-            raise StageError(option, str(value), f"a whole number from {least} to {most}", example)
+            raise InputError(option, str(value), f"a whole number from {least} to {most}", example)
     clocked, notes = _with_clock(stage)
     spreads = _spreads(clocked)
     drawn = draw(_spread(clocked, spreads), _joined(correlations, spreads), count, seed)
@@ -116,7 +116,7 @@ def draw_machines(stage: Stage, correlations: Correlations, count: int, seed: in
 
 
 def _with_clock(stage: Stage) -> tuple[Stage, list[str]]:
-    """The stage with a sample time, and whether it had to be chosen. Raises StageError where it is too long."""
+    """The stage with a sample time, and whether it had to be chosen. Raises InputError where it is too long."""
     if "drive.sample_time" in stage.flat():
         return stage, []
     chosen = stage.with_numbers({"drive.sample_time": SAMPLE_TIME})

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from friso.equations.motion import last_corner
-from friso.quantities import StageError
+from friso.errors import InputError
 from friso.rig.run import Recorded, run
 from friso.rig.task import Task, own_motion
 from friso.stage import Stage
@@ -163,10 +163,10 @@ def compare(
 ) -> Comparison:
     """Settle `count` machines drawn around a stage in up to seven ways, `within` [m] being in position.
 
-    Raises StageError for a number, a seed or a tolerance that is not allowed, and for a motion that ends too late.
+    Raises InputError for a number, a seed or a tolerance that is not allowed, and for a motion that ends too late.
     """
     if not 0 < within < np.inf:
-        raise StageError("--within", f"{within:g} m", "a length greater than 0", '--within "1 um"')
+        raise InputError("--within", f"{within:g} m", "a length greater than 0", '--within "1 um"')
     machines = draw_machines(stage, correlations or Correlations(), count, seed)
     corner = _corner(machines.stage)
     progress(0, 1, "how fast the controller may be")
@@ -183,15 +183,15 @@ def compare(
 
 
 def _corner(stage: Stage) -> float:
-    """From when on the reference stands [s]. Raises StageError where that is too late, or never."""
+    """From when on the reference stands [s]. Raises InputError where that is too late, or never."""
     flat = stage.flat()
     corner, duration = float(last_corner(flat)), flat["motion.duration"]
     if flat["motion.kind"] == "ramp":
         example = '[motion] kind = "step", size = "1 mm", duration = "20 s"'
-        raise StageError("motion.kind", '"ramp"', "a reference that stands in the end", example)
+        raise InputError("motion.kind", '"ramp"', "a reference that stands in the end", example)
     if corner > LATEST * duration:
         expected = f"at least {corner / LATEST:g} s: the reference stands by half of it"
-        raise StageError("motion.duration", f"{duration:g} s", expected, f'duration = "{corner / LATEST:g} s"')
+        raise InputError("motion.duration", f"{duration:g} s", expected, f'duration = "{corner / LATEST:g} s"')
     return corner
 
 

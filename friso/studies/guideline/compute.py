@@ -13,8 +13,8 @@ from pathlib import Path
 import numpy as np
 
 from friso.engine.kernel import Wanted, kernels
+from friso.errors import InputError
 from friso.hunting.cycle.ensemble import shared_structure
-from friso.quantities import StageError
 from friso.studies.guideline.checks import Checked, checked
 from friso.studies.guideline.groups import Count, counted, values_of
 from friso.studies.guideline.hunting_laws import FREE_LAW, LOCKED_LAW
@@ -156,7 +156,7 @@ def _ratio(law: Fitted, values: Mapping[str, np.ndarray]) -> np.ndarray:
 def guideline(samples: int = SAMPLES, keep: Path | None = None, progress: Progress | None = None) -> Guideline:
     """Compute the guideline. `keep` is a folder for what is done, from which an interrupted run goes on.
 
-    Raises StageError for a number of samples that does not do.
+    Raises InputError for a number of samples that does not do.
     """
     checked_samples(samples)
     begin = time.perf_counter()
@@ -184,9 +184,9 @@ def guideline(samples: int = SAMPLES, keep: Path | None = None, progress: Progre
 
 
 def checked_samples(samples: int) -> None:
-    """Raises StageError for a number of samples that does not do."""
+    """Raises InputError for a number of samples that does not do."""
     if not FEWEST <= samples <= MOST:
-        raise StageError("--samples", f"{samples}", f"a whole number from {FEWEST} to {MOST}", f"--samples {SAMPLES}")
+        raise InputError("--samples", f"{samples}", f"a whole number from {FEWEST} to {MOST}", f"--samples {SAMPLES}")
 
 
 def counts() -> dict[str, Count]:

@@ -16,7 +16,8 @@ import numpy as np
 
 from friso.equations.model import assemble
 from friso.equations.structure import structure
-from friso.quantities import Quantity, StageError
+from friso.errors import InputError
+from friso.quantities import Quantity
 from friso.stage import numeric_keys
 
 LIMITER_OVER_BRISTLES = 200.0
@@ -214,11 +215,11 @@ def counted(flat: Mapping[str, Any]) -> Count:
 def values_of(flat: Mapping[str, Any]) -> dict[str, Any]:
     """The groups of a stage given by flat keys to SI numbers or arrays, those of the parts that it has.
 
-    Raises StageError for a stage without LuGre friction or without van Dijk's rules.
+    Raises InputError for a stage without LuGre friction or without van Dijk's rules.
     """
     if flat.get("friction.model") != "lugre" or "controller.crossover" not in flat:
         expected = "LuGre friction and a controller by van Dijk's rules, for which the groups are derived"
-        raise StageError("stage", "one with other friction, or with gains", expected, 'crossover = "8 Hz", alpha = 0.1')
+        raise InputError("stage", "one with other friction, or with gains", expected, 'crossover = "8 Hz", alpha = 0.1')
     parts = {"stage", *(part for part, key in _TELLING.items() if key in flat)}
     return {name: group.of(flat) for name, group in GROUPS.items() if group.part in parts}
 

@@ -45,7 +45,7 @@ class ConstantSpeed:
 
 def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
     """Passes at two speeds there and back, the joint free and locked; at many, and slow sliding, with it locked. Raises
-    StageError for a stage without joint."""
+    InputError for a stage without joint."""
     cases = []
     for number, (name, each) in enumerate((("free", freed(stage)), ("locked", locked(stage)))):
         progress(number, 4, f"constant speed, joint {name}")

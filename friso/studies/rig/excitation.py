@@ -72,7 +72,7 @@ def sines(count: int, lines: np.ndarray, seed: int) -> np.ndarray:
 
 
 def plant(logs: Sequence[RigLog]) -> FrequencyResponse:
-    """From the commanded force to the position, of realisations: the indirect estimate. Raises StageError for a loop
+    """From the commanded force to the position, of realisations: the indirect estimate. Raises InputError for a loop
     that was not stable."""
     for log in logs:
         if log.failure:

@@ -96,7 +96,7 @@ def nearest(loop: Loop) -> float:
 
 
 def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
-    """All plants and loops, and the stable settings. Raises StageError for a stage without a joint."""
+    """All plants and loops, and the stable settings. Raises InputError for a stage without a joint."""
     fixed, free = locked(jointed(stage)), freed(stage)
     places = np.linspace(*travel(stage), PLACES)
     progress(0, 4, f"plant, joint locked, at {PLACES} places")

@@ -10,8 +10,8 @@ import numpy as np
 
 from friso.engine.arrays import Status
 from friso.equations import motion
+from friso.errors import InputError
 from friso.hunting.peaks import COUNTED_ABOVE, SWING, WINDOW, scan
-from friso.quantities import StageError
 from friso.rig.run import Recorded, run
 from friso.rig.task import Task, point_to_point
 from friso.stage import Stage
@@ -37,10 +37,10 @@ ROUND = (1.0, 2.0, 5.0, 10.0)
 
 def distance(stage: Stage) -> float:
     """Of the move [m]: that of the stage's own motion, rounded to 1, 2 or 5 times a power of ten: 100 mm for the 90 mm
-    of the thesis's rig (Sec. 4.3.2). Raises StageError for a motion that goes nowhere."""
+    of the thesis's rig (Sec. 4.3.2). Raises InputError for a motion that goes nowhere."""
     own = float(motion.size(stage.flat()))
     if not np.isfinite(own):
-        raise StageError("motion.kind", repr(stage.flat()["motion.kind"]), "a motion that goes somewhere", '"step"')
+        raise InputError("motion.kind", repr(stage.flat()["motion.kind"]), "a motion that goes somewhere", '"step"')
     power = 10.0 ** np.floor(np.log10(own))
     return float(power * min(ROUND, key=lambda digit: abs(np.log(digit * power / own))))
 
@@ -66,16 +66,16 @@ def released(stage: Stage, displacement: float) -> Task:
 
 
 def with_joint(stage: Stage, locked: bool) -> Stage:
-    """The stage with its joint locked or free. Raises StageError for a stage that has none."""
+    """The stage with its joint locked or free. Raises InputError for a stage that has none."""
     return jointed(stage).replace({"joint.locked": locked})
 
 
 def crossover(stage: Stage) -> float:
-    """Of the stage's controller [Hz]. Raises StageError for one that is given by its gains."""
+    """Of the stage's controller [Hz]. Raises InputError for one that is given by its gains."""
     flat = stage.flat()
     if "controller.crossover" not in flat:
         given, expected = "gains", "a controller tuned by its crossover, which the experiment varies"
-        raise StageError("controller.crossover", given, expected, 'crossover = "8 Hz"')
+        raise InputError("controller.crossover", given, expected, 'crossover = "8 Hz"')
     return float(flat["controller.crossover"])
 
 

@@ -98,7 +98,7 @@ class HuntingResult:
 
 
 def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
-    """The move at all crossovers on all rails, and releases with the joint locked. Raises StageError without a joint,
+    """The move at all crossovers on all rails, and releases with the joint locked. Raises InputError without a joint,
     a crossover or a motion that goes somewhere."""
     stages = {case: with_joint(stage, locked) for case, locked in CASES.items()}
     frequencies, seeds = crossover(stage) * CROSSOVERS, rails(stage)

@@ -88,7 +88,7 @@ class InPosition:
 
 
 def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
-    """All standstills. Raises StageError without a joint or a crossover."""
+    """All standstills. Raises InputError without a joint or a crossover."""
     result, kept = in_position(stage, seed, progress)
     logs = tuple(
         rig_log(recorded, 0, f"in_position_{case}", None, machine, seed) for case, (recorded, machine) in kept.items()

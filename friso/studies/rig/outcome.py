@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from friso.engine.arrays import Status
+from friso.errors import InputError
 from friso.identify.experiments import record
 from friso.identify.logs.log import Log
-from friso.quantities import StageError
 from friso.rig.run import Recorded
 from friso.stage import Stage
 
@@ -74,9 +74,9 @@ def rig_log(recorded: Recorded, row: int, name: str, kind: str | None, stage: St
     return RigLog(name, kind, recorded.interval, logged, true, stage, seed, why)
 
 
-def stopped(log: RigLog) -> StageError:
+def stopped(log: RigLog) -> InputError:
     """The error of a log that stopped before it shows anything."""
-    return StageError("controller", f"a loop that stopped {log.failure}", "a stable one", 'crossover = "8 Hz"')
+    return InputError("controller", f"a loop that stopped {log.failure}", "a stable one", 'crossover = "8 Hz"')
 
 
 WINDOWS, SATURATED = 20, 0.1

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from friso.errors import InputError
 from friso.identify.experiments import Presliding, bristles_from_presliding
 from friso.identify.method import between
-from friso.quantities import StageError
 from friso.rig.run import as_built_keys
 from friso.stage import Stage
 from friso.studies.rig.excitation import Excitation, excite
@@ -34,11 +34,11 @@ class Bristles:
 
 
 def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
-    """A small multisine at each place. Raises StageError for a stage whose friction has no bristles."""
+    """A small multisine at each place. Raises InputError for a stage whose friction has no bristles."""
     flat = stage.flat()
     if "friction.bristle_stiffness" not in flat:
         given = f"model = {flat.get('friction.model', 'none')!r}"
-        raise StageError("friction.model", given, "friction with bristles", 'model = "lugre"')
+        raise InputError("friction.model", given, "friction with bristles", 'model = "lugre"')
     held = locked(stage) if stage.joint else stage
     places = np.linspace(*travel(stage), PLACES)
     logs = []

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from importlib import import_module
 from types import MappingProxyType
 
-from friso.quantities import StageError
+from friso.errors import InputError
 from friso.stage import Stage
 from friso.studies.rig.outcome import Outcome, Progress
 
@@ -26,7 +26,7 @@ EXPERIMENTS: Mapping[str, str] = MappingProxyType(
 
 
 def experiment(name: str) -> Callable[[Stage, int, Progress], Outcome]:
-    """The function that runs an experiment on a stage with a seed. Raises StageError for an unknown name."""
+    """The function that runs an experiment on a stage with a seed. Raises InputError for an unknown name."""
     if name not in EXPERIMENTS:
-        raise StageError("EXPERIMENT", name, f"one of {', '.join(EXPERIMENTS)}", "friso rig stiffness rig.toml")
+        raise InputError("EXPERIMENT", name, f"one of {', '.join(EXPERIMENTS)}", "friso rig stiffness rig.toml")
     return import_module(f"friso.studies.rig.{name.replace('-', '_')}").run_experiment

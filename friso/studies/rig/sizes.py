@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from friso.equations.bandwidth import faster
-from friso.quantities import StageError
+from friso.errors import InputError
 from friso.rig.run import as_built_keys
 from friso.rig.task import own_motion
 from friso.stage import Stage
@@ -30,22 +30,22 @@ FIXED = 1e9
 
 
 def jointed(stage: Stage) -> Stage:
-    """The stage itself. Raises StageError for one without a joint."""
+    """The stage itself. Raises InputError for one without a joint."""
     if stage.joint is None:
-        raise StageError("joint", "no [joint]", "a stage with a joint", '[joint] stiffness = "2.4 N/mm"')
+        raise InputError("joint", "no [joint]", "a stage with a joint", '[joint] stiffness = "2.4 N/mm"')
     return stage
 
 
 def freed(stage: Stage) -> Stage:
-    """The stage with its joint free and its limiters far off. Raises StageError where it has no joint, or no stroke."""
+    """The stage with its joint free and its limiters far off. Raises InputError where it has no joint, or no stroke."""
     stroke = jointed(stage).flat()["joint.stroke"]
     if not stroke > 0:
-        raise StageError("joint.stroke", f"{stroke:g} m", "a stroke greater than 0", 'stroke = "1 mm"')
+        raise InputError("joint.stroke", f"{stroke:g} m", "a stroke greater than 0", 'stroke = "1 mm"')
     return stage.with_numbers({"joint.stroke": WIDE * stroke}).replace({"joint.locked": False})
 
 
 def locked(stage: Stage) -> Stage:
-    """The stage with its joint held. Raises StageError where it has none."""
+    """The stage with its joint held. Raises InputError where it has none."""
     return jointed(stage).replace({"joint.locked": True})
 
 

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from friso.errors import InputError
 from friso.identify.experiments import StickSlip, static_from_stick_slip
-from friso.quantities import StageError
 from friso.rig.rail import friction_factors
 from friso.rig.run import Recorded, run
 from friso.rig.task import legs
@@ -47,11 +47,11 @@ class Stiction:
 
 
 def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
-    """Slow motion there and back on several rails. Raises StageError for a stage without a joint, or static
+    """Slow motion there and back on several rails. Raises InputError for a stage without a joint, or static
     friction."""
     if "friction.static" not in stage.flat():
         given = f"model = {stage.flat().get('friction.model', 'none')!r}"
-        raise StageError("friction.model", given, "friction with a static level", 'model = "lugre"')
+        raise InputError("friction.model", given, "friction with a static level", 'model = "lugre"')
     progress(0, 1, f"slow motion on {RAILS} rails")
     logs = slow_motion(stage, seed)
     progress(1, 1, "")

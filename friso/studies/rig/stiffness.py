@@ -39,7 +39,7 @@ class Stiffness:
 
 
 def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
-    """Steps of the reference with the cart fixed. Raises StageError for a stage without a joint."""
+    """Steps of the reference with the cart fixed. Raises InputError for a stage without a joint."""
     progress(0, 1, "position steps")
     log = steps(stage, seed)
     progress(1, 1, "")

@@ -64,7 +64,7 @@ class StrokeCrossover:
 
 
 def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
-    """The move at all strokes and crossovers on all rails, the joint free. Raises StageError without a joint."""
+    """The move at all strokes and crossovers on all rails, the joint free. Raises InputError without a joint."""
     free = with_joint(stage, locked=False)
     result = stroke_crossover(free, seed, STROKES, CROSSOVERS, rails(stage), progress)
     corners = {"joint.stroke": result.strokes[[0, -1]], "controller.crossover": np.full(2, crossover(stage))}

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from friso.engine.simulate import simulate
+from friso.errors import InputError
 from friso.frequency.bode import Bode, bode
 from friso.hunting import COUNTED_ABOVE
-from friso.stage import StageError
 from friso.studies.sweep import sweep
 from friso.studies.thesis.claims import Claim, Evidence, Finding, Registered, Response, claims, registered
 from friso.studies.thesis.cycles import Cycles, cycles
@@ -83,11 +83,11 @@ def reproduce(
 
     A claim that needs a study left out is "not yet covered". `with_cycles` the hunting cycles behind every map are
     computed too, which takes several times as long as all the maps. `progress` is called with steps done, steps in all
-    and what comes next. Raises StageError for an unknown study or too few points, ValueError for an unusable rtol.
+    and what comes next. Raises InputError for an unknown study or too few points, ValueError for an unusable rtol.
     """
     studies = _chosen(names)
     if points < 3:
-        raise StageError("points", str(points), "3 or more values per axis", "41")
+        raise InputError("points", str(points), "3 or more values per axis", "41")
     variants = (*OPEN, *METHOD)
     tell = _Teller(progress, 2 + len(variants) + (len(studies) if with_cycles else 0) + 1)
     tell("maps")
@@ -124,7 +124,7 @@ def _chosen(names: Iterable[str] | None) -> tuple[ThesisStudy, ...]:
     chosen = list(names)
     for name in chosen:
         if name not in STUDIES:
-            raise StageError("study", repr(name), f"one of {', '.join(STUDIES)}", "path")
+            raise InputError("study", repr(name), f"one of {', '.join(STUDIES)}", "path")
     return tuple(study for name, study in STUDIES.items() if name in chosen)
 
 
