@@ -21,7 +21,10 @@ from friso.equations.variational import variational
 
 
 def main(entry: Path, task: bytes) -> None:
-    wanted = pickle.loads(task)
+    plug_ins, pickled = pickle.loads(task)
+    for plug_in in plug_ins:
+        plug_in.load()
+    wanted = pickle.loads(pickled)
     model = _model(wanted.structure)
     model = variational(model) if wanted.variational else model
     source = write_module(model, TABLEAUS[wanted.method], repr(wanted), wanted.lanes)

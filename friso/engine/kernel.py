@@ -23,6 +23,9 @@ from friso.equations.as_built import AsBuilt
 from friso.equations.driven import Driven
 from friso.equations.imposed import Imposed
 from friso.equations.structure import Structure
+from friso.stage import Section
+from friso.stage.plug_ins import plug_ins
+from friso.stage.tables import friction_law
 
 Form = Structure | Imposed | Driven | AsBuilt
 """What a kernel may be made for: stages, friction under an imposed motion, stages that follow a log, and stages with
@@ -75,6 +78,12 @@ class Wanted:
     method: str = "Rodas5P"
     lanes: int = LANES
 
+    @property
+    def sections(self) -> tuple[type[Section], ...]:
+        """The classes of the stage file's sections that declare equations of their own."""
+        form = self.structure if isinstance(self.structure, Structure | Imposed) else self.structure.structure
+        return (friction_law(form.friction),)
+
 
 def kernel(structure: Form, variational: bool = False, method: str = "Rodas5P", lanes: int = LANES) -> Kernel:
     """The kernel for a form, stepping by the named method in so many lanes.
@@ -95,7 +104,11 @@ _loading: defaultdict[Wanted, Lock] = defaultdict(Lock)
 
 @cache
 def _loaded(wanted: Wanted) -> Kernel:
-    return Kernel(load_or_build(repr(wanted), "friso.engine.build", pickle.dumps(wanted), compile_driver))
+    """What is wanted is pickled apart from the plug-ins, which the builder loads first: it may hold their classes."""
+    foreign = plug_ins(wanted.sections)
+    name = " ".join([repr(wanted), *(plug_in.digest for plug_in in foreign)])
+    task = pickle.dumps((foreign, pickle.dumps(wanted)))
+    return Kernel(load_or_build(name, "friso.engine.build", task, compile_driver))
 
 
 def kernels(wanted: Iterable[Wanted]) -> list[Kernel]:

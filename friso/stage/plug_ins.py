@@ -1,0 +1,63 @@
+"""Where registered sections come from that are not friso's own, so that another process can register them too.
+
+A kernel is built in a process of its own, which gets the plug-ins with its task: a friction law or a controller from
+another package, from one file, or from the script that runs.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import importlib
+import importlib.util
+import sys
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+OWN = "friso"
+SCRIPT = "__main__"
+
+
+@dataclass(frozen=True)
+class PlugIn:
+    """A module outside friso by its name, and the file that it was loaded from; "" where it has none."""
+
+    module: str
+    file: str
+
+    @property
+    def digest(self) -> str:
+        """A digest of the module's source."""
+        return hashlib.sha256(Path(self.file).read_bytes() if self.file else b"").hexdigest()
+
+    def load(self) -> None:
+        """Import the module by its name where that gives this file, else from the file. Raises ImportError."""
+        if self.module in sys.modules and self.module != SCRIPT:
+            return
+        if (
+            self.module != SCRIPT
+            and (spec := importlib.util.find_spec(self.module))
+            and Path(spec.origin or "").resolve() == Path(self.file)
+        ):
+            importlib.import_module(self.module)
+            return
+        name = "friso_script" if self.module == SCRIPT else self.module
+        spec = importlib.util.spec_from_file_location(name, self.file) if self.file else None
+        if spec is None or spec.loader is None:
+            raise ImportError(f"{self.module}, which registers a section, has no file that it could be loaded from")
+        module = importlib.util.module_from_spec(spec)
+        sys.modules[name] = module
+        spec.loader.exec_module(module)
+
+
+def plug_in_of(cls: type) -> PlugIn | None:
+    """The plug-in that a class comes from; None for friso's own."""
+    if cls.__module__.split(".")[0] == OWN:
+        return None
+    file = getattr(sys.modules.get(cls.__module__), "__file__", None)
+    return PlugIn(cls.__module__, str(Path(file).resolve()) if file else "")
+
+
+def plug_ins(classes: Iterable[type]) -> tuple[PlugIn, ...]:
+    """The plug-ins that these classes come from, each once."""
+    return tuple(dict.fromkeys(plug_in for cls in classes if (plug_in := plug_in_of(cls))))
