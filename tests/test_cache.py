@@ -14,18 +14,18 @@ from pathlib import Path
 import pytest
 
 BUILDER = """
+import os
 import sys
 from pathlib import Path
 
-entry = Path(sys.argv[1])
-source = "from numba import njit\\n\\n@njit(cache=True)\\ndef run(x):\\n    return 2.0 * x\\n"
-(entry / "kernel.py").write_text(source)
-sys.stdin.buffer.read()
-
-from friso.engine.cache import import_entry
 from numba import types
 
-import_entry(entry).run.compile((types.float64,))
+from friso.engine.cache import keep
+
+sys.stdin.buffer.read()
+source = "from numba import njit\\n\\n@njit(cache=True)\\ndef run(x):\\n    return 2.0 * x"
+source += os.environ.get("STAND_IN_ENDS_WITH", "") + "\\n"
+print(keep(Path(sys.argv[1]), source, lambda module: module.run.compile((types.float64,))), end="")
 """
 
 SCRIPT = """
@@ -48,7 +48,7 @@ def builder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     folder = tmp_path_factory.mktemp("builder")
     (folder / "stand_in_builder.py").write_text(BUILDER)
     with pytest.MonkeyPatch.context() as patched:
-        patched.setenv("PYTHONPATH", str(folder))
+        patched.setenv("PYTHONPATH", str(folder), prepend=os.pathsep)
         yield
 
 
@@ -80,17 +80,21 @@ def finished(process: subprocess.Popen[str]) -> tuple[bool, str]:
     return COMPILING in err, err
 
 
-def built(folder: Path, **more: str) -> bool:
-    return finished(start(folder, **more))[0]
+def built(folder: Path, name: str = "stand-in", **more: str) -> bool:
+    return finished(start(folder, name, **more))[0]
 
 
 def mode(path: Path) -> int:
     return stat.S_IMODE(path.stat().st_mode)
 
 
+def entries(folder: Path) -> list[Path]:
+    return [path for path in (folder / "kernels").iterdir() if path.is_dir()]
+
+
 def entry(folder: Path) -> Path:
-    (found,) = [path for path in (folder / "kernels").iterdir() if path.is_dir()]
-    return found
+    (only,) = entries(folder)
+    return only
 
 
 def test_the_folder_is_private_and_the_second_process_does_not_compile(tmp_path: Path) -> None:
@@ -151,8 +155,26 @@ def test_processes_at_the_same_time_build_once(tmp_path: Path) -> None:
 
 
 def test_different_kernels_do_not_mix(tmp_path: Path) -> None:
-    processes = [start(tmp_path, name) for name in ("one", "two")]
-    assert [finished(each)[0] for each in processes] == [True, True]
+    processes = [start(tmp_path, name, STAND_IN_ENDS_WITH=end) for name, end in (("one", ""), ("two", " + 0.0"))]
+    assert [finished(process)[0] for process in processes] == [True, True]
+    assert len(entries(tmp_path)) == 2
+
+
+def test_a_comment_compiles_nothing(whole: Path, copied: Path) -> None:
+    """Another request, of which the same code is made, takes the machine code that is there."""
+    (before,) = entries(copied)
+    assert built(copied, "another", STAND_IN_ENDS_WITH="  # in words")
+    assert entries(copied) == [before]
+    assert (before / "manifest.json").stat().st_mtime == (entry(whole) / "manifest.json").stat().st_mtime
+    assert not built(copied, "another")
+
+
+@pytest.mark.parametrize("name", [b"", b"../../elsewhere", b"\xff", b"0" * 24])
+def test_a_damaged_request_is_made_again(copied: Path, name: bytes) -> None:
+    (request,) = (copied / "kernels").glob("*.request")
+    request.write_bytes(name)
+    assert built(copied)
+    assert not built(copied)
 
 
 def test_numba_may_have_a_folder_of_its_own(tmp_path: Path) -> None:

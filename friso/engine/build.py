@@ -1,6 +1,7 @@
 """The program that fills a cache entry: writes a kernel's module, and compiles it so that Numba keeps the machine code.
 
-Run by `friso.engine.cache` as ``python -m friso.engine.build FOLDER``, with the task pickled on standard input.
+Run by `friso.engine.cache` as ``python -m friso.engine.build FOLDER``, with the task pickled on standard input; prints
+the name of the entry in the cache's FOLDER.
 """
 
 from __future__ import annotations
@@ -9,7 +10,7 @@ import pickle
 import sys
 from pathlib import Path
 
-from friso.engine.cache import import_entry
+from friso.engine.cache import keep
 from friso.engine.kernel import Form, compile_driver
 from friso.engine.module_source import write_module
 from friso.engine.tableaus import TABLEAUS
@@ -20,7 +21,7 @@ from friso.equations.model import Model, assemble
 from friso.equations.variational import variational
 
 
-def main(entry: Path, task: bytes) -> None:
+def main(folder: Path, task: bytes) -> None:
     plug_ins, pickled = pickle.loads(task)
     for plug_in in plug_ins:
         plug_in.load()
@@ -28,8 +29,7 @@ def main(entry: Path, task: bytes) -> None:
     model = _model(wanted.structure)
     model = variational(model) if wanted.variational else model
     source = write_module(model, TABLEAUS[wanted.method], repr(wanted), wanted.lanes)
-    (entry / "kernel.py").write_text(source)
-    compile_driver(import_entry(entry))
+    print(keep(folder, source, compile_driver), end="")
 
 
 def _model(form: Form) -> Model:

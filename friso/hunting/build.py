@@ -11,7 +11,7 @@ from types import ModuleType
 import numba
 import numpy as np
 
-from friso.engine.cache import import_entry
+from friso.engine.cache import keep
 from friso.hunting import turning
 
 _JIT = 'error_model="numpy", nogil=True'
@@ -26,13 +26,11 @@ def compile_run(module: ModuleType) -> None:
     module.run.disable_compile()
 
 
-def main(entry: Path) -> None:
+def main(folder: Path) -> None:
     source = re.sub(r"^def ", f"@njit({_JIT})\ndef ", inspect.getsource(turning), flags=re.MULTILINE)
     source = source.replace(f"@njit({_JIT})\ndef run(", f"@njit(cache=True, {_JIT})\ndef run(")
-    (entry / "kernel.py").write_text(
-        source.replace("import numpy as np\n", "import numpy as np\nfrom numba import njit\n")
-    )
-    compile_run(import_entry(entry))
+    source = source.replace("import numpy as np\n", "import numpy as np\nfrom numba import njit\n")
+    print(keep(folder, source, compile_run), end="")
 
 
 if __name__ == "__main__":
