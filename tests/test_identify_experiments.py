@@ -25,7 +25,6 @@ from friso.identify.experiments import (
     record,
     static_from_ramps,
     static_from_stick_slip,
-    stiffness_from_hysteresis,
     stiffness_from_steps,
 )
 from friso.identify.experiments.common import block_mean, correlated_mean, low_pass, runs, t_value
@@ -225,43 +224,6 @@ def test_what_needs_no_more_force_to_move_shows_no_stiffness(rig: friso.Stage) -
         assert "is the cart fixed?" in found.stiffness.reason
         assert found.stiffness.low == 0
         assert np.isfinite(found.stiffness.high) == bounded
-
-
-# --- stiffness from hysteresis ----------------------------------------------------------------------------------------
-
-
-def loops(amplitude: float, cycles: int = 6, centre: float = 0.0) -> Log:
-    """A mass driven to and fro before sliding by a force."""
-    time = np.arange(0, cycles * 2.0, DT)
-    push = amplitude * np.sin(np.pi * time) + centre
-    push[: round(0.5 / DT)] = np.linspace(0, push[round(0.5 / DT)], round(0.5 / DT))
-    out = twin(1.0, LUGRE, np.zeros(2), push, np.zeros_like(push), DT, 20, *FLAT)
-    rng = np.random.default_rng(3)
-    noisy = push + 2e-3 * rng.standard_normal(len(push))
-    return record("loops", DT, position=out[:, 0] + 1e-9 * rng.standard_normal(len(push)), force=noisy)
-
-
-@pytest.mark.parametrize("amplitude", [0.3, 0.6, 0.9])
-def test_loops_show_the_bristles(amplitude: float) -> None:
-    """Where the friction passes 0 the slope is sigma_0 at any amplitude; just after the reversal it is larger."""
-    found = stiffness_from_hysteresis(loops(amplitude))
-    assert len(found.branches) >= 8
-    assert found.stiffness.value == pytest.approx(1e5, rel=0.03)
-    assert found.first_slope.value == pytest.approx(1e5 * (1 + amplitude / 1.5), rel=0.05)
-    assert found.stiffness.name == "friction.bristle_stiffness"
-
-
-def test_a_spring_has_one_slope_and_a_few_branches_are_not_enough() -> None:
-    time = np.arange(0, 10, DT)
-    x = 1e-4 * np.sin(2 * np.pi * 0.5 * time)
-    noise = 2e-3 * np.random.default_rng(0).standard_normal(len(x))
-    found = stiffness_from_hysteresis(record("spring", DT, position=x, force=2400 * x + 0.2 + noise), "joint")
-    assert found.stiffness.value == pytest.approx(2400, rel=0.02)
-    assert found.stiffness.name == "joint.stiffness"
-    half = record("half", DT, position=x[:1500], force=2400 * x[:1500])
-    assert not stiffness_from_hysteresis(half, "joint").stiffness.shown
-    with pytest.raises(friso.InputError, match="bristles"):
-        stiffness_from_hysteresis(half, "cable")  # type: ignore[arg-type]
 
 
 # --- static friction from stick-slip ----------------------------------------------------------------------------------
@@ -782,7 +744,6 @@ def test_what_is_no_record_is_refused() -> None:
 def test_short_and_still_records_show_nothing(length: int) -> None:
     log = record("short", DT, position=np.zeros(length), force=np.full(length, 0.1))
     assert not stiffness_from_steps(log).stiffness.shown
-    assert not stiffness_from_hysteresis(log).stiffness.shown
     assert not static_from_stick_slip(log).static.shown
     assert not static_from_ramps(log).static.shown
     assert not friction_velocity(log).both.coulomb.shown

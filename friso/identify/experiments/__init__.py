@@ -4,7 +4,6 @@ from friso.identify.experiments.break_away import BreakAway, static_from_ramps
 from friso.identify.experiments.common import record
 from friso.identify.experiments.friction_position import FrictionPosition, friction_position
 from friso.identify.experiments.friction_velocity import FrictionVelocity, friction_velocity
-from friso.identify.experiments.hysteresis import HysteresisStiffness, stiffness_from_hysteresis
 from friso.identify.experiments.presliding import Presliding, bristles_from_presliding
 from friso.identify.experiments.slow_sliding import SlowSliding, stribeck_from_slow_sliding
 from friso.identify.experiments.steps import StepStiffness, stiffness_from_steps
@@ -14,7 +13,6 @@ __all__ = [
     "BreakAway",
     "FrictionPosition",
     "FrictionVelocity",
-    "HysteresisStiffness",
     "Presliding",
     "SlowSliding",
     "StepStiffness",
@@ -25,7 +23,6 @@ __all__ = [
     "record",
     "static_from_ramps",
     "static_from_stick_slip",
-    "stiffness_from_hysteresis",
     "stiffness_from_steps",
     "stribeck_from_slow_sliding",
 ]

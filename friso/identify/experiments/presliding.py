@@ -2,8 +2,7 @@
 
 The force on a body that sticks is F = m a + sigma_0 z + (sigma_1 dz/dt + sigma_2 v) + c, with the deflection of the
 bristles dz/dt = v (1 - q z sign v), q = sigma_0/F_s (LuGre; Astrom, Canudas de Wit 2008, doi:10.1109/MCS.2008.929425):
-linear in all but q, once the motion is measured. Motion that is quick enough shows the damping beside the stiffness;
-hysteresis of slow loops, see `hysteresis`, shows the stiffness alone.
+linear in all but q, once the motion is measured. Motion that is quick enough shows the damping beside the stiffness.
 """
 
 from __future__ import annotations

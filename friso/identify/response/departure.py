@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy import stats
@@ -14,9 +13,6 @@ from friso.identify.estimate import Estimate
 from friso.identify.response.fitting import refined
 from friso.identify.response.response import FrequencyResponse
 from friso.intervals import COVERAGE
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 WINDOW = 9
 """Neighbouring lines that are judged together: scatter averages out over them, a departure does not."""
@@ -155,37 +151,3 @@ def _coulomb(damping: Estimate, velocity: float, unit: str) -> Estimate:
     model = abs(sine / random - 1) * value
     half = float(np.hypot(damping.half_width * random, COVERAGE * model / np.sqrt(3)))
     return Estimate("friction.coulomb", unit, value, max(value - half, 0.0), value + half, method)
-
-
-BRISTLES = 1e-5
-"""Displacement [output unit] before sliding of the friction that is simulated: some 10 um, our choice, far below the
-amplitudes at which a mass line is measured."""
-
-
-def amplitude_dependence(drag: Drag, forces: Sequence[float], frequencies: Sequence[float]) -> xr.DataArray:
-    """The simulated response, over its mass line, to sinusoids of amplitudes `forces` at `frequencies` [Hz].
-
-    Complex, over ("force", "frequency"), 1 on the line: a mass with the Coulomb friction found, one unit of input taken
-    as a newton and one of output as a metre (see `friso.mass_line`). Raises InputError where no level was found.
-    """
-    from friso.frequency.describing.mass_line import mass_line
-    from friso.stage import loads
-
-    if not drag.coulomb.value > 0:
-        raise InputError("friction.coulomb", "no level found in the departure", "a level above 0", "0.087 V")
-    force, mass = float(drag.coulomb.value), float(drag.mass.value)
-    stiffness, damping = force / BRISTLES, float(2 * np.sqrt(force / BRISTLES * mass))
-    stage = loads(
-        "[masses]\n"
-        f'cart = "{mass!r} kg"\n'
-        "[friction]\n"
-        'model = "lugre"\nstribeck_exponent = 2\n'
-        f'static = "{force!r} N"\ncoulomb = "{force!r} N"\nstribeck_velocity = "1 mm/s"\n'
-        f'bristle_stiffness = "{stiffness!r} N/m"\nbristle_damping = "{damping!r} N*s/m"\n'
-        'viscous = "0 N*s/m"\n'
-        "[controller]\n"
-        'kind = "pid"\nkp = "1 N/m"\nki = "0 N/(m*s)"\nkd = "0 N*s/m"\n'
-        "[motion]\n"
-        'kind = "hold"\nduration = "1 s"\n'
-    )
-    return mass_line(stage, [{}], list(forces), list(frequencies))["ratio"].isel(place=0)

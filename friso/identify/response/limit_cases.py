@@ -10,20 +10,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from friso.errors import InputError
 from friso.identify.response.mass_line import KINDS, Line, straight_lines
 from friso.identify.response.modes import Modes, fit_modes
 from friso.identify.response.response import FrequencyResponse
-
-if TYPE_CHECKING:
-    from friso.stage import Stage
-
-CLEARLY = 2.0
-"""The second best case lies this much further from the response than the best where a case is told."""
 
 
 @dataclass(frozen=True)
@@ -98,29 +90,3 @@ def _verdict(case: str, pairs: Mapping[str, float]) -> str:
             "friction or joint as a spring, then a mode" if "resonance" in kinds else "spring alone"
         )
     return "no straight line below the modes: the cart may be stuck or sliding"
-
-
-def nearest_case(response: FrequencyResponse, stage: Stage) -> tuple[str, Mapping[str, float]]:
-    """The limit case of `stage` nearest to a measured response [m/N], and the distance to each.
-
-    Distance: root mean square of the complex logarithm of the ratio, over the lines; it weighs all lines the same. The
-    name is "" where the second best is not clearly further. Raises InputError for other units than m and N.
-    """
-    from friso.frequency.analysis import linear
-    from friso.frequency.members import limit_cases
-
-    units = (response.channels.input_unit, response.channels.output_unit)
-    if units != ("N", "m"):
-        raise InputError(
-            "response", f"in {units[1]}/{units[0]}", "a response from force to position, in m/N", "a scale in N/V"
-        )
-    distances = {}
-    for case in limit_cases(stage.flat()):
-        plant = linear(stage, case)
-        number = plant.input_labels.index("force"), plant.output_labels.index("stage")
-        value = np.asarray(plant(2j * np.pi * response.frequency, squeeze=False))[number[1], number[0]]
-        distances[case] = float(np.sqrt(np.mean(np.abs(np.log(response.response / value)) ** 2)))
-    ordered = dict(sorted(distances.items(), key=lambda item: item[1]))
-    best, *others = ordered.values()
-    clear = not others or others[0] > CLEARLY * best
-    return (next(iter(ordered)) if clear else ""), ordered
