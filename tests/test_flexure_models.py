@@ -13,6 +13,7 @@ from numpy.polynomial import Polynomial
 from scipy.integrate import solve_bvp
 from scipy.linalg import block_diag, eigh
 from scipy.optimize import brentq
+from scipy.spatial.transform import Rotation
 
 from friso.flexure import closed_forms, curved, plate
 from friso.flexure.beam_system import BeamFailure, Leaves, Place
@@ -412,6 +413,79 @@ def test_tangent_is_the_slope_of_the_force(it: Mechanism) -> None:
     work = np.sum((found.forces[1:] + found.forces[:-1]) / 2) * step - step**2 / 12 * (found.drive[-1] - found.drive[0])
     linear = found.drive[0] * found.stroke**2 / 2
     assert work == pytest.approx(linear, rel=2 * found.nonlinearity + 1e-6)
+
+
+class Pushed:
+    """Leaves between a cart at rest and a stage anywhere, by virtual work alone: the stage goes by displacements [m]
+    and a rotation vector [rad] about axes at rest, on top of a turn [rad] about y; its inner nodes are solved for."""
+
+    def __init__(self, it: Mechanism) -> None:
+        self.leaves, self.offsets = Leaves(it), it.offsets
+        self.state = np.zeros((self.leaves.count, self.leaves.nodes, 6))
+
+    def ends(self, move: np.ndarray, turn: float) -> np.ndarray:
+        """Coordinates of the leaf ends, shape (leaves, 6)."""
+        rotation = Rotation.from_rotvec(move[3:]) * Rotation.from_euler("y", turn)
+        arms = np.stack([0 * self.offsets, 0 * self.offsets, self.offsets], axis=1)
+        angles = np.tile(rotation.as_euler("XYZ"), (len(arms), 1))
+        return np.concatenate([move[:3] + rotation.apply(arms) - arms, angles], axis=1)
+
+    def slopes(self, move: np.ndarray, turn: float) -> np.ndarray:
+        """How these follow the stage, shape (leaves, 6, 6)."""
+        steps = 1e-6 * np.eye(6)
+        return np.stack([self.ends(move + h, turn) - self.ends(move - h, turn) for h in steps], axis=2) / 2e-6
+
+    def forces(self, move: np.ndarray, turn: float) -> np.ndarray:
+        """Force and moment [N, N m] on the stage, shape (6,), conjugate to `move`."""
+        state = self.state
+        state[:, -1] = self.ends(move, turn)
+        for _ in range(4):
+            inner = self.leaves.forces(state)[:, 1:-1].reshape(len(state), -1, 1)
+            slope = self.leaves.stiffness(state)[:, 6:-6, 6:-6]
+            state[:, 1:-1] -= np.linalg.solve(slope, inner).reshape(state[:, 1:-1].shape)
+        return np.einsum("lik,li->k", self.slopes(move, turn), self.leaves.forces(state)[:, -1])
+
+    def stiffness(self, move: np.ndarray, turn: float) -> np.ndarray:
+        """The slope of these forces, shape (6, 6)."""
+        steps = np.diag([1e-8, 1e-8, 1e-8, 1e-6, 1e-6, 1e-6])
+        return np.array([(self.forces(move + h, turn) - self.forces(move - h, turn)) / (2 * h.sum()) for h in steps]).T
+
+    def to(self, stroke: float, steps: int) -> tuple[np.ndarray, float]:
+        """Where the stage is at this z [m], free along x and about y: Newton's method on all that is free at once."""
+        x, turn, rate, last = 0.0, 0.0, 0 * self.state, 0.0
+        for z in stroke * np.linspace(0, 1, steps + 1)[1:] ** 2:
+            before, state = self.state, self.state + (z - last) * rate
+            for _ in range(12):
+                move = np.array([x, 0, z, 0, 0, 0])
+                state[:, -1] = self.ends(move, turn)
+                forces, follow = self.leaves.forces(state)[:, 1:], self.slopes(move, turn)[:, :, [0, 4]]
+                bend = (self.slopes(move, turn + 1e-6) - self.slopes(move, turn - 1e-6))[:, :, 4] / 2e-6
+                free = block_diag(*[np.eye(forces[0].size - 6)] * len(state), np.eye(2))
+                ways = np.split(free[:-2], len(state))
+                slope = np.zeros((len(free), len(free)))
+                for own, way, end in zip(self.leaves.stiffness(state)[:, 6:, 6:], ways, follow, strict=True):
+                    way = np.concatenate([way, end @ free[-2:]])
+                    slope += way.T @ own @ way
+                slope[-1, -1] += np.sum(bend * forces[:, -1])
+                out = np.concatenate([forces[:, :-1].ravel(), np.einsum("lik,li->k", follow, forces[:, -1])])
+                change = -np.linalg.solve(slope, out)
+                state[:, 1:-1] += change[:-2].reshape(state[:, 1:-1].shape)
+                x, turn = x + change[-2], turn + change[-1]
+            self.state, rate, last = state, (state - before) / (z - last), z
+        return np.array([x, 0, stroke, 0, 0, 0]), turn
+
+
+def test_a_stage_that_turns_as_it_is_pushed() -> None:
+    """Leaves near each other hardly keep the stage from turning: its whole stiffness, as it stands, by virtual work."""
+    it, stroke = mechanism(spacing=0.003), 6e-3
+    pushed = Pushed(it)
+    move, turn = pushed.to(stroke, 16)
+    wanted, found = pushed.stiffness(move, turn), beams(it, stroke)
+    assert abs(turn) > 0.01
+    scale = np.sqrt(np.outer(np.diag(wanted), np.diag(wanted)))
+    assert np.abs((found.stiffness[-1] - wanted) / scale).max() < 2e-5
+    assert found.forces[-1] == pytest.approx(pushed.forces(move, turn)[2], rel=1e-5)
+    assert found.shortening == pytest.approx(-move[0], rel=1e-4)
 
 
 @pytest.mark.parametrize("leaves", [2, 3, 4])

@@ -7,6 +7,7 @@ import sympy as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.linalg import expm
+from scipy.optimize import brentq
 from variants import VARIANTS
 
 import friso
@@ -19,7 +20,7 @@ from friso.frequency.drive import Drive, exponentials
 from friso.frequency.family import impedance, loops, plants, scan, spectral_abscissa
 from friso.frequency.friction import level
 from friso.frequency.loops import closed_loop, open_loop, poles, response
-from friso.frequency.margins import margins
+from friso.frequency.margins import margins, of_loop, with_resonances
 from friso.frequency.members import Members, family, limit_cases, member
 from friso.frequency.parts import mechanics, plant
 from friso.frequency.stiffness import in_series, sensitivity
@@ -251,6 +252,27 @@ def test_margins_take_the_loop_to_the_edge(rig: Stage, changes: dict, case: str,
     assert np.abs(1 + at(np.array([HZ * found.closest])))[0] == pytest.approx(found.modulus_margin)
 
 
+@pytest.mark.parametrize(("gain", "turns"), [(0.5, 0.5045), (0.1, 0.5304), (1.5, 0.998)])
+def test_the_delay_margin_of_a_loop_that_leads(gain: float, turns: float) -> None:
+    """L = gain s^2/(s^2 + 2 zeta s + 1) leads by up to half a turn: delay takes it to -1 by more than half a turn, and
+    at the crossover that it takes least time for."""
+    zeta = 0.01
+
+    def loop(omega: np.ndarray) -> np.ndarray:
+        return -gain * omega**2 / (1 - omega**2 + 2j * zeta * omega)
+
+    damping = 2 - 4 * zeta**2
+    squares = np.roots([1 - gain**2, -damping, 1.0])  # |L| = 1
+    crossed = np.sqrt(squares[squares > 0].real)
+    lag = np.mod(np.pi + np.angle(loop(crossed)), 2 * np.pi)  # from L down to -1
+    poles = np.roots([1 + gain, 2 * zeta, 1]).astype(complex)
+    omega = with_resonances(np.geomspace(1e-3, 1e3, 1000), [poles, np.roots([1, 2 * zeta, 1]).astype(complex)])
+    found = of_loop(loop, poles, float(poles.real.max()), omega, np.zeros(0, complex))
+    assert HZ * np.array(found.crossovers) == pytest.approx(np.sort(crossed), rel=1e-9)
+    assert found.delay_margin == pytest.approx((lag / crossed).min(), rel=1e-9)
+    assert lag[np.argmin(lag / crossed)] / (2 * np.pi) == pytest.approx(turns, abs=0.003)
+
+
 @pytest.mark.parametrize("case", CASES)
 def test_margins_against_python_control(rig: Stage, case: str) -> None:
     found = margins(rig.flat(), limit_cases(rig.flat())[case])
@@ -362,6 +384,21 @@ def by_gains(rig: Stage, **gains: str) -> Stage:
     """The rig with a controller by these gains."""
     tables = rig.given() | {"controller": {"kind": "pid", "derivative_on": "measurement", **gains}}
     return Stage(**tables)
+
+
+@pytest.mark.parametrize("drive", [Drive(0.0, 2e-4), Drive(0.0, 5e-3), Drive(1e-4, 1e-4), Drive(1e-3, 1.5e-3)])
+@pytest.mark.parametrize("turn", [1e-10, 1e-8, 1e-5, 1e-4])
+def test_slow_poles_are_where_the_loop_is_minus_1(rig: Stage, turn: float, drive: Drive) -> None:
+    """Stuck, an integral acts on a spring: its pole, so many radians in the delay, is neither lost in the rounding of
+    the fast ones nor taken where it is without delay."""
+    rigid = by_gains(rig, kp="0 N/m", ki="1 N/(m*s)").replace({"joint.locked": True, "parasitic": None})
+    one = limit_cases(rigid.flat())["stuck"]
+    speed = 1e-3 * abs(response(rigid.flat(), one, Drive(0.0, 0.0))(np.array([1e-3]))[0])
+    slow = turn / drive.delay
+    flat = {**rigid.flat(), "controller.ki": slow / speed}
+    at = response(flat, one, drive)
+    exact = brentq(lambda s: 1 + at(np.array([-1j * s]))[0].real, -1.1 * slow, -0.9 * slow, xtol=1e-12 * slow)
+    assert poles(flat, one, drive).abscissa[0] == pytest.approx(exact, rel=3e-6)
 
 
 @pytest.mark.parametrize("drive", DRIVES)

@@ -508,6 +508,28 @@ def test_friction_velocity_map_without_slow_speeds() -> None:
     assert found.both.stribeck_velocity.high == pytest.approx(0.02, rel=0.01)
 
 
+def test_the_bias_takes_a_degree_of_freedom_of_the_friction() -> None:
+    """Passes that differ, without noise: the intervals are those of one least squares on Coulomb and viscous
+    friction and bias together."""
+    rng, rows = np.random.default_rng(4), []
+    for speed in (0.02, 0.05, 0.1):
+        leg = np.linspace(0, 0.1, int(0.1 / speed / DT))
+        for way, path in ((1, leg), (-1, leg[::-1])):
+            force = way * (1.0 + 4.0 * speed) + 0.3 + 0.05 * rng.standard_normal()
+            rest = np.stack([np.full(200, path[0]), np.zeros(200)], axis=1)
+            rows += [rest, np.stack([path, np.full(len(path), force)], axis=1)]
+    position, force = np.concatenate(rows).T
+    found = friction_velocity(record("scatter", DT, position=position, force=force, reference=position))
+    columns = np.stack([np.sign(found.velocities), found.velocities, np.ones(6)], axis=1)
+    solution, squares, *_ = np.linalg.lstsq(columns, found.forces, rcond=None)
+    spread = np.sqrt(np.diag(np.linalg.inv(columns.T @ columns)) * squares[0] / 3)
+    for estimate, value, deviation in zip(
+        (found.both.coulomb, found.both.viscous, found.bias), solution, spread, strict=True
+    ):
+        assert estimate.value == pytest.approx(value, abs=0.01 * deviation)
+        assert estimate.half_width == pytest.approx(t_value(3) * deviation, rel=0.01)
+
+
 def test_friction_velocity_map_with_slow_speeds_has_the_stribeck_curve() -> None:
     friction = np.array([1.5, 1.0, 5e-3, 1e5, 316.2, 4.0])
     speeds = [0.002, 0.003, 0.005, 0.008, 0.015, 0.03, 0.06]

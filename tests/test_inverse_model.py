@@ -91,6 +91,17 @@ def test_slow_hunting_does_not_hide_the_bandwidth(slow: float) -> None:
     assert bandwidth_of(force, DT) == pytest.approx(5, rel=0.1)
 
 
+@pytest.mark.parametrize(("share", "expected"), [(0.045, 2.0), (0.055, 10.0)])
+def test_the_bandwidth_holds_95_percent_of_the_accelerations_power(share: float, expected: float) -> None:
+    """Two sines, the faster with this share of the power of the acceleration, far less of that of the position."""
+    time, slow, fast = np.arange(40_000) * DT, 2.0, 10.0
+    powers = np.array([1 - share, share])
+    amplitudes = np.sqrt(powers) / (2 * np.pi * np.array([slow, fast])) ** 2
+    position = amplitudes[0] * np.sin(2 * np.pi * slow * time) + amplitudes[1] * np.sin(2 * np.pi * fast * time)
+    position += 1e-9 * np.random.default_rng(1).standard_normal(len(time))
+    assert bandwidth_of(position, DT) == pytest.approx(expected, rel=0.15)
+
+
 def test_intervals_hold_the_truth() -> None:
     """Force with correlated errors: of 60 records about 95 % of the intervals hold mass and viscous friction."""
     rng, log, held = np.random.default_rng(5), swinging(2.0, 5.0, 0.0, 0.0), np.zeros(2)
