@@ -15,6 +15,7 @@ from friso.engine.kernel import Kernel, empty_results
 from friso.engine.layout import LANES
 from friso.engine.shared_queue import new_queue
 from friso.equations import motion
+from friso.equations.roles import Steady
 
 LONGEST_SHARE = 1 / 200
 """Longest step as share of the run: what the step does not look at, it may not pass over."""
@@ -111,11 +112,8 @@ def prepare(
 
 def _starts(kernel: Kernel, flat: Mapping[str, Any], runs: int) -> np.ndarray:
     """Everything at rest, the masses (and what has been measured of them) displaced as the motion says."""
-    starts = np.zeros((runs, len(kernel.kept)))
-    for i, name in enumerate(kernel.states):
-        if name in ("position", "cart_position", "parasitic_position", "filtered_position"):
-            starts[:, i] = motion.initial_displacement(flat)
-    return starts
+    displacement = motion.initial_displacement(flat)
+    return kernel.settled({**flat, "motion.size": motion.size(flat)}, Steady(0.0, displacement), runs)
 
 
 def _segments(flat: Mapping[str, Any], runs: int, window: float) -> tuple[np.ndarray, np.ndarray]:

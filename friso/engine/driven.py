@@ -61,7 +61,7 @@ def follow(
     """
     count, segments = len(inputs.reference), inputs.segments
     options = Options(rtol=rtol, bands=(np.inf, np.inf), record_from=np.inf, least_swing=np.inf, budget=BUDGET * count)
-    size = float(np.abs(inputs.reference - starts[0, kernel.states.index("position")]).max())
+    size = float(np.abs(inputs.reference - starts[0, kernel.position]).max())
     settings = settings_of(replace(options, interval=inputs.sample_time))
     for first in range(0, runs, CHUNK):
         numbers = np.arange(first, min(first + CHUNK, runs))

@@ -22,6 +22,7 @@ from friso.engine.shared_queue import new_queue
 from friso.equations.as_built import AsBuilt
 from friso.equations.driven import Driven
 from friso.equations.imposed import Imposed
+from friso.equations.roles import Role, Steady
 from friso.equations.structure import Structure
 from friso.stage import Section
 from friso.stage.plug_ins import plug_ins
@@ -41,6 +42,30 @@ class Kernel:
     @property
     def states(self) -> tuple[str, ...]:
         return self.module.STATE_NAMES
+
+    @property
+    def position(self) -> int:
+        """Which state is the position of the stage, the one that is measured."""
+        return self.module.POSITION
+
+    @property
+    def velocity(self) -> int:
+        """Which state is the velocity of the stage."""
+        return self.module.VELOCITY
+
+    @property
+    def cart_position(self) -> int:
+        """Which state is the position of what the friction acts on; that of the stage where it is rigid."""
+        return self.module.CART_POSITION
+
+    @property
+    def cart_velocity(self) -> int:
+        """Which state is the velocity of what the friction acts on."""
+        return self.module.CART_VELOCITY
+
+    def having(self, role: Role) -> list[int]:
+        """Which states have a role."""
+        return [i for i, own in enumerate(self.module.ROLES) if own == role]
 
     @property
     def held(self) -> tuple[str, ...]:
@@ -63,6 +88,14 @@ class Kernel:
     def outputs(self) -> dict[str, tuple[str, str]]:
         """Unit and label of each output."""
         return self.module.OUTPUTS
+
+    def settled(self, flat: dict[str, Any], steady: Steady, runs: int) -> np.ndarray:
+        """States and numbers held in a steady motion that has lasted, shape (runs, kept); `flat` and the numbers of the
+        motion may be arrays of shape (runs,)."""
+        full = np.zeros((runs, len(self.kept)))
+        for i, row in enumerate(self.module.settled(steady, self.values(flat, runs))):
+            full[:, i] = row
+        return full
 
     def values(self, flat: dict[str, Any], runs: int) -> list[np.ndarray]:
         """The parameters of each run [SI], each of shape (runs,), from flat keys to numbers or arrays."""

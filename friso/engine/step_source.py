@@ -83,8 +83,7 @@ class StepWriter:
         self.size, self.kinks = len(model.states), len(model.kinks)
         self.constants = Constants(model.parameters)
         self._index = {symbol: i for i, symbol in enumerate(model.symbols)}
-        names = [str(symbol) for symbol in model.symbols]
-        self._position, self._velocity = names.index("position"), names.index("velocity")
+        self._position, self._velocity = self._index[model.stage.position], self._index[model.stage.velocity]
         self._fixed = {kink.beyond: f"mode{k}" for k, kink in enumerate(model.kinks)}
         self._given = [f"given{i}" for i in range(len(model.given))]
         self._fixed |= dict(zip(model.given, self._given, strict=True))

@@ -21,6 +21,11 @@ INJECTED, FLOOR = TIMES = ("injected_force", "floor_acceleration")
 """What is looked up over time: a force [N] added to the command, and the acceleration [m/s^2] of the floor."""
 
 
+READING, COMMANDED = "reading", "commanded"
+"""Names of what is held between samples that the drive logs: the position that its encoder reads [m], and the force
+[N] that it commands."""
+
+
 @dataclass(frozen=True)
 class AsBuilt:
     """The stage's structure; whole samples of delay; whether the current loop lags; and over how many samples a drive
@@ -71,10 +76,8 @@ def as_built(form: AsBuilt) -> Model:
     from friso.equations.model import assemble
     from friso.equations.sampled import SAMPLE_TIME
 
-    position, velocity = state("position"), state("velocity")
-    cable = -key("cable.stiffness") * position - key("cable.drag") * velocity
-    model = assemble(form.structure, cable, _drive(form))
-    cart = state("position" if form.structure.joint == "rigid" else "cart_position")
+    model = assemble(form.structure, lambda stage: _cable(stage.position, stage.velocity), _drive(form))
+    position, cart = model.stage.position, model.cart.position
     places = dict(zip(map(state, PLACES), (cart, cart, position), strict=True))
     clock = Clock(SAMPLE_TIME, key("drive.late"), {state("seen"): position}, places, tuple(map(state, TIMES)))
     varied = {key(f"friction.{name}"): key(f"friction.{name}") * state(f"{name}_factor") for name in _LEVELS}
@@ -88,22 +91,29 @@ _LEVELS = ("static", "coulomb")
 
 def _shaken(each: Any) -> sp.Expr:
     """The derivative of a state in a frame that moves with the floor."""
-    from friso.equations.component import state
+    from friso.equations.component import Role, state
 
-    return each.derivative - (state(FLOOR) if str(each.symbol).endswith("velocity") else 0)
+    return each.derivative - (state(FLOOR) if each.role == Role.VELOCITY else 0)
+
+
+def _cable(position: sp.Symbol, velocity: sp.Symbol) -> sp.Expr:
+    """The force of the cables on the stage [N]."""
+    from friso.equations.component import key
+
+    return -key("cable.stiffness") * position - key("cable.drag") * velocity
 
 
 def _drive(form: AsBuilt) -> Control:
     """Everything between the encoder and the motor's force."""
     from sympy import pi
 
-    from friso.equations.component import Component, Held, Output, State, key, state
+    from friso.equations.component import STEADY, Component, Held, Output, Role, State, key, state
     from friso.equations.pid import Controller, Loop, loop_stiffness
 
     def control(loop: Loop, length: sp.Expr, rate: sp.Expr) -> Controller:
         reading, command, kept = _command(form, loop)
-        commanded, waiting = state("commanded"), [state(f"waiting_{n + 1}") for n in range(form.delay_samples)]
-        held = [Held(state("reading"), reading), *kept, Held(commanded, command)]
+        commanded, waiting = state(COMMANDED), [state(f"waiting_{n + 1}") for n in range(form.delay_samples)]
+        held = [Held(state(READING), reading, STEADY.position), *kept, Held(commanded, command)]
         held += [Held(new, old) for new, old in zip(waiting, [commanded, *waiting], strict=False)]
         acting = waiting[-1] if waiting else commanded
         force = key("drive.motor_constant_ratio") * state(MOTOR_FACTOR) * acting
@@ -111,7 +121,7 @@ def _drive(form: AsBuilt) -> Control:
         if form.current_loop:
             lagging, omega = state("motor_force"), 2 * pi * key("drive.current_bandwidth")
             scale = loop_stiffness(form.structure.controller) * length
-            states = (State(lagging, omega * (force - lagging), "N", scale=scale),)
+            states = (State(lagging, omega * (force - lagging), "N", scale, Role.LAG),)
             force = lagging
         return Controller(force, Component(states, (), {"force": Output(force, "N", "motor force")}), tuple(held))
 
@@ -122,7 +132,7 @@ def _command(form: AsBuilt, loop: Any) -> tuple[sp.Expr, sp.Expr, tuple[Any, ...
     """What the encoder reads [m], what the controller commands [N], and what it keeps for the next sample."""
     import sympy as sp
 
-    from friso.equations.component import TICK, Held, gaussian, key, quantised, state
+    from friso.equations.component import STEADY, TICK, Held, gaussian, key, quantised, state
     from friso.equations.model import REFERENCE
     from friso.equations.pid import Loop
     from friso.equations.sampled import Rest, sampled_controller
@@ -132,7 +142,7 @@ def _command(form: AsBuilt, loop: Any) -> tuple[sp.Expr, sp.Expr, tuple[Any, ...
     noisy = state("seen") + drive["encoder_noise"] * gaussian(key("drive.seed"), TICK)
     digit = drive["encoder_resolution"]
     reading: Any = quantised(noisy, digit)
-    error = loop.error.xreplace({state("position"): reading})
+    error = loop.error.xreplace({loop.position: reading})
     acceleration, speed, before = REFERENCE[2], loop.reference_velocity, state("error_before")
     ahead = drive["feedforward_mass"] * acceleration + drive["feedforward_viscous"] * speed
     ahead += drive["feedforward_coulomb"] * sp.Piecewise((1, speed > 0), (-1, speed < 0), (0, True))
@@ -144,4 +154,4 @@ def _command(form: AsBuilt, loop: Any) -> tuple[sp.Expr, sp.Expr, tuple[Any, ...
     extra = ahead + state(INJECTED)
     command, held = sampled_controller(form.structure.controller, known, form.velocity_samples, extra, rest)
     last = sp.Piecewise((error, error**2 > 0), (before, True))  # a reading in whole digits may find none
-    return reading, command, (*held, Held(before, last))
+    return reading, command, (*held, Held(before, last, STEADY.error))

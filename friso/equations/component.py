@@ -11,6 +11,8 @@ from dataclasses import dataclass, field
 
 import sympy as sp
 
+from friso.equations.roles import Role, Steady
+
 
 def key(name: str) -> sp.Symbol:
     """The parameter with the stage-file key `name`, such as ``masses.cart`` [SI]."""
@@ -26,24 +28,35 @@ TIME = sp.Symbol("time", real=True)
 """Time since the last corner of the reference [s]."""
 
 
+STEADY = Steady(*(sp.Symbol(f"steady_{name}", real=True) for name in Steady._fields))
+"""The steady motion that a run begins with."""
+
+
 @dataclass(frozen=True)
 class State:
-    """A state, its time derivative, unit, and the magnitude below which it does not matter; a state that is not
-    `controlled` has no say in the size of the steps."""
+    """A state, its time derivative, unit, the magnitude below which it does not matter, and its role.
+
+    `settled` is its value in a steady motion that has lasted, in terms of `STEADY`. A state that is not `controlled`
+    has no say in the size of the steps.
+    """
 
     symbol: sp.Symbol
     derivative: sp.Expr
     unit: str
     scale: sp.Expr
+    role: Role
+    settled: sp.Expr = sp.S.Zero
     controlled: bool = True
 
 
 @dataclass(frozen=True)
 class Held:
-    """A number that is held between samples, and what it becomes at one, in terms of what held just before."""
+    """A number that is held between samples, what it becomes at one, in terms of what held just before, and its value
+    in a steady motion that has lasted, in terms of `STEADY`."""
 
     symbol: sp.Symbol
     update: sp.Expr
+    settled: sp.Expr = sp.S.Zero
 
 
 TICK = sp.Symbol("tick", real=True)

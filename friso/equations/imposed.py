@@ -49,21 +49,25 @@ def imposed(form: Imposed) -> Model:
     """The equations of the law under the imposed motion."""
     import sympy as sp
 
-    from friso.equations.component import Output, State, key, state
+    from friso.equations.component import Output, Role, State, key, state
+    from friso.equations.masses import Body
     from friso.equations.model import MOTION_SIZE, Model
 
-    position, velocity, period = state("position"), state("velocity"), 1 / key(FREQUENCY)
+    body, period = Body.named("", sp.oo), 1 / key(FREQUENCY)  # nothing acts back on a motion that is imposed
+    position, velocity = body.position, body.velocity
     friction: Friction = friction_law(form.friction).declare(velocity, form.friction_variant)
     omega, size = 2 * sp.pi / period, friction.breakaway
     shares = (2 * friction.force * position / MOTION_SIZE, 2 * friction.force * velocity / (omega * MOTION_SIZE))
     states = (
-        State(position, velocity * period, "m", scale=MOTION_SIZE),
-        State(velocity, -(omega**2) * position * period, "m/s", scale=MOTION_SIZE * omega),
+        State(position, velocity * period, "m", MOTION_SIZE, Role.POSITION),
+        State(velocity, -(omega**2) * position * period, "m/s", MOTION_SIZE * omega, Role.VELOCITY),
         *(_per_period(each, period) for each in friction.component.states),
-        *(State(state(name), share, "N", scale=size) for name, share in zip(HARMONIC, shares, strict=True)),
+        *(State(state(name), share, "N", size, Role.SUM) for name, share in zip(HARMONIC, shares, strict=True)),
     )
     return Model(
         states=states,
+        stage=body,
+        cart=body,
         kinks=friction.component.kinks,
         outputs={"friction_force": Output(friction.force, "N", "friction force")},
         deviation=position,

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import sympy as sp
 
-from friso.equations.component import Component, Output, State, key, state
+from friso.equations.component import STEADY, Component, Output, Role, State, key, state
 
 
 @dataclass(frozen=True)
@@ -24,8 +24,8 @@ class Body:
     def under(self, force: sp.Expr, length: sp.Expr, rate: sp.Expr) -> tuple[State, State]:
         """Newton's second law for the sum of forces [N]."""
         return (
-            State(self.position, self.velocity, "m", scale=length),
-            State(self.velocity, force / self.mass, "m/s", scale=length * rate),
+            State(self.position, self.velocity, "m", length, Role.POSITION, STEADY.position),
+            State(self.velocity, force / self.mass, "m/s", length * rate, Role.VELOCITY, STEADY.velocity),
         )
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import sympy as sp
 
-from friso.equations.component import TICK, TIME, Clock, Component, Held, Kink, Output, State, key
+from friso.equations.component import STEADY, TICK, TIME, Clock, Component, Held, Kink, Output, State, key
 from friso.equations.friction.common import Friction
 from friso.equations.joint import joint
 from friso.equations.masses import Body, parasitic_force, position_outputs
@@ -29,7 +29,8 @@ SMALLEST_LENGTH = sp.Rational(1, 10**4)
 
 @dataclass(frozen=True)
 class Model:
-    """The equations of a stage.
+    """The equations of a stage: of the bodies `stage`, which is measured, and `cart`, which feels friction; a rigid
+    stage has one that is both.
 
     The right-hand side is smooth while the kinks' `beyond` symbols are held; `TIME` counts from the last corner
     of the reference. `deviation` [m] is position minus reference, `length` [m] and `rate` [1/s] the scales of
@@ -42,6 +43,8 @@ class Model:
     """
 
     states: tuple[State, ...]
+    stage: Body
+    cart: Body
     kinks: tuple[Kink, ...]
     outputs: Mapping[str, Output]
     deviation: sp.Expr
@@ -64,6 +67,11 @@ class Model:
         return tuple(each.derivative for each in self.states)
 
     @property
+    def settled(self) -> tuple[sp.Expr, ...]:
+        """States, then the numbers held, in a steady motion that has lasted, in terms of `STEADY`."""
+        return tuple(each.settled for each in (*self.states, *self.held))
+
+    @property
     def given(self) -> tuple[sp.Symbol, ...]:
         """What the right-hand side finds as it is during a step: inputs, numbers held, and what is looked up."""
         return (*self.inputs, *(each.symbol for each in self.held), *(self.clock.tabled if self.clock else ()))
@@ -72,8 +80,8 @@ class Model:
     def parameters(self) -> tuple[sp.Symbol, ...]:
         """The stage-file keys (and the length of the motion) that the equations contain, sorted by name."""
         expressions = [*self.rhs, *(k.surface for k in self.kinks), *(o.expression for o in self.outputs.values())]
-        expressions += [*(each.scale for each in self.states), *(each.update for each in self.held)]
-        others = {*self.symbols, *(k.beyond for k in self.kinks), *self.given, TIME, TICK}
+        expressions += [*(each.scale for each in self.states), *(each.update for each in self.held), *self.settled]
+        others = {*self.symbols, *(k.beyond for k in self.kinks), *self.given, TIME, TICK, *STEADY}
         if self.clock:
             expressions += [self.clock.period, self.clock.late]
             others |= {*self.clock.seen}
@@ -85,8 +93,12 @@ Control = Callable[[Loop, sp.Expr, sp.Expr], Controller]
 """Makes a controller from what it sees, and the scales of its states: a length [m] and a rate [1/s]."""
 
 
-def assemble(structure: Structure, external: sp.Expr = sp.S.Zero, control: Control | None = None) -> Model:
-    """The equations of every stage with this structure, on which an `external` force [N] acts besides the actuator's.
+External = Callable[[Body], sp.Expr]
+"""A force [N] on the stage, which may depend on its motion."""
+
+
+def assemble(structure: Structure, external: External | None = None, control: Control | None = None) -> Model:
+    """The equations of every stage with this structure, on which an `external` force acts besides the actuator's.
 
     Instead of the structure's controller in continuous time there may be another one.
     """
@@ -100,7 +112,7 @@ def assemble(structure: Structure, external: sp.Expr = sp.S.Zero, control: Contr
     loop = Loop(reference - stage.position, stage.position, stage.velocity, reference_velocity)
     form = structure.controller
     acting = control(loop, length, rate) if control else controller(form, loop, length, rate) if form else None
-    forces = (acting.force if acting else sp.S.Zero) + external
+    forces = (acting.force if acting else sp.S.Zero) + (external(stage) if external else sp.S.Zero)
     bodies, parts = _mechanics(structure, (cart, stage, parasitic), friction, forces, (length, rate))
     if acting:
         parts.append(acting.component)
@@ -112,6 +124,8 @@ def assemble(structure: Structure, external: sp.Expr = sp.S.Zero, control: Contr
         outputs |= part.outputs
     return Model(
         states=(*bodies, *(each for part in parts for each in part.states)),
+        stage=stage,
+        cart=cart,
         kinks=tuple(kink for part in parts for kink in part.kinks),
         outputs=outputs,
         deviation=stage.position - reference,

@@ -8,7 +8,7 @@ from typing import Any
 
 import sympy as sp
 
-from friso.equations.component import Component, Held, Kink, Output, State, key, state
+from friso.equations.component import STEADY, Component, Held, Kink, Output, Role, State, key, state
 from friso.equations.structure import ControllerForm
 
 UNWINDING_BAND = sp.Rational(1, 1000)
@@ -46,7 +46,7 @@ def controller(form: ControllerForm, loop: Loop, length: sp.Expr, rate: sp.Expr)
     if form.integral:
         rest, resting = _rest(demand, integrand, kinks) if form.limited else (sp.S.One, ())
         kinks = (*kinks, *resting)
-        integral = State(state("integral"), integrand * rest, "m*s", scale=length / rate)
+        integral = State(state("integral"), integrand * rest, "m*s", length / rate, Role.INTEGRAL)
         states = (*states, integral)
     outputs = {"force": Output(force, "N", "actuator force")}
     names = {"p": "proportional", "i": "integral", "d": "derivative"}
@@ -96,7 +96,7 @@ def _van_dijk(form: ControllerForm, loop: Loop, length: sp.Expr) -> Terms:
         "i": k_p / tau_i * state("integral"),
         "d": k_p * tau_z / tau_p * (loop.error - filtered),
     }
-    return shares, filtered, (State(filtered, rate, "m", scale=length),)
+    return shares, filtered, (State(filtered, rate, "m", length, Role.FILTER, STEADY.error),)
 
 
 def _gains(form: ControllerForm, loop: Loop, length: sp.Expr) -> Terms:
@@ -122,7 +122,8 @@ def _derivative(form: ControllerForm, loop: Loop, tau: sp.Expr, length: sp.Expr)
     name = "filtered_error" if on_error else "filtered_position"
     low_passed = state(name) if on_error else -state(name)
     rate = (signal - low_passed) / tau
-    return rate, (State(state(name), rate if on_error else -rate, "m", scale=length),)
+    settled = STEADY.error if on_error else STEADY.position
+    return rate, (State(state(name), rate if on_error else -rate, "m", length, Role.FILTER, settled),)
 
 
 def _limit(demand: sp.Expr) -> tuple[sp.Expr, tuple[Kink, ...]]:

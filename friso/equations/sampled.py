@@ -11,7 +11,7 @@ from typing import Any
 
 import sympy as sp
 
-from friso.equations.component import Held, key, state
+from friso.equations.component import STEADY, Held, key, state
 from friso.equations.pid import Loop, van_dijk_gains
 from friso.equations.structure import ControllerForm
 
@@ -56,7 +56,10 @@ def _differences(form: ControllerForm, loop: Loop, velocity_samples: int) -> Ter
     if form.derivative_on != "none":
         past = [state(f"position_before_{n}") for n in range(1, velocity_samples + 1)]
         demand -= kd * (loop.position - past[-1]) / (velocity_samples * SAMPLE_TIME)
-        held = tuple(Held(old, new) for old, new in zip(past, [loop.position, *past], strict=False))
+        held = tuple(
+            Held(old, new, STEADY.position - n * SAMPLE_TIME * STEADY.velocity)
+            for n, (old, new) in enumerate(zip(past, [loop.position, *past], strict=False), start=1)
+        )
     return demand, ki, SAMPLE_TIME * loop.error, held
 
 
@@ -68,7 +71,8 @@ def _filtered(form: ControllerForm, loop: Loop, velocity_samples: int) -> Terms:
     gains = van_dijk_gains()
     tau = gains["tau_p"] if form.tuned else key("controller.tau")
     passed = ((2 * tau - SAMPLE_TIME) * low + SAMPLE_TIME * (signal + before)) / (2 * tau + SAMPLE_TIME)
-    held = (Held(before, signal), Held(low, passed))
+    settled = STEADY.error if on_error else -STEADY.position
+    held = (Held(before, signal, settled), Held(low, passed, settled))
     if form.tuned:
         k_p, tau_z, tau_i = gains["k_p"], gains["tau_z"], gains["tau_i"]
         demand = k_p * (1 + tau_z / tau_i) * passed + k_p * tau_z / tau * (signal - passed)
@@ -86,16 +90,3 @@ def _integral(form: ControllerForm, gain: sp.Expr, share: sp.Expr, demand: sp.Ex
         winding = sp.Or(sp.And(wanted > limit, share > 0), sp.And(wanted < -limit, share < 0))
         rests = sp.Or(rests, winding)
     return Held(old, sp.Piecewise((share, rest.restarts), (old, rests), (new, True)))
-
-
-def held_at_start(name: str, error: float, position: float, way: float, on_error: bool) -> float:
-    """What a controller holds under a name that has seen a steady motion, so that it begins without a kick.
-
-    `error` and `position` [m] are those of the first sample, `way` [m] is that of the motion per sample; `on_error`
-    tells what the filter acts on.
-    """
-    if name.startswith("position_before"):
-        return position - way * int(name.rsplit("_", 1)[1])
-    if name in ("signal_before", "low_passed"):
-        return error if on_error else -position
-    return {"reading": position, "error_before": error}.get(name, 0.0)

@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import sympy as sp
 
-from friso.equations.component import TIME, Kink, State, state
+from friso.equations.component import TIME, Kink, Role, State, state
 from friso.equations.model import Model
 
 PREFIX = "small_"
@@ -23,7 +23,9 @@ def variational(model: Model) -> Model:
     """The model with a deviation beside each state, the states first; it takes no part in the control of the step."""
     small = {each.symbol: state(f"{PREFIX}{each.symbol}") for each in model.states}
     deviations = tuple(
-        State(small[each.symbol], _along(each.derivative, small), each.unit, each.scale, controlled=False)
+        State(
+            small[each.symbol], _along(each.derivative, small), each.unit, each.scale, Role.DEVIATION, controlled=False
+        )
         for each in model.states
     )
     jumps = {kink: found for kink in model.kinks if (found := _saltation(model, kink, small))}

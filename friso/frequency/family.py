@@ -15,12 +15,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from friso.equations.structure import shared_structure
 from friso.frequency.drive import LIGHT, Drive
 from friso.frequency.friction import law_of, operating_point
 from friso.frequency.loops import Poles, poles
 from friso.frequency.margins import frequencies, margins
 from friso.frequency.members import Members, joined, limit_cases
-from friso.frequency.parts import REFERENCE, STAGE, VELOCITY, compensator, mechanics, plant
+from friso.frequency.parts import REFERENCE, STAGE, VELOCITY, cart_states, compensator, mechanics, plant
 from friso.frequency.system import Complex, System
 
 CHUNK = 256
@@ -141,17 +142,18 @@ def plants(flat: Mapping[str, Any], members: Members, omega: np.ndarray) -> Comp
     sides = np.unique(members.touched)
     side = np.searchsorted(sides, members.touched)
     masses = mechanics(flat, sides)
-    g, held = masses.at(s)[side], _cart_held(masses, s)[side]
+    g, held = masses.at(s)[side], _cart_held(flat, masses, s)[side]
     pushed = s * impedance(flat, members, s) * g[..., 1, 1]
     return (g[..., 0, 0] + pushed * held) / (1 + pushed)
 
 
-def _cart_held(masses: System, s: np.ndarray) -> Complex:
+def _cart_held(flat: Mapping[str, Any], masses: System, s: np.ndarray) -> Complex:
     """Stage position over force [m/N] while the cart is held, shape (members, k), at the complex frequencies s (k,)
     [rad/s]; 0 where cart and stage are one."""
-    if "cart_position" not in masses.states:
+    if shared_structure(flat).joint == "rigid":
         return np.zeros((len(masses.a), len(s)), complex)
-    kept = [i for i, name in enumerate(masses.states) if not name.startswith("cart_")]
+    cart = cart_states(flat)
+    kept = [i for i, name in enumerate(masses.states) if name not in cart]
     a, b, c = masses.a[:, kept][:, :, kept], masses.b[:, kept], masses.c[:, :, kept]
     names = tuple(masses.states[i] for i in kept)
     return replace(masses, a=a, b=b, c=c, states=names).at(s)[..., 0, 0]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import Any
 
@@ -12,6 +12,7 @@ import sympy as sp
 
 from friso.equations.model import assemble
 from friso.equations.pid import Loop, controller
+from friso.equations.roles import Role
 from friso.equations.structure import ControllerForm, Structure, shared_structure
 from friso.errors import InputError
 from friso.frequency.declared import Declared
@@ -29,19 +30,19 @@ _CONTROLLER_INPUTS = {REFERENCE: _REFERENCE, STAGE: _POSITION, VELOCITY: _VELOCI
 def plant(flat: Mapping[str, Any], members: Members) -> System:
     """From the forces on stage and cart [N] to position of stage and cart, joint deflection [m] and velocity of the
     stage [m/s], of members all of which are stuck or none; `flat` may hold arrays of shape (members,)."""
-    declared = _plant(shared_structure(flat))
+    form = _plant(shared_structure(flat))
     velocity = np.where(members.forward, members.speed, -members.speed)
     values = {**flat, **operating_point(flat, members)}
-    values |= {"velocity": velocity, "cart_velocity": velocity, "parasitic_velocity": velocity}
+    values |= dict.fromkeys(form.velocities, velocity)
     values |= {"beyond_stroke_ahead": members.touched.astype(float), "beyond_stroke_behind": 0.0}
-    whole = declared.at(values, len(members))
+    whole = form.declared.at(values, len(members))
     law = law_of(flat)
-    return _following(whole, law.states) if law is not None and members.stuck.all() else whole
+    return _following(whole, form.cart, law.states) if law is not None and members.stuck.all() else whole
 
 
 def mechanics(flat: Mapping[str, Any], touched: np.ndarray) -> System:
     """The masses without friction: from the forces on stage and cart to their positions, shape of `touched`."""
-    declared = _plant(replace(shared_structure(flat), friction="none", friction_variant=None))
+    declared = _plant(replace(shared_structure(flat), friction="none", friction_variant=None)).declared
     values = {**flat, "beyond_stroke_ahead": touched.astype(float), "beyond_stroke_behind": 0.0}
     return declared.at(values, len(touched)).take((FORCE, DISTURBANCE), (STAGE, CART))
 
@@ -57,16 +58,32 @@ def compensator(flat: Mapping[str, Any], members: int) -> System:
     return found
 
 
+@dataclass(frozen=True)
+class _Plant:
+    """The model's own equations, the controller replaced by a force; names of all velocities, and of position and
+    velocity of the cart."""
+
+    declared: Declared
+    velocities: tuple[str, ...]
+    cart: tuple[str, str]
+
+
 @cache
-def _plant(form: Structure) -> Declared:
-    """The model's own equations, the controller replaced by a force."""
+def _plant(form: Structure) -> _Plant:
     model = assemble(replace(form, controller=None, biased=("cart", "stage")))
     found = {name: output.expression for name, output in model.outputs.items()}
     outputs = {STAGE: found["position"], CART: found["cart_position"], VELOCITY: found["velocity"]}
     if "joint_deflection" in found:
         outputs[DEFLECTION] = found["joint_deflection"]
     inputs = {FORCE: sp.Symbol("bias.stage", real=True), DISTURBANCE: sp.Symbol("bias.cart", real=True)}
-    return Declared(model.symbols, model.rhs, inputs, outputs)
+    velocities = tuple(str(each.symbol) for each in model.states if each.role == Role.VELOCITY)
+    cart = (str(model.cart.position), str(model.cart.velocity))
+    return _Plant(Declared(model.symbols, model.rhs, inputs, outputs), velocities, cart)
+
+
+def cart_states(flat: Mapping[str, Any]) -> tuple[str, str]:
+    """Names of position and velocity of what the friction acts on, in the plant's systems."""
+    return _plant(shared_structure(flat)).cart
 
 
 @cache
@@ -78,15 +95,14 @@ def _compensator(form: ControllerForm) -> Declared:
     return Declared(symbols, rates, _CONTROLLER_INPUTS, {FORCE: control.force})
 
 
-def _following(whole: System, internal: tuple[str, ...]) -> System:
+def _following(whole: System, cart: tuple[str, str], internal: tuple[str, ...]) -> System:
     """The system with the internal states of the friction law following the cart, which is stuck.
 
     At rest their rate is proportional to the velocity of the cart alone, so that they differ from a multiple of its
     position by a constant: where on the rail it got stuck. Nothing controls that, nor does it matter; it would be a
     pole at 0.
     """
-    velocity = whole.states.index("cart_velocity" if "cart_velocity" in whole.states else "velocity")
-    position = whole.states.index("cart_position" if "cart_position" in whole.states else "position")
+    position, velocity = map(whole.states.index, cart)
     a, c = whole.a.copy(), whole.c.copy()
     for z in map(whole.states.index, internal):
         share = whole.a[:, z, velocity]

@@ -11,8 +11,8 @@ import numpy as np
 from friso.engine.arrays import Status
 from friso.engine.batch import Options, prepare, run_batch, settings_of
 from friso.engine.kernel import Kernel, empty_results, kernel
-from friso.equations.as_built import NEUTRAL, AsBuilt, whole_samples
-from friso.equations.sampled import held_at_start
+from friso.equations.as_built import COMMANDED, NEUTRAL, READING, AsBuilt, whole_samples
+from friso.equations.roles import Role, Steady
 from friso.errors import InputError
 from friso.rig.surroundings import MARGIN, tables
 from friso.rig.task import Task
@@ -125,12 +125,9 @@ def _recorded(
         rtol=RTOL, bands=(np.inf, np.inf), record_from=np.inf, least_swing=np.inf, interval=interval,
         budget=int(BUDGET * task.duration / flat["drive.sample_time"]),
     )  # fmt: skip
-    starts = np.zeros((len(seeds), len(shape.kept)))
-    place = float(task.pieces[0, 1]) + task.displacement
-    on_error = flat.get("controller.derivative_on", "error") == "error"
-    for i, name in enumerate(shape.kept):
-        held = held_at_start(name, -task.displacement, place, 0.0, on_error)
-        starts[:, i] = place if name.endswith("position") else held
+    at_rest = Steady(-task.displacement, float(task.pieces[0, 1]) + task.displacement)
+    starts = shape.settled(flat | motion, at_rest, len(seeds))
+    starts[:, shape.having(Role.INTEGRAL)] = 0.0
     batch = prepare(shape, flat | motion, len(seeds), options, starts)
     end = np.array([[task.duration, 0.0, 0.0, 0.0]])
     batch = batch._replace(
@@ -140,35 +137,36 @@ def _recorded(
     )
     results = empty_results(len(seeds), 1, count, len(shape.kept))
     run_batch(shape, batch, settings_of(options), results, threads)
-    kept = {name: results.samples[:, :, i] for i, name in enumerate(shape.kept)}
-    return Recorded(numbers, interval, *_signals(kept, flat, task, seeds, interval), results.statuses)
+    return Recorded(numbers, interval, *_signals(shape, results.samples, flat, task, seeds, interval), results.statuses)
 
 
 def _signals(
-    kept: Mapping[str, np.ndarray], flat: Mapping[str, Any], task: Task, seeds: np.ndarray, interval: float
+    shape: Kernel, samples: np.ndarray, flat: Mapping[str, Any], task: Task, seeds: np.ndarray, interval: float
 ) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
     """What the drive logs, and what is true."""
-    time = np.arange(kept["position"].shape[1]) * interval
+    time = np.arange(samples.shape[1]) * interval
+    position, reading, commanded = (
+        samples[:, :, i] for i in (shape.position, shape.kept.index(READING), shape.kept.index(COMMANDED))
+    )
     logged = {
-        "reference": np.broadcast_to(reference(task, time), kept["position"].shape),
-        "position": kept["reading"],
-        "force": kept["commanded"],
+        "reference": np.broadcast_to(reference(task, time), position.shape),
+        "position": reading,
+        "force": commanded,
     }
     if len(task.injected) and not task.unknown:
         places = np.arange(len(task.injected)) * task.injected_each
         logged["disturbance"] = np.broadcast_to(
             np.interp(time, places, task.injected, right=0.0), logged["force"].shape
         )
-    true = {name: kept[name] for name in TRUE if name in kept}
-    if "cart_position" in kept:
-        gap = kept["position"] - kept["cart_position"]
+    true = {"position": position, "velocity": samples[:, :, shape.velocity]}
+    if shape.cart_position != shape.position:
+        cart = true["cart_position"] = samples[:, :, shape.cart_position]
+        true["cart_velocity"] = samples[:, :, shape.cart_velocity]
+        gap = position - cart
         noise = np.array([_sensor(int(seed)).standard_normal(len(time)) for seed in seeds])
         logged["relative_position"] = gap + np.reshape(flat.get("drive.relative_noise", 0.0), (-1, 1)) * noise
+    true |= {shape.kept[i]: samples[:, :, i] for i in shape.having(Role.BRISTLE)}
     return logged, true
-
-
-TRUE = ("position", "velocity", "cart_position", "cart_velocity", "bristle_deflection")
-"""The states that the truth tells."""
 
 
 def _sensor(seed: int) -> np.random.Generator:

@@ -24,13 +24,13 @@ class Dahl(FrictionSection):
     @staticmethod
     def declare(velocity: sp.Symbol, variant: None) -> Friction:
         """Friction on a body moving at `velocity` [m/s]."""
-        from friso.equations.component import Component, Kink, Output, State, key, state
+        from friso.equations.component import Component, Kink, Output, Role, State, key, state
 
         forward = Kink("forward", velocity)
         deflection, stiffness = state("bristle_deflection"), key("friction.bristle_stiffness")
         coulomb = key("friction.coulomb")
         rate = velocity - stiffness * forward.sign * velocity / coulomb * deflection
-        bristles = State(deflection, rate, "m", scale=coulomb / stiffness)
+        bristles = State(deflection, rate, "m", coulomb / stiffness, Role.BRISTLE)
         outputs = {"bristle_deflection": Output(deflection, "m", "bristle deflection z")}
         force = stiffness * deflection + key("friction.viscous") * velocity
         return Friction(force, coulomb, Component((bristles,), (forward,), outputs))

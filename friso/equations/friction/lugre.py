@@ -23,7 +23,7 @@ class LuGre(StribeckSection):
     @staticmethod
     def declare(velocity: sp.Symbol, variant: Curve) -> Friction:
         """Friction on a body moving at `velocity` [m/s]."""
-        from friso.equations.component import Component, Kink, Output, State, key, state
+        from friso.equations.component import Component, Kink, Output, Role, State, key, state
 
         forward = Kink("forward", velocity)
         deflection, stiffness = state("bristle_deflection"), key("friction.bristle_stiffness")
@@ -35,6 +35,6 @@ class LuGre(StribeckSection):
             + viscous_force(velocity, forward.sign, variant)
         )
         static = key("friction.static")
-        bristles = State(deflection, rate, "m", scale=static / stiffness)
+        bristles = State(deflection, rate, "m", static / stiffness, Role.BRISTLE)
         outputs = {"bristle_deflection": Output(deflection, "m", "bristle deflection z")}
         return Friction(force, static, Component((bristles,), (forward,), outputs))

@@ -18,7 +18,8 @@ import numpy as np
 from friso.engine.arrays import Results, Status
 from friso.engine.batch import Options, run_chunks
 from friso.engine.kernel import Kernel, kernel
-from friso.equations.imposed import FREQUENCY, HARMONIC, imposed_form
+from friso.equations.imposed import FREQUENCY, imposed_form
+from friso.equations.roles import Role
 
 RTOL = 1e-9
 """Relative tolerance of the runs unless told."""
@@ -34,9 +35,6 @@ FINEST = 1e-4
 
 ROOM = 1 << 20
 """Samples that are kept at a time."""
-
-CARRIED = ("position", "velocity", *HARMONIC)
-"""States that are not the law's own."""
 
 
 @dataclass(frozen=True)
@@ -67,7 +65,7 @@ class Imposition:
     @cached_property
     def inner(self) -> list[int]:
         """Places of the law's own states."""
-        return [i for i, name in enumerate(self.kernel.states) if name not in CARRIED]
+        return self.kernel.having(Role.BRISTLE)
 
     @cached_property
     def scales(self) -> np.ndarray:
@@ -103,7 +101,7 @@ class Imposition:
     def run(self, inner: np.ndarray, share: float, samples: int = 0) -> Iterator[tuple[np.ndarray, Results]]:
         """Follow a share of a period from the law's own states (count, inner), with so many samples per period."""
         starts = np.zeros((self.count, len(self.kernel.states)))
-        starts[:, self.kernel.states.index("position")] = self.flat["motion.displacement"]
+        starts[:, self.kernel.position] = self.flat["motion.displacement"]
         starts[:, self.inner] = inner
         interval = 1 / samples if samples else None
         chunk = max(8, min(2048, ROOM // max(samples, 1)))

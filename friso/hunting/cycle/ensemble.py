@@ -12,6 +12,7 @@ import numpy as np
 from friso.engine.arrays import Results, Status
 from friso.engine.batch import Options, run_chunks
 from friso.engine.kernel import Kernel, kernel
+from friso.equations.roles import Role, Steady
 from friso.equations.structure import Structure, shared_structure
 
 
@@ -85,11 +86,16 @@ class Ensemble:
     @property
     def sticking(self) -> int:
         """The state that stays where it is while a stage sticks: the position of what the friction acts on."""
-        names = self.kernel.states
-        return names.index("cart_position" if "cart_position" in names else "position")
+        return self.kernel.cart_position
 
-    def index(self, state: str) -> int:
-        return self.kernel.states.index(state)
+    @property
+    def integral(self) -> int:
+        """The state that winds up while a stage sticks."""
+        return self.kernel.having(Role.INTEGRAL)[0]
+
+    def settled(self, steady: Steady) -> np.ndarray:
+        """States in a steady motion that has lasted, shape (count, states)."""
+        return self.kernel.settled({**self.flat, "motion.size": np.nan, "motion.duration": np.inf}, steady, self.count)
 
     def rates(self, states: np.ndarray) -> np.ndarray:
         """The time derivative of the states, both of shape (count, states)."""

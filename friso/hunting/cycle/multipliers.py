@@ -42,7 +42,7 @@ def multipliers(stages: Ensemble, orbits: Orbits, rtol: float) -> Multipliers:
 def _floquet(stages: Ensemble, flows: np.ndarray, rates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Multipliers and leading directions of the flow seen on the section at which the integrator's state is what it was
     at the start."""
-    phase = stages.index("integral")
+    phase = stages.integral
     sections = flows - rates[:, :, None] * flows[:, None, phase, :] / rates[:, phase, None, None]
     sections[:, :, phase] = 0.0
     known = np.all(np.isfinite(sections), axis=(1, 2), keepdims=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from friso.equations.roles import Role, Steady
 from friso.hunting.cycle.ensemble import Ensemble
 
 
@@ -16,7 +17,7 @@ def stuck(stages: Ensemble, displacement: np.ndarray) -> np.ndarray:
     follows.
     """
     states = displaced(stages, displacement)
-    states[:, stages.index("integral")] = relaxed(stages) * displacement
+    states[:, stages.integral] = relaxed(stages) * displacement
     return states
 
 
@@ -24,32 +25,26 @@ def relaxed(stages: Ensemble) -> np.ndarray:
     """State of the integrator per displacement [s] at which the actuator exerts no force on a stage at rest."""
     states = displaced(stages, np.ones(stages.count))
     free = stages.force(states)
-    states[:, stages.index("integral")] = 1.0
+    states[:, stages.integral] = 1.0
     return -free / (stages.force(states) - free)
 
 
 def displaced(stages: Ensemble, displacement: np.ndarray) -> np.ndarray:
-    """States of stages at rest that are displaced [m], what is measured of them having followed, all else zero."""
-    states = np.zeros((stages.count, len(stages.kernel.states)))
-    for i, name in enumerate(stages.kernel.states):
-        if name in ("position", "cart_position", "parasitic_position", "filtered_position"):
-            states[:, i] = displacement
-        elif name == "filtered_error":
-            states[:, i] = -displacement
+    """States of stages at rest that are displaced [m], the controller's filters having followed, all else zero."""
+    states = stages.settled(Steady(-displacement, displacement))
+    states[:, stages.kernel.having(Role.INTEGRAL)] = 0.0
     return states
 
 
 def pushed(stages: Ensemble, velocity: np.ndarray) -> np.ndarray:
     """States of stages at their reference, all masses moving at a velocity [m/s], all else zero."""
     states = np.zeros((stages.count, len(stages.kernel.states)))
-    for name in ("velocity", "cart_velocity", "parasitic_velocity"):
-        if name in stages.kernel.states:
-            states[:, stages.index(name)] = velocity
+    states[:, stages.kernel.having(Role.VELOCITY)] = velocity[:, None]
     return states
 
 
 def wait(stages: Ensemble, displacement: np.ndarray) -> np.ndarray:
     """Time [s] that the integrator takes to wind up to the break-away force while a stage sticks, shape (count,)."""
     states = stuck(stages, displacement)
-    ramp = states + stages.rates(states) * (np.arange(states.shape[1]) == stages.index("integral"))
+    ramp = states + stages.rates(states) * (np.arange(states.shape[1]) == stages.integral)
     return stages.number("breakaway") / np.abs(stages.force(ramp) - stages.force(states))

@@ -169,14 +169,14 @@ class _Shooting:
         jacobians = np.zeros((count, size + 1, size + 1))
         jacobians[:, :size, :size] = shot.flows - np.eye(size)
         jacobians[:, :size, size] = stages.rates(shot.ends)
-        jacobians[:, size, stages.index("integral")] = 1.0
+        jacobians[:, size, stages.integral] = 1.0
         jacobians[:, size, stages.sticking] = -relaxed(stages)
         return jacobians
 
     def _off(self, which: np.ndarray, stages: Ensemble) -> np.ndarray:
         """By how much the phase is off, shape (orbits, 1): the integrator's state that exerts no force is wanted."""
         states = self.states[which]
-        return (states[:, stages.index("integral")] - relaxed(stages) * states[:, stages.sticking])[:, None]
+        return (states[:, stages.integral] - relaxed(stages) * states[:, stages.sticking])[:, None]
 
     def _keep_best(self, which: np.ndarray, gaps: np.ndarray) -> None:
         """Keep what is closer than before; what is closed, fails or gets no closer rests."""

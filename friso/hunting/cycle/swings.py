@@ -26,7 +26,7 @@ def swings(stages: Ensemble, starts: np.ndarray, durations: np.ndarray, most: in
 
     An extremum counts once the way back from it is a leg long, or the run is over.
     """
-    position = starts[:, stages.index("position")]
+    position = starts[:, stages.kernel.position]
     legs = LEG * np.abs(position)
     results = stages.run(starts, durations, rtol, least_swing=0.1 * float(legs.min()))
     runs, room = results.turn_values.shape

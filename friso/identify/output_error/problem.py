@@ -14,7 +14,7 @@ from friso.engine.driven import Followed, Inputs, follow
 from friso.engine.kernel import Kernel, kernel
 from friso.equations.driven import Driven
 from friso.equations.pid import van_dijk_numbers
-from friso.equations.sampled import held_at_start
+from friso.equations.roles import Role, Steady
 from friso.equations.structure import ControllerForm, structure
 from friso.identify.inverse_model import SMOOTH, motion
 from friso.identify.logs.log import Log
@@ -115,27 +115,17 @@ class Problem:
 
     def _starts(self, flat: Mapping[str, Any], runs: int) -> np.ndarray:
         """Where the log begins and as fast, the bristles bent as far as the first force bends them."""
-        states = self.kernel.kept
-        starts = np.zeros((runs, len(states)))
         position, velocity = self.start
-        error = float(self.inputs.reference[0]) - position
-        on_error = flat.get("controller.derivative_on", "error") == "error"
-        for i, name in enumerate(states):
-            if name.endswith("position"):
-                starts[:, i] = position
-            elif name.endswith("velocity"):
-                starts[:, i] = velocity
-            elif name == "filtered_error":
-                starts[:, i] = error
-            else:
-                starts[:, i] = held_at_start(name, error, position, velocity * self.inputs.sample_time, on_error)
-        if "bristle_deflection" in states:
+        beginning = Steady(float(self.inputs.reference[0]) - position, position, velocity)
+        whole = {**flat, "motion.size": np.nan, "motion.duration": np.inf}
+        starts = self.kernel.settled(whole, beginning, runs)
+        if bristles := self.kernel.having(Role.BRISTLE):
             pull = self.wanted[0] + self.inputs.force[0] + flat.get("bias.cart", 0.0) + flat.get("bias.stage", 0.0)
             held = flat.get("friction.static", flat["friction.coulomb"])
             bent = np.clip(pull, -held, held) / flat["friction.bristle_stiffness"]
-            starts[:, states.index("bristle_deflection")] = bent
-        if self.closed and "integral" in states:
-            starts[:, states.index("integral")] = self._integral(flat, position, velocity)
+            starts[:, bristles] = np.reshape(bent, (-1, 1))
+        if self.closed and "integral" in self.kernel.kept:
+            starts[:, self.kernel.kept.index("integral")] = self._integral(flat, position, velocity)
         return starts
 
     def _integral(self, flat: Mapping[str, Any], position: float, velocity: float) -> Any:
@@ -150,8 +140,7 @@ class Problem:
         return (force - flat["controller.kp"] * error - flat["controller.kd"] * speed) / flat["controller.ki"]
 
     def _record(self, flat: Mapping[str, Any], runs: Followed) -> Simulated:
-        names = self.kernel.states
-        position, velocity = (runs.states[:, :, names.index(name)] for name in ("position", "velocity"))
+        position, velocity = (runs.states[:, :, i] for i in (self.kernel.position, self.kernel.velocity))
         held = self.kernel.held
         force = runs.held[:, :, held.index("held_force")] if held else self._force(flat, runs)
         failed = runs.statuses != Status.DONE

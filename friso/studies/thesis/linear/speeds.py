@@ -15,7 +15,7 @@ from friso.frequency.family import loops, spectral_abscissa
 from friso.frequency.friction import law_of, operating_point, speeds
 from friso.frequency.loops import closed_loop
 from friso.frequency.members import Members, member
-from friso.frequency.parts import DISTURBANCE
+from friso.frequency.parts import DISTURBANCE, cart_states
 from friso.frequency.ranges import Range, ranges_below
 
 SPEEDS = 257
@@ -89,7 +89,7 @@ def abscissa_with_bristles(flat: Mapping[str, Any], speed: np.ndarray, share: fl
     friction = law.declared.at(at, len(speed))
     loop = closed_loop({**flat, "friction.model": "none"}, sliding)
     push = loop.b[:, :, [loop.inputs.index(DISTURBANCE)]]
-    cart = np.eye(len(loop.states))[[loop.states.index("cart_velocity")]]
+    cart = np.eye(len(loop.states))[[loop.states.index(cart_states(flat)[1])]]
     above = np.concatenate([loop.a - push @ friction.d @ cart, -push @ friction.c], axis=2)
     below = np.concatenate([friction.b @ cart, friction.a], axis=2)
     return np.linalg.eigvals(np.concatenate([above, below], axis=1)).real.max(axis=1)
