@@ -110,7 +110,7 @@ def test_pushes_that_start_hunting() -> None:
     duration = LONG * cycle().period
     results = stages.run(starts, np.full(4, duration), 1e-7, interval=duration / 20000)
     assert done(results).all()
-    swing = np.ptp(results.samples[:, -600:, stages.index("position")], axis=1) / 2
+    swing = np.ptp(results.samples[:, -600:, stages.kernel.position], axis=1) / 2
     assert swing[:2] == pytest.approx(cycle().amplitude, rel=0.05)
     assert np.all(swing[2:] < 0.05 * cycle().amplitude)
 

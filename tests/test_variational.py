@@ -175,7 +175,7 @@ class Bounce:
         return brentq(self.beyond, low, high, xtol=1e-14)
 
     def place(self, name: str) -> int:
-        return self.stages.index(name)
+        return self.stages.kernel.states.index(name)
 
     def between(self, start: float, end: float) -> np.ndarray:
         """The flow's derivative between two times of the motion, in which no limiter is touched or left."""
