@@ -22,6 +22,7 @@ from friso.equations.variational import variational
 
 
 def main(folder: Path, task: bytes) -> None:
+    """Generates and compiles the kernel that a pickled task asks for into a folder; prints the name of its entry."""
     plug_ins, pickled = pickle.loads(task)
     for plug_in in plug_ins:
         plug_in.load()

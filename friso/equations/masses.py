@@ -19,6 +19,7 @@ class Body:
 
     @classmethod
     def named(cls, prefix: str, mass: sp.Expr) -> Body:
+        """A body of this mass [kg], its states named with a prefix."""
         return cls(mass, state(f"{prefix}position"), state(f"{prefix}velocity"))
 
     def under(self, force: sp.Expr, length: sp.Expr, rate: sp.Expr) -> tuple[State, State]:

@@ -42,7 +42,8 @@ class Reduced:
 
     @classmethod
     def of(cls, it: Mechanism, stiffness: np.ndarray, mass: np.ndarray) -> Reduced:
-        """Of the stiffness and mass of the nodes of a leaf, but for its torsion, which is that of a plate."""
+        """Of the stiffness [N/m, N, N m] and mass [kg, kg m, kg m^2] of the nodes of a leaf, but for its torsion, which
+        is that of a plate."""
         size = len(stiffness)
         stiffness, mass = stiffness.copy(), mass.copy()
         stiffness[3::COORDINATES, 3::COORDINATES], mass[3::COORDINATES, 3::COORDINATES] = _torsion(

@@ -90,9 +90,11 @@ class Place:
 
     @classmethod
     def rest(cls, leaves: Leaves) -> Place:
+        """The configuration without deflection."""
         return cls(np.zeros((leaves.count, leaves.nodes - 2, 3)), np.zeros(3))
 
     def plus(self, rate: Place, factor: float = 1.0) -> Place:
+        """The configuration moved along a rate, a factor times."""
         return Place(self.inner + factor * rate.inner, self.stage + factor * rate.stage)
 
     def state(self, offsets: np.ndarray) -> np.ndarray:

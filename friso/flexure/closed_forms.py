@@ -228,7 +228,7 @@ def modes(it: Mechanism) -> tuple[np.ndarray, np.ndarray]:
 
 
 def drive_mode(frequencies: np.ndarray, shapes: np.ndarray) -> np.ndarray:
-    """Which of the modes, (..., modes) and shapes (..., 7, modes), is the drive mode: that which yields most to a
-    steady force along the motion."""
+    """Which of the modes, frequencies [Hz] (..., modes) and shapes (..., 7, modes), is the drive mode: that which
+    yields most to a steady force along the motion."""
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.argmax(np.nan_to_num((shapes[..., 2, :] / frequencies) ** 2, posinf=np.inf), axis=-1)

@@ -21,7 +21,7 @@ STEPS = 5
 
 
 def closed(mechanism: Mechanism, stroke: float) -> Evaluation:
-    """The mechanism by closed forms: its drive stiffness is the same at any deflection."""
+    """The mechanism by closed forms over its stroke [m]: its drive stiffness is the same at any deflection."""
     deflections = np.linspace(0.0, stroke, STEPS)
     drive = closed_forms.drive_stiffness(mechanism) * np.ones(STEPS)
     return Evaluation(

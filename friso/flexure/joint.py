@@ -49,6 +49,7 @@ class Seen:
 
     @classmethod
     def of(cls, it: Mechanism) -> Seen:
+        """The modes of mechanisms by closed forms."""
         frequency, shapes = closed_forms.modes(it)
         motion = along_motion(it, it.actuation, shapes) * along_motion(it, it.sensor, shapes)
         own = np.arange(7) != closed_forms.drive_mode(frequency, shapes)[..., None]

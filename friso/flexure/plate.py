@@ -44,6 +44,7 @@ class Curl:
     @classmethod
     def of(cls, length: Any, width: Any, poisson: Any, odd: bool) -> Curl:
         # w^4/720 g'''' - (1 - nu) w^2/6 g'' + (1 - nu^2) g = -nu m; both squares are positive up to nu = 1/2
+        """The profile of leaves of a length and width [m]; `odd` for a moment that changes sign in the middle."""
         middle, square = (1 - poisson) / 6, 4 * (1 - poisson**2) / 720
         root = np.sqrt(middle**2 - square)
         fast, slow = (np.sqrt(360 * (middle + sign * root)) / width for sign in (1, -1))

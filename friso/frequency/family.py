@@ -160,7 +160,7 @@ def _cart_held(flat: Mapping[str, Any], masses: System, s: np.ndarray) -> Comple
 
 
 def loops(flat: Mapping[str, Any], members: Members, omega: np.ndarray) -> Complex:
-    """L, shape (members, k); of a sampled loop but for the aliases of the plant."""
+    """L at angular frequencies [rad/s], shape (members, k); of a sampled loop but for the aliases of the plant."""
     drive = Drive.of(flat)
     return plants(flat, members, omega) * controller(flat, omega) * drive.transfer(omega)
 

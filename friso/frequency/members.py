@@ -63,8 +63,8 @@ class Members:
 
 
 def member(speed: float = 0.0, bias: float = 0.0, touched: bool = False, forward: bool = True) -> Members:
-    """A single state: sliding at a speed [m/s], or, at 0, stuck under a bias force [N]. Raises InputError for a speed
-    that is negative and for a bias of a cart that slides."""
+    """A single state: sliding at a speed [m/s], `forward` or back, or, at 0, stuck under a bias force [N]; with its
+    limiter `touched` or not. Raises InputError for a speed that is negative and for a bias of a cart that slides."""
     if not 0 <= speed < np.inf:
         raise InputError("speed", f"{speed} m/s", "0 or greater; forward=False for the other direction", "speed=1e-3")
     if bias and speed:
@@ -73,6 +73,7 @@ def member(speed: float = 0.0, bias: float = 0.0, touched: bool = False, forward
 
 
 def joined(parts: list[Members]) -> Members:
+    """All members of several families, one after the other."""
     return Members(*(np.concatenate([getattr(part, each.name) for part in parts]) for each in fields(Members)))
 
 

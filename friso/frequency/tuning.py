@@ -29,8 +29,8 @@ class Tuning:
 
 
 def tuning(crossover: float, alpha: float, beta: float, mass: float) -> Tuning:
-    """The controller for a mass [kg] at a crossover [Hz], by van Dijk's rules, and how it does on that mass. Raises
-    InputError for numbers that no stage file may have."""
+    """The controller for a mass [kg] at a crossover [Hz], by van Dijk's rules with `alpha` and `beta`, and how it does
+    on that mass. Raises InputError for numbers that no stage file may have."""
     flat = {
         "friction.model": "none",
         "masses.stage": mass,

@@ -27,6 +27,7 @@ def compile_run(module: ModuleType) -> None:
 
 
 def main(folder: Path) -> None:
+    """Compiles the loops over turning points into a folder; prints the name of the entry."""
     source = re.sub(r"^def ", f"@njit({_JIT})\ndef ", inspect.getsource(turning), flags=re.MULTILINE)
     source = source.replace(f"@njit({_JIT})\ndef run(", f"@njit(cache=True, {_JIT})\ndef run(")
     source = source.replace("import numpy as np\n", "import numpy as np\nfrom numba import njit\n")

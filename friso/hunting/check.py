@@ -67,7 +67,7 @@ class Case:
 def check(stage: Stage, rtol: float = 1e-6, traces: bool = False) -> dict[str, Case]:
     """The cases "given" and, for a stage with a joint, "locked" and "free" (if the file tells its stiffness).
 
-    With `traces`, each case has its time response. Raises ValueError for a tolerance that is not usable.
+    With `traces`, each case has its time response. Raises ValueError for an `rtol` that is not usable.
     """
     checked_rtol(rtol)
     variants = stage.variants()

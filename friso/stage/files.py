@@ -14,7 +14,7 @@ _EXAMPLE = '[masses] and, on the next line, cart = "1.2 kg"'
 
 
 def load(path: str | os.PathLike[str]) -> Stage:
-    """The stage of a TOML file. Raises StageError."""
+    """The stage of the TOML file at `path`. Raises StageError."""
     try:
         return loads(text_of(Path(path), _EXPECTED), origin=str(path))
     except InputError as error:
@@ -30,7 +30,7 @@ def loads(text: str, origin: str = "stage file") -> Stage:
 
 
 def save(stage: Stage, path: str | os.PathLike[str], overwrite: bool = False) -> None:
-    """Write a stage file, all of it or nothing.
+    """Write a stage file to `path`, all of it or nothing.
 
     Raises InputError where there is a file already (unless `overwrite`) or the place cannot be written to.
     """

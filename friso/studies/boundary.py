@@ -33,11 +33,11 @@ def boundary(
 ) -> Diagram | Plane:
     """Where the hunting cycle of a stage stops attracting, over one key or two.
 
-    An axis is a key with a range, ``{"controller.crossover": "1 Hz..40 Hz"}``, logarithmic if ":log" is behind it or
-    with `log`; `links` are SI expressions for keys that follow, as in `friso.sweep`. With one axis the result is a
+    `axes` are keys with their ranges, ``{"controller.crossover": "1 Hz..40 Hz"}``, logarithmic if ":log" is behind
+    or with `log`; `links` are SI expressions for keys that follow, as in `friso.sweep`. With one axis the result is a
     `Diagram`: all branches of cycles over the range and the points at which they flip or fold; with two it is a
     `Plane`: the curves on which they do. The motion of the stage file plays no part. Raises InputError for a wrong
-    range, link or stage (one that cannot hunt), ValueError for a tolerance that is not usable.
+    range, link or stage (one that cannot hunt), ValueError for an `rtol` that is not usable.
     """
     checked_rtol(rtol)
     followers = dict(links or {})

@@ -35,10 +35,11 @@ def harmonic_balance(
 
     Over "crossover": `period` [s], `amplitude` [m] and `multiplier` of the cycle, found by shooting; `solutions`, the
     number of cycles that single-harmonic balance predicts, and `least_residual`, the least residual of that balance
-    (see `friso.frequency.describing.balance`). Over ("crossover", "highest"), `highest` being the highest harmonic of a
-    multi-harmonic balance that starts from the simulated cycle: `period_error` and `amplitude_error`, relative, NaN
-    where it does not close on a motion; and `status`. Raises InputError for a stage without friction, one whose
-    controller has no crossover, and one that has no cycle that is its own mirror image.
+    (see `friso.frequency.describing.balance`). Over ("crossover", "highest"), `highest` being the highest harmonic
+    of a multi-harmonic balance (each of `harmonics`) that starts from the simulated cycle: `period_error` and
+    `amplitude_error`, relative, NaN where it does not close on a motion; and `status`. Raises InputError for a
+    stage without friction, one whose controller has no crossover, and one that has no cycle that is its own mirror
+    image.
     """
     import xarray as xr
 

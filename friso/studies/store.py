@@ -173,7 +173,7 @@ class Store:
 
 
 def read_store(path: str | os.PathLike[str]) -> xr.Dataset:
-    """The study in a store, finished or not, as a dataset whose values are read when they are looked at.
+    """The study in the store at `path`, finished or not, as a dataset whose values are read when they are looked at.
 
     Raises StoreError if there is none.
     """

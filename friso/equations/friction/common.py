@@ -60,6 +60,7 @@ class StribeckSection(FrictionSection):
 
     @staticmethod
     def variant(flat: Mapping[str, Any]) -> Curve:
+        """What of the curve decides on its code: the exponent where it is a small whole number, and asymmetries."""
         exponent = float(flat["friction.stribeck_exponent"])
         return Curve(
             int(exponent) if exponent in (1.0, 2.0, 3.0, 4.0) else None,

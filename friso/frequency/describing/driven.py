@@ -55,7 +55,7 @@ class Driven:
 
     @classmethod
     def of(cls, flat: Mapping[str, Any], frequencies: np.ndarray, rtol: float = RTOL) -> Driven:
-        """The plant of a stage whose limiter is not touched."""
+        """The plant of a stage whose limiter is not touched, at frequencies [Hz]."""
         (compliances,) = mechanics(flat, np.zeros(1, bool)).at(2j * np.pi * frequencies)
         return cls(flat, frequencies, compliances, rtol)
 

@@ -66,7 +66,7 @@ def describing(
     for `harmonics` = 1: then F_0 is NaN unless the law is symmetric).
 
     Raises InputError for a stage without friction and for amplitudes, frequencies, harmonics or samples that are not
-    usable, ValueError for a tolerance that is not. A pair that fails has NaN and a reason in `status`.
+    usable, ValueError for an `rtol` that is not. A pair that fails has NaN and a reason in `status`.
     """
     import xarray as xr
 

@@ -44,7 +44,8 @@ class Law:
         return cls({name: flat[name] for name in names}, function, names, remembers)
 
     def at(self, velocity: np.ndarray, z: np.ndarray) -> list[np.ndarray]:
-        """Rate, its derivatives by z and by velocity, force, its derivatives by the same, at velocities and states."""
+        """Rate, its derivatives by z and by velocity, force [N], its derivatives by the same, at velocities [m/s] and
+        states."""
         found = self.function(velocity, z, (velocity > 0).astype(float), *self.values.values())
         return [np.broadcast_to(np.asarray(each, dtype=float), velocity.shape) for each in found]
 
@@ -77,7 +78,7 @@ class Answer:
     pushed: np.ndarray
 
     def along(self, velocities: np.ndarray) -> np.ndarray:
-        """Changes of the force for changes of the velocities, both of shape (M, columns)."""
+        """Changes of the force [N] for changes of the velocities [m/s], both of shape (M, columns)."""
         direct = self.by_velocity[:, None] * velocities
         if self.chain is None:
             return direct

@@ -53,6 +53,7 @@ class Space:
 
     @classmethod
     def of(cls, stage: Stage, ranges: Sequence[Range]) -> Space:
+        """The stages around one, over ranges of its keys."""
         return cls(tuple(ranges), stage.flat)
 
     def values(self, points: np.ndarray) -> dict[str, np.ndarray]:

@@ -62,7 +62,7 @@ class Orbits:
 
 
 def shoot(stages: Ensemble, states: np.ndarray, times: np.ndarray, sign: float, rtol: float) -> Shot:
-    """Follow orbits together with a small deviation along every state."""
+    """Follow orbits from states (count, states) over times [s] (count,), with a small deviation along every state."""
     count, size = states.shape
     every = np.repeat(np.arange(count), size)
     starts = np.hstack([states[every], np.tile(np.eye(size), (count, 1))])
@@ -105,8 +105,9 @@ def close_along(
     sign: float,
     rtol: float,
 ) -> tuple[Orbits, np.ndarray]:
-    """Close orbits as `close` does, their stages being free to change their places so that each comes to lie on its
-    border; orbits and places. Goes round folds, at which there is no orbit at a place beyond."""
+    """Close orbits as `close` does, from states and times [s], their stages being free to change their places so that
+    each comes to lie on its border; orbits and places. Goes round folds, at which there is no orbit at a place beyond.
+    """
     following = _Following(family, states, times, sign, rtol, places)
     following.border = border
     return _solved(following).orbits, following.best_places

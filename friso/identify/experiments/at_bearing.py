@@ -160,7 +160,7 @@ def at_bearing(record: Record, between: Between, mass: float) -> tuple[np.ndarra
 
 
 def rate_of(time: np.ndarray, signal: np.ndarray) -> np.ndarray:
-    """Time derivative of a signal, shape (n,), by a spline."""
+    """Time derivative of a signal at times [s], both of shape (n,), by a spline."""
     return CubicSpline(time, signal)(time, 1)
 
 

@@ -96,7 +96,8 @@ def low_pass(values: np.ndarray, sample_time: float, cutoff: float) -> np.ndarra
 
 
 def rate(values: np.ndarray, sample_time: float, cutoff: float) -> np.ndarray:
-    """Time derivative of the low-passed values, shape (n,); 0 for fewer than two."""
+    """Time derivative of the values, sampled every `sample_time` [s] and low-passed at the `cutoff` [Hz], shape (n,);
+    0 for fewer than two."""
     if len(values) < 2:
         return np.zeros(len(values))
     return np.gradient(low_pass(values, sample_time, cutoff), sample_time)

@@ -57,7 +57,8 @@ class Pass:
 def passes(log: Log, cutoff: float = CUTOFF) -> tuple[Pass, ...]:
     """All stretches over which the reference, or the body itself where there is none, goes at constant velocity.
 
-    With a reference the motion may be unsteady, which each tells. Raises InputError for missing position or force.
+    With a reference the motion may be unsteady, which each tells; `cutoff` [Hz] is that of the velocity. Raises
+    InputError for missing position or force.
     """
     position, velocity = on_bearing(log), _velocity(log, cutoff)
     channel(log, "force")
@@ -78,7 +79,7 @@ def passes(log: Log, cutoff: float = CUTOFF) -> tuple[Pass, ...]:
 
 def on_common_way(log: Log, found: Sequence[Pass], cutoff: float = CUTOFF) -> tuple[Pass, ...]:
     """Passes of a log, each cut to the way that all of them go, where friction is that of the same places; as they are
-    where that is too little."""
+    where that is too little. `cutoff` [Hz] is that of the velocity."""
     position, velocity = on_bearing(log), _velocity(log, cutoff)
     ways = [(float(position[each.span].min()), float(position[each.span].max())) for each in found]
     low, high = max((way[0] for way in ways), default=0.0), min((way[1] for way in ways), default=0.0)

@@ -11,7 +11,7 @@ CLIPPED = 1e-3
 
 
 def repeated_stamps(name: str, time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
-    """A channel without samples that repeat the one before, stamp and value; and how many there were.
+    """A channel without samples that repeat the one before, stamp [s] and value; and how many there were.
 
     Raises LogError for time that decreases and for another value at the same stamp.
     """
@@ -91,8 +91,9 @@ def held(values: np.ndarray) -> int:
 def velocity_factor(
     position: np.ndarray, velocity: np.ndarray, period: float, parts: list[slice]
 ) -> tuple[float, float]:
-    """Ratio of the measured velocity to the derivative of position (least squares, both smoothed over 11 samples) and
-    their correlation; NaN and 0 where there is nothing to compare."""
+    """Ratio of the measured velocity [m/s] to the derivative of position [m], sampled every `period` [s]
+    (least squares, both smoothed over 11 samples) and their correlation; NaN and 0 where there is nothing to compare.
+    """
     from scipy.signal import savgol_filter
 
     window = 11
@@ -120,7 +121,7 @@ _FACTORS = {
 
 
 def velocity_warning(position: np.ndarray, velocity: np.ndarray, period: float, parts: list[slice]) -> str:
-    """What is wrong between position and velocity, "" for nothing; a factor tells wrong units or counts."""
+    """What is wrong between position [m] and velocity [m/s], "" for nothing; a factor tells wrong units or counts."""
     ratio, correlation = velocity_factor(position, velocity, period, parts)
     if abs(correlation) < 0.8:
         return (

@@ -17,7 +17,8 @@ WINDOW = 11
 
 
 def velocity_line(position: np.ndarray, velocity: np.ndarray, period: float, parts: list[slice]) -> str:
-    """A line that offers the delay of the velocity behind the derivative of position, "" for none."""
+    """A line that offers the delay of the velocity [m/s] behind the derivative of position [m], "" for none; both are
+    sampled every `period` [s]."""
     part = max(parts, key=lambda each: each.stop - each.start)
     slope, speed = _smoothed(position[part], 1, period), _smoothed(velocity[part], 0, period)
     return _line(
@@ -29,7 +30,8 @@ def velocity_line(position: np.ndarray, velocity: np.ndarray, period: float, par
 
 
 def force_line(position: np.ndarray, force: np.ndarray, period: float, parts: list[slice]) -> str:
-    """A line that offers the delay of the motion behind the force, "" for none.
+    """A line that offers the delay of the motion [m] behind the force [N], "" for none; both are sampled every `period`
+    [s].
 
     For each lag the force is fitted by acceleration, velocity, its sign, position and a constant: against acceleration
     alone friction would look like a delay, and so would a spring. The lag with the least residual counts.

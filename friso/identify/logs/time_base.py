@@ -35,7 +35,7 @@ class Track:
 
 
 def track(name: str, time: np.ndarray, values: np.ndarray) -> Track:
-    """A channel cleaned of what is no number and of repeated stamps, split at gaps, on even instants.
+    """A channel cleaned of what is no number and of repeated stamps [s], split at gaps, on even instants.
 
     Raises LogError for too little, for time that decreases, for stamps that are repeated with other values, and for
     sampling that is not even.

@@ -30,7 +30,8 @@ SHARP = 3.0
 def fit_shown(
     follows: Problem, loop: Problem | None, covered: Coverage, bandwidth: float
 ) -> tuple[Fit, dict[str, Profile], set[str]]:
-    """The fit, the profile of every parameter, and which of those that not every motion shows it does show.
+    """The fit, the profile of every parameter, and which of those that not every motion shows it does show; `bandwidth`
+    [Hz] is that of the motion.
 
     Which they are is told by the stage that follows the log, since a closed loop that hunts soon gets out of step; the
     loop then has the last word, unless it cannot follow. Where the fit is clearly better with those that are not shown

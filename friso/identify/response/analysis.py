@@ -108,7 +108,8 @@ def as_measured(given: MeasuredResponse) -> FrequencyResponse:
 
 
 def predicted(found: Bench, log: Log, period: float | None = None) -> tuple[float, ...]:
-    """Relative errors with which the two-mass model predicts the outputs of another log over the band.
+    """Relative errors with which the two-mass model predicts the outputs of another log, excited every `period` [s],
+    over the band.
 
     Raises InputError where there is no model.
     """

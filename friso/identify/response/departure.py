@@ -45,7 +45,8 @@ def departure(response: FrequencyResponse, model: Callable[[np.ndarray], np.ndar
 
     The mean of the ratio of response to model, over windows of neighbouring lines, is tested against 1 (F with the
     degrees of the deviations) in the lower half of the lines; the scale of the test is that of the upper half, where
-    the model is taken to hold as well as it can. The interval is the last window that is off.
+    the model is taken to hold as well as it can. The interval is the last window that is off. Raises InputError for
+    fewer than 36 lines.
     """
     frequency = response.frequency
     if len(frequency) < 4 * WINDOW:

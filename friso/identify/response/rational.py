@@ -100,6 +100,7 @@ def _columns(nonlinear: np.ndarray, shape: Shape, s: np.ndarray) -> np.ndarray:
 
 
 def rational(parameters: np.ndarray, shape: Shape, s: np.ndarray) -> np.ndarray:
+    """The response at complex frequencies s [rad/s], shape (lines,), of parameters of this shape."""
     return parameters[shape.nonlinear :] @ _columns(parameters[: shape.nonlinear], shape, s)
 
 

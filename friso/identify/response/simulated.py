@@ -62,7 +62,8 @@ def explained(
 def slid(
     force: np.ndarray, sample_time: float, mass: float, coulomb: float, stiffness: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Position and velocity, each (lanes, n), of a mass on a spring with Coulomb friction under forces (lanes, n).
+    """Position [m] and velocity [m/s], each (lanes, n), of a mass [kg] on a spring [N/m] with Coulomb friction [N]
+    under forces [N] (lanes, n).
 
     Time stepping that treats sticking exactly (Moreau 1988, doi:10.1007/978-3-7091-2624-0_1): friction stops the mass
     where it can within the step. From rest; the error is of first order in the sample time.

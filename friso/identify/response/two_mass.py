@@ -57,7 +57,8 @@ class TwoMass:
 
 
 def two_masses(parameters: np.ndarray, frequency: np.ndarray) -> np.ndarray:
-    """Responses of the driven and the other mass to a force on the former, shape (2, lines); frequency in Hz."""
+    """Responses of the driven and the other mass to a force on the former, shape (2, lines), over frequencies
+    [Hz]."""
     driven, other, stiffness, damping = np.exp(parameters[:DRAG])
     s = 2j * np.pi * frequency
     joint = damping * s + stiffness

@@ -154,7 +154,8 @@ def _ratio(law: Fitted, values: Mapping[str, np.ndarray]) -> np.ndarray:
 
 
 def guideline(samples: int = SAMPLES, keep: Path | None = None, progress: Progress | None = None) -> Guideline:
-    """Compute the guideline. `keep` is a folder for what is done, from which an interrupted run goes on.
+    """Compute the guideline. `keep` is a folder for what is done, from which an interrupted run goes on;
+    `progress` is told how far it is.
 
     Raises InputError for a number of samples that does not do.
     """

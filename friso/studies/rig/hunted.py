@@ -196,8 +196,8 @@ def turning_points(time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np
 
 
 def cycle_shape(times: np.ndarray, values: np.ndarray, swing: float, ended: float) -> tuple[float, ...]:
-    """Of the cycles in the last half of a run, from its turning points: above, below, rising, scatter of period and of
-    height, as in `Hunted`."""
+    """Of the cycles in the last half of a run, from its turning points, times [s] and values [m]: above, below,
+    rising, scatter of period and of height, as in `Hunted`."""
     from friso.hunting.turning import zigzag
 
     nothing = (np.nan,) * 5

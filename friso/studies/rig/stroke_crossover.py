@@ -80,7 +80,7 @@ def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
 def stroke_crossover(
     stage: Stage, seed: int, strokes: np.ndarray, factors: np.ndarray, seeds: np.ndarray, progress: Progress
 ) -> StrokeCrossover:
-    """The grid of strokes and crossovers, both over the stage's own, on rails."""
+    """The grid of `strokes` and crossovers (`factors`) over those of the stage, [m] and [Hz], on rails."""
     sizes, frequencies = stage.flat()["joint.stroke"] * strokes, crossover(stage) * factors
     cases = {
         "joint.stroke": np.repeat(sizes, len(frequencies)),

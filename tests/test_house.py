@@ -1,0 +1,72 @@
+"""The house: what stands where, so that the fifth example of a pattern goes where the first four are."""
+
+import ast
+from collections import defaultdict
+from pathlib import Path
+
+import pytest
+
+import friso
+
+PACKAGE = Path(friso.__file__).parent
+GUIDE = PACKAGE.parent / "CONTRIBUTING.md"
+
+KNOW_CONTROLLERS = ("equations/controllers/", "stage/", "templates/")
+"""Where keys of a controller may be named: its own files, the stage file's schema, and the template of one."""
+
+SHARED_VIEWS = {"__init__.py", "documents.py", "pages.py", "report.py"}
+"""Modules of views that belong to no command; the rest stands in the command's folder or in drawing/."""
+
+ONE_MEANING = ("Moves", "Shown", "Found", "Options", "Estimate", "Case")
+"""Names that stood for several things."""
+
+RECIPES = {
+    "controller": "equations/controllers",
+    "friction law": "equations/friction",
+    "kind of experiment": "identify/experiments",
+    "page": "views/",
+    "log format": "identify/logs",
+}
+"""What CONTRIBUTING.md tells how to add, and the folder that takes its one file."""
+
+
+def sources() -> dict[str, str]:
+    """Modules of the package by their path in it."""
+    return {path.relative_to(PACKAGE).as_posix(): path.read_text(encoding="utf-8") for path in PACKAGE.rglob("*.py")}
+
+
+def classes() -> dict[str, list[str]]:
+    """Public classes at the top of modules, by name: the modules that have one of that name."""
+    found = defaultdict(list)
+    for name, text in sources().items():
+        for node in ast.parse(text).body:
+            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+                found[node.name].append(name)
+    return found
+
+
+@pytest.mark.xfail(reason="controllers are being made components (issue 20, part 1)", strict=True)
+def test_keys_of_a_controller_are_known_to_controllers_alone() -> None:
+    found = [name for name, text in sources().items() if '"controller.' in text]
+    assert [name for name in found if not name.startswith(KNOW_CONTROLLERS)] == []
+
+
+@pytest.mark.xfail(reason="names are being told apart (issue 20, parts 4 and 6)", strict=True)
+def test_a_name_stands_for_one_thing() -> None:
+    found = classes()
+    assert {name: found[name] for name in ONE_MEANING if len(found[name]) > 1} == {}
+
+
+def test_views_stand_in_the_folder_of_their_command() -> None:
+    assert {path.name for path in (PACKAGE / "views").glob("*.py")} - SHARED_VIEWS == set()
+
+
+@pytest.mark.xfail(not GUIDE.exists(), reason="CONTRIBUTING.md is being written (issue 20)", strict=True)
+@pytest.mark.parametrize("kind", RECIPES)
+def test_there_is_a_recipe(kind: str) -> None:
+    """A heading for what is added, and below it the folder of its file."""
+    sections = GUIDE.read_text(encoding="utf-8").split("\n#")
+    own = [each for each in sections if kind in each.partition("\n")[0].lower()]
+    assert own
+    assert any(RECIPES[kind] in each for each in own)
+    assert any((PACKAGE / RECIPES[kind]).glob("*"))
