@@ -92,10 +92,11 @@ def _machine() -> str:
     import scipy
 
     import friso
+    from friso.system import usable_cores
 
     names = [line.split(":")[1].strip() for line in _cpu_lines() if line.startswith("model name")]
     versions = ", ".join(f"{module.__name__} {module.__version__}" for module in (friso, numba, numpy, scipy))
-    cores, load = len(os.sched_getaffinity(0)), os.getloadavg()[0]
+    cores, load = usable_cores(), os.getloadavg()[0]
     return f"{versions}; {names[0] if names else 'unknown processor'}, {cores} cores, load before {load:.1f}"
 
 

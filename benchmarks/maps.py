@@ -7,7 +7,6 @@ Radau with compiled functions on a process pool, extrapolated from a sample.
 from __future__ import annotations
 
 import argparse
-import os
 import re
 import statistics
 import tempfile
@@ -30,6 +29,7 @@ from friso.studies.samples import Samples
 from friso.studies.study import Study
 from friso.studies.sweep import run_in_memory, run_in_store
 from friso.studies.thesis.studies import STUDIES, rig
+from friso.system import usable_cores
 
 RTOLS = (1e-4, 1e-6)
 WANTED = {1e-4: 1.5, 1e-6: 5.0}
@@ -117,7 +117,7 @@ def run_growth(largest: int, rtol: float, repetitions: int) -> list[Goal]:
 
 
 def _processors() -> int:
-    return len(os.sched_getaffinity(0))
+    return usable_cores()
 
 
 def _often(count: int, repetitions: int) -> int:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
@@ -19,13 +18,14 @@ from benchmarks.report import Goal, clock, print_table, spread
 from benchmarks.rigs import RTOLS, SAMPLE, Rig
 from friso.engine.batch import Options, run_chunks
 from friso.hunting import measures
+from friso.system import usable_cores
 
 RUNS = 512
 REFERENCE_RTOL = 1e-11
 WANTED = {1e-4: 2000.0, 1e-6: 1000.0}
 """How many times faster than the fastest peer friso is to be, by rtol (issue 2)."""
 
-CORES = len(os.sched_getaffinity(0))
+CORES = usable_cores()
 
 
 @dataclass

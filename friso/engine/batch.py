@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -16,6 +15,7 @@ from friso.engine.layout import LANES
 from friso.engine.shared_queue import new_queue
 from friso.equations import motion
 from friso.equations.roles import Steady
+from friso.system import usable_cores
 
 LONGEST_SHARE = 1 / 200
 """Longest step as share of the run: what the step does not look at, it may not pass over."""
@@ -185,7 +185,7 @@ def settings_of(options: Options) -> Settings:
 
 def run_batch(kernel: Kernel, batch: Batch, settings: Settings, results: Results, threads: int | None) -> None:
     """Have threads take the runs of a chunk from a queue; the kernel runs without the interpreter's lock."""
-    workers = min(threads or len(os.sched_getaffinity(0)), -(-len(batch.starts) // LANES))
+    workers = min(threads or usable_cores(), -(-len(batch.starts) // LANES))
     arguments = (new_queue(), batch, settings, results)
     if workers == 1:
         kernel.module.run(*arguments)

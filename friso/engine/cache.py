@@ -20,7 +20,6 @@ import logging
 import os
 import re
 import shutil
-import stat
 import subprocess
 import sys
 import tempfile
@@ -39,6 +38,7 @@ import numpy as np
 from filelock import FileLock
 from platformdirs import user_cache_dir
 
+from friso.system import check_private
 from friso.version import VERSION
 
 logger = logging.getLogger("friso")
@@ -55,10 +55,7 @@ def cache_folder() -> Path:
     folder = Path(os.environ.get(FOLDER_VARIABLE) or user_cache_dir("friso")) / "kernels"
     try:
         folder.mkdir(parents=True, exist_ok=True, mode=0o700)
-        if folder.stat().st_uid != os.geteuid():
-            raise PermissionError(f"{folder} belongs to another user")
-        if stat.S_IMODE(folder.stat().st_mode) != 0o700:
-            folder.chmod(0o700)
+        check_private(folder)
         with tempfile.TemporaryFile(dir=folder):
             return folder
     except OSError as error:
@@ -198,7 +195,7 @@ def _checksums(entry: Path) -> dict[str, str]:
 def _intact(entry: Path) -> bool:
     """Whether the entry is there, whole and unchanged."""
     try:
-        return json.loads((entry / "manifest.json").read_text()) == _checksums(entry)
+        return json.loads((entry / "manifest.json").read_text(encoding="utf-8")) == _checksums(entry)
     except (OSError, ValueError):
         return False
 

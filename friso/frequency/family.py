@@ -7,7 +7,6 @@ large numbers from each other: a few operations for each member and frequency.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -23,6 +22,7 @@ from friso.frequency.margins import frequencies, margins
 from friso.frequency.members import Members, joined, limit_cases
 from friso.frequency.parts import REFERENCE, STAGE, VELOCITY, cart_states, compensator, mechanics, plant
 from friso.frequency.system import Complex, System
+from friso.system import usable_cores
 
 CHUNK = 256
 """Members that are computed together: their arrays then stay in the cache."""
@@ -194,5 +194,5 @@ def _split(numbers: np.ndarray) -> list[np.ndarray]:
 
 def _side_by_side(work: Callable[[Any], Any], parts: Any) -> list[Any]:
     """The work on every part, in threads: NumPy lets go of the interpreter's lock in its loops."""
-    with ThreadPoolExecutor(len(os.sched_getaffinity(0))) as pool:
+    with ThreadPoolExecutor(usable_cores()) as pool:
         return list(pool.map(work, parts))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping
@@ -35,6 +34,7 @@ from friso.studies.guideline.sweeps import (
 )
 from friso.studies.guideline.worked import Worked, friction_range, worked
 from friso.studies.thesis.studies import rig
+from friso.system import usable_cores
 
 SAMPLES = 512
 """Samples to which the locked law is fitted unless told; the other sweeps are shares of it."""
@@ -180,7 +180,7 @@ def guideline(samples: int = SAMPLES, keep: Path | None = None, progress: Progre
     laws = Laws(locked_fit.law, free_fit.law)
     steps = worked(laws, safe_over_friction(locked_fit), free_fit.on_test.safe)
     modes = parasitic_limits(rig())
-    seconds, cores = time.perf_counter() - begin, len(os.sched_getaffinity(0))
+    seconds, cores = time.perf_counter() - begin, usable_cores()
     return Guideline(samples, counts(), locked_fit, free_fit, steps, modes, seconds, cores, resumed)
 
 
