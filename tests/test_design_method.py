@@ -93,7 +93,7 @@ def test_the_front_is_a_front(task: Task, candidates: list[Candidate]) -> None:
 def test_better_than_the_thesis_in_both(task: Task, candidates: list[Candidate]) -> None:
     """At the thesis's own specification the method beats 70 x 45 x 0.35 mm in stiffness and in parasitic frequency."""
     thesis = Geometry(70e-3, 45e-3, 60e-3, Sheet(2.0, 0.35e-3, "stainless 1.4310"))
-    own = closed(mechanisms(task.flat, sizes_of([thesis]), [thesis.sheet]).one(0), 1e-3)
+    own = closed(mechanisms(task.flat, sizes_of([thesis]), [thesis.sheet]).member(0), 1e-3)
     choice = chosen(replace(task, crossover=40.0), candidates)
     assert choice is not None
     assert choice.beams.drive[0] <= own.drive[0]
@@ -106,7 +106,7 @@ def test_better_than_the_thesis_in_both(task: Task, candidates: list[Candidate])
 def test_requirements_by_the_evaluation(task: Task) -> None:
     """The requirements, written for arrays, against the figures of one mechanism."""
     geometry = Geometry(60e-3, 20e-3, 50e-3, Sheet(2.0, 0.3e-3, "stainless 1.4310"))
-    it = mechanisms(task.flat, sizes_of([geometry]), [geometry.sheet]).one(0)
+    it = mechanisms(task.flat, sizes_of([geometry]), [geometry.sheet]).member(0)
     found = closed(it, task.stroke)
     excess = {each.name: float(each.excess(it)) for each in requirements(task)}
     weight = 9.80665 * 0.525  # of the heaviest stage

@@ -238,7 +238,7 @@ def test_arrays_are_one_by_one(many: list[Mechanism]) -> None:
     assert np.allclose(first_interfering(arrays), [first_interfering(each) for each in many], rtol=1e-7)
     assert np.allclose(parasitic_mode(arrays), np.transpose([parasitic_mode(each) for each in many]), rtol=1e-7)
     for k, each in enumerate(many):
-        assert closed_forms.drive_stiffness(arrays.one(k)) == closed_forms.drive_stiffness(each)
+        assert closed_forms.drive_stiffness(arrays.member(k)) == closed_forms.drive_stiffness(each)
 
 
 def displacements(it: Mechanism, s: np.ndarray) -> np.ndarray:

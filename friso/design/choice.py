@@ -92,7 +92,7 @@ def _in_order(
 
 def evaluated(task: Task, geometry: Geometry) -> Evaluation:
     """A geometry by the beam model. Raises BeamFailure."""
-    return beams(mechanisms(task.flat, sizes_of([geometry]), [geometry.sheet]).one(0), task.stroke)
+    return beams(mechanisms(task.flat, sizes_of([geometry]), [geometry.sheet]).member(0), task.stroke)
 
 
 def confirmed(task: Task, candidates: Sequence[Candidate]) -> Iterable[Confirmed]:

@@ -12,7 +12,7 @@ from friso.equations.bandwidth import faster
 from friso.flexure.evaluation import Evaluation
 from friso.frequency.crossover import DENSITY, STEPS, WANTED, searched, settled_members
 from friso.frequency.drive import Drive
-from friso.frequency.family import controller, distance_to_lines, grid, looked_at, plants
+from friso.frequency.family import controller, distance_to_lines, grid, stability_by_poles, plants
 from friso.frequency.members import Members
 from friso.frequency.ranges import Range, ranges_below
 
@@ -51,7 +51,7 @@ class Modal:
         own = self._at(np.array(crossover))
         shape = controller(own, self.omega)
         bare, whole = self.bare * shape, self.whole * shape
-        settled = looked_at(own, self.members).abscissa < 0
+        settled = stability_by_poles(own, self.members).abscissa < 0
         stable = settled & (np.abs(_turns((1 + whole) / (1 + bare))) < 0.5)
         return float(distance_to_lines(whole).min()) if stable.all() else 0.0
 

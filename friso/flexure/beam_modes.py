@@ -41,25 +41,25 @@ class Reduced:
     coupling: np.ndarray
 
     @classmethod
-    def of(cls, it: Mechanism, stiffness: np.ndarray, mass: np.ndarray) -> Reduced:
+    def of(cls, mechanism: Mechanism, stiffness: np.ndarray, mass: np.ndarray) -> Reduced:
         """Of the stiffness [N/m, N, N m] and mass [kg, kg m, kg m^2] of the nodes of a leaf, but for its torsion, which
         is that of a plate."""
         size = len(stiffness)
         stiffness, mass = stiffness.copy(), mass.copy()
         stiffness[3::COORDINATES, 3::COORDINATES], mass[3::COORDINATES, 3::COORDINATES] = _torsion(
-            it, size // COORDINATES
+            mechanism, size // COORDINATES
         )
         static, parts, squares = np.zeros((size, COORDINATES)), [], []
         static[-COORDINATES:] = np.eye(COORDINATES)
-        for kind, kept in KINDS:
+        for kind, number in KINDS:
             inside = np.add.outer(np.arange(COORDINATES, size - COORDINATES, COORDINATES), kind).ravel()
-            own = stiffness[np.ix_(inside, inside)]
-            static[inside] = -np.linalg.solve(own, stiffness[inside, -COORDINATES:])
-            values, vectors = eigh(own, mass[np.ix_(inside, inside)])
-            shapes = np.zeros((size, min(kept, len(values))))
-            shapes[inside] = vectors[:, :kept]
+            clamped = stiffness[np.ix_(inside, inside)]
+            static[inside] = -np.linalg.solve(clamped, stiffness[inside, -COORDINATES:])
+            values, vectors = eigh(clamped, mass[np.ix_(inside, inside)])
+            shapes = np.zeros((size, min(number, len(values))))
+            shapes[inside] = vectors[:, :number]
             parts.append(shapes)
-            squares.append(values[:kept])
+            squares.append(values[:number])
         inner, moved = np.hstack(parts), mass @ static
         return cls(
             static.reshape(-1, COORDINATES, COORDINATES),
@@ -71,18 +71,18 @@ class Reduced:
         )
 
 
-def _torsion(it: Mechanism, nodes: int) -> tuple[np.ndarray, np.ndarray]:
+def _torsion(mechanism: Mechanism, nodes: int) -> tuple[np.ndarray, np.ndarray]:
     """Torsional stiffness and mass of the nodes of a leaf that cannot warp at its ends: of cubic elements whose rates
     of twist at the inner nodes follow statically. Beams lack warping, of which modes have more than statics."""
-    h = float(it.length) / (nodes - 1)
-    rigidity = float(it.shear * plate.torsion_constant(it.width, it.thickness))
-    warping = rigidity / float(plate.warping_rate(it.width, it.poisson)) ** 2
+    h = float(mechanism.length) / (nodes - 1)
+    rigidity = float(mechanism.shear * plate.torsion_constant(mechanism.width, mechanism.thickness))
+    warping = rigidity / float(plate.warping_rate(mechanism.width, mechanism.poisson)) ** 2
     signs = np.array([[1, 1, -1, 1], [1, 1, -1, 1], [-1, -1, 1, -1], [1, 1, -1, 1]])
     lengths = np.outer([1, h, 1, h], [1, h, 1, h])
     bent = np.array([[12, 6, 12, 6], [6, 4, 6, 2], [12, 6, 12, 6], [6, 2, 6, 4]]) * signs / h**3
     turned = np.array([[36, 3, -36, 3], [3, 4, -3, -1], [-36, -3, 36, -3], [3, -1, -3, 4]]) / (30 * h)
     moved = np.array([[156, 22, 54, -13], [22, 4, 13, -3], [54, 13, 156, -22], [-13, -3, -22, 4]]) * h / 420
-    polar = float(it.density * (it.bending + it.edgewise))
+    polar = float(mechanism.density * (mechanism.bending + mechanism.edgewise))
     stiffness, mass = np.zeros((2 * nodes, 2 * nodes)), np.zeros((2 * nodes, 2 * nodes))
     for i in range(0, 2 * nodes - 2, 2):
         stiffness[i : i + 4, i : i + 4] += (warping * bent + rigidity * turned) * lengths
@@ -94,49 +94,51 @@ def _torsion(it: Mechanism, nodes: int) -> tuple[np.ndarray, np.ndarray]:
     return follow.T @ stiffness @ follow, follow.T @ mass @ follow
 
 
-def modes(it: Mechanism, leaf: Reduced) -> tuple[Mode, ...]:
+def modes(mechanism: Mechanism, leaf: Reduced) -> tuple[Mode, ...]:
     """The lowest modes and all of the stage, the drive mode first, the others by frequency."""
-    ends, rows = end_motions(it.offsets), _rows(it.offsets)
+    ends, rows = end_motions(mechanism.offsets), _rows(mechanism.offsets)
     count = len(leaf.squares)
     size = COORDINATES + count * len(rows)
     stiffness, mass = np.zeros((size, size)), np.eye(size)
     stage = slice(0, COORDINATES)
     stiffness[stage, stage] = _gathered(ends, leaf.stiffness)
-    mass[stage, stage] = body_mass(it) + _gathered(ends, leaf.mass)
+    mass[stage, stage] = body_mass(mechanism) + _gathered(ends, leaf.mass)
     np.fill_diagonal(stiffness[COORDINATES:, COORDINATES:], np.tile(leaf.squares, len(rows)))
     # row k of the leaves takes part with the weights rows[k]
     mass[COORDINATES:, stage] = np.einsum("kl,me,les->kms", rows, leaf.coupling, ends).reshape(-1, COORDINATES)
     mass[stage, COORDINATES:] = mass[COORDINATES:, stage].T
     squares, vectors = eigh(stiffness, mass)
-    found = []
+    lowest = []
     for square, vector in zip(squares, vectors.T, strict=True):
-        if len(found) >= MODES and not _of_stage(it, vector[stage]):
+        if len(lowest) >= MODES and not _of_stage(mechanism, vector[stage]):
             continue
-        own = rows.T @ vector[COORDINATES:].reshape(len(rows), count)
+        amplitudes = rows.T @ vector[COORDINATES:].reshape(len(rows), count)
         moved = np.einsum("nce,les,s->lnc", leaf.static[:, :3], ends, vector[stage])
-        moved += np.einsum("ncm,lm->lnc", leaf.inner[:, :3], own)
-        found.append(_mode(it, np.sqrt(max(square, 0.0)) / (2 * np.pi), vector[stage], moved))
-    drive = max(found, key=lambda mode: abs(mode.stage[2]) / mode.frequency if mode.frequency else np.inf)
-    return (replace(drive, name="drive"), *(mode for mode in found if mode is not drive))
+        moved += np.einsum("ncm,lm->lnc", leaf.inner[:, :3], amplitudes)
+        lowest.append(_mode(mechanism, np.sqrt(max(square, 0.0)) / (2 * np.pi), vector[stage], moved))
+    drive = max(lowest, key=lambda mode: abs(mode.stage[2]) / mode.frequency if mode.frequency else np.inf)
+    return (replace(drive, name="drive"), *(mode for mode in lowest if mode is not drive))
 
 
-def _of_stage(it: Mechanism, motion: np.ndarray) -> bool:
+def _of_stage(mechanism: Mechanism, motion: np.ndarray) -> bool:
     """Whether a tenth of the energy of a mode, or more, is the stage's."""
-    return bool(motion @ body_mass(it) @ motion > 0.1)
+    return bool(motion @ body_mass(mechanism) @ motion > 0.1)
 
 
-def _mode(it: Mechanism, frequency: float, stage: np.ndarray, leaves: np.ndarray) -> Mode:
+def _mode(mechanism: Mechanism, frequency: float, stage: np.ndarray, leaves: np.ndarray) -> Mode:
     """The mode that moves stage and leaves so, its sign such that the largest displacement of a leaf is positive."""
-    actuator, sensor = (float(along_motion(it, point, stage[:, None])[0]) for point in (it.actuation, it.sensor))
+    actuator, sensor = (
+        float(along_motion(mechanism, point, stage[:, None])[0]) for point in (mechanism.actuation, mechanism.sensor)
+    )
     sign = 1.0 if leaves.flat[np.argmax(np.abs(leaves))] >= 0 else -1.0
-    arm = np.subtract(it.body.centre, (it.length, 0.0, 0.0)).astype(float)
-    name = mode_name(stage, float(it.body.mass), it.body.inertia, arm, leaves, float(it.leaf_mass))
+    arm = np.subtract(mechanism.body.centre, (mechanism.length, 0.0, 0.0)).astype(float)
+    name = mode_name(stage, float(mechanism.body.mass), mechanism.body.inertia, arm, leaves, float(mechanism.leaf_mass))
     return Mode(
         name,
         float(frequency),
         sign * actuator,
         sign * sensor,
-        peak_of(it, actuator, sensor),
+        peak_of(mechanism, actuator, sensor),
         sign * stage,
         sign * leaves,
     )
@@ -160,18 +162,18 @@ def _rows(offsets: np.ndarray) -> np.ndarray:
     return np.linalg.qr(powers)[0].T
 
 
-def buckling_load(it: Mechanism, leaves: Leaves, straight: np.ndarray, load: float) -> float:
+def buckling_load(mechanism: Mechanism, leaves: Leaves, straight: np.ndarray, load: float) -> float:
     """Least load [N] along the leaves, shared by them, at which the stage sways, `straight` being the stiffness of a
     leaf without load and `load` a guess [N], at which it is linearised."""
     state = np.zeros((1, leaves.nodes, COORDINATES))
-    strain = load / float(it.leaves * axial(it))
-    state[:, :, 0] = -strain * np.linspace(0, float(it.length), leaves.nodes)
+    strain = load / float(mechanism.leaves * axial(mechanism))
+    state[:, :, 0] = -strain * np.linspace(0, float(mechanism.length), leaves.nodes)
     loaded = leaves.stiffness(state)[0]
     # all leaves bend alike; the stage's pitch stretches them
     moving = np.add.outer(np.arange(COORDINATES, len(straight), COORDINATES), (2, 4)).ravel()
-    without, with_load = (int(it.leaves) * each[np.ix_(moving, moving)] for each in (straight, loaded))
+    without, with_load = (int(mechanism.leaves) * matrix[np.ix_(moving, moving)] for matrix in (straight, loaded))
     softening = without - with_load
-    without[-1, -1] += axial(it) / it.length * it.offset_squares
+    without[-1, -1] += axial(mechanism) / mechanism.length * mechanism.offset_squares
     last = len(moving) - 1
     largest = eigh(softening, without, eigvals_only=True, subset_by_index=(last, last))[0]
     return float(load / largest)

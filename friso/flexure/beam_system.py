@@ -127,25 +127,28 @@ class Condensed:
         """Of the stiffness of the leaves and forces on their nodes, the coordinates which, which + 2 and which + 4 of
         each node; `ends` (leaves, 3, 3) tells how those of the leaf ends follow the stage, `bend` at which coordinate
         their path is curved, and what the forces do there [N m]."""
-        own = stiffness[:, COORDINATES + which :: 2, COORDINATES + which :: 2]
+        matrices = stiffness[:, COORDINATES + which :: 2, COORDINATES + which :: 2]
         out = forces[:, 1:, which::2].reshape(len(forces), -1)
         inside, border = slice(None, -3), slice(-3, None)
         back = np.swapaxes(ends, 1, 2)
-        across = own[:, inside, border] @ ends
-        solved = np.linalg.solve(own[:, inside, inside], np.concatenate([across, out[:, inside, None]], axis=2))
+        across = matrices[:, inside, border] @ ends
+        solved = np.linalg.solve(matrices[:, inside, inside], np.concatenate([across, out[:, inside, None]], axis=2))
         follow, settle = -solved[:, :, :3], -solved[:, :, 3]
         felt = np.swapaxes(across, 1, 2)
-        left = np.sum(back @ own[:, border, border] @ ends + felt @ follow, axis=0)
+        left = np.sum(back @ matrices[:, border, border] @ ends + felt @ follow, axis=0)
         left[bend[0], bend[0]] += bend[1]
         force = np.sum(back @ out[:, border, None] + felt @ settle[:, :, None], axis=0)[:, 0]
         return cls(follow, settle, force, left)
 
 
-def _add_leaf(system: Any, it: Mechanism, elements: int) -> None:
+def _add_leaf(system: Any, mechanism: Mechanism, elements: int) -> None:
     """The nodes and elements of a leaf."""
-    h = float(it.length) / elements
+    h = float(mechanism.length) / elements
     middles = h * (np.arange(elements // 2) + 0.5)
-    half = [_section(it, h, *pair) for pair in zip(_curl(it, h, middles), _twist(it, h, middles), strict=True)]
+    half = [
+        _section(mechanism, h, *pair)
+        for pair in zip(_curl(mechanism, h, middles), _twist(mechanism, h, middles), strict=True)
+    ]
     nodes = [
         system.AddNode({"nodeType": "RigidBodyRxyz", "referenceCoordinates": [i * h, 0, 0, 0, 0, 0], "Vshow": False})
         for i in range(elements + 1)
@@ -162,18 +165,18 @@ def _add_leaf(system: Any, it: Mechanism, elements: int) -> None:
         )
 
 
-def _section(it: Mechanism, h: float, curl: float, twist: float) -> Any:
+def _section(mechanism: Mechanism, h: float, curl: float, twist: float) -> Any:
     """The section of an element of length h, its compliance in bending and torsion over that of a plain beam given."""
-    weak, strong = it.young * it.bending / curl, it.young * it.edgewise
-    shears = (edgewise_shear(it), strong), (SHEAR * it.shear * it.area, weak)
-    torsion = it.shear * plate.torsion_constant(it.width, it.thickness) / twist
+    weak, strong = mechanism.young * mechanism.bending / curl, mechanism.young * mechanism.edgewise
+    shears = (edgewise_shear(mechanism), strong), (SHEAR * mechanism.shear * mechanism.area, weak)
+    torsion = mechanism.shear * plate.torsion_constant(mechanism.width, mechanism.thickness) / twist
     edgewise, flatwise = (1 / (1 / shear + h**2 / (12 * bending)) for shear, bending in shears)
-    bulge = it.area * h**2 / 6
+    bulge = mechanism.area * h**2 / 6
     section: Any = exudyn.BeamSection()
-    section.stiffnessMatrix = np.diag([axial(it), edgewise, flatwise, torsion, weak, strong])
-    section.massPerLength = it.density * it.area
-    moments = [it.bending + it.edgewise, it.bending + bulge, it.edgewise + bulge]
-    section.inertia = it.density * np.diag(moments)
+    section.stiffnessMatrix = np.diag([axial(mechanism), edgewise, flatwise, torsion, weak, strong])
+    section.massPerLength = mechanism.density * mechanism.area
+    moments = [mechanism.bending + mechanism.edgewise, mechanism.bending + bulge, mechanism.edgewise + bulge]
+    section.inertia = mechanism.density * np.diag(moments)
     return section
 
 
@@ -185,20 +188,26 @@ def _inside(h: float, middles: np.ndarray) -> np.ndarray:
     return middles[:, None] + _POINTS * h / 2
 
 
-def _curl(it: Mechanism, h: float, middles: np.ndarray) -> np.ndarray:
+def _curl(mechanism: Mechanism, h: float, middles: np.ndarray) -> np.ndarray:
     """Compliance in bending of elements, weighted by the square of the moment in parallel motion."""
     s = _inside(h, middles)
-    return (plate.compliance_profile(s, it.length, it.width, it.poisson) * s**2) @ _WEIGHTS / (s**2 @ _WEIGHTS)
+    return (
+        (plate.compliance_profile(s, mechanism.length, mechanism.width, mechanism.poisson) * s**2)
+        @ _WEIGHTS
+        / (s**2 @ _WEIGHTS)
+    )
 
 
-def _twist(it: Mechanism, h: float, middles: np.ndarray) -> np.ndarray:
+def _twist(mechanism: Mechanism, h: float, middles: np.ndarray) -> np.ndarray:
     """Compliance in torsion of elements: as `plate.free_twist`, so that a constant torque meets the stiffness of the
     plate, but tilted, so that the torque of a force across the deflected leaf, s^3, does so too.
 
     That torque in an element is s^3 + s h^2/2 at its middle: its strain being constant, it sees the curved leaf as arcs
     (found by comparison; 1/n^2 errors of the stiffness along y vanish).
     """
-    s, end = 2 * _inside(h, middles) / it.length, 2 * middles / it.length
-    even = plate.free_twist(s * it.length / 2, it.length, it.width, it.poisson) @ _WEIGHTS / 2
-    odd = (plate.cubic_twist(s, it.length, it.width, it.poisson) * s**3) @ _WEIGHTS / 2
-    return plate.tilted(even, end**3 + end * (2 * h / it.length) ** 2 / 2, end, odd.sum())
+    s, end = 2 * _inside(h, middles) / mechanism.length, 2 * middles / mechanism.length
+    even = (
+        plate.free_twist(s * mechanism.length / 2, mechanism.length, mechanism.width, mechanism.poisson) @ _WEIGHTS / 2
+    )
+    odd = (plate.cubic_twist(s, mechanism.length, mechanism.width, mechanism.poisson) * s**3) @ _WEIGHTS / 2
+    return plate.tilted(even, end**3 + end * (2 * h / mechanism.length) ** 2 / 2, end, odd.sum())

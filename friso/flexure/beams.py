@@ -58,65 +58,65 @@ def beams(mechanism: Mechanism, stroke: float, elements: int = ELEMENTS) -> Eval
         raise BeamFailure(f"The beams have no unique equilibrium or modes: {cause[0]}") from error
 
 
-def _check(it: Mechanism, stroke: float) -> None:
+def _check(mechanism: Mechanism, stroke: float) -> None:
     """Raises BeamFailure for numbers that make no mechanism."""
-    given = {name: getattr(it, name) for name in ("length", "width", "thickness", "young", "density")}
-    given |= {"leaves": it.leaves, "mass of the stage": it.body.mass, "stroke": stroke}
-    for name, value in given.items():
+    dimensions = {name: getattr(mechanism, name) for name in ("length", "width", "thickness", "young", "density")}
+    dimensions |= {"leaves": mechanism.leaves, "mass of the stage": mechanism.body.mass, "stroke": stroke}
+    for name, value in dimensions.items():
         if not 0 < float(value) < np.inf:
             raise BeamFailure(f"The beams need a positive {name}, not {float(value):.6g}.")
 
 
-def _evaluate(it: Mechanism, stroke: float, leaves: Leaves) -> Evaluation:
+def _evaluate(mechanism: Mechanism, stroke: float, leaves: Leaves) -> Evaluation:
     deflections = np.linspace(0, stroke, POINTS)
     rest = Place.rest(leaves)
-    straight = np.repeat(leaves.stiffness(rest.state(it.offsets)[:1]), leaves.count, axis=0)
+    straight = np.repeat(leaves.stiffness(rest.state(mechanism.offsets)[:1]), leaves.count, axis=0)
     unloaded = np.zeros((leaves.count, leaves.nodes, 6))
-    held = [_held(it, rest, _solved(it, rest, straight, unloaded), straight, unloaded)]
+    held = [_held(mechanism, rest, _solved(mechanism, rest, straight, unloaded), straight, unloaded)]
     for z in deflections[1:]:
-        held.append(_pushed(it, leaves, held, z))
-    stiffness = np.array([each.stiffness for each in held])
-    mean, largest = plate.stress_factors(it.length, it.width, it.poisson)
-    moment = np.max(np.abs(leaves.forces(held[-1].place.state(it.offsets))[:, [0, -1], 4]))
+        held.append(_pushed(mechanism, leaves, held, z))
+    stiffness = np.array([state.stiffness for state in held])
+    mean, largest = plate.stress_factors(mechanism.length, mechanism.width, mechanism.poisson)
+    moment = np.max(np.abs(leaves.forces(held[-1].place.state(mechanism.offsets))[:, [0, -1], 4]))
     return Evaluation(
         model="beams",
-        mechanism=it,
+        mechanism=mechanism,
         deflections=deflections,
-        forces=np.array([each.force for each in held]),
+        forces=np.array([state.force for state in held]),
         drive=1 / np.linalg.inv(stiffness)[:, 2, 2],
         support_x=stiffness[:, 0, 0],
         support_y=stiffness[:, 1, 1],
         stiffness=stiffness[[0, -1]],
-        modes=modes(it, Reduced.of(it, straight[0], leaves.mass())),
-        stress=float(moment / (it.width * it.thickness**2 / 6) * largest / mean),
+        modes=modes(mechanism, Reduced.of(mechanism, straight[0], leaves.mass())),
+        stress=float(moment / (mechanism.width * mechanism.thickness**2 / 6) * largest / mean),
         shortening=float(-held[-1].place.stage[0]),
-        buckling=buckling_load(it, leaves, straight[0], float(closed_forms.buckling_load(it))),
+        buckling=buckling_load(mechanism, leaves, straight[0], float(closed_forms.buckling_load(mechanism))),
     )
 
 
-def _pushed(it: Mechanism, leaves: Leaves, held: list[Held], z: float) -> Held:
+def _pushed(mechanism: Mechanism, leaves: Leaves, held: list[Held], z: float) -> Held:
     """The next equilibrium, in as few steps as it can be reached."""
-    known = held[-2:]
-    start = known[-1].place.stage[1]
+    nearest = held[-2:]
+    start = nearest[-1].place.stage[1]
     for halving in range(HALVINGS):
         steps = 2**halving
         try:
-            reached = known
+            reached = nearest
             for k in range(1, steps + 1):
                 place = _predicted(reached, start + (z - start) * k / steps)
-                reached = [reached[-1], _equilibrium(it, leaves, place)]
+                reached = [reached[-1], _equilibrium(mechanism, leaves, place)]
             return reached[-1]
         except (BeamFailure, np.linalg.LinAlgError):
             continue
     raise BeamFailure(f"The beams find no equilibrium at a deflection of {z * 1e3:.4g} mm: reduce the stroke.")
 
 
-def _predicted(known: list[Held], z: float) -> Place:
+def _predicted(reached: list[Held], z: float) -> Place:
     """Extrapolation to z through the last two equilibria and their rates, or along the rate of the only one."""
-    last = known[-1]
-    if len(known) == 1:
+    last = reached[-1]
+    if len(reached) == 1:
         return last.place.plus(last.rate, z - last.place.stage[1])
-    before = known[-2]
+    before = reached[-2]
     step = last.place.stage[1] - before.place.stage[1]
     s = (z - before.place.stage[1]) / step
     weights = (1 + s**2 * (2 * s - 3), s**2 * (3 - 2 * s), step * s * (s - 1) ** 2, step * s**2 * (s - 1))
@@ -127,18 +127,18 @@ def _predicted(known: list[Held], z: float) -> Place:
     )
 
 
-def _equilibrium(it: Mechanism, leaves: Leaves, place: Place) -> Held:
+def _equilibrium(mechanism: Mechanism, leaves: Leaves, place: Place) -> Held:
     """The equilibrium at the z of this place by Newton's method."""
     z = place.stage[1]
-    close = CLOSE * (float(it.thickness) / z) ** 2 * float(closed_forms.drive_stiffness(it)) * z**2
+    close = CLOSE * (float(mechanism.thickness) / z) ** 2 * float(closed_forms.drive_stiffness(mechanism)) * z**2
     for _ in range(ITERATIONS):
         if not np.max(np.abs(place.inner[:, :, 2]), initial=abs(place.stage[2])) < FOLDED:
             break
-        state = place.state(it.offsets)
+        state = place.state(mechanism.offsets)
         forces, stiffness = leaves.forces(state), leaves.stiffness(state)
-        solved = _solved(it, place, stiffness, forces)
+        solved = _solved(mechanism, place, stiffness, forces)
         if solved.energy < close:
-            return _held(it, place, solved, stiffness, forces)
+            return _held(mechanism, place, solved, stiffness, forces)
         place = place.plus(solved.change)
     raise BeamFailure("Newton's method does not converge.")
 
@@ -153,9 +153,9 @@ class Solved:
     energy: float
 
 
-def _solved(it: Mechanism, place: Place, stiffness: np.ndarray, forces: np.ndarray) -> Solved:
+def _solved(mechanism: Mechanism, place: Place, stiffness: np.ndarray, forces: np.ndarray) -> Solved:
     """The stiffness of the leaves and the forces on their nodes, condensed onto the stage."""
-    offsets, turn = it.offsets, place.stage[2]
+    offsets, turn = mechanism.offsets, place.stage[2]
     ends = np.tile(np.eye(3), (len(offsets), 1, 1))
     ends[:, 0, 2], ends[:, 1, 2] = np.cos(turn) * offsets, -np.sin(turn) * offsets
     bend = -np.sum(offsets * (np.sin(turn) * forces[:, -1, 0] + np.cos(turn) * forces[:, -1, 2]))
@@ -169,25 +169,25 @@ def _solved(it: Mechanism, place: Place, stiffness: np.ndarray, forces: np.ndarr
     return Solved(plane, change, float(plane.force[1] + plane.stiffness[1] @ move), float(energy))
 
 
-def _held(it: Mechanism, place: Place, solved: Solved, stiffness: np.ndarray, forces: np.ndarray) -> Held:
+def _held(mechanism: Mechanism, place: Place, solved: Solved, stiffness: np.ndarray, forces: np.ndarray) -> Held:
     """The equilibrium next to this place."""
     plane = solved.plane
     rate = np.array([0.0, 1.0, 0.0])
     rate[::2] = -np.linalg.solve(plane.stiffness[::2, ::2], plane.stiffness[::2, 1])
-    whole = np.zeros((6, 6))
-    whole[PLANE, PLANE] = plane.stiffness
-    whole[ACROSS, ACROSS] = _across(it, place.stage[2], stiffness, forces)
+    matrix = np.zeros((6, 6))
+    matrix[PLANE, PLANE] = plane.stiffness
+    matrix[ACROSS, ACROSS] = _across(mechanism, place.stage[2], stiffness, forces)
     return Held(
         place.plus(solved.change),
         Place((plane.follow @ rate).reshape(place.inner.shape), rate),
         solved.force,
-        whole,
+        matrix,
     )
 
 
-def _across(it: Mechanism, turn: float, stiffness: np.ndarray, forces: np.ndarray) -> np.ndarray:
+def _across(mechanism: Mechanism, turn: float, stiffness: np.ndarray, forces: np.ndarray) -> np.ndarray:
     """Stiffness of the stage along y and about x and z, itself turned about y."""
-    offsets, tilt = it.offsets, np.cos(turn)
+    offsets, tilt = mechanism.offsets, np.cos(turn)
     ends = np.tile(np.eye(3), (len(offsets), 1, 1))
     ends[:, 0, 1] = -tilt * offsets
     bend = -tilt * np.sum(offsets * forces[:, -1, 2])

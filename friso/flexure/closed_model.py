@@ -32,7 +32,7 @@ def closed(mechanism: Mechanism, stroke: float) -> Evaluation:
         drive=drive,
         support_x=closed_forms.support_x(mechanism, deflections),
         support_y=closed_forms.support_y(mechanism, deflections),
-        stiffness=np.array([stage_stiffness_at(mechanism, each) for each in (0.0, stroke)]),
+        stiffness=np.array([stage_stiffness_at(mechanism, deflection) for deflection in (0.0, stroke)]),
         modes=_modes(mechanism),
         stress=float(closed_forms.max_stress(mechanism, stroke)),
         shortening=float(closed_forms.shortening(mechanism, stroke)),
@@ -40,29 +40,31 @@ def closed(mechanism: Mechanism, stroke: float) -> Evaluation:
     )
 
 
-def _modes(it: Mechanism) -> tuple[Mode, ...]:
+def _modes(mechanism: Mechanism) -> tuple[Mode, ...]:
     """Those of the stage and of leaves that bend alike, and those of leaves with the stage at rest."""
-    frequencies, shapes = closed_forms.modes(it)
+    frequencies, shapes = closed_forms.modes(mechanism)
     drive = int(closed_forms.drive_mode(frequencies, shapes))
-    first = replace(_mode(it, frequencies[drive], shapes[:, drive]), name="drive")
-    others = [_mode(it, frequencies[k], shapes[:, k]) for k in range(7) if k != drive]
-    return (first, *sorted([*others, *_unlike(it), _torsion_mode(it)], key=lambda mode: mode.frequency))
+    first = replace(_mode(mechanism, frequencies[drive], shapes[:, drive]), name="drive")
+    others = [_mode(mechanism, frequencies[k], shapes[:, k]) for k in range(7) if k != drive]
+    return (first, *sorted([*others, *_unlike(mechanism), _torsion_mode(mechanism)], key=lambda mode: mode.frequency))
 
 
-def _mode(it: Mechanism, frequency: float, shape: np.ndarray) -> Mode:
+def _mode(mechanism: Mechanism, frequency: float, shape: np.ndarray) -> Mode:
     """A mode of the stage's six coordinates and the bending of the leaves."""
-    stage, leaves = shape[:6], following(it, shape[:6])
-    leaves[:, :, 2] += shape[6] / np.sqrt(it.leaves * it.leaf_mass) * _clamped_shape()
-    actuator, sensor = (float(along_motion(it, point, stage[:, None])[0]) for point in (it.actuation, it.sensor))
-    arm = np.array(it.body.centre) - np.array([it.length, 0.0, 0.0])
-    name = mode_name(stage, it.body.mass, np.array(it.body.inertia), arm, leaves, it.leaf_mass)
-    return Mode(name, float(frequency), actuator, sensor, peak_of(it, actuator, sensor), stage, leaves)
+    stage, leaves = shape[:6], following(mechanism, shape[:6])
+    leaves[:, :, 2] += shape[6] / np.sqrt(mechanism.leaves * mechanism.leaf_mass) * _clamped_shape()
+    actuator, sensor = (
+        float(along_motion(mechanism, point, stage[:, None])[0]) for point in (mechanism.actuation, mechanism.sensor)
+    )
+    arm = np.array(mechanism.body.centre) - np.array([mechanism.length, 0.0, 0.0])
+    name = mode_name(stage, mechanism.body.mass, np.array(mechanism.body.inertia), arm, leaves, mechanism.leaf_mass)
+    return Mode(name, float(frequency), actuator, sensor, peak_of(mechanism, actuator, sensor), stage, leaves)
 
 
-def following(it: Mechanism, stage: np.ndarray) -> np.ndarray:
+def following(mechanism: Mechanism, stage: np.ndarray) -> np.ndarray:
     """How the middle lines of the leaves move with the stage (6,), statically, shape (leaves, POINTS, 3)."""
     s = np.linspace(0.0, 1.0, POINTS)
-    by_place, by_slope = 3 * s**2 - 2 * s**3, it.length * (s**3 - s**2)
+    by_place, by_slope = 3 * s**2 - 2 * s**3, mechanism.length * (s**3 - s**2)
     x, y, z, turn_x, turn_y, turn_z = stage
     return np.array(
         [
@@ -74,22 +76,22 @@ def following(it: Mechanism, stage: np.ndarray) -> np.ndarray:
                 ],
                 axis=1,
             )
-            for offset in it.offsets
+            for offset in mechanism.offsets
         ]
     )
 
 
-def _unlike(it: Mechanism) -> list[Mode]:
+def _unlike(mechanism: Mechanism) -> list[Mode]:
     """The first bending mode of the leaves against each other, the stage at rest."""
-    count, own = int(it.leaves), float(it.leaf_mass)
-    found = []
+    count, leaf_mass = int(mechanism.leaves), float(mechanism.leaf_mass)
+    modes = []
     for k in range(1, count):
         wave = np.cos(np.pi * k * (np.arange(count) + 0.5) / count)  # orthogonal patterns
         leaves = np.zeros((count, POINTS, 3))
-        leaves[:, :, 2] = wave[:, None] * _clamped_shape() / np.sqrt(own * np.sum(wave**2))
-        frequency = float(closed_forms.leaf_bending(it))
-        found.append(Mode("leaf bending, out of phase", frequency, 0.0, 0.0, 0.0, np.zeros(6), leaves))
-    return found
+        leaves[:, :, 2] = wave[:, None] * _clamped_shape() / np.sqrt(leaf_mass * np.sum(wave**2))
+        frequency = float(closed_forms.leaf_bending(mechanism))
+        modes.append(Mode("leaf bending, out of phase", frequency, 0.0, 0.0, 0.0, np.zeros(6), leaves))
+    return modes
 
 
 def _clamped_shape() -> np.ndarray:
@@ -99,7 +101,7 @@ def _clamped_shape() -> np.ndarray:
     return np.cosh(x) - np.cos(x) - ratio * (np.sinh(x) - np.sin(x))
 
 
-def _torsion_mode(it: Mechanism) -> Mode:
+def _torsion_mode(mechanism: Mechanism) -> Mode:
     """The first torsion of the leaves, whose middle lines stay at rest."""
-    leaves = np.zeros((int(it.leaves), POINTS, 3))
-    return Mode("leaf torsion", float(closed_forms.leaf_torsion(it)), 0.0, 0.0, 0.0, np.zeros(6), leaves)
+    leaves = np.zeros((int(mechanism.leaves), POINTS, 3))
+    return Mode("leaf torsion", float(closed_forms.leaf_torsion(mechanism)), 0.0, 0.0, 0.0, np.zeros(6), leaves)

@@ -106,10 +106,10 @@ class Evaluation:
         return next((mode for mode in self.modes[1:] if mode.interferes), None)
 
 
-def peak_of(it: Mechanism, actuator: float, sensor: float) -> float:
+def peak_of(mechanism: Mechanism, actuator: float, sensor: float) -> float:
     """How far the resonance of a mode rises over the line of the stage's mass, from its motion [1/sqrt(kg)] at actuator
     and sensor: residue phi_a phi_s, 1/m of the mass, and 2 zeta of the resonance."""
-    return abs(actuator * sensor) * float(it.body.mass) / (2 * float(it.damping_ratio))
+    return abs(actuator * sensor) * float(mechanism.body.mass) / (2 * float(mechanism.damping_ratio))
 
 
 Model = Callable[[Mechanism, float], Evaluation]

@@ -23,23 +23,25 @@ def joint_keys(flat: Mapping[str, Any]) -> dict[str, Any]:
     """`joint.stiffness` and the keys of [parasitic] of a stage whose leaves are given, by closed forms. Raises
     InputError where a single mechanism buckles under its load."""
     with np.errstate(all="ignore"):  # numbers that make no mechanism are found out by the rules of the stage file
-        it = Mechanism.of(flat)
-        frequency, share = parasitic_mode(it)
-        stiffness, buckling = closed_forms.loaded_drive_stiffness(it), closed_forms.buckling_load(it)
-    if np.ndim(stiffness) == 0 and it.load >= buckling > 0:
+        mechanism = Mechanism.of(flat)
+        frequency, share = parasitic_mode(mechanism)
+        stiffness, buckling = closed_forms.loaded_drive_stiffness(mechanism), closed_forms.buckling_load(mechanism)
+    if np.ndim(stiffness) == 0 and mechanism.load >= buckling > 0:
         expected = f"less than the buckling load of the leaves, {float(buckling):.4g} N"
-        raise InputError("flexure.load", f"{float(it.load):.4g} N", expected, f'load = "{float(buckling) / 3:.2g} N"')
-    found = {
+        raise InputError(
+            "flexure.load", f"{float(mechanism.load):.4g} N", expected, f'load = "{float(buckling) / 3:.2g} N"'
+        )
+    keys = {
         "joint.stiffness": stiffness,
         "parasitic.frequency": frequency,
-        "parasitic.mass": share / (1 + share) * it.body.mass,
-        "parasitic.damping_ratio": it.damping_ratio,
+        "parasitic.mass": share / (1 + share) * mechanism.body.mass,
+        "parasitic.damping_ratio": mechanism.damping_ratio,
     }
-    return {key: value if np.ndim(value) else float(value) for key, value in found.items()}
+    return {key: value if np.ndim(value) else float(value) for key, value in keys.items()}
 
 
 @dataclass(frozen=True)
-class Seen:
+class VisibleModes:
     """The modes of mechanisms but for the drive mode, arrays of shape (..., 7): frequency [Hz], and residue times the
     mass of the stage, whose sign tells whether actuator and sensor move alike; those at the drive mode are 0."""
 
@@ -48,36 +50,41 @@ class Seen:
     visible: np.ndarray
 
     @classmethod
-    def of(cls, it: Mechanism) -> Seen:
+    def of(cls, mechanism: Mechanism) -> VisibleModes:
         """The modes of mechanisms by closed forms."""
-        frequency, shapes = closed_forms.modes(it)
-        motion = along_motion(it, it.actuation, shapes) * along_motion(it, it.sensor, shapes)
-        own = np.arange(7) != closed_forms.drive_mode(frequency, shapes)[..., None]
-        residue = np.where(own, motion * np.asarray(it.body.mass)[..., None], 0.0)
-        return cls(frequency, residue, np.abs(residue) > VISIBLE * 2 * np.asarray(it.damping_ratio)[..., None])
+        frequency, shapes = closed_forms.modes(mechanism)
+        motion = along_motion(mechanism, mechanism.actuation, shapes) * along_motion(
+            mechanism, mechanism.sensor, shapes
+        )
+        internal = np.arange(7) != closed_forms.drive_mode(frequency, shapes)[..., None]
+        residue = np.where(internal, motion * np.asarray(mechanism.body.mass)[..., None], 0.0)
+        return cls(frequency, residue, np.abs(residue) > VISIBLE * 2 * np.asarray(mechanism.damping_ratio)[..., None])
 
     def at(self, mode: np.ndarray) -> tuple[Any, Any]:
         """Frequency [Hz] and residue, each (...), of one mode each; infinite and 0 where none is visible."""
-        picked = [np.take_along_axis(each, mode[..., None], axis=-1)[..., 0] for each in (self.frequency, self.residue)]
+        picked = [
+            np.take_along_axis(quantity, mode[..., None], axis=-1)[..., 0]
+            for quantity in (self.frequency, self.residue)
+        ]
         some = self.visible.any(axis=-1)
         return np.where(some, picked[0], np.inf)[()], np.where(some, picked[1], 0.0)[()]
 
 
-def first_interfering(it: Mechanism) -> Any:
+def first_interfering(mechanism: Mechanism) -> Any:
     """Frequency [Hz] of the lowest mode, but for the drive mode, that actuator and sensor see; infinite without one."""
-    seen = Seen.of(it)
+    seen = VisibleModes.of(mechanism)
     return seen.at(np.argmin(np.where(seen.visible, seen.frequency, np.inf), axis=-1))[0]
 
 
-def parasitic_mode(it: Mechanism) -> tuple[Any, Any]:
+def parasitic_mode(mechanism: Mechanism) -> tuple[Any, Any]:
     """Frequency [Hz] and residue, times the stage's mass, of the mode whose resonance stands highest in the plant: the
     largest residue over the square of the frequency. Where none is seen, that of the leaves, without weight.
 
     The model of the equations, a part m_p of the stage's mass m on a spring, has the residue m_p/(m (m - m_p)); it
     knows none below 0, of modes in which actuator and sensor move against each other, of which the size counts here.
     """
-    seen = Seen.of(it)
+    seen = VisibleModes.of(mechanism)
     height = np.where(seen.visible, np.abs(seen.residue), 0.0) / np.maximum(seen.frequency, 1e-9) ** 2
     frequency, residue = seen.at(np.argmax(height, axis=-1))
-    leaves = closed_forms.leaf_bending(it)
+    leaves = closed_forms.leaf_bending(mechanism)
     return np.where(np.isfinite(frequency), frequency, leaves)[()], np.maximum(np.abs(residue), LEAST)[()]

@@ -62,41 +62,41 @@ class Mechanism:
     @classmethod
     def of(cls, flat: Mapping[str, Any]) -> Mechanism:
         """The mechanism of a stage given as flat keys to SI numbers or arrays. Raises KeyError without [flexure]."""
-        own = {key.removeprefix("flexure."): value for key, value in flat.items() if key.startswith("flexure.")}
+        section = {key.removeprefix("flexure."): value for key, value in flat.items() if key.startswith("flexure.")}
         names = ("leaves", "length", "width", "thickness", "spacing", "young", "poisson", "density")
-        shape = {name: own[name] for name in names}
+        shape = {name: section[name] for name in names}
         bare = cls(
             **shape,
-            yield_strength=own["yield"],
-            fatigue=own.get("fatigue", np.nan),
-            body=Body(flat["masses.stage"], (0.0, 0.0, 0.0), (own["length"], 0.0, 0.0)),
-            actuation=(own["length"], 0.0, 0.0),
-            sensor=(own["length"], 0.0, 0.0),
-            damping_ratio=own["damping_ratio"],
-            stress_concentration=own["stress_concentration"],
-            load=own.get("load", 0.0),
+            yield_strength=section["yield"],
+            fatigue=section.get("fatigue", np.nan),
+            body=Body(flat["masses.stage"], (0.0, 0.0, 0.0), (section["length"], 0.0, 0.0)),
+            actuation=(section["length"], 0.0, 0.0),
+            sensor=(section["length"], 0.0, 0.0),
+            damping_ratio=section["damping_ratio"],
+            stress_concentration=section["stress_concentration"],
+            load=section.get("load", 0.0),
         )
-        inertia = _triple(own, "inertia", cube_inertia(bare.body.mass))
-        centre = _triple(own, "centre", bare.body.centre)
-        actuation = _triple(own, "actuation", centre)
+        inertia = _triple(section, "inertia", cube_inertia(bare.body.mass))
+        centre = _triple(section, "centre", bare.body.centre)
+        actuation = _triple(section, "actuation", centre)
         return replace(
             bare,
             body=Body(bare.body.mass, inertia, centre),
             actuation=actuation,
-            sensor=_triple(own, "sensor", actuation),
+            sensor=_triple(section, "sensor", actuation),
         )
 
-    def one(self, number: int) -> Mechanism:
+    def member(self, number: int) -> Mechanism:
         """One of many mechanisms."""
 
         def pick(value: Any) -> Any:
             if isinstance(value, tuple):
                 return tuple(map(pick, value))
             if isinstance(value, Body):
-                return Body(*(pick(getattr(value, each.name)) for each in fields(Body)))
+                return Body(*(pick(getattr(value, field.name)) for field in fields(Body)))
             return float(value[number]) if np.ndim(value) else value
 
-        return Mechanism(*(pick(getattr(self, each.name)) for each in fields(Mechanism)))
+        return Mechanism(*(pick(getattr(self, field.name)) for field in fields(Mechanism)))
 
     @property
     def weight(self) -> Any:
@@ -151,13 +151,13 @@ def cube_inertia(mass: Any) -> tuple[Any, Any, Any]:
     return moment, moment, moment
 
 
-def _triple(own: Mapping[str, Any], name: str, default: tuple[Any, Any, Any]) -> tuple[Any, Any, Any]:
+def _triple(section: Mapping[str, Any], name: str, default: tuple[Any, Any, Any]) -> tuple[Any, Any, Any]:
     """The three keys of a point or of inertias, each as given or its default."""
-    return tuple(own.get(f"{name}_{axis}", value) for axis, value in zip(AXES, default, strict=True))  # type: ignore[return-value]
+    return tuple(section.get(f"{name}_{axis}", value) for axis, value in zip(AXES, default, strict=True))  # type: ignore[return-value]
 
 
-def along_motion(it: Mechanism, point: tuple[Any, Any, Any], shapes: np.ndarray) -> np.ndarray:
+def along_motion(mechanism: Mechanism, point: tuple[Any, Any, Any], shapes: np.ndarray) -> np.ndarray:
     """Displacement along z of a point of the stage, (..., modes), in motions of it about its reference point, the
     middle of the leaf ends, shapes (..., 6, modes)."""
-    x, y = (np.asarray(each, dtype=float)[..., None] for each in (point[0] - it.length, point[1]))
+    x, y = (np.asarray(coordinate, dtype=float)[..., None] for coordinate in (point[0] - mechanism.length, point[1]))
     return shapes[..., 2, :] + shapes[..., 3, :] * y - shapes[..., 4, :] * x

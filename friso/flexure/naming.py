@@ -29,24 +29,24 @@ def mode_name(
     from cart to stage, `leaf_mass` [kg] that of one. What of the energy is found nowhere else is torsion of the leaves.
     """
     speed = stage[:3] + np.cross(stage[3:], arm)
-    own = np.concatenate([mass * speed**2, np.asarray(inertia, dtype=float) * stage[3:] ** 2])
+    energies = np.concatenate([mass * speed**2, np.asarray(inertia, dtype=float) * stage[3:] ** 2])
     _, y, z = leaf_mass * np.sum(_mean(leaves**2), axis=0)
     shares = {
-        **dict(zip(STAGE, own, strict=True)),
+        **dict(zip(STAGE, energies, strict=True)),
         "leaf bending": z,
         "leaf in-plane bending": y,
-        "leaf torsion": 1 - own.sum() - y - z,
+        "leaf torsion": 1 - energies.sum() - y - z,
     }
     name = max(shares, key=shares.__getitem__)
     if name == "drive" and stage[2] ** 2 < speed[2] ** 2 / 2:
-        return STAGE[3 + int(np.argmax(own[3:5]))]
+        return STAGE[3 + int(np.argmax(energies[3:5]))]
     if name == "leaf bending":
-        ripples = _own(leaves[:, :, 2])
+        ripples = _dynamic_part(leaves[:, :, 2])
         # what all leaves do alike
         alike = len(leaves) * np.sum(np.mean(ripples, axis=0) ** 2) / np.sum(ripples**2)
         return f"leaf bending, {'in' if alike > 0.5 else 'out of'} phase{_number(ripples)}"
     if name == "leaf in-plane bending":
-        return name + _number(_own(leaves[:, :, 1]))
+        return name + _number(_dynamic_part(leaves[:, :, 1]))
     return name
 
 
@@ -55,7 +55,7 @@ def _mean(values: np.ndarray) -> np.ndarray:
     return (values[:, 1:] + values[:, :-1]).mean(axis=1) / 2
 
 
-def _own(shapes: np.ndarray) -> np.ndarray:
+def _dynamic_part(shapes: np.ndarray) -> np.ndarray:
     """The shapes (leaves, points) without what follows a shift of the stage statically."""
     x = np.linspace(0, 1, shapes.shape[1])
     return shapes - np.outer(shapes[:, -1], x**2 * (3 - 2 * x))

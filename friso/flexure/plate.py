@@ -49,11 +49,11 @@ class Curl:
         root = np.sqrt(middle**2 - square)
         fast, slow = (np.sqrt(360 * (middle + sign * root)) / width for sign in (1, -1))
         half = length / 2
-        wanted = (half, 1.0) if odd else (1.0, 0.0)
+        at_clamp = (half, 1.0) if odd else (1.0, 0.0)
         slopes = [rate / _tanh(rate * half, odd) for rate in (fast, slow)]
         # a + b = m, a slope_1 + b slope_2 = m' at the clamp, h being 1 there
-        a = (wanted[1] - wanted[0] * slopes[1]) / (slopes[0] - slopes[1])
-        return cls(poisson, (fast, slow), (a, wanted[0] - a), odd)
+        a = (at_clamp[1] - at_clamp[0] * slopes[1]) / (slopes[0] - slopes[1])
+        return cls(poisson, (fast, slow), (a, at_clamp[0] - a), odd)
 
     def shape(self, s: Any, length: Any, derivative: int = 0) -> Any:
         """m - a h1 - b h2 at s, or its second derivative."""
@@ -93,9 +93,9 @@ def stiffening(length: Any, width: Any, poisson: Any, odd: bool = True) -> Any:
     curl = Curl.of(length, width, poisson, odd)
     # compliance: integral of f'' m over that of m^2, times (1 - nu^2) for a beam
     share = poisson**2 / (1 - poisson**2)
-    whole = length**3 / 12 if odd else length
+    beam = length**3 / 12 if odd else length
     lost = sum(weight * _moment_of(rate, length, odd) for rate, weight in zip(curl.rates, curl.weights, strict=True))
-    compliance = 1 + share * (1 - lost / whole)
+    compliance = 1 + share * (1 - lost / beam)
     return 1 + CONVERGED * (1 / ((1 - poisson**2) * compliance) - 1)
 
 
@@ -104,8 +104,8 @@ def compliance_profile(s: Any, length: Any, width: Any, poisson: Any) -> Any:
     parallel motion of its ends."""
     curl = Curl.of(length, width, poisson, odd=True)
     stiff = 1 - (1 - poisson**2) * curl.curvature(s, length) / s
-    whole = stiffening(length, width, poisson)
-    return 1 - stiff * (CONVERGED + whole - 1) / whole  # the share of `stiff` that more functions leave
+    factor = stiffening(length, width, poisson)
+    return 1 - stiff * (CONVERGED + factor - 1) / factor  # the share of `stiff` that more functions leave
 
 
 def _moment_of(rate: Any, length: Any, odd: bool) -> Any:
@@ -148,18 +148,18 @@ def cubic_twist(s: Any, length: Any, width: Any, poisson: Any) -> Any:
     return s**3 + 6 * s / rate**2 - (1 + 6 / rate**2) * _decay(rate, s, 2.0, odd=True)
 
 
-def tilted(shares: np.ndarray, torques: np.ndarray, places: np.ndarray, wanted: float) -> np.ndarray:
+def tilted(shares: np.ndarray, torques: np.ndarray, places: np.ndarray, weighted_sum: float) -> np.ndarray:
     """Compliances in torsion along a leaf (n,), changed by exp(tilt place^2) such that their sum stays (an even torque
-    twists the leaf as before) and that weighted by the square of the `torques` (n,) is what is `wanted`."""
-    tilt, whole = 0.0, shares.sum()
+    twists the leaf as before) and that weighted by the square of the `torques` (n,) is `weighted_sum`."""
+    tilt, total = 0.0, shares.sum()
     for _ in range(TILTS):
         now = shares * np.exp(tilt * places**2)
-        now *= whole / now.sum()
+        now *= total / now.sum()
         met = now @ torques**2
-        slope = now @ (torques * places) ** 2 - met * (now @ places**2) / whole
-        tilt += (wanted - met) / slope
+        slope = now @ (torques * places) ** 2 - met * (now @ places**2) / total
+        tilt += (weighted_sum - met) / slope
     now = shares * np.exp(tilt * places**2)
-    return now * whole / now.sum()
+    return now * total / now.sum()
 
 
 def free_twist(s: Any, length: Any, width: Any, poisson: Any) -> Any:

@@ -40,25 +40,27 @@ def linear(stage: Stage, case: str | Members | None = None, part: str = "plant",
     """
     flat: Mapping[str, Any] = stage.flat()
     cases = limit_cases(flat)
-    one = _checked(flat, case) if isinstance(case, Members) else _chosen("case", case or next(iter(cases)), cases)
-    if series and one.touched.all():
-        flat, one = limiter_in_series(flat), one.with_limiter(False)
-    system = _chosen("part", part, _PARTS)(flat, one)
+    member = _checked(flat, case) if isinstance(case, Members) else _chosen("case", case or next(iter(cases)), cases)
+    if series and member.touched.all():
+        flat, member = limiter_in_series(flat), member.with_limiter(False)
+    system = _chosen("part", part, _PARTS)(flat, member)
     return _control(system, f"{stage.name} {part}".strip())
 
 
-def _checked(flat: Mapping[str, Any], one: Members) -> Members:
+def _checked(flat: Mapping[str, Any], member: Members) -> Members:
     """A single state, if the stage can be in it. Raises InputError."""
-    if len(one) != 1:
-        raise InputError("case", f"{len(one)} states", "a single one", "friso.linear(stage, friso.member(speed=1e-3))")
-    if bool(one.touched[0]) not in limiter_states(flat):
-        given = f"a limiter that is {'' if one.touched[0] else 'not '}touched"
-        raise InputError("case", given, "what the joint allows: free with a stroke, it may be both", "touched=False")
-    least, most = -level(flat, not one.forward[0]), level(flat, bool(one.forward[0]))
-    if one.bias[0] and not least < one.bias[0] < most:
+    if len(member) != 1:
+        raise InputError(
+            "case", f"{len(member)} states", "a single one", "friso.linear(stage, friso.member(speed=1e-3))"
+        )
+    if bool(member.touched[0]) not in limiter_states(flat):
+        state = f"a limiter that is {'' if member.touched[0] else 'not '}touched"
+        raise InputError("case", state, "what the joint allows: free with a stroke, it may be both", "touched=False")
+    least, most = -level(flat, not member.forward[0]), level(flat, bool(member.forward[0]))
+    if member.bias[0] and not least < member.bias[0] < most:
         expected = f"between {least:g} N and {most:g} N, at which the cart breaks away"
-        raise InputError("case", f"a bias of {one.bias[0]:g} N", expected, "friso.member(bias=0.5)")
-    return one
+        raise InputError("case", f"a bias of {member.bias[0]:g} N", expected, "friso.member(bias=0.5)")
+    return member
 
 
 def _control(system: System, name: str) -> StateSpace:
@@ -68,21 +70,21 @@ def _control(system: System, name: str) -> StateSpace:
     return StateSpace(system.a[0], system.b[0], system.c[0], system.d[0], name=name, **names)
 
 
-def _plant(flat: Mapping[str, Any], one: Members) -> System:
-    return _shown(plant(flat, one))
+def _plant(flat: Mapping[str, Any], member: Members) -> System:
+    return _at_axis(plant(flat, member))
 
 
-def _controller(flat: Mapping[str, Any], one: Members) -> System:
-    whole = compensator(flat, len(one))
-    measures_velocity = whole.take((VELOCITY,), (FORCE,)).d.any()
-    return whole.take((REFERENCE, STAGE, VELOCITY) if measures_velocity else (REFERENCE, STAGE), (FORCE,))
+def _controller(flat: Mapping[str, Any], member: Members) -> System:
+    controller = compensator(flat, len(member))
+    measures_velocity = controller.take((VELOCITY,), (FORCE,)).d.any()
+    return controller.take((REFERENCE, STAGE, VELOCITY) if measures_velocity else (REFERENCE, STAGE), (FORCE,))
 
 
-def _closed(flat: Mapping[str, Any], one: Members) -> System:
-    return _shown(closed_loop(flat, one))
+def _closed(flat: Mapping[str, Any], member: Members) -> System:
+    return _at_axis(closed_loop(flat, member))
 
 
-def _shown(system: System) -> System:
+def _at_axis(system: System) -> System:
     """Without the velocity of the stage, which is the controller's business."""
     return system.take(system.inputs, [name for name in system.outputs if name != VELOCITY])
 
@@ -95,8 +97,8 @@ _PARTS: dict[str, Callable[[Mapping[str, Any], Members], System]] = {
 }
 
 
-def _chosen(what: str, name: str, known: Mapping[str, Any]) -> Any:
-    if name not in known:
-        first = next(iter(known))
-        raise InputError(what, quoted(name), f"one of {', '.join(known)}", f'friso.linear(stage, {what}="{first}")')
-    return known[name]
+def _chosen(what: str, name: str, choices: Mapping[str, Any]) -> Any:
+    if name not in choices:
+        first = next(iter(choices))
+        raise InputError(what, quoted(name), f"one of {', '.join(choices)}", f'friso.linear(stage, {what}="{first}")')
+    return choices[name]

@@ -92,16 +92,16 @@ class Bode:
         return bool(self.scan.stable.all())
 
 
-def bode(stage: Stage, shown: Range | None = None, series: bool = False) -> Bode:
-    """The linear analysis of a stage, its curves over frequencies `shown` [Hz] (default: those that matter); with
+def bode(stage: Stage, band: Range | None = None, series: bool = False) -> Bode:
+    """The linear analysis of a stage, its curves over frequencies `band` [Hz] (default: those that matter); with
     `series`, the thesis's formula for a touched limiter is shown beside. Raises InputError for frequencies that are not
     usable, a controller that exerts no force, and a delay that is too long (see `Drive`)."""
-    if shown is not None and not 0 < shown[0] < shown[1] < np.inf:
-        raise InputError("shown", repr(shown), "two rising frequencies [Hz]", "friso.bode(stage, (0.1, 1000.0))")
+    if band is not None and not 0 < band[0] < band[1] < np.inf:
+        raise InputError("band", repr(band), "two rising frequencies [Hz]", "friso.bode(stage, (0.1, 1000.0))")
     flat = stage.flat()
-    states = {name: (flat, one) for name, one in limit_cases(flat).items()} | (_in_series(flat) if series else {})
-    known = {name: margins(*each) for name, each in states.items()}
-    omega = _omega(flat, shown or _mattering(flat, known.values()))
+    states = {name: (flat, member) for name, member in limit_cases(flat).items()} | (_in_series(flat) if series else {})
+    margins_of = {name: margins(*state) for name, state in states.items()}
+    omega = _omega(flat, band or _mattering(flat, margins_of.values()))
     every = scan(flat, family(flat))
     worst = every.members[every.worst()]
     settled = every.members[every.worst(every.members.settled)]
@@ -110,8 +110,10 @@ def bode(stage: Stage, shown: Range | None = None, series: bool = False) -> Bode
         stage=stage,
         omega=omega,
         cases={
-            name: Case(one, _plant(own, one, omega), response(own, one, Drive.of(own))(omega), known[name])
-            for name, (own, one) in states.items()
+            name: Case(
+                member, _plant(keys, member, omega), response(keys, member, Drive.of(keys))(omega), margins_of[name]
+            )
+            for name, (keys, member) in states.items()
         },
         scan=every,
         loops=loops(flat, every.members, omega),
@@ -119,34 +121,38 @@ def bode(stage: Stage, shown: Range | None = None, series: bool = False) -> Bode
         settled=(settled, margins(flat, settled)),
         unstable=_unstable(flat, every.members),
         prescribed=_prescribed(flat, omega),
-        limits={name: limits(one.flat()) for name, one in variants.items() if name != "given" or len(variants) == 1},
+        limits={
+            name: limits(member.flat()) for name, member in variants.items() if name != "given" or len(variants) == 1
+        },
     )
 
 
-def _plant(flat: Mapping[str, Any], one: Members, omega: np.ndarray) -> Complex:
+def _plant(flat: Mapping[str, Any], member: Members, omega: np.ndarray) -> Complex:
     """Stage position over force [m/N] of a stage in one state, exactly."""
-    return plant(flat, one).take((FORCE,), (STAGE,)).at(1j * omega)[0, :, 0, 0]
+    return plant(flat, member).take((FORCE,), (STAGE,)).at(1j * omega)[0, :, 0, 0]
 
 
 def _in_series(flat: Mapping[str, Any]) -> dict[str, tuple[Mapping[str, Any], Members]]:
     """The cases with a touched limiter by the formula of Table 1: as stages whose limiter is not touched."""
-    touched = {name: one for name, one in limit_cases(flat).items() if one.touched[0]}
-    return {f"{name}-series": (limiter_in_series(flat), one.with_limiter(False)) for name, one in touched.items()}
+    touched = {name: member for name, member in limit_cases(flat).items() if member.touched[0]}
+    return {f"{name}-series": (limiter_in_series(flat), member.with_limiter(False)) for name, member in touched.items()}
 
 
-def _mattering(flat: Mapping[str, Any], known: Iterable[Margins]) -> Range:
+def _mattering(flat: Mapping[str, Any], all_margins: Iterable[Margins]) -> Range:
     """Frequencies [Hz] that show all crossovers and resonances."""
     poles = modes(flat, joined([*limit_cases(flat).values()]))
     resonances = np.abs(poles[np.abs(poles.imag) > np.abs(poles.real)]) / (2 * np.pi)
-    places = np.array([*(f for each in known for f in each.crossovers), *resonances[resonances > 1e-3]])
+    places = np.array(
+        [*(f for case_margins in all_margins for f in case_margins.crossovers), *resonances[resonances > 1e-3]]
+    )
     places = places if places.size else np.ones(1)
     return float(places.min()) / AROUND, min(float(places.max()) * AROUND, Drive.of(flat).highest / (2 * np.pi))
 
 
-def _omega(flat: Mapping[str, Any], shown: Range) -> np.ndarray:
+def _omega(flat: Mapping[str, Any], band: Range) -> np.ndarray:
     """Frequencies [rad/s] for curves, dense about resonances."""
     cases = joined([*limit_cases(flat).values()])
-    return with_resonances(np.geomspace(*shown, POINTS) * 2 * np.pi, [closed(flat, cases), modes(flat, cases)])
+    return with_resonances(np.geomspace(*band, POINTS) * 2 * np.pi, [closed(flat, cases), modes(flat, cases)])
 
 
 def _prescribed(flat: Mapping[str, Any], omega: np.ndarray) -> tuple[Prescribed, ...]:
@@ -165,14 +171,14 @@ def _prescribed(flat: Mapping[str, Any], omega: np.ndarray) -> tuple[Prescribed,
 def _unstable(flat: Mapping[str, Any], every: Members) -> tuple[Unstable, ...]:
     """The ranges of speed at which the stage is not stable, for each state of the limiter and direction."""
     sliding = every[~every.stuck]
-    found = []
+    ranges = []
     for touched, backward in sorted({*zip(sliding.touched.tolist(), (~sliding.forward).tolist(), strict=True)}):
         alike = sliding[(sliding.touched == touched) & (sliding.forward != backward)]
 
-        def stability(speed: np.ndarray, one: Members = alike[[0]]) -> np.ndarray:
-            return -spectral_abscissa(flat, replace(one.repeated(len(speed)), speed=speed))
+        def stability(speed: np.ndarray, member: Members = alike[[0]]) -> np.ndarray:
+            return -spectral_abscissa(flat, replace(member.repeated(len(speed)), speed=speed))
 
         for low, high in ranges_below(alike.speed, stability):
             before, after = steady_force(flat, np.array([low, high]), not backward)
-            found.append(Unstable(low, high, touched, not backward, bool(after < before)))
-    return tuple(found)
+            ranges.append(Unstable(low, high, touched, not backward, bool(after < before)))
+    return tuple(ranges)

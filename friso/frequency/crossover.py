@@ -10,7 +10,7 @@ import numpy as np
 
 from friso.equations.bandwidth import faster
 from friso.frequency.drive import Drive
-from friso.frequency.family import Looked, controller, distance_to_lines, grid, looked_at, plants, scan
+from friso.frequency.family import PoleStability, controller, distance_to_lines, grid, stability_by_poles, plants, scan
 from friso.frequency.members import Members, family, joined, limit_cases
 from friso.frequency.ranges import Range, ranges_below, shared
 
@@ -63,12 +63,12 @@ class Limits:
 def limits(flat: Mapping[str, Any]) -> Limits:
     """The crossovers at which a stage is stable, and comfortably so."""
     ends, members = searched(flat), settled_members(flat)
-    own = flat.get("controller.crossover", 1.0)
+    crossover = flat.get("controller.crossover", 1.0)
     stable = stable_crossovers(flat, members)
     close = ranges_below(np.geomspace(*ends, STEPS), lambda f: WANTED - _distance(flat, members, f).min(axis=1))
     comfortable = shared(close, stable)
-    highest, calm = (end_of(ranges, own) for ranges in (stable, comfortable))
-    above, beyond = (np.array([end * (1 + JUST) if end else own]) for end in (highest, calm))
+    highest, calm = (end_of(ranges, crossover) for ranges in (stable, comfortable))
+    above, beyond = (np.array([end * (1 + JUST) if end else crossover]) for end in (highest, calm))
     return Limits(
         ends,
         stable,
@@ -86,9 +86,9 @@ def stable_crossovers(flat: Mapping[str, Any], members: Members) -> tuple[Range,
     return ranges_below(at, lambda f: _abscissa(flat, members, f).max(axis=1))
 
 
-def end_of(ranges: Sequence[Range], own: float) -> float | None:
+def end_of(ranges: Sequence[Range], crossover: float) -> float | None:
     """Where the range ends that holds a crossover, or the next below it, or else the lowest; None if there is none."""
-    below = [high for low, high in ranges if low <= own] or [high for _, high in ranges[:1]]
+    below = [high for low, high in ranges if low <= crossover] or [high for _, high in ranges[:1]]
     return below[-1] if below else None
 
 
@@ -130,9 +130,9 @@ def _distance(flat: Mapping[str, Any], members: Members, crossover: np.ndarray) 
     return np.minimum(shared, _looked_at(flat, members, crossover).resonant.reshape(shared.shape))
 
 
-def _looked_at(flat: Mapping[str, Any], members: Members, crossover: np.ndarray) -> Looked:
+def _looked_at(flat: Mapping[str, Any], members: Members, crossover: np.ndarray) -> PoleStability:
     """All members at the first crossover, then at the second, and so on."""
-    return looked_at(_at(flat, np.repeat(crossover, len(members))), members.repeated(len(crossover)))
+    return stability_by_poles(_at(flat, np.repeat(crossover, len(members))), members.repeated(len(crossover)))
 
 
 def _search_grid(flat: Mapping[str, Any]) -> np.ndarray:

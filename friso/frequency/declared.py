@@ -28,8 +28,8 @@ class Declared:
         """Places of the entries of [[a, b], [c, d]] that are not zero, the function that computes them, and the names
         of what it takes."""
         rows = sp.Matrix([*self.rates, *self.outputs.values()])
-        whole = rows.jacobian([*self.states, *self.inputs.values()])
-        entries = {place: entry for place, entry in whole.todok().items() if entry != 0}
+        matrix = rows.jacobian([*self.states, *self.inputs.values()])
+        entries = {place: entry for place, entry in matrix.todok().items() if entry != 0}
         symbols = sorted(set[Any]().union(*(entry.free_symbols for entry in entries.values())), key=str)
         function = sp.lambdify(symbols, list(entries.values()), "numpy", cse=True)
         return list(entries), function, [str(symbol) for symbol in symbols]
@@ -38,10 +38,10 @@ class Declared:
         """The linear systems where the symbols have these values, numbers or arrays of shape (members,), by name."""
         places, function, names = self._entries
         n, m, p = len(self.states), len(self.inputs), len(self.outputs)
-        whole = np.zeros((members, n + p, n + m))
+        matrices = np.zeros((members, n + p, n + m))
         for (i, j), entry in zip(places, function(*(values[name] for name in names)), strict=True):
-            whole[:, i, j] = entry
-        parts = whole[:, :n, :n], whole[:, :n, n:], whole[:, n:, :n], whole[:, n:, n:]
+            matrices[:, i, j] = entry
+        parts = matrices[:, :n, :n], matrices[:, :n, n:], matrices[:, n:, :n], matrices[:, n:, n:]
         return System(*parts, tuple(map(str, self.states)), tuple(self.inputs), tuple(self.outputs))
 
 

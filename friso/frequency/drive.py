@@ -46,8 +46,8 @@ class Drive:
         """The drive of a stage. Raises InputError for a delay of more samples than are followed."""
         drive = cls(flat.get("drive.sample_time", 0.0), flat.get("drive.delay", 0.0))
         if drive.sample_time and drive.delay > MOST_SAMPLES * drive.sample_time * (1 + 1e-9):
-            given = f"{drive.delay:g} s, {drive.delay / drive.sample_time:.3g} samples of {drive.sample_time:g} s"
-            raise InputError("drive.delay", given, f"at most {MOST_SAMPLES} samples", 'delay = "100 us"')
+            text = f"{drive.delay:g} s, {drive.delay / drive.sample_time:.3g} samples of {drive.sample_time:g} s"
+            raise InputError("drive.delay", text, f"at most {MOST_SAMPLES} samples", 'delay = "100 us"')
         return drive
 
     @property
@@ -58,8 +58,8 @@ class Drive:
     @property
     def samples_late(self) -> tuple[int, float]:
         """The delay as whole samples, and the rest [s]."""
-        whole = int(self.delay / self.sample_time + 1e-9)
-        return whole, max(0.0, self.delay - whole * self.sample_time)
+        samples = int(self.delay / self.sample_time + 1e-9)
+        return samples, max(0.0, self.delay - samples * self.sample_time)
 
     def transfer(self, omega: np.ndarray) -> np.ndarray:
         """What hold and delay do to angular frequencies [rad/s], all but their aliases."""
@@ -91,11 +91,11 @@ def resonances(poles: Complex) -> Complex:
 def bilinear(control: System, sample_time: float) -> System:
     """A controller in discrete time [s], by the bilinear transform."""
     half = control.a * sample_time / 2
-    one = np.eye(len(control.states))
-    inverse = np.linalg.inv(one - half)
+    identity = np.eye(len(control.states))
+    inverse = np.linalg.inv(identity - half)
     b = inverse @ control.b * sample_time
     d = control.d + control.c @ b / 2
-    return replace(control, a=inverse @ (one + half), b=b, c=control.c @ inverse, d=d)
+    return replace(control, a=inverse @ (identity + half), b=b, c=control.c @ inverse, d=d)
 
 
 def zero_order_hold(machine: System, sample_time: float, late: float) -> System:
@@ -126,12 +126,12 @@ def waited(machine: System, samples: int) -> System:
 def delayed(machine: System, delay: float, loop: float) -> System:
     """A plant with one input behind a delay [s], as a row of rational functions (Pade), whose closed loop without delay
     has resonances of up to `loop` [rad/s]. Raises InputError where the plant's own turn too often in the delay."""
-    own = fastest(np.linalg.eigvals(machine.a).astype(complex)) * delay
-    sections = int(np.ceil(max(LEAST_TURN, own, min(loop * delay, MOST_TURN)) / TURN))
+    turn = fastest(np.linalg.eigvals(machine.a).astype(complex)) * delay
+    sections = int(np.ceil(max(LEAST_TURN, turn, min(loop * delay, MOST_TURN)) / TURN))
     if sections > MOST_SECTIONS:
         expected = f"at most {MOST_SECTIONS * TURN / (2 * np.pi):.3g} periods, or a drive.sample_time"
-        given = f"{delay:g} s, {own / (2 * np.pi):.3g} periods of the fastest mode"
-        raise InputError("drive.delay", given, expected, 'delay = "100 us"')
+        text = f"{delay:g} s, {turn / (2 * np.pi):.3g} periods of the fastest mode"
+        raise InputError("drive.delay", text, expected, 'delay = "100 us"')
     from control import pade
 
     for k in range(sections):
@@ -159,9 +159,9 @@ def _behind(machine: System, first: tuple[np.ndarray, ...], name: str) -> System
 def _transition(machine: System, time: float) -> tuple[np.ndarray, np.ndarray]:
     """How states and a constant force act on the states a time [s] later."""
     n = len(machine.states)
-    whole = np.zeros((len(machine.a), n + 1, n + 1))
-    whole[:, :n, :n], whole[:, :n, n:] = machine.a * time, machine.b * time
-    moved = exponentials(whole)
+    matrices = np.zeros((len(machine.a), n + 1, n + 1))
+    matrices[:, :n, :n], matrices[:, :n, n:] = machine.a * time, machine.b * time
+    moved = exponentials(matrices)
     return moved[:, :n, :n], moved[:, :n, n:]
 
 
@@ -170,8 +170,8 @@ def exponentials(matrices: np.ndarray) -> np.ndarray:
     doi:10.1137/04061101X), for all members at once, which `scipy.linalg.expm` takes one by one."""
     norm = np.abs(matrices).sum(axis=-2).max()
     squarings = max(0, int(np.ceil(np.log2(norm / SCALED)))) if norm > 0 else 0
-    scaled, one = matrices / 2.0**squarings, np.eye(matrices.shape[-1])
-    power, even, odd = one, one * 0.0, one * 0.0
+    scaled, identity = matrices / 2.0**squarings, np.eye(matrices.shape[-1])
+    power, even, odd = identity, identity * 0.0, identity * 0.0
     for k, weight in enumerate(PADE_6):
         term = weight * power
         even, odd = (even + term, odd) if k % 2 == 0 else (even, odd + term)

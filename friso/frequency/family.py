@@ -28,10 +28,10 @@ CHUNK = 256
 """Members that are computed together: their arrays then stay in the cache."""
 
 DENSITY = 35
-"""Frequencies per decade at which all members are looked at, besides those about resonances of the limit cases."""
+"""Frequencies per decade at which all members are by_poles at, besides those about resonances of the limit cases."""
 
 NEAR = np.array([-1.0, -0.5, 0.0, 0.5, 1.0])
-"""Where a member is looked at about its own closed-loop resonances, in units of their half widths."""
+"""Where a member is by_poles at about its own closed-loop resonances, in units of their half widths."""
 
 CLOSEST = 16
 """Members whose margin is computed exactly."""
@@ -63,17 +63,17 @@ def scan(flat: Mapping[str, Any], members: Members) -> Scan:
     """Stability of every member, and its modulus margin: on frequencies that all share and about its own closed-loop
     resonances, and exactly for those that come closest to -1 there."""
     omega = grid(flat, DENSITY)
-    known = looked_at(flat, members)
+    by_poles = stability_by_poles(flat, members)
     parts = (members[part] for part in _split(np.arange(len(members))))
     shared = np.concatenate(_side_by_side(lambda part: distance_to_lines(loops(flat, part, omega)), parts))
-    distance = np.minimum(shared, known.resonant)
-    for k in np.argsort(np.where(known.abscissa < 0, distance, np.inf))[:CLOSEST]:
+    distance = np.minimum(shared, by_poles.resonant)
+    for k in np.argsort(np.where(by_poles.abscissa < 0, distance, np.inf))[:CLOSEST]:
         exact = margins(flat, members[k]).modulus_margin
         distance[k] = distance[k] if np.isnan(exact) else exact
-    return Scan(members, known.abscissa, distance)
+    return Scan(members, by_poles.abscissa, distance)
 
 
-class Looked(NamedTuple):
+class PoleStability(NamedTuple):
     """Real part of the rightmost closed-loop pole [1/s], 0 on the edge of stability, and the least abs(1 + L) about
     closed-loop resonances, both of shape (members,)."""
 
@@ -81,40 +81,40 @@ class Looked(NamedTuple):
     resonant: np.ndarray
 
 
-def looked_at(flat: Mapping[str, Any], members: Members) -> Looked:
+def stability_by_poles(flat: Mapping[str, Any], members: Members) -> PoleStability:
     """Every member by its own poles; `flat` may hold arrays of shape (members,), but for the drive's keys."""
-    drive, found = Drive.of(flat), Looked(np.empty(len(members)), np.empty(len(members)))
+    drive, by_poles = Drive.of(flat), PoleStability(np.empty(len(members)), np.empty(len(members)))
 
     def look(which: np.ndarray) -> None:
-        own = {key: value[which] if np.ndim(value) else value for key, value in flat.items()}
-        known = poles(own, members[which], drive)
-        found.abscissa[which], found.resonant[which] = known.abscissa, _about_resonances(known)
+        keys = {key: value[which] if np.ndim(value) else value for key, value in flat.items()}
+        part_poles = poles(keys, members[which], drive)
+        by_poles.abscissa[which], by_poles.resonant[which] = part_poles.abscissa, _about_resonances(part_poles)
 
     numbers = (np.flatnonzero(mask) for mask in (members.stuck, ~members.stuck))
-    _side_by_side(look, [part for each in numbers for part in _split(each)])
-    return found
+    _side_by_side(look, [part for numbers_of_kind in numbers for part in _split(numbers_of_kind)])
+    return by_poles
 
 
 def spectral_abscissa(flat: Mapping[str, Any], members: Members) -> np.ndarray:
     """Real part [1/s] of the rightmost closed-loop pole, shape (members,), 0 on the edge of stability."""
-    return looked_at(flat, members).abscissa
+    return stability_by_poles(flat, members).abscissa
 
 
-def _about_resonances(known: Poles) -> np.ndarray:
+def _about_resonances(system: Poles) -> np.ndarray:
     """The least abs(1 + L) about the lightly damped closed-loop poles of each member, shape (members,)."""
-    closed = known.in_s
+    closed = system.in_s
     light = (closed.imag > 0) & (np.abs(closed.real) < LIGHT * closed.imag)
     omega = np.where(light, closed.imag, np.nan)[:, :, None] + NEAR * np.where(light, closed.real, np.nan)[:, :, None]
-    omega = np.clip(omega, 0, known.drive.highest).reshape(len(closed), -1)
-    return np.nanmin(np.where(np.isnan(omega), np.inf, known.distance(np.nan_to_num(omega, nan=1.0))), axis=1)
+    omega = np.clip(omega, 0, system.drive.highest).reshape(len(closed), -1)
+    return np.nanmin(np.where(np.isnan(omega), np.inf, system.distance(np.nan_to_num(omega, nan=1.0))), axis=1)
 
 
 def distance_to_lines(loop: Complex) -> np.ndarray:
     """Least distance from -1 of loops over ascending frequencies, shape (..., k), joined by straight lines: (...)."""
-    start, way = 1 + loop[..., :-1], np.diff(loop, axis=-1)
-    length = np.maximum(np.abs(way) ** 2, np.finfo(float).tiny)
-    along = np.clip(-(start * way.conj()).real / length, 0, 1)
-    return np.abs(start + along * way).min(axis=-1)
+    start, step = 1 + loop[..., :-1], np.diff(loop, axis=-1)
+    length = np.maximum(np.abs(step) ** 2, np.finfo(float).tiny)
+    along = np.clip(-(start * step.conj()).real / length, 0, 1)
+    return np.abs(start + along * step).min(axis=-1)
 
 
 def grid(flat: Mapping[str, Any], density: float) -> np.ndarray:
@@ -127,13 +127,13 @@ def grid(flat: Mapping[str, Any], density: float) -> np.ndarray:
 def closed(flat: Mapping[str, Any], members: Members) -> Complex:
     """Finite closed-loop poles [rad/s] of members."""
     drive = Drive.of(flat)
-    every = np.concatenate([poles(flat, each, drive).in_s.ravel() for each in members.kinds])
+    every = np.concatenate([poles(flat, kind, drive).in_s.ravel() for kind in members.kinds])
     return every[np.isfinite(every)]
 
 
 def modes(flat: Mapping[str, Any], members: Members) -> Complex:
     """Poles [rad/s] of the plant in all these states."""
-    return np.concatenate([np.linalg.eigvals(plant(flat, each).a).ravel() for each in members.kinds]).astype(complex)
+    return np.concatenate([np.linalg.eigvals(plant(flat, kind).a).ravel() for kind in members.kinds]).astype(complex)
 
 
 def plants(flat: Mapping[str, Any], members: Members, omega: np.ndarray) -> Complex:
@@ -153,9 +153,9 @@ def _cart_held(flat: Mapping[str, Any], masses: System, s: np.ndarray) -> Comple
     if shared_structure(flat).joint == "rigid":
         return np.zeros((len(masses.a), len(s)), complex)
     cart = cart_states(flat)
-    kept = [i for i, name in enumerate(masses.states) if name not in cart]
-    a, b, c = masses.a[:, kept][:, :, kept], masses.b[:, kept], masses.c[:, :, kept]
-    names = tuple(masses.states[i] for i in kept)
+    held = [i for i, name in enumerate(masses.states) if name not in cart]
+    a, b, c = masses.a[:, held][:, :, held], masses.b[:, held], masses.c[:, :, held]
+    names = tuple(masses.states[i] for i in held)
     return replace(masses, a=a, b=b, c=c, states=names).at(s)[..., 0, 0]
 
 
@@ -178,11 +178,11 @@ def impedance(flat: Mapping[str, Any], members: Members, s: np.ndarray) -> Compl
     if law is None:
         return np.zeros((len(members), len(s)), complex)
     velocity = np.where(members.forward, members.speed, -members.speed)
-    own = law.declared.at({**flat, **operating_point(flat, members), "velocity": velocity}, len(members))
-    total = np.broadcast_to(own.d[:, 0], (len(members), len(s))).astype(complex)
+    system = law.declared.at({**flat, **operating_point(flat, members), "velocity": velocity}, len(members))
+    total = np.broadcast_to(system.d[:, 0], (len(members), len(s))).astype(complex)
     if law.states:
-        values, vectors = np.linalg.eig(own.a)
-        residues = (own.c @ vectors)[:, 0] * np.linalg.solve(vectors, own.b.astype(complex))[..., 0]
+        values, vectors = np.linalg.eig(system.a)
+        residues = (system.c @ vectors)[:, 0] * np.linalg.solve(vectors, system.b.astype(complex))[..., 0]
         for k in range(len(law.states)):
             total += residues[:, k, None] / (s - values[:, k, None])
     return total

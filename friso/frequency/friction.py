@@ -58,8 +58,8 @@ def _law(name: str, variant: Hashable) -> Law | None:
     friction = friction_law(name).declare(VELOCITY, variant)
     if friction is None:
         return None
-    states = tuple(each.symbol for each in friction.component.states)
-    rates = tuple(each.derivative for each in friction.component.states)
+    states = tuple(state.symbol for state in friction.component.states)
+    rates = tuple(state.derivative for state in friction.component.states)
     declared = Declared(states, rates, {"velocity": VELOCITY}, {"force": friction.force})
     sliding = solved(rates, states) if states else []
     at_rest = friction.force.subs(VELOCITY, 0) - BIAS
@@ -70,7 +70,7 @@ def _law(name: str, variant: Hashable) -> Law | None:
 
 def _compiled(expressions: list[sp.Expr]) -> Callable[[Mapping[str, Any]], list[Any]]:
     """The expressions as a function of the values of their symbols by name."""
-    symbols = sorted(set[Any]().union(*(each.free_symbols for each in expressions)), key=str)
+    symbols = sorted(set[Any]().union(*(expression.free_symbols for expression in expressions)), key=str)
     function = sp.lambdify(symbols, expressions, "numpy")
     return lambda values: function(*(values[str(symbol)] for symbol in symbols))
 
@@ -90,7 +90,7 @@ def steady_force(flat: Mapping[str, Any], speeds: np.ndarray, forward: bool) -> 
 
 def speeds(flat: Mapping[str, Any], count: int) -> np.ndarray:
     """Speeds [m/s] from creeping to so fast that friction hardly depends on it, shape (count,)."""
-    units = {key: each.unit for key, each in numeric_keys(flat).items() if key.startswith("friction.")}
+    units = {key: quantity.unit for key, quantity in numeric_keys(flat).items() if key.startswith("friction.")}
     named = [flat[key] for key, unit in units.items() if unit == "m/s" and key in flat]
     if named:
         return np.geomspace(SLOWEST * min(named), FASTEST * max(named), count)

@@ -44,20 +44,20 @@ def closed_loop(flat: Mapping[str, Any], members: Members) -> System:
     outside = np.zeros((len(members), n + k, 2))
     outside[:, :n] = machine.b
     inside = np.concatenate([push @ commanded.d, commanded.b], axis=1)
-    shown = np.concatenate([machine.c, np.zeros((len(members), machine.c.shape[1], k))], axis=2)
+    outputs = np.concatenate([machine.c, np.zeros((len(members), machine.c.shape[1], k))], axis=2)
     force = np.concatenate([measured.d @ seen.c, control.c], axis=2)
-    d = np.zeros((len(members), shown.shape[1] + 1, 4))
+    d = np.zeros((len(members), outputs.shape[1] + 1, 4))
     d[:, -1:, 2:] = commanded.d
-    whole = System(
+    system = System(
         a,
         np.concatenate([outside, inside], axis=2),
-        np.concatenate([shown, force], axis=1),
+        np.concatenate([outputs, force], axis=1),
         d,
         machine.states + control.states,
         (FORCE, DISTURBANCE, REFERENCE, NOISE),
         (*machine.outputs, FORCE),
     )
-    return whole
+    return system
 
 
 @dataclass(frozen=True)
@@ -82,8 +82,8 @@ class Poles:
         step = self.drive.sample_time or self.drive.delay
         if not step:
             return _real_parts(self.closed).max(axis=1)
-        own, bare = self.in_s, self.continuous
-        fast = np.where(np.abs(own) > SLOW / step, _real_parts(own), -np.inf)
+        closed, bare = self.in_s, self.continuous
+        fast = np.where(np.abs(closed) > SLOW / step, _real_parts(closed), -np.inf)
         slow = np.where(np.abs(bare) <= SLOW / step, _real_parts(bare), -np.inf)
         return np.maximum(fast.max(axis=1), slow.max(axis=1))
 
@@ -91,10 +91,10 @@ class Poles:
         """abs(1 + L) at angular frequencies [rad/s], shape (members, k): the distances from all closed-loop poles over
         those from all poles of the cut loop."""
         at = np.exp(1j * omega * self.drive.sample_time) if self.drive.sample_time else 1j * omega
-        found = np.ones(omega.shape)
+        distance = np.ones(omega.shape)
         for k in range(self.closed.shape[1]):
-            found = found * (np.abs(at - self.closed[:, [k]]) / np.abs(at - self.cut[:, [k]]))
-        return found
+            distance = distance * (np.abs(at - self.closed[:, [k]]) / np.abs(at - self.cut[:, [k]]))
+        return distance
 
 
 def poles(flat: Mapping[str, Any], members: Members, drive: Drive) -> Poles:
@@ -103,8 +103,8 @@ def poles(flat: Mapping[str, Any], members: Members, drive: Drive) -> Poles:
     machine, control = plant(flat, members).take((FORCE,), (STAGE, VELOCITY)), compensator(flat, len(members))
     bare = _cut(machine, control)
     if drive.sample_time:
-        whole, late = drive.samples_late
-        machine = waited(zero_order_hold(machine, drive.sample_time, late), whole)
+        samples, late = drive.samples_late
+        machine = waited(zero_order_hold(machine, drive.sample_time, late), samples)
         control = bilinear(control, drive.sample_time)
     elif drive.delay:
         machine = delayed(machine, drive.delay, fastest(_shut(bare)))
@@ -114,19 +114,19 @@ def poles(flat: Mapping[str, Any], members: Members, drive: Drive) -> Poles:
     return Poles(closed, cut, closed if loop is bare else _shut(bare), drive)
 
 
-def response(flat: Mapping[str, Any], one: Members, drive: Drive) -> Callable[[np.ndarray], Complex]:
+def response(flat: Mapping[str, Any], member: Members, drive: Drive) -> Callable[[np.ndarray], Complex]:
     """L over angular frequencies [rad/s], exactly, of a stage in one state."""
     if not drive.sample_time:
-        loop = open_loop(flat, one)
+        loop = open_loop(flat, member)
         return lambda omega: loop.at(1j * omega)[0, :, 0, 0] * np.exp(-1j * omega * drive.delay)
-    machine, control = plant(flat, one).take((FORCE,), (STAGE, VELOCITY)), compensator(flat, 1)
-    whole, late = drive.samples_late
+    machine, control = plant(flat, member).take((FORCE,), (STAGE, VELOCITY)), compensator(flat, 1)
+    samples, late = drive.samples_late
     held = zero_order_hold(machine, drive.sample_time, late)
     sampled = _cut(held, bilinear(control, drive.sample_time))
 
     def at(omega: np.ndarray) -> Complex:
         z = np.exp(1j * omega * drive.sample_time)
-        return sampled.at(z)[0, :, 0, 0] * z ** -float(whole)
+        return sampled.at(z)[0, :, 0, 0] * z ** -float(samples)
 
     return at
 
@@ -147,9 +147,9 @@ def _shut(loop: System) -> Complex:
     return np.linalg.eigvals(loop.a - loop.b @ loop.c).astype(complex)
 
 
-def _real_parts(known: Complex) -> np.ndarray:
+def _real_parts(poles: Complex) -> np.ndarray:
     """Real parts of poles, shape (members, n), 0 for those on the imaginary axis as far as rounding can tell."""
-    size = np.abs(known)
+    size = np.abs(poles)
     fastest = np.where(np.isfinite(size), size, 0.0).max(axis=1, keepdims=True)
-    edge = np.where(known.imag != 0, UNDAMPED * size, 0.0) + ROUNDING * fastest
-    return np.where(np.abs(known.real) <= edge, 0.0, known.real)
+    edge = np.where(poles.imag != 0, UNDAMPED * size, 0.0) + ROUNDING * fastest
+    return np.where(np.abs(poles.real) <= edge, 0.0, poles.real)

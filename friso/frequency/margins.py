@@ -76,14 +76,14 @@ class Margins:
         return 1 / self.modulus_margin if self.modulus_margin else np.inf
 
 
-def margins(flat: Mapping[str, Any], one: Members) -> Margins:
+def margins(flat: Mapping[str, Any], member: Members) -> Margins:
     """The margins of a stage in one of its states. Raises InputError for a delay that is too long (see `Drive`)."""
     drive = Drive.of(flat)
-    known, at = poles(flat, one, drive), response(flat, one, drive)
-    closed = known.in_s[0]
-    omega = frequencies(flat, one, drive, DENSITY, [closed, drive.to_s(known.cut[0])])
+    closed_poles, at = poles(flat, member, drive), response(flat, member, drive)
+    closed = closed_poles.in_s[0]
+    omega = frequencies(flat, member, drive, DENSITY, [closed, drive.to_s(closed_poles.cut[0])])
     ends = [*_at_rest(at, omega[0]), *([at(np.array([drive.highest]))[0]] if drive.sample_time else [])]
-    return of_loop(at, closed[np.isfinite(closed)], float(known.abscissa[0]), omega, np.array(ends, complex))
+    return of_loop(at, closed[np.isfinite(closed)], float(closed_poles.abscissa[0]), omega, np.array(ends, complex))
 
 
 def frequencies(
@@ -91,7 +91,7 @@ def frequencies(
 ) -> np.ndarray:
     """Angular frequencies [rad/s] that show all that loops of these states do, up to the highest the drive knows: so
     many per decade, and more about the resonances among the poles `resonant`."""
-    size = np.concatenate([np.abs(poles(flat, each, Drive(0.0, 0.0)).closed).ravel() for each in members.kinds])
+    size = np.concatenate([np.abs(poles(flat, kind, Drive(0.0, 0.0)).closed).ravel() for kind in members.kinds])
     size = size[size > NEGLIGIBLE * size.max(initial=0.0)] if size.any() else np.ones(1)
     low, high = size.min() / BEYOND, min(size.max() * BEYOND, drive.highest)
     return with_resonances(np.geomspace(low, high, int(density * np.log10(high / low)) + 2), resonant)
@@ -99,7 +99,7 @@ def frequencies(
 
 def with_resonances(even: np.ndarray, resonant: Sequence[Complex]) -> np.ndarray:
     """Ascending angular frequencies [rad/s] with those about the resonances of these poles among them."""
-    light = resonances(np.concatenate([each.ravel() for each in resonant]))
+    light = resonances(np.concatenate([roots.ravel() for roots in resonant]))
     near = (np.abs(light.imag)[:, None] + np.abs(light.real)[:, None] * AROUND).ravel()
     return np.unique(np.concatenate([even, near[(near > even[0]) & (near < even[-1])]]))
 
@@ -148,8 +148,10 @@ def _roots(function: Callable[[float], float], omega: np.ndarray, values: np.nda
     """Where a function of the frequency, known at some, passes zero."""
     with np.errstate(invalid="ignore"):
         passes = np.flatnonzero(values[:-1] * values[1:] < 0)
-    found = [brentq(function, omega[k], omega[k + 1], xtol=1e-14 * omega[k], rtol=np.float64(1e-13)) for k in passes]
-    return np.array(sorted({*found, *omega[values == 0].tolist()}))
+    crossings = [
+        brentq(function, omega[k], omega[k + 1], xtol=1e-14 * omega[k], rtol=np.float64(1e-13)) for k in passes
+    ]
+    return np.array(sorted({*crossings, *omega[values == 0].tolist()}))
 
 
 def _gains(response: Response, omega: np.ndarray, seen: Complex, ends: Complex) -> np.ndarray:
@@ -166,11 +168,11 @@ def _closest(response: Response, omega: np.ndarray, distance: np.ndarray) -> tup
     least = int(distance.argmin())
     best = float(omega[least]), float(distance[least])
     for k in inner[distance[inner] < 1.1 * best[1]]:
-        found: Any = minimize_scalar(
+        minimum: Any = minimize_scalar(
             lambda w: abs(1 + response(np.array([w]))[0]),
             bounds=(omega[k - 1], omega[k + 1]),
             method="bounded",
             options={"xatol": 1e-9 * omega[k]},
         )
-        best = min(best, (float(found.x), float(found.fun)), key=lambda pair: pair[1])
+        best = min(best, (float(minimum.x), float(minimum.fun)), key=lambda pair: pair[1])
     return best

@@ -37,7 +37,7 @@ class Members:
 
     def __getitem__(self, which: Any) -> Members:
         """Those at the numbers given, or in a boolean array."""
-        return Members(*(np.atleast_1d(getattr(self, each.name)[which]) for each in fields(self)))
+        return Members(*(np.atleast_1d(getattr(self, field.name)[which]) for field in fields(self)))
 
     @property
     def kinds(self) -> list[Members]:
@@ -59,7 +59,7 @@ class Members:
 
     def repeated(self, times: int) -> Members:
         """All of them, so many times one after the other."""
-        return Members(*(np.tile(getattr(self, each.name), times) for each in fields(self)))
+        return Members(*(np.tile(getattr(self, field.name), times) for field in fields(self)))
 
 
 def member(speed: float = 0.0, bias: float = 0.0, touched: bool = False, forward: bool = True) -> Members:
@@ -74,7 +74,7 @@ def member(speed: float = 0.0, bias: float = 0.0, touched: bool = False, forward
 
 def joined(parts: list[Members]) -> Members:
     """All members of several families, one after the other."""
-    return Members(*(np.concatenate([getattr(part, each.name) for part in parts]) for each in fields(Members)))
+    return Members(*(np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(Members)))
 
 
 def limit_cases(flat: Mapping[str, Any]) -> dict[str, Members]:

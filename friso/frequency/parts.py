@@ -35,9 +35,9 @@ def plant(flat: Mapping[str, Any], members: Members) -> System:
     values = {**flat, **operating_point(flat, members)}
     values |= dict.fromkeys(form.velocities, velocity)
     values |= {"beyond_stroke_ahead": members.touched.astype(float), "beyond_stroke_behind": 0.0}
-    whole = form.declared.at(values, len(members))
+    system = form.declared.at(values, len(members))
     law = law_of(flat)
-    return _following(whole, form.cart, law.states) if law is not None and members.stuck.all() else whole
+    return _following(system, form.cart, law.states) if law is not None and members.stuck.all() else system
 
 
 def mechanics(flat: Mapping[str, Any], touched: np.ndarray) -> System:
@@ -52,10 +52,10 @@ def compensator(flat: Mapping[str, Any], members: int) -> System:
     for one that exerts none."""
     form = shared_structure(flat).controller
     assert form is not None  # a stage file has a controller
-    found = _compensator(replace(form, limited=False)).at(flat, members)
-    if not (found.c.any() or found.d.any()):
+    system = _compensator(replace(form, limited=False)).at(flat, members)
+    if not (system.c.any() or system.d.any()):
         raise InputError("controller", "gains that are all 0", "a controller that acts", 'kp = "3 N/m"')
-    return found
+    return system
 
 
 @dataclass(frozen=True)
@@ -71,12 +71,12 @@ class _Plant:
 @cache
 def _plant(form: Structure) -> _Plant:
     model = assemble(replace(form, controller=None, biased=("cart", "stage")))
-    found = {name: output.expression for name, output in model.outputs.items()}
-    outputs = {STAGE: found["position"], CART: found["cart_position"], VELOCITY: found["velocity"]}
-    if "joint_deflection" in found:
-        outputs[DEFLECTION] = found["joint_deflection"]
+    expressions = {name: output.expression for name, output in model.outputs.items()}
+    outputs = {STAGE: expressions["position"], CART: expressions["cart_position"], VELOCITY: expressions["velocity"]}
+    if "joint_deflection" in expressions:
+        outputs[DEFLECTION] = expressions["joint_deflection"]
     inputs = {FORCE: sp.Symbol("bias.stage", real=True), DISTURBANCE: sp.Symbol("bias.cart", real=True)}
-    velocities = tuple(str(each.symbol) for each in model.states if each.role == Role.VELOCITY)
+    velocities = tuple(str(state.symbol) for state in model.states if state.role == Role.VELOCITY)
     cart = (str(model.cart.position), str(model.cart.velocity))
     return _Plant(Declared(model.symbols, model.rhs, inputs, outputs), velocities, cart)
 
@@ -91,23 +91,25 @@ def _compensator(form: ControllerForm) -> Declared:
     loop = Loop(_REFERENCE - _POSITION, _POSITION, _VELOCITY, sp.S.Zero)
     control = controller(form, loop, sp.S.One, sp.S.One)
     states = control.component.states
-    symbols, rates = tuple(each.symbol for each in states), tuple(each.derivative for each in states)
+    symbols, rates = tuple(state.symbol for state in states), tuple(state.derivative for state in states)
     return Declared(symbols, rates, _CONTROLLER_INPUTS, {FORCE: control.force})
 
 
-def _following(whole: System, cart: tuple[str, str], internal: tuple[str, ...]) -> System:
+def _following(system: System, cart: tuple[str, str], internal: tuple[str, ...]) -> System:
     """The system with the internal states of the friction law following the cart, which is stuck.
 
     At rest their rate is proportional to the velocity of the cart alone, so that they differ from a multiple of its
     position by a constant: where on the rail it got stuck. Nothing controls that, nor does it matter; it would be a
     pole at 0.
     """
-    position, velocity = map(whole.states.index, cart)
-    a, c = whole.a.copy(), whole.c.copy()
-    for z in map(whole.states.index, internal):
-        share = whole.a[:, z, velocity]
+    position, velocity = map(system.states.index, cart)
+    a, c = system.a.copy(), system.c.copy()
+    for z in map(system.states.index, internal):
+        share = system.a[:, z, velocity]
         for matrix in (a, c):
             matrix[:, :, position] += share[:, None] * matrix[:, :, z]
-    kept = [i for i, name in enumerate(whole.states) if name not in internal]
-    states = tuple(whole.states[i] for i in kept)
-    return replace(whole, a=a[:, kept][:, :, kept], b=whole.b[:, kept], c=c[:, :, kept], states=states)
+    external = [i for i, name in enumerate(system.states) if name not in internal]
+    states = tuple(system.states[i] for i in external)
+    return replace(
+        system, a=a[:, external][:, :, external], b=system.b[:, external], c=c[:, :, external], states=states
+    )

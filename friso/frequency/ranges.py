@@ -21,9 +21,9 @@ def ranges_below(at: np.ndarray, excess: Callable[[np.ndarray], np.ndarray]) -> 
     return tuple((float(a), float(b)) for a, b in zip(ends[::2], ends[1::2], strict=True))
 
 
-def shared(one: tuple[Range, ...], other: tuple[Range, ...]) -> tuple[Range, ...]:
+def shared(first: tuple[Range, ...], second: tuple[Range, ...]) -> tuple[Range, ...]:
     """What two lists of ranges have in common."""
-    pairs = [(max(a[0], b[0]), min(a[1], b[1])) for a in one for b in other]
+    pairs = [(max(a[0], b[0]), min(a[1], b[1])) for a in first for b in second]
     return tuple(pair for pair in pairs if pair[0] < pair[1])
 
 

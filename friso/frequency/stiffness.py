@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from typing import Any
 
 
-def in_series(one: Any, other: Any) -> Any:
+def in_series(first: Any, second: Any) -> Any:
     """Stiffness [N/m] of two springs, or damping [N s/m] of two dampers, in series (Eq. 1)."""
-    return one * other / (one + other)
+    return first * second / (first + second)
 
 
 def sensitivity(friction_stiffness: Any, joint_stiffness: Any) -> Any:
@@ -28,5 +28,5 @@ def limiter_in_series(flat: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _printed(flat: Mapping[str, Any], joint: str, limiter: str) -> Any:
-    one, other = flat[f"joint.{joint}"], flat[f"joint.{limiter}"]
-    return in_series(one, other) if one + other else one
+    joint_value, limiter_value = flat[f"joint.{joint}"], flat[f"joint.{limiter}"]
+    return in_series(joint_value, limiter_value) if joint_value + limiter_value else joint_value

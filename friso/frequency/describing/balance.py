@@ -87,13 +87,13 @@ def single_harmonic(
     turns, unknown = _turns(left)
     cells = np.argwhere(turns != 0)
     middles = np.stack([(axis[cell] + axis[cell + 1]) / 2 for axis, cell in zip(axes, cells.T, strict=True)])
-    found = loop.polished(middles)
-    error = loop.left(found)[1]
-    good = (error < SOLVED) & _near(axes, cells, found)
+    solutions = loop.polished(middles)
+    error = loop.left(solutions)[1]
+    good = (error < SOLVED) & _near(axes, cells, solutions)
     i, j = np.unravel_index(np.argmin(np.where(np.isnan(residual), np.inf, residual)), shape)
     least = (float(residual[i, j]), float(sizes[i]), float(rates[j]))
-    found, error = found[:, good], error[good]
-    return Balance(np.exp(found[0]), np.exp(found[1]), error, *least, int(unknown.sum()), int((~good).sum()))
+    solutions, error = solutions[:, good], error[good]
+    return Balance(np.exp(solutions[0]), np.exp(solutions[1]), error, *least, int(unknown.sum()), int((~good).sum()))
 
 
 def _turns(left: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -106,10 +106,10 @@ def _turns(left: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return np.rint(np.where(unknown, 0.0, turns)).astype(int), unknown
 
 
-def _near(axes: tuple[np.ndarray, np.ndarray], cells: np.ndarray, found: np.ndarray) -> np.ndarray:
+def _near(axes: tuple[np.ndarray, np.ndarray], cells: np.ndarray, solutions: np.ndarray) -> np.ndarray:
     """Whether places (2, count) are inside their cells (count, 2), or inside one next to them."""
     near = np.ones(len(cells), bool)
-    for axis, cell, place in zip(axes, cells.T, found, strict=True):
+    for axis, cell, place in zip(axes, cells.T, solutions, strict=True):
         low, high = axis[np.maximum(cell - 1, 0)], axis[np.minimum(cell + 2, len(axis) - 1)]
         near &= (low <= place) & (place <= high)
     return near

@@ -91,7 +91,7 @@ class Driven:
     def _extended(self, amplitudes: np.ndarray, forces: np.ndarray, side: int) -> np.ndarray:
         """Amplitudes moved down (side -1) or up (1) until their forces lie on that side of the ones asked for."""
         amplitudes = np.clip(amplitudes, *LIMITS)
-        force, frequency = (each.ravel() for each in np.indices(amplitudes.shape))
+        force, frequency = (indices.ravel() for indices in np.indices(amplitudes.shape))
         for _ in range(DECADES):
             reached = self.answer(amplitudes[force, frequency], frequency)[0]
             missed = ~(side * (reached - forces[force]) > 0)
@@ -135,8 +135,8 @@ def roots(driven: Driven, forces: np.ndarray) -> Roots:
     """All amplitudes at which forces [N] move the cart, as far as they are told apart by the grid."""
     amplitudes, reached, inside = driven.grid(forces)
     above = reached >= forces[:, None, None]
-    known = np.isfinite(reached[:, :-1] + reached[:, 1:])
-    force, frequency, cell = np.nonzero((above[:, :, :-1] != above[:, :, 1:]) & inside & known)
+    computed = np.isfinite(reached[:, :-1] + reached[:, 1:])
+    force, frequency, cell = np.nonzero((above[:, :, :-1] != above[:, :, 1:]) & inside & computed)
     low, high = (np.log(amplitudes[frequency, cell + side]) for side in (0, 1))
     f_low, f_high = (np.log(reached[frequency, cell + side] / forces[force]) for side in (0, 1))
     rising = f_high > f_low
@@ -145,7 +145,7 @@ def roots(driven: Driven, forces: np.ndarray) -> Roots:
         (low, high),
         (f_low, f_high),
     )
-    return Roots(force, frequency, np.exp(middle), rising, np.abs(error), np.any(inside & ~known, axis=2))
+    return Roots(force, frequency, np.exp(middle), rising, np.abs(error), np.any(inside & ~computed, axis=2))
 
 
 def _illinois(function: Any, ends: tuple[np.ndarray, ...], values: tuple[np.ndarray, ...]) -> tuple[np.ndarray, ...]:

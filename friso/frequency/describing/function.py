@@ -41,9 +41,9 @@ def dynamic_stiffness(
     if not len(amplitudes):
         return np.empty(0, complex)
     friction = Imposition.of(flat, amplitudes, frequencies, rtol)
-    found = steady(friction)
-    first, _ = _harmonics(friction, found.inner, 1, 0)
-    good = found.done & (found.gap <= closed(rtol))
+    motion = steady(friction)
+    first, _ = _harmonics(friction, motion.inner, 1, 0)
+    good = motion.done & (motion.gap <= closed(rtol))
     return np.where(good, first[:, 1] / amplitudes, np.nan)
 
 
@@ -77,12 +77,12 @@ def describing(
         raise InputError("harmonics", str(harmonics), expected, "harmonics = 9")
     pairs = (np.repeat(sizes, len(rates)), np.tile(rates, len(sizes)))
     friction = Imposition.of(stage.flat(), *pairs, checked_rtol(rtol))
-    found = steady(friction)
-    force, aliasing = _harmonics(friction, found.inner, harmonics, samples if harmonics > 1 else 0)
-    status = _status(found, force, rtol)
+    motion = steady(friction)
+    force, aliasing = _harmonics(friction, motion.inner, harmonics, samples if harmonics > 1 else 0)
+    status = _status(motion, force, rtol)
     force[status != Status.DONE.text] = np.nan
     coords = _coords(sizes, rates, harmonics)
-    variables = _variables(pairs[0], force, {"gap": found.gap, "aliasing": aliasing, "status": status})
+    variables = _variables(pairs[0], force, {"gap": motion.gap, "aliasing": aliasing, "status": status})
     shape = (len(sizes), len(rates))
     shaped = {name: (dims, v.reshape(*shape, *v.shape[1:]), words) for name, (dims, v, words) in variables.items()}
     return xr.Dataset(shaped, coords, {"stage": stage.to_toml(), "rtol": rtol, "samples": samples})
@@ -96,9 +96,9 @@ def _coords(amplitudes: np.ndarray, frequencies: np.ndarray, harmonics: int) -> 
     }
 
 
-def _status(found: Steady, force: np.ndarray, rtol: float) -> np.ndarray:
-    status = np.where(found.gap <= closed(rtol), Status.DONE.text, NOT_CLOSED)
-    return np.where(found.done & np.isfinite(force[:, 1]), status, NOT_RUN)
+def _status(motion: Steady, force: np.ndarray, rtol: float) -> np.ndarray:
+    status = np.where(motion.gap <= closed(rtol), Status.DONE.text, NOT_CLOSED)
+    return np.where(motion.done & np.isfinite(force[:, 1]), status, NOT_RUN)
 
 
 def _variables(
@@ -150,7 +150,7 @@ def _spectrum(friction: Imposition, states: np.ndarray, share: float, samples: i
     """Harmonics of the force [N] from states (runs, samples of the share of a period, states)."""
     within = round(samples * share)
     force = friction.force(np.moveaxis(states[:, :within], 0, 2).swapaxes(0, 1)).T
-    whole = force if share == 1.0 else np.hstack([force, -force])
-    spectrum = np.fft.rfft(whole, axis=1) / samples
+    period = force if share == 1.0 else np.hstack([force, -force])
+    spectrum = np.fft.rfft(period, axis=1) / samples
     spectrum[:, 1:] *= 2
     return spectrum

@@ -48,5 +48,5 @@ def mass_line(
         "spread_magnitude": (magnitude.std("place", ddof=1), "1", "scatter of the magnitude"),
         "spread_phase": (phase.std("place", ddof=1), "rad", "scatter of the phase"),
     }
-    variables = {name: each.assign_attrs(units=unit, long_name=text) for name, (each, unit, text) in named.items()}
+    variables = {name: array.assign_attrs(units=unit, long_name=text) for name, (array, unit, text) in named.items()}
     return xr.Dataset(variables, attrs={"stage": stage.to_toml(), "rtol": rtol})

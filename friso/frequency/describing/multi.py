@@ -188,11 +188,11 @@ class _Problem:
         by_state = -receptances[:, None] * forces[:, :-1]
         by_state[:, -1] -= later * forces[:, -1]
         count = len(self.basis.orders)
-        whole = np.zeros((2 * count + 1, 2 * count + 1))
-        whole[: 2 * count] = _parts(by_state) / self.length
-        whole[: 2 * count, : 2 * count] += np.eye(2 * count)
-        whole[-1, :-1] = self._phase
-        return whole
+        jacobian = np.zeros((2 * count + 1, 2 * count + 1))
+        jacobian[: 2 * count] = _parts(by_state) / self.length
+        jacobian[: 2 * count, : 2 * count] += np.eye(2 * count)
+        jacobian[-1, :-1] = self._phase
+        return jacobian
 
     def solve(self) -> tuple[np.ndarray, float]:
         """The state that solves the equations, and the last step."""

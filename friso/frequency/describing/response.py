@@ -49,17 +49,21 @@ def plant_response(
 
     sizes, rates = checked_positive("forces", forces, "2 N"), checked_positive("frequencies", frequencies, "10 Hz")
     driven = Driven.of(stage.flat(), rates, checked_rtol(rtol))
-    found = roots(driven, sizes)
-    plane, place, count = ("force", "frequency"), *_branches(found, (len(sizes), len(rates)))
-    columns = _columns(driven, found)
+    branch_points = roots(driven, sizes)
+    plane, place, count = ("force", "frequency"), *_branches(branch_points, (len(sizes), len(rates)))
+    columns = _columns(driven, branch_points)
     branches = {name: _spread(values, place, count.shape) for name, (values, _, _) in columns.items()}
     variables: dict[str, Any] = {
         name: ((*plane, "branch"), branches[name], _words(unit, text)) for name, (_, unit, text) in columns.items()
     }
     for name, order in (("up", 1), ("down", -1)):
-        variables[name] = (plane, _shown(branches, order), _words("m/N", f"stage position over force, stepping {name}"))
+        variables[name] = (
+            plane,
+            _on_branch(branches, order),
+            _words("m/N", f"stage position over force, stepping {name}"),
+        )
     variables["answers"] = (plane, count, _words("1", "number of answers"))
-    variables["status"] = (plane, _status(stage, branches, sizes, found.unknown))
+    variables["status"] = (plane, _status(stage, branches, sizes, branch_points.unknown))
     coords = {
         "force": ("force", sizes, _words("N", "amplitude of the actuator force")),
         "frequency": ("frequency", rates, _words("Hz", "frequency")),
@@ -67,16 +71,16 @@ def plant_response(
     return xr.Dataset(variables, coords, {"stage": stage.to_toml(), "rtol": rtol})
 
 
-def _columns(driven: Driven, found: Roots) -> dict[str, tuple[np.ndarray, str, str]]:
+def _columns(driven: Driven, branch_points: Roots) -> dict[str, tuple[np.ndarray, str, str]]:
     """What is told of every root, with units and text."""
-    _, positions, stiffness = driven.answer(found.amplitude, found.frequency)
+    _, positions, stiffness = driven.answer(branch_points.amplitude, branch_points.frequency)
     return {
         "response": (positions[:, 0], "m/N", "stage position over force"),
         "cart_response": (positions[:, 1], "m/N", "cart position over force"),
-        "amplitude": (found.amplitude, "m", "amplitude of the cart"),
+        "amplitude": (branch_points.amplitude, "m", "amplitude of the cart"),
         "stiffness": (stiffness, "N/m", "dynamic stiffness of friction"),
-        "lasting": (found.rising.astype(float), "1", "whether the motion lasts"),
-        "error": (found.error, "1", "relative error of the force"),
+        "lasting": (branch_points.rising.astype(float), "1", "whether the motion lasts"),
+        "error": (branch_points.error, "1", "relative error of the force"),
     }
 
 
@@ -84,14 +88,14 @@ def _words(unit: str, text: str) -> dict[str, str]:
     return {"units": unit, "long_name": text}
 
 
-def _branches(found: Roots, shape: tuple[int, int]) -> tuple[tuple[np.ndarray, ...], np.ndarray]:
+def _branches(branch_points: Roots, shape: tuple[int, int]) -> tuple[tuple[np.ndarray, ...], np.ndarray]:
     """The place of every root: force, frequency and number among those there, by rising amplitude; and how many."""
-    cell = found.force * shape[1] + found.frequency
+    cell = branch_points.force * shape[1] + branch_points.frequency
     count = np.bincount(cell, minlength=shape[0] * shape[1])
-    order = np.lexsort((found.amplitude, cell))
+    order = np.lexsort((branch_points.amplitude, cell))
     number = np.empty(len(cell), np.int64)
     number[order] = np.arange(len(cell)) - np.repeat(np.cumsum(count) - count, count)
-    return (found.force, found.frequency, number), count.reshape(shape)
+    return (branch_points.force, branch_points.frequency, number), count.reshape(shape)
 
 
 def _spread(values: np.ndarray, place: tuple[np.ndarray, ...], shape: tuple[int, int]) -> np.ndarray:
@@ -101,10 +105,10 @@ def _spread(values: np.ndarray, place: tuple[np.ndarray, ...], shape: tuple[int,
     return array
 
 
-def _shown(branches: dict[str, np.ndarray], order: int) -> np.ndarray:
+def _on_branch(branches: dict[str, np.ndarray], order: int) -> np.ndarray:
     """The response [m/N] that shows, shape (forces, frequencies), NaN where no branch lasts."""
-    shown = _followed(branches["amplitude"], branches["lasting"], order)[:, :, None]
-    answer, lasting = (np.take_along_axis(branches[name], shown, axis=2)[:, :, 0] for name in ("response", "lasting"))
+    chosen = _followed(branches["amplitude"], branches["lasting"], order)[:, :, None]
+    answer, lasting = (np.take_along_axis(branches[name], chosen, axis=2)[:, :, 0] for name in ("response", "lasting"))
     return np.where(lasting == 1, answer, np.nan)
 
 
@@ -112,15 +116,15 @@ def _followed(amplitudes: np.ndarray, lasting: np.ndarray, order: int) -> np.nda
     """The number of the branch that shows at every frequency, stepping up (order 1) or down (-1), shape (forces,
     frequencies): the lasting one that is nearest in amplitude to the one before, the least at the start."""
     sizes = np.where(lasting == 1, np.log(amplitudes), np.inf)
-    shown = np.zeros(sizes.shape[:2], np.int64)
+    chosen = np.zeros(sizes.shape[:2], np.int64)
     before = np.full(len(sizes), -np.inf)
     every = np.arange(len(sizes))
     for j in range(sizes.shape[1])[::order]:
         far = np.where(np.isfinite(before)[:, None], np.abs(sizes[:, j] - before[:, None]), sizes[:, j])
-        shown[:, j] = np.argmin(far, axis=1)
-        now = sizes[every, j, shown[:, j]]
+        chosen[:, j] = np.argmin(far, axis=1)
+        now = sizes[every, j, chosen[:, j]]
         before = np.where(np.isfinite(now), now, before)
-    return shown
+    return chosen
 
 
 def _status(stage: Stage, branches: dict[str, np.ndarray], forces: np.ndarray, unknown: np.ndarray) -> np.ndarray:

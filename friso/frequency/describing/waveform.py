@@ -46,8 +46,8 @@ class Law:
     def at(self, velocity: np.ndarray, z: np.ndarray) -> list[np.ndarray]:
         """Rate, its derivatives by z and by velocity, force [N], its derivatives by the same, at velocities [m/s] and
         states."""
-        found = self.function(velocity, z, (velocity > 0).astype(float), *self.values.values())
-        return [np.broadcast_to(np.asarray(each, dtype=float), velocity.shape) for each in found]
+        values = self.function(velocity, z, (velocity > 0).astype(float), *self.values.values())
+        return [np.broadcast_to(np.asarray(value, dtype=float), velocity.shape) for value in values]
 
 
 @cache
@@ -56,8 +56,8 @@ def _compiled(form: Imposed) -> tuple[Callable[..., list[Any]], tuple[str, ...],
     friction = friction_law(form.friction).declare(velocity, form.friction_variant)
     inner = friction.component.states
     if len(inner) > 1:
-        given = f'"{form.friction}", with {len(inner)} states of its own'
-        raise InputError("friction.model", given, "a law with at most one", 'model = "lugre"')
+        law = f'"{form.friction}", with {len(inner)} states of its own'
+        raise InputError("friction.model", law, "a law with at most one", 'model = "lugre"')
     z, rate = (inner[0].symbol, inner[0].derivative) if inner else (none, sp.S.Zero)
     forward = Kink("forward", velocity).beyond
     parts = [e for f in (rate, friction.force) for e in (f, sp.diff(f, z), sp.diff(f, velocity))]
@@ -93,15 +93,15 @@ class Chain:
     before: np.ndarray
     sign: float
 
-    def solve(self, given: np.ndarray) -> np.ndarray:
+    def solve(self, right: np.ndarray) -> np.ndarray:
         """The states, shape (M + 1, columns), for given differences (M, columns)."""
         count = len(self.after)
         bands = np.zeros((2, count + 1))
         bands[0, 0], bands[0, 1:], bands[1, :-1] = 1.0, self.after, -self.before
-        start = np.zeros((count + 1, given.shape[1] + 1))
-        start[1:, :-1], start[0, -1] = given, 1.0
-        found = solve_banded((1, 0), bands, start, check_finite=False)
-        forced, free = found[:, :-1], found[:, -1:]
+        start = np.zeros((count + 1, right.shape[1] + 1))
+        start[1:, :-1], start[0, -1] = right, 1.0
+        solution = solve_banded((1, 0), bands, start, check_finite=False)
+        forced, free = solution[:, :-1], solution[:, -1:]
         return forced + free * (forced[-1] / (self.sign - free[-1]))
 
 

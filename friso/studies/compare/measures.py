@@ -10,7 +10,7 @@ import numpy as np
 
 from friso.engine.arrays import Status
 from friso.frequency.drive import Drive
-from friso.frequency.family import looked_at
+from friso.frequency.family import stability_by_poles
 from friso.frequency.loops import poles
 from friso.frequency.members import limit_cases
 from friso.hunting.peaks import COUNTED_AFTER, WINDOW, scan
@@ -136,7 +136,7 @@ def linear_loops(stage: Stage, flat: Mapping[str, Any], count: int) -> Loops:
     drive, stable, margin = Drive.of(flat), np.ones(count, bool), np.full(count, np.inf)
     for one in limit_cases(stage.flat()).values():
         machines = one.repeated(count)
-        known, looked = poles(flat, machines, drive), looked_at(flat, machines)
+        known, looked = poles(flat, machines, drive), stability_by_poles(flat, machines)
         size = np.abs(known.continuous)
         low, high = SLOWEST * float(np.median(size.min(axis=1))), drive.highest
         omega = np.geomspace(low, high, int(DENSITY * np.log10(high / low)) + 2)
