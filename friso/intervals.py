@@ -98,58 +98,60 @@ class Span:
         """The example as it stands in a file."""
         return f'"{self.example}"'
 
-    def read(self, given: Any) -> Interval:
+    def read(self, value: Any) -> Interval:
         """The range of a text, all of it allowed. Raises InputError."""
-        if isinstance(given, Interval):
-            return given
+        if isinstance(value, Interval):
+            return value
         try:
-            found = _read(given, self.of)[1]
-            if not (self.of.bound.holds(found.low) and self.of.bound.holds(found.high)):
-                raise _Refused(_reach(found, self.of))
+            interval = _read(value, self.of)[1]
+            if not (self.of.bound.holds(interval.low) and self.of.bound.holds(interval.high)):
+                raise _Refused(_reach(interval, self.of))
         except _Refused as refused:
-            raise InputError("", quoted(given, str(refused)), self.expected, self.written_example) from None
-        return found
+            raise InputError("", quoted(value, str(refused)), self.expected, self.written_example) from None
+        return interval
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         return core_schema.no_info_plain_validator_function(self.read)
 
 
-def is_range(given: Any) -> bool:
+def is_range(value: Any) -> bool:
     """Whether this is a text with one of the marks of a range."""
-    return isinstance(given, str) and any(mark in given for mark in _MARKS)
+    return isinstance(value, str) and any(mark in value for mark in _MARKS)
 
 
-def uncertain_value(given: str, of: Quantity | Number) -> UncertainValue:
+def uncertain_value(text: str, of: Quantity | Number) -> UncertainValue:
     """The uncertain value of a text that `is_range`. Raises InputError.
 
     All of a range "LOW .. HIGH" has to be allowed. Of "VALUE +/- HALF" the value has to be: a normal distribution has
     no ends, and what reaches beyond the bound is no mistake of the user; it is cut off where values are drawn.
     """
     try:
-        centre, found = _read(given, of)
-        asked = (found.low, centre, found.high) if found.form == "range" else (centre,)
+        centre, interval = _read(text, of)
+        asked = (interval.low, centre, interval.high) if interval.form == "range" else (centre,)
         if not all(of.bound.holds(value) for value in asked):
-            raise _Refused(_reach(found, of))
-        if found.low < found.high and not any(of.bound.holds(found.at(0.5 + side)) for side in (-_BESIDE, _BESIDE)):
+            raise _Refused(_reach(interval, of))
+        if interval.low < interval.high and not any(
+            of.bound.holds(interval.at(0.5 + side)) for side in (-_BESIDE, _BESIDE)
+        ):
             raise _Refused("none of the numbers beside the centre is allowed")
     except _Refused as refused:
         expected = f'{of.expected}; or with its uncertainty, "VALUE +/- HALF-WIDTH" or "LOW .. HIGH"'
-        raise InputError("", quoted(given, str(refused)), expected, f'"{of.example} +/- 5 %"') from None
-    return UncertainValue(found.evenly(0.5) if found.wide else centre, given, found)
+        raise InputError("", quoted(text, str(refused)), expected, f'"{of.example} +/- 5 %"') from None
+    return UncertainValue(interval.evenly(0.5) if interval.wide else centre, text, interval)
 
 
 class _Refused(Exception):
     """Why a text is no range of a quantity; becomes the hint of a InputError."""
 
 
-def _reach(found: Interval, of: Quantity | Number) -> str:
-    return f"reaches from {found.low:g} to {found.high:g} {of.unit}".rstrip()
+def _reach(interval: Interval, of: Quantity | Number) -> str:
+    return f"reaches from {interval.low:g} to {interval.high:g} {of.unit}".rstrip()
 
 
-def _read(given: Any, of: Quantity | Number) -> tuple[float, Interval]:
+def _read(entry: Any, of: Quantity | Number) -> tuple[float, Interval]:
     """Centre and range of a text, or of a single value; ends beyond the bound of a quantity may come out of a
     tolerance. Raises _Refused."""
-    text = given if isinstance(given, str) else ""
+    text = entry if isinstance(entry, str) else ""
     try:
         if ".." in text:
             low, high = (_number(part, of) for part in text.split("..", 1))
@@ -160,19 +162,19 @@ def _read(given: Any, of: Quantity | Number) -> tuple[float, Interval]:
             off = _half_width(centre, tolerance.strip(), of)
             low, high = centre - off, centre + off
         else:
-            low = high = centre = _number(given, of)
+            low = high = centre = _number(entry, of)
             form = "value"
     except InputError as error:
-        raise _Refused(f"of which {error.given if error.given != quoted(given) else error.expected}") from None
+        raise _Refused(f"of which {error.given if error.given != quoted(entry) else error.expected}") from None
     if not low <= high:
         raise _Refused("a reversed range")
-    return centre, Interval(low, high, str(getattr(given, "text", given)), form)
+    return centre, Interval(low, high, str(getattr(entry, "text", entry)), form)
 
 
-def _number(given: Any, of: Quantity | Number) -> float:
+def _number(value: Any, of: Quantity | Number) -> float:
     if isinstance(of, Quantity):
-        return float(of.read(given.strip() if isinstance(given, str) else given))
-    return float(of.read(_bare(given)))
+        return float(of.read(value.strip() if isinstance(value, str) else value))
+    return float(of.read(_bare(value)))
 
 
 def _half_width(centre: float, tolerance: str, of: Quantity | Number) -> float:
@@ -183,14 +185,14 @@ def _half_width(centre: float, tolerance: str, of: Quantity | Number) -> float:
     return float(Number(non_negative, of.example).read(_bare(tolerance)))
 
 
-def _bare(given: Any) -> Any:
+def _bare(value: Any) -> Any:
     """The number in a text, or what was given."""
-    if not isinstance(given, str):
-        return given
+    if not isinstance(value, str):
+        return value
     try:
-        return float(given)
+        return float(value)
     except ValueError:
-        raise InputError("", quoted(given, "not a number"), "a number") from None
+        raise InputError("", quoted(value, "not a number"), "a number") from None
 
 
 def _percent(text: str) -> float:

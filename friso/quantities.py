@@ -19,23 +19,23 @@ from pydantic_core import CoreSchema, core_schema
 from friso.errors import InputError
 
 
-def as_toml(given: Any) -> str:
+def as_toml(value: Any) -> str:
     """How a scalar is written in TOML; anything else is named, not written out."""
-    if isinstance(given, bool):
-        return "true" if given else "false"
-    if isinstance(given, str):
-        return json.dumps(given, ensure_ascii=False).replace("\x7f", "\\u007f")
-    if isinstance(given, float):
-        return repr(float(given))  # float(): numpy's own repr is no TOML
-    if isinstance(given, int):
-        return str(given) if abs(given) < 10**60 else "a huge integer"
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    if isinstance(value, float):
+        return repr(float(value))  # float(): numpy's own repr is no TOML
+    if isinstance(value, int):
+        return str(value) if abs(value) < 10**60 else "a huge integer"
     names = {dict: "a table", list: "an array", type(None): "nothing"}
-    return names.get(type(given), f"{given} (a {type(given).__name__})")
+    return names.get(type(value), f"{value} (a {type(value).__name__})")
 
 
-def quoted(given: Any, hint: str = "") -> str:
+def quoted(value: Any, hint: str = "") -> str:
     """What was given, for an error message: printable, one line, not long; and what is wrong with it."""
-    text = as_toml(given).encode(errors="backslashreplace").decode()
+    text = as_toml(value).encode(errors="backslashreplace").decode()
     text = text if len(text) <= 60 else f"{text[:57]}..."
     return f"{text} ({hint})" if hint else text
 
@@ -103,9 +103,9 @@ class Quantity:
         except _Refused as refused:
             raise InputError("", quoted(unit, str(refused)), f"a unit convertible to {self.unit}") from None
 
-    def read(self, given: Any) -> Value:
+    def read(self, entry: Any) -> Value:
         """The SI value of a text (or of the text of a Value). Raises InputError."""
-        text = getattr(given, "text", given)
+        text = getattr(entry, "text", entry)
         try:
             value = _read(text, self.unit)
         except _Refused as refused:
@@ -137,12 +137,12 @@ class Number:
         """The example as it stands in a file."""
         return self.example
 
-    def read(self, given: Any) -> float:
+    def read(self, value: Any) -> float:
         """What was given, checked. Raises InputError."""
-        is_number = isinstance(given, int | float) and not isinstance(given, bool)
-        if not is_number or not self.bound.holds(given):
-            raise InputError("", quoted(given), self.expected, self.written_example)
-        return given
+        is_number = isinstance(value, int | float) and not isinstance(value, bool)
+        if not is_number or not self.bound.holds(value):
+            raise InputError("", quoted(value), self.expected, self.written_example)
+        return value
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         return core_schema.no_info_plain_validator_function(self.read)
@@ -160,13 +160,13 @@ _UNIT = re.compile(rf"(?:1 ?/ ?)?{_GROUP}(?: ?[*/·. ] ?{_GROUP})*")
 _LONGEST = 100
 
 
-def _read(given: Any, si_unit: str) -> Value:
+def _read(entry: Any, si_unit: str) -> Value:
     """Number times factor, in exact arithmetic: "30 ms" is the float 0.03. Raises _Refused."""
-    if isinstance(given, int | float) and not isinstance(given, bool):
+    if isinstance(entry, int | float) and not isinstance(entry, bool):
         raise _Refused("a bare number, its unit is missing")
-    if not isinstance(given, str):
+    if not isinstance(entry, str):
         raise _Refused("not a text")
-    number, unit = _split(given)
+    number, unit = _split(entry)
     factor = _factor(unit, si_unit)
     bare = float(number)
     if math.isinf(bare):
@@ -177,12 +177,12 @@ def _read(given: Any, si_unit: str) -> Value:
         raise _Refused("too large") from None
     if value == 0 and re.search("[1-9]", re.split("[eE]", number)[0]):
         raise _Refused("too small, it would become 0")
-    return Value(value, given)
+    return Value(value, entry)
 
 
-def _split(given: str) -> tuple[str, str]:
+def _split(entry: str) -> tuple[str, str]:
     """Number and unit of a text. Raises _Refused."""
-    text = " ".join(given.split())
+    text = " ".join(entry.split())
     if len(text) > _LONGEST:
         raise _Refused("too long")
     match = _NUMBER.match(text)

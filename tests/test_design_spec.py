@@ -10,7 +10,7 @@ import pytest
 
 import friso
 from friso.design.geometry import Geometry, Sheet, box, rounded, sheets
-from friso.design.population import corners, drawn, typical_move
+from friso.design.population import corners, sampled, typical_move
 from friso.design.prepare import prepared, with_leaves
 from friso.design.spec import Spec, load_spec
 
@@ -103,19 +103,19 @@ def test_corners_hold_the_ends_of_all_ranges(rig: friso.Stage) -> None:
 def test_drawn_machines_lie_in_all_ranges(rig: friso.Stage) -> None:
     spec = load_spec(SPEC)
     flat = rig.flat()
-    found = drawn(spec, flat, 500, 0.3)
+    found = sampled(spec, flat, 500, 0.3)
     factors = found.keys["joint.stiffness"] / flat["joint.stiffness"]
     assert (factors.min(), factors.max()) == pytest.approx((0.9 * 0.7, 1.1), abs=5e-3)
     travel = found.keys["motion.acceleration"] * found.keys["motion.acceleration_time"] ** 2
     assert travel.min() >= 1e-3 * (1 - 1e-9)
     assert travel.max() <= 0.1 * (1 + 1e-9)
     assert np.all(found.keys["friction.coulomb"] < found.keys["friction.static"])
-    again = drawn(spec, flat, 500, 0.3)
+    again = sampled(spec, flat, 500, 0.3)
     assert all(np.array_equal(found.keys[key], again.keys[key]) for key in found.keys)
 
 
 def test_coulomb_friction_never_exceeds_the_static_one(rig: friso.Stage) -> None:
-    found = drawn(changed("friction", gap=None, coulomb="0.5 N .. 2 N"), rig.flat(), 200, 0.0)
+    found = sampled(changed("friction", gap=None, coulomb="0.5 N .. 2 N"), rig.flat(), 200, 0.0)
     assert np.all(found.keys["friction.coulomb"] <= found.keys["friction.static"])
 
 

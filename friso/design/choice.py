@@ -52,42 +52,42 @@ class Choice:
 
 def chosen(task: Task, candidates: Sequence[Candidate]) -> Choice | None:
     """The softest geometry that meets all requirements, by closed forms and by beams; None if there is none."""
-    wanted, passed = requirements(task), []
-    for geometry, excess in _in_order(task, wanted, candidates):
+    needs, passed = requirements(task), []
+    for geometry, excess in _in_order(task, needs, candidates):
         try:
-            found = evaluated(task, geometry)
+            evaluation = evaluated(task, geometry)
         except BeamFailure as failure:
             passed.append(str(failure))
             continue
-        choice = Choice(geometry, found, tuple(wanted), excess, tuple(passed))
-        if choice.frequency >= task.spec.safety.parasitic * task.crossover and _bears(task, found):
+        choice = Choice(geometry, evaluation, tuple(needs), excess, tuple(passed))
+        if choice.frequency >= task.spec.safety.parasitic * task.crossover and _bears(task, evaluation):
             return choice
-        passed.append(f"beams: {found.drive[0]:.4g} N/m, {choice.frequency:.4g} Hz")
+        passed.append(f"beams: {evaluation.drive[0]:.4g} N/m, {choice.frequency:.4g} Hz")
     return None
 
 
-def _bears(task: Task, found: Evaluation) -> bool:
+def _bears(task: Task, by_beams: Evaluation) -> bool:
     """Whether by beams, too, the cart does not break away inside the stroke and the leaves bear bending and load."""
     safety = task.spec.safety
-    stays = safety.breakaway * (1 + safety.stiffness_tolerance) * found.forces[-1] <= task.friction
-    swing = 0.0 if np.isnan(found.fatigue_margin) else 1 / found.fatigue_margin
-    lasts = safety.fatigue * (swing + load_stress(found.mechanism, task) / found.mechanism.yield_strength) <= 1
-    return bool(stays and lasts and safety.buckling * buckling_share(found.mechanism, task, found.buckling) <= 1)
+    stays = safety.breakaway * (1 + safety.stiffness_tolerance) * by_beams.forces[-1] <= task.friction
+    swing = 0.0 if np.isnan(by_beams.fatigue_margin) else 1 / by_beams.fatigue_margin
+    lasts = safety.fatigue * (swing + load_stress(by_beams.mechanism, task) / by_beams.mechanism.yield_strength) <= 1
+    return bool(stays and lasts and safety.buckling * buckling_share(by_beams.mechanism, task, by_beams.buckling) <= 1)
 
 
 def _in_order(
-    task: Task, wanted: list[Requirement], candidates: Sequence[Candidate]
+    task: Task, needs: list[Requirement], candidates: Sequence[Candidate]
 ) -> Iterator[tuple[Geometry, np.ndarray]]:
     """Geometries in whole sizes that meet the requirements by closed forms, the softest first."""
     enough = task.spec.safety.parasitic * task.crossover
-    near = [each.geometry for each in candidates if each.frequency >= 0.98 * enough]
-    whole = list({geometry: None for each in near for geometry in rounded(task.spec, each, STEP)})
-    if not whole:
+    near = [candidate.geometry for candidate in candidates if candidate.frequency >= 0.98 * enough]
+    sizes = list({geometry: None for start in near for geometry in rounded(task.spec, start, STEP)})
+    if not sizes:
         return
-    found = judged(task, wanted, sizes_of(whole), [each.sheet for each in whole])
-    for k in np.argsort(found.stiffness):
-        if np.all(found.excess[k] <= 1):
-            yield whole[k], found.excess[k]
+    judgement = judged(task, needs, sizes_of(sizes), [geometry.sheet for geometry in sizes])
+    for k in np.argsort(judgement.stiffness):
+        if np.all(judgement.excess[k] <= 1):
+            yield sizes[k], judgement.excess[k]
 
 
 def evaluated(task: Task, geometry: Geometry) -> Evaluation:
@@ -98,11 +98,11 @@ def evaluated(task: Task, geometry: Geometry) -> Evaluation:
 def confirmed(task: Task, candidates: Sequence[Candidate]) -> Iterable[Confirmed]:
     """Some of the front, evenly, by the beam model; where that fails, why."""
     for k in np.unique(np.linspace(0, len(candidates) - 1, SHOWN).astype(int)):
-        each = candidates[k]
+        candidate = candidates[k]
         try:
-            found = evaluated(task, each.geometry)
+            evaluation = evaluated(task, candidate.geometry)
         except BeamFailure as failure:
-            yield Confirmed(each, np.nan, np.nan, str(failure))
+            yield Confirmed(candidate, np.nan, np.nan, str(failure))
             continue
-        mode = found.interfering
-        yield Confirmed(each, float(found.drive[0]), mode.frequency if mode else np.nan)
+        mode = evaluation.interfering
+        yield Confirmed(candidate, float(evaluation.drive[0]), mode.frequency if mode else np.nan)

@@ -65,20 +65,20 @@ def comfortable(stage: Stage, leaves: Evaluation, population: Population) -> tup
         tuple((key, value) for key, value in population.of(k).items() if key.startswith("masses."))
         for k in range(population.count)
     }
-    for own in sorted(masses):
-        if own:
-            ranges = shared(ranges, Modal.of({**flat, **dict(own)}, leaves).comfortable)
+    for group in sorted(masses):
+        if group:
+            ranges = shared(ranges, Modal.of({**flat, **dict(group)}, leaves).comfortable)
     return ranges
 
 
-def controller(stage: Stage, leaves: Evaluation, found: Limits, population: Population) -> Controller:
+def controller(stage: Stage, leaves: Evaluation, ranges: Limits, population: Population) -> Controller:
     """The controller of a stage with leaf springs, its crossover chosen."""
     flat = stage.flat()
     gains = tuning(*(flat[f"controller.{name}"] for name in ("crossover", "alpha", "beta", "tuned_mass")))
     corners = np.array([_margin({**flat, **population.of(k)}, leaves) for k in range(population.count)])
     tried = dampings(flat)
-    damping = Damping(tried, np.array([_margin({**flat, "joint.damping": each}, leaves) for each in tried]))
-    return Controller(flat["controller.crossover"], gains, found, _margin(flat, leaves), corners, damping)
+    damping = Damping(tried, np.array([_margin({**flat, "joint.damping": trial}, leaves) for trial in tried]))
+    return Controller(flat["controller.crossover"], gains, ranges, _margin(flat, leaves), corners, damping)
 
 
 def _margin(flat: Mapping[str, Any], leaves: Evaluation) -> float:
@@ -88,5 +88,5 @@ def _margin(flat: Mapping[str, Any], leaves: Evaluation) -> float:
 def dampings(flat: Mapping[str, Any]) -> np.ndarray:
     """Dampings of the joint [N s/m] to be tried: the stage's own and larger ones."""
     critical = 2 * np.sqrt(flat["joint.stiffness"] * flat["masses.stage"])
-    own = flat["joint.damping"]
-    return np.array([own, *(each for each in RATIOS * critical if each > own)])
+    given_damping = flat["joint.damping"]
+    return np.array([given_damping, *(damping for damping in RATIOS * critical if damping > given_damping)])

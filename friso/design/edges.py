@@ -64,17 +64,17 @@ def edges_over(
 ) -> Corners:
     """The edges of the stage `flat` in all corners, searched from `low` to `high` [Hz], tuned by van Dijk's rules: on a
     grid, and between the last point at which a cycle attracts and the next. `tell` gets steps done and steps in all."""
-    whole = Ensemble.held(population.over({**flat, "controller.crossover": np.nan}), population.count)
+    ensemble = Ensemble.held(population.over({**flat, "controller.crossover": np.nan}), population.count)
     grid, every = np.log(np.geomspace(low, high, steps)), np.arange(population.count)
-    attracts, known = _attracts(whole, np.repeat(every, steps), np.tile(grid, population.count))
-    attracts, known = attracts.reshape(-1, steps), known.reshape(-1, steps)
+    attracts, decided = _attracts(ensemble, np.repeat(every, steps), np.tile(grid, population.count))
+    attracts, decided = attracts.reshape(-1, steps), decided.reshape(-1, steps)
     last = steps - 1 - attracts[:, ::-1].argmax(axis=1)
     inside, outside = grid[last], grid[np.minimum(last + 1, steps - 1)]
     open_ = np.flatnonzero(attracts.any(axis=1) & (last < steps - 1))
     for k in range(ROUNDS if open_.size else 0):
         tell(k + 1, ROUNDS + 1)
         middle = (inside[open_] + outside[open_]) / 2
-        within, _ = _attracts(whole, open_, middle)
+        within, _ = _attracts(ensemble, open_, middle)
         inside[open_], outside[open_] = (
             np.where(within, middle, inside[open_]),
             np.where(within, outside[open_], middle),
@@ -82,20 +82,20 @@ def edges_over(
     edges = np.exp((inside + outside) / 2)
     edges[last == steps - 1] = np.inf
     edges[~attracts.any(axis=1)] = 0.0
-    return Corners(population, edges, (low, high), int((~known).any(axis=1).sum()))
+    return Corners(population, edges, (low, high), int((~decided).any(axis=1).sum()))
 
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
-def _attracts(whole: Ensemble, which: np.ndarray, crossover: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _attracts(ensemble: Ensemble, which: np.ndarray, crossover: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Whether a cycle attracts, or may for all that is known, in corners at logarithms of crossovers; whether it is."""
-    some = whole.take(which)
+    some = ensemble.take(which)
     stages = Ensemble.held({**some.flat, "controller.crossover": np.exp(crossover)}, len(which))
     cycles = hunting_cycles(stages, RTOL)
-    attracts, known = cycles.attracting.copy(), np.ones(len(which), bool)
+    attracts, decided = cycles.attracting.copy(), np.ones(len(which), bool)
     unsure = np.flatnonzero(cycles.uncertain)
     if unsure.size:
-        attracts[unsure], known[unsure] = hunts_somehow(stages.take(unsure), PERIODS, TRIED)
-    return attracts | ~known, known
+        attracts[unsure], decided[unsure] = hunts_somehow(stages.take(unsure), PERIODS, TRIED)
+    return attracts | ~decided, decided
 
 
 def rigid(flat: Mapping[str, Any]) -> dict[str, Any]:

@@ -40,8 +40,8 @@ def front(task: Task) -> list[Candidate]:
     from pymoo.operators.mutation.pm import PM
     from pymoo.optimize import minimize
 
-    wanted = [each for each in requirements(task) if each.name != PARASITIC]
-    start = closest(task, wanted)
+    needs = [requirement for requirement in requirements(task) if requirement.name != PARASITIC]
+    start = closest(task, needs)
     if start is None:
         return []
     low, high = _ends(task)
@@ -49,16 +49,16 @@ def front(task: Task) -> list[Candidate]:
     first[: len(first) // 4] = start  # from where the others are reached, however little room there is
     variation = {"sampling": first, "crossover": SBX(prob=0.9, eta=10), "mutation": PM(eta=10)}
     algorithm = NSGA2(pop_size=POPULATION, **variation)
-    result = minimize(_problem(task, wanted), algorithm, ("n_gen", GENERATIONS), seed=SEED, verbose=False)
+    result = minimize(_problem(task, needs), algorithm, ("n_gen", GENERATIONS), seed=SEED, verbose=False)
     if result.X is None or result.F is None:
         return []
     bought = sheets(task.spec)
-    chosen, objectives = (np.atleast_2d(np.asarray(each, dtype=float)) for each in (result.X, result.F))
-    found = [
+    chosen, objectives = (np.atleast_2d(np.asarray(array, dtype=float)) for array in (result.X, result.F))
+    candidates = [
         Candidate(Geometry.of(np.exp(x[:3]), bought[int(x[3])]), float(np.exp(f[0])), float(np.exp(-f[1])))
         for x, f in zip(chosen, objectives, strict=True)
     ]
-    return sorted(found, key=lambda each: each.stiffness)
+    return sorted(candidates, key=lambda candidate: candidate.stiffness)
 
 
 def _ends(task: Task) -> tuple[np.ndarray, np.ndarray]:
@@ -67,7 +67,7 @@ def _ends(task: Task) -> tuple[np.ndarray, np.ndarray]:
     return np.append(np.log(low), 0.0), np.append(np.log(high), len(sheets(task.spec)) - 1e-9)
 
 
-def _problem(task: Task, wanted: list[Requirement]) -> Any:
+def _problem(task: Task, needs: list[Requirement]) -> Any:
     """The two objectives and the requirements, as pymoo takes them."""
     from pymoo.core.problem import Problem
 
@@ -76,28 +76,28 @@ def _problem(task: Task, wanted: list[Requirement]) -> Any:
 
     class Leaves(Problem):
         def _evaluate(self, x: np.ndarray, out: dict[str, Any], *args: Any, **kwargs: Any) -> None:
-            found = judged(task, wanted, np.exp(x[:, :3]), [bought[int(k)] for k in x[:, 3]])
-            out["F"] = np.stack([np.log(found.stiffness), -np.log(found.frequency)], axis=1)
-            out["G"] = np.log(found.excess)
+            judgement = judged(task, needs, np.exp(x[:, :3]), [bought[int(k)] for k in x[:, 3]])
+            out["F"] = np.stack([np.log(judgement.stiffness), -np.log(judgement.frequency)], axis=1)
+            out["G"] = np.log(judgement.excess)
 
-    return Leaves(n_var=len(low), n_obj=2, n_ieq_constr=len(wanted), xl=low, xu=high)
+    return Leaves(n_var=len(low), n_obj=2, n_ieq_constr=len(needs), xl=low, xu=high)
 
 
-def closest(task: Task, wanted: list[Requirement]) -> np.ndarray | None:
+def closest(task: Task, needs: list[Requirement]) -> np.ndarray | None:
     """A geometry, as the logarithms of its sizes and the number of its sheet (4,), that meets the requirements with the
     most to spare, by differential evolution; None if none meets them."""
     bought = sheets(task.spec)
 
     def objective(x: np.ndarray) -> np.ndarray:
-        found = judged(task, wanted, np.exp(x[:3]).T, [bought[int(k)] for k in x[3]])
-        return np.log(found.excess).max(axis=1)
+        judgement = judged(task, needs, np.exp(x[:3]).T, [bought[int(k)] for k in x[3]])
+        return np.log(judgement.excess).max(axis=1)
 
     low, high = _ends(task)
     bounds = [*zip(low, high + 1e-12 * (high == low), strict=True)]
-    found = differential_evolution(
+    minimum = differential_evolution(
         objective, bounds, vectorized=True, updating="deferred", maxiter=SEARCHED, rng=SEED, polish=False
     )
-    return found.x if found.fun <= 0 else None
+    return minimum.x if minimum.fun <= 0 else None
 
 
 @dataclass(frozen=True)
@@ -110,8 +110,8 @@ class Judged:
     excess: np.ndarray
 
 
-def judged(task: Task, wanted: list[Requirement], sizes: np.ndarray, bought: list[Sheet]) -> Judged:
+def judged(task: Task, needs: list[Requirement], sizes: np.ndarray, bought: list[Sheet]) -> Judged:
     """Geometries by closed forms."""
     many = mechanisms(task.flat, sizes, bought)
-    excess = [np.broadcast_to(each.excess(many), (len(sizes),)) for each in wanted]
+    excess = [np.broadcast_to(requirement.excess(many), (len(sizes),)) for requirement in needs]
     return Judged(closed_forms.drive_stiffness(many), first_interfering(many), np.stack(excess, axis=1))

@@ -27,8 +27,10 @@ class Sheet:
 
 def sheets(spec: Spec) -> list[Sheet]:
     """All that may be bought."""
-    own = spec.leaves
-    return [Sheet(*each) for each in product(own.leaves, sorted(map(float, own.thickness)), own.materials)]
+    section = spec.leaves
+    return [
+        Sheet(*sheet) for sheet in product(section.leaves, sorted(map(float, section.thickness)), section.materials)
+    ]
 
 
 @dataclass(frozen=True)
@@ -59,15 +61,15 @@ class Geometry:
 
 def mechanisms(flat: Mapping[str, Any], sizes: np.ndarray, bought: list[Sheet]) -> Mechanism:
     """Geometries of lengths, widths and spacings [m], shape (count, 3), each of its sheet, in the stage `flat`."""
-    known = [materials()[each.material] for each in bought]
+    sheet_materials = [materials()[sheet.material] for sheet in bought]
     columns = {
-        "leaves": [each.leaves for each in bought],
-        "thickness": [each.thickness for each in bought],
-        "young": [each.young for each in known],
-        "poisson": [each.poisson for each in known],
-        "density": [each.density for each in known],
-        "yield": [each.yield_strength for each in known],
-        "fatigue": [each.fatigue for each in known],
+        "leaves": [sheet.leaves for sheet in bought],
+        "thickness": [sheet.thickness for sheet in bought],
+        "young": [material.young for material in sheet_materials],
+        "poisson": [material.poisson for material in sheet_materials],
+        "density": [material.density for material in sheet_materials],
+        "yield": [material.yield_strength for material in sheet_materials],
+        "fatigue": [material.fatigue for material in sheet_materials],
     }
     keys = {f"flexure.{name}": np.array(column, float) for name, column in columns.items()}
     keys |= {f"flexure.{name}": column for name, column in zip(SIZES, sizes.T, strict=True)}
@@ -88,13 +90,15 @@ def box(spec: Spec) -> tuple[np.ndarray, np.ndarray]:
 
 def sizes_of(geometries: Sequence[Geometry]) -> np.ndarray:
     """Their lengths, widths and spacings [m], shape (count, 3)."""
-    return np.array([[getattr(each, name) for name in SIZES] for each in geometries])
+    return np.array([[getattr(geometry, name) for name in SIZES] for geometry in geometries])
 
 
 def rounded(spec: Spec, geometry: Geometry, step: float) -> list[Geometry]:
     """The geometries with whole multiples of a step [m] next to one, as far as there is space for them."""
     low, high = box(spec)
     near = [{float(np.round(size / step + side, 0) * step) for side in (-0.5, 0.5)} for size in sizes_of([geometry])[0]]
-    found = [np.array(each) for each in product(*map(sorted, near))]
-    inside = [each for each in found if np.all(each >= low * (1 - 1e-9)) and np.all(each <= high * (1 + 1e-9))]
-    return [Geometry.of(each, geometry.sheet) for each in inside]
+    corners = [np.array(corner) for corner in product(*map(sorted, near))]
+    inside = [
+        corner for corner in corners if np.all(corner >= low * (1 - 1e-9)) and np.all(corner <= high * (1 + 1e-9))
+    ]
+    return [Geometry.of(corner, geometry.sheet) for corner in inside]

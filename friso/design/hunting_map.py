@@ -39,10 +39,10 @@ def hunting_map(stage: Stage, spec: Spec, population: Population) -> HuntingMap:
     )
     shape = (STROKES, CROSSOVERS, population.count)
     stroke, crossover, number = (
-        each.ravel() for each in np.meshgrid(strokes, crossovers, np.arange(population.count), indexing="ij")
+        axis.ravel() for axis in np.meshgrid(strokes, crossovers, np.arange(population.count), indexing="ij")
     )
     machines = {key: value[number] for key, value in population.keys.items()}
     runs = {**flat, **machines, **typical_move(spec), "controller.crossover": crossover, "joint.stroke": stroke}
-    found = tried(runs, len(number), float(spec.position.window), patient=False)
-    share = np.where(found.completed, found.hunts, np.nan).reshape(shape).mean(axis=2)
+    outcome = tried(runs, len(number), float(spec.position.window), patient=False)
+    share = np.where(outcome.completed, outcome.hunts, np.nan).reshape(shape).mean(axis=2)
     return HuntingMap(crossovers, strokes, share)

@@ -96,18 +96,18 @@ class Design:
     def unmet(self) -> tuple[Relaxation, ...]:
         """What the verification found not to be met: the settling time, with that which would be; hunting is told by
         the verification itself."""
-        wanted, found = self.spec.position.settling_time, self.verification.free.slower_than(SLOW)
-        if wanted is None or found <= wanted or not np.isfinite(found):
+        limit, settling = self.spec.position.settling_time, self.verification.free.slower_than(SLOW)
+        if limit is None or settling <= limit or not np.isfinite(settling):
             return ()
         name = f"{1 - SLOW:.0%} of the moves settle in time"
-        later = Relaxation(name, "position.settling_time", float(wanted), found, "s")
+        later = Relaxation(name, "position.settling_time", float(limit), settling, "s")
         return (self.damped, later) if self.damped else (later,)
 
     @property
     def meets(self) -> bool:
         """Whether no move hunts, and moves settle in the time specified."""
-        wanted, free = self.spec.position.settling_time, self.verification.free
-        return not free.hunting and (wanted is None or free.slower_than(SLOW) <= wanted)
+        limit, free = self.spec.position.settling_time, self.verification.free
+        return not free.hunting and (limit is None or free.slower_than(SLOW) <= limit)
 
     @property
     def needed(self) -> bool:
@@ -127,38 +127,38 @@ def design(stage: Stage, spec: Spec, progress: Progress = lambda what, done, tot
         raise NoDesign("the bias force on the cart exceeds the least static friction: no joint is soft enough")
     task, candidates = leaves(spec, flat, friction, progress)
     progress("leaves and crossover", 0, 1)
-    found = fitted(base, task, candidates, population)
-    crossover, tell = found.stage.flat()["controller.crossover"], partial(progress, "hunting with isolator")
+    fit = fitted(base, task, candidates, population)
+    crossover, tell = fit.stage.flat()["controller.crossover"], partial(progress, "hunting with isolator")
     tell(0, 1)
-    stiffest = found.stage.flat()["joint.stiffness"] * (1 + spec.safety.stiffness_tolerance)
-    worst = {**found.stage.flat(), "joint.stiffness": stiffest}
+    stiffest = fit.stage.flat()["joint.stiffness"] * (1 + spec.safety.stiffness_tolerance)
+    worst = {**fit.stage.flat(), "joint.stiffness": stiffest}
     edges = edges_over(worst, population, FIRST * crossover, ABOVE * crossover, STEPS, tell)
-    _does_not_hunt(found, edges)
+    _does_not_hunt(fit, edges)
     progress("margins", 0, 1)
-    control = controller(found.stage, found.choice.beams, found.limits, population)
+    control = controller(fit.stage, fit.choice.beams, fit.limits, population)
     progress("hunting map", 0, 1)
-    drawn = hunting_map(found.stage, spec, population)
-    by_beams = tuple(confirmed(found.task, candidates))
-    tried = verification(found.stage, spec, found.task.load / found.choice.beams.buckling, progress)
-    damped, faster = with_damping(found)
-    known = (without, tuple(candidates), by_beams, found, edges, control, drawn, tried, damped, faster)
-    return Design(spec, stage, *known)
+    edges_map = hunting_map(fit.stage, spec, population)
+    by_beams = tuple(confirmed(fit.task, candidates))
+    tried = verification(fit.stage, spec, fit.task.load / fit.choice.beams.buckling, progress)
+    damped, faster = with_damping(fit)
+    results = (without, tuple(candidates), by_beams, fit, edges, control, edges_map, tried, damped, faster)
+    return Design(spec, stage, *results)
 
 
-def with_damping(found: Fitted) -> tuple[Relaxation | None, float]:
+def with_damping(fit: Fitted) -> tuple[Relaxation | None, float]:
     """The least joint damping of those tried with which the crossover could be what leaves and machine allow, and that
     crossover [Hz]; none where it is already, or where damping does not help."""
-    flat, spec = found.stage.flat(), found.task.spec
-    wanted = min(spec.limit, found.choice.frequency / spec.safety.parasitic)
-    if flat["controller.crossover"] >= ALIKE * wanted:
-        return None, wanted
-    for each in dampings(flat)[1::2]:
-        ranges = Modal.of({**flat, "joint.damping": each}, found.choice.beams).comfortable
-        best = comfortable_below(ranges, wanted)
-        if best is not None and best >= ALIKE * wanted:
+    flat, spec = fit.stage.flat(), fit.task.spec
+    target = min(spec.limit, fit.choice.frequency / spec.safety.parasitic)
+    if flat["controller.crossover"] >= ALIKE * target:
+        return None, target
+    for damping in dampings(flat)[1::2]:
+        ranges = Modal.of({**flat, "joint.damping": damping}, fit.choice.beams).comfortable
+        best = comfortable_below(ranges, target)
+        if best is not None and best >= ALIKE * target:
             name = f"crossover of up to {best:.3g} Hz with a modulus margin of 0.5"
-            return Relaxation(name, "joint.damping", flat["joint.damping"], float(each), "N*s/m"), best
-    return None, wanted
+            return Relaxation(name, "joint.damping", flat["joint.damping"], float(damping), "N*s/m"), best
+    return None, target
 
 
 def least_friction(population: Population, flat: Mapping[str, Any]) -> float:
@@ -172,48 +172,48 @@ def least_friction(population: Population, flat: Mapping[str, Any]) -> float:
 def leaves(spec: Spec, flat: Mapping[str, Any], friction: float, progress: Progress) -> tuple[Task, list[Candidate]]:
     """The front for the largest stroke that allows the machine's limit; else that which allows the highest crossover.
     Raises NoDesign where no leaf springs meet the requirements."""
-    stroke, found = spec.leaves.stroke, []
+    stroke, choices = spec.leaves.stroke, []
     several = stroke.high > stroke.low
     strokes = np.geomspace(stroke.high, stroke.low, STROKES).tolist() if several else [stroke.high]
-    for k, each in enumerate(strokes):
+    for k, size in enumerate(strokes):
         progress("leaf springs", k, len(strokes))
-        task = Task(spec, each, spec.limit, friction, flat)
+        task = Task(spec, size, spec.limit, friction, flat)
         if candidates := front(task):
-            found.append((task, candidates))
+            choices.append((task, candidates))
             if allowed(task, candidates) >= spec.limit:
                 break
-    if not found:
+    if not choices:
         raise NoDesign(
             "no leaf springs meet the specification", relaxations(Task(spec, strokes[-1], 0.0, friction, flat))
         )
-    return max(found, key=lambda each: min(allowed(*each), spec.limit))
+    return max(choices, key=lambda pair: min(allowed(*pair), spec.limit))
 
 
 def allowed(task: Task, candidates: list[Candidate]) -> float:
     """The highest crossover [Hz] whose multiple is still below a first interfering frequency of the front."""
-    return max(each.frequency for each in candidates) / task.spec.safety.parasitic
+    return max(candidate.frequency for candidate in candidates) / task.spec.safety.parasitic
 
 
 def fitted(base: Stage, task: Task, candidates: list[Candidate], population: Population) -> Fitted:
     """Leaves as soft as the crossover allows, that as high as leaves and margins allow. Raises NoDesign."""
-    wanted = min(task.spec.limit, allowed(task, candidates))
+    target = min(task.spec.limit, allowed(task, candidates))
     for _ in range(ROUNDS):
-        task = replace(task, crossover=wanted)
+        task = replace(task, crossover=target)
         choice = chosen(task, candidates)
         if choice is None:
-            wanted *= LOWER
+            target *= LOWER
             continue
         stage = with_leaves(base, choice.geometry, task.stroke)
-        found = replace(limits(stage.flat()), comfortable=comfortable(stage, choice.beams, population))
-        best = comfortable_below(found.comfortable, wanted)
+        ranges = replace(limits(stage.flat()), comfortable=comfortable(stage, choice.beams, population))
+        best = comfortable_below(ranges.comfortable, target)
         if best is None:
-            raise NoDesign(f"up to {wanted:.3g} Hz there is no crossover with a modulus margin of 0.5")
-        if best >= ALIKE * wanted:
-            return Fitted(task, choice, stage.replace({"controller.crossover": f"{_down(best):.6g} Hz"}), found)
-        wanted = best
+            raise NoDesign(f"up to {target:.3g} Hz there is no crossover with a modulus margin of 0.5")
+        if best >= ALIKE * target:
+            return Fitted(task, choice, stage.replace({"controller.crossover": f"{_down(best):.6g} Hz"}), ranges)
+        target = best
     raise NoDesign(
         f"of {len(candidates)} leaf springs on the front none, in sizes of whole tenths of a millimetre, is confirmed "
-        f"by the beam model at a crossover of {wanted:.3g} Hz"
+        f"by the beam model at a crossover of {target:.3g} Hz"
     )
 
 
@@ -223,34 +223,34 @@ def _down(crossover: float) -> float:
     return float(np.floor(crossover / step * (1 + 1e-9)) * step)
 
 
-def _does_not_hunt(found: Fitted, edges: Corners) -> None:
+def _does_not_hunt(fit: Fitted, edges: Corners) -> None:
     """Raises NoDesign where the crossover does not keep its distance from the edge of hunting."""
-    spec, crossover = found.task.spec, found.stage.flat()["controller.crossover"]
+    spec, crossover = fit.task.spec, fit.stage.flat()["controller.crossover"]
     needed = spec.safety.hunting * edges.highest
     if not edges.hunts or needed <= crossover:
         return
     until = f"{edges.highest:.3g} Hz" if np.isfinite(needed) else f"beyond {edges.searched[1]:.3g} Hz"
-    stiffness, stroke = found.stage.flat()["joint.stiffness"], found.task.stroke * 1e3
+    stiffness, stroke = fit.stage.flat()["joint.stiffness"], fit.task.stroke * 1e3
     reason = (
         f"with the softest leaf springs that can be had, {stiffness:.4g} N/m and a stroke of {stroke:.3g} mm, the "
         f"stage hunts up to {until}; a crossover with the factor of safety above that, {spec.safety.hunting:g}, is not "
         f"to be had: it can be {crossover:.3g} Hz"
     )
-    raise NoDesign(reason, tuple(_ways_out(found, edges.highest, needed, crossover)))
+    raise NoDesign(reason, tuple(_ways_out(fit, edges.highest, needed, crossover)))
 
 
-def _ways_out(found: Fitted, edge: float, needed: float, crossover: float) -> Iterator[Relaxation]:
+def _ways_out(fit: Fitted, edge: float, needed: float, crossover: float) -> Iterator[Relaxation]:
     """What would let the crossover keep its distance from the edge [Hz]."""
-    spec, name = found.task.spec, "crossover above the edge of hunting"
-    above = [max(low, needed) for low, high in found.limits.comfortable if high > needed]
-    allowed_ = found.choice.frequency / spec.safety.parasitic
+    spec, name = fit.task.spec, "crossover above the edge of hunting"
+    above = [max(low, needed) for low, high in fit.limits.comfortable if high > needed]
+    allowed_ = fit.choice.frequency / spec.safety.parasitic
     if spec.limit < needed and above and min(above) <= allowed_:
         yield Relaxation(name, "machine.bandwidth_limit", spec.limit, min(above), "Hz")
     if edge < crossover:
         yield Relaxation(name, "safety.hunting", spec.safety.hunting, crossover / edge, "")
-    own = found.stage.flat()["joint.damping"]
-    for each in dampings(found.stage.flat())[1:]:
-        damped = {**found.stage.flat(), "joint.damping": each}
-        if any(low <= needed <= high for low, high in Modal.of(damped, found.choice.beams).comfortable):
-            yield Relaxation(name, "joint.damping", own, float(each), "N*s/m")
+    damping = fit.stage.flat()["joint.damping"]
+    for larger in dampings(fit.stage.flat())[1:]:
+        damped = {**fit.stage.flat(), "joint.damping": larger}
+        if any(low <= needed <= high for low, high in Modal.of(damped, fit.choice.beams).comfortable):
+            yield Relaxation(name, "joint.damping", damping, float(larger), "N*s/m")
             return

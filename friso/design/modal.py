@@ -12,7 +12,7 @@ from friso.equations.bandwidth import faster
 from friso.flexure.evaluation import Evaluation
 from friso.frequency.crossover import DENSITY, STEPS, WANTED, searched, settled_members
 from friso.frequency.drive import Drive
-from friso.frequency.family import controller, distance_to_lines, grid, stability_by_poles, plants
+from friso.frequency.family import controller, distance_to_lines, grid, plants, stability_by_poles
 from friso.frequency.members import Members
 from friso.frequency.ranges import Range, ranges_below
 
@@ -23,7 +23,7 @@ AROUND = np.sinh(np.linspace(-7.0, 7.0, 71))
 @dataclass(frozen=True)
 class Modal:
     """Settled states of a stage (members,) with their plants without parasitic mode, `bare`, and with those of the leaf
-    springs, `whole`, both of shape (members, frequencies) [m/N], the drive included, over `omega` [rad/s].
+    springs, `with_modes`, both of shape (members, frequencies) [m/N], the drive included, over `omega` [rad/s].
 
     Modes act beside what the stage does as a rigid mass, whatever the cart does far below them.
     """
@@ -32,7 +32,7 @@ class Modal:
     members: Members
     omega: np.ndarray
     bare: np.ndarray
-    whole: np.ndarray
+    with_modes: np.ndarray
 
     @classmethod
     def of(cls, flat: Mapping[str, Any], leaves: Evaluation) -> Modal:
@@ -45,15 +45,15 @@ class Modal:
 
     def margin(self, crossover: np.ndarray) -> np.ndarray:
         """The least modulus margin of all states at each crossover [Hz], shape (n,); 0 where one is unstable."""
-        return np.array([self._margin(float(each)) for each in np.atleast_1d(crossover)])
+        return np.array([self._margin(float(value)) for value in np.atleast_1d(crossover)])
 
     def _margin(self, crossover: float) -> float:
-        own = self._at(np.array(crossover))
-        shape = controller(own, self.omega)
-        bare, whole = self.bare * shape, self.whole * shape
-        settled = stability_by_poles(own, self.members).abscissa < 0
-        stable = settled & (np.abs(_turns((1 + whole) / (1 + bare))) < 0.5)
-        return float(distance_to_lines(whole).min()) if stable.all() else 0.0
+        keys = self._at(np.array(crossover))
+        shape = controller(keys, self.omega)
+        bare, loop = self.bare * shape, self.with_modes * shape
+        settled = stability_by_poles(keys, self.members).abscissa < 0
+        stable = settled & (np.abs(_turns((1 + loop) / (1 + bare))) < 0.5)
+        return float(distance_to_lines(loop).min()) if stable.all() else 0.0
 
     def _at(self, crossover: np.ndarray) -> dict[str, Any]:
         return faster(self.flat, crossover / self.flat["controller.crossover"])

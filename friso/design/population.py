@@ -57,36 +57,36 @@ def corners(spec: Spec, flat: Mapping[str, Any]) -> Population:
     ranges = friction | masses
     levels = product(*(LEVELS if ranges[name].high > ranges[name].low else (0.0,) for name in main))
     rows = [
-        {**dict(zip(main, level, strict=True)), **own, **mass} for level, own, mass in product(levels, turned, groups)
+        {**dict(zip(main, level, strict=True)), **side, **mass} for level, side, mass in product(levels, turned, groups)
     ]
     shares = {name: np.array([row[name] for row in rows]) for name in ranges}
-    found = _population(ranges, shares, flat, len(rows))
-    _falls(found, flat)
-    return found
+    population = _population(ranges, shares, flat, len(rows))
+    _falls(population, flat)
+    return population
 
 
-def _falls(found: Population, flat: Mapping[str, Any]) -> None:
+def _falls(population: Population, flat: Mapping[str, Any]) -> None:
     """Raises InputError where sliding friction is nowhere below the static one although there are both."""
-    static, coulomb = (found.keys.get(f"friction.{name}") for name in ("static", "coulomb"))
+    static, coulomb = (population.keys.get(f"friction.{name}") for name in ("static", "coulomb"))
     if static is not None and coulomb is not None and np.all(coulomb >= static):
-        given = f"static friction up to {static.max():g} N with Coulomb friction from {coulomb.min():g} N on"
+        text = f"static friction up to {static.max():g} N with Coulomb friction from {coulomb.min():g} N on"
         expected = "static friction above Coulomb friction, which is the stage file's where the specification has none"
-        raise InputError("friction.static", given, expected, 'static = "1 N .. 3 N", gap = "0.3 .. 0.85"')
+        raise InputError("friction.static", text, expected, 'static = "1 N .. 3 N", gap = "0.3 .. 0.85"')
 
 
-def drawn(spec: Spec, flat: Mapping[str, Any], count: int, softening: float) -> Population:
+def sampled(spec: Spec, flat: Mapping[str, Any], count: int, softening: float) -> Population:
     """Machines and moves drawn evenly from all ranges: friction, masses, stiffness (its tolerance either way, and down
     by the share of it that the load may take, `softening`), travel and acceleration (evenly in the logarithm)."""
     ranges = _friction(spec, flat) | _masses(spec)
     names = [*ranges, "stiffness", "travel", "acceleration"]
     sequence = qmc.Sobol(len(names), rng=SEED).random_base2(int(np.ceil(np.log2(count))))[:count]
     shares = dict(zip(names, sequence.T, strict=True))
-    found = _population(ranges, {name: shares[name] for name in ranges}, flat, count)
+    population = _population(ranges, {name: shares[name] for name in ranges}, flat, count)
     moves = _moves(spec, shares["travel"], shares["acceleration"])
     tolerance = spec.safety.stiffness_tolerance
     factors = Interval((1 - tolerance) * (1 - softening), 1 + tolerance, "").at(shares["stiffness"])
     stiffness = {"joint.stiffness": flat["joint.stiffness"] * factors}
-    return Population({**found.keys, **moves, **stiffness}, count)
+    return Population({**population.keys, **moves, **stiffness}, count)
 
 
 def typical_move(spec: Spec) -> dict[str, Any]:
@@ -97,11 +97,11 @@ def typical_move(spec: Spec) -> dict[str, Any]:
 
 def _moves(spec: Spec, travel: np.ndarray, acceleration: np.ndarray) -> dict[str, np.ndarray]:
     """There and back, at shares of the ranges."""
-    way, rate = (
+    distance, rate = (
         interval.low * (interval.high / interval.low) ** share
         for interval, share in ((spec.moves.travel, travel), (spec.moves.acceleration, acceleration))
     )
-    time = np.sqrt(way / rate)
+    time = np.sqrt(distance / rate)
     back = np.maximum(DISTANT, 2 * time + DISTANT / 2)
     return {
         "motion.acceleration": rate,
@@ -112,8 +112,8 @@ def _moves(spec: Spec, travel: np.ndarray, acceleration: np.ndarray) -> dict[str
 
 def _friction(spec: Spec, flat: Mapping[str, Any]) -> dict[str, Interval]:
     """The ranges of friction by key. Raises InputError for one that the stage's friction law does not have."""
-    given = {name: getattr(spec.friction, name) for name in type(spec.friction).model_fields}
-    ranges = {name: interval for name, interval in given.items() if interval is not None}
+    values = {name: getattr(spec.friction, name) for name in type(spec.friction).model_fields}
+    ranges = {name: interval for name, interval in values.items() if interval is not None}
     for name in ranges:
         key = f"friction.{'coulomb' if name == 'gap' else name}"
         if key not in flat:
@@ -124,8 +124,8 @@ def _friction(spec: Spec, flat: Mapping[str, Any]) -> dict[str, Interval]:
 
 
 def _masses(spec: Spec) -> dict[str, Interval]:
-    given = {name: getattr(spec.masses, name) for name in ("cart", "stage")}
-    return {name: interval for name, interval in given.items() if interval is not None}
+    masses = {name: getattr(spec.masses, name) for name in ("cart", "stage")}
+    return {name: interval for name, interval in masses.items() if interval is not None}
 
 
 def _population(

@@ -15,20 +15,20 @@ def prepared(stage: Stage, spec: Spec) -> Stage:
     the middle of their ranges, which the controller is tuned for. Points of the stage stay where they are from the leaf
     ends; a load is the specification's. Raises InputError for a stage that cannot be given an isolator."""
     _can_be_isolated(stage)
-    own = spec.leaves
-    low, high = (min(map(float, own.thickness)), own.stroke.high)
+    section = spec.leaves
+    low, high = (min(map(float, section.thickness)), section.stroke.high)
     masses: dict[str, str | None] = {
-        f"masses.{name}": f"{each.centre!r} kg"
+        f"masses.{name}": f"{mass.centre!r} kg"
         for name in ("cart", "stage")
-        if (each := getattr(spec.masses, name)) is not None
+        if (mass := getattr(spec.masses, name)) is not None
     }
     if masses and "tuned_mass" in stage.controller.given():
         masses["controller.tuned_mass"] = None  # it follows the masses
-    sizes = {f"flexure.{name}": f"{own.space(name)[1]!r} m" for name in ("length", "width", "spacing")}
+    sizes = {f"flexure.{name}": f"{section.space(name)[1]!r} m" for name in ("length", "width", "spacing")}
     leaves = {
-        "flexure.leaves": own.leaves[0],
+        "flexure.leaves": section.leaves[0],
         "flexure.thickness": f"{low!r} m",
-        "flexure.material": own.materials[0],
+        "flexure.material": section.materials[0],
         "joint.locked": False,
         "joint.stroke": f"{high!r} m",
         "controller.crossover": f"{spec.limit!r} Hz",
@@ -37,10 +37,10 @@ def prepared(stage: Stage, spec: Spec) -> Stage:
     removed = {"joint.stiffness": None} if joint and joint.stiffness is not None else {}
     removed |= {"parasitic": None} if stage.parasitic else {}
     numbers = ("young", "poisson", "density", "yield", "fatigue")
-    given = stage.flexure.given() if stage.flexure else {}
-    removed |= {f"flexure.{key}": None for key in (*numbers, "load") if key in given}
+    section = stage.flexure.given() if stage.flexure else {}
+    removed |= {f"flexure.{key}": None for key in (*numbers, "load") if key in section}
     base = stage.replace(removed | masses | sizes | leaves)
-    return base.with_numbers(moved_along(stage.flat(), base.flat()["flexure.length"])) if given else base
+    return base.with_numbers(moved_along(stage.flat(), base.flat()["flexure.length"])) if section else base
 
 
 def with_leaves(base: Stage, geometry: Geometry, stroke: float) -> Stage:

@@ -43,33 +43,33 @@ class Relaxation:
 def relaxations(task: Task) -> tuple[Relaxation, ...]:
     """For each requirement, by how much it has to be relaxed if all others stand; those that can be, the least change
     first. Empty where no single one is enough."""
-    wanted = [*requirements(task), *_space(task)]
-    found = [each for k in range(len(wanted)) for each in _alone(task, wanted, k)]
-    return tuple(sorted(found, key=_change))
+    needs = [*requirements(task), *_space(task)]
+    all_relaxations = [relaxation for k in range(len(needs)) for relaxation in _alone(task, needs, k)]
+    return tuple(sorted(all_relaxations, key=_change))
 
 
-def _change(it: Relaxation) -> float:
+def _change(relaxation: Relaxation) -> float:
     """How large a change is, as a factor's logarithm."""
-    return float(abs(np.log(it.needed / it.value))) if it.needed > 0 else np.inf
+    return float(abs(np.log(relaxation.needed / relaxation.value))) if relaxation.needed > 0 else np.inf
 
 
 def _space(task: Task) -> list[Requirement]:
     """The limits of space and sheets as requirements."""
     low, high = box(task.spec)
     gauges = sorted(map(float, task.spec.leaves.thickness))
-    found = []
+    limits = []
     for name, least, most in zip((*SIZES, "thickness"), [*low, gauges[0]], [*high, gauges[-1]], strict=True):
         words, key = "sheets" if name == "thickness" else f"{name} of the leaves", f"leaves.{name}"
-        found += [
+        limits += [
             Requirement(f"{words}, at least", (less(key, float(least), "m"),), _over(name, least, low=True)),
             Requirement(f"{words}, at most", (more(key, float(most), "m"),), _over(name, most, low=False)),
         ]
-    return found
+    return limits
 
 
 def _over(name: str, limit: float, low: bool) -> Callable[[Mechanism], Any]:
-    def excess(it: Mechanism) -> Any:
-        return limit / getattr(it, name) if low else getattr(it, name) / limit
+    def excess(mechanism: Mechanism) -> Any:
+        return limit / getattr(mechanism, name) if low else getattr(mechanism, name) / limit
 
     return excess
 
@@ -85,8 +85,8 @@ class _Trials:
     @property
     def kinds(self) -> list[tuple[float, str]]:
         """Numbers of leaves with materials."""
-        own = self.task.spec.leaves
-        return [(count, material) for count in own.leaves for material in own.materials]
+        section = self.task.spec.leaves
+        return [(count, material) for count in section.leaves for material in section.materials]
 
     @property
     def gauges(self) -> np.ndarray:
@@ -107,25 +107,25 @@ class _Trials:
         return sizes[:, :3], [Sheet(count, float(t), of) for t, (count, of) in zip(thickness, chosen, strict=True)]
 
 
-def _alone(task: Task, wanted: list[Requirement], k: int) -> Iterator[Relaxation]:
+def _alone(task: Task, needs: list[Requirement], k: int) -> Iterator[Relaxation]:
     """The least relaxation of requirement `k` with which the others can be met."""
-    of_sheets = np.array([each.ways[0].key == "leaves.thickness" for each in wanted])
+    of_sheets = np.array([requirement.ways[0].key == "leaves.thickness" for requirement in needs])
     trials = _Trials(task, free=bool(of_sheets[k]))
     spare = np.where(of_sheets, 0.0, SPARE)  # what may be bought is met exactly
 
     def objective(x: np.ndarray) -> np.ndarray:
         many = mechanisms(task.flat, *trials.built(x))
-        excess = np.log([np.broadcast_to(each.excess(many), x.shape[1]) for each in wanted])
+        excess = np.log([np.broadcast_to(requirement.excess(many), x.shape[1]) for requirement in needs])
         others = np.delete(excess + spare[:, None], k, axis=0).max(axis=0)
         return np.where(others <= 1e-9, excess[k], UNMET + others)
 
     search = {"popsize": POPULATION, "maxiter": GENERATIONS, "rng": SEED, "polish": False}
     with np.errstate(divide="ignore"):  # a requirement that asks for nothing
-        found = differential_evolution(objective, trials.bounds, vectorized=True, updating="deferred", **search)
-    if found.fun >= UNMET:
+        minimum = differential_evolution(objective, trials.bounds, vectorized=True, updating="deferred", **search)
+    if minimum.fun >= UNMET:
         return
-    (sizes,), (sheet,) = trials.built(found.x[:, None])
-    for way in wanted[k].ways:
-        needed = way.needed(MORE * float(np.exp(max(found.fun, 0.0))))
-        if needed is not None and not np.isclose(needed, way.value, rtol=1e-6):
-            yield Relaxation(wanted[k].name, way.key, way.value, needed, way.unit, Geometry.of(sizes, sheet))
+    (sizes,), (sheet,) = trials.built(minimum.x[:, None])
+    for remedy in needs[k].ways:
+        needed = remedy.needed(MORE * float(np.exp(max(minimum.fun, 0.0))))
+        if needed is not None and not np.isclose(needed, remedy.value, rtol=1e-6):
+            yield Relaxation(needs[k].name, remedy.key, remedy.value, needed, remedy.unit, Geometry.of(sizes, sheet))

@@ -82,32 +82,34 @@ def requirements(task: Task) -> list[Requirement]:
     shorter = less("leaves.stroke", stroke, "m")
     stiffest = safety.breakaway * (1 + safety.stiffness_tolerance)
 
-    def fatigue(it: Mechanism) -> Any:
-        known = np.where(np.isnan(it.fatigue), np.inf, it.fatigue)
-        swing = it.stress_concentration * closed_forms.max_stress(it, stroke) / known
-        return RESERVE * safety.fatigue * (swing + load_stress(it, task) / it.yield_strength)
+    def fatigue(mechanism: Mechanism) -> Any:
+        strength = np.where(np.isnan(mechanism.fatigue), np.inf, mechanism.fatigue)
+        swing = mechanism.stress_concentration * closed_forms.max_stress(mechanism, stroke) / strength
+        return RESERVE * safety.fatigue * (swing + load_stress(mechanism, task) / mechanism.yield_strength)
 
     return [
         Requirement(
             BREAKAWAY,
             (more("friction.static", task.friction, "N"), shorter),
-            lambda it: stiffest * closed_forms.drive_stiffness(it) * stroke / task.friction,
+            lambda mechanism: stiffest * closed_forms.drive_stiffness(mechanism) * stroke / task.friction,
         ),
         Requirement("stress borne for ever", (factor("safety.fatigue", safety.fatigue), shorter), fatigue),
         Requirement(
             "yield strength under stroke and load",
             (factor("safety.strength", safety.strength),),
-            lambda it: RESERVE * safety.strength * static_stress(it, task) / it.yield_strength,
+            lambda mechanism: RESERVE * safety.strength * static_stress(mechanism, task) / mechanism.yield_strength,
         ),
         Requirement(
             "buckling under load",
             (factor("safety.buckling", safety.buckling), *_lighter(task)),
-            lambda it: RESERVE * safety.buckling * buckling_share(it, task, closed_forms.buckling_load(it)),
+            lambda mechanism: (
+                RESERVE * safety.buckling * buckling_share(mechanism, task, closed_forms.buckling_load(mechanism))
+            ),
         ),
         Requirement(
             PARASITIC,
             (factor("safety.parasitic", safety.parasitic),),
-            lambda it: safety.parasitic * task.crossover / first_interfering(it),
+            lambda mechanism: safety.parasitic * task.crossover / first_interfering(mechanism),
         ),
         *_support(spec, stroke),
     ]
@@ -136,36 +138,38 @@ def _support(spec: Spec, stroke: float) -> list[Requirement]:
     return [
         Requirement(
             f"stiffness {where} at full stroke",
-            (less(f"load.{key}", float(wanted), "N/m"),),
-            lambda it, wanted=wanted, form=form: wanted / form(it, stroke),
+            (less(f"load.{key}", float(limit), "N/m"),),
+            lambda mechanism, limit=limit, form=form: limit / form(mechanism, stroke),
         )
         for key, (where, form) in forms.items()
-        if (wanted := getattr(spec.load, key)) is not None
+        if (limit := getattr(spec.load, key)) is not None
     ]
 
 
-def buckling_share(it: Mechanism, task: Task, buckling: Any) -> Any:
+def buckling_share(mechanism: Mechanism, task: Task, buckling: Any) -> Any:
     """How much of what makes the leaves give way is there: the largest force along a leaf, as if it pressed on all,
     over the `buckling` load [N], and the force across them over that at which they give way sideways."""
-    across = float(task.spec.load.force_y) / closed_forms.lateral_load(it)
-    return leaf_load(it, task) * it.leaves / buckling + across
+    across = float(task.spec.load.force_y) / closed_forms.lateral_load(mechanism)
+    return leaf_load(mechanism, task) * mechanism.leaves / buckling + across
 
 
-def leaf_load(it: Mechanism, task: Task) -> Any:
+def leaf_load(mechanism: Mechanism, task: Task) -> Any:
     """The largest force along a leaf [N]: its share of the load, and what a moment about the width adds."""
-    outermost = it.depth / 2 / it.offset_squares
-    return task.load / it.leaves + float(task.spec.load.moment_y) * outermost
+    outermost = mechanism.depth / 2 / mechanism.offset_squares
+    return task.load / mechanism.leaves + float(task.spec.load.moment_y) * outermost
 
 
-def static_stress(it: Mechanism, task: Task) -> Any:
+def static_stress(mechanism: Mechanism, task: Task) -> Any:
     """Largest stress at the clamps [Pa] at full stroke under all loads at once, with the concentration there."""
-    return it.stress_concentration * closed_forms.max_stress(it, task.stroke) + load_stress(it, task)
+    return mechanism.stress_concentration * closed_forms.max_stress(mechanism, task.stroke) + load_stress(
+        mechanism, task
+    )
 
 
-def load_stress(it: Mechanism, task: Task) -> Any:
+def load_stress(mechanism: Mechanism, task: Task) -> Any:
     """Of it, what the loads make [Pa]: a force across the leaf ends bends them in their plane as cantilevers, since
     nothing else holds the stage about z; a moment about x as leaves whose ends stay parallel."""
-    load, middle = task.spec.load, it.width / 2 / it.edgewise
-    about_x = float(load.moment_x) * it.depth / 2 / it.offset_squares * it.length / 2
-    edgewise = (float(load.force_y) * it.length + float(load.moment_z)) / it.leaves + about_x
-    return it.stress_concentration * (edgewise * middle + leaf_load(it, task) / it.area)
+    load, middle = task.spec.load, mechanism.width / 2 / mechanism.edgewise
+    about_x = float(load.moment_x) * mechanism.depth / 2 / mechanism.offset_squares * mechanism.length / 2
+    edgewise = (float(load.force_y) * mechanism.length + float(load.moment_z)) / mechanism.leaves + about_x
+    return mechanism.stress_concentration * (edgewise * middle + leaf_load(mechanism, task) / mechanism.area)

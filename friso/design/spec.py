@@ -46,22 +46,22 @@ class Choice:
         """The example as it stands in a file."""
         return self.example
 
-    def read(self, given: Any) -> tuple[Any, ...]:
+    def read(self, value: Any) -> tuple[Any, ...]:
         """The items. Raises SpecError."""
-        items = given if isinstance(given, list | tuple) else [given]
+        items = value if isinstance(value, list | tuple) else [value]
         if not items:
             raise SpecError("", "an empty list", self.expected, self.example)
         return tuple(self._one(item) for item in items)
 
-    def _one(self, given: Any) -> Any:
+    def _item(self, value: Any) -> Any:
         if self.of:
             try:
-                return self.of.read(given)
+                return self.of.read(value)
             except InputError as error:
                 raise SpecError("", error.given, self.expected, self.example) from None
-        if not isinstance(given, str) or given not in materials():
-            raise unknown_material(given if isinstance(given, str) else str(given))
-        return given
+        if not isinstance(value, str) or value not in materials():
+            raise unknown_material(value if isinstance(value, str) else str(value))
+        return value
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         return core_schema.no_info_plain_validator_function(self.read)
@@ -75,17 +75,19 @@ GAUGES = (0.05, 0.08, 0.1, 0.12, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.5, 0.6, 0.7,
 class Gauges(Choice):
     """A list of thicknesses, or a range that stands for the usual gauges in it."""
 
-    def read(self, given: Any) -> tuple[Any, ...]:
+    def read(self, value: Any) -> tuple[Any, ...]:
         """The thicknesses. Raises SpecError."""
-        if not (isinstance(given, str) and ".." in given):
-            return super().read(given)
+        if not (isinstance(value, str) and ".." in value):
+            return super().read(value)
         assert isinstance(self.of, Quantity)
-        among = Span(self.of, "0.1 mm .. 0.5 mm").read(given)
-        found = [f"{each:g} mm" for each in GAUGES if among.low <= each * 1e-3 * (1 + 1e-9) <= among.high * (1 + 1e-8)]
-        if not found:
-            expected = f"a range with a usual gauge in it ({', '.join(f'{each:g}' for each in GAUGES)} mm)"
-            raise SpecError("", quoted(given), expected, 'thickness = "0.1 mm .. 0.5 mm"')
-        return super().read(found)
+        among = Span(self.of, "0.1 mm .. 0.5 mm").read(value)
+        gauges = [
+            f"{gauge:g} mm" for gauge in GAUGES if among.low <= gauge * 1e-3 * (1 + 1e-9) <= among.high * (1 + 1e-8)
+        ]
+        if not gauges:
+            expected = f"a range with a usual gauge in it ({', '.join(f'{gauge:g}' for gauge in GAUGES)} mm)"
+            raise SpecError("", quoted(value), expected, 'thickness = "0.1 mm .. 0.5 mm"')
+        return super().read(gauges)
 
 
 _FORCE = Quantity("N", non_negative, "20 N")
@@ -108,9 +110,9 @@ class Machine(Section):
     @model_validator(mode="after")
     def _has_one(self) -> Self:
         if (self.bandwidth_limit is None) == (self.parasitic_frequencies is None):
-            given = "both" if self.bandwidth_limit else "neither"
+            text = "both" if self.bandwidth_limit else "neither"
             example = 'bandwidth_limit = "48 Hz" or parasitic_frequencies = ["480 Hz"]'
-            raise SpecError("", given, "the bandwidth limit, or the parasitic frequencies that decide it", example)
+            raise SpecError("", text, "the bandwidth limit, or the parasitic frequencies that decide it", example)
         return self
 
 
@@ -134,8 +136,8 @@ class Friction(Section):
         if self.coulomb and self.gap:
             raise SpecError("", "coulomb together with gap", "one of the two", 'gap = "0.3 .. 0.85"')
         if self.static and self.coulomb and self.coulomb.high > self.static.high:
-            given = f"coulomb = {quoted(self.coulomb.text)}, static = {quoted(self.static.text)}"
-            raise SpecError("", given, "Coulomb friction below the static friction", 'coulomb = "0.5 N .. 1 N"')
+            text = f"coulomb = {quoted(self.coulomb.text)}, static = {quoted(self.static.text)}"
+            raise SpecError("", text, "Coulomb friction below the static friction", 'coulomb = "0.5 N .. 1 N"')
         return self
 
 
@@ -196,16 +198,16 @@ class Leaves(Section):
     def _can_be_built(self) -> Self:
         thickest = max(self.thickness)
         if 2 * self.stroke.low > self.length.high:
-            given = f"stroke = {quoted(self.stroke.text)}, length = {quoted(self.length.text)}"
-            raise SpecError("stroke", given, "a stroke of at most half the length of the leaves", 'stroke = "1 mm"')
+            text = f"stroke = {quoted(self.stroke.text)}, length = {quoted(self.length.text)}"
+            raise SpecError("stroke", text, "a stroke of at most half the length of the leaves", 'stroke = "1 mm"')
         for name in ("length", "width"):
             longest = getattr(self, name)
             if min(self.thickness) >= longest.high:
-                given = f"thickness = {quoted(self.thickness[0].text)}, {name} = {quoted(longest.text)}"
-                raise SpecError("thickness", given, f"sheets thinner than the {name} of the leaves", _GAUGES)
+                text = f"thickness = {quoted(self.thickness[0].text)}, {name} = {quoted(longest.text)}"
+                raise SpecError("thickness", text, f"sheets thinner than the {name} of the leaves", _GAUGES)
         if thickest >= self.spacing.high:
-            given = f"thickness up to {thickest:g} m, spacing = {quoted(self.spacing.text)}"
-            raise SpecError("spacing", given, "leaves farther apart than they are thick", 'spacing = "20 mm .. 60 mm"')
+            text = f"thickness up to {thickest:g} m, spacing = {quoted(self.spacing.text)}"
+            raise SpecError("spacing", text, "leaves farther apart than they are thick", 'spacing = "20 mm .. 60 mm"')
         return self
 
 

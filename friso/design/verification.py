@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import binomtest
 
-from friso.design.population import Population, drawn
+from friso.design.population import Population, sampled
 from friso.design.spec import Spec
 from friso.engine.arrays import Status
 from friso.engine.batch import Options, run_chunks
@@ -67,8 +67,8 @@ class Outcome:
         """The range that holds the probability of hunting with 95 % (Clopper and Pearson)."""
         if not self.tried:
             return 0.0, 1.0
-        found = binomtest(self.hunting, self.tried).proportion_ci(0.95, method="exact")
-        return float(found.low), float(found.high)
+        proportion = binomtest(self.hunting, self.tried).proportion_ci(0.95, method="exact")
+        return float(proportion.low), float(proportion.high)
 
     def slower_than(self, share: float) -> float:
         """The settling time [s] that is exceeded by a share of the moves; infinite where more of them hunt."""
@@ -102,16 +102,16 @@ def verification(stage: Stage, spec: Spec, softening: float, progress: Callable[
     """Try the design in all that the specification allows; its load takes a share of the drive stiffness, `softening`,
     or none of it."""
     flat = stage.flat()
-    machines = drawn(spec, flat, MACHINES, softening)
+    machines = sampled(spec, flat, MACHINES, softening)
     window = float(spec.position.window)
     outcomes: list[Outcome] = []
     for name, held in (("joint free", False), ("joint locked", True)):
-        own = machines.over(flat) | {"joint.locked": held, "motion.kind": "there_and_back"}
+        keys = machines.over(flat) | {"joint.locked": held, "motion.kind": "there_and_back"}
         outcomes.append(
-            tried(own, machines.count, window, lambda done, name=name: progress(name, done, machines.count))
+            tried(keys, machines.count, window, lambda done, name=name: progress(name, done, machines.count))
         )
     free, locked = outcomes
-    return Verification(machines, free, locked, _one(stage, machines.of(free.worst), free.followed(free.worst)))
+    return Verification(machines, free, locked, _worst_stage(stage, machines.of(free.worst), free.followed(free.worst)))
 
 
 def tried(
@@ -126,8 +126,8 @@ def tried(
     first = _followed(flat, count, window, FOLLOWED, progress)
     again = np.flatnonzero(first.completed & first.hunts & patient)
     if again.size:
-        own = {key: value[again] if np.ndim(value) else value for key, value in flat.items()}
-        longer = _followed(own, again.size, window, LONGER * FOLLOWED, lambda done: None)
+        keys = {key: value[again] if np.ndim(value) else value for key, value in flat.items()}
+        longer = _followed(keys, again.size, window, LONGER * FOLLOWED, lambda done: None)
         better = np.flatnonzero(longer.completed)  # where the long run fails, the first verdict stays
         for name in ("hunts", "settling", "swing"):
             getattr(first, name)[again[better]] = getattr(longer, name)[better]
@@ -137,24 +137,24 @@ def tried(
 def _followed(flat: dict[str, Any], count: int, window: float, time: float, progress: Callable[[int], None]) -> Outcome:
     """The moves, each followed for a time [s] after its last corner."""
     corner = np.broadcast_to(np.asarray(last_corner(flat), float), (count,))
-    whole = {**flat, "motion.duration": corner + time}
+    keys = {**flat, "motion.duration": corner + time}
     options = Options(rtol=RTOL, bands=(window, 10 * window), window=1 - LAST, record_from=0.0, least_swing=np.inf)
-    found = Outcome(np.zeros(count, bool), np.zeros(count, bool), np.full(count, np.nan), np.full(count, np.nan))
+    outcome = Outcome(np.zeros(count, bool), np.zeros(count, bool), np.full(count, np.nan), np.full(count, np.nan))
     done = 0
-    for runs in run_chunks(kernel(shared_structure(whole)), whole, count, options):
+    for runs in run_chunks(kernel(shared_structure(keys)), keys, count, options):
         numbers, ended, left = runs.numbers, runs.statistic("ended"), runs.statistic("inner_exit")
         completed = runs.results.statuses == Status.DONE
-        found.completed[numbers] = completed
-        found.hunts[numbers] = completed & (left > (1 - LAST) * ended)
-        settled = completed & ~found.hunts[numbers]
-        found.settling[numbers] = np.where(settled, np.maximum(left - corner[numbers], 0.0), np.nan)
-        found.swing[numbers] = runs.statistic("deviation_max") - runs.statistic("deviation_min")
+        outcome.completed[numbers] = completed
+        outcome.hunts[numbers] = completed & (left > (1 - LAST) * ended)
+        settled = completed & ~outcome.hunts[numbers]
+        outcome.settling[numbers] = np.where(settled, np.maximum(left - corner[numbers], 0.0), np.nan)
+        outcome.swing[numbers] = runs.statistic("deviation_max") - runs.statistic("deviation_min")
         done += len(numbers)
         progress(done)
-    return found
+    return outcome
 
 
-def _one(stage: Stage, keys: dict[str, float], time: float) -> Stage:
+def _worst_stage(stage: Stage, keys: dict[str, float], time: float) -> Stage:
     """One of the machines with its move as a stage, followed for a time [s] after the move. Its joint is given by its
     numbers: of which size of the leaves its stiffness is off is not told apart."""
     flat = stage.flat()

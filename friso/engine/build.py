@@ -26,10 +26,10 @@ def main(folder: Path, task: bytes) -> None:
     plug_ins, pickled = pickle.loads(task)
     for plug_in in plug_ins:
         plug_in.load()
-    wanted = pickle.loads(pickled)
-    model = _model(wanted.structure)
-    model = variational(model) if wanted.variational else model
-    source = write_module(model, TABLEAUS[wanted.method], repr(wanted), wanted.lanes)
+    request = pickle.loads(pickled)
+    model = _model(request.structure)
+    model = variational(model) if request.variational else model
+    source = write_module(model, TABLEAUS[request.method], repr(request), request.lanes)
     print(keep(folder, source, compile_driver), end="")
 
 

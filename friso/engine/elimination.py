@@ -38,25 +38,25 @@ class Elimination:
         return forward + backward
 
 
-def eliminate(size: int, nonzero: set[Entry], own: set[int], solves: int) -> Elimination:
+def eliminate(size: int, nonzero: set[Entry], diagonal: set[int], solves: int) -> Elimination:
     """Elimination of the matrix whose entries ``A_i_j`` are nonzero at `nonzero` and on the diagonal.
 
-    Rows not in `own` have nothing but ``diagonal`` on the diagonal, whose inverse is ``inverse``. The order is the
+    Rows not in `diagonal` have nothing but ``diagonal`` on the diagonal, whose inverse is ``inverse``. The order is the
     best of the exchanges of two pivots, tried until none helps, for one factorisation and `solves` solutions.
     """
     pattern = nonzero | {(i, i) for i in range(size)}
     order = _markowitz(size, pattern)
-    best = _cost(order, pattern, own, solves)
+    best = _cost(order, pattern, diagonal, solves)
     improved = True
     while improved:
         improved = False
         for a, b in combinations(range(size), 2):
             trial = list(order)
             trial[a], trial[b] = trial[b], trial[a]
-            cost = _cost(trial, pattern, own, solves)
+            cost = _cost(trial, pattern, diagonal, solves)
             if cost < best:
                 order, best, improved = trial, cost, True
-    return _write(order, pattern, own)
+    return _write(order, pattern, diagonal)
 
 
 def _markowitz(size: int, nonzero: set[Entry]) -> list[int]:
@@ -72,12 +72,12 @@ def _markowitz(size: int, nonzero: set[Entry]) -> list[int]:
     return order
 
 
-def _cost(order: Sequence[int], nonzero: set[Entry], own: set[int], solves: int) -> float:
+def _cost(order: Sequence[int], nonzero: set[Entry], diagonal: set[int], solves: int) -> float:
     """Cycles for a factorisation and `solves` solutions: the longest wait, and a share for every operation."""
     ready = dict.fromkeys(nonzero, 0)
     inverse, operations = dict.fromkeys(order, 0), 0
     forward, backward = dict.fromkeys(order, 0), dict.fromkeys(order, 0)
-    untouched = set(order) - own
+    untouched = set(order) - diagonal
     for step, k in enumerate(order):
         inverse[k] = 0 if k in untouched else ready[k, k] + DIVIDE
         later = order[step + 1 :]
@@ -98,9 +98,9 @@ def _cost(order: Sequence[int], nonzero: set[Entry], own: set[int], solves: int)
     return max(inverse.values()) + solves * max(backward.values()) + WORK * operations
 
 
-def _write(order: Sequence[int], nonzero: set[Entry], own: set[int]) -> Elimination:
+def _write(order: Sequence[int], nonzero: set[Entry], diagonal: set[int]) -> Elimination:
     """The elimination in the given order."""
-    pattern, untouched = set(nonzero), set(order) - own
+    pattern, untouched = set(nonzero), set(order) - diagonal
     code: list[str] = []
     lower: list[Entry] = []
     upper: dict[int, tuple[int, ...]] = {}
@@ -116,8 +116,8 @@ def _write(order: Sequence[int], nonzero: set[Entry], own: set[int]) -> Eliminat
             lower.append((i, k))
             code.append(f"L_{i}_{k} = A_{i}_{k} * D_{k}")
             for j in columns:
-                known = f"A_{i}_{j}" if (i, j) in pattern else ""
-                code.append(f"A_{i}_{j} = {known} - L_{i}_{k} * A_{k}_{j}")
+                present = f"A_{i}_{j}" if (i, j) in pattern else ""
+                code.append(f"A_{i}_{j} = {present} - L_{i}_{k} * A_{k}_{j}")
                 pattern.add((i, j))
                 untouched -= {i} if i == j else set()
     return Elimination(tuple(order), tuple(lower), upper, tuple(code))

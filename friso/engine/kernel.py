@@ -127,34 +127,34 @@ def kernel(structure: Form, variational: bool = False, method: str = "Rodas5P", 
     return _kernel(Wanted(structure, variational, method, lanes))
 
 
-def _kernel(wanted: Wanted) -> Kernel:
-    with _loading[wanted]:
-        return _loaded(wanted)
+def _kernel(request: Wanted) -> Kernel:
+    with _loading[request]:
+        return _loaded(request)
 
 
 _loading: defaultdict[Wanted, Lock] = defaultdict(Lock)
 
 
 @cache
-def _loaded(wanted: Wanted) -> Kernel:
+def _loaded(request: Wanted) -> Kernel:
     """What is wanted is pickled apart from the plug-ins, which the builder loads first: it may hold their classes."""
-    foreign = plug_ins(wanted.sections)
-    name = " ".join([repr(wanted), *(plug_in.digest for plug_in in foreign)])
-    task = pickle.dumps((foreign, pickle.dumps(wanted)))
+    foreign = plug_ins(request.sections)
+    name = " ".join([repr(request), *(plug_in.digest for plug_in in foreign)])
+    task = pickle.dumps((foreign, pickle.dumps(request)))
     return Kernel(load_or_build(name, "friso.engine.build", task, compile_driver))
 
 
-def kernels(wanted: Iterable[Wanted]) -> list[Kernel]:
+def kernels(requests: Iterable[Wanted]) -> list[Kernel]:
     """Several kernels; what has to be compiled is compiled side by side."""
     with ThreadPoolExecutor() as pool:
         try:
-            return list(pool.map(_kernel, wanted))
+            return list(pool.map(_kernel, requests))
         except BaseException:
             stop_building()
             raise
 
 
-def empty_results(runs: int, capacity: int, samples: int, kept: int) -> Results:
+def empty_results(runs: int, capacity: int, samples: int, outputs: int) -> Results:
     """Room for the results of so many runs, with turning points, samples, and numbers kept at each of these."""
     return Results(
         statistics=np.zeros((runs, len(STATISTICS))),
@@ -162,8 +162,8 @@ def empty_results(runs: int, capacity: int, samples: int, kept: int) -> Results:
         turn_times=np.zeros((runs, capacity)),
         turn_values=np.zeros((runs, capacity)),
         turn_counts=np.zeros(runs, np.int64),
-        samples=np.full((runs, samples, kept), np.nan),
-        ends=np.full((runs, kept), np.nan),
+        samples=np.full((runs, samples, outputs), np.nan),
+        ends=np.full((runs, outputs), np.nan),
     )
 
 

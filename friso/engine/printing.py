@@ -48,7 +48,7 @@ class _KernelPrinter(PythonCodePrinter):
         return f"tanh({self._print(expr.args[0])})"
 
     def _print_call(self, expr: sp.Expr) -> str:
-        return f"{type(expr).__name__}({', '.join(self._print(each) for each in expr.args)})"
+        return f"{type(expr).__name__}({', '.join(self._print(argument) for argument in expr.args)})"
 
     _print_gaussian = _print_quantised = _print_call
 

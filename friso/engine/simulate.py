@@ -41,8 +41,8 @@ def simulate(stage: Stage, rtol: float = 1e-6, sample_time: float | None = None)
     duration = flat["motion.duration"]
     interval = duration / SAMPLES if sample_time is None else sample_time
     if not duration / MOST_SAMPLES <= interval <= duration:
-        given, expected = f"{interval:g} s", f"from {duration / MOST_SAMPLES:g} s to the duration, {duration:g} s"
-        raise InputError("sample_time", given, expected, "1 ms")
+        text, expected = f"{interval:g} s", f"from {duration / MOST_SAMPLES:g} s to the duration, {duration:g} s"
+        raise InputError("sample_time", text, expected, "1 ms")
     shape = kernel(structure(flat))
     (runs,) = run_chunks(shape, flat, 1, Options(rtol=checked_rtol(rtol), interval=interval))
     time = np.arange(runs.results.samples.shape[1]) * interval
@@ -57,7 +57,7 @@ def sampled_outputs(shape: Kernel, flat: dict[str, Any], states: np.ndarray, tim
     since, reference = time - active[:, 0], active[:, 1:].T
     modes = [s > 0 for s in shape.module.surfaces(states, since, reference, parameters)]
     outputs = shape.module.outputs(states, np.array(modes, dtype=float), since, reference, parameters)
-    return [np.broadcast_to(np.asarray(each, dtype=float), time.shape) for each in outputs]
+    return [np.broadcast_to(np.asarray(output, dtype=float), time.shape) for output in outputs]
 
 
 def output_variables(shape: Kernel, flat: dict[str, Any], states: np.ndarray, time: np.ndarray) -> dict[str, Any]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from friso.equations.bandwidth import faster
 from friso.frequency.drive import Drive
-from friso.frequency.family import PoleStability, controller, distance_to_lines, grid, stability_by_poles, plants, scan
+from friso.frequency.family import PoleStability, controller, distance_to_lines, grid, plants, scan, stability_by_poles
 from friso.frequency.members import Members, family, joined, limit_cases
 from friso.frequency.ranges import Range, ranges_below, shared
 

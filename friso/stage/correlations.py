@@ -53,8 +53,8 @@ class Correlations:
 
     def among(self, keys: Iterable[str]) -> Correlations:
         """Those of some of the keys."""
-        kept = [k for k, key in enumerate(self.keys) if key in [*keys]]
-        return Correlations(tuple(self.keys[k] for k in kept), self.matrix[np.ix_(kept, kept)])
+        places = [k for k, key in enumerate(self.keys) if key in [*keys]]
+        return Correlations(tuple(self.keys[k] for k in places), self.matrix[np.ix_(places, places)])
 
     def over(self, keys: list[str]) -> np.ndarray:
         """The matrix of all `keys`, shape (keys, keys); those that this does not name are independent."""
@@ -87,11 +87,11 @@ def beside(path: str | os.PathLike[str]) -> Path:
 def read_correlations(path: str | os.PathLike[str], stage: Stage) -> Correlations:
     """The correlations of a file, which are to be of uncertain keys of the stage. Raises StageError."""
     try:
-        found = _from(parsed(text_of(Path(path), _EXPECTED, _EXAMPLE), _EXPECTED, _EXAMPLE))
-        _belongs(found, stage)
+        correlations = _from(parsed(text_of(Path(path), _EXPECTED, _EXAMPLE), _EXPECTED, _EXAMPLE))
+        _belongs(correlations, stage)
     except InputError as error:
         raise error.found_in(str(path)) from None
-    return found
+    return correlations
 
 
 def write_correlations(
@@ -127,14 +127,14 @@ def _from(document: dict[str, Any]) -> Correlations:
 
 def _belongs(correlations: Correlations, stage: Stage) -> None:
     """Raises StageError for a key that the stage does not have, or that is not uncertain there."""
-    known, uncertain = numeric_keys(stage.flat()), stage.uncertain()
+    keys, uncertain = numeric_keys(stage.flat()), stage.uncertain()
     for key in correlations.keys:
-        if key not in known:
-            raise unknown_key(key, known, _EXAMPLE)
+        if key not in keys:
+            raise unknown_key(key, keys, _EXAMPLE)
         if key not in uncertain:
-            given = f"{key}, which is not uncertain in the stage file"
+            text = f"{key}, which is not uncertain in the stage file"
             raise StageError(
-                "keys", given, f"some of {', '.join(uncertain) or 'nothing: no key is uncertain'}", _EXAMPLE
+                "keys", text, f"some of {', '.join(uncertain) or 'nothing: no key is uncertain'}", _EXAMPLE
             )
 
 
@@ -165,23 +165,23 @@ def draw(stage: Stage, correlations: Correlations, count: int, seed: int) -> Dra
         raise StageError("", "a stage file of which no key is uncertain", "an uncertain quantity to draw", example)
     sampler = qmc.Sobol(len(intervals), rng=seed)
     matrix, size = correlations.over([*intervals]), 1 << max(0, count - 1).bit_length()
-    parts, found, beyond, broken = [], 0, 0, Counter[str]()
+    parts, accepted, beyond, broken = [], 0, 0, Counter[str]()
     for _ in range(MOST):
         keys = _values(stage, matrix, sampler.random(size))
         within, why = _allowed(stage, keys, size)
-        enough = np.flatnonzero(np.cumsum(within) == count - found)[:1]
+        enough = np.flatnonzero(np.cumsum(within) == count - accepted)[:1]
         seen = slice(0, int(enough[0]) + 1 if enough.size else size)
         reasons = why[seen][~within[seen]]
         beyond += int(np.count_nonzero(reasons == ""))
         broken.update(reasons[reasons != ""].tolist())
         parts.append({key: values[seen][within[seen]] for key, values in keys.items()})
-        found += int(within[seen].sum())
-        if found == count:
+        accepted += int(within[seen].sum())
+        if accepted == count:
             joined = {key: np.concatenate([part[key] for part in parts]) for key in intervals}
             return Drawn(joined, count, beyond, broken)
     most = broken.most_common(1)
-    given = f"ranges of which {100 * found / (MOST * size):.2g} % are allowed"
-    raise StageError("", given, most[0][0] if most else "ranges within the bounds of their keys")
+    text = f"ranges of which {100 * accepted / (MOST * size):.2g} % are allowed"
+    raise StageError("", text, most[0][0] if most else "ranges within the bounds of their keys")
 
 
 def _values(stage: Stage, matrix: np.ndarray, shares: np.ndarray) -> dict[str, np.ndarray]:

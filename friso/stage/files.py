@@ -74,11 +74,11 @@ def text_of(path: Path, expected: str, example: str = _EXAMPLE) -> str:
     try:
         return path.read_bytes().decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        given = f"byte {error.start + 1} is not UTF-8"
-        raise InputError("", given, "a text file saved as UTF-8", _EXAMPLE, str(path)) from None
+        text = f"byte {error.start + 1} is not UTF-8"
+        raise InputError("", text, "a text file saved as UTF-8", _EXAMPLE, str(path)) from None
     except (OSError, ValueError) as error:
-        given = "a folder" if path.is_dir() else _reason(error)
-        raise InputError("", given, expected, example, str(path)) from None
+        text = "a folder" if path.is_dir() else _reason(error)
+        raise InputError("", text, expected, example, str(path)) from None
 
 
 def _reason(error: OSError | ValueError) -> str:

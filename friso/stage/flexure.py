@@ -109,19 +109,21 @@ class _Leaves(UncertainSection):
     @model_validator(mode="after")
     def _can_turn(self) -> Self:
         inertia = [self.inertia_x, self.inertia_y, self.inertia_z]
-        known = [each for each in inertia if each is not None]
-        if len(known) == 3 and 2 * max(known) > sum(known) * (1 + 1e-9):
-            given = ", ".join(f"inertia_{axis} = {quoted(each.text)}" for axis, each in zip("xyz", known, strict=True))
+        moments = [moment for moment in inertia if moment is not None]
+        if len(moments) == 3 and 2 * max(moments) > sum(moments) * (1 + 1e-9):
+            text = ", ".join(
+                f"inertia_{axis} = {quoted(moment.text)}" for axis, moment in zip("xyz", moments, strict=True)
+            )
             example = 'inertia_x = "2e-4 kg*m^2", inertia_y = "3e-4 kg*m^2", inertia_z = "3e-4 kg*m^2"'
-            raise StageError("inertia", given, "none larger than the sum of the other two, as in all bodies", example)
+            raise StageError("inertia", text, "none larger than the sum of the other two, as in all bodies", example)
         return self
 
     @model_validator(mode="after")
     def _has_a_material(self) -> Self:
         numbers = ("young", "poisson", "density", "yield")
-        given = [key for key in (*numbers, "fatigue") if getattr(self, key) is not None]
-        if self.material and given:
-            raise StageError("", f"material together with {', '.join(given)}", "one form, not both", _EITHER)
+        keys = [key for key in (*numbers, "fatigue") if getattr(self, key) is not None]
+        if self.material and keys:
+            raise StageError("", f"material together with {', '.join(keys)}", "one form, not both", _EITHER)
         if self.material:
             if self.material not in materials():
                 raise unknown_material(self.material).under("material")
@@ -141,10 +143,10 @@ Flexure = create_model(
 
 def unknown_material(name: str) -> StageError:
     """The error for a material that is not known, naming the nearest that is."""
-    near = nearest(name, materials()) or next((each for each in materials() if name.lower() in each), None)
+    near = nearest(name, materials()) or next((material for material in materials() if name.lower() in material), None)
     hint = f"unknown; did you mean {near}?" if near else "unknown"
-    known = ", ".join(materials())
-    return StageError("", quoted(name, hint), f"one of {known}", f'material = "{near or "stainless 1.4310"}"')
+    names = ", ".join(materials())
+    return StageError("", quoted(name, hint), f"one of {names}", f'material = "{near or "stainless 1.4310"}"')
 
 
 def with_material(flat: dict[str, Any]) -> dict[str, Any]:
@@ -152,7 +154,12 @@ def with_material(flat: dict[str, Any]) -> dict[str, Any]:
     name = flat.get("flexure.material")
     if not name:
         return flat
-    known = materials()[str(name)]
-    numbers = {"young": known.young, "density": known.density, "yield": known.yield_strength, "fatigue": known.fatigue}
+    properties = materials()[str(name)]
+    numbers = {
+        "young": properties.young,
+        "density": properties.density,
+        "yield": properties.yield_strength,
+        "fatigue": properties.fatigue,
+    }
     plain = {f"flexure.{key}": float(value) for key, value in numbers.items()}
-    return flat | plain | {"flexure.poisson": known.poisson}
+    return flat | plain | {"flexure.poisson": properties.poisson}

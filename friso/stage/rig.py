@@ -153,13 +153,13 @@ class Several:
         """The example as it stands in a file."""
         return f"[{', '.join(map(as_toml, self.examples))}]"
 
-    def read(self, given: Any) -> Values:
+    def read(self, value: Any) -> Values:
         """The values of an array. Raises StageError."""
-        if not isinstance(given, list | tuple) or len(given) < 2:
-            hint = f"of {len(given)}" if isinstance(given, list | tuple) else "not an array"
-            raise StageError("", quoted(given, hint), self.expected, self.written_example)
+        if not isinstance(value, list | tuple) or len(value) < 2:
+            hint = f"of {len(value)}" if isinstance(value, list | tuple) else "not an array"
+            raise StageError("", quoted(value, hint), self.expected, self.written_example)
         try:
-            return Values(self.of.read(item) for item in given)
+            return Values(self.of.read(item) for item in value)
         except InputError as error:
             raise StageError("", error.given, self.expected, self.written_example) from None
 
@@ -179,9 +179,9 @@ class Density(Quantity):
         """What the key takes, in words."""
         return f"number and unit in quotes, convertible to {self.unit}, and /Hz^0.5, {self.bound.text}"
 
-    def read(self, given: Any) -> Value:
+    def read(self, value: Any) -> Value:
         """The SI value of a text (or of the text of a Value). Raises StageError."""
-        text = getattr(given, "text", given)
+        text = getattr(value, "text", value)
         amplitude = _PER_ROOT_HERTZ.sub("", text) if isinstance(text, str) else text
         if amplitude == text and isinstance(text, str):
             raise StageError("", quoted(text, "does not end with /Hz^0.5"), self.expected, self.written_example)
@@ -212,10 +212,10 @@ class Floor(Section):
         frequencies, densities = len(self.frequency), len(self.acceleration)
         if frequencies != densities:
             example = 'frequency = ["1 Hz", "100 Hz"], acceleration = ["1e-5 m/s^2/Hz^0.5", "1e-4 m/s^2/Hz^0.5"]'
-            given = f"{frequencies} frequencies and {densities} densities"
-            raise StageError("acceleration", given, "one density for each frequency", example)
+            text = f"{frequencies} frequencies and {densities} densities"
+            raise StageError("acceleration", text, "one density for each frequency", example)
         for low, high in pairwise(self.frequency):
             if not low < high:
-                given = f"{quoted(high.text)} after {quoted(low.text)}"
-                raise StageError("frequency", given, "frequencies that rise", 'frequency = ["1 Hz", "10 Hz", "100 Hz"]')
+                text = f"{quoted(high.text)} after {quoted(low.text)}"
+                raise StageError("frequency", text, "frequencies that rise", 'frequency = ["1 Hz", "10 Hz", "100 Hz"]')
         return self

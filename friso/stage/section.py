@@ -57,11 +57,11 @@ class UncertainSection(Section):
 
     @field_validator("*", mode="wrap")
     @classmethod
-    def _read_uncertain(cls, given: Any, read: ValidatorFunctionWrapHandler, info: ValidationInfo) -> Any:
-        text = getattr(given, "text", given)
+    def _read_uncertain(cls, value: Any, read: ValidatorFunctionWrapHandler, info: ValidationInfo) -> Any:
+        text = getattr(value, "text", value)
         if is_range(text) and (field := numeric_fields(cls).get(str(info.field_name))):
             return uncertain_value(text, field)
-        return read(given)
+        return read(value)
 
     def uncertain(self) -> dict[str, Interval]:
         """The intervals of the uncertain quantities by key, those without width left out."""
@@ -79,13 +79,13 @@ class Table:
     pick: Callable[[dict[str, Any]], type[Section]]
     example: str
 
-    def read(self, given: Any) -> Any:
+    def read(self, value: Any) -> Any:
         """The section for a table; a section is left as it is. Raises InputError."""
-        if isinstance(given, Section):
-            return given
-        if not isinstance(given, dict):
-            raise InputError("", quoted(given), "a table of keys", self.example)
-        return self.pick(given)(**given)
+        if isinstance(value, Section):
+            return value
+        if not isinstance(value, dict):
+            raise InputError("", quoted(value), "a table of keys", self.example)
+        return self.pick(value)(**value)
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         return core_schema.no_info_before_validator_function(self.read, handler(source))
@@ -115,20 +115,20 @@ class Variants:
 
 def numeric_fields(cls: type[Section]) -> dict[str, Quantity | Number]:
     """Unit, bound and example of each numeric key of a table."""
-    found = ((key, item) for key, field in cls.model_fields.items() for item in field.metadata)
-    return {key: item for key, item in found if isinstance(item, Quantity | Number)}
+    items = ((key, item) for key, field in cls.model_fields.items() for item in field.metadata)
+    return {key: item for key, item in items if isinstance(item, Quantity | Number)}
 
 
-def nearest(name: Any, known: Iterable[str]) -> str | None:
+def nearest(name: Any, names: Iterable[str]) -> str | None:
     """The known name most like `name`, if one is like it."""
-    return next(iter(difflib.get_close_matches(str(name).lower(), [*known], n=1, cutoff=0.7)), None)
+    return next(iter(difflib.get_close_matches(str(name).lower(), [*names], n=1, cutoff=0.7)), None)
 
 
-def unknown_key(key: str, known: Iterable[str], example: str = "") -> InputError:
+def unknown_key(key: str, names: Iterable[str], example: str = "") -> InputError:
     """The error for a key that does not exist, naming the nearest that does."""
-    near = nearest(key, known)
+    near = nearest(key, names)
     hint = f"an unknown key; did you mean {near}?" if near else "an unknown key"
-    return InputError(key, hint, f"one of {', '.join(known)}", example)
+    return InputError(key, hint, f"one of {', '.join(names)}", example)
 
 
 def _first_problem(cls: type[Section], error: ValidationError) -> InputError:
@@ -142,8 +142,8 @@ def _first_problem(cls: type[Section], error: ValidationError) -> InputError:
     if problem["type"] == "extra_forbidden":
         near = nearest(key, cls.model_fields) or next(iter(cls.model_fields))
         return unknown_key(key, cls.model_fields, _described(cls, near)[1])
-    given = "nothing" if problem["type"] == "missing" else quoted(problem["input"])
-    return InputError(key, given, *_described(cls, key))
+    text = "nothing" if problem["type"] == "missing" else quoted(problem["input"])
+    return InputError(key, text, *_described(cls, key))
 
 
 def _complete(error: InputError, key: str) -> InputError:

@@ -89,8 +89,8 @@ class Stage(Section):
     @model_validator(mode="after")
     def _tables_fit_together(self) -> Self:
         if self.joint and (self.masses.cart is None or self.masses.stage is None):
-            given = "a [joint], but a single mass"
-            raise StageError("masses", given, "both masses", 'cart = "1.2 kg", stage = "0.5 kg"')
+            text = "a [joint], but a single mass"
+            raise StageError("masses", text, "both masses", 'cart = "1.2 kg", stage = "0.5 kg"')
         for table, what in (("parasitic", "a parasitic mode"), ("flexure", "leaf springs")):
             if getattr(self, table) and not self.joint:
                 raise StageError(table, f"{what}, but no [joint]", "both or neither", _JOINT.example)
@@ -109,10 +109,10 @@ class Stage(Section):
         """A joint has its stiffness, or leaf springs from which it follows."""
         joint = self.joint
         if joint and self.flexure:
-            given = ["joint.stiffness"] if joint.stiffness is not None else ["[parasitic]"] if self.parasitic else []
-            if given:
+            keys = ["joint.stiffness"] if joint.stiffness is not None else ["[parasitic]"] if self.parasitic else []
+            if keys:
                 expected = "one of the two: stiffness and parasitic mode follow from the leaf springs"
-                raise StageError(given[0], f"{given[0]} together with [flexure]", expected, _FLEXURE.example)
+                raise StageError(keys[0], f"{keys[0]} together with [flexure]", expected, _FLEXURE.example)
         elif joint and not joint.locked and joint.stiffness is None:
             expected = "the stiffness of the joint, or a [flexure]; only a joint with locked = true can do without"
             raise StageError("joint.stiffness", "nothing", expected, 'stiffness = "2.4 N/mm"')
@@ -123,8 +123,8 @@ class Stage(Section):
         followed = (key for key in flat if key.startswith(("parasitic.", "joint.")))
         lost = [key for key in followed if not isinstance(flat[key], bool) and not np.isfinite(flat[key])]
         if lost:
-            given = f"leaf springs of which {lost[0]} cannot be computed"
-            raise StageError("flexure", given, "sizes of leaf springs", 'length = "70 mm", width = "45 mm"')
+            text = f"leaf springs of which {lost[0]} cannot be computed"
+            raise StageError("flexure", text, "sizes of leaf springs", 'length = "70 mm", width = "45 mm"')
 
     def _written(self, rule: Rule) -> str:
         """The values that a rule is about, as the user wrote them."""
@@ -134,8 +134,8 @@ class Stage(Section):
 
     def given(self) -> dict[str, Any]:
         """The stage file as nested tables: the keys that the user gave, with the values as written."""
-        given = super().given()
-        return {key: item.given() if isinstance(item, Section) else item for key, item in given.items()}
+        texts = super().given()
+        return {key: item.given() if isinstance(item, Section) else item for key, item in texts.items()}
 
     def flat(self, swept: Mapping[str, Any] | None = None) -> dict[str, Any]:
         """Dotted keys to SI floats, texts and booleans; defaults filled in, absent optional keys absent, and so are
@@ -147,14 +147,14 @@ class Stage(Section):
         flat: dict[str, Any] = {"friction.model": "none"}
         for table, section in self:
             if isinstance(section, Section):
-                given = {key: value for key, value in section if not isinstance(value, Values | None)}
-                flat |= {f"{table}.{key}": _plain(value) for key, value in given.items()}
-        known = numeric_keys(flat)
+                values = {key: value for key, value in section if not isinstance(value, Values | None)}
+                flat |= {f"{table}.{key}": _plain(value) for key, value in values.items()}
+        keys = numeric_keys(flat)
         if self.flexure:
-            known = {key: item for key, item in known.items() if not key.startswith(("parasitic.", "joint.stiffness"))}
+            keys = {key: item for key, item in keys.items() if not key.startswith(("parasitic.", "joint.stiffness"))}
         for key in swept or {}:
-            if key not in known:
-                raise StageError.of(unknown_key(key, known))
+            if key not in keys:
+                raise StageError.of(unknown_key(key, keys))
         return derived(_with_defaults(flat | dict(swept or {})))
 
     def uncertain(self) -> dict[str, Interval]:
@@ -175,9 +175,9 @@ class Stage(Section):
     def with_numbers(self, numbers: Mapping[str, float], without: Iterable[str] = ()) -> "Stage":
         """The stage with SI numbers for dotted keys, written such that they are read again as the same ones, and
         without some tables. Raises StageError."""
-        known = numeric_keys({**self.flat(), **numbers})
+        keys = numeric_keys({**self.flat(), **numbers})
         texts = {
-            key: f"{float(value)!r} {known[key].unit}" if known[key].unit else value for key, value in numbers.items()
+            key: f"{float(value)!r} {keys[key].unit}" if keys[key].unit else value for key, value in numbers.items()
         }
         return self.replace(texts | dict.fromkeys(without))
 
@@ -192,9 +192,9 @@ class Stage(Section):
 
     def to_toml(self) -> str:
         """The text of a stage file that gives this stage again."""
-        given = self.given()
-        lines = [f"{key} = {as_toml(text)}" for key, text in given.items() if isinstance(text, str)]
-        for name, table in given.items():
+        texts = self.given()
+        lines = [f"{key} = {as_toml(text)}" for key, text in texts.items() if isinstance(text, str)]
+        for name, table in texts.items():
             if isinstance(table, dict):
                 lines += ["", f"[{name}]", *(f"{key} = {_toml(value)}" for key, value in table.items())]
         return "\n".join(lines).lstrip() + "\n"

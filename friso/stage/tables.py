@@ -145,8 +145,8 @@ def controller_form(table: dict[str, Any]) -> type[Section]:
     rules = [key for key in TunedController.model_fields if key in table and key not in Controller.model_fields]
     gains = [key for key in GainsController.model_fields if key in table and key not in Controller.model_fields]
     if rules and gains:
-        given = f"{', '.join(rules)} (van Dijk's rules) together with {', '.join(gains)} (gains)"
-        raise StageError("", given, "one form, not both", _EITHER_FORM)
+        text = f"{', '.join(rules)} (van Dijk's rules) together with {', '.join(gains)} (gains)"
+        raise StageError("", text, "one form, not both", _EITHER_FORM)
     if not rules and not {"kp", "ki", "kd"} & {*gains}:
         raise StageError("", "neither crossover nor any of kp, ki, kd", "one of the two forms", _EITHER_FORM)
     return TunedController if rules else GainsController

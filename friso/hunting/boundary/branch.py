@@ -98,29 +98,29 @@ class Tracer:
         points, direction, step = [start], np.array([ahead, 0.0, 0.0]), FIRST
         while len(points) <= MOST:
             last = points[-1]
-            found = self.solve(last, last.vector + step * direction, direction)
-            moved = np.zeros(3) if found is None else found.vector - last.vector
+            point = self.solve(last, last.vector + step * direction, direction)
+            moved = np.zeros(3) if point is None else point.vector - last.vector
             length = float(np.linalg.norm(moved))
-            near = found is not None and 0 < length < (2 * step if len(points) > 1 else LONGEST)
+            near = point is not None and 0 < length < (2 * step if len(points) > 1 else LONGEST)
             ahead = float(moved @ direction) / length if near else 0.0
             if near and (ahead > 0 or len(points) == 1):
                 direction = moved / length
-            if found is None or not near or (ahead < np.cos(TURN) and len(points) > 1):
+            if point is None or not near or (ahead < np.cos(TURN) and len(points) > 1):
                 step /= 3  # and along the direction that the branch turned out to have
                 if step < SHORTEST:
                     return points[1:], f"it could not be followed farther (multiplier {last.multiplier:.3g})"
                 continue
-            coarse = abs(found.multiplier - last.multiplier) > SMOOTH and abs(last.multiplier) < STEEP
+            coarse = abs(point.multiplier - last.multiplier) > SMOOTH and abs(last.multiplier) < STEEP
             if coarse and step > FIRST:
                 step /= 2
                 continue
-            if not 0 <= found.place <= self.farthest:
-                return [*points[1:], *self._at_the_end(last, found)], END_OF_RANGE
-            if self._is_mirrored(start, found):
+            if not 0 <= point.place <= self.farthest:
+                return [*points[1:], *self._at_the_end(last, point)], END_OF_RANGE
+            if self._is_mirrored(start, point):
                 return points[1:], "it meets the symmetric cycle"
-            points.append(found)
+            points.append(point)
             step = min(1.5 * step, LONGEST)
-            if reason := self._stop(found):
+            if reason := self._stop(point):
                 return points[1:], reason
         return points[1:], "it was followed for as many steps as there may be"
 
@@ -128,21 +128,21 @@ class Tracer:
         """The point at the end of the range that lies between two."""
         end = 0.0 if beyond.place < 0 else self.farthest
         share = (end - last.place) / (beyond.place - last.place)
-        found = self.solve(last, last.vector + share * (beyond.vector - last.vector), np.array([1.0, 0.0, 0.0]))
-        return [found] if found else []
+        terminal = self.solve(last, last.vector + share * (beyond.vector - last.vector), np.array([1.0, 0.0, 0.0]))
+        return [terminal] if terminal else []
 
-    def _is_mirrored(self, start: Point, found: Point) -> bool:
+    def _is_mirrored(self, start: Point, point: Point) -> bool:
         """Whether a cycle of a symmetric stage leans to the other side than the start: beyond the symmetric cycle the
         branch is its own mirror image."""
-        stages = self.family(np.zeros(1, np.int64), np.array([found.place]))
-        leans = float(found.cycle.middle[0] * start.cycle.middle[0])
+        stages = self.family(np.zeros(1, np.int64), np.array([point.place]))
+        leans = float(point.cycle.middle[0] * start.cycle.middle[0])
         return bool(self.sign > 0 and stages.symmetric[0] and leans < 0)
 
-    def _stop(self, found: Point) -> str:
-        stages = self.family(np.zeros(1, np.int64), np.array([found.place]))
-        if found.cycle.amplitude[0] < SHRUNK * stages.length[0]:
+    def _stop(self, point: Point) -> str:
+        stages = self.family(np.zeros(1, np.int64), np.array([point.place]))
+        if point.cycle.amplitude[0] < SHRUNK * stages.length[0]:
             return "the cycle shrinks into the rest at the reference"
-        if abs(found.multiplier) > STEEPEST:
+        if abs(point.multiplier) > STEEPEST:
             return f"the cycle repels {STEEPEST:g}-fold and more per return"
         return ""
 

@@ -89,10 +89,10 @@ class CurveTracer:
         if self.kind == "fold":
             along, far = near.found.direction * [0.0, 1.0, 1.0], DEEP
             along = along / np.linalg.norm(along)
-        found = corrected(tracer, point, start, along, self.kind, far)
-        if found is None or abs(found.point.place) > reach:
+        special = corrected(tracer, point, start, along, self.kind, far)
+        if special is None or abs(special.point.place) > reach:
             return None
-        return Spot(origin + found.point.place * across, found, across)
+        return Spot(origin + special.point.place * across, special, across)
 
     def curve(self, first: Spot) -> Curve | None:
         """The whole curve through a point; None if no second one is found beside it."""
@@ -122,16 +122,16 @@ class CurveTracer:
             if np.any((ahead < 0) | (ahead > 1)):
                 return [*spots, *self._at_the_side(last, direction, step)], END_OF_RANGE
             size = last.size + step / np.linalg.norm(last.at - before.at) * (last.size - before.size)
-            found = self.on_line(ahead, direction[::-1] * [-1.0, 1.0], last, ASIDE * step, size)
-            moved = np.zeros(2) if found is None else found.at - last.at
-            if found is None or moved @ direction < np.cos(TURN) * np.linalg.norm(moved):
+            spot = self.on_line(ahead, direction[::-1] * [-1.0, 1.0], last, ASIDE * step, size)
+            moved = np.zeros(2) if spot is None else spot.at - last.at
+            if spot is None or moved @ direction < np.cos(TURN) * np.linalg.norm(moved):
                 step /= 2
                 if step < SHORTEST:
                     return spots, f"it could not be followed farther than {self._named(last.at)}"
                 continue
-            spots = [*spots, found]
+            spots = [*spots, spot]
             direction, step = _unit(moved), min(1.4 * step, LONGEST)
-            if len(spots) > 7 and np.linalg.norm(found.at - start.at) < step:
+            if len(spots) > 7 and np.linalg.norm(spot.at - start.at) < step:
                 return spots, CLOSED
         return spots, "it was followed for as many steps as there may be"
 
@@ -143,13 +143,13 @@ class CurveTracer:
             )
         side = int(np.argmin(times))
         along = np.array([0.0, 1.0]) if side == 0 else np.array([1.0, 0.0])
-        found = self.on_line(np.clip(last.at + times[side] * direction, 0, 1), along, last, 2 * step)
-        inside = found is not None and bool(np.all((found.at >= 0) & (found.at <= 1)))
-        return [found] if found is not None and inside else []
+        spot = self.on_line(np.clip(last.at + times[side] * direction, 0, 1), along, last, 2 * step)
+        inside = spot is not None and bool(np.all((spot.at >= 0) & (spot.at <= 1)))
+        return [spot] if spot is not None and inside else []
 
     def _named(self, at: np.ndarray) -> str:
         values = self.space.values(at[None])
-        units = [each.unit for each in self.space.ranges]
+        units = [swept.unit for swept in self.space.ranges]
         named = zip(values.items(), units, strict=True)
         return ", ".join(f"{key} = {value[0]:.6g} {unit}".rstrip() for (key, value), unit in named)
 

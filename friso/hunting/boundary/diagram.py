@@ -36,9 +36,9 @@ class Diagram:
         """The value of the key [SI] at a place."""
         return float(self.space.ranges[0].at(np.array(place)))
 
-    def error(self, found: Found) -> float:
+    def error(self, special: Found) -> float:
         """By how much the value [SI] of a special point changes when it is computed to a hundredth of the tolerance."""
-        return abs(self.value(found.point.place + found.error) - self.value(found.point.place))
+        return abs(self.value(special.point.place + special.error) - self.value(special.point.place))
 
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
@@ -70,7 +70,7 @@ def _passes(branch: Branch, point: Point) -> bool:
     """Whether a branch passes through a cycle, or through its mirror image."""
     if branch.sign != point.cycle.sign:
         return False
-    path = np.array([each.vector for each in branch.points])
+    path = np.array([passed.vector for passed in branch.points])
     for first, second in pairwise(path):
         low, high = sorted((first[0], second[0]))
         if low <= point.place <= high:

@@ -65,10 +65,10 @@ def located(tracer: Tracer, first: Point, second: Point, kind: Kind) -> Found | 
     def off(along: float) -> float:
         if along not in met:
             nearest = min(met, key=lambda place: abs(place - along))
-            found = tracer.solve(met[nearest], first.vector + along * direction, direction)
-            if found is None:
+            point = tracer.solve(met[nearest], first.vector + along * direction, direction)
+            if point is None:
                 raise Unreached
-            met[along] = found
+            met[along] = point
         return distance_to(kind, met[along])
 
     try:
@@ -76,7 +76,7 @@ def located(tracer: Tracer, first: Point, second: Point, kind: Kind) -> Found | 
         off(along)
     except (Unreached, RuntimeError):
         return None
-    return _found(tracer, kind, met[along], direction, _slope(kind, met))
+    return _special_point(tracer, kind, met[along], direction, _slope(kind, met))
 
 
 class Unreached(Exception):
@@ -89,7 +89,7 @@ def _slope(kind: Kind, met: dict[float, Point]) -> float:
     return (distance_to(kind, second) - distance_to(kind, first)) / (b - a)
 
 
-def _found(tracer: Tracer, kind: Kind, point: Point, direction: np.ndarray, slope: float) -> Found:
+def _special_point(tracer: Tracer, kind: Kind, point: Point, direction: np.ndarray, slope: float) -> Found:
     """The point with its error; infinite where it cannot be computed at the tighter tolerance."""
     tight = Tracer(tracer.family, tracer.sign, tracer.rtol * TIGHTER).solve(point, point.vector, direction)
     if tight is None:
@@ -106,34 +106,34 @@ def corrected(
     met: dict[float, Point] = {}
     along, other = 0.0, ASIDE
     for place in (along, other):
-        found = tracer.solve(near, origin + place * direction, direction)
-        if found is None:
+        point = tracer.solve(near, origin + place * direction, direction)
+        if point is None:
             return None
-        met[place] = found
+        met[place] = point
     for _ in range(TRIES):
         slope = (distance_to(kind, met[along]) - distance_to(kind, met[other])) / (along - other)
         step = -distance_to(kind, met[along]) / slope if slope else np.inf
         if not abs(along + step) <= reach:
             return None
         if abs(step) < PRECISE:
-            return _found(tracer, kind, met[along], direction, slope)
+            return _special_point(tracer, kind, met[along], direction, slope)
         other, along = along, along + step
-        found = tracer.solve(met[other], origin + along * direction, direction)
-        if found is None:
+        point = tracer.solve(met[other], origin + along * direction, direction)
+        if point is None:
             return None
-        met[along] = found
+        met[along] = point
     return None
 
 
 def special_points(tracer: Tracer, branch: Branch) -> list[Found]:
     """All points of a branch at which a multiplier passes the unit circle."""
-    found = [located(tracer, *pair, kind) for pair in pairwise(branch.points) for kind in changes(*pair)]
-    return [each for each in found if each and not _meets_symmetric(tracer, each)]
+    specials = [located(tracer, *pair, kind) for pair in pairwise(branch.points) for kind in changes(*pair)]
+    return [special for special in specials if special and not _meets_symmetric(tracer, special)]
 
 
-def _meets_symmetric(tracer: Tracer, found: Found) -> bool:
+def _meets_symmetric(tracer: Tracer, special: Found) -> bool:
     """Whether what looks like a fold of an asymmetric branch is where it meets the symmetric cycle."""
-    cycle = found.point.cycle
+    cycle = special.point.cycle
     leans = abs(cycle.middle[0]) > 0.02 * cycle.amplitude[0]
-    stages = tracer.family(np.zeros(1, np.int64), np.array([found.point.place]))
-    return bool(found.kind == "fold" and tracer.sign > 0 and stages.symmetric[0] and not leans)
+    stages = tracer.family(np.zeros(1, np.int64), np.array([special.point.place]))
+    return bool(special.kind == "fold" and tracer.sign > 0 and stages.symmetric[0] and not leans)

@@ -47,9 +47,9 @@ def plane(space: Space, rtol: float = RTOL, nodes: int = NODES) -> Plane:
     lost: list[np.ndarray] = []
     hunting, searches = _searches(space.stages(points[allowed]), rtol)
     for cycles, inside, outside in searches:
-        own: list[Curve] = []
+        new_curves: list[Curve] = []
         for a, b in _changes(_on_grid(allowed[inside], nodes), _on_grid(allowed[outside], nodes)):
-            if any(_crossed(curve, points[a], points[b]) for curve in own):
+            if any(_crossed(curve, points[a], points[b]) for curve in new_curves):
                 continue
             cycle = cycles.take(np.flatnonzero(allowed == a))
             spot, end = _first(space, points[a], points[b], cycle, rtol)
@@ -57,10 +57,10 @@ def plane(space: Space, rtol: float = RTOL, nodes: int = NODES) -> Plane:
                 continue
             curve = spot and CurveTracer(space, spot.found.kind, cycle.sign, rtol).curve(spot)
             if curve:
-                own.append(curve)
+                new_curves.append(curve)
             else:
                 lost.append((points[a] + points[b]) / 2)
-        curves += own
+        curves += new_curves
     return Plane(space, tuple(curves), nodes, allowed, hunting, tuple(lost))
 
 
@@ -87,17 +87,17 @@ def _changes(inside: np.ndarray, outside: np.ndarray) -> Iterator[tuple[int, int
     """Neighbours on the grid, by number, of which the first is inside and the second outside."""
     numbers = np.arange(inside.size).reshape(inside.shape)
     pairs = [(numbers[:-1], numbers[1:]), (numbers[:, :-1], numbers[:, 1:])]
-    for one, other in [*pairs, *(pair[::-1] for pair in pairs)]:
-        changed = inside.flat[one] & outside.flat[other]
-        yield from zip(one[changed].tolist(), other[changed].tolist(), strict=True)
+    for first, second in [*pairs, *(pair[::-1] for pair in pairs)]:
+        changed = inside.flat[first] & outside.flat[second]
+        yield from zip(first[changed].tolist(), second[changed].tolist(), strict=True)
 
 
 def _crossed(curve: Curve, start: np.ndarray, end: np.ndarray) -> bool:
     """Whether a curve passes by the way between two neighbours."""
     points = curve.points
     legs = points[1:] - points[:-1]
-    way = start + np.linspace(0, 1, 9)[:, None] * (end - start)
-    for at in way:
+    path = start + np.linspace(0, 1, 9)[:, None] * (end - start)
+    for at in path:
         shares = np.clip(((at - points[:-1]) * legs).sum(axis=1) / np.maximum((legs**2).sum(axis=1), 1e-30), 0, 1)
         away = np.linalg.norm(points[:-1] + shares[:, None] * legs - at, axis=1)
         if away.min() < SAME * np.linalg.norm(end - start):
@@ -116,6 +116,6 @@ def _first(space: Space, start: np.ndarray, end: np.ndarray, cycle: Cycles, rtol
     for pair in pairwise([first, *points]):
         kinds = changes(*pair)
         if kinds:
-            found = located(tracer, *pair, "fold" if "fold" in kinds else kinds[0])
-            return (Spot(start + found.point.place * across, found, across) if found else None), reason
+            special = located(tracer, *pair, "fold" if "fold" in kinds else kinds[0])
+            return (Spot(start + special.point.place * across, special, across) if special else None), reason
     return None, reason

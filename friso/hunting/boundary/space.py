@@ -58,7 +58,7 @@ class Space:
 
     def values(self, points: np.ndarray) -> dict[str, np.ndarray]:
         """The values [SI] of the keys at points of the box, shape (count, keys)."""
-        return {each.key: each.at(points[:, i]) for i, each in enumerate(self.ranges)}
+        return {swept.key: swept.at(points[:, i]) for i, swept in enumerate(self.ranges)}
 
     def stages(self, points: np.ndarray) -> Ensemble:
         """The stages at points of the box, shape (count, keys)."""

@@ -69,8 +69,8 @@ class Ensemble:
         """What the generated function `name` has to say about every stage, shape (count,): "rate" [1/s], the natural
         frequency of mass and loop, "breakaway" [N], the largest friction force at rest, or "stiffness" [N/m], the
         proportional one of the loop."""
-        (found,) = getattr(self.kernel.module, name)(self.values)
-        return np.broadcast_to(np.asarray(found, dtype=float), (self.count,))
+        (value,) = getattr(self.kernel.module, name)(self.values)
+        return np.broadcast_to(np.asarray(value, dtype=float), (self.count,))
 
     @cached_property
     def length(self) -> np.ndarray:

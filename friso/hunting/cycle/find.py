@@ -91,7 +91,7 @@ class Cycles:
     @property
     def arrays(self) -> dict[str, np.ndarray]:
         """What is known of every stage, by name."""
-        return {each.name: getattr(self, each.name) for each in fields(self) if each.name != "sign"}
+        return {field.name: getattr(self, field.name) for field in fields(self) if field.name != "sign"}
 
     def take(self, numbers: np.ndarray) -> Cycles:
         """The cycles with these numbers."""
@@ -212,20 +212,20 @@ def described(stages: Ensemble, orbits: Orbits, rtol: float, reasons: np.ndarray
     )
     if not which.size:
         return cycles
-    found = multipliers(some, shut, rtol)
+    floquet = multipliers(some, shut, rtol)
     round_trip = some.run(shut.states, periods, rtol, window=0.0)
     extremes = round_trip.statistics[:, [STATISTICS.index("deviation_max"), STATISTICS.index("deviation_min")]]
-    first = found.local[:, 0]
+    first = floquet.local[:, 0]
     complex_pair = np.abs(np.imag(first)) > 1e-6 * np.abs(first)
-    decisive = found.slope if some.chatters else np.where(complex_pair, np.abs(first), np.real(first))
+    decisive = floquet.slope if some.chatters else np.where(complex_pair, np.abs(first), np.real(first))
     values = {
         "period": periods,
         "amplitude": np.where(done(round_trip), (extremes[:, 0] - extremes[:, 1]) / 2, np.nan),
         "middle": np.where(done(round_trip), (extremes[:, 0] + extremes[:, 1]) / 2, np.nan),
         "gap": shut.gaps,
-        "local": found.local,
-        "direction": found.direction,
-        "slope": found.slope,
+        "local": floquet.local,
+        "direction": floquet.direction,
+        "slope": floquet.slope,
         "multiplier": decisive,
     }
     for name, value in values.items():

@@ -55,7 +55,7 @@ def whole_guess(stages: Ensemble, there: ReturnMap, back: ReturnMap, apart: floa
 
     `there` and `back` are the maps of the stages that stick on the positive and on the negative side.
     """
-    found = Guess(np.full(stages.count, np.nan), np.full(stages.count, np.nan))
+    guess = Guess(np.full(stages.count, np.nan), np.full(stages.count, np.nan))
     for k in range(stages.count):
         start, far = there.distances[k], there.returns[k]
         end = np.interp(far, back.distances[k], back.returns[k], left=0.0)
@@ -65,8 +65,8 @@ def whole_guess(stages: Ensemble, there: ReturnMap, back: ReturnMap, apart: floa
             middle = np.interp(at, start, far)
             flights = np.interp(at, start, there.times[k]) + np.interp(middle, back.distances[k], back.times[k])
             waits = wait(stages.take(np.array([k, k])), np.array([at, middle]))
-            found.distances[k], found.times[k] = at, flights + UNWINDING * waits.sum()
-    return found
+            guess.distances[k], guess.times[k] = at, flights + UNWINDING * waits.sum()
+    return guess
 
 
 def _comes_back(start: np.ndarray, far: np.ndarray, end: np.ndarray, goes: np.ndarray, apart: float) -> float | None:

@@ -111,35 +111,35 @@ def hunting(stage: Stage, rtol: float = RTOL) -> Hunting:
     stages = Ensemble.held(flat, 1)
     there = return_map(stages, ROUGH)
     sought = list(families(stages, there, rtol))
-    if sought[0].found[0] and not any(each.attracting[0] for each in sought):
+    if sought[0].found[0] and not any(family.attracting[0] for family in sought):
         beside = pair_beside if stages.symmetric[0] else partner
         if other := beside(stages, sought[0], rtol):
             sought.append(other)
-    cycles = tuple(_cycle(stages, each) for each in sought if each.found[0])
+    cycles = tuple(_cycle(stages, family) for family in sought if family.found[0])
     first = sought[0]
     return Hunting(cycles, "" if cycles else first.reasons[0], bool(cycles) or not first.uncertain[0], there)
 
 
-def _cycle(stages: Ensemble, found: Cycles) -> Cycle:
+def _cycle(stages: Ensemble, cycles: Cycles) -> Cycle:
     return Cycle(
-        symmetric=found.sign < 0,
-        amplitude=float(found.amplitude[0]),
-        middle=float(found.middle[0]),
-        period=float(found.period[0]),
-        multiplier=float(found.multiplier[0]),
-        multipliers=found.local[0],
-        slope=float(found.slope[0]),
-        growth=_growth(stages, found),
-        residual=float(found.gap[0]),
-        trace=_trace(stages, found),
+        symmetric=cycles.sign < 0,
+        amplitude=float(cycles.amplitude[0]),
+        middle=float(cycles.middle[0]),
+        period=float(cycles.period[0]),
+        multiplier=float(cycles.multiplier[0]),
+        multipliers=cycles.local[0],
+        slope=float(cycles.slope[0]),
+        growth=_growth(stages, cycles),
+        residual=float(cycles.gap[0]),
+        trace=_trace(stages, cycles),
     )
 
 
-def _growth(stages: Ensemble, found: Cycles) -> float:
+def _growth(stages: Ensemble, cycles: Cycles) -> float:
     """By how much a small deviation grows from one return to the next, in a simulation beside the cycle."""
     away = np.array([[0.0, AWAY, -AWAY]])
-    heights = returns_of(stages, found.orbits, found.direction, away, FOLLOWED, ROUGH / 100)[0]
-    deviations = (heights[1:] - heights[0]) / found.amplitude[0]
+    heights = returns_of(stages, cycles.orbits, cycles.direction, away, FOLLOWED, ROUGH / 100)[0]
+    deviations = (heights[1:] - heights[0]) / cycles.amplitude[0]
     before, after = deviations[:, :-1].ravel(), deviations[:, 1:].ravel()
     small = (np.abs(before) < LINEAR) & (np.abs(after) < LINEAR)  # and no NaN
     if np.count_nonzero(small) < 2:
@@ -147,11 +147,11 @@ def _growth(stages: Ensemble, found: Cycles) -> float:
     return float(before[small] @ after[small] / (before[small] @ before[small]))
 
 
-def _trace(stages: Ensemble, found: Cycles) -> xr.Dataset:
+def _trace(stages: Ensemble, cycles: Cycles) -> xr.Dataset:
     import xarray as xr
 
-    period = float(found.period[0])
-    results = stages.run(found.states, found.period, ROUGH / 100, interval=period / SAMPLES)
+    period = float(cycles.period[0])
+    results = stages.run(cycles.states, cycles.period, ROUGH / 100, interval=period / SAMPLES)
     time = np.arange(results.samples.shape[1]) * (period / SAMPLES)
     flat = {**stages.flat, "motion.displacement": float(stages.length[0]), "motion.duration": period}
     return xr.Dataset(output_variables(stages.kernel, flat, results.samples[0].T, time), coords=time_axis(time))

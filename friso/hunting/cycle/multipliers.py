@@ -45,9 +45,9 @@ def _floquet(stages: Ensemble, flows: np.ndarray, rates: np.ndarray) -> tuple[np
     phase = stages.integral
     sections = flows - rates[:, :, None] * flows[:, None, phase, :] / rates[:, phase, None, None]
     sections[:, :, phase] = 0.0
-    known = np.all(np.isfinite(sections), axis=(1, 2), keepdims=True)
-    values, vectors = np.linalg.eig(np.where(known, sections, 0.0))
-    values = np.where(known[:, :, 0], values, np.nan)
+    finite = np.all(np.isfinite(sections), axis=(1, 2), keepdims=True)
+    values, vectors = np.linalg.eig(np.where(finite, sections, 0.0))
+    values = np.where(finite[:, :, 0], values, np.nan)
     order = np.argsort(-np.abs(values), axis=1)
     values = np.take_along_axis(values, order, axis=1)[:, :-1]  # the last is that of the phase, which is zero
     first = np.take_along_axis(vectors, order[:, None, :1], axis=2)[:, :, 0]
@@ -85,7 +85,7 @@ def returns_of(
     starts = orbits.states[:, None, :] + (away * np.abs(distance)[:, None])[:, :, None] * direction[:, None, :]
     starts = starts.reshape(count * points, -1)
     several = stages.take(np.repeat(np.arange(count), points))
-    each = 1 if orbits.sign < 0 else 2
+    half_periods = 1 if orbits.sign < 0 else 2
     durations = (returns + 0.5) * np.repeat(orbits.times, points)
-    found = swings(several, starts, durations, each * returns, rtol)
-    return np.abs(found.values[:, each - 1 :: each]).reshape(count, points, returns)
+    extrema = swings(several, starts, durations, half_periods * returns, rtol)
+    return np.abs(extrema.values[:, half_periods - 1 :: half_periods]).reshape(count, points, returns)

@@ -29,12 +29,12 @@ def partner(stages: Ensemble, cycles: Cycles, rtol: float = RTOL) -> Cycles | No
     away = np.linspace(-BESIDE, BESIDE, AROUND)
     heights = returns_of(stages, cycles.orbits, cycles.direction, away[None, :], 2, rtol)[0]
     rise = heights[:, 1] - heights[:, 0]
-    own = np.nanargmin(np.abs(heights[:, 0] / heights[AROUND // 2, 0] - 1))
+    here = np.nanargmin(np.abs(heights[:, 0] / heights[AROUND // 2, 0] - 1))
     crosses = np.flatnonzero(rise[:-1] * rise[1:] < 0)
-    crosses = crosses[np.abs(crosses + 0.5 - own) > 1]
+    crosses = crosses[np.abs(crosses + 0.5 - here) > 1]
     if not crosses.size:
         return None
-    k = crosses[np.abs(crosses - own).argmin()]
+    k = crosses[np.abs(crosses - here).argmin()]
     share = away[k] + (away[k + 1] - away[k]) * rise[k] / (rise[k] - rise[k + 1])
     size = np.abs(cycles.states[:, stages.sticking])
     several = stages.take(np.zeros(len(SOONER), np.int64))

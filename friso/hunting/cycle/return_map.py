@@ -50,8 +50,8 @@ def return_map(stages: Ensemble, rtol: float, side: float = 1.0) -> ReturnMap:
     return ReturnMap(*(np.take_along_axis(part, order, axis=1) for part in (distances, returns, times)))
 
 
-def _columns(found: ReturnMap) -> tuple[np.ndarray, ...]:
-    return found.distances, found.returns, found.times
+def _columns(return_map: ReturnMap) -> tuple[np.ndarray, ...]:
+    return return_map.distances, return_map.returns, return_map.times
 
 
 def follow(stages: Ensemble, distances: np.ndarray, rtol: float, side: float) -> ReturnMap:

@@ -190,15 +190,15 @@ class _Shooting:
         moving = self.idle[which] < np.where(self.gaps[which] > RENEWED, *STALLED)
         self.active[which] = (gaps > FINEST) & np.isfinite(gaps) & moving
 
-    def _step(self, k: int, wanted: np.ndarray, sticking: int) -> None:
+    def _step(self, k: int, step: np.ndarray, sticking: int) -> None:
         """Take a step of one orbit, shortened to the stride."""
         size = self.states.shape[1]
-        far = abs(wanted[sticking]) / (STRIDE * abs(self.states[k, sticking]))
-        late = abs(wanted[size]) / (STRIDE * self.times[k])
-        wanted = wanted / max(far, late, 1.0)
-        self.states[k] += wanted[:size]
-        self.times[k] += wanted[size]
-        self.places[k] += wanted[size + 1 :].sum()
+        far = abs(step[sticking]) / (STRIDE * abs(self.states[k, sticking]))
+        late = abs(step[size]) / (STRIDE * self.times[k])
+        step = step / max(far, late, 1.0)
+        self.states[k] += step[:size]
+        self.times[k] += step[size]
+        self.places[k] += step[size + 1 :].sum()
 
     @property
     def orbits(self) -> Orbits:

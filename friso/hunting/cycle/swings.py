@@ -40,17 +40,17 @@ def _zigzag(values: np.ndarray, times: np.ndarray, least: np.ndarray, side: np.n
     """Follow the zigzags column by column; `side` is that on which they start."""
     runs = len(values)
     every = np.arange(runs)
-    found = Swings(np.full((runs, most + 1), np.nan), np.full((runs, most + 1), np.nan))
-    count, way = np.zeros(runs, np.int64), side.copy()  # way: the side on which the next extremum lies
+    extrema = Swings(np.full((runs, most + 1), np.nan), np.full((runs, most + 1), np.nan))
+    count, sign = np.zeros(runs, np.int64), side.copy()  # sign: the side on which the next extremum lies
     best, when = values[:, 0].copy(), times[:, 0].copy()
     for value, time in zip(values.T[1:], times.T[1:], strict=True):
-        turned = (way * (best - value) >= least) & (count <= most)
-        found.values[every[turned], count[turned]] = best[turned]
-        found.times[every[turned], count[turned]] = when[turned]
+        turned = (sign * (best - value) >= least) & (count <= most)
+        extrema.values[every[turned], count[turned]] = best[turned]
+        extrema.times[every[turned], count[turned]] = when[turned]
         count[turned] += 1
-        way = np.where(turned, -way, way)
-        farther = turned | (way * (value - best) > 0)
+        sign = np.where(turned, -sign, sign)
+        farther = turned | (sign * (value - best) > 0)
         best, when = np.where(farther, value, best), np.where(farther, time, when)
     last = (count > 0) & (count <= most)
-    found.values[every[last], count[last]], found.times[every[last], count[last]] = best[last], when[last]
-    return Swings(found.values[:, 1:], found.times[:, 1:])
+    extrema.values[every[last], count[last]], extrema.times[every[last], count[last]] = best[last], when[last]
+    return Swings(extrema.values[:, 1:], extrema.times[:, 1:])
