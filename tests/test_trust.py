@@ -18,7 +18,7 @@ from friso.studies.execute import local_crew
 from friso.studies.refine import FINER, SHARE, finer, refine
 from friso.studies.request import Request
 from friso.studies.study import Study
-from friso.studies.verify import drawn, loosest_rtol
+from friso.studies.verify import loosest_rtol, sampled
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 MASS = {"masses.cart": "0.7 * mass", "masses.stage": "0.3 * mass", "parasitic.mass": "0.15 * mass"}
@@ -50,13 +50,13 @@ def test_only_cells_that_were_run_are_verified(rig: Stage) -> None:
 def test_cells_are_drawn_evenly_once_and_always_the_same(count: int, points: int, modulus: int) -> None:
     stage = friso.load(EXAMPLES / "thesis_rig.toml")
     study = Request(stage, {"controller.crossover": (np.linspace(1, 2, points), "Hz")}).study()
-    picked = drawn(study, count, lambda cells: cells % modulus == 0)
+    picked = sampled(study, count, lambda cells: cells % modulus == 0)
     assert np.array_equal(picked, np.unique(picked))
     assert np.all(picked % modulus == 0)
     assert len(picked) <= count
     if points <= 8 * count:
         assert len(picked) == min(count, -(-points // modulus))
-    assert np.array_equal(picked, drawn(study, count, lambda cells: cells % modulus == 0))
+    assert np.array_equal(picked, sampled(study, count, lambda cells: cells % modulus == 0))
 
 
 def test_the_loosest_safe_tolerance_is_chosen(rig: Stage, monkeypatch: pytest.MonkeyPatch) -> None:

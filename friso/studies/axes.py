@@ -90,13 +90,13 @@ class _Reader:
     def unit(self) -> str:
         return "" if self.field is None else self.field.unit
 
-    def text(self, given: Any) -> float:
+    def text(self, entry: Any) -> float:
         """The SI value of a text such as "8 Hz" or, without unit, "0.1"."""
-        given = given.strip() if isinstance(given, str) else given
-        bare = _number(given)
+        entry = entry.strip() if isinstance(entry, str) else entry
+        bare = _number(entry)
         if self.field is None:
-            self.field = Number(any_sign, "0.1") if bare is not None else self._natural(str(given))
-        return float(self.field.read(bare if isinstance(self.field, Number) and bare is not None else given))
+            self.field = Number(any_sign, "0.1") if bare is not None else self._natural(str(entry))
+        return float(self.field.read(bare if isinstance(self.field, Number) and bare is not None else entry))
 
     def factor(self, unit: str) -> float:
         """SI value of 1 `unit`."""
@@ -109,22 +109,22 @@ class _Reader:
         return 1.0
 
     @staticmethod
-    def _natural(given: str) -> Quantity:
+    def _natural(text: str) -> Quantity:
         for unit in ("kg", "N", "m", "s", "Hz", "m/s", "m/s^2", "N/m", "N*s/m", "N/(m*s)"):
             try:
-                Quantity(unit, any_sign, "").read(given)
+                Quantity(unit, any_sign, "").read(text)
             except InputError:
                 continue
             return Quantity(unit, any_sign, f"1 {unit}")
-        raise InputError("", quoted(given), "a number with a unit that some key of the stage file has", '"1.7 kg"')
+        raise InputError("", quoted(text), "a number with a unit that some key of the stage file has", '"1.7 kg"')
 
 
-def _number(given: Any) -> float | None:
+def _number(value: Any) -> float | None:
     """The bare number that was given, None if it is none."""
-    if isinstance(given, int | float | np.number) and not isinstance(given, bool):
-        return float(given)
+    if isinstance(value, int | float | np.number) and not isinstance(value, bool):
+        return float(value)
     try:
-        return float(given) if isinstance(given, str) else None
+        return float(value) if isinstance(value, str) else None
     except ValueError:
         return None
 
@@ -139,8 +139,8 @@ def _range(name: str, text: str, reader: _Reader, log: bool) -> Range:
         raise InputError("", quoted(text, f"{order} range"), "a range that rises", RANGE_EXAMPLE)
     scale: Scale = cast(Scale, match["scale"] or ("log" if log else "linear"))
     if scale == "log" and first <= 0:
-        given = quoted(text, "a logarithmic axis never reaches 0")
-        raise InputError("", given, "a logarithmic range that begins above 0", '"10 um..1 cm:41:log"')
+        range_text = quoted(text, "a logarithmic axis never reaches 0")
+        raise InputError("", range_text, "a logarithmic range that begins above 0", '"10 um..1 cm:41:log"')
     return Range(name, first, last, reader.unit, _count(text, match["count"]), scale)
 
 
@@ -175,8 +175,8 @@ def _words(stage: Stage, key: str, values: Values) -> Axis:
     options = [parse_set(f"{key}={word}")[1] for word in values.split(",")] if isinstance(values, str) else list(values)
     table, _, rest = key.partition(".")
     if rest and getattr(stage, table, 0) is None:
-        given = f"a key of [{table}], which this stage does not have"
-        raise InputError(key, given, "a key of the stage, or a stage with that table")
+        problem = f"a key of [{table}], which this stage does not have"
+        raise InputError(key, problem, "a key of the stage, or a stage with that table")
     if not rest or table not in type(stage).model_fields:
         expected = "a key of the stage file, or a name that a link uses"
         raise InputError(key, "a name that nothing depends on", expected, 'with the link masses.cart = "0.7 * mass"')

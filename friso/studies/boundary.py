@@ -44,13 +44,13 @@ def boundary(
     ranges = tuple(_range(stage, name, text, names(followers), log) for name, text in axes.items())
     if len(ranges) not in (1, 2):
         raise InputError("axes", f"{len(ranges)} keys", "one key or two", EXAMPLE)
-    check_links(stage, followers, frozenset(each.key for each in ranges))
+    check_links(stage, followers, frozenset(swept.key for swept in ranges))
     if reason := cannot_hunt(stage):
         raise InputError("stage", f"one that cannot hunt: {reason}", "friction and integral action", EXAMPLE)
-    for each in ranges:
-        if each.key.startswith("motion."):
-            given = "a key of the motion, which plays no part"
-            raise InputError(each.key, given, "a key of the stage or its controller", EXAMPLE)
+    for swept in ranges:
+        if swept.key.startswith("motion."):
+            problem = "a key of the motion, which plays no part"
+            raise InputError(swept.key, problem, "a key of the stage or its controller", EXAMPLE)
     if rtol > LOOSEST:
         raise InputError("rtol", f"{rtol:g}", f"at most {LOOSEST:g}, since multipliers are derivatives", "1e-9")
     space = Space(ranges, lambda values: flat_cells(stage, followers, values))

@@ -79,13 +79,13 @@ def run_cells(
         flat = flat_cells(part, links, {name: column[cells] for name, column in columns.items()})
         table.invalidate(cells, flat)
         for shape, members in _by_structure(flat, table.valid(cells), len(cells)):
-            own = {key: value[members] if np.ndim(value) else value for key, value in flat.items()}
-            for runs in run_chunks(kernel(shape), own, len(members), options(rtol, threads, cancel)):
-                table.write(cells[members[runs.numbers]], measure(runs.part(own), runs), runs)
+            keys = {key: value[members] if np.ndim(value) else value for key, value in flat.items()}
+            for runs in run_chunks(kernel(shape), keys, len(members), options(rtol, threads, cancel)):
+                table.write(cells[members[runs.numbers]], measure(runs.part(keys), runs), runs)
     if cycles:
         valid = table.valid(np.arange(table.count))
-        for which, found in cell_cycles(stage, links, columns, valid, threads, cancel):
-            table.write_cycles(which, found)
+        for which, described in cell_cycles(stage, links, columns, valid, threads, cancel):
+            table.write_cycles(which, described)
     return table.columns
 
 
@@ -111,8 +111,8 @@ def cell_cycles(
                 value[members] for key, value in flat.items() if np.ndim(value) and not key.startswith("motion.")
             ]
             _, first, again = np.unique(np.stack(varied), axis=1, return_index=True, return_inverse=True)
-            own = {key: value[members[first]] if np.ndim(value) else value for key, value in flat.items()}
-            stages = Ensemble.held(own, len(first), form=shape, threads=threads, cancel=cancel)
+            keys = {key: value[members[first]] if np.ndim(value) else value for key, value in flat.items()}
+            stages = Ensemble.held(keys, len(first), form=shape, threads=threads, cancel=cancel)
             yield cells[members], hunting_cycles(stages).take(again.ravel())
 
 
@@ -126,8 +126,8 @@ def allowed(stage: Stage, links: Mapping[str, str], columns: Mapping[str, np.nda
 
 def flat_cells(stage: Stage, links: Mapping[str, str], columns: Mapping[str, np.ndarray]) -> dict[str, Any]:
     """The flat SI form of all cells, links followed; numeric columns only."""
-    known = numeric_keys(stage.flat())
-    keys = {name: column for name, column in columns.items() if name in known}
+    numeric = numeric_keys(stage.flat())
+    keys = {name: column for name, column in columns.items() if name in numeric}
     if not links:
         return stage.flat(keys)
     return stage.flat(keys | linked(links, stage.flat(keys) | dict(columns)))
@@ -159,8 +159,8 @@ def _by_structure(flat: Mapping[str, Any], valid: np.ndarray, count: int) -> Ite
     for k in range(len(kinds)):
         members = np.flatnonzero((which.ravel() == k) & valid)
         if members.size:
-            one = {**flat, **{key: kinds[k][i] for i, key in enumerate(decisive)}}
-            groups.setdefault(structure(one), []).append(members)
+            example = {**flat, **{key: kinds[k][i] for i, key in enumerate(decisive)}}
+            groups.setdefault(structure(example), []).append(members)
     for shape, members in groups.items():
         yield shape, np.sort(np.concatenate(members))
 
@@ -185,16 +185,16 @@ class _Table:
     def valid(self, cells: np.ndarray) -> np.ndarray:
         return self.columns["verdict"][cells] != "invalid"
 
-    def write(self, which: np.ndarray, found: Measures, runs: Runs) -> None:
+    def write(self, which: np.ndarray, measures: Measures, runs: Runs) -> None:
         """Write the measures of the cells that were run."""
         ran = runs.results.statuses != Status.NOT_RUN
-        inner, outer = found.settling_time
-        numbers = (found.peaks, found.peak_to_peak, found.period, inner, outer, found.largest_force)
-        words = (found.verdict, _STATUS[found.status])
-        for name, column in zip(USUAL, (*numbers, found.steps, found.rejected, *words), strict=True):
+        inner, outer = measures.settling_time
+        numbers = (measures.peaks, measures.peak_to_peak, measures.period, inner, outer, measures.largest_force)
+        words = (measures.verdict, _STATUS[measures.status])
+        for name, column in zip(USUAL, (*numbers, measures.steps, measures.rejected, *words), strict=True):
             self.columns[name][which[ran]] = column[ran]
 
-    def write_cycles(self, which: np.ndarray, found: Cycles) -> None:
+    def write_cycles(self, which: np.ndarray, cycles: Cycles) -> None:
         """Write the measures of hunting cycles."""
-        for name, column in zip(CYCLE_UNITS, (found.multiplier, found.amplitude, found.period), strict=True):
+        for name, column in zip(CYCLE_UNITS, (cycles.multiplier, cycles.amplitude, cycles.period), strict=True):
             self.columns[name][which] = column

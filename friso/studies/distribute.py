@@ -91,11 +91,11 @@ def _refuse_strangers(client: Any) -> None:
             return f"that runs no studies ({error})"
         return equations_version()
 
-    for address, found in client.run(version).items():
-        if found != equations_version():
-            raise _stranger(f"the worker {address}", found)
+    for address, version_there in client.run(version).items():
+        if version_there != equations_version():
+            raise _stranger(f"the worker {address}", version_there)
 
 
 def _stranger(who: str, version: str) -> InputError:
-    given = f"{who} has friso {version}"
-    return InputError("--scheduler", given, f"friso {equations_version()}, as here, on every worker")
+    text = f"{who} has friso {version}"
+    return InputError("--scheduler", text, f"friso {equations_version()}, as here, on every worker")

@@ -100,6 +100,6 @@ def run_scattered(study: Study, cells: np.ndarray, crew: Crew) -> Columns:
     """The measures of single cells, by their numbers in C order."""
     picked = study.at(cells)
     parts: dict[int, Columns] = {}
-    for _, block, found in crew.compute(crew.jobs([picked])):
-        parts[block[0].start] = found
+    for _, block, columns in crew.compute(crew.jobs([picked])):
+        parts[block[0].start] = columns
     return {name: np.concatenate([parts[start][name] for start in sorted(parts)]) for name in study.metrics}

@@ -50,16 +50,16 @@ def harmonic_balance(
     stages = Ensemble.held({**flat, "controller.crossover": rates}, len(rates))
     cycles = _symmetric(stages, rtol)
     singles = [single_harmonic(stage.replace({"controller.crossover": f"{rate!r} Hz"})) for rate in map(float, rates)]
-    known = {
+    columns = {
         "period": (cycles.period, "s"),
         "amplitude": (cycles.amplitude, "m"),
         "multiplier": (cycles.multiplier, "1"),
     }
-    known |= {
+    columns |= {
         "solutions": (np.array([len(single.amplitudes) for single in singles]), "1"),
         "least_residual": (np.array([single.least for single in singles]), "1"),
     }
-    variables: dict[str, Any] = {name: ("crossover", value, {"units": unit}) for name, (value, unit) in known.items()}
+    variables: dict[str, Any] = {name: ("crossover", value, {"units": unit}) for name, (value, unit) in columns.items()}
     names, plane = ("period_error", "amplitude_error", "status"), ("crossover", "highest")
     rows = [_errors(stages, cycles, number, harmonics, rtol) for number in range(len(rates))]
     variables |= {name: (plane, [[cell[k] for cell in row] for row in rows]) for k, name in enumerate(names)}
@@ -80,14 +80,14 @@ def _errors(
     stages: Ensemble, cycles: Cycles, number: int, harmonics: Sequence[int], rtol: float
 ) -> list[tuple[float, float, str]]:
     """Errors of period and amplitude, relative, and status, of one stage for every highest harmonic."""
-    one, period = stages.take(np.array([number])), float(cycles.period[number])
+    single, period = stages.take(np.array([number])), float(cycles.period[number])
     interval = period / SAMPLES
-    run = one.run(cycles.states[[number]], np.array([period]), rtol, interval=interval)
+    run = single.run(cycles.states[[number]], np.array([period]), rtol, interval=interval)
     cart = run.samples[0, :SAMPLES, stages.sticking]
-    flat = {key: value[0] if np.ndim(value) else value for key, value in one.flat.items()}
+    flat = {key: value[0] if np.ndim(value) else value for key, value in single.flat.items()}
     cells = []
     for highest in harmonics:
         series = balanced(flat, np.arange(SAMPLES) * interval, cart, highest)
-        found = (series.period / period - 1, series.amplitude / float(cycles.amplitude[number]) - 1)
-        cells.append((*(found if series.status == DONE else (np.nan, np.nan)), series.status))
+        errors = (series.period / period - 1, series.amplitude / float(cycles.amplitude[number]) - 1)
+        cells.append((*(errors if series.status == DONE else (np.nan, np.nan)), series.status))
     return cells

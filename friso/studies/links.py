@@ -32,36 +32,36 @@ def names(links: Mapping[str, str]) -> frozenset[str]:
     """Every name that the expressions use. Raises InputError."""
     trees = [_parsed(key, text) for key, text in links.items()]
     called = {id(node.func) for tree in trees for node in ast.walk(tree) if isinstance(node, ast.Call)}
-    found = set()
+    keys = set()
     for tree in trees:
         inner = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Attribute)}
         for node in ast.walk(tree):
             if isinstance(node, ast.Name | ast.Attribute) and id(node) not in called | inner:
-                found.add(ast.unparse(node))
-    return frozenset(found)
+                keys.add(ast.unparse(node))
+    return frozenset(keys)
 
 
 def check_links(stage: Stage, links: Mapping[str, str], axes: frozenset[str]) -> None:
     """Refuse links to no key, and expressions with names that are neither keys nor `axes`. Raises InputError."""
-    known = numeric_keys(stage.flat())
+    numeric = numeric_keys(stage.flat())
     for key in links:
-        if key not in known:
+        if key not in numeric:
             stage.flat({key: 0.0})  # raises, and names the nearest key
         if key in axes and key not in names({key: links[key]}):
-            given = f"{key} = {links[key]}, which does not follow the axis {key}"
-            raise InputError("link", given, "an axis or a link, or a link in which the axis occurs", EXAMPLE)
+            text = f"{key} = {links[key]}, which does not follow the axis {key}"
+            raise InputError("link", text, "an axis or a link, or a link in which the axis occurs", EXAMPLE)
     for name in sorted(names(links) - axes):
-        if name not in known or name not in stage.flat():
+        if name not in numeric or name not in stage.flat():
             raise InputError("link", f"the name {name}", "axes and numeric keys that the stage has", EXAMPLE)
 
 
 def linked(links: Mapping[str, str], values: Mapping[str, Any]) -> dict[str, Any]:
     """The SI values of the linked keys from those of keys and axes (numbers or arrays); a link sees those before it."""
-    known = dict(values)
+    numbers = dict(values)
     for key, text in links.items():
         with np.errstate(all="ignore"):  # what comes out as no number makes the cell invalid
-            known[key] = _value(_parsed(key, text), known)
-    return {key: known[key] for key in links}
+            numbers[key] = _value(_parsed(key, text), numbers)
+    return {key: numbers[key] for key in links}
 
 
 def _parsed(key: str, text: str) -> ast.expr:
@@ -92,15 +92,15 @@ def _check(node: ast.expr) -> None:
             raise ValueError(ast.unparse(node))
 
 
-def _value(node: ast.expr, known: Mapping[str, Any]) -> Any:
+def _value(node: ast.expr, numbers: Mapping[str, Any]) -> Any:
     match node:
         case ast.BinOp(left, op, right):
-            return _OPERATORS[type(op)](_value(left, known), _value(right, known))
+            return _OPERATORS[type(op)](_value(left, numbers), _value(right, numbers))
         case ast.UnaryOp(op, operand):
-            return _OPERATORS[type(op)](_value(operand, known))
+            return _OPERATORS[type(op)](_value(operand, numbers))
         case ast.Call(ast.Name(name), arguments):
-            return _FUNCTIONS[name](*(_value(argument, known) for argument in arguments))
+            return _FUNCTIONS[name](*(_value(argument, numbers) for argument in arguments))
         case ast.Constant(value):
             return np.float64(str(value))
         case _:
-            return np.asarray(known[ast.unparse(node)], dtype=float)[()]
+            return np.asarray(numbers[ast.unparse(node)], dtype=float)[()]

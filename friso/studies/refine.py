@@ -47,7 +47,7 @@ def finer(study: Study) -> Study:
     if len(study.shape) > 3 or not all(axis.numeric for axis in study.axes) or SAMPLE in study.names:
         expected = "one to three axes of numbers on a grid"
         raise InputError("--refine", f"axes: {', '.join(study.names)}", expected)
-    dimensions = tuple(Dimension(each.name, (_finer(each.axes[0]),)) for each in study.dimensions)
+    dimensions = tuple(Dimension(dimension.name, (_finer(dimension.axes[0]),)) for dimension in study.dimensions)
     return replace(study, dimensions=dimensions, refined=True)
 
 
@@ -70,17 +70,17 @@ def refine(study: Study, ask: Ask) -> Columns:
 
     A cell that was not asked for has the verdict of the nearest one that was, a status that says so, and no numbers.
     """
-    known = _Known(study)
-    known.learn(_lattice(study.shape), ask)
-    while (left := known.budget - known.runs) > 0:
-        cells = known.unseen_changes()
+    grid = _Known(study)
+    grid.learn(_lattice(study.shape), ask)
+    while (left := grid.budget - grid.runs) > 0:
+        cells = grid.unseen_changes()
         if not cells.size:
-            batch = max(1, known.budget // BATCHES)
-            cells = known.likely_surprises(min(left - batch, batch))  # one batch is kept to follow what it finds
+            batch = max(1, grid.budget // BATCHES)
+            cells = grid.likely_surprises(min(left - batch, batch))  # one batch is kept to follow what it finds
         if not cells.size:
             break
-        known.learn(cells[:left], ask)
-    return known.filled()
+        grid.learn(cells[:left], ask)
+    return grid.filled()
 
 
 def _lattice(shape: tuple[int, ...]) -> np.ndarray:
@@ -94,25 +94,25 @@ class _Known:
 
     def __init__(self, study: Study) -> None:
         self.shape = study.shape
-        given = math.prod(size // FINER + 1 for size in study.shape)
-        self.budget = max(int(SHARE * study.cells), min(3 * given // 2, study.cells))
+        coarse = math.prod(size // FINER + 1 for size in study.shape)
+        self.budget = max(int(SHARE * study.cells), min(3 * coarse // 2, study.cells))
         self.columns: Columns = {}
         self.asked = np.zeros(study.shape, bool)
         self.runs = 0
 
     def learn(self, cells: np.ndarray, ask: Ask) -> None:
         """Ask for cells; those that no stage may have cost no run."""
-        found = ask(cells)
-        for name in found:
+        columns = ask(cells)
+        for name in columns:
             empty = np.full(self.asked.size, np.nan) if name in UNITS else np.full(self.asked.size, "", dtype=object)
-            self.columns.setdefault(name, empty)[cells] = found[name]
+            self.columns.setdefault(name, empty)[cells] = columns[name]
         self.asked.flat[cells] = True
-        self.runs += int(np.sum(found["verdict"] != "invalid"))
+        self.runs += int(np.sum(columns["verdict"] != "invalid"))
 
     def _nearest(self) -> tuple[np.ndarray, np.ndarray]:
         """Distance to the nearest cell asked for, and its number, both of the study's shape."""
-        found: Any = distance_transform_edt(~self.asked, return_indices=True)
-        distance, places = found
+        transform: Any = distance_transform_edt(~self.asked, return_indices=True)
+        distance, places = transform
         return distance, np.asarray(np.ravel_multi_index(tuple(places), self.shape))
 
     def _changes(self, nearest: np.ndarray) -> np.ndarray:

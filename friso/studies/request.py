@@ -43,13 +43,13 @@ class Request:
     def trial(self) -> Study:
         """A few cells drawn evenly from a study that may be too large to be made. Raises InputError."""
         rng = np.random.default_rng(0)
-        drawn = []
+        axes = []
         for axis in self._read({**self.axes, **(self.samples.ranges if self.samples else {})}):
             if isinstance(axis, Range):
-                drawn.append(Axis(axis.name, axis.at(rng.random(TRIED)), axis.unit, axis.scale))
+                axes.append(Axis(axis.name, axis.at(rng.random(TRIED)), axis.unit, axis.scale))
             else:
-                drawn.append(replace(axis, values=rng.choice(axis.values, TRIED)))
-        return Study(self.stage, (Dimension(SAMPLE, tuple(drawn)),), dict(self.links), USUAL, 1e-6)
+                axes.append(replace(axis, values=rng.choice(axis.values, TRIED)))
+        return Study(self.stage, (Dimension(SAMPLE, tuple(axes)),), dict(self.links), USUAL, 1e-6)
 
     def study(self, metrics: Sequence[str] | None = None, rtol: float = 1e-6) -> Study:
         """The study. Raises InputError, and ValueError for a tolerance that is not usable."""
@@ -74,8 +74,8 @@ def _points(axis: Axis | Range) -> int:
     if isinstance(axis, Axis):
         return len(axis.values)
     if axis.count is None:
-        given = f"{axis.first:g}..{axis.last:g} {axis.unit}, without a number of points"
-        raise InputError(axis.name, given, "FIRST..LAST:POINTS", '"1 Hz..40 Hz:41"')
+        text = f"{axis.first:g}..{axis.last:g} {axis.unit}, without a number of points"
+        raise InputError(axis.name, text, "FIRST..LAST:POINTS", '"1 Hz..40 Hz:41"')
     return axis.count
 
 
@@ -93,5 +93,5 @@ def _checked_metrics(metrics: Sequence[str] | None) -> tuple[str, ...]:
     for name in metrics or ():
         if name not in METRICS:
             raise InputError("metrics", name, f"some of {', '.join(METRICS)}", '["peaks", "period"]')
-    wanted = metrics or USUAL
-    return tuple(name for name in METRICS if name in wanted or name not in UNITS)
+    requested = metrics or USUAL
+    return tuple(name for name in METRICS if name in requested or name not in UNITS)

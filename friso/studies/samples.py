@@ -34,7 +34,7 @@ def sampled(stage: Stage, samples: Samples, free: frozenset[str], log: bool = Fa
     read = read_axes(stage, samples.ranges, free, log)
     ranges = [axis for axis in read if isinstance(axis, Range)]
     if not ranges:
-        return _given(read)
+        return _values(read)
     if len(ranges) < len(read):
         raise InputError("samples", "ranges together with lists", "one or the other", '{"joint.stroke": "0 m..1 mm"}')
     for axis in ranges:
@@ -44,7 +44,7 @@ def sampled(stage: Stage, samples: Samples, free: frozenset[str], log: bool = Fa
     return tuple(Axis(axis.name, axis.at(points[:, i]), axis.unit, axis.scale) for i, axis in enumerate(ranges))
 
 
-def _given(read: tuple[Axis | Range, ...]) -> tuple[Axis, ...]:
+def _values(read: tuple[Axis | Range, ...]) -> tuple[Axis, ...]:
     axes = tuple(axis for axis in read if isinstance(axis, Axis))
     if len({len(axis.values) for axis in axes}) != 1:
         lengths = ", ".join(f"{axis.name} {len(axis.values)}" for axis in axes) or "none"
@@ -60,8 +60,8 @@ def _points(dimensions: int, samples: Samples) -> np.ndarray:
         raise InputError("samples", f"{samples.count} points", "2 points or more", "1024")
     if samples.method == "sobol":
         sampler = qmc.Sobol(dimensions, rng=samples.seed)
-        whole = sampler.random_base2(int(np.ceil(np.log2(samples.count))))
-        return whole[: samples.count]
+        points = sampler.random_base2(int(np.ceil(np.log2(samples.count))))
+        return points[: samples.count]
     if samples.method == "latin":
         return qmc.LatinHypercube(dimensions, rng=samples.seed).random(samples.count)
     raise InputError("samples", samples.method, f"one of {', '.join(METHODS)}", "sobol")

@@ -116,19 +116,19 @@ class Store:
         except (OSError, RuntimeError, ValueError):
             return False
 
-    def write(self, block: Block, found: Mapping[str, np.ndarray]) -> None:
+    def write(self, block: Block, columns: Mapping[str, np.ndarray]) -> None:
         """Write the measures of a block, its verdicts last. Raises OSError where the disk is full."""
         shape = tuple(part.stop - part.start for part in block)
         region = dict(zip(self.study.names, block, strict=True))
-        self._write([name for name in self.study.metrics if name != "verdict"], found, shape, region)
-        self._write(["verdict"], found, shape, region)
+        self._write([name for name in self.study.metrics if name != "verdict"], columns, shape, region)
+        self._write(["verdict"], columns, shape, region)
 
     def _write(
-        self, names: list[str], found: Mapping[str, np.ndarray], shape: tuple[int, ...], region: dict[str, slice]
+        self, names: list[str], columns: Mapping[str, np.ndarray], shape: tuple[int, ...], region: dict[str, slice]
     ) -> None:
         import xarray as xr
 
-        arrays = {name: found[name].astype(WORDS.get(name, "f8")).reshape(shape) for name in names}
+        arrays = {name: columns[name].astype(WORDS.get(name, "f8")).reshape(shape) for name in names}
         part = xr.Dataset({name: (self.study.names, array) for name, array in arrays.items()})
         # a chunk that holds nothing is written too: that it is there tells that its block was done
         part.to_zarr(self.path, region=region, zarr_format=_FORMAT, consolidated=True, write_empty_chunks=True)
@@ -141,15 +141,15 @@ class Store:
 
         def answer(cells: np.ndarray) -> Columns:
             file = folder / f"{next(number)}.npz"
-            if (kept := _answer(file, cells)) is not None:
-                return kept
-            found = ask(cells)
+            if (stored := _answer(file, cells)) is not None:
+                return stored
+            columns = ask(cells)
             draft = file.with_suffix(".partial")
             with draft.open("wb") as stream:
-                arrays: dict[str, Any] = {name: found[name].astype(WORDS.get(name, "f8")) for name in found}
+                arrays: dict[str, Any] = {name: columns[name].astype(WORDS.get(name, "f8")) for name in columns}
                 np.savez_compressed(stream, cells=cells, **arrays)
             draft.rename(file)
-            return found
+            return columns
 
         return answer
 
@@ -193,21 +193,21 @@ def _shared(texts: xr.DataArray) -> np.ndarray:
     """The texts as objects, equal ones being one object."""
     import pandas as pd
 
-    known: dict[str, str] = {}
-    found = np.empty(texts.shape, dtype=object)
+    words_once: dict[str, str] = {}
+    decoded = np.empty(texts.shape, dtype=object)
     rows = max(1, LARGEST_BLOCK // max(1, int(np.prod(texts.shape[1:]))))
     for first in range(0, texts.shape[0], rows):
         codes, words = pd.factorize(texts[first : first + rows].values.ravel())
-        once = np.array([known.setdefault(str(word), str(word)) for word in words], dtype=object)
-        found[first : first + rows] = once[codes].reshape(found[first : first + rows].shape)
-    return found
+        once = np.array([words_once.setdefault(str(word), str(word)) for word in words], dtype=object)
+        decoded[first : first + rows] = once[codes].reshape(decoded[first : first + rows].shape)
+    return decoded
 
 
 def _answer(file: Path, cells: np.ndarray) -> Columns | None:
     """What was kept about just these cells, None if nothing."""
     try:
-        with np.load(file) as kept:
-            answer = dict(kept)
+        with np.load(file) as stored:
+            answer = dict(stored)
     except (OSError, ValueError, zipfile.BadZipFile):
         return None
     return answer if np.array_equal(answer.pop("cells"), cells) else None
@@ -221,28 +221,28 @@ def _refuse_foreign(path: Path) -> None:
     if not path.exists():
         raise StoreError("", "nothing there", expected, "friso map STAGE.toml ... --out study.zarr", str(path))
     try:
-        with xr.open_zarr(path, chunks=None, zarr_format=_FORMAT) as found:
-            if "verdict" in found and "equations" in found.attrs:
+        with xr.open_zarr(path, chunks=None, zarr_format=_FORMAT) as dataset:
+            if "verdict" in dataset and "equations" in dataset.attrs:
                 return
     except (OSError, ValueError, KeyError):
         pass
-    given = "a folder with other things in it" if path.is_dir() else "a file"
-    raise StoreError("", f"{given}; nothing was overwritten", expected, "--out study.zarr", str(path))
+    text = "a folder with other things in it" if path.is_dir() else "a file"
+    raise StoreError("", f"{text}; nothing was overwritten", expected, "--out study.zarr", str(path))
 
 
 def _refuse_other(path: Path, study: Study) -> None:
     """Raises StoreError if the store holds another study than this."""
-    with read_store(path) as found:
-        differences = study.differences(study_of(found), found.attrs["equations"])
+    with read_store(path) as dataset:
+        differences = study.differences(study_of(dataset), dataset.attrs["equations"])
     if differences:
-        given = "a store of another study:\n            " + "\n            ".join(differences)
+        text = "a store of another study:\n            " + "\n            ".join(differences)
         expected = "the same study to go on with, or another --out; nothing was overwritten"
-        raise StoreError("", given, expected, origin=str(path))
+        raise StoreError("", text, expected, origin=str(path))
 
 
 def _warn_of_another_machine(path: Path) -> None:
-    with read_store(path) as found:
-        there = found.attrs["machine"]
+    with read_store(path) as dataset:
+        there = dataset.attrs["machine"]
     if there != machine():
         logger.warning("the store was begun on %s, here is %s: cells may differ in their last bits", there, machine())
 

@@ -152,23 +152,23 @@ class Study:
 
     def differences(self, other: Study, its_equations: str) -> list[str]:
         """What tells a stored study (`other`, made by `its_equations`) from this one, in words; empty if nothing."""
-        found = _stage_differences(self.stage, other.stage)
+        differences = _stage_differences(self.stage, other.stage)
         if its_equations != equations_version():
-            found.append(f"version of the equations: {its_equations} there, {equations_version()} here")
+            differences.append(f"version of the equations: {its_equations} there, {equations_version()} here")
         if self._named() != other._named():
-            found.append(f"axes: {other._named()} there, {self._named()} here")
+            differences.append(f"axes: {other._named()} there, {self._named()} here")
         else:
-            found += [
+            differences += [
                 f"axis {mine.name}: {_described(its)} there, {_described(mine)} here"
                 for mine, its in zip(self.axes, other.axes, strict=True)
                 if _described(mine) != _described(its)
             ]
         if list(self.links.items()) != list(other.links.items()):  # in order: a link sees those before it
-            found.append(f"links: {dict(other.links)} there, {dict(self.links)} here")
+            differences.append(f"links: {dict(other.links)} there, {dict(self.links)} here")
         for what in ("metrics", "rtol", "refined"):
             if getattr(self, what) != getattr(other, what):
-                found.append(f"{what}: {getattr(other, what)} there, {getattr(self, what)} here")
-        return found
+                differences.append(f"{what}: {getattr(other, what)} there, {getattr(self, what)} here")
+        return differences
 
 
 def cells_of(block: Block) -> int:

@@ -75,12 +75,12 @@ def run_in_memory(
     refined = {id(study): _refined(study, crew, progress) for study in studies if study.refined}
     columns = [refined.get(id(study)) or _room(study) for study in studies]
     number = {id(study): k for k, study in enumerate(studies)}
-    for study, block, found in crew.compute(crew.jobs([study for study in studies if not study.refined])):
+    for study, block, columns_of_block in crew.compute(crew.jobs([study for study in studies if not study.refined])):
         for name in study.metrics:
             target = columns[number[id(study)]][name][block]
-            target[...] = found[name].reshape(target.shape)
-        progress(len(found["verdict"]))
-    results = [dataset(study, found) for study, found in zip(studies, columns, strict=True)]
+            target[...] = columns_of_block[name].reshape(target.shape)
+        progress(len(columns_of_block["verdict"]))
+    results = [dataset(study, columns_of_study) for study, columns_of_study in zip(studies, columns, strict=True)]
     for study, runs in zip(studies, results, strict=True):
         runs.attrs |= verified(study, runs, crew, verify)
     return results
@@ -106,9 +106,9 @@ def run_in_store(
                 store.write(block, {name: columns[name][block] for name in study.metrics})
             store.forget_answers()
             missing = []
-        for _, block, found in crew.compute((study, block) for block in missing):
-            store.write(block, found)
-            progress(len(found["verdict"]))
+        for _, block, measures in crew.compute((study, block) for block in missing):
+            store.write(block, measures)
+            progress(len(measures["verdict"]))
         runs = store.read()
         if verify and runs.attrs.get("verified_share") != verify:
             store.annotate(verified(study, runs, crew, verify))
@@ -120,9 +120,9 @@ def _refined(study: Study, crew: Crew, progress: Progress, keeping: Callable[[As
     everything = replace(study, metrics=METRICS if study.cycles else USUAL)
 
     def ask(cells: np.ndarray) -> Columns:
-        found = run_scattered(everything, cells, crew)
+        columns = run_scattered(everything, cells, crew)
         progress(len(cells))
-        return found
+        return columns
 
     columns = refine_study(study, keeping(ask))
     return {name: columns[name].reshape(study.shape) for name in study.metrics}

@@ -53,18 +53,18 @@ def verified(study: Study, runs: xr.Dataset, crew: Crew, share: float) -> dict[s
     tighter = replace(study, rtol=rtol, metrics=tuple(WORDS))
 
     def same(kind: str) -> tuple[int, int]:
-        picked = drawn(study, count, lambda cells: _kinds(runs, study, cells) == kind)
+        picked = sampled(study, count, lambda cells: _kinds(runs, study, cells) == kind)
         again = run_scattered(tighter, picked, crew)["verdict"] if picked.size else np.empty(0)
         return len(picked), int(np.sum(_at(runs["verdict"], study, picked) == again))
 
     cells, surviving = same("run")
     if not cells:
         return {}
-    found = {"verified_share": share, "verified_rtol": rtol, "verified_cells": cells, "verified_surviving": surviving}
+    columns = {"verified_share": share, "verified_rtol": rtol, "verified_cells": cells, "verified_surviving": surviving}
     if study.refined:
         checked, confirmed = same(INFERRED)
-        found |= {"inferred_checked": checked, "inferred_confirmed": confirmed}
-    return found
+        columns |= {"inferred_checked": checked, "inferred_confirmed": confirmed}
+    return columns
 
 
 def loosest_rtol(study: Study, crew: Crew) -> tuple[float, dict[float, float], int]:
@@ -73,7 +73,7 @@ def loosest_rtol(study: Study, crew: Crew) -> tuple[float, dict[float, float], i
 
     If no tolerance is good enough it is the one at which most survive.
     """
-    picked = drawn(study, TRIED, lambda cells: allowed(study.stage, study.links, study.columns(cells)))
+    picked = sampled(study, TRIED, lambda cells: allowed(study.stage, study.links, study.columns(cells)))
     if not picked.size:
         return CANDIDATES[-1], {}, 0
     verdicts: dict[float, np.ndarray] = {}
@@ -92,19 +92,19 @@ def loosest_rtol(study: Study, crew: Crew) -> tuple[float, dict[float, float], i
     return max(shares, key=lambda rtol: shares[rtol]), shares, len(picked)
 
 
-def drawn(study: Study, count: int, wanted: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
-    """Up to `count` numbers of different cells for which `wanted` holds, drawn evenly, rising; always the same."""
+def sampled(study: Study, count: int, condition: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+    """Up to `count` numbers of different cells for which `condition` holds, drawn evenly, rising; always the same."""
     rng = np.random.default_rng(0)
     if study.cells <= 8 * count:
         order = rng.permutation(study.cells)
-        return np.sort(order[wanted(order)][:count])
-    found = np.empty(0, int)
+        return np.sort(order[condition(order)][:count])
+    accepted = np.empty(0, int)
     for _ in range(20):  # of a map nearly all of which is unwanted, fewer must do
         new = rng.integers(0, study.cells, 2 * count)
-        found = np.unique(np.concatenate([found, new[wanted(new)]]))
-        if len(found) >= count:
+        accepted = np.unique(np.concatenate([accepted, new[condition(new)]]))
+        if len(accepted) >= count:
             break
-    return np.sort(rng.permutation(found)[:count])
+    return np.sort(rng.permutation(accepted)[:count])
 
 
 def _at(values: xr.DataArray, study: Study, cells: np.ndarray) -> np.ndarray:

@@ -46,11 +46,11 @@ class Checked:
 
 def checked(sweep: Sweep, most: int) -> Checked:
     """The first `most` samples that have an edge, which are random ones, simulated."""
-    known = sweep.usable
-    some = known.take(np.arange(min(most, len(known.edge))))
-    found = [_hunts(some, share, *how) for how in (_STUCK, _MOVED) for share in (BELOW, ABOVE)]
-    numbers = [int(hunts.any(axis=1).sum()) for hunts, _ in found]
-    completed = np.concatenate([done.ravel() for _, done in found])
+    usable = sweep.usable
+    some = usable.take(np.arange(min(most, len(usable.edge))))
+    runs = [_hunts(some, share, *how) for how in (_STUCK, _MOVED) for share in (BELOW, ABOVE)]
+    numbers = [int(hunts.any(axis=1).sum()) for hunts, _ in runs]
+    completed = np.concatenate([done.ravel() for _, done in runs])
     return Checked(len(some.edge), *numbers, runs=completed.size, failed=int(np.count_nonzero(~completed)))
 
 

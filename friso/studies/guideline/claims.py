@@ -41,9 +41,9 @@ def claims(worked: Worked) -> tuple[Claim, ...]:
 
 
 def _gap(worked: Worked) -> Claim:
-    found = worked.studies["gap"]
-    forces = sorted({case.changes["friction.static"] for case in found})
-    gaps = [least_gap(found, force) for force in forces]
+    cases = worked.studies["gap"]
+    forces = sorted({case.changes["friction.static"] for case in cases})
+    gaps = [least_gap(cases, force) for force in forces]
     words = ", ".join(f"{gap.words} at F_s = {force:g} N" for force, gap in zip(forces, gaps, strict=True))
     return Claim(
         "Sec. 4.3.3",
@@ -68,7 +68,7 @@ def _share(worked: Worked) -> Claim:
         "the mass ratio does not matter for the working of the isolator",
         f"edge by the share of the stage in the mass: {ends}{spread}",
         f"an edge below {CLAIMED_AT:g} Hz, where the thesis evaluates its isolator, for all shares tried",
-        _judged([_told(edge < CLAIMED_AT, edge) for edge in edges]),
+        _judged([_verdict(edge < CLAIMED_AT, edge) for edge in edges]),
     )
 
 
@@ -76,20 +76,20 @@ def _mass(worked: Worked) -> Claim:
     cases = worked.studies["mass"]
     edges = _computed(cases)
     at = [STUDIED["mass"](case.changes) for case in cases]
-    found = (
+    text = (
         f"locked, tuned for its mass: edge {_edge(cases[0])} at {at[0]:.2g} kg, {_edge(cases[-1])} at {at[-1]:.2g} kg"
     )
-    falls = [_told(after < before, before, after) for before, after in pairwise(edges)]
+    falls = [_verdict(after < before, before, after) for before, after in pairwise(edges)]
     falls = falls if None in falls else [all(falls)]
-    return Claim("Fig. 11B", "more mass helps", found, "the edge falls all the way", _judged(falls))
+    return Claim("Fig. 11B", "more mass helps", text, "the edge falls all the way", _judged(falls))
 
 
 def _stiffness(worked: Worked) -> Claim:
     cases = {round(STUDIED["stiffness"](case.changes)): case for case in worked.studies["stiffness"]}
-    soft, own = cases[1000], cases[2400]
-    lower = _told(soft.ranked < own.ranked, soft.ranked, own.ranked)
-    found = f"edge {_edge(soft)} at 1 N/mm, {_edge(own)} at 2.4 N/mm"
-    return Claim("Fig. 16B", "a softer joint lowers the limit", found, "it is lower", _judged([lower]))
+    soft, stiff = cases[1000], cases[2400]
+    lower = _verdict(soft.ranked < stiff.ranked, soft.ranked, stiff.ranked)
+    text = f"edge {_edge(soft)} at 1 N/mm, {_edge(stiff)} at 2.4 N/mm"
+    return Claim("Fig. 16B", "a softer joint lowers the limit", text, "it is lower", _judged([lower]))
 
 
 def _stroke(worked: Worked) -> Claim:
@@ -104,9 +104,9 @@ def _stroke(worked: Worked) -> Claim:
         f"at 0.3 mm below {CLAIMED_AT:g} Hz and within 10 % of that at 2 mm; at 1 mm within 2 % of it",
         _judged(
             [
-                _told(short < CLAIMED_AT, short),
-                _told(short < 1.1 * longest, short, longest),
-                _told(same, long, longest),
+                _verdict(short < CLAIMED_AT, short),
+                _verdict(short < 1.1 * longest, short, longest),
+                _verdict(same, long, longest),
             ]
         ),
     )
@@ -115,23 +115,23 @@ def _stroke(worked: Worked) -> Claim:
 def _edges(worked: Worked) -> Claim:
     _, locked, free = (machine.computed for machine in worked.machines)
     worst = worked.worst
-    found = (
+    text = (
         f"free {_hertz(free)}, locked {_hertz(locked)} with the friction of Table 2; locked at most {_edge(worst)} "
         "over the measured friction range, both as computed"
     )
     ends = [FREE_EDGE[0] / NEAR, FREE_EDGE[1] * NEAR]
-    near = [_told(ends[0] <= free <= ends[1], free)]
-    near += [_told(about(worst.ranked, edge), worst.ranked) for edge in LOCKED_EDGES]
+    near = [_verdict(ends[0] <= free <= ends[1], free)]
+    near += [_verdict(about(worst.ranked, edge), worst.ranked) for edge in LOCKED_EDGES]
     return Claim(
         "Sec. 4.3.3, 6",
         "the isolator works from 5 to 5.5 Hz, the locked rig needs about 15 Hz (hunting was gone at 14.3 Hz)",
-        found,
+        text,
         f"free within 10 % of the range, the highest locked edge within a factor of {ABOUT:g} of both numbers",
         _judged(near),
     )
 
 
-def _told(holds: bool, *edges: float) -> bool | None:
+def _verdict(holds: bool, *edges: float) -> bool | None:
     """Whether something holds of edges; None if one of them is not known."""
     return None if np.isnan(edges).any() else bool(holds)
 
@@ -179,11 +179,11 @@ class LeastGap:
         return True if least <= self.low and self.high <= most else None
 
 
-def least_gap(found: Sequence[Case], static: float, crossover: float = CLAIMED_AT) -> LeastGap:
+def least_gap(cases: Sequence[Case], static: float, crossover: float = CLAIMED_AT) -> LeastGap:
     """The friction gap F_s - F_c from which on the rig of a static friction [N] hunts at a crossover [Hz], straight
     between the points of its edge in logarithms."""
-    own = [case for case in found if case.changes["friction.static"] == static]
-    x, y = np.array([STUDIED["gap"](case.changes) for case in own]), _computed(own)
+    at_force = [case for case in cases if case.changes["friction.static"] == static]
+    x, y = np.array([STUDIED["gap"](case.changes) for case in at_force]), _computed(at_force)
     above = np.flatnonzero(y >= crossover)
     if np.isnan(y).any():
         return LeastGap(np.nan, np.nan)

@@ -131,21 +131,21 @@ def by_rates(locked: Fit) -> list[ByRates]:
     """Errors of the locked law by the ratio of its two rates."""
     held = locked.test.usable
     ratio = _ratio(locked.law, held.values)
-    found = []
+    decades = []
     for low, high in pairwise(RATIOS):
         some = held.take((ratio >= low) & (ratio < high))
         errors = Errors.between(locked.law.edge(some.values), some.edge) if len(some.edge) else None
-        found.append(ByRates(low, high, errors))
-    return found
+        decades.append(ByRates(low, high, errors))
+    return decades
 
 
 def safe_over_friction(locked: Fit) -> float:
     """The largest of the safe factors of those bins of slip over drop that the rig visits over its friction range."""
-    flats = [plain() | each for each in friction_range()]
+    flats = [plain() | forces for forces in friction_range()]
     groups = [values_of(flat) for flat in flats]
-    visited = _ratio(locked.law, {name: np.array([each[name] for each in groups], float) for name in groups[0]})
-    bins = [each for each in by_rates(locked) if np.any((visited >= each.low) & (visited < each.high))]
-    return max(each.errors.safe if each.errors else locked.on_test.safe for each in bins)
+    visited = _ratio(locked.law, {name: np.array([group[name] for group in groups], float) for name in groups[0]})
+    bins = [decade for decade in by_rates(locked) if np.any((visited >= decade.low) & (visited < decade.high))]
+    return max(decade.errors.safe if decade.errors else locked.on_test.safe for decade in bins)
 
 
 def _ratio(law: Fitted, values: Mapping[str, np.ndarray]) -> np.ndarray:
@@ -162,21 +162,21 @@ def guideline(samples: int = SAMPLES, keep: Path | None = None, progress: Progre
     checked_samples(samples)
     begin = time.perf_counter()
     sizes = _sizes(samples)
-    told = _told(sizes, progress)
+    announce = _announcer(sizes, progress)
     parts = Keep(keep)
     resumed = parts.count
-    told("compiling", 0)
+    announce("compiling", 0)
     _compile()
 
-    rigid = locked_sweep(sizes["locked fit"], LOCKED_FIT, parts, told)
-    rigid_test = locked_sweep(sizes["locked test"], LOCKED_TEST, parts, told)
-    free, beside = free_sweep(sizes["free fit"], FREE_FIT, parts, told)
-    free_test, beside_test = free_sweep(sizes["free test"], FREE_TEST, parts, told)
-    told("laws and simulations", 0)
+    rigid = locked_sweep(sizes["locked fit"], LOCKED_FIT, parts, announce)
+    rigid_test = locked_sweep(sizes["locked test"], LOCKED_TEST, parts, announce)
+    free, beside = free_sweep(sizes["free fit"], FREE_FIT, parts, announce)
+    free_test, beside_test = free_sweep(sizes["free test"], FREE_TEST, parts, announce)
+    announce("laws and simulations", 0)
     few = max(8, int(samples * CHECKED))
     locked_fit = _locked(rigid, together(rigid_test, beside, beside_test), few)
     free_fit = _free(free, free_test, locked_fit.law, few)
-    told("worked steps", 0)
+    announce("worked steps", 0)
     laws = Laws(locked_fit.law, free_fit.law)
     steps = worked(laws, safe_over_friction(locked_fit), free_fit.on_test.safe)
     modes = parasitic_limits(rig())
@@ -205,17 +205,17 @@ def _sizes(samples: int) -> dict[str, int]:
     }
 
 
-def _told(sizes: Mapping[str, int], progress: Progress | None) -> Callable[[str, int], None]:
+def _announcer(sizes: Mapping[str, int], progress: Progress | None) -> Callable[[str, int], None]:
     total = sum(size * (WEIGHT + 1 if name.startswith("free") else 1) for name, size in sizes.items())
     done = 0
 
-    def told(what: str, more: int) -> None:
+    def announce(what: str, more: int) -> None:
         nonlocal done
         done += more * (WEIGHT if what == FREE else 1)
         if progress is not None:
             progress(done, total, what)
 
-    return told
+    return announce
 
 
 def _compile() -> None:
@@ -234,7 +234,7 @@ def _locked(fit: Sweep, test: Sweep, few: int) -> Fit:
 def _free(fit: Sweep, test: Sweep, locked: Fitted, few: int) -> Fit:
     used, held = fit.usable, test.usable
     law = fitted(FREE_LAW, used.values, used.edge, used.locked)
-    given = Errors.between(law.edge(held.values, held.locked), held.edge)
-    whole = Errors.between(law.edge(held.values, locked.edge(held.values)), held.edge)
+    from_simulated = Errors.between(law.edge(held.values, held.locked), held.edge)
+    combined = Errors.between(law.edge(held.values, locked.edge(held.values)), held.edge)
     on_fit = Errors.between(law.edge(used.values, used.locked), used.edge)
-    return Fit(law, fit, test, on_fit, whole, given, checked(test, few))
+    return Fit(law, fit, test, on_fit, combined, from_simulated, checked(test, few))

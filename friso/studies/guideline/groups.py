@@ -186,7 +186,7 @@ def parameters_of(flat: Mapping[str, Any]) -> tuple[str, ...]:
     """The parameters on which the equations of a stage depend, by name; masses that move as one are one."""
     form = structure(flat)
     present = {str(symbol) for symbol in assemble(form).parameters}
-    names = [name for name, each in PARAMETERS.items() if present.issuperset(each.keys)]
+    names = [name for name, parameter in PARAMETERS.items() if present.issuperset(parameter.keys)]
     return tuple(name for name in names if name != "stage_mass" or form.joint != "rigid")
 
 

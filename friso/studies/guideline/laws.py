@@ -109,10 +109,10 @@ class Errors:
     safe: float
 
     @classmethod
-    def between(cls, law: np.ndarray, found: np.ndarray) -> Errors:
+    def between(cls, law: np.ndarray, edges: np.ndarray) -> Errors:
         """Errors of the edges by a law against those found, both (count,); `safe` is the factor on the law below which
         95 % of the edges lie."""
-        off = np.log(found / law)
+        off = np.log(edges / law)
         size = np.abs(off)
         return cls(
             len(off),
@@ -142,21 +142,21 @@ def beside_locked(rates: np.ndarray, locked: np.ndarray) -> tuple[np.ndarray, np
 def fitted(law: Law, values: Values, edges: np.ndarray, locked: np.ndarray | None = None, seed: int = 0) -> Fitted:
     """The law fitted to edges, shape (count,), its exponents chosen by cross-validation."""
     target = np.log(edges)
-    given = np.zeros(len(edges)) if locked is None else np.log(locked)
+    offset = np.zeros(len(edges)) if locked is None else np.log(locked)
     folds = np.random.default_rng(seed).permutation(len(edges)) % FOLDS
     chosen: tuple[Exponent, ...] = ()
-    path = [_validated(law, chosen, values, target, given, folds)]
+    path = [_validated(law, chosen, values, target, offset, folds)]
     while len(chosen) < MOST:
-        tried = [each for each in law.candidates if each not in chosen]
-        scores = [_validated(law, (*chosen, each), values, target, given, folds) for each in tried]
+        tried = [exponent for exponent in law.candidates if exponent not in chosen]
+        scores = [_validated(law, (*chosen, exponent), values, target, offset, folds) for exponent in tried]
         if not scores or min(scores) > (1 - GAIN) * path[-1]:
             break
         path.append(min(scores))
         chosen = (*chosen, tried[int(np.argmin(scores))])
-    found = _solved(law, chosen, values, target, given)
+    solution = _solved(law, chosen, values, target, offset)
     rates = len(law.rates)
-    factors = tuple(float(factor) for factor in np.exp(found[:rates]))
-    return Fitted(law, factors, dict(zip(chosen, map(float, found[rates:]), strict=True)), tuple(path))
+    factors = tuple(float(factor) for factor in np.exp(solution[:rates]))
+    return Fitted(law, factors, dict(zip(chosen, map(float, solution[rates:]), strict=True)), tuple(path))
 
 
 def loss(off: np.ndarray) -> float:
@@ -165,30 +165,30 @@ def loss(off: np.ndarray) -> float:
 
 
 def _validated(
-    law: Law, chosen: tuple[Exponent, ...], values: Values, target: np.ndarray, given: np.ndarray, folds: np.ndarray
+    law: Law, chosen: tuple[Exponent, ...], values: Values, target: np.ndarray, offset: np.ndarray, folds: np.ndarray
 ) -> float:
     """The loss on each part of the samples of the law fitted to the others."""
     off = np.empty(len(target))
     for fold in range(FOLDS):
         out, rest = folds == fold, folds != fold
-        found = _solved(law, chosen, _some(values, rest), target[rest], given[rest])
-        rates = _log_rates(law, chosen, _some(values, out), found)
-        off[out] = law.combine(rates, given[out])[0] - target[out]
+        solution = _solved(law, chosen, _some(values, rest), target[rest], offset[rest])
+        rates = _log_rates(law, chosen, _some(values, out), solution)
+        off[out] = law.combine(rates, offset[out])[0] - target[out]
     return loss(off)
 
 
 def _solved(
-    law: Law, chosen: tuple[Exponent, ...], values: Values, target: np.ndarray, given: np.ndarray
+    law: Law, chosen: tuple[Exponent, ...], values: Values, target: np.ndarray, offset: np.ndarray
 ) -> np.ndarray:
     """Logarithms of the factors, then the exponents."""
     features = _features(law, chosen, values)
     fixed = np.stack([np.broadcast_to(rate.fixed(values), target.shape) for rate in law.rates])
 
     def off(parameters: np.ndarray) -> np.ndarray:
-        return law.combine(fixed + np.einsum("rpc,p->rc", features, parameters), given)[0] - target
+        return law.combine(fixed + np.einsum("rpc,p->rc", features, parameters), offset)[0] - target
 
     def slopes(parameters: np.ndarray) -> np.ndarray:
-        weights = law.combine(fixed + np.einsum("rpc,p->rc", features, parameters), given)[1]
+        weights = law.combine(fixed + np.einsum("rpc,p->rc", features, parameters), offset)[1]
         return np.einsum("rc,rpc->cp", weights, features)
 
     start = np.zeros(len(law.rates) + len(chosen))

@@ -35,15 +35,15 @@ class Parasitic:
 
 def parasitic_limits(stage: Stage) -> list[Parasitic]:
     """The stage with each of these modes instead of its own, sampled as the thesis's drive."""
-    found = []
+    limits = []
     for damping in DAMPING_RATIOS:
         for frequency in FREQUENCIES:
             mode = {"parasitic.frequency": f"{frequency!r} Hz", "parasitic.damping_ratio": damping, **DRIVE}
             locked, free = (
                 _comfortable(stage.replace({**mode, "joint.locked": held}).flat()) for held in (True, False)
             )
-            found.append(Parasitic(frequency, damping, locked, free))
-    return found
+            limits.append(Parasitic(frequency, damping, locked, free))
+    return limits
 
 
 def settled_margin(stage: Stage, changes: Mapping[str, Any]) -> float:
@@ -56,6 +56,6 @@ def _comfortable(flat: Mapping[str, Any]) -> Range | None:
     return holding(limits(flat).comfortable, flat["controller.crossover"])
 
 
-def holding(ranges: Sequence[Range], own: float) -> Range | None:
+def holding(ranges: Sequence[Range], crossover: float) -> Range | None:
     """The range that holds a crossover; None if none does."""
-    return next((each for each in ranges if each[0] <= own <= each[1]), None)
+    return next((stable for stable in ranges if stable[0] <= crossover <= stable[1]), None)

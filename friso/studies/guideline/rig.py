@@ -62,9 +62,9 @@ class Laws:
         """All rates of the laws [Hz], by name."""
         values, rate = _shaped(flat)
         return {
-            each.name: np.exp(log) * rate
+            quantity.name: np.exp(log) * rate
             for law in (self.locked, self.free)
-            for each, log in zip(law.law.rates, law.log_rates(values), strict=True)
+            for quantity, log in zip(law.law.rates, law.log_rates(values), strict=True)
         }
 
 
@@ -84,23 +84,25 @@ def plain(part: str = "") -> dict[str, Any]:
 
 def cases(laws: Laws, changes: Sequence[Changes], free: bool) -> list[Case]:
     """The rig with each of these changes, rigid or with its joint free."""
-    base = rig().flat() if any("parasitic.frequency" in each for each in changes) else plain("joint" if free else "")
-    keys = {key for each in changes for key in each}
-    flat = base | {key: np.array([each.get(key, base[key]) for each in changes], float) for key in keys}
+    base = (
+        rig().flat() if any("parasitic.frequency" in change for change in changes) else plain("joint" if free else "")
+    )
+    keys = {key for change in changes for key in change}
+    flat = base | {key: np.array([change.get(key, base[key]) for change in changes], float) for key in keys}
 
     def stages(which: np.ndarray, crossover: np.ndarray) -> Ensemble:
         some = {key: value[which] if np.ndim(value) else value for key, value in flat.items()}
         return Ensemble.held(some | {"controller.crossover": crossover}, len(which))
 
     grid = FREE_GRID if free else RIGID_GRID
-    found = find_edges(stages, np.broadcast_to(grid, (len(changes), len(grid))))
-    known = plain("joint") | {key: value for key, value in flat.items() if not key.startswith("parasitic.")}
-    law = np.broadcast_to(laws.free_edge(known) if free else laws.locked_edge(known), found.kind.shape)
-    columns = law.tolist(), found.crossover.tolist(), found.kind.astype(str).tolist()
-    return [Case(*each) for each in zip(changes, *columns, strict=True)]
+    edges = find_edges(stages, np.broadcast_to(grid, (len(changes), len(grid))))
+    with_joint = plain("joint") | {key: value for key, value in flat.items() if not key.startswith("parasitic.")}
+    law = np.broadcast_to(laws.free_edge(with_joint) if free else laws.locked_edge(with_joint), edges.kind.shape)
+    columns = law.tolist(), edges.crossover.tolist(), edges.kind.astype(str).tolist()
+    return [Case(*row) for row in zip(changes, *columns, strict=True)]
 
 
 def direct(stage: Stage) -> float:
     """The edge [Hz] as `friso check` finds it, from a crossover at which the stage hunts; NaN without one."""
-    found = margin(stage, attracting=True)
-    return found.crossover if found and found.crossover else np.nan
+    edge = margin(stage, attracting=True)
+    return edge.crossover if edge and edge.crossover else np.nan

@@ -92,8 +92,8 @@ class Sweep:
 
 def together(*sweeps: Sweep) -> Sweep:
     """The samples of all sweeps of one kind."""
-    values = {name: np.concatenate([each.values[name] for each in sweeps]) for name in sweeps[0].values}
-    return Sweep(values, np.concatenate([each.locked for each in sweeps]), joined([each.edges for each in sweeps]))
+    values = {name: np.concatenate([sweep.values[name] for sweep in sweeps]) for name in sweeps[0].values}
+    return Sweep(values, np.concatenate([sweep.locked for sweep in sweeps]), joined([sweep.edges for sweep in sweeps]))
 
 
 @dataclass(frozen=True)
@@ -121,8 +121,8 @@ class Keep:
         key = hashlib.sha256(repr(settings).encode()).hexdigest()[:16]
         path = self.folder / f"{key}.npz"
         if path.exists():
-            with np.load(path, allow_pickle=False) as kept:
-                return Edges(**{each.name: kept[each.name] for each in fields(Edges)})
+            with np.load(path, allow_pickle=False) as stored:
+                return Edges(**{field.name: stored[field.name] for field in fields(Edges)})
         made = make()
         self.folder.mkdir(parents=True, exist_ok=True)
         half = path.with_suffix(".part")
@@ -141,16 +141,16 @@ def _sources() -> str:
     return hashlib.sha256(b"".join(path.read_bytes() for path in paths)).hexdigest()
 
 
-def drawn(box: Box, count: int, seed: int) -> dict[str, np.ndarray]:
+def sampled(box: Box, count: int, seed: int) -> dict[str, np.ndarray]:
     """Sobol samples of a box, by group, each of shape (count,)."""
-    whole = qmc.Sobol(len(box), rng=seed).random_base2(int(np.ceil(np.log2(max(count, 2)))))[:count]
+    points = qmc.Sobol(len(box), rng=seed).random_base2(int(np.ceil(np.log2(max(count, 2)))))[:count]
     low, high = np.log(np.array(list(box.values()))).T
-    return dict(zip(box, np.exp(low + whole * (high - low)).T, strict=True))
+    return dict(zip(box, np.exp(low + points * (high - low)).T, strict=True))
 
 
 def locked_sweep(count: int, seed: int, keep: Keep, progress: Progress) -> Sweep:
     """The edges of samples of rigid masses, which locked joints are but for the contact of their fixtures."""
-    values = drawn(LOCKED_BOX, count, seed)
+    values = sampled(LOCKED_BOX, count, seed)
     grid = np.broadcast_to(LOCKED_GRID, (count, len(LOCKED_GRID)))
     edges = _in_parts(f"locked {seed} {count}", values, grid, keep, partial(progress, LOCKED))
     return Sweep(values, edges.crossover, edges)
@@ -159,7 +159,7 @@ def locked_sweep(count: int, seed: int, keep: Keep, progress: Progress) -> Sweep
 def free_sweep(count: int, seed: int, keep: Keep, progress: Progress) -> tuple[Sweep, Sweep]:
     """The edges of samples with a free joint, of those that have one with the joint locked; and those of all samples
     with their joints locked, to which the frequency of the joint is drawn relative."""
-    drawn_values = drawn({**LOCKED_BOX, **JOINT_BOX}, count, seed)
+    drawn_values = sampled({**LOCKED_BOX, **JOINT_BOX}, count, seed)
     rigid = {name: drawn_values[name] for name in LOCKED_BOX}
     grid = np.broadcast_to(LOCKED_GRID, (count, len(LOCKED_GRID)))
     locked = _in_parts(f"locked beside free {seed} {count}", rigid, grid, keep, partial(progress, LOCKED))

@@ -138,7 +138,7 @@ def worked(laws: Laws, safe_locked: float, safe_free: float) -> Worked:
         highest(laws),
         safe_locked,
         needs,
-        tuple(designed(laws, each.limit, safe_free) for each in needs if each.needed),
+        tuple(designed(laws, need.limit, safe_free) for need in needs if need.needed),
         {name: tuple(cases(laws, changes, free)) for name, (changes, free) in _studies().items()},
     )
 
@@ -147,16 +147,16 @@ def machines(laws: Laws) -> tuple[Machine, ...]:
     """The rig as one rigid mass, locked and free."""
     flat = plain("joint")
     locked, free = (float(edge(flat)[0]) for edge in (laws.locked_edge, laws.free_edge))
-    whole = rig()
-    rigid = whole.model_copy(update={"joint": None, "parasitic": None})
+    stage = rig()
+    rigid = stage.model_copy(update={"joint": None, "parasitic": None})
     return (
         Machine("one rigid mass of 1.7 kg", locked, direct(rigid)),
         Machine(
             "joint locked by its fixtures, parasitic mode at 300 Hz",
             locked,
-            direct(whole.replace({"joint.locked": True})),
+            direct(stage.replace({"joint.locked": True})),
         ),
-        Machine("joint free, parasitic mode at 300 Hz", free, direct(whole.replace({"controller.crossover": "5 Hz"}))),
+        Machine("joint free, parasitic mode at 300 Hz", free, direct(stage.replace({"controller.crossover": "5 Hz"}))),
     )
 
 
@@ -171,11 +171,11 @@ def highest(laws: Laws) -> float:
 def designed(laws: Laws, limit: float, safe: float) -> tuple[Design, ...]:
     """The isolator by the law, its edge by a safety factor below the limit; then, as long as computed edges are above
     the limit, again with the aim lowered by as much, and where one is unknown at least by `BLIND`."""
-    found = [_design(laws, limit, limit / safe)]
-    while not found[-1].does and len(found) < CORRECTED:
-        share = min(limit / found[-1].worst, BLIND if found[-1].unknown else 1.0)
-        found.append(_design(laws, limit, CLOSER * found[-1].aim * share))
-    return tuple(found)
+    designs = [_design(laws, limit, limit / safe)]
+    while not designs[-1].does and len(designs) < CORRECTED:
+        share = min(limit / designs[-1].worst, BLIND if designs[-1].unknown else 1.0)
+        designs.append(_design(laws, limit, CLOSER * designs[-1].aim * share))
+    return tuple(designs)
 
 
 def _design(laws: Laws, limit: float, aim: float) -> Design:
@@ -183,7 +183,7 @@ def _design(laws: Laws, limit: float, aim: float) -> Design:
     least stroke with which it still does."""
     forces = friction_range(DESIGN_GAPS)
     base: dict[str, Any] = plain("joint")
-    base |= {key: np.array([each[key] for each in forces]) for key in forces[0]}
+    base |= {key: np.array([pair[key] for pair in forces]) for key in forces[0]}
 
     def over(stiffness: float, stroke: float) -> float:
         edges = laws.free_edge(base | {"joint.stiffness": stiffness, "joint.stroke": stroke})
@@ -191,7 +191,7 @@ def _design(laws: Laws, limit: float, aim: float) -> Design:
 
     stiffness = MARGIN * _root(lambda log: over(np.exp(log), AMPLE), np.log(1.0), np.log(1e7))
     stroke = _root(lambda log: over(stiffness, np.exp(log)), np.log(1e-7), np.log(AMPLE))
-    changes = [each | {"joint.stiffness": stiffness, "joint.stroke": stroke} for each in forces]
+    changes = [pair | {"joint.stiffness": stiffness, "joint.stroke": stroke} for pair in forces]
     joint = {"joint.stiffness": stiffness, "joint.stroke": stroke}
     margin = settled_margin(rig(), joint | {"controller.crossover": limit})
     return Design(limit, aim, stiffness, stroke, tuple(cases(laws, changes, free=True)), margin)
@@ -219,8 +219,8 @@ def _studies() -> dict[str, tuple[Sequence[Mapping[str, float]], bool]]:
     flat = plain("joint")
     mass, static = flat["masses.cart"] + flat["masses.stage"], flat["friction.static"]
     forces = [
-        {"friction.static": each, "friction.coulomb": each * (1 - gap)}
-        for each in (2.0, static, 4.0)
+        {"friction.static": force, "friction.coulomb": force * (1 - gap)}
+        for force in (2.0, static, 4.0)
         for gap in np.linspace(0.1, 0.85, 11)
     ]
     shares = [

@@ -38,9 +38,9 @@ CONVENTIONS = (
 """How the criteria read the words of the claims: one reading for all."""
 
 
-def about(found: float, expected: float, factor: float = ABOUT) -> bool:
+def about(value: float, expected: float, factor: float = ABOUT) -> bool:
     """Whether a positive number is within a factor of what is expected; NaN is not."""
-    return expected / factor <= found <= expected * factor
+    return expected / factor <= value <= expected * factor
 
 
 @dataclass(frozen=True)
@@ -140,7 +140,7 @@ _JUDGES: dict[str, Registered] = {}
 
 def judges(claim: str, figure: str, needs: tuple[str, ...] = ()) -> Callable[[Judge], Judge]:
     """Register the decorated function as judge of a claim. Raises ValueError for an unknown or taken claim."""
-    if claim not in {each.id for each in claims()}:
+    if claim not in {entry.id for entry in claims()}:
         raise ValueError(f"judge of {claim!r}: expected a claim of claims.toml, such as 'F11A'")
     if claim in _JUDGES:
         raise ValueError(f"judge of {claim!r}: the claim has one already, {_JUDGES[claim].judge.__qualname__}")

@@ -67,18 +67,18 @@ def _comparison(runs: xr.Dataset) -> Comparison:
     coarse = runs.isel(dict.fromkeys(runs.dims, slice(None, None, EVERY)))
     study = study_of(coarse)
     valid = (coarse["verdict"].values != "invalid").ravel()
-    attracts, known = np.zeros(study.cells, bool), np.zeros(study.cells, bool)
-    for which, found in cell_cycles(study.stage, study.links, study.columns(np.arange(study.cells)), valid):
-        attracts[which], known[which] = found.attracting, ~found.uncertain
+    attracts, decided = np.zeros(study.cells, bool), np.zeros(study.cells, bool)
+    for which, cycles in cell_cycles(study.stage, study.links, study.columns(np.arange(study.cells)), valid):
+        attracts[which], decided[which] = cycles.attracting, ~cycles.uncertain
     peaks = (coarse["peaks"].values > 0).ravel()
-    known &= valid
+    decided &= valid
     return Comparison(
         cells=int(valid.sum()),
-        agreed=int((known & attracts & peaks).sum()),
-        quiet=int((known & ~attracts & ~peaks).sum()),
-        transient=int((known & ~attracts & peaks).sum()),
-        dormant=int((known & attracts & ~peaks).sum()),
-        unknown=int((valid & ~known).sum()),
+        agreed=int((decided & attracts & peaks).sum()),
+        quiet=int((decided & ~attracts & ~peaks).sum()),
+        transient=int((decided & ~attracts & peaks).sum()),
+        dormant=int((decided & attracts & ~peaks).sum()),
+        unknown=int((valid & ~decided).sum()),
     )
 
 
@@ -89,10 +89,10 @@ def _edges(study: ThesisStudy, runs: xr.Dataset) -> tuple[Edge, ...]:
     source = study_of(runs)
     ranges = tuple(_range(runs[span.key].values, span.key, span.log) for span in study.spans)
     space = Space(ranges, lambda values: flat_cells(source.stage, source.links, values))
-    found = plane(space, nodes=NODES).curves
-    lines = [space.values(curve.points) for curve in found]
-    x, y = (each.key for each in ranges)
-    return tuple(Edge(curve.kind, curve.sign < 0, line[x], line[y]) for curve, line in zip(found, lines, strict=True))
+    curves = plane(space, nodes=NODES).curves
+    lines = [space.values(curve.points) for curve in curves]
+    x, y = (swept.key for swept in ranges)
+    return tuple(Edge(curve.kind, curve.sign < 0, line[x], line[y]) for curve, line in zip(curves, lines, strict=True))
 
 
 def _range(values: np.ndarray, key: str, log: bool) -> Range:

@@ -162,8 +162,8 @@ def locked_line(stage: Stage) -> LockedLine:
     places = [
         {"friction.static": f"{f} N", "friction.coulomb": f"{COULOMB * f} N"} for f in np.linspace(*RANGE, PLACES)
     ]
-    found = mass_line(stage.replace(dict(LOCKED)), places, [FORCE], FREQUENCIES)
-    return LockedLine(found["magnitude"].values[:, 0], found["spread_phase"].values[0])
+    line = mass_line(stage.replace(dict(LOCKED)), places, [FORCE], FREQUENCIES)
+    return LockedLine(line["magnitude"].values[:, 0], line["spread_phase"].values[0])
 
 
 def joint_steps(stage: Stage) -> JointSteps:
@@ -174,9 +174,9 @@ def joint_steps(stage: Stage) -> JointSteps:
     run = simulate(_moved(fixed, kind="step", size=f"{STEP!r} m", duration=f"{duration} s"), sample_time=SAMPLE_TIME)
     count, signals = round(STANDS / SAMPLE_TIME), {}
     for name in ("reference", "position", "force"):
-        one, total = run[name].values, np.zeros(count * (len(STEPS) + 1))
-        for number, way in enumerate(STEPS, start=1):
-            total[number * count :] += way * one[: len(total) - number * count]
+        step, total = run[name].values, np.zeros(count * (len(STEPS) + 1))
+        for number, direction in enumerate(STEPS, start=1):
+            total[number * count :] += direction * step[: len(total) - number * count]
         signals[name] = total
     log = record("0.3 mm steps, cart fixed", SAMPLE_TIME, **signals)
     return JointSteps(log, stiffness_from_steps(log), float(stage.flat()["joint.stiffness"]))

@@ -40,9 +40,9 @@ def begins(values: np.ndarray, hunts: np.ndarray) -> np.ndarray:
 
 def trend(x: np.ndarray, y: np.ndarray) -> float:
     """Spearman's rank correlation of the known pairs; NaN for fewer than three or where one of them is constant."""
-    known = ~(np.isnan(x) | np.isnan(y))
-    ranks = [rankdata(each[known]) for each in (x, y)]
-    if known.sum() < 3 or any(np.ptp(rank) == 0 for rank in ranks):
+    defined = ~(np.isnan(x) | np.isnan(y))
+    ranks = [rankdata(values[defined]) for values in (x, y)]
+    if defined.sum() < 3 or any(np.ptp(rank) == 0 for rank in ranks):
         return np.nan
     return float(np.corrcoef(*ranks)[0, 1])
 
@@ -58,6 +58,6 @@ def free_square(hunts: np.ndarray, valid: np.ndarray) -> float:
     return float(side.max(initial=0) ** 2 / max(1, valid.sum()))
 
 
-def share(part: np.ndarray, whole: np.ndarray) -> float:
-    """Share of the cells of `whole` that are in `part` too; NaN of an empty whole."""
-    return float((part & whole).sum() / whole.sum()) if whole.any() else np.nan
+def share(part: np.ndarray, total: np.ndarray) -> float:
+    """Share of the cells of `total` that are in `part` too; NaN of an empty whole."""
+    return float((part & total).sum() / total.sum()) if total.any() else np.nan

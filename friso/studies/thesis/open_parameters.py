@@ -42,9 +42,9 @@ class Variant:
         """Whether the study's map can be another than the baseline's."""
         return self.changes_more_than(study.sets, bool(study.changes.get("joint.locked")))
 
-    def changes_more_than(self, own: Set[str], locked: bool) -> bool:
-        """Whether it matters to what decides on the keys `own` itself; a locked joint has no damping of its own."""
-        decided = own | _OPEN_JOINT_KEYS if locked else own
+    def changes_more_than(self, fixed: Set[str], locked: bool) -> bool:
+        """Whether it matters to what decides on the keys `fixed` itself; a locked joint has no damping of its own."""
+        decided = fixed | _OPEN_JOINT_KEYS if locked else fixed
         return self.kind != "unknown parameter" or not self.changes.keys() <= decided
 
     def touches_part(self, need: Need) -> bool:

@@ -91,11 +91,16 @@ def reproduce(
     variants = (*OPEN, *METHOD)
     tell = _Teller(progress, 2 + len(variants) + (len(studies) if with_cycles else 0) + 1)
     tell("maps")
-    responses = {name: _response(own, NOTHING, rtol) for name, own in RESPONSES.items()}
+    responses = {name: _response(changes, NOTHING, rtol) for name, changes in RESPONSES.items()}
     maps = _maps(studies, points, rtol, VERIFIED)
     baseline = Evidence(maps, responses, analysed(rig()), experiments_on(rig()))
     tell("Fig. 14B at two tolerances")
-    tolerances = {each: _map(s, NOTHING, points, each) for s in studies if s.panel == "14B" for each in (RTOL, TIGHT)}
+    tolerances = {
+        tolerance: _map(s, NOTHING, points, tolerance)
+        for s in studies
+        if s.panel == "14B"
+        for tolerance in (RTOL, TIGHT)
+    }
     entries = _covered(baseline)
     varied: list[tuple[Variant, Mapping[str, Finding]]] = []
     for variant in variants:
@@ -107,15 +112,15 @@ def reproduce(
         behind[study.name] = cycles(study, baseline.maps[study.name])
     tell("done")
     verdicts, curves = _verdicts(entries, baseline, varied), bode(rig(), SHOWN, series=True)
-    known = (baseline.maps, baseline.responses, baseline.analysis, curves)
-    return Reproduction(*known, tolerances, _changed(tolerances), verdicts, behind, points, rtol)
+    results = (baseline.maps, baseline.responses, baseline.analysis, curves)
+    return Reproduction(*results, tolerances, _changed(tolerances), verdicts, behind, points, rtol)
 
 
 def _verdicts(
     entries: Mapping[str, Registered], baseline: Evidence, varied: Sequence[tuple[Variant, Mapping[str, Finding]]]
 ) -> tuple[Verdict, ...]:
-    found, coarse = _findings(entries, baseline), _findings(entries, _coarser(baseline))
-    return tuple(_judged(claim, baseline, found, coarse, varied) for claim in claims())
+    fine, coarse = _findings(entries, baseline), _findings(entries, _coarser(baseline))
+    return tuple(_judged(claim, baseline, fine, coarse, varied) for claim in claims())
 
 
 def _chosen(names: Iterable[str] | None) -> tuple[ThesisStudy, ...]:
@@ -169,10 +174,10 @@ def _varied(studies: Iterable[ThesisStudy], points: int, rtol: float, variant: V
     tolerance = variant.rtol or rtol
     touched = [study for study in studies if variant.touches(study)]
     maps = {**plain.maps, **_maps(touched, points, tolerance, changes=variant.changes)}
-    responses = {name: _response(own, variant.changes, tolerance) for name, own in RESPONSES.items()}
+    responses = {name: _response(changes, variant.changes, tolerance) for name, changes in RESPONSES.items()}
     if variant.kind == "metric":
         maps = {name: lasting(runs) for name, runs in maps.items()}
-        responses = {name: Response(lasting(each.cell), each.trace) for name, each in responses.items()}
+        responses = {name: Response(lasting(response.cell), response.trace) for name, response in responses.items()}
     stage, linear = rig().replace(dict(variant.changes)), plain.linear
     if any(variant.touches_part(need) for need in NEEDS.values()):
         linear = analysed(stage)
@@ -196,9 +201,9 @@ def _map(
     return sweep(study.stage(changes), study.axes(points), links=dict(study.links), rtol=rtol, verify=verify)
 
 
-def _response(own: Mapping[str, object], changes: Mapping[str, object], rtol: float) -> Response:
+def _response(own_changes: Mapping[str, object], changes: Mapping[str, object], rtol: float) -> Response:
     """One run in time; a variant's changes come before the run's own, which tell it apart from the others."""
-    stage = rig().replace(dict(changes)).replace(dict(own))
+    stage = rig().replace(dict(changes)).replace(dict(own_changes))
     cell = sweep(stage, {"joint.locked": [stage.flat()["joint.locked"]]}, rtol=rtol).isel({"joint.locked": 0})
     return Response(cell, simulate(stage, rtol))
 
@@ -220,15 +225,15 @@ def _changed(tolerances: Mapping[float, xr.Dataset]) -> tuple[float, float]:
     if not tolerances:
         return np.nan, np.nan
     loose, tight = tolerances.values()
-    one, other = loose["peaks"].values, tight["peaks"].values
-    other_count = (one != other) & ~(np.isnan(one) & np.isnan(other))
+    first, second = loose["peaks"].values, tight["peaks"].values
+    other_count = (first != second) & ~(np.isnan(first) & np.isnan(second))
     return float((loose["verdict"] != tight["verdict"]).mean()), float(other_count.mean())
 
 
 def _judged(
     claim: Claim,
     baseline: Evidence,
-    found: Mapping[str, Finding],
+    fine: Mapping[str, Finding],
     coarse: Mapping[str, Finding],
     varied: Iterable[tuple[Variant, Mapping[str, Finding]]],
 ) -> Verdict:
@@ -239,7 +244,7 @@ def _judged(
     if missing:
         return not_covered(claim, f"not computed in this run: {', '.join(missing)}")
     findings = [(variant, other[claim.id]) for variant, other in varied if _enters(variant, entry.needs)]
-    return verdict(claim, entry.figure, found[claim.id], coarse[claim.id], findings)
+    return verdict(claim, entry.figure, fine[claim.id], coarse[claim.id], findings)
 
 
 def _enters(variant: Variant, needs: Iterable[str]) -> bool:
@@ -253,5 +258,5 @@ def _changes(variant: Variant, name: str) -> bool:
         return variant.touches(STUDIES[name])
     if need := _PARTS.get(name):
         return variant.touches_part(need)
-    own = RESPONSES[name]
-    return variant.changes_more_than(own.keys(), bool(own.get("joint.locked")))
+    response = RESPONSES[name]
+    return variant.changes_more_than(response.keys(), bool(response.get("joint.locked")))

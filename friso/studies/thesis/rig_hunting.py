@@ -89,17 +89,17 @@ def as_built(stage: Stage) -> Stage:
 
 def moves(stage: Stage) -> Moves:
     """The moves of Fig. 24 and 25, on several rails."""
-    own = as_built(stage)
-    locked, free = (with_joint(own, held) for held in (True, False))
-    seeds, frequencies = 1.0 + np.arange(float(RAILS)), crossover(own) * CROSSOVERS
+    machine = as_built(stage)
+    locked, free = (with_joint(machine, held) for held in (True, False))
+    seeds, frequencies = 1.0 + np.arange(float(RAILS)), crossover(machine) * CROSSOVERS
     keys = "controller.crossover"
     held = follow(
-        locked, move(own), numbers_of(SEED, len(CROSSOVERS), RAILS), on_rails(own, {keys: frequencies}, seeds)
+        locked, move(machine), numbers_of(SEED, len(CROSSOVERS), RAILS), on_rails(machine, {keys: frequencies}, seeds)
     )
-    one, two = (on_rails(own, {keys: frequencies[[row]]}, seeds) for row in (0, 1))
-    loose = follow(free, move(own), numbers_of(SEED, 1, RAILS), one)
-    tasks = [released(own, share * distance(own)) for share in DISPLACEMENTS]
-    let_go = joined([follow(locked, task, numbers_of(SEED, 1, RAILS), two) for task in tasks])
+    first, second = (on_rails(machine, {keys: frequencies[[row]]}, seeds) for row in (0, 1))
+    loose = follow(free, move(machine), numbers_of(SEED, 1, RAILS), first)
+    tasks = [released(machine, share * distance(machine)) for share in DISPLACEMENTS]
+    let_go = joined([follow(locked, task, numbers_of(SEED, 1, RAILS), second) for task in tasks])
     return Moves(frequencies, held.shaped(len(CROSSOVERS), RAILS), loose, let_go.shaped(len(tasks), RAILS))
 
 
@@ -111,14 +111,14 @@ def grid(stage: Stage) -> StrokeCrossover:
 
 def cycles(stage: Stage) -> Cycles:
     """Fig. 27: an even rail and rails that vary, the joint locked."""
-    own = as_built(stage)
-    even = on_rail(with_joint(own, locked=True))
-    one = started(even, SEED, {}, 1, silent, "")
-    swing = float(one.swing[0]) if one.lives[0] else 0.01 * distance(own)
-    flat = own.flat()
+    machine = as_built(stage)
+    even = on_rail(with_joint(machine, locked=True))
+    run = started(even, SEED, {}, 1, silent, "")
+    swing = float(run.swing[0]) if run.lives[0] else 0.01 * distance(machine)
+    flat = machine.flat()
     cases = {f"rail.{name}": np.array([flat[f"rail.{name}"]]) for name in _FIELD}
     rails, asymmetry = varied(even, SEED, cases, 1.0 + np.arange(float(RAILS)), swing, silent, "")
-    return Cycles(one, rails, asymmetry)
+    return Cycles(run, rails, asymmetry)
 
 
 _FIELD = ("static_deviation", "coulomb_deviation", "correlation_length")

@@ -32,6 +32,6 @@ def rig_loops(stage: Stage) -> RigLoops:
     fixed, free, place = locked(built), freed(built), travel(built)[0]
     log = rig_log(excite(free, place, SEED), 0, "free", "frequency", free, SEED)
     settings, stable = stable_settings(free, place, SEED)
-    apparent = np.array([apparent_masses(each, place, SEED) for each in (fixed, free)])
+    apparent = np.array([apparent_masses(machine, place, SEED) for machine in (fixed, free)])
     _, loops = open_loops(fixed, place, SEED, SETTINGS)
     return RigLoops(loops, measured_loop(log, pace(built)), settings, stable, apparent)

@@ -58,8 +58,10 @@ class Verdict:
 def _listed(dependences: Iterable[Dependence]) -> str:
     """Each parameter once, with what is judged at which value."""
     by_name: dict[str, list[str]] = {}
-    for each in dependences:
-        by_name.setdefault(each.variant.parameter, []).append(f"{each.variant.value}: {each.judgement}")
+    for dependence in dependences:
+        by_name.setdefault(dependence.variant.parameter, []).append(
+            f"{dependence.variant.value}: {dependence.judgement}"
+        )
     return "; ".join(f"{name} ({', '.join(values)})" for name, values in by_name.items())
 
 
@@ -89,9 +91,9 @@ def verdict(
     return Verdict(claim, baseline.judgement, figure, baseline, reason, tuple(depends), tuple(hangs), grid, tried)
 
 
-def _turned(one: Finding, other: Finding) -> tuple[str, ...]:
+def _turned(first: Finding, second: Finding) -> tuple[str, ...]:
     """The numbers of the other's parts that hold where the first's do not, or the reverse."""
-    pairs = zip(one.parts, other.parts, strict=True)
+    pairs = zip(first.parts, second.parts, strict=True)
     return tuple(after.number for before, after in pairs if before.holds != after.holds)
 
 
@@ -100,11 +102,11 @@ def _reason(baseline: Finding, other: Sequence[Dependence], grid: str) -> str:
     if baseline.judgement == "holds":
         return ""
     better: dict[str, list[str]] = {}
-    for each in other:
-        if _ORDER[each.judgement] > _ORDER[baseline.judgement]:
-            kind = f"{each.variant.kind} ({each.judgement} with"
-            better.setdefault(kind, []).append(f"{each.variant.parameter} {each.variant.value}")
+    for dependence in other:
+        if _ORDER[dependence.judgement] > _ORDER[baseline.judgement]:
+            kind = f"{dependence.variant.kind} ({dependence.judgement} with"
+            better.setdefault(kind, []).append(f"{dependence.variant.parameter} {dependence.variant.value}")
     named = [f"{kind} {', '.join(values)})" for kind, values in better.items()]
-    own = dict.fromkeys(part.why for part in baseline.parts if not part.holds and part.why)
-    found = "; ".join((*named, *own, *([grid] if grid else [])))
-    return found or "no value varied makes it hold"
+    reasons = dict.fromkeys(part.why for part in baseline.parts if not part.holds and part.why)
+    text = "; ".join((*named, *reasons, *([grid] if grid else [])))
+    return text or "no value varied makes it hold"

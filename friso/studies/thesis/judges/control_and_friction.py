@@ -23,7 +23,11 @@ def gap_makes_hunting(evidence: Evidence) -> Finding:
     at_static = _along(gap, peaks, hunts)
     at_coulomb = _along(gap.T, peaks.T, hunts.T)
     at_fixed = {"F_s": at_static, "F_c": at_coulomb}
-    flat = ", ".join(f"{name} (mean rank correlation {found:.2f})" for name, found in at_fixed.items() if found < TREND)
+    flat = ", ".join(
+        f"{name} (mean rank correlation {correlation:.2f})"
+        for name, correlation in at_fixed.items()
+        if correlation < TREND
+    )
     return Finding(
         (
             Part(
@@ -80,5 +84,5 @@ def control_is_no_cure(evidence: Evidence) -> Finding:
 
 def _along(x: np.ndarray, y: np.ndarray, hunts: np.ndarray) -> float:
     """Mean over the rows of the rank correlation of x and y, all of one shape, over the cells that hunt."""
-    found = np.array([trend(*pair) for pair in ((a[h], b[h]) for a, b, h in zip(x, y, hunts, strict=True))])
-    return float(found[np.isfinite(found)].mean()) if np.isfinite(found).any() else np.nan
+    trends = np.array([trend(*pair) for pair in ((a[h], b[h]) for a, b, h in zip(x, y, hunts, strict=True))])
+    return float(trends[np.isfinite(trends)].mean()) if np.isfinite(trends).any() else np.nan

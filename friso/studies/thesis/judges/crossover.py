@@ -15,24 +15,24 @@ _SAME = 0.15
 def isolated_rig_needs_crossover(evidence: Evidence) -> Finding:
     """The crossover below which the isolated rig hunts, at each stroke."""
     crossover, stroke, hunts, valid = table(evidence.maps["isolator-crossover"], *_AXES)
-    found = ends(crossover, hunts)
+    limits = ends(crossover, hunts)
     long, longest = stroke >= stroke[-1] / 2, stroke >= 0.75 * stroke[-1]
-    third, fourth = found[long & ~longest].mean(), found[longest].mean()
-    below = (crossover[:, None] < found[None, :]) & long[None, :] & valid
+    third, fourth = limits[long & ~longest].mean(), limits[longest].mean()
+    below = (crossover[:, None] < limits[None, :]) & long[None, :] & valid
     return Finding(
         (
             Part(
                 "at every stroke of the upper half of the range it hunts at some crossover, and at none from a higher "
                 "one on",
                 bool(hunts[:, long].any(axis=0).all() and not hunts[-1, long].any()),
-                f"mean limit {found[long].mean():.3g} Hz ({found[long].min():.3g} to {found[long].max():.3g} Hz); "
+                f"mean limit {limits[long].mean():.3g} Hz ({limits[long].min():.3g} to {limits[long].max():.3g} Hz); "
                 f"{share(hunts, below):.0%} of the cells below it hunt",
             ),
             Part(
                 "the mean limits over the third and over the fourth quarter of the strokes differ by at most "
                 f"{_SAME:.0%}, and the limit of stroke 0 is higher than both by a factor of {ABOUT:g} at least",
-                bool(abs(third - fourth) <= _SAME * third and found[0] >= ABOUT * max(third, fourth)),
-                f"{third:.3g} Hz over the third and {fourth:.3g} Hz over the fourth quarter; {found[0]:.3g} Hz at "
+                bool(abs(third - fourth) <= _SAME * third and limits[0] >= ABOUT * max(third, fourth)),
+                f"{third:.3g} Hz over the third and {fourth:.3g} Hz over the fourth quarter; {limits[0]:.3g} Hz at "
                 "stroke 0",
             ),
         )

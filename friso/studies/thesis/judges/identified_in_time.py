@@ -71,18 +71,18 @@ def static_friction_from_stick_slip(evidence: Evidence) -> Finding:
 
 def judged_slips(runs: tuple[SlowMotion, ...]) -> Finding:
     """The finding from simulated slow motion."""
-    slips = sum(len(each.found.forces) for each in runs)
-    forces, rates = (np.concatenate([getattr(each.found, name) for each in runs]) for name in ("forces", "rates"))
+    slips = sum(len(run.found.forces) for run in runs)
+    forces, rates = (np.concatenate([getattr(run.found, name) for run in runs]) for name in ("forces", "rates"))
     read = static_friction("friction.static", forces, rates)
     truth = runs[0].static
-    counts = ", ".join(f"{len(each.found.forces)} slips at {each.speed * 1e3:g} mm/s" for each in runs)
+    counts = ", ".join(f"{len(run.found.forces)} slips at {run.speed * 1e3:g} mm/s" for run in runs)
     range_read = f"{forces.min():.3g} to {forces.max():.3g} N" if slips else "none"
     return Finding(
         (
             Part(
                 f"at every speed the cart sticks and slips, and a spike of its velocity follows every peak of the "
                 f"relative position within {_SPIKE:g} s",
-                all(len(each.found.forces) > 1 and _spikes(each) for each in runs),
+                all(len(run.found.forces) > 1 and _spikes(run) for run in runs),
                 f"{counts}. Assumed: these speeds, {SLOW_TIME:g} s each (the thesis tells neither); {_UNIFORM}",
             ),
             Part(
@@ -106,9 +106,9 @@ def judged_slips(runs: tuple[SlowMotion, ...]) -> Finding:
 
 def _spikes(run: SlowMotion) -> bool:
     """Whether the velocity of the cart spikes after every peak, to more than half of the usual."""
-    found, time = run.found, run.log.time
-    after = [(time >= at) & (time <= at + _SPIKE) for at in found.times]
-    return all(np.abs(found.cart_velocity[each]).max() > np.median(found.speeds) / 2 for each in after)
+    slips, time = run.found, run.log.time
+    after = [(time >= at) & (time <= at + _SPIKE) for at in slips.times]
+    return all(np.abs(slips.cart_velocity[window]).max() > np.median(slips.speeds) / 2 for window in after)
 
 
 @judges("F21", figure="21", needs=(SPEEDY,))
@@ -120,9 +120,12 @@ def force_at_constant_speed(evidence: Evidence) -> Finding:
 def judged_speeds(free: ConstantSpeed, locked: ConstantSpeed) -> Finding:
     """The finding from the simulated runs."""
     named = {"free": free.found, "locked": locked.found}
-    swings = {name: [each.spread / abs(each.mean.value) for each in found.passes] for name, found in named.items()}
+    swings = {
+        name: [passage.spread / abs(passage.mean.value) for passage in friction.passes]
+        for name, friction in named.items()
+    }
     listed = "; ".join(f"{name} {', '.join(f'{s:.2g}' for s in shares)}" for name, shares in swings.items())
-    repeats = ", ".join(f"{name} {found.repeatability.value:.2f}" for name, found in named.items())
+    repeats = ", ".join(f"{name} {friction.repeatability.value:.2f}" for name, friction in named.items())
     return Finding(
         (
             Part(
@@ -134,14 +137,14 @@ def judged_speeds(free: ConstantSpeed, locked: ConstantSpeed) -> Finding:
             ),
             Part(
                 "the oscillation goes with the place: passes over the same places repeat it",
-                all(found.repeatability.shown and found.repeatability.low > 0 for found in named.values()),
+                all(friction.repeatability.shown and friction.repeatability.low > 0 for friction in named.values()),
                 f"correlation of the two speeds: {repeats}",
                 why="not in the model: its friction is alike all along the rail, and what swings is the loop, by "
                 "sticking and slipping. Simulation alone cannot tell",
             ),
             Part(
                 "dynamic friction cannot be read off, joint free or locked",
-                not any(found.separated for found in named.values()),
+                not any(friction.separated for friction in named.values()),
                 f"free: {free.found.verdict} Locked: {locked.found.verdict}",
             ),
         )

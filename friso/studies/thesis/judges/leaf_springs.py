@@ -30,7 +30,7 @@ _SPACINGS, _HEIGHTS = (0.03, 0.06, 0.09), (0.0, 0.03, 0.06)
 @cache
 def _evaluated() -> tuple[Evaluation, ...]:
     """The thesis's leaves over what it leaves open."""
-    return tuple(beams(_mechanism(*each), _STROKE) for each in product(_YOUNG, _SPACINGS, _HEIGHTS))
+    return tuple(beams(_mechanism(*variant), _STROKE) for variant in product(_YOUNG, _SPACINGS, _HEIGHTS))
 
 
 def _mechanism(young: float, spacing: float, height: float) -> Mechanism:
@@ -56,10 +56,10 @@ def _mechanism(young: float, spacing: float, height: float) -> Mechanism:
 @judges("S35", figure="Sec. 3.5")
 def the_leaf_springs(evidence: Evidence) -> Finding:
     """Stiffness, frequencies and stress, by geometrically exact beams."""
-    found = _evaluated()
-    stiffness = np.array([each.drive[0] for each in found])
-    first = np.array([each.modes[0].frequency for each in found])
-    stress = np.array([each.stress for each in found])
+    evaluations = _evaluated()
+    stiffness = np.array([evaluation.drive[0] for evaluation in evaluations])
+    first = np.array([evaluation.modes[0].frequency for evaluation in evaluations])
+    stress = np.array([evaluation.stress for evaluation in evaluations])
     over = "over Young's moduli from 185 to 210 GPa"
     return Finding(
         (
@@ -73,21 +73,23 @@ def the_leaf_springs(evidence: Evidence) -> Finding:
                 _met(first / _FIRST),
                 f"{_range(first)} Hz",
             ),
-            _parasitic(found),
+            _parasitic(evaluations),
             Part(
                 f"the stress at 1 mm is at most {_STRESS / 1e6:g} MPa with the modulus of tempered strip, 195 GPa, or "
                 "less",
-                bool(np.all(stress[[each.mechanism.young <= 195e9 for each in found]] <= _STRESS)),
+                bool(np.all(stress[[evaluation.mechanism.young <= 195e9 for evaluation in evaluations]] <= _STRESS)),
                 f"{_range(stress / 1e6)} MPa {over}, at the largest over the width of the clamp",
             ),
         )
     )
 
 
-def _parasitic(found: tuple[Evaluation, ...]) -> Part:
+def _parasitic(evaluations: tuple[Evaluation, ...]) -> Part:
     """The first mode but for the drive mode, over what is left open."""
-    modes = [min(each.modes[1:], key=lambda mode: mode.frequency) for each in found]
-    seen = np.array([each.interfering.frequency if each.interfering else np.nan for each in found])
+    modes = [min(evaluation.modes[1:], key=lambda mode: mode.frequency) for evaluation in evaluations]
+    seen = np.array(
+        [evaluation.interfering.frequency if evaluation.interfering else np.nan for evaluation in evaluations]
+    )
     frequencies = np.array([mode.frequency for mode in modes])
     names = sorted({mode.name for mode in modes})
     return Part(

@@ -47,7 +47,7 @@ def _high_modes(plants: Mapping[str, LimitCase]) -> tuple[Part, Part, Part]:
     names = (*_FREE, *_TOUCHED)
     pairs = {name: plants[name].pair_above for name in _TOUCHED}
     free = [name for name in _FREE if plants[name].pair_above]
-    found = [f"{name} {pair[0]:.4g} and {pair[1]:.4g} Hz" for name, pair in pairs.items() if pair]
+    listed = [f"{name} {pair[0]:.4g} and {pair[1]:.4g} Hz" for name, pair in pairs.items() if pair]
     series = [f"{name} {_and(plants[f'{name}-series'])}" for name in _TOUCHED]
     ratio = max((pair[1] / plants[name].parasitic for name, pair in pairs.items() if pair), default=float("inf"))
     above = all(pairs.values())
@@ -63,7 +63,7 @@ def _high_modes(plants: Mapping[str, LimitCase]) -> tuple[Part, Part, Part]:
             "with the limiter touched, an antiresonance and then a resonance lie above the parasitic mode, and with it "
             "free none",
             above and not free,
-            f"{', '.join(found) or 'none'}; with the formula that Table 1 prints for a touched limiter, no more modes "
+            f"{', '.join(listed) or 'none'}; with the formula that Table 1 prints for a touched limiter, no more modes "
             f"than with it free: {'; '.join(series)}",
         ),
         Part(

@@ -22,24 +22,24 @@ _CROSSES = 20.0
 @judges("F8", figure="8", needs=(FREE, LOCKED_LOOP))
 def stable_at_every_speed(evidence: Evidence) -> Finding:
     """Stability over the speed of the cart, what speed does to the loop, and the crossover by the design method."""
-    found = evidence.analysis
-    single = found.free.single
+    analysis = evidence.analysis
+    single = analysis.free.single
     return Finding(
         (
-            _stable_at_speeds(found.speeds),
+            _stable_at_speeds(analysis.speeds),
             Part(
                 f"between the prescribed speeds the loop differs far (by more than a factor of {ORDER:.2g}) at a tenth "
                 f"of the crossover, and hardly (at most {ABOUT:g}) at ten times",
-                found.speeds.slow > ORDER and found.speeds.fast <= ABOUT,
-                f"factor {found.speeds.slow:.3g} at a tenth, {found.speeds.fast:.3g} at ten times",
+                analysis.speeds.slow > ORDER and analysis.speeds.fast <= ABOUT,
+                f"factor {analysis.speeds.slow:.3g} at a tenth, {analysis.speeds.fast:.3g} at ten times",
             ),
             Part(
                 "by the design method of Sec. 3.4.2 (the loop of the whole mass, sliding, crosses 0 dB once) the "
                 f"crossover may be about {_SIMULATED:g} Hz (from {_SIMULATED / ABOUT:.3g} to {_SIMULATED * ABOUT:.3g} "
                 "Hz)",
                 single is not None and about(single, _SIMULATED),
-                f"up to {_hertz(single)}, where {_beyond(found.locked)}; all limit cases are stable up to "
-                f"{_hertz(found.free.unsampled)} in continuous time; {_edges(found, _SIMULATED)}",
+                f"up to {_hertz(single)}, where {_beyond(analysis.locked)}; all limit cases are stable up to "
+                f"{_hertz(analysis.free.unsampled)} in continuous time; {_edges(analysis, _SIMULATED)}",
             ),
         )
     )
@@ -78,7 +78,7 @@ def _speeds(ranges: tuple[Range, ...]) -> str:
 def locked_loops_cross_where_tuned(evidence: Evidence) -> Finding:
     """The crossings of the locked rig, sliding, at the thesis's settings."""
     settings = {f: cases["sliding"] for f, cases in evidence.analysis.locked.margins.items()}
-    tuned = {f: nearest(known, f) for f, known in settings.items()}
+    tuned = {f: nearest(loop, f) for f, loop in settings.items()}
     lowest, highest = min(settings), max(settings)
     further = _further(settings[highest], highest)
     near = min(further, key=lambda f: abs(np.log(f / FURTHER)), default=np.nan)
@@ -88,8 +88,8 @@ def locked_loops_cross_where_tuned(evidence: Evidence) -> Finding:
             Part(
                 f"at every setting from {lowest:g} to {highest:g} Hz the sliding rig crosses 0 dB about there (within "
                 f"a factor of {ABOUT:g})",
-                all(about(found, f) for f, found in tuned.items()),
-                ", ".join(f"{found:.3g} Hz tuned to {f:g}" for f, found in tuned.items()),
+                all(about(crossing, f) for f, crossing in tuned.items()),
+                ", ".join(f"{crossing:.3g} Hz tuned to {f:g}" for f, crossing in tuned.items()),
             ),
             Part(
                 "at the highest setting it crosses 0 dB again above, at the lowest it does not",
@@ -112,7 +112,7 @@ def locked_loops_cross_where_tuned(evidence: Evidence) -> Finding:
 
 def _why_elsewhere(contact: Contact) -> str:
     """What it would take to cross 0 dB where the thesis measured it."""
-    soft, undamped = (_further(known, _MEASURED) for known in (contact.margins, contact.undamped))
+    soft, undamped = (_further(loop_margins, _MEASURED) for loop_margins in (contact.margins, contact.undamped))
     return (
         "no mode of the locked model lies there. The contact of cart and stage would with k_l of "
         f"{contact.stiffness:.2g} N/m (Sec. 3.2.3: 2e7 N/m, for limiters, not for fixtures): further crossings then "
@@ -121,18 +121,20 @@ def _why_elsewhere(contact: Contact) -> str:
     )
 
 
-def _threatened(known: Margins, setting: float, further: tuple[float, ...]) -> Part:
+def _threatened(margins: Margins, setting: float, further: tuple[float, ...]) -> Part:
     """Whether a further crossing takes the loop close to instability."""
-    there = any(about(known.closest, f) for f in further)
-    where = f"distance {known.modulus_margin:.2g} from -1, at {known.closest:.3g} Hz" if known.stable else "unstable"
+    there = any(about(margins.closest, f) for f in further)
+    where = (
+        f"distance {margins.modulus_margin:.2g} from -1, at {margins.closest:.3g} Hz" if margins.stable else "unstable"
+    )
     return Part(
         "at the highest setting that crossing threatens stability: about there the loop comes closer to -1 than "
         f"{WANTED:g} (or it is unstable)",
-        bool(further) and (not known.stable or (there and known.modulus_margin < WANTED)),
+        bool(further) and (not margins.stable or (there and margins.modulus_margin < WANTED)),
         where,
         why=f"tuned to {setting:g} Hz, the model is far from instability even there: it takes a delay of "
-        f"{_micro(known.delay_margin)}"
-        if further and known.stable
+        f"{_micro(margins.delay_margin)}"
+        if further and margins.stable
         else "",
     )
 
@@ -140,24 +142,24 @@ def _threatened(known: Margins, setting: float, further: tuple[float, ...]) -> P
 @judges("F23", figure="23", needs=(FREE, LOCKED_LOOP, BUILT))
 def free_loop_crosses_above(evidence: Evidence) -> Finding:
     """The crossing of the free joint tuned for the whole mass, and its highest stable setting."""
-    found = evidence.analysis
-    cases = found.free.margins[min(found.free.margins)]
+    analysis = evidence.analysis
+    cases = analysis.free.margins[min(analysis.free.margins)]
     crossing = {name: nearest(cases[name], _CROSSES) for name in ("stuck", "sliding")}
-    highest = found.free.unsampled
+    highest = analysis.free.unsampled
     return Finding(
         (
             Part(
                 f"tuned to 8 Hz for the whole mass, the free joint's loop crosses 0 dB about {_CROSSES:g} Hz (from "
                 f"{_CROSSES / ABOUT:.3g} to {_CROSSES * ABOUT:.3g} Hz), stuck and sliding",
-                all(about(each, _CROSSES) for each in crossing.values()),
-                f"{', '.join(f'{name} {each:.3g} Hz' for name, each in crossing.items())}; with the masses identified "
-                f"(0.75 kg, tuned for 2.5 kg) {nearest(found.identified, _CROSSES):.3g} Hz",
+                all(about(f, _CROSSES) for f in crossing.values()),
+                f"{', '.join(f'{name} {frequency:.3g} Hz' for name, frequency in crossing.items())}; with the masses identified "
+                f"(0.75 kg, tuned for 2.5 kg) {nearest(analysis.identified, _CROSSES):.3g} Hz",
             ),
             Part(
                 f"the setting up to which all limit cases are stable is about {_MEASURED:g} Hz (from "
                 f"{_MEASURED / ABOUT:.3g} to {_MEASURED * ABOUT:.3g} Hz)",
                 highest is not None and about(highest, _MEASURED),
-                f"in continuous time {_hertz(highest)}; {_sampled(found)}; {_edges(found, _MEASURED)}",
+                f"in continuous time {_hertz(highest)}; {_sampled(analysis)}; {_edges(analysis, _MEASURED)}",
                 why="idealisation: the simulated controller neither samples nor delays; the rig's does, but the thesis "
                 "gives no delay. Besides, its frame has resonances (Sec. 4.3.1) that the model does not have",
             ),
@@ -166,14 +168,14 @@ def free_loop_crosses_above(evidence: Evidence) -> Finding:
     )
 
 
-def nearest(known: Margins, frequency: float) -> float:
+def nearest(margins: Margins, frequency: float) -> float:
     """The crossing of 0 dB closest to a frequency [Hz]; NaN without any."""
-    return min(known.crossovers, key=lambda f: abs(np.log(f / frequency)), default=np.nan)
+    return min(margins.crossovers, key=lambda f: abs(np.log(f / frequency)), default=np.nan)
 
 
-def _further(known: Margins, setting: float) -> tuple[float, ...]:
+def _further(margins: Margins, setting: float) -> tuple[float, ...]:
     """Crossings of 0 dB above that of the crossover tuned for [Hz]."""
-    return tuple(f for f in known.crossovers if f > nearest(known, setting))
+    return tuple(f for f in margins.crossovers if f > nearest(margins, setting))
 
 
 def _listed(frequencies: tuple[float, ...]) -> str:
@@ -184,22 +186,22 @@ def _hertz(crossover: float | None) -> str:
     return "10 kHz, the end of the search" if crossover is None else f"{crossover:.4g} Hz"
 
 
-def _sampled(found: Linear) -> str:
+def _sampled(analysis: Linear) -> str:
     """What sampling and delays leave of the highest stable crossover."""
     by_delay = ", ".join(
-        f"{_hertz(free)} and {_hertz(found.locked.sampled[delay])} with {_micro(delay)}"
-        for delay, free in found.free.sampled.items()
+        f"{_hertz(free)} and {_hertz(analysis.locked.sampled[delay])} with {_micro(delay)}"
+        for delay, free in analysis.free.sampled.items()
     )
     return f"sampled at 50 us, by delay, free and locked: {by_delay}"
 
 
-def _edges(found: Linear, setting: float) -> str:
+def _edges(analysis: Linear, setting: float) -> str:
     """The delays at which a setting is at the edge of stability."""
-    edges = {"free": found.free.delay_at[setting], "locked": found.locked.delay_at[setting]}
-    said = [
+    edges = {"free": analysis.free.delay_at[setting], "locked": analysis.locked.delay_at[setting]}
+    parts = [
         f"{name} {f'with a delay of {_micro(at)}' if np.isfinite(at) else 'beyond it'}" for name, at in edges.items()
     ]
-    return f"sampled at 50 us, {setting:g} Hz is at the edge of stability: {', '.join(said)}"
+    return f"sampled at 50 us, {setting:g} Hz is at the edge of stability: {', '.join(parts)}"
 
 
 def _micro(seconds: float) -> str:

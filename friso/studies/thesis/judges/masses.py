@@ -18,16 +18,16 @@ def mass_ratio_hardly_matters(evidence: Evidence) -> Finding:
     column = int(np.argmin(np.abs(stage - marker["masses.stage"])))
     other = hunts != hunts[row, column]
     ratio = cart[:, None] / stage[None, :]
-    found = f"{share(other, valid):.1%} of {valid.sum()} cells are otherwise, "
-    found += f"cart to stage from {ratio.min():.2g} to {ratio.max():.2g}"
+    text = f"{share(other, valid):.1%} of {valid.sum()} cells are otherwise, "
+    text += f"cart to stage from {ratio.min():.2g} to {ratio.max():.2g}"
     if (other & valid).any():
-        found += f"; the others at {ratio[other & valid].min():.2g} to {ratio[other & valid].max():.2g}"
+        text += f"; the others at {ratio[other & valid].min():.2g} to {ratio[other & valid].max():.2g}"
     return Finding(
         (
             Part(
                 f"few cells (at most {FEW:.0%}) have another verdict than the marker's masses, which settle",
                 bool(not hunts[row, column] and share(other, valid) <= FEW),
-                found,
+                text,
             ),
         )
     )

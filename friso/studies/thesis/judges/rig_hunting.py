@@ -133,7 +133,7 @@ def judged_cycles(cycles: Cycles) -> Finding:
     similar = lives & (abs(np.log(larger)) <= np.log(SIMILAR))
     sides = np.where(lives, rails.above / rails.below, np.nan)
     lopsided = abs(np.log(sides[np.isfinite(sides)]))
-    found = f"{int(lives.sum())} of {len(lives)} rails still swing at the end"
+    swinging = f"{int(lives.sum())} of {len(lives)} rails still swing at the end"
     times = f", with {np.nanmin(slower):.3g} to {np.nanmax(slower):.3g} times its period" if similar.any() else ""
     scatter = float(np.nanmedian(rails.period_scatter)) if np.isfinite(rails.period_scatter).any() else np.nan
     return Finding(
@@ -149,7 +149,7 @@ def judged_cycles(cycles: Cycles) -> Finding:
                 f"on a rail that varies its period is nearly twice as long (at least {AS_SLOW:g} times) at a similar "
                 f"swing (within a factor of {SIMILAR:g}), on at least half of those that hunt",
                 bool(lives.any() and 2 * (slower[similar] >= AS_SLOW).sum() >= lives.sum()),
-                f"{found}{times}. {_ASSUMED}",
+                f"{swinging}{times}. {_ASSUMED}",
                 why="not by the rail: friction that differs between the two sides slows a cycle, and ends it before it "
                 "is twice as slow. On an even rail a motor that gives 0.68 of its force, as the mass line asks for, "
                 "with Coulomb friction of 2 N makes it so (friso rig compare)",
@@ -176,15 +176,15 @@ def free_joint_stands_less_still(evidence: Evidence) -> Finding:
     return judged_standstill(evidence.experiments.standstill)
 
 
-def judged_standstill(found: InPosition) -> Finding:
+def judged_standstill(standstill: InPosition) -> Finding:
     """The finding from the standstills."""
-    peaks = [float(found.runs[case, "all"].true[0, 1]) for case in ("locked", "free")]
-    ratio = found.ratio("all")
+    peaks = [float(standstill.runs[case, "all"].true[0, 1]) for case in ("locked", "free")]
+    ratio = standstill.ratio("all")
     expected = _DEVIATIONS[1] / _DEVIATIONS[0]
-    tenfold = float(np.interp(np.log(10 * found.own), np.log(found.damping), found.recovered))
+    tenfold = float(np.interp(np.log(10 * standstill.own), np.log(standstill.damping), standstill.recovered))
     assumed = (
-        f"Assumed: {found.amplifier * 1e3:.2g} mN RMS of noise of the drive's force (rounding to {BITS} bits), a quiet "
-        "laboratory's floor"
+        f"Assumed: {standstill.amplifier * 1e3:.2g} mN RMS of noise of the drive's force (rounding to {BITS} bits), a "
+        "quiet laboratory's floor"
     )
     return Finding(
         (
@@ -204,7 +204,7 @@ def judged_standstill(found: InPosition) -> Finding:
                 f"the joint's damping is what is missing: ten times as much takes away at least {_RECOVERED:.0%} of "
                 "the difference",
                 tenfold >= _RECOVERED,
-                f"{tenfold:.0%} at {10 * found.own:g} N s/m, {found.recovered.max():.0%} at the most tried",
+                f"{tenfold:.0%} at {10 * standstill.own:g} N s/m, {standstill.recovered.max():.0%} at the most tried",
                 why="stiffness: the bearing that sticks holds the locked stage with its bristles, the free one has "
                 "only the joint and the controller",
             ),

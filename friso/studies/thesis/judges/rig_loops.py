@@ -27,13 +27,13 @@ def on_the_rig(evidence: Evidence, parts: Callable[[RigLoops], tuple[Part, ...]]
     return parts(evidence.identified.rig_loops) if evidence.identified is not None else ()
 
 
-def measured_locked(found: RigLoops) -> tuple[Part, ...]:
+def measured_locked(loops: RigLoops) -> tuple[Part, ...]:
     """Where the open loops of the locked rig cross 0 dB."""
-    return _crossings(found), _further(found)
+    return _crossings(loops), _further(loops)
 
 
-def _crossings(found: RigLoops) -> Part:
-    read = {each.tuned: nearest(each) for each in found.locked}
+def _crossings(loops: RigLoops) -> Part:
+    read = {loop.tuned: nearest(loop) for loop in loops.locked}
     return Part(
         f"measured on the rig as built, every open loop crosses 0 dB about where it is tuned (within {ABOUT:g})",
         all(about(crossed, tuned) for tuned, crossed in read.items()),
@@ -42,15 +42,15 @@ def _crossings(found: RigLoops) -> Part:
     )
 
 
-def _further(found: RigLoops) -> Part:
+def _further(loops: RigLoops) -> Part:
     """Whether the loop with the highest setting crosses again."""
-    last = found.locked[-1]
-    above = [each.value for each in last.crossings if each.value > ABOUT * last.tuned]
+    last = loops.locked[-1]
+    above = [crossing.value for crossing in last.crossings if crossing.value > ABOUT * last.tuned]
     near, gain = _peak(last, BEYOND * last.tuned)
     return Part(
         f"measured on the rig as built, that tuned to {last.tuned:g} Hz crosses 0 dB again about {_OTHER:g} Hz",
-        any(about(each, _OTHER) for each in above),
-        f"above the first crossing: {', '.join(f'{each:.3g} Hz' for each in above) or 'none'}; its peak there is "
+        any(about(f, _OTHER) for f in above),
+        f"above the first crossing: {', '.join(f'{f:.3g} Hz' for f in above) or 'none'}; its peak there is "
         f"{gain:.2g} at {near:.3g} Hz",
         why=f"not in the model: its only parasitic mode, that of Fig. 18, is at {near:.3g} Hz with the joint locked. "
         "Simulation alone cannot tell",
@@ -65,13 +65,13 @@ def _peak(loop: Loop, low: float) -> tuple[float, float]:
     return float(loop.response.frequency[size.argmax()]), float(size.max())
 
 
-def measured_free(found: RigLoops) -> tuple[Part, Part]:
+def measured_free(loops: RigLoops) -> tuple[Part, Part]:
     """Where the open loop of the free joint crosses 0 dB, and how far it can be tuned."""
-    crossed = max((each.value for each in found.free.crossings), default=np.nan)
-    highest = highest_stable(found.settings, found.stable)
+    crossed = max((crossing.value for crossing in loops.free.crossings), default=np.nan)
+    highest = highest_stable(loops.settings, loops.stable)
     return (
         Part(
-            f"measured on the rig as built, tuned to {found.free.tuned:g} Hz, it crosses 0 dB about {_FREE:g} Hz",
+            f"measured on the rig as built, tuned to {loops.free.tuned:g} Hz, it crosses 0 dB about {_FREE:g} Hz",
             about(crossed, _FREE),
             f"last at {crossed:.3g} Hz. {ASSUMED}",
             why="not in the model: with the masses identified instead of weighed it crosses lower",
@@ -86,9 +86,9 @@ def measured_free(found: RigLoops) -> tuple[Part, Part]:
     )
 
 
-def weaker_motor(found: RigLoops, joint: int, seen: float, weighed: float) -> tuple[Part]:
+def weaker_motor(loops: RigLoops, joint: int, seen: float, weighed: float) -> tuple[Part]:
     """Whether a weaker motor shows the mass seen [kg]; `joint` is 0 locked, 1 free."""
-    plain, weak, strong = found.apparent[joint]
+    plain, weak, strong = loops.apparent[joint]
     part = Part(
         f"with a motor that gives {RATIOS[1]:g} of the force that the drive believes, it is nearer {seen:g} than the "
         f"{weighed:g} kg weighed (by their ratios)",

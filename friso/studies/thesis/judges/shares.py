@@ -39,7 +39,11 @@ class Sticking:
 
         Sticks may alternate between long and short: a cycle need not be symmetric.
         """
-        return float(np.mean([values[self.direction == way].mean() for way in (1, -1)])) if self.both else np.nan
+        return (
+            float(np.mean([values[self.direction == direction].mean() for direction in (1, -1)]))
+            if self.both
+            else np.nan
+        )
 
     @property
     def both(self) -> bool:
@@ -50,7 +54,7 @@ class Sticking:
         """The mean, and the means in the two directions, with their unit."""
         if not self.both:
             return "no cycle"
-        ways = " and ".join(f"{values[self.direction == way].mean():{form}}{unit}" for way in (1, -1))
+        ways = " and ".join(f"{values[self.direction == direction].mean():{form}}{unit}" for direction in (1, -1))
         return f"{self.mean(values):{form}}{unit} ({ways} in the two directions)"
 
 

@@ -24,12 +24,12 @@ def stiffness_has_a_limit(evidence: Evidence) -> Finding:
     """The stiffness above which the isolated rig hunts, at each stroke."""
     runs = evidence.maps["isolator-stiffness"]
     stiffness, stroke, hunts, _ = table(runs, "joint.stiffness", "joint.stroke")
-    found = begins(stiffness, hunts)
+    limits = begins(stiffness, hunts)
     works = ~hunts[0]  # strokes at which the softest joint of the range settles
-    rises = trend(stroke[works], found[works])
+    rises = trend(stroke[works], limits[works])
     shortest = stroke[works][0] * 1e3 if works.any() else np.nan
-    span = f"{found[works][0]:.3g} N/m at {shortest:.2g} mm, {found[-1]:.3g} N/m at {stroke[-1] * 1e3:.2g} mm"
-    force = found[works] * stroke[works]
+    span = f"{limits[works][0]:.3g} N/m at {shortest:.2g} mm, {limits[-1]:.3g} N/m at {stroke[-1] * 1e3:.2g} mm"
+    force = limits[works] * stroke[works]
     why = (
         f"idealisation: below {shortest:.2g} mm even the softest joint of the range hunts, and at the limit the joint "
         f"carries {force.min():.2g} to {force.max():.2g} N at its stroke, with a static friction of 3 N: the force at "
@@ -42,7 +42,7 @@ def stiffness_has_a_limit(evidence: Evidence) -> Finding:
             Part(
                 "at the largest stroke the softest joint settles and the stiffest hunts",
                 bool(not hunts[0, -1] and hunts[-1, -1]),
-                f"limit {found[-1]:.3g} N/m" if hunts[:, -1].any() else "no stiffness of the range hunts",
+                f"limit {limits[-1]:.3g} N/m" if hunts[:, -1].any() else "no stiffness of the range hunts",
             ),
             Part(
                 "the limit rises as the stroke gets smaller, over the strokes at which the softest joint settles "

@@ -69,9 +69,11 @@ def loops_of(stage: Stage, settings: tuple[float, ...]) -> Loops:
     moving = limit_cases(flat)["sliding"]
     drive = stage.replace({"drive.sample_time": SAMPLED}).flat()
     return Loops(
-        margins={f: {name: margins(own, one) for name, one in limit_cases(own).items()} for f, own in tuned.items()},
+        margins={
+            f: {name: margins(keys, member) for name, member in limit_cases(keys).items()} for f, keys in tuned.items()
+        },
         omega=omega,
-        curves={f: loops(own, moving, omega)[0] for f, own in tuned.items()},
+        curves={f: loops(keys, moving, omega)[0] for f, keys in tuned.items()},
         single=_single(flat),
         unsampled=_highest(flat),
         sampled={delay: _highest({**drive, "drive.delay": delay}) for delay in DELAYS},
@@ -92,9 +94,9 @@ def _omega(flat: Mapping[str, Any]) -> np.ndarray:
 def _single(flat: Mapping[str, Any]) -> float | None:
     """See `Loops`; the free joint's limiter is touched, since the controller is tuned for all the mass."""
     cases = limit_cases(flat)
-    one = cases.get("sliding-touched", cases["sliding"])
-    omega = frequencies(flat, one, Drive.of(flat), DENSITY, [modes(flat, one)])
-    bare = plants(flat, one, omega)[0]
+    member = cases.get("sliding-touched", cases["sliding"])
+    omega = frequencies(flat, member, Drive.of(flat), DENSITY, [modes(flat, member)])
+    bare = plants(flat, member, omega)[0]
 
     def more(crossover: np.ndarray) -> np.ndarray:
         above = np.array([np.abs(bare * controller(_tuned(flat, f), omega)) > 1 for f in crossover])
@@ -120,4 +122,4 @@ def _end_of_first(excess: Callable[[np.ndarray], np.ndarray]) -> float | None:
 
 def _edge(flat: Mapping[str, Any]) -> float:
     """The delay [s] that some limit case does not bear."""
-    return float(np.min([margins(flat, one).delay_margin for one in limit_cases(flat).values()]))
+    return float(np.min([margins(flat, member).delay_margin for member in limit_cases(flat).values()]))

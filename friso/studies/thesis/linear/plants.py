@@ -73,25 +73,25 @@ def limit_cases_of(flat: Mapping[str, Any]) -> dict[str, LimitCase]:
     """All limit cases by name; those with a touched limiter by the formula of Table 1 too, with "-series" behind."""
     cases = limit_cases(flat)
     series = limiter_in_series(flat)
-    found = {name: _limit_case(flat, one) for name, one in cases.items()}
-    printed = {name: one.with_limiter(False) for name, one in cases.items() if one.touched[0]}
-    return found | {f"{name}-series": _limit_case(series, one) for name, one in printed.items()}
+    plain = {name: _limit_case(flat, member) for name, member in cases.items()}
+    printed = {name: member.with_limiter(False) for name, member in cases.items() if member.touched[0]}
+    return plain | {f"{name}-series": _limit_case(series, member) for name, member in printed.items()}
 
 
-def _limit_case(flat: Mapping[str, Any], one: Members) -> LimitCase:
-    omega = frequencies(flat, one, Drive.of(flat), DENSITY, [modes(flat, one)])
-    resonances, antiresonances = (_peaks(flat, one, omega, sign) for sign in (1, -1))
+def _limit_case(flat: Mapping[str, Any], member: Members) -> LimitCase:
+    omega = frequencies(flat, member, Drive.of(flat), DENSITY, [modes(flat, member)])
+    resonances, antiresonances = (_peaks(flat, member, omega, sign) for sign in (1, -1))
     at = _mass_line(LimitCase(resonances, antiresonances, np.nan, np.nan))
     omega_at = np.array([2 * np.pi * at])
-    mass = np.nan if np.isnan(at) else float(1 / (abs(plants(flat, one, omega_at)[0, 0]) * omega_at[0] ** 2))
+    mass = np.nan if np.isnan(at) else float(1 / (abs(plants(flat, member, omega_at)[0, 0]) * omega_at[0] ** 2))
     return LimitCase(resonances, antiresonances, mass, at)
 
 
-def _peaks(flat: Mapping[str, Any], one: Members, omega: np.ndarray, sign: int) -> tuple[float, ...]:
+def _peaks(flat: Mapping[str, Any], member: Members, omega: np.ndarray, sign: int) -> tuple[float, ...]:
     """Frequencies [Hz] at which the magnitude has its peaks, or those of its inverse for a negative sign."""
 
     def height(at: np.ndarray) -> np.ndarray:
-        return sign * np.log(np.abs(plants(flat, one, at)[0]))
+        return sign * np.log(np.abs(plants(flat, member, at)[0]))
 
     places, _ = find_peaks(height(omega), prominence=VISIBLE)
     if not len(places):

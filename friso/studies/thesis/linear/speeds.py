@@ -46,15 +46,15 @@ class Speeds:
 
 def speeds_of(flat: Mapping[str, Any]) -> Speeds:
     """The loop of a stage over the speed of its cart."""
-    found = {touched: _unstable(flat, touched) for touched in (False, True)}
+    unstable = {touched: _unstable(flat, touched) for touched in (False, True)}
     tenth = 2 * np.pi * flat["controller.crossover"] * np.array([0.1, 10.0])
     size = np.abs(np.array([loops(flat, member(speed), tenth)[0] for speed in PRESCRIBED]))
     slow, fast = (size.max(axis=0) / size.min(axis=0)).tolist()
     return Speeds(
-        unstable=found[False],
-        unstable_touched=found[True],
+        unstable=unstable[False],
+        unstable_touched=unstable[True],
         undeflected=ranges_below(speeds(flat, SPEEDS), lambda v: -abscissa_with_bristles(flat, v, 0.0)),
-        incurable=_incurable(flat, found[False]),
+        incurable=_incurable(flat, unstable[False]),
         slow=slow,
         fast=fast,
     )
