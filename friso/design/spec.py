@@ -51,7 +51,7 @@ class Choice:
         items = value if isinstance(value, list | tuple) else [value]
         if not items:
             raise SpecError("", "an empty list", self.expected, self.example)
-        return tuple(self._one(item) for item in items)
+        return tuple(self._item(item) for item in items)
 
     def _item(self, value: Any) -> Any:
         if self.of:

@@ -57,10 +57,10 @@ WIDTHS = {False: 2.6, True: 1.3}
 LOST = "#eeb48f"
 
 
-def bode_figures(found: Bode) -> tuple[Figure, ...]:
+def bode_figures(bode: Bode) -> tuple[Figure, ...]:
     """All figures, in the order in which they are read."""
-    figures = (_plant(found), _loop(found), _speeds(found), _nyquist(found), _sensitivity(found))
-    return tuple(replace(figure, subject=found.stage.name) for figure in figures if figure.panels)
+    figures = (_plant(bode), _loop(bode), _speeds(bode), _nyquist(bode), _sensitivity(bode))
+    return tuple(replace(figure, subject=bode.stage.name) for figure in figures if figure.panels)
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,7 @@ def phases(responses: Sequence[np.ndarray]) -> list[Array]:
     first, *others = [np.degrees(np.unwrap(angle)) for angle in lagging]
     first = first - 360 * np.floor((first[0] - STARTS) / 360)
     high = slice(len(first) // 2, None)
-    return [first, *(one + 360 * np.round(np.median(first[high] - one[high]) / 360) for one in others)]
+    return [first, *(phase + 360 * np.round(np.median(first[high] - phase[high]) / 360) for phase in others)]
 
 
 def size(response: np.ndarray) -> Array:
@@ -90,52 +90,52 @@ def size(response: np.ndarray) -> Array:
     return 20 * np.log10(np.abs(response))
 
 
-def _plant(found: Bode) -> Figure:
+def _plant(bode: Bode) -> Figure:
     """Stage position over actuator force, with the mass lines (thesis, Fig. 7)."""
-    curves = [_curve(name, case.plant) for name, case in found.cases.items()]
+    curves = [_curve(name, case.plant) for name, case in bode.cases.items()]
     sizes = np.concatenate([np.abs(curve.response) for curve in curves])
     axis = Axis("Magnitude", "m/N", (float(sizes.min()) / 2, float(sizes.max()) * 2), log=True, prefixed=False)
-    above = _magnitudes(_hertz(found), curves, axis, np.abs)
+    above = _magnitudes(_hertz(bode), curves, axis, np.abs)
     lines = tuple(
-        Series(_hertz(found), 1 / (mass * found.omega**2), f"mass of {mass:.4g} kg", INK, style, 0.9)
-        for mass, style in zip(_masses(found), ("dashed", "dotted"), strict=False)
+        Series(_hertz(bode), 1 / (mass * bode.omega**2), f"mass of {mass:.4g} kg", INK, style, 0.9)
+        for mass, style in zip(_masses(bode), ("dashed", "dotted"), strict=False)
     )
     caption = (
         "Stage position over actuator force, at small motions in the limit cases of Table 1 of the thesis (its Fig. 7)"
         " and on the mass lines. A stuck cart rests on its bristles, a sliding one feels its viscous friction."
     )
-    if has_limiter(found):
+    if has_limiter(bode):
         caption += " A touched limiter acts beside the joint" + (
-            "; dashed: one behind the other, as Table 1 prints it." if _any_series(found) else "."
+            "; dashed: one behind the other, as Table 1 prints it." if _any_series(bode) else "."
         )
-    panels = (replace(above, series=(*above.series, *lines)), _phases(_hertz(found), curves))
+    panels = (replace(above, series=(*above.series, *lines)), _phases(_hertz(bode), curves))
     return Figure("bode_plant", "Plant", caption, panels)
 
 
-def _loop(found: Bode) -> Figure:
+def _loop(bode: Bode) -> Figure:
     """The open loop in the limit cases."""
     caption = (
         "The loop cut at the actuator: controller, plant and, if the stage file has one, the drive. The phase margin is"
         " the way to −180° where the magnitude passes 0 dB."
     )
-    panels = loop_panels(_hertz(found), [_loop_of(name, case) for name, case in found.cases.items()])
+    panels = loop_panels(_hertz(bode), [_loop_of(name, case) for name, case in bode.cases.items()])
     return Figure("bode_loop", "Open loop, limit cases", caption, panels)
 
 
-def _speeds(found: Bode) -> Figure:
+def _speeds(bode: Bode) -> Figure:
     """The open loop at prescribed speeds of the cart (thesis, Fig. 8); no panels without friction."""
     caption = (
         "The same while the cart slides at a prescribed speed"
-        f"{', limiter free' if has_limiter(found) else ''} (thesis, Fig. 8): the faster, the sooner the bristles give"
+        f"{', limiter free' if has_limiter(bode) else ''} (thesis, Fig. 8): the faster, the sooner the bristles give"
         " way. Where friction falls as the speed rises, the loop may be unstable (dashed)."
     )
-    count = len(found.prescribed)
+    count = len(bode.prescribed)
     styles = zip(ramp(count + 1)[:count], np.linspace(2.6, 1.2, count), strict=True)  # the last shade is light
     curves = [
         _marked(Curve(at.loop, with_unit(at.speed, "m/s", 1) if at.speed else "stuck", shade, width=width), at.stable)
-        for at, (shade, width) in zip(found.prescribed, styles, strict=True)
+        for at, (shade, width) in zip(bode.prescribed, styles, strict=True)
     ]
-    return Figure("bode_speeds", "Open loop, prescribed cart speeds", caption, loop_panels(_hertz(found), curves))
+    return Figure("bode_speeds", "Open loop, prescribed cart speeds", caption, loop_panels(_hertz(bode), curves))
 
 
 def _marked(curve: Curve, stable: bool) -> Curve:
@@ -143,15 +143,15 @@ def _marked(curve: Curve, stable: bool) -> Curve:
     return curve if stable else replace(curve, label=f"{curve.label} (unstable)", dash="dashed")
 
 
-def _nyquist(found: Bode) -> Figure:
+def _nyquist(bode: Bode) -> Figure:
     """The loop about -1: limit cases, and the family behind them."""
     family = [
-        *_family(found, True, "stable states of the family", LIGHT),
-        *_family(found, False, "unstable states of the family", LOST),
+        *_family(bode, True, "stable states of the family", LIGHT),
+        *_family(bode, False, "unstable states of the family", LOST),
     ]
     cases = [
         Series(np.real(curve.response), np.imag(curve.response), curve.label, curve.colour, curve.dash, curve.width)
-        for curve in (_loop_of(name, case) for name, case in found.cases.items())
+        for curve in (_loop_of(name, case) for name, case in bode.cases.items())
     ]
     turn = np.linspace(0, 2 * np.pi, 181)
     name = f"modulus margin {WANTED:g}"
@@ -168,39 +168,39 @@ def _nyquist(found: Bode) -> Figure:
     return Figure("bode_nyquist", "Nyquist plot", caption, (panel,))
 
 
-def _family(found: Bode, stable: bool, name: str, shade: str) -> list[Series]:
+def _family(bode: Bode, stable: bool, name: str, shade: str) -> list[Series]:
     """Evenly picked members that are stable, or those that are not, where they are in view."""
-    numbers = np.flatnonzero(found.scan.stable == stable) if has_family(found) else np.empty(0, int)
+    numbers = np.flatnonzero(bode.scan.stable == stable) if has_family(bode) else np.empty(0, int)
     picked = numbers[np.linspace(0, len(numbers) - 1, min(DRAWN[stable], len(numbers))).round().astype(int)]
     lines = []
-    for k, loop in enumerate(found.loops[picked]):
+    for k, loop in enumerate(bode.loops[picked]):
         seen = (np.abs(loop) > KEPT[0]) & (np.abs(loop) < KEPT[1])
-        shown = np.where(seen, loop, np.nan)[np.convolve(seen, np.ones(3), "same") > 0]
-        lines.append(Series(np.real(shown), np.imag(shown), "" if k else name, shade, width=0.9))
+        visible = np.where(seen, loop, np.nan)[np.convolve(seen, np.ones(3), "same") > 0]
+        lines.append(Series(np.real(visible), np.imag(visible), "" if k else name, shade, width=0.9))
     return lines
 
 
-def _sensitivity(found: Bode) -> Figure:
+def _sensitivity(bode: Bode) -> Figure:
     """Sensitivity of the limit cases that are stable, and the band of the family."""
-    stable = found.scan.stable
+    stable = bode.scan.stable
     lines = tuple(
-        Series(_hertz(found), -size(1 + curve.response), curve.label, curve.colour, curve.dash, curve.width)
-        for curve in (_loop_of(name, case) for name, case in found.cases.items() if case.margins.stable)
+        Series(_hertz(bode), -size(1 + curve.response), curve.label, curve.colour, curve.dash, curve.width)
+        for curve in (_loop_of(name, case) for name, case in bode.cases.items() if case.margins.stable)
     )
     bands = ()
-    if stable.any() and has_family(found):
-        all_ = -size(1 + found.loops[stable])
+    if stable.any() and has_family(bode):
+        all_ = -size(1 + bode.loops[stable])
         name = "stable states of the family"
-        bands = (Band(_hertz(found), all_.min(axis=0), all_.max(axis=0), name, LIGHT),)
+        bands = (Band(_hertz(bode), all_.min(axis=0), all_.max(axis=0), name, LIGHT),)
     if not (lines or bands):
         return Figure("bode_sensitivity", "", "", ())
     largest = max(float(np.max(part)) for part in (*(line.y for line in lines), *(band.high for band in bands)))
-    wanted = Limit((-decibels(WANTED),), f"{-decibels(WANTED):.0f} dB: modulus margin {WANTED:g}", INK)
+    limit = Limit((-decibels(WANTED),), f"{-decibels(WANTED):.0f} dB: modulus margin {WANTED:g}", INK)
     axis = Axis("|1/(1 + L)|", "dB", (LEAST_SENSITIVITY, max(10.0, 1.08 * largest)))
     caption = "How much of a disturbance is left: above 0 dB the controller makes it worse."
     lost = f"; {(~stable).sum()} unstable ones are left out, and close to them it reaches any height"
     note = f"Band: least to greatest of {stable.sum()} stable states{'' if stable.all() else lost}." if bands else ""
-    panel = Panel("", _frequency(_hertz(found)), axis, lines, limits=(wanted,), bands=bands)
+    panel = Panel("", _frequency(_hertz(bode)), axis, lines, limits=(limit,), bands=bands)
     return Figure("bode_sensitivity", "Sensitivity", caption, (panel,), note=note)
 
 
@@ -219,14 +219,14 @@ def loop_panels(hertz: Array, curves: Sequence[Curve]) -> tuple[Panel, ...]:
 
 
 def _magnitudes(hertz: Array, curves: Sequence[Curve], axis: Axis, of: Callable[[np.ndarray], Array]) -> Panel:
-    lines = (Series(hertz, of(one.response), one.label, one.colour, one.dash, one.width) for one in curves)
+    lines = (Series(hertz, of(curve.response), curve.label, curve.colour, curve.dash, curve.width) for curve in curves)
     return Panel("", _frequency(hertz), axis, tuple(lines))
 
 
 def _phases(hertz: Array, curves: Sequence[Curve]) -> Panel:
     """The phases, without labels: those stand above the magnitudes."""
-    known = zip(curves, phases([one.response for one in curves]), strict=True)
-    lines = tuple(Series(hertz, y, "", one.colour, one.dash, one.width) for one, y in known)
+    angles = zip(curves, phases([curve.response for curve in curves]), strict=True)
+    lines = tuple(Series(hertz, y, "", curve.colour, curve.dash, curve.width) for curve, y in angles)
     least = QUARTER * np.floor((min(line.y.min() for line in lines) + 1) / QUARTER)
     most = QUARTER * np.ceil((max(line.y.max() for line in lines) - 1) / QUARTER)
     if most == least:
@@ -245,19 +245,19 @@ def _loop_of(name: str, case: Case) -> Curve:
     return _marked(_curve(name, case.loop), case.margins.stable)
 
 
-def _masses(found: Bode) -> list[float]:
+def _masses(bode: Bode) -> list[float]:
     """All that moves, and the stage alone, if it can move alone [kg]."""
-    flat = found.stage.flat()
-    known = [float(flat[key]) for key in ("masses.cart", "masses.stage") if key in flat]
-    return [sum(known), *(known[1:] if "joint.locked" in flat and not flat["joint.locked"] else [])]
+    flat = bode.stage.flat()
+    masses = [float(flat[key]) for key in ("masses.cart", "masses.stage") if key in flat]
+    return [sum(masses), *(masses[1:] if "joint.locked" in flat and not flat["joint.locked"] else [])]
 
 
-def _any_series(found: Bode) -> bool:
-    return any(name.endswith(SERIES) for name in found.cases)
+def _any_series(bode: Bode) -> bool:
+    return any(name.endswith(SERIES) for name in bode.cases)
 
 
-def _hertz(found: Bode) -> Array:
-    return found.omega / (2 * np.pi)
+def _hertz(bode: Bode) -> Array:
+    return bode.omega / (2 * np.pi)
 
 
 def _frequency(hertz: Array) -> Axis:

@@ -13,20 +13,20 @@ from friso.views.drawing.figure import GREEN, VERMILLION, Figure
 from friso.views.pages import stage_page
 
 
-def bode_html(found: Bode, figures: Sequence[Figure]) -> str:
+def bode_html(bode: Bode, figures: Sequence[Figure]) -> str:
     """The whole page of a linear analysis and its figures."""
-    shown = shown_states(found)
-    verdict, *further = stability(found)
+    states = shown_states(bode)
+    verdict, *further = stability(bode)
     return stage_page(
         "bode.html",
-        found.stage,
+        bode.stage,
         figures,
-        verdict=(GREEN if found.settled[1].stable else VERMILLION, verdict),
+        verdict=(GREEN if bode.settled[1].stable else VERMILLION, verdict),
         further=further,
-        heading=crossover_heading(found),
-        crossovers=[(COLOURS[name], sentence) for name, sentence in crossovers(found).items()],
-        caveats=caveats(found),
-        shown=shown,
-        rows=rows(shown),
-        states=len(found.scan.members),
+        heading=crossover_heading(bode),
+        crossovers=[(COLOURS[name], sentence) for name, sentence in crossovers(bode).items()],
+        caveats=caveats(bode),
+        shown=states,
+        rows=rows(states),
+        states=len(bode.scan.members),
     )

@@ -30,15 +30,15 @@ class Shown:
     margins: Margins
 
 
-def shown_states(found: Bode) -> tuple[Shown, ...]:
+def shown_states(bode: Bode) -> tuple[Shown, ...]:
     """The limit cases, the worst of all settled states, and the worst of the whole family, if that is another one."""
-    cases = [Shown(label(name), colour(name), _speed(case.members), case.margins) for name, case in found.cases.items()]
-    if not has_family(found):
+    cases = [Shown(label(name), colour(name), _speed(case.members), case.margins) for name, case in bode.cases.items()]
+    if not has_family(bode):
         return tuple(cases)
-    (settled, known), (worst, lost) = found.settled, found.worst
-    cases.append(Shown("Worst settled", GREY, place(settled, found), known))
+    (settled, margins), (worst, lost) = bode.settled, bode.worst
+    cases.append(Shown("Worst settled", GREY, place(settled, bode), margins))
     if worst != settled:
-        cases.append(Shown("Worst of the family", GREY, place(worst, found), lost))
+        cases.append(Shown("Worst of the family", GREY, place(worst, bode), lost))
     return tuple(cases)
 
 
@@ -57,9 +57,9 @@ def dash(name: str) -> Dash:
     return "dashed" if name.endswith(SERIES) else "solid"
 
 
-def place(one: Members, found: Bode) -> str:
+def place(member: Members, bode: Bode) -> str:
     """A state in words, as far as states differ: "sliding at 1.78 mm/s, limiter free"."""
-    return in_words(cart(one) if has_friction(found) else "", bool(one.touched[0]), has_limiter(found))
+    return in_words(cart(member) if has_friction(bode) else "", bool(member.touched[0]), has_limiter(bode))
 
 
 def in_words(cart: str, touched: bool, limited: bool) -> str:
@@ -67,30 +67,30 @@ def in_words(cart: str, touched: bool, limited: bool) -> str:
     return ", ".join([*([cart] if cart else []), *([f"limiter {side(touched)}"] if limited else [])]) or "as given"
 
 
-def cart(one: Members) -> str:
+def cart(member: Members) -> str:
     """What the cart does."""
-    if not one.stuck[0]:
-        return f"sliding{'' if one.forward[0] else ' backwards'} at {with_unit(one.speed[0], 'm/s')}"
-    return f"stuck under a bias force of {with_unit(one.bias[0], 'N')}" if one.bias[0] else "stuck"
+    if not member.stuck[0]:
+        return f"sliding{'' if member.forward[0] else ' backwards'} at {with_unit(member.speed[0], 'm/s')}"
+    return f"stuck under a bias force of {with_unit(member.bias[0], 'N')}" if member.bias[0] else "stuck"
 
 
 def side(touched: bool) -> str:
     return "touched" if touched else "free"
 
 
-def has_limiter(found: Bode) -> bool:
+def has_limiter(bode: Bode) -> bool:
     """Whether the limiter may be touched or not; it is always the same where the joint is locked or has no stroke."""
-    return bool(np.ptp(found.scan.members.touched.astype(int)))
+    return bool(np.ptp(bode.scan.members.touched.astype(int)))
 
 
-def has_family(found: Bode) -> bool:
+def has_family(bode: Bode) -> bool:
     """Whether there are states behind the limit cases: only friction makes some."""
-    return len(found.scan.members) > len(found.cases)
+    return len(bode.scan.members) > len(bode.cases)
 
 
-def has_friction(found: Bode) -> bool:
-    return found.stage.flat()["friction.model"] != "none"
+def has_friction(bode: Bode) -> bool:
+    return bode.stage.flat()["friction.model"] != "none"
 
 
-def _speed(one: Members) -> str:
-    return "" if one.stuck[0] else f"at {with_unit(one.speed[0], 'm/s')}"
+def _speed(member: Members) -> str:
+    return "" if member.stuck[0] else f"at {with_unit(member.speed[0], 'm/s')}"

@@ -15,10 +15,10 @@ ANY = "no limit"
 """Stands where nothing takes a loop to the edge of its stability."""
 
 
-def rows(shown: tuple[Shown, ...]) -> list[tuple[str, list[str]]]:
+def rows(states: tuple[Shown, ...]) -> list[tuple[str, list[str]]]:
     """The rows of which some state has something to say."""
-    texts = [("State", [item.where or NOTHING for item in shown])]
-    texts += [(name, [text(item.margins) for item in shown]) for name, text in _ROWS.items()]
+    texts = [("State", [item.where or NOTHING for item in states])]
+    texts += [(name, [text(item.margins) for item in states]) for name, text in _ROWS.items()]
     return [(name, row) for name, row in texts if set(row) != {NOTHING}]
 
 
@@ -26,11 +26,11 @@ def decibels(factor: float) -> float:
     return 20 * math.log10(factor)
 
 
-def growth(known: Margins) -> str:
+def growth(margins: Margins) -> str:
     """How fast a deviation from an unstable state grows; on the edge of stability it does not."""
-    if known.on_the_edge:
+    if margins.on_the_edge:
         return "neither dies out nor grows"
-    pole = known.poles[known.poles.real.argmax()]
+    pole = margins.poles[margins.poles.real.argmax()]
     swings = f", swinging at {with_unit(abs(pole.imag) / (2 * np.pi), 'Hz')}" if pole.imag else ""
     return f"grows e-fold in {with_unit(1 / pole.real, 's')}{swings}"
 
@@ -51,18 +51,18 @@ def _signed(size: float, sign: str = "") -> str:
     return f"{round(size, 1) + 0.0:{sign}.1f} dB".replace("-", "−")
 
 
-def _peak(known: Margins) -> str:
-    peak = known.peak_sensitivity
-    return f"{peak:.3g} ({_signed(decibels(peak))})" if known.stable else NOTHING
+def _peak(margins: Margins) -> str:
+    peak = margins.peak_sensitivity
+    return f"{peak:.3g} ({_signed(decibels(peak))})" if margins.stable else NOTHING
 
 
-def _slowest(known: Margins) -> str:
-    return with_unit(-1 / known.abscissa, "s") if known.stable else NOTHING
+def _slowest(margins: Margins) -> str:
+    return with_unit(-1 / margins.abscissa, "s") if margins.stable else NOTHING
 
 
-def _least_damped(known: Margins) -> str:
-    swinging = known.poles[known.poles.imag != 0]
-    if not known.stable or not swinging.size:
+def _least_damped(margins: Margins) -> str:
+    swinging = margins.poles[margins.poles.imag != 0]
+    if not margins.stable or not swinging.size:
         return NOTHING
     damping = -swinging.real / np.abs(swinging)
     k = int(damping.argmin())
@@ -70,16 +70,16 @@ def _least_damped(known: Margins) -> str:
 
 
 _ROWS: dict[str, Callable[[Margins], str]] = {
-    "Stable": lambda known: "yes" if known.stable else ("on the edge" if known.on_the_edge else "no"),
-    "0 dB crossings": lambda known: ", ".join(with_unit(f, "Hz") for f in known.crossovers) or "none",
-    "Phase margin": lambda known: _number(known.phase_margin, math.inf, "{:.1f}°".format),
-    "Gain margin": lambda known: _number(known.gain_margin, math.inf, _factor),
-    "Gain margin downwards": lambda known: _number(known.gain_reduction, 0.0, _factor),
-    "Delay margin": lambda known: _number(known.delay_margin, math.inf, lambda time: with_unit(time, "s")),
-    "Modulus margin": lambda known: _number(known.modulus_margin, math.inf, "{:.3g}".format),
+    "Stable": lambda margins: "yes" if margins.stable else ("on the edge" if margins.on_the_edge else "no"),
+    "0 dB crossings": lambda margins: ", ".join(with_unit(f, "Hz") for f in margins.crossovers) or "none",
+    "Phase margin": lambda margins: _number(margins.phase_margin, math.inf, "{:.1f}°".format),
+    "Gain margin": lambda margins: _number(margins.gain_margin, math.inf, _factor),
+    "Gain margin downwards": lambda margins: _number(margins.gain_reduction, 0.0, _factor),
+    "Delay margin": lambda margins: _number(margins.delay_margin, math.inf, lambda time: with_unit(time, "s")),
+    "Modulus margin": lambda margins: _number(margins.modulus_margin, math.inf, "{:.3g}".format),
     "Peak sensitivity": _peak,
-    "Closest to −1": lambda known: with_unit(known.closest, "Hz"),
+    "Closest to −1": lambda margins: with_unit(margins.closest, "Hz"),
     "Slowest time constant": _slowest,
     "Least damped pole": _least_damped,
-    "Unstable": lambda known: NOTHING if known.stable else growth(known),
+    "Unstable": lambda margins: NOTHING if margins.stable else growth(margins),
 }

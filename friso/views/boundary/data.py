@@ -62,12 +62,12 @@ class _Row(NamedTuple):
     kind: str
 
 
-def lines(found: Diagram | Plane) -> tuple[Line, ...]:
+def lines(result: Diagram | Plane) -> tuple[Line, ...]:
     """All branches of a diagram, each with its special points where they lie on it; or all curves of a plane."""
-    if isinstance(found, Diagram):
-        pairs = zip(found.branches, found.special, strict=True)
-        return tuple(_line(found, branch, _of_branch(branch, special)) for branch, special in pairs)
-    return tuple(_line(found, curve, _of_curve(curve)) for curve in found.curves)
+    if isinstance(result, Diagram):
+        pairs = zip(result.branches, result.special, strict=True)
+        return tuple(_line(result, branch, _of_branch(branch, special)) for branch, special in pairs)
+    return tuple(_line(result, curve, _of_curve(curve)) for curve in result.curves)
 
 
 def _of_branch(branch: Branch, special: tuple[Found, ...]) -> list[_Row]:
@@ -75,9 +75,9 @@ def _of_branch(branch: Branch, special: tuple[Found, ...]) -> list[_Row]:
     path = np.array([point.vector for point in branch.points])
     placed = [(float(k), point, np.nan, "") for k, point in enumerate(branch.points)]
     placed += [
-        (_along(path, each.point.vector), each.point, each.error, each.kind)
-        for each in special
-        if 0 <= each.point.place <= 1
+        (_along(path, spot.point.vector), spot.point, spot.error, spot.kind)
+        for spot in special
+        if 0 <= spot.point.place <= 1
     ]
     return [
         _Row(np.array([point.place]), np.array([error]), point.cycle, kind)
@@ -96,13 +96,13 @@ def _along(path: Array, vector: Array) -> float:
     return leg + before[leg] / (before[leg] + after[leg])
 
 
-def _line(found: Diagram | Plane, traced: Branch | Curve, rows: list[_Row]) -> Line:
+def _line(result: Diagram | Plane, traced: Branch | Curve, rows: list[_Row]) -> Line:
     at = np.array([row.at for row in rows])
-    values = _values(found.space, at)
+    values = _values(result.space, at)
     return Line(
-        "symmetric" if traced.sign < 0 else "asymmetric" if found.cycles.sign < 0 else "whole",
+        "symmetric" if traced.sign < 0 else "asymmetric" if result.cycles.sign < 0 else "whole",
         values,
-        np.abs(_values(found.space, at + np.array([row.error for row in rows])) - values),
+        np.abs(_values(result.space, at + np.array([row.error for row in rows])) - values),
         tuple(row.kind for row in rows),
         np.array([row.cycle.amplitude[0] for row in rows]),
         np.array([row.cycle.period[0] for row in rows]),
@@ -115,39 +115,40 @@ def _values(space: Space, at: Array) -> Array:
     return np.stack(list(space.values(at).values()), axis=1)
 
 
-def end_verdicts(found: Diagram) -> tuple[str, str]:
+def end_verdicts(result: Diagram) -> tuple[str, str]:
     """The verdicts at both ends of the range, by all branches that reach them."""
-    known = dict(zip(found.places.tolist(), _verdicts(found.cycles), strict=True))
+    verdict_at = dict(zip(result.places.tolist(), _verdicts(result.cycles), strict=True))
     low, high = (
-        ATTRACTS if place in known and _attracts_at(found, place) else known.get(place, INVALID) for place in (0.0, 1.0)
+        ATTRACTS if place in verdict_at and _attracts_at(result, place) else verdict_at.get(place, INVALID)
+        for place in (0.0, 1.0)
     )
     return low, high
 
 
-def _attracts_at(found: Diagram, place: float) -> bool:
+def _attracts_at(result: Diagram, place: float) -> bool:
     """Whether any cycle attracts on both sides of a place."""
-    pairs = [pair for branch in found.branches for pair in pairwise(branch.points)]
+    pairs = [pair for branch in result.branches for pair in pairwise(branch.points)]
     across = [(a, b) for a, b in pairs if (a.place - place) * (b.place - place) <= 0]
     return any(max(abs(a.multiplier), abs(b.multiplier)) < 1 for a, b in across)
 
 
-def node_verdicts(found: Plane) -> list[tuple[float, float, str]]:
+def node_verdicts(result: Plane) -> list[tuple[float, float, str]]:
     """The values [SI] of both keys at every node of the grid, the first key the slowest, and the verdict there."""
-    verdicts = np.full(found.nodes**2, INVALID, object)
-    verdicts[found.allowed] = _verdicts(found.cycles)
-    values = _values(found.space, found.space.grid(found.nodes)).tolist()
+    verdicts = np.full(result.nodes**2, INVALID, object)
+    verdicts[result.allowed] = _verdicts(result.cycles)
+    values = _values(result.space, result.space.grid(result.nodes)).tolist()
     return [(x, y, verdict) for (x, y), verdict in zip(values, verdicts.tolist(), strict=True)]
 
 
-def corner_verdicts(found: Plane) -> list[tuple[float, float, str]]:
+def corner_verdicts(result: Plane) -> list[tuple[float, float, str]]:
     """The same at the corners: both keys low, the second high, the first high, both high."""
-    nodes, last = node_verdicts(found), found.nodes - 1
-    return [nodes[k] for k in (0, last, found.nodes * last, -1)]
+    nodes, last = node_verdicts(result), result.nodes - 1
+    return [nodes[k] for k in (0, last, result.nodes * last, -1)]
 
 
-def lost_places(found: Plane) -> Array:
+def lost_places(result: Plane) -> Array:
     """Where a change was seen that no curve could be begun at [SI], shape (places, 2)."""
-    return _values(found.space, np.reshape(found.lost, (-1, 2)))
+    return _values(result.space, np.reshape(result.lost, (-1, 2)))
 
 
 def _verdicts(cycles: Cycles) -> list[str]:

@@ -50,15 +50,15 @@ MARGIN = 0.02
 """Share of a range by which the plane of two keys is drawn larger, so that nodes at its sides are seen whole."""
 
 
-def boundary_figure(found: Diagram | Plane, shown: tuple[Shown, ...], subject: str = "") -> Figure:
+def boundary_figure(traced: Diagram | Plane, keys: tuple[Shown, ...], subject: str = "") -> Figure:
     """What was found over one key, or in the plane of two; special points are named in the units shown."""
-    figure = _diagram(found, shown[0]) if isinstance(found, Diagram) else _plane(found)
+    figure = _diagram(traced, keys[0]) if isinstance(traced, Diagram) else _plane(traced)
     return replace(figure, subject=subject)
 
 
-def _diagram(found: Diagram, key: Shown) -> Figure:
+def _diagram(traced: Diagram, key: Shown) -> Figure:
     """Amplitude, period and multiplier of all cycles over the key; the legend stands above the first of them."""
-    branches, x = lines(found), _axis(found.space.ranges[0])
+    branches, x = lines(traced), _axis(traced.space.ranges[0])
     sizes = [size for line in branches for size in line.amplitude]
     log = max(sizes, default=0.0) > LOGARITHMIC * min(sizes, default=0.0)
     panels = (
@@ -69,7 +69,7 @@ def _diagram(found: Diagram, key: Shown) -> Figure:
     bounds = Limit((-1.0, 1.0), "", GREY, "dotted")
     panels = (*panels[:2], replace(panels[2], title="A cycle attracts between −1 and 1", limits=(bounds,)))
     styles = "Solid: the cycle attracts, motions near it end in it. Dashed: it repels."
-    note = f"{styles if branches else 'No cycle was found.'} {end_sentence(found, key)}"
+    note = f"{styles if branches else 'No cycle was found.'} {end_sentence(traced, key)}"
     return Figure("boundary", "Hunting cycles", note, panels, note=note)
 
 
@@ -101,10 +101,10 @@ def _runs(line: Line) -> Iterator[tuple[bool, np.ndarray]]:
             yield bool(line.attracts[legs[0]]), np.append(legs, legs[-1] + 1)
 
 
-def _plane(found: Plane) -> Figure:
+def _plane(traced: Plane) -> Figure:
     """The curves, and between them the verdicts at the nodes of the grid."""
-    x, y = (_axis(one, MARGIN) for one in found.space.ranges)
-    curves = lines(found)
+    x, y = (_axis(swept, MARGIN) for swept in traced.space.ranges)
+    curves = lines(traced)
     series = tuple(
         Series(
             line.at[:, 0],
@@ -116,7 +116,7 @@ def _plane(found: Plane) -> Figure:
         )
         for line in curves
     )
-    across, up, verdicts = zip(*node_verdicts(found), strict=True)
+    across, up, verdicts = zip(*node_verdicts(traced), strict=True)
     codes = np.array([list(NODES).index(verdict) for verdict in verdicts], dtype=float)
     numbers = np.full(codes.shape, np.nan)
     nodes = Cloud(np.array(across), np.array(up), numbers, "", "", kinds=tuple(NODES.values()), codes=codes)
@@ -126,6 +126,6 @@ def _plane(found: Plane) -> Figure:
     return Figure("boundary", "Edge of hunting", note, (Panel("", x, y, series, clouds=(nodes,)),), note=note)
 
 
-def _axis(one: Range, margin: float = 0.0) -> Axis:
-    low, high = one.at(np.array([-margin, 1 + margin])).tolist()
-    return Axis(quantity(one.key), one.unit, (low, high), one.log)
+def _axis(swept: Range, margin: float = 0.0) -> Axis:
+    low, high = swept.at(np.array([-margin, 1 + margin])).tolist()
+    return Axis(quantity(swept.key), swept.unit, (low, high), swept.log)

@@ -64,25 +64,25 @@ class Shown:
             return f"{self.text(value)} (error not known)"
         return self._with_unit(f"{self.number(value):.6g} ± {self.number(error):.1g}")
 
-    def extent(self, values: Array, one: Range) -> str:
+    def extent(self, values: Array, swept: Range) -> str:
         """From the lowest value [SI] to the highest inside a range."""
-        low, high = self.number(max(one.low, float(values.min()))), self.number(min(one.high, float(values.max())))
+        low, high = self.number(max(swept.low, float(values.min()))), self.number(min(swept.high, float(values.max())))
         return self._with_unit(f"{low:.6g} to {high:.6g}")
 
     def _with_unit(self, numbers: str) -> str:
         return f"{numbers} {pretty(self.unit)}".rstrip()
 
 
-def sentences(found: Diagram | Plane, shown: tuple[Shown, ...]) -> list[str]:
+def sentences(traced: Diagram | Plane, keys: tuple[Shown, ...]) -> list[str]:
     """What was found, for the terminal."""
-    return _of_diagram(found, shown[0]) if isinstance(found, Diagram) else _of_plane(found, shown)
+    return _of_diagram(traced, keys[0]) if isinstance(traced, Diagram) else _of_plane(traced, keys)
 
 
-def _of_diagram(found: Diagram, key: Shown) -> list[str]:
-    branches = lines(found)
+def _of_diagram(traced: Diagram, key: Shown) -> list[str]:
+    branches = lines(traced)
     turns = sorted((line.at[k, 0], _turn(line, k, key)) for line in branches for k in line.special)
-    said = [text for _, text in turns] or [_no_boundary(found.space, (key,))]
-    return [end_sentence(found, key), *said, *(_followed(line, key, found.space) for line in branches)]
+    boundaries = [text for _, text in turns] or [_no_boundary(traced.space, (key,))]
+    return [end_sentence(traced, key), *boundaries, *(_followed(line, key, traced.space) for line in branches)]
 
 
 def _turn(line: Line, k: int, key: Shown) -> str:
@@ -112,53 +112,53 @@ def _followed(line: Line, key: Shown, space: Space) -> str:
     return f"{name} were followed over {key.extent(line.at[:, 0], space.ranges[0])}; ends: {_ends(line)}."
 
 
-def end_sentence(found: Diagram, key: Shown) -> str:
+def end_sentence(traced: Diagram, key: Shown) -> str:
     """The verdicts at both ends of the range."""
-    one = found.space.ranges[0]
-    first, last = end_verdicts(found)
-    return f"At {key.text(one.low)}: {VERDICTS[first]}; at {key.text(one.high)}: {VERDICTS[last]}."
+    swept = traced.space.ranges[0]
+    first, last = end_verdicts(traced)
+    return f"At {key.text(swept.low)}: {VERDICTS[first]}; at {key.text(swept.high)}: {VERDICTS[last]}."
 
 
-def _of_plane(found: Plane, shown: tuple[Shown, ...]) -> list[str]:
-    curves = lines(found)
-    said = [_curve(line, shown, found.space) for line in curves] or [_no_boundary(found.space, shown)]
-    said += [
+def _of_plane(traced: Plane, keys: tuple[Shown, ...]) -> list[str]:
+    curves = lines(traced)
+    text = [_curve(line, keys, traced.space) for line in curves] or [_no_boundary(traced.space, keys)]
+    text += [
         f"{kind.capitalize()}: beyond, {MEANINGS[kind]}." for kind in dict.fromkeys(line.kinds[0] for line in curves)
     ]
-    said += [BASIN] if any(line.shape == "asymmetric" for line in curves) else []
-    return [*said, *_corners(found, shown), *_lost(found, shown)]
+    text += [BASIN] if any(line.shape == "asymmetric" for line in curves) else []
+    return [*text, *_corners(traced, keys), *_lost(traced, keys)]
 
 
-def _curve(line: Line, shown: tuple[Shown, ...], space: Space) -> str:
+def _curve(line: Line, keys: tuple[Shown, ...], space: Space) -> str:
     """How many points a curve has, where it runs, how it ends, and its largest errors."""
-    sides = zip(shown, line.at.T, space.ranges, strict=True)
-    extents = ", ".join(f"{key.key} {key.extent(values, one)}" for key, values, one in sides)
-    errors = ", ".join(key.text(error, 1) for key, error in zip(shown, line.error.max(axis=0), strict=True))
+    sides = zip(keys, line.at.T, space.ranges, strict=True)
+    extents = ", ".join(f"{key.key} {key.extent(values, swept)}" for key, values, swept in sides)
+    errors = ", ".join(key.text(error, 1) for key, error in zip(keys, line.error.max(axis=0), strict=True))
     head = f"{line.kinds[0].capitalize()} of {CYCLES[line.shape]}: {len(line.at)} points, {extents}"
     return f"{head}; ends: {_ends(line)}; largest error: {errors}."
 
 
-def _corners(found: Plane, shown: tuple[Shown, ...]) -> list[str]:
+def _corners(traced: Plane, keys: tuple[Shown, ...]) -> list[str]:
     """The verdicts at the corners, in one sentence where they agree."""
-    corners = corner_verdicts(found)
+    corners = corner_verdicts(traced)
     if len({verdict for _, _, verdict in corners}) == 1:
         return [f"At all four corners: {VERDICTS[corners[0][2]]}."]
-    return [f"At {_place((x, y), shown)}: {VERDICTS[verdict]}." for x, y, verdict in corners]
+    return [f"At {_place((x, y), keys)}: {VERDICTS[verdict]}." for x, y, verdict in corners]
 
 
-def _lost(found: Plane, shown: tuple[Shown, ...]) -> list[str]:
-    places = [_place(values, shown) for values in lost_places(found).tolist()]
+def _lost(traced: Plane, keys: tuple[Shown, ...]) -> list[str]:
+    places = [_place(values, keys) for values in lost_places(traced).tolist()]
     return [f"A change was seen near {'; '.join(places)}, but no curve could be begun there."] if places else []
 
 
-def _place(values: Sequence[float], shown: tuple[Shown, ...]) -> str:
-    return ", ".join(f"{key.key} = {key.text(value)}" for key, value in zip(shown, values, strict=True))
+def _place(values: Sequence[float], keys: tuple[Shown, ...]) -> str:
+    return ", ".join(f"{key.key} = {key.text(value)}" for key, value in zip(keys, values, strict=True))
 
 
-def _no_boundary(space: Space, shown: tuple[Shown, ...]) -> str:
+def _no_boundary(space: Space, keys: tuple[Shown, ...]) -> str:
     between = (
-        f"{key.key} {key.text(each.low)} to {key.text(each.high)}"
-        for key, each in zip(shown, space.ranges, strict=True)
+        f"{key.key} {key.text(swept.low)} to {key.text(swept.high)}"
+        for key, swept in zip(keys, space.ranges, strict=True)
     )
     return f"No boundary of hunting over {', '.join(between)}."
 

@@ -25,125 +25,125 @@ LITTLE = 0.1
 """Share by which more joint damping has to raise the modulus margin to be worth its trouble."""
 
 
-def controller_step(found: Design) -> Step:
+def controller_step(design: Design) -> Step:
     """The crossover, why it is no other, and the gains."""
-    it = found.controller
-    gains = f"Gains of a PID (kp, ki, kd): {_parallel(found)} of {plain(it.gains.tau_p, 's')}."
-    faster = [_faster(found)] if found.damped else []
-    said = (_not_higher(found), *faster, _not_lower(found), gains, _margin(found), _damping(found))
+    controller = design.controller
+    gains = f"Gains of a PID (kp, ki, kd): {_parallel(design)} of {plain(controller.gains.tau_p, 's')}."
+    faster = [_faster(design)] if design.damped else []
+    sentences = (_not_higher(design), *faster, _not_lower(design), gains, _margin(design), _damping(design))
     figures = ("design_window", "design_damping")
-    return Step(f"Controller: crossover {hertz(it.crossover)}", said, _gains(found), figures)
+    return Step(f"Controller: crossover {hertz(controller.crossover)}", sentences, _gains(design), figures)
 
 
-def _gains(found: Design) -> tuple[tuple[str, str], ...]:
-    it, gains, flat = found.controller, found.controller.gains, found.stage.flat()
-    window = " to ".join(map(hertz, comfortable(found)))
+def _gains(design: Design) -> tuple[tuple[str, str], ...]:
+    controller, gains, flat = design.controller, design.controller.gains, design.stage.flat()
+    window = " to ".join(map(hertz, comfortable(design)))
     return (
-        ("Crossover", hertz(it.crossover)),
+        ("Crossover", hertz(controller.crossover)),
         (
             "Tuned for",
             f"{plain(flat['controller.tuned_mass'], 'kg')}, α = {flat['controller.alpha']:g}, "
             f"β = {flat['controller.beta']:g}",
         ),
         ("k_p", plain(gains.k_p, "N/m")),
-        ("τ_z, τ_i, τ_p", ", ".join(plain(each, "s") for each in (gains.tau_z, gains.tau_i, gains.tau_p))),
-        ("As gains of a PID: kp, ki, kd", _parallel(found)),
-        ("Least modulus margin, as designed", f"{it.margin:.3g}"),
-        ("The same over the corners", f"{it.corners.min():.3g}"),
+        ("τ_z, τ_i, τ_p", ", ".join(plain(time, "s") for time in (gains.tau_z, gains.tau_i, gains.tau_p))),
+        ("As gains of a PID: kp, ki, kd", _parallel(design)),
+        ("Least modulus margin, as designed", f"{controller.margin:.3g}"),
+        ("The same over the corners", f"{controller.corners.min():.3g}"),
         (f"Modulus margin above {WANTED:g}", window),
     )
 
 
-def _faster(found: Design) -> str:
+def _faster(design: Design) -> str:
     """What would let the crossover be higher."""
-    assert found.damped
+    assert design.damped
     return (
-        f"With {plain(found.damped.needed, 'N*s/m')} of joint damping instead of "
-        f"{plain(found.damped.value, 'N*s/m')} it could be {hertz(found.faster)}: --set joint.damping tries it."
+        f"With {plain(design.damped.needed, 'N*s/m')} of joint damping instead of "
+        f"{plain(design.damped.value, 'N*s/m')} it could be {hertz(design.faster)}: --set joint.damping tries it."
     )
 
 
-def _parallel(found: Design) -> str:
+def _parallel(design: Design) -> str:
     """The gains of Eq. 6 that act on the error low-passed with tau_p."""
-    kp, ki, kd = parallel_gains(found)
+    kp, ki, kd = parallel_gains(design)
     return f"{plain(kp, 'N/m')}, {plain(ki, 'N/(m*s)')}, {plain(kd, 'N*s/m')}, behind a low-pass of τ_p"
 
 
-def parallel_gains(found: Design) -> tuple[float, float, float]:
+def parallel_gains(design: Design) -> tuple[float, float, float]:
     """Proportional [N/m], integral [N/(m s)] and derivative gain [N s/m] on the error behind the low-pass of tau_p."""
-    it = found.controller.gains
-    return it.k_p * (1 + it.tau_z / it.tau_i), it.k_p / it.tau_i, it.k_p * it.tau_z
+    gains = design.controller.gains
+    return gains.k_p * (1 + gains.tau_z / gains.tau_i), gains.k_p / gains.tau_i, gains.k_p * gains.tau_z
 
 
-def _not_higher(found: Design) -> str:
-    bounds, crossover = upper(found), found.controller.crossover
-    said = f"Not higher: it is bounded by {_listed(bounds)}."
+def _not_higher(design: Design) -> str:
+    bounds, crossover = upper(design), design.controller.crossover
+    text = f"Not higher: it is bounded by {_listed(bounds)}."
     short = 1 - crossover / bounds[0].value
     if short < ROUNDED:
-        return said
+        return text
     return (
-        f"{said} It stays {percent(short)} below the first of these: sizes in whole tenths of a millimetre, and "
+        f"{text} It stays {percent(short)} below the first of these: sizes in whole tenths of a millimetre, and "
         "their confirmation by beams take that."
     )
 
 
-def _not_lower(found: Design) -> str:
-    bounds = lower(found)
+def _not_lower(design: Design) -> str:
+    bounds = lower(design)
     if not bounds:
         return "Nothing bounds it from below, but the higher, the faster."
     return f"Not lower: from below it is bounded by {_listed(bounds)}; above these, the higher the faster."
 
 
 def _listed(bounds: list[Bound]) -> str:
-    return listed([f"{hertz(each.value)} ({each.reason})" for each in bounds], "and")
+    return listed([f"{hertz(bound.value)} ({bound.reason})" for bound in bounds], "and")
 
 
-def _margin(found: Design) -> str:
-    it = found.controller
+def _margin(design: Design) -> str:
+    controller = design.controller
     return (
-        f"The least modulus margin of the settled states is {it.margin:.3g} as designed and {it.corners.min():.3g} "
-        f"over the corners ({WANTED:g} is wanted)."
+        f"The least modulus margin of the settled states is {controller.margin:.3g} as designed and "
+        f"{controller.corners.min():.3g} over the corners ({WANTED:g} is wanted)."
     )
 
 
-def _damping(found: Design) -> str:
-    it = found.controller.damping
-    own, best, worth = float(it.margins[0]), float(it.margins.max()), it.worth
-    now = f"with its own damping of {plain(it.tried[0], 'N*s/m')} the least modulus margin is {own:.3g}"
-    if worth == 0 or best < (1 + LITTLE) * own:
+def _damping(design: Design) -> str:
+    damping = design.controller.damping
+    as_designed, best, worth = float(damping.margins[0]), float(damping.margins.max()), damping.worth
+    now = f"with its own damping of {plain(damping.tried[0], 'N*s/m')} the least modulus margin is {as_designed:.3g}"
+    if worth == 0 or best < (1 + LITTLE) * as_designed:
         return (
-            f"More damping in the joint is not worth adding: {now}, and none up to {plain(it.tried[-1], 'N*s/m')} "
+            f"More damping in the joint is not worth adding: {now}, and none up to {plain(damping.tried[-1], 'N*s/m')} "
             f"makes more of it than {best:.3g}."
         )
     return (
-        f"Damping in the joint is worth adding: {now}, with {plain(it.tried[worth], 'N*s/m')} it is "
-        f"{it.margins[worth]:.3g}; more brings little."
+        f"Damping in the joint is worth adding: {now}, with {plain(damping.tried[worth], 'N*s/m')} it is "
+        f"{damping.margins[worth]:.3g}; more brings little."
     )
 
 
-def moves_step(found: Design) -> Step:
+def moves_step(design: Design) -> Step:
     """What the simulated moves show."""
-    free, locked = found.verification.free, found.verification.locked
-    said = [f"Of {free.tried} moves over all ranges and tolerances {hunting(free)}: {probability(free)}."]
+    free, locked = design.verification.free, design.verification.locked
+    sentences = [f"Of {free.tried} moves over all ranges and tolerances {hunting(free)}: {probability(free)}."]
     other = settling(locked)
-    said.append(f"{settling(free)}. With the joint locked: {other[0].lower()}{other[1:]}, and {hunting(locked)}.")
+    sentences.append(f"{settling(free)}. With the joint locked: {other[0].lower()}{other[1:]}, and {hunting(locked)}.")
     broken = len(free.completed) - free.tried
     if broken:
-        said.append(f"{broken} moves could not be simulated to their end and do not count.")
-    said += [_met(found), f"{_worst(free)}: worst.toml"]
+        sentences.append(f"{broken} moves could not be simulated to their end and do not count.")
+    sentences += [_met(design), f"{_worst(free)}: worst.toml"]
     facts = (
         *(row for name, outcome in (("free", free), ("locked", locked)) for row in _outcome(name, outcome)),
-        ("In position", f"within ±{plain(found.spec.position.window, 'm')} of the reference"),
+        ("In position", f"within ±{plain(design.spec.position.window, 'm')} of the reference"),
     )
     title = f"Verification: {free.tried} moves, {hunting(free)}"
-    return Step(title, tuple(each for each in said if each), facts, ("design_settling",))
+    return Step(title, tuple(sentence for sentence in sentences if sentence), facts, ("design_settling",))
 
 
-def _met(found: Design) -> str:
-    wanted, time = found.spec.position.settling_time, found.verification.free.slower_than(0.05)
-    if wanted is None:
+def _met(design: Design) -> str:
+    limit, time = design.spec.position.settling_time, design.verification.free.slower_than(0.05)
+    if limit is None:
         return ""
-    return f"Specified for 95 % of the moves: {seconds(float(wanted))}; that is {'' if time <= wanted else 'NOT '}met."
+    return f"Specified for 95 % of the moves: {seconds(float(limit))}; that is {'' if time <= limit else 'NOT '}met."
 
 
 def _worst(outcome: Outcome) -> str:
@@ -153,13 +153,13 @@ def _worst(outcome: Outcome) -> str:
     return f"The worst one, which takes {seconds(float(outcome.settling[k]))} to settle"
 
 
-def _outcome(name: str, it: Outcome) -> tuple[tuple[str, str], ...]:
+def _outcome(name: str, outcome: Outcome) -> tuple[tuple[str, str], ...]:
     """The rows of one state of the joint."""
-    low, high = it.interval
+    low, high = outcome.interval
     return (
-        (f"Joint {name}: hunting", f"{it.hunting} of {it.tried}, {percent(low)} to {percent(high)}"),
+        (f"Joint {name}: hunting", f"{outcome.hunting} of {outcome.tried}, {percent(low)} to {percent(high)}"),
         (
             f"Joint {name}: settling, median and 95 %",
-            f"{seconds(it.slower_than(0.5))}, {seconds(it.slower_than(0.05))}",
+            f"{seconds(outcome.slower_than(0.5))}, {seconds(outcome.slower_than(0.05))}",
         ),
     )

@@ -20,117 +20,125 @@ from friso.views.design.window import lower, upper
 from friso.views.documents import plain_json
 
 
-def design_document(found: Design) -> dict[str, Any]:
+def design_document(design: Design) -> dict[str, Any]:
     """All but the files."""
     document = {
-        "stage": found.given.name,
-        "spec": found.spec.name,
-        "feasible": found.meets,
-        "relax": _relax(found.unmet),
-        "needed": found.needed,
-        "machine_limit_hz": found.spec.limit,
-        "without": _corners(found.without, found),
-        "joint": _joint(found),
-        "leaves": _leaves(found),
-        "front": _front(found),
-        "controller": _controller(found),
-        "verification": _verification(found),
+        "stage": design.given.name,
+        "spec": design.spec.name,
+        "feasible": design.meets,
+        "relax": _relax(design.unmet),
+        "needed": design.needed,
+        "machine_limit_hz": design.spec.limit,
+        "without": _corners(design.without, design),
+        "joint": _joint(design),
+        "leaves": _leaves(design),
+        "front": _front(design),
+        "controller": _controller(design),
+        "verification": _verification(design),
     }
     return plain_json(document)
 
 
 def refused_document(stage: str, spec: str, failure: NoDesign) -> dict[str, Any]:
     """What there is to say where no design meets the specification."""
-    told = {"stage": stage, "spec": spec, "feasible": False, "reason": failure.reason}
-    return plain_json(told | {"relax": _relax(failure.relaxed)})
+    document = {"stage": stage, "spec": spec, "feasible": False, "reason": failure.reason}
+    return plain_json(document | {"relax": _relax(failure.relaxed)})
 
 
 def _relax(relaxed: Sequence[Relaxation]) -> list[dict[str, Any]]:
     return [
-        {"key": it.key, "requirement": it.requirement, "from": it.value, "to": it.needed, "unit": it.unit}
-        for it in relaxed
+        {
+            "key": relaxation.key,
+            "requirement": relaxation.requirement,
+            "from": relaxation.value,
+            "to": relaxation.needed,
+            "unit": relaxation.unit,
+        }
+        for relaxation in relaxed
     ]
 
 
-def _corners(it: Corners, found: Design) -> dict[str, Any]:
-    units = {key: field.unit for key, field in numeric_keys(found.stage.flat()).items()}
-    worst = it.population.of(it.worst)
+def _corners(corners: Corners, design: Design) -> dict[str, Any]:
+    units = {key: field.unit for key, field in numeric_keys(design.stage.flat()).items()}
+    worst = corners.population.of(corners.worst)
     return {
-        "hunts": it.hunts,
-        "highest_edge_hz": it.highest if it.hunts else None,
-        "corners": it.population.count,
-        "unknown_corners": it.unknown,
-        "searched_hz": list(it.searched),
-        "edges_hz": np.where(it.edges > 0, it.edges, np.nan),
+        "hunts": corners.hunts,
+        "highest_edge_hz": corners.highest if corners.hunts else None,
+        "corners": corners.population.count,
+        "unknown_corners": corners.unknown,
+        "searched_hz": list(corners.searched),
+        "edges_hz": np.where(corners.edges > 0, corners.edges, np.nan),
         "worst_corner": {f"{key.replace('.', '_')}{_suffix(units[key])}": value for key, value in worst.items()},
     }
 
 
-def _joint(found: Design) -> dict[str, Any]:
-    it = found.fitted.choice.beams
-    edges = _corners(found.edges, found)
+def _joint(design: Design) -> dict[str, Any]:
+    beams = design.fitted.choice.beams
+    edges = _corners(design.edges, design)
     return {
-        "stiffness_n_per_m": it.drive[0],
-        "stroke_m": found.fitted.task.stroke,
-        "force_at_stroke_n": it.forces[-1],
-        "least_static_friction_n": found.fitted.task.friction,
+        "stiffness_n_per_m": beams.drive[0],
+        "stroke_m": design.fitted.task.stroke,
+        "force_at_stroke_n": beams.forces[-1],
+        "least_static_friction_n": design.fitted.task.friction,
         **edges,
     }
 
 
-def _leaves(found: Design) -> dict[str, Any]:
-    choice, it = found.fitted.choice, found.fitted.choice.beams
-    wanted = [{"name": each.name, "key": each.ways[0].key} for each in choice.requirements]
+def _leaves(design: Design) -> dict[str, Any]:
+    choice, beams = design.fitted.choice, design.fitted.choice.beams
+    requirements = [{"name": requirement.name, "key": requirement.ways[0].key} for requirement in choice.requirements]
     return {
         **_sizes(choice.geometry),
-        "drive_stiffness_n_per_m": it.drive[0],
+        "drive_stiffness_n_per_m": beams.drive[0],
         "first_interfering_hz": choice.frequency,
-        "max_stress_pa": it.stress,
-        "clamp_stress_pa": it.clamp_stress,
-        "yield_margin": it.yield_margin,
-        "fatigue_margin": it.fatigue_margin,
-        "load_n": found.fitted.task.load,
-        "buckling_load_n": it.buckling,
-        "requirements": [{**each, "excess": excess} for each, excess in zip(wanted, choice.excess, strict=True)],
+        "max_stress_pa": beams.stress,
+        "clamp_stress_pa": beams.clamp_stress,
+        "yield_margin": beams.yield_margin,
+        "fatigue_margin": beams.fatigue_margin,
+        "load_n": design.fitted.task.load,
+        "buckling_load_n": beams.buckling,
+        "requirements": [
+            {**requirement, "excess": excess} for requirement, excess in zip(requirements, choice.excess, strict=True)
+        ],
         "passed_over": list(choice.passed_over),
     }
 
 
-def _sizes(it: Geometry) -> dict[str, Any]:
+def _sizes(geometry: Geometry) -> dict[str, Any]:
     return {
-        "count": int(it.sheet.leaves),
-        "length_m": it.length,
-        "width_m": it.width,
-        "thickness_m": it.sheet.thickness,
-        "spacing_m": it.spacing,
-        "material": it.sheet.material,
+        "count": int(geometry.sheet.leaves),
+        "length_m": geometry.length,
+        "width_m": geometry.width,
+        "thickness_m": geometry.sheet.thickness,
+        "spacing_m": geometry.spacing,
+        "material": geometry.sheet.material,
     }
 
 
-def _front(found: Design) -> list[dict[str, Any]]:
+def _front(design: Design) -> list[dict[str, Any]]:
     """Every candidate, with what beams say of it where they were asked."""
-    known = {each.candidate: each for each in found.confirmed}
-    return [_candidate(each, known.get(each)) for each in found.candidates]
+    confirmed = {confirmation.candidate: confirmation for confirmation in design.confirmed}
+    return [_candidate(candidate, confirmed.get(candidate)) for candidate in design.candidates]
 
 
-def _candidate(it: Candidate, beams: Confirmed | None) -> dict[str, Any]:
+def _candidate(candidate: Candidate, beams: Confirmed | None) -> dict[str, Any]:
     return {
-        **_sizes(it.geometry),
-        "drive_stiffness_n_per_m": it.stiffness,
-        "frequency_hz": it.frequency,
+        **_sizes(candidate.geometry),
+        "drive_stiffness_n_per_m": candidate.stiffness,
+        "frequency_hz": candidate.frequency,
         "beams_n_per_m": beams.stiffness if beams else None,
         "beams_hz": beams.frequency if beams else None,
         "failure": beams.failure or None if beams else None,
     }
 
 
-def _controller(found: Design) -> dict[str, Any]:
-    it, gains = found.controller, found.controller.gains
-    kp, ki, kd = parallel_gains(found)
+def _controller(design: Design) -> dict[str, Any]:
+    controller, gains = design.controller, design.controller.gains
+    kp, ki, kd = parallel_gains(design)
     return {
-        "crossover_hz": it.crossover,
-        "bounds_above_hz": [{"value": each.value, "reason": each.reason} for each in upper(found)],
-        "bounds_below_hz": [{"value": each.value, "reason": each.reason} for each in lower(found)],
+        "crossover_hz": controller.crossover,
+        "bounds_above_hz": [{"value": bound.value, "reason": bound.reason} for bound in upper(design)],
+        "bounds_below_hz": [{"value": bound.value, "reason": bound.reason} for bound in lower(design)],
         "k_p_n_per_m": gains.k_p,
         "tau_z_s": gains.tau_z,
         "tau_i_s": gains.tau_i,
@@ -138,30 +146,30 @@ def _controller(found: Design) -> dict[str, Any]:
         "kp_n_per_m": kp,
         "ki_n_per_m_s": ki,
         "kd_n_s_per_m": kd,
-        "modulus_margin": it.margin,
-        "least_modulus_margin": it.corners.min(),
-        "joint_dampings_n_s_per_m": it.damping.tried,
-        "modulus_margins": it.damping.margins,
-        "joint_damping_worth_n_s_per_m": it.damping.tried[it.damping.worth],
+        "modulus_margin": controller.margin,
+        "least_modulus_margin": controller.corners.min(),
+        "joint_dampings_n_s_per_m": controller.damping.tried,
+        "modulus_margins": controller.damping.margins,
+        "joint_damping_worth_n_s_per_m": controller.damping.tried[controller.damping.worth],
     }
 
 
-def _verification(found: Design) -> dict[str, Any]:
-    it, wanted = found.verification, found.spec.position.settling_time
-    met = None if wanted is None else it.free.slower_than(SLOW) <= wanted
-    return {**_outcome(it.free), "settling_time_met": met, "locked": _outcome(it.locked)}
+def _verification(design: Design) -> dict[str, Any]:
+    verification, limit = design.verification, design.spec.position.settling_time
+    met = None if limit is None else verification.free.slower_than(SLOW) <= limit
+    return {**_outcome(verification.free), "settling_time_met": met, "locked": _outcome(verification.locked)}
 
 
-def _outcome(it: Outcome) -> dict[str, Any]:
-    low, high = it.interval
+def _outcome(outcome: Outcome) -> dict[str, Any]:
+    low, high = outcome.interval
     return {
-        "moves": it.tried,
-        "not_completed": len(it.completed) - it.tried,
-        "hunting": it.hunting,
+        "moves": outcome.tried,
+        "not_completed": len(outcome.completed) - outcome.tried,
+        "hunting": outcome.hunting,
         "probability_low": low,
         "probability_high": high,
-        "settling_median_s": it.slower_than(0.5),
-        "settling_95_s": it.slower_than(0.05),
+        "settling_median_s": outcome.slower_than(0.5),
+        "settling_95_s": outcome.slower_than(0.05),
     }
 
 

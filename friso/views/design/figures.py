@@ -50,63 +50,68 @@ SHARES = 401
 KINDS = (Kind("settles in all corners", QUIET), Kind("run failed", INK))
 
 
-def design_figures(found: Design) -> tuple[Figure, ...]:
+def design_figures(design: Design) -> tuple[Figure, ...]:
     """All figures, in the order in which they are read."""
-    figures = (_map(found), _front(found), _modes(found), window_figure(found), _damping(found), _settling(found))
-    return tuple(replace(figure, subject=found.stage.name) for figure in figures)
+    figures = (_map(design), _front(design), _modes(design), window_figure(design), _damping(design), _settling(design))
+    return tuple(replace(figure, subject=design.stage.name) for figure in figures)
 
 
-def _front(found: Design) -> Figure:
+def _front(design: Design) -> Figure:
     """Drive stiffness against first interfering frequency."""
-    choice, multiple = found.fitted.choice, found.spec.safety.parasitic
-    good = [each for each in found.confirmed if not each.failure]
-    failed = [each.candidate for each in found.confirmed if each.failure]
+    choice, multiple = design.fitted.choice, design.spec.safety.parasitic
+    good = [confirmation for confirmation in design.confirmed if not confirmation.failure]
+    failed = [confirmation.candidate for confirmation in design.confirmed if confirmation.failure]
     points = [
         Markers(*_points(good), "by beams", BLUE),
         *([Markers(*_points(failed), "beams failed", VERMILLION, "cross")] if failed else []),
         Markers(choice.beams.drive[:1] / 1e3, np.array([choice.frequency]), "chosen, by beams", CHOSEN, "target"),
     ]
     limits = (
-        Limit((multiple * found.controller.crossover,), f"{multiple:g} times the crossover chosen", INK),
-        Limit((multiple * found.spec.limit,), f"{multiple:g} times the machine's limit", ORANGE),
+        Limit((multiple * design.controller.crossover,), f"{multiple:g} times the crossover chosen", INK),
+        Limit((multiple * design.spec.limit,), f"{multiple:g} times the machine's limit", ORANGE),
     )
     axes = Axis("Drive stiffness", "N/mm", prefixed=False), Axis("First interfering frequency", "Hz")
-    line = Series(*_points(found.candidates), "front, by closed forms", GREY, width=1.8)
-    sheets = sorted({each.geometry.sheet for each in found.candidates}, key=lambda each: (each.thickness, each.leaves))
-    kinds = [f"{each.leaves:g} leaves of {size(each.thickness)} mm {each.material}" for each in sheets]
+    line = Series(*_points(design.candidates), "front, by closed forms", GREY, width=1.8)
+    sheets = sorted(
+        {candidate.geometry.sheet for candidate in design.candidates},
+        key=lambda candidate: (candidate.thickness, candidate.leaves),
+    )
+    kinds = [f"{sheet.leaves:g} leaves of {size(sheet.thickness)} mm {sheet.material}" for sheet in sheets]
     caption = (
         "The best that can be built: no leaves within all requirements are both softer and have a higher first "
         "interfering frequency. It ends on the right where the cart would break away inside the stroke, at "
-        f"{newtons_per(_stiffest(found), 'mm')}, or where space or sheets end. On this front: {listed(kinds, 'and')}."
+        f"{newtons_per(_stiffest(design), 'mm')}, or where space or sheets end. On this front: {listed(kinds, 'and')}."
     )
     panel = Panel("", *axes, (line,), tuple(points), limits)
     return Figure("design_front", "Pareto front of leaf springs", caption, (panel,))
 
 
-def _stiffest(found: Design) -> float:
+def _stiffest(design: Design) -> float:
     """The drive stiffness [N/m] from which the cart breaks away inside the stroke."""
-    task = found.fitted.task
-    return task.friction / (found.spec.safety.breakaway * task.stroke)
+    task = design.fitted.task
+    return task.friction / (design.spec.safety.breakaway * task.stroke)
 
 
 def _points(several: Sequence[Candidate | Confirmed]) -> tuple[Array, Array]:
     """Stiffness [N/mm] and frequency [Hz] of candidates, by closed forms or beams."""
-    return np.array([each.stiffness / 1e3 for each in several]), np.array([each.frequency for each in several])
+    return np.array([candidate.stiffness / 1e3 for candidate in several]), np.array(
+        [candidate.frequency for candidate in several]
+    )
 
 
-def _modes(found: Design) -> Figure:
-    return replace(modes_figure(found.fitted.choice.beams), name="design_modes")
+def _modes(design: Design) -> Figure:
+    return replace(modes_figure(design.fitted.choice.beams), name="design_modes")
 
 
-def _map(found: Design) -> Figure:
+def _map(design: Design) -> Figure:
     """Hunting over crossover and stroke."""
-    it, crossover, stroke = found.map, found.controller.crossover, found.fitted.task.stroke
-    codes = np.where(np.isnan(it.share), 1.0, np.where(it.share == 0, 0.0, np.nan))
-    percents = np.where(np.isnan(codes), 100 * it.share, np.nan)
-    strokes, shade = 1e3 * it.strokes, ("Corners not in position", "%", (0.0, 100.0))
-    field = Map(it.crossovers, strokes, percents, *shade, kinds=KINDS, codes=codes)
-    right, up = _reach(it.crossovers), _reach(strokes)
-    edge, limit = found.edges.highest, found.spec.limit
+    hunting_map, crossover, stroke = design.map, design.controller.crossover, design.fitted.task.stroke
+    codes = np.where(np.isnan(hunting_map.share), 1.0, np.where(hunting_map.share == 0, 0.0, np.nan))
+    percents = np.where(np.isnan(codes), 100 * hunting_map.share, np.nan)
+    strokes, shade = 1e3 * hunting_map.strokes, ("Corners not in position", "%", (0.0, 100.0))
+    field = Map(hunting_map.crossovers, strokes, percents, *shade, kinds=KINDS, codes=codes)
+    right, up = _reach(hunting_map.crossovers), _reach(strokes)
+    edge, limit = design.edges.highest, design.spec.limit
     lines: list[tuple[float, str, Dash]] = [
         (edge, f"edge of hunting at {size(stroke)} mm: {hertz(edge)}", "dashed"),
         (limit, f"machine's limit: {hertz(limit)}", "solid"),
@@ -120,7 +125,7 @@ def _map(found: Design) -> Figure:
     axes = Axis("Crossover", "Hz", right, log=True), Axis("Stroke", "mm", up, log=True, prefixed=False)
     panel = Panel("", *axes, tuple(upright), (point,), maps=(field,))
     caption = (
-        f"The share of the {found.edges.population.count} corners of friction and masses in which the stage is not in "
+        f"The share of the {design.edges.population.count} corners of friction and masses in which the stage is not in "
         "position a quarter of a minute after a typical move: it hunts, or creeps so slowly that it may as well. Drive "
         "stiffness as chosen."
     )
@@ -133,31 +138,31 @@ def _reach(centres: Array) -> tuple[float, float]:
     return float(edges[0]), float(edges[-1])
 
 
-def _damping(found: Design) -> Figure:
+def _damping(design: Design) -> Figure:
     """The least modulus margin over joint damping."""
-    it = found.controller.damping
-    line = Series(it.tried, it.margins, "least modulus margin", BLUE)
+    damping = design.controller.damping
+    line = Series(damping.tried, damping.margins, "least modulus margin", BLUE)
     points = (
-        Markers(it.tried, it.margins, "", BLUE),
-        Markers(it.tried[:1], it.margins[:1], "as designed", CHOSEN, "target"),
+        Markers(damping.tried, damping.margins, "", BLUE),
+        Markers(damping.tried[:1], damping.margins[:1], "as designed", CHOSEN, "target"),
     )
     limit = Limit((WANTED,), f"wanted: {WANTED:g}", INK)
-    x = Axis("Joint damping", "N*s/m", log=bool(it.tried[0] > 0), prefixed=False)
-    top = 1.1 * max(float(it.margins.max()), WANTED)
+    x = Axis("Joint damping", "N*s/m", log=bool(damping.tried[0] > 0), prefixed=False)
+    top = 1.1 * max(float(damping.margins.max()), WANTED)
     panel = Panel("", x, Axis("Modulus margin", "", (0.0, top)), (line,), points, (limit,))
     caption = "The least of all settled states, if damping were added to the joint; 0 where one is not stable."
     return Figure("design_damping", "Margin over joint damping", caption, (panel,))
 
 
-def _settling(found: Design) -> Figure:
+def _settling(design: Design) -> Figure:
     """Cumulative distributions of the settling time."""
-    free, locked = found.verification.free, found.verification.locked
+    free, locked = design.verification.free, design.verification.locked
     cases = ((free, "joint free", BLUE), (locked, "joint locked", ORANGE))
-    lines = [Series(*_distribution(each), name, colour, width=1.8) for each, name, colour in cases]
-    wanted = found.spec.position.settling_time
-    if wanted is not None:
-        lines.append(Series(np.full(2, float(wanted)), np.array([0.0, 100.0]), "specified", INK, "dashed", 1.2))
-    times = np.concatenate([each.x for each in lines])
+    lines = [Series(*_distribution(outcome), name, colour, width=1.8) for outcome, name, colour in cases]
+    specified = design.spec.position.settling_time
+    if specified is not None:
+        lines.append(Series(np.full(2, float(specified)), np.array([0.0, 100.0]), "specified", INK, "dashed", 1.2))
+    times = np.concatenate([line.x for line in lines])
     low, high = float(np.quantile(times, FEW)), float(times.max())
     wide = high > WIDE * low
     x = Axis("Settling time", "s", (0.8 * low if wide else 0.0, 1.05 * high), log=wide)
@@ -172,10 +177,10 @@ def _settling(found: Design) -> Figure:
     return Figure("design_settling", "Settling times", caption, (panel,))
 
 
-def _distribution(it: Outcome) -> tuple[Array, Array]:
+def _distribution(outcome: Outcome) -> tuple[Array, Array]:
     """Settling times [s] and the shares of the moves [%] that have settled by then."""
-    times = np.sort(np.maximum(it.settling[it.completed & np.isfinite(it.settling)], 1e-6))
+    times = np.sort(np.maximum(outcome.settling[outcome.completed & np.isfinite(outcome.settling)], 1e-6))
     if not times.size:
         return np.array([1e-6]), np.array([np.nan])
     picked = np.unique(np.linspace(0, len(times) - 1, SHARES).round().astype(int))
-    return times[picked], 100.0 * (picked + 1) / it.tried
+    return times[picked], 100.0 * (picked + 1) / outcome.tried

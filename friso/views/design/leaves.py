@@ -18,104 +18,114 @@ BINDS = 0.95
 """Share of what is required from which on a requirement is said to bind."""
 
 
-def leaves_step(found: Design) -> Step:
+def leaves_step(design: Design) -> Step:
     """Which leaf springs, and why these."""
-    said = (_interfering(found), _strength(found), _why(found), _confirmed(found), *assumptions(found.stage))
+    sentences = (_interfering(design), _strength(design), _why(design), _confirmed(design), *assumptions(design.stage))
     figures = ("design_front", "design_modes")
-    return Step(f"Leaf springs: {leaves(found)}", said, (*_sizes(found), *_numbers(found)), figures)
+    return Step(f"Leaf springs: {leaves(design)}", sentences, (*_sizes(design), *_numbers(design)), figures)
 
 
-def requirement_rows(found: Design) -> list[tuple[str, str, str, str]]:
+def requirement_rows(design: Design) -> list[tuple[str, str, str, str]]:
     """The requirements: name, keys of the specification that relax it, their values, and how much of it is used."""
-    choice = found.fitted.choice
+    choice = design.fitted.choice
     return [
         (
-            each.name,
-            _keys(each, lambda way: way.key),
-            _keys(each, lambda way: plain(way.value, way.unit)),
+            requirement.name,
+            _keys(requirement, lambda remedy: remedy.key),
+            _keys(requirement, lambda remedy: plain(remedy.value, remedy.unit)),
             f"{100 * share:.1f} %{', binds' if share > BINDS else ''}",
         )
-        for each, share in zip(choice.requirements, choice.excess, strict=True)
+        for requirement, share in zip(choice.requirements, choice.excess, strict=True)
     ]
 
 
-def _keys(it: Requirement, text: Callable[[Way], str]) -> str:
-    return ", ".join(map(text, it.ways))
+def _keys(requirement: Requirement, text: Callable[[Way], str]) -> str:
+    return ", ".join(map(text, requirement.ways))
 
 
-def _sizes(found: Design) -> tuple[tuple[str, str], ...]:
-    it = found.fitted.choice.geometry
+def _sizes(design: Design) -> tuple[tuple[str, str], ...]:
+    geometry = design.fitted.choice.geometry
     return (
-        ("Leaves", f"{it.sheet.leaves:g} of {it.sheet.material}"),
-        ("Length, width, thickness", f"{size(it.length)}, {size(it.width)}, {size(it.sheet.thickness)} mm"),
-        ("Spacing", f"{size(it.spacing)} mm"),
+        ("Leaves", f"{geometry.sheet.leaves:g} of {geometry.sheet.material}"),
+        (
+            "Length, width, thickness",
+            f"{size(geometry.length)}, {size(geometry.width)}, {size(geometry.sheet.thickness)} mm",
+        ),
+        ("Spacing", f"{size(geometry.spacing)} mm"),
     )
 
 
-def _numbers(found: Design) -> tuple[tuple[str, str], ...]:
-    choice, it = found.fitted.choice, found.fitted.choice.beams
+def _numbers(design: Design) -> tuple[tuple[str, str], ...]:
+    choice, beams = design.fitted.choice, design.fitted.choice.beams
     return (
-        ("Drive stiffness, by beams", newtons_per(it.drive[0], "mm")),
+        ("Drive stiffness, by beams", newtons_per(beams.drive[0], "mm")),
         ("First interfering frequency, by beams", hertz(choice.frequency)),
-        ("Stress at the clamps at full stroke", megapascals(it.clamp_stress)),
-        ("Margin to yield, to fatigue", f"{it.yield_margin:.3g} times, {_factor(it.fatigue_margin)}"),
-        ("Buckling load", plain(it.buckling, "N")),
-        ("Load along the leaves, weight included", f"{found.fitted.task.load:.3g} N"),
+        ("Stress at the clamps at full stroke", megapascals(beams.clamp_stress)),
+        ("Margin to yield, to fatigue", f"{beams.yield_margin:.3g} times, {_factor(beams.fatigue_margin)}"),
+        ("Buckling load", plain(beams.buckling, "N")),
+        ("Load along the leaves, weight included", f"{design.fitted.task.load:.3g} N"),
         (
             "Support stiffness at full stroke, x and y",
-            f"{newtons_per(it.support_x[-1], 'µm')}, {newtons_per(it.support_y[-1], 'µm')}",
+            f"{newtons_per(beams.support_x[-1], 'µm')}, {newtons_per(beams.support_y[-1], 'µm')}",
         ),
-        ("Shortening at full stroke", plain(it.shortening, "m")),
+        ("Shortening at full stroke", plain(beams.shortening, "m")),
     )
 
 
-def _interfering(found: Design) -> str:
-    choice, multiple = found.fitted.choice, found.spec.safety.parasitic
+def _interfering(design: Design) -> str:
+    choice, multiple = design.fitted.choice, design.spec.safety.parasitic
     mode = choice.beams.interfering
     if mode is None:
         return f"None of the modes looked at interferes with control ({multiple:g} times the crossover is required)."
     return (
         f"The first mode that interferes with control is {mode.name}, at {hertz(mode.frequency)}: "
-        f"{mode.frequency / found.controller.crossover:.3g} times the crossover ({multiple:g} required)."
+        f"{mode.frequency / design.controller.crossover:.3g} times the crossover ({multiple:g} required)."
     )
 
 
-def _strength(found: Design) -> str:
-    it, load, safety = found.fitted.choice.beams, found.fitted.task.load, found.spec.safety
-    fatigue = "" if math.isnan(it.fatigue_margin) else f" and {_factor(it.fatigue_margin)} below fatigue"
-    required = "" if math.isnan(it.fatigue_margin) else f" and {safety.fatigue:g}"
-    margin = it.buckling / load
+def _strength(design: Design) -> str:
+    beams, load, safety = design.fitted.choice.beams, design.fitted.task.load, design.spec.safety
+    fatigue = "" if math.isnan(beams.fatigue_margin) else f" and {_factor(beams.fatigue_margin)} below fatigue"
+    required = "" if math.isnan(beams.fatigue_margin) else f" and {safety.fatigue:g}"
+    margin = beams.buckling / load
     forms = ", met by the closed forms" if margin < safety.buckling else ""
     return (
-        f"Bent by the stroke alone, the clamps bear {megapascals(it.clamp_stress)}, {it.yield_margin:.3g} times below "
-        f"yield{fatigue} ({safety.strength:g}{required} required). The leaves buckle at {plain(it.buckling, 'N')}, "
-        f"{margin:.3g} times the {load:.3g} N that they carry ({safety.buckling:g} required{forms})."
+        f"Bent by the stroke alone, the clamps bear {megapascals(beams.clamp_stress)}, {beams.yield_margin:.3g} "
+        f"times below yield{fatigue} ({safety.strength:g}{required} required). The leaves buckle at "
+        f"{plain(beams.buckling, 'N')}, {margin:.3g} times the {load:.3g} N that they carry ({safety.buckling:g} "
+        f"required{forms})."
     )
 
 
-def _why(found: Design) -> str:
+def _why(design: Design) -> str:
     """What made these leaves and no others."""
-    choice = found.fitted.choice
-    binding = [each.name for each, share in zip(choice.requirements, choice.excess, strict=True) if share > BINDS]
+    choice = design.fitted.choice
+    binding = [
+        requirement.name for requirement, share in zip(choice.requirements, choice.excess, strict=True) if share > BINDS
+    ]
     chosen = "They are the softest of the front that allow this crossover"
     if not binding:
         return f"{chosen}; no requirement binds but space and sheets."
     return f"{chosen}; what binds (less than 5 % to spare): {listed(binding, 'and')}."
 
 
-def _confirmed(found: Design) -> str:
+def _confirmed(design: Design) -> str:
     """How beams see the front."""
-    tried = found.confirmed
-    failed = sum(bool(each.failure) for each in tried)
-    known = [each for each in tried if not each.failure]
-    off = [abs(each.stiffness / each.candidate.stiffness - 1) for each in known]
-    off += [abs(each.frequency / each.candidate.frequency - 1) for each in known if math.isfinite(each.frequency)]
+    tried = design.confirmed
+    failed = sum(bool(confirmation.failure) for confirmation in tried)
+    confirmed = [confirmation for confirmation in tried if not confirmation.failure]
+    off = [abs(confirmation.stiffness / confirmation.candidate.stiffness - 1) for confirmation in confirmed]
+    off += [
+        abs(confirmation.frequency / confirmation.candidate.frequency - 1)
+        for confirmation in confirmed
+        if math.isfinite(confirmation.frequency)
+    ]
     apart = f", within {percent(max(off))} of the closed forms" if off else ""
     broken = f"; {failed} could not be computed" if failed else ""
-    passed = len(found.fitted.choice.passed_over)
+    passed = len(design.fitted.choice.passed_over)
     over = f" {passed} softer ones fell short by beams and were passed over." if passed else ""
     return (
-        f"Of the {len(found.candidates)} geometries on the front beams confirm {len(known)} of {len(tried)} "
+        f"Of the {len(design.candidates)} geometries on the front beams confirm {len(confirmed)} of {len(tried)} "
         f"tried{apart}{broken}.{over}"
     )
 

@@ -19,24 +19,24 @@ LEAVES = 2
 """The step that shows the drawing and the requirements."""
 
 
-def design_html(found: Design, figures: Sequence[Figure]) -> str:
+def design_html(design: Design, figures: Sequence[Figure]) -> str:
     """The whole page of a design and its figures."""
     return stage_page(
         "design.html",
-        found.stage,
+        design.stage,
         figures,
-        spec=found.spec,
-        verdicts=headline(found),
-        steps=steps(found),
+        spec=design.spec,
+        verdicts=headline(design),
+        steps=steps(design),
         leaves=LEAVES,
-        drawing=Markup(drawing(found)),
-        requirements=requirement_rows(found),
+        drawing=Markup(drawing(design)),
+        requirements=requirement_rows(design),
     )
 
 
-def drawing(found: Design) -> str:
+def drawing(design: Design) -> str:
     """The dimensioned drawing of the leaf springs, SVG."""
-    choice = found.fitted.choice
-    known = materials()[choice.geometry.sheet.material]
-    material = f"{known.name}, {known.grade}"
-    return drawing_svg(choice.beams.mechanism, found.fitted.task.stroke, title=found.stage.name, material=material)
+    choice = design.fitted.choice
+    data = materials()[choice.geometry.sheet.material]
+    material = f"{data.name}, {data.grade}"
+    return drawing_svg(choice.beams.mechanism, design.fitted.task.stroke, title=design.stage.name, material=material)

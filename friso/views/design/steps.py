@@ -15,46 +15,51 @@ GAP = 1.0
 """Static less Coulomb friction [N] that hunting needs at least, as the thesis found (Sec. 4.3.1)."""
 
 
-def steps(found: Design) -> tuple[Step, ...]:
+def steps(design: Design) -> tuple[Step, ...]:
     """All steps of the method, in order."""
-    return isolator_step(found), joint_step(found), leaves_step(found), controller_step(found), moves_step(found)
+    return isolator_step(design), joint_step(design), leaves_step(design), controller_step(design), moves_step(design)
 
 
-def isolator_step(found: Design) -> Step:
+def isolator_step(design: Design) -> Step:
     """Whether an isolator is needed."""
-    corners, flat = found.without, found.given.flat()
-    said = [f"Without isolator the machine {edge(corners)}.", *_worst(corners, found), *_gap(found)]
-    if not found.needed:
-        said.append(brings(found))
+    corners, flat = design.without, design.given.flat()
+    sentences = [f"Without isolator the machine {edge(corners)}.", *_worst(corners, design), *_gap(design)]
+    if not design.needed:
+        sentences.append(brings(design))
     facts = [
         ("Corners of friction and masses", str(corners.population.count)),
         ("Edge of hunting without isolator", _edge(corners)),
-        ("The same with the safety factor", _edge(corners, found.spec.safety.hunting)),
-        ("Machine's limit", hertz(found.spec.limit)),
+        ("The same with the safety factor", _edge(corners, design.spec.safety.hunting)),
+        ("Machine's limit", hertz(design.spec.limit)),
         ("Crossovers searched", " to ".join(map(hertz, corners.searched))),
     ]
-    known = gaps(corners, flat)
-    facts += [] if known is None else [("Static less Coulomb friction", f"{known.min():.3g} to {known.max():.3g} N")]
-    answer = "yes" if found.needed else "no"
-    return Step(f"Is an isolator needed: {answer}", tuple(said), tuple(facts), ())
+    losses = gaps(corners, flat)
+    facts += [] if losses is None else [("Static less Coulomb friction", f"{losses.min():.3g} to {losses.max():.3g} N")]
+    answer = "yes" if design.needed else "no"
+    return Step(f"Is an isolator needed: {answer}", tuple(sentences), tuple(facts), ())
 
 
-def joint_step(found: Design) -> Step:
+def joint_step(design: Design) -> Step:
     """How soft, and with which stroke."""
-    task, it, safety = found.fitted.task, found.fitted.choice.beams, found.spec.safety
+    task, beams, safety = design.fitted.task, design.fitted.choice.beams, design.spec.safety
     allowed = task.friction / safety.breakaway / (1 + safety.stiffness_tolerance)
-    stiffness, force = newtons_per(it.drive[0], "mm"), plain(it.forces[-1], "N")
+    stiffness, force = newtons_per(beams.drive[0], "mm"), plain(beams.forces[-1], "N")
     held = (
         f"At full stroke the joint pushes with {force}. The cart breaks away at {plain(task.friction, 'N')} at the "
         f"least; with the safety factor of {safety.breakaway:g} and a stiffness off by "
         f"{safety.stiffness_tolerance:.0%} that allows {allowed:.3g} N, so that it stays stuck inside the stroke."
     )
-    said = [held, _stroke(found), f"With this joint the machine {edge(found.edges)}.", *_worst(found.edges, found)]
-    joint = found.stage.flat()
+    sentences = [
+        held,
+        _stroke(design),
+        f"With this joint the machine {edge(design.edges)}.",
+        *_worst(design.edges, design),
+    ]
+    joint = design.stage.flat()
     facts = (
         ("Drive stiffness", stiffness),
         ("Stroke to each side", f"{size(task.stroke)} mm"),
-        ("Departure from linear over the stroke", f"{100 * it.nonlinearity:.2g} %"),
+        ("Departure from linear over the stroke", f"{100 * beams.nonlinearity:.2g} %"),
         ("Force at full stroke", force),
         ("Least static friction", plain(task.friction, "N")),
         (
@@ -62,9 +67,9 @@ def joint_step(found: Design) -> Step:
             f"{plain(joint['joint.limiter_stiffness'], 'N/m')}, "
             f"{plain(joint['joint.limiter_damping'], 'N*s/m')} (as given)",
         ),
-        ("Edge of hunting with isolator", _edge(found.edges)),
+        ("Edge of hunting with isolator", _edge(design.edges)),
     )
-    return Step(f"Joint: {stiffness}, stroke {size(task.stroke)} mm", tuple(said), facts, ("design_map",))
+    return Step(f"Joint: {stiffness}, stroke {size(task.stroke)} mm", tuple(sentences), facts, ("design_map",))
 
 
 def _edge(corners: Corners, factor: float = 1.0) -> str:
@@ -75,8 +80,8 @@ def _edge(corners: Corners, factor: float = 1.0) -> str:
     return hertz(factor * corners.highest) if math.isfinite(corners.highest) else beyond
 
 
-def _stroke(found: Design) -> str:
-    stroke, allowed = found.fitted.task.stroke, found.spec.leaves.stroke
+def _stroke(design: Design) -> str:
+    stroke, allowed = design.fitted.task.stroke, design.spec.leaves.stroke
     if allowed.low == allowed.high:
         return f"The stroke of {size(stroke)} mm is the one specified."
     if stroke == allowed.high:
@@ -87,32 +92,32 @@ def _stroke(found: Design) -> str:
     )
 
 
-def _worst(corners: Corners, found: Design) -> list[str]:
+def _worst(corners: Corners, design: Design) -> list[str]:
     """The corner that decides, and those of which nothing is known."""
-    said = []
+    sentences = []
     if corners.hunts:
         count = corners.population.count
-        said.append(f"Worst of {count} corners: {corner(corners, found.stage.flat())}.")
+        sentences.append(f"Worst of {count} corners: {corner(corners, design.stage.flat())}.")
     if corners.unknown:
-        said.append(
+        sentences.append(
             f"In {corners.unknown} corners a run that had to decide failed at some crossover: there it counts as "
             "hunting."
         )
-    return said
+    return sentences
 
 
-def _gap(found: Design) -> list[str]:
+def _gap(design: Design) -> list[str]:
     """The friction that is lost in sliding, against what the thesis says of it."""
-    known = gaps(found.without, found.given.flat())
-    if known is None:
+    losses = gaps(design.without, design.given.flat())
+    if losses is None:
         return []
-    small = found.without.edges[known < GAP]
-    said = f"Breaking away, the cart loses {known.min():.3g} to {known.max():.3g} N of its friction."
+    small = design.without.edges[losses < GAP]
+    text = f"Breaking away, the cart loses {losses.min():.3g} to {losses.max():.3g} N of its friction."
     if not small.size:
-        return [f"{said} That is more than the {GAP:g} N that hunting needs by the thesis."]
+        return [f"{text} That is more than the {GAP:g} N that hunting needs by the thesis."]
     hunting = small[small > 0]
     if not hunting.size:
-        return [f"{said} Corners with less than {GAP:g} N do not hunt, as the thesis found."]
+        return [f"{text} Corners with less than {GAP:g} N do not hunt, as the thesis found."]
     top = hunting.max()
-    reach = f"up to {hertz(float(top))}" if top < found.without.searched[1] else "at all crossovers searched"
-    return [f"{said} By the thesis hunting needs about {GAP:g} N; here corners with less hunt too, {reach}."]
+    reach = f"up to {hertz(float(top))}" if top < design.without.searched[1] else "at all crossovers searched"
+    return [f"{text} By the thesis hunting needs about {GAP:g} N; here corners with less hunt too, {reach}."]

@@ -19,45 +19,45 @@ class Bound:
     reason: str
 
 
-def comfortable(found: Design) -> Range:
+def comfortable(design: Design) -> Range:
     """The range of crossovers [Hz] with a modulus margin above 0.5 that holds the one chosen."""
-    below = [each for each in found.fitted.limits.comfortable if each[0] <= 1.01 * found.controller.crossover]
+    below = [window for window in design.fitted.limits.comfortable if window[0] <= 1.01 * design.controller.crossover]
     return below[-1]
 
 
-def stiffest(found: Design) -> float:
+def stiffest(design: Design) -> float:
     """The crossover [Hz] that the front allows: a share of the highest first interfering frequency on it."""
-    return max(each.frequency for each in found.candidates) / found.spec.safety.parasitic
+    return max(candidate.frequency for candidate in design.candidates) / design.spec.safety.parasitic
 
 
-def upper(found: Design) -> list[Bound]:
+def upper(design: Design) -> list[Bound]:
     """What bounds the crossover from above, the lowest first."""
-    multiple = found.spec.safety.parasitic
+    multiple = design.spec.safety.parasitic
     front = f"the highest first interfering frequency of the front over {multiple:g}"
     bounds = [
-        Bound(found.spec.limit, "the machine's limit"),
-        Bound(stiffest(found), front),
-        Bound(comfortable(found)[1], f"above, the modulus margin is under {WANTED:g}"),
+        Bound(design.spec.limit, "the machine's limit"),
+        Bound(stiffest(design), front),
+        Bound(comfortable(design)[1], f"above, the modulus margin is under {WANTED:g}"),
     ]
-    return sorted((each for each in bounds if np.isfinite(each.value)), key=lambda each: each.value)
+    return sorted((bound for bound in bounds if np.isfinite(bound.value)), key=lambda bound: bound.value)
 
 
-def lower(found: Design) -> list[Bound]:
+def lower(design: Design) -> list[Bound]:
     """What bounds the crossover from below, the highest first."""
-    factor, edges = found.spec.safety.hunting, found.edges
-    low = comfortable(found)[0]
+    factor, edges = design.spec.safety.hunting, design.edges
+    low = comfortable(design)[0]
     bounds = (
-        [Bound(low, f"below, the modulus margin is under {WANTED:g}")] if low > found.fitted.limits.searched[0] else []
+        [Bound(low, f"below, the modulus margin is under {WANTED:g}")] if low > design.fitted.limits.searched[0] else []
     )
     if edges.hunts:
         bounds.append(Bound(factor * edges.highest, f"{factor:g} times the edge of hunting"))
-    return sorted(bounds, key=lambda each: -each.value)
+    return sorted(bounds, key=lambda bound: -bound.value)
 
 
-def view(found: Design) -> Range:
+def view(design: Design) -> Range:
     """The crossovers [Hz] that a figure of the window shows."""
-    crossover = found.controller.crossover
-    edges = np.concatenate([found.without.edges, found.edges.edges])
+    crossover = design.controller.crossover
+    edges = np.concatenate([design.without.edges, design.edges.edges])
     edges = edges[np.isfinite(edges) & (edges > 0)]
-    top = max(crossover, found.spec.limit, *edges.tolist())
+    top = max(crossover, design.spec.limit, *edges.tolist())
     return float(min(crossover / 10, *edges.tolist(), crossover) / 1.3), float(3 * top)

@@ -21,33 +21,33 @@ HALF = 0.32
 CHOSEN, EDGES = "#e3001b", "#7a3300"
 
 
-def window_figure(found: Design) -> Figure:
+def window_figure(design: Design) -> Figure:
     """Rows of bars over the crossover, from the machine's limit down to hunting."""
-    shown = view(found)
-    factor, multiple = found.spec.safety.hunting, found.spec.safety.parasitic
+    visible = view(design)
+    factor, multiple = design.spec.safety.hunting, design.spec.safety.parasitic
     allowed = [
-        ("machine", [(0.0, found.spec.limit)]),
-        ("leaves", [(0.0, stiffest(found))]),
-        ("margin", list(found.fitted.limits.comfortable)),
+        ("machine", [(0.0, design.spec.limit)]),
+        ("leaves", [(0.0, stiffest(design))]),
+        ("margin", list(design.fitted.limits.comfortable)),
     ]
-    hunting = [("isolator", found.edges), ("without", found.without)]
+    hunting = [("isolator", design.edges), ("without", design.without)]
     rows = [name for name, _ in (*allowed, *hunting)][::-1]
     bands = []
     for name, ranges in allowed:
-        bands += _bars(ranges, shown, rows.index(name), "allowed", ALLOWED)
+        bands += _bars(ranges, visible, rows.index(name), "allowed", ALLOWED)
     for name, corners in hunting:
         top = corners.highest if corners.hunts else 0.0
-        bands += _bars([(0.0, top)], shown, rows.index(name), "hunts in some corner", HUNTS)
-        bands += _bars([(top, factor * top)], shown, rows.index(name), f"within the safety factor {factor:g}", CLOSE)
+        bands += _bars([(0.0, top)], visible, rows.index(name), "hunts in some corner", HUNTS)
+        bands += _bars([(top, factor * top)], visible, rows.index(name), f"within the safety factor {factor:g}", CLOSE)
     line = Series(
-        np.full(2, found.controller.crossover), np.array([-0.5, len(rows) - 0.5]), "chosen", CHOSEN, width=2.0
+        np.full(2, design.controller.crossover), np.array([-0.5, len(rows) - 0.5]), "chosen", CHOSEN, width=2.0
     )
-    points = _corners([(rows.index(name), corners) for name, corners in hunting], shown)
+    points = _corners([(rows.index(name), corners) for name, corners in hunting], visible)
     panel = Panel(
-        "", Axis("Crossover", "Hz", shown, log=True), _words(rows), (line,), (points,), bands=_named_once(bands)
+        "", Axis("Crossover", "Hz", visible, log=True), _words(rows), (line,), (points,), bands=_named_once(bands)
     )
     caption = (
-        f"What bounds the crossover, and the one chosen, {hertz(found.controller.crossover)}. Machine: its limit. "
+        f"What bounds the crossover, and the one chosen, {hertz(design.controller.crossover)}. Machine: its limit. "
         f"Leaves: the highest first interfering frequency of the front over {multiple:g}. Margin: modulus margin above "
         f"{WANTED:g}. Isolator, without: where the machine hunts with it and without it; dots are the edges in the "
         "corners of friction and masses."
@@ -59,13 +59,13 @@ def _words(rows: list[str]) -> Axis:
     return Axis("", "", (-0.5, len(rows) - 0.5), words=tuple(rows))
 
 
-def _bars(ranges: list[Range], shown: Range, row: int, label: str, colour: str) -> list[Band]:
+def _bars(ranges: list[Range], visible: Range, row: int, label: str, colour: str) -> list[Band]:
     """The parts of ranges that are in view."""
-    clipped = [(max(low, shown[0]), min(high, shown[1])) for low, high in ranges]
+    clipped = [(max(low, visible[0]), min(high, visible[1])) for low, high in ranges]
     return [
-        Band(np.array(each), np.full(2, row - HALF), np.full(2, row + HALF), label, colour)
-        for each in clipped
-        if each[0] < each[1]
+        Band(np.array(ends), np.full(2, row - HALF), np.full(2, row + HALF), label, colour)
+        for ends in clipped
+        if ends[0] < ends[1]
     ]
 
 
@@ -79,9 +79,11 @@ def _named_once(bands: list[Band]) -> tuple[Band, ...]:
     return tuple(named)
 
 
-def _corners(rows: list[tuple[int, Corners]], shown: Range) -> Markers:
+def _corners(rows: list[tuple[int, Corners]], visible: Range) -> Markers:
     """The edge of each corner that is known and in view."""
-    known = [(row, corners.edges[(corners.edges > shown[0]) & (corners.edges < shown[1])]) for row, corners in rows]
-    x = np.concatenate([edges for _, edges in known])
-    y = np.concatenate([np.full(len(edges), float(row)) for row, edges in known])
+    edges_of_rows = [
+        (row, corners.edges[(corners.edges > visible[0]) & (corners.edges < visible[1])]) for row, corners in rows
+    ]
+    x = np.concatenate([edges for _, edges in edges_of_rows])
+    y = np.concatenate([np.full(len(edges), float(row)) for row, edges in edges_of_rows])
     return Markers(x, y, "edge in a corner", EDGES, "circle")

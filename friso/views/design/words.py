@@ -33,64 +33,65 @@ class Step:
     figures: tuple[str, ...]
 
 
-def headline(found: Design) -> list[tuple[str, str]]:
+def headline(design: Design) -> list[tuple[str, str]]:
     """The verdicts, each with its colour: isolator or not, what it is, whether it holds."""
     return [
-        (ORANGE if found.needed else GREEN, need(found)),
+        (ORANGE if design.needed else GREEN, need(design)),
         (
             GREEN,
-            f"The isolator: {leaves(found)}; stroke {size(found.fitted.task.stroke)} mm to each side, crossover "
-            f"{hertz(found.controller.crossover)}.",
+            f"The isolator: {leaves(design)}; stroke {size(design.fitted.task.stroke)} mm to each side, crossover "
+            f"{hertz(design.controller.crossover)}.",
         ),
-        _verified(found),
+        _verified(design),
     ]
 
 
-def need(found: Design) -> str:
+def need(design: Design) -> str:
     """Whether the machine needs an isolator, and why."""
-    limit, factor, without = hertz(found.spec.limit), found.spec.safety.hunting, found.without
+    limit, factor, without = hertz(design.spec.limit), design.spec.safety.hunting, design.without
     if not without.hunts:
         return f"No isolator is needed: without one the machine {edge(without)}."
     above = f"{_at_least(factor * without.highest)}, {factor:g} times the edge of hunting"
-    if found.needed:
+    if design.needed:
         return f"An isolator is needed: without one the crossover has to be {above}; the machine allows {limit}."
     return f"No isolator is needed: without one the crossover has to be {above}, and the machine allows {limit}."
 
 
-def brings(found: Design) -> str:
+def brings(design: Design) -> str:
     """What an isolator brings and costs where none is needed."""
-    tried, crossover, limit = found.verification, found.controller.crossover, found.spec.limit
+    tried, crossover, limit = design.verification, design.controller.crossover, design.spec.limit
     slower = f" It costs crossover: {hertz(crossover)} instead of {hertz(limit)}." if crossover < 0.97 * limit else ""
     return (
-        f"All the same, this is what one brings: with it the machine {edge(found.edges)}. Moves settle in "
+        f"All the same, this is what one brings: with it the machine {edge(design.edges)}. Moves settle in "
         f"{seconds(tried.free.slower_than(0.5))} instead of {seconds(tried.locked.slower_than(0.5))} (median), 95 % "
         f"of them in {seconds(tried.free.slower_than(0.05))} instead of "
         f"{seconds(tried.locked.slower_than(0.05))}, at the same crossover.{slower}"
     )
 
 
-def leaves(found: Design) -> str:
+def leaves(design: Design) -> str:
     """The leaf springs chosen."""
-    return leaf_words(found.fitted.choice.geometry)
+    return leaf_words(design.fitted.choice.geometry)
 
 
-def leaf_words(it: Geometry) -> str:
+def leaf_words(geometry: Geometry) -> str:
     """Leaf springs in words."""
+    edges = f"{size(geometry.length)} x {size(geometry.width)} x {size(geometry.sheet.thickness)}"
     return (
-        f"{it.sheet.leaves:g} leaves of {size(it.length)} x {size(it.width)} x {size(it.sheet.thickness)} mm, "
-        f"{size(it.spacing)} mm apart, of {it.sheet.material}"
+        f"{geometry.sheet.leaves:g} leaves of {edges} mm, {size(geometry.spacing)} mm apart, of "
+        f"{geometry.sheet.material}"
     )
 
 
-def _verified(found: Design) -> tuple[str, str]:
-    free, locked, wanted = found.verification.free, found.verification.locked, found.spec.position.settling_time
+def _verified(design: Design) -> tuple[str, str]:
+    free, locked, limit = design.verification.free, design.verification.locked, design.spec.position.settling_time
     held = f" (with the joint locked, {hunting(locked)})" if locked.hunting else ""
-    said = f"Of {free.tried} simulated moves {hunting(free)}{held}: {probability(free)}. {settling(free)}"
-    if wanted is None:
-        return (VERMILLION if free.hunting else GREEN), f"{said}."
-    met = free.slower_than(0.05) <= wanted
+    text = f"Of {free.tried} simulated moves {hunting(free)}{held}: {probability(free)}. {settling(free)}"
+    if limit is None:
+        return (VERMILLION if free.hunting else GREEN), f"{text}."
+    met = free.slower_than(0.05) <= limit
     colour = VERMILLION if free.hunting or not met else GREEN
-    return colour, f"{said}; {'as' if met else 'not as'} specified ({seconds(float(wanted))})."
+    return colour, f"{text}; {'as' if met else 'not as'} specified ({seconds(float(limit))})."
 
 
 def hunting(outcome: Outcome) -> str:
@@ -151,24 +152,25 @@ def refusal(failure: NoDesign) -> str:
     if not failure.relaxed:
         tail = "no requirement is known that, relaxed alone, is enough: relax several"
         return f"{failure.reason}\n  {tail}"
-    later = any(each.geometry for each in failure.relaxed)
+    later = any(change.geometry for change in failure.relaxed)
     tail = ["(each alone; this is of the leaf springs, the steps after them were not tried)"] if later else []
     return "\n  ".join([failure.reason, *map(relaxation, failure.relaxed[:SHOWN]), *tail])
 
 
-def shortfall(found: Design) -> str:
+def shortfall(design: Design) -> str:
     """What of the specification the design does not meet."""
-    free = found.verification.free
+    free = design.verification.free
     hunts = [f"of {free.tried} moves {hunting(free)}"] if free.hunting else []
-    return "; ".join([*hunts, *map(relaxation, found.unmet)])
+    return "; ".join([*hunts, *map(relaxation, design.unmet)])
 
 
-def relaxation(it: Relaxation) -> str:
-    needed = outwards(it.needed, it.needed > it.value)
-    said = f"relax {it.key} from {plain(it.value, it.unit)} to {plain(needed, it.unit)} ({it.requirement})"
-    if it.geometry is None:
-        return said
-    return f"{said}: then {leaf_words(it.geometry)} do"
+def relaxation(change: Relaxation) -> str:
+    needed = outwards(change.needed, change.needed > change.value)
+    values = f"{plain(change.value, change.unit)} to {plain(needed, change.unit)}"
+    text = f"relax {change.key} from {values} ({change.requirement})"
+    if change.geometry is None:
+        return text
+    return f"{text}: then {leaf_words(change.geometry)} do"
 
 
 def outwards(value: float, larger: bool) -> float:
@@ -176,8 +178,8 @@ def outwards(value: float, larger: bool) -> float:
     if value <= 0:
         return value
     step = 10.0 ** (math.floor(math.log10(value)) - 2)
-    whole = math.ceil(value / step - 1e-9) if larger else math.floor(value / step + 1e-9)
-    return float(f"{whole * step:.6g}")
+    steps = math.ceil(value / step - 1e-9) if larger else math.floor(value / step + 1e-9)
+    return float(f"{steps * step:.6g}")
 
 
 def plain(value: float, unit: str) -> str:

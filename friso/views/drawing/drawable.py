@@ -129,8 +129,8 @@ def _limit(limit: Limit, extent: tuple[float, float]) -> Series:
 
 
 def _markers(markers: Markers, x_factor: float, y_factor: float) -> Markers:
-    shown = np.isfinite(markers.x) & np.isfinite(markers.y)
-    return replace(markers, x=markers.x[shown] * x_factor, y=markers.y[shown] * y_factor)
+    finite = np.isfinite(markers.x) & np.isfinite(markers.y)
+    return replace(markers, x=markers.x[finite] * x_factor, y=markers.y[finite] * y_factor)
 
 
 def _band(band: Band, x_factor: float, y_factor: float) -> Band:

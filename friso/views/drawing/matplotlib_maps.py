@@ -27,8 +27,8 @@ _VECTORS = 10_000  # more cells than these become a picture inside an SVG or PDF
 def draw_coloured(axes: Axes, panel: Panel) -> None:
     """The maps and clouds of a panel: first what shows a number, then what shows a kind."""
     for field in panel.coloured:
-        drawn = scale(field)
-        _add(axes, panel, field, painted(field), _colour_map(drawn), (drawn.low, drawn.high))
+        colour_scale = scale(field)
+        _add(axes, panel, field, painted(field), _colour_map(colour_scale), (colour_scale.low, colour_scale.high))
         if field.codes is not None and field.kinds:
             kinds = ListedColormap([kind.colour for kind in field.kinds])
             _add(axes, panel, field, field.codes, kinds, (-0.5, len(field.kinds) - 0.5))
@@ -45,9 +45,9 @@ def _add(
         x, y = cell_edges(field.x, log=panel.x.log), cell_edges(field.y, log=panel.y.log)
         seams = {} if style["rasterized"] else {"edgecolors": "face", "linewidth": 0.2}  # else white hairlines in SVG
         return axes.pcolormesh(x, y, np.ma.masked_invalid(values), **seams, **style)
-    shown = np.isfinite(values)
+    finite = np.isfinite(values)
     edge = {"s": 20, "linewidths": 0.3, "edgecolors": GREY}
-    return axes.scatter(field.x[shown], field.y[shown], c=values[shown], **edge, **style)
+    return axes.scatter(field.x[finite], field.y[finite], c=values[finite], **edge, **style)
 
 
 def add_colour_bars(canvas: Canvas, axes: Sequence[Axes], panels: Sequence[Panel]) -> None:
@@ -58,23 +58,25 @@ def add_colour_bars(canvas: Canvas, axes: Sequence[Axes], panels: Sequence[Panel
         shared = [axes[i] for i, panel in enumerate(panels) if panel.coloured]
         _bar(canvas, shared, *next(iter(bars.values())))
         return
-    for i, (drawn, label) in bars.items():
-        _bar(canvas, [axes[i]], drawn, label)
+    for i, (colour_scale, label) in bars.items():
+        _bar(canvas, [axes[i]], colour_scale, label)
 
 
-def _bar(canvas: Canvas, axes: list[Axes], drawn: Scale, label: str) -> None:
-    mappable = ScalarMappable(Normalize(drawn.low, drawn.high), _colour_map(drawn))
-    bar = canvas.colorbar(mappable, ax=axes, ticks=list(drawn.ticks) or None, fraction=0.05, pad=0.015, aspect=28)
-    if drawn.texts:
-        bar.set_ticklabels(list(drawn.texts))
+def _bar(canvas: Canvas, axes: list[Axes], colour_scale: Scale, label: str) -> None:
+    mappable = ScalarMappable(Normalize(colour_scale.low, colour_scale.high), _colour_map(colour_scale))
+    bar = canvas.colorbar(
+        mappable, ax=axes, ticks=list(colour_scale.ticks) or None, fraction=0.05, pad=0.015, aspect=28
+    )
+    if colour_scale.texts:
+        bar.set_ticklabels(list(colour_scale.texts))
     bar.minorticks_off()
     bar.set_label(label, parse_math=False)
 
 
-def _colour_map(drawn: Scale) -> Colormap:
-    if drawn.steps:
-        return ListedColormap(list(drawn.colours))
-    return LinearSegmentedColormap.from_list("friso", list(drawn.colours))
+def _colour_map(colour_scale: Scale) -> Colormap:
+    if colour_scale.steps:
+        return ListedColormap(list(colour_scale.colours))
+    return LinearSegmentedColormap.from_list("friso", list(colour_scale.colours))
 
 
 def note_lines(figure: Figure, width: float) -> list[str]:

@@ -61,13 +61,13 @@ def _layer(panel: Panel, field: Coloured, values: Array, colouring: dict[str, An
     text = {"hovertemplate": f"{where}<extra></extra>", "showlegend": False}
     if isinstance(field, Map):
         x, y = _cells(field.x, panel.x), _cells(field.y, panel.y)
-        shown = None if values is field.codes else field.z
-        return go.Heatmap(x=x, y=y, z=values, customdata=shown, **colouring, **text, **place)
-    shown = np.isfinite(values)
+        numbers_shown = None if values is field.codes else field.z
+        return go.Heatmap(x=x, y=y, z=values, customdata=numbers_shown, **colouring, **text, **place)
+    numbers_shown = np.isfinite(values)
     names = {"zmin": "cmin", "zmax": "cmax"}
     marker = {names.get(name, name): value for name, value in colouring.items()}
-    marker |= {"color": values[shown], "size": 6, "line": {"color": GREY, "width": 0.4}}
-    numbers = {"x": field.x[shown], "y": field.y[shown], "customdata": field.z[shown]}
+    marker |= {"color": values[numbers_shown], "size": 6, "line": {"color": GREY, "width": 0.4}}
+    numbers = {"x": field.x[numbers_shown], "y": field.y[numbers_shown], "customdata": field.z[numbers_shown]}
     return go.Scatter(mode="markers", marker=marker, **numbers, **text, **place)
 
 
@@ -80,11 +80,20 @@ def _hover(name: str, axis: Axis) -> str:
     return f"%{{{name}}}" if axis.words else f"%{{{name}:.5~g}} {html.escape(axis.unit)}"
 
 
-def _colouring(drawn: Scale, bar: dict[str, Any] | None, label: str) -> dict[str, Any]:
-    colouring = {"colorscale": drawn.stops, "zmin": drawn.low, "zmax": drawn.high, "showscale": bar is not None}
+def _colouring(colour_scale: Scale, bar: dict[str, Any] | None, label: str) -> dict[str, Any]:
+    colouring = {
+        "colorscale": colour_scale.stops,
+        "zmin": colour_scale.low,
+        "zmax": colour_scale.high,
+        "showscale": bar is not None,
+    }
     if bar is None:
         return colouring
-    ticks = {"tickmode": "array", "tickvals": drawn.ticks, "ticktext": drawn.texts} if drawn.ticks else {}
+    ticks = (
+        {"tickmode": "array", "tickvals": colour_scale.ticks, "ticktext": colour_scale.texts}
+        if colour_scale.ticks
+        else {}
+    )
     title = {"text": html.escape(label), "side": "right"}
     return colouring | {"colorbar": {"title": title, "thickness": 14, "outlinewidth": 0, **ticks, **bar}}
 
@@ -109,10 +118,10 @@ def footer(figure: Figure, legend: str) -> tuple[int, dict[str, Any], list[dict[
     below = {"x": 0, "xanchor": "left", "y": 0, "yanchor": "top", "xref": "paper", "yref": "paper"}
     text = "<br>".join(html.escape(line) for line in lines)
     font = {"size": 11, "color": INK}
-    shown = [{"text": text, "align": "left", "showarrow": False, "font": font, **below}] if lines else []
+    annotations = [{"text": text, "align": "left", "showarrow": False, "font": font, **below}] if lines else []
     if not any((*colour_key(figure), line_key(figure))):
-        return note, {}, shown
-    for annotation in shown:
+        return note, {}, annotations
+    for annotation in annotations:
         annotation["yshift"] = -KEY
     style = {"orientation": "h", "x": 0, "xanchor": "left", "y": 0, "yanchor": "top", "itemclick": False}
-    return note + KEY, {legend: style | {"itemdoubleclick": False, "bgcolor": "rgba(0,0,0,0)"}}, shown
+    return note + KEY, {legend: style | {"itemdoubleclick": False, "bgcolor": "rgba(0,0,0,0)"}}, annotations

@@ -9,41 +9,41 @@ from friso.views.documents import plain_json
 from friso.views.flexure.findings import Found, interferes
 
 
-def flexure_document(found: Found) -> dict[str, Any]:
+def flexure_document(flexure: Found) -> dict[str, Any]:
     """The figures that count, and beside them those of the closed forms."""
-    head = {"stage": found.stage.name, "failure": found.failure or None}
-    return {**head, **_evaluation(found.best), "closed_forms": _evaluation(found.closed)}
+    head = {"stage": flexure.stage.name, "failure": flexure.failure or None}
+    return {**head, **_evaluation(flexure.best), "closed_forms": _evaluation(flexure.closed)}
 
 
-def _evaluation(it: Evaluation) -> dict[str, Any]:
-    first = it.interfering
+def _evaluation(evaluation: Evaluation) -> dict[str, Any]:
+    first = evaluation.interfering
     plain = {
-        "model": it.model,
-        "stroke_m": it.stroke,
-        "drive_stiffness_n_per_m": it.drive[0],
-        "drive_stiffness_under_load_n_per_m": it.loaded_drive,
-        "drive_stiffness_at_stroke_n_per_m": it.drive[-1],
-        "nonlinearity": it.nonlinearity,
+        "model": evaluation.model,
+        "stroke_m": evaluation.stroke,
+        "drive_stiffness_n_per_m": evaluation.drive[0],
+        "drive_stiffness_under_load_n_per_m": evaluation.loaded_drive,
+        "drive_stiffness_at_stroke_n_per_m": evaluation.drive[-1],
+        "nonlinearity": evaluation.nonlinearity,
         "support_stiffness_n_per_m": {
             axis: {"zero": support[0], "full": support[-1]}
-            for axis, support in (("x", it.support_x), ("y", it.support_y))
+            for axis, support in (("x", evaluation.support_x), ("y", evaluation.support_y))
         },
-        "eigenfrequencies_hz": [mode.frequency for mode in it.modes],
-        "names": [mode.name for mode in it.modes],
-        "interferes": [interferes(it, mode) for mode in it.modes],
+        "eigenfrequencies_hz": [mode.frequency for mode in evaluation.modes],
+        "names": [mode.name for mode in evaluation.modes],
+        "interferes": [interferes(evaluation, mode) for mode in evaluation.modes],
         "first_interfering_hz": None if first is None else first.frequency,
-        "max_stress_pa": it.stress,
-        "clamp_stress_pa": it.clamp_stress,
-        "stress_concentration": it.mechanism.stress_concentration,
-        "yield_margin": it.yield_margin,
-        "fatigue_margin": it.fatigue_margin,
-        "shortening_m": it.shortening,
-        "buckling_load_n": it.buckling,
-        "buckling_load_per_leaf_n": it.buckling / it.mechanism.leaves,
-        "buckling_margin": it.buckling_margin,
-        "stiffness_zero": it.stiffness[0],
-        "stiffness_full": it.stiffness[1],
-        "deflections_m": it.deflections,
-        "forces_n": it.forces,
+        "max_stress_pa": evaluation.stress,
+        "clamp_stress_pa": evaluation.clamp_stress,
+        "stress_concentration": evaluation.mechanism.stress_concentration,
+        "yield_margin": evaluation.yield_margin,
+        "fatigue_margin": evaluation.fatigue_margin,
+        "shortening_m": evaluation.shortening,
+        "buckling_load_n": evaluation.buckling,
+        "buckling_load_per_leaf_n": evaluation.buckling / evaluation.mechanism.leaves,
+        "buckling_margin": evaluation.buckling_margin,
+        "stiffness_zero": evaluation.stiffness[0],
+        "stiffness_full": evaluation.stiffness[1],
+        "deflections_m": evaluation.deflections,
+        "forces_n": evaluation.forces,
     }
     return {key: plain_json(value) for key, value in plain.items()}

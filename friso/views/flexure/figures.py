@@ -23,19 +23,19 @@ FINE = 101
 """Deflections between which lines are drawn."""
 
 
-def flexure_figures(found: Found) -> tuple[Figure, ...]:
+def flexure_figures(flexure: Found) -> tuple[Figure, ...]:
     """All figures, in the order in which they are read."""
-    figures = (_force(found), _support(found), modes_figure(found.best))
-    return tuple(replace(figure, subject=found.stage.name) for figure in figures)
+    figures = (_force(flexure), _support(flexure), modes_figure(flexure.best))
+    return tuple(replace(figure, subject=flexure.stage.name) for figure in figures)
 
 
-def _force(found: Found) -> Figure:
+def _force(flexure: Found) -> Figure:
     """Force over deflection, to both sides alike."""
-    reach, steepness = found.best.stroke, float(found.best.drive[0])
+    reach, steepness = flexure.best.stroke, float(flexure.best.drive[0])
     ends = np.array([0.0, reach])
     straight = Series(ends, steepness * ends, "initial stiffness", GREY, "dotted", 1.2)
-    lines, points = _lines(found, lambda it: it.forces, _odd)
-    panel = Panel("", _deflection(found), Axis("Force", "N"), (*lines, straight), (points,))
+    lines, points = _lines(flexure, lambda evaluation: evaluation.forces, _odd)
+    panel = Panel("", _deflection(flexure), Axis("Force", "N"), (*lines, straight), (points,))
     caption = (
         "The force that holds the stage deflected, the same to both sides, while it is free to shift and turn "
         "otherwise. Closed forms know one stiffness; the beams stiffen where they lean much. Dots: computed."
@@ -43,11 +43,11 @@ def _force(found: Found) -> Figure:
     return Figure("flexure_force", "Force over the stroke", caption, (panel,))
 
 
-def _support(found: Found) -> Figure:
+def _support(flexure: Found) -> Figure:
     """Support stiffness along the leaves and along their width."""
     panels = (
-        _supports(found, "Along the leaves (x)", lambda it: it.support_x / 1e6),
-        _supports(found, "Along their width (y)", lambda it: it.support_y / 1e6),
+        _supports(flexure, "Along the leaves (x)", lambda evaluation: evaluation.support_x / 1e6),
+        _supports(flexure, "Along their width (y)", lambda evaluation: evaluation.support_y / 1e6),
     )
     caption = (
         "What the leaves hold against forces across the motion, at the middle of their ends and with all else held: it "
@@ -56,23 +56,30 @@ def _support(found: Found) -> Figure:
     return Figure("flexure_support", "Support stiffness over the deflection", caption, panels, columns=2)
 
 
-def _supports(found: Found, title: str, of: Callable[[Evaluation], Array]) -> Panel:
+def _supports(flexure: Found, title: str, of: Callable[[Evaluation], Array]) -> Panel:
     """One support stiffness [N/µm], the same to both sides."""
-    lines, points = _lines(found, of, _even_falling)
+    lines, points = _lines(flexure, of, _even_falling)
     top = 1.1 * max(float(line.y.max()) for line in lines)
     axis = Axis("Stiffness", "N/µm", (0.0, top), prefixed=False)
-    return Panel(title, _deflection(found), axis, lines, (points,))
+    return Panel(title, _deflection(flexure), axis, lines, (points,))
 
 
-def _lines(found: Found, of: Callable[[Evaluation], Array], smooth: Smooth) -> tuple[tuple[Series, ...], Markers]:
+def _lines(flexure: Found, of: Callable[[Evaluation], Array], smooth: Smooth) -> tuple[tuple[Series, ...], Markers]:
     """The same quantity by each model, drawn smoothly, and where the model that counts was computed."""
-    fine = np.linspace(0.0, found.best.stroke, FINE)
+    fine = np.linspace(0.0, flexure.best.stroke, FINE)
     lines = tuple(
-        Series(fine, smooth(it.deflections, of(it), fine), name, COLOURS[name], DASHES.get(name, "solid"), 1.8)
-        for name, it in found.models.items()
+        Series(
+            fine,
+            smooth(evaluation.deflections, of(evaluation), fine),
+            name,
+            COLOURS[name],
+            DASHES.get(name, "solid"),
+            1.8,
+        )
+        for name, evaluation in flexure.models.items()
     )
-    best = next(iter(found.models))
-    return lines, Markers(found.best.deflections, of(found.best), "", COLOURS[best])
+    best = next(iter(flexure.models))
+    return lines, Markers(flexure.best.deflections, of(flexure.best), "", COLOURS[best])
 
 
 def _odd(x: Array, y: Array, at: Array) -> Array:
@@ -85,5 +92,5 @@ def _even_falling(x: Array, y: Array, at: Array) -> Array:
     return 1 / CubicSpline(np.concatenate([-x[:0:-1], x]), 1 / np.concatenate([y[:0:-1], y]))(at)
 
 
-def _deflection(found: Found) -> Axis:
-    return Axis("Deflection", "m", (0.0, found.best.stroke))
+def _deflection(flexure: Found) -> Axis:
+    return Axis("Deflection", "m", (0.0, flexure.best.stroke))

@@ -32,24 +32,24 @@ class Found:
     @property
     def models(self) -> dict[str, Evaluation]:
         """What there is, by the name of its column."""
-        known = {} if self.beams is None else {BEAMS: self.beams}
-        return {**known, CLOSED: self.closed}
+        models = {} if self.beams is None else {BEAMS: self.beams}
+        return {**models, CLOSED: self.closed}
 
     @property
     def mechanism(self) -> Mechanism:
         return self.closed.mechanism
 
 
-def interferes(it: Evaluation, mode: Mode) -> bool:
+def interferes(evaluation: Evaluation, mode: Mode) -> bool:
     """Whether a mode disturbs control: all but the drive mode, on which control works, may."""
-    return mode.interferes and mode is not it.modes[0]
+    return mode.interferes and mode is not evaluation.modes[0]
 
 
-def named_modes(it: Evaluation) -> dict[str, Mode]:
+def named_modes(evaluation: Evaluation) -> dict[str, Mode]:
     """The modes by name, in their order; namesakes beyond the first are counted."""
     seen: Counter[str] = Counter()
     named = {}
-    for mode in it.modes:
+    for mode in evaluation.modes:
         seen[mode.name] += 1
         named[mode.name if seen[mode.name] == 1 else f"{mode.name} ({seen[mode.name]})"] = mode
     return named

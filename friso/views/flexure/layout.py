@@ -34,9 +34,9 @@ FOOT = 26.0
 """Height of the title block [mm]."""
 
 
-def block_size(it: Mechanism) -> tuple[float, float, float]:
+def block_size(mechanism: Mechanism) -> tuple[float, float, float]:
     """Edges [m] along x, y, z of the block of the stage's mass and moments of inertia; 0 where there is none."""
-    x, y, z = (6 * float(each) / float(it.body.mass) for each in it.body.inertia)
+    x, y, z = (6 * float(moment) / float(mechanism.body.mass) for moment in mechanism.body.inertia)
     return math.sqrt(max(0.0, y + z - x)), math.sqrt(max(0.0, x + z - y)), math.sqrt(max(0.0, x + y - z))
 
 
@@ -66,9 +66,9 @@ class Drawing:
     @property
     def points(self) -> dict[str, tuple[float, float, float]]:
         """Marked points [m] by their letter."""
-        it = self.mechanism
-        places = {"A": it.actuation, "S": it.sensor, "C": it.body.centre}
-        return {letter: tuple(float(each) for each in place) for letter, place in places.items()}  # type: ignore[misc]
+        mechanism = self.mechanism
+        places = {"A": mechanism.actuation, "S": mechanism.sensor, "C": mechanism.body.centre}
+        return {letter: tuple(float(coordinate) for coordinate in place) for letter, place in places.items()}  # type: ignore[misc]
 
     @cached_property
     def block(self) -> tuple[tuple[float, float], ...]:

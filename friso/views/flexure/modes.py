@@ -43,10 +43,12 @@ class Shape:
     moved: Array
 
 
-def modes_figure(it: Evaluation) -> Figure:
+def modes_figure(evaluation: Evaluation) -> Figure:
     """The first modes, a panel each."""
-    drawn = [mode for mode in it.modes if mode.interferes or drawable_share(it.mechanism, mode) > HALF][:SHOWN]
-    panels = tuple(_panel(it.mechanism, mode, mode is it.modes[0] or mode.interferes) for mode in drawn)
+    modes = [mode for mode in evaluation.modes if mode.interferes or drawable_share(evaluation.mechanism, mode) > HALF][
+        :SHOWN
+    ]
+    panels = tuple(_panel(evaluation.mechanism, mode, mode is evaluation.modes[0] or mode.interferes) for mode in modes)
     caption = (
         "The first modes with the cart held and the leaves straight, at a size to be seen. Grey: at rest. The stage is "
         "drawn as the block of its mass and moments of inertia. A mode that actuator and sensor both see limits the "
@@ -55,10 +57,10 @@ def modes_figure(it: Evaluation) -> Figure:
     return Figure("flexure_modes", "Modes", caption, panels, columns=2)
 
 
-def _panel(it: Mechanism, mode: Mode, seen: bool) -> Panel:
-    view = best_view(it, mode)
+def _panel(mechanism: Mechanism, mode: Mode, seen: bool) -> Panel:
+    view = best_view(mechanism, mode)
     axes = VIEWS[view]
-    shapes = [*_leaves(it, mode, axes), _block(it, mode, axes)]
+    shapes = [*_leaves(mechanism, mode, axes), _block(mechanism, mode, axes)]
     corners = np.concatenate([shape.rest[:, axes] for shape in shapes])
     low, high = corners.min(axis=0), corners.max(axis=0)
     largest = max(float(np.abs(shape.moved[:, axes]).max()) for shape in shapes)
@@ -73,82 +75,90 @@ def _panel(it: Mechanism, mode: Mode, seen: bool) -> Panel:
     return Panel(title, Axis("xyz"[axes[0]], "m", x), Axis("xyz"[axes[1]], "m", y), lines, equal=True)
 
 
-def best_view(it: Mechanism, mode: Mode) -> str:
+def best_view(mechanism: Mechanism, mode: Mode) -> str:
     """The first view in which nearly all motion takes place, or the one with most of it."""
-    everything = np.concatenate([mode.leaves.reshape(-1, 3), _corners_moved(it, mode)])
+    everything = np.concatenate([mode.leaves.reshape(-1, 3), _corners_moved(mechanism, mode)])
     shares = np.sum(everything**2, axis=0) / max(float(np.sum(everything**2)), np.finfo(float).tiny)
     seen = {view: float(sum(shares[axis] for axis in axes)) for view, axes in VIEWS.items()}
     return next((view for view, share in seen.items() if share > ENOUGH), max(seen, key=seen.__getitem__))
 
 
-def drawable_share(it: Mechanism, mode: Mode) -> float:
+def drawable_share(mechanism: Mechanism, mode: Mode) -> float:
     """Share of the kinetic energy that is in the stage and the middle lines: the rest is torsion of the leaves."""
-    speed = _rigid(it, mode, _centre(it)[None, :])[0]
-    stage = it.body.mass * np.sum(speed**2) + np.sum(np.array(it.body.inertia, dtype=float) * mode.stage[3:] ** 2)
+    speed = _rigid(mechanism, mode, _centre(mechanism)[None, :])[0]
+    stage = mechanism.body.mass * np.sum(speed**2) + np.sum(
+        np.array(mechanism.body.inertia, dtype=float) * mode.stage[3:] ** 2
+    )
     middle = (mode.leaves[:, 1:] ** 2 + mode.leaves[:, :-1] ** 2).mean(axis=1) / 2
-    return float(stage + it.leaf_mass * np.sum(middle))
+    return float(stage + mechanism.leaf_mass * np.sum(middle))
 
 
-def _corners_moved(it: Mechanism, mode: Mode) -> Array:
+def _corners_moved(mechanism: Mechanism, mode: Mode) -> Array:
     signs = np.array([[a, b, c] for a in (-1, 1) for b in (-1, 1) for c in (-1, 1)])
-    return _rigid(it, mode, _centre(it) + signs * np.array(block_size(it)) / 2)
+    return _rigid(mechanism, mode, _centre(mechanism) + signs * np.array(block_size(mechanism)) / 2)
 
 
-def _centre(it: Mechanism) -> Array:
-    return np.array([float(each) for each in it.body.centre])
+def _centre(mechanism: Mechanism) -> Array:
+    return np.array([float(coordinate) for coordinate in mechanism.body.centre])
 
 
-def _rigid(it: Mechanism, mode: Mode, points: Array) -> Array:
+def _rigid(mechanism: Mechanism, mode: Mode, points: Array) -> Array:
     """How points of the stage, (n, 3), move with it."""
-    arm = points - np.array([float(it.length), 0.0, 0.0])
+    arm = points - np.array([float(mechanism.length), 0.0, 0.0])
     return mode.stage[:3] + np.cross(mode.stage[3:], arm)
 
 
-def _block(it: Mechanism, mode: Mode, axes: tuple[int, int]) -> Shape:
+def _block(mechanism: Mechanism, mode: Mode, axes: tuple[int, int]) -> Shape:
     """The outline of the stage, halfway through it."""
-    half = np.array(block_size(it)) / 2
-    rest = np.tile(_centre(it), (5, 1))
+    half = np.array(block_size(mechanism)) / 2
+    rest = np.tile(_centre(mechanism), (5, 1))
     for axis, signs in zip(axes, ((-1, 1, 1, -1, -1), (-1, -1, 1, 1, -1)), strict=True):
         rest[:, axis] += half[axis] * np.array(signs)
-    return Shape(rest, _rigid(it, mode, rest))
+    return Shape(rest, _rigid(mechanism, mode, rest))
 
 
-def _leaves(it: Mechanism, mode: Mode, axes: tuple[int, int]) -> list[Shape]:
+def _leaves(mechanism: Mechanism, mode: Mode, axes: tuple[int, int]) -> list[Shape]:
     """Middle lines from the side, outlines from above, cross-sections along the leaves."""
     draw = {(0, 2): _middle, (0, 1): _outline, (1, 2): _sections}[axes]
-    return [shape for k, offset in enumerate(it.offsets) for shape in draw(it, mode, mode.leaves[k], float(offset))]
+    return [
+        shape
+        for k, offset in enumerate(mechanism.offsets)
+        for shape in draw(mechanism, mode, mode.leaves[k], float(offset))
+    ]
 
 
-def _middle(it: Mechanism, mode: Mode, leaf: Array, offset: float) -> list[Shape]:
-    x, leaf = _smooth(it, leaf)
+def _middle(mechanism: Mechanism, mode: Mode, leaf: Array, offset: float) -> list[Shape]:
+    x, leaf = _smooth(mechanism, leaf)
     return [Shape(np.stack([x, np.zeros_like(x), np.full_like(x, offset)], axis=1), leaf)]
 
 
-def _outline(it: Mechanism, mode: Mode, leaf: Array, offset: float) -> list[Shape]:
+def _outline(mechanism: Mechanism, mode: Mode, leaf: Array, offset: float) -> list[Shape]:
     """Both long edges and both ends: cross-sections turn as the middle line does."""
-    x, leaf = _smooth(it, leaf)
+    x, leaf = _smooth(mechanism, leaf)
     turn = np.gradient(leaf[:, 1], x)
     turn -= turn[0]  # what is left at the clamp is shear, of nearly the same size all along the leaf
     sides = []
-    for y in (-it.width / 2, it.width / 2):
+    for y in (-mechanism.width / 2, mechanism.width / 2):
         rest = np.stack([x, np.full_like(x, y), np.full_like(x, offset)], axis=1)
         sides.append((rest, leaf + np.stack([-y * turn, 0 * turn, 0 * turn], axis=1)))
-    around = [np.concatenate([one, other[::-1], one[:1]]) for one, other in zip(*sides, strict=True)]
+    around = [np.concatenate([first, second[::-1], first[:1]]) for first, second in zip(*sides, strict=True)]
     return [Shape(*around)]
 
 
-def _smooth(it: Mechanism, leaf: Array) -> tuple[Array, Array]:
+def _smooth(mechanism: Mechanism, leaf: Array) -> tuple[Array, Array]:
     """More places along a leaf [m] and the displacement there, by a cubic spline."""
-    known, fine = (np.linspace(0.0, float(it.length), count) for count in (len(leaf), FINE))
-    return fine, CubicSpline(known, leaf)(fine)
+    reported, fine = (np.linspace(0.0, float(mechanism.length), count) for count in (len(leaf), FINE))
+    return fine, CubicSpline(reported, leaf)(fine)
 
 
-def _sections(it: Mechanism, mode: Mode, leaf: Array, offset: float) -> list[Shape]:
+def _sections(mechanism: Mechanism, mode: Mode, leaf: Array, offset: float) -> list[Shape]:
     """A few cross-sections between cart and stage: they turn evenly more, up to the stage's own turn."""
     shapes = []
     for k in np.linspace(0, len(leaf) - 1, 5).astype(int):
         share = k / (len(leaf) - 1)
-        ends = np.array([[share * float(it.length), y, offset] for y in (-it.width / 2, it.width / 2)])
+        ends = np.array(
+            [[share * float(mechanism.length), y, offset] for y in (-mechanism.width / 2, mechanism.width / 2)]
+        )
         lift = share * mode.stage[3] * ends[:, 1]
         shapes.append(Shape(ends, leaf[k] + np.stack([0 * lift, 0 * lift, lift], axis=1)))
     return shapes
@@ -157,8 +167,8 @@ def _sections(it: Mechanism, mode: Mode, leaf: Array, offset: float) -> list[Sha
 def _joined(lines: list[Array]) -> tuple[Array, Array]:
     """All lines as one, with gaps between them, shapes (n,)."""
     gap = np.full((1, 2), np.nan)
-    whole = np.concatenate([part for line in lines for part in (line, gap)])
-    return whole[:, 0], whole[:, 1]
+    points = np.concatenate([part for line in lines for part in (line, gap)])
+    return points[:, 0], points[:, 1]
 
 
 def _limits(low: Array, high: Array) -> tuple[tuple[float, float], tuple[float, float]]:

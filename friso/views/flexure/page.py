@@ -23,23 +23,23 @@ class Column(NamedTuple):
     colour: str
 
 
-def flexure_html(found: Found, figures: Sequence[Figure]) -> str:
+def flexure_html(flexure: Found, figures: Sequence[Figure]) -> str:
     """The whole page of a mechanism and its figures."""
-    joint, *further = findings(found)
+    joint, *further = findings(flexure)
     return stage_page(
         "flexure.html",
-        found.stage,
+        flexure.stage,
         figures,
-        verdicts=[(GREEN, joint), *((VERMILLION, warning) for warning in warnings(found))],
-        further=[*further, *assumptions(found.stage)],
-        drawing=Markup(drawing(found)),
-        shown=[Column(name, COLOURS[name]) for name in found.models],
-        rows=rows(found),
+        verdicts=[(GREEN, joint), *((VERMILLION, warning) for warning in warnings(flexure))],
+        further=[*further, *assumptions(flexure.stage)],
+        drawing=Markup(drawing(flexure)),
+        shown=[Column(name, COLOURS[name]) for name in flexure.models],
+        rows=rows(flexure),
     )
 
 
-def drawing(found: Found) -> str:
+def drawing(flexure: Found) -> str:
     """The dimensioned drawing of the mechanism, SVG."""
-    known = materials().get(str(found.stage.flat().get("flexure.material")))
-    material = f"{known.name}, {known.grade}" if known else ""
-    return drawing_svg(found.mechanism, found.best.stroke, title=found.stage.name, material=material)
+    data = materials().get(str(flexure.stage.flat().get("flexure.material")))
+    material = f"{data.name}, {data.grade}" if data else ""
+    return drawing_svg(flexure.mechanism, flexure.best.stroke, title=flexure.stage.name, material=material)

@@ -133,14 +133,17 @@ def leader(tip: Point, knee: Point, lines: list[str], reach: float = 2.0) -> lis
     return parts + [words((end[0] + 0.8, end[1] + TEXT * (0.35 + 1.35 * k)), line) for k, line in enumerate(lines)]
 
 
-def _arrows(start: Point, end: Point, way: Point) -> list[str]:
+def _arrows(start: Point, end: Point, direction: Point) -> list[str]:
     """A line with arrows at both ends; from outside, where there is no room between them."""
-    back = (-way[0], -way[1])
+    back = (-direction[0], -direction[1])
     if math.dist(start, end) > 3 * ARROW:
-        return [path([start, end], "thin"), arrow(start, back), arrow(end, way)]
+        return [path([start, end], "thin"), arrow(start, back), arrow(end, direction)]
     tail = 2 * ARROW
-    outer = [(start[0] - tail * way[0], start[1] - tail * way[1]), (end[0] + tail * way[0], end[1] + tail * way[1])]
-    return [path(outer, "thin"), arrow(start, way), arrow(end, back)]
+    outer = [
+        (start[0] - tail * direction[0], start[1] - tail * direction[1]),
+        (end[0] + tail * direction[0], end[1] + tail * direction[1]),
+    ]
+    return [path(outer, "thin"), arrow(start, direction), arrow(end, back)]
 
 
 def _extension(edge: Point, at: Point) -> str:

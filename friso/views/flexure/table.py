@@ -16,11 +16,14 @@ UNKNOWN = "unknown"
 """Stands where a number of the material is not known."""
 
 
-def rows(found: Found) -> list[tuple[str, list[str]]]:
+def rows(flexure: Found) -> list[tuple[str, list[str]]]:
     """The rows: stiffnesses, eigenfrequencies, and what the leaves bear."""
-    models = list(found.models.values())
-    above, below = ([(name, [text(it) for it in models]) for name, text in part.items()] for part in (_STIFF, _BORNE))
-    return [*above, *_modes(found), *below]
+    models = list(flexure.models.values())
+    above, below = (
+        [(name, [text(evaluation) for evaluation in models]) for name, text in part.items()]
+        for part in (_STIFF, _BORNE)
+    )
+    return [*above, *_modes(flexure), *below]
 
 
 def newtons_per(value: float, length: str) -> str:
@@ -47,39 +50,39 @@ def _plain(value: float) -> str:
     return with_unit(value, "").strip()
 
 
-def _modes(found: Found) -> list[tuple[str, list[str]]]:
+def _modes(flexure: Found) -> list[tuple[str, list[str]]]:
     """A row for each mode that some model knows, by name and in the order of frequency, the drive mode first."""
-    known = [(it, named_modes(it)) for it in found.models.values()]
+    named = [(evaluation, named_modes(evaluation)) for evaluation in flexure.models.values()]
     frequencies: dict[str, float] = {}
-    for _, modes in known:
+    for _, modes in named:
         frequencies = {name: mode.frequency for name, mode in modes.items()} | frequencies
-    drive = next(iter(known[0][1]))
+    drive = next(iter(named[0][1]))
     names = [drive, *sorted(frequencies.keys() - {drive}, key=frequencies.__getitem__)]
-    return [(f"Mode: {name}", [_mode(it, modes.get(name)) for it, modes in known]) for name in names]
+    return [(f"Mode: {name}", [_mode(evaluation, modes.get(name)) for evaluation, modes in named]) for name in names]
 
 
-def _mode(it: Evaluation, mode: Mode | None) -> str:
+def _mode(evaluation: Evaluation, mode: Mode | None) -> str:
     if mode is None:
         return NOTHING
-    return with_unit(mode.frequency, "Hz") + (f" ({INTERFERES})" if interferes(it, mode) else "")
+    return with_unit(mode.frequency, "Hz") + (f" ({INTERFERES})" if interferes(evaluation, mode) else "")
 
 
 _STIFF: dict[str, Callable[[Evaluation], str]] = {
-    "Drive stiffness": lambda it: newtons_per(it.drive[0], "mm"),
-    "Drive stiffness under the load": lambda it: newtons_per(it.loaded_drive, "mm"),
-    "Departure from linear over the stroke": lambda it: percent(it.nonlinearity),
-    "Support stiffness x, straight": lambda it: newtons_per(it.support_x[0], "µm"),
-    "Support stiffness x, at full stroke": lambda it: newtons_per(it.support_x[-1], "µm"),
-    "Support stiffness y, straight": lambda it: newtons_per(it.support_y[0], "µm"),
-    "Support stiffness y, at full stroke": lambda it: newtons_per(it.support_y[-1], "µm"),
+    "Drive stiffness": lambda evaluation: newtons_per(evaluation.drive[0], "mm"),
+    "Drive stiffness under the load": lambda evaluation: newtons_per(evaluation.loaded_drive, "mm"),
+    "Departure from linear over the stroke": lambda evaluation: percent(evaluation.nonlinearity),
+    "Support stiffness x, straight": lambda evaluation: newtons_per(evaluation.support_x[0], "µm"),
+    "Support stiffness x, at full stroke": lambda evaluation: newtons_per(evaluation.support_x[-1], "µm"),
+    "Support stiffness y, straight": lambda evaluation: newtons_per(evaluation.support_y[0], "µm"),
+    "Support stiffness y, at full stroke": lambda evaluation: newtons_per(evaluation.support_y[-1], "µm"),
 }
 _BORNE: dict[str, Callable[[Evaluation], str]] = {
-    "Largest stress at full stroke": lambda it: megapascals(it.stress),
-    "Concentration factor at the clamp": lambda it: f"{it.mechanism.stress_concentration:g}",
-    "Stress at the clamp": lambda it: megapascals(it.clamp_stress),
-    "Margin to yield": lambda it: factor(it.yield_margin),
-    "Margin to fatigue": lambda it: factor(it.fatigue_margin),
-    "Shortening at full stroke": lambda it: with_unit(it.shortening, "m"),
-    "Buckling load": lambda it: with_unit(it.buckling, "N"),
-    "Buckling load over the load": lambda it: factor(it.buckling_margin),
+    "Largest stress at full stroke": lambda evaluation: megapascals(evaluation.stress),
+    "Concentration factor at the clamp": lambda evaluation: f"{evaluation.mechanism.stress_concentration:g}",
+    "Stress at the clamp": lambda evaluation: megapascals(evaluation.clamp_stress),
+    "Margin to yield": lambda evaluation: factor(evaluation.yield_margin),
+    "Margin to fatigue": lambda evaluation: factor(evaluation.fatigue_margin),
+    "Shortening at full stroke": lambda evaluation: with_unit(evaluation.shortening, "m"),
+    "Buckling load": lambda evaluation: with_unit(evaluation.buckling, "N"),
+    "Buckling load over the load": lambda evaluation: factor(evaluation.buckling_margin),
 }

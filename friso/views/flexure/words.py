@@ -20,54 +20,56 @@ AGREE = 0.1
 """Share by which the models may differ before that is said."""
 
 
-def sentences(found: Found) -> list[str]:
+def sentences(flexure: Found) -> list[str]:
     """All that is said, in order."""
-    joint, *further = findings(found)
-    return [joint, *warnings(found), *further, *assumptions(found.stage)]
+    joint, *further = findings(flexure)
+    return [joint, *warnings(flexure), *further, *assumptions(flexure.stage)]
 
 
-def findings(found: Found) -> list[str]:
+def findings(flexure: Found) -> list[str]:
     """What the joint is, and what it allows."""
-    return [_joint(found.best), _control(found.best), _endurance(found.best)]
+    return [_joint(flexure.best), _control(flexure.best), _endurance(flexure.best)]
 
 
-def warnings(found: Found) -> list[str]:
+def warnings(flexure: Found) -> list[str]:
     """What is wrong with it."""
-    failed = f"The beam model found no answer: {found.failure.rstrip('.')}. All this is by closed forms."
+    failed = f"The beam model found no answer: {flexure.failure.rstrip('.')}. All this is by closed forms."
     return [
-        *([failed] if found.beams is None else []),
-        *_borne(found.best),
-        *_loaded(found.best),
-        *_breaks_away(found),
-        *_against(found.best),
-        *_differences(found),
+        *([failed] if flexure.beams is None else []),
+        *_borne(flexure.best),
+        *_loaded(flexure.best),
+        *_breaks_away(flexure),
+        *_against(flexure.best),
+        *_differences(flexure),
     ]
 
 
 def assumptions(stage: Stage) -> list[str]:
     """What stands in for keys that the stage file leaves out."""
     flat = stage.flat()
-    said = [_centre(flat), _inertia(flat, flat["masses.stage"]), _points(flat), _load(flat)]
-    parts = [part for part in said if part]
+    notes = [_centre(flat), _inertia(flat, flat["masses.stage"]), _points(flat), _load(flat)]
+    parts = [part for part in notes if part]
     return [f"Assumed, since [flexure] does not say: {'; '.join(parts)}."] if parts else []
 
 
-def _joint(it: Evaluation) -> str:
-    own, drive = it.mechanism, it.modes[0]
+def _joint(evaluation: Evaluation) -> str:
+    mechanism, drive = evaluation.mechanism, evaluation.modes[0]
     return (
-        f"The joint: {own.leaves:g} leaves of {_size(own.length)} x {_size(own.width)} x {_size(own.thickness)} mm, "
-        f"{newtons_per(it.drive[0], 'mm')}; with the cart held the stage of {own.body.mass:g} kg swings at "
-        f"{with_unit(drive.frequency, 'Hz')}. Over {_stroke(it)} the force departs from linear by "
-        f"{percent(it.nonlinearity)} and takes {with_unit(it.forces[-1], 'N')} at its end."
+        f"The joint: {mechanism.leaves:g} leaves of {_size(mechanism.length)} x {_size(mechanism.width)} x "
+        f"{_size(mechanism.thickness)} mm, {newtons_per(evaluation.drive[0], 'mm')}; with the cart held the stage of "
+        f"{mechanism.body.mass:g} kg swings at {with_unit(drive.frequency, 'Hz')}. Over {_stroke(evaluation)} the "
+        f"force departs from linear by {percent(evaluation.nonlinearity)} and takes "
+        f"{with_unit(evaluation.forces[-1], 'N')} at its end."
     )
 
 
-def _control(it: Evaluation) -> str:
-    first = it.interfering
+def _control(evaluation: Evaluation) -> str:
+    first = evaluation.interfering
     if first is None:
         return (
-            f"None of the {len(it.modes) - 1} modes above the drive mode that are known is seen by both actuator and "
-            f"sensor (highest: {with_unit(it.modes[-1].frequency, 'Hz')}); the leaves set no limit to the crossover."
+            f"None of the {len(evaluation.modes) - 1} modes above the drive mode that are known is seen by both "
+            f"actuator and sensor (highest: {with_unit(evaluation.modes[-1].frequency, 'Hz')}); the leaves set no "
+            "limit to the crossover."
         )
     return (
         f"The first mode that interferes with control is {first.name}, at {with_unit(first.frequency, 'Hz')}: by the "
@@ -76,68 +78,72 @@ def _control(it: Evaluation) -> str:
     )
 
 
-def _endurance(it: Evaluation) -> str:
-    bent = f"At the clamp the leaves bear {megapascals(it.clamp_stress)} at full stroke"
-    if math.isnan(it.fatigue_margin):
+def _endurance(evaluation: Evaluation) -> str:
+    bent = f"At the clamp the leaves bear {megapascals(evaluation.clamp_stress)} at full stroke"
+    if math.isnan(evaluation.fatigue_margin):
         return f"{bent}; how much they bear for ever is not known (flexure.fatigue), so neither is the largest stroke."
-    largest = with_unit(it.stroke * it.fatigue_margin, "m")
-    bounds = f" More than half the length, {with_unit(it.mechanism.length / 2, 'm')}, is beyond both models."
-    beyond = bounds if it.stroke * it.fatigue_margin > it.mechanism.length / 2 else ""
+    largest = with_unit(evaluation.stroke * evaluation.fatigue_margin, "m")
+    bounds = f" More than half the length, {with_unit(evaluation.mechanism.length / 2, 'm')}, is beyond both models."
+    beyond = bounds if evaluation.stroke * evaluation.fatigue_margin > evaluation.mechanism.length / 2 else ""
     return (
-        f"{bent} and would bear {megapascals(it.mechanism.fatigue)} for ever: "
+        f"{bent} and would bear {megapascals(evaluation.mechanism.fatigue)} for ever: "
         f"by fatigue the stroke may be about {largest}.{beyond}"
     )
 
 
-def _borne(it: Evaluation) -> list[str]:
+def _borne(evaluation: Evaluation) -> list[str]:
     """Stresses and loads beyond what the leaves bear."""
-    said, own = [], it.mechanism
-    if it.yield_margin < 1:
-        said.append(
-            f"The leaves yield: {megapascals(it.clamp_stress)} at the clamp at {_stroke(it)}, the material bears "
-            f"{megapascals(own.yield_strength)}. Longer or thinner leaves, or less stroke, mend it."
+    lines, mechanism = [], evaluation.mechanism
+    if evaluation.yield_margin < 1:
+        lines.append(
+            f"The leaves yield: {megapascals(evaluation.clamp_stress)} at the clamp at {_stroke(evaluation)}, the "
+            f"material bears {megapascals(mechanism.yield_strength)}. Longer or thinner leaves, or less stroke, mend "
+            "it."
         )
-    elif it.fatigue_margin < 1:
-        said.append(
-            f"The leaves break in the long run: {megapascals(it.clamp_stress)} at the clamp at {_stroke(it)}, for ever "
-            f"they bear {megapascals(own.fatigue)}. Longer or thinner leaves, or less stroke, mend it."
+    elif evaluation.fatigue_margin < 1:
+        lines.append(
+            f"The leaves break in the long run: {megapascals(evaluation.clamp_stress)} at the clamp at "
+            f"{_stroke(evaluation)}, for ever they bear {megapascals(mechanism.fatigue)}. Longer or thinner leaves, "
+            "or less stroke, mend it."
         )
-    if it.buckling_margin < 1:
-        said.append(
-            f"A stage that stands on its leaves buckles them: it weighs {with_unit(own.weight, 'N')} "
-            f"(g = {GRAVITY} m/s²), they bear {with_unit(it.buckling, 'N')} along their length."
+    if evaluation.buckling_margin < 1:
+        lines.append(
+            f"A stage that stands on its leaves buckles them: it weighs {with_unit(mechanism.weight, 'N')} "
+            f"(g = {GRAVITY} m/s²), they bear {with_unit(evaluation.buckling, 'N')} along their length."
         )
-    return said
+    return lines
 
 
-def _loaded(it: Evaluation) -> list[str]:
+def _loaded(evaluation: Evaluation) -> list[str]:
     """What a load along the leaves does."""
-    load = float(it.mechanism.load)
+    load = float(evaluation.mechanism.load)
     if not load:
         return []
-    first = it.modes[0].frequency * math.sqrt(max(it.loaded_drive / it.drive[0], 0.0))
-    close = f" That is {it.buckling_margin:.2g} times below buckling: stiffness hangs on it." if load > 0 else ""
+    first = evaluation.modes[0].frequency * math.sqrt(max(evaluation.loaded_drive / evaluation.drive[0], 0.0))
+    close = (
+        f" That is {evaluation.buckling_margin:.2g} times below buckling: stiffness hangs on it." if load > 0 else ""
+    )
     return [
         f"Under the load of {with_unit(load, 'N')} along the leaves the drive stiffness is "
-        f"{newtons_per(it.loaded_drive, 'mm')} and the drive mode at {with_unit(first, 'Hz')}; all else is told "
-        f"without it.{close}"
+        f"{newtons_per(evaluation.loaded_drive, 'mm')} and the drive mode at {with_unit(first, 'Hz')}; all else is "
+        f"told without it.{close}"
     ]
 
 
-def _breaks_away(found: Found) -> list[str]:
-    static, force = found.stage.flat().get("friction.static"), float(found.best.forces[-1])
+def _breaks_away(flexure: Found) -> list[str]:
+    static, force = flexure.stage.flat().get("friction.static"), float(flexure.best.forces[-1])
     if static is None or force <= static:
         return []
     return [
         f"The cart breaks away inside the stroke: the leaves push with {with_unit(force, 'N')} at "
-        f"{_stroke(found.best)}, static friction holds {with_unit(static, 'N')}. The joint cannot use its stroke "
-        f"beyond about {with_unit(found.best.stroke * static / force, 'm')}."
+        f"{_stroke(flexure.best)}, static friction holds {with_unit(static, 'N')}. The joint cannot use its stroke "
+        f"beyond about {with_unit(flexure.best.stroke * static / force, 'm')}."
     ]
 
 
-def _against(it: Evaluation) -> list[str]:
+def _against(evaluation: Evaluation) -> list[str]:
     """Modes in which the sensor sees the opposite of what the actuator does."""
-    modes = [mode for mode in it.modes if interferes(it, mode) and mode.actuator * mode.sensor < 0]
+    modes = [mode for mode in evaluation.modes if interferes(evaluation, mode) and mode.actuator * mode.sensor < 0]
     if not modes:
         return []
     named = listed([f"{mode.name} ({with_unit(mode.frequency, 'Hz')})" for mode in modes], "and")
@@ -148,11 +154,11 @@ def _against(it: Evaluation) -> list[str]:
     ]
 
 
-def _differences(found: Found) -> list[str]:
+def _differences(flexure: Found) -> list[str]:
     """Where the two models differ so much that one of them is beyond its range."""
-    if found.beams is None:
+    if flexure.beams is None:
         return []
-    shares = {name: get(found.closed) / get(found.beams) - 1 for name, get in _COMPARED.items()}
+    shares = {name: get(flexure.closed) / get(flexure.beams) - 1 for name, get in _COMPARED.items()}
     far = [f"{name} by {100 * share:+.0f} %" for name, share in shares.items() if abs(share) > AGREE]
     if not far:
         return []
@@ -163,16 +169,18 @@ def _differences(found: Found) -> list[str]:
 
 
 _COMPARED: Mapping[str, Callable[[Evaluation], float]] = {
-    "drive stiffness": lambda it: float(it.drive[0]),
-    "force at full stroke": lambda it: float(it.forces[-1]),
-    "support stiffness x": lambda it: float(it.support_x[0]),
-    "support stiffness x at full stroke": lambda it: float(it.support_x[-1]),
-    "support stiffness y": lambda it: float(it.support_y[0]),
-    "support stiffness y at full stroke": lambda it: float(it.support_y[-1]),
-    "drive frequency": lambda it: it.modes[0].frequency,
-    "first interfering frequency": lambda it: it.interfering.frequency if it.interfering else math.nan,
-    "stress": lambda it: it.stress,
-    "buckling load": lambda it: it.buckling,
+    "drive stiffness": lambda evaluation: float(evaluation.drive[0]),
+    "force at full stroke": lambda evaluation: float(evaluation.forces[-1]),
+    "support stiffness x": lambda evaluation: float(evaluation.support_x[0]),
+    "support stiffness x at full stroke": lambda evaluation: float(evaluation.support_x[-1]),
+    "support stiffness y": lambda evaluation: float(evaluation.support_y[0]),
+    "support stiffness y at full stroke": lambda evaluation: float(evaluation.support_y[-1]),
+    "drive frequency": lambda evaluation: evaluation.modes[0].frequency,
+    "first interfering frequency": lambda evaluation: (
+        evaluation.interfering.frequency if evaluation.interfering else math.nan
+    ),
+    "stress": lambda evaluation: evaluation.stress,
+    "buckling load": lambda evaluation: evaluation.buckling,
 }
 
 
@@ -198,12 +206,12 @@ def _point(flat: Mapping[str, Any], name: str, place: str) -> str:
 
 
 def _load(flat: Mapping[str, Any]) -> str:
-    said = "no load on the leaves, but the weight of the stage for the margin to buckling"
-    return "" if "flexure.load" in flat else said
+    text = "no load on the leaves, but the weight of the stage for the margin to buckling"
+    return "" if "flexure.load" in flat else text
 
 
-def _stroke(it: Evaluation) -> str:
-    return f"a stroke of {with_unit(it.stroke, 'm')}"
+def _stroke(evaluation: Evaluation) -> str:
+    return f"a stroke of {with_unit(evaluation.stroke, 'm')}"
 
 
 def _size(length: float) -> str:

@@ -152,7 +152,7 @@ def free_loop_crosses_above(evidence: Evidence) -> Finding:
                 f"tuned to 8 Hz for the whole mass, the free joint's loop crosses 0 dB about {_CROSSES:g} Hz (from "
                 f"{_CROSSES / ABOUT:.3g} to {_CROSSES * ABOUT:.3g} Hz), stuck and sliding",
                 all(about(f, _CROSSES) for f in crossing.values()),
-                f"{', '.join(f'{name} {frequency:.3g} Hz' for name, frequency in crossing.items())}; with the masses identified "
+                f"{', '.join(f'{name} {f:.3g} Hz' for name, f in crossing.items())}; with the masses identified "
                 f"(0.75 kg, tuned for 2.5 kg) {nearest(analysis.identified, _CROSSES):.3g} Hz",
             ),
             Part(
