@@ -244,7 +244,7 @@ def test_jump_is_told_apart_and_followed() -> None:
 
 def made(count: int, seed: int, noise: float) -> tuple[dict[str, np.ndarray], np.ndarray]:
     """Samples of the locked law with known numbers."""
-    values = sweeps.drawn(sweeps.LOCKED_BOX, count, seed)
+    values = sweeps.sampled(sweeps.LOCKED_BOX, count, seed)
     slip = 1.5 * values["stribeck"] * values["gap"] * (values["alpha"] / 0.1) ** -0.4
     drop = 0.4 / values["stribeck"] * values["tuned_mass"] ** -0.9
     off = noise * np.random.default_rng(seed).normal(size=count)
@@ -280,7 +280,7 @@ def test_held_out_errors_tell_a_law_of_the_wrong_shape() -> None:
 
 
 def test_free_law_takes_the_larger_rate_beside_the_locked_edge() -> None:
-    values = sweeps.drawn({**sweeps.LOCKED_BOX, **sweeps.JOINT_BOX, "joint": (1e-4, 0.1)}, 200, 3)
+    values = sweeps.sampled({**sweeps.LOCKED_BOX, **sweeps.JOINT_BOX, "joint": (1e-4, 0.1)}, 200, 3)
     locked = made(200, 3, 0.0)[1]
     joint = 1.3 * np.sqrt(values["joint"]) * values["gap"] ** 0.66
     largest = np.maximum(joint, 0.9 * np.sqrt(values["joint"] / values["stroke"]))

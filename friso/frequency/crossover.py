@@ -87,7 +87,8 @@ def stable_crossovers(flat: Mapping[str, Any], members: Members) -> tuple[Range,
 
 
 def end_of(ranges: Sequence[Range], crossover: float) -> float | None:
-    """Where the range ends that holds a crossover, or the next below it, or else the lowest; None if there is none."""
+    """Upper end [Hz] of the range that contains a crossover [Hz], or of the next one below it, or else of the lowest; None
+    without ranges."""
     below = [high for low, high in ranges if low <= crossover] or [high for _, high in ranges[:1]]
     return below[-1] if below else None
 
@@ -119,7 +120,7 @@ def _at(flat: Mapping[str, Any], crossover: np.ndarray) -> dict[str, Any]:
 
 def _abscissa(flat: Mapping[str, Any], members: Members, crossover: np.ndarray) -> np.ndarray:
     """Real part of the rightmost closed-loop pole [1/s], shape (crossovers, members)."""
-    return _looked_at(flat, members, crossover).abscissa.reshape(len(crossover), len(members))
+    return _stability(flat, members, crossover).abscissa.reshape(len(crossover), len(members))
 
 
 def _distance(flat: Mapping[str, Any], members: Members, crossover: np.ndarray) -> np.ndarray:
@@ -127,10 +128,10 @@ def _distance(flat: Mapping[str, Any], members: Members, crossover: np.ndarray) 
     omega = _search_grid(flat)
     bare = plants(flat, members, omega) * Drive.of(flat).transfer(omega)
     shared = np.array([distance_to_lines(bare * controller(_at(flat, f), omega)) for f in crossover])
-    return np.minimum(shared, _looked_at(flat, members, crossover).resonant.reshape(shared.shape))
+    return np.minimum(shared, _stability(flat, members, crossover).resonant.reshape(shared.shape))
 
 
-def _looked_at(flat: Mapping[str, Any], members: Members, crossover: np.ndarray) -> PoleStability:
+def _stability(flat: Mapping[str, Any], members: Members, crossover: np.ndarray) -> PoleStability:
     """All members at the first crossover, then at the second, and so on."""
     return stability_by_poles(_at(flat, np.repeat(crossover, len(members))), members.repeated(len(crossover)))
 

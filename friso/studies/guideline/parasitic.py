@@ -57,5 +57,5 @@ def _comfortable(flat: Mapping[str, Any]) -> Range | None:
 
 
 def holding(ranges: Sequence[Range], crossover: float) -> Range | None:
-    """The range that holds a crossover; None if none does."""
+    """The range [Hz] that contains a crossover [Hz]; None if none does."""
     return next((stable for stable in ranges if stable[0] <= crossover <= stable[1]), None)

@@ -29,7 +29,7 @@ def stability(bode: Bode) -> list[str]:
         return [f"The loop is {_well(bode.settled[1])}."]
     says = [_settled(bode)]
     if bode.stable:
-        return [*says, f"So it is in every state: {_looked_at(bode)}. Worst: {_worst(bode)}."]
+        return [*says, f"So it is in every state: {_states_checked(bode)}. Worst: {_worst(bode)}."]
     return [*says, f"It is not stable in every state. Unstable: {'; '.join(_where(bode))}.", *_why(bode)]
 
 
@@ -104,7 +104,7 @@ def _unit(bode: Bode) -> str:
     return "Hz" if _crossing(bode) else "times this bandwidth"
 
 
-def _looked_at(bode: Bode) -> str:
+def _states_checked(bode: Bode) -> str:
     """The family in words."""
     members = bode.scan.members
     parts = []
