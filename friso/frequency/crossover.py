@@ -87,8 +87,8 @@ def stable_crossovers(flat: Mapping[str, Any], members: Members) -> tuple[Range,
 
 
 def end_of(ranges: Sequence[Range], crossover: float) -> float | None:
-    """Upper end [Hz] of the range that contains a crossover [Hz], or of the next one below it, or else of the lowest; None
-    without ranges."""
+    """Upper end [Hz] of the range that contains a crossover [Hz], or of the next one below it, or else of the lowest;
+    None without ranges."""
     below = [high for low, high in ranges if low <= crossover] or [high for _, high in ranges[:1]]
     return below[-1] if below else None
 
