@@ -44,15 +44,15 @@ print(before / 1024, peak / 1024, time.perf_counter() - start, hunting)
 
 def _check(cache: Path, *options: str) -> tuple[float, str]:
     """Wall time [s] of one `friso check` and its standard error."""
-    kept: list[subprocess.CompletedProcess[str]] = []
+    processes: list[subprocess.CompletedProcess[str]] = []
     command = [sys.executable, *options, "-c", START, "check", str(FILE)]
     environment = {**os.environ, "FRISO_CACHE_DIR": str(cache)}
     seconds = clock(
-        lambda: kept.append(subprocess.run(command, env=environment, capture_output=True, text=True, cwd=cache))
+        lambda: processes.append(subprocess.run(command, env=environment, capture_output=True, text=True, cwd=cache))
     )
-    if kept[0].returncode:
-        raise RuntimeError(f"friso check ended with status {kept[0].returncode}: {kept[0].stderr[-500:]}")
-    return seconds, kept[0].stderr
+    if processes[0].returncode:
+        raise RuntimeError(f"friso check ended with status {processes[0].returncode}: {processes[0].stderr[-500:]}")
+    return seconds, processes[0].stderr
 
 
 def _import_seconds(cache: Path) -> float:
@@ -84,11 +84,13 @@ def run_memory() -> list[Goal]:
     with tempfile.TemporaryDirectory(prefix="friso-bench-") as cache:
         environment = {**os.environ, "FRISO_CACHE_DIR": cache}
         command = [sys.executable, "-c", _SWEEP]
-        found = [subprocess.run(command, env=environment, capture_output=True, text=True, cwd=root) for _ in range(2)]
-    for done in found:
+        processes = [
+            subprocess.run(command, env=environment, capture_output=True, text=True, cwd=root) for _ in range(2)
+        ]
+    for done in processes:
         if done.returncode:
             raise RuntimeError(done.stderr[-800:])
-    (_, cold, *_), (before, peak, seconds, hunting) = (map(float, done.stdout.split()) for done in found)
+    (_, cold, *_), (before, peak, seconds, hunting) = (map(float, done.stdout.split()) for done in processes)
     print(f"\nSweep of {SWEPT} runs (free rig, crossover x stroke, rtol 1e-4): {seconds:.1f} s, {hunting:.0f} hunt,")
     print(f"  peak memory {peak:.0f} MB, {before:.0f} MB of it before the sweep; ", end="")
     print(f"{cold:.0f} MB, of this process or the compiling one, where the kernel is compiled first")

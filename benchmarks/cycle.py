@@ -46,12 +46,12 @@ def run_verdict(repetitions: int) -> list[Goal]:
     rows, cycles, rests = [], [], []
     for name, changes in CASES.items():
         stage = stage_of(changes)
-        found = hunting(stage)
+        verdict = hunting(stage)
         once = [clock(lambda: hunting(stage)) for _ in range(repetitions)]  # noqa: B023
         rest = [clock(lambda: _what_starts(stage)) for _ in range(repetitions)]  # noqa: B023
         cycles.append(min(once))
         rests.append(min(rest))
-        rows.append([name, len(found.cycles), spread(once, digits=3), spread(rest, digits=3)])
+        rows.append([name, len(verdict.cycles), spread(once, digits=3), spread(rest, digits=3)])
     print("\nVerdict, kernels warm: cycle with multipliers and return map; kicks, moves and margin")
     print_table(("stage", "cycles", "cycle min / median [s]", "the rest min / median [s]"), rows)
     both = cycles[0] + cycles[1]  # a check judges the rig locked and free
@@ -62,11 +62,11 @@ def run_verdict(repetitions: int) -> list[Goal]:
 
 
 def _what_starts(stage: Stage) -> None:
-    found = hunting(stage)
-    if found.attracting:
+    verdict = hunting(stage)
+    if verdict.attracting:
         for kind in (displacements, pushes, moves):
-            kind(stage, found.attracting[0])
-    margin(stage, bool(found.attracting))
+            kind(stage, verdict.attracting[0])
+    margin(stage, bool(verdict.attracting))
 
 
 def run_curve(repetitions: int) -> list[Goal]:
@@ -78,7 +78,7 @@ def run_curve(repetitions: int) -> list[Goal]:
         seconds = []
         for _ in range(repetitions):
             seconds.append(clock(lambda: _keep(boundary(stage, axes))))  # noqa: B023
-        curves = _kept[-1].curves
+        curves = _planes[-1].curves
         points = sum(len(curve.spots) for curve in curves)
         fifty = 50 * min(seconds) / points
         rows.append([name, len(curves), points, spread(seconds), f"{fifty:.1f}"])
@@ -88,19 +88,19 @@ def run_curve(repetitions: int) -> list[Goal]:
     return goals
 
 
-_kept: list[Plane] = []
+_planes: list[Plane] = []
 
 
-def _keep(found: Any) -> None:
-    _kept.append(found)
+def _keep(plane: Any) -> None:
+    _planes.append(plane)
 
 
 def run_map(repetitions: int) -> list[Goal]:
     """Maps of the multiplier, 41 x 41."""
     rows, goals = [], []
     for name, (changes, axes) in MAPS.items():
-        stage, wanted = stage_of(changes), ["multiplier", "amplitude", "cycle_period"]
-        seconds = [clock(lambda: sweep(stage, axes, metrics=wanted)) for _ in range(repetitions)]  # noqa: B023
+        stage, metrics = stage_of(changes), ["multiplier", "amplitude", "cycle_period"]
+        seconds = [clock(lambda: sweep(stage, axes, metrics=metrics)) for _ in range(repetitions)]  # noqa: B023
         rows.append([name, spread(seconds), f"{min(seconds) / 1681 * 1e3:.1f}"])
         goals.append(Goal(f"41 x 41 multipliers, {name}", "< 60 s", f"{min(seconds):.1f} s", min(seconds) < 60))
     print("\nMaps of the multiplier, 41 x 41")
@@ -119,9 +119,9 @@ def run_accuracy() -> list[Goal]:
         off = [
             abs(getattr(plain, what)[0] / getattr(tight, what)[0] - 1) for what in ("period", "amplitude", "multiplier")
         ]
-        rows.append([name, *(f"{each:.1e}" for each in off)])
+        rows.append([name, *(f"{error:.1e}" for error in off)])
         reached = off[0] < 1e-6 and off[1] < 1e-6 and off[2] < 1e-4
-        goals.append(Goal(f"accuracy, {name}", "1e-6, 1e-6, 1e-4", ", ".join(f"{each:.0e}" for each in off), reached))
+        goals.append(Goal(f"accuracy, {name}", "1e-6, 1e-6, 1e-4", ", ".join(f"{error:.0e}" for error in off), reached))
     print("\nRelative difference between rtol 1e-9 and 1e-11")
     print_table(("stage", "period", "amplitude", "multiplier"), rows)
     return goals

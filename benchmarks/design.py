@@ -28,73 +28,74 @@ CHUNK = 20_000
 STROKE = 1e-3
 
 
-def many(one: Mechanism, count: int) -> Mechanism:
+def many(mechanism: Mechanism, count: int) -> Mechanism:
     """Mechanisms with lengths, widths and thicknesses drawn about one."""
     draw = np.random.default_rng(0).uniform(0.5, 1.5, (3, count))
     sizes = {
-        name: getattr(one, name) * factor for name, factor in zip(("length", "width", "thickness"), draw, strict=True)
+        name: getattr(mechanism, name) * factor
+        for name, factor in zip(("length", "width", "thickness"), draw, strict=True)
     }
     centre = (sizes["length"], 0.0, 0.0)
-    return replace(one, **sizes, body=replace(one.body, centre=centre), actuation=centre, sensor=centre)
+    return replace(mechanism, **sizes, body=replace(mechanism.body, centre=centre), actuation=centre, sensor=centre)
 
 
-def all_figures(it: Mechanism) -> None:
+def all_figures(mechanism: Mechanism) -> None:
     """What a search looks at."""
     for form in (closed_forms.drive_stiffness, closed_forms.buckling_load):
-        form(it)
+        form(mechanism)
     for deflected in (closed_forms.max_stress, closed_forms.support_x, closed_forms.support_y):
-        deflected(it, STROKE)
-    first_interfering(it)
+        deflected(mechanism, STROKE)
+    first_interfering(mechanism)
 
 
 def steps() -> tuple[list[tuple[str, float]], float]:
     """The steps of a design run with their times [s], and the time of the whole."""
     stage, spec = friso.load(EXAMPLES / "thesis_rig.toml"), load_spec(EXAMPLES / "specs" / "thesis.toml")
-    told: list[tuple[str, float]] = []
+    reported: list[tuple[str, float]] = []
     start = time.perf_counter()
 
     def progress(what: str, done: int, total: int) -> None:
-        if not told or told[-1][0] != what:
-            told.append((what, time.perf_counter()))
+        if not reported or reported[-1][0] != what:
+            reported.append((what, time.perf_counter()))
 
     design(stage, spec, progress)
     end = time.perf_counter()
-    starts = [at for _, at in told]
-    return [(what, b - a) for (what, a), b in zip(told, [*starts[1:], end], strict=True)], end - start
+    starts = [at for _, at in reported]
+    return [(what, b - a) for (what, a), b in zip(reported, [*starts[1:], end], strict=True)], end - start
 
 
 def run(repetitions: int) -> list[Goal]:
-    one = Mechanism.of(friso.load(EXAMPLES / "thesis_leaves.toml").flat())
-    parts = [many(one, CHUNK) for _ in range(MANY // CHUNK)]
-    single = [clock(lambda: all_figures(one)) for _ in range(20 * repetitions)]
-    whole = [clock(lambda: [all_figures(part) for part in parts]) for _ in range(repetitions)]
-    beam = [clock(lambda: beams(one, STROKE)) for _ in range(20 * repetitions)]
+    single_mechanism = Mechanism.of(friso.load(EXAMPLES / "thesis_leaves.toml").flat())
+    parts = [many(single_mechanism, CHUNK) for _ in range(MANY // CHUNK)]
+    single = [clock(lambda: all_figures(single_mechanism)) for _ in range(20 * repetitions)]
+    batches = [clock(lambda: [all_figures(part) for part in parts]) for _ in range(repetitions)]
+    beam = [clock(lambda: beams(single_mechanism, STROKE)) for _ in range(20 * repetitions)]
     print_table(
         ("leaf springs", "min / median [s]"),
         [
             ["closed forms, one geometry", spread(single, digits=5)],
-            [f"closed forms, {MANY:.0e} geometries", spread(whole, digits=2)],
+            [f"closed forms, {MANY:.0e} geometries", spread(batches, digits=2)],
             ["beams, one geometry", spread(beam, digits=4)],
         ],
     )
     steps()  # compiles
     runs = [steps() for _ in range(repetitions)]
-    best = min(runs, key=lambda each: each[1])
+    best = min(runs, key=lambda timed: timed[1])
     print_table(("design run", "[s]"), [[what, f"{seconds:.1f}"] for what, seconds in best[0]])
     total = best[1]
     return [
         Goal(
             "one geometry by closed forms, of many at once",
             "< 1 ms",
-            f"{min(whole) / MANY * 1e3:.4f} ms",
-            min(whole) / MANY < 1e-3,
+            f"{min(batches) / MANY * 1e3:.4f} ms",
+            min(batches) / MANY < 1e-3,
         ),
-        Goal(f"{MANY:.0e} geometries", "a few seconds", f"{min(whole):.1f} s", min(whole) < 10),
+        Goal(f"{MANY:.0e} geometries", "a few seconds", f"{min(batches):.1f} s", min(batches) < 10),
         Goal("one geometry by beams", "< 10 ms", f"{min(beam) * 1e3:.1f} ms", min(beam) < 10e-3),
         Goal(
             "beams against closed forms, one by one of many",
             "",
-            f"{min(beam) / (min(whole) / MANY):.0f} times as long",
+            f"{min(beam) / (min(batches) / MANY):.0f} times as long",
             None,
         ),
         Goal("design run with verification", "< 60 s", f"{total:.1f} s", total < 60),

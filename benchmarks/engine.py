@@ -30,20 +30,20 @@ def main() -> None:
     from benchmarks.report import Goal, print_goals
     from benchmarks.rigs import rig
 
-    wanted = _arguments()
-    chosen = (wanted.only,) if wanted.only else SECTIONS
-    repetitions = 1 if wanted.quick else 3
+    arguments = _arguments()
+    chosen = (arguments.only,) if arguments.only else SECTIONS
+    repetitions = 1 if arguments.quick else 3
     print(_machine())
     start = time.perf_counter()
     goals: list[Goal] = []
     rigs = [rig(locked=True), rig(locked=False)]
     lanes = prototype.load() if {"race", "maps"} & set(chosen) else None
     if {"race", "precision"} & set(chosen):
-        places = _places(rigs, lanes, repetitions, wanted.quick)
+        places = _places(rigs, lanes, repetitions, arguments.quick)
         if "race" in chosen:
             goals += [goal for place in places for goal in run_race(place)]
         if "precision" in chosen:
-            work_precision(places, wanted.out, wanted.quick)
+            work_precision(places, arguments.out, arguments.quick)
     if "maps" in chosen:
         goals += two_maps.run_maps(two_maps.both_maps(*rigs), lanes, repetitions)
     if "check" in chosen:
@@ -65,24 +65,24 @@ def _places(rigs: list[Rig], lanes: ModuleType | None, repetitions: int, quick: 
 
     places = []
     solvers = peers()
-    for each in rigs:
-        equations = compile_equations(each)
-        state = np.zeros(len(each.scales))
-        equations.rate(0.0, state, each.pieces)
-        equations.jacobian(0.0, state, each.pieces)
-        own = friso_trace(each, REFERENCE_RTOL)[0]
+    for rig in rigs:
+        equations = compile_equations(rig)
+        state = np.zeros(len(rig.scales))
+        equations.rate(0.0, state, rig.pieces)
+        equations.jacobian(0.0, state, rig.pieces)
+        by_friso = friso_trace(rig, REFERENCE_RTOL)[0]
         if quick:
-            reference = friso_trace(each, REFERENCE_RTOL / 10)[0]
+            reference = friso_trace(rig, REFERENCE_RTOL / 10)[0]
         else:
-            reference = reference_trace(each, equations, solvers["SciPy Radau"])
-        apart = distance(each.grid, own, reference)
+            reference = reference_trace(rig, equations, solvers["SciPy Radau"])
+        apart = distance(rig.grid, by_friso, reference)
         print(
-            f"  {each.name}: reference by {'friso at 1e-12 (--quick)' if quick else 'SciPy Radau at 1e-11'}; ",
+            f"  {rig.name}: reference by {'friso at 1e-12 (--quick)' if quick else 'SciPy Radau at 1e-11'}; ",
             end="",
         )
         print(f"friso at 1e-11 is off by {apart.early:.1e} m in 0.1 s, {apart.largest:.1e} m at most, ", end="")
         print(f"{apart.rms:.1e} m rms, {apart.late:.1e} m rms after 10 s")
-        places.append(Field(each, equations, solvers, lanes, reference, repetitions))
+        places.append(Field(rig, equations, solvers, lanes, reference, repetitions))
     return places
 
 

@@ -26,12 +26,12 @@ DRIVES = {"continuous": {}, "sampled": {"drive.sample_time": "50 us", "drive.del
 
 def one_by_one(stage: Stage, members: Members, omega: np.ndarray) -> list[float]:
     """Poles and least distance from -1 of each member, by python-control."""
-    found = []
+    margins = []
     for k in range(len(members)):
         loop = friso.linear(stage, members[k], "open")
         poles = control.feedback(loop, 1).poles()
-        found.append(float(np.abs(1 + loop(1j * omega)).min()) if poles.real.max() < 0 else np.nan)
-    return found
+        margins.append(float(np.abs(1 + loop(1j * omega)).min()) if poles.real.max() < 0 else np.nan)
+    return margins
 
 
 def run(repetitions: int) -> list[Goal]:
@@ -41,8 +41,8 @@ def run(repetitions: int) -> list[Goal]:
         flat = stage.flat()
         members = family(flat, MEMBERS // 4, MEMBERS // 4)
         times = [clock(lambda: scan(flat, members)) for _ in range(repetitions + 1)][1:]  # noqa: B023
-        whole = [clock(lambda: bode(stage)) for _ in range(repetitions)]  # noqa: B023
-        rows.append([name, len(members), spread(times, digits=2), spread(whole, digits=2)])
+        analyses = [clock(lambda: bode(stage)) for _ in range(repetitions)]  # noqa: B023
+        rows.append([name, len(members), spread(times, digits=2), spread(analyses, digits=2)])
         about = f"worst case over {len(members)} states, {name}"
         goals.append(Goal(about, "< 1 s", f"{min(times):.2f} s", min(times) < 1))
         if name == "continuous":

@@ -54,14 +54,14 @@ class Count:
     unshown: int = 0
     right: int = 0
 
-    def add(self, found: Estimate, truth: float) -> None:
-        if not found.shown:
+    def add(self, estimate: Estimate, truth: float) -> None:
+        if not estimate.shown:
             self.unshown += 1
-            self.right += found.holds(truth)
+            self.right += estimate.holds(truth)
             return
-        self.held += found.holds(truth)
-        self.missed += not found.holds(truth)
-        self.widths.append(found.half_width / abs(truth) if truth else found.half_width)
+        self.held += estimate.holds(truth)
+        self.missed += not estimate.holds(truth)
+        self.widths.append(estimate.half_width / abs(truth) if truth else estimate.half_width)
 
 
 def mass_of(flat: dict) -> float:
@@ -74,8 +74,8 @@ def of_rigid(machine: Machine) -> Iterator[Answer]:
     mass = mass_of(flat)
     yield "break-away", static_from_ramps(break_aways(machine), mass).static, flat["friction.static"]
     both = friction_velocity(speeds(machine), mass).both
-    for each in (both.coulomb, both.viscous, both.static):
-        yield "constant speed", each, flat[each.name]
+    for estimate in (both.coulomb, both.viscous, both.static):
+        yield "constant speed", estimate, flat[estimate.name]
     lines = analyse([shaken(machine)]).lines
     if lines:
         value = lines[0].value
@@ -88,16 +88,16 @@ def of_jointed(machine: Machine) -> Iterator[Answer]:
     stiffness = stiffness_from_steps(steps(machine)).stiffness
     yield "steps", stiffness, flat["joint.stiffness"]
     if stiffness.shown:
-        found = static_from_stick_slip(creeping(machine), stiffness, flat["masses.stage"], flat["joint.stroke"])
-        yield "stick-slip", found.static, flat["friction.static"]
+        slips = static_from_stick_slip(creeping(machine), stiffness, flat["masses.stage"], flat["joint.stroke"])
+        yield "stick-slip", slips.static, flat["friction.static"]
 
 
 def of_moves(machine: Machine) -> Iterator[Answer]:
     """Moves, with and without the machine's own controller."""
     flat, log = machine.flat, moves(machine)
-    for own, words in ((True, "moves, controller known"), (False, "moves, controller unknown")):
-        for each in identify_moves(log, machine.guess.flat(), own).estimates:
-            yield words, each, flat.get(each.name, 0.0)
+    for controller_known, words in ((True, "moves, controller known"), (False, "moves, controller unknown")):
+        for estimate in identify_moves(log, machine.guess.flat(), controller_known).estimates:
+            yield words, estimate, flat.get(estimate.name, 0.0)
 
 
 def run(first: int, machines: int, fitted: int) -> dict[tuple[str, str], Count]:
@@ -109,12 +109,12 @@ def run(first: int, machines: int, fitted: int) -> dict[tuple[str, str], Count]:
             tasks.append(of_moves(drawn(seed, False)))
         for task in tasks:
             try:
-                for method, found, truth in task:
-                    counts[method, found.name].add(found, truth)
-                    if not found.holds(truth):
-                        shown = "" if found.shown else " (not shown)"
-                        print(f"  machine {seed}, {method}: {found.name} {found.low:.4g} to {found.high:.4g}{shown}, "
-                              f"true {truth:.4g}")  # fmt: skip
+                for method, estimate, truth in task:
+                    counts[method, estimate.name].add(estimate, truth)
+                    if not estimate.holds(truth):
+                        remark = "" if estimate.shown else " (not shown)"
+                        span = f"{estimate.low:.4g} to {estimate.high:.4g}{remark}"
+                        print(f"  machine {seed}, {method}: {estimate.name} {span}, true {truth:.4g}")
             except InputError as error:
                 print(f"  machine {seed}: refused: {' '.join(str(error).split())}")
         print(f"machine {seed}: {time.perf_counter() - begin:.0f} s", flush=True)
@@ -125,20 +125,20 @@ def rows(counts: dict[tuple[str, str], Count]) -> list[list[str]]:
     table = []
     for (method, name), count in sorted(counts.items()):
         width = f"{np.median(count.widths):.2g}" if count.widths else "-"
-        shown = count.held + count.missed
-        table.append([f"{method}: {name}", f"{count.held} of {shown}", width, f"{count.right} of {count.unshown}"])
+        reported = count.held + count.missed
+        table.append([f"{method}: {name}", f"{count.held} of {reported}", width, f"{count.right} of {count.unshown}"])
     return table
 
 
 def goals(counts: dict[tuple[str, str], Count]) -> list[Goal]:
     """Of each quantity that the goal is about, by each method that shows it."""
-    found = []
+    reached = []
     for (method, name), count in sorted(counts.items(), key=lambda item: item[0][::-1]):
-        shown = count.held + count.missed
-        if name in GOALS and shown:
+        reported = count.held + count.missed
+        if name in GOALS and reported:
             about = f"{name} by {method}: 95 % intervals hold the truth"
-            found.append(Goal(about, ">= 90 %", f"{count.held} of {shown}", count.held >= WANTED * shown))
-    return found
+            reached.append(Goal(about, ">= 90 %", f"{count.held} of {reported}", count.held >= WANTED * reported))
+    return reached
 
 
 def main() -> None:
@@ -146,8 +146,10 @@ def main() -> None:
     parser.add_argument("--machines", type=int, default=100)
     parser.add_argument("--moves", type=int, default=None, help="machines whose moves are fitted (default: all)")
     parser.add_argument("--first", type=int, default=0, help="number of the first machine")
-    given = parser.parse_args()
-    counts = run(given.first, given.machines, given.machines if given.moves is None else given.moves)
+    arguments = parser.parse_args()
+    counts = run(
+        arguments.first, arguments.machines, arguments.machines if arguments.moves is None else arguments.moves
+    )
     head = ("method: quantity", "held of shown", "median half-width / truth", "range right of not shown")
     print_table(head, rows(counts))
     print_goals(goals(counts), "Goals")

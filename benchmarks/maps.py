@@ -153,20 +153,28 @@ def run_peer(cells_per_map: int) -> list[Goal]:
         wall = time.perf_counter() - start
     workers = _processors()
     cells = sum(study.cells for study in thesis_studies(rtol))
-    whole = (wall - compile_seconds / workers) / len(jobs) * cells
+    extrapolated = (wall - compile_seconds / workers) / len(jobs) * cells
     with local_crew() as crew:
-        own = _own(crew, rtol)
+        by_friso = _by_friso(crew, rtol)
     print(
         f"\nSciPy Radau, compiled functions, {workers} processes, rtol {rtol:g}: {len(jobs)} of {cells} cells in ",
         end="",
     )
-    print(f"{wall:.1f} s ({compile_seconds / workers:.1f} s of it compiling); all cells, extrapolated: {whole:.0f} s")
+    print(
+        f"{wall:.1f} s ({compile_seconds / workers:.1f} s of it compiling); all cells, extrapolated: "
+        f"{extrapolated:.0f} s"
+    )
     return [
-        Goal("all ten maps against SciPy Radau", "-", f"{own:.2f} s against {whole:.0f} s: {whole / own:.0f}x", None)
+        Goal(
+            "all ten maps against SciPy Radau",
+            "-",
+            f"{by_friso:.2f} s against {extrapolated:.0f} s: {extrapolated / by_friso:.0f}x",
+            None,
+        )
     ]
 
 
-def _own(crew: Crew, rtol: float) -> float:
+def _by_friso(crew: Crew, rtol: float) -> float:
     studies = thesis_studies(rtol)
     run_in_memory(studies, crew)
     return min(clock(lambda: run_in_memory(studies, crew)) for _ in range(3))
@@ -174,27 +182,27 @@ def _own(crew: Crew, rtol: float) -> float:
 
 def _sampled(study: Study, count: int) -> list[tuple[Stage, float]]:
     """Stages of some cells that a stage may have."""
-    found: list[tuple[Stage, float]] = []
+    cells: list[tuple[Stage, float]] = []
     for number in np.random.default_rng(0).permutation(study.cells):
         try:
-            found.append((study.cell_stage(np.unravel_index(number, study.shape)), study.rtol))  # type: ignore[arg-type]
+            cells.append((study.cell_stage(np.unravel_index(number, study.shape)), study.rtol))  # type: ignore[arg-type]
         except ValueError:
             continue
-        if len(found) == count:
+        if len(cells) == count:
             break
-    return found
+    return cells
 
 
 def _by_radau(job: tuple[Stage, float]) -> float:
     """Run one cell by Radau; the time its compilation took [s], which a real study would share among its cells."""
     stage, rtol = job
-    each = rig_of(stage)
+    rig = rig_of(stage)
     start = time.perf_counter()
-    compiled = compile_equations(each)
-    compiled.rate(0.0, np.zeros(len(each.scales)), each.pieces)
-    compiled.jacobian(0.0, np.zeros(len(each.scales)), each.pieces)
+    compiled = compile_equations(rig)
+    compiled.rate(0.0, np.zeros(len(rig.scales)), rig.pieces)
+    compiled.jacobian(0.0, np.zeros(len(rig.scales)), rig.pieces)
     seconds = time.perf_counter() - start
-    piecewise(peers()["SciPy Radau"], each, compiled, rtol, sampled=False)
+    piecewise(peers()["SciPy Radau"], rig, compiled, rtol, sampled=False)
     return seconds
 
 

@@ -17,19 +17,19 @@ def maxima(times: np.ndarray, values: np.ndarray, beyond: float = -np.inf) -> tu
     """
     inner = np.pad(values, 1, constant_values=beyond)
     top = (inner[1:-1] > inner[:-2]) & (inner[1:-1] >= inner[2:])
-    kept: list[int] = []
+    chosen: list[int] = []
     for i in np.argsort(-values):
         counts = top[i] and times[i] >= COUNTED_AFTER and values[i] > COUNTED_ABOVE
-        if counts and all(abs(times[i] - times[j]) >= APART for j in kept):
-            kept.append(int(i))
-    kept.sort()
-    return times[kept], values[kept]
+        if counts and all(abs(times[i] - times[j]) >= APART for j in chosen):
+            chosen.append(int(i))
+    chosen.sort()
+    return times[chosen], values[chosen]
 
 
 def sampled_maxima(times: np.ndarray, position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The counted maxima of a sampled trace, each refined by the parabola through three samples."""
-    found, _ = maxima(times, position, np.inf)
-    at = np.clip(np.searchsorted(times, found), 1, len(times) - 2)
+    at_maxima, _ = maxima(times, position, np.inf)
+    at = np.clip(np.searchsorted(times, at_maxima), 1, len(times) - 2)
     y0, y1, y2 = position[at - 1], position[at], position[at + 1]
     bend = y0 - 2 * y1 + y2
     shift = np.where(bend < 0, (y0 - y2) / (2 * np.where(bend < 0, bend, 1.0)), 0.0)
@@ -46,9 +46,9 @@ class Cycle:
     period: float
 
 
-def cycle(found: tuple[np.ndarray, np.ndarray]) -> Cycle:
+def cycle(turns: tuple[np.ndarray, np.ndarray]) -> Cycle:
     """The cycle that the counted maxima belong to."""
-    times, heights = found
+    times, heights = turns
     amplitude = float(heights.mean()) if len(heights) else np.nan
     return Cycle(len(times), amplitude, float(np.diff(times).mean()) if len(times) > 1 else np.nan)
 

@@ -50,7 +50,7 @@ With two times, the states at the solver's own steps where it can give them."""
 def _solve_ivp(method: str) -> Solve:
     def solve(task: Task) -> tuple[np.ndarray, int]:
         f, j, rows = task.equations.rate, task.equations.jacobian, task.rows
-        found = solve_ivp(
+        solution = solve_ivp(
             lambda t, x: f(t, x, rows),
             (task.times[0], task.times[-1]),
             task.start,
@@ -60,9 +60,9 @@ def _solve_ivp(method: str) -> Solve:
             atol=task.rtol * task.rig.scales,
             jac=lambda t, x: j(t, x, rows),
         )
-        if not found.success:
-            raise RuntimeError(found.message)
-        return found.y.T, len(found.t) - 1 if len(task.times) <= 2 else -1
+        if not solution.success:
+            raise RuntimeError(solution.message)
+        return solution.y.T, len(solution.t) - 1 if len(task.times) <= 2 else -1
 
     return solve
 
@@ -105,10 +105,10 @@ def _cvode(order: int) -> Solve:
             max_order=order,
             max_num_steps=MANY,
         )
-        found = solver.solve(task.times, task.start)
-        if not found.success:
-            raise RuntimeError(found.message)
-        return found.y, len(found.t) - 1 if len(task.times) <= 2 else -1
+        solution = solver.solve(task.times, task.start)
+        if not solution.success:
+            raise RuntimeError(solution.message)
+        return solution.y, len(solution.t) - 1 if len(task.times) <= 2 else -1
 
     return solve
 
@@ -119,7 +119,7 @@ NAMED = ("SciPy Radau", "SciPy BDF", "SciPy LSODA", "SUNDIALS CVODE")
 
 def peers() -> dict[str, Solve]:
     """All peers by name; SUNDIALS is left out where scikit-sundae is not installed."""
-    found = {
+    solvers = {
         "SciPy Radau": _solve_ivp("Radau"),
         "SciPy BDF": _solve_ivp("BDF"),
         "SciPy LSODA": _solve_ivp("LSODA"),
@@ -127,13 +127,13 @@ def peers() -> dict[str, Solve]:
         "odeint, order <= 2": _odeint(2),
     }
     try:
-        return found | {"SUNDIALS CVODE": _cvode(5), "CVODE, order <= 2": _cvode(2)}
+        return solvers | {"SUNDIALS CVODE": _cvode(5), "CVODE, order <= 2": _cvode(2)}
     except ImportError:
         print("  skipped: SUNDIALS CVODE (pip install scikit-sundae)")
-        return found
+        return solvers
 
 
-def whole(solve: Solve, rig: Rig, equations: Compiled, rtol: float, sampled: bool) -> tuple[np.ndarray, int]:
+def at_once(solve: Solve, rig: Rig, equations: Compiled, rtol: float, sampled: bool) -> tuple[np.ndarray, int]:
     """States over the whole run in one call; steps."""
     times = rig.grid if sampled else rig.grid[[0, -1]]
     return solve(Task(rig, equations, rtol, rig.pieces, times, np.zeros(len(rig.scales))))
@@ -156,9 +156,9 @@ def piecewise(solve: Solve, rig: Rig, equations: Compiled, rtol: float, sampled:
 
 @dataclass
 class Run:
-    """What a peer did: the better way, its wall times [s], its positions on the grid, steps, and unsampled time [s]."""
+    """What a peer did: its better form, wall times [s], positions on the grid, steps, and unsampled time [s]."""
 
-    way: str
+    form: str
     seconds: list[float]
     position: np.ndarray | None
     steps: int
@@ -166,38 +166,38 @@ class Run:
     note: str = ""
 
 
-WAYS: dict[str, Any] = {"whole": whole, "pieces": piecewise}
+FORMS: dict[str, Any] = {"whole": at_once, "pieces": piecewise}
 
 
 def race(solve: Solve, rig: Rig, equations: Compiled, rtol: float, repetitions: int) -> Run:
     """Time a peer both ways, repeat the faster; a run beyond the time-out counts as that long."""
-    runs = [_try(way, solve, rig, equations, rtol) for way in WAYS]
+    runs = [_try(form, solve, rig, equations, rtol) for form in FORMS]
     best = min(runs, key=lambda run: run.seconds[0])
     if best.position is None:
         return best
     if best.seconds[0] > LONG:
         return best
     for _ in range(repetitions - 1):
-        best.seconds.append(_timed(best.way, solve, rig, equations, rtol, True)[0])
-    best.unsampled, (_, steps) = _timed(best.way, solve, rig, equations, rtol, False)
+        best.seconds.append(_timed(best.form, solve, rig, equations, rtol, True)[0])
+    best.unsampled, (_, steps) = _timed(best.form, solve, rig, equations, rtol, False)
     best.steps = steps
     return best
 
 
-def _try(way: str, solve: Solve, rig: Rig, equations: Compiled, rtol: float) -> Run:
+def _try(form: str, solve: Solve, rig: Rig, equations: Compiled, rtol: float) -> Run:
     try:
         with time_out(TIME_OUT):
-            seconds, (states, steps) = _timed(way, solve, rig, equations, rtol, True)
+            seconds, (states, steps) = _timed(form, solve, rig, equations, rtol, True)
     except TimeoutError:
-        return Run(way, [TIME_OUT], None, -1, np.nan, f"stopped after {TIME_OUT:g} s")
+        return Run(form, [TIME_OUT], None, -1, np.nan, f"stopped after {TIME_OUT:g} s")
     except RuntimeError as error:
-        return Run(way, [np.inf], None, -1, np.nan, f"failed: {error}")
-    return Run(way, [seconds], states[:, rig.kernel.states.index("position")], steps, np.nan)
+        return Run(form, [np.inf], None, -1, np.nan, f"failed: {error}")
+    return Run(form, [seconds], states[:, rig.kernel.states.index("position")], steps, np.nan)
 
 
-def _timed(way: str, *arguments: Any) -> tuple[float, Any]:
+def _timed(form: str, *arguments: Any) -> tuple[float, Any]:
     start = time.perf_counter()
-    result = WAYS[way](*arguments)
+    result = FORMS[form](*arguments)
     return time.perf_counter() - start, result
 
 

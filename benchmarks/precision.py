@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.metrics import Cycle, cycle, distance, sampled_maxima
-from benchmarks.peers import time_out, whole
+from benchmarks.peers import time_out, at_once
 from benchmarks.race import RUNS, Field, friso_seconds, friso_trace
 from benchmarks.report import clock, print_table
 
@@ -43,7 +43,7 @@ def _curves(place: Field, rtols: list[float]) -> dict[str, Curve]:
         def run(rtol: float, solve=solve) -> tuple[float, np.ndarray]:
             traces: list[np.ndarray] = []
             with time_out(LIMIT):
-                seconds = clock(lambda: traces.append(whole(solve, place.rig, place.equations, rtol, True)[0]))
+                seconds = clock(lambda: traces.append(at_once(solve, place.rig, place.equations, rtol, True)[0]))
             return seconds, traces[0][:, place.rig.kernel.states.index("position")]
 
         curves[name] = _curve(place, rtols, truth, run)
@@ -62,8 +62,8 @@ def _curve(place: Field, rtols: list[float], truth: Cycle, run: Callable[[float]
             seconds, trace = run(rtol)
         except (TimeoutError, RuntimeError):
             break
-        found = cycle(sampled_maxima(place.rig.grid, trace))
-        off = abs(found.amplitude / truth.amplitude - 1)
+        measured = cycle(sampled_maxima(place.rig.grid, trace))
+        off = abs(measured.amplitude / truth.amplitude - 1)
         curve.append((rtol, seconds, distance(place.rig.grid, trace, place.reference).rms, off))
         if seconds > LIMIT / 3:
             break
@@ -82,8 +82,8 @@ def _equal_precision(methods: dict[str, Curve]) -> None:
     order = np.argsort(errors)
     for method, curve in methods.items():
         if method != "friso" and curve:
-            own = [float(np.exp(np.interp(np.log(e), errors[order], work[order]))) for _, _, e, _ in curve]
-            ratios = [f"{s / mine:.0f}" for mine, (_, s, _, _) in zip(own, curve, strict=True)]
+            interpolated = [float(np.exp(np.interp(np.log(e), errors[order], work[order]))) for _, _, e, _ in curve]
+            ratios = [f"{s / mine:.0f}" for mine, (_, s, _, _) in zip(interpolated, curve, strict=True)]
             print(f"  at equal rms error, {method} takes x friso: {', '.join(ratios)} (rtol as above)")
 
 

@@ -92,13 +92,13 @@ def _lanes(place: Field, rtol: float) -> list[Entry]:
     rig, module = place.rig, place.prototype
     times: dict[str, list[float]] = {}
     jobs: dict[str, Callable[[], float]] = {}
-    found = None
+    answer = None
     for n in sorted({1, CORES}):
         jobs[f"friso, {n} thread{'s' * (n > 1)}"] = partial(friso_seconds, rig, rtol, RUNS, n)
     jobs["friso, crossovers +-5 %"] = partial(friso_seconds, rig, rtol, RUNS, 1, 0.05)
     if module is not None:
         rows = np.array([module.parameters(crossover=8.0, locked=rig.name == "locked")] * RUNS)
-        found = run_prototype(module, rows[:1], rtol)
+        answer = run_prototype(module, rows[:1], rtol)
         for n in sorted({1, CORES}):
             jobs[f"prototype, {n} thread{'s' * (n > 1)}"] = partial(_prototype_seconds, module, rows, rtol, n)
     for _ in range(max(5, 2 * place.repetitions)):
@@ -110,8 +110,8 @@ def _lanes(place: Field, rtol: float) -> list[Entry]:
     turns = runs.results.turn_times[0, :count], runs.results.turn_values[0, :count]
     rejected = runs.statistic("rejected")[0] / runs.statistic("attempted")[0]
     for entry in entries:
-        if entry.name.startswith("prototype") and found is not None:
-            (attempted, accepted), peaks = found
+        if entry.name.startswith("prototype") and answer is not None:
+            (attempted, accepted), peaks = answer
             entry.cycle = cycle(maxima(*peaks))
             entry.steps = f"{attempted} ({1 - accepted / attempted:.0%} rej.)"
             entry.remark = "own absolute tolerances"
@@ -135,7 +135,7 @@ def _peers(place: Field, rtol: float) -> list[Entry]:
     entries = []
     for name, solve in place.peers.items():
         run = race(solve, place.rig, place.equations, rtol, place.repetitions)
-        entry = Entry(name, run.seconds, remark=run.note or run.way)
+        entry = Entry(name, run.seconds, remark=run.note or run.form)
         if np.isfinite(run.unsampled):
             entry.remark += f"; unsampled {run.unsampled:.3f} s"
         if run.position is not None:

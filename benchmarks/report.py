@@ -11,10 +11,10 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Goal:
-    """A goal: what it is about, what is wanted, what was measured, and whether that reaches it (None: information)."""
+    """A goal: what it is about, the target, what was measured, and whether that reaches it (None: information)."""
 
     about: str
-    wanted: str
+    target: str
     measured: str
     reached: bool | None
 
@@ -36,7 +36,7 @@ def print_goals(goals: Sequence[Goal], title: str) -> None:
     print(f"\n{title}")
     print_table(
         ("goal", "wanted", "measured", "reached?"),
-        [(g.about, g.wanted, g.measured, words[g.reached]) for g in goals],
+        [(g.about, g.target, g.measured, words[g.reached]) for g in goals],
     )
 
 

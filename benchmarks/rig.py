@@ -50,8 +50,8 @@ def run_rigs(repetitions: int) -> list[Goal]:
         seconds = {about: [turn[about] for turn in turns] for about in jobs}
         least = min(seconds["continuous"])
         rows += [
-            [f"{name}, {about}", spread(each, 1e3 / RUNS), f"{min(each) / least:.1f}"]
-            for about, each in seconds.items()
+            [f"{name}, {about}", spread(times, 1e3 / RUNS), f"{min(times) / least:.1f}"]
+            for about, times in seconds.items()
         ]
         taken = min(seconds["as built"]) * 1e3 / RUNS
         goals.append(Goal(f"a run of the drive, {name}", f"< {WANTED:g} ms", f"{taken:.1f} ms", taken < WANTED))

@@ -63,8 +63,8 @@ def benches(machine: Machine, seed: int) -> list[list[RigLog]]:
     low, high = travel(stage)
     places = [low + (high - low) * number / (PLACES - 1) for number in range(PLACES)]
 
-    def shaken(each: Stage, name: str) -> list[RigLog]:
-        return [plant_log(each, f"{name}_{n + 1}", place, noise + n) for n, place in enumerate(places)]
+    def shaken(machine_stage: Stage, name: str) -> list[RigLog]:
+        return [plant_log(machine_stage, f"{name}_{n + 1}", place, noise + n) for n, place in enumerate(places)]
 
     slow = slow_motion(stage, noise, 1)
     small = [presliding_log(locked(stage), f"presliding_{n + 1}", place, noise + n) for n, place in enumerate(places)]
@@ -80,12 +80,12 @@ def found_in(logs: list[RigLog], machine: Machine) -> tuple[Identification, Stag
     """What the files of logs show, and the stage file that comes of it. The owner tells the stroke of the fixtures."""
     wide = {"joint.stroke": freed(machine.truth).flat()["joint.stroke"]}
     with tempfile.TemporaryDirectory() as folder:
-        given = through_files(logs, Path(folder))
-        found = identify(sources(given), machine.guess.with_numbers(wide))
-        assert found.stage is not None
+        recorded = through_files(logs, Path(folder))
+        identified = identify(sources(recorded), machine.guess.with_numbers(wide))
+        assert identified.stage is not None
         file = Path(folder) / "identified.toml"
-        save(found.stage, file)
-        return found, load(file).with_numbers({"joint.stroke": machine.flat["joint.stroke"]})
+        save(identified.stage, file)
+        return identified, load(file).with_numbers({"joint.stroke": machine.flat["joint.stroke"]})
 
 
 def on_its_rail(machine: Machine) -> Stage:
@@ -94,17 +94,21 @@ def on_its_rail(machine: Machine) -> Stage:
     return machine.truth.with_numbers({key: machine.flat[key] * by for key, by in zip(LEVELS, factors, strict=True)})
 
 
-def answers(found: Identification, logs: list[RigLog], machine: Machine) -> Iterator[Answer]:
+def answers(identified: Identification, logs: list[RigLog], machine: Machine) -> Iterator[Answer]:
     """What each experiment shows, and what all together show, with the truth."""
     flat, travelled = machine.flat, on_its_rail(machine).flat()
-    for each in found.experiments:
-        own = [log for log in logs if log.name in {source.name.removesuffix(".csv") for source in each.logs}]
-        words = f"{each.kind}, free" if own[0].name.startswith("free") else each.kind
-        for one in each.estimates:
-            yield words, one, mean_level(own, one.name) if one.name in LEVELS else flat[one.name]
-    if len(found.experiments) > 1:
-        for one in found.estimates:
-            yield "stage file", one, travelled[one.name]
+    for experiment in identified.experiments:
+        matching = [log for log in logs if log.name in {source.name.removesuffix(".csv") for source in experiment.logs}]
+        words = f"{experiment.kind}, free" if matching[0].name.startswith("free") else experiment.kind
+        for estimate in experiment.estimates:
+            yield (
+                words,
+                estimate,
+                mean_level(matching, estimate.name) if estimate.name in LEVELS else flat[estimate.name],
+            )
+    if len(identified.experiments) > 1:
+        for estimate in identified.estimates:
+            yield "stage file", estimate, travelled[estimate.name]
 
 
 def run(first: int, machines: int) -> tuple[dict[tuple[str, str], Count], Verdicts]:
@@ -117,16 +121,16 @@ def run(first: int, machines: int) -> tuple[dict[tuple[str, str], Count], Verdic
                 if log.failure:
                     print(f"  machine {seed}: {log.name} stopped {log.failure}")
             try:
-                found, stage = found_in(logs, machine)
+                identified, stage = found_in(logs, machine)
             except InputError as error:
                 print(f"  machine {seed}: refused: {' '.join(str(error).split())}")
                 continue
-            for method, one, truth in answers(found, logs, machine):
-                counts[method, one.name].add(one, truth)
-                if not one.holds(truth):
-                    shown = "" if one.shown else " (not shown)"
-                    print(f"  machine {seed}, {method}: {one.name} {one.low:.4g} to {one.high:.4g}{shown}, "
-                          f"true {truth:.4g}")  # fmt: skip
+            for method, estimate, truth in answers(identified, logs, machine):
+                counts[method, estimate.name].add(estimate, truth)
+                if not estimate.holds(truth):
+                    remark = "" if estimate.shown else " (not shown)"
+                    span = f"{estimate.low:.4g} to {estimate.high:.4g}{remark}"
+                    print(f"  machine {seed}, {method}: {estimate.name} {span}, true {truth:.4g}")
             if number == 0:
                 _compare(machine, stage, verdicts, seed)
         print(f"machine {seed}: {time.perf_counter() - begin:.0f} s", flush=True)
@@ -135,9 +139,9 @@ def run(first: int, machines: int) -> tuple[dict[tuple[str, str], Count], Verdic
 
 def _compare(machine: Machine, stage: Stage, verdicts: Verdicts, seed: int) -> None:
     """Count the verdicts on the identified stage against those on the machine, both on an even rail."""
-    true, found = check(on_its_rail(machine)), check(stage)
-    for case, each in true.items():
-        pair = each.verdict, found[case].verdict
+    true, identified = check(on_its_rail(machine)), check(stage)
+    for case, true_case in true.items():
+        pair = true_case.verdict, identified[case].verdict
         verdicts[case][pair] += 1
         if pair[0] != pair[1]:
             print(f"  machine {seed}, {case}: {pair[0]}, identified {pair[1]}")
@@ -145,22 +149,22 @@ def _compare(machine: Machine, stage: Stage, verdicts: Verdicts, seed: int) -> N
 
 def same(verdicts: Verdicts) -> list[Goal]:
     """The goals about the verdicts."""
-    found = []
+    reached = []
     for case, pairs in verdicts.items():
         right, total = sum(n for (true, back), n in pairs.items() if true == back), pairs.total()
-        found.append(Goal(f"verdict, {case}", ">= 95 %", f"{right} of {total}", right >= SAME * total))
-    return found
+        reached.append(Goal(f"verdict, {case}", ">= 95 %", f"{right} of {total}", right >= SAME * total))
+    return reached
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--machines", type=int, default=100)
     parser.add_argument("--first", type=int, default=0, help="number of the first machine")
-    given = parser.parse_args()
-    counts, verdicts = run(given.first, given.machines)
+    arguments = parser.parse_args()
+    counts, verdicts = run(arguments.first, arguments.machines)
     head = ("method: quantity", "held of shown", "median half-width / truth", "range right of not shown")
     print_table(head, rows(counts))
-    pairs = [[case, *pair, n] for case, each in verdicts.items() for pair, n in sorted(each.items())]
+    pairs = [[case, *pair, n] for case, table in verdicts.items() for pair, n in sorted(table.items())]
     print_table(("case", "verdict of the machine", "identified", "machines"), pairs)
     print_goals([*goals(counts), *same(verdicts)], "Goals")
 

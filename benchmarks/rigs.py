@@ -53,8 +53,8 @@ class Rig:
     @property
     def parameters(self) -> dict[str, float]:
         """Value [SI] of every parameter of the equations."""
-        given = {**self.flat, "motion.size": motion.size(self.flat)}
-        return {name: float(given[name]) for name in self.kernel.parameters}
+        numbers = {**self.flat, "motion.size": motion.size(self.flat)}
+        return {name: float(numbers[name]) for name in self.kernel.parameters}
 
 
 def rig(locked: bool) -> Rig:
@@ -68,5 +68,5 @@ def rig_of(stage: Stage, name: str = "") -> Rig:
     flat = stage.flat()
     shape = kernel(structure(flat))
     values = shape.values({**flat, "motion.size": motion.size(flat)}, 1)
-    scales = np.array([float(np.ravel(each)[0]) for each in shape.module.scales(values)])
+    scales = np.array([float(np.ravel(scale)[0]) for scale in shape.module.scales(values)])
     return Rig(name, flat, shape, scales, motion.pieces(flat, 1)[0])

@@ -55,17 +55,17 @@ def both_maps(locked: Rig, free: Rig) -> list[Map]:
     return [first, Map("free, crossover x stroke", free, by_stroke, rows, 0.97)]
 
 
-def friso_map(each: Map, rtol: float) -> tuple[np.ndarray, float]:
+def friso_map(case: Map, rtol: float) -> tuple[np.ndarray, float]:
     """Peak counts of all cells, and the rejected share of steps: the work that the prototype does."""
     settings = Options(rtol=rtol, record_from=0.8 * COUNTED_AFTER, least_swing=SWING / 4)
-    chunks = list(run_chunks(each.rig.kernel, each.flat, len(each.prototype), settings))
-    peaks = np.empty(len(each.prototype))
+    chunks = list(run_chunks(case.rig.kernel, case.flat, len(case.prototype), settings))
+    peaks = np.empty(len(case.prototype))
     for chunk in chunks:
         peaks[chunk.numbers] = _count(chunk)
     attempted, rejected = (sum(float(c.statistic(name).sum()) for c in chunks) for name in ("attempted", "rejected"))
     failed = sum(int((chunk.results.statuses != 1).sum()) for chunk in chunks)
     if failed:
-        print(f"  {each.name}, rtol {rtol:g}: {failed} cells failed")
+        print(f"  {case.name}, rtol {rtol:g}: {failed} cells failed")
     return peaks, rejected / attempted
 
 
@@ -77,24 +77,24 @@ def _count(chunk: Runs) -> np.ndarray:
     return scan(times, values, results.turn_counts, nothing, nothing)[0].sum(axis=1)
 
 
-def _measured_map(each: Map, rtol: float) -> None:
+def _measured_map(case: Map, rtol: float) -> None:
     """The same with all measures that `friso.sweep` reports."""
-    for chunk in run_chunks(each.rig.kernel, each.flat, len(each.prototype), options(rtol)):
-        measure(chunk.part(each.flat), chunk)
+    for chunk in run_chunks(case.rig.kernel, case.flat, len(case.prototype), options(rtol)):
+        measure(chunk.part(case.flat), chunk)
 
 
 def run_maps(maps: list[Map], prototype: ModuleType | None, repetitions: int) -> list[Goal]:
     """Time both maps at both tolerances; prints a table, returns the goals."""
     goals: list[Goal] = []
     rows = []
-    for each in maps:
-        strict = friso_map(each, STRICT)[0] > 0
-        lanes = [prototype.parameters(**row) for row in each.prototype] if prototype else []
+    for case in maps:
+        strict = friso_map(case, STRICT)[0] > 0
+        lanes = [prototype.parameters(**row) for row in case.prototype] if prototype else []
         for rtol in RTOLS:
-            times = _times(each, prototype, lanes, rtol, repetitions)
-            peaks, rejected = friso_map(each, rtol)
+            times = _times(case, prototype, lanes, rtol, repetitions)
+            peaks, rejected = friso_map(case, rtol)
             agreement = float(np.mean((peaks > 0) == strict))
-            rows.append([f"{each.name}, {rtol:g}", spread(times["friso"], digits=3)])
+            rows.append([f"{case.name}, {rtol:g}", spread(times["friso"], digits=3)])
             rows[-1].append(spread(times["measured"], digits=3))
             ratio, other = np.nan, ["absent"] * 3
             if prototype:
@@ -104,13 +104,13 @@ def run_maps(maps: list[Map], prototype: ModuleType | None, repetitions: int) ->
                 share = float(np.mean((counts > 0) == strict))
                 other = [spread(times["prototype"], digits=3), f"{ratio:.2f} / {middle:.2f}"]
                 other.append(f"{1 - steps[1] / steps[0]:.1%}, {share:.2%}")
-                about = f"map {each.name}, rtol {rtol:g}: wall time over the prototype's"
+                about = f"map {case.name}, rtol {rtol:g}: wall time over the prototype's"
                 goals.append(Goal(about, "<= 1", f"{ratio:.2f} (min), {middle:.2f} (median)", ratio <= 1))
             rows[-1] += [*other, f"{rejected:.1%}", f"{agreement:.2%}"]
-            about = f"map {each.name}, rtol {rtol:g}: "
+            about = f"map {case.name}, rtol {rtol:g}: "
             goals.append(Goal(about + "rejected steps", "< 15 %", f"{rejected:.1%}", rejected < MOST_REJECTED))
-            wanted = f">= {each.agreement:.1%}"
-            goals.append(Goal(about + "verdicts as at 1e-9", wanted, f"{agreement:.2%}", agreement >= each.agreement))
+            target = f">= {case.agreement:.1%}"
+            goals.append(Goal(about + "verdicts as at 1e-9", target, f"{agreement:.2%}", agreement >= case.agreement))
     print("\nMaps, 41 x 41 runs of 20 s, all threads, wall time min / median [s]")
     head = ("map, rtol", "friso", "with all measures", "prototype", "friso/prototype min / median")
     print_table((*head, "prototype rejected, agrees", "rejected", "agrees with 1e-9"), rows)
@@ -118,12 +118,12 @@ def run_maps(maps: list[Map], prototype: ModuleType | None, repetitions: int) ->
 
 
 def _times(
-    each: Map, prototype: ModuleType | None, lanes: list[Any], rtol: float, repetitions: int
+    case: Map, prototype: ModuleType | None, lanes: list[Any], rtol: float, repetitions: int
 ) -> dict[str, list[float]]:
     """Wall times [s] of friso, friso with all measures, and the prototype, taken in turns."""
     jobs: dict[str, Any] = {
-        "friso": lambda: friso_map(each, rtol),
-        "measured": lambda: _measured_map(each, rtol),
+        "friso": lambda: friso_map(case, rtol),
+        "measured": lambda: _measured_map(case, rtol),
     }
     if prototype:
         jobs["prototype"] = lambda: prototype.sweep(lanes, rtol=rtol)
