@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.metrics import Cycle, cycle, distance, sampled_maxima
-from benchmarks.peers import time_out, at_once
+from benchmarks.peers import at_once, time_out
 from benchmarks.race import RUNS, Field, friso_seconds, friso_trace
 from benchmarks.report import clock, print_table
 
