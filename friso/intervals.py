@@ -98,16 +98,16 @@ class Span:
         """The example as it stands in a file."""
         return f'"{self.example}"'
 
-    def read(self, value: Any) -> Interval:
+    def read(self, entry: Any) -> Interval:
         """The range of a text, all of it allowed. Raises InputError."""
-        if isinstance(value, Interval):
-            return value
+        if isinstance(entry, Interval):
+            return entry
         try:
-            interval = _read(value, self.of)[1]
+            interval = _read(entry, self.of)[1]
             if not (self.of.bound.holds(interval.low) and self.of.bound.holds(interval.high)):
                 raise _Refused(_reach(interval, self.of))
         except _Refused as refused:
-            raise InputError("", quoted(value, str(refused)), self.expected, self.written_example) from None
+            raise InputError("", quoted(entry, str(refused)), self.expected, self.written_example) from None
         return interval
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:

@@ -137,12 +137,12 @@ class Number:
         """The example as it stands in a file."""
         return self.example
 
-    def read(self, value: Any) -> float:
+    def read(self, entry: Any) -> float:
         """What was given, checked. Raises InputError."""
-        is_number = isinstance(value, int | float) and not isinstance(value, bool)
-        if not is_number or not self.bound.holds(value):
-            raise InputError("", quoted(value), self.expected, self.written_example)
-        return value
+        is_number = isinstance(entry, int | float) and not isinstance(entry, bool)
+        if not is_number or not self.bound.holds(entry):
+            raise InputError("", quoted(entry), self.expected, self.written_example)
+        return entry
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         return core_schema.no_info_plain_validator_function(self.read)

@@ -46,9 +46,9 @@ class Choice:
         """The example as it stands in a file."""
         return self.example
 
-    def read(self, value: Any) -> tuple[Any, ...]:
+    def read(self, entry: Any) -> tuple[Any, ...]:
         """The items. Raises SpecError."""
-        items = value if isinstance(value, list | tuple) else [value]
+        items = entry if isinstance(entry, list | tuple) else [entry]
         if not items:
             raise SpecError("", "an empty list", self.expected, self.example)
         return tuple(self._item(item) for item in items)
@@ -75,18 +75,18 @@ GAUGES = (0.05, 0.08, 0.1, 0.12, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.5, 0.6, 0.7,
 class Gauges(Choice):
     """A list of thicknesses, or a range that stands for the usual gauges in it."""
 
-    def read(self, value: Any) -> tuple[Any, ...]:
+    def read(self, entry: Any) -> tuple[Any, ...]:
         """The thicknesses. Raises SpecError."""
-        if not (isinstance(value, str) and ".." in value):
-            return super().read(value)
+        if not (isinstance(entry, str) and ".." in entry):
+            return super().read(entry)
         assert isinstance(self.of, Quantity)
-        among = Span(self.of, "0.1 mm .. 0.5 mm").read(value)
+        among = Span(self.of, "0.1 mm .. 0.5 mm").read(entry)
         gauges = [
             f"{gauge:g} mm" for gauge in GAUGES if among.low <= gauge * 1e-3 * (1 + 1e-9) <= among.high * (1 + 1e-8)
         ]
         if not gauges:
             expected = f"a range with a usual gauge in it ({', '.join(f'{gauge:g}' for gauge in GAUGES)} mm)"
-            raise SpecError("", quoted(value), expected, 'thickness = "0.1 mm .. 0.5 mm"')
+            raise SpecError("", quoted(entry), expected, 'thickness = "0.1 mm .. 0.5 mm"')
         return super().read(gauges)
 
 

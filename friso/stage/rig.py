@@ -153,13 +153,13 @@ class Several:
         """The example as it stands in a file."""
         return f"[{', '.join(map(as_toml, self.examples))}]"
 
-    def read(self, value: Any) -> Values:
+    def read(self, entry: Any) -> Values:
         """The values of an array. Raises StageError."""
-        if not isinstance(value, list | tuple) or len(value) < 2:
-            hint = f"of {len(value)}" if isinstance(value, list | tuple) else "not an array"
-            raise StageError("", quoted(value, hint), self.expected, self.written_example)
+        if not isinstance(entry, list | tuple) or len(entry) < 2:
+            hint = f"of {len(entry)}" if isinstance(entry, list | tuple) else "not an array"
+            raise StageError("", quoted(entry, hint), self.expected, self.written_example)
         try:
-            return Values(self.of.read(item) for item in value)
+            return Values(self.of.read(item) for item in entry)
         except InputError as error:
             raise StageError("", error.given, self.expected, self.written_example) from None
 
@@ -179,9 +179,9 @@ class Density(Quantity):
         """What the key takes, in words."""
         return f"number and unit in quotes, convertible to {self.unit}, and /Hz^0.5, {self.bound.text}"
 
-    def read(self, value: Any) -> Value:
+    def read(self, entry: Any) -> Value:
         """The SI value of a text (or of the text of a Value). Raises StageError."""
-        text = getattr(value, "text", value)
+        text = getattr(entry, "text", entry)
         amplitude = _PER_ROOT_HERTZ.sub("", text) if isinstance(text, str) else text
         if amplitude == text and isinstance(text, str):
             raise StageError("", quoted(text, "does not end with /Hz^0.5"), self.expected, self.written_example)

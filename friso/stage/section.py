@@ -79,13 +79,13 @@ class Table:
     pick: Callable[[dict[str, Any]], type[Section]]
     example: str
 
-    def read(self, value: Any) -> Any:
+    def read(self, entry: Any) -> Any:
         """The section for a table; a section is left as it is. Raises InputError."""
-        if isinstance(value, Section):
-            return value
-        if not isinstance(value, dict):
-            raise InputError("", quoted(value), "a table of keys", self.example)
-        return self.pick(value)(**value)
+        if isinstance(entry, Section):
+            return entry
+        if not isinstance(entry, dict):
+            raise InputError("", quoted(entry), "a table of keys", self.example)
+        return self.pick(entry)(**entry)
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         return core_schema.no_info_before_validator_function(self.read, handler(source))
