@@ -22,6 +22,9 @@ from friso.flexure.naming import mode_name
 MODES = 12
 """Modes reported, the lowest; and those of the stage above them."""
 
+OF_STAGE = 0.1
+"""Share of the energy of a mode from which it is one of the stage."""
+
 KINDS = (((2, 4), 8), ((1, 5), 4), ((3,), 5), ((0,), 2))
 """Coordinates of a node that go together while the leaf is straight, and how many modes between held ends are kept:
 bending, bending in its plane, torsion, stretching."""
@@ -102,7 +105,8 @@ def modes(mechanism: Mechanism, leaf: Reduced) -> tuple[Mode, ...]:
     stiffness, mass = np.zeros((size, size)), np.eye(size)
     stage = slice(0, COORDINATES)
     stiffness[stage, stage] = _gathered(ends, leaf.stiffness)
-    mass[stage, stage] = body_mass(mechanism) + _gathered(ends, leaf.mass)
+    body = body_mass(mechanism)
+    mass[stage, stage] = body + _gathered(ends, leaf.mass)
     np.fill_diagonal(stiffness[COORDINATES:, COORDINATES:], np.tile(leaf.squares, len(rows)))
     # row k of the leaves takes part with the weights rows[k]
     mass[COORDINATES:, stage] = np.einsum("kl,me,les->kms", rows, leaf.coupling, ends).reshape(-1, COORDINATES)
@@ -110,7 +114,7 @@ def modes(mechanism: Mechanism, leaf: Reduced) -> tuple[Mode, ...]:
     squares, vectors = eigh(stiffness, mass)
     lowest = []
     for square, vector in zip(squares, vectors.T, strict=True):
-        if len(lowest) >= MODES and not _of_stage(mechanism, vector[stage]):
+        if len(lowest) >= MODES and not vector[stage] @ body @ vector[stage] > OF_STAGE:
             continue
         amplitudes = rows.T @ vector[COORDINATES:].reshape(len(rows), count)
         moved = np.einsum("nce,les,s->lnc", leaf.static[:, :3], ends, vector[stage])
@@ -118,11 +122,6 @@ def modes(mechanism: Mechanism, leaf: Reduced) -> tuple[Mode, ...]:
         lowest.append(_mode(mechanism, np.sqrt(max(square, 0.0)) / (2 * np.pi), vector[stage], moved))
     drive = max(lowest, key=lambda mode: abs(mode.stage[2]) / mode.frequency if mode.frequency else np.inf)
     return (replace(drive, name="drive"), *(mode for mode in lowest if mode is not drive))
-
-
-def _of_stage(mechanism: Mechanism, motion: np.ndarray) -> bool:
-    """Whether a tenth of the energy of a mode, or more, is the stage's."""
-    return bool(motion @ body_mass(mechanism) @ motion > 0.1)
 
 
 def _mode(mechanism: Mechanism, frequency: float, stage: np.ndarray, leaves: np.ndarray) -> Mode:

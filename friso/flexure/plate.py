@@ -50,8 +50,9 @@ class Curl:
         fast, slow = (np.sqrt(360 * (middle + sign * root)) / width for sign in (1, -1))
         half = length / 2
         at_clamp = (half, 1.0) if odd else (1.0, 0.0)
-        slopes = [rate / _tanh(rate * half, odd) for rate in (fast, slow)]
-        # a + b = m, a slope_1 + b slope_2 = m' at the clamp, h being 1 there
+        # a + b = m, a slope_1 + b slope_2 = m' at the clamp, where h is 1 and h' is rate/tanh or rate tanh
+        tanhs = [np.tanh(rate * half) for rate in (fast, slow)]
+        slopes = [rate / (tanh if odd else 1 / tanh) for rate, tanh in zip((fast, slow), tanhs, strict=True)]
         a = (at_clamp[1] - at_clamp[0] * slopes[1]) / (slopes[0] - slopes[1])
         return cls(poisson, (fast, slow), (a, at_clamp[0] - a), odd)
 
@@ -68,11 +69,6 @@ class Curl:
         """f'' at s for the moment m."""
         moment = s if self.odd else 1.0
         return moment + self.poisson**2 / (1 - self.poisson**2) * self.shape(s, length)
-
-
-def _tanh(x: Any, odd: bool) -> Any:
-    """The value over the slope, times the rate, of sinh (odd) or cosh at x."""
-    return np.tanh(x) if odd else 1 / np.tanh(x)
 
 
 def _decay(rate: Any, s: Any, length: Any, odd: bool) -> Any:

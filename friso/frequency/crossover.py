@@ -125,7 +125,8 @@ def _abscissa(flat: Mapping[str, Any], members: Members, crossover: np.ndarray) 
 
 def _distance(flat: Mapping[str, Any], members: Members, crossover: np.ndarray) -> np.ndarray:
     """Least distance of the loop from -1, shape (crossovers, members)."""
-    omega = _search_grid(flat)
+    # frequencies that show the loop at all crossovers searched, always the same: the distance stays a smooth function
+    omega = np.unique(np.concatenate([grid(_at(flat, np.array(end)), DENSITY) for end in searched(flat)]))
     bare = plants(flat, members, omega) * Drive.of(flat).transfer(omega)
     shared = np.array([distance_to_lines(bare * controller(_at(flat, f), omega)) for f in crossover])
     return np.minimum(shared, _stability(flat, members, crossover).resonant.reshape(shared.shape))
@@ -134,10 +135,3 @@ def _distance(flat: Mapping[str, Any], members: Members, crossover: np.ndarray) 
 def _stability(flat: Mapping[str, Any], members: Members, crossover: np.ndarray) -> PoleStability:
     """All members at the first crossover, then at the second, and so on."""
     return stability_by_poles(_at(flat, np.repeat(crossover, len(members))), members.repeated(len(crossover)))
-
-
-def _search_grid(flat: Mapping[str, Any]) -> np.ndarray:
-    """Angular frequencies [rad/s] that show the loop at all crossovers searched: always the same ones, so that the
-    distance is a smooth function of the crossover."""
-    both = [grid(_at(flat, np.array(end)), DENSITY) for end in searched(flat)]
-    return np.unique(np.concatenate(both))

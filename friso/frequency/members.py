@@ -98,19 +98,15 @@ def family(flat: Mapping[str, Any], biases: int = BIASES, speeds_: int = SPEEDS)
     if flat["friction.model"] == "none":
         return joined([*limit_cases(flat).values()])
     parts = []
+    differs = any(flat.get(f"friction.{name}", 0.0) != 0 for name in ("asymmetry", "viscous_asymmetry"))
     for touched in limiter_states(flat):
-        for forward in (True, False) if _differs(flat) else (True,):
+        for forward in (True, False) if differs else (True,):
             least, most = (-NEARLY * level(flat, not forward), NEARLY * level(flat, forward))
             bias = np.unique(np.linspace(least, most, biases))  # a law that creeps instead of sticking bears none
             speed = np.concatenate([np.zeros(len(bias)), speeds(flat, speeds_)])
             bias = np.concatenate([bias, np.zeros(speeds_)])
             parts.append(Members(speed, bias, np.full(len(speed), touched), np.full(len(speed), forward)))
     return joined(parts)
-
-
-def _differs(flat: Mapping[str, Any]) -> bool:
-    """Whether friction differs between the two directions."""
-    return any(flat.get(f"friction.{name}", 0.0) != 0 for name in ("asymmetry", "viscous_asymmetry"))
 
 
 def _fast(flat: Mapping[str, Any]) -> float:

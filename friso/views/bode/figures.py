@@ -105,9 +105,9 @@ def _plant(bode: Bode) -> Figure:
         " and on the mass lines. A stuck cart rests on its bristles, a sliding one feels its viscous friction."
     )
     if has_limiter(bode):
-        caption += " A touched limiter acts beside the joint" + (
-            "; dashed: one behind the other, as Table 1 prints it." if _any_series(bode) else "."
-        )
+        in_series = any(name.endswith(SERIES) for name in bode.cases)
+        dashed = "; dashed: one behind the other, as Table 1 prints it" if in_series else ""
+        caption += f" A touched limiter acts beside the joint{dashed}."
     panels = (replace(above, series=(*above.series, *lines)), _phases(_hertz(bode), curves))
     return Figure("bode_plant", "Plant", caption, panels)
 
@@ -250,10 +250,6 @@ def _masses(bode: Bode) -> list[float]:
     flat = bode.stage.flat()
     masses = [float(flat[key]) for key in ("masses.cart", "masses.stage") if key in flat]
     return [sum(masses), *(masses[1:] if "joint.locked" in flat and not flat["joint.locked"] else [])]
-
-
-def _any_series(bode: Bode) -> bool:
-    return any(name.endswith(SERIES) for name in bode.cases)
 
 
 def _hertz(bode: Bode) -> Array:

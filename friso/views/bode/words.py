@@ -26,10 +26,14 @@ def sentences(bode: Bode) -> list[str]:
 def stability(bode: Bode) -> list[str]:
     """Whether the one controller is stable in the settled states, and how well; whether in all others; and why not."""
     if len(bode.scan.members) == 1:
-        return [f"The loop is {_well(bode.settled[1])}."]
+        margins = bode.settled[1]
+        how = f"stable, {_margin(margins)}" if margins.stable else f"not stable: a deviation {growth(margins)}"
+        return [f"The loop is {how}."]
     says = [_settled(bode)]
     if bode.stable:
-        return [*says, f"So it is in every state: {_states_checked(bode)}. Worst: {_worst(bode)}."]
+        worst, margins = bode.worst
+        where = f"{place(worst, bode)}, {_margin(margins)}"
+        return [*says, f"So it is in every state: {_states_checked(bode)}. Worst: {where}."]
     return [*says, f"It is not stable in every state. Unstable: {'; '.join(_where(bode))}.", *_why(bode)]
 
 
@@ -46,10 +50,6 @@ def _settled(bode: Bode) -> str:
 def _tuned(bode: Bode) -> str:
     flat = bode.stage.flat()
     return f"At {with_unit(flat['controller.crossover'], 'Hz')}" if _crossing(bode) else "As given"
-
-
-def _well(margins: Margins) -> str:
-    return f"stable, {_margin(margins)}" if margins.stable else f"not stable: a deviation {growth(margins)}"
 
 
 def _margin(margins: Margins) -> str:
@@ -157,11 +157,6 @@ def _why(bode: Bode) -> list[str]:
     ]
 
 
-def _worst(bode: Bode) -> str:
-    member, margins = bode.worst
-    return f"{place(member, bode)}, {_margin(margins)}"
-
-
 def _limits(bode: Bode, name: str) -> str:
     limits = bode.limits[name]
     stable = _remark(bode, name, limits.highest_stable, "lost first", limits.first_lost)
@@ -177,12 +172,8 @@ def _remark(bode: Bode, name: str, end: float | None, what: str, member: Members
     if member is None or len(bode.scan.members) == 1:
         return ""
     where = f"above {with_unit(end, _unit(bode))}" if end else "as given"
-    return f" ({where}, {what}: {_state(bode, name, member)})"
-
-
-def _state(bode: Bode, name: str, member: Members) -> str:
-    """A state of a joint in words."""
-    return in_words(cart(member) if has_friction(bode) else "", bool(member.touched[0]), name == "free")
+    state = in_words(cart(member) if has_friction(bode) else "", bool(member.touched[0]), name == "free")
+    return f" ({where}, {what}: {state})"
 
 
 def _windows(ranges: Sequence[Range], limits: Limits, bode: Bode) -> str:

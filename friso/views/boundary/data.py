@@ -67,7 +67,11 @@ def lines(result: Diagram | Plane) -> tuple[Line, ...]:
     if isinstance(result, Diagram):
         pairs = zip(result.branches, result.special, strict=True)
         return tuple(_line(result, branch, _of_branch(branch, special)) for branch, special in pairs)
-    return tuple(_line(result, curve, _of_curve(curve)) for curve in result.curves)
+    rows = [
+        [_Row(spot.at, spot.error, spot.found.point.cycle, spot.found.kind) for spot in curve.spots]
+        for curve in result.curves
+    ]
+    return tuple(_line(result, *pair) for pair in zip(result.curves, rows, strict=True))
 
 
 def _of_branch(branch: Branch, special: tuple[Found, ...]) -> list[_Row]:
@@ -83,10 +87,6 @@ def _of_branch(branch: Branch, special: tuple[Found, ...]) -> list[_Row]:
         _Row(np.array([point.place]), np.array([error]), point.cycle, kind)
         for _, point, error, kind in sorted(placed, key=lambda row: row[0])
     ]
-
-
-def _of_curve(curve: Curve) -> list[_Row]:
-    return [_Row(spot.at, spot.error, spot.found.point.cycle, spot.found.kind) for spot in curve.spots]
 
 
 def _along(path: Array, vector: Array) -> float:

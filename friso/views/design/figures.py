@@ -52,13 +52,15 @@ KINDS = (Kind("settles in all corners", QUIET), Kind("run failed", INK))
 
 def design_figures(design: Design) -> tuple[Figure, ...]:
     """All figures, in the order in which they are read."""
-    figures = (_map(design), _front(design), _modes(design), window_figure(design), _damping(design), _settling(design))
+    modes = replace(modes_figure(design.fitted.choice.beams), name="design_modes")
+    figures = (_map(design), _front(design), modes, window_figure(design), _damping(design), _settling(design))
     return tuple(replace(figure, subject=design.stage.name) for figure in figures)
 
 
 def _front(design: Design) -> Figure:
     """Drive stiffness against first interfering frequency."""
-    choice, multiple = design.fitted.choice, design.spec.safety.parasitic
+    choice, task, safety = design.fitted.choice, design.fitted.task, design.spec.safety
+    multiple, stiffest = safety.parasitic, task.friction / (safety.breakaway * task.stroke)
     good = [confirmation for confirmation in design.confirmed if not confirmation.failure]
     failed = [confirmation.candidate for confirmation in design.confirmed if confirmation.failure]
     points = [
@@ -74,33 +76,22 @@ def _front(design: Design) -> Figure:
     line = Series(*_points(design.candidates), "front, by closed forms", GREY, width=1.8)
     sheets = sorted(
         {candidate.geometry.sheet for candidate in design.candidates},
-        key=lambda candidate: (candidate.thickness, candidate.leaves),
+        key=lambda sheet: (sheet.thickness, sheet.leaves),
     )
     kinds = [f"{sheet.leaves:g} leaves of {size(sheet.thickness)} mm {sheet.material}" for sheet in sheets]
     caption = (
         "The best that can be built: no leaves within all requirements are both softer and have a higher first "
         "interfering frequency. It ends on the right where the cart would break away inside the stroke, at "
-        f"{newtons_per(_stiffest(design), 'mm')}, or where space or sheets end. On this front: {listed(kinds, 'and')}."
+        f"{newtons_per(stiffest, 'mm')}, or where space or sheets end. On this front: {listed(kinds, 'and')}."
     )
     panel = Panel("", *axes, (line,), tuple(points), limits)
     return Figure("design_front", "Pareto front of leaf springs", caption, (panel,))
 
 
-def _stiffest(design: Design) -> float:
-    """The drive stiffness [N/m] from which the cart breaks away inside the stroke."""
-    task = design.fitted.task
-    return task.friction / (design.spec.safety.breakaway * task.stroke)
-
-
 def _points(several: Sequence[Candidate | Confirmed]) -> tuple[Array, Array]:
     """Stiffness [N/mm] and frequency [Hz] of candidates, by closed forms or beams."""
-    return np.array([candidate.stiffness / 1e3 for candidate in several]), np.array(
-        [candidate.frequency for candidate in several]
-    )
-
-
-def _modes(design: Design) -> Figure:
-    return replace(modes_figure(design.fitted.choice.beams), name="design_modes")
+    stiffness = np.array([candidate.stiffness / 1e3 for candidate in several])
+    return stiffness, np.array([candidate.frequency for candidate in several])
 
 
 def _map(design: Design) -> Figure:

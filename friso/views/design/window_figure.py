@@ -43,9 +43,8 @@ def window_figure(design: Design) -> Figure:
         np.full(2, design.controller.crossover), np.array([-0.5, len(rows) - 0.5]), "chosen", CHOSEN, width=2.0
     )
     points = _corners([(rows.index(name), corners) for name, corners in hunting], visible)
-    panel = Panel(
-        "", Axis("Crossover", "Hz", visible, log=True), _words(rows), (line,), (points,), bands=_named_once(bands)
-    )
+    axes = Axis("Crossover", "Hz", visible, log=True), Axis("", "", (-0.5, len(rows) - 0.5), words=tuple(rows))
+    panel = Panel("", *axes, (line,), (points,), bands=_named_once(bands))
     caption = (
         f"What bounds the crossover, and the one chosen, {hertz(design.controller.crossover)}. Machine: its limit. "
         f"Leaves: the highest first interfering frequency of the front over {multiple:g}. Margin: modulus margin above "
@@ -53,10 +52,6 @@ def window_figure(design: Design) -> Figure:
         "corners of friction and masses."
     )
     return Figure("design_window", "The window for the crossover", caption, (panel,))
-
-
-def _words(rows: list[str]) -> Axis:
-    return Axis("", "", (-0.5, len(rows) - 0.5), words=tuple(rows))
 
 
 def _bars(ranges: list[Range], visible: Range, row: int, label: str, colour: str) -> list[Band]:

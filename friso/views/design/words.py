@@ -51,7 +51,9 @@ def need(design: Design) -> str:
     limit, factor, without = hertz(design.spec.limit), design.spec.safety.hunting, design.without
     if not without.hunts:
         return f"No isolator is needed: without one the machine {edge(without)}."
-    above = f"{_at_least(factor * without.highest)}, {factor:g} times the edge of hunting"
+    least = factor * without.highest
+    bound = f"{hertz(least)} or more" if math.isfinite(least) else "higher than was searched"
+    above = f"{bound}, {factor:g} times the edge of hunting"
     if design.needed:
         return f"An isolator is needed: without one the crossover has to be {above}; the machine allows {limit}."
     return f"No isolator is needed: without one the crossover has to be {above}, and the machine allows {limit}."
@@ -206,7 +208,3 @@ def seconds(time: float) -> str:
 
 def percent(share: float) -> str:
     return f"{100 * share:.2g} %"
-
-
-def _at_least(frequency: float) -> str:
-    return f"{hertz(frequency)} or more" if math.isfinite(frequency) else "higher than was searched"

@@ -11,7 +11,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from friso.views.drawing.figure import Array, Axis, Band, Coloured, Figure, Kind, Limit, Markers, Panel, Series
+from friso.views.drawing.figure import Array, Axis, Coloured, Figure, Kind, Limit, Markers, Panel, Series
 from friso.views.drawing.prefixes import choose, pretty
 from friso.views.drawing.thinning import thin
 
@@ -84,7 +84,10 @@ def _panel(panel: Panel) -> Panel:
         markers=tuple(_markers(marker, x_factor, y_factor) for marker in panel.markers),
         maps=tuple(_coloured(field, x_factor, y_factor) for field in panel.maps),
         clouds=tuple(_coloured(cloud, x_factor, y_factor) for cloud in panel.clouds),
-        bands=tuple(_band(band, x_factor, y_factor) for band in panel.bands),
+        bands=tuple(
+            replace(band, x=band.x * x_factor, low=band.low * y_factor, high=band.high * y_factor)
+            for band in panel.bands
+        ),
         limits=(),
     )
 
@@ -131,10 +134,6 @@ def _limit(limit: Limit, extent: tuple[float, float]) -> Series:
 def _markers(markers: Markers, x_factor: float, y_factor: float) -> Markers:
     finite = np.isfinite(markers.x) & np.isfinite(markers.y)
     return replace(markers, x=markers.x[finite] * x_factor, y=markers.y[finite] * y_factor)
-
-
-def _band(band: Band, x_factor: float, y_factor: float) -> Band:
-    return replace(band, x=band.x * x_factor, low=band.low * y_factor, high=band.high * y_factor)
 
 
 def _coloured(field: Field, x_factor: float, y_factor: float) -> Field:

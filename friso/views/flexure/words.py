@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from typing import Any
 
 from friso.flexure.evaluation import Evaluation
 from friso.flexure.mechanism import AXES, GRAVITY
@@ -47,8 +46,19 @@ def warnings(flexure: Found) -> list[str]:
 def assumptions(stage: Stage) -> list[str]:
     """What stands in for keys that the stage file leaves out."""
     flat = stage.flat()
-    notes = [_centre(flat), _inertia(flat, flat["masses.stage"]), _points(flat), _load(flat)]
-    parts = [part for part in notes if part]
+    parts = []
+    if "flexure.centre_x" not in flat:
+        parts.append("centre of mass in the middle of the leaf ends")
+    if not all(f"flexure.inertia_{axis}" in flat for axis in AXES):
+        parts.append(f"moments of inertia of an aluminium cube of {flat['masses.stage']:g} kg")
+    points = []
+    for point, place in (("actuation", "the centre of mass of the stage"), ("sensor", "the point of actuation")):
+        if f"flexure.{point}_x" not in flat:
+            partly = any(f"flexure.{point}_{axis}" in flat for axis in AXES)
+            points.append(f"{point}{' along x' if partly else ''} at {place}")
+    parts += [", ".join(points)] if points else []
+    if "flexure.load" not in flat:
+        parts.append("no load on the leaves, but the weight of the stage for the margin to buckling")
     return [f"Assumed, since [flexure] does not say: {'; '.join(parts)}."] if parts else []
 
 
@@ -182,32 +192,6 @@ _COMPARED: Mapping[str, Callable[[Evaluation], float]] = {
     "stress": lambda evaluation: evaluation.stress,
     "buckling load": lambda evaluation: evaluation.buckling,
 }
-
-
-def _centre(flat: Mapping[str, Any]) -> str:
-    return "" if "flexure.centre_x" in flat else "centre of mass in the middle of the leaf ends"
-
-
-def _inertia(flat: Mapping[str, Any], mass: float) -> str:
-    if all(f"flexure.inertia_{axis}" in flat for axis in AXES):
-        return ""
-    return f"moments of inertia of an aluminium cube of {mass:g} kg"
-
-
-def _points(flat: Mapping[str, Any]) -> str:
-    places = {"actuation": "the centre of mass of the stage", "sensor": "the point of actuation"}
-    return ", ".join(_point(flat, name, place) for name, place in places.items() if f"flexure.{name}_x" not in flat)
-
-
-def _point(flat: Mapping[str, Any], name: str, place: str) -> str:
-    """Where something is whose place along x is left out."""
-    partly = any(f"flexure.{name}_{axis}" in flat for axis in AXES)
-    return f"{name}{' along x' if partly else ''} at {place}"
-
-
-def _load(flat: Mapping[str, Any]) -> str:
-    text = "no load on the leaves, but the weight of the stage for the margin to buckling"
-    return "" if "flexure.load" in flat else text
 
 
 def _stroke(evaluation: Evaluation) -> str:
