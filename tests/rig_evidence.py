@@ -10,8 +10,7 @@ from friso.studies.rig.frf import Loop
 from friso.studies.rig.hunted import Hunted
 from friso.studies.rig.in_position import InPosition, Standstill
 from friso.studies.rig.stroke_crossover import StrokeCrossover
-from friso.studies.thesis.rig_hunting import Cycles, Moves
-from friso.studies.thesis.rig_loops import RigLoops
+from friso.studies.thesis.as_built import Cycles, Moves, RigLoops
 
 HUNTS, FAILED = 7, -1
 """Peaks of a run that hunts; of one that failed, which says nothing."""

@@ -37,8 +37,7 @@ from friso.studies.guideline.groups import (
     parameters_of,
     values_of,
 )
-from friso.studies.guideline.hunting_laws import FREE_LAW, LOCKED_LAW
-from friso.studies.guideline.laws import Errors, Law, Rate, fitted, in_series
+from friso.studies.guideline.laws import FREE_LAW, LOCKED_LAW, Errors, Law, Rate, fitted, in_series
 from friso.studies.guideline.parasitic import holding
 from friso.studies.guideline.rig import plain
 from friso.studies.thesis.studies import rig

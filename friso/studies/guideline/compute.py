@@ -16,8 +16,7 @@ from friso.errors import InputError
 from friso.hunting.cycle.ensemble import shared_structure
 from friso.studies.guideline.checks import Checked, checked
 from friso.studies.guideline.groups import Count, counted, values_of
-from friso.studies.guideline.hunting_laws import FREE_LAW, LOCKED_LAW
-from friso.studies.guideline.laws import Errors, Fitted, fitted
+from friso.studies.guideline.laws import FREE_LAW, LOCKED_LAW, Errors, Fitted, fitted
 from friso.studies.guideline.parasitic import Parasitic, parasitic_limits
 from friso.studies.guideline.rig import Laws, plain
 from friso.studies.guideline.sweeps import (

@@ -35,15 +35,14 @@ class Parasitic:
 
 def parasitic_limits(stage: Stage) -> list[Parasitic]:
     """The stage with each of these modes instead of its own, sampled as the thesis's drive."""
-    limits = []
+    modes = []
     for damping in DAMPING_RATIOS:
         for frequency in FREQUENCIES:
             mode = {"parasitic.frequency": f"{frequency!r} Hz", "parasitic.damping_ratio": damping, **DRIVE}
-            locked, free = (
-                _comfortable(stage.replace({**mode, "joint.locked": held}).flat()) for held in (True, False)
-            )
-            limits.append(Parasitic(frequency, damping, locked, free))
-    return limits
+            flats = [stage.replace({**mode, "joint.locked": held}).flat() for held in (True, False)]
+            locked, free = (holding(limits(flat).comfortable, flat["controller.crossover"]) for flat in flats)
+            modes.append(Parasitic(frequency, damping, locked, free))
+    return modes
 
 
 def settled_margin(stage: Stage, changes: Mapping[str, Any]) -> float:
@@ -52,10 +51,6 @@ def settled_margin(stage: Stage, changes: Mapping[str, Any]) -> float:
     return crossover.settled_margin(stage.replace(DRIVE).flat() | dict(changes))
 
 
-def _comfortable(flat: Mapping[str, Any]) -> Range | None:
-    return holding(limits(flat).comfortable, flat["controller.crossover"])
-
-
 def holding(ranges: Sequence[Range], crossover: float) -> Range | None:
     """The range [Hz] that contains a crossover [Hz]; None if none does."""
-    return next((stable for stable in ranges if stable[0] <= crossover <= stable[1]), None)
+    return next((window for window in ranges if window[0] <= crossover <= window[1]), None)

@@ -29,9 +29,8 @@ from friso.identify.logs.log import Log
 from friso.stage import Stage, loads
 from friso.studies.rig.in_position import InPosition
 from friso.studies.rig.stroke_crossover import StrokeCrossover
+from friso.studies.thesis.as_built import Cycles, Moves, RigLoops, cycles, grid, moves, rig_loops, standstill
 from friso.studies.thesis.linear import Need
-from friso.studies.thesis.rig_hunting import Cycles, Moves, cycles, grid, moves, standstill
-from friso.studies.thesis.rig_loops import RigLoops, rig_loops
 from friso.studies.thesis.studies import LOCKED
 
 FORCE = 5.0

@@ -101,7 +101,7 @@ def reproduce(
         if s.panel == "14B"
         for tolerance in (RTOL, TIGHT)
     }
-    entries = _covered(baseline)
+    entries = {claim: entry for claim, entry in registered().items() if not _missing(entry, baseline)}
     varied: list[tuple[Variant, Mapping[str, Finding]]] = []
     for variant in variants:
         tell(f"{variant.parameter} {variant.value}")
@@ -154,11 +154,6 @@ def _coarser(evidence: Evidence) -> Evidence:
         for name, runs in evidence.maps.items()
     }
     return replace(evidence, maps=maps)
-
-
-def _covered(evidence: Evidence) -> Mapping[str, Registered]:
-    """The judges by claim whose needs the evidence meets."""
-    return {claim: entry for claim, entry in registered().items() if not _missing(entry, evidence)}
 
 
 def _missing(entry: Registered, evidence: Evidence) -> list[str]:

@@ -10,9 +10,9 @@ from friso.studies.rig.compare import AS_SLOW, SIMILAR
 from friso.studies.rig.hunted import Hunted
 from friso.studies.rig.in_position import BITS, InPosition
 from friso.studies.rig.stroke_crossover import StrokeCrossover
+from friso.studies.thesis.as_built import AS_BUILT, Cycles, Moves
 from friso.studies.thesis.claims import ORDER, Evidence, Finding, Part, about, judges
 from friso.studies.thesis.experiments import GRID, MOVES, ON_RAILS, STANDSTILL
-from friso.studies.thesis.rig_hunting import AS_BUILT, Cycles, Moves
 
 _ASSUMED = (
     f"Assumed: friction that varies by {AS_BUILT['rail.static_deviation']:.0%} over "

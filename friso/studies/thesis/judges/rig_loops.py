@@ -7,8 +7,8 @@ from collections.abc import Callable
 import numpy as np
 
 from friso.studies.rig.frf import RATIOS, Loop, highest_stable, nearest
+from friso.studies.thesis.as_built import RigLoops
 from friso.studies.thesis.claims import ABOUT, Evidence, Part, about
-from friso.studies.thesis.rig_loops import RigLoops
 
 _HIGHEST, _OTHER, _FREE = 48.0, 600.0, 20.0
 """Highest setting, crossing that threatens stability (Fig. 22), and the crossing of the free joint (Fig. 23) [Hz]."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -65,7 +65,8 @@ def loops_of(stage: Stage, settings: tuple[float, ...]) -> Loops:
     """The loops of a stage, tuned to the crossovers `settings` [Hz]."""
     flat = stage.flat()
     tuned = {f: _tuned(flat, f) for f in settings}
-    omega = _omega(flat)
+    resonances = modes(flat, joined([*limit_cases(flat).values()]))
+    omega = with_resonances(np.geomspace(*CURVE, POINTS) * 2 * np.pi, [resonances])
     moving = limit_cases(flat)["sliding"]
     drive = stage.replace({"drive.sample_time": SAMPLED}).flat()
     return Loops(
@@ -85,14 +86,9 @@ def _tuned(flat: Mapping[str, Any], crossover: Any) -> dict[str, Any]:
     return faster(flat, crossover / flat["controller.crossover"])
 
 
-def _omega(flat: Mapping[str, Any]) -> np.ndarray:
-    """Frequencies [rad/s] of the curves, dense about resonances."""
-    poles = modes(flat, joined([*limit_cases(flat).values()]))
-    return with_resonances(np.geomspace(*CURVE, POINTS) * 2 * np.pi, [poles])
-
-
 def _single(flat: Mapping[str, Any]) -> float | None:
-    """See `Loops`; the free joint's limiter is touched, since the controller is tuned for all the mass."""
+    """See `Loops`; the free joint's limiter is touched, since the controller is tuned for all the mass. None where the
+    end of the search comes first, 0 without any such crossover."""
     cases = limit_cases(flat)
     member = cases.get("sliding-touched", cases["sliding"])
     omega = frequencies(flat, member, Drive.of(flat), DENSITY, [modes(flat, member)])
@@ -102,7 +98,9 @@ def _single(flat: Mapping[str, Any]) -> float | None:
         above = np.array([np.abs(bare * controller(_tuned(flat, f), omega)) > 1 for f in crossover])
         return (above[:, 1:] != above[:, :-1]).sum(axis=1) - 1.5
 
-    return _end_of_first(more)
+    at = np.geomspace(LOWEST, 0.999 * HIGHEST, STEPS)
+    end = next((high for _, high in ranges_below(at, more)), 0.0)
+    return None if end >= at[-1] else end
 
 
 def _highest(flat: Mapping[str, Any]) -> float | None:
@@ -110,14 +108,6 @@ def _highest(flat: Mapping[str, Any]) -> float | None:
     ranges = stable_crossovers(flat, joined([*limit_cases(flat).values()]))
     end = end_of(ranges, flat["controller.crossover"]) or 0.0
     return None if end == searched(flat)[1] else end
-
-
-def _end_of_first(excess: Callable[[np.ndarray], np.ndarray]) -> float | None:
-    """Where the first range of crossovers [Hz] ends in which something is below 0; None at the end of the search, 0
-    without any."""
-    at = np.geomspace(LOWEST, 0.999 * HIGHEST, STEPS)
-    end = next((high for _, high in ranges_below(at, excess)), 0.0)
-    return None if end >= at[-1] else end
 
 
 def _edge(flat: Mapping[str, Any]) -> float:

@@ -1,4 +1,5 @@
-"""The thesis's hunting experiments on its rig as built (Sec. 4.3.2), in sizes for a reproduction."""
+"""The thesis's rig with its drive as built: its loops and plants as they would be measured (Sec. 4.2.1, 4.2.4), and the
+hunting experiments (Sec. 4.3.2), in sizes for a reproduction."""
 
 from __future__ import annotations
 
@@ -11,6 +12,8 @@ import numpy as np
 
 from friso.stage import Stage
 from friso.studies.rig.compare import on_rail, started, varied
+from friso.studies.rig.excitation import excite
+from friso.studies.rig.frf import SETTINGS, Loop, apparent_masses, measured_loop, open_loops, stable_settings
 from friso.studies.rig.hunted import (
     Hunted,
     crossover,
@@ -24,7 +27,8 @@ from friso.studies.rig.hunted import (
     with_joint,
 )
 from friso.studies.rig.in_position import InPosition, in_position
-from friso.studies.rig.outcome import silent
+from friso.studies.rig.outcome import rig_log, silent
+from friso.studies.rig.sizes import freed, locked, pace, travel
 from friso.studies.rig.stroke_crossover import StrokeCrossover, stroke_crossover
 
 AS_BUILT: Mapping[str, Any] = MappingProxyType(
@@ -127,3 +131,26 @@ _FIELD = ("static_deviation", "coulomb_deviation", "correlation_length")
 def standstill(stage: Stage) -> InPosition:
     """Fig. 28."""
     return in_position(as_built(stage), SEED, silent)[0]
+
+
+@dataclass(frozen=True)
+class RigLoops:
+    """Open loops locked at several settings, and free at the lowest of these; settings [Hz] tried free, shape (n,),
+    and which were stable; apparent masses [kg], shape (2, ratios), locked and free, for the motor constants RATIOS."""
+
+    locked: tuple[Loop, ...]
+    free: Loop
+    settings: np.ndarray
+    stable: np.ndarray
+    apparent: np.ndarray
+
+
+def rig_loops(stage: Stage) -> RigLoops:
+    """The loops of a rig with its drive as built."""
+    built = as_built(stage)
+    fixed, free, place = locked(built), freed(built), travel(built)[0]
+    log = rig_log(excite(free, place, SEED), 0, "free", "frequency", free, SEED)
+    settings, stable = stable_settings(free, place, SEED)
+    apparent = np.array([apparent_masses(machine, place, SEED) for machine in (fixed, free)])
+    _, loops = open_loops(fixed, place, SEED, SETTINGS)
+    return RigLoops(loops, measured_loop(log, pace(built)), settings, stable, apparent)
