@@ -23,7 +23,7 @@ COVERAGE = 1.959963984540054
 """Half-width of a 95 % interval of a normal distribution, in standard deviations."""
 
 WIDE = 10.0
-"""Ratio of the ends of a range beyond which its order of magnitude is what is uncertain."""
+"""Ratio of the ends of a range above which its order of magnitude counts as the uncertain quantity."""
 
 _BESIDE = 1e-6
 """Share of the range beside its centre in which some number has to be allowed: of whole numbers none is."""
@@ -31,7 +31,7 @@ _BESIDE = 1e-6
 
 @dataclass(frozen=True)
 class Interval:
-    """From `low` to `high`, SI, both included; `text` is what the user wrote, and `form` in which way."""
+    """From `low` to `high`, SI, both included; `text` is what the user wrote, `form` the notation used."""
 
     low: float
     high: float
@@ -49,7 +49,7 @@ class Interval:
 
     @property
     def wide(self) -> bool:
-        """Whether it is a range over orders of magnitude: of such, the logarithm is what is known evenly."""
+        """Whether it is a range over orders of magnitude, whose logarithm is then taken as uniform."""
         return self.form == "range" and self.low > 0 and self.high > WIDE * self.low
 
     def at(self, share: Any) -> Any:

@@ -244,7 +244,7 @@ def _factor(unit: str, si_unit: str) -> float:
 
 
 def _hertz(factor: float, root: dict[str, float], names: list[str]) -> float:
-    """pint takes 1 Hz for 1 rad/s; they are told apart here. A plain 1/s could be either and is refused."""
+    """pint takes 1 Hz for 1 rad/s; they are distinguished here. A plain 1/s could be either and is refused."""
     if root == {"radian": 1, "second": -1}:
         return factor / (2 * math.pi)
     if root != {"second": -1}:

@@ -1,6 +1,6 @@
 """The edge of hunting over the corners of a specification: below which crossover a cycle attracts.
 
-Coarser than `friso.hunting.edges`, which tells kinds of edges apart and simulates for minutes where a cycle cannot be
+Coarser than `friso.hunting.edges`, which distinguishes kinds of edges and simulates for minutes where a cycle cannot be
 closed: a design asks for 1 or 2 % in seconds, and simulates all its moves afterwards.
 """
 

@@ -34,7 +34,7 @@ class Candidate:
 
 def front(task: Task) -> list[Candidate]:
     """The front, by rising stiffness (NSGA-II, doi:10.1109/4235.996017); empty where no geometry meets the requirements
-    but for that on the frequency, which is an objective here."""
+    except the one on the frequency, which is an objective here."""
     from pymoo.algorithms.moo.nsga2 import NSGA2
     from pymoo.operators.crossover.sbx import SBX
     from pymoo.operators.mutation.pm import PM

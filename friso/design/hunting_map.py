@@ -29,7 +29,7 @@ class HuntingMap:
 
 
 def hunting_map(stage: Stage, spec: Spec, population: Population) -> HuntingMap:
-    """The map about a design; its drive stiffness stays as it is."""
+    """The map about a design, at its own drive stiffness."""
     flat = stage.flat()
     crossovers, strokes = (
         np.geomspace(low * flat[key], high * flat[key], count)

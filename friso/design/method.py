@@ -40,7 +40,7 @@ ROUNDS, LOWER = 12, 0.97
 """How often leaves and crossover are chosen anew, and the factor on a crossover for which beams confirm no leaves."""
 
 ALIKE = 0.98
-"""Share of the crossover wanted from which one is taken as it is, instead of choosing softer leaves for it."""
+"""Share of the requested crossover from which a crossover is accepted, instead of choosing softer leaves for it."""
 
 Progress = Callable[[str, int, int], None]
 """Called with what is being done, how much of it is done, and how much there is."""

@@ -25,7 +25,7 @@ class Modal:
     """Settled states of a stage (members,) with their plants without parasitic mode, `bare`, and with those of the leaf
     springs, `with_modes`, both of shape (members, frequencies) [m/N], the drive included, over `omega` [rad/s].
 
-    Modes act beside what the stage does as a rigid mass, whatever the cart does far below them.
+    Modes add to the motion of the stage as a rigid mass, whatever the cart does far below them.
     """
 
     flat: Mapping[str, Any]
@@ -70,7 +70,7 @@ def _turns(ratio: np.ndarray) -> np.ndarray:
 
 
 def compliance(leaves: Evaluation, omega: np.ndarray) -> np.ndarray:
-    """What the modes but for the drive mode add to the plant [m/N] at frequencies [rad/s], shape (frequencies,)."""
+    """What the modes other than the drive mode add to the plant [m/N] at frequencies [rad/s], shape (frequencies,)."""
     zeta = float(leaves.mechanism.damping_ratio)
     parts = [
         mode.actuator

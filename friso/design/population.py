@@ -32,7 +32,7 @@ class Population:
     count: int
 
     def over(self, flat: Mapping[str, Any]) -> dict[str, Any]:
-        """The flat keys of the stage with these machines instead of it; they are tuned as it is."""
+        """The flat keys of the stage with its numbers replaced by those of these machines; its controller is kept."""
         return {**flat, **self.keys}
 
     def of(self, number: int) -> dict[str, float]:

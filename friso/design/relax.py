@@ -77,7 +77,7 @@ def _over(name: str, limit: float, low: bool) -> Callable[[Mechanism], Any]:
 @dataclass(frozen=True)
 class _Trials:
     """Geometries in more space than is allowed, as variables: logarithms of length, width, spacing and thickness, and
-    the number of the kind. The thickness is `free`, or that of the sheet next to it that is to be had."""
+    the number of the kind. The thickness is `free`, or that of the next available sheet."""
 
     task: Task
     free: bool

@@ -77,7 +77,7 @@ BREAKAWAY, PARASITIC = "the cart must not break away inside the stroke", "first 
 
 
 def requirements(task: Task) -> list[Requirement]:
-    """All of them but for the space and the sheets."""
+    """All requirements except those on space and sheets."""
     spec, safety, stroke = task.spec, task.spec.safety, task.stroke
     shorter = less("leaves.stroke", stroke, "m")
     stiffest = safety.breakaway * (1 + safety.stiffness_tolerance)

@@ -176,7 +176,7 @@ class Load(Section):
 
 
 class Leaves(Section):
-    """What may be built: the space for the leaves, the sheets and materials to be had, and the stroke.
+    """What can be built: the space for the leaves, the available sheets and materials, and the stroke.
 
     A single length, width or spacing is the largest allowed, a tenth of it the least.
     """

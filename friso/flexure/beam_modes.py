@@ -1,7 +1,7 @@
 """Modes and buckling load of undeflected leaves and their stage, from the stiffness and mass of one leaf.
 
 A leaf between held ends moves along x, y and z and twists independently of each other. Its lowest modes of each kind,
-together with the shapes that it takes statically when the stage moves, describe it in the whole (Craig & Bampton 1968,
+together with the shapes that it takes statically when the stage moves, describe it completely (Craig & Bampton 1968,
 doi:10.2514/3.4741).
 """
 
@@ -156,7 +156,7 @@ def _gathered(ends: np.ndarray, matrix: np.ndarray) -> np.ndarray:
 
 
 def _rows(offsets: np.ndarray) -> np.ndarray:
-    """Orthonormal patterns of the leaves, one per row: all alike, in proportion to their place, and the others."""
+    """Orthonormal patterns of the leaves, one per row: uniform, linear in the position of the leaf, and the rest."""
     powers = np.vander(np.arange(len(offsets)) - (len(offsets) - 1) / 2, increasing=True)
     return np.linalg.qr(powers)[0].T
 
@@ -168,7 +168,7 @@ def buckling_load(mechanism: Mechanism, leaves: Leaves, straight: np.ndarray, lo
     strain = load / float(mechanism.leaves * axial(mechanism))
     state[:, :, 0] = -strain * np.linspace(0, float(mechanism.length), leaves.nodes)
     loaded = leaves.stiffness(state)[0]
-    # all leaves bend alike; the stage's pitch stretches them
+    # all leaves bend identically; the stage's pitch stretches them
     moving = np.add.outer(np.arange(COORDINATES, len(straight), COORDINATES), (2, 4)).ravel()
     without, with_load = (int(mechanism.leaves) * matrix[np.ix_(moving, moving)] for matrix in (straight, loaded))
     softening = without - with_load

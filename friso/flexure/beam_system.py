@@ -32,7 +32,7 @@ class BeamFailure(RuntimeError):
 
 
 class Leaves:
-    """The leaves, which are all alike, none of their ends held: exudyn has one of them and is asked about each in turn.
+    """The leaves, all identical and with free ends: exudyn holds one leaf and evaluates each state in turn.
     States and forces are of shape (leaves, nodes, 6), the cart end first."""
 
     def __init__(self, mechanism: Mechanism, elements: int = ELEMENTS) -> None:

@@ -14,7 +14,7 @@ from friso.flexure.mechanism import Mechanism, along_motion
 from friso.flexure.naming import mode_name
 
 POINTS = 17
-"""Places along a leaf at which its modes are told."""
+"""Points along a leaf at which its mode shapes are given."""
 
 STEPS = 5
 """Deflections from 0 to the stroke."""
@@ -41,7 +41,7 @@ def closed(mechanism: Mechanism, stroke: float) -> Evaluation:
 
 
 def _modes(mechanism: Mechanism) -> tuple[Mode, ...]:
-    """Those of the stage and of leaves that bend alike, and those of leaves with the stage at rest."""
+    """Modes of the stage with all leaves bending in phase, and modes of the leaves with the stage at rest."""
     frequencies, shapes = closed_forms.modes(mechanism)
     drive = int(closed_forms.drive_mode(frequencies, shapes))
     first = replace(_mode(mechanism, frequencies[drive], shapes[:, drive]), name="drive")

@@ -102,7 +102,7 @@ class Evaluation:
 
     @property
     def interfering(self) -> Mode | None:
-        """The lowest mode, but for the drive mode, that interferes with control."""
+        """The lowest mode other than the drive mode that interferes with control."""
         return next((mode for mode in self.modes[1:] if mode.interferes), None)
 
 

@@ -42,8 +42,8 @@ def joint_keys(flat: Mapping[str, Any]) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class VisibleModes:
-    """The modes of mechanisms but for the drive mode, arrays of shape (..., 7): frequency [Hz], and residue times the
-    mass of the stage, whose sign tells whether actuator and sensor move alike; those at the drive mode are 0."""
+    """The modes of mechanisms other than the drive mode, arrays of shape (..., 7): frequency [Hz], and residue times
+    the mass of the stage, positive where actuator and sensor move in phase; those at the drive mode are 0."""
 
     frequency: np.ndarray
     residue: np.ndarray
@@ -71,7 +71,7 @@ class VisibleModes:
 
 
 def first_interfering(mechanism: Mechanism) -> Any:
-    """Frequency [Hz] of the lowest mode, but for the drive mode, that actuator and sensor see; infinite without one."""
+    """Frequency [Hz] of the lowest mode other than the drive mode that actuator and sensor see; infinite if none."""
     seen = VisibleModes.of(mechanism)
     return seen.at(np.argmin(np.where(seen.visible, seen.frequency, np.inf), axis=-1))[0]
 

@@ -1,4 +1,4 @@
-"""Names of modes by what moves most, as its share of the kinetic energy tells."""
+"""Names of modes, by the part with the largest share of the kinetic energy."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def mode_name(
         return STAGE[3 + int(np.argmax(energies[3:5]))]
     if name == "leaf bending":
         ripples = _dynamic_part(leaves[:, :, 2])
-        # what all leaves do alike
+        # the part that all leaves have in common
         alike = len(leaves) * np.sum(np.mean(ripples, axis=0) ** 2) / np.sum(ripples**2)
         return f"leaf bending, {'in' if alike > 0.5 else 'out of'} phase{_number(ripples)}"
     if name == "leaf in-plane bending":

@@ -34,9 +34,9 @@ def linear(stage: Stage, case: str | Members | None = None, part: str = "plant",
       deflection" and "force".
 
     All are in continuous time, without the sampling and delay of a drive. With `series`, a touched limiter acts by
-    the formula that Table 1 of the thesis prints instead of beside the joint. Where the cart is stuck, its bristles
-    follow it and are no states; a derivative of the measured velocity does not see the noise of the sensor, which has
-    none. Raises InputError for an unknown case or part, and for a state that the stage cannot be in.
+    the formula that Table 1 of the thesis prints, instead of in parallel with the joint. Where the cart is stuck, its
+    bristles follow it and are no states; a derivative of the measured velocity does not see the noise of the sensor,
+    which has none. Raises InputError for an unknown case or part, and for a state that the stage cannot be in.
     """
     flat: Mapping[str, Any] = stage.flat()
     cases = limit_cases(flat)

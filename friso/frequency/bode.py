@@ -94,7 +94,7 @@ class Bode:
 
 def bode(stage: Stage, band: Range | None = None, series: bool = False) -> Bode:
     """The linear analysis of a stage, its curves over frequencies `band` [Hz] (default: those that matter); with
-    `series`, the thesis's formula for a touched limiter is shown beside. Raises InputError for frequencies that are not
+    `series`, the thesis's formula for a touched limiter is added. Raises InputError for frequencies that are not
     usable, a controller that exerts no force, and a delay that is too long (see `Drive`)."""
     if band is not None and not 0 < band[0] < band[1] < np.inf:
         raise InputError("band", repr(band), "two rising frequencies [Hz]", "friso.bode(stage, (0.1, 1000.0))")

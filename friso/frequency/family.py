@@ -82,7 +82,7 @@ class PoleStability(NamedTuple):
 
 
 def stability_by_poles(flat: Mapping[str, Any], members: Members) -> PoleStability:
-    """Every member by its own poles; `flat` may hold arrays of shape (members,), but for the drive's keys."""
+    """Every member by its own poles; `flat` may hold arrays of shape (members,), except in the drive's keys."""
     drive, by_poles = Drive.of(flat), PoleStability(np.empty(len(members)), np.empty(len(members)))
 
     def look(which: np.ndarray) -> None:
@@ -160,7 +160,7 @@ def _cart_held(flat: Mapping[str, Any], masses: System, s: np.ndarray) -> Comple
 
 
 def loops(flat: Mapping[str, Any], members: Members, omega: np.ndarray) -> Complex:
-    """L at angular frequencies [rad/s], shape (members, k); of a sampled loop but for the aliases of the plant."""
+    """L at angular frequencies [rad/s], shape (members, k); of a sampled loop without the aliases of the plant."""
     drive = Drive.of(flat)
     return plants(flat, members, omega) * controller(flat, omega) * drive.transfer(omega)
 
@@ -193,6 +193,6 @@ def _split(numbers: np.ndarray) -> list[np.ndarray]:
 
 
 def _side_by_side(work: Callable[[Any], Any], parts: Any) -> list[Any]:
-    """The work on every part, in threads: NumPy lets go of the interpreter's lock in its loops."""
+    """The work on every part, in threads: NumPy releases the interpreter's lock in its loops."""
     with ThreadPoolExecutor(usable_cores()) as pool:
         return list(pool.map(work, parts))

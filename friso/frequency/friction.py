@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 VELOCITY, BIAS = state("velocity"), sp.Symbol("bias", real=True)
 FORWARD = "beyond_forward"
-"""Name of the symbol that tells the direction of the motion."""
+"""Name of the symbol for the direction of the motion."""
 
 SLOWEST, FASTEST = 1e-3, 1e3
 """Speeds of the family, in units of the slowest and of the fastest speed that the law names."""

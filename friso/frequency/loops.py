@@ -148,7 +148,7 @@ def _shut(loop: System) -> Complex:
 
 
 def _real_parts(poles: Complex) -> np.ndarray:
-    """Real parts of poles, shape (members, n), 0 for those on the imaginary axis as far as rounding can tell."""
+    """Real parts of poles, shape (members, n), 0 for those on the imaginary axis within rounding."""
     size = np.abs(poles)
     fastest = np.where(np.isfinite(size), size, 0.0).max(axis=1, keepdims=True)
     edge = np.where(poles.imag != 0, UNDAMPED * size, 0.0) + ROUNDING * fastest

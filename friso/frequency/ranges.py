@@ -28,7 +28,7 @@ def shared(first: tuple[Range, ...], second: tuple[Range, ...]) -> tuple[Range, 
 
 
 def _end(low: float, high: float, first: bool, excess: Callable[[np.ndarray], np.ndarray]) -> float:
-    """Where between two places the function passes 0; `first` tells whether it is below at the lower one."""
+    """The zero of the function between two points; `first` says whether it is negative at the lower one."""
     for _ in range(ROUNDS):
         finer = np.geomspace(low, high, FINER)
         other = (excess(finer[1:-1]) < 0) != first

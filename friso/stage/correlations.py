@@ -1,4 +1,4 @@
-"""How the uncertain keys of a stage hang together, in a file beside it; and stages drawn from them.
+"""Correlations of the uncertain keys of a stage, in a file next to it; and stages drawn from them.
 
 `identified.correlations.toml` stands beside `identified.toml` and holds `keys` and their correlation `matrix`:
 that of the normal distributions behind the keys (a normal copula, Nelsen 2006, An Introduction to Copulas, Sec. 2.8).
@@ -214,7 +214,7 @@ def _allowed(stage: Stage, keys: Mapping[str, np.ndarray], count: int) -> tuple[
 
 
 def laid_over(stage: Stage, keys: Mapping[str, np.ndarray]) -> dict[str, Any]:
-    """The flat keys of drawn stages. The controller is tuned as it is: it does not know the mass that was drawn."""
+    """The flat keys of drawn stages. The controller stays as tuned: it does not know the mass that was drawn."""
     flat = stage.flat()
     tuned = {key: flat[key] for key in ("controller.tuned_mass",) if key in flat}
     return stage.flat(tuned | dict(keys))

@@ -16,11 +16,11 @@ Derivation = Callable[[Mapping[str, Any]], dict[str, Any]]
 """Flat keys that follow from others, from the flat SI mapping; arrays allowed."""
 
 DERIVATIONS: dict[str, Derivation] = {}
-"""By table: what else is known of a stage that has it."""
+"""By table: what follows for a stage that has it."""
 
 
 def register_derivation(table: str) -> Callable[[Derivation], Derivation]:
-    """Decorator: the function tells what follows from a table."""
+    """Decorator: the function returns what follows from a table."""
 
     def register(derivation: Derivation) -> Derivation:
         DERIVATIONS[table] = derivation

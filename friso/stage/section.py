@@ -92,7 +92,7 @@ class Table:
 
 
 class Variants:
-    """Sections told apart by one of their keys, the tag: `kind` of [motion], `model` of [friction]."""
+    """Sections distinguished by one of their keys, the tag: `kind` of [motion], `model` of [friction]."""
 
     def __init__(self, tag: str) -> None:
         self.tag = tag

@@ -23,10 +23,10 @@ from friso.frequency.describing.steady import RTOL
 from friso.stage import Stage
 
 AMPLITUDES = np.geomspace(1e-9, 1.0, 181)
-"""Amplitudes [m] of the grid unless told."""
+"""Default amplitudes [m] of the grid."""
 
 FREQUENCIES = np.geomspace(1e-4, 1e3, 281)
-"""Frequencies [Hz] of the grid unless told."""
+"""Default frequencies [Hz] of the grid."""
 
 NUDGE = 1e-5
 """Change of the logarithms over which derivatives are taken."""
@@ -54,8 +54,8 @@ class Balance:
     `least_amplitude` [m] of the cart and `least_frequency` [Hz]. A residual is abs(N - 1/R) over abs(N) + abs(1/R): 0
     where the balance holds, and at most 1.
 
-    That there is no other cycle within the grid is known but for `unknown` cells, at a corner of which friction was not
-    found, and `unsolved` ones, round which the balance turns but in which no solution was found.
+    That there is no other cycle within the grid is known except for `unknown` cells, at a corner of which friction was
+    not found, and `unsolved` ones, round which the balance turns but in which no solution was found.
     """
 
     amplitudes: np.ndarray
@@ -98,7 +98,7 @@ def single_harmonic(
 
 def _turns(left: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """How often a complex function on a grid turns round zero along the edges of each cell: its zeros inside, those at
-    which it is mirrored counted as -1; and whether that is unknown (and told as 0), for a corner that is NaN."""
+    which it is mirrored counted as -1; and whether that is unknown (and given as 0), for a corner that is NaN."""
     along = np.angle(left[1:] * np.conj(left[:-1]))
     across = np.angle(left[:, 1:] * np.conj(left[:, :-1]))
     turns = (along[:, :-1] + across[1:] - along[:, 1:] - across[:-1]) / (2 * np.pi)

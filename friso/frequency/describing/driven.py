@@ -132,7 +132,7 @@ class Roots:
 
 
 def roots(driven: Driven, forces: np.ndarray) -> Roots:
-    """All amplitudes at which forces [N] move the cart, as far as they are told apart by the grid."""
+    """All amplitudes at which forces [N] move the cart, as far as the grid resolves them."""
     amplitudes, reached, inside = driven.grid(forces)
     above = reached >= forces[:, None, None]
     computed = np.isfinite(reached[:, :-1] + reached[:, 1:])

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 SAMPLES = 4096
-"""Samples per period from which higher harmonics are taken unless told."""
+"""Default number of samples per period for the higher harmonics."""
 
 NOT_CLOSED = "no periodic steady state found: the law's own states do not repeat; tighten rtol"
 NOT_RUN = "a run was not completed: loosen rtol"
@@ -61,9 +61,9 @@ def describing(
     out of the motion in a period; `gap`, by how much the law's own states miss themselves after a period, as a share
     of their scales; `aliasing` and `status`. `force` [N], complex, over ("amplitude", "frequency", "harmonic"), has the
     harmonics from F_0, the mean, to F_`harmonics`. The first is integrated by the solver
-    itself; the others come from `samples` samples of the period, whose accuracy `aliasing` tells: by how much the first
-    harmonic from the samples differs from the integrated one, as a share of it (NaN if nothing was sampled, which is so
-    for `harmonics` = 1: then F_0 is NaN unless the law is symmetric).
+    itself; the others come from `samples` samples of the period, whose accuracy `aliasing` estimates: by how much the
+    first harmonic from the samples differs from the integrated one, as a share of it (NaN if nothing was sampled,
+    which is so for `harmonics` = 1: then F_0 is NaN unless the law is symmetric).
 
     Raises InputError for a stage without friction and for amplitudes, frequencies, harmonics or samples that are not
     usable, ValueError for an `rtol` that is not. A pair that fails has NaN and a reason in `status`.

@@ -24,7 +24,7 @@ def mass_line(
 ) -> xr.Dataset:
     """How far the measured plant lies off the line 1/(m omega^2) of its whole mass, place by place.
 
-    `places` tell what differs there, as keys of the stage file with their values, such as {"friction.static": "2 N"};
+    `places` lists what differs there, as keys of the stage file with their values, such as {"friction.static": "2 N"};
     `forces` [N] and `frequencies` [Hz] are those of the measurement, `rtol` the tolerance of its friction.
     Variables over ("place", "force", "frequency"): `ratio`, the response of an analyser that steps upwards (see
     `plant_response`) over that line, complex and 1 on it; `magnitude`, its absolute value; `phase` [rad], that of

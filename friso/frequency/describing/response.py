@@ -72,7 +72,7 @@ def plant_response(
 
 
 def _columns(driven: Driven, branch_points: Roots) -> dict[str, tuple[np.ndarray, str, str]]:
-    """What is told of every root, with units and text."""
+    """The columns for every root, with units and text."""
     _, positions, stiffness = driven.answer(branch_points.amplitude, branch_points.frequency)
     return {
         "response": (positions[:, 0], "m/N", "stage position over force"),

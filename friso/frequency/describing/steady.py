@@ -22,7 +22,7 @@ from friso.equations.imposed import FREQUENCY, imposed_form
 from friso.equations.roles import Role
 
 RTOL = 1e-9
-"""Relative tolerance of the runs unless told."""
+"""Default relative tolerance of the runs."""
 
 CLOSED, WIDEST = 1e3, 1e-4
 """Gap up to which a state counts as periodic: so many relative tolerances, but never more than the second."""

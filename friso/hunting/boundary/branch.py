@@ -29,7 +29,7 @@ STEEPEST = 30.0
 """Multiplier beyond which a cycle is not followed farther: nothing comes near it."""
 
 SMOOTH, STEEP = 0.25, 3.0
-"""Largest change of the multiplier from one step to the next, as long as it is not steep."""
+"""Largest change of the multiplier from one step to the next, where it is not steep."""
 
 END_OF_RANGE = "end of the range"
 """How a branch ends that has been followed to the end."""

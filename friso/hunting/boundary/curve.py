@@ -95,7 +95,7 @@ class CurveTracer:
         return Spot(origin + special.point.place * across, special, across)
 
     def curve(self, first: Spot) -> Curve | None:
-        """The whole curve through a point; None if no second one is found beside it."""
+        """The whole curve through a point; None if no second point is found next to it."""
         aside = first.across[::-1] * [1.0, -1.0]
         for side in (BESIDE, -BESIDE):
             beside = first.at + side * aside

@@ -17,7 +17,7 @@ PRECISE, TRIES = 1e-7, 30
 """Step along the branch that ends a search, and steps at most."""
 
 ASIDE = 1e-3
-"""Step beside a first guess from which the slope is taken."""
+"""Step from a first guess from which the slope is taken."""
 
 TIGHTER = 0.01
 """Share of the tolerance at which a point is computed again for its error."""

@@ -67,7 +67,7 @@ class Space:
     @cached_property
     def form(self) -> Structure:
         """The structure of the stages inside the box, at a place where no key is zero or a whole number; those that are
-        simpler, as where the stroke is zero or an exponent whole, are treated alike."""
+        simpler, as where the stroke is zero or an exponent whole, are treated the same."""
         return shared_structure(self.flat(self.values(np.full((1, len(self.ranges)), GENERIC))))
 
     def grid(self, nodes: int) -> np.ndarray:

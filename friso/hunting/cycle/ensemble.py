@@ -127,7 +127,7 @@ class Ensemble:
 
 
 def without_motion(flat: Mapping[str, Any]) -> dict[str, Any]:
-    """The flat keys but for those of the motion."""
+    """The flat keys without those of the motion."""
     return {key: value for key, value in flat.items() if not key.startswith("motion.")}
 
 

@@ -16,7 +16,7 @@ from friso.hunting.cycle.shooting import Orbits, close
 from friso.hunting.cycle.swings import swings
 
 RTOL = 1e-9
-"""Relative tolerance to which cycles are followed unless told."""
+"""Default relative tolerance for following cycles."""
 
 ROUGH = 1e-6
 """Relative tolerance that does for guesses."""

@@ -56,7 +56,7 @@ class Cycle:
 
     @property
     def attracts(self) -> bool:
-        """Whether motions beside the cycle come closer to it."""
+        """Whether motions near the cycle approach it."""
         return abs(self.multiplier) < 1
 
     @property
@@ -136,7 +136,7 @@ def _cycle(stages: Ensemble, cycles: Cycles) -> Cycle:
 
 
 def _growth(stages: Ensemble, cycles: Cycles) -> float:
-    """By how much a small deviation grows from one return to the next, in a simulation beside the cycle."""
+    """Growth of a small deviation from one return to the next, in a simulation near the cycle."""
     away = np.array([[0.0, AWAY, -AWAY]])
     heights = returns_of(stages, cycles.orbits, cycles.direction, away, FOLLOWED, ROUGH / 100)[0]
     deviations = (heights[1:] - heights[0]) / cycles.amplitude[0]

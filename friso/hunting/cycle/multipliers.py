@@ -63,7 +63,7 @@ def _slope(stages: Ensemble, orbits: Orbits, direction: np.ndarray, rtol: float)
 
 
 def _straight(pairs: np.ndarray) -> float:
-    """Slope of a straight line through pairs (points, 2) but for those that lie off the others, as where the stage
+    """Slope of a straight line through pairs (points, 2) without outliers, as where the stage
     does not break away; NaN with too few."""
     if len(pairs) < ENOUGH:
         return np.nan

@@ -1,4 +1,4 @@
-"""Cycles of one stage that lie beside another one: the other of two near a fold, and the pair born in a flip."""
+"""Cycles of one stage next to another one: the other of two near a fold, and the pair born in a flip."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from friso.hunting.cycle.rest import stuck
 from friso.hunting.cycle.shooting import close
 
 BESIDE, AROUND = 0.2, 81
-"""How far beside a cycle another one is looked for, as a share of its distance, and runs over that range."""
+"""How far from a cycle another one is sought, as a share of its distance, and the number of runs over that range."""
 
 SOONER = (0.96, 0.94, 0.98, 1.0, 0.9)
 """Shares of the period of a cycle tried for another one."""
@@ -25,7 +25,7 @@ watched whether an asymmetric pair takes over."""
 
 
 def partner(stages: Ensemble, cycles: Cycles, rtol: float = RTOL) -> Cycles | None:
-    """The other cycle of one stage near a fold, at which the two meet; None if none is found beside the first."""
+    """The other cycle of one stage near a fold, at which the two meet; None if none is found near the first."""
     away = np.linspace(-BESIDE, BESIDE, AROUND)
     heights = returns_of(stages, cycles.orbits, cycles.direction, away[None, :], 2, rtol)[0]
     rise = heights[:, 1] - heights[:, 0]

@@ -1,4 +1,4 @@
-"""The return map of hunting: from how far a stage sticks from its reference to how far it swings to the other side."""
+"""The return map of hunting: from the distance at which a stage sticks to how far it swings to the other side."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Laws of the edge of hunting: a few frequencies, each a product of powers, combined; cross-validation picks the powers.
+"""Laws of the edge of hunting: a few frequencies, each a product of powers, combined; the powers by cross-validation.
 
 A law is fitted to the logarithm of the edge with a loss that outliers do not dominate (soft L1). Beginning with none,
 the exponent that lowers the cross-validated loss most is let in, until the next one gains too little.

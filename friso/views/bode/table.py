@@ -36,7 +36,7 @@ def growth(margins: Margins) -> str:
 
 
 def _number(value: float, none: float, text: Callable[[float], str]) -> str:
-    """A margin in words: `none` is what it is where nothing takes the loop to its edge."""
+    """A margin in words; `none` is its value where nothing brings the loop to its edge of stability."""
     if math.isnan(value):
         return NOTHING
     return ANY if value == none else text(value)

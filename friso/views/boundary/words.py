@@ -44,7 +44,7 @@ BASIN = "Asymmetric cycles bound the basin of the hunting cycle."
 
 @dataclass(frozen=True)
 class Shown:
-    """A key, and the unit in which its values are told: its name, and its value in SI."""
+    """A key and the unit in which its values are printed: its name, and its value in SI."""
 
     key: str
     unit: str = ""
@@ -164,5 +164,5 @@ def _no_boundary(space: Space, keys: tuple[Shown, ...]) -> str:
 
 
 def _ends(line: Line) -> str:
-    """How a line ends, once if both sides end alike."""
+    """How a line ends; said once if both ends are the same."""
     return "; ".join(dict.fromkeys(line.ends))

@@ -20,7 +20,7 @@ from friso.views.drawing.prefixes import choose, pretty, with_unit
 from friso.views.map.words import quantity
 
 SHOWN = 5
-"""Requirements whose relaxation is told in a message."""
+"""Number of relaxations listed in a message."""
 
 
 @dataclass(frozen=True)

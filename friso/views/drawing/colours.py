@@ -72,7 +72,7 @@ def scale(field: Coloured) -> Scale:
 
 
 def ramp(count: int) -> tuple[str, ...]:
-    """`count` colours, evenly along viridis but for its darkest and lightest."""
+    """`count` colours evenly spaced along viridis, without its darkest and lightest parts."""
     table = np.array([[int(colour[i : i + 2], 16) for i in (1, 3, 5)] for colour in VIRIDIS])
     places = np.linspace(0.5, len(VIRIDIS) - 1.2, count)
     mixed = [np.interp(places, np.arange(len(VIRIDIS)), table[:, i]).round().astype(int) for i in range(3)]

@@ -18,7 +18,7 @@ Array = npt.NDArray[np.float64]
 Dash = Literal["solid", "dashed", "dotted"]
 Symbol = Literal["circle", "triangle", "cross", "target", "patch"]
 
-# Okabe & Ito, "Color universal design" (2008): told apart with any colour vision.
+# Okabe & Ito, "Color universal design" (2008): distinguishable with any colour vision.
 BLUE, VERMILLION, GREEN = "#0072B2", "#D55E00", "#009E73"
 SKY, ORANGE, PINK = "#56B4E9", "#E69F00", "#CC79A7"
 INK, GREY, LIGHT = "#222222", "#767676", "#c9c9c9"
@@ -118,7 +118,7 @@ class Kind:
 
 @dataclass(frozen=True)
 class Coloured:
-    """Places x, y whose colour tells the number z [unit], or, where there is one, their kind.
+    """Points x, y coloured by the number z [unit] or, where there is one, by their kind.
 
     `limits` [unit] is the range of the colours (None: from z), on a logarithmic scale if `log`; `colours`, if given,
     are those of the whole numbers 0, 1, 2, ... instead. `codes`, of the shape of z, numbers the `kinds`; it is NaN
@@ -150,7 +150,7 @@ class Coloured:
 
     @property
     def has_numbers(self) -> bool:
-        """Whether any colour tells a number: without one there is no colour bar."""
+        """Whether colour encodes a number anywhere; without that there is no colour bar."""
         return bool(np.isfinite(self.z).any())
 
 
@@ -205,7 +205,7 @@ class Panel:
 class Figure:
     """Panels in `columns` columns, row by row. `name` serves as file name, `subject` is the stage.
 
-    The caption stands beside the figure, where there is a page; the note stands in it, wherever it goes.
+    The caption stands next to the figure on a page; the note is part of the figure itself.
     """
 
     name: str

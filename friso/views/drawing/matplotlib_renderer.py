@@ -34,7 +34,7 @@ from friso.views.drawing.matplotlib_maps import add_colour_bars, add_footer, dra
 FORMATS = ("png", "svg", "pdf")
 WIDTH = 9.0  # [inch]
 ROW_HEIGHT = 2.7  # [inch] axes, labels, title and legend of one row of panels
-MAP_HEIGHTS = {1: 4.9, 2: 3.7}  # [inch] the same of one or two columns of maps: their two axes matter alike
+MAP_HEIGHTS = {1: 4.9, 2: 3.7}  # [inch] the same of one or two columns of maps: both axes matter equally
 EQUAL_HEIGHTS = {1: 5.9, 2: 3.6}  # [inch] the same of panels with equal scales, which need height for their width
 HEADER_HEIGHT = 0.35  # [inch] the figure's own title
 

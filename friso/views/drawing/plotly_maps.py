@@ -112,7 +112,7 @@ def key_traces(figure: Figure, legend: str) -> list[go.Scatter]:
 
 
 def footer(figure: Figure, legend: str) -> tuple[int, dict[str, Any], list[dict[str, Any]]]:
-    """Height [px] of what stands beneath the panels, its legend by name, and the note as annotations."""
+    """Height [px] of the area below the panels, its legend by name, and the note as annotations."""
     lines = [line for part in figure.note.splitlines() for line in textwrap.wrap(part, _LETTERS)]
     note = LINE * len(lines) + 6 if lines else 0
     below = {"x": 0, "xanchor": "left", "y": 0, "yanchor": "top", "xref": "paper", "yref": "paper"}

@@ -19,7 +19,7 @@ from friso.views.drawing.plotly_maps import BAR, DASHES, SYMBOLS, bar_panels, co
 
 HEADER = 54  # [px] title and legend above the axes
 PLOT = 230  # [px] height of the axes
-MAP_PLOTS = {1: 430, 2: 320}  # [px] the same of one or two columns of maps: their two axes matter alike
+MAP_PLOTS = {1: 430, 2: 320}  # [px] the same of one or two columns of maps: both axes matter equally
 EQUAL_PLOTS = {1: 520, 2: 290}  # [px] the same of panels with equal scales
 FOOTER = 54  # [px] tick labels and axis label
 LEFT, RIGHT, TOP = 72, 14, 26  # [px]; the buttons stand in the top margin

@@ -10,7 +10,7 @@ from friso.views.flexure.findings import Found, interferes
 
 
 def flexure_document(flexure: Found) -> dict[str, Any]:
-    """The figures that count, and beside them those of the closed forms."""
+    """The main results, and those of the closed forms for comparison."""
     head = {"stage": flexure.stage.name, "failure": flexure.failure or None}
     return {**head, **_evaluation(flexure.best), "closed_forms": _evaluation(flexure.closed)}
 

@@ -30,7 +30,7 @@ def flexure_figures(flexure: Found) -> tuple[Figure, ...]:
 
 
 def _force(flexure: Found) -> Figure:
-    """Force over deflection, to both sides alike."""
+    """Force over deflection, odd about the middle."""
     reach, steepness = flexure.best.stroke, float(flexure.best.drive[0])
     ends = np.array([0.0, reach])
     straight = Series(ends, steepness * ends, "initial stiffness", GREY, "dotted", 1.2)
@@ -88,7 +88,7 @@ def _odd(x: Array, y: Array, at: Array) -> Array:
 
 
 def _even_falling(x: Array, y: Array, at: Array) -> Array:
-    """The same of a stiffness that is alike on both sides: its inverse grows about as the square of x."""
+    """The same for a stiffness that is even about the middle: its inverse grows about as the square of x."""
     return 1 / CubicSpline(np.concatenate([-x[:0:-1], x]), 1 / np.concatenate([y[:0:-1], y]))(at)
 
 
