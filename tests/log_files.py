@@ -129,13 +129,13 @@ def _dspace73(file: Any, signals: dict[str, np.ndarray]) -> None:
     size = len(next(iter(signals.values())))
     x.create_dataset("Data", data=STEP * np.arange(size)[None, :]).attrs["MATLAB_class"] = np.bytes_("double")
     for key in ("Name", "Data"):
-        found = []
+        references = []
         for i, (heading, values) in enumerate(signals.items()):
             data = np.array([[ord(c)] for c in heading], dtype=np.uint16) if key == "Name" else values[None, :]
             item = refs.create_dataset(f"{key}{i}", data=data)
             item.attrs["MATLAB_class"] = np.bytes_("char" if key == "Name" else "double")
-            found.append(item.ref)
-        y.create_dataset(key, data=np.array(found, dtype=h5py.ref_dtype)[:, None], dtype=h5py.ref_dtype)
+            references.append(item.ref)
+        y.create_dataset(key, data=np.array(references, dtype=h5py.ref_dtype)[:, None], dtype=h5py.ref_dtype)
 
 
 def write_tdms(path: Path, signals: dict[str, tuple[str, np.ndarray]], step: float = STEP) -> Path:

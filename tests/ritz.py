@@ -54,10 +54,10 @@ def plate(length: float, width: float, poisson: float, along: int = ALONG, acros
     energy += poisson * (mixed + mixed.T)
     scale = 1 / np.sqrt(np.diag(energy))  # equal diagonal: solved without loss of digits
     scaled = energy * np.outer(scale, scale)
-    found = np.linalg.solve(scaled[1:, 1:], -scaled[1:, 0]) * scale[1:] / scale[0]
-    stiffness = (energy[0, 0] + energy[0, 1:] @ found) / 4  # the ends are 2 apart
+    shares = np.linalg.solve(scaled[1:, 1:], -scaled[1:, 0]) * scale[1:] / scale[0]
+    stiffness = (energy[0, 0] + energy[0, 1:] @ shares) / 4  # the ends are 2 apart
     beam = (1 - poisson**2) * 12 * width / length**3
-    return Plate(float(stiffness / beam), length, poisson, [cubic, *inner], even, found)
+    return Plate(float(stiffness / beam), length, poisson, [cubic, *inner], even, shares)
 
 
 def _curvatures(f: np.ndarray, g: np.ndarray, a: float, b: float) -> np.ndarray:

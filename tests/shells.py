@@ -172,9 +172,9 @@ def coupled(part: csc_matrix, leaf: Leaf, shifts: list[np.ndarray], body: np.nda
     return csc_matrix(bmat([[inner, borders], [borders.T, csc_matrix(stage)]]))
 
 
-def start(whole: csc_matrix) -> np.ndarray:
+def start(matrix: csc_matrix) -> np.ndarray:
     """The same vector for the eigenvalues of a matrix every time."""
-    return np.random.default_rng(0).standard_normal(len(whole.indptr) - 1)
+    return np.random.default_rng(0).standard_normal(len(matrix.indptr) - 1)
 
 
 def modes(
@@ -194,13 +194,13 @@ def modes(
     """
     leaf = leaf_mesh(sheet, mesh)
     arm = np.asarray(centre, float) - [sheet.length, 0, 0]
-    centred, own = rigid_motion(arm[None, :]), np.array([mass] * 3 + list(inertia))
-    body, shifts = centred.T @ (own[:, None] * centred), places(leaves, spacing)
+    centred, inertias = rigid_motion(arm[None, :]), np.array([mass] * 3 + list(inertia))
+    body, shifts = centred.T @ (inertias[:, None] * centred), places(leaves, spacing)
     stiff, heavy = coupled(leaf.stiffness, leaf, shifts, np.zeros((6, 6))), coupled(leaf.mass, leaf, shifts, body)
     squares, vectors = eigsh(stiff, count, heavy, sigma=0.0, v0=start(stiff))
     order = np.argsort(squares)
     vectors = vectors[:, order]
-    shares = own[:, None] * (centred @ vectors[-6:]) ** 2
+    shares = inertias[:, None] * (centred @ vectors[-6:]) ** 2
     kinds = [kind(share, vector[:-6], leaf) for share, vector in zip(shares.T, vectors.T, strict=True)]
     return np.sqrt(squares[order]) / (2 * np.pi), kinds
 

@@ -150,7 +150,7 @@ def test_an_interrupted_build_is_built_again(copied: Path) -> None:
 
 def test_processes_at_the_same_time_build_once(tmp_path: Path) -> None:
     processes = [start(tmp_path) for _ in range(4)]
-    assert sorted(finished(each)[0] for each in processes) == [False, False, False, True]
+    assert sorted(finished(process)[0] for process in processes) == [False, False, False, True]
     assert not built(tmp_path)
 
 

@@ -155,8 +155,8 @@ class Twin:
             error = self._reference(n * TIME) - reading
             extra = np.interp(n * TIME, np.arange(201) * SPACING, tables.times[0, 0])
             demand = KP * error - KD * (reading - past[1]) / (2 * TIME) + extra
-            wanted = demand + KI * (integral + TIME * error)
-            winding = (wanted > LIMIT and error > 0) or (wanted < -LIMIT and error < 0)
+            command = demand + KI * (integral + TIME * error)
+            winding = (command > LIMIT and error > 0) or (command < -LIMIT and error < 0)
             integral = integral if winding else integral + TIME * error
             commands.append(float(np.clip(demand + KI * integral, -LIMIT, LIMIT)))
             past = [reading, past[0]]
@@ -168,7 +168,7 @@ class Twin:
         return np.array(moved), np.array(commands[int(self.delay) :])
 
     @staticmethod
-    def _found(tables: Tables, n: int, place: float) -> tuple[float, float]:
+    def _located(tables: Tables, n: int, place: float) -> tuple[float, float]:
         floor = np.interp(n * TIME, np.arange(201) * SPACING, tables.times[0, 1])
         return float(floor), RATIO * float(np.interp(place, -1e-3 + GRID * np.arange(POINTS), tables.places[0, 2]))
 
@@ -193,11 +193,11 @@ def test_drive_is_that_of_plain_python(delay: float, ramp: str) -> None:
     shape, results = run(keys(stage, delay, **digital), tables=tables)
     assert results.statuses[0] == Status.DONE
     states, commands = Twin(stage, delay).run(tables, 400)
-    found = results.samples[0, :400, [shape.kept.index(n) for n in ("position", "velocity", "motor_force")]].T
+    simulated = results.samples[0, :400, [shape.kept.index(n) for n in ("position", "velocity", "motor_force")]].T
     assert np.abs(commands).max() == LIMIT  # the limit is met, and left again
     assert np.mean(np.abs(commands) == LIMIT) < 0.4
     assert results.samples[0, :400, shape.kept.index("commanded")] == pytest.approx(commands[:400], abs=1e-6)
-    assert found == pytest.approx(states, abs=1e-7, rel=1e-7)
+    assert simulated == pytest.approx(states, abs=1e-7, rel=1e-7)
 
 
 def test_delays_act_in_turn() -> None:
@@ -218,8 +218,8 @@ def test_the_continuous_loop_is_approached_in_the_first_order() -> None:
     for time in times:
         flat = keys(stage, sample_time=time, current_bandwidth=0.5 / time)
         shape, results = run(flat, every=round(0.01 / TIME), rtol=1e-9)
-        found = results.samples[0, :40, shape.kept.index("position")]
-        errors.append(float(np.abs(found - exact.position.values[:40]).max()))
+        positions = results.samples[0, :40, shape.kept.index("position")]
+        errors.append(float(np.abs(positions - exact.position.values[:40]).max()))
     slope = np.polyfit(np.log(times[1:]), np.log(errors[1:]), 1)[0]
     assert slope == pytest.approx(1, abs=0.1)
 
@@ -245,8 +245,8 @@ def test_tables_between_their_points() -> None:
         shape, results = run(keys(axis()) | still, tables=tables)
         commanded.append(results.samples[0, :400, shape.kept.index("commanded")])
     expected = -4.0 + 10.0 * np.arange(400) * TIME / 0.4
-    for each in commanded:
-        assert each == pytest.approx(expected, abs=1e-9)
+    for force in commanded:
+        assert force == pytest.approx(expected, abs=1e-9)
 
 
 def test_any_lane_and_any_number_of_threads() -> None:
@@ -260,18 +260,18 @@ def test_any_lane_and_any_number_of_threads() -> None:
     }
     tables = surroundings()
     times = tables.times * rng.uniform(0, 1, (runs, 1, 1))
-    one = run(flat, runs, tables._replace(times=times), threads=1)[1]
-    assert np.all(one.statuses == Status.DONE)
-    assert len({tuple(row) for row in one.ends}) == runs
+    single_thread = run(flat, runs, tables._replace(times=times), threads=1)[1]
+    assert np.all(single_thread.statuses == Status.DONE)
+    assert len({tuple(row) for row in single_thread.ends}) == runs
     order = rng.permutation(runs)
     shuffled = {key: value[order] if np.ndim(value) else value for key, value in flat.items()}
     several = run(shuffled, runs, tables._replace(times=times[order]), threads=3)[1]
-    assert np.array_equal(several.samples, one.samples[order], equal_nan=True)
+    assert np.array_equal(several.samples, single_thread.samples[order], equal_nan=True)
     for j in (0, 7, 18):
         alone = {key: value[j] if np.ndim(value) else value for key, value in flat.items()}
-        found = run(alone, 1, tables._replace(times=times[j : j + 1]))[1]
-        assert np.array_equal(found.samples[0], one.samples[j], equal_nan=True)
-        assert np.array_equal(found.statistics[0], one.statistics[j], equal_nan=True)
+        lane = run(alone, 1, tables._replace(times=times[j : j + 1]))[1]
+        assert np.array_equal(lane.samples[0], single_thread.samples[j], equal_nan=True)
+        assert np.array_equal(lane.statistics[0], single_thread.statistics[j], equal_nan=True)
 
 
 def test_a_loop_that_diverges_keeps_its_samples() -> None:
@@ -306,8 +306,8 @@ TAU = 3e-3
 @cache
 def stepping(command: sp.Expr, held: tuple[Held, ...]) -> tuple[list[str], Callable[..., list[float]]]:
     """A sample as a function of numbers with these names; a deviate is the sine of the sum of its arguments."""
-    expressions = [command, *(each.update for each in held)]
-    names = sorted({str(symbol) for each in expressions for symbol in each.free_symbols})
+    expressions = [command, *(state.update for state in held)]
+    names = sorted({str(symbol) for expression in expressions for symbol in expression.free_symbols})
     plain = {"gaussian": lambda seed, tick: np.sin(seed + tick), "quantised": rounded}
     return names, sp.lambdify([key(name) for name in names], expressions, [plain, "math"], cse=True)
 
@@ -315,13 +315,13 @@ def stepping(command: sp.Expr, held: tuple[Held, ...]) -> tuple[list[str], Calla
 def iterated(command: sp.Expr, held: tuple[Held, ...], flat: Flat, inputs: Mapping[str, np.ndarray]) -> Flat:
     """What is commanded and held at every sample, all beginning at 0."""
     names, step = stepping(command, held)
-    kept = [str(each.symbol) for each in held]
-    rows, last = [], [0.0] * len(kept)
+    labels = [str(state.symbol) for state in held]
+    rows, last = [], [0.0] * len(labels)
     for values in zip(*inputs.values(), strict=True):
-        known = {**flat, **dict(zip(kept, last, strict=True)), **dict(zip(inputs, values, strict=True))}
-        rows.append(step(*(known[name] for name in names)))
+        numbers = {**flat, **dict(zip(labels, last, strict=True)), **dict(zip(inputs, values, strict=True))}
+        rows.append(step(*(numbers[name] for name in names)))
         last = rows[-1][1:]
-    return dict(zip(["commanded", *kept], np.array(rows).T, strict=True))
+    return dict(zip(["commanded", *labels], np.array(rows).T, strict=True))
 
 
 def rounded(value: float, digit: float) -> float:
@@ -350,12 +350,12 @@ def test_eq_7_is_its_bilinear_transform() -> None:
     k_p, tau_z, tau_i, tau_p = van_dijk()
     error = np.random.default_rng(4).normal(0, 1e-3, 300)
     command, held = sampled_controller(ControllerForm(tuned=True), SEEN, 1)
-    found = iterated(command, held, keys(axis()) | TUNED, {"error": error})
+    outputs = iterated(command, held, keys(axis()) | TUNED, {"error": error})
     force = bilinear([k_p * tau_z * tau_i, k_p * (tau_z + tau_i), k_p], [tau_i * tau_p, tau_i, 0.0], error)
-    assert found["commanded"] == pytest.approx(force, rel=1e-9, abs=1e-9)
+    assert outputs["commanded"] == pytest.approx(force, rel=1e-9, abs=1e-9)
     passed = bilinear([1.0], [tau_p, 1.0], error)
-    assert found["low_passed"] == pytest.approx(passed, abs=1e-14)
-    assert found["integral"] == pytest.approx(bilinear([1.0], [1.0, 0.0], passed), abs=1e-14)
+    assert outputs["low_passed"] == pytest.approx(passed, abs=1e-14)
+    assert outputs["integral"] == pytest.approx(bilinear([1.0], [1.0, 0.0], passed), abs=1e-14)
 
 
 @pytest.mark.parametrize("derivative_on", ["error", "measurement"])
@@ -364,9 +364,9 @@ def test_eq_6_with_a_filter_is_its_bilinear_transform(derivative_on: Literal["er
     error, position = np.random.default_rng(5).normal(0, 1e-3, (2, 300))
     command, held = sampled_controller(ControllerForm(tuned=False, derivative_on=derivative_on), SEEN, 1)
     inputs = {"error": error, "position": position}
-    found = iterated(command, held, keys(axis()) | {"controller.tau": TAU}, inputs)
+    outputs = iterated(command, held, keys(axis()) | {"controller.tau": TAU}, inputs)
     rate = bilinear([KD, 0.0], [TAU, 1.0], error if derivative_on == "error" else -position)
-    assert found["commanded"] == pytest.approx(KP * error + KI * TIME * np.cumsum(error) + rate, rel=1e-9, abs=1e-9)
+    assert outputs["commanded"] == pytest.approx(KP * error + KI * TIME * np.cumsum(error) + rate, rel=1e-9, abs=1e-9)
 
 
 def shares(flat: Flat, error: np.ndarray, reading: np.ndarray) -> tuple[np.ndarray, float, np.ndarray]:
@@ -382,19 +382,19 @@ def shares(flat: Flat, error: np.ndarray, reading: np.ndarray) -> tuple[np.ndarr
 
 def plain_drive(flat: Flat, inputs: Mapping[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
     """Commands [N] and integrals [m s] of the drive: encoder, feedforward, deadband, reset, limit."""
-    own = {name.removeprefix("drive."): value for name, value in flat.items() if name.startswith("drive.")}
-    noise = own["encoder_noise"] * np.sin(own["seed"] + inputs["tick"])
-    reading = np.array([rounded(each, own["encoder_resolution"]) for each in inputs["seen"] + noise])
+    drive = {name.removeprefix("drive."): value for name, value in flat.items() if name.startswith("drive.")}
+    noise = drive["encoder_noise"] * np.sin(drive["seed"] + inputs["tick"])
+    reading = np.array([rounded(each, drive["encoder_resolution"]) for each in inputs["seen"] + noise])
     error, speed = inputs["reference"] - reading, inputs["speed"]
     demand, gain, added = shares(flat, error, reading)
-    demand = demand + own["feedforward_mass"] * inputs["reference.acceleration"] + inputs["injected_force"]
-    demand += own["feedforward_viscous"] * speed + own["feedforward_coulomb"] * np.sign(speed)
+    demand = demand + drive["feedforward_mass"] * inputs["reference.acceleration"] + inputs["injected_force"]
+    demand += drive["feedforward_viscous"] * speed + drive["feedforward_coulomb"] * np.sign(speed)
     integral, last, commands, integrals = 0.0, 0.0, [], []
     for n, now in enumerate(error):
         wanted = demand[n] + gain * (integral + added[n])
-        if own["integrator_reset"] and now * last < 0:
+        if drive["integrator_reset"] and now * last < 0:
             integral = added[n]
-        elif abs(now) >= own["integrator_deadband"] and (abs(wanted) <= LIMIT or wanted * added[n] <= 0):
+        elif abs(now) >= drive["integrator_deadband"] and (abs(wanted) <= LIMIT or wanted * added[n] <= 0):
             integral += added[n]
         last = now or last
         integrals.append(integral)

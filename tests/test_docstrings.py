@@ -86,11 +86,13 @@ def test_the_functions_are_there() -> None:
 
 
 def test_every_public_function_has_a_docstring() -> None:
-    assert [each.place for each in FUNCTIONS if not each.text] == []
+    assert [function.place for function in FUNCTIONS if not function.text] == []
 
 
 def test_errors_that_a_function_raises_itself_are_told() -> None:
-    assert [each.place for each in FUNCTIONS if each.raises & set(ERRORS) and "Raises" not in each.text] == []
+    assert [
+        function.place for function in FUNCTIONS if function.raises & set(ERRORS) and "Raises" not in function.text
+    ] == []
 
 
 def test_arguments_that_are_physical_have_units() -> None:
@@ -100,8 +102,8 @@ def test_arguments_that_are_physical_have_units() -> None:
         kind = ast.unparse(argument.annotation) if argument.annotation else ""
         return kind in ARRAYS and PHYSICAL.fullmatch(argument.arg) is not None
 
-    bare = [each for each in FUNCTIONS if not re.search(r"\[[^\]]+\]", each.text)]
-    assert [each.place for each in bare if any(map(physical, each.arguments))] == []
+    bare = [function for function in FUNCTIONS if not re.search(r"\[[^\]]+\]", function.text)]
+    assert [function.place for function in bare if any(map(physical, function.arguments))] == []
 
 
 @pytest.mark.parametrize("name", friso.__all__)
@@ -114,4 +116,4 @@ def test_the_public_list(name: str) -> None:
     assert len(text.split()) > 3
     if inspect.isfunction(value):
         arguments = set(inspect.signature(value).parameters) - COMMON
-        assert {each for each in arguments if not re.search(rf"\b{each}\b", text)} == set()
+        assert {argument for argument in arguments if not re.search(rf"\b{argument}\b", text)} == set()

@@ -36,8 +36,8 @@ def twin(reference: np.ndarray, extra: np.ndarray) -> tuple[np.ndarray, np.ndarr
     for r, d in zip(reference, extra, strict=True):
         demand = KP * (r - x) - KD * (x - past[1]) / (2 * TIME)
         new = integral + TIME * (r - x)
-        wanted = demand + KI * new
-        integral = integral if (wanted > LIMIT and r > x) or (wanted < -LIMIT and r < x) else new
+        command = demand + KI * new
+        integral = integral if (command > LIMIT and r > x) or (command < -LIMIT and r < x) else new
         u = np.clip(demand + KI * integral, -LIMIT, LIMIT)
         position.append(x)
         force.append(u)

@@ -35,14 +35,14 @@ def exact(flat: dict[str, Any], names: tuple[str, ...], times: np.ndarray) -> np
     system[:n, n] = held(0, [0.0] * n)
     system[n, n + 1] = system[n + 1, n + 2] = 1.0
     rows = motion.pieces(flat, 1)[0]
-    x, found = np.zeros(n), np.zeros((times.size, n))
+    x, states = np.zeros(n), np.zeros((times.size, n))
     for start, end, r in zip(rows[:, 0], [*rows[1:, 0], np.inf], rows[:, 1:], strict=True):
         full = np.concatenate([x, r])
         for i in np.flatnonzero((times >= start) & (times < end)):
-            found[i] = (expm(system * (times[i] - start)) @ full)[:n]
+            states[i] = (expm(system * (times[i] - start)) @ full)[:n]
         if end < np.inf:
             x = (expm(system * (end - start)) @ full)[:n]
-    return found
+    return states
 
 
 def fixed_steps(h: float, interval: float, changes: dict[str, Any]) -> tuple[Results, np.ndarray, np.ndarray]:
@@ -118,7 +118,7 @@ def radau(flat: dict[str, Any], names: tuple[str, ...], scales: np.ndarray, time
     masses = ("position", "cart_position", "parasitic_position")
     x = np.array([motion.initial_displacement(flat) if name in masses else 0.0 for name in names])
     corners = [*(c for c in motion.pieces(flat, 1)[0][:, 0] if c < times[-1]), times[-1]]
-    found = np.zeros((times.size, len(names)))
+    states = np.zeros((times.size, len(names)))
     rates, nudges = plain.rates(flat, names), np.diag(1e-7 * scales)
 
     def jacobian(t: float, x: np.ndarray) -> np.ndarray:
@@ -130,8 +130,8 @@ def radau(flat: dict[str, Any], names: tuple[str, ...], scales: np.ndarray, time
         options = {"rtol": 1e-10, "atol": 1e-12 * scales, "max_step": (end - start) / 20, "first_step": 1e-7}
         solution = solve_ivp(rates, (start, end), x, "Radau", dense_output=True, jac=jacobian, **options)
         assert solution.success
-        found[inside], x = solution.sol(times[inside]).T, solution.y[:, -1]
-    return found
+        states[inside], x = solution.sol(times[inside]).T, solution.y[:, -1]
+    return states
 
 
 TOUCHES = stage(step(), friction=lugre(2), joint=TOUCHING, parasitic=PARASITIC, controller=van_dijk())

@@ -57,8 +57,8 @@ def widened(array: np.ndarray, width: int) -> np.ndarray:
     return np.pad(array, padding, constant_values=np.nan)
 
 
-def assert_identical(one: Results, other: Results, which: Any = slice(None)) -> None:
-    for name, a, b in zip(Results._fields, one, other, strict=True):
+def assert_identical(first: Results, second: Results, which: Any = slice(None)) -> None:
+    for name, a, b in zip(Results._fields, first, second, strict=True):
         width = max(array.shape[1] if array.ndim > 1 else 0 for array in (a, b))
         assert np.array_equal(widened(a, width)[which], widened(b, width)[which], equal_nan=True), name
 
@@ -82,14 +82,14 @@ def test_any_number_of_threads_and_chunks(
 def test_alone_or_in_company(eight: Kernel, flat: Flat, reference: Results) -> None:
     for j in range(0, RUNS, 9):
         alone = {key: value[j] if np.ndim(value) else value for key, value in flat.items()}
-        one = run(eight, alone, BASE, 1)
-        samples = one.samples.shape[1]
-        assert np.array_equal(one.samples[0], reference.samples[j, :samples])
-        count = one.turn_counts[0]
+        single = run(eight, alone, BASE, 1)
+        samples = single.samples.shape[1]
+        assert np.array_equal(single.samples[0], reference.samples[j, :samples])
+        count = single.turn_counts[0]
         assert count == reference.turn_counts[j]
-        assert np.array_equal(one.turn_times[0, :count], reference.turn_times[j, :count])
-        assert np.array_equal(one.turn_values[0, :count], reference.turn_values[j, :count])
-        assert np.array_equal(one.statistics[0], reference.statistics[j])
+        assert np.array_equal(single.turn_times[0, :count], reference.turn_times[j, :count])
+        assert np.array_equal(single.turn_values[0, :count], reference.turn_values[j, :count])
+        assert np.array_equal(single.statistics[0], reference.statistics[j])
 
 
 def test_any_order(eight: Kernel, flat: Flat, reference: Results) -> None:

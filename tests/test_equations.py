@@ -63,7 +63,7 @@ def points(name: str, twin: ModuleType, count: int) -> list[tuple[float, Point]]
     flat, values = VARIANTS[name].flat(), parameters(name)
     scales = np.array(twin.scales(values), dtype=float)
     scales[~np.isfinite(scales)] = 1e-3
-    found = []
+    rows = []
     for i in range(count):
         time = flat["motion.duration"] * rng.uniform(0, 1) * (0.003 if i % 2 else 1)
         x = scales * rng.normal(size=scales.size) * 10.0 ** rng.uniform(-2, 1)
@@ -74,8 +74,8 @@ def points(name: str, twin: ModuleType, count: int) -> list[tuple[float, Point]]
                     x[twin.STATE_NAMES.index(body)] = place + flat.get("joint.stroke", 1e-5) * rng.normal()
         since, r = active_piece(name, time)
         modes = (np.array(twin.surfaces(x, since, r, values), dtype=float) > 0).astype(float)
-        found.append((time, (x, modes, since, r)))
-    return found
+        rows.append((time, (x, modes, since, r)))
+    return rows
 
 
 def test_right_hand_side_against_hand_written_equations(name: str, twin: ModuleType) -> None:

@@ -20,7 +20,7 @@ from friso.flexure.beam_system import BeamFailure, Leaves, Place
 from friso.flexure.beams import beams
 from friso.flexure.closed_model import closed
 from friso.flexure.evaluation import VISIBLE
-from friso.flexure.joint import first_interfering, parasitic_mode
+from friso.flexure.springs import first_interfering, parasitic_mode
 from friso.flexure.mechanism import Body, Mechanism, cube_inertia
 
 MANY = settings(max_examples=40, deadline=None, derandomize=True)
@@ -40,10 +40,10 @@ def mechanism(
     """The thesis's leaves; the centre of mass of the stage, where it is pushed and seen, is `off` the leaf ends [m]."""
     centre = (length + off[0], off[1], off[2])
     body = Body(mass, (0.0, 0.0, 0.0), centre)
-    it = Mechanism(
+    base = Mechanism(
         leaves, length, width, thickness, spacing, 210e9, poisson, 7850.0, 1.1e9, 4e8, body, centre, centre, 0.01
     )
-    return replace(it, body=replace(body, inertia=cube_inertia(it.body.mass)))
+    return replace(base, body=replace(body, inertia=cube_inertia(base.body.mass)))
 
 
 @st.composite
@@ -70,15 +70,15 @@ THESIS = mechanism()
 
 def scaled(value: Any, factors: dict[str, float]) -> Any:
     """With each number multiplied by the factor of its name."""
-    own = {}
-    for each in fields(value):
-        now = getattr(value, each.name)
+    changed = {}
+    for item in fields(value):
+        now = getattr(value, item.name)
         if isinstance(now, Body):
-            own[each.name] = scaled(now, factors)
+            changed[item.name] = scaled(now, factors)
         else:
-            factor = factors.get(each.name, 1.0)
-            own[each.name] = tuple(n * factor for n in now) if isinstance(now, tuple) else now * factor
-    return replace(value, **own)
+            factor = factors.get(item.name, 1.0)
+            changed[item.name] = tuple(n * factor for n in now) if isinstance(now, tuple) else now * factor
+    return replace(value, **changed)
 
 
 def together(many: list[Mechanism]) -> Mechanism:
@@ -88,10 +88,10 @@ def together(many: list[Mechanism]) -> Mechanism:
         if isinstance(values[0], tuple):
             return tuple(map(stacked, zip(*values, strict=True)))
         if isinstance(values[0], Body):
-            return Body(*(stacked([getattr(each, field.name) for each in values]) for field in fields(Body)))
+            return Body(*(stacked([getattr(value, field.name) for value in values]) for field in fields(Body)))
         return np.array(values, dtype=float)
 
-    return Mechanism(*(stacked([getattr(each, field.name) for each in many]) for field in fields(Mechanism)))
+    return Mechanism(*(stacked([getattr(alone, field.name) for alone in many]) for field in fields(Mechanism)))
 
 
 # ---- published numbers (references.md, section 3: 70 x 45 x 0.35 mm, E 210 GPa, nu 0.3)
@@ -118,11 +118,11 @@ def test_published_leaf_by_closed_forms() -> None:
 
 @pytest.mark.parametrize("model", [closed, beams])
 def test_published_leaf_by_both_models(model: Any) -> None:
-    it = model(THESIS, 1e-3)
-    named = {mode.name: mode.frequency for mode in it.modes}
-    assert it.drive[0] == pytest.approx(2540, rel=5e-3)
-    assert it.stress == pytest.approx(51.8e6, rel=0.01)
-    assert it.support_x[[0, -1]] == pytest.approx([96.0e6, 84.9e6], rel=0.01)  # shells
+    evaluation = model(THESIS, 1e-3)
+    named = {mode.name: mode.frequency for mode in evaluation.modes}
+    assert evaluation.drive[0] == pytest.approx(2540, rel=5e-3)
+    assert evaluation.stress == pytest.approx(51.8e6, rel=0.01)
+    assert evaluation.support_x[[0, -1]] == pytest.approx([96.0e6, 84.9e6], rel=0.01)  # shells
     assert 10.9 < named["drive"] < 11.4
     stiffer = np.sqrt(210 / 200)  # shells at 200 GPa: 383.9 and 385.1 Hz
     assert named["leaf bending, out of phase"] == pytest.approx(383.9 * stiffer, rel=5e-3)
@@ -131,81 +131,83 @@ def test_published_leaf_by_both_models(model: Any) -> None:
 
 def test_a_plain_beam_is_what_exudyn_makes_of_it() -> None:
     """Without lateral contraction no correction is left but that of torsion; 2.365 N/mm with 32 elements, published."""
-    it = beams(replace(THESIS, poisson=1e-9), 1e-3)
-    assert it.forces[-1] == pytest.approx(2.365, rel=2e-3)
-    assert it.drive[0] == pytest.approx(2362.5, rel=1e-3)
-    assert it.stress == pytest.approx(45.3e6, rel=0.01)
-    assert it.shortening == pytest.approx(3e-6 / (5 * 0.07), rel=0.01)
+    evaluation = beams(replace(THESIS, poisson=1e-9), 1e-3)
+    assert evaluation.forces[-1] == pytest.approx(2.365, rel=2e-3)
+    assert evaluation.drive[0] == pytest.approx(2362.5, rel=1e-3)
+    assert evaluation.stress == pytest.approx(45.3e6, rel=0.01)
+    assert evaluation.shortening == pytest.approx(3e-6 / (5 * 0.07), rel=0.01)
 
 
 # ---- closed forms
 
 
 @MANY
-@given(it=mechanisms(), factor=st.floats(0.1, 10))
-def test_similar_mechanisms(it: Mechanism, factor: float) -> None:
+@given(springs=mechanisms(), factor=st.floats(0.1, 10))
+def test_similar_mechanisms(springs: Mechanism, factor: float) -> None:
     """All lengths by a factor: stiffness by the factor, mass by its cube, frequency by its inverse, same stress."""
     lengths = dict.fromkeys(("length", "width", "thickness", "spacing", "centre", "actuation", "sensor"), factor)
-    large = scaled(it, {**lengths, "mass": factor**3, "inertia": factor**5})
-    stroke = it.length / 100
+    large = scaled(springs, {**lengths, "mass": factor**3, "inertia": factor**5})
+    stroke = springs.length / 100
     for name, power in (("drive_stiffness", 1), ("support_x", 1), ("support_y", 1), ("leaf_bending", -1)):
         f = getattr(closed_forms, name)
-        assert f(large) == pytest.approx(factor**power * f(it), rel=1e-9)
+        assert f(large) == pytest.approx(factor**power * f(springs), rel=1e-9)
     for name, power in (("support_x", 1), ("support_y", 1), ("max_stress", 0), ("shortening", 1)):
         f = getattr(closed_forms, name)
-        assert f(large, factor * stroke) == pytest.approx(factor**power * f(it, stroke), rel=1e-9)
-    assert closed_forms.buckling_load(large) == pytest.approx(factor**2 * closed_forms.buckling_load(it), rel=1e-9)
-    assert closed_forms.leaf_torsion(large) == pytest.approx(closed_forms.leaf_torsion(it) / factor, rel=1e-9)
-    assert closed_forms.lateral_load(large) == pytest.approx(factor**2 * closed_forms.lateral_load(it), rel=1e-9)
-    assert closed_forms.modes(large)[0] == pytest.approx(closed_forms.modes(it)[0] / factor, rel=1e-6)
+        assert f(large, factor * stroke) == pytest.approx(factor**power * f(springs, stroke), rel=1e-9)
+    assert closed_forms.buckling_load(large) == pytest.approx(factor**2 * closed_forms.buckling_load(springs), rel=1e-9)
+    assert closed_forms.leaf_torsion(large) == pytest.approx(closed_forms.leaf_torsion(springs) / factor, rel=1e-9)
+    assert closed_forms.lateral_load(large) == pytest.approx(factor**2 * closed_forms.lateral_load(springs), rel=1e-9)
+    assert closed_forms.modes(large)[0] == pytest.approx(closed_forms.modes(springs)[0] / factor, rel=1e-6)
 
 
 @MANY
-@given(it=mechanisms(), force=st.floats(0.1, 10), density=st.floats(0.1, 10))
-def test_units_of_force_and_mass(it: Mechanism, force: float, density: float) -> None:
-    other = scaled(it, {"young": force, "density": density, "mass": density, "inertia": density})
-    assert closed_forms.stage_stiffness(other) == pytest.approx(force * closed_forms.stage_stiffness(it), rel=1e-9)
+@given(springs=mechanisms(), force=st.floats(0.1, 10), density=st.floats(0.1, 10))
+def test_units_of_force_and_mass(springs: Mechanism, force: float, density: float) -> None:
+    other = scaled(springs, {"young": force, "density": density, "mass": density, "inertia": density})
+    assert closed_forms.stage_stiffness(other) == pytest.approx(force * closed_forms.stage_stiffness(springs), rel=1e-9)
     ratio = np.sqrt(force / density)
-    assert closed_forms.modes(other)[0] == pytest.approx(ratio * closed_forms.modes(it)[0], rel=1e-6)
-    assert first_interfering(other) == pytest.approx(ratio * first_interfering(it), rel=1e-6)
-    (frequency, share), (f, m) = parasitic_mode(other), parasitic_mode(it)
+    assert closed_forms.modes(other)[0] == pytest.approx(ratio * closed_forms.modes(springs)[0], rel=1e-6)
+    assert first_interfering(other) == pytest.approx(ratio * first_interfering(springs), rel=1e-6)
+    (frequency, share), (f, m) = parasitic_mode(other), parasitic_mode(springs)
     assert (frequency, share) == pytest.approx((ratio * f, m), rel=1e-6)
 
 
 @MANY
-@given(it=mechanisms(), share=st.floats(0.0, 0.05))
-def test_stiffness_at_the_stage(it: Mechanism, share: float) -> None:
-    straight = closed_forms.stage_stiffness(it)
-    assert curved.stage_stiffness_at(it, 0.0) == pytest.approx(straight, rel=2e-3, abs=1e-6 * straight[2, 2])
-    bent = curved.stage_stiffness_at(it, share * it.length)
-    unit = np.array([1, 1, 1, *[it.length] * 3])
-    for each in (straight, bent):
-        even = each / np.outer(unit, unit)
+@given(springs=mechanisms(), share=st.floats(0.0, 0.05))
+def test_stiffness_at_the_stage(springs: Mechanism, share: float) -> None:
+    straight = closed_forms.stage_stiffness(springs)
+    assert curved.stage_stiffness_at(springs, 0.0) == pytest.approx(straight, rel=2e-3, abs=1e-6 * straight[2, 2])
+    bent = curved.stage_stiffness_at(springs, share * springs.length)
+    unit = np.array([1, 1, 1, *[springs.length] * 3])
+    for matrix in (straight, bent):
+        even = matrix / np.outer(unit, unit)
         assert np.allclose(even, even.T, rtol=1e-9, atol=1e-9 * np.max(even))
         assert np.all(np.linalg.eigvalsh((even + even.T) / 2) > 0)
     # the mechanism is softest along the motion, and its supports fall as it deflects
     assert straight[2, 2] < straight[1, 1] < straight[0, 0] * 1.0001 + straight[1, 1]
-    assert closed_forms.support_x(it, share * it.length) <= closed_forms.support_x(it)
-    if it.length >= it.width and it.poisson <= 0.35:  # where docs/flexure.md says that the closed forms hold
-        assert bent[0, 0] == pytest.approx(closed_forms.support_x(it, share * it.length), rel=0.03)
-    assert bent[1, 1] == pytest.approx(closed_forms.support_y(it, share * it.length), rel=0.03)
+    assert closed_forms.support_x(springs, share * springs.length) <= closed_forms.support_x(springs)
+    if (
+        springs.length >= springs.width and springs.poisson <= 0.35
+    ):  # where docs/flexure.md says that the closed forms hold
+        assert bent[0, 0] == pytest.approx(closed_forms.support_x(springs, share * springs.length), rel=0.03)
+    assert bent[1, 1] == pytest.approx(closed_forms.support_y(springs, share * springs.length), rel=0.03)
 
 
 @FEW
-@given(it=mechanisms(), share=st.floats(0.005, 0.05))
-def test_twist_of_a_deflected_leaf(it: Mechanism, share: float) -> None:
+@given(springs=mechanisms(), share=st.floats(0.005, 0.05))
+def test_twist_of_a_deflected_leaf(springs: Mechanism, share: float) -> None:
     """k_y against the numerical solution of the twist p of a leaf, p - p''/rate^2 = torque/(G J), p = 0 at clamps."""
-    delta = share * it.length
-    half = it.length / 2
-    rate = plate.warping_rate(it.width, it.poisson)
-    rigidity = it.shear * plate.torsion_constant(it.width, it.thickness)
+    delta = share * springs.length
+    half = springs.length / 2
+    rate = plate.warping_rate(springs.width, springs.poisson)
+    rigidity = springs.shear * plate.torsion_constant(springs.width, springs.thickness)
 
     def torque(s: np.ndarray) -> np.ndarray:
         """Of a unit force along y at the end, about the middle line 3 u^2 - 2 u^3 without its linear part."""
-        return 4 * delta * (s / it.length) ** 3
+        return 4 * delta * (s / springs.length) ** 3
 
     s = np.linspace(-half, half, 201)
-    found = solve_bvp(
+    solution = solve_bvp(
         lambda s, p: np.stack([p[1], rate**2 * (p[0] - torque(s) / rigidity)]),
         lambda a, b: np.array([a[0], b[0]]),
         s,
@@ -213,45 +215,47 @@ def test_twist_of_a_deflected_leaf(it: Mechanism, share: float) -> None:
         tol=1e-8,
     )
     nodes, weights = np.polynomial.legendre.leggauss(60)
-    twisted = half * np.sum(weights * found.sol(half * nodes)[0] * torque(half * nodes))
-    shear = 5 / 6 * it.shear * it.area * plate.edgewise_shear(it.length, it.width, it.poisson)
-    flat = it.length**3 / (12 * it.young * it.edgewise) + it.length / shear
-    assert closed_forms.support_y(it, delta) == pytest.approx(it.leaves / (flat + twisted), rel=1e-5)
+    twisted = half * np.sum(weights * solution.sol(half * nodes)[0] * torque(half * nodes))
+    shear = 5 / 6 * springs.shear * springs.area * plate.edgewise_shear(springs.length, springs.width, springs.poisson)
+    flat = springs.length**3 / (12 * springs.young * springs.edgewise) + springs.length / shear
+    assert closed_forms.support_y(springs, delta) == pytest.approx(springs.leaves / (flat + twisted), rel=1e-5)
 
 
 @FEW
 @given(many=st.lists(mechanisms(), min_size=3, max_size=3))
 def test_arrays_are_one_by_one(many: list[Mechanism]) -> None:
     arrays = together(many)
-    stroke = np.array([each.length / 50 for each in many])
+    stroke = np.array([alone.length / 50 for alone in many])
     for name in ("drive_stiffness", "buckling_load", "leaf_bending", "leaf_torsion", "lateral_load"):
         f = getattr(closed_forms, name)
-        assert f(arrays) == pytest.approx([f(each) for each in many], rel=1e-12)
+        assert f(arrays) == pytest.approx([f(alone) for alone in many], rel=1e-12)
     for name in ("support_x", "support_y", "max_stress", "shortening"):
         f = getattr(closed_forms, name)
-        assert f(arrays, stroke) == pytest.approx([f(*each) for each in zip(many, stroke, strict=True)], rel=1e-12)
+        assert f(arrays, stroke) == pytest.approx([f(*pair) for pair in zip(many, stroke, strict=True)], rel=1e-12)
     for name in ("stage_stiffness", "stage_mass"):
         f = getattr(closed_forms, name)
-        assert np.allclose(f(arrays), [f(each) for each in many], rtol=1e-12, atol=0)
+        assert np.allclose(f(arrays), [f(alone) for alone in many], rtol=1e-12, atol=0)
     frequencies = closed_forms.modes(arrays)[0]
-    assert np.allclose(frequencies, [closed_forms.modes(each)[0] for each in many], rtol=1e-7, atol=0)
-    assert np.allclose(first_interfering(arrays), [first_interfering(each) for each in many], rtol=1e-7)
-    assert np.allclose(parasitic_mode(arrays), np.transpose([parasitic_mode(each) for each in many]), rtol=1e-7)
+    assert np.allclose(frequencies, [closed_forms.modes(alone)[0] for alone in many], rtol=1e-7, atol=0)
+    assert np.allclose(first_interfering(arrays), [first_interfering(alone) for alone in many], rtol=1e-7)
+    assert np.allclose(parasitic_mode(arrays), np.transpose([parasitic_mode(alone) for alone in many]), rtol=1e-7)
     for k, each in enumerate(many):
         assert closed_forms.drive_stiffness(arrays.member(k)) == closed_forms.drive_stiffness(each)
 
 
-def displacements(it: Mechanism, s: np.ndarray) -> np.ndarray:
+def displacements(springs: Mechanism, s: np.ndarray) -> np.ndarray:
     """How leaves move at s, from 0 at the cart to 1, per stage coordinate and with the first mode of beams between
     clamps, all alike, at unit modal mass; `s` are the nodes of Gauss's rule; shape (leaves, points, 3, 7)."""
-    place, slope = 3 * s**2 - 2 * s**3, it.length * (s**3 - s**2)
+    place, slope = 3 * s**2 - 2 * s**3, springs.length * (s**3 - s**2)
     root = brentq(lambda x: np.cos(x) * np.cosh(x) - 1, 4.5, 5.0)
-    one, other = np.sinh(root) - np.sin(root), np.cos(root) - np.cosh(root)
-    bending = one * (np.cosh(root * s) - np.cos(root * s)) + other * (np.sinh(root * s) - np.sin(root * s))
+    first, second = np.sinh(root) - np.sin(root), np.cos(root) - np.cosh(root)
+    bending = first * (np.cosh(root * s) - np.cos(root * s)) + second * (np.sinh(root * s) - np.sin(root * s))
     weights = np.polynomial.legendre.leggauss(len(s))[1]
-    bending *= np.sign(bending[len(s) // 2]) / np.sqrt(it.leaves * it.leaf_mass * np.sum(weights / 2 * bending**2))
-    moved = np.zeros((int(it.leaves), len(s), 3, 7))
-    for leaf, offset in zip(moved, it.offsets, strict=True):
+    bending *= np.sign(bending[len(s) // 2]) / np.sqrt(
+        springs.leaves * springs.leaf_mass * np.sum(weights / 2 * bending**2)
+    )
+    moved = np.zeros((int(springs.leaves), len(s), 3, 7))
+    for leaf, offset in zip(moved, springs.offsets, strict=True):
         leaf[:, 0, 0], leaf[:, 0, 4] = s, offset * s
         leaf[:, 1, 1], leaf[:, 1, 3], leaf[:, 1, 5] = place, -offset * place, slope
         leaf[:, 2, 2], leaf[:, 2, 4], leaf[:, 2, 6] = place, -slope, bending
@@ -259,20 +263,22 @@ def displacements(it: Mechanism, s: np.ndarray) -> np.ndarray:
 
 
 @MANY
-@given(it=mechanisms())
-def test_modes_of_stage_and_leaves(it: Mechanism) -> None:
+@given(springs=mechanisms())
+def test_modes_of_stage_and_leaves(springs: Mechanism) -> None:
     """Against a mass matrix from the displacements of the leaves, and a stage moved as a rigid body."""
     nodes, weights = np.polynomial.legendre.leggauss(24)
     s = (nodes + 1) / 2
-    moved = displacements(it, s)
-    mass = it.leaf_mass * np.einsum("p,lpca,lpcb->ab", weights / 2, moved, moved)
-    mass[3, 3] += it.leaves * it.leaf_mass * it.width**2 / 12 * np.sum(weights / 2 * s**2)  # leaves twist linearly
-    arm = np.subtract(it.body.centre, (it.length, 0.0, 0.0))
+    moved = displacements(springs, s)
+    mass = springs.leaf_mass * np.einsum("p,lpca,lpcb->ab", weights / 2, moved, moved)
+    mass[3, 3] += (
+        springs.leaves * springs.leaf_mass * springs.width**2 / 12 * np.sum(weights / 2 * s**2)
+    )  # leaves twist linearly
+    arm = np.subtract(springs.body.centre, (springs.length, 0.0, 0.0))
     rigid = np.eye(6)
     rigid[:3, 3:] = np.cross(np.eye(3), arm).T  # column k: e_k x arm
-    mass[:6, :6] += rigid.T @ np.diag([it.body.mass] * 3 + list(it.body.inertia)) @ rigid
-    stiffness = block_diag(closed_forms.stage_stiffness(it), (2 * np.pi * closed_forms.leaf_bending(it)) ** 2)
-    frequencies, shapes = closed_forms.modes(it)
+    mass[:6, :6] += rigid.T @ np.diag([springs.body.mass] * 3 + list(springs.body.inertia)) @ rigid
+    stiffness = block_diag(closed_forms.stage_stiffness(springs), (2 * np.pi * closed_forms.leaf_bending(springs)) ** 2)
+    frequencies, shapes = closed_forms.modes(springs)
     squares = eigh(stiffness, mass, eigvals_only=True)
     assert frequencies == pytest.approx(np.sqrt(squares) / (2 * np.pi), rel=1e-5)
     assert np.allclose(shapes.T @ mass @ shapes, np.eye(7), atol=1e-4)  # constants of five digits
@@ -284,26 +290,26 @@ def test_modes_of_stage_and_leaves(it: Mechanism) -> None:
 
 @FEW
 @given(
-    it=mechanisms(),
+    springs=mechanisms(),
     centre=st.floats(-0.2, 0.3),
     places=st.tuples(st.floats(0.0, 1.2), st.floats(0.0, 1.2)),
     together=st.booleans(),
 )
 def test_first_interfering_mode_of_both_models(
-    it: Mechanism, centre: float, places: tuple[float, float], together: bool
+    springs: Mechanism, centre: float, places: tuple[float, float], together: bool
 ) -> None:
     """Centre of mass, actuation and sensor anywhere along x, the latter two at one place or at two."""
-    actuation, sensor = ((each * it.length, 0.0, 0.0) for each in (places[0], places[0 if together else 1]))
-    body = replace(it.body, centre=((1 + centre) * it.length, 0.0, 0.0))
-    it = replace(it, body=body, actuation=actuation, sensor=sensor)
-    wanted, found = beams(it, it.length / 300), closed(it, it.length / 300)
-    assume(not any(VISIBLE / 1.5 < mode.peak < VISIBLE * 1.5 for mode in wanted.modes[1:]))  # seen by one alone
-    assert (found.interfering is None) == (wanted.interfering is None)
-    if found.interfering and wanted.interfering:
-        assert found.interfering.frequency == pytest.approx(wanted.interfering.frequency, rel=0.02)
-        assert first_interfering(it) == pytest.approx(found.interfering.frequency, rel=1e-9)
+    actuation, sensor = ((share * springs.length, 0.0, 0.0) for share in (places[0], places[0 if together else 1]))
+    body = replace(springs.body, centre=((1 + centre) * springs.length, 0.0, 0.0))
+    springs = replace(springs, body=body, actuation=actuation, sensor=sensor)
+    by_beams, by_closed = beams(springs, springs.length / 300), closed(springs, springs.length / 300)
+    assume(not any(VISIBLE / 1.5 < mode.peak < VISIBLE * 1.5 for mode in by_beams.modes[1:]))  # seen by one alone
+    assert (by_closed.interfering is None) == (by_beams.interfering is None)
+    if by_closed.interfering and by_beams.interfering:
+        assert by_closed.interfering.frequency == pytest.approx(by_beams.interfering.frequency, rel=0.02)
+        assert first_interfering(springs) == pytest.approx(by_closed.interfering.frequency, rel=1e-9)
     else:
-        assert first_interfering(it) == np.inf
+        assert first_interfering(springs) == np.inf
 
 
 def test_lateral_load_without_dimensions() -> None:
@@ -315,24 +321,26 @@ def test_lateral_load_without_dimensions() -> None:
     assert 1 / np.sqrt(np.max(loads)) == pytest.approx(closed_forms.LATERAL, rel=1e-3)
 
 
-def lateral_load_without_warping(it: Mechanism) -> float:
+def lateral_load_without_warping(springs: Mechanism) -> float:
     """That of leaves whose clamps forbid them to warp (Vlasov), by Ritz's method: theta = theta' = 0 at the clamps."""
     nodes, weights = np.polynomial.legendre.leggauss(60)
     x, weights = (nodes + 1) / 2, weights / 2
     base = [Polynomial([0, 0, 1, -2, 1]) * Polynomial([-1, 2]) ** n for n in range(12)]
-    twist, rate, warping = (np.array([each.deriv(k)(x) if k else each(x) for each in base]) for k in range(3))
-    decay = plate.warping_rate(it.width, it.poisson) * it.length
+    twist, rate, warping = (
+        np.array([function.deriv(k)(x) if k else function(x) for function in base]) for k in range(3)
+    )
+    decay = plate.warping_rate(springs.width, springs.poisson) * springs.length
     stiff = (rate * weights) @ rate.T + (warping * weights) @ warping.T / decay**2
     bent = (1 - x) * twist
     mean = bent @ weights
     largest = np.max(eigh((bent * weights) @ bent.T - np.outer(mean, mean), stiff, eigvals_only=True))
-    return float(closed_forms.lateral_load(it) / closed_forms.LATERAL / np.sqrt(largest))
+    return float(closed_forms.lateral_load(springs) / closed_forms.LATERAL / np.sqrt(largest))
 
 
-def lateral_load_by_beams(it: Mechanism) -> float:
+def lateral_load_by_beams(springs: Mechanism) -> float:
     """Force across the ends of straight leaves [N] at which their tangent stiffness is singular, linearised: the stage
     free along y and z and to turn about z."""
-    leaves = Leaves(it, elements=32)
+    leaves = Leaves(springs, elements=32)
     node = np.arange(6, 6 * leaves.nodes).reshape(-1, 6)
     plane = np.concatenate([node[:-1, [1, 5]].ravel(), node[-1, [1, 5]]])
     out = np.concatenate([node[:-1, [2, 3, 4]].ravel(), node[-1, [2]]])
@@ -343,19 +351,21 @@ def lateral_load_by_beams(it: Mechanism) -> float:
     state, force = np.zeros(6 * leaves.nodes), np.zeros(len(plane))
     force[-2] = 1.0
     state[plane] = np.linalg.solve(tangent(state, plane), force)
-    step = 1e-5 * it.length / np.max(np.abs(state))
+    step = 1e-5 * springs.length / np.max(np.abs(state))
     softer = (tangent(step * state, out) - tangent(-step * state, out)) / (2 * step)
-    return float(it.leaves / np.max(eigh(softer, tangent(0 * state, out), eigvals_only=True)))
+    return float(springs.leaves / np.max(eigh(softer, tangent(0 * state, out), eigvals_only=True)))
 
 
 @pytest.mark.parametrize(("width", "above"), [(0.02, 1.2), (0.03, 1.3), (0.045, 1.45)])
 def test_lateral_load(width: float, above: float) -> None:
     """The closed form lets leaves warp, which clamps forbid: it is on the safe side, the nearer the more slender."""
-    it = mechanism(width=width)
-    own, found = closed_forms.lateral_load(it), lateral_load_by_beams(it)
-    assert 1 < found / own < above
-    bound = np.sqrt(plate.stiffening(it.length, it.width, it.poisson)) * lateral_load_without_warping(it)
-    assert found < bound
+    springs = mechanism(width=width)
+    by_closed, by_beams = closed_forms.lateral_load(springs), lateral_load_by_beams(springs)
+    assert 1 < by_beams / by_closed < above
+    bound = np.sqrt(plate.stiffening(springs.length, springs.width, springs.poisson)) * lateral_load_without_warping(
+        springs
+    )
+    assert by_beams < bound
     slender = mechanism(length=3.0, width=width)
     assert 1 < lateral_load_without_warping(slender) / closed_forms.lateral_load(slender) < 1.01
 
@@ -367,11 +377,11 @@ def test_numbers_that_make_no_mechanism_are_nan() -> None:
 
 def test_drive_mode_of_a_heavy_stage() -> None:
     """On narrow leaves a long stage turns about z more slowly than it is driven."""
-    it = mechanism(0.06, 0.01, 0.3e-3, spacing=0.03, mass=3.0)
-    by_beams, by_closed = beams(it, 1e-3).modes[0], closed(it, 1e-3).modes[0]
+    springs = mechanism(0.06, 0.01, 0.3e-3, spacing=0.03, mass=3.0)
+    by_beams, by_closed = beams(springs, 1e-3).modes[0], closed(springs, 1e-3).modes[0]
     assert by_beams.name == by_closed.name == "drive"
     assert by_closed.frequency == pytest.approx(by_beams.frequency, rel=0.01)
-    assert first_interfering(it) != pytest.approx(by_beams.frequency, rel=0.01)
+    assert first_interfering(springs) != pytest.approx(by_beams.frequency, rel=0.01)
 
 
 # ---- beams
@@ -383,44 +393,46 @@ def test_no_lateral_contraction() -> None:
 
 
 @FEW
-@given(it=mechanisms(), share=st.floats(0.002, 0.02))
-def test_beams_agree_with_closed_forms(it: Mechanism, share: float) -> None:
-    stroke = share * it.length
-    wanted, found = closed(it, stroke), beams(it, stroke)
-    assert found.drive[0] == pytest.approx(wanted.drive[0], rel=0.01)  # the stage may turn
-    assert found.forces == pytest.approx(wanted.forces, rel=0.03)
-    assert found.support_x == pytest.approx(wanted.support_x, rel=0.05)
-    assert found.support_y == pytest.approx(wanted.support_y, rel=0.05)
-    assert found.stress == pytest.approx(wanted.stress, rel=0.05)
-    assert found.shortening == pytest.approx(wanted.shortening, rel=0.02)
-    assert found.buckling == pytest.approx(wanted.buckling, rel=0.015)
-    assert found.modes[0].name == wanted.modes[0].name == "drive"
-    assert found.modes[0].frequency == pytest.approx(wanted.modes[0].frequency, rel=0.01)
-    unit = np.array([1, 1, 1, *[it.length] * 3])
-    for matrix in found.stiffness / np.outer(unit, unit):
+@given(springs=mechanisms(), share=st.floats(0.002, 0.02))
+def test_beams_agree_with_closed_forms(springs: Mechanism, share: float) -> None:
+    stroke = share * springs.length
+    by_closed, by_beams = closed(springs, stroke), beams(springs, stroke)
+    assert by_beams.drive[0] == pytest.approx(by_closed.drive[0], rel=0.01)  # the stage may turn
+    assert by_beams.forces == pytest.approx(by_closed.forces, rel=0.03)
+    assert by_beams.support_x == pytest.approx(by_closed.support_x, rel=0.05)
+    assert by_beams.support_y == pytest.approx(by_closed.support_y, rel=0.05)
+    assert by_beams.stress == pytest.approx(by_closed.stress, rel=0.05)
+    assert by_beams.shortening == pytest.approx(by_closed.shortening, rel=0.02)
+    assert by_beams.buckling == pytest.approx(by_closed.buckling, rel=0.015)
+    assert by_beams.modes[0].name == by_closed.modes[0].name == "drive"
+    assert by_beams.modes[0].frequency == pytest.approx(by_closed.modes[0].frequency, rel=0.01)
+    unit = np.array([1, 1, 1, *[springs.length] * 3])
+    for matrix in by_beams.stiffness / np.outer(unit, unit):
         assert np.allclose(matrix, matrix.T, rtol=1e-6, atol=1e-6 * np.max(matrix))
         assert np.all(np.linalg.eigvalsh((matrix + matrix.T) / 2) > 0)
 
 
 @FEW
-@given(it=mechanisms())
-def test_tangent_is_the_slope_of_the_force(it: Mechanism) -> None:
+@given(springs=mechanisms())
+def test_tangent_is_the_slope_of_the_force(springs: Mechanism) -> None:
     """The drive stiffness is the derivative of the force over the stroke, which a parabola through three fits."""
-    found = beams(it, it.length / 50)
-    step = found.deflections[1]
-    slopes = (found.forces[2:] - found.forces[:-2]) / (2 * step)
-    assert slopes == pytest.approx(found.drive[1:-1], rel=2e-4)
-    work = np.sum((found.forces[1:] + found.forces[:-1]) / 2) * step - step**2 / 12 * (found.drive[-1] - found.drive[0])
-    linear = found.drive[0] * found.stroke**2 / 2
-    assert work == pytest.approx(linear, rel=2 * found.nonlinearity + 1e-6)
+    evaluation = beams(springs, springs.length / 50)
+    step = evaluation.deflections[1]
+    slopes = (evaluation.forces[2:] - evaluation.forces[:-2]) / (2 * step)
+    assert slopes == pytest.approx(evaluation.drive[1:-1], rel=2e-4)
+    work = np.sum((evaluation.forces[1:] + evaluation.forces[:-1]) / 2) * step - step**2 / 12 * (
+        evaluation.drive[-1] - evaluation.drive[0]
+    )
+    linear = evaluation.drive[0] * evaluation.stroke**2 / 2
+    assert work == pytest.approx(linear, rel=2 * evaluation.nonlinearity + 1e-6)
 
 
 class Pushed:
     """Leaves between a cart at rest and a stage anywhere, by virtual work alone: the stage goes by displacements [m]
     and a rotation vector [rad] about axes at rest, on top of a turn [rad] about y; its inner nodes are solved for."""
 
-    def __init__(self, it: Mechanism) -> None:
-        self.leaves, self.offsets = Leaves(it), it.offsets
+    def __init__(self, springs: Mechanism) -> None:
+        self.leaves, self.offsets = Leaves(springs), springs.offsets
         self.state = np.zeros((self.leaves.count, self.leaves.nodes, 6))
 
     def ends(self, move: np.ndarray, turn: float) -> np.ndarray:
@@ -463,9 +475,9 @@ class Pushed:
                 free = block_diag(*[np.eye(forces[0].size - 6)] * len(state), np.eye(2))
                 ways = np.split(free[:-2], len(state))
                 slope = np.zeros((len(free), len(free)))
-                for own, way, end in zip(self.leaves.stiffness(state)[:, 6:, 6:], ways, follow, strict=True):
-                    way = np.concatenate([way, end @ free[-2:]])
-                    slope += way.T @ own @ way
+                for matrix, motion, end in zip(self.leaves.stiffness(state)[:, 6:, 6:], ways, follow, strict=True):
+                    motion = np.concatenate([motion, end @ free[-2:]])
+                    slope += motion.T @ matrix @ motion
                 slope[-1, -1] += np.sum(bend * forces[:, -1])
                 out = np.concatenate([forces[:, :-1].ravel(), np.einsum("lik,li->k", follow, forces[:, -1])])
                 change = -np.linalg.solve(slope, out)
@@ -477,27 +489,27 @@ class Pushed:
 
 def test_a_stage_that_turns_as_it_is_pushed() -> None:
     """Leaves near each other hardly keep the stage from turning: its whole stiffness, as it stands, by virtual work."""
-    it, stroke = mechanism(spacing=0.003), 6e-3
-    pushed = Pushed(it)
+    springs, stroke = mechanism(spacing=0.003), 6e-3
+    pushed = Pushed(springs)
     move, turn = pushed.to(stroke, 16)
-    wanted, found = pushed.stiffness(move, turn), beams(it, stroke)
+    expected, evaluation = pushed.stiffness(move, turn), beams(springs, stroke)
     assert abs(turn) > 0.01
-    scale = np.sqrt(np.outer(np.diag(wanted), np.diag(wanted)))
-    assert np.abs((found.stiffness[-1] - wanted) / scale).max() < 2e-5
-    assert found.forces[-1] == pytest.approx(pushed.forces(move, turn)[2], rel=1e-5)
-    assert found.shortening == pytest.approx(-move[0], rel=1e-4)
+    scale = np.sqrt(np.outer(np.diag(expected), np.diag(expected)))
+    assert np.abs((evaluation.stiffness[-1] - expected) / scale).max() < 2e-5
+    assert evaluation.forces[-1] == pytest.approx(pushed.forces(move, turn)[2], rel=1e-5)
+    assert evaluation.shortening == pytest.approx(-move[0], rel=1e-4)
 
 
 @pytest.mark.parametrize("leaves", [2, 3, 4])
 def test_mirrored_motion(leaves: int) -> None:
     """Pushed either way by the same amount, leaves in a row that is even about its middle answer the same."""
-    it = mechanism(leaves=leaves)
-    system = Leaves(it)
+    springs = mechanism(leaves=leaves)
+    system = Leaves(springs)
     rng = np.random.default_rng(leaves)
     inner = rng.standard_normal((leaves, system.nodes - 2, 3)) * np.array([1e-6, 1e-4, 1e-3])
     place = Place(inner, np.array([-2e-6, 5e-4, 1e-5]))
     mirrored = Place(inner[::-1] * [1, -1, -1], place.stage * [1, -1, -1])
-    there, back = (system.forces(each.state(it.offsets)) for each in (place, mirrored))
+    there, back = (system.forces(configuration.state(springs.offsets)) for configuration in (place, mirrored))
     assert np.allclose(back[::-1, :, 0::2] * [1, -1, -1], there[:, :, 0::2], atol=1e-9 * np.max(np.abs(there)))
 
 
@@ -523,11 +535,13 @@ def test_elements_converge() -> None:
 
 def test_modes_have_unit_modal_mass_and_are_orthogonal() -> None:
     """As far as the stage, by far the heaviest part, tells."""
-    it = beams(replace(THESIS, density=1.0), 1e-3)
-    own = [mode for mode in it.modes if np.linalg.norm(mode.stage) > 0.1]
-    shapes = np.array([mode.stage for mode in own]).T
-    assert "drive" in [mode.name for mode in own]
-    assert np.allclose(shapes.T @ closed_forms.body_mass(it.mechanism) @ shapes, np.eye(len(own)), atol=1e-2)
+    evaluation = beams(replace(THESIS, density=1.0), 1e-3)
+    of_stage = [mode for mode in evaluation.modes if np.linalg.norm(mode.stage) > 0.1]
+    shapes = np.array([mode.stage for mode in of_stage]).T
+    assert "drive" in [mode.name for mode in of_stage]
+    assert np.allclose(
+        shapes.T @ closed_forms.body_mass(evaluation.mechanism) @ shapes, np.eye(len(of_stage)), atol=1e-2
+    )
 
 
 @pytest.mark.parametrize(

@@ -25,16 +25,16 @@ def test_stiffening_is_that_of_the_plate(ratio: float, poisson: float) -> None:
 @FEW
 @given(ratio=SLENDER, poisson=st.floats(0.05, 0.45))
 def test_one_function_across_is_exact(ratio: float, poisson: float) -> None:
-    whole = 1 + (plate.stiffening(ratio, 1.0, poisson) - 1) / plate.CONVERGED
-    assert whole == pytest.approx(ritz(ratio, 1.0, poisson, along=10, across=2).stiffening, rel=1e-6)
+    expected = 1 + (plate.stiffening(ratio, 1.0, poisson) - 1) / plate.CONVERGED
+    assert expected == pytest.approx(ritz(ratio, 1.0, poisson, along=10, across=2).stiffening, rel=1e-6)
 
 
 @FEW
 @given(ratio=SLENDER, poisson=METAL)
 def test_share_that_converges(ratio: float, poisson: float) -> None:
     """Of the stiffening: 0.866 to 0.901 for metals."""
-    whole = (plate.stiffening(ratio, 1.0, poisson) - 1) / plate.CONVERGED
-    assert (ritz(ratio, 1.0, poisson).stiffening - 1) / whole == pytest.approx(plate.CONVERGED, abs=0.025)
+    expected = (plate.stiffening(ratio, 1.0, poisson) - 1) / plate.CONVERGED
+    assert (ritz(ratio, 1.0, poisson).stiffening - 1) / expected == pytest.approx(plate.CONVERGED, abs=0.025)
 
 
 @settings(max_examples=6, deadline=None, derandomize=True)
@@ -57,8 +57,8 @@ def test_limits(poisson: float, odd: bool) -> None:
     """A narrow leaf is a beam, a wide one bends into a cylinder."""
     assert plate.stiffening(1e5, 1.0, poisson, odd) == pytest.approx(1, rel=1e-4)
     cylinder = 1 / (1 - poisson**2)
-    whole = 1 + (plate.stiffening(1.0, 1e5, poisson, odd) - 1) / plate.CONVERGED
-    assert whole == pytest.approx(cylinder, rel=1e-4)
+    expected = 1 + (plate.stiffening(1.0, 1e5, poisson, odd) - 1) / plate.CONVERGED
+    assert expected == pytest.approx(cylinder, rel=1e-4)
     ratios = np.geomspace(0.1, 100, 40)
     rising = plate.stiffening(ratios, 1.0, poisson, odd)
     assert np.all(np.diff(rising) <= 1e-9)
@@ -82,8 +82,8 @@ def test_profile_has_the_stiffness_of_the_plate(ratio: float, poisson: float) ->
     nodes, weights = np.polynomial.legendre.leggauss(80)
     s = nodes * ratio * WIDTH / 2
     profile = plate.compliance_profile(s, ratio * WIDTH, WIDTH, poisson)
-    whole = np.sum(weights * profile * s**2) / np.sum(weights * s**2)
-    assert whole == pytest.approx(1 / plate.stiffening(ratio * WIDTH, WIDTH, poisson), rel=1e-9)
+    expected = np.sum(weights * profile * s**2) / np.sum(weights * s**2)
+    assert expected == pytest.approx(1 / plate.stiffening(ratio * WIDTH, WIDTH, poisson), rel=1e-9)
 
 
 @given(ratio=SLENDER, poisson=POISSON)
@@ -123,7 +123,7 @@ def test_torsion_constant(ratio: float, factor: float) -> None:
 def test_arrays_are_one_by_one() -> None:
     lengths, widths, poissons = np.array([0.03, 0.07, 0.1]), np.array([0.03, 0.045, 0.02]), np.array([0.3, 0.0, 0.4])
     for odd in (True, False):
-        alone = [plate.stiffening(*each, odd) for each in zip(lengths, widths, poissons, strict=True)]
+        alone = [plate.stiffening(*sizes, odd) for sizes in zip(lengths, widths, poissons, strict=True)]
         assert plate.stiffening(lengths, widths, poissons, odd) == pytest.approx(alone, rel=1e-13)
-    stresses = [plate.stress_factors(*each) for each in zip(lengths, widths, poissons, strict=True)]
+    stresses = [plate.stress_factors(*sizes) for sizes in zip(lengths, widths, poissons, strict=True)]
     assert np.allclose(np.transpose(plate.stress_factors(lengths, widths, poissons)), stresses, rtol=1e-13, atol=0)

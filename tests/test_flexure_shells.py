@@ -51,43 +51,45 @@ KINDS = {
 
 def mechanism(name: str) -> Mechanism:
     leaves, length, width, thickness, spacing, material, mass, beyond = MECHANISMS[name]
-    known = materials()[material]
+    data = materials()[material]
     length, width, thickness, spacing, beyond = (mm * 1e-3 for mm in (length, width, thickness, spacing, beyond))
-    it = Mechanism(
+    bare = Mechanism(
         leaves,
         length,
         width,
         thickness,
         spacing,
-        *(float(known.young), known.poisson, float(known.density)),
-        *(float(known.yield_strength), float(known.fatigue)),
+        *(float(data.young), data.poisson, float(data.density)),
+        *(float(data.yield_strength), float(data.fatigue)),
         Body(mass, (0.0, 0.0, 0.0), (length + beyond, 0.0, 0.0)),
         *((length + beyond, 0.0, 0.0),) * 2,
     )
-    return Mechanism(**{**it.__dict__, "body": Body(mass, cube_inertia(mass), it.body.centre)})
+    return Mechanism(**{**bare.__dict__, "body": Body(mass, cube_inertia(mass), bare.body.centre)})
 
 
 @cache
 def by_shells(name: str, mesh: shells.Mesh = shells.MESH) -> dict[str, float]:
     """What shells say: stiffness [N/m, N m] straight and deflected by L/50, frequencies [Hz], stress [Pa] at L/100,
     buckling load [N]."""
-    it = mechanism(name)
-    sheet = shells.Sheet(it.length, it.width, it.thickness, it.young, it.poisson, it.density)
-    row, body = (int(it.leaves), it.spacing), it.body
+    example = mechanism(name)
+    sheet = shells.Sheet(
+        example.length, example.width, example.thickness, example.young, example.poisson, example.density
+    )
+    row, body = (int(example.leaves), example.spacing), example.body
     straight = shells.mechanism_stiffness(sheet, *row, mesh=mesh)
-    bent = shells.mechanism_stiffness(sheet, *row, deflection=it.length / 50, mesh=mesh)
+    bent = shells.mechanism_stiffness(sheet, *row, deflection=example.length / 50, mesh=mesh)
     frequencies, kinds = shells.modes(
         sheet, *row, body.mass, body.inertia, body.centre, count=6 + 8 * row[0], mesh=mesh
     )
     finer = (mesh[0] * 4 // 3, mesh[1] * 4 // 3)
-    found = {
-        "stress": shells.clamp_stress(sheet, it.length / 100, mesh=finer)[1],
+    results = {
+        "stress": shells.clamp_stress(sheet, example.length / 100, mesh=finer)[1],
         "buckling": shells.buckling_load(sheet, row[0], mesh=mesh),
     }
     for kind, frequency in zip(kinds, frequencies, strict=True):
         if kind in KINDS:
-            found.setdefault(f"frequency, {KINDS[kind]}", float(frequency))
-    return found | stiffnesses(straight, bent)
+            results.setdefault(f"frequency, {KINDS[kind]}", float(frequency))
+    return results | stiffnesses(straight, bent)
 
 
 def stiffnesses(straight: np.ndarray, bent: np.ndarray) -> dict[str, float]:
@@ -108,30 +110,37 @@ def stiffnesses(straight: np.ndarray, bent: np.ndarray) -> dict[str, float]:
     }
 
 
-def by_model(it: Evaluation, half: Evaluation) -> dict[str, float]:
+def by_model(evaluation: Evaluation, half: Evaluation) -> dict[str, float]:
     """What a model says at strokes of L/50 and L/100."""
-    found = {"stress": half.stress, "buckling": it.buckling} | stiffnesses(*it.stiffness)
-    for mode in it.modes:
-        found.setdefault(f"frequency, {mode.name.split(',')[0]}", mode.frequency)
+    results = {"stress": half.stress, "buckling": evaluation.buckling} | stiffnesses(*evaluation.stiffness)
+    for mode in evaluation.modes:
+        results.setdefault(f"frequency, {mode.name.split(',')[0]}", mode.frequency)
     # the stiffness along x and y of the evaluation is that of its matrices, which closed forms have twice
-    own = {"support x": it.support_x, "support y": it.support_y}
-    both = {f"{name}, {at}": each[k] for name, each in own.items() for at, k in (("straight", 0), ("deflected", -1))}
-    return found | both | {"drive, straight": it.drive[0], "drive, deflected": it.drive[-1]}
+    supports = {"support x": evaluation.support_x, "support y": evaluation.support_y}
+    both = {
+        f"{name}, {at}": support[k]
+        for name, support in supports.items()
+        for at, k in (("straight", 0), ("deflected", -1))
+    }
+    return results | both | {"drive, straight": evaluation.drive[0], "drive, deflected": evaluation.drive[-1]}
 
 
 def errors(name: str, model: Model, mesh: shells.Mesh = shells.MESH) -> dict[str, float]:
-    it = mechanism(name)
-    found, wanted = by_model(model(it, it.length / 50), model(it, it.length / 100)), by_shells(name, mesh)
-    return {key: found[key] / value - 1 for key, value in wanted.items() if key in found}
+    example = mechanism(name)
+    results, expected = (
+        by_model(model(example, example.length / 50), model(example, example.length / 100)),
+        by_shells(name, mesh),
+    )
+    return {key: results[key] / value - 1 for key, value in expected.items() if key in results}
 
 
 @pytest.mark.parametrize("name", MECHANISMS)
 def test_both_models_agree_with_shells(name: str) -> None:
     for model in MODELS.values():
-        found = errors(name, model)
-        assert {"frequency, drive", "frequency, leaf bending", "frequency, leaf torsion"} <= found.keys()
-        limits = {key: LIMITS[key.split(",")[0].split()[0]] for key in found} | TWISTED
-        wrong = {key: f"{each:.2%}" for key, each in found.items() if abs(each) > limits[key]}
+        deviations = errors(name, model)
+        assert {"frequency, drive", "frequency, leaf bending", "frequency, leaf torsion"} <= deviations.keys()
+        limits = {key: LIMITS[key.split(",")[0].split()[0]] for key in deviations} | TWISTED
+        wrong = {key: f"{deviation:.2%}" for key, deviation in deviations.items() if abs(deviation) > limits[key]}
         assert not wrong
 
 

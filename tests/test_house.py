@@ -37,24 +37,24 @@ def sources() -> dict[str, str]:
 
 def classes() -> dict[str, list[str]]:
     """Public classes at the top of modules, by name: the modules that have one of that name."""
-    found = defaultdict(list)
+    modules = defaultdict(list)
     for name, text in sources().items():
         for node in ast.parse(text).body:
             if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
-                found[node.name].append(name)
-    return found
+                modules[node.name].append(name)
+    return modules
 
 
 @pytest.mark.xfail(reason="controllers are being made components (issue 20, part 1)", strict=True)
 def test_keys_of_a_controller_are_known_to_controllers_alone() -> None:
-    found = [name for name, text in sources().items() if '"controller.' in text]
-    assert [name for name in found if not name.startswith(KNOW_CONTROLLERS)] == []
+    knowing = [name for name, text in sources().items() if '"controller.' in text]
+    assert [name for name in knowing if not name.startswith(KNOW_CONTROLLERS)] == []
 
 
 @pytest.mark.xfail(reason="names are being told apart (issue 20, parts 4 and 6)", strict=True)
 def test_a_name_stands_for_one_thing() -> None:
-    found = classes()
-    assert {name: found[name] for name in ONE_MEANING if len(found[name]) > 1} == {}
+    modules = classes()
+    assert {name: modules[name] for name in ONE_MEANING if len(modules[name]) > 1} == {}
 
 
 def test_views_stand_in_the_folder_of_their_command() -> None:
@@ -66,7 +66,7 @@ def test_views_stand_in_the_folder_of_their_command() -> None:
 def test_there_is_a_recipe(kind: str) -> None:
     """A heading for what is added, and below it the folder of its file."""
     sections = GUIDE.read_text(encoding="utf-8").split("\n#")
-    own = [each for each in sections if kind in each.partition("\n")[0].lower()]
-    assert own
-    assert any(RECIPES[kind] in each for each in own)
+    recipes = [section for section in sections if kind in section.partition("\n")[0].lower()]
+    assert recipes
+    assert any(RECIPES[kind] in recipe for recipe in recipes)
     assert any((PACKAGE / RECIPES[kind]).glob("*"))

@@ -410,9 +410,9 @@ def test_mirrored_friction_mirrors_the_cycle() -> None:
 def test_much_unequal_friction_ends_hunting() -> None:
     """At 8 Hz, where the cycle attracts less, 5 % of difference is too much: simulations come to rest from anywhere."""
     chosen = rigid(8, friction__asymmetry=0.05)
-    found = known(chosen)
-    assert found.cycles == ()
-    assert found.reason == NO_RETURN
+    result = known(chosen)
+    assert result.cycles == ()
+    assert result.reason == NO_RETURN
     assert np.all(last_swing(chosen, np.geomspace(1e-4, 3e-2, 32), 150, 4) < BRISTLES)
 
 
@@ -428,8 +428,8 @@ def test_constant_force_is_carried_by_the_integrator_alone(bias: float) -> None:
     assert biased.multiplier == pytest.approx(plain.multiplier**2, rel=1e-4)
     after, before = (from_crossing(cycle) for cycle in (biased, plain))
     for name, signal in before.items():
-        given = -bias if name in ("force", "force_i") else 0.0
-        assert np.max(np.abs(after[name] - signal - given)) < 0.02 * np.ptp(signal), name  # straight between samples
+        offset = -bias if name in ("force", "force_i") else 0.0
+        assert np.max(np.abs(after[name] - signal - offset)) < 0.02 * np.ptp(signal), name  # straight between samples
 
 
 def from_crossing(cycle: Cycle) -> dict[str, np.ndarray]:
@@ -464,11 +464,11 @@ def test_no_force_is_no_bias() -> None:
 )
 def test_stages_that_cannot_hunt(name: str, reason: str) -> None:
     """Without friction there is nothing to stick to, without integral action nothing breaks away: no computation."""
-    found = hunting(VARIANTS[name])
-    assert found.cycles == found.attracting == ()
-    assert reason in found.reason
-    assert found.certain
-    assert found.returns is None
+    result = hunting(VARIANTS[name])
+    assert result.cycles == result.attracting == ()
+    assert reason in result.reason
+    assert result.certain
+    assert result.returns is None
 
 
 @RIGID
@@ -528,10 +528,10 @@ def test_newton_does_not_slide_onto_the_rest_line() -> None:
 
 @RIGID
 def test_no_cycle_at_18_hz() -> None:
-    found = known(rigid(18))
-    assert found.cycles == ()
-    assert found.reason == NO_RETURN
-    assert found.certain
+    result = known(rigid(18))
+    assert result.cycles == ()
+    assert result.reason == NO_RETURN
+    assert result.certain
 
 
 @RIGID
@@ -557,10 +557,10 @@ def test_unusable_tolerances_are_refused(rtol: float) -> None:
 def test_both_cycles_near_a_fold_are_found() -> None:
     """At an asymmetry of 1.7 % the cycle is about to vanish: of 24 simulated starts 20 swing to 0.786 and -0.274 mm for
     1500 s, and a cycle that repels lies 2 % beside."""
-    found = hunting(rigid(8, friction__asymmetry=0.017))
-    assert found.certain
-    assert len(found.cycles) == 2
-    (attracting,) = found.attracting
+    result = hunting(rigid(8, friction__asymmetry=0.017))
+    assert result.certain
+    assert len(result.cycles) == 2
+    (attracting,) = result.attracting
     assert attracting.middle + attracting.amplitude == pytest.approx(0.786e-3, abs=0.5e-6)
     assert attracting.middle - attracting.amplitude == pytest.approx(-0.274e-3, abs=0.5e-6)
 

@@ -36,14 +36,14 @@ def leuven(number: int) -> tuple[Record, Record]:
     path = present(f"kuleuven_lsb250/exp{number}.mat")
     log = scipy.io.loadmat(path, squeeze_me=True, struct_as_record=False)[f"exp{number}"]
     by_name = {channel.Name: np.asarray(channel.Data, float) for channel in log.Y}
-    given = by_name["input (V)"]
-    first, second = (Record(given, 1e-3 * by_name[f"enc{i} (mm)"], 1e-3) for i in (1, 2))
+    voltage = by_name["input (V)"]
+    first, second = (Record(voltage, 1e-3 * by_name[f"enc{i} (mm)"], 1e-3) for i in (1, 2))
     return first, second
 
 
 @cache
 def leuven_response(numbers: tuple[int, ...], output: int) -> FrequencyResponse:
-    return multisine([leuven(one)[output] for one in numbers], 5.0, Channels("voltage", "V", "position", "m"))
+    return multisine([leuven(number)[output] for number in numbers], 5.0, Channels("voltage", "V", "position", "m"))
 
 
 @cache
@@ -63,15 +63,15 @@ def tokyo(output: str) -> FrequencyResponse:
 
 def test_leuven_lines_and_exact_period() -> None:
     """The README says 5 s; the input repeats after 4999 samples."""
-    found = leuven_response((1, 2), 0)
-    assert len(found.frequency) == 100
-    assert found.frequency[0] == pytest.approx(1 / 4.999)
-    assert "every 4999 samples, not every 5000" in found.warnings[0]
+    response = leuven_response((1, 2), 0)
+    assert len(response.frequency) == 100
+    assert response.frequency[0] == pytest.approx(1 / 4.999)
+    assert "every 4999 samples, not every 5000" in response.warnings[0]
     assert feedback(leuven(1)[0]) == ()
 
 
 def test_leuven_realisations_lie_in_each_others_bands() -> None:
-    both, single = leuven_response((1, 2), 0), [leuven_response((one,), 0) for one in (1, 2)]
+    both, single = leuven_response((1, 2), 0), [leuven_response((number,), 0) for number in (1, 2)]
     apart = np.abs(single[0].response - single[1].response) / 2  # of each from their mean
     band = (both.frequency > 3) & (both.frequency < 20)
     assert 0.5 < np.sqrt(np.mean((apart / both.deviation)[band] ** 2)) < 2
@@ -79,15 +79,15 @@ def test_leuven_realisations_lie_in_each_others_bands() -> None:
 
 
 def test_leuven_antiresonance_and_resonance() -> None:
-    found = fit_modes(leuven_response((1, 2), 0), BAND)
-    assert (found.shape.modes, found.shape.rigid) == (1, True)
-    assert found["antiresonance 1 frequency"].value == pytest.approx(11, abs=1)
-    assert found["resonance 1 frequency"].value == pytest.approx(14, abs=1)
-    assert 0.02 < found["resonance 1 damping ratio"].low < found["resonance 1 damping ratio"].high < 0.15
+    modes = fit_modes(leuven_response((1, 2), 0), BAND)
+    assert (modes.shape.modes, modes.shape.rigid) == (1, True)
+    assert modes["antiresonance 1 frequency"].value == pytest.approx(11, abs=1)
+    assert modes["resonance 1 frequency"].value == pytest.approx(14, abs=1)
+    assert 0.02 < modes["resonance 1 damping ratio"].low < modes["resonance 1 damping ratio"].high < 0.15
     two = leuven_model((1, 2))
     for name in ("antiresonance", "resonance"):
-        one, other = found[f"{name} 1 frequency"], two[f"{name} frequency"]
-        assert max(one.low, other.low) < min(one.high, other.high)
+        single, double = modes[f"{name} 1 frequency"], two[f"{name} frequency"]
+        assert max(single.low, double.low) < min(single.high, double.high)
 
 
 @pytest.mark.parametrize(("train", "aside"), [(1, 2), (2, 1)])
@@ -111,30 +111,33 @@ def test_leuven_prediction_of_the_other_realisation(train: int, aside: int) -> N
 
 
 def test_leuven_two_masses_agree_between_realisations() -> None:
-    single = [leuven_model((one,)) for one in (1, 2)]
+    single = [leuven_model((number,)) for number in (1, 2)]
     both = widened(leuven_model((1, 2)), single)
     for name in ("driven mass", "other mass", "joint stiffness", "resonance frequency"):
-        for one in single:
-            assert both[name].low < one[name].high
-            assert one[name].low < both[name].high
+        for model in single:
+            assert both[name].low < model[name].high
+            assert model[name].low < both[name].high
         assert both[name].half_width < 0.1 * both[name].value
 
 
 def test_leuven_departure_by_friction() -> None:
     model = leuven_model((1, 2))
-    found = departure(leuven_response((1, 2), 0), model.predict)
-    assert 1 < found.frequency.value < 4
-    assert found.differ
+    result = departure(leuven_response((1, 2), 0), model.predict)
+    assert 1 < result.frequency.value < 4
+    assert result.differ
     low = signal.butter(4, 40, fs=1000, output="sos")
-    velocities = [signal.sosfiltfilt(low, np.gradient(leuven(one)[0].output, 1e-3)) for one in (1, 2)]
+    velocities = [signal.sosfiltfilt(low, np.gradient(leuven(number)[0].output, 1e-3)) for number in (1, 2)]
     drag = friction_from_departure(leuven_response((1, 2), 0), velocities, (0.1, 5.0), model.signs[0])
     assert 0 < drag.coulomb.low < drag.coulomb.high < 0.5  # below the peak of the input, which moves it
     assert drag.left < 0.3
     assert any("a spring acts" in text for text in drag.warnings)
-    once = [leuven(one)[0].input[-4999:] for one in (1, 2)]
-    told = explained(drag, leuven_response((1, 2), 0), once, 1e-3, (0.1, 5.0))
-    assert told.left < 0.5
-    inertia = {factor: np.abs(each.accelerations().response[:8]).mean() for factor, each in told.responses.items()}
+    once = [leuven(number)[0].input[-4999:] for number in (1, 2)]
+    explanation = explained(drag, leuven_response((1, 2), 0), once, 1e-3, (0.1, 5.0))
+    assert explanation.left < 0.5
+    inertia = {
+        factor: np.abs(response.accelerations().response[:8]).mean()
+        for factor, response in explanation.responses.items()
+    }
     assert inertia[0.5] < 0.5 * inertia[2.0]
     total = model["total mass"]
     assert drag.mass.low < total.high
@@ -152,17 +155,17 @@ def test_tokyo_mass_lines() -> None:
 
 
 def test_tokyo_modes() -> None:
-    found = fit_modes(tokyo("theta_mx"))
-    assert found["antiresonance 1 frequency"].value == pytest.approx(55, abs=1)
-    assert found["resonance 1 frequency"].value == pytest.approx(77, abs=1)
-    seen = visible(tokyo("theta_mx"), found)
+    modes = fit_modes(tokyo("theta_mx"))
+    assert modes["antiresonance 1 frequency"].value == pytest.approx(55, abs=1)
+    assert modes["resonance 1 frequency"].value == pytest.approx(77, abs=1)
+    seen = visible(tokyo("theta_mx"), modes)
     assert seen.case == "sliding"
     assert seen.words[-1] == "cart sliding: free joint, antiresonance and resonance"
 
 
 def test_tokyo_second_encoder_counts_the_other_way() -> None:
-    found = fit_two_mass(tokyo("theta_mx"), tokyo("theta_my"))
-    assert found.signs == (1.0, -1.0)
-    assert any("opposite sign" in text for text in found.warnings)
-    assert found["total mass"].value == pytest.approx(1 / 107, rel=0.05)
-    assert found["resonance frequency"].value == pytest.approx(77, abs=1)
+    fit = fit_two_mass(tokyo("theta_mx"), tokyo("theta_my"))
+    assert fit.signs == (1.0, -1.0)
+    assert any("opposite sign" in text for text in fit.warnings)
+    assert fit["total mass"].value == pytest.approx(1 / 107, rel=0.05)
+    assert fit["resonance frequency"].value == pytest.approx(77, abs=1)

@@ -1,4 +1,4 @@
-"""The claims of the thesis that linear analysis decides: what is found of the rig, and rigs made to judge otherwise."""
+"""The claims of the thesis that linear analysis decides: what is analysis of the rig, and rigs made to judge otherwise."""
 
 import re
 from collections.abc import Mapping
@@ -23,7 +23,7 @@ pytestmark = pytest.mark.xdist_group("linear-claims")
 
 
 @pytest.fixture(scope="module")
-def found() -> Linear:
+def analysis() -> Linear:
     return analysed(rig())
 
 
@@ -35,7 +35,7 @@ def changed(changes: Mapping[str, Any]) -> Linear:
     return analysed(rig().replace(dict(changes)))
 
 
-# --- what is found of the rig -----------------------------------------------------------------------------------------
+# --- what is analysis of the rig -----------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -48,8 +48,8 @@ def changed(changes: Mapping[str, Any]) -> Linear:
         ("F23", (True, False)),
     ],
 )
-def test_the_rig(found: Linear, claim: str, holds: tuple[bool, ...]) -> None:
-    finding = judged(claim, found)
+def test_the_rig(linear: Linear, claim: str, holds: tuple[bool, ...]) -> None:
+    finding = judged(claim, linear)
     assert finding.pattern == holds, finding
     assert all(part.holds or part.why for part in finding.parts)
     assert not re.search(r"\bnan\b", str(finding))
@@ -79,24 +79,24 @@ def test_judges_recognise_what_holds(claim: str) -> None:
 
 
 @pytest.mark.parametrize("claim", FAILS)
-def test_judges_recognise_what_does_not(found: Linear, claim: str) -> None:
+def test_judges_recognise_what_does_not(linear: Linear, claim: str) -> None:
     finding = judged(claim, changed(FAILS[claim]))
-    assert sum(finding.pattern) < sum(judged(claim, found).pattern), finding
+    assert sum(finding.pattern) < sum(judged(claim, linear).pattern), finding
 
 
-def test_parts_of_made_evidence(found: Linear) -> None:
+def test_parts_of_made_evidence(linear: Linear) -> None:
     """Single numbers, made otherwise, turn the parts that they decide."""
-    alike = replace(found, speeds=replace(found.speeds, unstable=(), unstable_touched=(), slow=1.5))
+    alike = replace(linear, speeds=replace(linear.speeds, unstable=(), unstable_touched=(), slow=1.5))
     assert judged("F8", alike).pattern == (True, False, True)
-    assert judged("F8", replace(found, free=replace(found.free, single=None))).pattern == (False, True, False)
-    sliding = found.plants["sliding"]
+    assert judged("F8", replace(linear, free=replace(linear.free, single=None))).pattern == (False, True, False)
+    sliding = linear.plants["sliding"]
     made = {
         "sliding": replace(sliding, antiresonances=sliding.antiresonances[1:], mass=1.7),
-        "stuck": replace(found.plants["stuck"], resonances=()),
+        "stuck": replace(linear.plants["stuck"], resonances=()),
     }
-    other = replace(found, plants={**found.plants, **made})
+    other = replace(linear, plants={**linear.plants, **made})
     assert judged("F7", other).pattern == (False, False, False, True, False, False)
-    limited = replace(found, free=replace(found.free, unsampled=50.0))
+    limited = replace(linear, free=replace(linear.free, unsampled=50.0))
     assert judged("F23", limited).judgement == "holds"
 
 
@@ -114,8 +114,8 @@ def test_printed_formulas() -> None:
     assert [part.holds for part in compare(2 * PRINTED_STIFFNESS, 1 + PRINTED_SENSITIVITY)] == [False, False, False]
 
 
-def test_the_plant_against_eq_1(found: Linear) -> None:
-    springs = found.springs
+def test_the_plant_against_eq_1(linear: Linear) -> None:
+    springs = linear.springs
     assert springs.both == pytest.approx(1 / (1 / 2.4e3 + 1 / 1e5), rel=1e-12)
     assert in_the_plant(PRINTED_STIFFNESS, springs).holds
     assert not in_the_plant(PRINTED_STIFFNESS, Springs(springs.joint, springs.bristles, springs.joint)).holds
@@ -124,9 +124,9 @@ def test_the_plant_against_eq_1(found: Linear) -> None:
 # --- the evidence -----------------------------------------------------------------------------------------------------
 
 
-def test_limit_cases_against_closed_forms(found: Linear) -> None:
+def test_limit_cases_against_closed_forms(linear: Linear) -> None:
     """Two masses on the joint, the parasitic mode far above; cart and stage on the limiter, far above that."""
-    plants = found.plants
+    plants = linear.plants
     assert plants["sliding"].antiresonances[0] == pytest.approx(np.sqrt(2.4e3 / 1.2) / (2 * np.pi), rel=1e-3)
     assert plants["sliding"].first == pytest.approx(13.12, rel=1e-3)
     assert plants["stuck"].first == pytest.approx(np.sqrt(2343.75 / 0.5) / (2 * np.pi), rel=2e-3)
@@ -138,10 +138,10 @@ def test_limit_cases_against_closed_forms(found: Linear) -> None:
         assert plants[f"{case}-series"].pair_above is None
 
 
-def test_unstable_speeds_are_those_of_the_analysis(found: Linear) -> None:
+def test_unstable_speeds_are_those_of_the_analysis(linear: Linear) -> None:
     free, touched = bode(rig()).unstable
-    assert found.speeds.unstable[0] == pytest.approx((free.low, free.high), rel=1e-5)
-    assert found.speeds.unstable_touched[0] == pytest.approx((touched.low, touched.high), rel=1e-5)
+    assert linear.speeds.unstable[0] == pytest.approx((free.low, free.high), rel=1e-5)
+    assert linear.speeds.unstable_touched[0] == pytest.approx((touched.low, touched.high), rel=1e-5)
 
 
 def test_bristles_in_steady_state_are_the_family() -> None:
@@ -154,9 +154,9 @@ def test_bristles_in_steady_state_are_the_family() -> None:
 
 
 @pytest.mark.parametrize("joint", ["free", "locked"])
-def test_the_edges_of_stability(found: Linear, joint: str) -> None:
+def test_the_edges_of_stability(linear: Linear, joint: str) -> None:
     """It is stable just below the delay of a setting and the crossover of a delay, and not just above."""
-    loops = found.locked if joint == "locked" else found.free
+    loops = linear.locked if joint == "locked" else linear.free
 
     def rightmost(crossover: float, delay: float) -> float:
         changes = {"drive.sample_time": "50 us", "drive.delay": f"{delay!r} s", "joint.locked": joint == "locked"}
@@ -170,15 +170,15 @@ def test_the_edges_of_stability(found: Linear, joint: str) -> None:
         assert rightmost(0.999 * crossover, delay) < 0 < rightmost(1.001 * crossover, delay)
 
 
-def test_the_crossover_from_which_a_mode_reaches_0_db(found: Linear) -> None:
-    settings = {f: len(cases["sliding"].crossovers) for f, cases in found.locked.margins.items()}
-    assert found.locked.single is not None
-    assert all((count == 1) == (f < found.locked.single) for f, count in settings.items())
-    assert found.free.single == pytest.approx(found.locked.single, rel=1e-3)
+def test_the_crossover_from_which_a_mode_reaches_0_db(linear: Linear) -> None:
+    settings = {f: len(cases["sliding"].crossovers) for f, cases in linear.locked.margins.items()}
+    assert linear.locked.single is not None
+    assert all((count == 1) == (f < linear.locked.single) for f, count in settings.items())
+    assert linear.free.single == pytest.approx(linear.locked.single, rel=1e-3)
 
 
-def test_curves_are_the_loops_of_the_margins(found: Linear) -> None:
-    for loops in (found.free, found.locked):
+def test_curves_are_the_loops_of_the_margins(linear: Linear) -> None:
+    for loops in (linear.free, linear.locked):
         for setting, curve in loops.curves.items():
             size = np.interp(loops.margins[setting]["sliding"].crossovers, loops.omega / (2 * np.pi), np.abs(curve))
             assert size == pytest.approx(1.0, rel=0.02)

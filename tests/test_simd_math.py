@@ -125,7 +125,7 @@ def test_first_crossing_of_a_cubic(seed: int) -> None:
         inside = np.sort([z.real for z in zeros if abs(z.imag) < 1e-12 and 1e-9 < z.real < 1 - 1e-9])
         assert (guess < 2.0) == bool(inside.size)
         if inside.size:
-            dips += all(each > 0 for each in p)
+            dips += all(point > 0 for point in p)
             assert there <= 0.01 * p[0] + 1e-12
             assert inside[0] - 0.02 <= found <= 1.0 or there > 0
     assert dips > 20

@@ -60,23 +60,23 @@ class Steady:
 
 
 def steady(rig: Stage, name: str) -> Steady:
-    changes, one = CASES[name]
-    speed = float(one.speed[0])
+    changes, member = CASES[name]
+    speed = float(member.speed[0])
     motion = {"motion.kind": "ramp", "motion.velocity": f"{speed} m/s"} if speed else HELD
     flat = rig.replace({**dict.fromkeys(THERE), **motion, "motion.duration": "10 s", **changes}).flat()
     shape = kernel(structure(flat))
     start = np.array([speed if state.endswith("velocity") else 0.0 for state in shape.states])
-    internal = operating_point(flat, one)
+    internal = operating_point(flat, member)
     start[shape.states.index("bristle_deflection")] = internal["bristle_deflection"][0]
-    return Steady(flat, shape, balanced(flat, shape, start, one), one)
+    return Steady(flat, shape, balanced(flat, shape, start, member), member)
 
 
-def balanced(flat: dict, shape: Kernel, start: np.ndarray, one: Members) -> np.ndarray:
+def balanced(flat: dict, shape: Kernel, start: np.ndarray, member: Members) -> np.ndarray:
     """The start with joint, parasitic mass and controller such that nothing accelerates."""
     free = [shape.states.index(name) for name in ("cart_position", "parasitic_position", "integral")]
     parameters = [v[0] for v in shape.values({**flat, "motion.size": 1.0}, 1)]
-    speed = float(one.speed[0])
-    touched, stuck = bool(one.touched[0]), not one.speed[0]
+    speed = float(member.speed[0])
+    touched, stuck = bool(member.touched[0]), not member.speed[0]
     if stuck and touched:  # the bristles bear what just touches the limiter
         gap = flat["joint.stroke"] * (1 + 1e-2)
         start = start.copy()
@@ -92,10 +92,10 @@ def balanced(flat: dict, shape: Kernel, start: np.ndarray, one: Members) -> np.n
         return rates[[i for i, state in enumerate(shape.states) if state.endswith("velocity")]]
 
     sizes = np.array([1e-4, 1e-6, 1e-3])
-    found = least_squares(accelerations, np.zeros(3), xtol=1e-15, ftol=1e-15, gtol=1e-15)
-    assert np.abs(found.fun).max() < 1e-8
+    solution = least_squares(accelerations, np.zeros(3), xtol=1e-15, ftol=1e-15, gtol=1e-15)
+    assert np.abs(solution.fun).max() < 1e-8
     start = start.copy()
-    start[free] += found.x * sizes
+    start[free] += solution.x * sizes
     return start
 
 
