@@ -20,7 +20,7 @@ from friso.flexure.beam_system import BeamFailure, Leaves, Place
 from friso.flexure.beams import beams
 from friso.flexure.closed_model import closed
 from friso.flexure.evaluation import VISIBLE
-from friso.flexure.springs import first_interfering, parasitic_mode
+from friso.flexure.joint import first_interfering, parasitic_mode
 from friso.flexure.mechanism import Body, Mechanism, cube_inertia
 
 MANY = settings(max_examples=40, deadline=None, derandomize=True)

@@ -1,4 +1,4 @@
-"""The claims of the thesis that linear analysis decides: what is analysis of the rig, and rigs made to judge otherwise."""
+"""The claims of the thesis that linear analysis decides: what is found of the rig, and rigs made to judge otherwise."""
 
 import re
 from collections.abc import Mapping
@@ -23,7 +23,7 @@ pytestmark = pytest.mark.xdist_group("linear-claims")
 
 
 @pytest.fixture(scope="module")
-def analysis() -> Linear:
+def linear() -> Linear:
     return analysed(rig())
 
 
@@ -35,7 +35,7 @@ def changed(changes: Mapping[str, Any]) -> Linear:
     return analysed(rig().replace(dict(changes)))
 
 
-# --- what is analysis of the rig -----------------------------------------------------------------------------------------
+# --- what is found of the rig -----------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
