@@ -62,7 +62,7 @@ class Range:
 def read_axis(stage: Stage, name: str, values: Values, free: bool, log: bool = False) -> Axis | Range:
     """An axis of a stage from a text, a list or an array with a unit; a range stays a `Range`.
 
-    `free` tells that links use the name, so that it needs to be no key. With `log` a range that does not say how
+    `free`: links use the name, so it need not be a key. With `log` a range that does not say how
     it is spaced is logarithmic. Raises InputError.
     """
     field = numeric_keys(stage.flat()).get(name)

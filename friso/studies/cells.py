@@ -150,7 +150,7 @@ def _by_words(stage: Stage, columns: Mapping[str, np.ndarray]) -> Iterator[tuple
 def _by_structure(flat: Mapping[str, Any], valid: np.ndarray, count: int) -> Iterator[tuple[Structure, np.ndarray]]:
     """The places of the valid cells, grouped by the equations they need.
 
-    Only a few keys decide on the structure; cells are told apart by those.
+    Only a few keys determine the structure; cells are grouped by those.
     """
     decisive = [key for key in decisive_keys(flat) if np.ndim(flat.get(key, 0.0))]
     groups: dict[Structure, list[np.ndarray]] = {}

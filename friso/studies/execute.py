@@ -87,7 +87,7 @@ class Crew:
 
 
 def local_crew(threads: int | None = None) -> Crew:
-    """The threads of this process, as many as it has processors unless told; all of them work on one block.
+    """The threads of this process, by default one per processor; all of them work on one block.
 
     A second block is prepared, or its results written, while they do.
     """

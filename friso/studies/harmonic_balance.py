@@ -1,4 +1,4 @@
-"""Hunting cycles by harmonic balance, beside those that are there: why the textbook's method misleads here."""
+"""Hunting cycles by harmonic balance, compared with the true ones: why the textbook method misleads here."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ SAMPLES = 16_384
 """Samples per period of the simulated cycle from which multi-harmonic balance starts."""
 
 HARMONICS = (1, 5, 25, 51, 75, 101, 151, 201, 301, 401)
-"""Highest harmonics that are tried unless told."""
+"""Default orders of the highest harmonic."""
 
 
 def harmonic_balance(

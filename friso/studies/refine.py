@@ -30,7 +30,7 @@ SHARE = 0.2
 
 LATTICE = 8
 """Every how manieth cell of the fine grid is run first. Every second cell of the given grid and more runs left for
-where they tell something found three times as much of the thesis's map as every cell of it and fewer left."""
+where they are informative found three times as much of the thesis's map as every cell of it and fewer left."""
 
 BATCHES = 100
 """Into how many batches the runs are split: each is chosen after the last one's results."""

@@ -130,7 +130,7 @@ class Store:
 
         arrays = {name: columns[name].astype(WORDS.get(name, "f8")).reshape(shape) for name in names}
         part = xr.Dataset({name: (self.study.names, array) for name, array in arrays.items()})
-        # a chunk that holds nothing is written too: that it is there tells that its block was done
+        # an empty chunk is written too: its presence marks the block as done
         part.to_zarr(self.path, region=region, zarr_format=_FORMAT, consolidated=True, write_empty_chunks=True)
 
     def keeping(self, ask: Ask) -> Ask:

@@ -133,7 +133,7 @@ class Study:
         return coordinates
 
     def attributes(self) -> dict[str, Any]:
-        """What is kept beside the numbers, so that any cell can be run again alone."""
+        """What is stored with the numbers, so that any cell can be run again on its own."""
         return {
             "name": self.stage.name,
             "stage": self.stage.to_toml(),
@@ -151,7 +151,7 @@ class Study:
         return ", ".join(" with ".join(axis.name for axis in dimension.axes) for dimension in self.dimensions)
 
     def differences(self, other: Study, its_equations: str) -> list[str]:
-        """What tells a stored study (`other`, made by `its_equations`) from this one, in words; empty if nothing."""
+        """Differences between a stored study (`other`, made by `its_equations`) and this one, in words."""
         differences = _stage_differences(self.stage, other.stage)
         if its_equations != equations_version():
             differences.append(f"version of the equations: {its_equations} there, {equations_version()} here")

@@ -53,7 +53,7 @@ def sweep(
     below 1), amplitude [m] and cycle_period [s]; they are smooth, whatever the motion does.
 
     A verdict is as good as its tolerance: with `verify` that share of the cells is run again at rtol/100, and the
-    attributes verified_cells, verified_surviving and verified_rtol tell how many verdicts survived. With `refine` the
+    attributes verified_cells, verified_surviving and verified_rtol count the verdicts that survived. With `refine` the
     grid is made four times finer, of which a fifth is run, along the changes of verdict; the other cells are
     inferred, which their status says. With `store`, a folder, results are written there in Zarr as they come, and a
     study that was interrupted resumes. Raises InputError for a wrong axis, link or store, ValueError for a tolerance

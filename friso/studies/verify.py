@@ -21,7 +21,7 @@ TIGHTER = 100.0
 """By how much the tolerance of the second run is tighter."""
 
 LEAST = 50
-"""Cells that are checked at least, as far as there are so many: of fewer no share can be told."""
+"""Least number of cells checked, if there are as many: fewer give no meaningful share."""
 
 WANTED = 0.99
 """Share of the verdicts that shall survive at an automatic tolerance."""
@@ -41,7 +41,7 @@ def checked_share(share: float) -> float:
 
 
 def verified(study: Study, runs: xr.Dataset, crew: Crew, share: float) -> dict[str, Any]:
-    """Run a share of the cells again at rtol/100; attributes that tell how many verdicts survived.
+    """Run a share of the cells again at rtol/100; attributes with the share of verdicts that survived.
 
     The same cells for the same study. Of a refined map cells that were inferred are run too, and counted apart
     (inferred_checked, inferred_confirmed). Invalid and failed cells have no verdict that could survive; nothing is

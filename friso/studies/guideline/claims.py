@@ -1,4 +1,4 @@
-"""What the thesis claims about the edge of hunting, beside what the sweeps and the rig show."""
+"""What the thesis claims about the edge of hunting, and what the sweeps and the rig show."""
 
 from __future__ import annotations
 

@@ -36,10 +36,10 @@ from friso.studies.thesis.studies import rig
 from friso.system import usable_cores
 
 SAMPLES = 512
-"""Samples to which the locked law is fitted unless told; the other sweeps are shares of it."""
+"""Default number of samples for the fit of the locked law; the other sweeps are shares of it."""
 
 FEWEST, MOST = 64, 65536
-"""Fewer samples do not tell the exponents of a law; more are beyond the Sobol points' use here."""
+"""Fewer samples do not determine the exponents of a law; more exceed what Sobol points gain here."""
 
 FREE_SHARE, TEST_SHARE = 3 / 8, 1 / 2
 """Samples with a free joint per one of a rigid mass, whose edge costs a tenth; and of their test per one of their
@@ -52,7 +52,7 @@ WEIGHT = 8
 """Time of a sample with a free joint, in that of one of a rigid mass: for the progress bar."""
 
 RATIOS = (0.0, 0.05, 0.3, 3.0, 20.0, np.inf)
-"""Ratios of slip to drop between which errors of the locked law are told apart."""
+"""Ratios of slip to drop that separate the bins for errors of the locked law."""
 
 Progress = Callable[[int, int, str], None]
 
@@ -61,7 +61,7 @@ Progress = Callable[[int, int, str], None]
 class Fit:
     """A law and what it rests on: the samples it was fitted to, those it was tested on, and its errors on both. With a
     free joint the locked edge is that computed in `on_fit`, that of the locked law in `on_test`, where `given` has the
-    errors with the computed one. `checked` tells of simulations of samples of the test."""
+    errors with the computed one. `checked` holds simulations of samples of the test."""
 
     law: Fitted
     fit: Sweep
@@ -89,7 +89,7 @@ class Fit:
 
 @dataclass(frozen=True)
 class Guideline:
-    """All that `docs/guideline.md` tells: how many groups there are by part of the stage, both laws, the worked steps,
+    """Everything in `docs/guideline.md`: how many groups there are by part of the stage, both laws, the worked steps,
     what a parasitic mode allows; how long it took [s] on how many cores, and how many parts of the sweeps an earlier,
     interrupted run had left."""
 
@@ -154,7 +154,7 @@ def _ratio(law: Fitted, values: Mapping[str, np.ndarray]) -> np.ndarray:
 
 def guideline(samples: int = SAMPLES, keep: Path | None = None, progress: Progress | None = None) -> Guideline:
     """Compute the guideline. `keep` is a folder for what is done, from which an interrupted run goes on;
-    `progress` is told how far it is.
+    `progress` gets what is done.
 
     Raises InputError for a number of samples that does not do.
     """

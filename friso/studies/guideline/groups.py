@@ -147,7 +147,7 @@ GROUPS: Mapping[str, Group] = {
 }
 
 _TELLING = {"joint": "joint.stiffness", "parasitic": "parasitic.frequency"}
-"""A key that stages have with the part of which a group tells."""
+"""A key that stages have where the part described by a group exists."""
 
 Values = Mapping[str, Any]
 """Numbers, or arrays of one shape, by the name of their group."""

@@ -1,7 +1,7 @@
 """Laws of the edge of hunting: a few frequencies, each a product of powers, combined; the powers by cross-validation.
 
 A law is fitted to the logarithm of the edge with a loss that outliers do not dominate (soft L1). Beginning with none,
-the exponent that lowers the cross-validated loss most is let in, until the next one gains too little.
+the exponent that lowers the cross-validated loss most is added, until the next one gains too little.
 
 Rigid (or locked). Two times add up. At the Stribeck velocity the bristles need F_s/(sigma_0 v_s) to slip; and where
 friction falls with speed, it drives a mass away with the time constant m v_s/(F_s - F_c). A loop that is faster than

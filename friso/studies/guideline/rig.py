@@ -27,7 +27,7 @@ Changes = Mapping[str, Any]
 @dataclass(frozen=True)
 class Case:
     """A stage of the rig's kind: what is changed, and its edge [Hz] by the law and as computed (NaN: none found), with
-    its `kind`, one of `KINDS`, which tells why there is none."""
+    its `kind`, one of `KINDS`, which says why there is none."""
 
     changes: Changes
     law: float

@@ -149,7 +149,7 @@ def sampled(box: Box, count: int, seed: int) -> dict[str, np.ndarray]:
 
 
 def locked_sweep(count: int, seed: int, keep: Keep, progress: Progress) -> Sweep:
-    """The edges of samples of rigid masses, which locked joints are but for the contact of their fixtures."""
+    """The edges of samples of rigid masses, which locked joints are apart from the contact of their fixtures."""
     values = sampled(LOCKED_BOX, count, seed)
     grid = np.broadcast_to(LOCKED_GRID, (count, len(LOCKED_GRID)))
     edges = _in_parts(f"locked {seed} {count}", values, grid, keep, partial(progress, LOCKED))

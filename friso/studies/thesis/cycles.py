@@ -1,4 +1,4 @@
-"""The hunting cycles behind the thesis's maps: the edge of hunting, and how far the peak count agrees with it."""
+"""The hunting cycles behind the thesis's maps: the edge of hunting, and the agreement of the peak count with it."""
 
 from __future__ import annotations
 

@@ -34,7 +34,7 @@ from friso.studies.thesis.linear import Need
 from friso.studies.thesis.studies import LOCKED
 
 FORCE = 5.0
-"""Amplitude [N] of the identification with the joint locked, which the thesis does not tell: some times the friction
+"""Amplitude [N] of the identification with the joint locked, which the thesis does not give: some times the friction
 that it finds."""
 
 RANGE, PLACES, COULOMB = (1.0, 2.5), 4, 1 / 3
@@ -54,7 +54,7 @@ FIXED_CART = "1e9 kg"
 """Mass of a cart that does not move: 1 N displaces it by less than a thousandth of a micrometre in 10 s."""
 
 SLOW, SLOW_TIME = (0.5e-3, 1e-3, 2.5e-3), 20.0
-"""Speeds of slow motion [m/s] and their time [s]: the thesis tells neither; up to the slower one of Fig. 21."""
+"""Speeds of slow motion [m/s] and their time [s]: the thesis gives neither; up to the slower one of Fig. 21."""
 
 STROKE = "8 mm"
 """The limiters in the identification (Sec. 4.2.1)."""

@@ -1,4 +1,5 @@
-"""What the thesis leaves open, over its plausible range; and what else a judgement may hang on."""
+"""Parameters that the thesis leaves open, over their plausible ranges, and other assumptions a judgement may depend
+on."""
 
 from __future__ import annotations
 

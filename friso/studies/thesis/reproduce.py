@@ -32,7 +32,7 @@ VERIFIED = 0.05
 """Share of the cells of a shown map that are run again at a tighter tolerance."""
 
 TIGHT = 1e-8
-"""Relative tolerance beside the thesis's own for Fig. 14B."""
+"""Second relative tolerance for Fig. 14B, besides the thesis's own."""
 
 RESPONSES: Mapping[str, Mapping[str, object]] = {
     "locked": LOCKED,
@@ -197,7 +197,7 @@ def _map(
 
 
 def _response(own_changes: Mapping[str, object], changes: Mapping[str, object], rtol: float) -> Response:
-    """One run in time; a variant's changes come before the run's own, which tell it apart from the others."""
+    """One run in time; a variant's changes come before the run's own, which distinguish it from the others."""
     stage = rig().replace(dict(changes)).replace(dict(own_changes))
     cell = sweep(stage, {"joint.locked": [stage.flat()["joint.locked"]]}, rtol=rtol).isel({"joint.locked": 0})
     return Response(cell, simulate(stage, rtol))

@@ -76,7 +76,7 @@ def verdict(
     """The baseline's judgement, and the variants under which other parts hold.
 
     `varied` has the variants that enter the evidence of the claim, on the grid of the baseline; `coarse` is the
-    baseline on a coarser one, which is told where it turns a part.
+    baseline on a coarser one, which is mentioned where it changes a part.
     """
     depends, hangs = [], []
     for variant, finding in varied:

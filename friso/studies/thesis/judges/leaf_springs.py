@@ -24,7 +24,7 @@ _YOUNG = (185e9, 195e9, 210e9)
 """Young's moduli [Pa] of stainless spring steel: as rolled, tempered, and of steel in general."""
 
 _SPACINGS, _HEIGHTS = (0.03, 0.06, 0.09), (0.0, 0.03, 0.06)
-"""Spacings of the leaves, and heights of the stage's centre of mass above their ends [m]: the thesis tells neither."""
+"""Spacings of the leaves, and heights of the stage's centre of mass above their ends [m]: the thesis gives neither."""
 
 
 @cache
@@ -85,7 +85,7 @@ def the_leaf_springs(evidence: Evidence) -> Finding:
 
 
 def _parasitic(evaluations: tuple[Evaluation, ...]) -> Part:
-    """The first mode but for the drive mode, over what is left open."""
+    """The first mode other than the drive mode, over the parameters left open."""
     modes = [min(evaluation.modes[1:], key=lambda mode: mode.frequency) for evaluation in evaluations]
     seen = np.array(
         [evaluation.interfering.frequency if evaluation.interfering else np.nan for evaluation in evaluations]

@@ -35,7 +35,7 @@ def mass_ratio_hardly_matters(evidence: Evidence) -> Finding:
 
 @judges("F15B", figure="15B", needs=("isolator-friction", "friction"))
 def friction_does_not_bring_it_back(evidence: Evidence) -> Finding:
-    """Cells that hunt with the isolator, and what becomes of those that hunt with the joint locked."""
+    """Cells that hunt with the isolator, and the behaviour of those that hunt with the joint locked."""
     axes = ("friction.static", "friction.coulomb")
     static, coulomb, hunts, valid = table(evidence.maps["isolator-friction"], *axes)
     _, _, locked, _ = table(evidence.maps["friction"], *axes)

@@ -66,7 +66,7 @@ def _peak(loop: Loop, low: float) -> tuple[float, float]:
 
 
 def measured_free(loops: RigLoops) -> tuple[Part, Part]:
-    """Where the open loop of the free joint crosses 0 dB, and how far it can be tuned."""
+    """Where the open loop of the free joint crosses 0 dB, and the highest stable tuning."""
     crossed = max((crossing.value for crossing in loops.free.crossings), default=np.nan)
     highest = highest_stable(loops.settings, loops.stable)
     return (

@@ -57,7 +57,7 @@ def stiffness_has_a_limit(evidence: Evidence) -> Finding:
 
 
 def _locked_at_no_stroke(runs: xr.Dataset, locked: Response) -> Part:
-    """The cells of stroke 0 beside the locked rig."""
+    """The cells of stroke 0, compared with the locked rig."""
     none = runs.sel({"joint.stroke": 0.0})
     peaks, same = int(locked.cell["peaks"]), none["verdict"].values == locked.cell["verdict"].item()
     counted = none["peaks"].values
@@ -71,7 +71,7 @@ def _locked_at_no_stroke(runs: xr.Dataset, locked: Response) -> Part:
 
 @judges("F14B", figure="14B", needs=("isolator-damping", "locked"))
 def damped_limiter_needs_stroke(evidence: Evidence) -> Finding:
-    """The stroke that ends hunting where the limiter is damped much, and beside the hunting amplitude."""
+    """The stroke that ends hunting where the limiter is damped much, and the hunting amplitude."""
     damping, stroke, hunts, _ = table(evidence.maps["isolator-damping"], "joint.limiter_damping", "joint.stroke")
     needed = np.exp(ends(np.log(stroke), hunts.T))
     large, small = needed[damping >= _LARGE_DAMPING], needed[damping < 1]
