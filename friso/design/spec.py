@@ -261,8 +261,8 @@ class Spec(Section):
         """The highest crossover [Hz] that the machine allows."""
         if self.machine.bandwidth_limit is not None:
             return float(self.machine.bandwidth_limit)
-        known: Sequence[float] = self.machine.parasitic_frequencies or ()
-        return min(known) / self.safety.parasitic
+        frequencies: Sequence[float] = self.machine.parasitic_frequencies or ()
+        return min(frequencies) / self.safety.parasitic
 
 
 EXAMPLE = '[machine] and, on the next line, bandwidth_limit = "48 Hz"'

@@ -65,7 +65,7 @@ class Kernel:
 
     def having(self, role: Role) -> list[int]:
         """Which states have a role."""
-        return [i for i, own in enumerate(self.module.ROLES) if own == role]
+        return [i for i, state_role in enumerate(self.module.ROLES) if state_role == role]
 
     @property
     def held(self) -> tuple[str, ...]:

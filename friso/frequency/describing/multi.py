@@ -148,7 +148,7 @@ class _Problem:
     basis: Basis
     length: float
     omega: float
-    known: np.ndarray
+    start: np.ndarray
 
     def split(self, state: np.ndarray) -> tuple[np.ndarray, float]:
         real, imaginary = np.split(state[:-1] * self.length, 2)
@@ -168,12 +168,12 @@ class _Problem:
         cart, speed = self.split(state)
         force = self.basis.harmonics(self.answer(state).force[:, None])[:, 0]
         left = (cart - self.receptances(speed) * force) / self.length
-        return np.append(_parts(left), self._phase @ (state[:-1] - self.known))
+        return np.append(_parts(left), self._phase @ (state[:-1] - self.start))
 
     @property
     def _phase(self) -> np.ndarray:
         """Direction in which a shift in time moves the known motion."""
-        real, imaginary = np.split(self.known, 2)
+        real, imaginary = np.split(self.start, 2)
         return np.concatenate([-imaginary * self.basis.orders, real * self.basis.orders])
 
     def jacobian(self, state: np.ndarray) -> np.ndarray:
@@ -196,7 +196,7 @@ class _Problem:
 
     def solve(self) -> tuple[np.ndarray, float]:
         """The state that solves the equations, and the last step."""
-        state, size = np.append(self.known, 0.0), np.inf
+        state, size = np.append(self.start, 0.0), np.inf
         for _ in range(STEPS):
             left = self.residual(state)
             step = np.linalg.lstsq(self.jacobian(state), -left, rcond=None)[0]

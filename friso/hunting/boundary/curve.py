@@ -36,22 +36,22 @@ DEEP = 0.5
 
 @dataclass(frozen=True)
 class Spot:
-    """A point of a curve: where it is in the box of the keys, shape (2,), what was found there, and the direction of
-    the line across the curve on which it was found, shape (2,)."""
+    """A point of a curve: its place in the box of the keys, shape (2,), the special point there, and the direction of
+    the line across the curve on which it was located, shape (2,)."""
 
     at: np.ndarray
-    found: Found
+    special: Found
     across: np.ndarray
 
     @property
     def size(self) -> np.ndarray:
         """Logarithms of the cycle's distance [m] and time [s], shape (2,)."""
-        return self.found.point.vector[1:]
+        return self.special.point.vector[1:]
 
     @property
     def error(self) -> np.ndarray:
         """How far it moves, along each key, when it is computed to a hundredth of the tolerance, shape (2,)."""
-        return np.abs(self.found.error * self.across)
+        return np.abs(self.special.error * self.across)
 
 
 @dataclass(frozen=True)
@@ -83,11 +83,11 @@ class CurveTracer:
         """The point of the curve on the line through an origin of the box along a direction, found from one near it;
         `size` is about what the logarithms of its distance and time will be."""
         tracer = Tracer(self.space.lines(origin[None], across[None]), self.sign, self.rtol)
-        point = near.found.point
+        point = near.special.point
         start = np.concatenate([[0.0], near.size if size is None else size])
         along, far = np.array([1.0, 0.0, 0.0]), reach
         if self.kind == "fold":
-            along, far = near.found.direction * [0.0, 1.0, 1.0], DEEP
+            along, far = near.special.direction * [0.0, 1.0, 1.0], DEEP
             along = along / np.linalg.norm(along)
         special = corrected(tracer, point, start, along, self.kind, far)
         if special is None or abs(special.point.place) > reach:

@@ -55,7 +55,7 @@ def plane(space: Space, rtol: float = RTOL, nodes: int = NODES) -> Plane:
             spot, end = _first(space, points[a], points[b], cycle, rtol)
             if spot is None and end == END_OF_RANGE:  # the neighbour has the cycle too, it was not found there
                 continue
-            curve = spot and CurveTracer(space, spot.found.kind, cycle.sign, rtol).curve(spot)
+            curve = spot and CurveTracer(space, spot.special.kind, cycle.sign, rtol).curve(spot)
             if curve:
                 new_curves.append(curve)
             else:

@@ -68,7 +68,7 @@ def lines(result: Diagram | Plane) -> tuple[Line, ...]:
         pairs = zip(result.branches, result.special, strict=True)
         return tuple(_line(result, branch, _of_branch(branch, special)) for branch, special in pairs)
     rows = [
-        [_Row(spot.at, spot.error, spot.found.point.cycle, spot.found.kind) for spot in curve.spots]
+        [_Row(spot.at, spot.error, spot.special.point.cycle, spot.special.kind) for spot in curve.spots]
         for curve in result.curves
     ]
     return tuple(_line(result, *pair) for pair in zip(result.curves, rows, strict=True))
