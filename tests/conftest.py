@@ -7,6 +7,8 @@ import tempfile
 from pathlib import Path
 
 import pytest
+from refusals import Refused
+from snapshots import Snapshots
 
 import friso
 from friso.stage import Stage
@@ -16,11 +18,22 @@ MADE = "FRISO_TEST_CACHE_DIR"
 BLAS = "OPENBLAS_NUM_THREADS"
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--refresh-snapshots", action="store_true", help="Write what commands say to tests/snapshots.")
+
+
 def pytest_configure(config: pytest.Config) -> None:
     """Before the workers start, so that they inherit the variables; a folder already chosen is kept and left."""
     os.environ.setdefault(BLAS, "1")
     if FOLDER not in os.environ:
         os.environ[FOLDER] = os.environ[MADE] = tempfile.mkdtemp(prefix="friso-tests-")
+
+
+def pytest_make_parametrize_id(val: object, argname: str) -> str | None:
+    """Arguments of a command name their test, folders left out; anything else as pytest has it."""
+    if isinstance(val, list | tuple) and argname in ("arguments", "options", "given", "overrides"):
+        return " ".join(part.name if isinstance(part, Path) else str(part) for part in val) or "nothing"
+    return None
 
 
 def pytest_unconfigure(config: pytest.Config) -> None:
@@ -33,3 +46,15 @@ def pytest_unconfigure(config: pytest.Config) -> None:
 def rig() -> Stage:
     """The thesis rig, its joint free."""
     return friso.load(Path(__file__).parent.parent / "examples" / "thesis_rig.toml")
+
+
+@pytest.fixture(scope="session")
+def snapshots(pytestconfig: pytest.Config) -> Snapshots:
+    """What commands say, kept in tests/snapshots."""
+    return Snapshots(bool(pytestconfig.getoption("--refresh-snapshots")))
+
+
+@pytest.fixture
+def refused(request: pytest.FixtureRequest, snapshots: Snapshots) -> Refused:
+    """Inputs that this test has refused."""
+    return Refused(request.node.nodeid.removeprefix("tests/"), snapshots)

@@ -27,3 +27,9 @@ class Page(HTMLParser):
     def text(self) -> str:
         """All words in one piece."""
         return "".join(self.words)
+
+    @property
+    def lines(self) -> str:
+        """The same without blank lines and white space about others."""
+        rows = (" ".join(row.split()) for row in self.text.splitlines())
+        return "\n".join(row for row in rows if row)

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+from refusals import Refused
 
 import friso.equations.friction  # noqa: F401  the friction laws register themselves
 from friso.errors import InputError
@@ -419,14 +420,14 @@ def test_contents(content: bytes, expected: str, tmp_path: Path) -> None:
     assert expected in str(caught.value)
 
 
-def test_no_file_and_folder(tmp_path: Path) -> None:
+def test_no_file_and_folder(tmp_path: Path, refused: Refused) -> None:
     with pytest.raises(
         InputError, match=r"missing\.toml\n  given:    no such file or directory\n  expected: a stage f"
     ):
         load(tmp_path / "missing.toml")
-    with pytest.raises(InputError, match="given:    a folder"):
+    with refused():
         load(tmp_path)
-    with pytest.raises(InputError, match="null byte"):
+    with refused():
         load("rig\0.toml")
 
 
@@ -459,15 +460,15 @@ def test_changes(changes: dict[str, object], fragments: list[str]) -> None:
 
 
 @pytest.mark.parametrize("text", ["controller.crossover", "=12 Hz", "", " = 3"])
-def test_set_without_key_or_value(text: str) -> None:
-    with pytest.raises(InputError, match=r"--set\n  given: .*\n  expected: KEY=VALUE\n  example:  controller"):
+def test_set_without_key_or_value(text: str, refused: Refused) -> None:
+    with refused():
         parse_set(text)
 
 
-def test_wrong_sections_from_python() -> None:
-    with pytest.raises(InputError, match="cart\n"):
+def test_wrong_sections_from_python(refused: Refused) -> None:
+    with refused("cart"):
         Masses(cart="3 m")  # pyright: ignore[reportArgumentType]
     masses = Masses(cart="3 kg")  # pyright: ignore[reportArgumentType]
     tables = loads(RIG).given()
-    with pytest.raises(InputError, match=r"motion\n.*\n  expected: a table \[motion\]"):
+    with refused("motion"):
         Stage(**{**tables, "motion": masses})

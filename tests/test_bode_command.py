@@ -1,9 +1,7 @@
 """`friso bode` as a user runs it: what it computes, says, draws and refuses."""
 
 import json
-import os
 import subprocess
-import sys
 from collections.abc import Mapping
 from dataclasses import replace
 from itertools import chain
@@ -12,12 +10,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from inside import friso_inside
 from pages import Page
+from refusals import Refused
 
 import friso
 from friso.cli.bode import bode as command
 from friso.cli.bode import bode_document
-from friso.errors import InputError
 from friso.frequency.bode import Bode, Unstable, bode
 from friso.stage import Stage
 from friso.views.bode.figures import bode_figures, phases
@@ -52,9 +51,7 @@ duration = "2 s"
 
 def run(folder: Path, *arguments: str, stage: Path = RIG) -> subprocess.CompletedProcess[str]:
     """Run the command in a folder."""
-    done = [sys.executable, "-m", "friso.cli", "bode", str(stage), *arguments]
-    environment = {**os.environ, "COLUMNS": "160"}
-    return subprocess.run(done, cwd=folder, capture_output=True, text=True, timeout=300, env=environment)
+    return friso_inside(folder, "bode", stage, *arguments)
 
 
 @pytest.fixture(scope="module")
@@ -506,22 +503,22 @@ def test_a_band_with_gaps_or_of_two_lengths_is_refused() -> None:
         ("1 Hz..2 Hz..3 Hz", "is not a unit", "convertible to Hz, rad/s or rpm"),
     ],
 )
-def test_frequencies_that_are_refused(text: str, given: str, expected: str) -> None:
-    with pytest.raises(InputError, match=rf"(?s)--frequencies\n.*{given}.*{expected}.*0\.1 Hz\.\.1 kHz"):
+def test_frequencies_that_are_refused(text: str, given: str, expected: str, refused: Refused) -> None:
+    with refused():
         command(RIG, frequencies=text)
 
 
 @pytest.mark.parametrize(
-    ("overrides", "frequencies", "message"),
+    ("overrides", "frequencies"),
     [
-        (['drive.sample_time="1 ms"'], "1 Hz..600 Hz", "frequencies of up to 500 Hz, half the sampling frequency"),
-        (['drive.sample_time="100 ms"'], None, "a sample time of at most a tenth of the crossover's period"),
-        (['controller.crosover="8 Hz"'], None, "did you mean crossover"),
-        (["crossover"], None, "KEY=VALUE"),
+        (['drive.sample_time="1 ms"'], "1 Hz..600 Hz"),
+        (['drive.sample_time="100 ms"'], None),
+        (['controller.crosover="8 Hz"'], None),
+        (["crossover"], None),
     ],
 )
-def test_overrides_that_are_refused(overrides: list[str], frequencies: str | None, message: str) -> None:
-    with pytest.raises(InputError, match=message):
+def test_overrides_that_are_refused(overrides: list[str], frequencies: str | None, refused: Refused) -> None:
+    with refused():
         command(RIG, overrides=overrides, frequencies=frequencies)
 
 
@@ -530,9 +527,9 @@ def test_half_the_sampling_frequency_itself_is_shown(tmp_path: Path, capsys: pyt
     assert capsys.readouterr().out.startswith("{")
 
 
-def test_a_folder_that_is_a_file_is_refused(tmp_path: Path) -> None:
+def test_a_folder_that_is_a_file_is_refused(tmp_path: Path, refused: Refused) -> None:
     (tmp_path / "taken").write_text("")
-    with pytest.raises(InputError, match="a folder that can be written"):
+    with refused():
         command(RIG, out=tmp_path / "taken")
 
 

@@ -5,10 +5,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from refusals import Refused
 from variants import VARIANTS
 
 import friso
-from friso.errors import InputError
 from friso.hunting.boundary import Diagram, Found, Plane, Range, Space, diagram, plane
 from friso.hunting.boundary.branch import Point, Tracer
 from friso.hunting.cycle.find import symmetric_cycles
@@ -180,16 +180,16 @@ NO_INTEGRAL = VARIANTS["rigid cart, P"]
 
 
 @pytest.mark.parametrize(
-    ("stage", "axes", "words"),
+    ("stage", "axes"),
     [
-        (RIGID, {}, "0 keys"),
-        (RIGID, {"controller.crossover": "1 Hz..40 Hz:41"}, "without a number of points"),
-        (RIGID, {"controller.crossover": "40 Hz..1 Hz"}, "reversed"),
-        (RIGID, {"controller.crosover": "1 Hz..40 Hz"}, "controller.crosover"),
-        (NO_INTEGRAL, {"controller.kp": "1 N/m..4 N/m"}, "no integral action"),
-        (VARIANTS["rigid, no friction section"], {"controller.crossover": "1 Hz..40 Hz"}, "no friction"),
+        (RIGID, {}),
+        (RIGID, {"controller.crossover": "1 Hz..40 Hz:41"}),
+        (RIGID, {"controller.crossover": "40 Hz..1 Hz"}),
+        (RIGID, {"controller.crosover": "1 Hz..40 Hz"}),
+        (NO_INTEGRAL, {"controller.kp": "1 N/m..4 N/m"}),
+        (VARIANTS["rigid, no friction section"], {"controller.crossover": "1 Hz..40 Hz"}),
     ],
 )
-def test_what_has_no_boundary_is_refused(stage: Stage, axes: dict[str, str], words: str) -> None:
-    with pytest.raises(InputError, match=words):
+def test_what_has_no_boundary_is_refused(stage: Stage, axes: dict[str, str], refused: Refused) -> None:
+    with refused():
         friso.boundary(stage, axes)

@@ -2,7 +2,6 @@
 
 import json
 import subprocess
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -10,6 +9,7 @@ import numpy as np
 import pandas as pd
 import pytest
 from inside import friso_inside
+from refusals import Refused
 
 from friso.hunting.boundary import Branch, Curve, Diagram, Found, Kind, Plane, Point, Range, Space, Spot
 from friso.hunting.cycle.ensemble import Ensemble
@@ -30,8 +30,7 @@ pytestmark = pytest.mark.xdist_group("locked")
 
 def boundary(folder: Path, *arguments: str, stage: Path = RIG) -> subprocess.CompletedProcess[str]:
     """Run the command in a folder."""
-    command = [sys.executable, "-m", "friso.cli", "boundary", str(stage), *arguments]
-    return subprocess.run(command, cwd=folder, capture_output=True, text=True, timeout=300)
+    return friso_inside(folder, "boundary", stage, *arguments)
 
 
 @pytest.fixture(scope="module")
@@ -129,26 +128,26 @@ def test_the_curve_of_two_keys_separates_what_attracts(tmp_path: Path, rig: Stag
 
 
 @pytest.mark.parametrize(
-    ("arguments", "message"),
+    "arguments",
     [
-        (("--y", "masses.cart=1 kg..2 kg"), "--x"),
-        (("--x", "controller.crossover"), "KEY=VALUE"),
-        (("--x", "controller.crossover=1 Hz..40 Hz:41"), "without a number of points"),
-        (("--x", "controller.crossover=8 Hz, 9 Hz"), "a range FIRST..LAST"),
-        (("--x", "controller.crossover=12 Hz..8 Hz"), "reversed"),
-        (("--x", "controller.crosover=8 Hz..12 Hz"), "did you mean crossover"),
-        (("--x", "joint.locked=false..true"), "true or false"),
-        (("--x", "masses.stage=0 kg..1 kg", "--log"), "never reaches 0"),
-        ((*CROSSOVER, "--y", "controller.crossover=1 Hz..2 Hz"), "a second time"),
-        ((*CROSSOVER, "--rtol", "1e-15"), "1e-12 to 1e-2"),
-        ((*CROSSOVER, "--link", "masses.cart=0.7 * mas"), "the name mas"),
-        ((*CROSSOVER, "--out", str(RIG)), "can be written"),
+        ("--y", "masses.cart=1 kg..2 kg"),
+        ("--x", "controller.crossover"),
+        ("--x", "controller.crossover=1 Hz..40 Hz:41"),
+        ("--x", "controller.crossover=8 Hz, 9 Hz"),
+        ("--x", "controller.crossover=12 Hz..8 Hz"),
+        ("--x", "controller.crosover=8 Hz..12 Hz"),
+        ("--x", "joint.locked=false..true"),
+        ("--x", "masses.stage=0 kg..1 kg", "--log"),
+        (*CROSSOVER, "--y", "controller.crossover=1 Hz..2 Hz"),
+        (*CROSSOVER, "--rtol", "1e-15"),
+        (*CROSSOVER, "--link", "masses.cart=0.7 * mas"),
+        (*CROSSOVER, "--out", str(RIG)),
     ],
 )
-def test_wrong_input_ends_in_one_message_and_status_2(tmp_path: Path, arguments: tuple, message: str) -> None:
+def test_wrong_input_ends_in_one_message_and_status_2(tmp_path: Path, arguments: tuple, refused: Refused) -> None:
     done = friso_inside(tmp_path, "boundary", RIG, *LOCKED, *arguments)
     assert done.returncode == 2
-    assert message in done.stderr
+    refused.says(done.stderr)
     assert done.stdout == ""
     assert list(tmp_path.iterdir()) == []
 

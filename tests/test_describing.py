@@ -9,13 +9,13 @@ import plain
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from refusals import Refused
 from scipy.integrate import solve_ivp
 from scipy.special import dawsn
 from variants import DAHL, HOLD, NO_FRICTION, free, lugre, stage, stribeck, van_dijk
 
 from friso.engine.kernel import Wanted, kernels
 from friso.equations.imposed import imposed_form
-from friso.errors import InputError
 from friso.frequency.describing.function import describing, dynamic_stiffness
 from friso.frequency.describing.loop import TOUCHES
 from friso.frequency.describing.mass_line import mass_line
@@ -271,19 +271,19 @@ def test_friction_may_differ_from_pair_to_pair() -> None:
 
 
 @pytest.mark.parametrize(
-    ("ask", "text"),
+    "ask",
     [
-        (lambda: describing(rigid(NO_FRICTION), [1e-3], [1.0]), r'friction.model\s+given:\s+"none", without a force'),
-        (lambda: describing(rigid(DAHL), [0.0], [1.0]), r"amplitudes\s+given:\s+\[0.0\]\s+expected: positive"),
-        (lambda: describing(rigid(DAHL), [1.0], [np.nan]), r"frequencies\s+given:\s+\[nan\]"),
-        (lambda: describing(rigid(DAHL), [1.0], [1.0], 0), r"harmonics\s+given:\s+0"),
-        (lambda: describing(rigid(DAHL), [1.0], [1.0], 9, 32), r"harmonics\s+given:\s+9"),
-        (lambda: plant_response(rigid(DAHL), [-1.0], [1.0]), r"forces\s+given:\s+\[-1.0\]"),
-        (lambda: plant_response(rigid(NO_FRICTION), [1.0], [1.0]), "friction.model"),
+        lambda: describing(rigid(NO_FRICTION), [1e-3], [1.0]),
+        lambda: describing(rigid(DAHL), [0.0], [1.0]),
+        lambda: describing(rigid(DAHL), [1.0], [np.nan]),
+        lambda: describing(rigid(DAHL), [1.0], [1.0], 0),
+        lambda: describing(rigid(DAHL), [1.0], [1.0], 9, 32),
+        lambda: plant_response(rigid(DAHL), [-1.0], [1.0]),
+        lambda: plant_response(rigid(NO_FRICTION), [1.0], [1.0]),
     ],
 )
-def test_bad_input(ask: Callable[[], object], text: str) -> None:
-    with pytest.raises(InputError, match=text):
+def test_bad_input(ask: Callable[[], object], refused: Refused) -> None:
+    with refused():
         ask()
 
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from refusals import Refused
 
 import friso
 from friso.design.geometry import Geometry, Sheet, box, rounded, sheets
@@ -82,11 +83,11 @@ def test_what_is_refused(table: str, keys: dict[str, Any], words: str) -> None:
     assert caught.value.key.startswith(table)
 
 
-def test_a_missing_file_and_an_empty_one(tmp_path: Path) -> None:
-    with pytest.raises(friso.InputError, match=r"specs/thesis\.toml"):
+def test_a_missing_file_and_an_empty_one(tmp_path: Path, refused: Refused) -> None:
+    with refused():
         load_spec(tmp_path / "none.toml")
     (tmp_path / "empty.toml").write_text("")
-    with pytest.raises(friso.InputError, match="an empty file"):
+    with refused():
         load_spec(tmp_path / "empty.toml")
 
 
@@ -125,29 +126,29 @@ def test_the_typical_move_is_in_the_middle() -> None:
     assert move["motion.acceleration"] == pytest.approx(np.sqrt(10 * 100))
 
 
-def test_a_range_the_friction_law_does_not_have(rig: friso.Stage) -> None:
+def test_a_range_the_friction_law_does_not_have(rig: friso.Stage, refused: Refused) -> None:
     dahl = {"model": "dahl", "coulomb": "1 N", "bristle_stiffness": "1e5 N/m", "viscous": "0.5 N*s/m"}
     stage = rig.replace({"friction": dahl})
-    with pytest.raises(friso.InputError, match="dahl friction"):
+    with refused("friction.static"):
         corners(load_spec(SPEC), stage.flat())
 
 
 @pytest.mark.parametrize(
-    ("change", "words"),
+    "change",
     [
-        ({"joint": None, "parasitic": None}, "limiter"),
-        ({"masses.cart": None, "joint": None, "parasitic": None}, "a single mass"),
-        ({"friction": {"model": "none"}}, "friction, which the isolator is for"),
+        {"joint": None, "parasitic": None},
+        {"masses.cart": None, "joint": None, "parasitic": None},
+        {"friction": {"model": "none"}},
     ],
 )
-def test_stages_that_cannot_be_isolated(rig: friso.Stage, change: dict[str, Any], words: str) -> None:
-    with pytest.raises(friso.InputError, match=words):
+def test_stages_that_cannot_be_isolated(rig: friso.Stage, change: dict[str, Any], refused: Refused) -> None:
+    with refused():
         prepared(rig.replace(change), load_spec(SPEC))
 
 
-def test_gains_instead_of_a_crossover(rig: friso.Stage) -> None:
+def test_gains_instead_of_a_crossover(rig: friso.Stage, refused: Refused) -> None:
     gains = {"kind": "pid", "kp": "3 N/m", "ki": "4 N/(m*s)", "kd": "6 N*s/m", "tau": "1 ms"}
-    with pytest.raises(friso.InputError, match="van Dijk"):
+    with refused("controller"):
         prepared(rig.replace({"controller": gains}), load_spec(SPEC))
 
 

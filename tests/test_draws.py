@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from refusals import Refused
 from scipy.stats import beta
 
 import friso
@@ -189,17 +190,17 @@ def test_check_draws(
 
 
 @pytest.mark.parametrize(
-    ("options", "said"),
+    "options",
     [
-        (("--draws", "8"), "no key is uncertain"),
-        (("--draws", "0", "--set", "masses.cart=1 kg +/- 1 %"), "a whole number from 1 to 100000"),
-        (("--draws", "8", "--seed", "-1", "--set", "masses.cart=1 kg +/- 1 %"), "a whole number from 0"),
+        ("--draws", "8"),
+        ("--draws", "0", "--set", "masses.cart=1 kg +/- 1 %"),
+        ("--draws", "8", "--seed", "-1", "--set", "masses.cart=1 kg +/- 1 %"),
     ],
 )
 def test_check_draws_refused(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], options: tuple[str, ...], said: str
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], options: tuple[str, ...], refused: Refused
 ) -> None:
     assert run(monkeypatch, "check", Path(__file__).parents[1] / "examples" / "thesis_rig.toml", *options) == 2
     shown = capsys.readouterr()
     assert shown.out == ""
-    assert said in shown.err
+    refused.says(shown.err)

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 import typer
 from pages import Page
+from refusals import Refused
 
 import friso
 from friso.cli.flexure import EXAMPLE
@@ -432,8 +433,8 @@ def test_the_block_of_the_stage_has_its_moments_of_inertia(stage: Stage) -> None
 # ---------------------------------------------------------------- what is refused
 
 
-def test_a_stage_without_leaves_is_shown_a_table_that_works() -> None:
-    with pytest.raises(InputError, match=r"(?s)thesis_rig.toml: flexure\n.*no \[flexure\].*leave these out") as refused:
+def test_a_stage_without_leaves_is_shown_a_table_that_works(refused: Refused) -> None:
+    with refused("flexure") as refused:
         command(RIG)
     table = refused.value.example
     assert table == EXAMPLE
@@ -458,38 +459,40 @@ def test_strokes_that_are_refused(path: Path, stroke: str, given: str, expected:
         command(path, stroke=stroke)
 
 
-def test_a_stroke_of_the_stage_file_is_refused_alike(path: Path) -> None:
-    with pytest.raises(InputError, match=r"(?s)joint.stroke\n.*36 mm.*at most half the length of the leaves, 35 mm"):
+def test_a_stroke_of_the_stage_file_is_refused_alike(path: Path, refused: Refused) -> None:
+    with refused("joint.stroke"):
         command(path, overrides=['joint.stroke="36 mm"'])
 
 
-def test_a_locked_joint_without_a_stroke_needs_one(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+def test_a_locked_joint_without_a_stroke_needs_one(
+    tmp_path: Path, capsys: pytest.CaptureFixture, refused: Refused
+) -> None:
     file = tmp_path / "locked.toml"
     file.write_text(with_leaves().replace("locked = false", "locked = true").replace('stroke = "1 mm"\n', ""))
-    with pytest.raises(InputError, match=r"(?s)--stroke\n.*nothing.*the joint has none"):
+    with refused("--stroke"):
         command(file)
     command(file, stroke="1 mm", as_json=True)
     assert _strict(capsys.readouterr().out)["stroke_m"] == 1e-3
 
 
 @pytest.mark.parametrize(
-    ("overrides", "message"),
+    "overrides",
     [
-        (['flexure.thickness="80 mm"', 'flexure.width="300 mm"'], "leaves at least ten times as long as thick"),
-        (['flexure.lenght="70 mm"'], "did you mean length"),
-        (["flexure.leaves=1"], "a whole number, 2 to 20"),
+        ['flexure.thickness="80 mm"', 'flexure.width="300 mm"'],
+        ['flexure.lenght="70 mm"'],
+        ["flexure.leaves=1"],
     ],
 )
-def test_overrides_that_are_refused(path: Path, overrides: list[str], message: str) -> None:
-    with pytest.raises(InputError, match=message):
+def test_overrides_that_are_refused(path: Path, overrides: list[str], refused: Refused) -> None:
+    with refused():
         command(path, overrides=overrides)
 
 
-def test_an_unknown_material_names_the_nearest(tmp_path: Path) -> None:
+def test_an_unknown_material_names_the_nearest(tmp_path: Path, refused: Refused) -> None:
     file = tmp_path / "material.toml"
     start = LEAVES.index("young")
     file.write_text(with_leaves(LEAVES[:start] + 'material = "titanum"\n'))
-    with pytest.raises(InputError, match="did you mean titanium"):
+    with refused("flexure.material"):
         command(file)
 
 

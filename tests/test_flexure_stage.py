@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from refusals import Refused
 
 import friso
 from friso.errors import InputError
@@ -145,8 +146,8 @@ def test_load_along_the_leaves(stage: Stage, share: float) -> None:
     assert loaded.flat()["joint.stiffness"] / stage.flat()["joint.stiffness"] == pytest.approx(exact, rel=0.015)
 
 
-def test_leaves_that_buckle(stage: Stage) -> None:
-    with pytest.raises(InputError, match=r"less than the buckling load of the leaves, 135\.9 N"):
+def test_leaves_that_buckle(stage: Stage, refused: Refused) -> None:
+    with refused("flexure.load"):
         stage.replace({"flexure.load": "140 N"})
     loads_along = np.array([0.0, 130.0, 140.0])
     assert allowed(stage, {}, {"flexure.load": loads_along}).tolist() == [True, True, False]
@@ -296,12 +297,12 @@ def test_refused(table: str, key: str, said: str) -> None:
     assert error.example
 
 
-def test_stiffness_given_twice_or_not_at_all(stage: Stage) -> None:
-    with pytest.raises(InputError, match=r"joint\.stiffness together with \[flexure\]"):
+def test_stiffness_given_twice_or_not_at_all(stage: Stage, refused: Refused) -> None:
+    with refused("joint.stiffness"):
         stage.replace({"joint.stiffness": "2.4 N/mm"})
-    with pytest.raises(InputError, match="the stiffness of the joint, or a \\[flexure\\]"):
+    with refused("joint.stiffness"):
         stage.replace({"flexure": None})
-    with pytest.raises(InputError, match=r"leaf springs, but no \[joint\]"):
+    with refused("flexure"):
         stage.replace({"joint": None})
     locked: dict[str, Any] = {"flexure": None, "joint.locked": True}
     assert "joint.stiffness" not in stage.replace(locked).flat()

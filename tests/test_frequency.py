@@ -6,6 +6,7 @@ import pytest
 import sympy as sp
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from refusals import Refused
 from scipy.linalg import expm
 from scipy.optimize import brentq
 from variants import VARIANTS
@@ -342,10 +343,10 @@ def test_a_long_delay_and_a_sharp_mode(rig: Stage, delay: str, crossover: float,
     assert found.abscissa == pytest.approx(growth, abs=0.005)
 
 
-def test_a_delay_too_long_is_refused(rig: Stage) -> None:
-    with pytest.raises(InputError, match="at most 64 samples"):
+def test_a_delay_too_long_is_refused(rig: Stage, refused: Refused) -> None:
+    with refused("drive.delay"):
         bode(rig.replace({"drive.sample_time": "50 us", "drive.delay": "6 ms"}))
-    with pytest.raises(InputError, match="periods"):
+    with refused("drive.delay"):
         bode(rig.replace({"drive.delay": "1 s"}))
 
 
@@ -357,8 +358,8 @@ def test_a_delay_is_lag(rig: Stage) -> None:
     assert (early, late) == (True, False)
 
 
-def test_the_sample_time_is_at_most_a_tenth_of_the_crossovers_period(rig: Stage) -> None:
-    with pytest.raises(InputError, match="a sample time of at most a tenth of the crossover's period"):
+def test_the_sample_time_is_at_most_a_tenth_of_the_crossovers_period(rig: Stage, refused: Refused) -> None:
+    with refused():
         rig.replace({"drive.sample_time": "50 ms", "controller.crossover": "10 Hz"})
 
 
@@ -410,8 +411,8 @@ def test_a_position_that_is_not_controlled_is_on_the_edge(rig: Stage, drive: dic
         assert limits(changed.flat()).stable == ()
 
 
-def test_a_controller_that_does_nothing_is_refused(rig: Stage) -> None:
-    with pytest.raises(InputError, match="a controller that acts"):
+def test_a_controller_that_does_nothing_is_refused(rig: Stage, refused: Refused) -> None:
+    with refused("controller"):
         bode(by_gains(rig, kp="0 N/m"))
 
 
@@ -523,16 +524,16 @@ def test_closed_loop_follows_its_reference(rig: Stage) -> None:
     assert abs(at[0, closed.input_labels.index("disturbance on cart")]) < 1e-6
 
 
-def test_linear_takes_states_that_the_stage_can_be_in(rig: Stage) -> None:
-    with pytest.raises(InputError, match="between -3 N and 3 N"):
+def test_linear_takes_states_that_the_stage_can_be_in(rig: Stage, refused: Refused) -> None:
+    with refused("case"):
         friso.linear(rig, friso.member(bias=5.0))
-    with pytest.raises(InputError, match="a single one"):
+    with refused("case"):
         friso.linear(rig, family(rig.flat()))
-    with pytest.raises(InputError, match="touched"):
+    with refused("case"):
         friso.linear(rig.replace({"joint.locked": True}), friso.member(touched=True))
-    with pytest.raises(InputError, match="forward=False"):
+    with refused("speed"):
         friso.member(speed=-1e-3)
-    with pytest.raises(InputError, match="stuck"):
+    with refused("bias"):
         friso.member(speed=1e-3, bias=2.0)
 
 

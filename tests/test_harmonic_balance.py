@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 import plain
 import pytest
+from refusals import Refused
 from scipy.integrate import solve_ivp
 from variants import DAHL, HOLD, LOCKED, MEASURED, NO_FRICTION, PARASITIC, gains, lugre, stage, stribeck, van_dijk
 
-from friso.errors import InputError
 from friso.frequency.describing import balance
 from friso.frequency.describing.balance import FREQUENCIES, single_harmonic
 from friso.frequency.describing.function import dynamic_stiffness
@@ -253,15 +253,15 @@ def one_period(one: Stage) -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.mark.parametrize(
-    ("ask", "text"),
+    "ask",
     [
-        (lambda: harmonic_balance(hunting(8.0), [-1.0]), r"crossovers\s+given:\s+\[-1.0\]"),
-        (lambda: harmonic_balance(unstable("1e5 N/m"), [8.0]), r"controller\s+given:\s+gains"),
-        (lambda: harmonic_balance(hunting(8.0), [300.0]), r"crossovers\s+given:.*no distance"),
-        (lambda: single_harmonic(stage(HOLD, friction=NO_FRICTION, controller=van_dijk())), "friction.model"),
-        (lambda: single_harmonic(hunting(8.0), [], [1.0]), "amplitudes"),
+        lambda: harmonic_balance(hunting(8.0), [-1.0]),
+        lambda: harmonic_balance(unstable("1e5 N/m"), [8.0]),
+        lambda: harmonic_balance(hunting(8.0), [300.0]),
+        lambda: single_harmonic(stage(HOLD, friction=NO_FRICTION, controller=van_dijk())),
+        lambda: single_harmonic(hunting(8.0), [], [1.0]),
     ],
 )
-def test_bad_input(ask: Callable[[], object], text: str) -> None:
-    with pytest.raises(InputError, match=text):
+def test_bad_input(ask: Callable[[], object], refused: Refused) -> None:
+    with refused():
         ask()

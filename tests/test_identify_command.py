@@ -14,7 +14,9 @@ import numpy as np
 import pandas as pd
 import pytest
 from machines import Machine, drawn, moves
+from pages import Page
 from patched import patched
+from snapshots import Snapshots
 
 import friso
 from friso.cli.app import main
@@ -99,7 +101,7 @@ def done(inputs: tuple[Path, Path], tmp_path_factory: pytest.TempPathFactory) ->
     return out, json.loads(answer.read_text(), parse_constant=lambda text: pytest.fail(f"{text} is no JSON"))
 
 
-def test_files_are_written_and_listed(done: tuple[Path, dict[str, Any]]) -> None:
+def test_files_are_written_and_listed(done: tuple[Path, dict[str, Any]], snapshots: Snapshots) -> None:
     out, answer = done
     files = {Path(each) for each in answer["files"]}
     assert {out / "identified.toml", out / "identify.html", beside(out / "identified.toml")} <= files
@@ -107,6 +109,7 @@ def test_files_are_written_and_listed(done: tuple[Path, dict[str, Any]]) -> None
     assert {each.suffix for each in files} >= {".toml", ".html", ".png", ".svg", ".pdf"}
     page = (out / "identify.html").read_text()
     assert not re.search(r"<(script|link|img)[^>]*(src|href)=.https?:", page)
+    snapshots.check("identify", "page", Page(page).lines)
 
 
 def test_the_stage_file_has_uncertain_keys_that_hold_the_truth(

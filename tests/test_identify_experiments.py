@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from machines import break_aways, creeping, drawn
 from numba import njit
+from refusals import Refused
 from scipy.io import loadmat
 from scipy.signal import lfilter
 
@@ -347,7 +348,7 @@ def test_motion_hidden_in_noise_widens_the_interval_downwards() -> None:
     assert found.static.holds(flat["friction.static"])
 
 
-def test_what_shows_no_slips_says_so() -> None:
+def test_what_shows_no_slips_says_so(refused: Refused) -> None:
     time = np.arange(0, 5, DT)
     rng = np.random.default_rng(0)
     log = record("slides", DT, position=0.01 * time, force=1 + 0.01 * rng.standard_normal(len(time)))
@@ -356,9 +357,9 @@ def test_what_shows_no_slips_says_so() -> None:
     assert "slides all the time" in found.static.reason
     assert "not all measured" in found.stiffness.reason
     assert found.static.low == 0
-    with pytest.raises(friso.InputError, match="--map relative_position"):
+    with refused("relative_position"):
         static_from_stick_slip(log, 2400.0)
-    with pytest.raises(friso.InputError, match="greater than 0"):
+    with refused("stiffness"):
         static_from_stick_slip(log, -1.0)
 
 
@@ -743,22 +744,22 @@ def test_passes_that_hardly_overlap_are_read_whole() -> None:
     assert high - low > 0.02
 
 
-def test_what_is_no_record_is_refused() -> None:
+def test_what_is_no_record_is_refused(refused: Refused) -> None:
     ones = np.ones(100)
-    with pytest.raises(friso.InputError, match="no role"):
+    with refused("speed"):
         record("x", DT, speed=ones)
-    with pytest.raises(friso.InputError, match="arrays of one length"):
+    with refused("force"):
         record("x", DT, position=ones, force=ones[1:])
-    with pytest.raises(friso.InputError, match="greater than 0 s"):
+    with refused("sample_time"):
         record("x", 0.0, position=ones)
-    with pytest.raises(friso.InputError, match="--map force"):
+    with refused("force"):
         stiffness_from_steps(record("x", DT, position=ones))
     bad = record("x", DT, position=ones, force=np.where(np.arange(100) == 5, np.nan, 1.0))
     for analysis in (stiffness_from_steps, static_from_stick_slip, static_from_ramps, friction_velocity):
-        with pytest.raises(friso.InputError, match="1 of 100 values"):
+        with refused("force"):
             analysis(bad)
     volts = replace(record("x", DT, position=ones, force=ones), units={"force": "V"})
-    with pytest.raises(friso.InputError, match="N/V"):
+    with refused("force"):
         friction_position(volts)
 
 

@@ -12,9 +12,9 @@ import pytest
 from emps import emps_log
 from machines import drawn, moves
 from patched import patched
+from refusals import Refused
 
 import friso
-from friso.errors import InputError
 from friso.identify import moves as method
 from friso.identify.errors import errors_of
 from friso.identify.logs.log import Log
@@ -110,13 +110,13 @@ def test_pulses_of_force_are_predicted(quick: tuple[dict[str, Any], Log, Moves])
     assert predict(found, silent)[2].force > 5 * errors.force
 
 
-def test_missing_signals_are_named(quick: tuple[dict[str, Any], Log, Moves]) -> None:
+def test_missing_signals_are_named(quick: tuple[dict[str, Any], Log, Moves], refused: Refused) -> None:
     _, log, found = quick
     bare = replace(log, signals={role: log[role] for role in ("position", "force")})
-    with pytest.raises(InputError, match="reference"):
+    with refused("reference"):
         predict(found, bare)
     volts = replace(log, units={"force": "V"})
-    with pytest.raises(InputError, match="N/V"):
+    with refused("force"):
         identify_moves(volts, found.flat, True)
 
 

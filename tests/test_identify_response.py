@@ -4,9 +4,9 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
+from refusals import Refused
 from scipy import signal
 
-from friso.errors import InputError
 from friso.identify.estimate import Estimate
 from friso.identify.logs.log import Log
 from friso.identify.response.arbitrary import local_polynomial, welch
@@ -96,10 +96,10 @@ def test_noise_on_the_input_does_not_move_the_period() -> None:
     assert (found.samples, found.count) == (PERIOD, 6)
 
 
-def test_what_does_not_repeat_is_refused() -> None:
-    with pytest.raises(InputError, match="does not repeat"):
+def test_what_does_not_repeat_is_refused(refused: Refused) -> None:
+    with refused("period"):
         find_periods(np.random.default_rng(4).normal(size=4000))
-    with pytest.raises(InputError, match="constant"):
+    with refused("period"):
         find_periods(np.ones(400))
 
 
@@ -158,57 +158,54 @@ def test_a_transient_is_left_out_and_a_drift_does_not_matter() -> None:
     assert not any("transient" in text for text in multisine([record]).warnings)
 
 
-def test_realisations_that_do_not_belong_together_are_refused() -> None:
+def test_realisations_that_do_not_belong_together_are_refused(refused: Refused) -> None:
     rng = np.random.default_rng(9)
     one = played(rng, rig, np.arange(2, 60))
-    with pytest.raises(InputError, match="the same period"):
+    with refused("records"):
         multisine([one, Record(one.input, one.output, 2 * DT)])
-    with pytest.raises(InputError, match="common line"):
+    with refused("records"):
         multisine([one, played(rng, rig, np.arange(80, 99))])
-    with pytest.raises(InputError, match="at least one record"):
+    with refused("records"):
         multisine([])
 
 
 @pytest.mark.parametrize(
-    ("spoilt", "said"),
+    "spoilt",
     [
-        (
-            lambda one: Record(one.input, np.where(np.arange(6000) == 7, np.nan, one.output), DT),
-            "1 samples that are not",
-        ),
-        (lambda one: Record(one.input, np.zeros(6000), DT), "constant"),
-        (lambda one: Record(one.input[:-1], one.output, DT), "one and the same length"),
-        (lambda one: Record(one.input, one.output, 0.0), "greater than 0 s"),
-        (lambda one: Record(one.input[:5], one.output[:5], DT), "at least 8"),
+        lambda one: Record(one.input, np.where(np.arange(6000) == 7, np.nan, one.output), DT),
+        lambda one: Record(one.input, np.zeros(6000), DT),
+        lambda one: Record(one.input[:-1], one.output, DT),
+        lambda one: Record(one.input, one.output, 0.0),
+        lambda one: Record(one.input[:5], one.output[:5], DT),
     ],
 )
-def test_bad_records_are_refused(spoilt: Callable[[Record], Record], said: str) -> None:
-    with pytest.raises(InputError, match=said):
+def test_bad_records_are_refused(spoilt: Callable[[Record], Record], refused: Refused) -> None:
+    with refused():
         multisine([spoilt(played(np.random.default_rng(10), rig, np.arange(2, 60)))])
 
 
-def test_weak_lines_are_left_out_and_nothing_left_is_an_error() -> None:
+def test_weak_lines_are_left_out_and_nothing_left_is_an_error(refused: Refused) -> None:
     rng = np.random.default_rng(11)
     found = multisine([played(rng, rig, np.arange(2, 200), noise=0.3)])
     strong = found.usable()
     assert 0 < len(strong.frequency) < len(found.frequency)
     assert "too weakly excited" in strong.warnings[-1]
     record = played(rng, rig, np.arange(2, 60))
-    with pytest.raises(InputError, match="no line stands out"):
+    with refused("excitation"):
         multisine([Record(record.input, rng.normal(size=6000), DT)]).usable(ratio=10)
 
 
-def test_other_forms_of_a_response() -> None:
+def test_other_forms_of_a_response(refused: Refused) -> None:
     found = multisine([played(np.random.default_rng(12), rig, np.arange(2, 60), noise=0.01)])
     assert found.accelerations().response == pytest.approx(-((2 * np.pi * found.frequency) ** 2) * found.response)
     assert found.accelerations().channels.output_unit == "m/s^2"
     frd = found.frd()
     assert frd(2j * np.pi * found.frequency[3]) == pytest.approx(found.response[3])
-    with pytest.raises(InputError, match="holds lines"):
+    with refused("band"):
         found.between(400, 500)
 
 
-def test_a_log_becomes_a_record() -> None:
+def test_a_log_becomes_a_record(refused: Refused) -> None:
     one = played(np.random.default_rng(31), rig, np.arange(2, 60))
     signals = {"force": one.input, "position": one.output}
     parts = (slice(0, 100), slice(100, 6000))
@@ -216,7 +213,7 @@ def test_a_log_becomes_a_record() -> None:
     record, channels = from_log(log)
     assert len(record.input) == 5900
     assert (channels.input_unit, channels.output_unit) == ("V", "m")
-    with pytest.raises(InputError, match="a channel for the velocity"):
+    with refused("velocity"):
         from_log(log, output="velocity")
 
 
@@ -255,7 +252,7 @@ def test_local_polynomials_are_free_of_the_leakage_that_welch_has() -> None:
     assert worst[1] < 1e-2 < 5e-2 < worst[0]
 
 
-def test_coherence_falls_with_noise_and_short_records_are_refused() -> None:
+def test_coherence_falls_with_noise_and_short_records_are_refused(refused: Refused) -> None:
     rng = np.random.default_rng(15)
     given = rng.normal(size=20000)
     clean, noisy = (
@@ -265,7 +262,7 @@ def test_coherence_falls_with_noise_and_short_records_are_refused() -> None:
     assert clean.coherence is not None
     assert noisy.coherence is not None
     assert np.median(clean.coherence) > 0.999 > 0.3 > np.median(noisy.coherence)
-    with pytest.raises(InputError, match="at least 4 segments"):
+    with refused("resolution"):
         welch(Record(given, given, DT), 0.03)
 
 
@@ -394,7 +391,7 @@ def test_modes_and_their_intervals() -> None:
     assert min(held.values()) >= 35
 
 
-def test_the_number_of_modes_is_found_and_said() -> None:
+def test_the_number_of_modes_is_found_and_said(refused: Refused) -> None:
     def three(frequency: np.ndarray) -> np.ndarray:
         s = 2j * np.pi * frequency
         modes = ((11.0, 0.02, 0.4), (60.0, 0.01, 0.3))
@@ -408,7 +405,7 @@ def test_the_number_of_modes_is_found_and_said() -> None:
         assert found[f"resonance {number} damping ratio"].value == pytest.approx(damping, rel=0.2)
     assert found.low_level.value == pytest.approx(0.6, rel=0.02)
     assert found.high_level.value == pytest.approx(1.3, rel=0.02)
-    with pytest.raises(InputError, match="at least 12 lines"):
+    with refused("band"):
         fit_modes(exact(three, np.arange(3.0, 10.0), 0.02, None))
 
 
@@ -427,7 +424,7 @@ def test_two_mass_intervals_hold_the_truth() -> None:
     assert min(held.values()) >= 53, held
 
 
-def test_two_mass_predicts_another_record_and_signs_are_told() -> None:
+def test_two_mass_predicts_another_record_and_signs_are_told(refused: Refused) -> None:
     rng, lines = np.random.default_rng(26), np.arange(6, 80)
     first, second = (multisine([played(rng, lambda f, i=i: -rig(f, i), lines, noise=0.01)]) for i in (0, 1))
     found = fit_two_mass(first, second, (3, 40))
@@ -437,11 +434,11 @@ def test_two_mass_predicts_another_record_and_signs_are_told() -> None:
         aside = played(rng, lambda f, i=which: -rig(f, i), lines, noise=0.01)
         assert relative_error(lambda f, c=collocated: found.predict(f, c), aside, (3, 20)) < 0.02
     assert relative_error(lambda f: 0.0 * f, aside, (3, 20)) == pytest.approx(1.0)
-    with pytest.raises(InputError, match="excited lines"):
+    with refused("band"):
         relative_error(rig, aside, (200, 220))
 
 
-def test_intervals_grow_where_realisations_scatter() -> None:
+def test_intervals_grow_where_realisations_scatter(refused: Refused) -> None:
     frequency, rng = np.arange(3.0, 40.0, 1.0), np.random.default_rng(27)
     softer = TRUE + np.array([0, 0, 0.2, 0, 0, 0, 0])
     alike = [fit_two_mass(exact(rig, frequency, 0.01, rng)) for _ in range(2)]
@@ -449,7 +446,7 @@ def test_intervals_grow_where_realisations_scatter() -> None:
     before = alike[0]["joint stiffness"].half_width
     assert widened(alike[0], apart)["joint stiffness"].half_width > 5 * before
     assert widened(alike[0], alike)["joint stiffness"].half_width < 3 * before
-    with pytest.raises(InputError, match="at least two"):
+    with refused("records"):
         widened(alike[0], alike[:1])
 
 
@@ -503,12 +500,12 @@ def test_sliding_mass_against_its_closed_form() -> None:
     assert abs(end) <= 1.0 / 20.0 + 1e-9  # it sticks where friction holds the spring
 
 
-@pytest.mark.parametrize(("value", "factors", "said"), [(0.0, (1.0,), "no level"), (0.1, (0.5, 2.0), "1 among them")])
-def test_explanations_that_cannot_be_given(value: float, factors: tuple[float, ...], said: str) -> None:
+@pytest.mark.parametrize(("value", "factors"), [(0.0, (1.0,)), (0.1, (0.5, 2.0))])
+def test_explanations_that_cannot_be_given(value: float, factors: tuple[float, ...], refused: Refused) -> None:
     some = Estimate.normal("x", "N", value, 0.01, "")
     drag = Drag(some, some, some, some, 1.0, 1.0, 0.1, ())
     response = exact(dragged, np.arange(1.0, 30), 0.05, None)
-    with pytest.raises(InputError, match=said):
+    with refused():
         explained(drag, response, [np.ones(100)], DT, (1, 20), factors)
 
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from refusals import Refused
 from rig_machines import EXAMPLE, built
 
 import friso
@@ -144,7 +145,7 @@ def reason(log: Log, known: Known | None = KNOWN) -> str:
     return found.estimates[2].reason
 
 
-def test_what_a_log_cannot_show_is_told() -> None:
+def test_what_a_log_cannot_show_is_told(refused: Refused) -> None:
     assert "--as presliding" in reason(sliding(), None)
     assert "delay" in stribeck_from_slow_sliding(sliding(), replace(THERE, delay=None), KNOWN).estimates[0].reason
     short = record("x", DT, **{role: signal[:1500] for role, signal in sliding().signals.items()})
@@ -160,7 +161,7 @@ def test_what_a_log_cannot_show_is_told() -> None:
     unlike = sliding()
     unlike = replace(unlike, signals={**unlike.signals, "force": np.roll(unlike["force"], 150)})
     assert "not explained" in reason(unlike)
-    with pytest.raises(friso.InputError, match="force"):
+    with refused("force"):
         stribeck_from_slow_sliding(record("x", DT, position=np.zeros(9000)), THERE, KNOWN)
 
 

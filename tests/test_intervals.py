@@ -3,6 +3,7 @@
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from refusals import Refused
 
 from friso.errors import InputError
 from friso.intervals import Interval, Span
@@ -79,8 +80,8 @@ def test_refused_quantities(given_text: object, said: str) -> None:
 @pytest.mark.parametrize(
     "given_text", ["0.3 .. 1.8", "-0.1 .. 0.5", "0.8 .. 0.3", "a .. b", "0.5 N", True, None, "0.9 +/- 0.2"]
 )
-def test_refused_numbers(given_text: object) -> None:
-    with pytest.raises(InputError, match=r"0 to 1|a number"):
+def test_refused_numbers(given_text: object, refused: Refused) -> None:
+    with refused():
         SHARE.read(given_text)
 
 

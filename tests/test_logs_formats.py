@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from refusals import Refused
 from scipy.io import savemat
 
 from friso.errors import InputError
@@ -191,9 +192,9 @@ def test_mat_73(tmp_path: Path) -> None:
     assert any("result (timeseries)" in line and "structure with time" in line for line in table.read)
 
 
-def test_mat_with_objects_only(tmp_path: Path) -> None:
+def test_mat_with_objects_only(tmp_path: Path, refused: Refused) -> None:
     path = log_files.write_mat73(tmp_path / "a.mat", {})
-    with pytest.raises(InputError, match="save as structure with time"):
+    with refused("log"):
         read_table(path)
 
 
@@ -280,60 +281,62 @@ def test_a_log_is_no_frequency_response(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    "text",
     [
-        ("f,mag [dB],phase [deg]\n1,2,3\n2,2,3\n3,2,3\n", "f without a unit"),
-        ("f [Hz],mag [dB],phase\n1,2,3\n2,2,3\n3,2,3\n", "phase without a unit"),
-        ("f [Hz],mag [dB],phase [deg]\n1,2,3\n3,2,3\n2,2,3\n", "2 Hz after 3 Hz"),
-        ("f [Hz],mag [dB],phase [deg]\n1,2,3\n2,nan,3\n3,2,3\n", "no number in row 2"),
-        ("f [Hz],mag [dB],phase [deg]\n1,2,3\n2,2,3\n", "2 frequencies"),
-        ("f [Hz],mag A [dB],mag B [dB],phase [deg]\n1,2,3,4\n2,2,3,4\n3,2,3,4\n", "mag A, mag B"),
+        "f,mag [dB],phase [deg]\n1,2,3\n2,2,3\n3,2,3\n",
+        "f [Hz],mag [dB],phase\n1,2,3\n2,2,3\n3,2,3\n",
+        "f [Hz],mag [dB],phase [deg]\n1,2,3\n3,2,3\n2,2,3\n",
+        "f [Hz],mag [dB],phase [deg]\n1,2,3\n2,nan,3\n3,2,3\n",
+        "f [Hz],mag [dB],phase [deg]\n1,2,3\n2,2,3\n",
+        "f [Hz],mag A [dB],mag B [dB],phase [deg]\n1,2,3,4\n2,2,3,4\n3,2,3,4\n",
     ],
 )
-def test_bad_frequency_responses(tmp_path: Path, text: str, said: str) -> None:
+def test_bad_frequency_responses(tmp_path: Path, text: str, refused: Refused) -> None:
     (tmp_path / "a.csv").write_text(text)
-    with pytest.raises(InputError, match=said):
+    with refused():
         read_frequency_response(tmp_path / "a.csv")
 
 
 @pytest.mark.parametrize(
-    ("content", "said"),
+    "content",
     [
-        (b"", "0 bytes"),
-        (bytes(range(256)) * 40, "neither text nor a known format"),
-        (b"time [s],position [mm]\n", "no row of numbers"),
-        (b"hello\nworld\n", "no row of numbers"),
-        (b"t [s],x [m]\n1,2\n2,3\n3,4,5\n4,5\n", "3 cells in line 4"),
-        (b"t [s],x [m]\n1,2\n2,3\n3\n4,5\n", "1 cells in line 4"),
-        (b"t [s],x [m]\n" + b"1,2\n" * 300 + b"2,oops\n" + b"3,4\n" * 300, '"oops" in line 302, column x'),
-        (b"note\n\nt;x\n1,0;2,5\n2,0;3,5\n\n3,0;bad\n4,0;1,5\n", '"bad" in line 7, column x'),
-        (b"TDSm" + bytes(200), "TDMS file that cannot be read"),
-        (b"MATLAB 5.0 MAT-file" + bytes(300), "MAT file that cannot be read|no arrays"),
-        (b"LabVIEW Measurement\t\n", "LVM file"),
-        (b"    -1\n    58\nrubbish\n    -1\n", "UFF file that cannot be read"),
-        (b"Name\trig\nSampleTime[ms]\t1\n\nName\tpos\n", "without rows of numbers"),
-        (b"Name\trig\nStarttime of export\t1\n\nName\tpos\n\n0\t1\n1\t2\n2\tx\n3\t4\n4\t4\n", '"x" in line 8'),
+        b"",
+        bytes(range(256)) * 40,
+        b"time [s],position [mm]\n",
+        b"hello\nworld\n",
+        b"t [s],x [m]\n1,2\n2,3\n3,4,5\n4,5\n",
+        b"t [s],x [m]\n1,2\n2,3\n3\n4,5\n",
+        b"t [s],x [m]\n" + b"1,2\n" * 300 + b"2,oops\n" + b"3,4\n" * 300,
+        b"note\n\nt;x\n1,0;2,5\n2,0;3,5\n\n3,0;bad\n4,0;1,5\n",
+        b"TDSm" + bytes(200),
+        b"MATLAB 5.0 MAT-file" + bytes(300),
+        b"LabVIEW Measurement\t\n",
+        b"    -1\n    58\nrubbish\n    -1\n",
+        b"Name\trig\nSampleTime[ms]\t1\n\nName\tpos\n",
+        b"Name\trig\nStarttime of export\t1\n\nName\tpos\n\n0\t1\n1\t2\n2\tx\n3\t4\n4\t4\n",
     ],
 )
-def test_bad_files_end_in_one_message(tmp_path: Path, content: bytes, said: str) -> None:
+def test_bad_files_end_in_one_message(tmp_path: Path, content: bytes, refused: Refused) -> None:
     (tmp_path / "a.log").write_bytes(content)
-    with pytest.raises(InputError, match=said) as caught:
+    with refused("log") as caught:
         read_table(tmp_path / "a.log")
     assert str(tmp_path / "a.log") in str(caught.value)
 
 
-def test_missing_files_and_folders(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="cannot be opened"):
+def test_missing_files_and_folders(tmp_path: Path, refused: Refused) -> None:
+    with refused("log"):
         read_table(tmp_path / "none.csv")
-    with pytest.raises(InputError, match="a folder"):
+    with refused("log"):
         read_table(tmp_path)
 
 
-def test_a_file_too_large_is_refused_with_its_size(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_file_too_large_is_refused_with_its_size(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, refused: Refused
+) -> None:
     monkeypatch.setattr(reading, "decoded_head", lambda path: pytest.fail("read before it was refused"))
     with (tmp_path / "big.csv").open("wb") as file:
         file.truncate(10 * 2**30)
-    with pytest.raises(InputError, match="10 GiB"):
+    with refused("log"):
         read_table(tmp_path / "big.csv")
 
 

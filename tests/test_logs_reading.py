@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from refusals import Refused
 from scipy.io import savemat
 
 from friso.errors import InputError
@@ -145,8 +146,8 @@ def test_scales(text: str, unit: str, factor: float) -> None:
 
 
 @pytest.mark.parametrize(("text", "unit"), [("35", ""), ("35 N", "V"), ("35 m/V", "V"), ("3 N/V", "A"), ("x N/V", "V")])
-def test_wrong_scales(text: str, unit: str) -> None:
-    with pytest.raises(InputError, match="--scale force="):
+def test_wrong_scales(text: str, unit: str, refused: Refused) -> None:
+    with refused("scale"):
         read_scale("force", text, unit)
 
 
@@ -333,9 +334,9 @@ def test_channels_of_different_rates(tmp_path: Path) -> None:
     assert told(log.warnings, "without a filter against aliasing")
 
 
-def test_no_common_span() -> None:
+def test_no_common_span(refused: Refused) -> None:
     t = 1e-3 * np.arange(100)
-    with pytest.raises(InputError, match="that all channels share"):
+    with refused("log"):
         together({"a": track("a", t, t), "b": track("b", t + 5, t)})
 
 
@@ -395,21 +396,21 @@ def test_any_mapping_comes_back(tmp_path_factory: pytest.TempPathFactory, roles:
     assert mappings.load(log) == mapping
 
 
-def test_mapping_in_another_folder(tmp_path: Path) -> None:
+def test_mapping_in_another_folder(tmp_path: Path, refused: Refused) -> None:
     log = tmp_path / "gone" / "a.csv"  # a folder that cannot be written: there is none
     place = mappings.save(Mapping({"position": "x"}), log, tmp_path)
     assert place == tmp_path / "a.csv.friso.toml"
     assert mappings.load(log, tmp_path) == Mapping({"position": "x"})
-    with pytest.raises(InputError, match="a folder that can be written"):
+    with refused("mapping"):
         mappings.save(Mapping(), log)
 
 
 @pytest.mark.parametrize(
     "text", ["rubbish", "[roles]\nstage = 'x'\n", "[roles]\nposition = 3\n", "nonsense = 1\n", "sample_time = 1\n"]
 )
-def test_a_broken_mapping(tmp_path: Path, text: str) -> None:
+def test_a_broken_mapping(tmp_path: Path, text: str, refused: Refused) -> None:
     (tmp_path / "a.csv.friso.toml").write_text(text)
-    with pytest.raises(InputError, match=r"a\.csv\.friso\.toml"):
+    with refused():
         mappings.load(tmp_path / "a.csv")
 
 
@@ -420,8 +421,8 @@ def test_a_broken_mapping(tmp_path: Path, text: str) -> None:
         {"dt": "-1 ms"}, {"maps": ["position="]},
     ],
 )  # fmt: skip
-def test_wrong_options(options: dict) -> None:
-    with pytest.raises(InputError, match="--"):
+def test_wrong_options(options: dict, refused: Refused) -> None:
+    with refused():
         from_options(**options)
 
 

@@ -44,6 +44,15 @@ def test_of_close_peaks_the_tallest_stays() -> None:
     assert peaks(turns) == [11.2, 11.75]
 
 
+def test_what_counts_at_the_edge() -> None:
+    """At 10 s and 0.5 s apart peaks count, at 0.1 mm they do not; of equal ones too close the first stays."""
+    assert peaks([(9.5, 0.0), (10.0, 2e-4), (10.2, 0.0), (10.5, 2e-4), (10.7, 0.0), (11.5, 1e-4), (12.0, 0.0)]) == [
+        *(10.0, 10.5),
+    ]
+    assert peaks([(11.0, 0.0), (11.2, 2e-4), (11.3, 0.0), (11.4, 2e-4), (11.5, 0.0)]) == [11.2]
+    assert peaks([(9.0, 3e-4), (9.5, 0.0), (11.0, 0.5e-4), (12.0, 0.0)]) == []
+
+
 def test_runs_of_a_batch_do_not_mix() -> None:
     times = np.array([[11.0, 11.5, 12.0], [11.0, 11.5, 12.0]])
     values = np.array([[1e-3, -1e-3, 1e-3], [1e-3, -1e-3, 1e-3]])
@@ -66,13 +75,32 @@ def test_agrees_with_scipy(gaps: list[tuple[float, int]]) -> None:
         assert peaks(list(zip(times.tolist(), values.tolist(), strict=True))) == times[sorted(kept)].tolist()
 
 
-def test_period_of_a_cycle_with_ringing_on_top() -> None:
-    """A 2 s cycle of 1 mm on which a 0.05 s ringing of 0.1 mm makes turning points of its own."""
+@pytest.mark.parametrize("many", [0, np.inf])
+def test_period_of_a_cycle_with_ringing_on_top(many: float, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A 2 s cycle of 1 mm on which a 0.05 s ringing of 0.1 mm makes turning points of its own; compiled and plain."""
+    monkeypatch.setattr(scanning, "MANY", many)
     time = np.linspace(0.0, 20.0, 200_001)
     wave = np.sin(np.pi * time) + 0.1 * np.sin(40 * np.pi * time)
     turns = np.flatnonzero(np.diff(np.sign(np.diff(wave)))) + 1
     found = periods(time[None, turns], 1e-3 * wave[None, turns], np.array([turns.size]), np.array([2.2e-3]))
     assert found[0] == pytest.approx(2.0, rel=1e-3)
+
+
+def swung(maxima: list[float], minima: list[float], leg: float) -> float:
+    """The period of swings by a leg [m] in a run whose peak-to-peak amplitude is 2 m."""
+    times = np.sort(maxima + minima)
+    values = leg * np.isin(times, maxima)
+    return float(periods(times[None], values[None], np.array([times.size]), np.array([2.0]))[0])
+
+
+def test_period_of_uneven_swings() -> None:
+    """From the first maximum of the last quarter, which begins at 15 s, to the last but one, the last being unfinished;
+    legs are half the amplitude or more."""
+    assert swung([14.0, 15.0, 16.2, 18.0, 19.0], [14.5, 15.5, 16.6, 18.5], 1.0) == pytest.approx(1.5)
+    assert np.isnan(swung([14.0, 15.0, 16.2, 18.0, 19.0], [14.5, 15.5, 16.6, 18.5], 0.99))
+    assert swung([14.9, 16.2, 18.7], [15.2, 17.2, 19.6], 1.0) == pytest.approx(2.5)  # of two maxima
+    assert swung([14.9, 16.2, 19.7], [13.0, 15.2, 17.2], 1.0) == pytest.approx(2.0)  # of two minima
+    assert swung([9.0, 10.5, 13.5, 16.5], [9.5, 12.0, 15.5, 19.0], 1.0) == pytest.approx(3.0)  # the last half's last
 
 
 def test_no_period_without_a_cycle() -> None:

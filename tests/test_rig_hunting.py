@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from patched import patched
+from refusals import Refused
 
 from friso import load
 from friso.engine.arrays import Status
-from friso.errors import InputError
 from friso.rig.run import Recorded
 from friso.stage import Stage
 from friso.studies.rig import compare, hunting, in_position, stroke_crossover
@@ -95,10 +95,10 @@ def test_a_larger_stage_moves_farther() -> None:
     assert distance(RIG.replace({"motion.acceleration_time": "0.1 s"})) == pytest.approx(1.0)
 
 
-def test_what_has_no_joint_or_goes_nowhere() -> None:
+def test_what_has_no_joint_or_goes_nowhere(refused: Refused) -> None:
     bare = RIG.replace({"joint": None, "parasitic": None})
     for run_experiment in (hunting, stroke_crossover, compare, in_position):
-        with pytest.raises(InputError, match="no \\[joint\\]"):
+        with refused("joint"):
             run_experiment.run_experiment(bare, 1, silent)
 
 

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from refusals import Refused
 
 import friso
-from friso.errors import InputError
 from friso.identify.experiments import static_from_stick_slip
 from friso.stage import Stage
 from friso.studies.rig import constant_speed, excitation, frf, many_speeds, sizes, stiction, stiffness
@@ -115,10 +115,10 @@ def test_a_free_joint_is_stable_up_to_a_setting_and_not_beyond(built: Stage) -> 
     assert not stable[settings > highest].any()
 
 
-def test_an_experiment_on_the_joint_needs_one(built: Stage) -> None:
+def test_an_experiment_on_the_joint_needs_one(built: Stage, refused: Refused) -> None:
     rigid = built.replace({"joint": None, "parasitic": None})
     for each in (frf, stiffness, stiction, constant_speed):
-        with pytest.raises(InputError, match="joint"):
+        with refused():
             each.run_experiment(rigid, 1, silent)
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from refusals import Refused
 
 import friso.equations.friction  # noqa: F401  the friction laws register themselves
 from friso.errors import InputError
@@ -135,10 +136,10 @@ def test_units(text: str, unit: str, si: float) -> None:
     assert value.text == text
 
 
-def test_unit_factor_converts_arrays() -> None:
+def test_unit_factor_converts_arrays(refused: Refused) -> None:
     assert Quantity("m", positive, "1 mm").factor("mm") == 1e-3
     assert Quantity("Hz", positive, "8 Hz").factor("rad/s") == 1 / (2 * math.pi)
-    with pytest.raises(InputError, match="kg is not convertible to m"):
+    with refused():
         Quantity("m", positive, "1 mm").factor("kg")
 
 
@@ -179,10 +180,10 @@ def test_byte_order_mark_and_windows_line_ends(tmp_path: Path, rig: Stage) -> No
     assert load(path) == rig
 
 
-def test_save_keeps_an_existing_file(tmp_path: Path, rig: Stage) -> None:
+def test_save_keeps_an_existing_file(tmp_path: Path, rig: Stage, refused: Refused) -> None:
     path = tmp_path / "rig.toml"
     path.write_text("precious", encoding="utf-8")
-    with pytest.raises(InputError, match=r"rig\.toml\n.*a file that exists"):
+    with refused():
         save(rig, path)
     assert path.read_text(encoding="utf-8") == "precious"
     save(rig, path, overwrite=True)
@@ -190,8 +191,8 @@ def test_save_keeps_an_existing_file(tmp_path: Path, rig: Stage) -> None:
     assert [*tmp_path.iterdir()] == [path]
 
 
-def test_save_into_nowhere(tmp_path: Path, rig: Stage) -> None:
-    with pytest.raises(InputError, match="no such file"):
+def test_save_into_nowhere(tmp_path: Path, rig: Stage, refused: Refused) -> None:
+    with refused():
         save(rig, tmp_path / "missing" / "rig.toml")
 
 
@@ -244,12 +245,12 @@ def test_parse_set(text: str, expected: tuple[str, object]) -> None:
     assert parse_set(text) == expected
 
 
-def test_swept_values_move_the_defaults_that_follow_them(rig: Stage) -> None:
+def test_swept_values_move_the_defaults_that_follow_them(rig: Stage, refused: Refused) -> None:
     cart = np.array([1.0, 2.0])
     stage = rig.replace({"controller.tuned_mass": None})
     np.testing.assert_array_equal(stage.flat({"masses.cart": cart})["controller.tuned_mass"], cart + 0.5)
     assert rig.flat({"masses.cart": cart})["controller.tuned_mass"] == 1.7
-    with pytest.raises(InputError, match=r"controller\.crossovr\n.*did you mean controller\.crossover\?"):
+    with refused("controller.crossovr"):
         rig.flat({"controller.crossovr": cart})
 
 

@@ -7,12 +7,12 @@ import pytest
 import xarray as xr
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from refusals import Refused
 
 import friso
 from friso.engine.batch import run_chunks
 from friso.engine.kernel import kernel
 from friso.equations.structure import structure
-from friso.errors import InputError
 from friso.hunting.basin import ends_hunting
 from friso.hunting.cycle.hunting import hunting
 from friso.hunting.measures import Measures, measure, options
@@ -174,73 +174,73 @@ def test_results_do_not_depend_on_threads(rig: Stage) -> None:
 
 
 @pytest.mark.parametrize(
-    ("axes", "message"),
+    "axes",
     [
-        ({}, "at least one key"),
-        ({"controller.crosover": ["8 Hz"]}, "did you mean crossover"),
-        ({"mass": ["8 kg"]}, "a name that a link uses"),
-        ({"controller.crossover": ["8 N"]}, "Hz"),
-        ({"controller.crossover": (np.linspace(1, 2, 3), "N")}, "Hz"),
-        ({"controller.crossover": []}, "no values"),
-        ({"controller.crossover": ["8 Hz", "8 Hz"]}, "twice"),
-        ({"controller.crossover": (np.array([1.0, np.nan]), "Hz")}, "finite"),
-        ({"controller.alpha": (np.array([0.1]), "Hz")}, "no unit"),
-        ({"joint.locked": []}, "no values"),
-        ({"joint.locked": ["perhaps"]}, "joint.locked"),
-        ({"controller.crossover": "1 Hz..40 Hz"}, "without a number of points"),
-        ({"controller.crossover": "40 Hz..1 Hz:3"}, "reversed"),
-        ({"controller.crossover": "4 Hz..4 Hz:3"}, "empty range"),
-        ({"controller.crossover": "1 Hz..4 Hz:1"}, "2 points or more"),
-        ({"controller.crossover": "1 Hz..4 Hz:many"}, "2 points or more"),
-        ({"controller.crossover": "0 Hz..4 Hz:3:log"}, "never reaches 0"),
-        ({"controller.crossover": "1..4:3"}, "unit is missing"),
-        ({"controller.crossover": "1 Hz..4 Hz:3:cubic"}, "FIRST..LAST:POINTS"),
-        ({"controller.crossover": "8 Hz"}, "one point"),
-        ({"sample": ["8 kg"]}, "sample"),
-        ({"name": ["a", "b"]}, "a name that a link uses"),
-        ({"controller.crossover": "1 Hz..2 Hz:10000000000000"}, "at most"),
+        {},
+        {"controller.crosover": ["8 Hz"]},
+        {"mass": ["8 kg"]},
+        {"controller.crossover": ["8 N"]},
+        {"controller.crossover": (np.linspace(1, 2, 3), "N")},
+        {"controller.crossover": []},
+        {"controller.crossover": ["8 Hz", "8 Hz"]},
+        {"controller.crossover": (np.array([1.0, np.nan]), "Hz")},
+        {"controller.alpha": (np.array([0.1]), "Hz")},
+        {"joint.locked": []},
+        {"joint.locked": ["perhaps"]},
+        {"controller.crossover": "1 Hz..40 Hz"},
+        {"controller.crossover": "40 Hz..1 Hz:3"},
+        {"controller.crossover": "4 Hz..4 Hz:3"},
+        {"controller.crossover": "1 Hz..4 Hz:1"},
+        {"controller.crossover": "1 Hz..4 Hz:many"},
+        {"controller.crossover": "0 Hz..4 Hz:3:log"},
+        {"controller.crossover": "1..4:3"},
+        {"controller.crossover": "1 Hz..4 Hz:3:cubic"},
+        {"controller.crossover": "8 Hz"},
+        {"sample": ["8 kg"]},
+        {"name": ["a", "b"]},
+        {"controller.crossover": "1 Hz..2 Hz:10000000000000"},
     ],
 )
-def test_wrong_axes_are_refused(rig: Stage, axes: dict, message: str) -> None:
-    with pytest.raises(InputError, match=message):
+def test_wrong_axes_are_refused(rig: Stage, axes: dict, refused: Refused) -> None:
+    with refused():
         friso.sweep(rig, axes)
 
 
 @pytest.mark.parametrize(
-    ("links", "message"),
+    "links",
     [
-        ({"masses.crt": "mass"}, "cart"),
-        ({"masses.cart": "mas + mass"}, "the name mas"),
-        ({"masses.cart": "__import__('os').getcwd()"}, "min, max, sqrt, abs"),
-        ({"masses.cart": "mass if mass else 1"}, "min, max, sqrt, abs"),
-        ({"masses.cart": "0.7 *"}, "min, max, sqrt, abs"),
-        ({"masses.cart": "max(mass)"}, "min, max, sqrt, abs"),
-        ({"masses.cart": "mass * friction.model"}, "the name friction.model"),
-        ({"masses.cart": "mass", "controller.crossover": "8"}, "does not follow the axis"),
+        {"masses.crt": "mass"},
+        {"masses.cart": "mas + mass"},
+        {"masses.cart": "__import__('os').getcwd()"},
+        {"masses.cart": "mass if mass else 1"},
+        {"masses.cart": "0.7 *"},
+        {"masses.cart": "max(mass)"},
+        {"masses.cart": "mass * friction.model"},
+        {"masses.cart": "mass", "controller.crossover": "8"},
     ],
 )
-def test_wrong_links_are_refused(rig: Stage, links: dict, message: str) -> None:
-    with pytest.raises(InputError, match=message):
+def test_wrong_links_are_refused(rig: Stage, links: dict, refused: Refused) -> None:
+    with refused():
         friso.sweep(rig, {"mass": ["1 kg", "2 kg"], "controller.crossover": ["8 Hz"]}, links=links)
 
 
 @pytest.mark.parametrize(
-    ("samples", "message"),
+    "samples",
     [
-        (Samples({"joint.stroke": "0 m..1 mm"}), "2 points or more"),
-        (Samples({"joint.stroke": "0 m..1 mm:5"}, 8), "FIRST..LAST alone"),
-        (Samples({"joint.stroke": "0 m..1 mm"}, 8, "dice"), "sobol, latin"),
-        (Samples({"joint.stroke": ["1 mm"], "controller.alpha": [0.1, 0.2]}), "equally many"),
-        (Samples({"joint.stroke": "0 m..1 mm", "controller.alpha": [0.1, 0.2]}, 8), "one or the other"),
+        Samples({"joint.stroke": "0 m..1 mm"}),
+        Samples({"joint.stroke": "0 m..1 mm:5"}, 8),
+        Samples({"joint.stroke": "0 m..1 mm"}, 8, "dice"),
+        Samples({"joint.stroke": ["1 mm"], "controller.alpha": [0.1, 0.2]}),
+        Samples({"joint.stroke": "0 m..1 mm", "controller.alpha": [0.1, 0.2]}, 8),
     ],
 )
-def test_wrong_samples_are_refused(rig: Stage, samples: Samples, message: str) -> None:
-    with pytest.raises(InputError, match=message):
+def test_wrong_samples_are_refused(rig: Stage, samples: Samples, refused: Refused) -> None:
+    with refused():
         friso.sweep(rig, {}, samples)
 
 
-def test_an_unknown_metric_is_refused(rig: Stage) -> None:
-    with pytest.raises(InputError, match="peak_to_peak"):
+def test_an_unknown_metric_is_refused(rig: Stage, refused: Refused) -> None:
+    with refused("metrics"):
         friso.sweep(rig, {"controller.crossover": ["8 Hz"]}, metrics=["loudness"])
 
 

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from refusals import Refused
 from scipy.stats import kstest, norm, spearmanr, truncnorm
 
 from friso.cli.common import read_stage
-from friso.errors import InputError
 from friso.intervals import COVERAGE, UncertainValue
 from friso.stage import Stage, load, numeric_keys, parse_set, save
 from friso.stage.correlations import Correlations, beside, draw, laid_over, read_correlations, write_correlations
@@ -93,41 +93,41 @@ def test_value_survives_pickling_and_set(rig: Stage) -> None:
 
 
 @pytest.mark.parametrize(
-    ("key", "text", "said"),
+    ("key", "text"),
     [
-        (COULOMB, "2 +/- 1 N", "its unit is missing"),
-        (COULOMB, "2 N +/- 1", "its unit is missing"),
-        (COULOMB, "2 N +/- 1 mm", "mm is not convertible to N"),
-        (COULOMB, "2 N .. 1 N", "a reversed range"),
-        (COULOMB, "-1 N .. 2 N", "greater than 0"),
-        (COULOMB, "-1 N +/- 2 N", "greater than 0"),
-        (COULOMB, "2 N +/- -1 N", "0 or greater|-1 N"),
-        (COULOMB, "2 N .. 5 N", "no larger than static"),
-        ("controller.alpha", "0.5 .. 1", "between 0 and 1"),
-        ("controller.alpha", "0.5 +/- nan", "a number|nan"),
-        ("controller.kind", "pid .. pd", 'one of "pid"'),
-        ("joint.locked", "0 .. 1", "true or false"),
-        ("controller.alpha", "0.1", "a bare number without quotes"),
+        (COULOMB, "2 +/- 1 N"),
+        (COULOMB, "2 N +/- 1"),
+        (COULOMB, "2 N +/- 1 mm"),
+        (COULOMB, "2 N .. 1 N"),
+        (COULOMB, "-1 N .. 2 N"),
+        (COULOMB, "-1 N +/- 2 N"),
+        (COULOMB, "2 N +/- -1 N"),
+        (COULOMB, "2 N .. 5 N"),
+        ("controller.alpha", "0.5 .. 1"),
+        ("controller.alpha", "0.5 +/- nan"),
+        ("controller.kind", "pid .. pd"),
+        ("joint.locked", "0 .. 1"),
+        ("controller.alpha", "0.1"),
     ],
 )
-def test_refused(rig: Stage, key: str, text: str, said: str) -> None:
-    with pytest.raises(InputError, match=said) as caught:
+def test_refused(rig: Stage, key: str, text: str, refused: Refused) -> None:
+    with refused() as caught:
         rig.replace({key: text})
     assert key in caught.value.key
 
 
-def test_a_number_of_leaves_is_certain() -> None:
+def test_a_number_of_leaves_is_certain(refused: Refused) -> None:
     leaves = load(EXAMPLE.parent / "thesis_leaves.toml")
     for text in ("2 +/- 1", "2 .. 4"):
-        with pytest.raises(InputError, match="a whole number"):
+        with refused("flexure.leaves"):
             leaves.replace({"flexure.leaves": text})
 
 
-def test_specifications_take_no_uncertain_value() -> None:
+def test_specifications_take_no_uncertain_value(refused: Refused) -> None:
     """One value is meant there, or a range that is allowed: not what is known of a machine."""
     from friso.design.spec import Machine
 
-    with pytest.raises(InputError, match="bandwidth_limit"):
+    with refused("bandwidth_limit"):
         Machine(bandwidth_limit="48 Hz +/- 5 Hz")
 
 
@@ -152,7 +152,7 @@ def pair(value: float, keys: tuple[str, ...] = (COULOMB, VISCOUS)) -> Correlatio
     return Correlations(keys, np.array([[1, value], [value, 1]]))
 
 
-def test_correlations_are_written_and_read(rig: Stage, tmp_path: Path) -> None:
+def test_correlations_are_written_and_read(rig: Stage, tmp_path: Path, refused: Refused) -> None:
     stage = uncertain(rig, coulomb="1 N +/- 0.1 N", viscous="0.5 N*s/m +/- 0.1 N*s/m")
     path = beside(tmp_path / "identified.toml")
     assert path.name == "identified.correlations.toml"
@@ -163,40 +163,40 @@ def test_correlations_are_written_and_read(rig: Stage, tmp_path: Path) -> None:
     assert found.among([VISCOUS]).keys == (VISCOUS,)
     assert found.among([VISCOUS]).matrix.tolist() == [[1.0]]
     assert found.among([]).over([COULOMB]).tolist() == [[1.0]]
-    with pytest.raises(InputError, match="exists already"):
+    with refused():
         write_correlations(pair(0.1), stage, path)
 
 
 @pytest.mark.parametrize(
-    ("text", "said"),
+    "text",
     [
-        ('keys = ["friction.coulomb", "friction.viscous"]\nmatrix = [[1, 0.5], [0.4, 1]]', "not symmetric"),
-        ('keys = ["friction.coulomb", "friction.viscous"]\nmatrix = [[1, 1.5], [1.5, 1]]', "not positive semidefinite"),
-        ('keys = ["friction.coulomb", "friction.viscous"]\nmatrix = [[2, 0.5], [0.5, 1]]', "a diagonal that is not 1"),
-        ('keys = ["friction.coulomb", "friction.viscous"]\nmatrix = [[1]]', "1 x 1 numbers for 2 keys"),
-        ('keys = ["friction.coulomb", "friction.viscous"]\nmatrix = [[1, 0], [1]]', "rows of different lengths"),
-        ('keys = ["friction.coulomb", "friction.viscous"]\nmatrix = [[1, nan], [nan, 1]]', "not finite"),
-        ('keys = ["friction.coulomb", "friction.coulomb"]\nmatrix = [[1, 0], [0, 1]]', "friction.coulomb twice"),
-        ('keys = ["friction.static"]\nmatrix = [[1]]', "friction.static, which is not uncertain"),
-        ('keys = ["friction.colomb"]\nmatrix = [[1]]', "did you mean friction.coulomb"),
-        ('keys = "friction.coulomb"\nmatrix = [[1]]', "a list of keys"),
-        ('keys = ["friction.coulomb"]\nmatrix = [["1"]]', "a list of rows of numbers"),
-        ('keys = ["friction.coulomb"]', "a list of rows of numbers"),
-        ('keys = []\nmatrices = []', "did you mean matrix"),
-        ("keys = [", "not TOML"),
-        ("", "an empty file"),
+        'keys = ["friction.coulomb", "friction.viscous"]\nmatrix = [[1, 0.5], [0.4, 1]]',
+        'keys = ["friction.coulomb", "friction.viscous"]\nmatrix = [[1, 1.5], [1.5, 1]]',
+        'keys = ["friction.coulomb", "friction.viscous"]\nmatrix = [[2, 0.5], [0.5, 1]]',
+        'keys = ["friction.coulomb", "friction.viscous"]\nmatrix = [[1]]',
+        'keys = ["friction.coulomb", "friction.viscous"]\nmatrix = [[1, 0], [1]]',
+        'keys = ["friction.coulomb", "friction.viscous"]\nmatrix = [[1, nan], [nan, 1]]',
+        'keys = ["friction.coulomb", "friction.coulomb"]\nmatrix = [[1, 0], [0, 1]]',
+        'keys = ["friction.static"]\nmatrix = [[1]]',
+        'keys = ["friction.colomb"]\nmatrix = [[1]]',
+        'keys = "friction.coulomb"\nmatrix = [[1]]',
+        'keys = ["friction.coulomb"]\nmatrix = [["1"]]',
+        'keys = ["friction.coulomb"]',
+        'keys = []\nmatrices = []',
+        "keys = [",
+        "",
     ],
 )  # fmt: skip
-def test_correlations_refused(rig: Stage, tmp_path: Path, text: str, said: str) -> None:
+def test_correlations_refused(rig: Stage, tmp_path: Path, text: str, refused: Refused) -> None:
     stage, path = uncertain(rig, coulomb="1 N +/- 0.1 N", viscous="0 N*s/m .. 1 N*s/m"), tmp_path / "c.toml"
     path.write_text(text)
-    with pytest.raises(InputError, match=said) as caught:
+    with refused() as caught:
         read_correlations(path, stage)
     assert str(path) in str(caught.value)
 
 
-def test_correlations_of_certain_keys_are_not_written(rig: Stage, tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="not uncertain"):
+def test_correlations_of_certain_keys_are_not_written(rig: Stage, tmp_path: Path, refused: Refused) -> None:
+    with refused("keys"):
         write_correlations(pair(0.5), uncertain(rig, coulomb="1 N +/- 0.1 N"), tmp_path / "c.toml")
     assert not list(tmp_path.iterdir())
 
@@ -254,8 +254,8 @@ def test_draws_that_break_a_rule_are_left_out_and_told(rig: Stage) -> None:
     assert count / (count + 1000) == pytest.approx(0.5 / 1.2, rel=0.05)
 
 
-def test_nothing_to_draw(rig: Stage) -> None:
-    with pytest.raises(InputError, match="no key is uncertain"):
+def test_nothing_to_draw(rig: Stage, refused: Refused) -> None:
+    with refused():
         draw(rig, Correlations(), 10, seed=0)
 
 

@@ -1,0 +1,105 @@
+"""What commands say, kept in files: words and layout of a text exactly, its numbers as far as processors agree.
+
+A file holds the texts of one command by name. `pytest --refresh-snapshots` writes those that differ. A text is kept as
+it was, but for folders, times, versions and numerical errors, which are masked; numbers are compared to 2 %, white
+space and the length of lines of a table are not.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from itertools import zip_longest
+from pathlib import Path
+from tempfile import gettempdir
+
+from filelock import FileLock
+
+import friso
+
+FOLDER = Path(__file__).parent / "snapshots"
+TOLERANCE = 0.02
+
+HEAD = re.compile(r"^==== (.+) ====\n", re.MULTILINE)
+
+NUMBER = re.compile(r"(?<![\w.])\d+(?:\.\d+)?(?:e[-+]?\d+)?")
+
+RULES = str.maketrans({**dict.fromkeys("─━═╌┄-", "─"), **dict.fromkeys("│┃║|", "│")})
+"""Lines of a table look alike, however long they are."""
+
+MASKED = (
+    (re.compile(r"/\S*/pytest-of-\w+/pytest-\d+(?:/popen-gw\d+)?/[\w.\[\]-]+"), "FOLDER"),
+    (re.compile(r"(?:FOLDER|(?<![\w.]))/(?:[\w.+-]+/)+(?=[\w.+-]*)"), "FOLDER/"),
+    (re.compile(r"[\x00-\x09\x0b-\x1f\x7f]"), lambda match: repr(match.group())[1:-1]),
+    (re.compile(re.escape(friso.__version__)), "VERSION"),
+    (re.compile(r"\d{4}-\d\d-\d\d(?:[ T]\d\d:\d\d(?::\d\d)?)?"), "DATE"),
+    (re.compile(r"\b(took|takes) \d+(?:\.\d+)? ?(?:ms|s|min|h)\b"), r"\1 TIME"),
+    (re.compile(r"(?<=\d ± )\d+(?:\.\d+)?(?:e-?\d+)?"), "ERROR"),
+)
+
+
+def masked(text: str) -> str:
+    """A text without what differs from run to run."""
+    for pattern, mask in MASKED:
+        text = pattern.sub(mask, text)
+    return "\n".join(line.rstrip() for line in text.strip().splitlines()) + "\n"
+
+
+def words(text: str) -> list[str | float]:
+    """Words and numbers of a text."""
+    found: list[str | float] = []
+    place = 0
+    for match in NUMBER.finditer(text):
+        found += _split(text[place : match.start()])
+        found.append(float(match.group()))
+        place = match.end()
+    return found + _split(text[place:])
+
+
+def _split(text: str) -> list[str]:
+    return re.sub(r"─+", "─", text.translate(RULES)).split()
+
+
+def alike(one: str, other: str) -> bool:
+    """Whether texts say the same, their numbers up to what processors differ by."""
+    pairs = zip_longest(words(one), words(other))
+    return all(
+        math.isclose(a, b, rel_tol=TOLERANCE) if isinstance(a, float) and isinstance(b, float) else a == b
+        for a, b in pairs
+    )
+
+
+def read(path: Path) -> dict[str, str]:
+    """The texts in a file by name."""
+    parts = HEAD.split(path.read_text(encoding="utf-8")) if path.exists() else [""]
+    return {name: text.strip("\n") + "\n" for name, text in zip(parts[1::2], parts[2::2], strict=True)}
+
+
+@dataclass(frozen=True)
+class Snapshots:
+    """The texts that are kept, or, to `refresh`, written where they differ."""
+
+    refresh: bool = False
+
+    def check(self, command: str, name: str, text: str) -> None:
+        """Compare what a command says under a name with what is kept."""
+        path, now = FOLDER / f"{command}.txt", masked(text)
+        kept = read(path).get(name, "")
+        if alike(kept, now):
+            return
+        if not self.refresh:
+            raise AssertionError(_difference(kept, now) + f"\n{path.name}, {name}: as kept, or --refresh-snapshots")
+        with FileLock(Path(gettempdir()) / "friso-snapshots.lock"):
+            texts = {**read(path), name: now}
+            rows = (f"==== {each} ====\n{texts[each]}" for each in sorted(texts))
+            path.write_text("\n".join(rows), encoding="utf-8")
+
+
+def _difference(kept: str, now: str) -> str:
+    """The first words that differ, with those before."""
+    one, other = words(kept), words(now)
+    place = next(k for k, (a, b) in enumerate(zip_longest(one, other)) if not alike(str(a), str(b)))
+    some = slice(max(0, place - 8), place + 12)
+    was, is_ = (" ".join(map(str, each[some])) for each in (one, other))
+    return f"was: {was}\nnow: {is_}"
