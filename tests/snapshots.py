@@ -34,6 +34,7 @@ MASKED = (
     (re.compile(r"[\x00-\x09\x0b-\x1f\x7f]"), lambda match: repr(match.group())[1:-1]),
     (re.compile(re.escape(friso.__version__)), "VERSION"),
     (re.compile(r"\d{4}-\d\d-\d\d(?:[ T]\d\d:\d\d(?::\d\d)?)?"), "DATE"),
+    (re.compile(r"\([0-9a-f]{12}\)"), "(DIGEST)"),
     (re.compile(r"\b(took|takes) \d+(?:\.\d+)? ?(?:ms|s|min|h)\b"), r"\1 TIME"),
     (re.compile(r"(?<=\d ± )\d+(?:\.\d+)?(?:e-?\d+)?"), "ERROR"),
 )
