@@ -74,9 +74,10 @@ def run_chunks(
 ) -> Iterator[Runs]:
     """Run `runs` stages of one structure, given as flat keys to SI numbers or arrays of shape (runs,).
 
-    They start at rest, displaced as the motion says, or else from the states `starts`, shape (runs, states). They
-    come chunk by chunk, those with many turning points after the others of their chunk. Results do not depend
-    on lanes, threads or chunks. A failed run has a status; the others go on.
+    They start at rest, displaced as the motion says, or else from the states `starts`, shape (runs, states); modes
+    that remember may stand behind these, else they are those in which a run begins in that state. They come chunk by
+    chunk, those with many turning points after the others of their chunk. Results do not depend on lanes, threads or
+    chunks. A failed run has a status; the others go on.
     """
     for first in range(0, runs, options.chunk):
         numbers = np.arange(first, min(first + options.chunk, runs))
@@ -102,8 +103,8 @@ def prepare(
     scales[~((scales > 0) & np.isfinite(scales))] = 1.0  # nothing moves: any tolerance will do
     segments, windows = _segments(flat, runs, options.window)
     starts = _starts(kernel, flat, runs) if starts is None else np.ascontiguousarray(starts, dtype=float)
-    surfaces = kernel.module.surfaces(starts.T[: len(kernel.states)], 0.0, segments[:, 0, 1:].T, values)
-    modes = (columns(surfaces) > 0).astype(float)
+    starts = kernel.with_modes(starts, segments[:, 0, 1:].T, values)
+    modes = np.ascontiguousarray(kernel.modes(starts.T, 0.0, segments[:, 0, 1:].T, values).T)
     first_steps = np.ascontiguousarray(FIRST_STEP / rates)
     longest = LONGEST_SHARE * segments[:, -1, 0]
     clocks = columns(kernel.module.clock(values)) if kernel.module.CLOCKED else np.zeros((1, 2))

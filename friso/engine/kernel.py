@@ -69,12 +69,23 @@ class Kernel:
 
     @property
     def held(self) -> tuple[str, ...]:
+        """Numbers that are held between samples, and modes that remember, which come last."""
         return self.module.HELD_NAMES
 
     @property
     def kept(self) -> tuple[str, ...]:
         """All that a run has at an instant: states, then the numbers held."""
         return self.states + self.held
+
+    @property
+    def switches(self) -> tuple[int, ...]:
+        """The numbers of the modes that remember, among the kinks."""
+        return getattr(self.module, "SWITCHES", ())
+
+    @property
+    def told(self) -> int:
+        """How much of `kept` a run has to be told at its start: the modes that remember follow from it if need be."""
+        return len(self.kept) - len(self.switches)
 
     @property
     def parameters(self) -> tuple[str, ...]:
@@ -90,12 +101,31 @@ class Kernel:
         return self.module.OUTPUTS
 
     def settled(self, flat: dict[str, Any], steady: Steady, runs: int) -> np.ndarray:
-        """States and numbers held in a steady motion that has lasted, shape (runs, kept); `flat` and the numbers of the
+        """States and numbers held in a steady motion that has lasted, shape (runs, told); `flat` and the numbers of the
         motion may be arrays of shape (runs,)."""
-        full = np.zeros((runs, len(self.kept)))
+        full = np.zeros((runs, self.told))
         for i, row in enumerate(self.module.settled(steady, self.values(flat, runs))):
             full[:, i] = row
         return full
+
+    def modes(self, kept: np.ndarray, time: Any, reference: Any, values: list[Any]) -> np.ndarray:
+        """On which side of each kink runs are, 1 beyond and 0 before it, shape (kinks, ...), from what is `kept`
+        (states or all of it, ...): modes that remember are as they are kept, and where they are not, those in which a
+        run begins there."""
+        sides = self.module.surfaces(kept[: len(self.states)], time, reference, values)
+        modes = np.zeros((len(self.kinks), *kept.shape[1:]))
+        for k, side in enumerate(sides):
+            modes[k] = np.asarray(side) > 0
+        if len(kept) == len(self.kept):
+            modes[list(self.switches)] = kept[self.told :]
+        return modes
+
+    def with_modes(self, starts: np.ndarray, reference: Any, values: list[Any]) -> np.ndarray:
+        """Starts, shape (runs, told or kept), with the modes that remember in which a run begins there."""
+        if starts.shape[1] == len(self.kept):
+            return starts
+        modes = self.modes(starts.T, 0.0, reference, values)[list(self.switches)]
+        return np.hstack([starts, modes.T])
 
     def values(self, flat: dict[str, Any], runs: int) -> list[np.ndarray]:
         """The parameters of each run [SI], each of shape (runs,), from flat keys to numbers or arrays."""

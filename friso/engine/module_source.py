@@ -73,8 +73,9 @@ def _numbers(model: Model, writer: StepWriter, lanes: int) -> str:
         f"OUTPUTS = { {name: (each.unit, each.label) for name, each in model.outputs.items()}!r}",
         f"STATES, KINKS, CONSTANTS = {len(states)}, {len(model.kinks)}, {writer.layout.constants}",
         f"GIVEN_NAMES = {tuple(given)!r}",
-        f"HELD_NAMES = {tuple(str(each.symbol) for each in model.held)!r}",
-        f"INPUTS, HELD, CLOCKED = {len(model.inputs)}, {len(model.held)}, {model.clock is not None}",
+        f"HELD_NAMES = {tuple(map(str, model.kept))!r}",
+        f"INPUTS, HELD, CLOCKED = {len(model.inputs)}, {len(model.kept)}, {model.clock is not None}",
+        *([f"SWITCHES = {switches!r}"] if (switches := writer.switches) else []),
         *_clock_numbers(model, writer),
         f"DENSE, POSITION, VELOCITY = {writer.layout.dense}, {', '.join(map(str, _places(model, model.stage)))}",
         f"CART_POSITION, CART_VELOCITY = {', '.join(map(str, _places(model, model.cart)))}",
@@ -104,9 +105,9 @@ def _clock_numbers(model: Model, writer: StepWriter) -> list[str]:
 def _numpy_functions(model: Model, writer: StepWriter) -> str:
     names: dict[sp.Symbol, str] = {p: f"p[{i}]" for i, p in enumerate(model.parameters)}
     names |= {s: f"x[{i}]" for i, s in enumerate(model.symbols)}
-    names |= {kink.beyond: f"m[{k}]" for k, kink in enumerate(model.kinks)}
     names |= {r: f"r[{i}]" for i, r in enumerate(model.given)} | {TIME: "t"}
     names |= {s: f"s[{i}]" for i, s in enumerate(STEADY)}
+    names |= {kink.beyond: f"m[{k}]" for k, kink in enumerate(model.kinks)}
     rename: Rename = names.__getitem__
     functions = {
         "constants(p)": writer.constants.expressions,
@@ -116,7 +117,7 @@ def _numpy_functions(model: Model, writer: StepWriter) -> str:
         "breakaway(p)": [model.breakaway],
         "stiffness(p)": [model.stiffness],
         "settled(s, p)": model.settled,
-        "surfaces(x, t, r, p)": [kink.surface for kink in model.kinks],
+        "surfaces(x, t, r, p)": [kink.at_start for kink in model.kinks],
         "right_hand_side(x, m, t, r, p)": model.rhs,
         "outputs(x, m, t, r, p)": [each.expression for each in model.outputs.values()],
     }

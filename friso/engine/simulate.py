@@ -55,8 +55,8 @@ def sampled_outputs(shape: Kernel, flat: dict[str, Any], states: np.ndarray, tim
     rows = motion.pieces(flat, 1)[0]
     active = rows[np.searchsorted(rows[:, 0], time, side="right") - 1]
     since, reference = time - active[:, 0], active[:, 1:].T
-    modes = [s > 0 for s in shape.module.surfaces(states, since, reference, parameters)]
-    outputs = shape.module.outputs(states, np.array(modes, dtype=float), since, reference, parameters)
+    modes = shape.modes(states, since, reference, parameters)
+    outputs = shape.module.outputs(states, modes, since, reference, parameters)
     return [np.broadcast_to(np.asarray(output, dtype=float), time.shape) for output in outputs]
 
 

@@ -84,9 +84,9 @@ class StepWriter:
         self.constants = Constants(model.parameters)
         self._index = {symbol: i for i, symbol in enumerate(model.symbols)}
         self._position, self._velocity = self._index[model.stage.position], self._index[model.stage.velocity]
-        self._fixed = {kink.beyond: f"mode{k}" for k, kink in enumerate(model.kinks)}
         self._given = [f"given{i}" for i in range(len(model.given))]
-        self._fixed |= dict(zip(model.given, self._given, strict=True))
+        self._fixed = dict(zip(model.given, self._given, strict=True))
+        self._fixed |= {kink.beyond: f"mode{k}" for k, kink in enumerate(model.kinks)}
         self._jacobian = self._nonzero_jacobian()
         self._drift = {i: d for i, f in enumerate(model.rhs) if (d := sp.diff(f, TIME)) != 0}
         force = model.outputs["force"].expression if "force" in model.outputs else sp.S.Zero
@@ -146,6 +146,11 @@ class StepWriter:
 
         return name
 
+    @property
+    def switches(self) -> tuple[int, ...]:
+        """The numbers of the modes that remember, among the kinks."""
+        return tuple(map(self.model.kinks.index, self.model.switches))
+
     def source(self) -> str:
         """The function `step(B, rtol, inner, outer, budget)` over the lanes' buffer."""
         body = [
@@ -198,7 +203,8 @@ class StepWriter:
 
     def update_source(self) -> str:
         """The function `update(B)`: tables are looked up, and the numbers that are held become what follows from the
-        sample just taken, in the lanes that have `ticked`; and when they will next."""
+        sample just taken, in the lanes that have `ticked`; and when they will next. Modes that remember are kept as
+        they are at the beginning of the step."""
         clock, name = self.model.clock, self._in_buffer()
         lines = [f"ticked, tick = {self._row('ticked')}, {self._row('tick')}", "instant = 0.0"]
         if clock:
@@ -212,6 +218,8 @@ class StepWriter:
         for symbol, value in held.items():
             row = self._row("reference", self.model.given.index(symbol))
             lines.append(f"{row} = {value} if ticked > 0.0 else {row}")
+        for k, switch in zip(self.switches, self.model.switches, strict=True):
+            lines.append(f"{self._row('reference', self.model.given.index(switch.beyond))} = {self._row('mode', k)}")
         lines.append(f"{self._row('tick')} = tick + ticked")
         if clock:
             due = self._row("due")

@@ -73,7 +73,7 @@ def as_built(form: AsBuilt) -> Model:
     from dataclasses import replace
 
     from friso.equations.component import Clock, key, state
-    from friso.equations.model import assemble
+    from friso.equations.model import assemble, resets
     from friso.equations.sampled import SAMPLE_TIME
 
     model = assemble(form.structure, lambda stage: _cable(stage.position, stage.velocity), _drive(form))
@@ -83,7 +83,8 @@ def as_built(form: AsBuilt) -> Model:
     varied = {key(f"friction.{name}"): key(f"friction.{name}") * state(f"{name}_factor") for name in _LEVELS}
     states = tuple(replace(each, derivative=_shaken(each).xreplace(varied)) for each in model.states)
     outputs = {n: replace(each, expression=each.expression.xreplace(varied)) for n, each in model.outputs.items()}
-    return replace(model, states=states, outputs=outputs, clock=clock)
+    kinks = tuple(kink.with_values(varied) for kink in model.kinks)
+    return replace(model, states=states, outputs=outputs, kinks=kinks, jumps=resets(kinks), clock=clock)
 
 
 _LEVELS = ("static", "coulomb")

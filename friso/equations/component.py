@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any, cast
 
 import sympy as sp
 
@@ -115,6 +116,52 @@ class Kink:
     def sign(self) -> sp.Expr:
         """+1 beyond the surface, -1 before it."""
         return 2 * self.beyond - 1
+
+    @property
+    def at_start(self) -> sp.Expr:
+        """Positive in the states from which a run begins beyond."""
+        return self.surface
+
+    def with_values(self, values: Mapping[Any, Any]) -> Kink:
+        """The same with expressions put in the place of others."""
+        return Kink(self.name, cast(sp.Expr, self.surface.xreplace(values)))
+
+
+@dataclass(frozen=True)
+class Switch(Kink):
+    """A mode that remembers, such as the slip of an element: which side it is on depends on how the motion came there.
+
+    It is entered where `enter` rises through 0 and left where `leave` does; `beyond` is 1 in it. `begins` is positive
+    in the states in which a run begins in the mode where nothing else tells; it contains no mode. `entered` and `left`
+    are what states become on entering and on leaving, in terms of what they were; the other states go on as they were.
+    """
+
+    surface: sp.Expr = field(init=False, compare=False)
+    enter: sp.Expr
+    leave: sp.Expr
+    begins: sp.Expr
+    entered: Mapping[sp.Symbol, sp.Expr] = field(default_factory=dict, compare=False)
+    left: Mapping[sp.Symbol, sp.Expr] = field(default_factory=dict, compare=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "surface", (1 - self.beyond) * self.enter - self.beyond * self.leave)
+
+    @property
+    def at_start(self) -> sp.Expr:
+        return self.begins
+
+    @property
+    def becomes(self) -> dict[sp.Symbol, sp.Expr]:
+        """What states become where the mode changes, `beyond` being what it was before."""
+        changed = dict.fromkeys((*self.entered, *self.left))
+        return {x: (1 - self.beyond) * self.entered.get(x, x) + self.beyond * self.left.get(x, x) for x in changed}
+
+    def with_values(self, values: Mapping[Any, Any]) -> Switch:
+        enter, leave, begins = (cast(sp.Expr, each.xreplace(values)) for each in (self.enter, self.leave, self.begins))
+        entered, left = (
+            {x: cast(sp.Expr, e.xreplace(values)) for x, e in each.items()} for each in (self.entered, self.left)
+        )
+        return Switch(self.name, enter, leave, begins, entered, left)
 
 
 @dataclass(frozen=True)

@@ -51,7 +51,7 @@ def imposed(form: Imposed) -> Model:
 
     from friso.equations.component import Output, Role, State, key, state
     from friso.equations.masses import Body
-    from friso.equations.model import MOTION_SIZE, Model
+    from friso.equations.model import MOTION_SIZE, Model, resets
 
     body, period = Body.named("", sp.oo), 1 / key(FREQUENCY)  # nothing acts back on a motion that is imposed
     position, velocity = body.position, body.velocity
@@ -76,6 +76,7 @@ def imposed(form: Imposed) -> Model:
         rate=2 * sp.pi,
         breakaway=friction.breakaway,
         stiffness=sp.S.Zero,
+        jumps=resets(friction.component.kinks),
     )
 
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 import sympy as sp
 
-from friso.equations.component import STEADY, TICK, TIME, Clock, Component, Held, Kink, Output, State, key
+from friso.equations.component import STEADY, TICK, TIME, Clock, Component, Held, Kink, Output, State, Switch, key
 from friso.equations.friction.common import Friction
 from friso.equations.joint import joint
 from friso.equations.masses import Body, parasitic_force, position_outputs
@@ -72,21 +72,38 @@ class Model:
         return tuple(each.settled for each in (*self.states, *self.held))
 
     @property
+    def switches(self) -> tuple[Switch, ...]:
+        """The modes that remember."""
+        return tuple(kink for kink in self.kinks if isinstance(kink, Switch))
+
+    @property
+    def kept(self) -> tuple[sp.Symbol, ...]:
+        """What a run has besides its states: numbers held, and the modes that remember."""
+        return (*(each.symbol for each in self.held), *(switch.beyond for switch in self.switches))
+
+    @property
     def given(self) -> tuple[sp.Symbol, ...]:
-        """What the right-hand side finds as it is during a step: inputs, numbers held, and what is looked up."""
-        return (*self.inputs, *(each.symbol for each in self.held), *(self.clock.tabled if self.clock else ()))
+        """What the right-hand side finds as it is during a step: inputs, what is kept, and what is looked up."""
+        return (*self.inputs, *self.kept, *(self.clock.tabled if self.clock else ()))
 
     @property
     def parameters(self) -> tuple[sp.Symbol, ...]:
         """The stage-file keys (and the length of the motion) that the equations contain, sorted by name."""
         expressions = [*self.rhs, *(k.surface for k in self.kinks), *(o.expression for o in self.outputs.values())]
         expressions += [*(each.scale for each in self.states), *(each.update for each in self.held), *self.settled]
+        expressions += [*(k.at_start for k in self.kinks), *(e for jump in self.jumps.values() for e in jump.values())]
         others = {*self.symbols, *(k.beyond for k in self.kinks), *self.given, TIME, TICK, *STEADY}
         if self.clock:
             expressions += [self.clock.period, self.clock.late]
             others |= {*self.clock.seen}
         free: set[Any] = set().union(*(e.free_symbols for e in expressions)) - others
         return tuple(sorted(free, key=str))
+
+
+def resets(kinks: Iterable[Kink]) -> dict[Kink, dict[sp.Symbol, sp.Expr]]:
+    """By how much states jump where a mode that remembers changes (see `Model.jumps`)."""
+    switches = (kink for kink in kinks if isinstance(kink, Switch))
+    return {switch: {x: new - x for x, new in becomes.items()} for switch in switches if (becomes := switch.becomes)}
 
 
 Control = Callable[[Loop, sp.Expr, sp.Expr], Controller]
@@ -122,11 +139,12 @@ def assemble(structure: Structure, external: External | None = None, control: Co
     }
     for part in parts:
         outputs |= part.outputs
+    kinks = tuple(kink for part in parts for kink in part.kinks)
     return Model(
         states=(*bodies, *(each for part in parts for each in part.states)),
         stage=stage,
         cart=cart,
-        kinks=tuple(kink for part in parts for kink in part.kinks),
+        kinks=kinks,
         outputs=outputs,
         deviation=stage.position - reference,
         deviation_rate=stage.velocity - reference_velocity,
@@ -134,6 +152,7 @@ def assemble(structure: Structure, external: External | None = None, control: Co
         rate=rate,
         breakaway=friction.breakaway if friction else sp.S.Zero,
         stiffness=loop_stiffness(structure.controller),
+        jumps=resets(kinks),
         held=acting.held if acting else (),
     )
 

@@ -1,18 +1,19 @@
 """The variational equations: how a small deviation from a motion evolves beside it.
 
 Between kinks the deviation obeys the linearised equations. Where a kink is crossed at which the right-hand side
-itself jumps, the deviation jumps with it, since the motion beside crosses a little earlier or later: the saltation
-matrix (Leine, Nijmeijer 2004, doi:10.1007/978-3-540-44398-8, chapter 7).
+itself jumps, or the state does, the deviation jumps with it, since the motion beside crosses a little earlier or later:
+the saltation matrix (Leine, Nijmeijer 2004, doi:10.1007/978-3-540-44398-8, chapter 7).
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import cast
 
 import sympy as sp
 
-from friso.equations.component import TIME, Kink, Role, State, state
+from friso.equations.component import TIME, Kink, Role, State, Switch, state
 from friso.equations.model import Model
 
 PREFIX = "small_"
@@ -28,8 +29,10 @@ def variational(model: Model) -> Model:
         )
         for each in model.states
     )
-    jumps = {kink: found for kink in model.kinks if (found := _saltation(model, kink, small))}
-    return replace(model, states=(*model.states, *deviations), jumps=jumps)
+    jumps = {kink: {**model.jumps.get(kink, {}), **_saltation(model, kink, small)} for kink in model.kinks}
+    return replace(
+        model, states=(*model.states, *deviations), jumps={kink: jump for kink, jump in jumps.items() if jump}
+    )
 
 
 Small = Mapping[sp.Symbol, sp.Symbol]
@@ -43,15 +46,33 @@ def _along(expression: sp.Expr, small: Small) -> sp.Expr:
 
 def _saltation(model: Model, kink: Kink, small: Small) -> dict[sp.Symbol, sp.Expr]:
     """By how much the deviations jump at a kink: (f+ - f-) times their share across it over the speed of crossing."""
+    speed = sp.diff(kink.surface, TIME)
+    speed += sum((sp.diff(kink.surface, each.symbol) * each.derivative for each in model.states), start=sp.S.Zero)
+    share = _along(kink.surface, small) / speed
+    if isinstance(kink, Switch):
+        return _saltation_with_reset(model, kink, small, share)
     across = {
         each.symbol: gap * (1 - 2 * kink.beyond)
         for each in model.states
         if not _vanishes(gap := each.derivative.subs(kink.beyond, 1) - each.derivative.subs(kink.beyond, 0), kink)
     }
-    speed = sp.diff(kink.surface, TIME)
-    speed += sum((sp.diff(kink.surface, each.symbol) * each.derivative for each in model.states), start=sp.S.Zero)
-    share = _along(kink.surface, small) / speed
     return {small[x]: gap * share for x, gap in across.items()}
+
+
+def _saltation_with_reset(model: Model, switch: Switch, small: Small, share: sp.Expr) -> dict[sp.Symbol, sp.Expr]:
+    """The same where states become R(x): the deviations become DR small + (f+ - DR f-) share, f+ taken at R(x)."""
+    becomes = switch.becomes
+    behind = {**becomes, switch.beyond: 1 - switch.beyond}
+    before = {each.symbol: each.derivative for each in model.states}
+    jumps: dict[sp.Symbol, sp.Expr] = {}
+    for x, rate in before.items():
+        if x not in becomes and not rate.free_symbols & {switch.beyond, *becomes}:
+            continue
+        new = becomes.get(x, x)
+        carried = _along(new, small)
+        moved = sum((sp.diff(new, y) * before[y] for y in before), start=sp.S.Zero)
+        jumps[small[x]] = carried - small[x] + (cast(sp.Expr, rate.xreplace(behind)) - moved) * share
+    return jumps
 
 
 def _vanishes(gap: sp.Expr, kink: Kink) -> bool:

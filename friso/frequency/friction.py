@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING, Any
@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import sympy as sp
 
-from friso.equations.component import state
+from friso.equations.component import Switch, state
 from friso.equations.structure import shared_structure
 from friso.frequency.declared import Declared, solved
 from friso.stage.stage import numeric_keys
@@ -31,16 +31,22 @@ SLOWEST, FASTEST = 1e-3, 1e3
 SLOW, FAST = 0.1, 1e5
 """Rates [1/s] at which bristles give way at the least and the greatest speed, of a law that names no speed."""
 
+BRISTLES = 1e-6
+"""Length [m] for that of the bristles of a law that has none: its force is alike at all speeds."""
+
 
 @dataclass(frozen=True)
 class Law:
     """A friction law as a linear system from the velocity of the cart to its force, and its steady states: those of its
-    internal states that slide at a velocity, and that bear a bias force at rest."""
+    internal states, and then of its modes that remember, that slide at a velocity, and that bear a bias force at rest;
+    and the lengths [m] among the scales of its states."""
 
     declared: Declared
+    modes: tuple[str, ...]
     sliding: Callable[[Mapping[str, Any]], list[Any]]
     stuck: Callable[[Mapping[str, Any]], list[Any]]
     force: Callable[[Mapping[str, Any]], list[Any]]
+    lengths: Callable[[Mapping[str, Any]], list[Any]]
 
     @property
     def states(self) -> tuple[str, ...]:
@@ -58,14 +64,36 @@ def _law(name: str, variant: Hashable) -> Law | None:
     friction = friction_law(name).declare(VELOCITY, variant)
     if friction is None:
         return None
-    states = tuple(state.symbol for state in friction.component.states)
-    rates = tuple(state.derivative for state in friction.component.states)
-    declared = Declared(states, rates, {"velocity": VELOCITY}, {"force": friction.force})
-    sliding = solved(rates, states) if states else []
-    at_rest = friction.force.subs(VELOCITY, 0) - BIAS
-    stuck = solved([at_rest], states) if states else []
-    steady = friction.force.subs(dict(zip(states, sliding, strict=True)))
-    return Law(declared, _compiled(sliding), _compiled(stuck), _compiled([steady]))
+    component = friction.component
+    states = tuple(state.symbol for state in component.states)
+    rates = tuple(state.derivative for state in component.states)
+    modes = tuple(kink.beyond for kink in component.kinks if isinstance(kink, Switch))
+    left: dict[Any, Any] = dict.fromkeys(modes, sp.S.Zero)
+    sliding = friction.sliding or dict(zip(states, solved(rates, states) if states else [], strict=True))
+    slid: dict[Any, Any] = {x: sp.sympify(sliding.get(x, 0)) for x in (*states, *modes)}
+    stuck = _stuck(states, [rate.subs(left) for rate in rates], friction.force.subs(left)) | left
+    lengths = [state.scale for state in component.states if state.unit == "m"]
+    return Law(
+        Declared(states, rates, {"velocity": VELOCITY}, {"force": friction.force}),
+        tuple(map(str, modes)),
+        _compiled([*slid.values()]),
+        _compiled([*stuck.values()]),
+        _compiled([friction.force.subs(slid)]),
+        _compiled(lengths),
+    )
+
+
+def _stuck(states: Sequence[sp.Symbol], rates: Sequence[sp.Expr], force: sp.Expr) -> dict[sp.Symbol, sp.Expr]:
+    """The internal states that bear the bias at rest: all pulled as far as the cart, from where they bear nothing."""
+    pulled = sp.Symbol("pulled", real=True)
+    relaxed: dict[Any, Any] = {VELOCITY: 0, **dict.fromkeys(states, 0)}
+    ways: dict[Any, Any] = {
+        x: sp.diff(rate, VELOCITY).subs(relaxed) * pulled for x, rate in zip(states, rates, strict=True)
+    }
+    if not ways:
+        return {}
+    (far,) = solved([force.subs(VELOCITY, 0).subs(ways) - BIAS], [pulled])
+    return {x: way.subs(pulled, far) for x, way in ways.items()}
 
 
 def _compiled(expressions: list[sp.Expr]) -> Callable[[Mapping[str, Any]], list[Any]]:
@@ -94,12 +122,14 @@ def speeds(flat: Mapping[str, Any], count: int) -> np.ndarray:
     named = [flat[key] for key, unit in units.items() if unit == "m/s" and key in flat]
     if named:
         return np.geomspace(SLOWEST * min(named), FASTEST * max(named), count)
-    bristles = flat["friction.coulomb"] / flat["friction.bristle_stiffness"]
-    return np.geomspace(SLOW * bristles, FAST * bristles, count)
+    law = law_of(flat)
+    bristles = (law.lengths(flat) if law else []) or [BRISTLES]
+    return np.geomspace(SLOW * min(bristles), FAST * max(bristles), count)
 
 
 def operating_point(flat: Mapping[str, Any], members: Members) -> dict[str, Any]:
-    """Values of the internal states of the law and of its direction, by name, each of shape (members,)."""
+    """Values of the internal states of the law, of its modes that remember and of its direction, by name, each of shape
+    (members,)."""
     law, forward = law_of(flat), members.forward.astype(float)
     if law is None:
         return {}
@@ -108,6 +138,6 @@ def operating_point(flat: Mapping[str, Any], members: Members) -> dict[str, Any]
     sliding, stuck = law.sliding(at), law.stuck({**at, "bias": sign * members.bias})
     internal = {
         name: np.where(members.stuck, rest, moving)
-        for name, rest, moving in zip(law.states, stuck, sliding, strict=True)
+        for name, rest, moving in zip((*law.states, *law.modes), stuck, sliding, strict=True)
     }
     return {FORWARD: forward, **internal}

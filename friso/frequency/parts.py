@@ -37,7 +37,9 @@ def plant(flat: Mapping[str, Any], members: Members) -> System:
     values |= {"beyond_stroke_ahead": members.touched.astype(float), "beyond_stroke_behind": 0.0}
     system = form.declared.at(values, len(members))
     law = law_of(flat)
-    return _following(system, form.cart, law.states) if law is not None and members.stuck.all() else system
+    if law is None:
+        return system
+    return _following(system, form.cart, law.states) if members.stuck.all() else _without_constants(system, law.states)
 
 
 def mechanics(flat: Mapping[str, Any], touched: np.ndarray) -> System:
@@ -113,3 +115,13 @@ def _following(system: System, cart: tuple[str, str], internal: tuple[str, ...])
     return replace(
         system, a=a[:, external][:, :, external], b=system.b[:, external], c=c[:, :, external], states=states
     )
+
+
+def _without_constants(system: System, internal: tuple[str, ...]) -> System:
+    """The system without those internal states of the friction law that stay as they are, such as the force of an
+    element that slips: each would be a pole at 0."""
+    still = [z for z in map(system.states.index, internal) if not (system.a[:, z].any() or system.b[:, z].any())]
+    moving = [i for i in range(len(system.states)) if i not in still]
+    states = tuple(system.states[i] for i in moving)
+    a, b, c = system.a[:, moving][:, :, moving], system.b[:, moving], system.c[:, :, moving]
+    return replace(system, a=a, b=b, c=c, states=states)

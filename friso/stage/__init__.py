@@ -2,6 +2,7 @@
 
 from friso.quantities import Number, Quantity, Value
 from friso.stage.files import load, loads, parse_set, save
+from friso.stage.lists import Several, Values, element_keys
 from friso.stage.section import Rule, Section
 from friso.stage.stage import Stage, numeric_keys, violations
 from friso.stage.tables import FrictionSection, register_friction
@@ -12,8 +13,11 @@ __all__ = [
     "Quantity",
     "Rule",
     "Section",
+    "Several",
     "Stage",
     "Value",
+    "Values",
+    "element_keys",
     "load",
     "loads",
     "numeric_keys",

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Annotated, Any, ClassVar, Self
 
-from pydantic import GetCoreSchemaHandler, model_validator
-from pydantic_core import CoreSchema, core_schema
+from pydantic import model_validator
 
 from friso.errors import InputError, StageError
 from friso.quantities import (
@@ -15,12 +14,12 @@ from friso.quantities import (
     Number,
     Quantity,
     Value,
-    as_toml,
     at_least_1,
     non_negative,
     positive,
     quoted,
 )
+from friso.stage.lists import Several, Values
 from friso.stage.section import Rule, Section, UncertainSection
 
 share = Bound("0 or greater, below 1", lambda value: (value >= 0) & (value < 1))
@@ -125,46 +124,6 @@ class Cable(UncertainSection):
 
     stiffness: Annotated[Value, Quantity("N/m", non_negative, "50 N/m")] = Value(0, "0 N/m")
     drag: Annotated[Value, Quantity("N*s/m", non_negative, "0.5 N*s/m")] = Value(0, "0 N*s/m")
-
-
-class Values(tuple[Value, ...]):
-    """An array of dimensioned values."""
-
-    @property
-    def text(self) -> list[str]:
-        """What the user wrote."""
-        return [value.text for value in self]
-
-
-@dataclass(frozen=True)
-class Several:
-    """A key that takes an array of at least two quantities; the examples are those of its values."""
-
-    of: Quantity
-    examples: tuple[str, ...]
-
-    @property
-    def expected(self) -> str:
-        """What the key takes, in words."""
-        return f"an array of two or more, each {self.of.expected}"
-
-    @property
-    def written_example(self) -> str:
-        """The example as it stands in a file."""
-        return f"[{', '.join(map(as_toml, self.examples))}]"
-
-    def read(self, entry: Any) -> Values:
-        """The values of an array. Raises StageError."""
-        if not isinstance(entry, list | tuple) or len(entry) < 2:
-            hint = f"of {len(entry)}" if isinstance(entry, list | tuple) else "not an array"
-            raise StageError("", quoted(entry, hint), self.expected, self.written_example)
-        try:
-            return Values(self.of.read(item) for item in entry)
-        except InputError as error:
-            raise StageError("", error.given, self.expected, self.written_example) from None
-
-    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        return core_schema.no_info_plain_validator_function(self.read)
 
 
 _PER_ROOT_HERTZ = re.compile(r"\s*/\s*(Hz(\^|\*\*)0\.5|sqrt\(Hz\)|√Hz)\s*$")

@@ -19,6 +19,7 @@ from pydantic_core import CoreSchema, core_schema
 from friso.errors import InputError
 from friso.intervals import Interval, UncertainValue, is_range, uncertain_value
 from friso.quantities import Number, Quantity, as_toml, quoted
+from friso.stage.lists import Several, Values
 
 
 @dataclass(frozen=True)
@@ -58,15 +59,34 @@ class UncertainSection(Section):
     @field_validator("*", mode="wrap")
     @classmethod
     def _read_uncertain(cls, value: Any, read: ValidatorFunctionWrapHandler, info: ValidationInfo) -> Any:
-        text = getattr(value, "text", value)
-        if is_range(text) and (field := numeric_fields(cls).get(str(info.field_name))):
+        key, text = str(info.field_name), getattr(value, "text", value)
+        if (field := numeric_fields(cls).get(key)) and is_range(text):
             return uncertain_value(text, field)
+        if several := list_fields(cls).get(key):
+            return several.read(value, lambda item: _perhaps_uncertain(item, several.of))
         return read(value)
+
+    @property
+    def numbers(self) -> dict[str, Any]:
+        """The values by key; those of an array by key and number, from 1."""
+        values: dict[str, Any] = {}
+        for key, value in self:
+            if isinstance(value, Values):
+                values |= {f"{key}.{number}": item for number, item in enumerate(value, start=1)}
+            else:
+                values[key] = value
+        return values
 
     def uncertain(self) -> dict[str, Interval]:
         """The intervals of the uncertain quantities by key, those without width left out."""
-        values = {key: value.interval for key, value in self if isinstance(value, UncertainValue)}
+        values = {key: value.interval for key, value in self.numbers.items() if isinstance(value, UncertainValue)}
         return {key: interval for key, interval in values.items() if interval.low < interval.high}
+
+
+def _perhaps_uncertain(value: Any, field: Quantity | Number) -> Any:
+    """The value of an element, uncertain where its text has a range. Raises InputError."""
+    text = getattr(value, "text", value)
+    return uncertain_value(text, field) if is_range(text) else field.read(value)
 
 
 SectionClass = TypeVar("SectionClass", bound=type[Section])
@@ -117,6 +137,12 @@ def numeric_fields(cls: type[Section]) -> dict[str, Quantity | Number]:
     """Unit, bound and example of each numeric key of a table."""
     items = ((key, item) for key, field in cls.model_fields.items() for item in field.metadata)
     return {key: item for key, item in items if isinstance(item, Quantity | Number)}
+
+
+def list_fields(cls: type[Section]) -> dict[str, Several]:
+    """The keys of a table that take an array, and what of."""
+    items = ((key, item) for key, field in cls.model_fields.items() for item in field.metadata)
+    return {key: item for key, item in items if isinstance(item, Several)}
 
 
 def nearest(name: Any, names: Iterable[str]) -> str | None:

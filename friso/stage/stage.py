@@ -10,8 +10,9 @@ from friso.errors import InputError, StageError
 from friso.intervals import Interval
 from friso.quantities import Number, Quantity, as_toml, quoted
 from friso.stage.flexure import Flexure, derived, with_material
-from friso.stage.rig import Cable, Drive, Floor, Rail, Values
-from friso.stage.section import Rule, Section, Table, UncertainSection, numeric_fields, unknown_key
+from friso.stage.lists import element_keys
+from friso.stage.rig import Cable, Drive, Floor, Rail
+from friso.stage.section import Rule, Section, Table, UncertainSection, list_fields, numeric_fields, unknown_key
 from friso.stage.tables import (
     FRICTION,
     MOTION,
@@ -130,7 +131,7 @@ class Stage(Section):
         """The values that a rule is about, as the user wrote them."""
         pairs = [key.split(".") for key in rule.keys]
         values = [(name, getattr(getattr(self, table), name)) for table, name in pairs if getattr(self, table)]
-        return ", ".join(f"{name} = {quoted(getattr(value, 'text', value))}" for name, value in values)
+        return ", ".join(f"{name} = {_written(getattr(value, 'text', value))}" for name, value in values)
 
     def given(self) -> dict[str, Any]:
         """The stage file as nested tables: the keys that the user gave, with the values as written."""
@@ -139,15 +140,15 @@ class Stage(Section):
 
     def flat(self, swept: Mapping[str, Any] | None = None) -> dict[str, Any]:
         """Dotted keys to SI floats, texts and booleans; defaults filled in, absent optional keys absent, and so are
-        the arrays of [floor].
+        the arrays of [floor]. The elements of any other array are numbered from 1: friction.element_stiffness.2.
 
         `swept`, dotted keys to SI numbers or arrays, is laid over the stage before the defaults that follow
         other keys are filled in: tuned_mass follows a swept mass. Raises StageError for an unknown key.
         """
         flat: dict[str, Any] = {"friction.model": "none"}
         for table, section in self:
-            if isinstance(section, Section):
-                values = {key: value for key, value in section if not isinstance(value, Values | None)}
+            if isinstance(section, UncertainSection):
+                values = {key: value for key, value in section.numbers.items() if value is not None}
                 flat |= {f"{table}.{key}": _plain(value) for key, value in values.items()}
         keys = numeric_keys(flat)
         if self.flexure:
@@ -202,8 +203,12 @@ class Stage(Section):
 
 def numeric_keys(flat: Mapping[str, Any]) -> dict[str, Quantity | Number]:
     """Unit, bound and example of every numeric key that a stage with these tables can have."""
-    fields = {name: numeric_fields(cls) for name, cls in _tables(flat).items()}
-    return {f"{name}.{key}": field for name, table in fields.items() for key, field in table.items()}
+    keys: dict[str, Quantity | Number] = {}
+    for name, cls in _tables(flat).items():
+        keys |= {f"{name}.{key}": field for key, field in numeric_fields(cls).items()}
+        for key, several in list_fields(cls).items():
+            keys |= dict.fromkeys(element_keys(flat, f"{name}.{key}"), several.of)
+    return keys
 
 
 def violations(flat: Mapping[str, Any]) -> list[tuple[Any, str]]:
@@ -248,6 +253,11 @@ def _toml(value: Any) -> str:
     return f"[{', '.join(map(as_toml, value))}]" if isinstance(value, list) else as_toml(value)
 
 
+def _written(value: Any) -> str:
+    """A key's value in an error message."""
+    return f"[{', '.join(map(quoted, value))}]" if isinstance(value, list) else quoted(value)
+
+
 def _plain(value: Any) -> Any:
     """Numbers as plain floats; texts and booleans as they are."""
     return value if isinstance(value, bool | str) else float(value)
@@ -263,13 +273,26 @@ def _with_defaults(flat: dict[str, Any]) -> dict[str, Any]:
 
 
 def _put(tables: dict[str, Any], key: str, value: Any) -> None:
-    """Set or (None) remove a dotted key of nested tables. Raises StageError."""
+    """Set or (None) remove a dotted key of nested tables, or set an element of an array. Raises StageError."""
     *path, last = key.split(".")
     for name in path:
         tables = tables.setdefault(name, {})
+        if isinstance(tables, list) and name == path[-1]:
+            _put_element(tables, key, value)
+            return
         if not isinstance(tables, dict):
             raise StageError(key, "an unknown key", f"{name} is no table", 'controller.crossover="12 Hz"')
     if value is not None:
         tables[last] = value
     elif tables.pop(last, None) is None:
         raise StageError(key, "a key to remove", "a key that the stage has")
+
+
+def _put_element(values: list[Any], key: str, value: Any) -> None:
+    """Set the element of an array that a dotted key ends with the number of. Raises StageError."""
+    array, _, number = key.rpartition(".")
+    if not (number.isascii() and number.isdigit() and 1 <= int(number) <= len(values)):
+        raise StageError(key, f"the element {number}", f"a number from 1 to {len(values)}", f"{array}.1")
+    if value is None:
+        raise StageError(key, "an element to remove", f"the whole array {array} without it")
+    values[int(number) - 1] = value

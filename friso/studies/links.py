@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import operator
+import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -25,6 +26,9 @@ _OPERATORS: dict[type, Any] = {
     ast.UAdd: operator.pos,
 }
 _FUNCTIONS: dict[str, Any] = {"min": np.minimum, "max": np.maximum, "sqrt": np.sqrt, "abs": np.abs}
+_ELEMENT = re.compile(r"\b([A-Za-z_]\w*\.[A-Za-z_]\w*)\.([0-9]+)\b")
+"""The key of an element of an array, friction.element_stiffness.2; Python would write [2]."""
+
 _ARGUMENTS = {"min": 2, "max": 2, "sqrt": 1, "abs": 1}
 
 
@@ -34,10 +38,10 @@ def names(links: Mapping[str, str]) -> frozenset[str]:
     called = {id(node.func) for tree in trees for node in ast.walk(tree) if isinstance(node, ast.Call)}
     keys = set()
     for tree in trees:
-        inner = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Attribute)}
+        inner = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Attribute | ast.Subscript)}
         for node in ast.walk(tree):
-            if isinstance(node, ast.Name | ast.Attribute) and id(node) not in called | inner:
-                keys.add(ast.unparse(node))
+            if isinstance(node, ast.Name | ast.Attribute | ast.Subscript) and id(node) not in called | inner:
+                keys.add(_name(node))
     return frozenset(keys)
 
 
@@ -66,7 +70,7 @@ def linked(links: Mapping[str, str], values: Mapping[str, Any]) -> dict[str, Any
 
 def _parsed(key: str, text: str) -> ast.expr:
     try:
-        tree = ast.parse(text.strip(), mode="eval").body
+        tree = ast.parse(_ELEMENT.sub(r"\1[\2]", text.strip()), mode="eval").body
         _check(tree)
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         raise InputError(key, quoted(text), "numbers, names, + - * / **, min, max, sqrt, abs", EXAMPLE) from error
@@ -84,7 +88,7 @@ def _check(node: ast.expr) -> None:
         case ast.Call(ast.Name(name), arguments, []) if _ARGUMENTS.get(name) == len(arguments):
             for argument in arguments:
                 _check(argument)
-        case ast.Attribute(ast.Name(), _) | ast.Name():
+        case ast.Attribute(ast.Name(), _) | ast.Name() | ast.Subscript(ast.Attribute(ast.Name(), _), ast.Constant()):
             pass
         case ast.Constant(value) if type(value) in (int, float):
             pass
@@ -103,4 +107,9 @@ def _value(node: ast.expr, numbers: Mapping[str, Any]) -> Any:
         case ast.Constant(value):
             return np.float64(str(value))
         case _:
-            return np.asarray(numbers[ast.unparse(node)], dtype=float)[()]
+            return np.asarray(numbers[_name(node)], dtype=float)[()]
+
+
+def _name(node: ast.expr) -> str:
+    """The name of a key or an axis, as a stage file has it."""
+    return f"{_name(node.value)}.{ast.unparse(node.slice)}" if isinstance(node, ast.Subscript) else ast.unparse(node)

@@ -24,11 +24,19 @@ COULOMB_BELOW_STATIC = Rule(
 class Friction:
     """A declared friction law: force [N] that opposes the velocity, its component and its scales.
 
-    `breakaway` [N] is the largest force at rest, from which the solver takes its length scale.
+    `breakaway` [N] is the largest force at rest, from which the solver takes its length scale. `sliding` tells the
+    law's own states, and its modes that remember, in a steady motion at the velocity; without it they are those at
+    which the states do not change. At rest all modes that remember have been left.
     """
 
-    def __init__(self, force: sp.Expr, breakaway: sp.Expr, component: Component) -> None:
-        self.force, self.breakaway, self.component = force, breakaway, component
+    def __init__(
+        self,
+        force: sp.Expr,
+        breakaway: sp.Expr,
+        component: Component,
+        sliding: Mapping[sp.Symbol, sp.Expr] | None = None,
+    ) -> None:
+        self.force, self.breakaway, self.component, self.sliding = force, breakaway, component, sliding
 
 
 class Curve(NamedTuple):

@@ -82,14 +82,14 @@ class Imposition:
     def _reaction(self, states: np.ndarray) -> np.ndarray:
         """Friction force and rates of the law's own states, from states (states, count)."""
         module, at_rest = self.kernel.module, np.zeros(3)
-        modes = _rows(module.surfaces(states, 0.0, at_rest, self.values), self.count) > 0
-        rates = module.right_hand_side(states, modes.astype(float), 0.0, at_rest, self.values)
+        modes = self.kernel.modes(states, 0.0, at_rest, self.values)
+        rates = module.right_hand_side(states, modes, 0.0, at_rest, self.values)
         return np.vstack([self.force(states), _rows([rates[i] for i in self.inner], self.count)])
 
     def force(self, states: np.ndarray) -> np.ndarray:
         """Friction force [N] in states of shape (states, ..., count)."""
         module, at_rest = self.kernel.module, np.zeros(3)
-        modes = np.array([surface > 0 for surface in module.surfaces(states, 0.0, at_rest, self.values)], dtype=float)
+        modes = self.kernel.modes(states, 0.0, at_rest, self.values)
         (force,) = module.outputs(states, modes, 0.0, at_rest, self.values)
         return np.broadcast_to(force, states.shape[1:])
 

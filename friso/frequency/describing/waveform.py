@@ -17,7 +17,7 @@ import numpy as np
 import sympy as sp
 from scipy.linalg import solve_banded
 
-from friso.equations.component import Kink, state
+from friso.equations.component import Kink, Switch, state
 from friso.equations.imposed import Imposed, imposed_form
 from friso.errors import InputError
 from friso.stage.tables import friction_law
@@ -38,7 +38,8 @@ class Law:
 
     @classmethod
     def of(cls, flat: Mapping[str, Any]) -> Law:
-        """The law of a stage. Raises InputError for a stage without friction, or a law with more states."""
+        """The law of a stage. Raises InputError for a stage without friction, or a law with more
+        states or with modes that remember."""
         form = imposed_form(flat)
         function, names, remembers = _compiled(form)
         return cls({name: flat[name] for name in names}, function, names, remembers)
@@ -55,6 +56,9 @@ def _compiled(form: Imposed) -> tuple[Callable[..., list[Any]], tuple[str, ...],
     velocity, none = state("velocity"), state("no_state")
     friction = friction_law(form.friction).declare(velocity, form.friction_variant)
     inner = friction.component.states
+    if any(isinstance(kink, Switch) for kink in friction.component.kinks):
+        given = f'"{form.friction}", with modes that remember'
+        raise InputError("friction.model", given, "a law that is smooth but for the direction", 'model = "lugre"')
     if len(inner) > 1:
         law = f'"{form.friction}", with {len(inner)} states of its own'
         raise InputError("friction.model", law, "a law with at most one", 'model = "lugre"')

@@ -99,7 +99,7 @@ class Ensemble:
 
     def rates(self, states: np.ndarray) -> np.ndarray:
         """The time derivative of the states, both of shape (count, states)."""
-        modes = self._modes(states)
+        modes = self.kernel.modes(states.T, 0.0, np.zeros(3), self.values)
         rows = self.kernel.module.right_hand_side(states.T, modes, 0.0, np.zeros(3), self.values)
         return np.stack([np.broadcast_to(row, (self.count,)) for row in rows], axis=1)
 
@@ -109,21 +109,19 @@ class Ensemble:
         rows = self.kernel.module.outputs(states.T, modes, 0.0, np.zeros(3), self.values)
         return np.broadcast_to(rows[list(self.kernel.outputs).index("force")], (self.count,))
 
-    def _modes(self, states: np.ndarray) -> np.ndarray:
-        rows = self.kernel.module.surfaces(states.T, 0.0, np.zeros(3), self.values)
-        return np.array([np.broadcast_to(row, (self.count,)) > 0 for row in rows], dtype=float)
-
     def run(
         self, starts: np.ndarray, durations: np.ndarray, rtol: float, variational: bool = False, **how: Any
     ) -> Results:
-        """Run each stage from its state for its duration [s]; `how` as in `Options`."""
+        """Run each stage from its state for its duration [s]; `how` as in `Options`. Modes that remember are those in
+        which a run begins in that state; `ends` are states alone."""
         options = Options(rtol=rtol, threads=self.threads, cancel=self.cancel, **how)
         flat = {**self.flat, "motion.duration": durations, "motion.displacement": self.length}
         parts = list(run_chunks(kernel(self.structure, variational), flat, self.count, options, starts))
         order = np.argsort(np.concatenate([part.numbers for part in parts]))
         room = max(1, *(int(part.results.turn_counts.max(initial=0)) for part in parts))
         columns = zip(*(_with_room(part.results, room) for part in parts), strict=True)
-        return Results(*(np.concatenate(column)[order] for column in columns))
+        results = Results(*(np.concatenate(column)[order] for column in columns))
+        return results._replace(ends=results.ends[:, : starts.shape[1]])
 
 
 def without_motion(flat: Mapping[str, Any]) -> dict[str, Any]:

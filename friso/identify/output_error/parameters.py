@@ -8,11 +8,16 @@ from typing import Any
 
 import numpy as np
 
+from friso.errors import InputError
+
 MASS, SHARE, RATIO = "mass", "cart share", "static friction ratio"
 """The mass that moves; the cart's share of it, which a rigid stage has as given; static over Coulomb friction."""
 
 HIGHEST_RATIO = 4.0
 """Largest ratio of these that is believed of a bearing; the thesis's rig has 3."""
+
+FITTED = ("lugre", "dahl", "stribeck")
+"""Friction laws whose parameters are fitted."""
 
 SHORTEST, LONGEST = 5e-8, 3e-4
 """Lengths [m] by which bristles are believed to bend at least and at most before they slip."""
@@ -49,12 +54,16 @@ def parameters_of(
 
     `levels` holds first values, of mass, Coulomb and viscous friction and offset, from the inverse model; `speed` [m/s]
     is the highest of the log, `travel` [m] how far it goes: no Stribeck velocity and no bristle can be beyond them.
-    Where it does not go `both_ways`, a constant force and an asymmetry are not told from friction, and left out.
+    Where it does not go `both_ways`, a constant force and an asymmetry are not told from friction, and left out. Raises
+    InputError for a friction law that is not among those that can be fitted.
     """
     mass = levels["mass"]
     found = [Parameter(MASS, "kg", mass, mass / 5, mass * 5)]
-    if flat["friction.model"] in ("lugre", "dahl", "stribeck"):
+    if flat["friction.model"] in FITTED:
         found += _friction(flat, levels, speed, travel, both_ways)
+    elif flat["friction.model"] != "none":
+        given = f'"{flat["friction.model"]}", of which it is not known what a log shows'
+        raise InputError("friction.model", given, f"one of {', '.join(FITTED)}, or none", 'model = "lugre"')
     bias = "bias.cart" if "masses.cart" in flat else "bias.stage"
     reach = 5 * max(levels["coulomb"], abs(levels["offset"]))
     if both_ways:

@@ -142,7 +142,7 @@ class Problem:
     def _record(self, flat: Mapping[str, Any], runs: Followed) -> Simulated:
         position, velocity = (runs.states[:, :, i] for i in (self.kernel.position, self.kernel.velocity))
         held = self.kernel.held
-        force = runs.held[:, :, held.index("held_force")] if held else self._force(flat, runs)
+        force = runs.held[:, :, held.index("held_force")] if "held_force" in held else self._force(flat, runs)
         failed = runs.statuses != Status.DONE
         return Simulated(*(np.where(failed[:, None], np.nan, each) for each in (position, velocity, force)))
 
@@ -154,7 +154,7 @@ class Problem:
         values = [np.asarray(each)[:, None] for each in self.kernel.values(part, len(runs.numbers))]
         given = self.inputs.segments[0, :count, 1:].T[:, None, :]
         states = np.moveaxis(runs.states, 2, 0)
-        modes = [np.asarray(s > 0, dtype=float) for s in self.kernel.module.surfaces(states, 0.0, given, values)]
+        modes = self.kernel.modes(states, 0.0, given, values)
         outputs = self.kernel.module.outputs(states, modes, 0.0, given, values)
         return np.broadcast_to(outputs[list(self.kernel.outputs).index("force")], runs.states.shape[:2])
 

@@ -1,0 +1,71 @@
+"""Keys that take an array of values: `element_stiffness = ["40 N/um", "30 N/um"]`.
+
+In `Stage.flat` every element has a key of its own, numbered from 1: friction.element_stiffness.2.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from itertools import count, takewhile
+from typing import Any
+
+from pydantic import GetCoreSchemaHandler
+from pydantic_core import CoreSchema, core_schema
+
+from friso.errors import InputError
+from friso.quantities import Number, Quantity, quoted
+
+_WORDS = {1: "one", 2: "two"}
+
+
+class Values(tuple[Any, ...]):
+    """An array of values, dimensioned or bare."""
+
+    @property
+    def text(self) -> list[Any]:
+        """What the user wrote."""
+        return [getattr(value, "text", value) for value in self]
+
+
+@dataclass(frozen=True)
+class Several:
+    """A key that takes an array of at least `least` and, if told, at most `most` values; the examples are theirs."""
+
+    of: Quantity | Number
+    examples: tuple[str, ...]
+    least: int = 2
+    most: int | None = None
+
+    @property
+    def expected(self) -> str:
+        """What the key takes, in words."""
+        count = f"{_WORDS[self.least]} or more" if self.most is None else f"{self.least} to {self.most}"
+        return f"an array of {count}, each {self.of.expected}"
+
+    @property
+    def written_example(self) -> str:
+        """The example as it stands in a file."""
+        quote = '"' if isinstance(self.of, Quantity) else ""
+        return f"[{', '.join(f'{quote}{example}{quote}' for example in self.examples)}]"
+
+    def read(self, given: Any, read_one: Callable[[Any], Any] | None = None) -> Values:
+        """The values of an array, each read by `read_one` or as the key's kind is. Raises InputError, under the number
+        of the element that is wrong."""
+        size = len(given) if isinstance(given, list | tuple) else None
+        if size is None or size < self.least or size > (self.most or size):
+            hint = "not an array" if size is None else f"of {size}"
+            raise InputError("", quoted(given if size is None else [*given], hint), self.expected, self.written_example)
+        read, values = read_one or self.of.read, []
+        for number, item in enumerate(given, start=1):
+            try:
+                values.append(read(item))
+            except InputError as error:
+                raise error.under(str(number)) from None
+        return Values(values)
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return core_schema.no_info_plain_validator_function(self.read)
+
+
+def element_keys(flat: Mapping[str, Any], key: str) -> list[str]:
+    """The flat keys of the elements of an array, in order; none where the stage does not have it."""
+    return [*takewhile(flat.__contains__, (f"{key}.{number}" for number in count(1)))]

@@ -1,0 +1,77 @@
+"""A friction law of several elements side by side, each a spring that slips at its strength: Maxwell-slip, after
+Iwan 1966, doi:10.1115/1.3625070. An element sticks, F_i' = k_i v, until its force reaches its strength; it then slips,
+its force staying there, until the velocity passes 0.
+
+All that friso knows of it stands here, as in any file of a user: importing this module registers the law.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+
+from friso.equations.friction.common import Friction
+from friso.quantities import Quantity, Value, non_negative, positive
+from friso.stage import FrictionSection, Rule, Several, Values, element_keys, register_friction
+
+if TYPE_CHECKING:
+    import sympy as sp
+
+AT = 1 - 1e-9
+"""Share of the squared limit from which on an element that is pulled further is taken to slip."""
+
+STIFFNESS, STRENGTH = "friction.element_stiffness", "friction.element_strength"
+
+
+@register_friction
+class MaxwellSlip(FrictionSection):
+    """Elements that stick or slip, F = sum of F_i + sigma_2 v."""
+
+    model: Literal["maxwell_slip"]
+    element_stiffness: Annotated[Values, Several(Quantity("N/m", positive, "40 N/um"), ("40 N/um", "30 N/um"), 1, 12)]
+    element_strength: Annotated[Values, Several(Quantity("N", positive, "1 N"), ("0.5 N", "1 N"), 1, 12)]
+    viscous: Annotated[Value, Quantity("N*s/m", non_negative, "0.5 N*s/m")]
+
+    rules: ClassVar[tuple[Rule, ...]] = (
+        Rule(
+            (STIFFNESS, STRENGTH),
+            lambda flat: len(element_keys(flat, STIFFNESS)) == len(element_keys(flat, STRENGTH)),
+            "one strength for each stiffness",
+            'element_stiffness = ["40 N/um", "30 N/um"], element_strength = ["0.5 N", "1 N"]',
+        ),
+    )
+
+    @staticmethod
+    def variant(flat: Mapping[str, Any]) -> int:
+        """The number of elements."""
+        return len(element_keys(flat, STIFFNESS))
+
+    @staticmethod
+    def declare(velocity: sp.Symbol, variant: int) -> Friction:
+        """Friction on a body moving at `velocity` [m/s]."""
+        from sympy import And, Piecewise
+
+        from friso.equations.component import Component, Kink, Output, Role, State, Switch, key, state
+
+        total, states, switches, outputs, sliding = key("friction.viscous") * velocity, [], [], {}, {}
+        strengths: Any = 0
+        for number in range(1, variant + 1):
+            deflection = state(f"deflection_{number}")
+            stiffness, strength = key(f"{STIFFNESS}.{number}"), key(f"{STRENGTH}.{number}")
+            limit = strength / stiffness
+            slip = Switch(
+                f"slip_{number}",
+                enter=(deflection**2 - limit**2) / limit,
+                leave=-deflection * velocity / limit,
+                begins=Piecewise((1, And(deflection * velocity > 0, deflection**2 >= AT * limit**2)), (-1, True)),
+                entered={
+                    deflection: (deflection + limit**2 / deflection) / 2
+                },  # the limit, but for a square of rounding
+            )
+            states.append(State(deflection, velocity * (1 - slip.beyond), "m", limit, Role.BRISTLE))
+            switches.append(slip)
+            outputs[f"deflection_{number}"] = Output(deflection, "m", f"deflection of element {number}")
+            outputs[f"slip_{number}"] = Output(slip.beyond, "1", f"element {number} slips")
+            sliding |= {deflection: Kink("forward", velocity).sign * limit, slip.beyond: 1}
+            total, strengths = total + stiffness * deflection, strengths + strength
+        return Friction(total, strengths, Component(tuple(states), tuple(switches), outputs), sliding)

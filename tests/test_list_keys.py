@@ -1,0 +1,139 @@
+"""Keys that take an array of values with units: reading, flat keys of the elements, setting, sweeping, uncertainty."""
+
+import pickle
+
+import maxwell_slip
+import numpy as np
+import pytest
+from variants import gains, release, stage
+
+import friso
+from friso.engine.kernel import Wanted
+from friso.equations.structure import structure
+from friso.errors import InputError, StageError
+from friso.stage import Stage, numeric_keys, parse_set, violations
+from friso.stage.correlations import Correlations, draw, read_correlations, write_correlations
+from friso.stage.plug_ins import plug_ins
+from friso.studies.axes import Axis, read_axis
+from friso.studies.cells import allowed, flat_cells
+from friso.studies.links import check_links, linked
+
+STIFFNESS, STRENGTH = "friction.element_stiffness", "friction.element_strength"
+
+
+@pytest.fixture(scope="module")
+def three() -> Stage:
+    law = """model = "maxwell_slip"
+element_stiffness = ["40 N/um", "30 N/um", "30 kN/mm"]
+element_strength = ["0.5 N", "1 N +/- 0.1 N", "1 N .. 3 N"]
+viscous = "0.5 N*s/m"
+"""
+    return stage(release(), friction=law, controller=gains(1000, 500))
+
+
+def test_elements_have_flat_keys_of_their_own(three: Stage) -> None:
+    flat = three.flat()
+    assert [flat[f"{STIFFNESS}.{n}"] for n in (1, 2, 3)] == [4e7, 3e7, 3e7]
+    assert [flat[f"{STRENGTH}.{n}"] for n in (1, 2, 3)] == [0.5, 1.0, 2.0]
+    assert f"{STIFFNESS}.4" not in flat
+    assert STIFFNESS not in flat
+    known = numeric_keys(flat)
+    assert {known[f"{STIFFNESS}.{n}"].unit for n in (1, 2, 3)} == {"N/m"}
+    assert f"{STIFFNESS}.4" not in known
+
+
+def test_saved_and_loaded_it_is_the_same(three: Stage) -> None:
+    again = friso.loads(three.to_toml())
+    assert again == three
+    assert again.flat() == three.flat()
+    assert again.given()["friction"]["element_stiffness"] == ["40 N/um", "30 N/um", "30 kN/mm"]
+    assert pickle.loads(pickle.dumps(three)) == three
+
+
+def test_the_whole_array_or_one_element_is_set(three: Stage) -> None:
+    whole = three.replace(dict([parse_set(f'{STIFFNESS}=["1 N/um", "2 N/um", "3 N/um"]')]))
+    assert [whole.flat()[f"{STIFFNESS}.{n}"] for n in (1, 2, 3)] == [1e6, 2e6, 3e6]
+    one = three.replace(dict([parse_set(f"{STIFFNESS}.2=35 N/um")]))
+    assert [one.flat()[f"{STIFFNESS}.{n}"] for n in (1, 2, 3)] == [4e7, 3.5e7, 3e7]
+    assert three.flat()[f"{STIFFNESS}.2"] == 3e7
+    numbers = three.with_numbers({f"{STIFFNESS}.1": 0.1 + 0.2, f"{STRENGTH}.3": 1 / 3})
+    assert numbers.flat()[f"{STIFFNESS}.1"] == 0.1 + 0.2
+    assert numbers.flat()[f"{STRENGTH}.3"] == 1 / 3
+
+
+@pytest.mark.parametrize(
+    ("changes", "parts"),
+    [
+        ({STIFFNESS: "40 N/um"}, [STIFFNESS, '"40 N/um" (not an array)', "an array of 1 to 12", '["40 N/um", "30']),
+        ({STIFFNESS: []}, ["(of 0)", "an array of 1 to 12"]),
+        ({STIFFNESS: ["1 N/um"] * 13}, ["(of 13)", "an array of 1 to 12"]),
+        ({STIFFNESS: ["1 N/um", 2, "3 N/um"]}, [f"{STIFFNESS}.2", "its unit is missing", "convertible to N/m"]),
+        ({STIFFNESS: ["1 N/um", "2 N/um", "3 um"]}, [f"{STIFFNESS}.3", "um is not convertible to N/m"]),
+        ({f"{STIFFNESS}.2": "-1 N/um"}, [f"{STIFFNESS}.2", '"-1 N/um"', "greater than 0"]),
+        ({f"{STIFFNESS}.2": "1 N/um .. -1 N/um"}, [f"{STIFFNESS}.2", "LOW .. HIGH"]),
+        ({f"{STIFFNESS}.4": "1 N/um"}, [f"{STIFFNESS}.4", "a number from 1 to 3"]),
+        ({f"{STIFFNESS}.0": "1 N/um"}, [f"{STIFFNESS}.0", "a number from 1 to 3"]),
+        ({f"{STIFFNESS}.first": "1 N/um"}, [f"{STIFFNESS}.first", "a number from 1 to 3"]),
+        ({f"{STIFFNESS}.2": None}, [f"{STIFFNESS}.2", "an element to remove", "the whole array"]),
+        (
+            {STIFFNESS: ["1 N/um", "2 N/um"]},
+            [STIFFNESS, 'element_stiffness = ["1 N/um", "2 N/um"]', "one strength for"],
+        ),
+        ({STIFFNESS: [["1 N/um"], "2 N/um", "1 N/um"]}, [f"{STIFFNESS}.1", "an array"]),
+        ({"friction.viscous": ["1 N*s/m"]}, ["friction.viscous", "an array"]),
+    ],
+)
+def test_what_is_wrong_is_told(three: Stage, changes: dict, parts: list[str]) -> None:
+    with pytest.raises(StageError) as refused:
+        three.replace(changes)
+    assert all(part in str(refused.value) for part in parts), str(refused.value)
+
+
+def test_an_element_is_swept_and_linked(three: Stage) -> None:
+    axis = read_axis(three, f"{STRENGTH}.3", "1 N..3 N:3", False)
+    assert not isinstance(axis, Axis)
+    values = axis.axis().values
+    assert values == pytest.approx([1.0, 2.0, 3.0])
+    links = {f"{STRENGTH}.1": f"0.25 * {STRENGTH}.3 + 0.5", f"{STIFFNESS}.1": f"{STRENGTH}.1 / 1e-7"}
+    check_links(three, links, frozenset([f"{STRENGTH}.3"]))
+    cells = flat_cells(three, links, {f"{STRENGTH}.3": values})
+    assert cells[f"{STRENGTH}.1"] == pytest.approx([0.75, 1.0, 1.25])
+    assert cells[f"{STIFFNESS}.1"] == pytest.approx([7.5e6, 1e7, 1.25e7])
+    assert cells[f"{STRENGTH}.2"] == 1.0
+    assert list(allowed(three, {}, {f"{STRENGTH}.3": np.array([-1.0, 1.0])})) == [False, True]
+    assert violations(three.flat({f"{STRENGTH}.3": np.array([-1.0, 1.0])}))[0][1].startswith(f"{STRENGTH}.3 has to be")
+    for key in (f"{STRENGTH}.4", f"{STRENGTH}.x", STRENGTH):
+        with pytest.raises(InputError, match="element_strength"):
+            three.flat({key: 1.0})
+    with pytest.raises(InputError, match=r"element_strength\.7"):
+        check_links(three, {f"{STRENGTH}.1": f"{STRENGTH}.7"}, frozenset())
+    assert linked({"a": "2 * b.c.1"}, {"b.c.1": 3.0}) == {"a": 6.0}
+
+
+def test_elements_are_uncertain_and_drawn(three: Stage, tmp_path) -> None:
+    intervals = three.uncertain()
+    assert [*intervals] == [f"{STRENGTH}.2", f"{STRENGTH}.3"]
+    assert (intervals[f"{STRENGTH}.3"].low, intervals[f"{STRENGTH}.3"].high) == (1.0, 3.0)
+    known = Correlations((f"{STRENGTH}.2", f"{STRENGTH}.3"), np.array([[1.0, 0.9], [0.9, 1.0]]))
+    write_correlations(known, three, tmp_path / "c.toml")
+    read = read_correlations(tmp_path / "c.toml", three)
+    assert np.array_equal(read.matrix, known.matrix)
+    drawn = draw(three, read, 512, 1)
+    second, third = drawn.keys[f"{STRENGTH}.2"], drawn.keys[f"{STRENGTH}.3"]
+    assert np.mean(second) == pytest.approx(1.0, abs=0.01)
+    assert np.std(second) == pytest.approx(0.1 / 1.96, rel=0.05)
+    assert 1.0 <= third.min() <= third.max() <= 3.0
+    assert np.corrcoef(second, third)[0, 1] > 0.8
+
+
+def test_the_number_of_elements_is_part_of_the_structure(three: Stage) -> None:
+    two = three.replace({STIFFNESS: ["1 N/um", "2 N/um"], STRENGTH: ["1 N", "2 N"]})
+    assert structure(three.flat()).friction_variant == 3
+    assert structure(two.flat()).friction_variant == 2
+    assert structure(three.flat({f"{STIFFNESS}.1": np.array([1e6, 2e6])})) == structure(three.flat())
+
+
+def test_the_law_is_a_plug_in(three: Stage) -> None:
+    (plug_in,) = plug_ins(Wanted(structure(three.flat())).sections)
+    assert plug_in.module == "maxwell_slip"
+    assert plug_in.file == maxwell_slip.__file__
