@@ -1,6 +1,7 @@
 """A friction law of several elements side by side, each a spring that slips at its strength: Maxwell-slip, after
-Iwan 1966, doi:10.1115/1.3625070. An element sticks, F_i' = k_i v, until its force reaches its strength; it then slips,
-its force staying there, until the velocity passes 0.
+Iwan 1966, doi:10.1115/1.3625199. An element sticks, F_i' = k_i v, until its force reaches its strength; it then slips,
+its force staying there, until the velocity passes 0. With a `kinetic_share` the force drops to that share of the
+strength as the element breaks loose, so that stages hunt.
 
 All that friso knows of it stands here, as in any file of a user: importing this module registers the law.
 """
@@ -11,7 +12,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from friso.equations.friction.common import Friction
-from friso.quantities import Quantity, Value, non_negative, positive
+from friso.quantities import Number, Quantity, Value, inside_0_1, non_negative, positive
 from friso.stage import FrictionSection, Rule, Several, Values, element_keys, register_friction
 
 if TYPE_CHECKING:
@@ -31,6 +32,7 @@ class MaxwellSlip(FrictionSection):
     element_stiffness: Annotated[Values, Several(Quantity("N/m", positive, "40 N/um"), ("40 N/um", "30 N/um"), 1, 12)]
     element_strength: Annotated[Values, Several(Quantity("N", positive, "1 N"), ("0.5 N", "1 N"), 1, 12)]
     viscous: Annotated[Value, Quantity("N*s/m", non_negative, "0.5 N*s/m")]
+    kinetic_share: Annotated[float | None, Number(inside_0_1, "0.5")] = None
 
     rules: ClassVar[tuple[Rule, ...]] = (
         Rule(
@@ -42,36 +44,38 @@ class MaxwellSlip(FrictionSection):
     )
 
     @staticmethod
-    def variant(flat: Mapping[str, Any]) -> int:
-        """The number of elements."""
-        return len(element_keys(flat, STIFFNESS))
+    def variant(flat: Mapping[str, Any]) -> tuple[int, bool]:
+        """The number of elements, and whether their force drops."""
+        return len(element_keys(flat, STIFFNESS)), "friction.kinetic_share" in flat
 
     @staticmethod
-    def declare(velocity: sp.Symbol, variant: int) -> Friction:
+    def declare(velocity: sp.Symbol, variant: tuple[int, bool]) -> Friction:
         """Friction on a body moving at `velocity` [m/s]."""
-        from sympy import And, Piecewise
+        from sympy import And, Integer, Piecewise
 
         from friso.equations.component import Component, Kink, Output, Role, State, Switch, key, state
 
-        total, states, switches, outputs, sliding = key("friction.viscous") * velocity, [], [], {}, {}
-        strengths: Any = 0
-        for number in range(1, variant + 1):
+        elements, drops = variant
+        share = key("friction.kinetic_share") if drops else Integer(1)
+        force, breakaway = key("friction.viscous") * velocity, Integer(0)
+        states, switches, outputs, sliding = [], [], {}, {}
+        for number in range(1, elements + 1):
             deflection = state(f"deflection_{number}")
             stiffness, strength = key(f"{STIFFNESS}.{number}"), key(f"{STRENGTH}.{number}")
             limit = strength / stiffness
+            pulled_on = Piecewise((1, And(deflection * velocity > 0, deflection**2 >= AT * limit**2)), (-1, True))
             slip = Switch(
                 f"slip_{number}",
                 enter=(deflection**2 - limit**2) / limit,
                 leave=-deflection * velocity / limit,
-                begins=Piecewise((1, And(deflection * velocity > 0, deflection**2 >= AT * limit**2)), (-1, True)),
-                entered={
-                    deflection: (deflection + limit**2 / deflection) / 2
-                },  # the limit, but for a square of rounding
+                begins=Integer(-1) if drops else pulled_on,
+                # the limit to either side, but for the square of what rounding leaves
+                entered={deflection: share * (deflection + limit**2 / deflection) / 2},
             )
             states.append(State(deflection, velocity * (1 - slip.beyond), "m", limit, Role.BRISTLE))
             switches.append(slip)
             outputs[f"deflection_{number}"] = Output(deflection, "m", f"deflection of element {number}")
             outputs[f"slip_{number}"] = Output(slip.beyond, "1", f"element {number} slips")
-            sliding |= {deflection: Kink("forward", velocity).sign * limit, slip.beyond: 1}
-            total, strengths = total + stiffness * deflection, strengths + strength
-        return Friction(total, strengths, Component(tuple(states), tuple(switches), outputs), sliding)
+            sliding |= {deflection: Kink("forward", velocity).sign * share * limit, slip.beyond: Integer(1)}
+            force, breakaway = force + stiffness * deflection, breakaway + strength
+        return Friction(force, breakaway, Component(tuple(states), tuple(switches), outputs), sliding)

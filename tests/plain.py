@@ -59,6 +59,19 @@ def friction(flat: Flat, v: float, z: float) -> tuple[float, float]:
     return sigma_0 * z + flat["friction.bristle_damping"] * z_rate + viscous, z_rate
 
 
+def elements(flat: Flat, v: float, s: State) -> tuple[float, dict[str, float]]:
+    """Friction force [N] of elements that stick or slip against the velocity v, and their rates [m/s], in the mode in
+    which a run begins in this state."""
+    force, rate = flat["friction.viscous"] * v, {}
+    for number in range(1, 4):
+        stiffness, z = flat[f"friction.element_stiffness.{number}"], s[f"deflection_{number}"]
+        at_limit = abs(z) >= flat[f"friction.element_strength.{number}"] / stiffness
+        slips = at_limit and z * v > 0 and "friction.kinetic_share" not in flat
+        rate[f"deflection_{number}"] = 0.0 if slips else v
+        force += stiffness * z
+    return force, rate
+
+
 def control(flat: Flat, s: State, y: float, v: float, r: float, r_rate: float) -> tuple[float, dict[str, float]]:
     """Actuator force [N] and the rates of the controller's states."""
     error = r - y
@@ -118,7 +131,11 @@ def rates(flat: Flat, names: Sequence[str]) -> Callable[[float, Sequence[float]]
         force, rate = control(flat, s, y, v, *reference(flat, t))
         rate |= {"position": v}
         cart_velocity = s.get("cart_velocity", v)
-        drag, rate["bristle_deflection"] = friction(flat, cart_velocity, s.get("bristle_deflection", 0.0))
+        if flat["friction.model"] == "maxwell_slip":
+            drag, rates_within = elements(flat, cart_velocity, s)
+            rate |= rates_within
+        else:
+            drag, rate["bristle_deflection"] = friction(flat, cart_velocity, s.get("bristle_deflection", 0.0))
         if "joint.limiter_stiffness" not in flat:
             rate["velocity"] = (force - drag) / (flat.get("masses.cart", 0.0) + flat.get("masses.stage", 0.0))
             return [rate[name] for name in names]

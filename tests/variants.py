@@ -5,6 +5,8 @@ import sys
 from pathlib import Path
 from types import ModuleType
 
+import maxwell_slip as maxwell_slip
+
 import friso
 from friso.engine.module_source import write_module
 from friso.engine.tableaus import TABLEAUS
@@ -39,6 +41,16 @@ stribeck_velocity = "5 mm/s"
 stribeck_exponent = {exponent}
 viscous = "0.5 N*s/m"
 regularisation_velocity = "1 mm/s"
+"""
+
+
+def maxwell(share: float | None = None, viscous: str = "0.5 N*s/m") -> str:
+    """The law of `maxwell_slip`, which is registered from outside friso: three elements that stick or slip."""
+    return f"""model = "maxwell_slip"
+element_stiffness = ["100 N/mm", "80 N/mm", "60 N/mm"]
+element_strength = ["0.9 N", "0.96 N", "0.96 N"]
+viscous = "{viscous}"
+{"" if share is None else f"kinetic_share = {share}"}
 """
 
 
@@ -124,6 +136,10 @@ VARIANTS: dict[str, Stage] = {
     ),
     "rigid, LuGre 0.7, PID measured": stage(
         step(), friction=lugre(0.7), controller=gains(**FULL, tau=1e-3, extra=MEASURED)
+    ),
+    "rigid, Maxwell slip, PID": stage(step(), friction=maxwell(), controller=gains(**FULL, tau=1e-3)),
+    "free, parasitic, Maxwell slip": stage(
+        there_and_back(), friction=maxwell(), joint=free(), parasitic=PARASITIC, controller=van_dijk()
     ),
     "rigid, van Dijk, limit": stage(step("10 mm"), friction=lugre(2), controller=van_dijk("8 Hz", limit("6 N"))),
     "locked": stage(there_and_back(), friction=lugre(2), joint=LOCKED, controller=van_dijk()),
