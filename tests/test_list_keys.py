@@ -128,8 +128,8 @@ def test_elements_are_uncertain_and_drawn(three: Stage, tmp_path) -> None:
 
 def test_the_number_of_elements_is_part_of_the_structure(three: Stage) -> None:
     two = three.replace({STIFFNESS: ["1 N/um", "2 N/um"], STRENGTH: ["1 N", "2 N"]})
-    assert structure(three.flat()).friction_variant == 3
-    assert structure(two.flat()).friction_variant == 2
+    assert structure(three.flat()).friction_variant == (3, False)
+    assert structure(two.flat()).friction_variant == (2, False)
     assert structure(three.flat({f"{STIFFNESS}.1": np.array([1e6, 2e6])})) == structure(three.flat())
 
 

@@ -293,7 +293,8 @@ def meeting(name: str, kink: Kink, crossed: bool, rng: np.random.Generator) -> M
 @pytest.mark.parametrize("name", VARIANTS)
 def test_deviations_jump_at_a_limiter_alone(name: str) -> None:
     """At v = 0 no friction law's field jumps, nor does a controller's at its limit; that of a limiter with damping
-    does (and that of modes that remember may). What is left for the ends of the band of the anti-windup is zero wherever they are met."""
+    does, and that of modes that remember may. What is left for the ends of the band of the anti-windup is zero wherever
+    they are met."""
     model, whole = declared(name)
     limiters = {kink for kink in model.kinks if kink.name.startswith("stroke_")}
     jumping = set(whole.jumps) - set(model.switches)
