@@ -101,7 +101,10 @@ def bode(stage: Stage, band: Range | None = None, series: bool = False) -> Bode:
     flat = stage.flat()
     states = {name: (flat, member) for name, member in limit_cases(flat).items()} | (_in_series(flat) if series else {})
     margins_of = {name: margins(*state) for name, state in states.items()}
-    omega = _omega(flat, band or _mattering(flat, margins_of.values()))
+    low, high = band or _mattering(flat, margins_of.values())
+    together = joined([*limit_cases(flat).values()])
+    resonant = [closed(flat, together), modes(flat, together)]
+    omega = with_resonances(np.geomspace(low, high, POINTS) * 2 * np.pi, resonant)
     every = scan(flat, family(flat))
     worst = every.members[every.worst()]
     settled = every.members[every.worst(every.members.settled)]
@@ -147,12 +150,6 @@ def _mattering(flat: Mapping[str, Any], all_margins: Iterable[Margins]) -> Range
     )
     places = places if places.size else np.ones(1)
     return float(places.min()) / AROUND, min(float(places.max()) * AROUND, Drive.of(flat).highest / (2 * np.pi))
-
-
-def _omega(flat: Mapping[str, Any], band: Range) -> np.ndarray:
-    """Frequencies [rad/s] for curves, dense about resonances."""
-    cases = joined([*limit_cases(flat).values()])
-    return with_resonances(np.geomspace(*band, POINTS) * 2 * np.pi, [closed(flat, cases), modes(flat, cases)])
 
 
 def _prescribed(flat: Mapping[str, Any], omega: np.ndarray) -> tuple[Prescribed, ...]:

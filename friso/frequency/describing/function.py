@@ -20,7 +20,7 @@ from friso.engine.arrays import Status
 from friso.engine.tolerance import checked_rtol
 from friso.equations.imposed import HARMONIC
 from friso.errors import InputError
-from friso.frequency.describing.steady import RTOL, Imposition, Steady, closed, share_of_period, steady
+from friso.frequency.describing.steady import RTOL, Imposition, closed, share_of_period, steady
 from friso.stage import Stage
 
 if TYPE_CHECKING:
@@ -79,7 +79,8 @@ def describing(
     friction = Imposition.of(stage.flat(), *pairs, checked_rtol(rtol))
     motion = steady(friction)
     force, aliasing = _harmonics(friction, motion.inner, harmonics, samples if harmonics > 1 else 0)
-    status = _status(motion, force, rtol)
+    status = np.where(motion.gap <= closed(rtol), Status.DONE.text, NOT_CLOSED)
+    status = np.where(motion.done & np.isfinite(force[:, 1]), status, NOT_RUN)
     force[status != Status.DONE.text] = np.nan
     coords = _coords(sizes, rates, harmonics)
     variables = _variables(pairs[0], force, {"gap": motion.gap, "aliasing": aliasing, "status": status})
@@ -94,11 +95,6 @@ def _coords(amplitudes: np.ndarray, frequencies: np.ndarray, harmonics: int) -> 
         "frequency": ("frequency", frequencies, {"units": "Hz", "long_name": "frequency of the motion"}),
         "harmonic": np.arange(harmonics + 1),
     }
-
-
-def _status(motion: Steady, force: np.ndarray, rtol: float) -> np.ndarray:
-    status = np.where(motion.gap <= closed(rtol), Status.DONE.text, NOT_CLOSED)
-    return np.where(motion.done & np.isfinite(force[:, 1]), status, NOT_RUN)
 
 
 def _variables(

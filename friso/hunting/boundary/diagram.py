@@ -10,7 +10,6 @@ import numpy as np
 from friso.hunting.boundary.branch import Branch, Point, Tracer
 from friso.hunting.boundary.locate import Found, special_points
 from friso.hunting.boundary.space import Space
-from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import ROUGH, RTOL, Cycles, families
 from friso.hunting.cycle.return_map import return_map
 
@@ -53,17 +52,12 @@ def diagram(space: Space, rtol: float = RTOL, seeds: int = SEEDS) -> Diagram:
     for cycles in sought:
         tracer = Tracer(space.lines(np.zeros((1, 1)), np.ones((1, 1))), cycles.sign, rtol)
         for k in np.flatnonzero(cycles.found):
-            start = _point(stages, places, cycles, int(k))
+            start = Point.of(stages.take(k[None]), float(places[k]), cycles.take(k[None]))
             if not any(_passes(branch, start) for branch in branches):
                 branch = tracer.branch(start)
                 branches.append(branch)
                 special.append(tuple(special_points(tracer, branch)))
     return Diagram(space, tuple(branches), tuple(special), places, sought[0])
-
-
-def _point(stages: Ensemble, places: np.ndarray, cycles: Cycles, k: int) -> Point:
-    number = np.array([k])
-    return Point.of(stages.take(number), float(places[k]), cycles.take(number))
 
 
 def _passes(branch: Branch, point: Point) -> bool:
