@@ -21,13 +21,11 @@ import numpy as np
 from benchmarks.report import Goal, print_goals, print_table
 from friso.errors import InputError
 from friso.identify.estimate import Estimate
-from friso.identify.experiments import (
-    friction_velocity,
-    static_from_ramps,
-    static_from_stick_slip,
-    stiffness_from_steps,
-)
-from friso.identify.moves import identify_moves
+from friso.identify.experiments.break_away import static_from_ramps
+from friso.identify.experiments.moves import identify_moves
+from friso.identify.experiments.steps import stiffness_from_steps
+from friso.identify.experiments.stick_slip import static_from_stick_slip
+from friso.identify.readings.friction_velocity import friction_velocity
 from friso.identify.response.analysis import analyse
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))

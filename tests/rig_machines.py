@@ -15,10 +15,10 @@ import numpy as np
 from machines import Machine, drawn
 
 import friso
-from friso.identify.experiments import friction_velocity
+from friso.identify.kind import Source
 from friso.identify.logs.mapping import Mapping, save
-from friso.identify.method import Source
-from friso.identify.sources import Given, read_all
+from friso.identify.readings.friction_velocity import friction_velocity
+from friso.identify.sources import LogFile, read_all
 from friso.rig.log_files import write_csv
 from friso.rig.rail import friction_factors
 from friso.studies.rig.outcome import RigLog
@@ -62,7 +62,7 @@ def built(seed: int) -> Machine:
     return replace(machine, truth=friso.Stage(**{**tables, "controller": limited}).with_numbers(numbers))
 
 
-def through_files(logs: Iterable[RigLog], folder: Path) -> list[Given]:
+def through_files(logs: Iterable[RigLog], folder: Path) -> list[LogFile]:
     """Logs of the rig written as `friso rig` does, and read back as `friso identify` does."""
     paths = []
     for log in logs:
@@ -73,7 +73,7 @@ def through_files(logs: Iterable[RigLog], folder: Path) -> list[Given]:
     return read_all(paths, Mapping(), folder)
 
 
-def sources(given: Iterable[Given]) -> list[tuple[Source, str]]:
+def sources(given: Iterable[LogFile]) -> list[tuple[Source, str]]:
     """What `identify` takes."""
     return [(each.source, each.kind) for each in given]
 

@@ -177,7 +177,7 @@ BAD_OPTIONS = [
     (["--map", "position=Nowhere"], "Nowhere"),
     (["--map", "speed=ActPos"], "one of time, reference"),
     (["--map", "position"], "two texts with = between"),
-    (["--as", "dance"], "one of moves, frequency"),
+    (["--as", "dance"], "one of break-away, constant-speed, frequency, moves"),
     (["--unit", "ActPos=parrots"], "parrots"),
     (["--scale", "force=heavy"], "heavy"),
     (["--bandwidth", "20 kg"], "--bandwidth"),

@@ -14,11 +14,12 @@ import friso
 from friso.errors import InputError
 from friso.identify.combine import combined, correlations
 from friso.identify.estimate import Estimate
-from friso.identify.experiments import record
 from friso.identify.logs.log import Log
 from friso.identify.method import identify
-from friso.identify.response.analysis import analyse, external
-from friso.identify.sources import _kind
+from friso.identify.readings.common import record
+from friso.identify.readings.course import external
+from friso.identify.response.analysis import analyse
+from friso.identify.sources import recognised
 from friso.identify.stage_file import identified
 from friso.identify.stage_keys import fitting
 from friso.stage import Stage
@@ -220,7 +221,7 @@ def repeated(acceleration: float, rest: int, rng: np.random.Generator) -> Log:
 @pytest.mark.parametrize("lines", [range(1, 9), range(1, 100), range(20, 100), range(10, 20)], ids=str)
 @pytest.mark.parametrize("seed", range(3))
 def test_a_multisine_is_an_excitation(lines: range, seed: int) -> None:
-    assert _kind(excited(lines, np.random.default_rng(seed)), Path("log.csv"))[0] == "frequency"
+    assert recognised(excited(lines, np.random.default_rng(seed)), Path("log.csv"))[0] == "frequency"
 
 
 @pytest.mark.parametrize("acceleration", [0.5, 1.0, 5.0])
@@ -229,10 +230,10 @@ def test_a_repeated_move_is_none(acceleration: float, rest: int) -> None:
     """Or it is asked what it is, where it rests for little time and accelerates hard."""
     log = repeated(acceleration, rest, np.random.default_rng(2))
     try:
-        kind = _kind(log, Path("log.csv"))[0]
+        kind = recognised(log, Path("log.csv"))[0]
     except InputError as error:
         kind = error.example
-    assert kind in (["moves"] if rest == 400 or acceleration < 5 else ["moves", "--as moves, or --as frequency"])
+    assert kind in (["moves"] if rest == 400 or acceleration < 5 else ["moves", "--as frequency, or --as moves"])
 
 
 # what moves a loop from outside

@@ -17,8 +17,8 @@ from refusals import Refused
 import friso
 from friso.identify import moves as method
 from friso.identify.errors import errors_of
+from friso.identify.experiments.moves import Moves, identify_moves, predict
 from friso.identify.logs.log import Log
-from friso.identify.moves import Moves, identify_moves, predict
 from friso.identify.output_error import fit as fitting
 from friso.identify.output_error import profile as profiles
 from friso.identify.output_error.fit import everywhere, first_values, fit, nearby

@@ -12,11 +12,11 @@ from rig_machines import EXAMPLE, built
 from scipy.integrate import solve_ivp
 
 import friso
-from friso.identify.experiments import Presliding, bristles_from_presliding, record
-from friso.identify.experiments.at_bearing import Between, Mode
-from friso.identify.experiments.common import deflections, jackknife
+from friso.identify.experiments.presliding import Presliding, bristles_from_presliding
 from friso.identify.logs.log import Log
-from friso.identify.method import between, identify
+from friso.identify.method import identify
+from friso.identify.readings.at_bearing import Between, Mode, between
+from friso.identify.readings.common import deflections, jackknife, record
 from friso.studies.rig.excitation import excite
 from friso.studies.rig.outcome import rig_log
 from friso.studies.rig.presliding import GENTLE, presliding_log

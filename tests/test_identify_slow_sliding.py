@@ -11,12 +11,11 @@ from refusals import Refused
 from rig_machines import EXAMPLE, built
 
 import friso
-from friso.identify.experiments import SlowSliding, record, stribeck_from_slow_sliding
-from friso.identify.experiments.at_bearing import Between, Record, at_bearing
-from friso.identify.experiments.common import deflections
-from friso.identify.experiments.slow_sliding import Known
+from friso.identify.experiments.slow_sliding import MassOnBristles, SlowSliding, stribeck_from_slow_sliding
 from friso.identify.logs.log import Log
-from friso.identify.method import between, identify
+from friso.identify.method import identify
+from friso.identify.readings.at_bearing import Between, Record, at_bearing, between
+from friso.identify.readings.common import deflections, record
 from friso.rig.rail import friction_factors
 from friso.studies.rig import many_speeds, slow_sliding
 from friso.studies.rig.outcome import RigLog
@@ -25,7 +24,7 @@ from friso.studies.rig.sizes import locked
 DT, SECONDS, FINE = 2e-4, 4.0, 10
 MASS, STIFFNESS, DAMPING, VISCOUS = 1.7, 1e5, 300.0, 2.0
 COULOMB, STATIC, STRIBECK = 1.0, 2.2, 1.5e-3
-KNOWN = Known((MASS, 0.0), (STIFFNESS, 0.0), (DAMPING, 0.0))
+KNOWN = MassOnBristles((MASS, 0.0), (STIFFNESS, 0.0), (DAMPING, 0.0))
 TRUE = [COULOMB, STATIC, STRIBECK]
 THERE = Between(delay=0.0, mass=MASS, viscous=(VISCOUS, 0.0))
 
@@ -139,7 +138,7 @@ def test_a_contact_is_taken_off() -> None:
     assert values(stribeck_from_slow_sliding(seen, stiff, KNOWN)) == pytest.approx(TRUE, rel=0.02)
 
 
-def reason(log: Log, known: Known | None = KNOWN) -> str:
+def reason(log: Log, known: MassOnBristles | None = KNOWN) -> str:
     found = stribeck_from_slow_sliding(log, THERE, known)
     assert not found.estimates[2].shown
     return found.estimates[2].reason

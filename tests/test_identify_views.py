@@ -6,6 +6,7 @@ import json
 import re
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,32 +17,29 @@ from pages import Page
 from friso.identify.combine import combined
 from friso.identify.errors import Errors, residual_of
 from friso.identify.estimate import Estimate
-from friso.identify.experiments import (
-    bristles_from_presliding,
-    friction_position,
-    friction_velocity,
-    record,
-    static_from_ramps,
-    static_from_stick_slip,
-    stiffness_from_steps,
-    stribeck_from_slow_sliding,
-)
-from friso.identify.experiments.at_bearing import Between
-from friso.identify.experiments.common import deflections
-from friso.identify.experiments.slow_sliding import Known
+from friso.identify.experiments.break_away import static_from_ramps
+from friso.identify.experiments.constant_speed import FrictionAtSpeeds
+from friso.identify.experiments.moves import Moves, SimulatedLog
+from friso.identify.experiments.presliding import bristles_from_presliding
+from friso.identify.experiments.slow_sliding import MassOnBristles, stribeck_from_slow_sliding
+from friso.identify.experiments.steps import stiffness_from_steps
+from friso.identify.experiments.stick_slip import static_from_stick_slip
 from friso.identify.inverse_model import inverse_model, motion
 from friso.identify.logs.frequency_text import MeasuredResponse
 from friso.identify.logs.log import Log
-from friso.identify.method import ConstantSpeed, Experiment, Identification, Prediction, Result
-from friso.identify.moves import Moves
+from friso.identify.method import Experiment, Identification, Prediction
 from friso.identify.output_error.coverage import coverage
 from friso.identify.output_error.fit import Fit, first_values
 from friso.identify.output_error.parameters import parameters_of
 from friso.identify.output_error.problem import Simulated, closed_loop, tracking
 from friso.identify.output_error.profile import Profile
+from friso.identify.readings.at_bearing import Between
+from friso.identify.readings.common import deflections, record
+from friso.identify.readings.friction_position import friction_position
+from friso.identify.readings.friction_velocity import friction_velocity
 from friso.identify.response.analysis import analyse
 from friso.identify.response.two_mass import two_masses
-from friso.identify.sources import Given
+from friso.identify.sources import LogFile
 from friso.identify.stage_file import identified, made_up, written
 from friso.stage.correlations import Correlations
 from friso.views.drawing import plotly_renderer
@@ -51,7 +49,7 @@ from friso.views.identify.figures import identify_figures
 from friso.views.identify.moves_figures import moves_figures, record_panels
 from friso.views.identify.numbers import interval_text, unit_of, value_text, with_interval
 from friso.views.identify.page import identify_html
-from friso.views.identify.words import answer, estimate_rows, headline, labels, parts
+from friso.views.identify.words import answer, estimate_rows, headline, labels, summaries
 
 pytestmark = pytest.mark.xdist_group("identify-views")
 
@@ -109,7 +107,7 @@ def profile_of(name: str, low: float, high: float, closed: bool, best: float) ->
     return Profile(name, values, cost, 1.1 * best, values[2], values[4], not closed, not closed)
 
 
-def bench() -> tuple[Result, MeasuredResponse]:
+def bench() -> tuple[Any, MeasuredResponse]:
     frequency = np.arange(1.0, 60.0, 0.5)
     rng = np.random.default_rng(3)
     values = two_masses(TWO_MASSES, frequency)[0] * (1 + 0.003 * rng.standard_normal(len(frequency)))
@@ -117,7 +115,7 @@ def bench() -> tuple[Result, MeasuredResponse]:
     return analyse((), measured=source), source
 
 
-def multisine_bench() -> tuple[Result, tuple[Log, ...]]:
+def multisine_bench() -> tuple[Any, tuple[Log, ...]]:
     """Two realisations of a multisine, each with a distortion of its own, in volts."""
     rng, logs, period = np.random.default_rng(4), [], 1000
     lines = np.arange(1, 80)
@@ -133,14 +131,14 @@ def multisine_bench() -> tuple[Result, tuple[Log, ...]]:
     return analyse(logs), tuple(logs)
 
 
-def steps() -> tuple[Result, Log]:
+def steps() -> tuple[Any, Log]:
     level = np.repeat([0.0, 3e-4, 6e-4, 3e-4, 0.0, 3e-4], 1500)
     noise = np.random.default_rng(5).standard_normal((2, len(level)))
     log = record("steps", DT, reference=level, position=level + 1e-7 * noise[0], force=2400 * level + 0.02 * noise[1])
     return stiffness_from_steps(log), log
 
 
-def stick_slip() -> tuple[Result, Log]:
+def stick_slip() -> tuple[Any, Log]:
     """A joint that is drawn on at 1 mm/s while the cart sticks, and lets it go a millimetre within 20 ms."""
     time = np.arange(12000) * DT
     drawn = 1e-3 * time
@@ -152,7 +150,7 @@ def stick_slip() -> tuple[Result, Log]:
     return static_from_stick_slip(log, 2400.0), log
 
 
-def break_away() -> tuple[Result, Log]:
+def break_away() -> tuple[Any, Log]:
     """Ramps of several rates to either side, each a segment, of a mass that moves off at 3 N."""
     signals, spans = {"position": [], "force": []}, []
     rng, begin = np.random.default_rng(7), 0
@@ -170,7 +168,7 @@ def break_away() -> tuple[Result, Log]:
     return static_from_ramps(log), log
 
 
-def constant() -> tuple[Result, Log]:
+def constant() -> tuple[Any, Log]:
     """There and back over 20 mm at several speeds, with friction that falls and then rises with the speed."""
     legs = [np.zeros(200)]
     for speed in (0.002, 0.004, 0.008, 0.016, 0.032, 0.064):
@@ -182,10 +180,10 @@ def constant() -> tuple[Result, Log]:
     friction = friction + 0.05 * np.sin(position * 3000) * np.sign(velocity)
     force = friction + 0.02 * np.random.default_rng(8).standard_normal(len(position))
     log = record("speeds", DT, reference=position, position=position, force=force)
-    return ConstantSpeed(friction_velocity(log), friction_position(log)), log
+    return FrictionAtSpeeds(friction_velocity(log), friction_position(log)), log
 
 
-def presliding() -> tuple[Result, Log]:
+def presliding() -> tuple[Any, Log]:
     """A mass on bristles that hardly bend, moved by three sines."""
     time = np.arange(0, 3, DT)
     omega = 2 * np.pi * np.array([[1.7], [11.3], [31.9]])
@@ -196,23 +194,23 @@ def presliding() -> tuple[Result, Log]:
     return bristles_from_presliding(log), log
 
 
-def slow_sliding() -> tuple[Result, Log]:
+def slow_sliding() -> tuple[Any, Log]:
     """A mass that swings slowly on bristles; nothing else is known to be true of it."""
     step = 2e-4
     time = np.arange(0, 3, step)
     position = 1e-3 * time + 6e-5 * np.sin(60 * time)
     z = deflections(np.diff(position), np.full(len(time) - 1, 1e-5))
     log = record("slow", step, position=position, force=1e5 * z)
-    return stribeck_from_slow_sliding(log, Between(delay=0.0), Known((1e-3, 0.0), (1e5, 0.0), (0.0, 0.0))), log
+    return stribeck_from_slow_sliding(log, Between(delay=0.0), MassOnBristles((1e-3, 0.0), (1e5, 0.0), (0.0, 0.0))), log
 
 
-def everything() -> tuple[Identification, list[Given], list[Prediction]]:
+def everything() -> tuple[Identification, list[LogFile], list[Prediction]]:
     """An identification with every kind of experiment, and a prediction of each kind."""
     moved, log = moves(own_loop=True, fitted_in_loop=True)
     follows, second = moves(own_loop=False, fitted_in_loop=False)
     response, source = bench()
     sines, exps = multisine_bench()
-    rows: list[tuple[str, Result, tuple]] = [("frequency", response, (source,)), ("frequency", sines, exps)]
+    rows: list[tuple[str, Any, tuple]] = [("frequency", response, (source,)), ("frequency", sines, exps)]
     rows += [("moves", moved, (log,)), ("moves", follows, (second,))]
     others = (
         ("steps", steps()),
@@ -227,21 +225,21 @@ def everything() -> tuple[Identification, list[Given], list[Prediction]]:
     estimates = tuple(combined(list(moved.estimates))[0])
     stage = identified(made_up(log, moved.inverse), estimates, ["axis"])
     found = Identification(stage, Correlations(), experiments, estimates, ("something <to> know",))
-    files = [Given(Path(f"{each.name}.csv"), each, kind, "as told", None) for kind, _, logs in rows for each in logs]
+    files = [LogFile(Path(f"{each.name}.csv"), each, kind, "as told", None) for kind, _, logs in rows for each in logs]
     predictions = [
-        Prediction(log, moved.part, moved.simulated, moved.errors),
-        Prediction(exps[0], response_errors=(0.1, 0.7)),
+        Prediction(log, "moves", SimulatedLog(moved.part, moved.simulated, moved.errors)),
+        Prediction(exps[0], "frequency", (0.1, 0.7)),
     ]
     return found, files, predictions
 
 
 @pytest.fixture(scope="module")
-def case() -> tuple[Identification, list[Given], list[Prediction]]:
+def case() -> tuple[Identification, list[LogFile], list[Prediction]]:
     return everything()
 
 
 @pytest.fixture(scope="module")
-def figures(case: tuple[Identification, list[Given], list[Prediction]]) -> list[Figure]:
+def figures(case: tuple[Identification, list[LogFile], list[Prediction]]) -> list[Figure]:
     return identify_figures(case[0], case[2])
 
 
@@ -355,7 +353,7 @@ def test_the_facts_of_moves_say_how_the_machine_was_simulated() -> None:
         estimates = found.estimates
         stage = made_up(log, found.inverse)
         whole = Identification(stage, Correlations(), (Experiment("moves", (log,), found, ()),), estimates, ())
-        (part,) = parts(whole)
+        (part,) = summaries(whole)
         assert said in part.sentences[0]
         errors = dict(part.facts)["Relative errors of the simulation"]
         assert errors.endswith("force 4 %")
@@ -441,7 +439,7 @@ def line(panel: Panel, label: str) -> Series:
 
 def test_the_friction_map_shows_force_without_inertia_and_the_curve_found() -> None:
     found, _ = moves(own_loop=True, fitted_in_loop=True)
-    (panel,) = named(moves_figures(found, "moves"), "identify_moves_friction").panels
+    (panel,) = named(moves_figures(found, "identify_moves"), "identify_moves_friction").panels
     measured, curve = line(panel, "measured force less inertia"), line(panel, "identified")
     quick = np.abs(measured.x) > 0.02
     truth = COULOMB * np.sign(measured.x) + VISCOUS * measured.x
@@ -452,14 +450,16 @@ def test_the_friction_map_shows_force_without_inertia_and_the_curve_found() -> N
 
 def test_profiles_are_1_where_the_interval_ends() -> None:
     found, _ = moves(own_loop=True, fitted_in_loop=True)
-    figure = named(moves_figures(found, "moves"), "identify_moves_profiles")
+    figure = named(moves_figures(found, "identify_moves"), "identify_moves_profiles")
     mass = next(panel for panel in figure.panels if panel.x.quantity == "Mass")
     assert mass.series[0].y[2:5] == pytest.approx([1, 0, 1])
     assert np.isnan(mass.series[0].y[-1])
     assert tuple(mass.bands[0].x) == (found.profiles["mass"].low, found.profiles["mass"].high)
     assert "Below 0" not in figure.caption
     better = {**found.profiles, "mass": replace(found.profiles["mass"], cost=found.profiles["mass"].cost * 0.5)}
-    assert "Below 0" in named(moves_figures(replace(found, profiles=better), "m"), "identify_m_profiles").caption
+    assert (
+        "Below 0" in named(moves_figures(replace(found, profiles=better), "identify_m"), "identify_m_profiles").caption
+    )
 
 
 def test_traces_with_a_disturbance_and_of_a_stage_that_follows() -> None:
@@ -470,7 +470,7 @@ def test_traces_with_a_disturbance_and_of_a_stage_that_follows() -> None:
     assert line(panels[2], "simulated").y == pytest.approx(log["force"])
     assert np.abs(panels[3].series[0].y).max() < 1e-9
     follows, _ = moves(own_loop=False, fitted_in_loop=False)
-    above, below = named(moves_figures(follows, "m"), "identify_m_traces").panels
+    above, below = named(moves_figures(follows, "identify_m"), "identify_m_traces").panels
     assert line(above, "measured").y - line(above, "needed").y == pytest.approx(below.series[0].y)
 
 
@@ -550,7 +550,7 @@ def test_the_page_opens_offline_shows_all_and_is_the_same_bytes_again(case: tupl
     text = " ".join(page.text.split())
     for _, sentence in headline(found):
         assert sentence in text
-    for part in parts(found):
+    for part in summaries(found):
         assert part.title in text
         assert all(sentence in text for sentence in part.sentences)
     for figure in some:

@@ -7,7 +7,7 @@ import pytest
 from refusals import Refused
 
 import friso
-from friso.identify.experiments import static_from_stick_slip
+from friso.identify.experiments.stick_slip import static_from_stick_slip
 from friso.stage import Stage
 from friso.studies.rig import constant_speed, excitation, frf, many_speeds, sizes, stiction, stiffness
 from friso.studies.rig.outcome import rig_log, silent

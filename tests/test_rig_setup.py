@@ -6,8 +6,8 @@ import pytest
 from refusals import Refused
 
 import friso
+from friso.identify.kind import as_set_up
 from friso.identify.logs.mapping import Mapping, load, save
-from friso.identify.method import _as_set_up
 from friso.identify.sources import read_all
 from friso.rig.log_files import write_csv
 from friso.stage import Stage
@@ -29,13 +29,13 @@ def test_how_the_stage_was_set_up_goes_with_the_log(built: Stage, tmp_path: Path
     save(Mapping(experiment="steps", setup={"joint.stroke": "8 mm", "cable.drag": "1 N*s/m"}), path)
     assert load(path) == Mapping(experiment="steps", setup={"joint.stroke": "8 mm", "cable.drag": "1 N*s/m"})
     (given,) = read_all([path], Mapping(), tmp_path)
-    flat = _as_set_up(built, given.source)
+    flat = as_set_up(built, given.source)
     assert flat["joint.stroke"] == pytest.approx(8e-3)
     assert built.flat()["joint.stroke"] == pytest.approx(1e-3)
     save(Mapping(experiment="steps", setup={"joint.stroke": "8 volts"}), path)
     (wrong,) = read_all([path], Mapping(), tmp_path)
     with refused("joint.stroke"):
-        _as_set_up(built, wrong.source)
+        as_set_up(built, wrong.source)
 
 
 def test_a_log_has_its_name_once_it_is_whole(built: Stage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

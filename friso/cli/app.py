@@ -20,8 +20,9 @@ from friso.cli.compare import compare
 from friso.cli.design import design
 from friso.cli.flexure import flexure
 from friso.cli.guideline import guideline
-from friso.cli.identify import identify
+from friso.cli.identify import identify, listed_kinds
 from friso.cli.init import init
+from friso.cli.listing import ending_with
 from friso.cli.map import map_cells
 from friso.cli.reproduce import reproduce
 from friso.cli.rig import rig
@@ -35,6 +36,9 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
+
+LISTS = {"identify": ending_with("Kinds of experiment (--as)", listed_kinds)}
+"""Commands whose help lists what can be chosen."""
 
 for name, command in (
     ("init", init),
@@ -51,7 +55,7 @@ for name, command in (
     ("reproduce", reproduce),
     ("guideline", guideline),
 ):
-    app.command(name)(command)
+    app.command(name, cls=LISTS.get(name))(command)
 
 
 def main() -> NoReturn:

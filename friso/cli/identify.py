@@ -16,8 +16,9 @@ from friso.quantities import Quantity, positive
 from friso.stage import load
 
 if TYPE_CHECKING:
-    from friso.identify.method import Identification, Options, Prediction
-    from friso.identify.sources import Given
+    from friso.identify.kind import AnalysisSettings
+    from friso.identify.method import Identification, Prediction
+    from friso.identify.sources import LogFile
 
 STAGE, PAGE = "identified.toml", "identify.html"
 
@@ -36,7 +37,7 @@ def identify(
         typer.Option(
             "--as",
             metavar="KIND",
-            help="moves, frequency, steps, stick-slip, break-away, constant-speed, presliding, slow-sliding.",
+            help="Kind of experiment, one of those below; moves and frequency responses tell it themselves.",
         ),
     ] = None,
     maps: Annotated[Many, typer.Option("--map", metavar="ROLE=CHANNEL", help='position="Axis1.ActPos"')] = None,
@@ -69,7 +70,7 @@ def identify(
     known = None if stage is None else with_overrides(load(stage), overrides)
     if known is None and overrides:
         raise InputError("--set", overrides[0], "a stage whose keys to override", "--stage stage.toml")
-    options = _options(bandwidth, band, period)
+    settings = _settings(bandwidth, band, period)
     told = from_options(maps or (), units or (), scales or (), dt, kind)
     check_place(out, (STAGE,), PAGE, [*logs, *(predict or []), *([stage] if stage else [])])
     given = read_all([*logs, *(predict or [])], told, out)
@@ -79,16 +80,16 @@ def identify(
             if bar:
                 bar(done, total, what)
 
-        found = found_in([(each.source, each.kind) for each in given[: len(logs)]], known, options, progress)
-        predictions = _predictions(found, given[len(logs) :], options)
+        found = found_in([(each.source, each.kind) for each in given[: len(logs)]], known, settings, progress)
+        predictions = _predictions(found, given[len(logs) :], settings)
         given = [keep(each, out) for each in given]
         files = _write(found, given, predictions, made_folder(out), progress)
     _answer(found, given, predictions, files, as_json)
 
 
-def _options(bandwidth: str | None, band: str | None, period: str | None) -> Options:
-    """The options of the analyses. Raises InputError."""
-    from friso.identify.method import Options
+def _settings(bandwidth: str | None, band: str | None, period: str | None) -> AnalysisSettings:
+    """What the user chose for the analyses. Raises InputError."""
+    from friso.identify.kind import AnalysisSettings
     from friso.intervals import Span
 
     values = []
@@ -101,10 +102,10 @@ def _options(bandwidth: str | None, band: str | None, period: str | None) -> Opt
         limits = None if band is None else Span(_HERTZ, "3 Hz .. 20 Hz").read(band)
     except InputError as error:
         raise error.found_in("--band") from None
-    return Options(values[0], None if limits is None else (limits.low, limits.high), values[1])
+    return AnalysisSettings(values[0], None if limits is None else (limits.low, limits.high), values[1])
 
 
-def _predictions(found: Identification, given: Sequence[Given], options: Options) -> list[Prediction]:
+def _predictions(found: Identification, given: Sequence[LogFile], settings: AnalysisSettings) -> list[Prediction]:
     """The other logs, predicted. Raises InputError."""
     from friso.identify.logs.log import Log
     from friso.identify.method import predict
@@ -112,12 +113,12 @@ def _predictions(found: Identification, given: Sequence[Given], options: Options
     logs = [each.source for each in given if isinstance(each.source, Log)]
     if len(logs) < len(given):
         raise InputError("--predict", "a measured frequency response", "a log over time", "--predict other.mat")
-    return [predict(found, log, options) for log in logs]
+    return [predict(found, log, settings) for log in logs]
 
 
 def _write(
     found: Identification,
-    given: Sequence[Given],
+    given: Sequence[LogFile],
     predictions: Sequence[Prediction],
     folder: Path,
     progress: Callable[[str, int, int], None],
@@ -151,7 +152,7 @@ def _write(
 
 
 def _answer(
-    found: Identification, given: Sequence[Given], predictions: Sequence[Prediction], files: list[Path], as_json: bool
+    found: Identification, given: Sequence[LogFile], predictions: Sequence[Prediction], files: list[Path], as_json: bool
 ) -> None:
     """What was read and found, on standard output."""
     if as_json:
@@ -170,3 +171,10 @@ def _answer(
         print("no stage file: a frequency response or a stiffness alone is no machine; --stage tells what the rest is")
     else:
         print(f"next: friso check {files[0]}{' --draws 1000' if found.stage.uncertain() else ''}")
+
+
+def listed_kinds() -> list[tuple[str, str]]:
+    """The kinds of experiment that `--as` takes, each in one line."""
+    from friso.identify.kinds import KINDS
+
+    return [(name, KINDS.one_line(name)) for name in KINDS]

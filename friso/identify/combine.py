@@ -9,7 +9,7 @@ from scipy.optimize import brentq
 from scipy.stats import chi2
 
 from friso.identify.estimate import Estimate
-from friso.identify.experiments.common import Mean, by_t, t_value
+from friso.identify.readings.common import Mean, by_t, t_value
 from friso.intervals import COVERAGE
 
 CHANCE = 0.01

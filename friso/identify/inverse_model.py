@@ -16,8 +16,8 @@ from scipy.signal import butter, cheby1, sosfiltfilt, welch
 
 from friso.errors import InputError
 from friso.identify.estimate import Estimate
-from friso.identify.experiments.common import cart
 from friso.identify.logs.log import Log
+from friso.identify.readings.common import cart
 from friso.identify.spread import spread_of
 
 SMOOTH, DECIMATE = 5.0, 2.0

@@ -57,6 +57,17 @@ def fitting(stage: Stage, found: Sequence[Estimate]) -> Fitting:
     return Fitting(_together(stage, kept, said), {k: v for k, v in follows.items() if k in kept}, tuple(said))
 
 
+def shared_masses(total: Estimate, stage: Stage) -> tuple[Estimate, ...]:
+    """The whole mass, shared among the masses as in the stage."""
+    given = {f"masses.{name}": value for name, value in stage.masses if value is not None}
+    method, sizes = f"{total.method}, shared as in the stage file", ("value", "low", "high", "systematic")
+    shares = {key: value / sum(given.values()) for key, value in given.items()}
+    return tuple(
+        replace(total, name=key, unit="kg", method=method, **{size: getattr(total, size) * share for size in sizes})
+        for key, share in shares.items()
+    )
+
+
 def _bounded(each: Estimate, stage: Stage, found: Sequence[Estimate]) -> Estimate:
     """An estimate of which one bound is known, with the other one from what was known beforehand.
 

@@ -1,17 +1,22 @@
-"""Break-away force from force ramps: at which a body at rest begins to move, and how that falls with the force rate."""
+"""Force ramps from rest, each until the body moves off: static friction.
+
+The break-away force is that at which a body at rest begins to move; it falls with the force rate.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from friso.identify.estimate import Estimate
-from friso.identify.experiments.common import channel, low_pass, on_bearing, ways
-from friso.identify.experiments.peaks import peak, smoothed
-from friso.identify.experiments.rate_effect import BRISTLE_RATE, static_friction
-from friso.identify.experiments.slips import slips
+from friso.identify.kind import AnalysisSettings, ExperimentKind, Prior, Source
 from friso.identify.logs.log import Log
+from friso.identify.readings.common import channel, low_pass, on_bearing, ways
+from friso.identify.readings.peaks import peak, smoothed
+from friso.identify.readings.rate_effect import BRISTLE_RATE, static_friction
+from friso.identify.readings.slips import slips
 
 CUTOFF = 100.0
 """Low-pass of force and velocity [Hz]."""
@@ -111,3 +116,16 @@ def _answer(table: np.ndarray, bristle_rate: float, threshold: float, said: list
     if one.shown and other.shown and (one.low > other.high or other.low > one.high):
         said.append(f"The directions differ: {one.value:.3g} N forward, {other.value:.3g} N backward.")
     return BreakAway(every, one, other, times, places, directions, forces, rates, unsure, threshold, tuple(said))
+
+
+def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> BreakAway:
+    (log,) = logs
+    assert isinstance(log, Log)
+    return static_from_ramps(log, sum(prior.masses(log)))
+
+
+KIND = ExperimentKind[BreakAway](
+    analyse=_analyse,
+    estimates=lambda result, stage: (replace(result.static, name="friction.static"),),
+    after=("frequency", "moves"),
+)

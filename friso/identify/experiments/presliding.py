@@ -1,4 +1,4 @@
-"""Stiffness and damping of the bristles from small motion about a place at which the bearing sticks.
+"""Small motion about a place at which the bearing sticks: stiffness and damping of its bristles.
 
 The force on a body that sticks is F = m a + sigma_0 z + (sigma_1 dz/dt + sigma_2 v) + c, with the deflection of the
 bristles dz/dt = v (1 - q z sign v), q = sigma_0/F_s (LuGre; Astrom, Canudas de Wit 2008, doi:10.1109/MCS.2008.929425):
@@ -7,14 +7,18 @@ linear in all but q, once the motion is measured. Motion that is quick enough sh
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from scipy.optimize import minimize_scalar
 
+from friso.identify.combine import Correlated
 from friso.identify.estimate import Estimate
-from friso.identify.experiments.at_bearing import (
+from friso.identify.kind import AnalysisSettings, ExperimentKind, Prior, Source, with_interval
+from friso.identify.logs.log import Log
+from friso.identify.readings.at_bearing import (
     DIRECT,
     EXPLAINED,
     HELD,
@@ -22,12 +26,13 @@ from friso.identify.experiments.at_bearing import (
     LowPass,
     Record,
     at_bearing,
+    believed_between,
     cutoff_of,
     rate_of,
     record_of,
     why_unseen,
 )
-from friso.identify.experiments.common import (
+from friso.identify.readings.common import (
     BLOCKS,
     LINEARITY,
     Mean,
@@ -37,7 +42,8 @@ from friso.identify.experiments.common import (
     jackknife,
     solved,
 )
-from friso.identify.logs.log import Log
+from friso.identify.stage_keys import shared_masses
+from friso.stage import Stage
 
 CHECKED, MOTION = 0.7, 5.0
 """Low-pass of a second fit by which the first one is checked, and of the motion, both over that of the first."""
@@ -216,3 +222,25 @@ def _equation(record: Record, between: Between, cutoff: float, mass: float, late
     target = force - between.viscous[0] * rate_of(time, body)
     rest = [np.ones(len(time)), rate_of(time, rate_of(time, inertia)), *([rate_of(time, force)] if late else [])]
     return _Equation(low_pass, body, low_pass(target), low_pass(inertia), tuple(map(low_pass, rest)))
+
+
+def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> Presliding:
+    (log,) = logs
+    assert isinstance(log, Log)
+    return bristles_from_presliding(log, believed_between(prior, log))
+
+
+def _estimates(result: Presliding, stage: Stage | None) -> tuple[Estimate, ...]:
+    """The bristles, and the whole mass where there is a stage whose masses share it."""
+    masses = shared_masses(result.mass, stage) if stage is not None and result.mass.shown else ()
+    return (result.stiffness, result.damping, *masses)
+
+
+def _correlated(result: Presliding, estimates: Sequence[Estimate]) -> Correlated:
+    """As the fit has it; masses are shares of one."""
+    shown = with_interval(estimates)
+    rows = [result.order(estimate.name) for estimate in shown]
+    return shown, result.correlation[np.ix_(rows, rows)]
+
+
+KIND = ExperimentKind[Presliding](_analyse, _estimates, _correlated, after=("constant-speed", "frequency", "moves"))

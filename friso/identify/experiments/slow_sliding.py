@@ -1,4 +1,4 @@
-"""Friction that falls with the speed, from slow motion that swings, or sticks and slips.
+"""Slow motion that swings, or sticks and slips: Coulomb and static friction, Stribeck velocity.
 
 Where friction falls steeply no controller holds a constant speed, and `friction_velocity` has nothing to read. The
 motion itself goes through all those speeds: LuGre's bristles, dz/dt = v - sigma_0 |v| z / g(v) with
@@ -9,26 +9,31 @@ and damping of the bristles come from other experiments, see `presliding`.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from scipy.optimize import least_squares
 
+from friso.identify.combine import Correlated
 from friso.identify.estimate import Estimate
-from friso.identify.experiments.at_bearing import (
+from friso.identify.kind import AnalysisSettings, ExperimentKind, Prior, Source, with_interval
+from friso.identify.logs.log import Log
+from friso.identify.readings.at_bearing import (
     EXPLAINED,
     HELD,
     Between,
     LowPass,
     Record,
     at_bearing,
+    believed_between,
     cutoff_of,
     rate_of,
     record_of,
     why_unseen,
 )
-from friso.identify.experiments.common import (
+from friso.identify.readings.common import (
     BLOCKS,
     LINEARITY,
     Mean,
@@ -37,7 +42,6 @@ from friso.identify.experiments.common import (
     deflections,
     jackknife,
 )
-from friso.identify.logs.log import Log
 
 BELOW_MODE, CHECKED, MOTION = 1 / 3, 0.7, 8.0
 """Low-pass of the equation over the frequency of the structure's mode, at most; that of a second fit by which the first
@@ -68,7 +72,7 @@ DELAY = "the drive's delay has to be known: give it in [drive] of the stage file
 
 
 @dataclass(frozen=True)
-class Known:
+class MassOnBristles:
     """Moving mass [kg], stiffness [N/m] and damping [N s/m] of the bristles as other experiments show them, each with
     the half-width of its interval; the exponent of the Stribeck curve."""
 
@@ -108,7 +112,7 @@ class _Equation:
     velocity: np.ndarray
     friction: np.ndarray
     late: np.ndarray
-    known: Known
+    known: MassOnBristles
     sizes: np.ndarray
 
     def model(self, p: np.ndarray) -> np.ndarray:
@@ -130,7 +134,7 @@ class _Equation:
         return np.stack([(self.model(p + step) - here) / STEP for step in STEP * np.eye(len(p))], axis=1)
 
 
-def stribeck_from_slow_sliding(log: Log, between: Between, known: Known | None) -> SlowSliding:
+def stribeck_from_slow_sliding(log: Log, between: Between, known: MassOnBristles | None) -> SlowSliding:
     """Static and Coulomb friction and Stribeck velocity from a log of position and force in which the bearing slides
     slowly, there and back. Of a log with gaps the longest stretch is used, and of that no more than `MOST` samples.
 
@@ -163,7 +167,7 @@ def stribeck_from_slow_sliding(log: Log, between: Between, known: Known | None) 
     return SlowSliding(_judged(found, left, shown[1]), correlation, *shown, known.exponent, said)
 
 
-def _off(between: Between, known: Known) -> list[tuple[Between, Known]]:
+def _off(between: Between, known: MassOnBristles) -> list[tuple[Between, MassOnBristles]]:
     """What is known, with each in turn at the end of its interval."""
     doubted = {key: getattr(known, key) for key in ("mass", "stiffness", "damping")}
     others = [(between, replace(known, **{key: (sum(value), value[1])})) for key, value in doubted.items()]
@@ -190,7 +194,7 @@ def _sizes(record: Record, cutoff: float) -> np.ndarray:
     return np.array([level, level, float(low_pass(rate_of(record.time, record.body)).std()), level, level])
 
 
-def _equation(record: Record, between: Between, known: Known, cutoff: float, sizes: np.ndarray) -> _Equation:
+def _equation(record: Record, between: Between, known: MassOnBristles, cutoff: float, sizes: np.ndarray) -> _Equation:
     """The equation of a record at a low-pass [Hz]."""
     seen, low_pass = record.seen(MOTION * cutoff), LowPass(record.time, cutoff)
     body, force, inertia = at_bearing(seen, between, known.mass[0])
@@ -249,3 +253,39 @@ def _judged(found: tuple[Estimate, ...], left: float, velocity: np.ndarray) -> t
         why = "no rise of friction towards rest shows"
         return coulomb, *(Estimate.unknown(each.name, each.unit, METHOD, why) for each in (static, stribeck))
     return found
+
+
+def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> SlowSliding:
+    (log,) = logs
+    assert isinstance(log, Log)
+    return stribeck_from_slow_sliding(log, believed_between(prior, log), _bristles(prior, log))
+
+
+def _bristles(prior: Prior, log: Log) -> MassOnBristles | None:
+    """The mass and the bristles that other experiments show; None where they do not."""
+    flat = prior.flat(log)
+    masses = [key for key in flat if key.startswith("masses.")]
+    bristles = ["friction.bristle_stiffness", "friction.bristle_damping"]
+    if not masses or not all(key in prior.shown for key in (*masses, *bristles)):
+        return None
+    mass = (
+        sum(prior.shown[key].value for key in masses),
+        sum(prior.shown[key].half_width for key in masses),
+    )
+    stiffness, damping = ((prior.shown[key].value, prior.shown[key].half_width) for key in bristles)
+    return MassOnBristles(mass, stiffness, damping, flat.get("friction.stribeck_exponent", 2.0))
+
+
+def _correlated(result: SlowSliding, estimates: Sequence[Estimate]) -> Correlated:
+    """As the fit has it."""
+    shown = with_interval(estimates)
+    rows = [result.estimates.index(estimate) for estimate in shown]
+    return shown, result.correlation[np.ix_(rows, rows)]
+
+
+KIND = ExperimentKind[SlowSliding](
+    _analyse,
+    lambda result, stage: result.estimates,
+    _correlated,
+    after=("constant-speed", "frequency", "moves", "presliding"),
+)

@@ -1,18 +1,22 @@
-"""Stiffness of the joint from position steps with the cart fixed (thesis, Sec. 4.2.2, Fig. 19).
+"""Position steps with the cart fixed: stiffness of the joint.
 
-At rest the actuator holds the joint alone, so the differences of force over those of deflection are its stiffness,
-whatever constant force there is besides; and they are that even if the cart creeps, where the deflection is measured.
+Thesis, Sec. 4.2.2, Fig. 19. At rest the actuator holds the joint alone, so the differences of force over those of
+deflection are its stiffness, whatever constant force there is besides; and they are that even if the cart creeps, where
+the deflection is measured.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from itertools import pairwise, product
 
 import numpy as np
 
 from friso.identify.estimate import Estimate
-from friso.identify.experiments.common import (
+from friso.identify.kind import AnalysisSettings, ExperimentKind, Prior, Source
+from friso.identify.logs.log import Log
+from friso.identify.readings.common import (
     BLOCKS,
     LINEARITY,
     Mean,
@@ -24,7 +28,7 @@ from friso.identify.experiments.common import (
     low_pass,
     runs,
 )
-from friso.identify.logs.log import Log
+from friso.stage import Stage
 
 CUTOFF = 25.0
 """Low-pass of the force [Hz] (Sec. 4.2.2)."""
@@ -223,3 +227,17 @@ def _fixed(log: Log, position: np.ndarray, windows: tuple[Window, ...]) -> tuple
         return True, ()
     said = f"The cart is not fixed: it moved by {followed:.3g} m while the stage moved by {went:.3g} m"
     return False, (f"{said}; the deflection is that of the joint all the same.",)
+
+
+def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> StepStiffness:
+    (log,) = logs
+    assert isinstance(log, Log)
+    return stiffness_from_steps(log)
+
+
+def _estimates(result: StepStiffness, stage: Stage | None) -> tuple[Estimate, ...]:
+    """The stiffness, but not for a stage that has no joint."""
+    return (replace(result.stiffness, name=KEY),) if stage is None or stage.joint else ()
+
+
+KIND = ExperimentKind[StepStiffness](_analyse, _estimates)

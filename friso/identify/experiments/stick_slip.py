@@ -1,18 +1,21 @@
-"""Static friction from stick-slip with the sensor of the joint's deflection (thesis, Sec. 4.2.3, Fig. 20).
+"""Slow motion on a free joint, the cart sticking and slipping: static friction.
 
-While the cart sticks the joint pulls at it with k_j times its deflection, and more and more; at the peak the cart
-breaks away, and its velocity shows a spike.
+Thesis, Sec. 4.2.3, Fig. 20. While the cart sticks the joint pulls at it with k_j times its deflection, and more and
+more; at the peak the cart breaks away, and its velocity shows a spike.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from friso.errors import InputError
 from friso.identify.estimate import Estimate
-from friso.identify.experiments.common import (
+from friso.identify.kind import AnalysisSettings, ExperimentKind, Prior, Source
+from friso.identify.logs.log import Log
+from friso.identify.readings.common import (
     Mean,
     by_t,
     channel,
@@ -23,12 +26,12 @@ from friso.identify.experiments.common import (
     rate,
     ways,
 )
-from friso.identify.experiments.loading import METHOD as LOADED
-from friso.identify.experiments.loading import stiffness_of_loading
-from friso.identify.experiments.rate_effect import BRISTLE_RATE, static_friction
-from friso.identify.experiments.slips import SLIDING, VISIBLE, slips
-from friso.identify.logs.log import Log
+from friso.identify.readings.loading import METHOD as LOADED
+from friso.identify.readings.loading import stiffness_of_loading
+from friso.identify.readings.rate_effect import BRISTLE_RATE, static_friction
+from friso.identify.readings.slips import SLIDING, VISIBLE, slips
 from friso.intervals import COVERAGE
+from friso.stage import Stage
 
 CUTOFF = 100.0
 """Low-pass of deflection and velocity [Hz]."""
@@ -45,6 +48,9 @@ AT_STOP = 0.05
 STOPPED = "the force on the cart stops rising before it slips: the limiter was touched, or the sensor is at its end"
 
 KEY = "friction.static"
+
+FAR_BELOW = 0.1
+"""Share of the limiter's stiffness up to which a stiffness is the joint's."""
 
 
 @dataclass(frozen=True)
@@ -301,3 +307,32 @@ def _offset(one: Estimate, other: Estimate) -> Estimate:
     half = float(np.hypot(one.half_width, other.half_width)) / 2
     middle = (one.value - other.value) / 2
     return Estimate(name, "N", middle, middle - half, middle + half, method)
+
+
+def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> StickSlip:
+    """With the joint's stiffness as other experiments show it; else as this log does; else as the stage file has it."""
+    (log,) = logs
+    assert isinstance(log, Log)
+    flat, (_, mass) = prior.flat(log), prior.masses(log)
+    stroke, stiffness = flat.get("joint.stroke", np.inf), prior.shown.get("joint.stiffness")
+    result = static_from_stick_slip(log, stiffness or flat.get("joint.stiffness"), mass, stroke)
+    if stiffness is None and result.stiffness.shown:
+        return static_from_stick_slip(log, result.stiffness, mass, stroke)
+    return result
+
+
+def _estimates(result: StickSlip, stage: Stage | None) -> tuple[Estimate, ...]:
+    """Static friction, and the stiffness where it is that of the stage's joint."""
+    return (result.static, *([result.stiffness] if _of_joint(result.stiffness, stage) else ()))
+
+
+def _of_joint(stiffness: Estimate, stage: Stage | None) -> bool:
+    """Whether a stiffness is that of the stage's joint, and not of the limiter that holds it."""
+    if stage is None or stage.joint is None or not stiffness.shown:
+        return False
+    return bool(stiffness.value < FAR_BELOW * stage.flat()["joint.limiter_stiffness"])
+
+
+KIND = ExperimentKind[StickSlip](
+    _analyse, _estimates, after=("frequency", "moves", "steps"), roles=("relative_position|position", "force")
+)

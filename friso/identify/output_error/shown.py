@@ -7,12 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.stats import chi2
 
-from friso.identify.experiments.common import low_pass
 from friso.identify.output_error.coverage import Coverage
 from friso.identify.output_error.fit import Fit, everywhere, first_values, fit, nearby
 from friso.identify.output_error.parameters import LONGEST, RATIO, SHARE
 from friso.identify.output_error.problem import Problem
 from friso.identify.output_error.profile import Profile, profile
+from friso.identify.readings.common import low_pass
 
 STRIBECK = (RATIO, "friction.stribeck_velocity")
 BRISTLES = ("friction.bristle_stiffness", "friction.bristle_damping")

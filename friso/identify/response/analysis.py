@@ -11,6 +11,7 @@ from scipy.signal import butter, sosfiltfilt
 from friso.errors import InputError
 from friso.identify.logs.frequency_text import MeasuredResponse
 from friso.identify.logs.log import Log
+from friso.identify.readings.course import external
 from friso.identify.response.arbitrary import local_polynomial
 from friso.identify.response.closed_loop import feedback
 from friso.identify.response.departure import Departure, Drag, departure, friction_from_departure
@@ -129,15 +130,6 @@ def _attempt(said: list[str], what: str, function, *arguments):
 
 def _record(log: Log, output: str) -> Record:
     return from_log(log, "force", output, external(log))[0]
-
-
-def external(log: Log) -> str | None:
-    """The role of what moves a loop from outside: the force injected, else a reference that moves; None without one.
-
-    A reference that is held constant excites nothing.
-    """
-    roles = ("disturbance", "reference")
-    return next((role for role in roles if role in log and np.ptp(log[role][log.longest]) > 0), None)
 
 
 def _response(records: Sequence[Record], log: Log, output: str, period: float | None) -> FrequencyResponse:

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from friso.identify.experiments import FrictionPosition, FrictionVelocity, friction_position, friction_velocity
+from friso.identify.readings.friction_position import FrictionPosition, friction_position
+from friso.identify.readings.friction_velocity import FrictionVelocity, friction_velocity
 from friso.rig.run import run
 from friso.rig.task import legs
 from friso.stage import Stage

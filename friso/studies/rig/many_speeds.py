@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 
 from friso.frequency.friction import steady_force
-from friso.identify.experiments import FrictionVelocity, friction_velocity
-from friso.identify.experiments.passes import passes
+from friso.identify.readings.friction_velocity import FrictionVelocity, friction_velocity
+from friso.identify.readings.passes import passes
 from friso.rig.rail import friction_factors
 from friso.rig.run import run
 from friso.rig.task import legs

@@ -10,8 +10,8 @@ import numpy as np
 
 from friso.engine.arrays import Status
 from friso.errors import InputError
-from friso.identify.experiments import record
 from friso.identify.logs.log import Log
+from friso.identify.readings.common import record
 from friso.rig.run import Recorded
 from friso.stage import Stage
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from friso.errors import InputError
-from friso.identify.experiments import Presliding, bristles_from_presliding
-from friso.identify.method import between
+from friso.identify.experiments.presliding import Presliding, bristles_from_presliding
+from friso.identify.readings.at_bearing import between
 from friso.rig.run import as_built_keys
 from friso.stage import Stage
 from friso.studies.rig.excitation import Excitation, excite

@@ -11,10 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from friso.identify.experiments import SlowSliding, stribeck_from_slow_sliding
-from friso.identify.experiments.passes import passes
-from friso.identify.experiments.slow_sliding import Known
-from friso.identify.method import between
+from friso.identify.experiments.slow_sliding import MassOnBristles, SlowSliding, stribeck_from_slow_sliding
+from friso.identify.readings.at_bearing import between
+from friso.identify.readings.passes import passes
 from friso.rig.rail import friction_factors
 from friso.rig.run import as_built_keys, run
 from friso.rig.task import legs
@@ -91,8 +90,9 @@ def _edge(passed: Sequence[RigLog]) -> np.ndarray:
 def _found(log: RigLog) -> SlowSliding:
     flat = as_built_keys(log.stage)
     stiffness, damping = flat["friction.bristle_stiffness"], flat.get("friction.bristle_damping", 0.0)
-    known = Known((moving_mass(log.stage), 0.0), (stiffness, 0.0), (damping, 0.0), flat["friction.stribeck_exponent"])
-    return stribeck_from_slow_sliding(log.log, between(flat), known)
+    mass, exponent = moving_mass(log.stage), flat["friction.stribeck_exponent"]
+    bristles = MassOnBristles((mass, 0.0), (stiffness, 0.0), (damping, 0.0), exponent)
+    return stribeck_from_slow_sliding(log.log, between(flat), bristles)
 
 
 def _true(log: RigLog) -> np.ndarray:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from friso.errors import InputError
-from friso.identify.experiments import StickSlip, static_from_stick_slip
+from friso.identify.experiments.stick_slip import StickSlip, static_from_stick_slip
 from friso.rig.rail import friction_factors
 from friso.rig.run import Recorded, run
 from friso.rig.task import legs

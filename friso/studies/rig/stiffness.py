@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from friso.equations.pid import van_dijk_numbers
-from friso.identify.experiments import StepStiffness, stiffness_from_steps
+from friso.identify.experiments.steps import StepStiffness, stiffness_from_steps
 from friso.rig.run import run
 from friso.rig.task import staircase
 from friso.stage import Stage

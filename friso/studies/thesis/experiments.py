@@ -16,16 +16,11 @@ import numpy as np
 
 from friso.engine.simulate import simulate
 from friso.frequency.describing.mass_line import mass_line
-from friso.identify.experiments import (
-    FrictionPosition,
-    StepStiffness,
-    StickSlip,
-    friction_position,
-    record,
-    static_from_stick_slip,
-    stiffness_from_steps,
-)
+from friso.identify.experiments.steps import StepStiffness, stiffness_from_steps
+from friso.identify.experiments.stick_slip import StickSlip, static_from_stick_slip
 from friso.identify.logs.log import Log
+from friso.identify.readings.common import record
+from friso.identify.readings.friction_position import FrictionPosition, friction_position
 from friso.stage import Stage, loads
 from friso.studies.rig.in_position import InPosition
 from friso.studies.rig.stroke_crossover import StrokeCrossover

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from friso.identify.experiments.common import cart, on_bearing
+from friso.identify.experiments.moves import Moves
 from friso.identify.inverse_model import EDGE, SMOOTH, motion
 from friso.identify.logs.log import Log
-from friso.identify.moves import Moves
 from friso.identify.output_error.parameters import Parameter
 from friso.identify.output_error.problem import Simulated
 from friso.identify.output_error.profile import Profile
+from friso.identify.readings.common import cart, on_bearing
 from friso.views.drawing.figure import (
     BLUE,
     GREY,
@@ -27,6 +27,7 @@ from friso.views.drawing.figure import (
     Series,
 )
 from friso.views.drawing.prefixes import range_with_unit
+from friso.views.identify.kind_view import TIME
 from friso.views.identify.numbers import name_of, unit_of
 
 WORST = 5.0
@@ -35,13 +36,11 @@ WORST = 5.0
 WIDE = 8.0
 """Ratio of the ends from which a profile has a logarithmic axis."""
 
-TIME = Axis("Time", "s")
 PALE = "#dbe9f4"
 
 
-def moves_figures(it: Moves, label: str) -> list[Figure]:
-    """All figures of one log of moves; their names begin with "identify_" and the label."""
-    name = f"identify_{label}"
+def moves_figures(it: Moves, name: str) -> list[Figure]:
+    """All figures of one log of moves; their names begin with this one."""
     flat = it.fit.problem.flat
     apart = "joint.stiffness" in flat and not flat["joint.locked"]  # a cart of its own, whose speed has to be measured
     friction = [_friction(it, name)] if not apart or cart(it.log) is not None else []

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -84,6 +85,11 @@ def with_interval(it: Estimate) -> str:
         return f"not shown ({it.reason})"
     unit = _scale(it)[1]
     return f"{value_text(it)} ({interval_text(it).removesuffix(unit).rstrip()})"
+
+
+def listed(estimates: Sequence[Estimate]) -> str:
+    """Several in a sentence, by name."""
+    return ", ".join(f"{within(estimate.name)} {with_interval(estimate)}" for estimate in estimates)
 
 
 def digits(value: float, unit: str, count: int = 3) -> str:

@@ -25,15 +25,14 @@ from friso.views.drawing.figure import (
     Panel,
     Series,
 )
+from friso.views.identify.kind_view import AREA
 from friso.views.identify.numbers import percent, unit_of, with_interval
 
-AREA = "#cfdfee"
 FACTOR_COLOURS = (GREEN, BLUE, PINK)
 
 
-def response_figures(it: Bench, label: str) -> list[Figure]:
-    """All figures of one bench; their names begin with "identify_" and the label."""
-    name = f"identify_{label}"
+def response_figures(it: Bench, name: str) -> list[Figure]:
+    """All figures of one bench; their names begin with this one."""
     figures = [_bode(it, name), *_levels(it, name)]
     if it.departs is not None:
         figures.append(_departure(it, name))

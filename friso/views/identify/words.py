@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from friso.identify.response.analysis import Bench
+from friso.identify.logs.log import Log
 from friso.views.drawing.figure import GREEN, ORANGE, VERMILLION
-from friso.views.identify.facts import Part, part_of
-from friso.views.identify.numbers import interval_text, name_of, percent, value_text, with_interval, within
+from friso.views.identify.kind_view import VIEWS, Facts, PredictionView
+from friso.views.identify.numbers import interval_text, name_of, value_text, with_interval, within
 
 if TYPE_CHECKING:
     from friso.identify.estimate import Estimate
+    from friso.identify.kind import Source
     from friso.identify.method import Experiment, Identification, Prediction
-    from friso.identify.sources import Given
+    from friso.identify.sources import LogFile
 
 COLUMNS = ("Quantity", "Value", "95 % interval", "How, or why there is no value")
 """Of the table of estimates."""
@@ -33,48 +33,42 @@ POOR = 0.5
 
 
 @dataclass(frozen=True)
-class Row:
+class ExperimentSummary:
+    """An experiment: `label`, of which the names of its figures are made, title, sentences, numbers by name, and
+    warnings."""
+
+    label: str
+    title: str
+    sentences: tuple[str, ...]
+    facts: Facts
+    warnings: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class EstimateRow:
     """A line of the table of estimates: whether the value is shown, and the texts of `COLUMNS`."""
 
     shown: bool
     texts: tuple[str, ...]
 
 
-def headline(found: Identification) -> list[tuple[str, str]]:
+def headline(identification: Identification) -> list[tuple[str, str]]:
     """What is shown, what is not and why, and how well other logs are predicted; each with its colour."""
-    shown = [each for each in ordered(found.estimates) if each.shown]
-    benches = [(GREEN, sentence) for sentence in map(_bench, found.experiments) if sentence]
-    said = []
+    estimates = ordered(identification.estimates)
+    shown = [estimate for estimate in estimates if estimate.shown]
+    own = [VIEWS[experiment.kind].headline(experiment.result) for experiment in identification.experiments]
+    own = [sentence for sentence in own if sentence]
+    lines = []
     if shown:
-        said.append((GREEN, f"Shown: {'; '.join(f'{within(each.name)} {with_interval(each)}' for each in shown)}."))
-    elif not benches:
-        said.append((VERMILLION, "No key of the stage file is shown by these logs."))
-    said += benches
-    if found.stage is None:
-        said.append((ORANGE, NO_STAGE))
-    if len(shown) < len(found.estimates):
-        said.append((ORANGE, f"Not shown: {missing(ordered(found.estimates))}."))
-    return said
-
-
-def _bench(it: Experiment) -> str:
-    """The modes of a frequency response, and what its units keep from the stage file."""
-    if not isinstance(it.result, Bench):
-        return ""
-    bench, said = it.result, []
-    names = ("total mass", "antiresonance frequency", "resonance frequency")
-    if bench.two_masses is not None:
-        said = [f"{name} {with_interval(bench.two_masses[name])}" for name in names]
-    elif bench.modes is not None:
-        said = [f"{each.name} {with_interval(each)}" for each in bench.modes.estimates if each.unit == "Hz"]
-    units = bench.driven.channels.input_unit, bench.driven.channels.output_unit
-    told = f"Frequency response: {'; '.join(said)}." if said else ""
-    if units == ("N", "m"):
-        return told
-    scale = (
-        f"The force stands in {units[0]} and the motion in {units[1]}: only in N and m do masses and stiffness enter "
-    )
-    return f"{told} {scale}the stage file (--scale).".strip()
+        lines.append((GREEN, f"Shown: {'; '.join(f'{within(each.name)} {with_interval(each)}' for each in shown)}."))
+    elif not own:
+        lines.append((VERMILLION, "No key of the stage file is shown by these logs."))
+    lines += [(GREEN, sentence) for sentence in own]
+    if identification.stage is None:
+        lines.append((ORANGE, NO_STAGE))
+    if len(shown) < len(estimates):
+        lines.append((ORANGE, f"Not shown: {missing(estimates)}."))
+    return lines
 
 
 def missing(estimates: Sequence[Estimate]) -> str:
@@ -86,30 +80,23 @@ def missing(estimates: Sequence[Estimate]) -> str:
     return "; ".join(f"{', '.join(group)} ({reason})" for reason, group in names.items())
 
 
-def prediction(it: Prediction) -> tuple[str, str]:
-    """How well another log is predicted."""
-    if it.errors is not None:
-        worst = it.errors.force
-        said = (
-            f"{it.log.name}, predicted: relative errors of position {percent(it.errors.position)}, velocity "
-            f"{percent(it.errors.velocity)}, acceleration {percent(it.errors.acceleration)}, force "
-            f"{percent(it.errors.force)}."
-        )
-    else:
-        worst = max(it.response_errors, default=math.nan)
-        said = f"{it.log.name}, predicted: relative error of the response {outputs(it.response_errors)}."
-    return (GREEN if worst < POOR else VERMILLION), said
+def prediction_view(prediction: Prediction) -> PredictionView[Any]:
+    """How the kind of experiment that predicts shows it."""
+    view = VIEWS[prediction.kind].prediction
+    assert view is not None, f"{prediction.kind} predicts logs, and its view does not show it"
+    return view
 
 
-def outputs(errors: Sequence[float]) -> str:
-    """Relative errors of the outputs, the driven mass's first."""
-    names = ("driven mass", "other mass")
-    return ", ".join(f"{percent(error)} ({name})" for name, error in zip(names, errors, strict=False))
+def prediction_line(prediction: Prediction) -> tuple[str, str]:
+    """How well another log is predicted, with its colour."""
+    view = prediction_view(prediction)
+    colour = GREEN if view.worst(prediction.result) < POOR else VERMILLION
+    return colour, f"{prediction.log.name}, predicted: {view.sentence(prediction.result)}"
 
 
-def estimate_rows(found: Identification) -> list[Row]:
+def estimate_rows(identification: Identification) -> list[EstimateRow]:
     """The table of estimates, in words of `COLUMNS`."""
-    return [_row(each) for each in ordered(found.estimates)]
+    return [_row(each) for each in ordered(identification.estimates)]
 
 
 def ordered(estimates: Sequence[Estimate]) -> list[Estimate]:
@@ -119,57 +106,79 @@ def ordered(estimates: Sequence[Estimate]) -> list[Estimate]:
     return sorted(estimates, key=lambda each: places.get(each.name.split(".")[0], len(tables)))
 
 
-def _row(it: Estimate) -> Row:
+def _row(it: Estimate) -> EstimateRow:
     value = value_text(it) if it.shown else LEFT
-    return Row(it.shown, (name_of(it.name), value, interval_text(it), it.reason or it.method))
+    return EstimateRow(it.shown, (name_of(it.name), value, interval_text(it), it.reason or it.method))
 
 
-def parts(found: Identification) -> list[Part]:
+def summaries(identification: Identification) -> list[ExperimentSummary]:
     """The experiments, in words."""
-    return [part_of(each, label) for each, label in zip(found.experiments, labels(found), strict=True)]
+    several = zip(identification.experiments, labels(identification), strict=True)
+    return [_summary(experiment, label) for experiment, label in several]
 
 
-def labels(found: Identification) -> list[str]:
+def _summary(experiment: Experiment, label: str) -> ExperimentSummary:
+    view, result = VIEWS[experiment.kind], experiment.result
+    return ExperimentSummary(
+        label,
+        f"{view.title}: {', '.join(log.name for log in experiment.logs)}",
+        view.sentences(result),
+        (*view.facts(result), *(_used(experiment.logs) if view.longest else ())),
+        view.warnings(result),
+    )
+
+
+def _used(logs: Sequence[Source]) -> Facts:
+    """How much is used of logs with gaps, where an analysis takes the longest stretch without any."""
+    gapped = [log for log in logs if isinstance(log, Log) and len(log.segments) > 1]
+    if not gapped:
+        return ()
+    longest = [max(part.stop - part.start for part in log.segments) for log in gapped]
+    texts = [f"{most} of {len(log.time)}" for most, log in zip(longest, gapped, strict=True)]
+    return (("Samples used (longest stretch without gaps)", ", ".join(texts)),)
+
+
+def labels(identification: Identification) -> list[str]:
     """A name for every experiment, of which those of its figures are made: its kind, numbered where there are more."""
-    kinds = [each.kind for each in found.experiments]
+    kinds = [each.kind for each in identification.experiments]
     return [
         kind.replace("-", "_") + (str(kinds[: i + 1].count(kind)) if kinds.count(kind) > 1 else "")
         for i, kind in enumerate(kinds)
     ]
 
 
-def read_rows(given: Sequence[Given]) -> list[tuple[str, tuple[str, ...], tuple[str, ...]]]:
+def read_rows(given: Sequence[LogFile]) -> list[tuple[str, tuple[str, ...], tuple[str, ...]]]:
     """For every file: what it counts as and why, what was read, and what to know before believing it."""
     return [(_counts_as(each), (*each.source.read, *_kept(each)), _warned(each)) for each in given]
 
 
-def _counts_as(it: Given) -> str:
+def _counts_as(it: LogFile) -> str:
     return f"{it.path.name}: {it.kind} ({it.reason})"
 
 
-def _kept(it: Given) -> tuple[str, ...]:
+def _kept(it: LogFile) -> tuple[str, ...]:
     return () if it.kept is None else (f"mapping kept in {it.kept.name}",)
 
 
-def _warned(it: Given) -> tuple[str, ...]:
+def _warned(it: LogFile) -> tuple[str, ...]:
     return getattr(it.source, "warnings", ())
 
 
-def answer(found: Identification, given: Sequence[Given], predictions: Sequence[Prediction]) -> list[str]:
+def answer(identification: Identification, given: Sequence[LogFile], predictions: Sequence[Prediction]) -> list[str]:
     """The lines of the terminal: what was read, what was found, and what to know about it."""
     lines = []
     for title, read, warned in read_rows(given):
         lines += [title, *(f"  {each}" for each in read), *(f"  note: {each}" for each in warned)]
-    for part in parts(found):
+    for part in summaries(identification):
         lines += ["", part.title, *(f"  {each}" for each in part.sentences)]
         lines += [*(f"  {name}: {text}" for name, text in part.facts), *(f"  note: {each}" for each in part.warnings)]
-    rows = estimate_rows(found)
-    lines += [*(["", *_aligned(rows)] if rows else []), "", *(sentence for _, sentence in headline(found))]
-    lines += [prediction(each)[1] for each in predictions]
-    return lines + [f"note: {each}" for each in found.warnings]
+    rows = estimate_rows(identification)
+    lines += [*(["", *_aligned(rows)] if rows else []), "", *(sentence for _, sentence in headline(identification))]
+    lines += [prediction_line(each)[1] for each in predictions]
+    return lines + [f"note: {each}" for each in identification.warnings]
 
 
-def _aligned(rows: Sequence[Row]) -> list[str]:
+def _aligned(rows: Sequence[EstimateRow]) -> list[str]:
     """Quantity, value and interval in columns; the reason where there is no value."""
     table = [COLUMNS[:-1], *(row.texts[:-1] for row in rows)]
     widths = [max(map(len, column)) for column in zip(*table, strict=True)]

@@ -14,7 +14,7 @@ from friso.studies.rig.outcome import Outcome, RigLog
 from friso.studies.rig.slow_sliding import Slow
 from friso.views.drawing.figure import BLUE, GREEN, ORANGE, PINK, VERMILLION, Axis, Figure, Markers, Panel, Series
 from friso.views.drawing.prefixes import listed, with_unit
-from friso.views.identify.friction_figures import slow_sliding_caption, slow_sliding_panels
+from friso.views.identify.kinds.slow_sliding import slow_sliding_caption, slow_sliding_panels
 from friso.views.identify.numbers import with_interval
 
 COLOURS = (BLUE, VERMILLION, GREEN, ORANGE, PINK)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
-from friso.identify.experiments import Presliding
+from friso.identify.experiments.presliding import Presliding
 from friso.studies.rig.outcome import Outcome
 from friso.studies.rig.presliding import Bristles
 from friso.views.drawing.figure import Figure
 from friso.views.drawing.prefixes import with_unit
-from friso.views.identify.friction_figures import presliding_caption, presliding_panels
+from friso.views.identify.kinds.presliding import presliding_caption, presliding_panels
 from friso.views.identify.numbers import with_interval
 
 

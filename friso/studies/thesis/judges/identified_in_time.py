@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from friso.identify.experiments.rate_effect import static_friction
+from friso.identify.readings.rate_effect import static_friction
 from friso.studies.thesis.claims import Evidence, Finding, Part, judges
 from friso.studies.thesis.experiments import (
     RANGE,

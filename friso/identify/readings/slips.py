@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from friso.identify.experiments.common import rate, robust, runs
+from friso.identify.readings.common import rate, robust, runs
 
 SPIKE = 0.1
 """Share of the highest speed from which the body slips."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from friso.identify.estimate import Estimate
-from friso.identify.experiments.common import LINEARITY, Mean, by_t, solved
+from friso.identify.readings.common import LINEARITY, Mean, by_t, solved
 
 KEY, UNIT = "joint.stiffness", "N/m"
 METHOD = "force over deflection while the cart sticks"

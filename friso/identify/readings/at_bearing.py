@@ -6,14 +6,17 @@ seen up to a few times that frequency.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.signal import bilinear, lfilter, lfilter_zi
 
-from friso.identify.experiments.common import channel, deflection, low_pass, motion_bandwidth, robust
+from friso.identify.kind import Prior
 from friso.identify.logs.log import Log
+from friso.identify.readings.common import channel, deflection, low_pass, motion_bandwidth, robust
 
 FINER = 8
 """Points per sample for what a mode of the structure does: a mode of a tenth of the sampling rate is off by 0.05 %."""
@@ -67,6 +70,41 @@ class Between:
 
 DIRECT = Between()
 """Nothing lies between; the delay is not known."""
+
+
+def between(flat: Mapping[str, Any]) -> Between:
+    """What lies between the commanded force and the bearing of a stage given as flat keys, a joint being held by its
+    limiter.
+
+    The frequency of the parasitic mode is that of both parts of the stage's mass against each other; with the other one
+    held, that of the part on the spring is lower.
+    """
+    drive, joint, mode = (
+        {key.removeprefix(name): value for key, value in flat.items() if key.startswith(name)}
+        for name in ("drive.", "joint.", "parasitic.")
+    )
+    cart, held = (flat.get(f"masses.{name}", 0.0) for name in ("cart", "stage"))
+    lower = np.sqrt(1 - mode["mass"] / held) if mode else 1.0
+    return Between(
+        delay=drive.get("delay", 0.0) + drive["sample_time"] / 2 if "sample_time" in drive else None,
+        bandwidth=drive.get("current_bandwidth", np.inf),
+        mass=cart + held,
+        beyond=held / (cart + held) if joint and held else 0.0,
+        contact=joint.get("limiter_stiffness", np.inf),
+        joint=joint.get("stiffness", 0.0),
+        mode=Mode(mode["mass"] / (cart + held), *(lower * mode[key] for key in ("frequency", "damping_ratio")))
+        if mode
+        else None,
+        viscous=(flat.get("friction.viscous", 0.0), 0.0),
+    )
+
+
+def believed_between(prior: Prior, log: Log) -> Between:
+    """What lies between force and bearing, as other experiments show it or else the stage file has it, which tells no
+    viscous friction better than to its whole size. Raises InputError."""
+    believed = between(prior.believed(log))
+    viscous = prior.shown.get("friction.viscous")
+    return replace(believed, viscous=(believed.viscous[0], viscous.half_width if viscous else believed.viscous[0]))
 
 
 @dataclass(frozen=True)

@@ -10,9 +10,9 @@ from scipy.optimize import least_squares
 from scipy.stats import f as fisher
 
 from friso.identify.estimate import Estimate
-from friso.identify.experiments.common import Mean, by_t, t_value, ways
-from friso.identify.experiments.passes import CUTOFF, Pass, on_common_way, passes, way_of
 from friso.identify.logs.log import Log
+from friso.identify.readings.common import Mean, by_t, t_value, ways
+from friso.identify.readings.passes import CUTOFF, Pass, on_common_way, passes, way_of
 from friso.intervals import COVERAGE
 
 SPAN = 1.5

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from friso.identify.estimate import Estimate
-from friso.identify.experiments.common import Mean, by_t, correlated_mean, t_value
+from friso.identify.readings.common import Mean, by_t, correlated_mean, t_value
 
 BRISTLE_RATE = 100.0
 """sigma_0 v_s [N/s] taken as the least there is where nothing better is known: that of Canudas de Wit et al. 1995; the

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import detrend
 
-from friso.identify.experiments.common import Mean, block_mean, channel, low_pass, on_bearing, rate, robust, runs
 from friso.identify.logs.log import Log
+from friso.identify.readings.common import Mean, block_mean, channel, low_pass, on_bearing, rate, robust, runs
 
 CUTOFF = 25.0
 """Low-pass of the velocity [Hz] by which constant stretches are found."""

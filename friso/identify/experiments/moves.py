@@ -1,4 +1,7 @@
-"""What a log of moves tells: the inverse model by least squares, then the whole model by its output error."""
+"""Moves, with a reference or without: mass, friction and constant force, and the joint where it shows.
+
+First the inverse model by least squares, then the whole model by its output error.
+"""
 
 from __future__ import annotations
 
@@ -12,14 +15,18 @@ from friso.errors import InputError
 from friso.identify.errors import Errors, Residual, errors_of, residual_of, unexplained
 from friso.identify.estimate import Estimate
 from friso.identify.inverse_model import SMOOTH, InverseModel, directions, inverse_model, motion
+from friso.identify.kind import AnalysisSettings, ExperimentKind, Predictor, Prior, Source
 from friso.identify.logs.log import Log
 from friso.identify.output_error.answers import estimates_of
 from friso.identify.output_error.coverage import Coverage, coverage
 from friso.identify.output_error.fit import Fit
 from friso.identify.output_error.parameters import MASS, keys_of, parameters_of
-from friso.identify.output_error.problem import Problem, Simulated, closed_loop, tracking
+from friso.identify.output_error.problem import Problem, Simulated, closed_loop, tracking, why_continuous
 from friso.identify.output_error.profile import Profile
 from friso.identify.output_error.shown import fit_shown
+from friso.identify.readings.course import Course
+from friso.identify.stage_file import made_up
+from friso.stage import Stage
 
 
 @dataclass(frozen=True)
@@ -88,8 +95,17 @@ def identify_moves(log: Log, flat: Mapping[str, Any], own_loop: bool, bandwidth:
     )  # fmt: skip
 
 
-def predict(found: Moves, log: Log) -> tuple[slice, Simulated, Errors]:
-    """Another log of the same axis simulated with what was found: the samples used, the record, its errors.
+@dataclass(frozen=True)
+class SimulatedLog:
+    """Another log of the same axis, simulated: the samples used, the record, and its errors."""
+
+    part: slice
+    simulated: Simulated
+    errors: Errors
+
+
+def simulated_log(found: Moves, log: Log) -> SimulatedLog:
+    """Another log of the same axis simulated with what was found.
 
     Raises InputError where the machine's own loop is not known.
     """
@@ -99,7 +115,7 @@ def predict(found: Moves, log: Log) -> tuple[slice, Simulated, Errors]:
     part = log.longest
     problem = _same_kind(found.loop, log, part)
     simulated = problem.record(found.fit.inner)
-    return part, simulated, errors_of(log, part, simulated, found.inverse.bandwidth)
+    return SimulatedLog(part, simulated, errors_of(log, part, simulated, found.inverse.bandwidth))
 
 
 def _same_kind(problem: Problem, log: Log, part: slice) -> Problem:
@@ -158,3 +174,64 @@ def _levels(log: Log, flat: Mapping[str, Any], inverse: InverseModel) -> dict[st
             levels[each.name] = value if value > 0 and not each.low <= 0 else max(each.high / 2, 1e-6)
             levels[each.name] = levels[each.name] if np.isfinite(levels[each.name]) else max(value, 1e-6)
     return levels
+
+
+FEW = 7.0
+"""Harmonics, and turns in each period, that moves which are repeated stay below: our choice."""
+
+RESTS = 0.1
+"""Share of the time for which the position rests from which on what repeats is taken for moves."""
+
+FOLLOWED = (
+    "without the machine's own controller the intervals of friction are too narrow: of machines drawn at random "
+    "(benchmarks/identify.py) they held the truth less often than not; give the controller with --stage"
+)
+
+
+def _claims(course: Course) -> str | None:
+    """A reference moves; or nothing repeats, the position rests in between, or the force turns seldom and holds few
+    frequencies."""
+    if course.reference_moves:
+        return "it has a reference that moves"
+    repetition = course.repetition
+    if repetition is None:
+        standing = "reference" in course.log
+        return None if standing else f"the {course.signal} does not repeat, and there is no reference that moves"
+    if repetition.rests > RESTS:
+        return f"{course.repeats}, but the position rests in between"
+    if repetition.harmonics < FEW and repetition.turns < FEW:
+        return f"{course.repeats}, but turns seldom and holds few frequencies"
+    return None
+
+
+def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> Moves:
+    """With a stage that was given and a reference, in the machine's own loop; from what other experiments show."""
+    (log,) = logs
+    assert isinstance(log, Log)
+    flat = prior.flat(log)
+    start = {**flat, **{key: estimate.value for key, estimate in prior.shown.items() if key in flat}}
+    return identify_moves(log, start, prior.given and "reference" in log, settings.bandwidth)
+
+
+def _notes(results: Sequence[Moves], stage: Stage | None) -> list[str]:
+    """Where the drive that was given is not the one simulated, and where no controller was."""
+    loops = [result for result in results if result.loop] if stage is not None else []
+    told = [why_continuous(stage.flat(), result.log.sample_time) for result in loops if stage is not None]
+    followed = any(result.loop is None for result in results)
+    return [*(sentence for sentence in dict.fromkeys(told) if sentence), *([FOLLOWED] if followed else [])]
+
+
+def _predict(result: Moves, log: Log, settings: AnalysisSettings) -> SimulatedLog | None:
+    return simulated_log(result, log) if "reference" in log else None
+
+
+KIND = ExperimentKind[Moves](
+    _analyse,
+    lambda result, stage: result.estimates,
+    lambda result, estimates: (result.correlated, result.correlation),
+    after=("frequency", "steps"),
+    claims=_claims,
+    around=lambda log: made_up(log, inverse_model(log)),
+    notes=_notes,
+    predictor=Predictor("a log with a reference beside moves", _predict),
+)

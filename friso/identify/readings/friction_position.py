@@ -13,9 +13,9 @@ import numpy as np
 from scipy.signal import lfilter, periodogram
 
 from friso.identify.estimate import Estimate
-from friso.identify.experiments.common import block_mean, by_t, channel, low_pass, on_bearing
-from friso.identify.experiments.passes import CUTOFF, Pass, passes
 from friso.identify.logs.log import Log
+from friso.identify.readings.common import block_mean, by_t, channel, low_pass, on_bearing
+from friso.identify.readings.passes import CUTOFF, Pass, passes
 from friso.intervals import COVERAGE
 
 POINTS = 400

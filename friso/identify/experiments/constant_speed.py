@@ -1,0 +1,53 @@
+"""Constant speeds there and back: Coulomb, viscous and static friction, Stribeck velocity."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from friso.identify.combine import Correlated
+from friso.identify.estimate import Estimate
+from friso.identify.kind import AnalysisSettings, ExperimentKind, Prior, Source, independent
+from friso.identify.logs.log import Log
+from friso.identify.readings.friction_position import FrictionPosition, friction_position
+from friso.identify.readings.friction_velocity import FrictionVelocity, friction_velocity
+from friso.stage import Stage
+
+
+@dataclass(frozen=True)
+class FrictionAtSpeeds:
+    """Friction against velocity and against position, of one log."""
+
+    velocity: FrictionVelocity
+    position: FrictionPosition
+
+
+def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> FrictionAtSpeeds:
+    (log,) = logs
+    assert isinstance(log, Log)
+    mass, crossover = sum(prior.masses(log)), prior.flat(log).get("controller.crossover")
+    return FrictionAtSpeeds(friction_velocity(log, mass), friction_position(log, mass, crossover))
+
+
+def _estimates(result: FrictionAtSpeeds, stage: Stage | None) -> tuple[Estimate, ...]:
+    """Friction in both directions, in the order of its covariance."""
+    both = result.velocity.both
+    keys = {"coulomb": both.coulomb, "viscous": both.viscous, "static": both.static}
+    keys["stribeck_velocity"] = both.stribeck_velocity
+    return tuple(replace(estimate, name=f"friction.{key}") for key, estimate in keys.items())
+
+
+def _correlated(result: FrictionAtSpeeds, estimates: Sequence[Estimate]) -> Correlated:
+    """By the covariance of the fit."""
+    covariance = result.velocity.both.covariance
+    if not covariance.size:
+        return independent(result, estimates)
+    fitted = enumerate(estimates[: len(covariance)])
+    rows = [row for row, estimate in fitted if estimate.shown and estimate.half_width > 0]
+    size = np.sqrt(np.diag(covariance))
+    return [estimates[row] for row in rows], (covariance / np.outer(size, size))[np.ix_(rows, rows)]
+
+
+KIND = ExperimentKind[FrictionAtSpeeds](_analyse, _estimates, _correlated, after=("frequency", "moves"))

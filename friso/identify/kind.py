@@ -1,0 +1,127 @@
+"""What a kind of experiment declares of itself: the logs it takes, how they are analysed, what they tell of a stage."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Generic, TypeVar
+
+import numpy as np
+
+from friso.errors import InputError
+from friso.identify.combine import Correlated
+from friso.identify.estimate import Estimate
+from friso.identify.logs.frequency_text import MeasuredResponse
+from friso.identify.logs.log import Log
+from friso.identify.readings.course import Course
+from friso.stage import Stage
+
+Source = Log | MeasuredResponse
+"""What a file may hold: signals over time, or a frequency response as somebody measured it."""
+
+Result = TypeVar("Result")
+
+
+@dataclass(frozen=True)
+class AnalysisSettings:
+    """What the user chose: bandwidth of the moves [Hz] for the inverse model, band [Hz] and period [s] of frequency
+    responses; None where friso is to find them."""
+
+    bandwidth: float | None = None
+    band: tuple[float, float] | None = None
+    period: float | None = None
+
+
+NOTHING_CHOSEN = AnalysisSettings()
+
+
+@dataclass(frozen=True)
+class Prior:
+    """What is known of the machine before an experiment is analysed: the stage (None where there is none), whether the
+    user gave it, so that its controller is the machine's, and what the experiments analysed before show, by key."""
+
+    stage: Stage | None = None
+    given: bool = False
+    shown: Mapping[str, Estimate] = field(default_factory=dict)
+
+    def flat(self, log: Log) -> dict[str, Any]:
+        """The flat keys of the stage as it was set up for a log; none without a stage. Raises InputError."""
+        return {} if self.stage is None else as_set_up(self.stage, log)
+
+    def believed(self, log: Log) -> dict[str, Any]:
+        """The same, with the values that other experiments show. Raises InputError."""
+        return {**self.flat(log), **{key: estimate.value for key, estimate in self.shown.items()}}
+
+    def masses(self, log: Log) -> tuple[float, float]:
+        """Mass [kg] of the cart and of the stage as believed, 0 for what is not known. Raises InputError."""
+        believed = self.believed(log)
+        return float(believed.get("masses.cart", 0.0)), float(believed.get("masses.stage", 0.0))
+
+
+def as_set_up(stage: Stage, log: Log) -> dict[str, Any]:
+    """The flat keys of the stage as it was set up for a log; what the stage does not have is left out. Raises
+    InputError."""
+    keys = stage.flat()
+    try:
+        return stage.replace({key: text for key, text in log.setup.items() if key in keys}).flat()
+    except InputError as error:
+        raise error.found_in(f"{log.name}, [setup]") from None
+
+
+def independent(result: Any, estimates: Sequence[Estimate]) -> Correlated:
+    """Estimates none of which tells anything of another one."""
+    shown = with_interval(estimates)
+    return shown, np.eye(len(shown))
+
+
+def with_interval(estimates: Sequence[Estimate]) -> list[Estimate]:
+    """Those that are shown, with an interval."""
+    return [estimate for estimate in estimates if estimate.shown and estimate.half_width > 0]
+
+
+@dataclass(frozen=True)
+class Predictor(Generic[Result]):
+    """How a result predicts another log: the prediction, or None for a log of which it can tell nothing; and `needs`,
+    what there has to be, in words."""
+
+    needs: str
+    predict: Callable[[Result, Log, AnalysisSettings], Any]
+
+
+@dataclass(frozen=True)
+class ExperimentKind(Generic[Result]):
+    """A kind of experiment. Its name, the word of the command line, is that of its module; see `kinds`.
+
+    `analyse` gives the result of a group of logs, whose class is the kind's own affair; `estimates` what this tells of
+    keys of the stage file, and `correlated` how these hang together. `after` names the kinds whose results it uses.
+    `roles` are the channels that a log needs; of several that are told apart by | the first one that is mapped, or the
+    last. `si`: they have to be in SI units. `together`: all its logs are realisations of one experiment; `responses`:
+    it takes frequency responses as somebody measured them, too. `claims` answers why a log of which nobody said what
+    it is may be of this kind, or None; `around` makes up a stage around a log where none is given. `notes` are what
+    the engineer should know of all its results, the stage being given or not. Functions raise InputError for logs that
+    cannot be used.
+    """
+
+    analyse: Callable[[Sequence[Source], Prior, AnalysisSettings], Result]
+    estimates: Callable[[Result, Stage | None], tuple[Estimate, ...]]
+    correlated: Callable[[Result, Sequence[Estimate]], Correlated] = independent
+    after: tuple[str, ...] = ()
+    roles: tuple[str, ...] = ("position", "force")
+    si: bool = True
+    together: bool = False
+    responses: bool = False
+    claims: Callable[[Course], str | None] | None = None
+    around: Callable[[Log], Stage] | None = None
+    notes: Callable[[Sequence[Result], Stage | None], Sequence[str]] = lambda results, stage: ()
+    predictor: Predictor[Result] | None = None
+
+    def needed(self, mapped: Mapping[str, Any]) -> tuple[str, ...]:
+        """The roles that a log needs, where these are mapped."""
+        choices = [each.split("|") for each in self.roles]
+        return tuple(next((role for role in roles if role in mapped), roles[-1]) for roles in choices)
+
+    def groups(self, sources: Sequence[Source]) -> list[tuple[Source, ...]]:
+        """The logs of this kind, by experiment."""
+        times = tuple(source for source in sources if isinstance(source, Log))
+        responses = [(source,) for source in sources if not isinstance(source, Log)] if self.responses else []
+        return [*([times] if self.together and times else [(log,) for log in times]), *responses]
