@@ -28,7 +28,6 @@ from friso.identify.method import identify
 from friso.identify.readings.common import block_mean, correlated_mean, low_pass, record, runs, t_value
 from friso.identify.readings.friction_position import friction_position
 from friso.identify.readings.friction_velocity import friction_velocity
-from friso.identify.readings.hysteresis import stiffness_from_hysteresis
 from friso.identify.readings.rate_effect import break_away, share_below, static_friction
 from friso.identify.response.fitting import Fit
 from friso.studies.thesis.claims import Evidence, Finding, registered

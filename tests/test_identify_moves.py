@@ -15,9 +15,9 @@ from patched import patched
 from refusals import Refused
 
 import friso
-from friso.identify import moves as method
 from friso.identify.errors import errors_of
-from friso.identify.experiments.moves import Moves, identify_moves, predict
+from friso.identify.experiments import moves as method
+from friso.identify.experiments.moves import Moves, identify_moves, simulated_log
 from friso.identify.logs.log import Log
 from friso.identify.output_error import fit as fitting
 from friso.identify.output_error import profile as profiles
@@ -102,19 +102,20 @@ def test_pulses_of_force_are_predicted(quick: tuple[dict[str, Any], Log, Moves])
     machine = drawn(3, False)
     full = closed_loop(machine.flat, given, given.segments[0], ()).record(np.zeros(0))
     pushed = replace(given, signals={**given.signals, "position": full.position, "force": full.force + pulses})
-    part, _, errors = predict(found, machine.measured(pushed))
+    predicted = simulated_log(found, machine.measured(pushed))
+    part, errors = predicted.part, predicted.errors
     assert part == pushed.segments[0]
     assert errors.force < 0.05
     assert errors.position < 5e-3
     silent = replace(pushed, signals={**pushed.signals, "disturbance": 0 * pulses})
-    assert predict(found, silent)[2].force > 5 * errors.force
+    assert simulated_log(found, silent).errors.force > 5 * errors.force
 
 
 def test_missing_signals_are_named(quick: tuple[dict[str, Any], Log, Moves], refused: Refused) -> None:
     _, log, found = quick
     bare = replace(log, signals={role: log[role] for role in ("position", "force")})
     with refused("reference"):
-        predict(found, bare)
+        simulated_log(found, bare)
     volts = replace(log, units={"force": "V"})
     with refused("force"):
         identify_moves(volts, found.flat, True)
@@ -216,6 +217,6 @@ def test_emps_shows_mass_and_sliding_friction_alone(identified: Moves) -> None:
 def test_half_of_emps_predicts_the_other(identified: Moves, emps: Log) -> None:
     """The latter half alone, simulated with what was found, on its own."""
     latter = cut(emps, slice(len(emps.time) // 2, None))
-    errors = predict(identified, latter)[2]
+    errors = simulated_log(identified, latter).errors
     for name, percent in PUBLISHED.items():
         assert 100 * getattr(errors, name) < percent, name
