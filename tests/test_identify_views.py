@@ -25,8 +25,8 @@ from friso.identify.experiments.slow_sliding import MassOnBristles, stribeck_fro
 from friso.identify.experiments.steps import stiffness_from_steps
 from friso.identify.experiments.stick_slip import static_from_stick_slip
 from friso.identify.inverse_model import inverse_model, motion
-from friso.identify.logs.frequency_text import MeasuredResponse
 from friso.identify.logs.log import Log
+from friso.identify.logs.measured_response import MeasuredResponse
 from friso.identify.method import Experiment, Identification, Prediction
 from friso.identify.output_error.coverage import coverage
 from friso.identify.output_error.fit import Fit, first_values

@@ -12,7 +12,7 @@ from refusals import Refused
 from scipy.io import savemat
 
 from friso.errors import InputError
-from friso.identify.logs import read as reading
+from friso.identify.logs import format as reading
 from friso.identify.logs.channel import Channel, Table
 from friso.identify.logs.read import file_format, is_frequency_response, read_frequency_response, read_table
 

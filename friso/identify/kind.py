@@ -11,8 +11,8 @@ import numpy as np
 from friso.errors import InputError
 from friso.identify.combine import Correlated
 from friso.identify.estimate import Estimate
-from friso.identify.logs.frequency_text import MeasuredResponse
 from friso.identify.logs.log import Log
+from friso.identify.logs.measured_response import MeasuredResponse
 from friso.identify.readings.course import Course
 from friso.stage import Stage
 

@@ -9,9 +9,10 @@ import numpy as np
 
 from friso.errors import InputError, LogError
 from friso.identify.logs import checks, delays
+from friso.identify.logs.format import FORMATS
 from friso.identify.logs.log import ROLES, Log
 from friso.identify.logs.mapping import Mapping
-from friso.identify.logs.read import file_format, read_table
+from friso.identify.logs.read import file_format
 from friso.identify.logs.roles import Choice, choose, role_of
 from friso.identify.logs.signals import Reading, Told, instants, no_time, signal, unused, with_told_units
 from friso.identify.logs.time_base import Track, together, track
@@ -30,9 +31,9 @@ def read_log(
     `needed` are the roles that must be there. Raises LogError (one message) for what cannot be read or used.
     """
     path, mapping = Path(path), mapping or Mapping()
-    form = file_format(path)
-    table = with_told_units(read_table(path), mapping, form, str(path))
-    reading = Reading(table, mapping, strict, form == "mat", str(path))
+    form = FORMATS[file_format(path)]
+    table = with_told_units(form.read(path), mapping, form.times, str(path))
+    reading = Reading(table, mapping, strict, not form.units, str(path))
     chosen = choose(table, mapping.roles, needed, str(path))
     unused(mapping, chosen, str(path))
     told = Told(list(table.read))

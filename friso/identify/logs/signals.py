@@ -44,13 +44,14 @@ class Reading:
     origin: str
 
 
-def with_told_units(table: Table, mapping: Mapping, form: str, origin: str) -> Table:
-    """The table with the units that the user said, and with the times that follow from them. Raises LogError."""
+def with_told_units(table: Table, mapping: Mapping, times: bool, origin: str) -> Table:
+    """The table with the units that the user said, and with the times that follow from them, where the format has no
+    `times` of its own. Raises LogError."""
     if not mapping.units:
         return table
     told = {id(find(table, name, "unit", origin)): unit for name, unit in mapping.units.items()}
     channels = [replace(channel, unit=told.get(id(channel), channel.unit)) for channel in table.channels]
-    if form == "text":  # its times come from its columns
+    if not times:  # they come from its columns
         channels = [replace(channel, time=None) for channel in channels]
     timed = zip(channels, with_times(channels), strict=True)
     kept = tuple(new if old.time is None else old for old, new in timed)

@@ -75,7 +75,7 @@ def decoded_head(path: Path) -> tuple[str, list[str]]:
 def _no_text(path: Path) -> LogError:
     return LogError(
         "log", f"{path.stat().st_size} bytes that are neither text nor a known format",
-        "CSV, TXT, TSV, TwinCAT Scope CSV, MAT, TDMS, UFF or LVM", "", str(path),
+        "a text", "", str(path),
     )  # fmt: skip
 
 

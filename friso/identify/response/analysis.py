@@ -9,8 +9,8 @@ import numpy as np
 from scipy.signal import butter, sosfiltfilt
 
 from friso.errors import InputError
-from friso.identify.logs.frequency_text import MeasuredResponse
 from friso.identify.logs.log import Log
+from friso.identify.logs.measured_response import MeasuredResponse
 from friso.identify.readings.course import external
 from friso.identify.response.arbitrary import local_polynomial
 from friso.identify.response.closed_loop import feedback

@@ -1,5 +1,4 @@
-"""Frequency responses as somebody else measured them: a text of magnitude and phase, or of real and imaginary part;
-a universal file."""
+"""Frequency responses as somebody else measured them, and how columns of a table are one."""
 
 from __future__ import annotations
 
@@ -10,10 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from friso.errors import LogError
-from friso.identify.logs.channel import Channel
+from friso.identify.logs.channel import Channel, Table
 from friso.identify.logs.roles import words
-from friso.identify.logs.text import read_text
-from friso.identify.logs.uff import frequency_sets, label
 from friso.identify.logs.units import factor, spelled
 from friso.quantities import Quantity, any_sign
 
@@ -54,9 +51,8 @@ def is_response(names: Iterable[str]) -> bool:
     return "frequency" in found and ({"magnitude", "phase"} <= found or {"real", "imaginary"} <= found)
 
 
-def read_response_text(path: Path) -> MeasuredResponse:
-    """The response in a text file. Raises LogError."""
-    table = read_text(path)
+def response_of(table: Table, path: Path) -> MeasuredResponse:
+    """The response in the columns of a table. Raises LogError."""
     found: dict[str, list[Channel]] = {}
     for channel in table.channels:
         if kind_of(channel.name) is not None:
@@ -73,24 +69,13 @@ def read_response_text(path: Path) -> MeasuredResponse:
     frequency = _frequency(columns["frequency"], path)
     if {"real", "imaginary"} <= set(columns):
         response = columns["real"].values + 1j * columns["imaginary"].values
-        scale, unit, told = _unit(columns["real"].unit)
+        scale, unit, told = response_unit(columns["real"].unit)
         told = f"real and imaginary part {told}"
     else:
         response, scale, unit, told = _polar(columns["magnitude"], columns["phase"], path)
     coherence = columns["coherence"].values if "coherence" in columns else None
     read = (*table.read, told, f"{frequency.size} frequencies, {frequency.min():g} Hz to {frequency.max():g} Hz")
-    return _checked(MeasuredResponse(frequency, response * scale, coherence, path.stem, read, unit), path)
-
-
-def read_response_uff(path: Path) -> MeasuredResponse:
-    """The response in a universal file. Raises LogError."""
-    data, frequency, coherence = frequency_sets(path)
-    above, below = label(data, "ordinate_axis_units_lab"), label(data, "orddenom_axis_units_lab")
-    scale, unit, told = _unit(f"{above}/({below})" if above and below else above)
-    read = ("format: UFF, dataset 58", f"frequency response {told}", f"{frequency.size} frequencies")
-    response = np.asarray(data["data"], dtype=complex) * scale
-    name = label(data, "id1") or path.stem
-    return _checked(MeasuredResponse(frequency, response, coherence, name, read, unit), path)
+    return checked(MeasuredResponse(frequency, response * scale, coherence, path.stem, read, unit), path)
 
 
 def _frequency(column: Channel, path: Path) -> np.ndarray:
@@ -112,11 +97,11 @@ def _polar(magnitude: Channel, phase: Channel, path: Path) -> tuple[np.ndarray, 
     if unit.lower().startswith("db") or "db" in words(magnitude.name):
         with np.errstate(over="ignore"):
             return 10 ** (magnitude.values / 20) * angle, 1.0, "", f"magnitude in dB, phase in {phase.unit}"
-    scale, si, told = _unit(magnitude.unit)
+    scale, si, told = response_unit(magnitude.unit)
     return magnitude.values * angle, scale, si, f"magnitude {told}, phase in {phase.unit}"
 
 
-def _unit(text: str) -> tuple[float, str, str]:
+def response_unit(text: str) -> tuple[float, str, str]:
     """Factor to SI, the SI unit, and both in words; a unit of a kind not known here stays as it is."""
     text = spelled(text)
     for si in ("m/N", "m/s/N", "m/s^2/N", "m/V", "m/A", "m/s^2/A", "m/s^2/V", "rad/s^2/A", "rad/A", "rad/s/A", "rad/V",
@@ -126,7 +111,7 @@ def _unit(text: str) -> tuple[float, str, str]:
     return 1.0, text, f"in {text}" if text else "without a unit"
 
 
-def _checked(measured: MeasuredResponse, path: Path) -> MeasuredResponse:
+def checked(measured: MeasuredResponse, path: Path) -> MeasuredResponse:
     """The response without its line at 0 Hz, checked. Raises LogError for too few or falling frequencies and NaN."""
     positive = measured.frequency > 0
     if not positive.all():

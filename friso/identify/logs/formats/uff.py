@@ -9,7 +9,9 @@ import numpy as np
 
 from friso.errors import LogError
 from friso.identify.logs.channel import Channel, Table
-from friso.identify.logs.instruments import library
+from friso.identify.logs.format import LogFormat
+from friso.identify.logs.libraries import library
+from friso.identify.logs.measured_response import MeasuredResponse, checked, response_unit
 from friso.identify.logs.text import unique
 
 TIME_RESPONSE, FREQUENCY_RESPONSE, COHERENCE = 1, 4, 6
@@ -75,3 +77,27 @@ def frequency_sets(path: Path) -> tuple[dict[str, Any], np.ndarray, np.ndarray |
     fitting = [d for d in sets if d["func_type"] == COHERENCE and np.size(d["data"]) == axis.size]
     coherence = np.real(fitting[0]["data"]).astype(float) if len(fitting) == 1 else None
     return responses[0], axis, coherence
+
+
+def read_response_uff(path: Path) -> MeasuredResponse:
+    """The response in a universal file. Raises LogError."""
+    data, frequency, coherence = frequency_sets(path)
+    above, below = label(data, "ordinate_axis_units_lab"), label(data, "orddenom_axis_units_lab")
+    scale, unit, told = response_unit(f"{above}/({below})" if above and below else above)
+    read = ("format: UFF, dataset 58", f"frequency response {told}", f"{frequency.size} frequencies")
+    response = np.asarray(data["data"], dtype=complex) * scale
+    name = label(data, "id1") or path.stem
+    return checked(MeasuredResponse(frequency, response, coherence, name, read, unit), path)
+
+
+def _holds_response(path: Path) -> bool:
+    return any(data["func_type"] == FREQUENCY_RESPONSE for data in sets_58(path))
+
+
+FORMAT = LogFormat(
+    "UFF",
+    lambda head: is_uff(head.start),
+    read_uff,
+    holds_response=_holds_response,
+    read_response=read_response_uff,
+)

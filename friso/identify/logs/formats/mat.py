@@ -10,6 +10,7 @@ import numpy as np
 
 from friso.errors import LogError
 from friso.identify.logs.channel import Channel, Table
+from friso.identify.logs.format import FileHead, LogFormat
 from friso.identify.logs.text import unique
 from friso.identify.logs.units import split_heading
 
@@ -219,3 +220,12 @@ def _structures(item: Any, children: dict[str, Any]) -> Any:
         length = min(len(each) for each in children.values())
         return [{name: each[i] for name, each in children.items()} for i in range(length)]
     return children
+
+
+def _recognise(head: FileHead) -> bool:
+    """By its first bytes, or those behind the block that MATLAB puts before HDF5; or by its name."""
+    start = head.start
+    return start.startswith(b"MATLAB ") or HDF5 in (start[:8], start[512:520]) or head.path.suffix.lower() == ".mat"
+
+
+FORMAT = LogFormat("MAT", _recognise, read_mat, units=False)

@@ -15,6 +15,7 @@ import pandas as pd
 
 from friso.errors import LogError
 from friso.identify.logs.channel import Channel, Table
+from friso.identify.logs.format import LogFormat
 from friso.identify.logs.sniff import Layout, decoded_head, is_number, split_line
 from friso.identify.logs.text import as_numbers, read_frame, unique
 from friso.identify.logs.units import spelled
@@ -127,3 +128,6 @@ def _floats(path: Path, form: Layout, frame: Any, column: int) -> np.ndarray:
         given = f"{quoted(str(cells.iloc[wrong[0]]))} in line {line}, column {column + 1}"
         raise LogError("log", given, "numbers all the way down", "", str(path))
     return values
+
+
+FORMAT = LogFormat("TwinCAT Scope CSV", lambda head: is_twincat(head.lines), read_twincat, rank=1)
