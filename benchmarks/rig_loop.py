@@ -33,14 +33,14 @@ from friso.identify.method import Identification, identify
 from friso.rig.rail import friction_factors
 from friso.stage import Stage, load
 from friso.stage.files import save
-from friso.studies.rig.frf import plant_log
+from friso.studies.rig.experiments.frf import plant_log
+from friso.studies.rig.experiments.presliding import presliding_log
+from friso.studies.rig.experiments.stiction import slow_motion
+from friso.studies.rig.experiments.stiffness import steps
 from friso.studies.rig.many_speeds import many_speeds_logs
 from friso.studies.rig.outcome import RigLog
-from friso.studies.rig.presliding import presliding_log
 from friso.studies.rig.sizes import freed, locked, travel
 from friso.studies.rig.slow_sliding import slow_sliding_logs
-from friso.studies.rig.stiction import slow_motion
-from friso.studies.rig.stiffness import steps
 
 sys.path.insert(0, str(Path(__file__).parent.parent / "tests"))
 from rig_machines import Machine, built, mean_level, sources, through_files

@@ -6,10 +6,10 @@ import numpy as np
 
 from friso.identify.estimate import Estimate
 from friso.identify.response.response import FrequencyResponse
-from friso.studies.rig.frf import Loop
+from friso.studies.rig.experiments.frf import Loop
+from friso.studies.rig.experiments.in_position import InPosition, Standstill
+from friso.studies.rig.experiments.stroke_crossover import StrokeCrossover
 from friso.studies.rig.hunted import Hunted
-from friso.studies.rig.in_position import InPosition, Standstill
-from friso.studies.rig.stroke_crossover import StrokeCrossover
 from friso.studies.thesis.as_built import Cycles, Moves, RigLoops
 
 HUNTS, FAILED = 7, -1

@@ -18,8 +18,8 @@ from friso.identify.method import identify
 from friso.identify.readings.at_bearing import Between, Mode, between
 from friso.identify.readings.common import deflections, jackknife, record
 from friso.studies.rig.excitation import excite
+from friso.studies.rig.experiments.presliding import GENTLE, presliding_log
 from friso.studies.rig.outcome import rig_log
-from friso.studies.rig.presliding import GENTLE, presliding_log
 from friso.studies.rig.sizes import locked, travel
 
 DT, SECONDS = 5e-4, 6.0

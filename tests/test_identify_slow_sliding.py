@@ -205,7 +205,7 @@ def test_a_machine_on_which_no_slow_pass_is_steady_shows_its_friction_on_the_rig
 
 @pytest.mark.usefixtures("one_place")
 def test_the_stage_file_takes_it_with_what_presliding_shows() -> None:
-    from friso.studies.rig.presliding import presliding_log
+    from friso.studies.rig.experiments.presliding import presliding_log
 
     machine = built(93)
     stage, flat = locked(machine.truth), machine.flat

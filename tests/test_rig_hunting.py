@@ -12,7 +12,7 @@ from friso import load
 from friso.engine.arrays import Status
 from friso.rig.run import Recorded
 from friso.stage import Stage
-from friso.studies.rig import compare, hunting, in_position, stroke_crossover
+from friso.studies.rig.experiments import compare, hunting, in_position, stroke_crossover
 from friso.studies.rig.hunted import (
     Hunted,
     distance,

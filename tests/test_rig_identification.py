@@ -9,7 +9,8 @@ from refusals import Refused
 import friso
 from friso.identify.experiments.stick_slip import static_from_stick_slip
 from friso.stage import Stage
-from friso.studies.rig import constant_speed, excitation, frf, many_speeds, sizes, stiction, stiffness
+from friso.studies.rig import excitation, many_speeds, sizes
+from friso.studies.rig.experiments import constant_speed, frf, stiction, stiffness
 from friso.studies.rig.outcome import rig_log, silent
 
 PLACE = 0.02

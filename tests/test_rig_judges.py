@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from rig_evidence import FAILED, HUNTS, cycles, grid, loops, moves, standstill
 
-from friso.studies.rig.frf import measured_loop
+from friso.studies.rig.experiments.frf import measured_loop
 from friso.studies.thesis import Evidence, Finding
 from friso.studies.thesis.claims import registered
 from friso.studies.thesis.experiments import BUILT, GRID, MOVES, ON_RAILS, STANDSTILL, Experiments

@@ -14,9 +14,9 @@ from friso.identify.readings.common import record
 from friso.identify.readings.friction_velocity import friction_velocity
 from friso.stage import load
 from friso.stage.files import save
+from friso.studies.rig.experiments.stiction import slow_motion
+from friso.studies.rig.experiments.stiffness import steps
 from friso.studies.rig.sizes import freed
-from friso.studies.rig.stiction import slow_motion
-from friso.studies.rig.stiffness import steps
 
 STIFFNESS, STATIC = "joint.stiffness", "friction.static"
 

@@ -11,9 +11,9 @@ from friso.identify.logs.mapping import Mapping, load, save
 from friso.identify.sources import read_all
 from friso.rig.log_files import write_csv
 from friso.stage import Stage
-from friso.studies.rig import constant_speed, presliding, stiction
+from friso.studies.rig.experiments import constant_speed, presliding, stiction
+from friso.studies.rig.experiments.stiffness import steps
 from friso.studies.rig.outcome import silent
-from friso.studies.rig.stiffness import steps
 from friso.views.rig.page import sentences
 
 

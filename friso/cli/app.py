@@ -25,7 +25,7 @@ from friso.cli.init import init
 from friso.cli.listing import ending_with
 from friso.cli.map import map_cells
 from friso.cli.reproduce import reproduce
-from friso.cli.rig import rig
+from friso.cli.rig import listed_experiments, rig
 from friso.cli.simulate import simulate
 from friso.errors import InputError
 from friso.version import VERSION
@@ -37,7 +37,10 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 
-LISTS = {"identify": ending_with("Kinds of experiment (--as)", listed_kinds)}
+LISTS = {
+    "identify": ending_with("Kinds of experiment (--as)", listed_kinds),
+    "rig": ending_with("Experiments", listed_experiments),
+}
 """Commands whose help lists what can be chosen."""
 
 for name, command in (

@@ -23,7 +23,7 @@ Experiment = Annotated[
     str,
     typer.Argument(
         metavar="EXPERIMENT",
-        help="frf, stiffness, stiction, presliding, constant-speed, hunting, stroke-crossover, compare, in-position.",
+        help="One of those below.",
     ),
 ]
 OutFolder = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder for logs, truth and figures.")]
@@ -50,9 +50,9 @@ def rig(
     Example: friso rig stiffness examples/thesis_drive.toml --out rig
     """
     from friso.studies.rig.outcome import silent
-    from friso.studies.rig.registry import experiment as found_experiment
+    from friso.studies.rig.registry import RIG_EXPERIMENTS
 
-    run = found_experiment(experiment)
+    run = RIG_EXPERIMENTS[RIG_EXPERIMENTS.checked(experiment, "EXPERIMENT", "friso rig {} rig.toml")]
     stage = with_overrides(load(stage_file), overrides)
     _told(stage)
     if not 0 <= seed < MOST_SEED:
@@ -148,3 +148,10 @@ def _setup(own: Stage, stage: Stage) -> dict[str, str]:
 
 def _write_stage(stage: Stage, path: Path, seed: int) -> None:
     path.write_text(f"# friso rig, seed {seed}\n{stage.to_toml()}", encoding="utf-8", newline="\n")
+
+
+def listed_experiments() -> list[tuple[str, str]]:
+    """The experiments of the rig, each in one line."""
+    from friso.studies.rig.registry import RIG_EXPERIMENTS
+
+    return [(name, RIG_EXPERIMENTS.one_line(name)) for name in RIG_EXPERIMENTS]

@@ -11,9 +11,18 @@ from typing import Any
 import numpy as np
 
 from friso.stage import Stage
-from friso.studies.rig.compare import on_rail, started, varied
 from friso.studies.rig.excitation import excite
-from friso.studies.rig.frf import SETTINGS, Loop, apparent_masses, measured_loop, open_loops, stable_settings
+from friso.studies.rig.experiments.compare import on_rail, started, varied
+from friso.studies.rig.experiments.frf import (
+    SETTINGS,
+    Loop,
+    apparent_masses,
+    measured_loop,
+    open_loops,
+    stable_settings,
+)
+from friso.studies.rig.experiments.in_position import InPosition, in_position
+from friso.studies.rig.experiments.stroke_crossover import StrokeCrossover, stroke_crossover
 from friso.studies.rig.hunted import (
     Hunted,
     crossover,
@@ -26,10 +35,8 @@ from friso.studies.rig.hunted import (
     released,
     with_joint,
 )
-from friso.studies.rig.in_position import InPosition, in_position
 from friso.studies.rig.outcome import rig_log, silent
 from friso.studies.rig.sizes import freed, locked, pace, travel
-from friso.studies.rig.stroke_crossover import StrokeCrossover, stroke_crossover
 
 AS_BUILT: Mapping[str, Any] = MappingProxyType(
     {

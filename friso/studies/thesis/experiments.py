@@ -22,8 +22,8 @@ from friso.identify.logs.log import Log
 from friso.identify.readings.common import record
 from friso.identify.readings.friction_position import FrictionPosition, friction_position
 from friso.stage import Stage, loads
-from friso.studies.rig.in_position import InPosition
-from friso.studies.rig.stroke_crossover import StrokeCrossover
+from friso.studies.rig.experiments.in_position import InPosition
+from friso.studies.rig.experiments.stroke_crossover import StrokeCrossover
 from friso.studies.thesis.as_built import Cycles, Moves, RigLoops, cycles, grid, moves, rig_loops, standstill
 from friso.studies.thesis.linear import Need
 from friso.studies.thesis.studies import LOCKED

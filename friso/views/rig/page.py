@@ -3,28 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from importlib import import_module
-from types import ModuleType
 from typing import Any
 
 from friso.studies.rig.outcome import Outcome
 from friso.views.documents import plain_json
 from friso.views.drawing.figure import Figure
 from friso.views.pages import stage_page
-
-
-def _module(outcome: Outcome) -> ModuleType:
-    return import_module(f"friso.views.rig.{outcome.experiment.replace('-', '_')}")
+from friso.views.rig.outcome_view import OUTCOME_VIEWS
 
 
 def sentences(outcome: Outcome) -> list[str]:
     """What was found, for the engineer who has to decide with it."""
-    return _module(outcome).sentences(outcome)
+    return OUTCOME_VIEWS[outcome.experiment].sentences(outcome)
 
 
 def figures(outcome: Outcome) -> list[Figure]:
     """The figures, in the arrangement of the thesis."""
-    return _module(outcome).figures(outcome)
+    return OUTCOME_VIEWS[outcome.experiment].figures(outcome)
 
 
 def document(outcome: Outcome) -> dict[str, Any]:
@@ -34,7 +29,7 @@ def document(outcome: Outcome) -> dict[str, Any]:
         for log in outcome.logs
     ]
     head = {"experiment": outcome.experiment, "stage": outcome.stage.name, "seed": outcome.seed, "logs": logs}
-    return plain_json({**head, "found": _module(outcome).numbers(outcome), "notes": [*outcome.notes]})
+    return plain_json({**head, "found": OUTCOME_VIEWS[outcome.experiment].numbers(outcome), "notes": [*outcome.notes]})
 
 
 def page(outcome: Outcome, drawn: Sequence[Figure]) -> str:

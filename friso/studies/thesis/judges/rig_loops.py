@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from friso.studies.rig.frf import RATIOS, Loop, highest_stable, nearest
+from friso.studies.rig.experiments.frf import RATIOS, Loop, highest_stable, nearest
 from friso.studies.thesis.as_built import RigLoops
 from friso.studies.thesis.claims import ABOUT, Evidence, Part, about
 

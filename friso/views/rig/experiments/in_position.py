@@ -6,10 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from friso.studies.rig.in_position import BITS, CASES, SETTLING, SOURCES, InPosition, Standstill
+from friso.studies.rig.experiments.in_position import BITS, CASES, SETTLING, SOURCES, InPosition, Standstill
 from friso.studies.rig.outcome import Outcome
 from friso.views.drawing.figure import BLUE, GREEN, GREY, ORANGE, VERMILLION, Axis, Figure, Limit, Panel, Series
 from friso.views.drawing.prefixes import with_unit
+from friso.views.rig.outcome_view import OutcomeView
 
 COLOURS = {"locked": VERMILLION, "free": BLUE}
 PARTS = (GREEN, ORANGE, GREY)
@@ -122,3 +123,6 @@ def _document(run: Standstill) -> dict[str, float]:
     true = dict(zip(names, run.true[0], strict=True))
     read = {f"read_{name}": value for name, value in zip(names, run.read[0], strict=True)}
     return {**true, **read, "mean_m": float(run.mean[0])}
+
+
+VIEW = OutcomeView(sentences, figures, numbers)

@@ -1,4 +1,7 @@
-"""Standstill with the joint locked and free (Fig. 28): which disturbance moves the stage, and what damping recovers."""
+"""Standstill with the joint locked and free.
+
+Thesis, Fig. 28: which disturbance moves the stage, and what damping recovers.
+"""
 
 from __future__ import annotations
 

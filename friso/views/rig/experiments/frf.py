@@ -8,7 +8,7 @@ import numpy as np
 
 from friso.identify.estimate import Estimate
 from friso.identify.response.response import FrequencyResponse
-from friso.studies.rig.frf import RATIOS, Frf, Loop, Plant, nearest
+from friso.studies.rig.experiments.frf import RATIOS, Frf, Loop, Plant, nearest
 from friso.studies.rig.outcome import Outcome
 from friso.views.bode.figures import phases
 from friso.views.drawing.figure import (
@@ -28,6 +28,7 @@ from friso.views.drawing.figure import (
     Series,
 )
 from friso.views.drawing.prefixes import listed, with_unit
+from friso.views.rig.outcome_view import OutcomeView
 
 COLOURS = (BLUE, SKY, GREEN, ORANGE, VERMILLION, PINK)
 
@@ -183,3 +184,6 @@ def _numbers(plant: Plant) -> dict[str, Any]:
 
 def _loop_numbers(loop: Loop) -> dict[str, Any]:
     return {"tuned_hz": loop.tuned, "crossings_hz": [each.value for each in loop.crossings]}
+
+
+VIEW = OutcomeView(sentences, figures, numbers)

@@ -1,5 +1,8 @@
-"""The bearing's bristles by small motion before it slides, the joint locked: the thesis has no such experiment, but the
-bristles decide whether a machine near the boundary of hunting hunts."""
+"""Stiffness and damping of the bearing's bristles by small motion before it slides.
+
+The joint is locked. The thesis has no such experiment, but the bristles decide whether a machine near the boundary of
+hunting hunts.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""Stiffness of the joint by position steps, the cart fixed (thesis, Sec. 4.2.2, Fig. 19)."""
+"""Stiffness of the joint by position steps, the cart fixed.
+
+Thesis, Sec. 4.2.2, Fig. 19.
+"""
 
 from __future__ import annotations
 

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import Any
 
+from friso.studies.rig.experiments.stiffness import Stiffness
 from friso.studies.rig.outcome import Outcome
-from friso.studies.rig.stiffness import Stiffness
 from friso.views.drawing.figure import BLUE, LIGHT, VERMILLION, Axis, Figure, Panel, Series
 from friso.views.drawing.prefixes import range_with_unit, with_unit
+from friso.views.rig.outcome_view import OutcomeView
 
 
 def sentences(outcome: Outcome) -> list[str]:
@@ -68,3 +69,6 @@ def numbers(outcome: Outcome) -> dict[str, Any]:
         "motor_constant_ratio": found.motor_constant_ratio,
         "apparent_n_per_m": found.apparent,
     }
+
+
+VIEW = OutcomeView(sentences, figures, numbers)

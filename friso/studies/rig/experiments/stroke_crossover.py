@@ -1,4 +1,7 @@
-"""Which share of rails hunts, over stroke of the joint and crossover (Fig. 26)."""
+"""Which share of rails hunts, over stroke and crossover.
+
+Thesis, Fig. 26.
+"""
 
 from __future__ import annotations
 

@@ -1,5 +1,7 @@
-"""Force at constant speed along the rail (thesis, Sec. 4.2.3, Fig. 21), what it does not show, and what more speeds
-do."""
+"""Force at constant speed along the rail.
+
+Thesis, Sec. 4.2.3, Fig. 21; what it does not show, and what more speeds do.
+"""
 
 from __future__ import annotations
 

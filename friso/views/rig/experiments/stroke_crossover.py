@@ -6,11 +6,12 @@ from typing import Any
 
 import numpy as np
 
+from friso.studies.rig.experiments.stroke_crossover import StrokeCrossover
 from friso.studies.rig.outcome import Outcome
-from friso.studies.rig.stroke_crossover import StrokeCrossover
 from friso.views.drawing.figure import INK, Axis, Figure, Map, Panel, Series
 from friso.views.drawing.prefixes import with_unit
-from friso.views.rig.hunting import runs_document, share_document
+from friso.views.rig.experiments.hunting import runs_document, share_document
+from friso.views.rig.outcome_view import OutcomeView
 
 
 def sentences(outcome: Outcome) -> list[str]:
@@ -65,3 +66,6 @@ def numbers(outcome: Outcome) -> dict[str, Any]:
     ]
     axes = {"strokes_m": it.strokes, "crossovers_hz": it.crossovers, "rail_seeds": it.rails}
     return {**axes, "hunts": shares, "limits_hz": it.limits, **runs_document(it.runs)}
+
+
+VIEW = OutcomeView(sentences, figures, numbers)

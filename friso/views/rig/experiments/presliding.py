@@ -5,12 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 from friso.identify.experiments.presliding import Presliding
+from friso.studies.rig.experiments.presliding import Bristles
 from friso.studies.rig.outcome import Outcome
-from friso.studies.rig.presliding import Bristles
 from friso.views.drawing.figure import Figure
 from friso.views.drawing.prefixes import with_unit
 from friso.views.identify.kinds.presliding import presliding_caption, presliding_panels
 from friso.views.identify.numbers import with_interval
+from friso.views.rig.outcome_view import OutcomeView
 
 
 def sentences(outcome: Outcome) -> list[str]:
@@ -52,3 +53,6 @@ def numbers(outcome: Outcome) -> dict[str, Any]:
         for it in found.found
     ]
     return {"places": places, "true_stiffness_n_per_m": found.stiffness, "true_damping_n_s_per_m": found.damping}
+
+
+VIEW = OutcomeView(sentences, figures, numbers)

@@ -1,4 +1,6 @@
-"""Hunting cycles as slow and as irregular as measured (Fig. 27): what friction that varies does to them, and what else.
+"""Hunting cycles as irregular and as slow as measured: how much friction has to vary for that.
+
+Thesis, Fig. 27: what friction that varies does to them, and what else.
 
 The thesis gives no numbers for the irregularity; of the period it says that the simulated one is nearly half of the
 measured one, at a similar amplitude.
@@ -17,6 +19,7 @@ from friso.rig.rail import friction_factors
 from friso.rig.task import Task
 from friso.stage import Stage
 from friso.studies.draws import Fates, Share
+from friso.studies.rig.experiments.hunting import Trace
 from friso.studies.rig.hunted import (
     Hunted,
     crossover,
@@ -30,7 +33,6 @@ from friso.studies.rig.hunted import (
     released,
     with_joint,
 )
-from friso.studies.rig.hunting import Trace
 from friso.studies.rig.outcome import Outcome, Progress, rig_log
 
 DEVIATIONS = (0.02, 0.05, 0.1, 0.2, 0.3)

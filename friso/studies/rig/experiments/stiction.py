@@ -1,4 +1,7 @@
-"""Static friction by slow motion that sticks and slips, the joint free (thesis, Sec. 4.2.3, Fig. 20)."""
+"""Static friction by stick-slip in slow motion.
+
+The joint is free (thesis, Sec. 4.2.3, Fig. 20).
+"""
 
 from __future__ import annotations
 

@@ -8,8 +8,8 @@ import numpy as np
 
 from friso.hunting import COUNTED_ABOVE
 from friso.studies.draws import Share
+from friso.studies.rig.experiments.hunting import HuntingResult, Trace
 from friso.studies.rig.hunted import Hunted
-from friso.studies.rig.hunting import HuntingResult, Trace
 from friso.studies.rig.outcome import Outcome
 from friso.views.drawing.figure import (
     BLUE,
@@ -28,6 +28,7 @@ from friso.views.drawing.figure import (
     Series,
 )
 from friso.views.drawing.prefixes import with_unit
+from friso.views.rig.outcome_view import OutcomeView
 
 TIME = Axis("Time", "s")
 COLOURS = {"locked": VERMILLION, "free": BLUE}
@@ -233,3 +234,6 @@ def numbers(outcome: Outcome) -> dict[str, Any]:
         "cases": cases,
         "releases": started | runs_document(it.started),
     }
+
+
+VIEW = OutcomeView(sentences, figures, numbers)

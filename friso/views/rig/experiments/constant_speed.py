@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from friso.identify.estimate import Estimate
-from friso.studies.rig.constant_speed import ConstantSpeed, Passes
+from friso.studies.rig.experiments.constant_speed import ConstantSpeed, Passes
 from friso.studies.rig.many_speeds import ManySpeeds, Place
 from friso.studies.rig.outcome import Outcome, RigLog
 from friso.studies.rig.slow_sliding import Slow
@@ -16,6 +16,7 @@ from friso.views.drawing.figure import BLUE, GREEN, ORANGE, PINK, VERMILLION, Ax
 from friso.views.drawing.prefixes import listed, with_unit
 from friso.views.identify.kinds.slow_sliding import slow_sliding_caption, slow_sliding_panels
 from friso.views.identify.numbers import with_interval
+from friso.views.rig.outcome_view import OutcomeView
 
 COLOURS = (BLUE, VERMILLION, GREEN, ORANGE, PINK)
 """Of the places."""
@@ -191,3 +192,6 @@ def _numbers(each: Passes) -> dict[str, Any]:
         "coulomb_reason": coulomb.reason,
         "true_dynamic_friction_n": np.asarray(each.true).tolist(),
     }
+
+
+VIEW = OutcomeView(sentences, figures, numbers)

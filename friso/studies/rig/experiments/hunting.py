@@ -1,4 +1,7 @@
-"""A move at several crossovers, the joint locked and free (Fig. 24, 25), on the stage's rail and on repeated ones."""
+"""A move at several crossovers, the joint locked and free.
+
+Thesis, Fig. 24, 25; on the stage's rail and on repeated ones.
+"""
 
 from __future__ import annotations
 

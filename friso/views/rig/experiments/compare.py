@@ -6,12 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from friso.studies.rig.compare import AS_SLOW, BINS, COULOMB, MOTORS, SIMILAR, STATIC, Compared
+from friso.studies.rig.experiments.compare import AS_SLOW, BINS, COULOMB, MOTORS, SIMILAR, STATIC, Compared
 from friso.studies.rig.hunted import Hunted
 from friso.studies.rig.outcome import Outcome
 from friso.views.drawing.figure import BLUE, INK, VERMILLION, Axis, Band, Figure, Limit, Map, Markers, Panel, Series
 from friso.views.drawing.prefixes import with_unit
-from friso.views.rig.hunting import runs_document, share_document
+from friso.views.rig.experiments.hunting import runs_document, share_document
+from friso.views.rig.outcome_view import OutcomeView
 
 AREA = "#cfdfee"
 LATE = 10.0
@@ -237,3 +238,6 @@ def _cycle_document(runs: Hunted) -> dict[str, Any]:
     sides = {"above_m": runs.above, "below_m": runs.below, "rising_share": runs.rising}
     scatter = {"period_scatter": runs.period_scatter, "height_scatter": runs.height_scatter}
     return runs_document(runs) | sides | scatter
+
+
+VIEW = OutcomeView(sentences, figures, numbers)

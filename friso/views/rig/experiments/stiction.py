@@ -6,10 +6,11 @@ from typing import Any
 
 import numpy as np
 
+from friso.studies.rig.experiments.stiction import SPEEDS, Stiction
 from friso.studies.rig.outcome import Outcome
-from friso.studies.rig.stiction import SPEEDS, Stiction
 from friso.views.drawing.figure import BLUE, GREEN, INK, VERMILLION, Array, Axis, Band, Figure, Markers, Panel, Series
 from friso.views.drawing.prefixes import range_with_unit, with_unit
+from friso.views.rig.outcome_view import OutcomeView
 
 
 def sentences(outcome: Outcome) -> list[str]:
@@ -96,3 +97,6 @@ def numbers(outcome: Outcome) -> dict[str, Any]:
         for each, true in zip(found.found, found.true, strict=True)
     ]
     return {"speed_m_per_s": found.speed, "rails": rows}
+
+
+VIEW = OutcomeView(sentences, figures, numbers)

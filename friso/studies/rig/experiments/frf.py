@@ -1,4 +1,7 @@
-"""Frequency responses by closed-loop excitation: plants locked and free, open loops (Fig. 17, 18, 22, 23, 29)."""
+"""Frequency responses of the plant, locked at ten places and free; open loops over the crossover.
+
+By closed-loop excitation (thesis, Fig. 17, 18, 22, 23, 29).
+"""
 
 from __future__ import annotations
 

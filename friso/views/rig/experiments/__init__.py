@@ -1,0 +1,1 @@
+"""How outcomes of the rig's experiments are shown, one file each: each declares its `VIEW`."""

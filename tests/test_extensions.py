@@ -1,0 +1,142 @@
+"""A kind of experiment and a format of logs that are each declared in one place, here, go all the way through friso."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from friso.cli.app import main
+from friso.identify.estimate import Estimate
+from friso.identify.kind import AnalysisSettings, ExperimentKind, Prior, Source
+from friso.identify.kinds import KINDS, in_order
+from friso.identify.logs.channel import Channel, Table
+from friso.identify.logs.format import FORMATS, LogFormat
+from friso.identify.logs.log import Log
+from friso.identify.logs.read import file_format, read_table
+from friso.studies.rig.registry import RIG_EXPERIMENTS
+from friso.views.drawing.figure import Axis, Figure, Panel, Series
+from friso.views.identify.kind_view import VIEWS, KindView
+from friso.views.rig.outcome_view import OUTCOME_VIEWS
+
+ROOT = Path(__file__).parents[1]
+
+
+@dataclass(frozen=True)
+class Hold:
+    """Forces [N] under which a stage stands still without a brake: a kind of experiment of this test alone."""
+
+    least: Estimate
+    time: np.ndarray
+    force: np.ndarray
+    warnings: tuple[str, ...] = ()
+
+
+def analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> Hold:
+    (log,) = logs
+    assert isinstance(log, Log)
+    force = np.abs(log["force"])
+    top = float(force.max())
+    return Hold(Estimate.unknown("friction.static", "N", "holds", "it holds", top), log.time, log["force"])
+
+
+def figures(hold: Hold, logs: Sequence[Source], name: str) -> list[Figure]:
+    lines = (Series(hold.time, hold.force, "force", "#000000"),)
+    return [Figure(f"{name}_force", "Forces held", "Held.", (Panel("", Axis("Time", "s"), Axis("Force", "N"), lines),))]
+
+
+KIND = ExperimentKind[Hold](analyse, lambda hold, stage: (hold.least,), after=("moves",))
+VIEW = KindView[Hold](
+    "Held force",
+    lambda hold: (("Held", f"{hold.least.low:.3g} N"),),
+    lambda hold: {"held_n": hold.least.low},
+    figures,
+)
+
+
+def read_pairs(path: Path) -> Table:
+    """Position in m and force in N, a millisecond apart, alternating in a file of doubles behind its mark."""
+    position, force = np.frombuffer(path.read_bytes()[4:]).reshape(-1, 2).T
+    time = 1e-3 * np.arange(len(force))
+    channels = (Channel("position", "m", position, time, "pairs"), Channel("force", "N", force, time, "pairs"))
+    return Table(channels, {}, ("format: pairs",))
+
+
+FORMAT = LogFormat("Pairs", lambda head: head.start.startswith(b"PAIR"), read_pairs)
+
+
+@pytest.fixture
+def extended(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(KINDS.added, "hold", (KIND, "Forces that the stage bears without moving"))
+    monkeypatch.setitem(VIEWS.added, "hold", (VIEW, ""))
+    monkeypatch.setitem(FORMATS.added, "pairs", (FORMAT, "Pairs of doubles"))
+
+
+@pytest.fixture
+def log(tmp_path: Path) -> Path:
+    force = 2 * np.sin(np.arange(1000) / 50)
+    path = tmp_path / "held.bin"
+    path.write_bytes(b"PAIR" + np.stack([1e-9 * force, force], axis=1).tobytes())
+    return path
+
+
+def run(*arguments: object) -> int:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sys, "argv", ["friso", "identify", *map(str, arguments)])
+        with pytest.raises(SystemExit) as left:
+            main()
+    return int(left.value.code or 0)
+
+
+def test_a_format_of_its_own_is_read(extended: None, log: Path) -> None:
+    assert file_format(log) == "pairs"
+    assert [channel.name for channel in read_table(log).channels] == ["position", "force"]
+
+
+def test_a_kind_of_its_own_is_identified_and_shown(
+    extended: None, log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    stage, out = ROOT / "examples" / "emps_axis.toml", tmp_path / "out"
+    assert run(log, "--as", "hold", "--stage", stage, "--json", "--out", out) == 0
+    answer = json.loads(capsys.readouterr().out)
+    (experiment,) = answer["experiments"]
+    assert experiment["kind"] == "hold"
+    assert experiment["held_n"] == pytest.approx(2, rel=1e-3)
+    assert answer["estimates"][0]["key"] == "friction.static"
+    assert answer["estimates"][0]["low"] == pytest.approx(2, rel=1e-3)
+    page = (out / "identify.html").read_text(encoding="utf-8")
+    assert "Held force: held" in page
+    assert (out / "identify_hold_force.png").stat().st_size > 0
+    assert run(log, "--stage", stage, "--out", out) == 0  # as kept beside the log
+    assert "Held force: held" in capsys.readouterr().out
+
+
+def test_what_is_registered_is_in_the_help(extended: None, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run("--help") == 0
+    text = " ".join(capsys.readouterr().out.split())
+    assert all(f"{name} {KINDS.one_line(name)}" in text for name in KINDS)
+    assert "hold Forces that the stage bears without moving" in text
+
+
+def test_what_uses_others_is_analysed_after_them(extended: None) -> None:
+    order = in_order()
+    assert sorted(order) == list(KINDS)
+    assert all(order.index(earlier) < order.index(name) for name in KINDS for earlier in KINDS[name].after)
+
+
+def test_what_is_declared_on_one_floor_is_on_the_others() -> None:
+    assert list(VIEWS) == list(KINDS)
+    assert list(OUTCOME_VIEWS) == list(RIG_EXPERIMENTS)
+    predicting = [name for name in KINDS if KINDS[name].predictor is not None]
+    assert [name for name in VIEWS if VIEWS[name].prediction is not None] == predicting
+
+
+@pytest.mark.parametrize(("registry", "page"), [(KINDS, "identify.md"), (RIG_EXPERIMENTS, "rig.md")])
+def test_the_docs_name_all(registry: Sequence[str], page: str) -> None:
+    text = (ROOT / "docs" / page).read_text(encoding="utf-8")
+    assert [name for name in registry if f"`{name}`" not in text and f"rig {name}" not in text] == []
