@@ -204,20 +204,6 @@ def test_a_failure_of_the_beams_leaves_the_closed_forms(
 # ---------------------------------------------------------------- what is said
 
 
-def test_the_table_and_the_sentences(path: Path, capsys: pytest.CaptureFixture, monkeypatch: Any) -> None:
-    monkeypatch.setenv("COLUMNS", "200")
-    command(path)
-    said = " ".join(capsys.readouterr().out.split())
-    assert "Thesis rig" in said
-    assert "The joint: 2 leaves of 70 x 45 x 0.35 mm, 2.54 N/mm; with the cart held the stage of 0.5 kg swings" in said
-    assert "The first mode that interferes with control is leaf bending, in phase, at 39" in said
-    assert "the crossover may be 39." in said
-    assert "is not known (flexure.fatigue)" in said
-    assert "Assumed, since [flexure] does not say: centre of mass in the middle of the leaf ends" in said
-    assert "aluminium cube of 0.5 kg" in said
-    assert "actuation at the centre of mass of the stage, sensor at the point of actuation" in said
-
-
 def test_the_table_has_a_row_for_each_mode_by_name(found: Found) -> None:
     table = dict(rows(found))
     assert table["Drive stiffness"] == ["2.54 N/mm", "2.54 N/mm"]

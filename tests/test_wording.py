@@ -85,4 +85,5 @@ def test_what_is_compared() -> None:
     for other in ("0.5401 mm takes 3 s", "0.5201 um takes 3 s", "0.5201 mm 3 s"):
         assert not alike(one, masked(f"wrote /tmp/a/b.png\n──── ± {other}\n| x |  hunts"))
     assert not alike("6 peaks", "7 peaks")
+    assert alike("0.006 N", "0.007 N")
     assert not alike("hunts", "hunts not")
