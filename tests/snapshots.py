@@ -50,10 +50,10 @@ def masked(text: str) -> str:
 
 def words(text: str) -> list[str]:
     """Words and numbers of a text."""
-    parts = enumerate(NUMBER.split(text))
-    return [
-        word for k, part in parts for word in ([part] if k % 2 else re.sub("─+", "─", part.translate(RULES)).split())
-    ]
+    found: list[str] = []
+    for k, part in enumerate(NUMBER.split(text)):
+        found += [part] if k % 2 else re.sub("─+", "─", part.translate(RULES)).split()
+    return found
 
 
 def alike(one: str, other: str) -> bool:

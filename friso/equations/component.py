@@ -157,6 +157,7 @@ class Switch(Kink):
         return {x: (1 - self.beyond) * self.entered.get(x, x) + self.beyond * self.left.get(x, x) for x in changed}
 
     def with_values(self, values: Mapping[Any, Any]) -> Switch:
+        """The same with expressions put in the place of others."""
         enter, leave, begins = (cast(sp.Expr, each.xreplace(values)) for each in (self.enter, self.leave, self.begins))
         entered, left = (
             {x: cast(sp.Expr, e.xreplace(values)) for x, e in each.items()} for each in (self.entered, self.left)
