@@ -20,6 +20,15 @@ SHARED_VIEWS = {"__init__.py", "documents.py", "pages.py", "report.py"}
 ONE_MEANING = ("Moves", "Shown", "Found", "Options", "Estimate", "Case")
 """Names that stood for several things."""
 
+TWICE = {
+    *("Axis", "Band", "Body", "Bound", "Case", "Choice", "Claim", "Comparison", "ConstantSpeed", "Controller"),
+    *("Curve", "Cycles", "Design", "Drawing", "Drive", "Driven", "Errors", "Estimate", "Fit", "Fitted", "Found"),
+    *("Friction", "Held", "Law", "Layout", "Leaves", "Line", "Loop", "Loops", "Machine", "Mode", "Motion"),
+    *("Moves", "Need", "Options", "Outcome", "Parameter", "Parasitic", "Place", "Range", "Record", "Scale"),
+    *("Section", "Series", "Shape", "Shown", "Span", "Steady", "Step", "Table", "Task"),
+}
+"""Names that stand for several classes today; those of a subject may share one, no further ones do."""
+
 RECIPES = {
     "controller": "equations/controllers",
     "friction law": "equations/friction",
@@ -55,6 +64,10 @@ def test_keys_of_a_controller_are_known_to_controllers_alone() -> None:
 def test_a_name_stands_for_one_thing() -> None:
     modules = classes()
     assert {name: modules[name] for name in ONE_MEANING if len(modules[name]) > 1} == {}
+
+
+def test_no_further_name_stands_for_two_things() -> None:
+    assert {name: where for name, where in classes().items() if len(where) > 1 and name not in TWICE} == {}
 
 
 def test_views_stand_in_the_folder_of_their_command() -> None:
