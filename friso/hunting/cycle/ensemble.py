@@ -110,10 +110,16 @@ class Ensemble:
         return np.broadcast_to(rows[list(self.kernel.outputs).index("force")], (self.count,))
 
     def run(
-        self, starts: np.ndarray, durations: np.ndarray, rtol: float, variational: bool = False, **how: Any
+        self,
+        starts: np.ndarray,
+        durations: np.ndarray,
+        rtol: float,
+        variational: bool = False,
+        with_modes: bool = False,
+        **how: Any,
     ) -> Results:
         """Run each stage from its state for its duration [s]; `how` as in `Options`. Modes that remember are those in
-        which a run begins in that state; `ends` are states alone."""
+        which a run begins in that state; `ends` are states alone unless they are to be `with_modes` too."""
         options = Options(rtol=rtol, threads=self.threads, cancel=self.cancel, **how)
         flat = {**self.flat, "motion.duration": durations, "motion.displacement": self.length}
         parts = list(run_chunks(kernel(self.structure, variational), flat, self.count, options, starts))
@@ -121,7 +127,14 @@ class Ensemble:
         room = max(1, *(int(part.results.turn_counts.max(initial=0)) for part in parts))
         columns = zip(*(_with_room(part.results, room) for part in parts), strict=True)
         results = Results(*(np.concatenate(column)[order] for column in columns))
-        return results._replace(ends=results.ends[:, : starts.shape[1]])
+        return results if with_modes else results._replace(ends=results.ends[:, : starts.shape[1]])
+
+    def same_modes(self, states: np.ndarray, ends: np.ndarray) -> np.ndarray:
+        """Whether runs end, `ends` (count, kept), in the modes that remember in which they began in `states`, shape
+        (count,)."""
+        begun, ended = (self.kernel.modes(kept.T, 0.0, np.zeros(3), self.values) for kept in (states, ends))
+        switches = list(self.kernel.switches)
+        return np.all(begun[switches] == ended[switches], axis=0)
 
 
 def without_motion(flat: Mapping[str, Any]) -> dict[str, Any]:

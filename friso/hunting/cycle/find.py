@@ -213,7 +213,7 @@ def described(stages: Ensemble, orbits: Orbits, rtol: float, reasons: np.ndarray
     if not which.size:
         return cycles
     floquet = multipliers(some, shut, rtol)
-    round_trip = some.run(shut.states, periods, rtol, window=0.0)
+    round_trip = some.run(shut.states, periods, rtol, with_modes=True, window=0.0)
     extremes = round_trip.statistics[:, [STATISTICS.index("deviation_max"), STATISTICS.index("deviation_min")]]
     first = floquet.local[:, 0]
     complex_pair = np.abs(np.imag(first)) > 1e-6 * np.abs(first)
@@ -230,6 +230,8 @@ def described(stages: Ensemble, orbits: Orbits, rtol: float, reasons: np.ndarray
     }
     for name, value in values.items():
         getattr(cycles, name)[which] = value
+    elsewhere = which[~some.same_modes(shut.states, round_trip.ends)]
+    cycles.found[elsewhere], cycles.reasons[elsewhere] = False, NOT_CLOSED
     unknown = cycles.found & ~(np.isfinite(cycles.multiplier) & np.isfinite(cycles.amplitude))
     cycles.found[unknown], cycles.reasons[unknown] = False, NO_MULTIPLIER
     return cycles

@@ -1,0 +1,280 @@
+"""Modes that remember, on a law from one file outside friso (`maxwell_slip`): elements that stick or slip, against a
+reference written by hand (`slip_reference`), through every part of friso that follows them."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+from slip_reference import Loop, imposed, virgin
+from variants import FULL, gains, maxwell, release, stage, van_dijk
+
+import friso
+from friso.engine.kernel import Wanted, kernels
+from friso.equations.as_built import AsBuilt
+from friso.equations.component import Kink, Switch, state
+from friso.equations.imposed import imposed_form
+from friso.equations.structure import structure
+from friso.errors import InputError
+from friso.frequency.describing.function import describing
+from friso.frequency.describing.waveform import Law as Waveform
+from friso.frequency.friction import level, speeds, steady_force
+from friso.frequency.members import member
+from friso.frequency.parts import plant
+from friso.hunting.cycle.ensemble import Ensemble, done
+from friso.hunting.cycle.find import Cycles, hunting_cycles
+from friso.hunting.cycle.shooting import shoot
+from friso.identify.output_error.parameters import parameters_of
+from friso.rig.run import as_built_keys, failures, run
+from friso.rig.task import own_motion
+
+pytestmark = pytest.mark.xdist_group("maxwell_slip")
+
+STIFFNESS, STRENGTH, LIMIT = np.array([1e5, 8e4, 6e4]), np.array([0.9, 0.96, 0.96]), np.array([9e-6, 12e-6, 16e-6])
+
+THERE_AND_BACK = """kind = "there_and_back"
+acceleration = "100 m/s^2"
+acceleration_time = "5 ms"
+return_at = "0.15 s"
+duration = "0.4 s"
+"""
+
+MOVES = stage(THERE_AND_BACK, friction=maxwell(), controller=gains(**FULL, tau=1e-3))
+"""A rigid stage that moves there and back."""
+
+HELD = stage(release("40 um", "1 s"), friction=maxwell(viscous="0 N*s/m"), controller=gains(3000, 400000, 5, 1e-3))
+"""Released with a loop that hardly damps: it rings on its elements, while the integrator moves where it rings about."""
+
+SLIDES = stage(release("1 mm", "0.1 s"), friction=maxwell(viscous="0 N*s/m"), controller=gains(30000, 1000, 20, 1e-3))
+"""Swings so far that everything slips on each way."""
+
+DROPS = stage(release("1 mm", "1 s"), friction=maxwell(0.4), controller=van_dijk("12 Hz"))
+"""The force of an element drops as it breaks loose, so that the stage hunts."""
+
+
+@pytest.fixture(scope="module", autouse=True)
+def compiled() -> None:
+    drops, moves = structure(DROPS.flat()), structure(MOVES.flat())
+    built = Wanted(AsBuilt.of(as_built_keys(MOVES)), method="Rodas4")
+    kernels([Wanted(moves), Wanted(drops), Wanted(drops, True), Wanted(imposed_form(MOVES.flat())), built])
+
+
+# simulate
+
+
+def path(found: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Positions [m] at samples and at turning points, in order, and which of them are samples."""
+    reference = np.interp(found.turning_time, found.time, found.reference)
+    times = np.concatenate([found.time, found.turning_time])
+    positions = np.concatenate([found.position, found.turning_deviation + reference])
+    order = np.argsort(times, kind="stable")
+    return positions[order], order < found.sizes["time"]
+
+
+def closures(displacement: np.ndarray) -> int:
+    """How many inner loops a path closes, by its turning points: a way past where the way before the last began."""
+    turns = displacement[np.concatenate([[True], np.diff(np.sign(np.diff(displacement))) != 0, [True]])]
+    stack: list[float] = []
+    closed = 0
+    for turn in turns:
+        stack.append(turn)
+        while len(stack) > 3 and abs(stack[-1] - stack[-2]) >= abs(stack[-2] - stack[-3]):
+            del stack[-3:-1]
+            closed += 1
+    return closed
+
+
+def test_force_over_displacement_remembers_every_turn() -> None:
+    """On a path with loops within loops, every element's deflection is that of the reference, to rounding: inner loops
+    close, and are forgotten once they have."""
+    found = friso.simulate(HELD, 1e-10, 2e-5)
+    positions, sampled = path(found)
+    turns = found.turning_deviation.values
+    assert len(turns) > 20
+    assert closures(np.concatenate([[positions[0]], turns, [positions[-1]]])) > 3
+    exact = imposed(HELD.flat(), positions)[sampled]
+    ours = np.stack([found[f"deflection_{n}"].values for n in (1, 2, 3)], axis=1)
+    assert np.max(np.abs(ours - exact)) < 1e-9 * LIMIT.max()
+    force = exact @ STIFFNESS
+    assert np.max(np.abs(found.friction_force.values - force)) < 1e-9 * STRENGTH.sum()
+    slips = np.stack([found[f"slip_{n}"].values for n in (1, 2, 3)], axis=1)
+    assert set(np.unique(slips)) == {0.0, 1.0}
+    assert np.all(np.abs(np.abs(exact[slips == 1]) / np.broadcast_to(LIMIT, exact.shape)[slips == 1] - 1) < 1e-9)
+
+
+def test_masing_s_rule() -> None:
+    """From a turn with everything slipping, the force follows the virgin curve at twice its size."""
+    found = friso.simulate(SLIDES, 1e-10, 2e-6)
+    (first, second), positions = found.turning_time.values[:2], found.position.values
+    total = found.friction_force.values
+    branch = np.flatnonzero((found.time.values > first) & (found.time.values < second))
+    turn = float(found.turning_deviation[0])
+    side = np.sign(positions[branch[-1]] - turn)
+    expected = -side * STRENGTH.sum() + side * 2 * virgin(SLIDES.flat(), np.abs(positions[branch] - turn) / 2)
+    assert np.ptp(positions[branch]) > 4 * LIMIT.max()
+    assert np.max(np.abs(total[branch] - expected)) < 1e-8 * STRENGTH.sum()
+
+
+def test_a_loop_against_scipy_with_events() -> None:
+    """The first slips and sticks of a stage whose elements drop: when each comes, and where the stage is then."""
+    flat = DROPS.flat()
+    start = np.array([1e-3, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    times, states, slips = Loop(flat).run(start, 0.06, 1e-11)
+    assert len(times) > 6
+    found = friso.simulate(DROPS.replace({"motion.duration": "60 ms"}), 1e-11, 1e-6)
+    ours = np.stack([found[f"slip_{n}"].values for n in (1, 2, 3)], axis=1)
+    changes = np.flatnonzero(np.any(np.diff(ours, axis=0) != 0, axis=1))
+    moments = np.unique(np.round(times[1:-1], 5))
+    assert len(np.unique(np.round(found.time.values[changes], 5))) == pytest.approx(len(moments), abs=1)
+    assert found.time.values[changes][[0, -1]] == pytest.approx(times[[1, -2]], abs=2e-6)
+    assert found.position.values[-1] == pytest.approx(states[-1, 0], rel=1e-6)
+    assert found.friction_force.values[-1] == pytest.approx(states[-1, 4:] @ STIFFNESS + 0.5 * states[-1, 1], rel=1e-5)
+    assert np.array_equal(ours[-1], slips[-1])
+
+
+# cycles
+
+
+@pytest.fixture(scope="module")
+def cycle() -> tuple[Ensemble, Cycles]:
+    stages = Ensemble.held(DROPS.flat(), 1)
+    cycles = hunting_cycles(stages)
+    assert cycles.found[0], cycles.reasons[0]
+    return stages, cycles
+
+
+def test_the_cycle_against_simulation(cycle: tuple[Ensemble, Cycles]) -> None:
+    """Amplitude and period of the cycle that shooting closes are those in which a long run ends; so is its multiplier:
+    neighbours drift away from it by as much as they do in runs of their own."""
+    stages, cycles = cycle
+    long = friso.simulate(DROPS.replace({"motion.duration": "40 s"}), 1e-9)
+    turns, values = long.turning_time.values, long.turning_deviation.values
+    crossings = turns[1:][np.diff(np.sign(values)) > 0]
+    assert np.diff(crossings)[-3:] == pytest.approx(cycles.period[0], rel=1e-4)
+    late = values[turns > 40 - 2 * cycles.period[0]]
+    assert np.ptp(late) / 2 == pytest.approx(cycles.amplitude[0], rel=1e-4)
+    several = stages.take(np.zeros(2, np.int64))
+    aside = 1e-4 * abs(cycles.states[0, stages.sticking]) * cycles.direction[0]
+    ends = several.run(
+        cycles.states[0] + np.array([[1.0], [-1.0]]) * aside, np.repeat(cycles.period / 2, 2), 1e-11
+    ).ends
+    apart = -(ends[0] - ends[1]) / 2
+    rates = stages.rates(cycles.states)[0]
+    phase = stages.kernel.states.index("integral")
+    apart = apart - rates * apart[phase] / rates[phase]
+    moved = apart[stages.sticking] / aside[stages.sticking]
+    assert moved == pytest.approx(cycles.multiplier[0], rel=1e-3)
+    assert cycles.slope[0] == pytest.approx(cycles.multiplier[0], rel=2e-2)
+    assert abs(cycles.multiplier[0]) < 1
+
+
+def test_the_cycle_against_scipy_with_events(cycle: tuple[Ensemble, Cycles]) -> None:
+    stages, cycles = cycle
+    names = ["position", "velocity", "filtered_error", "integral", *(f"deflection_{n}" for n in (1, 2, 3))]
+    start = cycles.states[0][[stages.kernel.states.index(name) for name in names]]
+    _, states, slips = Loop(DROPS.flat()).run(start, cycles.period[0] / 2, 1e-11)
+    assert np.any(slips)
+    assert states[-1] == pytest.approx(-start, abs=1e-6 * cycles.amplitude[0])
+
+
+@pytest.mark.parametrize("duration", [0.004, 0.03])
+def test_deviations_through_switches_against_differences(duration: float) -> None:
+    """The derivative of the flow by where it began, over elements that break loose, drop and stick again."""
+    stages = Ensemble.held(DROPS.flat(), 1)
+    sizes = {"position": 2e-4, "velocity": -5e-3, "filtered_error": -2e-4}
+    start = np.array([sizes.get(name, 0.0) for name in stages.kernel.states])
+    shot = shoot(stages, start[None], np.array([duration]), 1.0, 1e-11)
+    scales, step = stages.scales[0], 1e-6
+    flow = shot.flows[0] * scales / scales[:, None]
+    starts = np.concatenate([start + side * step * np.diag(scales) for side in (1, -1)])
+    results = stages.take(np.zeros(len(starts), np.int64)).run(starts, np.full(len(starts), duration), 1e-12)
+    assert done(results).all()
+    ahead, behind = results.ends.reshape(2, len(start), -1)
+    differences = ((ahead - behind) / (2 * step)).T / scales[:, None]
+    assert np.max(np.abs(flow - differences)) < 1e-4 * np.max(np.abs(differences))
+
+
+# frequency
+
+
+def test_small_motions_of_a_stage_that_sticks() -> None:
+    """It hangs on all elements, that stick; one that slides on none."""
+    flat = MOVES.flat()
+    stuck, sliding = plant(flat, member()), plant(flat, member(1e-3))
+    assert stuck.states == sliding.states == ("position", "velocity")
+    assert stuck.a[0, 1, 0] == pytest.approx(-STIFFNESS.sum() / 1.7, rel=1e-12)
+    assert sliding.a[0, 1].tolist() == pytest.approx([0.0, -0.5 / 1.7], rel=1e-12)
+    assert level(flat, True) == level(flat, False) == pytest.approx(STRENGTH.sum())
+    assert steady_force(flat, np.array([1e-3]), False)[0] == pytest.approx(STRENGTH.sum() + 0.5e-3)
+    assert level(DROPS.flat(), True) == pytest.approx(0.4 * STRENGTH.sum())
+    assert speeds(flat, 2) == pytest.approx([0.1 * 9e-6, 1e5 * 16e-6])
+    found = friso.bode(MOVES)
+    assert found.stable
+    resonance = np.sqrt(STIFFNESS.sum() / 1.7)
+    shown = found.omega[np.argmax(np.abs(found.cases["stuck"].plant))]
+    assert shown == pytest.approx(resonance, rel=1e-3)
+    system = friso.linear(MOVES, "stuck")
+    assert np.max(np.abs(system.poles().imag)) > 0
+
+
+def test_describing_function_of_elements() -> None:
+    """Of each: k (theta - sin(2 theta)/2)/pi + i 4 k L (1 - L/A)/(pi A), cos(theta) = 1 - 2 L/A; k below L."""
+    amplitudes, frequency = np.array([2e-6, 1e-5, 1.3e-5, 3e-5, 1e-3]), 3.0
+    found = describing(MOVES, amplitudes, [frequency])
+    assert set(np.ravel(found.status)) == {"done"}
+    expected = np.zeros(len(amplitudes), complex) + 2j * np.pi * frequency * 0.5
+    for k, limit in zip(STIFFNESS, LIMIT, strict=True):
+        slips = amplitudes > limit
+        share = np.where(slips, limit / amplitudes, 1.0)
+        theta = np.arccos(1 - 2 * share)
+        expected += np.where(slips, k * (theta - np.sin(2 * theta) / 2) / np.pi, k)
+        expected += np.where(slips, 4j * k * share * (1 - share) / np.pi, 0)
+    assert np.abs(found.stiffness.values[:, 0] / expected - 1) == pytest.approx(0, abs=1e-7)
+
+
+def test_harmonic_balance_refuses_modes_that_remember() -> None:
+    with pytest.raises(InputError, match="modes that remember"):
+        Waveform.of(MOVES.flat())
+
+
+# drive, identification, declaration
+
+
+def test_the_drive_as_built() -> None:
+    """A quick drive without imperfections moves the stage as the continuous loop does."""
+    built = MOVES.replace({"drive": {"sample_time": "20 us"}})
+    (recorded,) = run(built, own_motion(built), [0], 1e-3)
+    assert not failures(recorded)
+    found = friso.simulate(MOVES, 1e-8, 1e-3)
+    position = recorded.true["position"][0]
+    gap = np.abs(position - found.position.values[: len(position)])
+    assert gap.max() < 0.05 * np.ptp(position)
+    assert np.ptp(position) > 1e-5
+
+
+def test_identification_refuses_a_law_it_does_not_know() -> None:
+    levels = {"mass": 1.7, "coulomb": 1.0, "viscous": 0.5, "offset": 0.0}
+    with pytest.raises(InputError, match="maxwell_slip") as refused:
+        parameters_of(MOVES.flat(), levels, 0.1, 0.1, True)
+    assert "lugre, dahl, stribeck" in str(refused.value)
+
+
+def test_a_switch_is_a_kink_whose_surface_depends_on_its_side() -> None:
+    x, y = state("x"), state("y")
+    switch = Switch("held", enter=x - 1, leave=-x, begins=y, entered={y: x})
+    assert isinstance(switch, Kink)
+    before, beyond = (switch.surface.subs(switch.beyond, side) for side in (0, 1))
+    assert (before, beyond) == (x - 1, x)
+    assert switch.at_start == y
+    assert [switch.becomes[y].subs(switch.beyond, side) for side in (0, 1)] == [x, y]
+
+
+def test_the_side_at_the_start_may_be_told() -> None:
+    """Behind the states; else it follows from them."""
+    (shape,) = kernels([Wanted(structure(MOVES.flat()))])
+    values = shape.values({**MOVES.flat(), "motion.size": 1e-3}, 1)
+    states = np.zeros((1, len(shape.states)))
+    names = [*shape.states]
+    states[0, names.index("velocity")], states[0, names.index("deflection_2")] = 1e-3, LIMIT[1]
+    assert shape.with_modes(states, np.zeros((3, 1)), values)[0, shape.told :].tolist() == [0.0, 1.0, 0.0]
+    other = np.hstack([states, [[1.0, 0.0, 0.0]]])
+    assert shape.modes(other.T, 0.0, np.zeros((3, 1)), values)[list(shape.switches), 0].tolist() == [1.0, 0.0, 0.0]
