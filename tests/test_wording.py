@@ -4,12 +4,13 @@ Facts are tested elsewhere; what is worded anew is read once and kept by `pytest
 take long are run in their own tests, which keep what these say beside.
 """
 
+import ast
 from pathlib import Path
 
 import pytest
 from inside import friso_inside
 from pages import Page
-from snapshots import Snapshots, alike, masked
+from snapshots import FOLDER, Snapshots, alike, masked, read
 
 from friso.views.drawing import matplotlib_renderer
 
@@ -87,3 +88,14 @@ def test_what_is_compared() -> None:
     assert not alike("6 peaks", "7 peaks")
     assert alike("0.006 N", "0.007 N")
     assert not alike("hunts", "hunts not")
+
+
+def test_messages_are_those_of_tests_that_there_are() -> None:
+    """None is kept of a test that is gone, and none is missing."""
+    kept = {name.partition("[")[0].partition(" ")[0] for name in read(FOLDER / "messages.txt")}
+    found = set()
+    for path in Path(__file__).parent.glob("test_*.py"):
+        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+            if isinstance(node, ast.FunctionDef) and "refused: Refused" in ast.unparse(node.args):
+                found.add(f"{path.name}::{node.name}")
+    assert kept == found
