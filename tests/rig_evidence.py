@@ -6,7 +6,7 @@ import numpy as np
 
 from friso.identify.estimate import Estimate
 from friso.identify.response.response import FrequencyResponse
-from friso.studies.rig.experiments.frf import Loop
+from friso.studies.rig.experiments.frf import MeasuredLoop
 from friso.studies.rig.experiments.in_position import InPosition, Standstill
 from friso.studies.rig.experiments.stroke_crossover import StrokeCrossover
 from friso.studies.rig.hunted import Hunted
@@ -62,10 +62,10 @@ def standstill(locked: float = 1e-7, free: float = 1e-6, ratio: float = 10.0, te
     return InPosition(16.0, 7e-3, False, np.array([1.0, 2.0]), runs, {}, damping, 0.5, damped, {})
 
 
-def loop(tuned: float, *crossings: float) -> Loop:
+def loop(tuned: float, *crossings: float) -> MeasuredLoop:
     line, none = np.array([tuned, 20 * tuned]), np.zeros(2)
     response = FrequencyResponse(line, np.array([1.0, 0.1]) + 0j, none, none, none, none + 2, "multisine")
-    return Loop(tuned, response, tuple(Estimate.normal("crossover", "Hz", each, 0.1, "") for each in crossings))
+    return MeasuredLoop(tuned, response, tuple(Estimate.normal("crossover", "Hz", each, 0.1, "") for each in crossings))
 
 
 def loops(

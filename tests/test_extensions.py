@@ -15,7 +15,7 @@ from friso.cli.app import main
 from friso.identify.estimate import Estimate
 from friso.identify.kind import AnalysisSettings, ExperimentKind, Prior, Source
 from friso.identify.kinds import KINDS, in_order
-from friso.identify.logs.channel import Channel, Table
+from friso.identify.logs.channel import Channel, ChannelTable
 from friso.identify.logs.format import FORMATS, LogFormat
 from friso.identify.logs.log import Log
 from friso.identify.logs.read import file_format, read_table
@@ -59,12 +59,12 @@ VIEW = KindView[Hold](
 )
 
 
-def read_pairs(path: Path) -> Table:
+def read_pairs(path: Path) -> ChannelTable:
     """Position in m and force in N, a millisecond apart, alternating in a file of doubles behind its mark."""
     position, force = np.frombuffer(path.read_bytes()[4:]).reshape(-1, 2).T
     time = 1e-3 * np.arange(len(force))
     channels = (Channel("position", "m", position, time, "pairs"), Channel("force", "N", force, time, "pairs"))
-    return Table(channels, {}, ("format: pairs",))
+    return ChannelTable(channels, {}, ("format: pairs",))
 
 
 FORMAT = LogFormat("Pairs", lambda head: head.start.startswith(b"PAIR"), read_pairs)

@@ -74,7 +74,7 @@ def test_views_stand_in_the_folder_of_their_command() -> None:
     assert {path.name for path in (PACKAGE / "views").glob("*.py")} - SHARED_VIEWS == set()
 
 
-TO_BE_WRITTEN = ("controller", "kind of experiment", "page", "log format")
+TO_BE_WRITTEN = ("controller", "page")
 """Recipes that CONTRIBUTING.md does not have yet (issue 20)."""
 
 _MARKS = {

@@ -15,7 +15,7 @@ from friso.identify.response.mass_line import mass_lines
 from friso.identify.response.modes import fit_modes
 from friso.identify.response.periodic import multisine
 from friso.identify.response.prediction import relative_error
-from friso.identify.response.records import Record
+from friso.identify.response.records import ResponseRecord
 from friso.identify.response.response import Channels, FrequencyResponse
 from friso.identify.response.simulated import explained
 from friso.identify.response.two_mass import TwoMass, fit_two_mass, widened
@@ -31,13 +31,13 @@ def present(name: str) -> Path:
 
 
 @cache
-def leuven(number: int) -> tuple[Record, Record]:
+def leuven(number: int) -> tuple[ResponseRecord, ResponseRecord]:
     """Realisation `number`: the records of both encoders [m]."""
     path = present(f"kuleuven_lsb250/exp{number}.mat")
     log = scipy.io.loadmat(path, squeeze_me=True, struct_as_record=False)[f"exp{number}"]
     by_name = {channel.Name: np.asarray(channel.Data, float) for channel in log.Y}
     voltage = by_name["input (V)"]
-    first, second = (Record(voltage, 1e-3 * by_name[f"enc{i} (mm)"], 1e-3) for i in (1, 2))
+    first, second = (ResponseRecord(voltage, 1e-3 * by_name[f"enc{i} (mm)"], 1e-3) for i in (1, 2))
     return first, second
 
 
@@ -54,7 +54,7 @@ def leuven_model(numbers: tuple[int, ...]) -> TwoMass:
 @cache
 def tokyo(output: str) -> FrequencyResponse:
     log = scipy.io.loadmat(present("utokyo_motorbench/MultisineTypeA.mat"), squeeze_me=True)
-    record = Record(log["iq_adx"], log[output], 1 / float(log["fs"]))
+    record = ResponseRecord(log["iq_adx"], log[output], 1 / float(log["fs"]))
     return multisine([record], channels=Channels("current", "A", "angle", "rad"))
 
 

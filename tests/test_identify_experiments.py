@@ -29,7 +29,7 @@ from friso.identify.readings.common import block_mean, correlated_mean, low_pass
 from friso.identify.readings.friction_position import friction_position
 from friso.identify.readings.friction_velocity import friction_velocity
 from friso.identify.readings.rate_effect import break_away, share_below, static_friction
-from friso.identify.response.fitting import Fit
+from friso.identify.response.fitting import ResponseFit
 from friso.studies.thesis.claims import Evidence, Finding, registered
 from friso.studies.thesis.experiments import (
     EXPERIMENTS,
@@ -773,7 +773,7 @@ def test_short_and_still_records_show_nothing(length: int) -> None:
 @pytest.mark.parametrize("deviation", [0.1, 1.0, 10.0, 1e6])
 def test_a_positive_parameter_that_is_hardly_known_is_not_shown(deviation: float) -> None:
     """Its interval is one of the logarithm; beyond a factor of 1000 it tells nothing, and is no overflow."""
-    found = Fit(np.array([2.0]), np.array([[deviation**2]]), 1.0, 10).estimate(
+    found = ResponseFit(np.array([2.0]), np.array([[deviation**2]]), 1.0, 10).estimate(
         "mass", "kg", "fit", lambda p: float(p[0]), positive=True
     )
     assert found.shown == (deviation < 5)

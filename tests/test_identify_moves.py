@@ -17,7 +17,7 @@ from refusals import Refused
 import friso
 from friso.identify.errors import errors_of
 from friso.identify.experiments import moves as method
-from friso.identify.experiments.moves import Moves, identify_moves, simulated_log
+from friso.identify.experiments.moves import IdentifiedMoves, identify_moves, simulated_log
 from friso.identify.logs.log import Log
 from friso.identify.output_error import fit as fitting
 from friso.identify.output_error import profile as profiles
@@ -47,14 +47,14 @@ def small() -> Iterator[None]:
 
 
 @pytest.fixture(scope="module")
-def quick() -> tuple[dict[str, Any], Log, Moves]:
+def quick() -> tuple[dict[str, Any], Log, IdentifiedMoves]:
     """A machine at 2 ms, its log, and what is found in it; its controller is known."""
     machine = drawn(3, False)
     log = moves(machine)
     return machine.flat, log, identify_moves(log, machine.guess.flat(), True)
 
 
-def test_intervals_hold_mass_and_friction(quick: tuple[dict[str, Any], Log, Moves]) -> None:
+def test_intervals_hold_mass_and_friction(quick: tuple[dict[str, Any], Log, IdentifiedMoves]) -> None:
     truth, _, found = quick
     by_name = {each.name: each for each in found.estimates}
     for name in ("masses.cart", "friction.coulomb", "friction.viscous", "bias.cart"):
@@ -65,7 +65,9 @@ def test_intervals_hold_mass_and_friction(quick: tuple[dict[str, Any], Log, Move
     assert by_name["friction.viscous_asymmetry"].value == pytest.approx(0, abs=0.1)
 
 
-def test_the_closed_loop_has_the_last_word_and_leaves_the_noise(quick: tuple[dict[str, Any], Log, Moves]) -> None:
+def test_the_closed_loop_has_the_last_word_and_leaves_the_noise(
+    quick: tuple[dict[str, Any], Log, IdentifiedMoves],
+) -> None:
     found, machine = quick[2], drawn(3, False)
     assert found.fit.problem.closed
     noise = np.hypot(machine.force_noise, machine.force_digit / 12**0.5)
@@ -73,7 +75,9 @@ def test_the_closed_loop_has_the_last_word_and_leaves_the_noise(quick: tuple[dic
     assert found.errors.position < 1e-3
 
 
-def test_static_friction_is_not_mistaken_for_coulomb_friction(quick: tuple[dict[str, Any], Log, Moves]) -> None:
+def test_static_friction_is_not_mistaken_for_coulomb_friction(
+    quick: tuple[dict[str, Any], Log, IdentifiedMoves],
+) -> None:
     """Slow moves are under the Stribeck effect: a fit without it must not put it into Coulomb friction."""
     truth, _, found = quick
     static = next(each for each in found.estimates if each.name == "friction.static")
@@ -82,7 +86,7 @@ def test_static_friction_is_not_mistaken_for_coulomb_friction(quick: tuple[dict[
     assert found.flat["friction.static"] == pytest.approx(truth["friction.static"], rel=0.15)
 
 
-def test_correlations_are_of_what_is_shown(quick: tuple[dict[str, Any], Log, Moves]) -> None:
+def test_correlations_are_of_what_is_shown(quick: tuple[dict[str, Any], Log, IdentifiedMoves]) -> None:
     found = quick[2]
     size = len(found.correlated)
     assert found.correlation.shape == (size, size)
@@ -92,7 +96,7 @@ def test_correlations_are_of_what_is_shown(quick: tuple[dict[str, Any], Log, Mov
     assert found.correlation[names.index("friction.coulomb"), names.index("friction.viscous")] < -0.3
 
 
-def test_pulses_of_force_are_predicted(quick: tuple[dict[str, Any], Log, Moves]) -> None:
+def test_pulses_of_force_are_predicted(quick: tuple[dict[str, Any], Log, IdentifiedMoves]) -> None:
     """A record of the same machine with pulses beside the controller: predicted with them, not without."""
     truth, log, found = quick
     pulses = np.zeros(len(log.time))
@@ -111,7 +115,7 @@ def test_pulses_of_force_are_predicted(quick: tuple[dict[str, Any], Log, Moves])
     assert simulated_log(found, silent).errors.force > 5 * errors.force
 
 
-def test_missing_signals_are_named(quick: tuple[dict[str, Any], Log, Moves], refused: Refused) -> None:
+def test_missing_signals_are_named(quick: tuple[dict[str, Any], Log, IdentifiedMoves], refused: Refused) -> None:
     _, log, found = quick
     bare = replace(log, signals={role: log[role] for role in ("position", "force")})
     with refused("reference"):
@@ -121,7 +125,7 @@ def test_missing_signals_are_named(quick: tuple[dict[str, Any], Log, Moves], ref
         identify_moves(volts, found.flat, True)
 
 
-def test_starts_stay_in_their_ranges(quick: tuple[dict[str, Any], Log, Moves]) -> None:
+def test_starts_stay_in_their_ranges(quick: tuple[dict[str, Any], Log, IdentifiedMoves]) -> None:
     found = quick[2].fit
     low, high = bounds_of(found.problem)
     every = range(len(found.inner))
@@ -177,7 +181,7 @@ def cut(log: Log, part: slice) -> Log:
 
 
 @pytest.fixture(scope="module")
-def identified(emps: Log, axis: friso.Stage) -> Moves:
+def identified(emps: Log, axis: friso.Stage) -> IdentifiedMoves:
     return identify_moves(emps, axis.flat(), True, 20.0)
 
 
@@ -185,13 +189,13 @@ PUBLISHED = {"position": 0.0138, "velocity": 0.229, "acceleration": 8.60, "force
 """Relative errors of closed-loop simulation [%]."""
 
 
-def test_emps_in_closed_loop(identified: Moves) -> None:
+def test_emps_in_closed_loop(identified: IdentifiedMoves) -> None:
     assert identified.fit.problem.closed
     for name, percent in PUBLISHED.items():
         assert 100 * getattr(identified.errors, name) < percent, name
 
 
-def test_emps_fits_better_than_the_inverse_model(identified: Moves, emps: Log, axis: friso.Stage) -> None:
+def test_emps_fits_better_than_the_inverse_model(identified: IdentifiedMoves, emps: Log, axis: friso.Stage) -> None:
     inverse = identified.inverse
     flat = axis.flat() | {"masses.cart": inverse.value("mass"), "friction.viscous": inverse.value("viscous")}
     flat |= dict.fromkeys(("friction.static", "friction.coulomb"), inverse.value("coulomb"))
@@ -200,7 +204,7 @@ def test_emps_fits_better_than_the_inverse_model(identified: Moves, emps: Log, a
     assert identified.errors.force < errors_of(emps, identified.part, plain, 20.0).force
 
 
-def test_emps_shows_mass_and_sliding_friction_alone(identified: Moves) -> None:
+def test_emps_shows_mass_and_sliding_friction_alone(identified: IdentifiedMoves) -> None:
     by_name = {each.name: each for each in identified.estimates}
     for name in ("friction.static", "friction.stribeck_velocity", *BRISTLES):
         assert not by_name[name].shown, name
@@ -214,7 +218,7 @@ def test_emps_shows_mass_and_sliding_friction_alone(identified: Moves) -> None:
     assert by_name["friction.coulomb"].value == pytest.approx(20.3935, rel=0.05)
 
 
-def test_half_of_emps_predicts_the_other(identified: Moves, emps: Log) -> None:
+def test_half_of_emps_predicts_the_other(identified: IdentifiedMoves, emps: Log) -> None:
     """The latter half alone, simulated with what was found, on its own."""
     latter = cut(emps, slice(len(emps.time) // 2, None))
     errors = simulated_log(identified, latter).errors

@@ -15,7 +15,7 @@ import friso
 from friso.identify.experiments.presliding import Presliding, bristles_from_presliding
 from friso.identify.logs.log import Log
 from friso.identify.method import identify
-from friso.identify.readings.at_bearing import Between, Mode, between
+from friso.identify.readings.at_bearing import Between, StructureMode, between
 from friso.identify.readings.common import deflections, jackknife, record
 from friso.studies.rig.excitation import excite
 from friso.studies.rig.experiments.presliding import GENTLE, presliding_log
@@ -118,7 +118,7 @@ def test_a_mode_of_the_structure_is_told_from_the_mass() -> None:
     shaking = replace(log, signals={**log.signals, "force": log["force"] + extra})
     found = bristles_from_presliding(shaking)
     assert found.mass.value == pytest.approx(MASS, rel=2e-3)
-    known = bristles_from_presliding(shaking, Between(delay=0.0, mode=Mode(share, mode, 1e-6)))
+    known = bristles_from_presliding(shaking, Between(delay=0.0, mode=StructureMode(share, mode, 1e-6)))
     assert known.mass.value == pytest.approx(MASS, rel=1e-3)
 
 

@@ -18,7 +18,7 @@ from friso.identify.response.modes import fit_modes
 from friso.identify.response.period import find_periods
 from friso.identify.response.periodic import multisine
 from friso.identify.response.prediction import relative_error
-from friso.identify.response.records import Record, drift, from_log
+from friso.identify.response.records import ResponseRecord, drift, from_log
 from friso.identify.response.response import FrequencyResponse
 from friso.identify.response.simulated import explained, slid
 from friso.identify.response.two_mass import fit_two_mass, two_masses, widened
@@ -41,7 +41,7 @@ def played(
     periods: int = 6,
     noise: float = 0.0,
     distortion: float = 0.0,
-) -> Record:
+) -> ResponseRecord:
     """A multisine of unit lines through a linear system, with white noise [output's rms] and, line by line, relative
     distortion of the realisation."""
     spectrum = np.zeros(PERIOD // 2 + 1, complex)
@@ -50,7 +50,7 @@ def played(
     answer = np.zeros_like(spectrum)
     answer[lines] = spectrum[lines] * truth(lines / (PERIOD * DT)) * (1 + distortion * (off[0] + 1j * off[1]))
     given, output = (np.tile(np.fft.irfft(each), periods) for each in (spectrum, answer))
-    return Record(given, output + noise * np.std(output) * rng.normal(size=len(output)), DT)
+    return ResponseRecord(given, output + noise * np.std(output) * rng.normal(size=len(output)), DT)
 
 
 def exact(
@@ -142,7 +142,7 @@ def test_one_realisation_says_that_distortion_is_unknown_unless_lines_are_free()
     assert np.isnan(full.distortion).all()
     assert "not nonlinear distortion" in full.warnings[-1]
     odd = played(rng, rig, np.arange(1, 60, 2), noise=1e-6)
-    bent = Record(odd.input, odd.output + 0.2 * odd.output**2 / np.std(odd.output), DT)
+    bent = ResponseRecord(odd.input, odd.output + 0.2 * odd.output**2 / np.std(odd.output), DT)
     assert np.isfinite(multisine([bent]).distortion).all()
     assert np.median(multisine([bent]).distortion) > 100 * np.median(multisine([odd]).distortion)
 
@@ -152,7 +152,7 @@ def test_a_transient_is_left_out_and_a_drift_does_not_matter() -> None:
     record = played(rng, rig, lines, 8, noise=1e-3)
     time = np.arange(len(record.output)) * DT
     start = 3 * np.std(record.output) * np.exp(-time / 0.5) * np.cos(60 * time)
-    found = multisine([Record(record.input, record.output + start + 1e-3 * time, DT)])
+    found = multisine([ResponseRecord(record.input, record.output + start + 1e-3 * time, DT)])
     assert any("transient" in text for text in found.warnings)
     assert np.abs(found.response / rig(found.frequency) - 1).max() < 0.05
     assert not any("transient" in text for text in multisine([record]).warnings)
@@ -162,7 +162,7 @@ def test_realisations_that_do_not_belong_together_are_refused(refused: Refused) 
     rng = np.random.default_rng(9)
     one = played(rng, rig, np.arange(2, 60))
     with refused("records"):
-        multisine([one, Record(one.input, one.output, 2 * DT)])
+        multisine([one, ResponseRecord(one.input, one.output, 2 * DT)])
     with refused("records"):
         multisine([one, played(rng, rig, np.arange(80, 99))])
     with refused("records"):
@@ -172,14 +172,14 @@ def test_realisations_that_do_not_belong_together_are_refused(refused: Refused) 
 @pytest.mark.parametrize(
     "spoilt",
     [
-        lambda one: Record(one.input, np.where(np.arange(6000) == 7, np.nan, one.output), DT),
-        lambda one: Record(one.input, np.zeros(6000), DT),
-        lambda one: Record(one.input[:-1], one.output, DT),
-        lambda one: Record(one.input, one.output, 0.0),
-        lambda one: Record(one.input[:5], one.output[:5], DT),
+        lambda one: ResponseRecord(one.input, np.where(np.arange(6000) == 7, np.nan, one.output), DT),
+        lambda one: ResponseRecord(one.input, np.zeros(6000), DT),
+        lambda one: ResponseRecord(one.input[:-1], one.output, DT),
+        lambda one: ResponseRecord(one.input, one.output, 0.0),
+        lambda one: ResponseRecord(one.input[:5], one.output[:5], DT),
     ],
 )
-def test_bad_records_are_refused(spoilt: Callable[[Record], Record], refused: Refused) -> None:
+def test_bad_records_are_refused(spoilt: Callable[[ResponseRecord], ResponseRecord], refused: Refused) -> None:
     with refused():
         multisine([spoilt(played(np.random.default_rng(10), rig, np.arange(2, 60)))])
 
@@ -192,7 +192,7 @@ def test_weak_lines_are_left_out_and_nothing_left_is_an_error(refused: Refused) 
     assert "too weakly excited" in strong.warnings[-1]
     record = played(rng, rig, np.arange(2, 60))
     with refused("excitation"):
-        multisine([Record(record.input, rng.normal(size=6000), DT)]).usable(ratio=10)
+        multisine([ResponseRecord(record.input, rng.normal(size=6000), DT)]).usable(ratio=10)
 
 
 def test_other_forms_of_a_response(refused: Refused) -> None:
@@ -232,7 +232,10 @@ def test_arbitrary_excitation_holds_the_truth() -> None:
     for _ in range(12):
         given = rng.normal(size=20000)
         output = signal.lfilter(B, A, given) + 0.05 * rng.normal(size=20000)
-        for found in (welch(Record(given, output, DT), 0.5), local_polynomial(Record(given, output, DT))):
+        for found in (
+            welch(ResponseRecord(given, output, DT), 0.5),
+            local_polynomial(ResponseRecord(given, output, DT)),
+        ):
             band, truth = found.band(), np.abs(filtered(found.frequency))
             part = (found.frequency < 30) | (found.frequency > 55)  # Welch is biased at the resonance by leakage
             inside[found.kind].append(np.mean(((band.magnitude_low <= truth) & (truth <= band.magnitude_high))[part]))
@@ -243,7 +246,7 @@ def test_arbitrary_excitation_holds_the_truth() -> None:
 def test_local_polynomials_are_free_of_the_leakage_that_welch_has() -> None:
     rng = np.random.default_rng(14)
     given = rng.normal(size=8000)
-    record = Record(given, signal.lfilter(B, A, given), DT)
+    record = ResponseRecord(given, signal.lfilter(B, A, given), DT)
     peak = 0.5 / (2 * np.pi * DT)
     worst = [
         np.max(np.abs(each.response / filtered(each.frequency) - 1)[np.abs(each.frequency - peak) < 3])
@@ -256,26 +259,26 @@ def test_coherence_falls_with_noise_and_short_records_are_refused(refused: Refus
     rng = np.random.default_rng(15)
     given = rng.normal(size=20000)
     clean, noisy = (
-        welch(Record(given, signal.lfilter(B, A, given) + size * rng.normal(size=20000), DT), 1.0)
+        welch(ResponseRecord(given, signal.lfilter(B, A, given) + size * rng.normal(size=20000), DT), 1.0)
         for size in (0.0, 3.0)
     )
     assert clean.coherence is not None
     assert noisy.coherence is not None
     assert np.median(clean.coherence) > 0.999 > 0.3 > np.median(noisy.coherence)
     with refused("resolution"):
-        welch(Record(given, given, DT), 0.03)
+        welch(ResponseRecord(given, given, DT), 0.03)
 
 
 # Closed loop
 
 
-def looped(rng: np.random.Generator, size: int, reference: np.ndarray, noise: float = 1.0) -> Record:
+def looped(rng: np.random.Generator, size: int, reference: np.ndarray, noise: float = 1.0) -> ResponseRecord:
     """y = G u + v, u = 2 (r - y), G = 0.2 z^-1/(1 - 0.9 z^-1), white noise v."""
     plant = np.array([0.0, 0.2]), np.array([1.0, -0.9])
     closed = plant[1] + 2 * plant[0]
     v = noise * rng.normal(size=size)
     output = signal.lfilter(2 * plant[0], closed, reference) + signal.lfilter(plant[1], closed, v)
-    return Record(2 * (reference - output), output, DT, reference)
+    return ResponseRecord(2 * (reference - output), output, DT, reference)
 
 
 def loop_plant(frequency: np.ndarray) -> np.ndarray:
@@ -285,7 +288,7 @@ def loop_plant(frequency: np.ndarray) -> np.ndarray:
 def test_indirect_estimates_are_right_where_direct_ones_are_not() -> None:
     rng = np.random.default_rng(16)
     record = looped(rng, 40000, rng.normal(size=40000))
-    direct = Record(record.input, record.output, DT)
+    direct = ResponseRecord(record.input, record.output, DT)
     for method in (lambda one: welch(one, 2.0), local_polynomial):
         good, bad = method(record), method(direct)
         off = [np.mean(np.abs(each.response - loop_plant(each.frequency)) / each.deviation) for each in (good, bad)]
@@ -310,17 +313,17 @@ def test_indirect_multisine_holds_the_truth() -> None:
 def test_feedback_is_noticed_and_not_imagined() -> None:
     rng = np.random.default_rng(18)
     loop = looped(rng, 8000, rng.normal(size=8000))
-    assert "closed loop" in feedback(Record(loop.input, loop.output, DT))[0]
+    assert "closed loop" in feedback(ResponseRecord(loop.input, loop.output, DT))[0]
     once = played(rng, rig, np.arange(2, 100), 1).input
     periodic = looped(rng, 8 * PERIOD, np.tile(once, 8) / np.std(once), noise=0.1)
-    assert feedback(Record(periodic.input, periodic.output, DT))
+    assert feedback(ResponseRecord(periodic.input, periodic.output, DT))
     white = rng.normal(size=8000)
     coloured = signal.lfilter(*signal.butter(4, 0.2), rng.normal(size=8000))
     for given in (white, coloured):
         output = signal.lfilter(B, A, given) + 0.1 * rng.normal(size=8000)
-        assert feedback(Record(given, output, DT), direct=True) == ()
+        assert feedback(ResponseRecord(given, output, DT), direct=True) == ()
         later = np.r_[0.0, output[:-1]]
-        assert feedback(Record(given, later, DT)) == ()
+        assert feedback(ResponseRecord(given, later, DT)) == ()
     assert feedback(played(rng, rig, np.arange(2, 60), noise=0.05)) == ()
 
 
@@ -478,7 +481,7 @@ def test_coulomb_friction_behind_a_departure() -> None:
     inputs = np.stack([played(rng, rig, lines, 1).input for _ in range(2)])
     inputs /= np.std(inputs)
     paths, velocities = slid(np.tile(inputs, 8), DT, mass, level, 3.0)
-    records = [Record(sign * np.tile(one, 8), path, DT) for one, path in zip(inputs, paths, strict=True)]
+    records = [ResponseRecord(sign * np.tile(one, 8), path, DT) for one, path in zip(inputs, paths, strict=True)]
     response = multisine(records)
     found = friction_from_departure(response, list(velocities), (0.4, 6.0), sign)
     assert found.coulomb.holds(level)

@@ -14,7 +14,7 @@ import friso
 from friso.identify.experiments.slow_sliding import MassOnBristles, SlowSliding, stribeck_from_slow_sliding
 from friso.identify.logs.log import Log
 from friso.identify.method import identify
-from friso.identify.readings.at_bearing import Between, Record, at_bearing, between
+from friso.identify.readings.at_bearing import BearingRecord, Between, at_bearing, between
 from friso.identify.readings.common import deflections, record
 from friso.rig.rail import friction_factors
 from friso.studies.rig import many_speeds, slow_sliding
@@ -114,7 +114,7 @@ def test_a_stage_with_a_mode_is_what_its_two_masses_do() -> None:
         s = 2j * np.pi * hertz
         followed = (spring + s * damping) / (spring + s * damping + part * s**2)
         turning = np.exp(s * time)
-        record = Record(time, 1e-6 * turning.real, np.zeros(len(time)), 0 * time)
+        record = BearingRecord(time, 1e-6 * turning.real, np.zeros(len(time)), 0 * time)
         total = flat["masses.cart"] + whole
         _, _, inertia = at_bearing(record, between(flat), total)
         true = ((total - part + part * followed) * s**2 * 1e-6 * turning).real

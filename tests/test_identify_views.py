@@ -15,11 +15,11 @@ from hypothesis import strategies as st
 from pages import Page
 
 from friso.identify.combine import combined
-from friso.identify.errors import Errors, residual_of
+from friso.identify.errors import SimulationErrors, residual_of
 from friso.identify.estimate import Estimate
 from friso.identify.experiments.break_away import static_from_ramps
 from friso.identify.experiments.constant_speed import FrictionAtSpeeds
-from friso.identify.experiments.moves import Moves, SimulatedLog
+from friso.identify.experiments.moves import IdentifiedMoves, SimulatedLog
 from friso.identify.experiments.presliding import bristles_from_presliding
 from friso.identify.experiments.slow_sliding import MassOnBristles, stribeck_from_slow_sliding
 from friso.identify.experiments.steps import stiffness_from_steps
@@ -29,7 +29,7 @@ from friso.identify.logs.log import Log
 from friso.identify.logs.measured_response import MeasuredResponse
 from friso.identify.method import Experiment, Identification, Prediction
 from friso.identify.output_error.coverage import coverage
-from friso.identify.output_error.fit import Fit, first_values
+from friso.identify.output_error.fit import OutputErrorFit, first_values
 from friso.identify.output_error.parameters import parameters_of
 from friso.identify.output_error.problem import Simulated, closed_loop, tracking
 from friso.identify.output_error.profile import Profile
@@ -69,7 +69,7 @@ def moves_log() -> Log:
     return record("axis", DT, position=position, force=force, reference=position)
 
 
-def moves(own_loop: bool, fitted_in_loop: bool) -> tuple[Moves, Log]:
+def moves(own_loop: bool, fitted_in_loop: bool) -> tuple[IdentifiedMoves, Log]:
     """The result of a fit that need not be made."""
     log = moves_log()
     inverse, part = inverse_model(log, 5.0), log.segments[0]
@@ -81,7 +81,7 @@ def moves(own_loop: bool, fitted_in_loop: bool) -> tuple[Moves, Log]:
     problem = loop if fitted_in_loop and loop else follows
     residual = 0.2 * np.random.default_rng(2).standard_normal(len(log.time))
     core = tuple(i for i, each in enumerate(parameters) if each.core)
-    fit = Fit(problem, first_values(parameters), core, 1e-6 * np.eye(len(core)), residual)
+    fit = OutputErrorFit(problem, first_values(parameters), core, 1e-6 * np.eye(len(core)), residual)
     profiles = {each.name: profile_of(each.name, each.low, each.high, each.core, fit.cost) for each in parameters}
     moved = motion(log["position"], DT, 25.0)
     known = (
@@ -90,11 +90,11 @@ def moves(own_loop: bool, fitted_in_loop: bool) -> tuple[Moves, Log]:
         Estimate.unknown("friction.static", "N", "output error", WHY, COULOMB, 4 * COULOMB),
         Estimate.unknown("friction.stribeck_velocity", "m/s", "output error", WHY, 5e-5, 0.16),
     )
-    found = Moves(
+    found = IdentifiedMoves(
         log, part, inverse, inverse_model(log, 5.0, by_direction=True), fit, profiles, known, np.eye(2),
         coverage(log["position"], moved, MASS, COULOMB, DT),
         Simulated(log["position"] + 1e-6, np.gradient(log["position"], DT), log["force"] - residual),
-        Errors(1e-5, 2e-3, 0.05, 0.04) if own_loop else Errors(np.nan, np.nan, np.nan, 0.04),
+        SimulationErrors(1e-5, 2e-3, 0.05, 0.04) if own_loop else SimulationErrors(np.nan, np.nan, np.nan, 0.04),
         residual_of(residual, moved, DT), loop,
     )  # fmt: skip
     return found, log

@@ -13,7 +13,7 @@ from scipy.io import savemat
 
 from friso.errors import InputError
 from friso.identify.logs import format as reading
-from friso.identify.logs.channel import Channel, Table
+from friso.identify.logs.channel import Channel, ChannelTable
 from friso.identify.logs.read import file_format, is_frequency_response, read_frequency_response, read_table
 
 M = log_files.motion()
@@ -21,11 +21,11 @@ HEADING = ["time [ms]", "position [mm]", "force [N]"]
 COLUMNS = [M["time"] * 1e3, M["position"] * 1e3, M["force"]]
 
 
-def channel(table: Table, name: str) -> Channel:
+def channel(table: ChannelTable, name: str) -> Channel:
     return next(each for each in table.channels if each.name == name)
 
 
-def check_motion(table: Table, unit: str = "mm", scale: float = 1e3) -> None:
+def check_motion(table: ChannelTable, unit: str = "mm", scale: float = 1e3) -> None:
     position = channel(table, "position")
     assert position.unit == unit
     assert position.time is not None

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from friso.identify.inverse_model import SMOOTH, Motion, motion
+from friso.identify.inverse_model import SMOOTH, FilteredMotion, motion
 from friso.identify.logs.log import Log
 from friso.identify.output_error.problem import Simulated
 from friso.identify.spread import correlation_length
@@ -16,7 +16,7 @@ BINS = 40
 
 
 @dataclass(frozen=True)
-class Errors:
+class SimulationErrors:
     """Norms of measured minus simulated over norms of the measured signal, of position, velocity, acceleration and
     force; velocity and acceleration of both by the same filter and differences. Of a stage that was held to the log's
     position only the force has one: what the model does not explain."""
@@ -44,12 +44,12 @@ class Residual:
         return self.correlation_time == 0.0
 
 
-def errors_of(log: Log, part: slice, simulated: Simulated, bandwidth: float) -> Errors:
+def errors_of(log: Log, part: slice, simulated: Simulated, bandwidth: float) -> SimulationErrors:
     """The errors of a simulated record of some samples of a log; `bandwidth` [Hz] is that of the motion."""
     measured = motion(log["position"][part], log.sample_time, SMOOTH * bandwidth)
     found = motion(simulated.position, log.sample_time, SMOOTH * bandwidth)
     disturbance = log["disturbance"][part] if "disturbance" in log else 0.0
-    return Errors(
+    return SimulationErrors(
         _relative(log["position"][part], simulated.position),
         _relative(measured.velocity, found.velocity),
         _relative(measured.acceleration, found.acceleration),
@@ -57,13 +57,13 @@ def errors_of(log: Log, part: slice, simulated: Simulated, bandwidth: float) -> 
     )
 
 
-def unexplained(log: Log, part: slice, held: Simulated) -> Errors:
+def unexplained(log: Log, part: slice, held: Simulated) -> SimulationErrors:
     """The error of a stage that was held to the log's position, by the force that it took."""
     share = float(np.linalg.norm(held.force) / np.linalg.norm(log["force"][part]))
-    return Errors(np.nan, np.nan, np.nan, share)
+    return SimulationErrors(np.nan, np.nan, np.nan, share)
 
 
-def residual_of(residual: np.ndarray, moved: Motion, sample_time: float) -> Residual:
+def residual_of(residual: np.ndarray, moved: FilteredMotion, sample_time: float) -> Residual:
     """What is left of the force, shape (n,) [N], over a motion."""
     alike = correlation_length(residual)
     return Residual(

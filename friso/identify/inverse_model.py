@@ -73,7 +73,7 @@ class InverseModel:
 
 
 @dataclass(frozen=True)
-class Motion:
+class FilteredMotion:
     """Position [m], velocity [m/s] and acceleration [m/s^2] without the noise beyond the cut-off frequency, (n,)."""
 
     position: np.ndarray
@@ -81,14 +81,14 @@ class Motion:
     acceleration: np.ndarray
 
 
-def motion(position: np.ndarray, sample_time: float, cutoff: float) -> Motion:
+def motion(position: np.ndarray, sample_time: float, cutoff: float) -> FilteredMotion:
     """The motion of a measured position, shape (n,) [m], smoothed forward and back at the cut-off frequency [Hz]."""
     smooth = position
     if cutoff < 0.5 / sample_time:
         sections = butter(ORDER, 2 * cutoff * sample_time, output="sos")
         smooth = sosfiltfilt(sections, position, padlen=min(3 * ORDER, len(position) - 1))
     velocity = np.gradient(smooth, sample_time)
-    return Motion(smooth, velocity, np.gradient(velocity, sample_time))
+    return FilteredMotion(smooth, velocity, np.gradient(velocity, sample_time))
 
 
 def bandwidth_of(position: np.ndarray, sample_time: float) -> float:

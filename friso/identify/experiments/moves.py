@@ -12,14 +12,14 @@ from typing import Any
 import numpy as np
 
 from friso.errors import InputError
-from friso.identify.errors import Errors, Residual, errors_of, residual_of, unexplained
+from friso.identify.errors import Residual, SimulationErrors, errors_of, residual_of, unexplained
 from friso.identify.estimate import Estimate
 from friso.identify.inverse_model import SMOOTH, InverseModel, directions, inverse_model, motion
 from friso.identify.kind import AnalysisSettings, ExperimentKind, Predictor, Prior, Source
 from friso.identify.logs.log import Log
 from friso.identify.output_error.answers import estimates_of
 from friso.identify.output_error.coverage import Coverage, coverage
-from friso.identify.output_error.fit import Fit
+from friso.identify.output_error.fit import OutputErrorFit
 from friso.identify.output_error.parameters import MASS, keys_of, parameters_of
 from friso.identify.output_error.problem import Problem, Simulated, closed_loop, tracking, why_continuous
 from friso.identify.output_error.profile import Profile
@@ -30,7 +30,7 @@ from friso.stage import Stage
 
 
 @dataclass(frozen=True)
-class Moves:
+class IdentifiedMoves:
     """What was found: both fits of the inverse model, the output-error `fit`, the profiles of all parameters by name,
     the estimates by key of the stage file with the `correlation` of the shown ones, what the motion covers, the
     simulated record of the fit and its errors, and `part`, the samples of the log used.
@@ -42,13 +42,13 @@ class Moves:
     part: slice
     inverse: InverseModel
     by_direction: InverseModel
-    fit: Fit
+    fit: OutputErrorFit
     profiles: Mapping[str, Profile]
     estimates: tuple[Estimate, ...]
     correlation: np.ndarray
     covered: Coverage
     simulated: Simulated
-    errors: Errors
+    errors: SimulationErrors
     residual: Residual
     loop: Problem | None
 
@@ -63,13 +63,15 @@ class Moves:
         return fitted_flat(self.fit)
 
 
-def fitted_flat(found: Fit) -> dict[str, Any]:
+def fitted_flat(found: OutputErrorFit) -> dict[str, Any]:
     """The stage of a fit as flat keys."""
     values = {each.name: each.outer(inner) for each, inner in zip(found.problem.parameters, found.inner, strict=True)}
     return {**found.problem.flat, **keys_of(found.problem.flat, values)}
 
 
-def identify_moves(log: Log, flat: Mapping[str, Any], own_loop: bool, bandwidth: float | None = None) -> Moves:
+def identify_moves(
+    log: Log, flat: Mapping[str, Any], own_loop: bool, bandwidth: float | None = None
+) -> IdentifiedMoves:
     """Mass, friction and what else the moves of a log show of a stage given as flat keys.
 
     With `own_loop` the stage's controller is the machine's, and the closed loop is simulated on the log's reference;
@@ -88,7 +90,7 @@ def identify_moves(log: Log, flat: Mapping[str, Any], own_loop: bool, bandwidth:
     found, profiles, shown = fit_shown(follows, loop, covered, inverse.bandwidth)
     estimates, correlation = estimates_of(found, profiles, shown, covered)
     simulated = (loop or follows).record(found.inner)
-    return Moves(
+    return IdentifiedMoves(
         log, part, inverse, by_direction, found, profiles, estimates, correlation, covered, simulated,
         errors_of(log, part, simulated, inverse.bandwidth) if loop else unexplained(log, part, simulated),
         residual_of(found.residual, moved, log.sample_time), loop,
@@ -101,10 +103,10 @@ class SimulatedLog:
 
     part: slice
     simulated: Simulated
-    errors: Errors
+    errors: SimulationErrors
 
 
-def simulated_log(found: Moves, log: Log) -> SimulatedLog:
+def simulated_log(found: IdentifiedMoves, log: Log) -> SimulatedLog:
     """Another log of the same axis simulated with what was found.
 
     Raises InputError where the machine's own loop is not known.
@@ -204,7 +206,7 @@ def _claims(course: Course) -> str | None:
     return None
 
 
-def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> Moves:
+def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> IdentifiedMoves:
     """With a stage that was given and a reference, in the machine's own loop; from what other experiments show."""
     (log,) = logs
     assert isinstance(log, Log)
@@ -213,7 +215,7 @@ def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -
     return identify_moves(log, start, prior.given and "reference" in log, settings.bandwidth)
 
 
-def _notes(results: Sequence[Moves], stage: Stage | None) -> list[str]:
+def _notes(results: Sequence[IdentifiedMoves], stage: Stage | None) -> list[str]:
     """Where the drive that was given is not the one simulated, and where no controller was."""
     loops = [result for result in results if result.loop] if stage is not None else []
     told = [why_continuous(stage.flat(), result.log.sample_time) for result in loops if stage is not None]
@@ -221,11 +223,11 @@ def _notes(results: Sequence[Moves], stage: Stage | None) -> list[str]:
     return [*(sentence for sentence in dict.fromkeys(told) if sentence), *([FOLLOWED] if followed else [])]
 
 
-def _predict(result: Moves, log: Log, settings: AnalysisSettings) -> SimulatedLog | None:
+def _predict(result: IdentifiedMoves, log: Log, settings: AnalysisSettings) -> SimulatedLog | None:
     return simulated_log(result, log) if "reference" in log else None
 
 
-KIND = ExperimentKind[Moves](
+KIND = ExperimentKind[IdentifiedMoves](
     _analyse,
     lambda result, stage: result.estimates,
     lambda result, estimates: (result.correlated, result.correlation),

@@ -22,9 +22,9 @@ from friso.identify.readings.at_bearing import (
     DIRECT,
     EXPLAINED,
     HELD,
+    BearingRecord,
     Between,
     LowPass,
-    Record,
     at_bearing,
     believed_between,
     cutoff_of,
@@ -133,7 +133,7 @@ def bristles_from_presliding(log: Log, between: Between = DIRECT) -> Presliding:
     return Presliding(mass, damping, stiffness, correlation, *shown, best.left, said)
 
 
-def _seen(record: Record, cutoff: float) -> Record:
+def _seen(record: BearingRecord, cutoff: float) -> BearingRecord:
     """With the motion that belongs to a low-pass [Hz], and no more samples than that needs."""
     return record.seen(MOTION * cutoff, max(int(1 / (FINE * cutoff * record.interval)), 1))
 
@@ -163,7 +163,7 @@ def _estimate(key: str, value: float, error: float, systematic: float) -> Estima
     return Estimate.unknown(key, UNITS[key], METHOD, why, 0.0, max(found.high, 0.0) or np.inf)
 
 
-def _settled(record: Record, between: Between, cutoff: float, late: bool) -> _Fit:
+def _settled(record: BearingRecord, between: Between, cutoff: float, late: bool) -> _Fit:
     """The fit once the mass that is believed to move is the one found and, if it is to be looked for (`late`), the
     delay is that which fits best."""
     fit = _fit(record, between, cutoff, between.mass, late)
@@ -171,7 +171,7 @@ def _settled(record: Record, between: Between, cutoff: float, late: bool) -> _Fi
     return _fit(record, delayed, cutoff, float(fit.values[0]), late)
 
 
-def _fit(record: Record, between: Between, cutoff: float, mass: float, late: bool) -> _Fit:
+def _fit(record: BearingRecord, between: Between, cutoff: float, mass: float, late: bool) -> _Fit:
     """Least squares of the force at a low-pass; the bending, in which it is not linear, is looked for. `mass` [kg] is
     believed to move; with `late`, what a little more delay would do is among the columns."""
     equation = _equation(record, between, cutoff, mass, late)
@@ -214,7 +214,7 @@ class _Equation:
         return np.stack([self.inertia, *turned, *self.rest], axis=1)
 
 
-def _equation(record: Record, between: Between, cutoff: float, mass: float, late: bool) -> _Equation:
+def _equation(record: BearingRecord, between: Between, cutoff: float, mass: float, late: bool) -> _Equation:
     """The equation of a record. A mode of the structure, whose mass m moves on its own spring at a frequency w, adds
     m/w^2 times the fourth derivative of the position: what of it `between` does not know is among the rest."""
     time, low_pass = record.time, LowPass(record.time, cutoff)

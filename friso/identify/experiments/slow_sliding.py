@@ -23,9 +23,9 @@ from friso.identify.logs.log import Log
 from friso.identify.readings.at_bearing import (
     EXPLAINED,
     HELD,
+    BearingRecord,
     Between,
     LowPass,
-    Record,
     at_bearing,
     believed_between,
     cutoff_of,
@@ -188,13 +188,15 @@ def _unknown(why: str) -> tuple[Estimate, ...]:
     return tuple(Estimate.unknown(*each, METHOD, why) for each in zip(NAMES, UNITS, strict=True))
 
 
-def _sizes(record: Record, cutoff: float) -> np.ndarray:
+def _sizes(record: BearingRecord, cutoff: float) -> np.ndarray:
     """Of what is fitted: the mean force [N], and the RMS velocity [m/s]."""
     level, low_pass = float(np.abs(record.force - record.force.mean()).mean()), LowPass(record.time, cutoff)
     return np.array([level, level, float(low_pass(rate_of(record.time, record.body)).std()), level, level])
 
 
-def _equation(record: Record, between: Between, known: MassOnBristles, cutoff: float, sizes: np.ndarray) -> _Equation:
+def _equation(
+    record: BearingRecord, between: Between, known: MassOnBristles, cutoff: float, sizes: np.ndarray
+) -> _Equation:
     """The equation of a record at a low-pass [Hz]."""
     seen, low_pass = record.seen(MOTION * cutoff), LowPass(record.time, cutoff)
     body, force, inertia = at_bearing(seen, between, known.mass[0])

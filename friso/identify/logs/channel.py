@@ -24,7 +24,7 @@ class Channel:
 
 
 @dataclass(frozen=True)
-class Table:
+class ChannelTable:
     """The channels of a file, the single numbers in it by name, and what was read, a line each (format, delimiter,
     decimal sign, rows left out and why)."""
 

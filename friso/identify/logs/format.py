@@ -8,7 +8,7 @@ from functools import cached_property
 from pathlib import Path
 
 from friso.errors import LogError
-from friso.identify.logs.channel import Table
+from friso.identify.logs.channel import ChannelTable
 from friso.identify.logs.measured_response import MeasuredResponse
 from friso.identify.logs.sniff import decoded_head
 from friso.registry import Registry
@@ -41,7 +41,7 @@ class LogFormat:
 
     title: str
     recognise: Callable[[FileHead], bool]
-    read: Callable[[Path], Table]
+    read: Callable[[Path], ChannelTable]
     rank: int = 0
     units: bool = True
     times: bool = True

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from friso.errors import LogError
-from friso.identify.logs.channel import Channel, Table
+from friso.identify.logs.channel import Channel, ChannelTable
 from friso.identify.logs.text import unique
 
 
@@ -25,11 +25,11 @@ def broken(kind: str, error: Exception, path: Path) -> LogError:
     return LogError("log", f"a {kind} file that cannot be read ({error})", f"a whole {kind} file", "", str(path))
 
 
-def named_table(kind: str, channels: list[Channel], notes: list[str], path: Path) -> Table:
+def named_table(kind: str, channels: list[Channel], notes: list[str], path: Path) -> ChannelTable:
     """The channels under names of their own. Raises LogError for none."""
     filled = [channel for channel in channels if channel.values.size]
     if not filled:
         raise LogError("log", f"a {kind} file without numbers", "a file with channels", "", str(path))
     names = unique([channel.name for channel in filled])
     renamed = tuple(Channel(name, c.unit, c.values, c.time, c.source) for name, c in zip(names, filled, strict=True))
-    return Table(renamed, {}, (f"format: {kind}", f"{len(renamed)} channels", *notes))
+    return ChannelTable(renamed, {}, (f"format: {kind}", f"{len(renamed)} channels", *notes))

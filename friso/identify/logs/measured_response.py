@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from friso.errors import LogError
-from friso.identify.logs.channel import Channel, Table
+from friso.identify.logs.channel import Channel, ChannelTable
 from friso.identify.logs.roles import words
 from friso.identify.logs.units import factor, spelled
 from friso.quantities import Quantity, any_sign
@@ -51,7 +51,7 @@ def is_response(names: Iterable[str]) -> bool:
     return "frequency" in found and ({"magnitude", "phase"} <= found or {"real", "imaginary"} <= found)
 
 
-def response_of(table: Table, path: Path) -> MeasuredResponse:
+def response_of(table: ChannelTable, path: Path) -> MeasuredResponse:
     """The response in the columns of a table. Raises LogError."""
     found: dict[str, list[Channel]] = {}
     for channel in table.channels:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from friso.errors import LogError
-from friso.identify.logs.channel import Table
+from friso.identify.logs.channel import ChannelTable
 from friso.identify.logs.format import FORMATS, FileHead
 from friso.identify.logs.measured_response import MeasuredResponse
 
@@ -38,7 +38,7 @@ def file_format(path: Path) -> str:
     raise LogError("log", f"{size} bytes that are neither text nor a known format", titles, "", str(path))
 
 
-def read_table(path: Path | str) -> Table:
+def read_table(path: Path | str) -> ChannelTable:
     """The channels of a log of any format. Raises LogError."""
     path = Path(path)
     return FORMATS[file_format(path)].read(path)

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from friso.errors import LogError
-from friso.identify.logs.channel import Channel, Table
+from friso.identify.logs.channel import Channel, ChannelTable
 from friso.identify.logs.units import split_heading
 from friso.quantities import quoted
 
@@ -66,7 +66,7 @@ def role_of(name: str) -> tuple[str, str] | None:
     return next(((role, key[role]) for role in ("velocity", "acceleration", "disturbance", "force") if key[role]), None)
 
 
-def find(table: Table, wanted: str, role: str, origin: str = "") -> Channel:
+def find(table: ChannelTable, wanted: str, role: str, origin: str = "") -> Channel:
     """The channel of this name, with or without its unit in brackets. Raises LogError that lists the channels."""
     plain = split_heading(wanted)[0]
     for matches in ([c for c in table.channels if c.name == wanted], [c for c in table.channels if c.name == plain]):
@@ -78,7 +78,7 @@ def find(table: Table, wanted: str, role: str, origin: str = "") -> Channel:
     raise LogError(role, f"{quoted(wanted)}, which the log does not hold", listing(table), example, origin)
 
 
-def listing(table: Table) -> str:
+def listing(table: ChannelTable) -> str:
     """The channels there are, for a message; and what was left out as objects."""
     shown = [c.name + (f" [{c.unit}]" if c.unit else "") for c in table.channels]
     text = ", ".join(shown[:40]) + (f" and {len(shown) - 40} more" if len(shown) > 40 else "")
@@ -86,7 +86,7 @@ def listing(table: Table) -> str:
     return f"one of the channels {text}{objects}"
 
 
-def choose(table: Table, told: Names[str, str], needed: Sequence[str], origin: str = "") -> dict[str, Choice]:
+def choose(table: ChannelTable, told: Names[str, str], needed: Sequence[str], origin: str = "") -> dict[str, Choice]:
     """Roles with their channels: first what the user told, then what the names tell.
 
     Raises LogError for a name that is not there, for two candidates, and for a role that is needed and not found.
@@ -115,7 +115,7 @@ def choose(table: Table, told: Names[str, str], needed: Sequence[str], origin: s
     return chosen
 
 
-def _own_times(table: Table) -> bool:
+def _own_times(table: ChannelTable) -> bool:
     """Whether the channels that are not times themselves have their instants from the file."""
     others = [channel for channel in table.channels if (role_of(channel.name) or ("",))[0] != "time"]
     return any(channel.time is not None for channel in others)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from friso.errors import InputError, LogError
-from friso.identify.logs.channel import Channel, Table
+from friso.identify.logs.channel import Channel, ChannelTable
 from friso.identify.logs.checks import unwrapped
 from friso.identify.logs.log import ROLES
 from friso.identify.logs.mapping import Mapping
@@ -37,14 +37,14 @@ class Reading:
     """How channels are read: the table, what the user said, whether only the units of the roles will do, whether the
     file is of a kind that cannot hold units, and where it lies."""
 
-    table: Table
+    table: ChannelTable
     mapping: Mapping
     strict: bool
     bare: bool
     origin: str
 
 
-def with_told_units(table: Table, mapping: Mapping, times: bool, origin: str) -> Table:
+def with_told_units(table: ChannelTable, mapping: Mapping, times: bool, origin: str) -> ChannelTable:
     """The table with the units that the user said, and with the times that follow from them, where the format has no
     `times` of its own. Raises LogError."""
     if not mapping.units:
@@ -142,7 +142,7 @@ def no_time(channel: Channel, reading: Reading) -> LogError:
     )
 
 
-def _offers(table: Table) -> str:
+def _offers(table: ChannelTable) -> str:
     """What single numbers in the file could mean for the sample time: offered, not used."""
     offers = []
     for name, value in table.scalars.items():

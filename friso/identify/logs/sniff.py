@@ -26,7 +26,7 @@ STAMP = re.compile(rf"(?:\d{{4}}-\d{{2}}-\d{{2}}(?:[T ]{_CLOCK}(?:Z|[+-]\d{{2}}:
 
 
 @dataclass(frozen=True)
-class Layout:
+class TextLayout:
     """How a text is written. `first` counts the lines before the numbers; `names` and `units` are per column."""
 
     encoding: str
@@ -105,7 +105,7 @@ def _is_row(cells: list[str], decimal: str, words: bool) -> bool:
     return numbers > 0 and len(rest) <= 0.5 * numbers + 1 and all(STAMP.fullmatch(cell) for cell in rest)
 
 
-def layout(path: Path) -> Layout:
+def layout(path: Path) -> TextLayout:
     """How a text with one table of numbers is written. Raises LogError where there is none."""
     encoding, lines = decoded_head(path)
     lines = lines[:HEAD_LINES]
@@ -120,7 +120,7 @@ def layout(path: Path) -> Layout:
 
 def _fit(
     lines: list[str], encoding: str, delimiter: str, decimal: str, words: bool
-) -> tuple[tuple[int, bool, int], Layout] | None:
+) -> tuple[tuple[int, bool, int], TextLayout] | None:
     """The layout with this delimiter and decimal sign, and how well it fits: rows of numbers, a heading as long as they
     are, columns. None for no fit."""
     rows = [split_line(line, delimiter) for line in lines]
@@ -132,7 +132,7 @@ def _fit(
     names, units = _headings(lines, first, columns, delimiter)
     certain = decimal == "," or any("." in cell for cells in rows[first:] for cell in cells)
     score = sum(is_row[first:]), all(names) and bool(names), columns
-    return score, Layout(encoding, delimiter, decimal, first, columns, names, units, certain)
+    return score, TextLayout(encoding, delimiter, decimal, first, columns, names, units, certain)
 
 
 def _goes_on(is_row: list[bool], rows: list[list[str]], i: int) -> bool:

@@ -12,14 +12,14 @@ import numpy as np
 import pandas as pd
 
 from friso.errors import LogError
-from friso.identify.logs.channel import Channel, Table
+from friso.identify.logs.channel import Channel, ChannelTable
 from friso.identify.logs.roles import role_of
-from friso.identify.logs.sniff import STAMP, Layout, layout, split_line
+from friso.identify.logs.sniff import STAMP, TextLayout, layout, split_line
 from friso.identify.logs.units import factor
 from friso.quantities import quoted
 
 
-def read_text(path: Path) -> Table:
+def read_text(path: Path) -> ChannelTable:
     """The table of a text file. Raises LogError for ragged rows and for a text among the numbers, with its line."""
     form = layout(path)
     if not form.certain and form.delimiter != "," and _has_comma(path, form):
@@ -43,10 +43,12 @@ def read_text(path: Path) -> Table:
     if blanks:
         notes.append(f"{blanks} empty lines left out")
     channels = with_times(_same_ends(path, form, columns, frame))
-    return Table(channels, {}, (f"format: text, {form.told}", f"{len(frame)} rows, {len(columns)} columns", *notes))
+    return ChannelTable(
+        channels, {}, (f"format: text, {form.told}", f"{len(frame)} rows, {len(columns)} columns", *notes)
+    )
 
 
-def read_frame(path: Path, form: Layout) -> Any:
+def read_frame(path: Path, form: TextLayout) -> Any:
     """All cells from the first row of numbers on; columns without text are floats. Raises LogError.
 
     The lines before are skipped here, not by pandas, which would take a lone quotation mark in them for an open one.
@@ -67,7 +69,7 @@ def read_frame(path: Path, form: Layout) -> Any:
         raise ragged(path, form, str(error)) from None
 
 
-def ragged(path: Path, form: Layout, why: str = "") -> LogError:
+def ragged(path: Path, form: TextLayout, why: str = "") -> LogError:
     """The error for the first line with more cells than columns; the parser's own words where there is none."""
     with path.open(encoding=form.encoding, errors="replace") as file:
         for number, line in enumerate(file, 1):
@@ -78,7 +80,7 @@ def ragged(path: Path, form: Layout, why: str = "") -> LogError:
     return LogError("log", why.strip(), f"rows of {form.columns} numbers", "", str(path))
 
 
-def _no_short_rows(path: Path, form: Layout, frame: Any) -> None:
+def _no_short_rows(path: Path, form: TextLayout, frame: Any) -> None:
     """Raises LogError for a row with fewer cells than columns above others that have them all."""
     there = frame.iloc[:, -1].notna().to_numpy()
     missing = np.flatnonzero(~there[: int(np.flatnonzero(there)[-1])]) if there.any() else np.empty(0, dtype=int)
@@ -93,7 +95,7 @@ def _no_short_rows(path: Path, form: Layout, frame: Any) -> None:
                 raise LogError("log", given, f"{form.columns} cells in every row", "", str(path))
 
 
-def _has_comma(path: Path, form: Layout) -> bool:
+def _has_comma(path: Path, form: TextLayout) -> bool:
     """Whether a comma stands anywhere after the first numbers (the head showed whole numbers only)."""
     with path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as bytes_:
         at = 0
@@ -112,7 +114,7 @@ def unique(names: list[str]) -> list[str]:
     return out
 
 
-def _numbers(path: Path, form: Layout, cells: Any, name: str) -> tuple[np.ndarray, str] | None:
+def _numbers(path: Path, form: TextLayout, cells: Any, name: str) -> tuple[np.ndarray, str] | None:
     """Values of a column, with "s" for the unit of time stamps; None for a column of texts.
     Raises LogError for a text among numbers."""
     if cells.dtype == bool or pd.api.types.is_numeric_dtype(cells.dtype):
@@ -142,7 +144,7 @@ def as_numbers(texts: Any) -> np.ndarray:
     return numbers.to_numpy(dtype=float)
 
 
-def _stamped(path: Path, texts: Any, there: Any, form: Layout) -> np.ndarray:
+def _stamped(path: Path, texts: Any, there: Any, form: TextLayout) -> np.ndarray:
     """Seconds since the first of these time stamps; a time of day that steps back goes on the next day."""
     texts = texts.str.replace(",", ".", regex=False)
     try:
@@ -162,7 +164,7 @@ def _stamped(path: Path, texts: Any, there: Any, form: Layout) -> np.ndarray:
     return seconds - seconds[int(np.flatnonzero(there)[0])]
 
 
-def _same_ends(path: Path, form: Layout, columns: list[Channel], frame: Any) -> list[Channel]:
+def _same_ends(path: Path, form: TextLayout, columns: list[Channel], frame: Any) -> list[Channel]:
     """The columns without the empty cells below their last value. A cell that is missing at the end of a single row
     stays and is a NaN, which the checks report."""
     out = []

@@ -8,7 +8,7 @@ import numpy as np
 
 from friso.identify.estimate import Estimate
 from friso.identify.output_error.coverage import Coverage
-from friso.identify.output_error.fit import Fit
+from friso.identify.output_error.fit import OutputErrorFit
 from friso.identify.output_error.parameters import MASS, RATIO, SHARE, keys_of
 from friso.identify.output_error.profile import Profile
 from friso.identify.output_error.shown import reason
@@ -18,7 +18,7 @@ METHOD = "output error"
 
 
 def estimates_of(
-    found: Fit, profiles: Mapping[str, Profile], shown: set[str], covered: Coverage
+    found: OutputErrorFit, profiles: Mapping[str, Profile], shown: set[str], covered: Coverage
 ) -> tuple[tuple[Estimate, ...], np.ndarray]:
     """The keys of the stage file with their intervals, and the correlation of those shown."""
     parameters = found.problem.parameters
@@ -48,7 +48,9 @@ _OWNERS = {"friction.static": RATIO, "masses.cart": MASS, "masses.stage": MASS}
 """The parameter behind a key that has another name."""
 
 
-def _reasons(found: Fit, profiles: Mapping[str, Profile], shown: set[str], covered: Coverage) -> dict[str, str]:
+def _reasons(
+    found: OutputErrorFit, profiles: Mapping[str, Profile], shown: set[str], covered: Coverage
+) -> dict[str, str]:
     """Why parameters, or keys that hang on them, are not shown."""
     parameters = {each.name: each for each in found.problem.parameters}
     unknown = {name: reason(name, covered) for name, each in parameters.items() if name not in shown and not each.core}
@@ -64,7 +66,7 @@ def _reasons(found: Fit, profiles: Mapping[str, Profile], shown: set[str], cover
     return unknown
 
 
-def _no_narrower(found: Fit, profiles: Mapping[str, Profile]) -> np.ndarray:
+def _no_narrower(found: OutputErrorFit, profiles: Mapping[str, Profile]) -> np.ndarray:
     """The covariance of the fitted numbers with spreads that reach as far as the profiles do."""
     spread = np.sqrt(np.diag(found.covariance))
     factors = np.ones(len(found.free))
@@ -77,12 +79,12 @@ def _no_narrower(found: Fit, profiles: Mapping[str, Profile]) -> np.ndarray:
     return found.covariance * np.outer(factors, factors)
 
 
-def _keys_at(found: Fit, inner: np.ndarray) -> dict[str, float]:
+def _keys_at(found: OutputErrorFit, inner: np.ndarray) -> dict[str, float]:
     values = {each.name: each.outer(number) for each, number in zip(found.problem.parameters, inner, strict=True)}
     return {key: float(value) for key, value in keys_of(found.problem.flat, values).items()}
 
 
-def _slopes(found: Fit) -> tuple[list[str], np.ndarray]:
+def _slopes(found: OutputErrorFit) -> tuple[list[str], np.ndarray]:
     """The keys of the stage file, and their derivatives to the fitted numbers, shape (keys, parameters)."""
     at = _keys_at(found, found.inner)
     step = 1e-6

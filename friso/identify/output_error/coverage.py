@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import find_peaks
 
-from friso.identify.inverse_model import Motion
+from friso.identify.inverse_model import FilteredMotion
 
 STEADY = 0.5
 """Share of the Coulomb friction that inertia has to stay below for a motion to count as steady."""
@@ -55,7 +55,7 @@ class Coverage:
         return bool(sum(count >= SAMPLES for count in seen) >= EPISODES)
 
 
-def coverage(position: np.ndarray, moved: Motion, mass: float, coulomb: float, sample_time: float) -> Coverage:
+def coverage(position: np.ndarray, moved: FilteredMotion, mass: float, coulomb: float, sample_time: float) -> Coverage:
     """What a motion of shape (n,) shows, of a mass [kg] with this Coulomb friction [N]."""
     rough = position - moved.position
     steps = np.abs(np.diff(position))
@@ -71,7 +71,7 @@ def coverage(position: np.ndarray, moved: Motion, mass: float, coulomb: float, s
     return Coverage(steady, _starts(position, moved, mass / coulomb, RESOLVED * resolution), resolution, slowest)
 
 
-def _starts(position: np.ndarray, moved: Motion, mass_per_force: float, swing: float) -> tuple[np.ndarray, ...]:
+def _starts(position: np.ndarray, moved: FilteredMotion, mass_per_force: float, swing: float) -> tuple[np.ndarray, ...]:
     """Ways [m] gone from each turning point to the next at the samples at which inertia was small; a swing that is less
     than `swing` [m] turns nothing."""
     turns = (find_peaks(sign * position, prominence=swing)[0] for sign in (1, -1))

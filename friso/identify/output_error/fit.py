@@ -10,7 +10,7 @@ import lmfit
 import numpy as np
 from scipy.stats import qmc
 
-from friso.identify.output_error.parameters import Parameter
+from friso.identify.output_error.parameters import FitParameter
 from friso.identify.output_error.problem import Problem
 from friso.identify.output_error.refine import bounds_of, costs, refine
 from friso.identify.spread import correlation_length, spread_of
@@ -35,7 +35,7 @@ SEED = 7
 
 
 @dataclass(frozen=True)
-class Fit:
+class OutputErrorFit:
     """The fitted numbers `inner`, shape (parameters,), of which `free` were fitted; their `covariance`, shape (free,
     free), and the residual [N], shape (n,)."""
 
@@ -61,12 +61,12 @@ class Fit:
         return float(self.problem.parameters[i].outer(self.inner[i]))
 
 
-def first_values(parameters: Sequence[Parameter]) -> np.ndarray:
+def first_values(parameters: Sequence[FitParameter]) -> np.ndarray:
     """The fitted numbers at which the parameters start, shape (parameters,)."""
     return np.array([each.inner(each.start) for each in parameters])
 
 
-def fit(problem: Problem, free: Sequence[int], starts: np.ndarray) -> Fit:
+def fit(problem: Problem, free: Sequence[int], starts: np.ndarray) -> OutputErrorFit:
     """Fit the free parameters, given by number, of a problem, from some starts, shape (starts, parameters), the best of
     which are refined; the others stay as in the first of them."""
     mask = np.zeros(starts.shape[1], bool)
@@ -89,7 +89,7 @@ def everywhere(problem: Problem, free: Sequence[int], first: np.ndarray) -> np.n
     return np.vstack([first, starts])
 
 
-def nearby(found: Fit) -> np.ndarray:
+def nearby(found: OutputErrorFit) -> np.ndarray:
     """Starts that another problem's fit allows, shape (starts, parameters), itself the first: drawn from its covariance
     `FAR` times as wide."""
     low, high = (end[list(found.free)] for end in bounds_of(found.problem))
@@ -114,7 +114,7 @@ def _screened(problem: Problem, starts: np.ndarray) -> np.ndarray:
     return np.vstack([starts[0], starts[1:][np.argsort(found)[: KEPT - 1]]])
 
 
-def _polished(problem: Problem, free: tuple[int, ...], inner: np.ndarray) -> Fit:
+def _polished(problem: Problem, free: tuple[int, ...], inner: np.ndarray) -> OutputErrorFit:
     """The end of the fit by lmfit, with derivatives from runs side by side."""
     low, high = bounds_of(problem)
     mask = np.isin(np.arange(len(inner)), free)
@@ -137,4 +137,4 @@ def _polished(problem: Problem, free: tuple[int, ...], inner: np.ndarray) -> Fit
     result: Any = lmfit.minimize(residual, given, Dfun=jacobian, max_nfev=FINE * len(free), ftol=1e-6, xtol=1e-6)
     best = numbers(result.params)
     ((rest, slopes),) = problem.jacobians(best[None], mask[None])
-    return Fit(problem, best, free, spread_of(slopes, rest), rest)
+    return OutputErrorFit(problem, best, free, spread_of(slopes, rest), rest)

@@ -24,7 +24,7 @@ SHORTEST, LONGEST = 5e-8, 3e-4
 
 
 @dataclass(frozen=True)
-class Parameter:
+class FitParameter:
     """A parameter with its SI unit, start value and range; of a `logarithmic` one the logarithm is fitted.
 
     `core` ones are shown by any motion; the others are asked about one by one.
@@ -49,7 +49,7 @@ class Parameter:
 
 def parameters_of(
     flat: Mapping[str, Any], levels: Mapping[str, float], speed: float, travel: float, both_ways: bool
-) -> list[Parameter]:
+) -> list[FitParameter]:
     """The parameters of a stage given as flat keys, that a log may show.
 
     `levels` holds first values, of mass, Coulomb and viscous friction and offset, from the inverse model; `speed` [m/s]
@@ -58,7 +58,7 @@ def parameters_of(
     InputError for a friction law that is not among those that can be fitted.
     """
     mass = levels["mass"]
-    found = [Parameter(MASS, "kg", mass, mass / 5, mass * 5)]
+    found = [FitParameter(MASS, "kg", mass, mass / 5, mass * 5)]
     if flat["friction.model"] in FITTED:
         found += _friction(flat, levels, speed, travel, both_ways)
     elif flat["friction.model"] != "none":
@@ -67,31 +67,31 @@ def parameters_of(
     bias = "bias.cart" if "masses.cart" in flat else "bias.stage"
     reach = 5 * max(levels["coulomb"], abs(levels["offset"]))
     if both_ways:
-        found.append(Parameter(bias, "N", -levels["offset"] or 1e-9, -reach, reach, logarithmic=False))
+        found.append(FitParameter(bias, "N", -levels["offset"] or 1e-9, -reach, reach, logarithmic=False))
     if "joint.stiffness" in flat and not flat["joint.locked"]:
         k, d = flat["joint.stiffness"], max(flat["joint.damping"], 1e-3)
         share = flat["masses.cart"] / (flat["masses.cart"] + flat["masses.stage"])
         found += [
-            Parameter(SHARE, "", share, share / 20, 1 - (1 - share) / 20, logarithmic=False, core=False),
-            Parameter("joint.stiffness", "N/m", k, k / 10, k * 10, core=False),
-            Parameter("joint.damping", "N*s/m", d, d / 100, d * 100, core=False),
+            FitParameter(SHARE, "", share, share / 20, 1 - (1 - share) / 20, logarithmic=False, core=False),
+            FitParameter("joint.stiffness", "N/m", k, k / 10, k * 10, core=False),
+            FitParameter("joint.damping", "N*s/m", d, d / 100, d * 100, core=False),
         ]
     return found
 
 
 def _friction(
     flat: Mapping[str, Any], levels: Mapping[str, float], speed: float, travel: float, both_ways: bool
-) -> list[Parameter]:
+) -> list[FitParameter]:
     coulomb, viscous = levels["coulomb"], levels["viscous"]
     found = [
-        Parameter("friction.coulomb", "N", coulomb, coulomb / 20, coulomb * 5),
-        Parameter("friction.viscous", "N*s/m", viscous, viscous / 1e3, viscous * 20),
+        FitParameter("friction.coulomb", "N", coulomb, coulomb / 20, coulomb * 5),
+        FitParameter("friction.viscous", "N*s/m", viscous, viscous / 1e3, viscous * 20),
     ]
     if "friction.stribeck_velocity" in flat:
         if both_ways:
-            found.append(Parameter("friction.viscous_asymmetry", "", 1e-6, -0.9, 0.9, logarithmic=False))
+            found.append(FitParameter("friction.viscous_asymmetry", "", 1e-6, -0.9, 0.9, logarithmic=False))
         found += [
-            Parameter(RATIO, "", 1.0, 1.0, HIGHEST_RATIO, logarithmic=False, core=False),
+            FitParameter(RATIO, "", 1.0, 1.0, HIGHEST_RATIO, logarithmic=False, core=False),
             _slow("friction.stribeck_velocity", "m/s", flat, speed / 3e3, speed),
         ]
     if "friction.bristle_stiffness" in flat:
@@ -103,13 +103,13 @@ def _friction(
     return found
 
 
-def _slow(name: str, unit: str, flat: Mapping[str, Any], low: float, high: float) -> Parameter:
+def _slow(name: str, unit: str, flat: Mapping[str, Any], low: float, high: float) -> FitParameter:
     """A parameter that slow motion alone shows, from what the stage has, in a range that holds that too."""
     start = float(flat[name])
-    return Parameter(name, unit, start, float(min(low, start)), float(max(high, start)), core=False)
+    return FitParameter(name, unit, start, float(min(low, start)), float(max(high, start)), core=False)
 
 
-def stages(flat: Mapping[str, Any], parameters: Sequence[Parameter], inner: np.ndarray) -> dict[str, Any]:
+def stages(flat: Mapping[str, Any], parameters: Sequence[FitParameter], inner: np.ndarray) -> dict[str, Any]:
     """The flat keys of the stages that the numbers fitted, shape (runs, parameters), make of a stage."""
     values = {each.name: each.outer(column) for each, column in zip(parameters, inner.T, strict=True)}
     return {**flat, **keys_of(flat, values)}

@@ -18,7 +18,7 @@ from friso.equations.roles import Role, Steady
 from friso.equations.structure import ControllerForm, structure
 from friso.identify.inverse_model import SMOOTH, motion
 from friso.identify.logs.log import Log
-from friso.identify.output_error.parameters import MASS, Parameter, stages
+from friso.identify.output_error.parameters import MASS, FitParameter, stages
 
 STEP = 1e-4
 """Steps of the fitted numbers for derivatives: shares of the value for logarithmic ones."""
@@ -62,7 +62,7 @@ class Problem:
     form: Driven
     inputs: Inputs
     wanted: np.ndarray
-    parameters: tuple[Parameter, ...]
+    parameters: tuple[FitParameter, ...]
     closed: bool
     start: tuple[float, float]
 
@@ -159,7 +159,7 @@ class Problem:
         return np.broadcast_to(outputs[list(self.kernel.outputs).index("force")], runs.states.shape[:2])
 
 
-def closed_loop(flat: Mapping[str, Any], log: Log, part: slice, parameters: Sequence[Parameter]) -> Problem:
+def closed_loop(flat: Mapping[str, Any], log: Log, part: slice, parameters: Sequence[FitParameter]) -> Problem:
     """The stage with its own controller on the log's reference; a `disturbance` in the log acts beside it."""
     sampled = "drive.sample_time" in flat and not why_continuous(flat, log.sample_time)
     samples = round(flat.get("drive.velocity_samples", 1.0)) if sampled else 0
@@ -193,7 +193,7 @@ def _is_held(flat: Mapping[str, Any], log: Log) -> bool:
 
 
 def tracking(
-    flat: Mapping[str, Any], log: Log, part: slice, parameters: Sequence[Parameter], bandwidth: float
+    flat: Mapping[str, Any], log: Log, part: slice, parameters: Sequence[FitParameter], bandwidth: float
 ) -> Problem:
     """The stage under the log's force, held to the log's smoothed position by a slow controller; `bandwidth` [Hz] is
     that of the motion. A faster one, or the noise itself, would shake the bristles of a stage at rest."""

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2
 
-from friso.identify.output_error.fit import Fit
+from friso.identify.output_error.fit import OutputErrorFit
 from friso.identify.output_error.refine import bounds_of, costs, refine
 
 POINTS = 7
@@ -45,7 +45,7 @@ class Profile:
     open_high: bool
 
 
-def profile(fit: Fit, number: int, others: tuple[int, ...], best: float) -> Profile:
+def profile(fit: OutputErrorFit, number: int, others: tuple[int, ...], best: float) -> Profile:
     """The profile of parameter `number`, with the `others` fitted at each of its values.
 
     `best` is the mean square [N^2] of the fit that others are compared with. The values reach as far as the interval,
@@ -69,7 +69,7 @@ def profile(fit: Fit, number: int, others: tuple[int, ...], best: float) -> Prof
     return Profile(parameter.name, parameter.outer(values), cost, limit, *ends, open_left, open_right)
 
 
-def _costs(fit: Fit, number: int, others: tuple[int, ...], values: np.ndarray) -> np.ndarray:
+def _costs(fit: OutputErrorFit, number: int, others: tuple[int, ...], values: np.ndarray) -> np.ndarray:
     """Mean squares [N^2] at values of a parameter, shape (values,), the others fitted: the least of those from several
     starts of the ones that are not part of the fit, whose own values mean nothing."""
     low, high = bounds_of(fit.problem)

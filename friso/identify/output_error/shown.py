@@ -8,7 +8,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from friso.identify.output_error.coverage import Coverage
-from friso.identify.output_error.fit import Fit, everywhere, first_values, fit, nearby
+from friso.identify.output_error.fit import OutputErrorFit, everywhere, first_values, fit, nearby
 from friso.identify.output_error.parameters import LONGEST, RATIO, SHARE
 from friso.identify.output_error.problem import Problem
 from friso.identify.output_error.profile import Profile, profile
@@ -29,7 +29,7 @@ SHARP = 3.0
 
 def fit_shown(
     follows: Problem, loop: Problem | None, covered: Coverage, bandwidth: float
-) -> tuple[Fit, dict[str, Profile], set[str]]:
+) -> tuple[OutputErrorFit, dict[str, Profile], set[str]]:
     """The fit, the profile of every parameter, and which of those that not every motion shows it does show; `bandwidth`
     [Hz] is that of the motion.
 
@@ -63,13 +63,13 @@ def fit_shown(
     return found, profiles, shown
 
 
-def _pays(whole: Fit, plain: Fit) -> bool:
+def _pays(whole: OutputErrorFit, plain: OutputErrorFit) -> bool:
     """Whether a fit with more parameters is better by more than chance would make it, with a probability of 99 %."""
     more = len(whole.free) - len(plain.free)
     return bool(plain.cost > whole.cost * (1 + chi2.ppf(SURE, more) / whole.independent))
 
 
-def _in_step(looped: Fit, found: Fit, bandwidth: float) -> bool:
+def _in_step(looped: OutputErrorFit, found: OutputErrorFit, bandwidth: float) -> bool:
     """Whether a closed loop follows: its residual is no larger than that of the stage that follows the log, both within
     the motion's bandwidth [Hz], since the latter knows no noise above it."""
     step = looped.problem.inputs.sample_time
@@ -103,7 +103,7 @@ def _may_show(name: str, covered: Coverage, problem: Problem) -> bool:
     return each.unit != "" or name == SHARE
 
 
-def _shows(whole: Fit, number: int, covered: Coverage) -> bool:
+def _shows(whole: OutputErrorFit, number: int, covered: Coverage) -> bool:
     """Whether a parameter has a sharp, closed interval, and the motion covers where it acts."""
     parameter = whole.problem.parameters[number]
     others = tuple(i for i in whole.free if i != number)

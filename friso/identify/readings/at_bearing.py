@@ -42,7 +42,7 @@ HELD = "The joint is taken as held, with the limiter's stiffness: it is not seen
 
 
 @dataclass(frozen=True)
-class Mode:
+class StructureMode:
     """The first mode of a structure on the side of the force and the sensor: a `share` of the moving mass on a spring
     of its own, and the frequency [Hz] and damping ratio that it has there, the rest being held."""
 
@@ -64,7 +64,7 @@ class Between:
     beyond: float = 0.0
     contact: float = np.inf
     joint: float = 0.0
-    mode: Mode | None = None
+    mode: StructureMode | None = None
     viscous: tuple[float, float] = (0.0, 0.0)
 
 
@@ -92,7 +92,7 @@ def between(flat: Mapping[str, Any]) -> Between:
         beyond=held / (cart + held) if joint and held else 0.0,
         contact=joint.get("limiter_stiffness", np.inf),
         joint=joint.get("stiffness", 0.0),
-        mode=Mode(mode["mass"] / (cart + held), *(lower * mode[key] for key in ("frequency", "damping_ratio")))
+        mode=StructureMode(mode["mass"] / (cart + held), *(lower * mode[key] for key in ("frequency", "damping_ratio")))
         if mode
         else None,
         viscous=(flat.get("friction.viscous", 0.0), 0.0),
@@ -108,7 +108,7 @@ def believed_between(prior: Prior, log: Log) -> Between:
 
 
 @dataclass(frozen=True)
-class Record:
+class BearingRecord:
     """Time [s], position of the body on which the force acts, deflection of the joint that carries it [m] (None: it
     is held), and force [N], shape (n,)."""
 
@@ -127,12 +127,12 @@ class Record:
         """About where the body on the bearing is [m], shape (n,)."""
         return self.position if self.bent is None else self.position - self.bent
 
-    def seen(self, cutoff: float, step: int = 1) -> Record:
+    def seen(self, cutoff: float, step: int = 1) -> BearingRecord:
         """With the motion low-passed at a frequency [Hz], about its start, and every `step`th sample."""
         place = low_pass(self.position, self.interval, cutoff)
         bent = None if self.bent is None else low_pass(self.bent, self.interval, cutoff)[::step]
         force = self.force if step == 1 else low_pass(self.force, self.interval, cutoff)
-        return Record(self.time[::step], (place - place[0])[::step], bent, force[::step])
+        return BearingRecord(self.time[::step], (place - place[0])[::step], bent, force[::step])
 
 
 @dataclass(frozen=True)
@@ -153,13 +153,15 @@ class LowPass:
         return low_pass(signal, float(self.time[1] - self.time[0]), self.cutoff)[self.inside]
 
 
-def record_of(log: Log, part: slice, between: Between) -> Record:
+def record_of(log: Log, part: slice, between: Between) -> BearingRecord:
     """A part of a log. Raises InputError for missing channels."""
     position, force = channel(log, "position")[part], channel(log, "force")[part]
-    return Record(log.time[part], position, _bent(log, part, position, float(force.std()) / between.contact), force)
+    return BearingRecord(
+        log.time[part], position, _bent(log, part, position, float(force.std()) / between.contact), force
+    )
 
 
-def why_unseen(record: Record, fewest: int) -> str:
+def why_unseen(record: BearingRecord, fewest: int) -> str:
     """Why nothing can be read from a record, of which so many samples are needed; empty where it can."""
     if len(record.time) < fewest:
         return f"the record has {len(record.time)} samples: {fewest} are needed"
@@ -178,13 +180,13 @@ def why_unseen(record: Record, fewest: int) -> str:
     return ""
 
 
-def cutoff_of(record: Record) -> float:
+def cutoff_of(record: BearingRecord) -> float:
     """The low-pass [Hz] for a record: where its motion ends, but no slower than its length allows."""
     highest = motion_bandwidth(record.body, record.interval)
     return max(min(highest, SAMPLED / (2 * record.interval)), LEAST / (len(record.time) * record.interval))
 
 
-def at_bearing(record: Record, between: Between, mass: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def at_bearing(record: BearingRecord, between: Between, mass: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Position [m] of the body on the bearing, the force [N] that has arrived, and the acceleration [m/s^2] that it
     gives to the whole moving mass, shape (n,) each: inertia is the mass times that. `mass` [kg] counts where a contact
     gives way, by the force that goes through it."""
@@ -225,7 +227,7 @@ def _arrived(time: np.ndarray, command: np.ndarray, between: Between) -> np.ndar
     return lfilter(b, a, late, zi=lfilter_zi(b, a) * late[0])[0]
 
 
-def _followed(time: np.ndarray, acceleration: np.ndarray, mode: Mode) -> np.ndarray:
+def _followed(time: np.ndarray, acceleration: np.ndarray, mode: StructureMode) -> np.ndarray:
     """Acceleration of the mass of a mode whose base moves with an acceleration [m/s^2], shape (n,)."""
     omega, each = 2 * np.pi * mode.frequency, float(time[1] - time[0]) / FINER
     fine = CubicSpline(time, acceleration)(np.linspace(time[0], time[-1], (len(time) - 1) * FINER + 1))

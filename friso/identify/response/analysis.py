@@ -16,12 +16,12 @@ from friso.identify.response.arbitrary import local_polynomial
 from friso.identify.response.closed_loop import feedback
 from friso.identify.response.departure import Departure, Drag, departure, friction_from_departure
 from friso.identify.response.limit_cases import Visible, visible
-from friso.identify.response.mass_line import Line, mass_lines
+from friso.identify.response.mass_line import StraightLine, mass_lines
 from friso.identify.response.modes import Modes, fit_modes
 from friso.identify.response.period import find_periods
 from friso.identify.response.periodic import multisine
 from friso.identify.response.prediction import relative_error
-from friso.identify.response.records import Record, from_log
+from friso.identify.response.records import ResponseRecord, from_log
 from friso.identify.response.response import Channels, FrequencyResponse
 from friso.identify.response.simulated import Explanation, explained
 from friso.identify.response.two_mass import TwoMass, fit_two_mass, widened
@@ -45,7 +45,7 @@ class Bench:
     driven: FrequencyResponse
     other: FrequencyResponse | None
     band: Range
-    lines: tuple[Line, ...]
+    lines: tuple[StraightLine, ...]
     modes: Modes | None
     two_masses: TwoMass | None
     seen: Visible | None
@@ -128,11 +128,11 @@ def _attempt(said: list[str], what: str, function, *arguments):
         return None
 
 
-def _record(log: Log, output: str) -> Record:
+def _record(log: Log, output: str) -> ResponseRecord:
     return from_log(log, "force", output, external(log))[0]
 
 
-def _response(records: Sequence[Record], log: Log, output: str, period: float | None) -> FrequencyResponse:
+def _response(records: Sequence[ResponseRecord], log: Log, output: str, period: float | None) -> FrequencyResponse:
     """By averaging over periods, or where nothing repeats by the local polynomial method; names are the log's."""
     channels = from_log(log, "force", output)[1]
     driving = records[0].input if records[0].reference is None else records[0].reference
@@ -167,7 +167,7 @@ def _top(driven: FrequencyResponse) -> float:
 
 
 def _of_all(
-    records: dict[str, list[Record]],
+    records: dict[str, list[ResponseRecord]],
     logs: Sequence[Log],
     driven: FrequencyResponse,
     other: FrequencyResponse | None,
@@ -180,7 +180,7 @@ def _of_all(
 
 
 def _single(
-    records: dict[str, list[Record]], logs: Sequence[Log], which: int, band: Range, period: float | None
+    records: dict[str, list[ResponseRecord]], logs: Sequence[Log], which: int, band: Range, period: float | None
 ) -> TwoMass:
     """The two-mass model of one realisation."""
     responses = [_response([own[which]], logs[which], output, period) for output, own in records.items()]
@@ -189,7 +189,7 @@ def _single(
 
 def _friction(
     said: list[str],
-    records: Sequence[Record],
+    records: Sequence[ResponseRecord],
     driven: FrequencyResponse,
     departs: Departure | None,
     model: TwoMass | None,
@@ -212,7 +212,7 @@ def _friction(
     return drag, _attempt(said, "explanation", explained, drag, driven, once, step, limits)
 
 
-def _last_period(record: Record, period: float | None) -> np.ndarray:
+def _last_period(record: ResponseRecord, period: float | None) -> np.ndarray:
     """The input over the last whole period. Raises InputError where nothing repeats."""
     driving = record.input if record.reference is None else record.reference
     found = find_periods(driving, None if period is None else period / record.sample_time)
@@ -220,7 +220,7 @@ def _last_period(record: Record, period: float | None) -> np.ndarray:
 
 
 def _left_out(
-    said: list[str], records: dict[str, list[Record]], logs: Sequence[Log], band: Range, period: float | None
+    said: list[str], records: dict[str, list[ResponseRecord]], logs: Sequence[Log], band: Range, period: float | None
 ) -> tuple[tuple[str, tuple[float, ...]], ...]:
     """For each log, how the model of one other log predicts it."""
     if len(logs) < 2:

@@ -10,7 +10,7 @@ import numpy as np
 from scipy import signal
 
 from friso.errors import InputError
-from friso.identify.response.records import Record
+from friso.identify.response.records import ResponseRecord
 from friso.identify.response.response import Channels, FrequencyResponse
 
 OVERLAP = 1 / 36
@@ -26,7 +26,7 @@ WEAK = 1e-4
 """Amplitude of the external signal, over its largest, below which a line is not excited and not reported (-80 dB)."""
 
 
-def welch(record: Record, resolution: float, channels: Channels | None = None) -> FrequencyResponse:
+def welch(record: ResponseRecord, resolution: float, channels: Channels | None = None) -> FrequencyResponse:
     """The response by Hann segments of 1/`resolution` [Hz] that overlap by half, with coherence.
 
     H1 where the record has no reference. Its variance is that of the output not coherent with the external signal
@@ -61,7 +61,7 @@ def welch(record: Record, resolution: float, channels: Channels | None = None) -
     return _response(frequency, response, deviation, degrees, "welch", channels, coherence).at(excited)
 
 
-def local_polynomial(record: Record, channels: Channels | None = None) -> FrequencyResponse:
+def local_polynomial(record: ResponseRecord, channels: Channels | None = None) -> FrequencyResponse:
     """The response by the local polynomial method, free of leakage (Pintelon, Schoukens, 2nd ed., ch. 7).
 
     About every line, response and transient are polynomials of order 2 in the frequency over 17 lines of the spectrum

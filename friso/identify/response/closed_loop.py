@@ -8,7 +8,7 @@ from scipy import stats
 from friso.errors import InputError
 from friso.identify.estimate import Estimate
 from friso.identify.response.period import find_periods
-from friso.identify.response.records import Record, drift
+from friso.identify.response.records import ResponseRecord, drift
 from friso.identify.response.response import Channels, FrequencyResponse
 
 OWN, OTHER = 60, 8
@@ -31,7 +31,7 @@ EXACT = 1e-6
 """Relative difference between periods of an input below which nothing was added to it: it was played from a table."""
 
 
-def feedback(record: Record, direct: bool = False) -> tuple[str, ...]:
+def feedback(record: ResponseRecord, direct: bool = False) -> tuple[str, ...]:
     """What speaks for a controller acting from output to input, as sentences; empty where nothing does.
 
     Without a loop the output's past cannot help to foretell the input beyond the input's own past (Granger 1969,
@@ -51,7 +51,7 @@ def feedback(record: Record, direct: bool = False) -> tuple[str, ...]:
     return (f"{told}: closed loop, a direct estimate is biased; give the force injected, or a reference that moves",)
 
 
-def _surprising(record: Record) -> tuple[np.ndarray | None, np.ndarray | None]:
+def _surprising(record: ResponseRecord) -> tuple[np.ndarray | None, np.ndarray | None]:
     """Input and output without their periodic part, if they have one; None where nothing is left of the input."""
     try:
         periods = find_periods(record.input)

@@ -23,7 +23,7 @@ LOOSE = 1e3
 
 
 @dataclass(frozen=True)
-class Fit:
+class ResponseFit:
     """Parameters (p,), their covariance (p, p), the sum of squares in units of the variance, and the counts of data."""
 
     parameters: np.ndarray
@@ -68,7 +68,7 @@ def refined(
     deviation: np.ndarray,
     lower: np.ndarray | float = -np.inf,
     upper: np.ndarray | float = np.inf,
-) -> Fit:
+) -> ResponseFit:
     """The model's parameters by least squares, weighted by the deviations; responses of shape (outputs, lines).
 
     The errors of one line may be correlated between outputs, and those of neighbouring lines with each other, since a
@@ -89,7 +89,7 @@ def refined(
     plain = inverse * (2 * found.cost / free)
     by_line = (found.jac * found.fun[:, None]).reshape(response.shape[0], lines, 2, -1).sum(axis=(0, 2))
     robust = inverse @ _long_run(by_line) @ inverse * (count / free)
-    return Fit(found.x, _larger(plain, robust), float(2 * found.cost), count)
+    return ResponseFit(found.x, _larger(plain, robust), float(2 * found.cost), count)
 
 
 def _long_run(scores: np.ndarray) -> np.ndarray:

@@ -13,7 +13,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from friso.identify.response.mass_line import KINDS, Line, straight_lines
+from friso.identify.response.mass_line import KINDS, StraightLine, straight_lines
 from friso.identify.response.modes import Modes, fit_modes
 from friso.identify.response.response import FrequencyResponse
 
@@ -24,7 +24,7 @@ class Visible:
     cart ("stuck", "sliding", or "" where it cannot be told), and all of it in words."""
 
     case: str
-    lines: tuple[Line, ...]
+    lines: tuple[StraightLine, ...]
     modes: Modes | None
     words: tuple[str, ...]
 
@@ -57,7 +57,7 @@ def _named(modes: Modes | None) -> Mapping[str, float]:
     return dict(sorted(found.items(), key=lambda item: item[1]))
 
 
-def _case(lines: tuple[Line, ...], pairs: Mapping[str, float]) -> str:
+def _case(lines: tuple[StraightLine, ...], pairs: Mapping[str, float]) -> str:
     """The case by the lowest line: a spring is a stuck cart, a mass or a damper a sliding one.
 
     A line above the first antiresonance, or the first resonance if there is none, says nothing about the cart.
@@ -70,7 +70,7 @@ def _case(lines: tuple[Line, ...], pairs: Mapping[str, float]) -> str:
     return "stuck" if below[0].kind == "stiffness line" else "sliding"
 
 
-def _words(line: Line) -> str:
+def _words(line: StraightLine) -> str:
     value = line.value
     text = f"{value.value:.4g} {value.unit} ({value.low:.4g} to {value.high:.4g})"
     return f"{line.kind} from {line.low:.3g} to {line.high:.3g} Hz: {text}"

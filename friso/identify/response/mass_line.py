@@ -37,7 +37,7 @@ KINDS: Mapping[int, str] = {0: "stiffness line", 1: "damping line", 2: "mass lin
 
 
 @dataclass(frozen=True)
-class Line:
+class StraightLine:
     """A straight line in a response, from `low` to `high` [Hz].
 
     `kind` is a name of `KINDS`; `value` the stiffness, damping or mass; `level` its inverse: position, velocity or
@@ -58,7 +58,7 @@ class Line:
         return float(np.log2(self.high / self.low))
 
 
-def mass_lines(response: FrequencyResponse, sign: float | None = None, most: int = 3) -> tuple[Line, ...]:
+def mass_lines(response: FrequencyResponse, sign: float | None = None, most: int = 3) -> tuple[StraightLine, ...]:
     """The mass lines of a force-to-position response by frequency, at most so many; none is an answer too.
 
     Below an antiresonance it is the line of the whole mass, above the resonance that of the driven part.
@@ -68,7 +68,7 @@ def mass_lines(response: FrequencyResponse, sign: float | None = None, most: int
 
 def straight_lines(
     response: FrequencyResponse, slope: int, sign: float | None = None, most: int = 3
-) -> tuple[Line, ...]:
+) -> tuple[StraightLine, ...]:
     """Bands in which the response falls with `slope` (0, 1 or 2), widest in octaves first found, then by frequency.
 
     `sign` is 1 or -1 where it is known which way the input acts (default: what most of the band says).
@@ -147,7 +147,7 @@ def _flat(response: FrequencyResponse, slope: int, sign: float) -> tuple[np.ndar
     return response.frequency, np.log(np.abs(value)), np.angle(value), relative
 
 
-def _line(response: FrequencyResponse, slope: int, sign: float, band: slice) -> Line:
+def _line(response: FrequencyResponse, slope: int, sign: float, band: slice) -> StraightLine:
     """The level of a band with its interval, and what it stands for."""
     mean, half, independent = _level(response, slope, sign, band)
     low, high = float(response.frequency[band][0]), float(response.frequency[band][-1])
@@ -161,7 +161,7 @@ def _line(response: FrequencyResponse, slope: int, sign: float, band: slice) -> 
     name = KINDS[slope].removesuffix(" line")
     level = Estimate(f"{name} line level", unit, float(np.exp(mean)), down, up, method)
     value = Estimate(name, inverse, float(np.exp(-mean)), 1 / up, 1 / down, method)
-    return Line(KINDS[slope], low, high, level, value, sign, independent)
+    return StraightLine(KINDS[slope], low, high, level, value, sign, independent)
 
 
 def _level(response: FrequencyResponse, slope: int, sign: float, band: slice) -> tuple[float, float, float]:

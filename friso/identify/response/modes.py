@@ -9,8 +9,8 @@ import numpy as np
 
 from friso.errors import InputError
 from friso.identify.estimate import Estimate
-from friso.identify.response.fitting import Fit, refined
-from friso.identify.response.rational import Row, Shape, bounds, orders, rational, roots, simplest
+from friso.identify.response.fitting import ResponseFit, refined
+from friso.identify.response.rational import RationalShape, Row, bounds, orders, rational, roots, simplest
 from friso.identify.response.response import FrequencyResponse
 
 METHOD = "rational fit of the response"
@@ -30,8 +30,8 @@ class Modes:
     and above all modes (the mass lines), unknown without a rigid body.
     """
 
-    shape: Shape
-    fit: Fit
+    shape: RationalShape
+    fit: ResponseFit
     scale: float
     estimates: tuple[Estimate, ...]
     low_level: Estimate
@@ -76,13 +76,13 @@ def fit_modes(
     )
 
 
-def _told(shape: Shape, rows: list[Row]) -> str:
+def _told(shape: RationalShape, rows: list[Row]) -> str:
     """How the order was chosen."""
     tried = ", ".join(f"{row.shape.words}: {row.bic:.4g}" for row in rows)
     return f"{shape.words} by the Bayesian information criterion ({tried})"
 
 
-def _pairs(fit: Fit, shape: Shape, scale: float, band: tuple[float, float]) -> tuple[Estimate, ...]:
+def _pairs(fit: ResponseFit, shape: RationalShape, scale: float, band: tuple[float, float]) -> tuple[Estimate, ...]:
     """Frequencies and damping ratios of resonances and antiresonances within the band, by frequency."""
     found: list[Estimate] = []
     for kind, which in (("resonance", 0), ("antiresonance", 1)):
@@ -101,7 +101,7 @@ def _pairs(fit: Fit, shape: Shape, scale: float, band: tuple[float, float]) -> t
     return tuple(found)
 
 
-def _tracked(shape: Shape, which: int, root: complex) -> Callable[[np.ndarray], complex]:
+def _tracked(shape: RationalShape, which: int, root: complex) -> Callable[[np.ndarray], complex]:
     """The root that is nearest to a given one, as a function of the parameters."""
 
     def nearest(parameters: np.ndarray) -> complex:
@@ -111,7 +111,7 @@ def _tracked(shape: Shape, which: int, root: complex) -> Callable[[np.ndarray], 
     return nearest
 
 
-def _level(fit: Fit, shape: Shape, scale: float, which: str, response: FrequencyResponse) -> Estimate:
+def _level(fit: ResponseFit, shape: RationalShape, scale: float, which: str, response: FrequencyResponse) -> Estimate:
     """Acceleration per input below all modes (the rigid body alone) or above all (with their residues)."""
     unit = f"{response.channels.output_unit}/s^2/{response.channels.input_unit}"
     name = f"mass line level, {'below' if which == 'low' else 'above'} the modes"

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from friso.errors import InputError
-from friso.identify.response.records import Record, Spectra, spectra
+from friso.identify.response.records import ResponseRecord, Spectra, spectra
 from friso.identify.response.response import Channels, FrequencyResponse
 
 LINES = 5
@@ -23,7 +23,7 @@ FEW = 10
 
 
 def multisine(
-    records: Sequence[Record], period: float | None = None, channels: Channels | None = None
+    records: Sequence[ResponseRecord], period: float | None = None, channels: Channels | None = None
 ) -> FrequencyResponse:
     """The response on the excited lines, from one or more realisations of a periodic excitation.
 

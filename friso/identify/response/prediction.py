@@ -7,12 +7,12 @@ from collections.abc import Callable
 import numpy as np
 
 from friso.errors import InputError
-from friso.identify.response.records import Record, spectra
+from friso.identify.response.records import ResponseRecord, spectra
 
 
 def relative_error(
     model: Callable[[np.ndarray], np.ndarray],
-    record: Record,
+    record: ResponseRecord,
     band: tuple[float, float],
     period: float | None = None,
 ) -> float:

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import least_squares
 
-from friso.identify.response.fitting import CLOSE, Fit
+from friso.identify.response.fitting import CLOSE, ResponseFit
 
 CLEAR = 10.0
 """By how much the information criterion must fall for another mode (Kass, Raftery 1995: very strong evidence)."""
@@ -27,7 +27,7 @@ PLACES, DAMPINGS = 60, (0.003, 0.01, 0.03, 0.1, 0.3)
 
 
 @dataclass(frozen=True)
-class Shape:
+class RationalShape:
     """What a model is made of: a rigid body or not, its number of modes, and a constant for those beyond the band."""
 
     rigid: bool
@@ -49,7 +49,7 @@ class Shape:
 class Row(NamedTuple):
     """A model that was tried: parameters (p,), criterion, sum of squares."""
 
-    shape: Shape
+    shape: RationalShape
     parameters: np.ndarray
     bic: float
     squares: float
@@ -60,7 +60,7 @@ def orders(s: np.ndarray, values: np.ndarray, deviation: np.ndarray, rigid: bool
     rows: list[Row] = []
     nonlinear = np.zeros(2)
     for modes in range(most + 1):
-        shape = Shape(rigid, modes, False)
+        shape = RationalShape(rigid, modes, False)
         if modes:
             nonlinear = _another(nonlinear, shape, s, values, deviation)
         if rigid or modes:
@@ -69,7 +69,7 @@ def orders(s: np.ndarray, values: np.ndarray, deviation: np.ndarray, rigid: bool
         if len(rows) > 1 and not _better(rows[-1], rows[-2]):
             break
     best = simplest(rows)
-    shape = Shape(rigid, best.shape.modes, True)
+    shape = RationalShape(rigid, best.shape.modes, True)
     nonlinear = _eliminated(best.parameters[: shape.nonlinear], shape, s, values, deviation)
     return [*rows, _completed(nonlinear, shape, s, values, deviation)]
 
@@ -88,7 +88,7 @@ def _better(larger: Row, smaller: Row) -> bool:
     return larger.bic < smaller.bic - CLEAR and larger.squares < WORTH * smaller.squares
 
 
-def _columns(nonlinear: np.ndarray, shape: Shape, s: np.ndarray) -> np.ndarray:
+def _columns(nonlinear: np.ndarray, shape: RationalShape, s: np.ndarray) -> np.ndarray:
     """What the linear parameters multiply, complex, shape (linear, lines)."""
     viscous, delay = nonlinear[:2]
     omega, damping = np.exp(nonlinear[2 : 2 + shape.modes]), np.exp(nonlinear[2 + shape.modes : shape.nonlinear])
@@ -99,7 +99,7 @@ def _columns(nonlinear: np.ndarray, shape: Shape, s: np.ndarray) -> np.ndarray:
     return np.concatenate(parts) * np.exp(-s * delay)
 
 
-def rational(parameters: np.ndarray, shape: Shape, s: np.ndarray) -> np.ndarray:
+def rational(parameters: np.ndarray, shape: RationalShape, s: np.ndarray) -> np.ndarray:
     """The response at complex frequencies s [rad/s], shape (lines,), of parameters of this shape."""
     return parameters[shape.nonlinear :] @ _columns(parameters[: shape.nonlinear], shape, s)
 
@@ -114,7 +114,7 @@ def _solved(columns: np.ndarray, values: np.ndarray, deviation: np.ndarray) -> t
     return linear, matrix @ linear - right
 
 
-def bounds(shape: Shape, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def bounds(shape: RationalShape, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Limits of all parameters: modes within an octave of the band, damping ratios from 1e-4 to 2, delays of a turn."""
     low, high, linear = np.abs(s[0]), np.abs(s[-1]), int(shape.rigid) + shape.modes + int(shape.constant)
     rest = np.full(linear, np.inf)
@@ -125,7 +125,7 @@ def bounds(shape: Shape, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _another(
-    nonlinear: np.ndarray, shape: Shape, s: np.ndarray, values: np.ndarray, deviation: np.ndarray
+    nonlinear: np.ndarray, shape: RationalShape, s: np.ndarray, values: np.ndarray, deviation: np.ndarray
 ) -> np.ndarray:
     """Nonlinear parameters with one more mode, at the place and damping that leave the least."""
     before = shape.modes - 1
@@ -140,7 +140,7 @@ def _another(
 
 
 def _eliminated(
-    start: np.ndarray, shape: Shape, s: np.ndarray, values: np.ndarray, deviation: np.ndarray
+    start: np.ndarray, shape: RationalShape, s: np.ndarray, values: np.ndarray, deviation: np.ndarray
 ) -> np.ndarray:
     """Nonlinear parameters refined with the linear ones eliminated (Golub, Pereyra 1973)."""
 
@@ -151,15 +151,17 @@ def _eliminated(
     return least_squares(left, np.clip(start, lower, upper), bounds=(lower, upper), ftol=CLOSE, max_nfev=60).x
 
 
-def _completed(nonlinear: np.ndarray, shape: Shape, s: np.ndarray, values: np.ndarray, deviation: np.ndarray) -> Row:
+def _completed(
+    nonlinear: np.ndarray, shape: RationalShape, s: np.ndarray, values: np.ndarray, deviation: np.ndarray
+) -> Row:
     """The model with all its parameters, and how good it is."""
     linear, left = _solved(_columns(nonlinear, shape, s), values, deviation)
     parameters = np.concatenate([nonlinear, linear])
     squares = float(left @ left)
-    return Row(shape, parameters, Fit(parameters, np.zeros((0, 0)), squares, left.size).bic, squares)
+    return Row(shape, parameters, ResponseFit(parameters, np.zeros((0, 0)), squares, left.size).bic, squares)
 
 
-def roots(parameters: np.ndarray, shape: Shape) -> tuple[np.ndarray, np.ndarray]:
+def roots(parameters: np.ndarray, shape: RationalShape) -> tuple[np.ndarray, np.ndarray]:
     """Poles of the modes and zeros of the response, those with positive imaginary part, in units of the scale."""
     omega, damping = np.exp(parameters[2 : 2 + shape.modes]), np.exp(parameters[2 + shape.modes : shape.nonlinear])
     linear = parameters[shape.nonlinear :]

@@ -26,7 +26,7 @@ FAR = 1.5
 
 
 @dataclass(frozen=True)
-class Record:
+class ResponseRecord:
     """Input, output and, in closed loop, the external reference (or injected force), each (n,), `sample_time` [s]."""
 
     input: np.ndarray
@@ -34,7 +34,7 @@ class Record:
     sample_time: float
     reference: np.ndarray | None = None
 
-    def checked(self, least: int = 8) -> Record:
+    def checked(self, least: int = 8) -> ResponseRecord:
         """The record as floats. Raises InputError for NaN, unequal lengths, constant signals, too few samples."""
         named = {"input": self.input, "output": self.output}
         if self.reference is not None:
@@ -47,12 +47,12 @@ class Record:
             raise InputError("sample_time", f"{self.sample_time}", "a time greater than 0 s", "0.001")
         for name, values in arrays.items():
             _check_signal(name, values, least)
-        return Record(arrays["input"], arrays["output"], self.sample_time, arrays.get("reference"))
+        return ResponseRecord(arrays["input"], arrays["output"], self.sample_time, arrays.get("reference"))
 
 
 def from_log(
     log: Log, given: str = "force", output: str = "position", reference: str | None = None
-) -> tuple[Record, Channels]:
+) -> tuple[ResponseRecord, Channels]:
     """The longest segment of a log as a record, by roles, with names and units. Raises InputError for a missing one."""
     roles = [given, output] + ([reference] if reference else [])
     for role in roles:
@@ -61,7 +61,9 @@ def from_log(
                 role, f"a log with {', '.join(log.signals)}", f"a channel for the {role}", f'{role}="Axis1"'
             )
     part = log.longest
-    record = Record(log[given][part], log[output][part], log.sample_time, log[reference][part] if reference else None)
+    record = ResponseRecord(
+        log[given][part], log[output][part], log.sample_time, log[reference][part] if reference else None
+    )
     return record, Channels(given, log.unit(given), output, log.unit(output))
 
 
@@ -93,7 +95,7 @@ class Spectra:
     warnings: tuple[str, ...] = ()
 
 
-def spectra(record: Record, period: float | None = None) -> Spectra:
+def spectra(record: ResponseRecord, period: float | None = None) -> Spectra:
     """Spectra of whole periods without transient, by the external signal: the reference if there is one, or the input.
 
     `period` [s] is about how long a period is. What drifts from period to period is taken out beforehand.

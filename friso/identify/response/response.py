@@ -29,7 +29,7 @@ class Channels:
 
 
 @dataclass(frozen=True)
-class Band:
+class ResponseBand:
     """Limits at 95 %: magnitude [output unit per input unit] and phase [rad], each of shape (lines,)."""
 
     magnitude_low: np.ndarray
@@ -60,13 +60,13 @@ class FrequencyResponse:
     coherence: np.ndarray | None = None
     warnings: tuple[str, ...] = ()
 
-    def band(self) -> Band:
+    def band(self) -> ResponseBand:
         """The 95 % intervals of magnitude and phase: half the variance lies along the response, half across it."""
         half = stats.t.ppf(0.975, self.degrees) * self.deviation / np.sqrt(2)
         size, phase = np.abs(self.response), np.unwrap(np.angle(self.response))
         with np.errstate(divide="ignore", invalid="ignore"):
             turn = np.where(half < size, np.arcsin(np.minimum(half / size, 1.0)), np.pi)
-        return Band(np.maximum(size - half, 0.0), size + half, phase - turn, phase + turn)
+        return ResponseBand(np.maximum(size - half, 0.0), size + half, phase - turn, phase + turn)
 
     def frd(self) -> FrequencyResponseData:
         """As data of python-control, its frequencies in rad/s; the line at 0 Hz, if any, included."""

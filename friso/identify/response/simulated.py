@@ -10,7 +10,7 @@ import numpy as np
 from friso.errors import InputError
 from friso.identify.response.departure import Drag
 from friso.identify.response.periodic import multisine
-from friso.identify.response.records import Record
+from friso.identify.response.records import ResponseRecord
 from friso.identify.response.response import FrequencyResponse
 
 PERIODS = 10
@@ -51,7 +51,7 @@ def explained(
     positions = slid(np.tile(forces, PERIODS), sample_time, drag.mass.value, drag.coulomb.value, spring)[0]
     kept = slice(4 * forces.shape[1], None)
     records = [
-        Record(drag.sign * np.tile(force, PERIODS)[kept], position[kept], sample_time)
+        ResponseRecord(drag.sign * np.tile(force, PERIODS)[kept], position[kept], sample_time)
         for force, position in zip(forces, positions, strict=True)
     ]
     groups = {factor: records[i * len(inputs) : (i + 1) * len(inputs)] for i, factor in enumerate(factors)}

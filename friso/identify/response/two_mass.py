@@ -10,7 +10,7 @@ import numpy as np
 
 from friso.errors import InputError
 from friso.identify.estimate import Estimate
-from friso.identify.response.fitting import Fit, refined
+from friso.identify.response.fitting import ResponseFit, refined
 from friso.identify.response.modes import fit_modes
 from friso.identify.response.response import FrequencyResponse
 from friso.intervals import COVERAGE
@@ -42,7 +42,7 @@ class TwoMass:
     """
 
     signs: tuple[float, float]
-    fit: Fit
+    fit: ResponseFit
     estimates: tuple[Estimate, ...]
     band: tuple[float, float]
     warnings: tuple[str, ...] = ()
@@ -168,7 +168,7 @@ def _start(other: float, stiffness: float, damping: float) -> np.ndarray:
 
 def _best(
     values: np.ndarray, deviation: np.ndarray, frequency: np.ndarray, seen: Callable[[], list[np.ndarray]]
-) -> Fit:
+) -> ResponseFit:
     """The best of the fits from the most promising mass ratio, from the modes `seen` and from the next ratio; the first
     one that explains the data."""
     late = 0.1 / frequency[-1]
@@ -213,7 +213,7 @@ def _scaled_to(start: np.ndarray, response: np.ndarray, frequency: np.ndarray) -
     return np.concatenate([start[:DRAG] + scale, start[DRAG:]])
 
 
-def _warnings(signs: tuple[float, float], fit: Fit) -> Iterator[str]:
+def _warnings(signs: tuple[float, float], fit: ResponseFit) -> Iterator[str]:
     if signs[0] < 0:
         yield "the driven mass goes against the input: its sign was reversed"
     if signs[0] != signs[1]:
@@ -222,7 +222,7 @@ def _warnings(signs: tuple[float, float], fit: Fit) -> Iterator[str]:
         yield f"the model is not right to the precision of the data (reduced chi-square {fit.reduced:.3g})"
 
 
-def _estimates(fit: Fit, response: FrequencyResponse) -> tuple[Estimate, ...]:
+def _estimates(fit: ResponseFit, response: FrequencyResponse) -> tuple[Estimate, ...]:
     """Masses and joint, with what follows from them."""
     into, out = response.channels.input_unit, response.channels.output_unit
     rate = f"{into} s/{out}"

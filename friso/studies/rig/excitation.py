@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from friso.identify.response.periodic import multisine
-from friso.identify.response.records import Record, from_log
+from friso.identify.response.records import ResponseRecord, from_log
 from friso.identify.response.response import Channels, FrequencyResponse
 from friso.rig.run import Recorded, as_built_keys, run
 from friso.rig.task import standing
@@ -83,5 +83,5 @@ def plant(logs: Sequence[RigLog]) -> FrequencyResponse:
 def loop(log: RigLog) -> FrequencyResponse:
     """The open loop: what the controller answers to the force that is commanded in all, turned round."""
     injected, commanded = log.logged["disturbance"], log.logged["force"]
-    record = Record(commanded, injected - commanded, log.interval, injected)
+    record = ResponseRecord(commanded, injected - commanded, log.interval, injected)
     return multisine([record], None, Channels("error", "1", "loop", "1"))

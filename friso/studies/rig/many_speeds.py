@@ -49,7 +49,7 @@ stage's own (2 ms)."""
 
 
 @dataclass(frozen=True)
-class Place:
+class PlaceOnRail:
     """Passes on one stretch: the log, what it shows, and dynamic friction with drag [N] at speeds [m/s] as it truly is
     on average over the way on which it was read, both of shape (n,)."""
 
@@ -71,7 +71,7 @@ class ManySpeeds:
     """The crossover [Hz] at which the passes went, and what they show at each of the places."""
 
     crossover: float
-    places: tuple[Place, ...]
+    places: tuple[PlaceOnRail, ...]
 
 
 def many_speeds(stage: Stage, seed: int) -> ManySpeeds:
@@ -84,7 +84,7 @@ def many_speeds(stage: Stage, seed: int) -> ManySpeeds:
         way = velocity.way if len(velocity.velocities) else (begin, begin + SHARED * longest_way(stage))
         drag = log.stage.flat().get("cable.drag", 0.0)
         true = mean_friction(log.stage, speeds, np.linspace(*way, 1000)) + drag * speeds
-        places.append(Place(log, velocity, speeds, true))
+        places.append(PlaceOnRail(log, velocity, speeds, true))
     return ManySpeeds(pace(logs[0].stage), tuple(places))
 
 

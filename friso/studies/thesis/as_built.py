@@ -15,7 +15,7 @@ from friso.studies.rig.excitation import excite
 from friso.studies.rig.experiments.compare import on_rail, started, varied
 from friso.studies.rig.experiments.frf import (
     SETTINGS,
-    Loop,
+    MeasuredLoop,
     apparent_masses,
     measured_loop,
     open_loops,
@@ -145,8 +145,8 @@ class RigLoops:
     """Open loops locked at several settings, and free at the lowest of these; settings [Hz] tried free, shape (n,),
     and which were stable; apparent masses [kg], shape (2, ratios), locked and free, for the motor constants RATIOS."""
 
-    locked: tuple[Loop, ...]
-    free: Loop
+    locked: tuple[MeasuredLoop, ...]
+    free: MeasuredLoop
     settings: np.ndarray
     stable: np.ndarray
     apparent: np.ndarray

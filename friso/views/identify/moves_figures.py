@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from friso.identify.experiments.moves import Moves
+from friso.identify.experiments.moves import IdentifiedMoves
 from friso.identify.inverse_model import EDGE, SMOOTH, motion
 from friso.identify.logs.log import Log
-from friso.identify.output_error.parameters import Parameter
+from friso.identify.output_error.parameters import FitParameter
 from friso.identify.output_error.problem import Simulated
 from friso.identify.output_error.profile import Profile
 from friso.identify.readings.common import cart, on_bearing
@@ -39,7 +39,7 @@ WIDE = 8.0
 PALE = "#dbe9f4"
 
 
-def moves_figures(it: Moves, name: str) -> list[Figure]:
+def moves_figures(it: IdentifiedMoves, name: str) -> list[Figure]:
     """All figures of one log of moves; their names begin with this one."""
     flat = it.fit.problem.flat
     apart = "joint.stiffness" in flat and not flat["joint.locked"]  # a cart of its own, whose speed has to be measured
@@ -47,7 +47,7 @@ def moves_figures(it: Moves, name: str) -> list[Figure]:
     return [_traces(it, name), _residual(it, name), *friction, _profiles(it, name)]
 
 
-def _traces(it: Moves, name: str) -> Figure:
+def _traces(it: IdentifiedMoves, name: str) -> Figure:
     """Measured and simulated over time."""
     if it.loop is not None:
         caption = (
@@ -87,7 +87,7 @@ def _left(time: Array, left: Array) -> Panel:
     return Panel("", TIME, Axis("Measured − simulated", "N"), (Series(time, left, "", VERMILLION, width=0.9),))
 
 
-def _residual(it: Moves, name: str) -> Figure:
+def _residual(it: IdentifiedMoves, name: str) -> Figure:
     """What is left of the force, over place and speed."""
     moved = motion(it.log["position"][it.part], it.log.sample_time, SMOOTH * it.inverse.bandwidth)
     left, axis = it.fit.residual, Axis("Force left", "N")
@@ -102,7 +102,7 @@ def _residual(it: Moves, name: str) -> Figure:
     return Figure(f"{name}_residual", "What is left of the force", caption, panels, columns=2)
 
 
-def _friction(it: Moves, name: str) -> Figure:
+def _friction(it: IdentifiedMoves, name: str) -> Figure:
     """Force less inertia over velocity, and the friction found."""
     flat = it.flat
     masses = [flat.get(f"masses.{name}", 0.0) for name in ("cart", "stage")]
@@ -147,7 +147,7 @@ def steady_friction(flat: dict, speeds: Array) -> Array:
     return way * (coulomb + rise * falls) + viscous * skew * speeds - constant
 
 
-def _profiles(it: Moves, name: str) -> Figure:
+def _profiles(it: IdentifiedMoves, name: str) -> Figure:
     """How much worse the fit gets as one parameter is moved."""
     best = it.fit.cost
     known = {each.name: each for each in it.fit.problem.parameters}
@@ -166,7 +166,7 @@ def _profiles(it: Moves, name: str) -> Figure:
     return Figure(f"{name}_profiles", "Profiles of the fit", caption, panels, columns=2)
 
 
-def _profile(it: Profile, parameter: Parameter, best: float, fitted: bool) -> Panel:
+def _profile(it: Profile, parameter: FitParameter, best: float, fitted: bool) -> Panel:
     """One parameter's panel."""
     worse = (it.cost - best) / (it.limit - best)
     log = parameter.logarithmic and it.values[-1] > WIDE * it.values[0]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from friso.identify.response.analysis import Bench
-from friso.identify.response.mass_line import Line
+from friso.identify.response.mass_line import StraightLine
 from friso.identify.response.response import FrequencyResponse
 from friso.views.bode.figures import phases
 from friso.views.drawing.figure import (
@@ -93,7 +93,7 @@ def _beside(hertz: Array, measured: Array, fine: Array, fitted: Array) -> Array:
     return fitted + 360 * np.round(np.median(off) / 360)
 
 
-def _mass_line(line: Line, hertz: Array, named: bool) -> Series:
+def _mass_line(line: StraightLine, hertz: Array, named: bool) -> Series:
     """A mass line over its band and an octave to each side."""
     reach = np.array([max(line.low / 2, hertz[0]), min(line.high * 2, hertz[-1])])
     label = line.kind if named else ""

@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from friso.identify.logs.channel import Channel, Table
+from friso.identify.logs.channel import Channel, ChannelTable
 from friso.identify.logs.format import FileHead, LogFormat
 from friso.identify.logs.libraries import broken, library, named_table
 from friso.identify.logs.units import split_heading
 
 
-def read_lvm(path: Path) -> Table:
+def read_lvm(path: Path) -> ChannelTable:
     """LabVIEW measurement text. Raises LogError."""
     lvm_read = library("lvm_read", "lvm", path)
     channels = []

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from friso.errors import LogError
-from friso.identify.logs.channel import Channel, Table
+from friso.identify.logs.channel import Channel, ChannelTable
 from friso.identify.logs.format import FileHead, LogFormat
 from friso.identify.logs.text import unique
 from friso.identify.logs.units import split_heading
@@ -36,7 +36,7 @@ class _Found:
     objects: list[str] = field(default_factory=list)
 
 
-def read_mat(path: Path) -> Table:
+def read_mat(path: Path) -> ChannelTable:
     """The channels and single numbers of a MAT file of any version. Raises LogError for a file that holds none."""
     with path.open("rb") as file:
         head = file.read(520)
@@ -57,7 +57,7 @@ def read_mat(path: Path) -> Table:
         raise LogError("log", given, "signals: save as structure with time", "", str(path))
     name = "MATLAB 7.3 (HDF5)" if newer else "MATLAB up to 7"
     channels = _plainly_named(found.channels)
-    return Table(channels, found.scalars, (f"format: {name}", f"{len(channels)} channels", *found.notes))
+    return ChannelTable(channels, found.scalars, (f"format: {name}", f"{len(channels)} channels", *found.notes))
 
 
 def _plainly_named(channels: list[Channel]) -> tuple[Channel, ...]:

@@ -7,13 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
-from friso.identify.logs.channel import Channel, Table
+from friso.identify.logs.channel import Channel, ChannelTable
 from friso.identify.logs.format import LogFormat
 from friso.identify.logs.libraries import broken, library, named_table
 from friso.identify.logs.units import split_heading
 
 
-def read_tdms(path: Path) -> Table:
+def read_tdms(path: Path) -> ChannelTable:
     """National Instruments TDMS. Raises LogError."""
     nptdms = library("nptdms", "tdms", path)
     channels, notes = [], []

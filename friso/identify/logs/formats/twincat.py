@@ -14,9 +14,9 @@ import numpy as np
 import pandas as pd
 
 from friso.errors import LogError
-from friso.identify.logs.channel import Channel, Table
+from friso.identify.logs.channel import Channel, ChannelTable
 from friso.identify.logs.format import LogFormat
-from friso.identify.logs.sniff import Layout, decoded_head, is_number, split_line
+from friso.identify.logs.sniff import TextLayout, decoded_head, is_number, split_line
 from friso.identify.logs.text import as_numbers, read_frame, unique
 from friso.identify.logs.units import spelled
 from friso.quantities import quoted
@@ -38,7 +38,7 @@ def is_twincat(lines: list[str]) -> bool:
     return any(line.startswith(_MARKS) for line in head) or any(_is_data(split_line(line, first[4])) for line in below)
 
 
-def read_twincat(path: Path) -> Table:
+def read_twincat(path: Path) -> ChannelTable:
     """Channels with their own times. Raises LogError."""
     encoding, lines = decoded_head(path)
     delimiter = lines[0][4]
@@ -55,10 +55,10 @@ def read_twincat(path: Path) -> Table:
     if delimiter != "," and decimal == "." and "." not in sample:
         decimal = ","  # whole numbers only so far: the export's locale writes a comma unless a point shows
     columns = max(len(table["Name"]), max(len(cells) for cells in rows[first : first + 50]))
-    form = Layout(encoding, delimiter, decimal, first, columns)
+    form = TextLayout(encoding, delimiter, decimal, first, columns)
     frame = _without_end(read_frame(path, form))
     channels, notes = _channels(path, form, table, frame)
-    return Table(channels, {}, (f"format: TwinCAT Scope CSV, {form.told}", f"{len(frame)} rows", *notes))
+    return ChannelTable(channels, {}, (f"format: TwinCAT Scope CSV, {form.told}", f"{len(frame)} rows", *notes))
 
 
 def _is_data(cells: list[str]) -> bool:
@@ -73,7 +73,7 @@ def _without_end(frame: Any) -> Any:
 
 
 def _channels(
-    path: Path, form: Layout, table: dict[str, list[str]], frame: Any
+    path: Path, form: TextLayout, table: dict[str, list[str]], frame: Any
 ) -> tuple[tuple[Channel, ...], list[str]]:
     """The channels of all groups, and lines that tell of them. Raises LogError."""
     labels, notes, out = table["Name"], [], []
@@ -114,7 +114,7 @@ def _scaled(table: dict[str, list[str]]) -> list[str]:
     return [f"taken as already applied to the values: {', '.join(scaled)}"] if scaled else []
 
 
-def _floats(path: Path, form: Layout, frame: Any, column: int) -> np.ndarray:
+def _floats(path: Path, form: TextLayout, frame: Any, column: int) -> np.ndarray:
     """A column as floats. Raises LogError with the line of a text among the numbers."""
     cells = frame.iloc[:, column]
     if pd.api.types.is_numeric_dtype(cells.dtype):

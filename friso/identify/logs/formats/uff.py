@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from friso.errors import LogError
-from friso.identify.logs.channel import Channel, Table
+from friso.identify.logs.channel import Channel, ChannelTable
 from friso.identify.logs.format import LogFormat
 from friso.identify.logs.libraries import library
 from friso.identify.logs.measured_response import MeasuredResponse, checked, response_unit
@@ -44,7 +44,7 @@ def label(data: dict[str, Any], key: str) -> str:
     return "" if text.upper() == "NONE" else text
 
 
-def read_uff(path: Path) -> Table:
+def read_uff(path: Path) -> ChannelTable:
     """The time histories of a universal file. Raises LogError."""
     times = [data for data in sets_58(path) if data["func_type"] == TIME_RESPONSE]
     if not times:
@@ -54,7 +54,7 @@ def read_uff(path: Path) -> Table:
         Channel(name, label(d, "ordinate_axis_units_lab"), np.real(d["data"]).astype(float), _axis(d), "dataset 58")
         for name, d in zip(unique(headings), times, strict=True)
     )
-    return Table(channels, {}, ("format: UFF, dataset 58", f"{len(channels)} time histories"))
+    return ChannelTable(channels, {}, ("format: UFF, dataset 58", f"{len(channels)} time histories"))
 
 
 def _axis(data: dict[str, Any]) -> np.ndarray:

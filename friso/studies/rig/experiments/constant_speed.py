@@ -36,7 +36,7 @@ class Passes:
 
 
 @dataclass(frozen=True)
-class ConstantSpeed:
+class ConstantSpeedResult:
     """The two speeds [m/s] of the thesis, the passes at them with the joint free and locked, those at many, and slow
     sliding (nothing where friction has no bristles)."""
 
@@ -59,7 +59,7 @@ def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
     slow = slow_sliding(locked(stage), [each.log for each in many.places], seed)
     progress(4, 4, "")
     logs = tuple(each.log for each in (*cases, *many.places, *slow))
-    return Outcome("constant-speed", stage, seed, logs, ConstantSpeed(speeds(stage), tuple(cases), many, slow))
+    return Outcome("constant-speed", stage, seed, logs, ConstantSpeedResult(speeds(stage), tuple(cases), many, slow))
 
 
 def speeds(stage: Stage) -> tuple[float, ...]:

@@ -53,7 +53,7 @@ class Plant:
 
 
 @dataclass(frozen=True)
-class Loop:
+class MeasuredLoop:
     """An open loop at a tuned crossover [Hz], and where it truly crosses 0 dB [Hz]. Without lines where the closed one
     was not stable."""
 
@@ -74,8 +74,8 @@ class Frf:
 
     locked: Plant
     free: Plant
-    loops: tuple[Loop, ...]
-    free_loop: Loop
+    loops: tuple[MeasuredLoop, ...]
+    free_loop: MeasuredLoop
     apparent: np.ndarray
     settings: np.ndarray
     stable: np.ndarray
@@ -92,7 +92,7 @@ def highest_stable(settings: np.ndarray, stable: np.ndarray) -> float:
     return float(settings[first - 1]) if first else np.nan
 
 
-def nearest(loop: Loop) -> float:
+def nearest(loop: MeasuredLoop) -> float:
     """The crossing of 0 dB [Hz] nearest to where the loop was tuned; NaN without any."""
     crossed = [each.value for each in loop.crossings]
     return min(crossed, key=lambda f: abs(np.log(f / loop.tuned)), default=np.nan)
@@ -131,7 +131,7 @@ def plant_log(stage: Stage, name: str, place: float, seed: int) -> RigLog:
 
 def open_loops(
     stage: Stage, place: float, seed: int, settings: tuple[float, ...]
-) -> tuple[tuple[RigLog, ...], tuple[Loop, ...]]:
+) -> tuple[tuple[RigLog, ...], tuple[MeasuredLoop, ...]]:
     """Logs of one excitation with the controller at each of the settings, crossovers over the stage's, and what they
     show."""
     factors = np.array(settings)
@@ -145,13 +145,13 @@ def open_loops(
     return tuple(rows), tuple(found)
 
 
-def measured_loop(log: RigLog, tuned: float) -> Loop:
+def measured_loop(log: RigLog, tuned: float) -> MeasuredLoop:
     """The open loop of a log of one excitation, tuned to a crossover [Hz]; of one that was not stable, no lines."""
     if log.failure:
         none = np.zeros(0)
-        return Loop(tuned, FrequencyResponse(none, none + 0j, none, none, none, none, "multisine"), ())
+        return MeasuredLoop(tuned, FrequencyResponse(none, none + 0j, none, none, none, none, "multisine"), ())
     response = loop(log)
-    return Loop(tuned, response, crossovers(response))
+    return MeasuredLoop(tuned, response, crossovers(response))
 
 
 def locked_plant(logs: list[RigLog]) -> Plant:

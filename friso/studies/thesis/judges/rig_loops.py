@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from friso.studies.rig.experiments.frf import RATIOS, Loop, highest_stable, nearest
+from friso.studies.rig.experiments.frf import RATIOS, MeasuredLoop, highest_stable, nearest
 from friso.studies.thesis.as_built import RigLoops
 from friso.studies.thesis.claims import ABOUT, Evidence, Part, about
 
@@ -57,7 +57,7 @@ def _further(loops: RigLoops) -> Part:
     )
 
 
-def _peak(loop: Loop, low: float) -> tuple[float, float]:
+def _peak(loop: MeasuredLoop, low: float) -> tuple[float, float]:
     """Frequency [Hz] and magnitude of the open loop's largest value above a frequency [Hz]; NaN of one not measured."""
     if not loop.measured:
         return np.nan, np.nan

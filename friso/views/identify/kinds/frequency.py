@@ -9,7 +9,7 @@ import numpy as np
 
 from friso.identify.response.analysis import Bench
 from friso.identify.response.departure import Drag
-from friso.identify.response.mass_line import Line
+from friso.identify.response.mass_line import StraightLine
 from friso.views.drawing.prefixes import range_with_unit
 from friso.views.identify.estimates import estimate_document
 from friso.views.identify.kind_view import Facts, KindView, PredictionView
@@ -100,7 +100,7 @@ def _numbers(it: Bench) -> dict[str, Any]:
     }
 
 
-def _line_numbers(it: Line) -> dict[str, Any]:
+def _line_numbers(it: StraightLine) -> dict[str, Any]:
     band = {"kind": it.kind, "low_hz": it.low, "high_hz": it.high, "sign": it.sign}
     return {**band, "level": estimate_document(it.level), "value": estimate_document(it.value)}
 

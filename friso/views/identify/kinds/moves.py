@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Any
 
-from friso.identify.experiments.moves import Moves, SimulatedLog
+from friso.identify.experiments.moves import IdentifiedMoves, SimulatedLog
 from friso.identify.inverse_model import InverseModel
 from friso.identify.logs.log import Log
 from friso.identify.output_error.profile import Profile
@@ -20,7 +20,7 @@ SUFFIXES = {"N": "n", "kg": "kg", "N*s/m": "n_s_per_m"}
 """Of keys, by unit, of what the inverse model tells."""
 
 
-def _sentences(it: Moves) -> tuple[str, ...]:
+def _sentences(it: IdentifiedMoves) -> tuple[str, ...]:
     """How it was fitted, and what the motion covers."""
     low, high = it.covered.gap
     along = "the machine was simulated along the position of the log: what is compared is the force that it takes."
@@ -39,7 +39,7 @@ def _sentences(it: Moves) -> tuple[str, ...]:
     )
 
 
-def _facts(it: Moves) -> Facts:
+def _facts(it: IdentifiedMoves) -> Facts:
     """Both fits of the inverse model, the errors of the output-error fit, and what is left."""
     left = it.residual
     alike = (
@@ -58,7 +58,7 @@ def _facts(it: Moves) -> Facts:
     )  # fmt: skip
 
 
-def _errors(it: Moves) -> str:
+def _errors(it: IdentifiedMoves) -> str:
     """The relative errors of the simulated record; along the log's position, that of the force alone says anything."""
     errors = it.errors
     if it.loop is None:
@@ -73,7 +73,7 @@ def _inverse_text(it: InverseModel) -> str:
     return f"{listed(it.estimates)}; force error {percent(it.error)}"
 
 
-def _numbers(it: Moves) -> dict[str, Any]:
+def _numbers(it: IdentifiedMoves) -> dict[str, Any]:
     low, high = it.covered.gap
     parameters = {
         each.name: {"unit": each.unit, "value": it.fit.value(each.name)} for each in it.fit.problem.parameters
@@ -102,7 +102,7 @@ def _inverse_numbers(it: InverseModel) -> dict[str, Any]:
     return {**named, "force_error": it.error, "bandwidth_hz": it.bandwidth}
 
 
-def _residual_numbers(it: Moves) -> dict[str, Any]:
+def _residual_numbers(it: IdentifiedMoves) -> dict[str, Any]:
     left = it.residual
     return {
         "rms_n": left.rms,
@@ -137,7 +137,7 @@ def _prediction_figures(log: Log, it: SimulatedLog, number: int) -> list[Figure]
     return [Figure(f"identify_prediction{number}", f"Predicted: {log.name}", caption, panels)]
 
 
-VIEW = KindView[Moves](
+VIEW = KindView[IdentifiedMoves](
     "Moves",
     _facts,
     _numbers,

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from friso.identify.estimate import Estimate
-from friso.studies.rig.experiments.constant_speed import ConstantSpeed, Passes
-from friso.studies.rig.many_speeds import ManySpeeds, Place
+from friso.studies.rig.experiments.constant_speed import ConstantSpeedResult, Passes
+from friso.studies.rig.many_speeds import ManySpeeds, PlaceOnRail
 from friso.studies.rig.outcome import Outcome, RigLog
 from friso.studies.rig.slow_sliding import Slow
 from friso.views.drawing.figure import BLUE, GREEN, ORANGE, PINK, VERMILLION, Axis, Figure, Markers, Panel, Series
@@ -24,7 +24,7 @@ COLOURS = (BLUE, VERMILLION, GREEN, ORANGE, PINK)
 
 def sentences(outcome: Outcome) -> list[str]:
     """What was found."""
-    found: ConstantSpeed = outcome.result
+    found: ConstantSpeedResult = outcome.result
     said = [f"Joint {each.name}: {each.place.verdict}" for each in found.cases]
     for each in found.cases:
         coulomb = each.velocity.both.coulomb
@@ -40,7 +40,7 @@ def sentences(outcome: Outcome) -> list[str]:
     return [*said, f"The dynamic friction along the way is truly {true} on average.", *_many(found), *_slow(found)]
 
 
-def _slow(found: ConstantSpeed) -> list[str]:
+def _slow(found: ConstantSpeedResult) -> list[str]:
     """What slow sliding shows."""
     if not found.slow:
         return []
@@ -66,14 +66,14 @@ def _start(log: RigLog) -> str:
     return with_unit(float(places[0]), "m") if len(places) else "nowhere"
 
 
-def _many(found: ConstantSpeed) -> list[str]:
+def _many(found: ConstantSpeedResult) -> list[str]:
     """What the many speeds show, at each place."""
     crossover = with_unit(found.many.crossover, "Hz")
     head = f"At many speeds, joint locked, with the crossover at {crossover}:"
     return [head, *(_place(number, each) for number, each in enumerate(found.many.places, start=1))]
 
 
-def _place(number: int, place: Place) -> str:
+def _place(number: int, place: PlaceOnRail) -> str:
     both, reached = place.velocity.both, np.abs(place.velocity.velocities)
     named = (("Coulomb friction", both.coulomb), ("viscous friction", both.viscous))
     named += (("static friction", both.static), ("the Stribeck velocity", both.stribeck_velocity))
@@ -82,14 +82,14 @@ def _place(number: int, place: Place) -> str:
     told = [f"not shown: {listed(words, 'and')} ({reason})" for reason, words in hidden.items() if reason]
     ends = [with_unit(float(end(reached)), "m/s") for end in (np.min, np.max) if len(reached)]
     passed = f"{len(reached)} steady passes{' from ' if ends else ''}{' to '.join(ends)}"
-    head = f"Place {number}, from {_start(place.log)} on, {passed}"
+    head = f"PlaceOnRail {number}, from {_start(place.log)} on, {passed}"
     stopped = [f"the log stopped {place.log.failure}"] if place.log.failure else []
     return f"{head}: {'; '.join([*stopped, *shown, *told])}."
 
 
 def figures(outcome: Outcome) -> list[Figure]:
     """Force against position at both speeds, a column for each state of the joint."""
-    found: ConstantSpeed = outcome.result
+    found: ConstantSpeedResult = outcome.result
     panels = tuple(
         Panel(
             f"joint {each.name}",
@@ -110,7 +110,7 @@ def figures(outcome: Outcome) -> list[Figure]:
 
 def _in_slow_sliding(outcome: Outcome) -> list[Figure]:
     """The friction at the first place."""
-    found: ConstantSpeed = outcome.result
+    found: ConstantSpeedResult = outcome.result
     places = [each.found for each in found.slow if len(each.found.model)]
     if not places:
         return []
@@ -147,18 +147,18 @@ def _lines(each: Passes, speeds: tuple[float, ...]) -> list[Series]:
 
 def numbers(outcome: Outcome) -> dict[str, Any]:
     """As JSON."""
-    found: ConstantSpeed = outcome.result
+    found: ConstantSpeedResult = outcome.result
     return {"speeds_m_per_s": [*found.speeds], "cases": {each.name: _numbers(each) for each in found.cases}} | {
         "many_speeds": _many_numbers(found),
         "slow_sliding": [_shown(each.found.estimates) for each in found.slow],
     }
 
 
-def _many_numbers(found: ConstantSpeed) -> dict[str, Any]:
+def _many_numbers(found: ConstantSpeedResult) -> dict[str, Any]:
     return {"crossover_hz": found.many.crossover, "places": [_place_numbers(each) for each in found.many.places]}
 
 
-def _place_numbers(place: Place) -> dict[str, Any]:
+def _place_numbers(place: PlaceOnRail) -> dict[str, Any]:
     velocity = place.velocity
     both = (velocity.both.coulomb, velocity.both.viscous, velocity.both.static, velocity.both.stribeck_velocity)
     return {

@@ -8,7 +8,7 @@ import numpy as np
 
 from friso.identify.estimate import Estimate
 from friso.identify.response.response import FrequencyResponse
-from friso.studies.rig.experiments.frf import RATIOS, Frf, Loop, Plant, nearest
+from friso.studies.rig.experiments.frf import RATIOS, Frf, MeasuredLoop, Plant, nearest
 from friso.studies.rig.outcome import Outcome
 from friso.views.bode.figures import phases
 from friso.views.drawing.figure import (
@@ -112,7 +112,7 @@ def _turned(response: Array, average: Array) -> Array:
     return angle + np.degrees(np.angle(response / average))
 
 
-def _loops(name: str, title: str, loops: tuple[Loop, ...], subject: str) -> Figure:
+def _loops(name: str, title: str, loops: tuple[MeasuredLoop, ...], subject: str) -> Figure:
     """Open loops, magnitude over phase."""
     named = [(each, colour) for each, colour in zip(loops, COLOURS, strict=False) if each.measured]
     gains = tuple(
@@ -138,7 +138,7 @@ def _loops(name: str, title: str, loops: tuple[Loop, ...], subject: str) -> Figu
     return Figure(f"rig_frf_{name}", title, f"Tuned, and where 0 dB is crossed: {told}.", panels, subject=subject)
 
 
-def _crossings(loop: Loop) -> str:
+def _crossings(loop: MeasuredLoop) -> str:
     if not loop.measured:
         return "not stable"
     return ", ".join(f"{each.value:.3g} ({each.low:.3g} to {each.high:.3g})" for each in loop.crossings) or "nowhere"
@@ -182,7 +182,7 @@ def _numbers(plant: Plant) -> dict[str, Any]:
     }
 
 
-def _loop_numbers(loop: Loop) -> dict[str, Any]:
+def _loop_numbers(loop: MeasuredLoop) -> dict[str, Any]:
     return {"tuned_hz": loop.tuned, "crossings_hz": [each.value for each in loop.crossings]}
 
 
