@@ -45,7 +45,8 @@ SLOW = {"period": 1.0, "swing": 1.2e-3, "ending": 1.2e-3, "above": 7e-4, "below"
 
 
 def cycles(even: dict[str, Any] | None = None, **rails: Any) -> Cycles:
-    return Cycles(hunted([HUNTS], **(even or {})), hunted([HUNTS] * 4, **{**SLOW, **rails}), np.zeros(4))
+    return Cycles(hunted([HUNTS], **(even or {})), hunted([HUNTS] * 4, **{**SLOW, **rails}), np.zeros(4),
+                  hunted([HUNTS], **SLOW))  # fmt: skip
 
 
 def standstill(locked: float = 1e-7, free: float = 1e-6, ratio: float = 10.0, tenfold: float = 0.6) -> InPosition:

@@ -58,6 +58,9 @@ AS_BUILT: Mapping[str, Any] = MappingProxyType(
 """The drive by Sec. 3.5.2 (sample time, resolution, peak force); the rest is our choice, as in the example
 thesis_drive.toml."""
 
+COULOMB_LEVEL = 2.0
+"""Over the Coulomb friction of the rig, with the weaker motor: our choice among the levels of `friso rig compare`."""
+
 SEED = 1
 RAILS = 20
 """Of the moves and of the rails that vary."""
@@ -86,11 +89,13 @@ class Moves:
 @dataclass(frozen=True)
 class Cycles:
     """Fig. 27: the cycle on an even rail, one run, and those on rails that vary, shape (rails,), with the asymmetry of
-    their friction about the target."""
+    their friction about the target; `weak` is the even rail again, one run, with a motor so weak that the mass line
+    shows the mass measured (`MOTORS`) and `COULOMB_LEVEL` times the Coulomb friction."""
 
     even: Hunted
     rails: Hunted
     asymmetry: np.ndarray
+    weak: Hunted
 
 
 def as_built(stage: Stage) -> Stage:
@@ -129,7 +134,11 @@ def cycles(stage: Stage) -> Cycles:
     flat = machine.flat()
     cases = {f"rail.{name}": np.array([flat[f"rail.{name}"]]) for name in _FIELD}
     rails, asymmetry = varied(even, SEED, cases, 1.0 + np.arange(float(RAILS)), swing, silent, "")
-    return Cycles(run, rails, asymmetry)
+    changes = {
+        "drive.motor_constant_ratio": np.array([MOTORS[1] * flat.get("drive.motor_constant_ratio", 1.0)]),
+        "friction.coulomb": np.array([COULOMB_LEVEL * flat["friction.coulomb"]]),
+    }
+    return Cycles(run, rails, asymmetry, started(even, SEED, changes, 1, silent, ""))
 
 
 _FIELD = ("static_deviation", "coulomb_deviation", "correlation_length")

@@ -228,12 +228,14 @@ def others(stage: Stage, seed: int, progress: Progress) -> dict[str, Hunted]:
     mass = flat["controller.tuned_mass"]
     motor = {"drive.motor_constant_ratio": flat.get("drive.motor_constant_ratio", 1.0) / MASS_FACTOR}
     named = {
-        "motor gives 0.68 of the force, tuned as before": motor,
-        "motor gives 0.68 of the force, tuned for 1.47 times the mass": motor
+        f"motor gives {MOTORS[1]:.2g} of the force, tuned as before": motor,
+        f"motor gives {MOTORS[1]:.2g} of the force, tuned for {MASS_FACTOR:g} times the mass": motor
         | {"controller.tuned_mass": MASS_FACTOR * mass},
         "alpha twice as large": {"controller.alpha": 2 * flat["controller.alpha"]},
         "beta one and a half times as large": {"controller.beta": 1.5 * flat["controller.beta"]},
-        "crossover 0.68 of it": {"controller.crossover": flat["controller.crossover"] / MASS_FACTOR},
+        f"crossover {1 / MASS_FACTOR:.2g} times as high": {
+            "controller.crossover": flat["controller.crossover"] / MASS_FACTOR
+        },
         "cables ten times as stiff, with ten times the drag": {
             key: 10 * flat[key] for key in ("cable.stiffness", "cable.drag") if key in flat
         },

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from friso.studies.rig.experiments.compare import AS_SLOW, SIMILAR
+from friso.studies.rig.experiments.compare import AS_SLOW, MOTORS, SIMILAR
 from friso.studies.rig.experiments.in_position import BITS, InPosition
 from friso.studies.rig.experiments.stroke_crossover import StrokeCrossover
 from friso.studies.rig.hunted import Hunted
@@ -150,9 +150,8 @@ def judged_cycles(cycles: Cycles) -> Finding:
                 f"swing (within a factor of {SIMILAR:g}), on at least half of those that hunt",
                 bool(lives.any() and 2 * (slower[similar] >= AS_SLOW).sum() >= lives.sum()),
                 f"{swinging}{times}. {_ASSUMED}",
-                why="not by the rail: friction that differs between the two sides slows a cycle, and ends it before it "
-                "is twice as slow. On an even rail a motor that gives 0.68 of its force, as the mass line asks for, "
-                "with Coulomb friction of 2 N makes it so (friso rig compare)",
+                why="not because of the rail: friction that differs between the two sides slows a cycle down, and ends "
+                f"it before it is twice as slow. {_weak_motor(cycles)}",
             ),
             Part(
                 "there its two sides differ (by more than a tenth, on at least half of those that hunt)",
@@ -168,6 +167,21 @@ def judged_cycles(cycles: Cycles) -> Finding:
             ),
         )
     )
+
+
+def _weak_motor(cycles: Cycles) -> str:
+    """What a weaker motor and more Coulomb friction do to the cycle on an even rail."""
+    cause = (
+        f"On an even rail, with a motor that gives {MOTORS[1]:.2g} of its force, which would explain the mass line, "
+        f"and {COULOMB_LEVEL:g} times the Coulomb friction,"
+    )
+    if not (cycles.weak.lives[0] and cycles.even.lives[0]):
+        return f"{cause} there is no cycle to compare"
+    period, swing = (float(getattr(cycles.weak, name)[0] / getattr(cycles.even, name)[0]) for name in _COMPARED)
+    return f"{cause} the period is {period:.3g} times as long at {swing:.3g} times the swing (friso rig compare)"
+
+
+_COMPARED = ("period", "swing")
 
 
 @judges("F28", figure="28", needs=(STANDSTILL,))
