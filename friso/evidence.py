@@ -1,0 +1,73 @@
+"""Findings of our own computations that take too long to repeat where they are stated.
+
+A number that we computed ourselves is either computed where it is stated or kept in `evidence.toml`: with its unit,
+the command that computes it again, the date, and the revision of the equations it was computed with.
+``python -m benchmarks.evidence`` lists the entries, computes them again and says which are older than the equations.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import date
+from functools import cache
+from importlib.resources import files
+from types import MappingProxyType
+
+
+@dataclass(frozen=True)
+class Entry:
+    """A finding: its `values` by name, their `units`, what they are (`about`), and the `command` that computes them.
+
+    `computed` is the day, `equations` the revision of the equations (of `evidence.toml`) it was computed with. `stated`
+    holds, per document of the repository, the phrases that state the finding there. `note` says where the values come
+    from when the command did not write them itself.
+    """
+
+    name: str
+    about: str
+    values: Mapping[str, float]
+    units: Mapping[str, str]
+    command: str
+    computed: date
+    equations: int
+    stated: Mapping[str, tuple[str, ...]] = MappingProxyType({})
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class Equations:
+    """A revision of the equations: its number, the day, and the reference numbers that tell it from others
+    (`benchmarks.canonical`), by stage and output [SI]."""
+
+    revision: int
+    since: date
+    numbers: Mapping[str, Mapping[str, list[float]]]
+
+
+@cache
+def entries() -> Mapping[str, Entry]:
+    """All findings on file, by name."""
+    return {name: _entry(name, row) for name, row in _file()["finding"].items()}
+
+
+@cache
+def equations() -> Equations:
+    """The latest revision of the equations on file."""
+    row = _file()["equations"]
+    return Equations(row["revision"], row["since"], row["numbers"])
+
+
+def value(entry: str, name: str) -> float:
+    """One number of a finding [SI, or as its unit says]. Raises KeyError for one that is not on file."""
+    return entries()[entry].values[name]
+
+
+def _entry(name: str, row: dict) -> Entry:
+    stated = {document: tuple(phrases) for document, phrases in row.pop("stated", {}).items()}
+    return Entry(name=name, stated=stated, units=row.pop("units", {}), **row)
+
+
+def _file() -> dict:
+    return tomllib.loads(files("friso").joinpath("evidence.toml").read_text(encoding="utf-8"))
