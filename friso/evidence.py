@@ -1,7 +1,7 @@
 """Findings of our own computations that take too long to repeat where they are stated.
 
-A number that we computed ourselves is either computed where it is stated or kept in `evidence.toml`: with its unit,
-the command that computes it again, the date, and the revision of the equations it was computed with.
+A number that we computed ourselves is either computed where it is stated or kept in `evidence.toml`: with the
+command that computes it again, the date, and the revision of the equations it was computed with.
 ``python -m benchmarks.evidence`` lists the entries, computes them again and says which are older than the equations.
 """
 
@@ -9,16 +9,16 @@ from __future__ import annotations
 
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import date
 from functools import cache
 from importlib.resources import files
-from types import MappingProxyType
 
 
 @dataclass(frozen=True)
 class Entry:
-    """A finding: its `values` by name, their `units`, what they are (`about`), and the `command` that computes them.
+    """A finding: what it is (`about`), its `values` by name (the unit in the name's suffix), and the `command` that
+    computes them.
 
     `computed` is the day, `equations` the revision of the equations (of `evidence.toml`) it was computed with. `stated`
     holds, per document of the repository, the phrases that state the finding there. `note` says where the values come
@@ -28,11 +28,10 @@ class Entry:
     name: str
     about: str
     values: Mapping[str, float]
-    units: Mapping[str, str]
     command: str
     computed: date
     equations: int
-    stated: Mapping[str, tuple[str, ...]] = MappingProxyType({})
+    stated: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     note: str = ""
 
 
@@ -66,7 +65,7 @@ def value(entry: str, name: str) -> float:
 
 def _entry(name: str, row: dict) -> Entry:
     stated = {document: tuple(phrases) for document, phrases in row.pop("stated", {}).items()}
-    return Entry(name=name, stated=stated, units=row.pop("units", {}), **row)
+    return Entry(name=name, stated=stated, **row)
 
 
 def _file() -> dict:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from friso.evidence import value
 from friso.frequency.crossover import WANTED
 from friso.studies.compare.options import JOINT, MODEL_ERROR, Option
 from friso.studies.compare.statistics import Estimate
@@ -181,8 +182,9 @@ def _standstill(found: Comparison) -> list[str]:
     if found.shaken:
         return []
     joint = (
-        " On the thesis's rig, with a quiet floor and the amplifier's noise, friso rig in-position shows that the free "
-        "joint moves several times as much as the locked one."
+        " On the thesis's rig, with a quiet floor and amplifier noise, the stage on its free joint moves "
+        f"{value('rig.in-position', 'rms_ratio'):.2g} times as much (RMS) as with the joint locked "
+        "(friso rig in-position)."
     )
     return [
         "How still they stand is not compared: the stage file has no [floor]. In-position RMS is then that of a "

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from friso.evidence import value
 from friso.hunting.edges import KINDS, STEP
 from friso.hunting.persistence import DISTANCES
 from friso.studies.guideline import Fit, Guideline
@@ -25,7 +26,7 @@ from friso.studies.guideline.worked import CLAIMED_AT, GAPS, MARGIN, STATIC, STU
 from friso.version import VERSION
 from friso.views.drawing import matplotlib_renderer
 from friso.views.guideline.figures import guideline_figures
-from friso.views.guideline.words import formulas, number, percent
+from friso.views.guideline.words import formulas, number, parasitic_edges, parasitic_sentences, percent
 from friso.views.pages import environment
 
 PAGE, TABLE = "guideline.md", "guideline_edges.csv"
@@ -74,6 +75,9 @@ def guideline_page(found: Guideline) -> str:
         figures={figure.name: figure for figure in guideline_figures(found)},
         claims=claims(found.worked),
         parasitic=found.parasitic,
+        parasitic_words=parasitic_sentences(found.parasitic),
+        parasitic_edges=parasitic_edges(found.worked.studies["parasitic"]),
+        rough_minutes=value("guideline.minutes", "rough"),
         drive=DRIVE,
         kinds=KINDS,
         errors_of=_errors(found),

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from friso.studies.guideline import Guideline
 from friso.studies.guideline.groups import GROUPS
 from friso.studies.guideline.laws import REFERENCE, Fitted
+from friso.studies.guideline.parasitic import Parasitic
+from friso.studies.guideline.rig import Case
+from friso.views.drawing.prefixes import listed
 
 BASES = {
     "slip": "sigma_0 v_s/F_s",
@@ -15,6 +19,10 @@ BASES = {
     "stroke": "sqrt(F_s/(m S_j))",
 }
 """What each rate is but for its factor and powers [rad/s]."""
+
+
+RULE = 2.0
+"""Factor up to which multiples of the crossover may differ and still pass for one rule."""
 
 
 def formulas(found: Guideline) -> str:
@@ -61,3 +69,51 @@ def number(value: float | None, digits: int = 3) -> str:
 def percent(off: float) -> str:
     """An error of a logarithm as a share: 0.1 is 11 %."""
     return f"{100 * math.expm1(off):.0f} %"
+
+
+def parasitic_edges(cases: Sequence[Case]) -> str:
+    """How far the parasitic mode moves the edge of hunting."""
+    edges = [case.computed for case in cases if math.isfinite(case.computed)]
+    if not edges:
+        return "No edge is known with any of these modes."
+    spread = max(edges) / min(edges) - 1
+    return f"Over these modes the edge differs by at most {100 * spread:.0f} %."
+
+
+def parasitic_sentences(modes: Sequence[Parasitic]) -> list[str]:
+    """Where the ranges of crossovers end, joint locked and free, by the damping ratio of the mode; and whether one
+    multiple of the crossover is a rule for all modes."""
+    ratios = [mode.frequency / end[1] for mode in modes for end in (mode.locked, mode.free) if end]
+    conclusion = "Actuator and sensor are on the same part here."
+    if ratios and max(ratios) > RULE * min(ratios):
+        conclusion = (
+            f"At the upper end of a range the mode is {_spread(ratios)} times the crossover: no single multiple of the "
+            f"crossover is a rule for all modes. {conclusion}"
+        )
+    dampings = dict.fromkeys(mode.damping_ratio for mode in modes)
+    return [
+        *(_ranges(state, damping, modes) for state in ("locked", "free") for damping in dampings),
+        conclusion,
+    ]
+
+
+def _ranges(state: str, damping: float, modes: Sequence[Parasitic]) -> str:
+    """Of one state of the joint and one damping ratio."""
+    ends = {mode.frequency: getattr(mode, state) for mode in modes if mode.damping_ratio == damping}
+    usable = {frequency: end for frequency, end in ends.items() if end}
+    without = [f"{frequency:g}" for frequency, end in ends.items() if not end]
+    what = f"Joint {state}, damping ratio {damping:g}"
+    if not usable:
+        return f"{what}: none of these modes leaves a range that contains the rig's crossover."
+    low, high = (_spread([end[place] for end in usable.values()]) for place in (0, 1))
+    ratio = _spread([frequency / end[1] for frequency, end in usable.items()])
+    lost = f" With a mode at {listed(without, 'or')} Hz there is no range that contains the rig's crossover."
+    return (
+        f"{what}: the range begins at {low} Hz and ends at {high} Hz, where the mode is {ratio} times as high."
+        f"{lost if without else ''}"
+    )
+
+
+def _spread(values: Sequence[float]) -> str:
+    low, high = number(min(values)), number(max(values))
+    return low if low == high else f"{low} to {high}"

@@ -1,0 +1,278 @@
+"""Findings on file: `python -m benchmarks.evidence [NAME ...] [--equations]`.
+
+Without arguments, the entries of friso/evidence.toml are listed with their dates, and those that are older than the
+equations are marked. NAME computes an entry again and writes it back with today's date and the revision of the
+equations; "quick" stands for all that take less than a few minutes each. Documents that state a finding are listed
+where the value has changed: they are edited by hand.
+
+`--equations` compares the reference numbers of the equations (`benchmarks.canonical`) with those on file and, if they
+differ, begins a new revision: every entry is then older than the equations.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from datetime import date
+from pathlib import Path
+from typing import Any
+
+from benchmarks.canonical import differ, reference_numbers
+from benchmarks.report import print_table
+from friso import evidence
+from friso.evidence import Entry, Equations
+
+FILE = Path(evidence.__file__).with_name("evidence.toml")
+ROOT = Path(__file__).parent.parent
+DRIVE = "examples/thesis_drive.toml"
+
+HEAD = """# Findings of our own computations that take too long to repeat where they are stated (friso.evidence).
+# Written by `python -m benchmarks.evidence`; only `about`, `stated` and `note` are edited by hand.
+"""
+
+Values = dict[str, float]
+NAN = float("nan")
+
+
+def friso(*arguments: str) -> dict[str, Any]:
+    """The JSON document of a command, run in the repository's folder."""
+    command = [sys.executable, "-m", "friso.cli", *arguments, "--json"]
+    done = subprocess.run(command, cwd=ROOT, stdout=subprocess.PIPE, check=True)
+    return json.loads(done.stdout)
+
+
+def rig(experiment: str) -> dict[str, Any]:
+    """What an experiment of the virtual rig found on the thesis's rig."""
+    return friso("rig", experiment, DRIVE)["found"]
+
+
+def rig_in_position() -> Values:
+    runs = rig("in-position")["runs"]
+    locked, free = (runs[case]["all"] for case in ("locked", "free"))
+    return {
+        "rms_ratio": free["rms_m"] / locked["rms_m"],
+        "locked_peak_m": locked["peak_m"],
+        "free_peak_m": free["peak_m"],
+    }
+
+
+def rig_hunting() -> Values:
+    found = rig("hunting")
+    rows, locked, free = found["crossovers_hz"], *(found["cases"][case]["hunts"] for case in ("locked", "free"))
+    rails = len(found["rail_seeds"])
+    last = max(row for row, each in enumerate(locked) if each["share"] > 0)
+    return {
+        "rails": rails,
+        "locked_at_8_hz": round(rails * locked[rows.index(8.0)]["share"]),
+        "free_at_8_hz": round(rails * free[rows.index(8.0)]["share"]),
+        "locked_at_9_5_hz": round(rails * locked[rows.index(9.5)]["share"]),
+        "locked_none_from_hz": rows[last + 1],
+    }
+
+
+def rig_stiffness() -> Values:
+    found = rig("stiffness")
+    low, high = found["interval_n_per_m"]
+    return {"stiffness_n_per_m": found["stiffness_n_per_m"], "low_n_per_m": low, "high_n_per_m": high}
+
+
+def rig_presliding() -> Values:
+    places = rig("presliding")["places"]
+    names = ("stiffness_n_per_m", "damping_n_s_per_m", "mass_kg")
+    values = {name: [place[name][0] for place in places] for name in names}
+    return {f"{end.__name__}_{name}": end(each) for name, each in values.items() for end in (min, max)}
+
+
+def rig_frf() -> Values:
+    found = rig("frf")
+    low, high = found["locked"]["mass_interval_kg"]
+    return {
+        "locked_kg": found["locked"]["mass_kg"],
+        "locked_low_kg": low,
+        "locked_high_kg": high,
+        "free_kg": found["free"]["mass_kg"],
+        "locked_weak_motor_kg": found["apparent_mass_locked_kg"][1],
+        "free_weak_motor_kg": found["apparent_mass_free_kg"][1],
+        "locked_strong_motor_kg": found["apparent_mass_locked_kg"][2],
+        "free_crossing_hz": found["free_loop"]["crossings_hz"][-1],
+        "highest_stable_hz": found["highest_stable_hz"],
+    }
+
+
+def rig_slow_cycles() -> Values:
+    found = rig("compare")
+    levels, (lopsided,) = found["levels"], [each for each in found["by_asymmetry"] if each["from"] == 0.05]
+    row, column = levels["static_over_file"].index(1.0), levels["coulomb_over_file"].index(2.0)
+    weak = {name: levels[name][1][row][column] / found["even_rail"][name][0] for name in ("period_s", "peak_to_peak_m")}
+    return {
+        "lopsided_period": lopsided["period_over_even"],
+        "weak_motor_period": weak["period_s"],
+        "weak_motor_swing": weak["peak_to_peak_m"],
+    }
+
+
+def rig_constant_speed() -> Values:
+    shown = [place["shown"] for place in rig("constant-speed")["many_speeds"]["places"]]
+    names = {
+        "friction.stribeck_velocity": "stribeck_m_per_s",
+        "friction.viscous": "viscous_n_s_per_m",
+        "friction.coulomb": "coulomb_n",
+        "friction.static": "static_n",
+    }
+    values = {short: [place[key]["value"] for place in shown if key in place] for key, short in names.items()}
+    return {f"{end.__name__}_{name}": end(each) for name, each in values.items() for end in (min, max)}
+
+
+def compare_thesis_rig() -> Values:
+    slow = ("--set", "drive.sample_time=200 us", "--set", "drive.delay=200 us")
+    options = friso("compare", DRIVE, *slow)["options"]
+    values = {"machines": 2000.0}
+    for letter, each in options.items():
+        values |= {
+            f"{letter}_hunts": each["hunts"]["probability"],
+            f"{letter}_in_position": each["in_position"]["probability"],
+            f"{letter}_force_rms_n": each["force_rms_n"]["value"],
+            f"{letter}_unstable": each["unstable"],
+        }
+        if each["settling_time_s"]["value"] is not None:
+            values[f"{letter}_settling_s"] = each["settling_time_s"]["value"]
+    return values
+
+
+def frequency_delays() -> Values:
+    from friso.frequency.crossover import limits
+    from friso.stage import load
+
+    stage, found = load(ROOT / "examples" / "thesis_rig.toml"), {}
+    for delay in (0, 50, 100, 200, 500, 1000):
+        for name, locked in (("locked", True), ("free", False)):
+            drive = {"drive": {"sample_time": "50 us", "delay": f"{delay} us"}, "joint.locked": locked}
+            found[f"{name}_{delay}_us_hz"] = limits(stage.replace(drive).flat()).highest_stable or 0.0
+    return found
+
+
+def hunting_locked_rig() -> Values:
+    crossovers = ("--set", "joint.locked=true", "--x", "controller.crossover=1 Hz..40 Hz")
+    points = friso("boundary", "examples/thesis_rig.toml", *crossovers)["points"]
+    symmetric = {kind: [each["value"] for each in points if (each["cycle"], each["kind"]) == ("symmetric", kind)]
+                 for kind in ("flip", "fold")}  # fmt: skip
+    return {"edge_hz": min(symmetric["flip"]), "fold_hz": max(symmetric["fold"])}
+
+
+MOVES = 6
+"""Machines whose moves are fitted without their controller."""
+
+
+def identify_without_controller() -> Values:
+    from benchmarks.identify import drawn, identify_moves, moves
+
+    shown = held = 0
+    for seed in range(MOVES):
+        machine = drawn(seed, False)
+        for each in identify_moves(moves(machine), machine.guess.flat(), False).estimates:
+            if each.name.startswith("friction.") and each.shown:
+                shown += 1
+                held += each.holds(machine.flat[each.name])
+    return {"machines": MOVES, "shown": shown, "held": held}
+
+
+def minutes(*arguments: str) -> float:
+    """Wall time of a command [min]."""
+    begin = time.perf_counter()
+    friso(*arguments)
+    return (time.perf_counter() - begin) / 60
+
+
+QUICK: Mapping[str, Callable[[], Values]] = {
+    "rig.stiffness": rig_stiffness,
+    "rig.presliding": rig_presliding,
+    "rig.in-position": rig_in_position,
+    "rig.hunting": rig_hunting,
+    "rig.frf": rig_frf,
+    "frequency.delays": frequency_delays,
+    "hunting.locked-rig": hunting_locked_rig,
+}
+
+LONG: Mapping[str, Callable[[], Values]] = {
+    "rig.constant-speed": rig_constant_speed,
+    "rig.slow-cycles": rig_slow_cycles,
+    "compare.thesis-rig": compare_thesis_rig,
+    "identify.without-controller": identify_without_controller,
+    "guideline.minutes": lambda: {"rough": minutes("guideline", "--samples", "64")},
+    "reproduce.minutes": lambda: {"all": minutes("reproduce")},
+}
+
+BY_HAND = ("rig.loop", "hunting.limiter", "hunting.supercritical")
+"""Entries whose command prints a table that is read by eye."""
+
+
+def renewed(entry: Entry, values: Values) -> Entry:
+    """The entry with values computed now."""
+    revision = evidence.equations().revision
+    return replace(entry, values=values, computed=date.today(), equations=revision, note="")
+
+
+def old(entries: Mapping[str, Entry]) -> list[str]:
+    """Names of the entries that were computed with other equations than those on file."""
+    revision = evidence.equations().revision
+    return [name for name, entry in entries.items() if entry.equations != revision]
+
+
+def written(entries: Mapping[str, Entry], equations: Equations) -> str:
+    """The file."""
+    lines = [HEAD, "[equations]", f"revision = {equations.revision}", f"since = {equations.since}"]
+    for stage, outputs in equations.numbers.items():
+        lines += ["", f"[equations.numbers.{_quoted(stage)}]"]
+        lines += [f"{output} = {json.dumps(values)}" for output, values in outputs.items()]
+    for name, entry in entries.items():
+        lines += ["", f"[finding.{_quoted(name)}]"]
+        texts = {"about": entry.about, "command": entry.command, "note": entry.note}
+        lines += [f"{key} = {_quoted(text)}" for key, text in texts.items() if text]
+        lines += [f"computed = {entry.computed}", f"equations = {entry.equations}"]
+        lines.append(f"values = {{ {', '.join(f'{key} = {_number(value)}' for key, value in entry.values.items())} }}")
+        if entry.stated:
+            lines.append(f"[finding.{_quoted(name)}.stated]")
+            lines += [f"{_quoted(place)} = {json.dumps(phrases, ensure_ascii=False)}" for place, phrases in
+                      entry.stated.items()]  # fmt: skip
+    return "\n".join(lines) + "\n"
+
+
+def _quoted(text: str) -> str:
+    return json.dumps(text, ensure_ascii=False)
+
+
+def _number(value: float) -> str:
+    return f"{value:.6g}"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("names", nargs="*", metavar="NAME", help=f"of {', '.join([*QUICK, *LONG])}; or: quick")
+    parser.add_argument("--equations", action="store_true", help="compare the equations with the revision on file")
+    given = parser.parse_args()
+    entries, equations = dict(evidence.entries()), evidence.equations()
+    if given.equations and (changed := differ(equations.numbers)):
+        print("The equations have changed:", *changed, sep="\n  ")
+        equations = Equations(equations.revision + 1, date.today(), reference_numbers())
+        FILE.write_text(written(entries, equations), encoding="utf-8")
+    for name in [*QUICK] if given.names == ["quick"] else given.names:
+        before, entries[name] = entries[name], renewed(entries[name], {**QUICK, **LONG}[name]())
+        FILE.write_text(written(entries, equations), encoding="utf-8")
+        changed = [
+            key for key, value in entries[name].values.items() if _number(value) != _number(before.values.get(key, NAN))
+        ]
+        print(f"{name}: {f'changed: {changed}; see {[*before.stated]}' if changed else 'as before'}", flush=True)
+    outdated = old(entries)
+    rows = [
+        [name, str(each.computed), "yes" if name in outdated else "", each.command] for name, each in entries.items()
+    ]
+    print_table(("finding", "computed", "older than the equations", "command"), rows)
+
+
+if __name__ == "__main__":
+    main()

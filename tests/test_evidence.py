@@ -1,0 +1,82 @@
+"""Findings on file: with which equations they were computed, and that documents state what is on file."""
+
+import copy
+from pathlib import Path
+
+import pytest
+
+from benchmarks import evidence as command
+from benchmarks.canonical import differ, reference_numbers
+from friso.evidence import entries, equations, value
+from friso.studies.guideline.parasitic import Parasitic
+from friso.views.guideline.words import parasitic_sentences
+
+ROOT = Path(__file__).parent.parent
+
+
+def test_the_equations_are_those_on_file() -> None:
+    changed = differ(equations().numbers)
+    assert not changed, f"the equations have changed ({changed}): run python -m benchmarks.evidence --equations"
+
+
+def test_no_finding_is_older_than_the_equations() -> None:
+    outdated = command.old(entries())
+    assert not outdated, f"compute again by python -m benchmarks.evidence {' '.join(outdated)}"
+
+
+def test_a_finding_of_an_earlier_revision_is_outdated(monkeypatch: pytest.MonkeyPatch) -> None:
+    later = command.Equations(equations().revision + 1, equations().since, equations().numbers)
+    monkeypatch.setattr(command.evidence, "equations", lambda: later)
+    assert command.old(entries()) == list(entries())
+    again = command.renewed(entries()["hunting.locked-rig"], {"edge_hz": 9.7, "fold_hz": 16.0})
+    assert command.old({"hunting.locked-rig": again}) == []
+    assert again.note == ""
+
+
+def test_other_physics_differ_and_rounding_does_not() -> None:
+    numbers = copy.deepcopy(reference_numbers())
+    force = numbers["touching"]["force"]
+    force[0] *= 1 + 1e-9
+    assert differ(numbers) == []
+    force[0] *= 1 + 1e-5
+    assert differ(numbers) == ["touching: force"]
+
+
+@pytest.mark.parametrize("name", entries())
+def test_documents_state_what_is_on_file(name: str) -> None:
+    for document, phrases in entries()[name].stated.items():
+        text = " ".join((ROOT / document).read_text(encoding="utf-8").split())
+        assert [phrase for phrase in phrases if " ".join(phrase.split()) not in text] == []
+
+
+def test_the_file_is_as_the_command_writes_it() -> None:
+    assert command.FILE.read_text(encoding="utf-8") == command.written(entries(), equations())
+
+
+def test_every_finding_has_a_way_to_be_computed_again() -> None:
+    assert {*command.QUICK, *command.LONG, *command.BY_HAND} == set(entries())
+    assert all(entry.command and entry.values for entry in entries().values())
+
+
+def test_findings_say_what_their_values_say() -> None:
+    """Phrases of the documents beside the numbers on file."""
+    assert f"{value('rig.in-position', 'rms_ratio'):.2g}" == "3.1"
+    assert value("rig.hunting", "locked_at_8_hz") == 12
+    assert value("rig.hunting", "locked_none_from_hz") == 12.5
+    assert value("compare.thesis-rig", "g_unstable") == 17
+
+
+def test_parasitic_modes_in_words() -> None:
+    modes = [
+        Parasitic(100.0, 0.01, (0.1, 69.2), None),
+        Parasitic(300.0, 0.01, (0.1, 69.9), (3.82, 14.2)),
+        Parasitic(100.0, 0.001, None, None),
+    ]
+    locked, light, free, lost, conclusion = parasitic_sentences(modes)
+    assert locked.endswith(
+        "begins at 0.1 Hz and ends at 69.2 to 69.9 Hz, where the mode is 1.45 to 4.29 times as high."
+    )
+    assert light.startswith("Joint locked, damping ratio 0.001: none of these modes")
+    assert "3.82 Hz and ends at 14.2 Hz, where the mode is 21.1 times as high. With a mode at 100 Hz" in free
+    assert lost.startswith("Joint free, damping ratio 0.001: none")
+    assert conclusion.startswith("At the upper end of a range the mode is 1.45 to 21.1 times the crossover: no single")
