@@ -198,5 +198,5 @@ def _bare(value: Any) -> Any:
 def _percent(text: str) -> float:
     number = _bare(text.rstrip("%").strip())
     if not 0 <= number < 100:
-        raise InputError("", quoted(text, "not a share below 100 %"), "0 % or more, below 100 %")
+        raise InputError("", quoted(text, "not a percentage below 100 %"), "0 % or more, below 100 %")
     return number / 100

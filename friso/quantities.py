@@ -192,7 +192,7 @@ def _split(entry: str) -> tuple[str, str]:
     if not rest:
         raise _Refused("its unit is missing")
     if re.match(", ?[0-9]", rest):
-        raise _Refused("a decimal comma, write a point")
+        raise _Refused("a decimal comma; use a point")
     return match[0], _checked_unit(rest)
 
 
@@ -200,7 +200,7 @@ def _why_no_number(text: str) -> str:
     if not text:
         return "empty"
     if text[0] in "−–—":
-        return "a typographic minus, write -"
+        return "a typographic minus sign; use -"
     if re.match(r"[+-]?(nan|inf)", text):
         return "not a finite number"
     return "does not begin with a number"

@@ -33,9 +33,9 @@ STIFFNESS = 'stiffness = "2.4 N/mm"'
 @pytest.mark.parametrize(
     ("value", "given"),
     [
-        ("2400", "2400 (a bare number, its unit is missing)"),
-        ("2.4e3", "2400.0 (a bare number, its unit is missing)"),
-        ("nan", "nan (a bare number, its unit is missing)"),
+        ("2400", "2400 (a bare number without a unit)"),
+        ("2.4e3", "2400.0 (a bare number without a unit)"),
+        ("nan", "nan (a bare number without a unit)"),
         ('"2.4"', '"2.4" (its unit is missing)'),
         ('"N/mm"', '"N/mm" (does not begin with a number)'),
         ('""', '"" (empty)'),
@@ -57,10 +57,10 @@ STIFFNESS = 'stiffness = "2.4 N/mm"'
         ('"-Infinity N/mm"', '"-Infinity N/mm" (not a finite number)'),
         ('"1e400 N/mm"', '"1e400 N/mm" (too large)'),
         ('"1e307 N/mm"', '"1e307 N/mm" (too large)'),
-        ('"1e-400 N/mm"', '"1e-400 N/mm" (too small, it would become 0)'),
-        ('"1e-320 N/Mm"', '"1e-320 N/Mm" (too small, it would become 0)'),
-        ('"2,4 N/mm"', '"2,4 N/mm" (a decimal comma, write a point)'),
-        ('"−2.4 N/mm"', '"−2.4 N/mm" (a typographic minus, write -)'),
+        ('"1e-400 N/mm"', '"1e-400 N/mm" (too small: it would be rounded to 0)'),
+        ('"1e-320 N/Mm"', '"1e-320 N/Mm" (too small: it would be rounded to 0)'),
+        ('"2,4 N/mm"', '"2,4 N/mm" (a decimal comma; use a point)'),
+        ('"−2.4 N/mm"', '"−2.4 N/mm" (a typographic minus sign; use -)'),
         ('"2_400 N/m"', '"2_400 N/m" ("_400 N/m" is not a unit)'),
         ('"0x10 N/m"', '"0x10 N/m" ("x10 N/m" is not a known unit)'),
         ('"٣ N/m"', '"٣ N/m" (does not begin with a number)'),
@@ -100,7 +100,7 @@ FREQUENCY = "number and unit in quotes, convertible to Hz, rad/s or rpm, greater
             "8",
             (
                 "controller.crossover",
-                "8 (a bare number, its unit is missing)",
+                "8 (a bare number without a unit)",
                 FREQUENCY,
                 '= "8 Hz"',
             ),
@@ -185,7 +185,7 @@ FREQUENCY = "number and unit in quotes, convertible to Hz, rad/s or rpm, greater
         (
             'kind = "pid"',
             'kind = "pid"\nanti_windup = "clamp"',
-            ("controller.anti_windup", '"clamp"', "a force_limit beside it", 'force_limit = "200 N"'),
+            ("controller.anti_windup", '"clamp"', "a force_limit as well", 'force_limit = "200 N"'),
         ),
         (
             'kind = "pid"',
@@ -227,7 +227,7 @@ FREQUENCY = "number and unit in quotes, convertible to Hz, rad/s or rpm, greater
         (
             'stroke = "1 mm"',
             "",
-            ("joint.stroke", "nothing", "only a joint with locked = true can do without", 'stroke = "1 mm"'),
+            ("joint.stroke", "nothing", "only a joint with locked = true needs none", 'stroke = "1 mm"'),
         ),
         (
             'stroke = "1 mm"',

@@ -197,7 +197,7 @@ def test_a_failure_of_the_beams_leaves_the_closed_forms(
     with pytest.raises(typer.Exit):
         command(path)
     said = " ".join(capsys.readouterr().out.split())
-    assert "The beam model found no answer: The beams find no equilibrium" in said
+    assert "The beam model found no solution: The beams find no equilibrium" in said
     assert (BEAMS in said, CLOSED in said) == (False, True)
 
 
@@ -277,7 +277,7 @@ def test_without_a_mode_that_interferes_there_is_no_limit(found: Found) -> None:
     alone = Found(found.stage, replace(found.closed, modes=quiet), None, "told")
     assert any("the leaves set no limit to the crossover" in said for said in sentences(alone))
     assert flexure_document(alone)["first_interfering_hz"] is None
-    assert "The beam model found no answer: told" in Page(flexure_html(alone, ())).text
+    assert "The beam model found no solution: told" in Page(flexure_html(alone, ())).text
 
 
 # ---------------------------------------------------------------- figures and page

@@ -241,7 +241,7 @@ def test_jitter_is_interpolated_and_told(tmp_path: Path) -> None:
     exact = log_files.motion(2000)["position"]
     late = np.interp(time, M["time"], exact)
     log = log_of(tmp_path, ["time [s]", "position [m]"], [time, late])
-    assert told(log.warnings, "interpolated onto even instants")
+    assert told(log.warnings, "interpolated onto uniform time stamps")
     assert np.diff(log.time) == pytest.approx(log.sample_time)
     assert np.abs(log["position"] - np.interp(log.time, M["time"], exact)).max() < 1e-4 * np.abs(M["velocity"]).max()
 
@@ -331,7 +331,7 @@ def test_channels_of_different_rates(tmp_path: Path) -> None:
     assert log.time.size == 1800  # the common span
     assert log["position"] == pytest.approx(0.05 * np.sin(7 * log.time), rel=1e-9, abs=1e-12)
     assert log["force"] == pytest.approx(np.cos(7 * log.time), rel=1e-9, abs=1e-12)
-    assert told(log.warnings, "without a filter against aliasing")
+    assert told(log.warnings, "without an anti-aliasing filter")
 
 
 def test_no_common_span(refused: Refused) -> None:

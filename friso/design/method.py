@@ -232,9 +232,9 @@ def _does_not_hunt(fit: Fitted, edges: Corners) -> None:
     until = f"{edges.highest:.3g} Hz" if np.isfinite(needed) else f"beyond {edges.searched[1]:.3g} Hz"
     stiffness, stroke = fit.stage.flat()["joint.stiffness"], fit.task.stroke * 1e3
     reason = (
-        f"with the softest leaf springs that can be had, {stiffness:.4g} N/m and a stroke of {stroke:.3g} mm, the "
-        f"stage hunts up to {until}; a crossover with the factor of safety above that, {spec.safety.hunting:g}, is not "
-        f"to be had: it can be {crossover:.3g} Hz"
+        f"with the softest leaf springs available, {stiffness:.4g} N/m and a stroke of {stroke:.3g} mm, the "
+        f"stage hunts up to {until}; a crossover above that by the safety factor of {spec.safety.hunting:g} is not "
+        f"possible, the highest is {crossover:.3g} Hz"
     )
     raise NoDesign(reason, tuple(_ways_out(fit, edges.highest, needed, crossover)))
 

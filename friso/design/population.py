@@ -118,7 +118,7 @@ def _friction(spec: Spec, flat: Mapping[str, Any]) -> dict[str, Interval]:
         key = f"friction.{'coulomb' if name == 'gap' else name}"
         if key not in flat:
             law = flat["friction.model"]
-            expected = "a range of what the friction law of the stage has"
+            expected = "a range of a key that the friction law of the stage has"
             raise InputError(f"friction.{name}", f"a range, but the stage has {law} friction", expected)
     return ranges
 

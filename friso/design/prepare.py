@@ -55,10 +55,12 @@ def _can_be_isolated(stage: Stage) -> None:
         expected = "both masses: the isolator goes between cart and stage"
         raise InputError("masses", "a single mass", expected, 'cart = "1.2 kg", stage = "0.5 kg"')
     if stage.joint is None or stage.joint.damping is None:
-        expected = "a [joint] with its damping and its limiter; its stiffness is what is sought"
+        expected = "a [joint] with its damping and its limiter; its stiffness follows from the design"
         raise InputError("joint", "nothing" if stage.joint is None else "no damping", expected, JOINT)
     if stage.friction is None or stage.friction.model == "none":
-        raise InputError("friction", "none", "friction, which the isolator is for", '[friction] model = "lugre" ...')
+        raise InputError(
+            "friction", "none", "friction, without which no isolator is needed", '[friction] model = "lugre" ...'
+        )
     if "controller.crossover" not in stage.flat():
-        expected = "a controller by van Dijk's rules, whose crossover is sought"
+        expected = "a controller tuned by van Dijk's rules; its crossover follows from the design"
         raise InputError("controller", "gains", expected, 'crossover = "8 Hz", alpha = 0.1, beta = 2')

@@ -93,7 +93,9 @@ def requirements(task: Task) -> list[Requirement]:
             (more("friction.static", task.friction, "N"), shorter),
             lambda mechanism: stiffest * closed_forms.drive_stiffness(mechanism) * stroke / task.friction,
         ),
-        Requirement("stress borne for ever", (factor("safety.fatigue", safety.fatigue), shorter), fatigue),
+        Requirement(
+            "fatigue limit under stroke and load", (factor("safety.fatigue", safety.fatigue), shorter), fatigue
+        ),
         Requirement(
             "yield strength under stroke and load",
             (factor("safety.strength", safety.strength),),

@@ -29,13 +29,13 @@ FLIP, JUMP, FOLD, LOST = "flip", "jump", "fold", "lost"
 BELOW, ABOVE, UNKNOWN = "below the range", "above the range", "unknown"
 
 KINDS = {
-    FLIP: "the cycle goes on, but repels (its multiplier has passed -1)",
+    FLIP: "the cycle continues, but repels (its multiplier has passed -1)",
     JUMP: "the cycle is replaced by another, which repels (the multipliers do not meet at -1), and simulations settle",
-    FOLD: "there is no cycle beyond, from no distance does the stage swing back as far",
-    LOST: "beyond, no orbit could be closed near the fixed point of the return map, and simulations settle",
-    BELOW: "at no crossover tried does a cycle attract",
+    FOLD: "no cycle exists beyond: from no distance does the stage swing back as far",
+    LOST: "no orbit could be closed beyond, near the fixed point of the return map, and simulations settle",
+    BELOW: "no cycle attracts at any crossover tried",
     ABOVE: "a cycle attracts up to the highest crossover tried",
-    UNKNOWN: "a simulation that had to decide failed, or after a jump hunting had no end within the steps allowed",
+    UNKNOWN: "a decisive simulation failed, or after a jump hunting did not end within the steps allowed",
 }
 """What is known of an edge, and of stages without one in the range."""
 

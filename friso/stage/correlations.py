@@ -47,7 +47,7 @@ class Correlations:
     def __post_init__(self) -> None:
         twice = [key for key, times in Counter(self.keys).items() if times > 1]
         if twice:
-            raise StageError("keys", f"{twice[0]} twice", "every key once", _EXAMPLE)
+            raise StageError("keys", f"{twice[0]} twice", "each key once", _EXAMPLE)
         if problem := _problem(self.matrix, len(self.keys)):
             raise StageError("matrix", problem, "a correlation matrix, one row and one column per key", _EXAMPLE)
 
@@ -162,7 +162,7 @@ def draw(stage: Stage, correlations: Correlations, count: int, seed: int) -> Dra
     intervals = stage.uncertain()
     if not intervals:
         example = 'coulomb = "1 N +/- 0.1 N", or coulomb = "0.8 N .. 1.2 N"'
-        raise StageError("", "a stage file of which no key is uncertain", "an uncertain quantity to draw", example)
+        raise StageError("", "a stage file without uncertain keys", "at least one uncertain key to draw from", example)
     sampler = qmc.Sobol(len(intervals), rng=seed)
     matrix, size = correlations.over([*intervals]), 1 << max(0, count - 1).bit_length()
     parts, accepted, beyond, broken = [], 0, 0, Counter[str]()

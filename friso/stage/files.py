@@ -40,13 +40,13 @@ def save(stage: Stage, path: str | os.PathLike[str], overwrite: bool = False) ->
 def write_whole(text: str, path: Path, overwrite: bool) -> None:
     """Write a text file, all of it or nothing. Raises InputError as `save` does."""
     if path.exists() and not overwrite:
-        raise InputError("", "a file that exists already", "a new file, or leave to overwrite", origin=str(path))
+        raise InputError("", "a file that already exists", "a new file, or permission to overwrite", origin=str(path))
     draft = path.with_name(f".{path.name}.{os.getpid()}")
     try:
         draft.write_text(text, encoding="utf-8", newline="\n")
         draft.replace(path)
     except OSError as error:
-        raise InputError("", _reason(error), "a place that can be written to", origin=str(path)) from error
+        raise InputError("", _reason(error), "a writable location", origin=str(path)) from error
     finally:
         draft.unlink(missing_ok=True)
 

@@ -42,7 +42,7 @@ class Drive(UncertainSection):
     relative_noise: Annotated[Value | None, Quantity("m", non_negative, "30 nm")] = None
     """RMS, of the sensor between cart and stage."""
     motor_constant_ratio: Annotated[float | None, Number(positive, "1.47")] = None
-    """The motor's true constant over the one that the drive believes."""
+    """The motor's true constant over the one that the drive assumes."""
     ripple: Annotated[float | None, Number(share, "0.02")] = None
     """Amplitude of what the force varies by over position, as a share of the force."""
     ripple_pitch: Annotated[Value | None, Quantity("m", positive, "24 mm")] = None
@@ -50,9 +50,9 @@ class Drive(UncertainSection):
     feedforward_coulomb: Annotated[Value | None, Quantity("N", non_negative, "1 N")] = None
     feedforward_viscous: Annotated[Value | None, Quantity("N*s/m", non_negative, "0.5 N*s/m")] = None
     integrator_deadband: Annotated[Value | None, Quantity("m", non_negative, "1 um")] = None
-    """The integrator waits while the error is no larger."""
+    """The integrator pauses while the error is no larger."""
     integrator_reset: bool = False
-    """Whether the integrator starts again from 0 where the error changes its sign."""
+    """Whether the integrator is reset to 0 where the error changes sign."""
 
     rules: ClassVar[tuple[Rule, ...]] = (
         Rule(
@@ -64,7 +64,7 @@ class Drive(UncertainSection):
         Rule(
             ("drive.ripple", "drive.ripple_pitch"),
             lambda f: ("drive.ripple" in f) == ("drive.ripple_pitch" in f),
-            "the force ripple's share together with its pitch",
+            "the force ripple together with its pitch",
             'ripple = 0.02, ripple_pitch = "24 mm"',
         ),
     )
@@ -101,7 +101,7 @@ class Rail(UncertainSection):
         Rule(
             (*_DEVIATIONS, "rail.correlation_length"),
             lambda f: ("rail.correlation_length" in f) | (_total(f, _DEVIATIONS) == 0),
-            "the correlation length of friction that deviates along the rail",
+            "the correlation length of friction that varies along the rail",
             'correlation_length = "5 mm"',
         ),
         Rule(

@@ -66,7 +66,7 @@ class Stage(Section):
         Rule(
             ("parasitic.mass", "masses.stage"),
             lambda f: "parasitic.mass" not in f or f["parasitic.mass"] < f["masses.stage"],
-            "a parasitic mass smaller than the stage mass, out of which it is taken",
+            "a parasitic mass smaller than the stage mass, of which it is a part",
             '[parasitic] mass = "0.25 kg" with [masses] stage = "0.5 kg"',
         ),
         Rule(
@@ -115,7 +115,7 @@ class Stage(Section):
                 expected = "one of the two: stiffness and parasitic mode follow from the leaf springs"
                 raise StageError(keys[0], f"{keys[0]} together with [flexure]", expected, _FLEXURE.example)
         elif joint and not joint.locked and joint.stiffness is None:
-            expected = "the stiffness of the joint, or a [flexure]; only a joint with locked = true can do without"
+            expected = "the stiffness of the joint, or a [flexure]; only a joint with locked = true needs none"
             raise StageError("joint.stiffness", "nothing", expected, 'stiffness = "2.4 N/mm"')
 
     def _has_computable_leaves(self) -> None:
@@ -214,7 +214,7 @@ def numeric_keys(flat: Mapping[str, Any]) -> dict[str, Quantity | Number]:
 def violations(flat: Mapping[str, Any]) -> list[tuple[Any, str]]:
     """What is wrong with a flat SI mapping, arrays allowed: where (a boolean or an array), and why."""
     bounds = [
-        (np.logical_not(field.bound.holds(flat[key])), f"{key} has to be {field.bound.text}")
+        (np.logical_not(field.bound.holds(flat[key])), f"{key} must be {field.bound.text}")
         for key, field in numeric_keys(flat).items()
         if key in flat
     ]
@@ -281,7 +281,7 @@ def _put(tables: dict[str, Any], key: str, value: Any) -> None:
             _put_element(tables, key, value)
             return
         if not isinstance(tables, dict):
-            raise StageError(key, "an unknown key", f"{name} is no table", 'controller.crossover="12 Hz"')
+            raise StageError(key, "an unknown key", f"{name} is not a table", 'controller.crossover="12 Hz"')
     if value is not None:
         tables[last] = value
     elif tables.pop(last, None) is None:

@@ -73,7 +73,7 @@ class Joint(UncertainSection):
     def _free_joint_is_complete(self) -> Self:
         for key, example in (("damping", "0.5 N*s/m"), ("stroke", "1 mm")):
             if not self.locked and getattr(self, key) is None:
-                expected = f"the {key} of the joint; only a joint with locked = true can do without"
+                expected = f"the {key} of the joint; only a joint with locked = true needs none"
                 raise StageError(key, "nothing", expected, f'{key} = "{example}"')
         return self
 
@@ -103,7 +103,7 @@ class Controller(UncertainSection):
     @model_validator(mode="after")
     def _anti_windup_has_a_limit(self) -> Self:
         if self.anti_windup and self.force_limit is None:
-            raise StageError("anti_windup", '"clamp"', "a force_limit beside it", 'force_limit = "200 N"')
+            raise StageError("anti_windup", '"clamp"', "a force_limit as well", 'force_limit = "200 N"')
         return self
 
 
@@ -179,7 +179,7 @@ class ThereAndBack(Motion):
         Rule(
             ("motion.acceleration_time", "motion.return_at"),
             lambda f: 2 * f["motion.acceleration_time"] <= f["motion.return_at"] * (1 + ROUNDING),
-            "the way there (2 acceleration_time) over before return_at",
+            "the move there (2 acceleration_time) finished before return_at",
             'acceleration_time = "30 ms", return_at = "5 s"',
         ),
         Rule(
@@ -187,7 +187,7 @@ class ThereAndBack(Motion):
             lambda f: (
                 f["motion.return_at"] + 2 * f["motion.acceleration_time"] <= f["motion.duration"] * (1 + ROUNDING)
             ),
-            "the way back (return_at + 2 acceleration_time) over within the duration",
+            "the move back (return_at + 2 acceleration_time) finished within the duration",
             'acceleration_time = "30 ms", return_at = "5 s", duration = "20 s"',
         ),
     )

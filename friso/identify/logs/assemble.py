@@ -65,7 +65,9 @@ def _tracks(chosen: dict[str, Choice], reading: Reading, told: Told, needed: Seq
         time = instants(choice, clock, reading, told)
         foreign = reading.mapping.sample_time is not None and choice.channel.values.size not in sizes
         if optional and (time is None or foreign):
-            told.warnings.append(f"{role}: {choice.channel.name} left out: of another length, or without instants")
+            told.warnings.append(
+                f"{role}: {choice.channel.name} left out: its length differs, or it has no time stamps"
+            )
             continue
         if time is None:
             raise no_time(choice.channel, reading)
@@ -78,7 +80,11 @@ def _tracks(chosen: dict[str, Choice], reading: Reading, told: Told, needed: Seq
             continue
         if time.size != values.size:
             raise LogError(
-                role, f"{values.size} values at {time.size} instants", "one value at each", "", reading.origin
+                role,
+                f"{values.size} values for {time.size} time stamps",
+                "one value per time stamp",
+                "",
+                reading.origin,
             )
         tracks[role] = _track(role, choice, time, values, told)
     told.read += _clocks(clock, reading)
@@ -88,13 +94,14 @@ def _tracks(chosen: dict[str, Choice], reading: Reading, told: Told, needed: Seq
 def _clocks(clock: Choice | None, reading: Reading) -> list[str]:
     """Where the instants come from, in words."""
     if reading.mapping.sample_time is not None:
-        return [f"time: a sample each {reading.mapping.sample_time:.9g} s, as told; times in the file unused"]
+        return [
+            f"time: one sample every {reading.mapping.sample_time:.9g} s, as specified; the times in the file are not "
+            "used"
+        ]
     if clock is not None:
         return [f"time: {clock.channel.name} ({clock.channel.source}), {clock.reason}"]
     columns = [c for c in reading.table.channels if c.unit and (role_of(c.name) or ("",))[0] == "time"]
-    return [f"time: {c.name} ({c.source}), in {c.unit}" for c in columns] or [
-        "time: as the file tells with the signals"
-    ]
+    return [f"time: {c.name} ({c.source}), in {c.unit}" for c in columns] or ["time: as stored with the signals"]
 
 
 def _track(role: str, choice: Choice, time: np.ndarray, values: np.ndarray, told: Told) -> Track:
@@ -130,7 +137,7 @@ def _doubts(base: Track, signals: dict[str, np.ndarray], told: Told) -> list[str
             lines.append(f"{role}: constant throughout")
         share = 0.0 if role in ("reference", "disturbance") else checks.clipped_share(values)
         if share > checks.CLIPPED:
-            lines.append(f"{role}: {share:.2%} of the samples stand in flat tops at its extremes: saturated or clipped")
+            lines.append(f"{role}: {share:.2%} of the samples lie on flat tops at its extremes: saturated or clipped")
     position, velocity, force = (signals.get(role) for role in ("position", "velocity", "force"))
     same_kind = ("position" in told.units) == ("velocity" in told.units)
     if position is not None and velocity is not None and same_kind:

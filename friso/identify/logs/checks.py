@@ -20,7 +20,7 @@ def repeated_stamps(name: str, time: np.ndarray, values: np.ndarray) -> tuple[np
     if back.size:
         i = int(back[0])
         given = f"time that decreases, from {time[i]:.9g} s to {time[i + 1]:.9g} s at sample {i + 2}"
-        raise LogError(name, given, "time that grows", "")
+        raise LogError(name, given, "time that increases", "")
     again = np.flatnonzero(steps == 0)
     if again.size == 0:
         return time, values, 0
@@ -28,10 +28,12 @@ def repeated_stamps(name: str, time: np.ndarray, values: np.ndarray) -> tuple[np
     if other.size:
         i = int(other[0])
         given = f"two values at {time[i]:.9g} s ({values[i]:.6g} and {values[i + 1]:.6g}), at {other.size} instants"
-        raise LogError(name, given, "one value at each instant; stamps rounded too far need --dt", '--dt "1 ms"')
+        raise LogError(
+            name, given, "one value per time stamp; if the stamps are rounded too coarsely, use --dt", '--dt "1 ms"'
+        )
     keep = np.r_[True, steps > 0]
     if keep.sum() < 2:
-        raise LogError(name, f"the same time stamp {time[0]:.9g} s throughout", "time that grows", '--dt "1 ms"')
+        raise LogError(name, f"the same time stamp {time[0]:.9g} s throughout", "time that increases", '--dt "1 ms"')
     return time[keep], values[keep], int(again.size)
 
 
@@ -126,7 +128,7 @@ def velocity_warning(position: np.ndarray, velocity: np.ndarray, period: float, 
     if abs(correlation) < 0.8:
         return (
             f"velocity does not follow the derivative of position (correlation {correlation:.2f}): one of them is "
-            "wrong, delayed, or of another body"
+            "wrong, delayed, or belongs to another body"
         )
     if abs(ratio - 1) < 0.05:
         return ""

@@ -72,7 +72,7 @@ def _pair(
     first, sign, second = text.rpartition("=") if last else text.partition("=")
     first, second = first.strip(), second.strip().strip('"')
     if not sign or not first or not second:
-        raise LogError(option, quoted(text), "two texts with = between", f"{option} {example}")
+        raise LogError(option, quoted(text), "two texts separated by =", f"{option} {example}")
     if left is not None and first not in left:
         raise LogError(option, quoted(first), f"one of {', '.join(left)}", f"{option} {example}")
     return first, second
@@ -123,7 +123,9 @@ def _parsed(place: Path) -> Mapping:
     try:
         document = tomllib.loads(place.read_text(encoding="utf-8"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError) as error:
-        raise LogError("", str(error), "a mapping kept by friso; remove the file to map anew", "", str(place)) from None
+        raise LogError(
+            "", str(error), "a mapping kept by friso; delete the file to map again", "", str(place)
+        ) from None
     known = {each.name for each in fields(Mapping)}
     for key, value in document.items():
         if key not in known or (key in TABLES) != isinstance(value, dict):

@@ -29,7 +29,7 @@ def file_format(path: Path) -> str:
     if size == 0:
         raise LogError("log", "an empty file (0 bytes)", "a heading and rows of numbers", "", str(path))
     if size > MOST_BYTES:
-        expected = f"at most {MOST_BYTES / 2**30:.3g} GiB: cut the log, or save the channels needed alone"
+        expected = f"at most {MOST_BYTES / 2**30:.3g} GiB: cut the log, or save only the channels needed"
         raise LogError("log", f"a file of {size / 2**30:.3g} GiB", expected, "", str(path))
     for name in sorted(FORMATS, key=lambda name: FORMATS[name].rank):
         if FORMATS[name].recognise(head):

@@ -75,7 +75,7 @@ def find(table: ChannelTable, wanted: str, role: str, origin: str = "") -> Chann
     names = [channel.name for channel in table.channels]
     near = difflib.get_close_matches(wanted, names, 1, 0.6)
     example = f'--map {role}="{near[0] if near else names[0]}"'
-    raise LogError(role, f"{quoted(wanted)}, which the log does not hold", listing(table), example, origin)
+    raise LogError(role, f"{quoted(wanted)}, which the log does not contain", listing(table), example, origin)
 
 
 def listing(table: ChannelTable) -> str:
@@ -111,7 +111,7 @@ def choose(table: ChannelTable, told: Names[str, str], needed: Sequence[str], or
     for role in needed:
         if role not in chosen:
             example = f'--map {role}="{table.channels[0].name}"'
-            raise LogError(role, "no channel whose name tells it", listing(table), example, origin)
+            raise LogError(role, "no channel whose name suggests it", listing(table), example, origin)
     return chosen
 
 

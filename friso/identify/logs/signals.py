@@ -63,15 +63,17 @@ def signal(choice: Choice, reading: Reading, told: Told) -> np.ndarray:
     channel, role = choice.channel, choice.role
     values, bits = unwrapped(channel.values) if ROLES[role] == "m" else (channel.values, 0)  # encoders overflow
     if bits:
-        told.warnings.append(f"{role}: {channel.name} taken as a counter of {bits} bits that overflows: unwrapped")
+        told.warnings.append(f"{role}: {channel.name} treated as a {bits}-bit counter that overflows: unwrapped")
     scale = reading.mapping.scales.get(role)
     unit = channel.unit
     if scale is not None:
         value, taken = _scaled(role, scale, unit, reading.origin)
-        line = f"{scale}" + ("" if unit else f", its values taken in {taken} as the scale says")
+        line = f"{scale}" + ("" if unit else f", its values taken to be in {taken} as the scale implies")
     elif not unit and reading.strict and choice.told and reading.bare:
-        value, line = 1.0, f"no unit in the file: taken in {ROLES[role]}"
-        told.warnings.append(f"{role}: {channel.name} has no unit (this format has none): taken in {ROLES[role]}")
+        value, line = 1.0, f"no unit in the file: assumed to be in {ROLES[role]}"
+        told.warnings.append(
+            f"{role}: {channel.name} has no unit (this format has none): assumed to be in {ROLES[role]}"
+        )
     else:
         value, si = in_si(unit, ROLES[role])
         line = f"in {unit}" if unit else "without a unit"
@@ -85,7 +87,7 @@ def signal(choice: Choice, reading: Reading, told: Told) -> np.ndarray:
         most = np.abs(values[np.isfinite(values)]).max(initial=0.0)
     if most > LARGEST:
         given = f"values up to {most:.3g} {told.units.get(role, ROLES[role])}"
-        raise LogError(role, given, "values that an instrument measures; is the file damaged?", "", reading.origin)
+        raise LogError(role, given, "values that an instrument can measure; is the file damaged?", "", reading.origin)
     return values
 
 
@@ -123,7 +125,7 @@ def _seconds(clock: Choice, reading: Reading, told: Told) -> float:
     """Seconds in the unit of the time channel. Raises LogError for none."""
     name, unit = clock.channel.name, clock.channel.unit
     if not unit and clock.told and reading.bare:
-        line = f"time: {name} has no unit (this format has none): taken in s"
+        line = f"time: {name} has no unit (this format has none): assumed to be in s"
         told.warnings += [line] if line not in told.warnings else []
         return 1.0
     value = factor(unit, "s") if unit else None
@@ -138,7 +140,7 @@ def no_time(channel: Channel, reading: Reading) -> LogError:
     """The error for a channel without instants."""
     example = _offers(reading.table) or '--map time="CHANNEL", or --dt "1 ms"'
     return LogError(
-        "time", f"no instants for {quoted(channel.name)}", "a time channel or a sample time", example, reading.origin
+        "time", f"no time stamps for {quoted(channel.name)}", "a time channel or a sample time", example, reading.origin
     )
 
 

@@ -134,7 +134,7 @@ def _numbers(path: Path, form: TextLayout, cells: Any, name: str) -> tuple[np.nd
         row = int(np.flatnonzero(wrong)[0])
         line = form.first + 1 + int(cells.index[row])
         given = f"{quoted(str(texts.iloc[row]))} in line {line}, column {name or 'without a name'}"
-        raise LogError("log", given, "numbers all the way down", "", str(path))
+        raise LogError("log", given, "numbers in every row", "", str(path))
     return values, ""
 
 

@@ -43,7 +43,7 @@ def track(name: str, time: np.ndarray, values: np.ndarray) -> Track:
     read: list[str] = []
     time, values, missing = _numbers_only(name, time, values)
     if missing:
-        read.append(f"{name}: {missing} samples that are no numbers left out, the record split there")
+        read.append(f"{name}: {missing} samples that are not numbers left out; the record is split there")
     time, values, repeated = repeated_stamps(name, time, values)
     if repeated:
         read.append(f"{name}: {repeated} samples repeated with the same time stamp left out")
@@ -51,7 +51,7 @@ def track(name: str, time: np.ndarray, values: np.ndarray) -> Track:
     gaps = steps > GAP * np.median(steps)
     if gaps.mean() > MOST_GAPS:
         given = f"time stamps with {gaps.mean():.0%} of the steps over {GAP} times the usual {np.median(steps):.4g} s"
-        raise LogError(name, given, "even sampling, or the true sample time", '--dt "1 ms"')
+        raise LogError(name, given, "uniform sampling, or the true sample time", '--dt "1 ms"')
     period = float(steps[~gaps].mean())
     edges = [0, *(np.flatnonzero(gaps) + 1).tolist(), time.size]
     segments = [slice(a, b) for a, b in pairwise(edges)]
@@ -62,7 +62,7 @@ def _numbers_only(name: str, time: np.ndarray, values: np.ndarray) -> tuple[np.n
     """The samples that are numbers, and how many are not between the first and the last. Raises LogError."""
     there = np.isfinite(time) & np.isfinite(values)
     if there.sum() < max(2, 0.5 * there.size):
-        given = f"{there.size - there.sum()} of {there.size} samples that are no numbers (NaN)"
+        given = f"{there.size - there.sum()} of {there.size} samples that are not numbers (NaN)"
         raise LogError(name, given, "at least half of the samples", "")
     inside = np.flatnonzero(there)
     return time[there], values[there], int(np.count_nonzero(~there[inside[0] : inside[-1]]))
@@ -83,8 +83,8 @@ def _evened(name: str, raw: Track) -> Track:
         raw.time = time
         return raw
     raw.warnings.append(
-        f"{name}: time stamps scatter by {jitter:.2g} of a sample time: interpolated onto even instants; if the "
-        f'sampling was even and only the stamps are not, say --dt "{raw.period * 1e3:.6g} ms"'
+        f"{name}: time stamps scatter by {jitter:.2g} of a sample time: interpolated onto uniform time stamps; if the "
+        f'sampling was uniform and only the time stamps were not, use --dt "{raw.period * 1e3:.6g} ms"'
     )
     times, values, segments, start = [], [], [], 0
     for part in raw.segments:
@@ -117,8 +117,8 @@ def together(tracks: Mapping[str, Track]) -> tuple[Track, dict[str, np.ndarray]]
             )
         if each.period < base.period / GAP:
             warnings.append(
-                f"{name}: sampled at {1 / each.period:.6g} Hz and read at {1 / base.period:.6g} Hz without a filter "
-                "against aliasing"
+                f"{name}: sampled at {1 / each.period:.6g} Hz and read at {1 / base.period:.6g} Hz without an "
+                "anti-aliasing filter"
             )
     covered = np.all([np.isfinite(each) for each in values.values()], axis=0)
     segments = [run for part in base.segments for run in _runs(covered, part)]
@@ -126,7 +126,9 @@ def together(tracks: Mapping[str, Track]) -> tuple[Track, dict[str, np.ndarray]]
     segments = [run for run in segments if run.stop - run.start >= SHORTEST]
     if not segments:
         spans = ", ".join(f"{name} {each.time[0]:.6g} s to {each.time[-1]:.6g} s" for name, each in tracks.items())
-        raise LogError("log", f"no {SHORTEST} samples in a row that all channels share: {spans}", "a common span", "")
+        raise LogError(
+            "log", f"no {SHORTEST} consecutive samples that all channels share: {spans}", "a common span", ""
+        )
     if short:
         read.append(f"{len(short)} segments shorter than {SHORTEST} samples left out")
     kept, start = [], 0

@@ -48,7 +48,7 @@ def _gap(worked: Worked) -> Claim:
     return Claim(
         "Sec. 4.3.3",
         "hunting needs a friction gap of about 1 N",
-        f"locked, at {CLAIMED_AT:g} Hz a cycle attracts from a gap of {words}; by the law that gap grows with the "
+        f"locked, at {CLAIMED_AT:g} Hz a cycle attracts from a gap of {words}; by the law this gap grows with the "
         "force and the crossover",
         "0.5 to 2 N at each static friction",
         _judged([gap.within(0.5, 2.0) for gap in gaps]),
@@ -60,12 +60,12 @@ def _share(worked: Worked) -> Claim:
     edges = _computed(cases)
     at = [STUDIED["share"](case.changes) for case in cases]
     spread = (
-        f", a spread of a factor {edges.max() / edges.min():.2g}" if np.all(np.isfinite(edges) & (edges > 0)) else ""
+        f", a spread by a factor of {edges.max() / edges.min():.2g}" if np.all(np.isfinite(edges) & (edges > 0)) else ""
     )
     ends = ", ".join(f"{_edge(case)} at {share:.0%}" for share, case in zip(at, cases, strict=True))
     return Claim(
         "Fig. 15A",
-        "the mass ratio does not matter for the working of the isolator",
+        "the mass ratio does not affect the isolator",
         f"edge by the share of the stage in the mass: {ends}{spread}",
         f"an edge below {CLAIMED_AT:g} Hz, where the thesis evaluates its isolator, for all shares tried",
         _judged([_verdict(edge < CLAIMED_AT, edge) for edge in edges]),

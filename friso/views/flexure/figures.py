@@ -37,8 +37,8 @@ def _force(flexure: Found) -> Figure:
     lines, points = _lines(flexure, lambda evaluation: evaluation.forces, _odd)
     panel = Panel("", _deflection(flexure), Axis("Force", "N"), (*lines, straight), (points,))
     caption = (
-        "The force that holds the stage deflected, the same to both sides, while it is free to shift and turn "
-        "otherwise. Closed forms know one stiffness; the beams stiffen where they lean much. Dots: computed."
+        "The force that holds the stage deflected, the same in both directions, while it is otherwise free to shift "
+        "and turn. The closed forms have a single stiffness; the beams stiffen at large deflections. Dots: computed."
     )
     return Figure("flexure_force", "Force over the stroke", caption, (panel,))
 
@@ -50,8 +50,8 @@ def _support(flexure: Found) -> Figure:
         _supports(flexure, "Along their width (y)", lambda evaluation: evaluation.support_y / 1e6),
     )
     caption = (
-        "What the leaves hold against forces across the motion, at the middle of their ends and with all else held: it "
-        "falls as they bend, and that is what the stroke costs."
+        "The stiffness of the leaves against forces across the motion, at the middle of their ends and with all else "
+        "held: it falls as they bend, which is the price of the stroke."
     )
     return Figure("flexure_support", "Support stiffness over the deflection", caption, panels, columns=2)
 

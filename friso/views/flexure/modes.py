@@ -50,7 +50,8 @@ def modes_figure(evaluation: Evaluation) -> Figure:
     ]
     panels = tuple(_panel(evaluation.mechanism, mode, mode is evaluation.modes[0] or mode.interferes) for mode in modes)
     caption = (
-        "The first modes with the cart held and the leaves straight, at a size to be seen. Grey: at rest. The stage is "
+        "The first modes with the cart held and the leaves straight, enlarged to be visible. Grey: at rest. The stage "
+        "is "
         "drawn as the block of its mass and moments of inertia. A mode that actuator and sensor both see limits the "
         "crossover. Torsion of the leaves about their middle lines is not drawn."
     )

@@ -83,8 +83,8 @@ def _control(evaluation: Evaluation) -> str:
         )
     return (
         f"The first mode that interferes with control is {first.name}, at {with_unit(first.frequency, 'Hz')}: by the "
-        f"thesis's rule (ten times the crossover) the crossover may be {with_unit(RULE * first.frequency, 'Hz')} at "
-        "most."
+        "thesis's rule (ten times the crossover) the crossover may be up to "
+        f"{with_unit(RULE * first.frequency, 'Hz')}."
     )
 
 
@@ -158,9 +158,9 @@ def _against(evaluation: Evaluation) -> list[str]:
         return []
     named = listed([f"{mode.name} ({with_unit(mode.frequency, 'Hz')})" for mode in modes], "and")
     return [
-        f"In {named} actuator and sensor move against each other. A controller cannot damp that by phase, and "
-        "[parasitic], which knows only the size of a mode, makes the loop look better than it is: actuate and measure "
-        "at the same point."
+        f"In {named} actuator and sensor move in opposite directions. A controller cannot damp that by phase, and "
+        "[parasitic], which describes only the size of a mode, makes the loop look better than it is: actuate and "
+        "measure at the same point."
     ]
 
 
@@ -173,8 +173,8 @@ def _differences(flexure: Found) -> list[str]:
     if not far:
         return []
     return [
-        f"Closed forms differ from beams in {listed(far, 'and')}: there the leaves are outside the range of the "
-        "former, and the beams count."
+        f"The closed forms differ from the beam model in {listed(far, 'and')}: there the leaves are outside the range "
+        "of the closed forms, and the beam model applies."
     ]
 
 

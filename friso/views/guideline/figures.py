@@ -66,7 +66,7 @@ def _locked(found: Guideline) -> Figure:
         (law,),
         clouds=(_by_end(slip / drop, sweep.edge / mean, sweep),),
     )
-    caption = "Above the points no cycle is known to attract. Left slip limits hunting, right the drop of friction."
+    caption = "Above the points no cycle is known to attract. On the left slip limits hunting, on the right the drop in friction."
     return Figure("guideline_locked", "Where hunting ends, joint locked", caption, (panel,))
 
 
@@ -84,7 +84,8 @@ def _free(found: Guideline) -> Figure:
         clouds=(_by_end(x, y, sweep),),
     )
     caption = (
-        "What the isolator gains: left of 1 the edge follows the joint, far right of it the joint is as good as locked."
+        "What the isolator gains: left of 1 the edge follows the joint; far to the right of 1 the joint is as good as "
+        "locked."
     )
     return Figure("guideline_free", "Where hunting ends, joint free", caption, (panel,))
 

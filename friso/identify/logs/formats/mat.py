@@ -44,14 +44,14 @@ def read_mat(path: Path) -> ChannelTable:
     try:
         tree = _read_hdf5(path) if newer else _read_old(path)
     except Exception as error:  # scipy and h5py let through whatever a broken file makes them stumble over
-        raise LogError("log", f"a MAT file that cannot be read ({error})", "a whole MAT file", "", str(path)) from None
+        raise LogError(
+            "log", f"a MAT file that cannot be read ({error})", "a complete MAT file", "", str(path)
+        ) from None
     found = _Found()
     for name, node in tree.items():
         _walk(node, name, found)
     if found.objects:
-        found.notes.append(
-            f"left out: objects {', '.join(found.objects)}: save as structure with time to have them read"
-        )
+        found.notes.append(f"left out: objects {', '.join(found.objects)}: save them as structure with time")
     if not found.channels:
         given = f"no arrays, but objects: {', '.join(found.objects)}" if found.objects else "no arrays of numbers"
         raise LogError("log", given, "signals: save as structure with time", "", str(path))
@@ -132,7 +132,7 @@ def _with_time(node: dict[str, Any], name: str, found: _Found) -> list[Channel]:
         values = np.squeeze(np.asarray(each.get("values", []), dtype=float))
         values = values.T if values.ndim == 2 and values.shape[0] != time.size else values
         if time.ndim != 1 or values.ndim not in (1, 2) or values.shape[0] != time.size:
-            found.notes.append(f"left out: {source}, {values.shape} values over {time.size} instants")
+            found.notes.append(f"left out: {source}, {values.shape} values for {time.size} time stamps")
             continue
         heading, unit = split_heading(
             _text(each.get("label")) or _text(each.get("blockName")).rpartition("/")[2] or source

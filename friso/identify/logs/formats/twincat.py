@@ -126,7 +126,7 @@ def _floats(path: Path, form: TextLayout, frame: Any, column: int) -> np.ndarray
     if wrong.size:
         line = form.first + 1 + int(cells.index[wrong[0]])
         given = f"{quoted(str(cells.iloc[wrong[0]]))} in line {line}, column {column + 1}"
-        raise LogError("log", given, "numbers all the way down", "", str(path))
+        raise LogError("log", given, "numbers in every row", "", str(path))
     return values
 
 

@@ -32,7 +32,7 @@ def sets_58(path: Path) -> list[dict[str, Any]]:
         numbers = [i for i, kind in enumerate(file.get_set_types()) if kind == 58]
         sets = [file.read_sets(i) for i in numbers]
     except Exception as error:  # pyuff lets through whatever a broken file makes it stumble over
-        raise LogError("log", f"a UFF file that cannot be read ({error})", "a whole file", "", str(path)) from None
+        raise LogError("log", f"a UFF file that cannot be read ({error})", "a complete file", "", str(path)) from None
     if not sets:
         raise LogError("log", "a UFF file without a dataset 58", "time histories or responses", "", str(path))
     return sets
