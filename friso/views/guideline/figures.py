@@ -66,7 +66,10 @@ def _locked(found: Guideline) -> Figure:
         (law,),
         clouds=(_by_end(slip / drop, sweep.edge / mean, sweep),),
     )
-    caption = "Above the points no cycle is known to attract. On the left slip limits hunting, on the right the drop in friction."
+    caption = (
+        "Above the points no cycle is known to attract. On the left slip limits hunting, on the right the drop in "
+        "friction."
+    )
     return Figure("guideline_locked", "Where hunting ends, joint locked", caption, (panel,))
 
 
