@@ -117,7 +117,8 @@ def rig_slow_cycles() -> Values:
 
 
 def rig_constant_speed() -> Values:
-    shown = [place["shown"] for place in rig("constant-speed")["many_speeds"]["places"]]
+    found = rig("constant-speed")
+    shown = [place["shown"] for place in found["many_speeds"]["places"]]
     names = {
         "friction.stribeck_velocity": "stribeck_m_per_s",
         "friction.viscous": "viscous_n_s_per_m",
@@ -125,6 +126,9 @@ def rig_constant_speed() -> Values:
         "friction.static": "static_n",
     }
     values = {short: [place[key]["value"] for place in shown if key in place] for key, short in names.items()}
+    key = "friction.stribeck_velocity"
+    slow = [place["shown"][key]["value"] for place in found["slow_sliding"] if key in place["shown"]]
+    values["slow_stribeck_m_per_s"] = slow
     return {f"{end.__name__}_{name}": end(each) for name, each in values.items() for end in (min, max)}
 
 
