@@ -281,7 +281,7 @@ FREQUENCY = "number and unit in quotes, convertible to Hz, rad/s or rpm, greater
             (
                 "motion.duration",
                 'return_at = "5 s", duration = "5.05 s"',
-                "over within the duration",
+                "finished within the duration",
                 '= "20 s"',
             ),
         ),
@@ -291,7 +291,7 @@ FREQUENCY = "number and unit in quotes, convertible to Hz, rad/s or rpm, greater
             (
                 "motion.return_at",
                 'acceleration_time = "30 ms", return_at = "59 ms"',
-                "over before return_at",
+                "finished before return_at",
                 '"5 s"',
             ),
         ),
