@@ -441,7 +441,7 @@ def test_no_file_and_folder(tmp_path: Path, refused: Refused) -> None:
             {"controller.crossovr": None},
             ["controller.crossovr\n", "a key to remove", "a key that the stage has"],
         ),
-        ({"controller.crossover.hz": 12}, ["controller.crossover.hz\n", "crossover is no table"]),
+        ({"controller.crossover.hz": 12}, ["controller.crossover.hz\n", "crossover is not a table"]),
         ({"controller": "12 Hz"}, ["controller\n", '"12 Hz"', "a table of keys"]),
         ({"controller.kp": "3 N/m"}, ["controller\n", "together with kp", "not both"]),
         ({"joint.locked": "True"}, ["joint.locked\n", '"True"', "true or false"]),

@@ -122,7 +122,7 @@ def test_disturbance_in_volts(tmp_path: Path) -> None:
     mapping = from_options(["disturbance=pulses_N"], scales=["disturbance=35.15 N/V"])
     log = log_of(tmp_path, names, [M["time"], M["position"] * 1e3, pulses, M["force"]], mapping)
     assert log["disturbance"] == pytest.approx(35.15 * pulses)
-    assert told(log.read, "taken in V as the scale says")
+    assert told(log.read, "taken to be in V as the scale implies")
 
 
 def test_unknown_units_are_kept_where_allowed(tmp_path: Path) -> None:
@@ -213,7 +213,7 @@ def test_nan_splits_and_is_counted(tmp_path: Path) -> None:
     values[3][500:503] = np.nan
     log = log_of(tmp_path, NAMES, values)
     assert log.segments == (slice(0, 500), slice(500, 1997))
-    assert told(log.read, "force: 3 samples that are no numbers")
+    assert told(log.read, "force: 3 samples that are not numbers")
     assert all(np.isfinite(each).all() for each in log.signals.values())
     values[3][100:1400] = np.nan
     assert "1300 of 2000" in message(tmp_path, NAMES, values)

@@ -153,7 +153,7 @@ def test_rails_are_swept_over_their_seed(built: Stage) -> None:
     flat = built.flat({"rail.seed": np.arange(3.0), "rail.first_harmonic": np.array([0.1, 0.95, -0.1])})
     where = {why.split(":")[0]: np.broadcast_to(broken, 3).tolist() for broken, why in violations(flat)}
     assert where == {
-        "rail.first_harmonic has to be 0 or greater, below 1": [False, False, True],
+        "rail.first_harmonic must be 0 or greater, below 1": [False, False, True],
         "rail.first_harmonic, rail.second_harmonic, rail.third_harmonic": [False, True, False],
     }
 

@@ -263,7 +263,7 @@ def test_violations_tell_cells_apart(rig: Stage) -> None:
     }
     found = {why: np.broadcast_to(where, 4).tolist() for where, why in violations(rig.flat(swept))}
     assert found == {
-        "masses.cart has to be greater than 0": [False, True, False, True],
+        "masses.cart must be greater than 0": [False, True, False, True],
         "friction.coulomb, friction.static: expected Coulomb friction no larger than static friction": [
             False,
             False,
