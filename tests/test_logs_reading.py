@@ -195,7 +195,7 @@ def test_no_counter_is_left_as_it_is() -> None:
 def test_the_log_tells_of_the_counter(tmp_path: Path) -> None:
     counts = (np.arange(2000.0) * 40) % 65536
     log = log_of(tmp_path, ["time [s]", "position [mm]"], [M["time"], counts])
-    assert told(log.warnings, "counter of 16 bits")
+    assert told(log.warnings, "a 16-bit counter")
     assert log["position"][-1] == pytest.approx(1999 * 40e-3)
 
 

@@ -233,8 +233,8 @@ def _other(key: str) -> str:
 @pytest.mark.parametrize(
     ("changes", "keys", "expected"),
     [
-        ({"drive.ripple_pitch": None}, "drive.ripple, drive.ripple_pitch", "share together with its pitch"),
-        ({"drive.ripple": None}, "drive.ripple, drive.ripple_pitch", "share together with its pitch"),
+        ({"drive.ripple_pitch": None}, "drive.ripple, drive.ripple_pitch", "ripple together with its pitch"),
+        ({"drive.ripple": None}, "drive.ripple, drive.ripple_pitch", "ripple together with its pitch"),
         ({"rail.correlation_length": None}, "rail.correlation_length", "the correlation length of friction"),
         ({"rail.rolling_pitch": None}, "rail.rolling_pitch", "the pitch of the rolling elements"),
         ({"rail.first_harmonic": 0.93}, "rail.first_harmonic, rail.second_harmonic", "add up to less than 1"),

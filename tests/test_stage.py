@@ -270,8 +270,10 @@ def test_violations_tell_cells_apart(rig: Stage) -> None:
             True,
             False,
         ],
-        "parasitic.mass, masses.stage: expected a parasitic mass smaller than the stage mass, "
-        "out of which it is taken": [True] * 4,
+        "parasitic.mass, masses.stage: expected a parasitic mass smaller than the stage mass, of which it is a part": [
+            True
+        ]
+        * 4,
     }
 
 
