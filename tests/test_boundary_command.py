@@ -267,8 +267,8 @@ def test_the_figure_of_two_keys_shows_nodes_and_curves_in_one_legend(crossing: P
     canvas = matplotlib_renderer.render(figure)
     texts = [text.get_text() for text in canvas.legends[0].get_texts()]
     assert texts == [
-        *("an attracting cycle: hunting", "none: no hunting", "not known: orbit not closed"),
-        *("no stage may have these values", "flip of the hunting cycle"),
+        *("an attracting cycle: hunting", "none: no hunting", "unknown: orbit not closed"),
+        *("invalid stage", "flip of the hunting cycle"),
     ]
     names = [trace.name for trace in plotly_renderer.render(figure).data if trace.mode == "lines"]
     assert "flip of the hunting cycle" in names

@@ -229,7 +229,7 @@ def test_the_summary_tells_all_steps(written: tuple[Path, str], snapshots: Snaps
 
 def test_an_isolator_that_is_not_needed_is_weighed(found: Design) -> None:
     (_, first), *_ = headline(found)
-    assert first.startswith("No isolator is needed: without one the crossover has to be")
+    assert first.startswith("No isolator is needed: without one the crossover must be")
     said = " ".join(isolator_step(found).sentences)
     assert "All the same, this is what one brings" in said
     assert "the machine hunts, in its worst corner, up to" in said
@@ -242,7 +242,7 @@ def test_an_isolator_that_is_needed_says_why(found: Design) -> None:
     needed = replace(found, without=limit)
     (_, first), *_ = headline(needed)
     assert first == (
-        "An isolator is needed: without one the crossover has to be 72.0 Hz or more, 1.2 times the edge of hunting; "
+        "An isolator is needed: without one the crossover must be 72.0 Hz or more, 1.2 times the edge of hunting; "
         "the machine allows 48.0 Hz."
     )
     step = isolator_step(needed)
@@ -275,7 +275,7 @@ def test_leaves_and_what_binds_them(found: Design) -> None:
     said = " ".join(leaves_step(found).sentences)
     assert "The first mode that interferes with control is" in said
     names = "the cart must not break away inside the stroke and first interfering frequency"
-    assert f"what binds (less than 5 % to spare): {names}." in said
+    assert f"binding requirements (less than 5 % to spare): {names}." in said
     assert f"Of the {len(found.candidates)} geometries on the front beams confirm" in said
     broken = replace(found.confirmed[0], stiffness=np.nan, frequency=np.nan, failure="no equilibrium")
     other = replace(found, confirmed=(broken, *found.confirmed[1:]))
@@ -372,9 +372,9 @@ def test_front_with_chosen_and_failed_points(found: Design) -> None:
     other = replace(found, confirmed=(broken, *found.confirmed[1:]))
     (panel,) = _figures(other)["design_front"].panels
     by_label = {each.label: each for each in panel.markers}
-    assert [*by_label] == ["by beams", "beams failed", "chosen, by beams"]
+    assert [*by_label] == ["by beams", "beams failed", "chosen, by the beam model"]
     assert by_label["beams failed"].y == pytest.approx([broken.candidate.frequency])
-    assert by_label["chosen, by beams"].x == pytest.approx(found.fitted.choice.beams.drive[:1] / 1e3)
+    assert by_label["chosen, by the beam model"].x == pytest.approx(found.fitted.choice.beams.drive[:1] / 1e3)
     assert [limit.values for limit in panel.limits] == [(10 * found.controller.crossover,), (480.0,)]
 
 
@@ -428,7 +428,7 @@ def test_no_design_says_what_to_relax(no_design: None, tmp_path: Path, capsys: p
         "  relax leaves.length from 70 mm to 74.3 mm (length of the leaves, at most): then 2 leaves of 70 x 20 x 0.3 "
         "mm, 45 mm apart, of stainless 1.4310 do",
         "  relax joint.damping from 0.5 N·s/m to 3.2 N·s/m (crossover above the edge of hunting)",
-        "  (each alone; this is of the leaf springs, the steps after them were not tried)",
+        "  (each one alone; this concerns the leaf springs only, the later steps were not tried)",
     ]
     assert not (tmp_path / "out").exists()
 
@@ -452,7 +452,7 @@ def test_no_design_as_a_document(no_design: None, tmp_path: Path, capsys: pytest
 
 def test_no_single_relaxation() -> None:
     assert refusal(NoDesign("too tight")) == (
-        "too tight\n  no requirement is known that, relaxed alone, is enough: relax several"
+        "too tight\n  no single requirement was found whose relaxation alone is enough: relax several"
     )
     many = refusal(NoDesign("too tight", RELAXED * 3))
     assert len(many.splitlines()) == 7

@@ -141,7 +141,7 @@ def test_document_rows_and_sentences() -> None:
     assert "hunts with a probability of 66.7 % (26.2 to 93.3 %)" in says
     assert "1 draws failed" in says
     assert "smaller values hunt" in says
-    assert "5 draws that no stage may have were left out (2: a key beyond its bound; 3: a rule)" in says
+    assert "5 invalid draws were left out (2: a key beyond its bounds; 3: a rule)" in says
     unknown = draws_document(drawing(made(0, 0, 3)), "given")
     assert unknown["hunts"] == {"probability": None, "low": 0.0, "high": 1.0}
 
@@ -182,7 +182,7 @@ def test_check_draws(
     assert sum(draws["verdicts"].values()) == 8
     assert draws["attracting_cycle"]["probability"] == 0
     page = (tmp_path / "report.html").read_text(encoding="utf-8")
-    assert "What if the numbers are off?" in page
+    assert "What if the parameters are wrong?" in page
     assert "of 8 draws, hunts with a probability of 0.0 %" in page
     beside.write_text('keys = ["masses.cart"]\nmatrix = [[1]]')
     assert run(monkeypatch, "check", path, *options) == 2

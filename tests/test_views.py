@@ -712,14 +712,14 @@ def test_a_transient_is_said_to_be_one():
     known = settles(verdict="transient", hunting=repels, settled_after=190.2, margin=Margin(0.975, 9.7496, True))
     text = sentence(known, peak_to_peak=6.9e-4, period=1.33)
     assert text == (
-        "transient, as no cycle attracts, but this motion has not settled at its end (still 690 µm peak to peak every "
+        "transient: no cycle attracts, but this motion has not settled at its end (still 690 µm peak to peak every "
         "1.33 s). Transients change slowly, by the factor e in 73.1 s. It settles to within 10 µm in 190 s. Hunting is "
         "possible below 9.75 Hz."
     )
     long = sentence(settles(verdict="transient", settled_after=None), peak_to_peak=1e-7)
     assert "(at rest, but off its reference). It does not settle to within 10 µm in 1000 s either." in long
     assert sentence(cannot_hunt("transient"), peak_to_peak=0.383, period=6.36) == (
-        "cannot hunt, as there is no friction to stick to; but this motion has not settled at its end "
+        "cannot hunt, because there is no friction to stick to; but this motion has not settled at its end "
         "(still 383 mm peak to peak every 6.36 s)."
     )
 
@@ -727,7 +727,7 @@ def test_a_transient_is_said_to_be_one():
 def test_a_stage_that_settles_is_told_where_hunting_begins():
     assert sentence(settles()) == "settles to within 1 µm in 823 ms. Hunting is possible below 5.60 Hz."
     assert sentence(settles(margin=None)).endswith("ms. No hunting was found down to 1/10 of this bandwidth.")
-    assert sentence(cannot_hunt()).endswith("ms. It cannot hunt, as there is no friction to stick to.")
+    assert sentence(cannot_hunt()).endswith("ms. It cannot hunt, because there is no friction to stick to.")
     coarse = sentence(settles(), settling_time={1e-6: None, 1e-5: 1.5})
     assert coarse.startswith("settles to within 10 µm in 1.50 s, but does not stay within 1 µm.")
     swings = sentence(settles(), settling_time=NEVER, peak_to_peak=7e-5)

@@ -101,8 +101,8 @@ def _plant(bode: Bode) -> Figure:
         for mass, style in zip(_masses(bode), ("dashed", "dotted"), strict=False)
     )
     caption = (
-        "Stage position over actuator force, at small motions in the limit cases of Table 1 of the thesis (its Fig. 7)"
-        " and on the mass lines. A stuck cart rests on its bristles, a sliding one feels its viscous friction."
+        "Stage position over actuator force for small motions, in the limit cases of Table 1 of the thesis (its Fig. "
+        "7), with the mass lines. A stuck cart rests on its bristles, a sliding one sees viscous friction only."
     )
     if has_limiter(bode):
         in_series = any(name.endswith(SERIES) for name in bode.cases)
@@ -115,8 +115,8 @@ def _plant(bode: Bode) -> Figure:
 def _loop(bode: Bode) -> Figure:
     """The open loop in the limit cases."""
     caption = (
-        "The loop cut at the actuator: controller, plant and, if the stage file has one, the drive. The phase margin is"
-        " the way to −180° where the magnitude passes 0 dB."
+        "The loop cut at the actuator: controller, plant and, if the stage file has one, the drive. The phase margin "
+        "is the distance to −180° where the magnitude crosses 0 dB."
     )
     panels = loop_panels(_hertz(bode), [_loop_of(name, case) for name, case in bode.cases.items()])
     return Figure("bode_loop", "Open loop, limit cases", caption, panels)
@@ -160,8 +160,8 @@ def _nyquist(bode: Bode) -> Figure:
     x, y = (Axis(f"{part} part of L", "", limits) for part, limits in zip(("Real", "Imaginary"), NEAR, strict=True))
     panel = Panel("", x, y, (*family, *cases, circle), (point,), equal=True)
     caption = (
-        "The loop for positive frequencies. Its least distance from −1 is the modulus margin: one above 0.5 stays out "
-        "of the circle."
+        "The loop for positive frequencies. Its smallest distance from −1 is the modulus margin: above 0.5 the loop "
+        "stays outside the circle."
     )
     if family:
         caption += " Light lines: a selection of the family, stuck under bias forces and sliding at all speeds."

@@ -36,8 +36,8 @@ DASHES: dict[str, Dash] = {"flip": "solid", "fold": "dashed", "torus": "dotted"}
 NODES = {
     ATTRACTS: Kind("an attracting cycle: hunting", VERMILLION),
     REPELS: Kind("none: no hunting", QUIET),
-    UNKNOWN: Kind("not known: orbit not closed", "#ffffff"),
-    INVALID: Kind("no stage may have these values", LIGHT),
+    UNKNOWN: Kind("unknown: orbit not closed", "#ffffff"),
+    INVALID: Kind("invalid stage", LIGHT),
 }
 
 REACH = 2.5

@@ -25,8 +25,8 @@ from friso.views.drawing.prefixes import plus_minus, pretty, with_unit
 VERDICTS = {
     ATTRACTS: "an attracting cycle (hunting is possible)",
     REPELS: "none (no hunting)",
-    UNKNOWN: "not known (there should be a cycle, but its orbit could not be closed)",
-    INVALID: "no stage may have these values",
+    UNKNOWN: "unknown (there should be a cycle, but its orbit could not be closed)",
+    INVALID: "invalid stage",
 }
 CYCLES: dict[Shape, str] = {
     "symmetric": "the hunting cycle",
@@ -61,7 +61,7 @@ class Shown:
     def uncertain(self, value: float, error: float) -> str:
         """A value with its error [SI]."""
         if not math.isfinite(error):
-            return f"{self.text(value)} (error not known)"
+            return f"{self.text(value)} (error unknown)"
         return self._with_unit(f"{self.number(value):.6g} ± {self.number(error):.1g}")
 
     def extent(self, values: Array, swept: Range) -> str:

@@ -29,14 +29,16 @@ def _return_maps(shown: list[Shown]) -> Figure:
     """How far each swing reaches against the one before: the map, and this motion's own swings."""
     panels = tuple(panel for item in shown for panel in _return_map(item))
     caption = (
-        "Each swing of the stage past its target (the curve: from the positive side), by its turning point, against "
-        "the one before. Where the curve crosses the dashed diagonal, every swing reaches as far as the last: a "
+        "Each swing of the stage past its target (curve: from the positive side), given by its turning point, against "
+        "the previous one. Where the curve crosses the dashed diagonal, every swing reaches as far as the last: a "
         "hunting cycle, which attracts if the curve is less steep there than the diagonal; where it stays below, "
-        "swings die out. The thin line is this motion after its last move. Beyond the ends of the curve the stage does "
-        "not swing past its target."
+        "swings die out. The thin line is this motion after its last move. Beyond the ends of the curve the stage "
+        "does not swing past its target."
     )
     if any((joint := item.case.stage.joint) and not joint.locked for item in shown):
-        caption += " A stage on a free joint turns farther out than its cart sticks, and somewhat off the curve."
+        caption += (
+            " A stage on a free joint turns farther out than the point where its cart sticks, slightly off the curve."
+        )
     known = [(item.label, item.case.judgement.hunting) for item in shown]
     caption += "".join(f" {label}: no cycle, as {each.reason}." for label, each in known if each.reason)
     return Figure("return-map", "Does the next swing reach as far?", caption, panels, 2, subject(shown))
@@ -89,8 +91,8 @@ def _cycles(shown: list[Shown]) -> Figure:
     panels = tuple(panel for item in shown if item.case.judgement.hunting.cycles for panel in _cycle_panels(item))
     caption = (
         "One period: the stage sticks off its target while the integral action winds up the actuator force, breaks "
-        "away, overshoots and sticks on the other side. Motions near a solid cycle end in it, near a dashed one they "
-        "leave it."
+        "away, overshoots and sticks on the other side. Motions near a solid cycle end in it; motions near a dashed "
+        "one leave it."
     )
     return Figure("cycle", "The hunting cycle", caption, panels, 3, subject(shown))
 

@@ -76,8 +76,8 @@ def draws_sentences(drawing: Drawing) -> list[str]:
     says = [f"{label}: {_sentence(drawing.cases[name], drawing)}" for name, label in drawing.labels.items()]
     if drawn.left_out:
         reasons = [f"{count}: {why}" for why, count in drawn.broken.items()]
-        beyond = [f"{drawn.beyond}: a key beyond its bound"] if drawn.beyond else []
-        says.append(f"{drawn.left_out} draws that no stage may have were left out ({'; '.join([*beyond, *reasons])}).")
+        beyond = [f"{drawn.beyond}: a key beyond its bounds"] if drawn.beyond else []
+        says.append(f"{drawn.left_out} invalid draws were left out ({'; '.join([*beyond, *reasons])}).")
     return says
 
 
@@ -88,10 +88,10 @@ def _sentence(found: Fates, drawing: Drawing) -> str:
         f"has a cycle that attracts with {_percent(found.share(ATTRACTED))}."
     ]
     if failed:
-        says.append(f"{failed} draws failed, and count either way in the intervals.")
+        says.append(f"{failed} draws failed; the intervals cover both outcomes for them.")
     if keys:
         key, how = next(iter(keys.items()))
-        says.append(f"{key} decides most ({how:+.2f}): {'larger' if how > 0 else 'smaller'} values hunt.")
+        says.append(f"{key} matters most ({how:+.2f}): {'larger' if how > 0 else 'smaller'} values hunt.")
     return " ".join(says)
 
 
@@ -105,10 +105,10 @@ def draws_figure(drawing: Drawing) -> Figure:
     """The verdicts over the key that decides most, case by case, as bars on top of each other."""
     panels = [_panel(label, drawing.cases[name], drawing) for name, label in drawing.labels.items()]
     caption = (
-        f"{drawing.drawn.count} stages drawn from what is uncertain (seed {drawing.seed}), by the key that tells best "
-        "those apart that have a cycle that attracts; all other uncertain keys vary too."
+        f"{drawing.drawn.count} stages drawn from the uncertain keys (seed {drawing.seed}), by the key that best "
+        "separates those with an attracting cycle from the others; all other uncertain keys vary too."
     )
-    return Figure("draws", "What if the numbers are off?", caption, tuple(panels), min(2, len(panels)))
+    return Figure("draws", "What if the parameters are wrong?", caption, tuple(panels), min(2, len(panels)))
 
 
 def _panel(label: str, found: Fates, drawing: Drawing) -> Panel:

@@ -93,7 +93,7 @@ def _settled(shown: list[Shown]) -> Figure:
         limits,
     )
     caption = (
-        "Hunting shows as a deviation that keeps coming back; so does a long transient, for a while. Peaks are "
+        "Hunting appears as a deviation that keeps coming back; so does a long transient, for a while. Peaks are "
         "counted as in the thesis (Sec. 3.2.2): after 10 s, higher than 0.1 mm, 0.5 s apart. Below: the size of the "
         "deviation over the whole run, on a logarithmic scale that ends at 1 nm; a stage that hunts never stays under "
         "the lines."
@@ -132,7 +132,7 @@ def _overview(shown: list[Shown]) -> Figure:
         series = (Series(samples(trace_of(item), "time"), force, "force", item.colour),)
         title = f"{item.label}: actuator force"
         panels.append(Panel(title, _TIME, Axis("Force", "N", view), series, limits=bounds))
-    caption = "The whole run. On this scale cases that differ by millimetres may look alike."
+    caption = "The whole run. On this scale cases that differ by millimetres may look the same."
     return Figure("overview", "The motion", caption, tuple(panels), len(shown), subject(shown))
 
 
@@ -198,7 +198,7 @@ def _friction(shown: list[Shown]) -> Figure:
     hunting = any(item.case.peaks for item in cases)
     start, end = _window(shown) if hunting else (-np.inf, np.inf)
     part = f"From {start:g} s on." if hunting else "The whole run."
-    caption = f"{part} The friction force opposes the velocity of the cart. A case that rests is a single point."
+    caption = f"{part} The friction force opposes the velocity of the cart. A case at rest is a single point."
     along = "Cart position from the target" if hunting else "Cart position"
     panels = []
     for title, quantity, unit, name in (

@@ -71,10 +71,10 @@ def _bistable(case: Case) -> str:
 def _transient(case: Case) -> str:
     known, end = case.judgement, _end(case)
     if known.hunting.returns is None:
-        return f"cannot hunt, as {known.hunting.reason}; but this motion has not settled at its end ({end})."
-    says = [f"transient, as no cycle attracts, but this motion has not settled at its end ({end})."]
+        return f"cannot hunt, because {known.hunting.reason}; but this motion has not settled at its end ({end})."
+    says = [f"transient: no cycle attracts, but this motion has not settled at its end ({end})."]
     if known.cycle:
-        says.append(f"Transients change slowly, by the factor e in {with_unit(known.cycle.time_constant, 's')}.")
+        says.append(f"Transients change slowly, by a factor of e in {with_unit(known.cycle.time_constant, 's')}.")
     if known.settled_after is None:
         says.append(f"It does not settle to within {BANDS[_TEN_MICRON]} in {with_unit(LONG, 's')} either.")
     else:
@@ -92,7 +92,7 @@ def _settling(case: Case) -> str:
     else:
         says = f"settles, but not to within {BANDS[_TEN_MICRON]} ({_end(case)})."
     hunting = case.judgement.hunting
-    return says if hunting.returns else f"{says} It cannot hunt, as {hunting.reason}."
+    return says if hunting.returns else f"{says} It cannot hunt, because {hunting.reason}."
 
 
 def _outlook(case: Case) -> list[str]:

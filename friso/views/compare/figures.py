@@ -49,12 +49,14 @@ def figures(found: Comparison) -> list[Figure]:
     within = with_unit(found.within, "m")
     caption = (
         f"{found.machines.count} machines drawn with seed {found.seed}, the same in all options; in position is within "
-        f"{within}. Bars of probabilities are 95 % intervals. Machines that never settle keep a settling time's line "
-        "below 100 %; of standstill, the thin bars hold 90 % of the machines, the thick ones are 95 % intervals of "
+        f"{within}. Bars of probabilities are 95 % intervals. Machines that never settle keep the line of the "
+        "settling times below 100 %; for standstill, the thin bars contain 90 % of the machines, the thick ones are "
+        "95 % "
+        "intervals of "
         "the median."
     )
     if not found.shaken:
-        caption += " No floor shakes them: what rests here need not stand still in a real room."
+        caption += " No floor vibration is included: a machine at rest here need not stand still in a real room."
     panels = (_probabilities(found), _settling(found, within), _standstill(found))
     return [Figure("compare", "Isolator or firmware?", caption, panels, subject=found.stage.name)]
 
@@ -77,7 +79,7 @@ def _probabilities(found: Comparison) -> Panel:
         heights = np.array([100 * each.probability for each in shares])
         markers.append(Markers(x, heights, name, colour))
     y = Axis("Share of machines", "%", (-3.0, 103.0))
-    return Panel("Who does not stand still", _names(found), y, tuple(series), tuple(markers))
+    return Panel("Machines that do not stand still", _names(found), y, tuple(series), tuple(markers))
 
 
 def _other(share: Share) -> Share:
@@ -107,7 +109,7 @@ def _settling(found: Comparison, within: str) -> Panel:
         steps = 100 * np.arange(len(ordered) + 1) / count
         series.append(Series(x, np.repeat(steps, 2), label(result), colour, dash))
     axis = Axis("Time since the end of the move", "s", (start, end), log=True, prefixed=False)
-    return Panel(f"In position to stay, within {within}", axis, Axis("Share", "%", (-3.0, 103.0)), tuple(series))
+    return Panel(f"In position for good, within {within}", axis, Axis("Share", "%", (-3.0, 103.0)), tuple(series))
 
 
 def _standstill(found: Comparison) -> Panel:
@@ -118,7 +120,7 @@ def _standstill(found: Comparison) -> Panel:
         _bars(x, [(each.low, each.high) for each in medians], BLUE, width=4.0),
     )
     y = Axis("In-position RMS", "m", log=True)
-    title = "How still they stand" if found.shaken else "Whether they rest, unshaken"
+    title = "How still they stand" if found.shaken else "Whether they are at rest, without a floor"
     return Panel(title, _names(found), y, series, (Markers(x, middle, "median", BLUE),))
 
 

@@ -47,10 +47,10 @@ def _about(option: Option, found: Comparison) -> str:
         "a": "the controller as in the file",
         "b": _bandwidth(option, found),
         "c": "the controller as in the file",
-        "d": f"the integrator waits while the error is below {deadband}",
-        "e": "the integrator starts anew where the error changes its sign",
-        "f": f"feedforward of Coulomb and viscous friction, both {100 * MODEL_ERROR:g} % too large, or both too small, "
-        "machine by machine",
+        "d": f"the integrator pauses while the error is below {deadband}",
+        "e": "the integrator is reset where the error changes sign",
+        "f": f"feedforward of Coulomb and viscous friction, both {100 * MODEL_ERROR:g} % too large or both too small, "
+        "drawn for each machine",
         "g": _bandwidth(option, found),
     }
     return f"{joint}; {what[option.letter]}"
@@ -146,8 +146,8 @@ def _who_settles(found: Comparison) -> str:
     if not settling:
         best = max(found.results, key=lambda each: each.in_position_count)
         return (
-            f"No option brings {100 * ENOUGH:g} % of the {count} machines into position {within} and keeps them there: "
-            f"{label(best)} has the most there at the end, {percent(best.settled)}."
+            f"No option brings {100 * ENOUGH:g} % of the {count} machines into position {within} and keeps them "
+            f"there: {label(best)} has the most in position at the end, {percent(best.settled)}."
         )
     parts = [f"{label(each)} {_how_many(each, count)}" for each in settling]
     return (
@@ -187,9 +187,9 @@ def _standstill(found: Comparison) -> list[str]:
         "(friso rig in-position)."
     )
     return [
-        "How still they stand is not compared: the stage file has no [floor]. In-position RMS is then that of a "
-        "machine that nothing shakes from outside; it tells whether the machine rests, not how still it stands in a "
-        "real room." + (joint if any(each.letter in JOINT for each in found.results) else "")
+        "Standstill is not compared: the stage file has no [floor]. In-position RMS is then that of a "
+        "machine that nothing shakes from outside; it shows whether the machine is at rest, not how still it would "
+        "stand in a real room." + (joint if any(each.letter in JOINT for each in found.results) else "")
     ]
 
 
@@ -214,15 +214,19 @@ def _choice(found: Comparison) -> str:
     joint, settings = ([each for each in settling if (each.letter in JOINT) is bought] for bought in (True, False))
     if joint and settings:
         return (
-            f"On these machines settings do what a joint does: {_names(settings)} settles them without one, "
-            f"{_names(joint)} with one. The joint is for machines that cannot have what the settings ask."
+            f"On these machines controller settings achieve what a joint achieves: {_names(settings)} settles them "
+            f"without one, {_names(joint)} with one. The joint is for machines on which those settings are not "
+            "possible."
         )
     if joint:
-        return f"On these machines the joint is what settles them: {_names(joint)}; no change of settings alone does."
+        return f"On these machines only the joint settles them: {_names(joint)}; no controller setting alone does."
     if settings:
         said = "and no option with a joint does" if any(each.letter in JOINT for each in found.results) else ""
-        return f"On these machines settings suffice: {_names(settings)}{', ' + said if said else ''}."
-    return "On these machines neither a joint nor settings settle enough of them: see the table for what each leaves."
+        return f"On these machines controller settings suffice: {_names(settings)}{', ' + said if said else ''}."
+    return (
+        "On these machines neither a joint nor controller settings settle enough of them: see the table for what each "
+        "achieves."
+    )
 
 
 def _names(some: Sequence[Result]) -> str:
@@ -237,13 +241,14 @@ def population(found: Comparison) -> list[str]:
     """How the machines were drawn."""
     machines = found.machines
     says = [
-        f"{machines.count} machines drawn with seed {found.seed}, each the same in all options: numbers, rail, noise."
+        f"{machines.count} machines drawn with seed {found.seed}, each the same in all options: parameters, rail, "
+        "noise."
     ]
     if machines.from_file:
-        says.append(f"As uncertain as the file says: {', '.join(machines.from_file)}.")
+        says.append(f"Uncertain as the file says: {', '.join(machines.from_file)}.")
     if machines.spreads:
         spreads = ", ".join(f"{key} ±{spread:g} %" for key, spread in machines.spreads.items())
-        says.append(f"By default spreads (95 % of the machines), the file giving none: {spreads}.")
+        says.append(f"With default spreads (95 % of the machines) because the file gives none: {spreads}.")
     if "rail.seed" in machines.keys:
-        says.append("Each has a rail of its own.")
+        says.append("Each has its own rail.")
     return says

@@ -90,8 +90,8 @@ def _not_higher(design: Design) -> str:
 def _not_lower(design: Design) -> str:
     bounds = lower(design)
     if not bounds:
-        return "Nothing bounds it from below, but the higher, the faster."
-    return f"Not lower: from below it is bounded by {_listed(bounds)}; above these, the higher the faster."
+        return "Nothing limits it from below, but a higher crossover settles faster."
+    return f"Not lower: it is limited from below by {_listed(bounds)}; above that, a higher crossover settles faster."
 
 
 def _listed(bounds: list[Bound]) -> str:
@@ -149,8 +149,8 @@ def _met(design: Design) -> str:
 def _worst(outcome: Outcome) -> str:
     k = outcome.worst
     if outcome.hunts[k]:
-        return f"The worst one, which swings over {plain(outcome.swing[k], 'm')}"
-    return f"The worst one, which takes {seconds(float(outcome.settling[k]))} to settle"
+        return f"The worst move, which swings over {plain(outcome.swing[k], 'm')}"
+    return f"The worst move, which takes {seconds(float(outcome.settling[k]))} to settle"
 
 
 def _outcome(name: str, outcome: Outcome) -> tuple[tuple[str, str], ...]:

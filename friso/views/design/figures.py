@@ -66,7 +66,9 @@ def _front(design: Design) -> Figure:
     points = [
         Markers(*_points(good), "by beams", BLUE),
         *([Markers(*_points(failed), "beams failed", VERMILLION, "cross")] if failed else []),
-        Markers(choice.beams.drive[:1] / 1e3, np.array([choice.frequency]), "chosen, by beams", CHOSEN, "target"),
+        Markers(
+            choice.beams.drive[:1] / 1e3, np.array([choice.frequency]), "chosen, by the beam model", CHOSEN, "target"
+        ),
     ]
     limits = (
         Limit((multiple * design.controller.crossover,), f"{multiple:g} times the crossover chosen", INK),
@@ -141,7 +143,10 @@ def _damping(design: Design) -> Figure:
     x = Axis("Joint damping", "N*s/m", log=bool(damping.tried[0] > 0), prefixed=False)
     top = 1.1 * max(float(damping.margins.max()), WANTED)
     panel = Panel("", x, Axis("Modulus margin", "", (0.0, top)), (line,), points, (limit,))
-    caption = "The least of all settled states, if damping were added to the joint; 0 where one is not stable."
+    caption = (
+        "The smallest margin over all settled states if damping were added to the joint; 0 where one of them is "
+        "unstable."
+    )
     return Figure("design_damping", "Margin over joint damping", caption, (panel,))
 
 
@@ -162,8 +167,8 @@ def _settling(design: Design) -> Figure:
     )
     caption = (
         f"The share of the {free.tried} simulated moves that are in position for good, over the time since the last "
-        "corner of the reference; the same machines with the joint free and locked. A curve that ends below 100 %: the "
-        "others hunt."
+        "corner of the reference; the same machines with the joint free and locked. If a curve ends below 100 %, the "
+        "remaining moves hunt."
     )
     return Figure("design_settling", "Settling times", caption, (panel,))
 

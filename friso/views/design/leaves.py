@@ -76,7 +76,7 @@ def _interfering(design: Design) -> str:
     choice, multiple = design.fitted.choice, design.spec.safety.parasitic
     mode = choice.beams.interfering
     if mode is None:
-        return f"None of the modes looked at interferes with control ({multiple:g} times the crossover is required)."
+        return f"None of the modes considered interferes with control ({multiple:g} times the crossover is required)."
     return (
         f"The first mode that interferes with control is {mode.name}, at {hertz(mode.frequency)}: "
         f"{mode.frequency / design.controller.crossover:.3g} times the crossover ({multiple:g} required)."
@@ -105,8 +105,8 @@ def _why(design: Design) -> str:
     ]
     chosen = "They are the softest of the front that allow this crossover"
     if not binding:
-        return f"{chosen}; no requirement binds but space and sheets."
-    return f"{chosen}; what binds (less than 5 % to spare): {listed(binding, 'and')}."
+        return f"{chosen}; no requirement is binding except space and available thicknesses."
+    return f"{chosen}; binding requirements (less than 5 % to spare): {listed(binding, 'and')}."
 
 
 def _confirmed(design: Design) -> str:

@@ -45,8 +45,8 @@ def joint_step(design: Design) -> Step:
     allowed = task.friction / safety.breakaway / (1 + safety.stiffness_tolerance)
     stiffness, force = newtons_per(beams.drive[0], "mm"), plain(beams.forces[-1], "N")
     held = (
-        f"At full stroke the joint pushes with {force}. The cart breaks away at {plain(task.friction, 'N')} at the "
-        f"least; with the safety factor of {safety.breakaway:g} and a stiffness off by "
+        f"At full stroke the joint pushes with {force}. The cart breaks away at no less than "
+        f"{plain(task.friction, 'N')}; with the safety factor of {safety.breakaway:g} and a stiffness error of "
         f"{safety.stiffness_tolerance:.0%} that allows {allowed:.3g} N, so that it stays stuck inside the stroke."
     )
     sentences = [
@@ -85,10 +85,13 @@ def _stroke(design: Design) -> str:
     if allowed.low == allowed.high:
         return f"The stroke of {size(stroke)} mm is the one specified."
     if stroke == allowed.high:
-        return f"The stroke is the largest specified, {size(stroke)} mm: the larger, the less the limiter is touched."
+        return (
+            f"The stroke is the largest specified, {size(stroke)} mm: the larger it is, the less often the limiter is "
+            "touched."
+        )
     return (
         f"The stroke is {size(stroke)} mm, of {size(allowed.low)} to {size(allowed.high)} mm: with a larger one the "
-        "leaves would have to be so soft that they allow a lower crossover only, or none would do."
+        "leaves would have to be so soft that they allow only a lower crossover, or no leaves would do."
     )
 
 

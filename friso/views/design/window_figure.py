@@ -48,7 +48,7 @@ def window_figure(design: Design) -> Figure:
     caption = (
         f"What bounds the crossover, and the one chosen, {hertz(design.controller.crossover)}. Machine: its limit. "
         f"Leaves: the highest first interfering frequency of the front over {multiple:g}. Margin: modulus margin above "
-        f"{WANTED:g}. Isolator, without: where the machine hunts with it and without it; dots are the edges in the "
+        f"{WANTED:g}. Isolator, without: where the machine hunts with and without it; dots mark the edges in the "
         "corners of friction and masses."
     )
     return Figure("design_window", "The window for the crossover", caption, (panel,))

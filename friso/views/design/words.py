@@ -152,7 +152,7 @@ def gaps(corners: Corners, flat: Mapping[str, Any]) -> np.ndarray | None:
 def refusal(failure: NoDesign) -> str:
     """Why no design meets a specification, and what to relax."""
     if not failure.relaxed:
-        tail = "no requirement is known that, relaxed alone, is enough: relax several"
+        tail = "no single requirement was found whose relaxation alone is enough: relax several"
         return f"{failure.reason}\n  {tail}"
     later = any(change.geometry for change in failure.relaxed)
     tail = ["(each alone; this is of the leaf springs, the steps after them were not tried)"] if later else []

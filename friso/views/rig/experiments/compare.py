@@ -18,7 +18,7 @@ AREA = "#cfdfee"
 LATE = 10.0
 """From where the cycles are shown [s], as those that count."""
 
-ASYMMETRY = "Friction's difference between the two sides"
+ASYMMETRY = "Difference of friction between the two sides"
 
 
 def sentences(outcome: Outcome) -> list[str]:
@@ -26,7 +26,7 @@ def sentences(outcome: Outcome) -> list[str]:
     it: Compared = outcome.result
     even = it.even
     if not even.lives[0]:
-        return ["On an even rail this stage is in no cycle when the run ends: there is nothing to compare with."]
+        return ["On an even rail this stage is not in a cycle when the run ends: there is nothing to compare with."]
     return [
         f"On an even rail the cycle swings by {with_unit(float(even.swing[0]), 'm')} from peak to peak with a period "
         f"of {with_unit(float(even.period[0]), 's')}; from cycle to cycle its period scatters by "
@@ -55,14 +55,15 @@ def _asymmetry(it: Compared) -> str:
     """What ends hunting on rails that vary."""
     rows = [(low, high, *row) for low, high, row in zip(BINS[:-1], BINS[1:], it.by_asymmetry, strict=True)]
     low, high, even, slow = rows[0]
-    parts = [f"{even.probability:.0%} swing on where it differs by less than {high:.0%} (period {slow:.3g} times)"]
+    parts = [f"{even.probability:.0%} keep swinging where it differs by less than {high:.0%} (period {slow:.3g} times)"]
     for low, high, share, slow in rows[1:]:
         if np.isfinite(share.probability):
             upper = f"{low:.0%} to {high:.0%}" if np.isfinite(high) else f"more than {low:.0%}"
             times = f" ({slow:.3g} times)" if np.isfinite(slow) else ""
             parts.append(f"{share.probability:.0%} at {upper}{times}")
     return (
-        "What slows a cycle, and ends it, is friction that differs between the two places where the stage sticks: "
+        "What slows a cycle down, and ends it, is a difference of friction between the two places where the stage "
+        "sticks: "
         f"{', '.join(parts)}."
     )
 
@@ -71,7 +72,8 @@ def _rolling(it: Compared) -> str:
     lives = (it.rolling.lives & ~it.rolling.failed).mean(axis=1)
     parts = [f"{share:.0%} at {size:.0%}" for share, size in zip(lives, it.harmonics, strict=True)]
     return (
-        f"With rolling elements of {with_unit(it.pitch, 'm')} pitch, of so large a first harmonic, swing on: "
+        f"With rolling elements of {with_unit(it.pitch, 'm')} pitch, the following shares keep swinging, by first "
+        "harmonic: "
         f"{', '.join(parts)}."
     )
 
@@ -85,10 +87,10 @@ def _irregular(it: Compared) -> str:
     sides = np.median(np.maximum(above, below) / np.minimum(above, below))
     scatter, heights = (np.median(each[lives]) for each in (it.field.period_scatter, it.field.height_scatter))
     return (
-        f"Such cycles are lopsided: the one side is {sides:.2g} times as high as the other (median). From cycle to "
+        f"Such cycles are lopsided: one side is {sides:.2g} times as high as the other (median). From cycle to "
         f"cycle they repeat: the period scatters by {scatter:.1%}, the heights by {heights:.1%} of the swing. "
-        "The same places do the same each time, so a rail that varies does not make a cycle irregular; what changes "
-        "from cycle to cycle is not in the model."
+        "Friction at a given place is the same every time, so a varying rail does not make a cycle irregular; what "
+        "changes from cycle to cycle is not in the model."
     )
 
 
@@ -99,13 +101,14 @@ def _levels(it: Compared) -> str:
     if not len(found):
         best = np.unravel_index(np.nanargmax(slow), slow.shape)
         return (
-            f"On an even rail no friction levels tried do that; the slowest has {slow[best]:.3g} times the period at "
+            f"On an even rail none of the friction levels tried does that; the slowest has {slow[best]:.3g} times the "
+            "period at "
             f"{swing[best]:.3g} times the swing ({_level(*best)})."
         )
     closest = sorted(map(tuple, found), key=lambda cell: abs(np.log(swing[cell])) + abs(np.log(slow[cell] / 2)))
     named = [f"{_level(*cell)} ({slow[cell]:.3g} and {swing[cell]:.3g})" for cell in closest[:3]]
     return (
-        f"On an even rail {len(found)} of {slow.size} other motors and friction levels do, closest to twice the period "
+        f"On an even rail {len(found)} of {slow.size} other motors and friction levels do; closest to twice the period "
         "at the same swing (period and swing over those of the file): "
         f"{'; '.join(named)}."
     )
@@ -121,7 +124,7 @@ def _others(it: Compared) -> str:
     for name, runs in it.others.items():
         slow, swing = float(it.slower(runs)[0]), float(it.larger(runs)[0])
         parts.append(f"{name}: {f'{slow:.3g} and {swing:.3g}' if np.isfinite(slow) else 'no cycle'}")
-    return f"Else on an even rail, period and swing over those of the file: {'; '.join(parts)}."
+    return f"Other changes on an even rail, period and swing over those of the file: {'; '.join(parts)}."
 
 
 def figures(outcome: Outcome) -> list[Figure]:
@@ -155,12 +158,15 @@ def _maps(it: Compared) -> Figure:
     columns, rows = (np.arange(float(len(words))) for words in (lengths, deviations))
     shares = it.field.lives.mean(axis=2)
     slow = _medians(it.slower(it.field))
-    quantities = (("Share of rails still swinging", shares, (0.0, 1.0)), ("Period over even rail's", slow, None))
+    quantities = (
+        ("Share of rails still swinging", shares, (0.0, 1.0)),
+        ("Period over that of the even rail", slow, None),
+    )
     panels = tuple(
         Panel("", x, y, maps=(Map(columns, rows, values, name, "", limits=limits),))
         for name, values, limits in quantities
     )
-    caption = f"{it.field.lives.shape[2]} rails in each cell; the period is the median of those that swing on."
+    caption = f"{it.field.lives.shape[2]} rails in each cell; the period is the median of those that keep swinging."
     return Figure("compare_rails", "Rails with a random field of friction", caption, panels, columns=2)
 
 
@@ -174,7 +180,7 @@ def _by_asymmetry(it: Compared) -> Figure:
     size, slow = np.abs(it.asymmetry).ravel(), it.slower(it.field).ravel()
     alive = np.isfinite(slow)
     largest = float(size.max())
-    points = Markers(size[alive], slow[alive], "rails that swing on", BLUE)
+    points = Markers(size[alive], slow[alive], "rails that keep swinging", BLUE)
     known = [(low, min(high, largest), row[0]) for low, high, row in zip(BINS, BINS[1:], it.by_asymmetry, strict=False)]
     known = [row for row in known if np.isfinite(row[2].probability)]
     middle = np.array([(low + high) / 2 for low, high, _ in known])
@@ -182,15 +188,17 @@ def _by_asymmetry(it: Compared) -> Figure:
     share, low, high = (np.array([getattr(each, name) for *_, each in known]) for name in ends)
     axis = Axis(ASYMMETRY, "")
     shares = Panel(
-        "share that swings on", axis, Axis("Share of rails", "", (-0.03, 1.03)),
+        "share that keeps swinging", axis, Axis("Share of rails", "", (-0.03, 1.03)),
         (Series(middle, share, "in each class", BLUE),), bands=(Band(middle, low, high, "95 % interval", AREA),),
     )  # fmt: skip
     periods = Panel(
         "period of those", axis, Axis("Period over that of the even rail", ""), markers=(points,),
         limits=(Limit((AS_SLOW,), "nearly twice", INK),),
     )  # fmt: skip
-    caption = "The natural logarithm of static friction, half a swing to one side of the target less to the other."
-    return Figure("compare_asymmetry", "What slows a cycle and ends it", caption, (shares, periods), columns=2)
+    caption = (
+        "The natural logarithm of static friction half a swing to one side of the target, minus that to the other."
+    )
+    return Figure("compare_asymmetry", "What slows a cycle down and ends it", caption, (shares, periods), columns=2)
 
 
 def _level_maps(it: Compared) -> Figure:
@@ -211,7 +219,7 @@ def _level_maps(it: Compared) -> Figure:
 
 
 def _motor(share: float) -> str:
-    return "motor as believed" if share == 1 else f"motor giving {share:.2g} of its force"
+    return "motor as assumed" if share == 1 else f"motor giving {share:.2g} of its force"
 
 
 def numbers(outcome: Outcome) -> dict[str, Any]:

@@ -37,14 +37,14 @@ def sentences(outcome: Outcome) -> list[str]:
         ],
         "and",
     )
-    return [*said, f"The dynamic friction along the way is truly {true} on average.", *_many(found), *_slow(found)]
+    return [*said, f"The true dynamic friction along the way is {true} on average.", *_many(found), *_slow(found)]
 
 
 def _slow(found: ConstantSpeedResult) -> list[str]:
     """What slow sliding shows."""
     if not found.slow:
         return []
-    head = "In slow sliding, joint locked, at the edge of what is steady, mass and bristles being known as they are:"
+    head = "In slow sliding, joint locked, at the limit of steady motion, with the true mass and bristles known:"
     return [head, *map(_slow_place, found.slow)]
 
 
@@ -99,7 +99,7 @@ def figures(outcome: Outcome) -> list[Figure]:
         )
         for each in found.cases
     )
-    caption = "Commanded force, averaged over places, on the way there; the way back goes with it in the log."
+    caption = "Commanded force on the way there, averaged over places; the log also has the way back."
     title = "Force at constant speed"
     return [
         Figure("rig_constant_speed", title, caption, panels, columns=1, subject=outcome.stage.name),
@@ -128,9 +128,10 @@ def _over_velocity(outcome: Outcome) -> Figure:
     return Figure(
         "rig_friction_over_velocity",
         "Friction over velocity, joint locked",
-        f"Crossover {with_unit(many.crossover, 'Hz')}. Mean commanded force of each steady pass, there and back, the "
-        "force of inertia and the constant pull of the cables taken off; the lines are the true friction, with the "
-        "drag of the cables, on average over the stretch that all passes share. Speeds without a mark were not steady.",
+        f"Crossover {with_unit(many.crossover, 'Hz')}. Mean commanded force of each steady pass, there and back, "
+        "without the force of inertia and the constant pull of the cables; the lines are the true friction, including "
+        "the drag of the cables, averaged over the stretch that all passes share. Speeds without a mark were not "
+        "steady.",
         (Panel("", Axis("Speed", "m/s", log=True), Axis("Friction", "N"), tuple(lines), markers=tuple(points)),),
         subject=outcome.stage.name,
     )

@@ -48,10 +48,10 @@ def sentences(outcome: Outcome) -> list[str]:
         f"{with_unit(found.locked.band[1], 'Hz')}.",
         f"Joint free: first mode near {with_unit(found.free.first_mode, 'Hz')}, above it a mass of "
         f"{_mass(found.free.mass)}.",
-        f"A motor that gives {RATIOS[1]:g} of the force believed makes these masses {found.apparent[0, 1]:.3g} and "
+        f"A motor that gives {RATIOS[1]:g} of the assumed force makes these masses {found.apparent[0, 1]:.3g} and "
         f"{found.apparent[1, 1]:.3g} kg; one that gives {RATIOS[2]:g} times the force makes them "
-        f"{found.apparent[0, 2]:.3g} and {found.apparent[1, 2]:.3g} kg: what looks heavier is a motor weaker than "
-        "believed.",
+        f"{found.apparent[0, 2]:.3g} and {found.apparent[1, 2]:.3g} kg: a machine that appears heavier has a motor "
+        "weaker than assumed.",
         f"Locked, the open loops cross 0 dB tuned to {tuned}, {above} at the highest of these settings.{unstable}",
         f"Free, the loop tuned to {with_unit(found.free_loop.tuned, 'Hz')} crosses at "
         f"{with_unit(found.free_loop.crossings[-1].value if found.free_loop.crossings else None, 'Hz')}; the highest "
@@ -135,7 +135,7 @@ def _loops(name: str, title: str, loops: tuple[MeasuredLoop, ...], subject: str)
         Panel("", _frequency(hertz), Axis("Phase", "°", step=90.0), angles, limits=(Limit((-180.0,), "", INK),)),
     )
     told = "; ".join(f"{each.tuned:.3g} Hz: {_crossings(each)}" for each in loops)
-    return Figure(f"rig_frf_{name}", title, f"Tuned, and where 0 dB is crossed: {told}.", panels, subject=subject)
+    return Figure(f"rig_frf_{name}", title, f"Tuned to, and crossing 0 dB at: {told}.", panels, subject=subject)
 
 
 def _crossings(loop: MeasuredLoop) -> str:

@@ -64,7 +64,7 @@ def _cycle(it: HuntingResult) -> str:
     lives = runs.lives[it.shown[0]]
     hunting = int((runs.peaks[it.shown[0]] > 0).sum())
     if not lives.any():
-        return "With the joint locked no rail is left in a cycle when the run ends."
+        return "With the joint locked no rail is in a cycle when the run ends."
     swing, period = runs.swing[it.shown[0]][lives], runs.period[it.shown[0]][lives]
     return (
         f"Of the {hunting} locked ones that hunt by the thesis's metric, {int(lives.sum())} still do when the run "
@@ -160,7 +160,7 @@ def _crossovers(it: HuntingResult) -> Figure:
     return Figure(
         "hunting_crossovers",
         f"The same move at other crossovers{_on(it)}",
-        "What is left of the error after the move (Fig. 25 shows the joint locked).",
+        "The error that remains after the move (Fig. 25 shows the joint locked).",
         tuple(panels),
         columns=2,
     )

@@ -26,9 +26,9 @@ def sentences(outcome: Outcome) -> list[str]:
         f"Settled at {it.crossover:.3g} Hz, the stage deviates by {with_unit(locked[0], 'm')} RMS "
         f"(peak {with_unit(locked[1], 'm')}) with the joint locked and by {with_unit(free[0], 'm')} RMS "
         f"(peak {with_unit(free[1], 'm')}) with it free: {it.ratio('all'):.2g} times as much.",
-        f"What moves it has to be assumed: {floor}, and a noise of the drive's force of "
-        f"{with_unit(it.amplifier, 'N')} RMS (assumed: rounding to {BITS} bits). Alone, RMS with the joint locked and "
-        f"free: {'; '.join(_source(it, source) for source in SOURCES[:-1])}.",
+        f"The disturbances must be assumed: {floor}, and a noise of the drive's force of "
+        f"{with_unit(it.amplifier, 'N')} RMS (assumed: rounding to {BITS} bits). Each one alone, RMS with the joint "
+        f"locked and free: {'; '.join(_source(it, source) for source in SOURCES[:-1])}.",
         _damping(it),
         *_after(it),
     ]
@@ -45,14 +45,14 @@ def _damping(it: InPosition) -> str:
     factor = it.damping / it.own
     ten = int(np.argmin(abs(np.log(factor / 10))))
     if recovered[best] < 0.01:
-        return "More damping of the joint does not recover any of the difference."
+        return "More damping in the joint recovers none of the difference."
     return (
-        f"Damping of the joint recovers little of the difference: {recovered[ten]:.0%} at {factor[ten]:.3g} times its "
-        f"own {with_unit(it.own, 'N*s/m')}, and {recovered[best]:.0%} at the most tried, "
-        f"{with_unit(it.damping[best], 'N*s/m')}. The rest is stiffness: the bearing that sticks holds the locked "
-        "stage, only the joint and the controller hold the free one."
+        f"Damping in the joint recovers little of the difference: {recovered[ten]:.0%} at {factor[ten]:.3g} times its "
+        f"own {with_unit(it.own, 'N*s/m')}, and at most {recovered[best]:.0%}, at "
+        f"{with_unit(it.damping[best], 'N*s/m')}. The rest is due to stiffness: the locked stage is held by the "
+        "sticking bearing, the free one only by the joint and the controller."
         if recovered[ten] < 0.5
-        else f"Damping of the joint recovers {recovered[ten]:.0%} of the difference at {factor[ten]:.3g} times its own "
+        else f"Damping in the joint recovers {recovered[ten]:.0%} of the difference at {factor[ten]:.3g} times its own "
         f"{with_unit(it.own, 'N*s/m')}, and {recovered[best]:.0%} at {with_unit(it.damping[best], 'N*s/m')}."
     )
 
@@ -86,7 +86,7 @@ def _spectra(it: InPosition) -> Figure:
         ]
         densities = Axis("Amplitude density", "m/Hz^0.5", (1e-14, 1e-6), log=True)
         panels.append(Panel(f"joint {case}", Axis("Frequency", "Hz", log=True), densities, tuple(lines)))
-    title = "What each disturbance does to the position"
+    title = "Effect of each disturbance on the position"
     return Figure("in_position_spectra", title, "One-sided spectra of the true position.", tuple(panels), columns=2)
 
 
@@ -98,7 +98,7 @@ def _over_damping(it: InPosition) -> Figure:
     )
     y = Axis("RMS deviation", "m", (0.0, 1.2 * float(it.damped.true[:, 0].max())))
     panel = Panel("", Axis("Damping of the joint", "N*s/m", log=True), y, (free,), limits=limits)
-    return Figure("in_position_damping", "What damping of the joint recovers", "All disturbances.", (panel,))
+    return Figure("in_position_damping", "What damping in the joint recovers", "All disturbances.", (panel,))
 
 
 def numbers(outcome: Outcome) -> dict[str, Any]:

@@ -20,12 +20,12 @@ def sentences(outcome: Outcome) -> list[str]:
     rails = len(found.found)
     truth = range_with_unit(float(found.true.min()), float(found.true.max()), "N")
     if not len(forces):
-        return [f"On {rails} stretches of rail the cart shows no slips; static friction there is truly {truth}."]
+        return [f"On {rails} stretches of rail the cart shows no slips; the true static friction there is {truth}."]
     return [
         f"At {with_unit(found.speed, 'm/s')} and {with_unit(SPEEDS[1] * found.speed, 'm/s')} the cart breaks away "
         f"{len(forces)} times on {rails} stretches of rail, at "
         f"{range_with_unit(float(forces.min()), float(forces.max()), 'N')}.",
-        f"Static friction there is truly {truth}; the mean where the cart went lies in the 95 % interval on "
+        f"The true static friction there is {truth}; its mean where the cart went lies in the 95 % interval on "
         f"{int(shown.sum())} of {rails}.",
     ]
 
@@ -62,7 +62,7 @@ def figures(outcome: Outcome) -> list[Figure]:
         ),
         Panel("", seconds, Axis("Cart velocity", "m/s"), (Series(time, first.cart_velocity, "", BLUE, width=1.0),)),
     )
-    caption = "The joint deflects while the cart sticks; where it peaks the cart breaks away, and its velocity spikes."
+    caption = "The joint deflects while the cart sticks; at each peak the cart breaks away, and its velocity spikes."
     typical = Figure("rig_stiction", "Slow motion with stick-slip", caption, panels, subject=outcome.stage.name)
     return [typical, _rails(found, outcome.stage.name)]
 
@@ -80,7 +80,7 @@ def _rails(found: Stiction, subject: str) -> Figure:
         markers=(Markers(rows, found.forces, "read at a slip", INK),),
         bands=(truth,),
     )
-    caption = "A finite force rate lets the cart break away somewhat before its static friction is reached."
+    caption = "At a finite force rate the cart breaks away slightly before its static friction is reached."
     return Figure("rig_stiction_rails", "Break-away along the rail", caption, (panel,), subject=subject)
 
 

@@ -23,7 +23,7 @@ def sentences(outcome: Outcome) -> list[str]:
     ]
     if found.motor_constant_ratio != 1:
         said.append(
-            f"The motor gives {found.motor_constant_ratio:g} of the force believed, which alone makes it look like "
+            f"The motor gives {found.motor_constant_ratio:g} of the assumed force, which alone would make it appear as "
             f"{with_unit(found.apparent, 'N/m', 4)}."
         )
     return said
@@ -54,7 +54,7 @@ def figures(outcome: Outcome) -> list[Figure]:
             ),
         ),
     )
-    caption = "Position steps with the cart fixed; differences of the settled levels are the stiffness."
+    caption = "Position steps with the cart fixed; the differences of the settled levels give the stiffness."
     return [Figure("rig_stiffness", "Joint stiffness by steps", caption, panels, subject=outcome.stage.name)]
 
 
