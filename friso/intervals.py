@@ -133,7 +133,7 @@ def uncertain_value(text: str, of: Quantity | Number) -> UncertainValue:
         if interval.low < interval.high and not any(
             of.bound.holds(interval.at(0.5 + side)) for side in (-_BESIDE, _BESIDE)
         ):
-            raise _Refused("none of the numbers beside the centre is allowed")
+            raise _Refused("no number near the centre is allowed")
     except _Refused as refused:
         expected = f'{of.expected}; or with its uncertainty, "VALUE +/- HALF-WIDTH" or "LOW .. HIGH"'
         raise InputError("", quoted(text, str(refused)), expected, f'"{of.example} +/- 5 %"') from None
@@ -145,7 +145,7 @@ class _Refused(Exception):
 
 
 def _reach(interval: Interval, of: Quantity | Number) -> str:
-    return f"reaches from {interval.low:g} to {interval.high:g} {of.unit}".rstrip()
+    return f"ranges from {interval.low:g} to {interval.high:g} {of.unit}".rstrip()
 
 
 def _read(entry: Any, of: Quantity | Number) -> tuple[float, Interval]:

@@ -163,7 +163,7 @@ _LONGEST = 100
 def _read(entry: Any, si_unit: str) -> Value:
     """Number times factor, in exact arithmetic: "30 ms" is the float 0.03. Raises _Refused."""
     if isinstance(entry, int | float) and not isinstance(entry, bool):
-        raise _Refused("a bare number, its unit is missing")
+        raise _Refused("a bare number without a unit")
     if not isinstance(entry, str):
         raise _Refused("not a text")
     number, unit = _split(entry)
@@ -176,7 +176,7 @@ def _read(entry: Any, si_unit: str) -> Value:
     except OverflowError:
         raise _Refused("too large") from None
     if value == 0 and re.search("[1-9]", re.split("[eE]", number)[0]):
-        raise _Refused("too small, it would become 0")
+        raise _Refused("too small: it would be rounded to 0")
     return Value(value, entry)
 
 

@@ -70,7 +70,7 @@ def _falls(population: Population, flat: Mapping[str, Any]) -> None:
     static, coulomb = (population.keys.get(f"friction.{name}") for name in ("static", "coulomb"))
     if static is not None and coulomb is not None and np.all(coulomb >= static):
         text = f"static friction up to {static.max():g} N with Coulomb friction from {coulomb.min():g} N on"
-        expected = "static friction above Coulomb friction, which is the stage file's where the specification has none"
+        expected = "static friction above Coulomb friction (that of the stage file where the specification gives none)"
         raise InputError("friction.static", text, expected, 'static = "1 N .. 3 N", gap = "0.3 .. 0.85"')
 
 

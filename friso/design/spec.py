@@ -112,7 +112,7 @@ class Machine(Section):
         if (self.bandwidth_limit is None) == (self.parasitic_frequencies is None):
             text = "both" if self.bandwidth_limit else "neither"
             example = 'bandwidth_limit = "48 Hz" or parasitic_frequencies = ["480 Hz"]'
-            raise SpecError("", text, "the bandwidth limit, or the parasitic frequencies that decide it", example)
+            raise SpecError("", text, "the bandwidth limit, or the parasitic frequencies that determine it", example)
         return self
 
 

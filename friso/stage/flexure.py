@@ -115,7 +115,8 @@ class _Leaves(UncertainSection):
                 f"inertia_{axis} = {quoted(moment.text)}" for axis, moment in zip("xyz", moments, strict=True)
             )
             example = 'inertia_x = "2e-4 kg*m^2", inertia_y = "3e-4 kg*m^2", inertia_z = "3e-4 kg*m^2"'
-            raise StageError("inertia", text, "none larger than the sum of the other two, as in all bodies", example)
+            expected = "none larger than the sum of the other two, as for any rigid body"
+            raise StageError("inertia", text, expected, example)
         return self
 
     @model_validator(mode="after")

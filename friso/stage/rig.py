@@ -176,5 +176,5 @@ class Floor(Section):
         for low, high in pairwise(self.frequency):
             if not low < high:
                 text = f"{quoted(high.text)} after {quoted(low.text)}"
-                raise StageError("frequency", text, "frequencies that rise", 'frequency = ["1 Hz", "10 Hz", "100 Hz"]')
+                raise StageError("frequency", text, "increasing frequencies", 'frequency = ["1 Hz", "10 Hz", "100 Hz"]')
         return self

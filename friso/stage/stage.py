@@ -124,7 +124,7 @@ class Stage(Section):
         followed = (key for key in flat if key.startswith(("parasitic.", "joint.")))
         lost = [key for key in followed if not isinstance(flat[key], bool) and not np.isfinite(flat[key])]
         if lost:
-            text = f"leaf springs of which {lost[0]} cannot be computed"
+            text = f"leaf springs for which {lost[0]} cannot be computed"
             raise StageError("flexure", text, "sizes of leaf springs", 'length = "70 mm", width = "45 mm"')
 
     def _written(self, rule: Rule) -> str:

@@ -81,7 +81,7 @@ def _mass(worked: Worked) -> Claim:
     )
     falls = [_verdict(after < before, before, after) for before, after in pairwise(edges)]
     falls = falls if None in falls else [all(falls)]
-    return Claim("Fig. 11B", "more mass helps", text, "the edge falls all the way", _judged(falls))
+    return Claim("Fig. 11B", "more mass helps", text, "the edge falls monotonically", _judged(falls))
 
 
 def _stiffness(worked: Worked) -> Claim:

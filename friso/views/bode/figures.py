@@ -126,8 +126,8 @@ def _speeds(bode: Bode) -> Figure:
     """The open loop at prescribed speeds of the cart (thesis, Fig. 8); no panels without friction."""
     caption = (
         "The same while the cart slides at a prescribed speed"
-        f"{', limiter free' if has_limiter(bode) else ''} (thesis, Fig. 8): the faster, the sooner the bristles give"
-        " way. Where friction falls as the speed rises, the loop may be unstable (dashed)."
+        f"{', limiter free' if has_limiter(bode) else ''} (thesis, Fig. 8): the faster it slides, the sooner the "
+        "bristles yield. Where friction falls with speed, the loop may be unstable (dashed)."
     )
     count = len(bode.prescribed)
     styles = zip(ramp(count + 1)[:count], np.linspace(2.6, 1.2, count), strict=True)  # the last shade is light
@@ -197,9 +197,9 @@ def _sensitivity(bode: Bode) -> Figure:
     largest = max(float(np.max(part)) for part in (*(line.y for line in lines), *(band.high for band in bands)))
     limit = Limit((-decibels(WANTED),), f"{-decibels(WANTED):.0f} dB: modulus margin {WANTED:g}", INK)
     axis = Axis("|1/(1 + L)|", "dB", (LEAST_SENSITIVITY, max(10.0, 1.08 * largest)))
-    caption = "How much of a disturbance is left: above 0 dB the controller makes it worse."
-    lost = f"; {(~stable).sum()} unstable ones are left out, and close to them it reaches any height"
-    note = f"Band: least to greatest of {stable.sum()} stable states{'' if stable.all() else lost}." if bands else ""
+    caption = "How much of a disturbance remains: above 0 dB the controller amplifies it."
+    lost = f"; {(~stable).sum()} unstable ones are left out; near them the sensitivity is unbounded"
+    note = f"Band: smallest to largest of {stable.sum()} stable states{'' if stable.all() else lost}." if bands else ""
     panel = Panel("", _frequency(_hertz(bode)), axis, lines, limits=(limit,), bands=bands)
     return Figure("bode_sensitivity", "Sensitivity", caption, (panel,), note=note)
 

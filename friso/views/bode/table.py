@@ -29,7 +29,7 @@ def decibels(factor: float) -> float:
 def growth(margins: Margins) -> str:
     """How fast a deviation from an unstable state grows; on the edge of stability it does not."""
     if margins.on_the_edge:
-        return "neither dies out nor grows"
+        return "neither decays nor grows"
     pole = margins.poles[margins.poles.real.argmax()]
     swings = f", swinging at {with_unit(abs(pole.imag) / (2 * np.pi), 'Hz')}" if pole.imag else ""
     return f"grows e-fold in {with_unit(1 / pole.real, 's')}{swings}"

@@ -60,9 +60,9 @@ def _margin(margins: Margins) -> str:
 def crossover_heading(bode: Bode) -> str:
     """What the sentences of `crossovers` are about."""
     if len(bode.scan.members) == 1:
-        return f"How fast this controller may be, {_subject(bode)}:"
+        return f"How fast this controller can be, {_subject(bode)}:"
     settled = "settled states" if has_friction(bode) else "limit cases"
-    return f"How fast this controller may be, {_subject(bode)} that suit all {settled}:"
+    return f"How fast this controller can be, {_subject(bode)} at which all {settled} are stable:"
 
 
 def crossovers(bode: Bode) -> dict[str, str]:
@@ -147,8 +147,8 @@ def _why(bode: Bode) -> list[str]:
     """What makes states unstable: friction that falls with speed, or tuning."""
     settled = all(case.margins.stable for name, case in bode.cases.items() if not name.endswith(SERIES))
     if not (settled and bode.scan.stable[bode.scan.members.stuck].all()):
-        even = ": not even the settled states (as below) are all stable" if has_friction(bode) else ""
-        return [f"That is a matter of tuning{even}."]
+        even = ": not even all settled states (listed below) are stable" if has_friction(bode) else ""
+        return [f"This is a matter of tuning{even}."]
     if not all(speeds.falling for speeds in bode.unstable):
         return []
     return [

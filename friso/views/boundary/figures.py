@@ -68,7 +68,7 @@ def _diagram(traced: Diagram, key: Shown) -> Figure:
     )
     bounds = Limit((-1.0, 1.0), "", GREY, "dotted")
     panels = (*panels[:2], replace(panels[2], title="A cycle attracts between −1 and 1", limits=(bounds,)))
-    styles = "Solid: the cycle attracts, motions near it end in it. Dashed: it repels."
+    styles = "Solid: the cycle attracts, nearby motions end in it. Dashed: it repels."
     note = f"{styles if branches else 'No cycle was found.'} {end_sentence(traced, key)}"
     return Figure("boundary", "Hunting cycles", note, panels, note=note)
 

@@ -148,7 +148,7 @@ def _corners(traced: Plane, keys: tuple[Shown, ...]) -> list[str]:
 
 def _lost(traced: Plane, keys: tuple[Shown, ...]) -> list[str]:
     places = [_place(values, keys) for values in lost_places(traced).tolist()]
-    return [f"A change was seen near {'; '.join(places)}, but no curve could be begun there."] if places else []
+    return [f"A change was found near {'; '.join(places)}, but no curve could be started there."] if places else []
 
 
 def _place(values: Sequence[float], keys: tuple[Shown, ...]) -> str:

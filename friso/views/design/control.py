@@ -77,13 +77,13 @@ def parallel_gains(design: Design) -> tuple[float, float, float]:
 
 def _not_higher(design: Design) -> str:
     bounds, crossover = upper(design), design.controller.crossover
-    text = f"Not higher: it is bounded by {_listed(bounds)}."
+    text = f"Not higher: it is limited by {_listed(bounds)}."
     short = 1 - crossover / bounds[0].value
     if short < ROUNDED:
         return text
     return (
-        f"{text} It stays {percent(short)} below the first of these: sizes in whole tenths of a millimetre, and "
-        "their confirmation by beams take that."
+        f"{text} It stays {percent(short)} below the first of these: sizes rounded to tenths of a millimetre, and "
+        "confirmation by the beam model, cost that much."
     )
 
 
@@ -101,8 +101,8 @@ def _listed(bounds: list[Bound]) -> str:
 def _margin(design: Design) -> str:
     controller = design.controller
     return (
-        f"The least modulus margin of the settled states is {controller.margin:.3g} as designed and "
-        f"{controller.corners.min():.3g} over the corners ({WANTED:g} is wanted)."
+        f"The smallest modulus margin of the settled states is {controller.margin:.3g} as designed and "
+        f"{controller.corners.min():.3g} over the corners ({WANTED:g} is required)."
     )
 
 
@@ -113,11 +113,11 @@ def _damping(design: Design) -> str:
     if worth == 0 or best < (1 + LITTLE) * as_designed:
         return (
             f"More damping in the joint is not worth adding: {now}, and none up to {plain(damping.tried[-1], 'N*s/m')} "
-            f"makes more of it than {best:.3g}."
+            f"raises it above {best:.3g}."
         )
     return (
         f"Damping in the joint is worth adding: {now}, with {plain(damping.tried[worth], 'N*s/m')} it is "
-        f"{damping.margins[worth]:.3g}; more brings little."
+        f"{damping.margins[worth]:.3g}; more damping adds little."
     )
 
 
@@ -129,7 +129,7 @@ def moves_step(design: Design) -> Step:
     sentences.append(f"{settling(free)}. With the joint locked: {other[0].lower()}{other[1:]}, and {hunting(locked)}.")
     broken = len(free.completed) - free.tried
     if broken:
-        sentences.append(f"{broken} moves could not be simulated to their end and do not count.")
+        sentences.append(f"{broken} moves could not be simulated to the end and do not count.")
     sentences += [_met(design), f"{_worst(free)}: worst.toml"]
     facts = (
         *(row for name, outcome in (("free", free), ("locked", locked)) for row in _outcome(name, outcome)),

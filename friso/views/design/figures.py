@@ -75,7 +75,7 @@ def _front(design: Design) -> Figure:
         Limit((multiple * design.spec.limit,), f"{multiple:g} times the machine's limit", ORANGE),
     )
     axes = Axis("Drive stiffness", "N/mm", prefixed=False), Axis("First interfering frequency", "Hz")
-    line = Series(*_points(design.candidates), "front, by closed forms", GREY, width=1.8)
+    line = Series(*_points(design.candidates), "front, by the closed forms", GREY, width=1.8)
     sheets = sorted(
         {candidate.geometry.sheet for candidate in design.candidates},
         key=lambda sheet: (sheet.thickness, sheet.leaves),
@@ -119,8 +119,8 @@ def _map(design: Design) -> Figure:
     panel = Panel("", *axes, tuple(upright), (point,), maps=(field,))
     caption = (
         f"The share of the {design.edges.population.count} corners of friction and masses in which the stage is not in "
-        "position a quarter of a minute after a typical move: it hunts, or creeps so slowly that it may as well. Drive "
-        "stiffness as chosen."
+        "position a quarter of a minute after a typical move: it hunts, or creeps so slowly that it might as well "
+        "hunt. Drive stiffness as chosen."
     )
     return Figure("design_map", "Hunting over crossover and stroke", caption, (panel,))
 

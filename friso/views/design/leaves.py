@@ -90,7 +90,8 @@ def _strength(design: Design) -> str:
     margin = beams.buckling / load
     forms = ", met by the closed forms" if margin < safety.buckling else ""
     return (
-        f"Bent by the stroke alone, the clamps bear {megapascals(beams.clamp_stress)}, {beams.yield_margin:.3g} "
+        f"With the stroke alone, the stress at the clamps is {megapascals(beams.clamp_stress)}, "
+        f"{beams.yield_margin:.3g} "
         f"times below yield{fatigue} ({safety.strength:g}{required} required). The leaves buckle at "
         f"{plain(beams.buckling, 'N')}, {margin:.3g} times the {load:.3g} N that they carry ({safety.buckling:g} "
         f"required{forms})."
@@ -103,7 +104,7 @@ def _why(design: Design) -> str:
     binding = [
         requirement.name for requirement, share in zip(choice.requirements, choice.excess, strict=True) if share > BINDS
     ]
-    chosen = "They are the softest of the front that allow this crossover"
+    chosen = "They are the softest on the front that allow this crossover"
     if not binding:
         return f"{chosen}; no requirement is binding except space and available thicknesses."
     return f"{chosen}; binding requirements (less than 5 % to spare): {listed(binding, 'and')}."
@@ -123,9 +124,10 @@ def _confirmed(design: Design) -> str:
     apart = f", within {percent(max(off))} of the closed forms" if off else ""
     broken = f"; {failed} could not be computed" if failed else ""
     passed = len(design.fitted.choice.passed_over)
-    over = f" {passed} softer ones fell short by beams and were passed over." if passed else ""
+    over = f" {passed} softer ones failed in the beam model and were skipped." if passed else ""
     return (
-        f"Of the {len(design.candidates)} geometries on the front beams confirm {len(confirmed)} of {len(tried)} "
+        f"Of the {len(design.candidates)} geometries on the front the beam model confirms {len(confirmed)} of "
+        f"{len(tried)} "
         f"tried{apart}{broken}.{over}"
     )
 

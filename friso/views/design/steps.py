@@ -59,7 +59,7 @@ def joint_step(design: Design) -> Step:
     facts = (
         ("Drive stiffness", stiffness),
         ("Stroke to each side", f"{size(task.stroke)} mm"),
-        ("Departure from linear over the stroke", f"{100 * beams.nonlinearity:.2g} %"),
+        ("Deviation from linear over the stroke", f"{100 * beams.nonlinearity:.2g} %"),
         ("Force at full stroke", force),
         ("Least static friction", plain(task.friction, "N")),
         (
@@ -103,8 +103,7 @@ def _worst(corners: Corners, design: Design) -> list[str]:
         sentences.append(f"Worst of {count} corners: {corner(corners, design.stage.flat())}.")
     if corners.unknown:
         sentences.append(
-            f"In {corners.unknown} corners a run that had to decide failed at some crossover: there it counts as "
-            "hunting."
+            f"In {corners.unknown} corners a decisive run failed at some crossover; there the corner counts as hunting."
         )
     return sentences
 
@@ -115,12 +114,12 @@ def _gap(design: Design) -> list[str]:
     if losses is None:
         return []
     small = design.without.edges[losses < GAP]
-    text = f"Breaking away, the cart loses {losses.min():.3g} to {losses.max():.3g} N of its friction."
+    text = f"When it breaks away, the cart loses {losses.min():.3g} to {losses.max():.3g} N of its friction."
     if not small.size:
-        return [f"{text} That is more than the {GAP:g} N that hunting needs by the thesis."]
+        return [f"{text} That is more than the {GAP:g} N that hunting needs according to the thesis."]
     hunting = small[small > 0]
     if not hunting.size:
         return [f"{text} Corners with less than {GAP:g} N do not hunt, as the thesis found."]
     top = hunting.max()
     reach = f"up to {hertz(float(top))}" if top < design.without.searched[1] else "at all crossovers searched"
-    return [f"{text} By the thesis hunting needs about {GAP:g} N; here corners with less hunt too, {reach}."]
+    return [f"{text} According to the thesis hunting needs about {GAP:g} N; here corners with less also hunt, {reach}."]

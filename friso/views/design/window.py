@@ -37,7 +37,7 @@ def upper(design: Design) -> list[Bound]:
     bounds = [
         Bound(design.spec.limit, "the machine's limit"),
         Bound(stiffest(design), front),
-        Bound(comfortable(design)[1], f"above, the modulus margin is under {WANTED:g}"),
+        Bound(comfortable(design)[1], f"above it the modulus margin is below {WANTED:g}"),
     ]
     return sorted((bound for bound in bounds if np.isfinite(bound.value)), key=lambda bound: bound.value)
 
@@ -47,7 +47,9 @@ def lower(design: Design) -> list[Bound]:
     factor, edges = design.spec.safety.hunting, design.edges
     low = comfortable(design)[0]
     bounds = (
-        [Bound(low, f"below, the modulus margin is under {WANTED:g}")] if low > design.fitted.limits.searched[0] else []
+        [Bound(low, f"below it the modulus margin is below {WANTED:g}")]
+        if low > design.fitted.limits.searched[0]
+        else []
     )
     if edges.hunts:
         bounds.append(Bound(factor * edges.highest, f"{factor:g} times the edge of hunting"))

@@ -46,7 +46,7 @@ def window_figure(design: Design) -> Figure:
     axes = Axis("Crossover", "Hz", visible, log=True), Axis("", "", (-0.5, len(rows) - 0.5), words=tuple(rows))
     panel = Panel("", *axes, (line,), (points,), bands=_named_once(bands))
     caption = (
-        f"What bounds the crossover, and the one chosen, {hertz(design.controller.crossover)}. Machine: its limit. "
+        f"What bounds the crossover, and the chosen one, {hertz(design.controller.crossover)}. Machine: its limit. "
         f"Leaves: the highest first interfering frequency of the front over {multiple:g}. Margin: modulus margin above "
         f"{WANTED:g}. Isolator, without: where the machine hunts with and without it; dots mark the edges in the "
         "corners of friction and masses."

@@ -55,16 +55,17 @@ def need(design: Design) -> str:
     bound = f"{hertz(least)} or more" if math.isfinite(least) else "higher than was searched"
     above = f"{bound}, {factor:g} times the edge of hunting"
     if design.needed:
-        return f"An isolator is needed: without one the crossover has to be {above}; the machine allows {limit}."
-    return f"No isolator is needed: without one the crossover has to be {above}, and the machine allows {limit}."
+        return f"An isolator is needed: without one the crossover must be {above}; the machine allows {limit}."
+    return f"No isolator is needed: without one the crossover must be {above}, and the machine allows {limit}."
 
 
 def brings(design: Design) -> str:
     """What an isolator brings and costs where none is needed."""
     tried, crossover, limit = design.verification, design.controller.crossover, design.spec.limit
-    slower = f" It costs crossover: {hertz(crossover)} instead of {hertz(limit)}." if crossover < 0.97 * limit else ""
+    costs = f" This costs bandwidth: a crossover of {hertz(crossover)} instead of {hertz(limit)}."
+    slower = costs if crossover < 0.97 * limit else ""
     return (
-        f"All the same, this is what one brings: with it the machine {edge(design.edges)}. Moves settle in "
+        f"For comparison, with the isolator the machine {edge(design.edges)}. Moves settle in "
         f"{seconds(tried.free.slower_than(0.5))} instead of {seconds(tried.locked.slower_than(0.5))} (median), 95 % "
         f"of them in {seconds(tried.free.slower_than(0.05))} instead of "
         f"{seconds(tried.locked.slower_than(0.05))}, at the same crossover.{slower}"
@@ -155,7 +156,7 @@ def refusal(failure: NoDesign) -> str:
         tail = "no single requirement was found whose relaxation alone is enough: relax several"
         return f"{failure.reason}\n  {tail}"
     later = any(change.geometry for change in failure.relaxed)
-    tail = ["(each alone; this is of the leaf springs, the steps after them were not tried)"] if later else []
+    tail = ["(each one alone; this concerns the leaf springs only, the later steps were not tried)"] if later else []
     return "\n  ".join([failure.reason, *map(relaxation, failure.relaxed[:SHOWN]), *tail])
 
 

@@ -70,7 +70,7 @@ def _mode(evaluation: Evaluation, mode: Mode | None) -> str:
 _STIFF: dict[str, Callable[[Evaluation], str]] = {
     "Drive stiffness": lambda evaluation: newtons_per(evaluation.drive[0], "mm"),
     "Drive stiffness under the load": lambda evaluation: newtons_per(evaluation.loaded_drive, "mm"),
-    "Departure from linear over the stroke": lambda evaluation: percent(evaluation.nonlinearity),
+    "Deviation from linear over the stroke": lambda evaluation: percent(evaluation.nonlinearity),
     "Support stiffness x, straight": lambda evaluation: newtons_per(evaluation.support_x[0], "µm"),
     "Support stiffness x, at full stroke": lambda evaluation: newtons_per(evaluation.support_x[-1], "µm"),
     "Support stiffness y, straight": lambda evaluation: newtons_per(evaluation.support_y[0], "µm"),

@@ -32,7 +32,7 @@ def findings(flexure: Found) -> list[str]:
 
 def warnings(flexure: Found) -> list[str]:
     """What is wrong with it."""
-    failed = f"The beam model found no answer: {flexure.failure.rstrip('.')}. All this is by closed forms."
+    failed = f"The beam model found no solution: {flexure.failure.rstrip('.')}. All results are from the closed forms."
     return [
         *([failed] if flexure.beams is None else []),
         *_borne(flexure.best),
@@ -68,7 +68,7 @@ def _joint(evaluation: Evaluation) -> str:
         f"The joint: {mechanism.leaves:g} leaves of {_size(mechanism.length)} x {_size(mechanism.width)} x "
         f"{_size(mechanism.thickness)} mm, {newtons_per(evaluation.drive[0], 'mm')}; with the cart held the stage of "
         f"{mechanism.body.mass:g} kg swings at {with_unit(drive.frequency, 'Hz')}. Over {_stroke(evaluation)} the "
-        f"force departs from linear by {percent(evaluation.nonlinearity)} and takes "
+        f"force deviates from linear by {percent(evaluation.nonlinearity)} and takes "
         f"{with_unit(evaluation.forces[-1], 'N')} at its end."
     )
 
@@ -77,7 +77,7 @@ def _control(evaluation: Evaluation) -> str:
     first = evaluation.interfering
     if first is None:
         return (
-            f"None of the {len(evaluation.modes) - 1} modes above the drive mode that are known is seen by both "
+            f"None of the {len(evaluation.modes) - 1} known modes above the drive mode is seen by both "
             f"actuator and sensor (highest: {with_unit(evaluation.modes[-1].frequency, 'Hz')}); the leaves set no "
             "limit to the crossover."
         )
@@ -89,15 +89,16 @@ def _control(evaluation: Evaluation) -> str:
 
 
 def _endurance(evaluation: Evaluation) -> str:
-    bent = f"At the clamp the leaves bear {megapascals(evaluation.clamp_stress)} at full stroke"
+    bent = f"The stress at the clamp is {megapascals(evaluation.clamp_stress)} at full stroke"
     if math.isnan(evaluation.fatigue_margin):
-        return f"{bent}; how much they bear for ever is not known (flexure.fatigue), so neither is the largest stroke."
+        return f"{bent}; the fatigue limit is not known (flexure.fatigue), so neither is the largest stroke."
     largest = with_unit(evaluation.stroke * evaluation.fatigue_margin, "m")
-    bounds = f" More than half the length, {with_unit(evaluation.mechanism.length / 2, 'm')}, is beyond both models."
+    half = with_unit(evaluation.mechanism.length / 2, "m")
+    bounds = f" A stroke of more than half the length, {half}, is beyond both models."
     beyond = bounds if evaluation.stroke * evaluation.fatigue_margin > evaluation.mechanism.length / 2 else ""
     return (
-        f"{bent} and would bear {megapascals(evaluation.mechanism.fatigue)} for ever: "
-        f"by fatigue the stroke may be about {largest}.{beyond}"
+        f"{bent}, and the fatigue limit is {megapascals(evaluation.mechanism.fatigue)}: "
+        f"fatigue allows a stroke of about {largest}.{beyond}"
     )
 
 
@@ -106,19 +107,19 @@ def _borne(evaluation: Evaluation) -> list[str]:
     lines, mechanism = [], evaluation.mechanism
     if evaluation.yield_margin < 1:
         lines.append(
-            f"The leaves yield: {megapascals(evaluation.clamp_stress)} at the clamp at {_stroke(evaluation)}, the "
-            f"material bears {megapascals(mechanism.yield_strength)}. Longer or thinner leaves, or less stroke, mend "
-            "it."
+            f"The leaves yield: {megapascals(evaluation.clamp_stress)} at the clamp at {_stroke(evaluation)}, but the "
+            f"material bears {megapascals(mechanism.yield_strength)}. Longer or thinner leaves, or a smaller stroke, "
+            "would remedy this."
         )
     elif evaluation.fatigue_margin < 1:
         lines.append(
-            f"The leaves break in the long run: {megapascals(evaluation.clamp_stress)} at the clamp at "
-            f"{_stroke(evaluation)}, for ever they bear {megapascals(mechanism.fatigue)}. Longer or thinner leaves, "
-            "or less stroke, mend it."
+            f"The leaves fail by fatigue: {megapascals(evaluation.clamp_stress)} at the clamp at "
+            f"{_stroke(evaluation)}, above the fatigue limit of {megapascals(mechanism.fatigue)}. Longer or thinner "
+            "leaves, or a smaller stroke, would remedy this."
         )
     if evaluation.buckling_margin < 1:
         lines.append(
-            f"A stage that stands on its leaves buckles them: it weighs {with_unit(mechanism.weight, 'N')} "
+            f"A stage standing on its leaves would buckle them: it weighs {with_unit(mechanism.weight, 'N')} "
             f"(g = {GRAVITY} m/s²), they bear {with_unit(evaluation.buckling, 'N')} along their length."
         )
     return lines
@@ -131,12 +132,14 @@ def _loaded(evaluation: Evaluation) -> list[str]:
         return []
     first = evaluation.modes[0].frequency * math.sqrt(max(evaluation.loaded_drive / evaluation.drive[0], 0.0))
     close = (
-        f" That is {evaluation.buckling_margin:.2g} times below buckling: stiffness hangs on it." if load > 0 else ""
+        f" That is {evaluation.buckling_margin:.2g} times below buckling, so the stiffness depends on it strongly."
+        if load > 0
+        else ""
     )
     return [
         f"Under the load of {with_unit(load, 'N')} along the leaves the drive stiffness is "
-        f"{newtons_per(evaluation.loaded_drive, 'mm')} and the drive mode at {with_unit(first, 'Hz')}; all else is "
-        f"told without it.{close}"
+        f"{newtons_per(evaluation.loaded_drive, 'mm')} and the drive mode at {with_unit(first, 'Hz')}; all other "
+        f"results are without it.{close}"
     ]
 
 
@@ -146,8 +149,8 @@ def _breaks_away(flexure: Found) -> list[str]:
         return []
     return [
         f"The cart breaks away inside the stroke: the leaves push with {with_unit(force, 'N')} at "
-        f"{_stroke(flexure.best)}, static friction holds {with_unit(static, 'N')}. The joint cannot use its stroke "
-        f"beyond about {with_unit(flexure.best.stroke * static / force, 'm')}."
+        f"{_stroke(flexure.best)}, static friction holds {with_unit(static, 'N')}. The joint can use its stroke only "
+        f"up to about {with_unit(flexure.best.stroke * static / force, 'm')}."
     ]
 
 
