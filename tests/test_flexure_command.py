@@ -227,7 +227,7 @@ def test_a_sound_joint_has_no_warnings_and_a_largest_stroke(stage: Stage) -> Non
     ("changes", "stroke", "warning"),
     [
         ({"flexure.thickness": "1 mm"}, 8e-3, "The leaves yield: "),
-        ({"flexure.fatigue": "60 MPa"}, 1e-3, "The leaves break in the long run: "),
+        ({"flexure.fatigue": "60 MPa"}, 1e-3, "The leaves fail by fatigue: "),
         ({"flexure.thickness": "0.05 mm", "masses.stage": "5 kg"}, 1e-4, "buckles them: it weighs 49.0 N"),
         ({"friction.static": "2 N"}, 1e-3, "The cart breaks away inside the stroke: the leaves push with 2.54 N"),
     ],

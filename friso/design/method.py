@@ -212,8 +212,8 @@ def fitted(base: Stage, task: Task, candidates: list[Candidate], population: Pop
             return Fitted(task, choice, stage.replace({"controller.crossover": f"{_down(best):.6g} Hz"}), ranges)
         target = best
     raise NoDesign(
-        f"of {len(candidates)} leaf springs on the front none, in sizes of whole tenths of a millimetre, is confirmed "
-        f"by the beam model at a crossover of {target:.3g} Hz"
+        f"none of the {len(candidates)} leaf springs on the front, in sizes rounded to tenths of a millimetre, is "
+        f"confirmed by the beam model at a crossover of {target:.3g} Hz"
     )
 
 
