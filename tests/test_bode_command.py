@@ -229,7 +229,7 @@ def test_unstable_limit_cases_are_a_matter_of_tuning(unstable: Bode) -> None:
     assert "grows e-fold in 64.4 ms, swinging at 9.26 Hz" in settled
     assert "Unstable: stuck, limiter free; stuck under a bias force of 2." in where
     assert "sliding, all from 1.60 µm/s to 1.60 m/s, limiter free" in where
-    assert why.startswith("That is a matter of tuning")
+    assert why.startswith("This is a matter of tuning")
     assert "Stribeck" not in why
     assert crossovers(unstable)["free"].startswith("Free (as given): stable: none from 0.100 Hz to 10.0 kHz")
     assert caveats(unstable) == []
@@ -256,7 +256,7 @@ def test_what_the_stage_file_lacks_is_named(found: Bode, rig: Stage) -> None:
 def test_words_of_a_controller_by_gains(emps: Bode) -> None:
     said = " ".join(sentences(emps))
     assert "As given, this controller is stable in all settled states" in said
-    assert "So it is in every state: stuck under bias forces of up to 20.4 N" in said
+    assert "It is stable in every state: stuck under bias forces of up to 20.4 N" in said
     assert "in multiples of its bandwidth" in said
     assert "stable: all from 0.0100 to 1000 times this bandwidth" in said
     assert "crossover" not in said
@@ -466,8 +466,8 @@ def test_a_band_with_gaps_or_of_two_lengths_is_refused() -> None:
 @pytest.mark.parametrize(
     ("text", "given", "expected"),
     [
-        ("1 kHz..0.1 Hz", r'"1 kHz..0.1 Hz" \(reversed range\)', "a range that rises"),
-        ("1 Hz..1 Hz", r'"1 Hz..1 Hz" \(empty range\)', "a range that rises"),
+        ("1 kHz..0.1 Hz", r'"1 kHz..0.1 Hz" \(reversed range\)', "an increasing range"),
+        ("1 Hz..1 Hz", r'"1 Hz..1 Hz" \(empty range\)', "an increasing range"),
         ("0 Hz..1 kHz", '"0 Hz"', "from 1 uHz to 1 GHz"),
         ("-1 Hz..1 kHz", '"-1 Hz"', "from 1 uHz to 1 GHz"),
         ("1 Hz..1e300 Hz", '"1e300 Hz"', "from 1 uHz to 1 GHz"),

@@ -256,7 +256,7 @@ def test_sentences_of_two_keys(crossing: Plane) -> None:
         *("attracting cycle", "unknown", "invalid", "no attracting cycle"),
     ]
     assert corners[3] == "At joint.stroke = 2 mm, controller.kp = 100 N/m: none (no hunting)."
-    assert lost.startswith("A change was seen near joint.stroke = 1.5 mm, controller.kp = 3.16228 N/m, but no curve")
+    assert lost.startswith("A change was found near joint.stroke = 1.5 mm, controller.kp = 3.16228 N/m, but no curve")
 
 
 def test_the_figure_of_two_keys_shows_nodes_and_curves_in_one_legend(crossing: Plane) -> None:

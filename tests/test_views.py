@@ -713,8 +713,8 @@ def test_a_transient_is_said_to_be_one():
     text = sentence(known, peak_to_peak=6.9e-4, period=1.33)
     assert text == (
         "transient: no cycle attracts, but this motion has not settled at its end (still 690 µm peak to peak every "
-        "1.33 s). Transients change slowly, by the factor e in 73.1 s. It settles to within 10 µm in 190 s. Hunting is "
-        "possible below 9.75 Hz."
+        "1.33 s). Transients change slowly, by a factor of e in 73.1 s. It settles to within 10 µm in 190 s. Hunting "
+        "is possible below 9.75 Hz."
     )
     long = sentence(settles(verdict="transient", settled_after=None), peak_to_peak=1e-7)
     assert "(at rest, but off its reference). It does not settle to within 10 µm in 1000 s either." in long

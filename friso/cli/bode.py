@@ -39,10 +39,11 @@ def bode(
     stage_file: StageFile,
     overrides: Overrides = None,
     frequencies: Annotated[
-        str | None, typer.Option(metavar='"FIRST..LAST"', help="Frequencies of the figures; default: all that matter.")
+        str | None,
+        typer.Option(metavar='"FIRST..LAST"', help="Frequency range of the figures; default: all that is relevant."),
     ] = None,
     series: Annotated[
-        bool, typer.Option("--series", help="Show the thesis's formula for a touched limiter beside.")
+        bool, typer.Option("--series", help="Also show the thesis's formula for a touched limiter.")
     ] = False,
     out: OutFolder = None,
     as_json: AsJson = False,
@@ -53,12 +54,12 @@ def bode(
     """
     stage = read_stage(stage_file, overrides, leaves_out=AS_BUILT[1:])
     if stage.drive and stage.drive.velocity_samples is not None:
-        say("drive.velocity_samples is left out: the derivative is that of the bilinear transform")
+        say("drive.velocity_samples is ignored: the derivative is that of the bilinear transform")
     shown = None if frequencies is None else _read_frequencies(frequencies, stage)
     folder = None if out is None else made_folder(out)
     from friso.frequency.bode import bode as analysis
 
-    with busy("looking at all states"):
+    with busy("analysing all states"):
         found = analysis(stage, shown, series)
         files = [] if folder is None else _write(found, folder)
     if as_json:
@@ -80,7 +81,7 @@ def _read_frequencies(text: str, stage: Stage) -> tuple[float, float]:
         raise InputError("--frequencies", error.given, error.expected, EXAMPLE) from None
     if not low < high:
         order = "empty" if low == high else "reversed"
-        raise InputError("--frequencies", quoted(text, f"{order} range"), "a range that rises", EXAMPLE)
+        raise InputError("--frequencies", quoted(text, f"{order} range"), "an increasing range", EXAMPLE)
     sample_time = stage.flat().get("drive.sample_time")
     if sample_time and high > 0.5 / sample_time:
         half = f"frequencies of up to {0.5 / sample_time:g} Hz, half the sampling frequency (drive.sample_time)"

@@ -38,11 +38,13 @@ RANGE = 'KEY="FIRST..LAST"'
 def boundary(
     stage_file: StageFile,
     x: Annotated[str, typer.Option(metavar=RANGE, help="The key over which cycles are followed.")],
-    y: Annotated[str | None, typer.Option(metavar=RANGE, help="A second one: curves in the plane of both.")] = None,
+    y: Annotated[str | None, typer.Option(metavar=RANGE, help="A second key: curves in the plane of both.")] = None,
     link: Annotated[
-        list[str] | None, typer.Option(metavar="KEY=EXPRESSION", help='A key that follows: masses.cart="0.7 * mass".')
+        list[str] | None, typer.Option(metavar="KEY=EXPRESSION", help='A key tied to others: masses.cart="0.7 * mass".')
     ] = None,
-    log: Annotated[bool, typer.Option("--log", help="Both ranges logarithmic; for one alone, :log behind it.")] = False,
+    log: Annotated[
+        bool, typer.Option("--log", help="Make both ranges logarithmic; for a single one, append :log.")
+    ] = False,
     overrides: Overrides = None,
     rtol: Tolerance = "1e-9",
     out: OutFolder = None,

@@ -35,10 +35,12 @@ Draws = Annotated[
     typer.Option(
         "--draws",
         metavar="N",
-        help='Draw N stages from the uncertain keys ("20 N +/- 1 N", "1 N .. 3 N"), and tell how many hunt.',
+        help='Draw N stages from the uncertain keys ("20 N +/- 1 N", "1 N .. 3 N"), and report how many hunt.',
     ),
 ]
-Seed = Annotated[int, typer.Option("--seed", metavar="K", help="Of the draws: the same seed, the same stages.")]
+Seed = Annotated[
+    int, typer.Option("--seed", metavar="K", help="Seed of the draws: the same seed gives the same stages.")
+]
 
 
 def check(

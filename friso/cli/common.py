@@ -86,7 +86,7 @@ def read_stage(
     left = [name for name in leaves_out if getattr(stage, name)]
     if left:
         tables = ", ".join(f"[{name}]" for name in left)
-        bode = "; friso bode knows sampling and delay" if "drive" in left else ""
+        bode = "; friso bode takes sampling and delay into account" if "drive" in left else ""
         say(f"{tables} {'are' if len(left) > 1 else 'is'} left out: friso rig simulates the machine as built{bode}")
     return stage
 
@@ -106,7 +106,7 @@ def key_values(given: list[tuple[str, str]], example: str) -> dict[str, str]:
         if not (equals and key and value.strip()):
             raise InputError(option, text, "KEY=VALUE", example)
         if key in pairs:
-            raise InputError(option, f"{key} a second time", "every key once", example)
+            raise InputError(option, f"{key} a second time", "each key once", example)
         pairs[key] = value.strip()
     return pairs
 
@@ -127,11 +127,13 @@ def check_place(folder: Path, written: Sequence[str], page: str, given: Sequence
     for path in (folder / name for name in written):
         if not path.exists():
             continue
-        expected = "another folder, or the files moved out of the way"
+        expected = "another folder, or a folder without these files"
         if any(each.exists() and path.samefile(each) for each in given):
-            raise InputError("--out", f"{folder}, where {path.name} is read", expected, f"--out {folder}-2")
+            raise InputError("--out", f"{folder}, from which {path.name} is read", expected, f"--out {folder}-2")
         if not (folder / page).exists():
-            raise InputError("--out", f"{folder}, with a {path.name} of no earlier run", expected, f"--out {folder}-2")
+            raise InputError(
+                "--out", f"{folder}, with a {path.name} that is not from an earlier run", expected, f"--out {folder}-2"
+            )
     was_there = folder.exists()
     made_folder(folder)  # now, not after a minute of computing
     if not os.access(folder, os.W_OK):

@@ -32,8 +32,12 @@ if TYPE_CHECKING:
 
 PAGE = "compare.html"
 
-Machines = Annotated[int, typer.Option("--machines", metavar="N", help="Machines drawn around the stage, 20 or more.")]
-Seed = Annotated[int, typer.Option("--seed", metavar="NUMBER", help="Of the machines: the same seed, the same ones.")]
+Machines = Annotated[
+    int, typer.Option("--machines", metavar="N", help="Number of machines drawn around the stage, 20 or more.")
+]
+Seed = Annotated[
+    int, typer.Option("--seed", metavar="NUMBER", help="Seed of the draws: the same seed gives the same machines.")
+]
 Within = Annotated[str, typer.Option("--within", metavar="LENGTH", help="Deviation that counts as in position.")]
 
 
@@ -101,7 +105,7 @@ def _print(found: Comparison, files: Sequence[Path]) -> None:
     for label, text in options_rows(found):
         print_wrapped(f"{label}: {text}")
     print_table(found.stage.name, COLUMNS, table_rows(found), [])
-    print_table("Against a, machine by machine", PAIRED, paired_rows(found), [])
+    print_table("Compared with a, machine by machine", PAIRED, paired_rows(found), [])
     notes = (f"note: {note}" for note in found.notes)
     for sentence in (*population(found), *notes, *sentences(found), *(f"wrote {file}" for file in files)):
         print_wrapped(sentence)

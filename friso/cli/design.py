@@ -47,7 +47,7 @@ def design(
     stage = read_stage(stage_file, overrides, leaves_out=AS_BUILT[1:])
     spec = load_spec(spec_file)
     if stage.drive:
-        say("[drive] counts for the margins; hunting and moves are simulated in continuous time")
+        say("[drive] is taken into account for the margins; hunting and moves are simulated in continuous time")
     check_place(out, STAGES, PAGE, (stage_file, spec_file))
     try:
         found, files = _designed(stage, spec, out)

@@ -57,7 +57,7 @@ def flexure(
         for file in files:
             print(f"wrote {file}")
     if found.failure:
-        say(f"the beam model found no answer: {found.failure}")
+        say(f"the beam model found no solution: {found.failure}")
     leave(not found.failure)
 
 
@@ -77,7 +77,7 @@ def _stroke(text: str | None, stage: Stage, mechanism: Mechanism) -> float:
     if text is None:
         given = stage.joint and stage.joint.stroke
         if given is None:
-            raise InputError("--stroke", "nothing", "the stroke, since the joint has none", '--stroke "1 mm"')
+            raise InputError("--stroke", "nothing", "the stroke, because the joint has none", '--stroke "1 mm"')
     else:
         try:
             given = STROKE.read(text)

@@ -17,7 +17,10 @@ UNFINISHED = ".guideline"
 
 def guideline(
     samples: Annotated[
-        int, typer.Option(metavar="NUMBER", help="Samples for the locked law, from 64; the other sweeps are shares.")
+        int,
+        typer.Option(
+            metavar="NUMBER", help="Number of samples for the locked law, 64 or more; the other sweeps scale with it."
+        ),
     ] = 512,
     out: OutFolder = Path("guideline"),
     as_json: AsJson = False,
@@ -41,7 +44,7 @@ def guideline(
         with step_bar() as progress:
             found = compute(samples, keep.folder, progress)
     except KeyboardInterrupt:
-        say(f"{keep.count} parts of the sweeps are kept in {keep.folder}; the same command goes on from there")
+        say(f"{keep.count} parts of the sweeps are kept in {keep.folder}; the same command resumes from there")
         raise
     files = write_guideline(found, folder)
     keep.clear()

@@ -29,7 +29,8 @@ _HERTZ, _SECONDS = Quantity("Hz", positive, "20 Hz"), Quantity("s", positive, "5
 def identify(
     logs: Annotated[list[Path], typer.Argument(metavar="LOG...", help="CSV, TwinCAT, MAT, TDMS, UFF58 or LVM files.")],
     stage: Annotated[
-        Path | None, typer.Option("--stage", metavar="STAGE.toml", help="What is known: structure, controller, drive.")
+        Path | None,
+        typer.Option("--stage", metavar="STAGE.toml", help="What is known beforehand: structure, controller, drive."),
     ] = None,
     overrides: Overrides = None,
     kind: Annotated[
@@ -43,17 +44,22 @@ def identify(
     maps: Annotated[Many, typer.Option("--map", metavar="ROLE=CHANNEL", help='position="Axis1.ActPos"')] = None,
     units: Annotated[Many, typer.Option("--unit", metavar="CHANNEL=UNIT", help='Axis1.ActPos="mm"')] = None,
     scales: Annotated[Many, typer.Option("--scale", metavar="ROLE=SCALE", help='force="35.15 N/V"')] = None,
-    dt: Annotated[str | None, typer.Option("--dt", metavar="TIME", help="Sample time, where no file tells it.")] = None,
+    dt: Annotated[
+        str | None, typer.Option("--dt", metavar="TIME", help="Sample time, if the file does not contain it.")
+    ] = None,
     predict: Annotated[
-        list[Path] | None, typer.Option("--predict", metavar="LOG", help="Another log, simulated with what was found.")
+        list[Path] | None,
+        typer.Option("--predict", metavar="LOG", help="Another log, simulated with the identified stage."),
     ] = None,
     bandwidth: Annotated[
-        str | None, typer.Option("--bandwidth", metavar="FREQUENCY", help="Of the moves, for the filters.")
+        str | None, typer.Option("--bandwidth", metavar="FREQUENCY", help="Bandwidth of the moves, for the filters.")
     ] = None,
     band: Annotated[
-        str | None, typer.Option("--band", metavar="RANGE", help='Of the response: "3 Hz .. 20 Hz".')
+        str | None, typer.Option("--band", metavar="RANGE", help='Band of the response: "3 Hz .. 20 Hz".')
     ] = None,
-    period: Annotated[str | None, typer.Option("--period", metavar="TIME", help="Of a periodic excitation.")] = None,
+    period: Annotated[
+        str | None, typer.Option("--period", metavar="TIME", help="Period of a periodic excitation.")
+    ] = None,
     out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for the files written.")] = Path(
         "identified"
     ),
@@ -168,7 +174,10 @@ def _answer(
     named = [file for file in files if file.suffix in (".toml", ".html")]
     print(f"\nwrote {', '.join(map(str, named))}, and {len({file.stem for file in files[len(named) :]})} figures")
     if found.stage is None:
-        print("no stage file: a frequency response or a stiffness alone is no machine; --stage tells what the rest is")
+        print(
+            "no stage file: a frequency response or a stiffness alone does not make a machine; describe the rest with "
+            "--stage"
+        )
     else:
         print(f"next: friso check {files[0]}{' --draws 1000' if found.stage.uncertain() else ''}")
 

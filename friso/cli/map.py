@@ -29,29 +29,35 @@ AXIS = 'KEY="FIRST..LAST:POINTS"'
 
 
 def map_cells(
-    source: Annotated[Path, typer.Argument(metavar="STAGE.toml|STORE", help="A stage file, or a study to go on with.")],
-    x: Annotated[str | None, typer.Option(metavar=AXIS, help='Horizontal axis; a list also: KEY="4 Hz, 8 Hz".')] = None,
+    source: Annotated[Path, typer.Argument(metavar="STAGE.toml|STORE", help="A stage file, or a study to resume.")],
+    x: Annotated[str | None, typer.Option(metavar=AXIS, help='Horizontal axis; also a list: KEY="4 Hz, 8 Hz".')] = None,
     y: Annotated[str | None, typer.Option(metavar=AXIS, help="Vertical axis.")] = None,
-    axis: Annotated[list[str] | None, typer.Option(metavar=AXIS, help="A further axis; as often as wanted.")] = None,
+    axis: Annotated[list[str] | None, typer.Option(metavar=AXIS, help="A further axis; may be repeated.")] = None,
     link: Annotated[
-        list[str] | None, typer.Option(metavar="KEY=EXPRESSION", help='A key that follows: masses.cart="0.7 * mass".')
+        list[str] | None, typer.Option(metavar="KEY=EXPRESSION", help='A key tied to others: masses.cart="0.7 * mass".')
     ] = None,
     samples: Annotated[
-        int | None, typer.Option(metavar="NUMBER", help="So many Sobol points of the ranges FIRST..LAST, no grid.")
+        int | None,
+        typer.Option(metavar="NUMBER", help="Number of Sobol points over the ranges FIRST..LAST, instead of a grid."),
     ] = None,
-    latin: Annotated[bool, typer.Option("--latin", help="Samples by a Latin hypercube.")] = False,
-    log: Annotated[bool, typer.Option("--log", help="All ranges logarithmic; for one alone, :log behind it.")] = False,
+    latin: Annotated[bool, typer.Option("--latin", help="Latin hypercube samples.")] = False,
+    log: Annotated[
+        bool, typer.Option("--log", help="Make all ranges logarithmic; for a single one, append :log.")
+    ] = False,
     overrides: Overrides = None,
     metric: Annotated[
-        str, typer.Option(metavar="NAME", help="What colours the map; of the cycle: multiplier, amplitude, period.")
+        str,
+        typer.Option(
+            metavar="NAME", help="Quantity that colours the map; of the cycle: multiplier, amplitude, period."
+        ),
     ] = "peaks",
     rtol: Annotated[
         str | None,
-        typer.Option(metavar="NUMBER|auto", help="Relative tolerance, 1e-6 unless told; auto: the loosest safe one."),
+        typer.Option(metavar="NUMBER|auto", help="Relative tolerance, default 1e-6; auto: the loosest safe one."),
     ] = None,
     verify: Annotated[float, typer.Option(metavar="SHARE", help="Share of the cells run again at rtol/100.")] = 0.05,
     refine: Annotated[
-        bool, typer.Option("--refine", help="A grid 4 times finer, run along its boundaries only.")
+        bool, typer.Option("--refine", help="A grid 4 times finer, run only along its boundaries.")
     ] = False,
     workers: Annotated[
         int | None, typer.Option(metavar="N", help="Run in N processes of a local Dask cluster.")
@@ -61,9 +67,9 @@ def map_cells(
     ] = None,
     export: Annotated[list[Path] | None, typer.Option(metavar="FILE", help="Also write a .nc or .csv file.")] = None,
     out: Annotated[
-        Path | None, typer.Option(metavar="STORE", help="Folder of the results, resumed if it is there.")
+        Path | None, typer.Option(metavar="STORE", help="Folder of the results, resumed if it exists.")
     ] = None,
-    yes: Annotated[bool, typer.Option("--yes", help="Do run a study of more than ten million cells.")] = False,
+    yes: Annotated[bool, typer.Option("--yes", help="Confirm a study of more than ten million cells.")] = False,
     as_json: AsJson = False,
 ) -> None:
     """Sweep two (or more) keys: results in a Zarr store, a figure, and a page whose cells can be clicked.
@@ -88,8 +94,8 @@ def map_cells(
     with _crew(workers, scheduler) as crew:
         if source.is_dir():
             if varied != Varied() or overrides or rtol or refine or out:
-                given = "a store together with what makes another study of it"
-                raise InputError(str(source), given, "a store alone: it knows its study", f"friso map {source}")
+                given = "a store together with options that would make it another study"
+                raise InputError(str(source), given, "the store alone: it contains its study", f"friso map {source}")
             store, study = source, stored_study(source, metric)
         else:
             stage = read_stage(source, overrides)
@@ -163,7 +169,7 @@ def _run(study: Study, store: Path, crew: Crew, share: float) -> xr.Dataset:
             return run_in_store(study, store, crew, share, count)
         except (KeyboardInterrupt, OSError, RuntimeError):
             if store.exists():
-                say(f"{done} of {study.cells} cells are kept; to go on: friso map {store}")
+                say(f"{done} of {study.cells} cells are kept; to resume: friso map {store}")
             raise
 
 
@@ -172,7 +178,7 @@ def _checked_exports(export: list[Path] | None) -> list[Path]:
         if path.suffix not in (".nc", ".csv"):
             raise InputError("--export", str(path), "a file that ends in .nc or .csv", "--export map.nc")
         if not path.parent.is_dir():
-            raise InputError("--export", str(path), "a file in a folder that is there", "--export map.nc")
+            raise InputError("--export", str(path), "a file in an existing folder", "--export map.nc")
     return list(export or [])
 
 

@@ -132,7 +132,7 @@ def refuse_overwriting(store: Path, exports: list[Path]) -> None:
     for path in exports if store.exists() else [*_view_paths(store), *exports]:
         if path.exists() or path == store:
             raise InputError(
-                "--out", f"{path} is there already", "another name; nothing was overwritten", "--out new.zarr"
+                "--out", f"{path} already exists", "another name; nothing was overwritten", "--out new.zarr"
             )
 
 

@@ -15,7 +15,7 @@ from friso.cli.progress import step_bar
 
 def reproduce(
     names: Annotated[
-        list[str] | None, typer.Argument(metavar="[STUDY]...", help="Studies of Table 3 by name; none: all of them.")
+        list[str] | None, typer.Argument(metavar="[STUDY]...", help="Studies of Table 3 by name; default: all of them.")
     ] = None,
     points: Annotated[int, typer.Option(metavar="NUMBER", help="Values per axis of every map.")] = 41,
     rtol: Tolerance = "1e-6",
@@ -44,8 +44,8 @@ def reproduce(
             print(f"{claim['id']:5} {claim['judgement']:14} {claim['number']}")
     for name, cells in document["cycles"].items():
         print(
-            f"{name}: of {cells['cells']} cells {cells['transient']} count peaks though no cycle attracts, and "
-            f"{cells['dormant']} count none though one does"
+            f"{name}: of {cells['cells']} cells {cells['transient']} count peaks although no cycle attracts, and "
+            f"{cells['dormant']} count none although one does"
         )
     counts = Counter(claim["judgement"] for claim in document["claims"])
     print(", ".join(f"{count} {judgement}" for judgement, count in counts.items()))

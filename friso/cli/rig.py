@@ -26,8 +26,12 @@ Experiment = Annotated[
         help="One of those below.",
     ),
 ]
-OutFolder = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder for logs, truth and figures.")]
-Seed = Annotated[int, typer.Option("--seed", metavar="NUMBER", help="Of the noise; the rail has its own, rail.seed.")]
+OutFolder = Annotated[
+    Path | None, typer.Option("--out", metavar="DIR", help="Folder for logs, true signals and figures.")
+]
+Seed = Annotated[
+    int, typer.Option("--seed", metavar="NUMBER", help="Seed of the noise; the rail has its own, rail.seed.")
+]
 
 MOST_SEED = 10**15
 
@@ -60,7 +64,10 @@ def rig(
     if out is not None:
         check_place(out, [f"{TRUTH}/stage.toml"], PAGE, [stage_file])
         if out.is_dir() and any(out.iterdir()) and not (out / TRUTH / "stage.toml").exists():
-            given, expected = f"{out}, with files of no earlier rig", "an empty folder, or a new one"
+            given, expected = (
+                f"{out}, with files that are not from an earlier friso rig",
+                "an empty folder, or a new one",
+            )
             raise InputError("--out", given, expected, f"--out {out}-2")
     with step_bar() as bar:
         outcome = run(stage, seed, bar or silent)
@@ -87,9 +94,9 @@ def _told(stage: Stage) -> None:
         say(f"drive.sample_time is not given: {SAMPLE_TIME * 1e6:g} us, as in the thesis")
     samples = whole_samples(as_built_keys(stage))
     if samples >= MANY:
-        say(f"drive.delay is {samples} samples: the force acts that much after what it answers")
+        say(f"drive.delay is {samples} samples: the force acts that much later than the reading it is computed from")
     if keys := [*stage.uncertain()]:
-        say(f"uncertain keys ({', '.join(keys[:3])}{', ...' if len(keys) > 3 else ''}) stand at their centres")
+        say(f"uncertain keys ({', '.join(keys[:3])}{', ...' if len(keys) > 3 else ''}) are set to their centres")
 
 
 def _print(outcome: Outcome, files: Sequence[Path]) -> None:
