@@ -40,7 +40,7 @@ def distance(stage: Stage) -> float:
     of the thesis's rig (Sec. 4.3.2). Raises InputError for a motion that goes nowhere."""
     own = float(motion.size(stage.flat()))
     if not np.isfinite(own):
-        raise InputError("motion.kind", repr(stage.flat()["motion.kind"]), "a motion that goes somewhere", '"step"')
+        raise InputError("motion.kind", repr(stage.flat()["motion.kind"]), "a motion that moves the stage", '"step"')
     power = 10.0 ** np.floor(np.log10(own))
     return float(power * min(ROUND, key=lambda digit: abs(np.log(digit * power / own))))
 

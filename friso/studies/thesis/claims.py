@@ -30,7 +30,8 @@ TREND = 0.5
 """Rank correlation (Spearman) from which there is a "trend"."""
 
 CONVENTIONS = (
-    f"Words are read alike in all claims: “about” is within a factor of {ABOUT:g}, “of the order of” within a factor "
+    f"Words have the same meaning in all claims: “about” is within a factor of {ABOUT:g}, “of the order of” within a "
+    "factor "
     f"of {ORDER:.2g} (half a decade) and “far” beyond it, “few” cells are at most {FEW:.0%} of a map, a “trend” is a "
     f"rank correlation of at least {TREND:g}. A “limit” lies halfway from the last cell that hunts to the next, with "
     "none hunting beyond it."

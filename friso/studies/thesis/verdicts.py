@@ -48,11 +48,17 @@ class Verdict:
         """One sentence on the open parameters, and one on tolerance and metric where they matter."""
         if self.finding is None:
             return ""
-        opened = "Nothing that the thesis leaves open enters."
+        opened = "Nothing that the thesis leaves open is involved."
         if self.tried:
-            turns = f"a part turns with {_listed(self.depends_on)}" if self.depends_on else "none turns a part"
+            turns = (
+                f"a part changes its judgement with {_listed(self.depends_on)}"
+                if self.depends_on
+                else "none changes a judgement"
+            )
             opened = f"What the thesis leaves open, varied one at a time, {self.tried} values: {turns}."
-        return f"{opened} Method: a part turns with {_listed(self.hangs_on)}." if self.hangs_on else opened
+        return (
+            f"{opened} Method: a part changes its judgement with {_listed(self.hangs_on)}." if self.hangs_on else opened
+        )
 
 
 def _listed(dependences: Iterable[Dependence]) -> str:
@@ -109,4 +115,4 @@ def _reason(baseline: Finding, other: Sequence[Dependence], grid: str) -> str:
     named = [f"{kind} {', '.join(values)})" for kind, values in better.items()]
     reasons = dict.fromkeys(part.why for part in baseline.parts if not part.holds and part.why)
     text = "; ".join((*named, *reasons, *([grid] if grid else [])))
-    return text or "no value varied makes it hold"
+    return text or "none of the values tried makes it hold"

@@ -125,7 +125,7 @@ class Compared:
 
 
 def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
-    """All cycles. Raises InputError without a joint, a crossover or a motion that goes somewhere."""
+    """All cycles. Raises InputError without a joint, a crossover or a motion that moves the stage."""
     locked = with_joint(stage, locked=True)
     crossover(stage)
     result = compared(locked, seed, DEVIATIONS, LENGTHS, HARMONICS, len(rails(on_rail(locked))), progress)

@@ -120,7 +120,7 @@ def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
 
 NOTES = (
     "give friso identify one bench at a time: locked_*.csv, free_*.csv, or one loop_*.csv",
-    "the drive knows the force that it commands: what the current loop and the delay make of it is part of the plant",
+    "the drive logs the commanded force: the effect of the current loop and the delay is part of the plant",
 )
 
 

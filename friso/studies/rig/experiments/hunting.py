@@ -102,7 +102,7 @@ class HuntingResult:
 
 def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
     """The move at all crossovers on all rails, and releases with the joint locked. Raises InputError without a joint,
-    a crossover or a motion that goes somewhere."""
+    a crossover or a motion that moves the stage."""
     stages = {case: with_joint(stage, locked) for case, locked in CASES.items()}
     frequencies, seeds = crossover(stage) * CROSSOVERS, rails(stage)
     changes = on_rails(stage, {"controller.crossover": frequencies}, seeds)
@@ -167,7 +167,7 @@ def _trace(recorded: Recorded, row: int) -> Trace:
 def _notes(stage: Stage, result: HuntingResult) -> tuple[str, ...]:
     notes = []
     if stage.rail is None:
-        notes.append("the stage file has no [rail], so friction is even and there is one machine only")
+        notes.append("the stage file has no [rail], so friction is uniform and there is only one machine")
     elif result.rail:
         own, shown = result.rails[0], result.rails[result.rail]
         notes.append(f"figure and logs show rail {shown:g}: the stage's own, {own:g}, does not hunt locked")
@@ -175,6 +175,7 @@ def _notes(stage: Stage, result: HuntingResult) -> tuple[str, ...]:
     if failed:
         notes.append(f"{failed} runs failed and count as neither hunting nor settled")
     notes.append(
-        "logs of moves that settle at once may hold too little motion for friso identify: those that hunt do not"
+        "logs of moves that settle at once may contain too little motion for friso identify; those of moves that hunt "
+        "contain enough"
     )
     return tuple(notes)

@@ -96,7 +96,7 @@ def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
     logs = tuple(
         rig_log(recorded, 0, f"in_position_{case}", None, machine, seed) for case, (recorded, machine) in kept.items()
     )
-    notes = ("the logs are of a standstill, from which friso identify learns nothing",)
+    notes = ("the logs are of a standstill, from which friso identify cannot identify anything",)
     return Outcome("in-position", stage, seed, logs, result, notes)
 
 

@@ -81,7 +81,7 @@ def pulling_time(stage: Stage) -> float:
 
 def _notes(stage: Stage) -> tuple[str, ...]:
     """What to know of the result."""
-    said = ["the cart is fixed and the limiters are far off, as an engineer would set them; the joint is free"]
+    said = ["the cart is fixed and the limiters are far away, as an engineer would set them up; the joint is free"]
     if stage.flat().get("cable.stiffness", 0.0) > 0:
-        said.append("the cables move with the stage: their stiffness is contained in what is read")
+        said.append("the cables move with the stage: their stiffness is included in the result")
     return tuple(said)

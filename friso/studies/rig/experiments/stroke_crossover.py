@@ -76,7 +76,7 @@ def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
     for row, stroke in enumerate(corners["joint.stroke"]):
         file = free.replace({"joint.stroke": f"{stroke:.6g} m"})
         logs.append(rig_log(recorded, row, f"stroke_{stroke * 1e3:.3g}_mm", "moves", file, seed))
-    notes = ("the stage file has no [rail]: friction is even, and a cell is one run",) if stage.rail is None else ()
+    notes = ("the stage file has no [rail]: friction is uniform, and a cell is one run",) if stage.rail is None else ()
     return Outcome("stroke-crossover", stage, seed, tuple(logs), result, notes)
 
 

@@ -79,11 +79,12 @@ def _up_to() -> Part:
 def _far() -> Part:
     ratio = _needed_ratio()
     return Part(
-        f"the parasitic mode has to be about {_RATIO:g} times the crossover (within a factor of {ABOUT:g}) for a "
+        f"the parasitic mode must be about {_RATIO:g} times the crossover (within a factor of {ABOUT:g}) for a "
         f"modulus margin of {WANTED:g} in all settled states, the joint free, 8 Hz",
         about(ratio, _RATIO),
         f"{ratio:.3g} times",
-        why="the mass and the damping ratio of the mode, which the thesis leaves open, decide how far it has to be",
+        why="the mass and the damping ratio of the mode, which the thesis leaves open, determine how far away it must "
+        "be",
     )
 
 
@@ -97,7 +98,7 @@ def _stroke(evidence: Evidence) -> Part:
         f"(within a factor of {ABOUT:g})",
         about(needed, _STROKE),
         f"{needed * 1e3:.3g} mm",
-        why="of the order of the stroke that the rule states, yet it hangs on the limiter's damping, which is open",
+        why="of the order of the stroke that the rule states, yet it depends on the limiter's damping, which is open",
     )
 
 

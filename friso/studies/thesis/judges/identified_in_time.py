@@ -25,7 +25,7 @@ _STIFFNESS = 2.9e3
 _SPIKE = 0.1
 """Time [s] within which a spike of the velocity follows a peak of the deflection."""
 
-_UNIFORM = "friction alike all along the rail, no noise"
+_UNIFORM = "uniform friction along the rail, no noise"
 """Of the simulated rig."""
 
 
@@ -46,7 +46,8 @@ def judged_steps(steps: JointSteps) -> Finding:
                 f"within {CLOSE:.0%} of it",
                 bool(read.holds(steps.stiffness) and read.half_width <= CLOSE * steps.stiffness),
                 f"{read.value / 1e3:.4g} N/mm ({read.low / 1e3:.4g} to {read.high / 1e3:.4g}) of "
-                f"{steps.stiffness / 1e3:.4g}, {len(steps.found.windows)} settled windows. Assumed: steps to and fro, "
+                f"{steps.stiffness / 1e3:.4g}, {len(steps.found.windows)} settled windows. Assumed: steps back and "
+                "forth, "
                 f"{STANDS:g} s each; no noise",
                 why=read.reason or "method: the interval misses it, or is wide",
             ),
@@ -54,10 +55,11 @@ def judged_steps(steps: JointSteps) -> Finding:
                 f"it is {_STIFFNESS / 1e3:g} N/mm (within {CLOSE:.0%})",
                 bool(abs(read.value / _STIFFNESS - 1) <= CLOSE),
                 f"{read.value / 1e3:.3g} N/mm, as entered by Sec. 3.5",
-                why=f"not in the model: cables, misalignment, the motor constant (Sec. 4.2.2). The latter alone, wrong "
-                f"as the masses of Fig. 17 and 18 ask for, would make it {larger / 1e3:.3g} N/mm, and {FIRST:g} Hz "
-                f"with {MEASURED[1]:g} kg are {apparent / 1e3:.3g} too: the force was scaled otherwise there, or "
-                "the joint softer. Simulation alone cannot tell",
+                why="not in the model: cables, misalignment, the motor constant (Sec. 4.2.2). The latter alone, "
+                f"wrong by as much as the masses of Fig. 17 and 18 require, would make it {larger / 1e3:.3g} N/mm, "
+                f"and {FIRST:g} Hz "
+                f"with {MEASURED[1]:g} kg are {apparent / 1e3:.3g} too: the force was scaled differently there, or "
+                "the joint was softer. Simulation alone cannot tell",
             ),
         )
     )
@@ -83,7 +85,7 @@ def judged_slips(runs: tuple[SlowMotion, ...]) -> Finding:
                 f"at every speed the cart sticks and slips, and a spike of its velocity follows every peak of the "
                 f"relative position within {_SPIKE:g} s",
                 all(len(run.found.forces) > 1 and _spikes(run) for run in runs),
-                f"{counts}. Assumed: these speeds, {SLOW_TIME:g} s each (the thesis tells neither); {_UNIFORM}",
+                f"{counts}. Assumed: these speeds, {SLOW_TIME:g} s each (the thesis states neither); {_UNIFORM}",
             ),
             Part(
                 "read from the peaks at all speeds, the 95 % interval holds the static friction of the rig",
@@ -136,14 +138,14 @@ def judged_speeds(free: ConstantSpeed, locked: ConstantSpeed) -> Finding:
                 why="locked, the simulated rig slides steadily where it is fast enough",
             ),
             Part(
-                "the oscillation goes with the place: passes over the same places repeat it",
+                "the oscillation depends on the place: passes over the same places repeat it",
                 all(friction.repeatability.shown and friction.repeatability.low > 0 for friction in named.values()),
                 f"correlation of the two speeds: {repeats}",
-                why="not in the model: its friction is alike all along the rail, and what swings is the loop, by "
+                why="not in the model: its friction is uniform along the rail, and it is the loop that oscillates, by "
                 "sticking and slipping. Simulation alone cannot tell",
             ),
             Part(
-                "dynamic friction cannot be read off, joint free or locked",
+                "dynamic friction cannot be determined, joint free or locked",
                 not any(friction.separated for friction in named.values()),
                 f"free: {free.found.verdict} Locked: {locked.found.verdict}",
             ),

@@ -64,10 +64,10 @@ def judged_line(line: LockedLine) -> Finding:
             ),
             Part(
                 f"identifications at different places differ most between {_NOISY[0]:g} and {_NOISY[1]:g} Hz, by more "
-                f"than {ABOUT:g} times what they do from {1.5 * _NOISY[1]:g} Hz",
+                f"than {ABOUT:g} times as much as from {1.5 * _NOISY[1]:g} Hz",
                 bool(_NOISY[0] <= worst <= _NOISY[1] and np.nanmax(scatter) > ABOUT * above),
                 f"the phase scatters most at {worst:.3g} Hz, by {np.degrees(np.nanmax(scatter)):.2g} degrees, and by "
-                f"{np.degrees(above):.2g} above. Assumed, as the thesis tells neither: sines of {FORCE:g} N; places "
+                f"{np.degrees(above):.2g} above. Assumed, as the thesis states neither: sines of {FORCE:g} N; places "
                 f"with static friction spread evenly over the {RANGE[0]:g} to {RANGE[1]:g} N of Fig. 20, a third of it "
                 "as Coulomb friction",
             ),
@@ -102,7 +102,7 @@ def response_of_the_free_joint(evidence: Evidence) -> Finding:
                 f"{reads[0]:.3g} to {reads[1]:.3g} kg",
                 why=f"not in the model: the line lies by a factor of {factor:.2f} off, in Fig. 17 by "
                 f"{CONSTANTS[0]:.2f}: one error of the motor constant {both} both (to {CLOSE:.0%}), and the first "
-                "mode does not hang on it. Simulation alone cannot tell",
+                "mode does not depend on it. Simulation alone cannot tell",
             ),
             *on_the_rig(evidence, lambda built: weaker_motor(built, 1, MEASURED[1], WEIGHED[1])),
         )

@@ -78,7 +78,8 @@ def _high_modes(plants: Mapping[str, LimitCase]) -> tuple[Part, Part, Part]:
 def _why_far(ratio: float) -> str:
     return (
         "idealisation: the pair is that of the cart on the limiter, and of cart and stage against each other on it, "
-        "with k_l of 2e7 N/m as printed (Sec. 3.2.3). It goes about with the root of k_l, which would have to be "
+        "with k_l of 2e7 N/m as printed (Sec. 3.2.3). Its frequency scales roughly with the root of k_l, which would "
+        "have to be "
         f"{(ratio / ORDER) ** 2:.2g} times smaller, and its resonance with the part of the stage's mass that the "
         "parasitic mode leaves"
     )
@@ -91,7 +92,7 @@ def _mass_lines(plants: Mapping[str, LimitCase]) -> Part:
         f"below the parasitic mode the magnitude follows about {_MASSES[False]:g} kg (within a factor of {ABOUT:g}) "
         f"with the limiter free and about {_MASSES[True]:g} kg with it touched",
         all(about(mass, _MASSES[name in _TOUCHED]) for name, mass in masses.items()),
-        f"{listed}; it is the limiter that tells them apart, not, as Sec. 3.4.2 says, sticking and slipping",
+        f"{listed}; it is the limiter that distinguishes them, not, as Sec. 3.4.2 says, sticking and slipping",
     )
 
 

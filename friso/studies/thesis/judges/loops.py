@@ -59,8 +59,8 @@ def _stable_at_speeds(speeds: Speeds) -> Part:
         why += ", and in the middle of that range no faster controller up to 10 kHz is stable"
     if not speeds.undeflected:
         why += (
-            "; linearised about an initial speed with the bristles not yet deflected (z = 0), which leaves that out, "
-            "the loop is stable at every speed: probably what the thesis drew"
+            "; linearised about an initial speed with the bristles not yet deflected (z = 0), which leaves this out, "
+            "the loop is stable at every speed: probably what the thesis plotted"
         )
     return Part(
         "the loop is stable at every speed of the cart, its limiter free or touched",
@@ -132,7 +132,7 @@ def _threatened(margins: Margins, setting: float, further: tuple[float, ...]) ->
         f"{WANTED:g} (or it is unstable)",
         bool(further) and (not margins.stable or (there and margins.modulus_margin < WANTED)),
         where,
-        why=f"tuned to {setting:g} Hz, the model is far from instability even there: it takes a delay of "
+        why=f"tuned to {setting:g} Hz, the model is far from instability even there: it would take a delay of "
         f"{_micro(margins.delay_margin)}"
         if further and margins.stable
         else "",

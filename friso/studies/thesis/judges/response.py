@@ -17,7 +17,7 @@ def locked_rig_hunts(evidence: Evidence) -> Finding:
     return Finding(
         (
             Part(
-                "at least two peaks are counted after 10 s (one alone makes no cycle)",
+                "at least two peaks are counted after 10 s (a single one is not a cycle)",
                 peaks >= 2,
                 f"{peaks} peaks",
             ),

@@ -80,7 +80,7 @@ def judged_crossovers(moves: Moves) -> Finding:
                 f"{middle[0]} of {middle[1]} rails hunt",
             ),
             Part(
-                f"at {moves.crossovers[1]:g} Hz a rail that settles after the move hunts on after a release",
+                f"at {moves.crossovers[1]:g} Hz a rail that settles after the move keeps hunting after a release",
                 started > 0,
                 f"{started} of {int(settle.sum())} do, released 5 mm to either side",
                 why="here the place on the rail decides, not the start; friso rig hunting finds such rails at other "
@@ -157,13 +157,14 @@ def judged_cycles(cycles: Cycles) -> Finding:
                 "there its two sides differ (by more than a tenth, on at least half of those that hunt)",
                 bool(len(lopsided) and np.median(lopsided) > np.log(1.1)),
                 f"larger side over the other, median {np.exp(np.median(lopsided)) if len(lopsided) else np.nan:.3g}",
-                why="too few cycles live on",
+                why="too few cycles persist",
             ),
             Part(
                 "there it is less regular from cycle to cycle (period scatters by more than a twentieth)",
                 scatter > 0.05,
                 f"median scatter of the period {scatter:.2%}",
-                why="the same places do the same in each cycle: what changes from cycle to cycle is not in the model",
+                why="friction at a given place is the same in each cycle: what changes from cycle to cycle is not in "
+                "the model",
             ),
         )
     )
@@ -215,12 +216,11 @@ def judged_standstill(standstill: InPosition) -> Finding:
                 f"{ratio:.2g} times (RMS)",
             ),
             Part(
-                f"the joint's damping is what is missing: ten times as much takes away at least {_RECOVERED:.0%} of "
-                "the difference",
+                f"the joint lacks damping: ten times as much removes at least {_RECOVERED:.0%} of the difference",
                 tenfold >= _RECOVERED,
                 f"{tenfold:.0%} at {10 * standstill.own:g} N s/m, {standstill.recovered.max():.0%} at the most tried",
-                why="stiffness: the bearing that sticks holds the locked stage with its bristles, the free one has "
-                "only the joint and the controller",
+                why="stiffness: the sticking bearing holds the locked stage with its bristles, the free one is held "
+                "only by the joint and the controller",
             ),
         )
     )

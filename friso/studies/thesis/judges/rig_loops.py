@@ -79,7 +79,7 @@ def measured_free(loops: RigLoops) -> tuple[Part, Part]:
         Part(
             f"the highest setting at which the rig as built comes to rest is about {_HIGHEST:g} Hz",
             about(highest, _HIGHEST),
-            f"{highest:.3g} Hz, of settings 10 % apart, released off its reference, the limiters not touched",
+            f"{highest:.3g} Hz, of settings 10 % apart, released away from its reference, the limiters not touched",
             why="not in the model: the thesis found “resonances in the compliant joint”, of which the model has one, "
             "and its delays are our choice",
         ),
@@ -90,10 +90,10 @@ def weaker_motor(loops: RigLoops, joint: int, seen: float, weighed: float) -> tu
     """Whether a weaker motor shows the mass seen [kg]; `joint` is 0 locked, 1 free."""
     plain, weak, strong = loops.apparent[joint]
     part = Part(
-        f"with a motor that gives {RATIOS[1]:g} of the force that the drive believes, it is nearer {seen:g} than the "
+        f"with a motor that gives {RATIOS[1]:g} of the force that the drive assumes, it is nearer {seen:g} than the "
         f"{weighed:g} kg weighed (by their ratios)",
         bool(weak > (seen * weighed) ** 0.5),
-        f"{weak:.3g} kg, {plain:.3g} with the force believed, {strong:.3g} with {RATIOS[2]:g} times it: a motor that "
-        f"is stronger than believed makes masses look lighter. {ASSUMED}",
+        f"{weak:.3g} kg, {plain:.3g} with the assumed force, {strong:.3g} with {RATIOS[2]:g} times it: a motor "
+        f"stronger than assumed makes masses appear lighter. {ASSUMED}",
     )
     return (part,)

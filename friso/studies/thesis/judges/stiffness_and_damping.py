@@ -33,7 +33,7 @@ def stiffness_has_a_limit(evidence: Evidence) -> Finding:
     why = (
         f"idealisation: below {shortest:.2g} mm even the softest joint of the range hunts, and at the limit the joint "
         f"carries {force.min():.2g} to {force.max():.2g} N at its stroke, with a static friction of 3 N: the force at "
-        "full stroke, from which the thesis argues, does not set the limit"
+        "full stroke, on which the thesis bases its argument, does not set the limit"
         if works.any()
         else ""
     )
