@@ -106,8 +106,8 @@ def _plant(bode: Bode) -> Figure:
     )
     if has_limiter(bode):
         in_series = any(name.endswith(SERIES) for name in bode.cases)
-        dashed = "; dashed: one behind the other, as Table 1 prints it" if in_series else ""
-        caption += f" A touched limiter acts beside the joint{dashed}."
+        dashed = "; dashed: in series, as Table 1 prints it" if in_series else ""
+        caption += f" A touched limiter acts in parallel with the joint{dashed}."
     panels = (replace(above, series=(*above.series, *lines)), _phases(_hertz(bode), curves))
     return Figure("bode_plant", "Plant", caption, panels)
 

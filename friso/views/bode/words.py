@@ -33,7 +33,7 @@ def stability(bode: Bode) -> list[str]:
     if bode.stable:
         worst, margins = bode.worst
         where = f"{place(worst, bode)}, {_margin(margins)}"
-        return [*says, f"So it is in every state: {_states_checked(bode)}. Worst: {where}."]
+        return [*says, f"It is stable in every state: {_states_checked(bode)}. Worst: {where}."]
     return [*says, f"It is not stable in every state. Unstable: {'; '.join(_where(bode))}.", *_why(bode)]
 
 

@@ -82,9 +82,10 @@ def _front(design: Design) -> Figure:
     )
     kinds = [f"{sheet.leaves:g} leaves of {size(sheet.thickness)} mm {sheet.material}" for sheet in sheets]
     caption = (
-        "The best that can be built: no leaves within all requirements are both softer and have a higher first "
-        "interfering frequency. It ends on the right where the cart would break away inside the stroke, at "
-        f"{newtons_per(stiffest, 'mm')}, or where space or sheets end. On this front: {listed(kinds, 'and')}."
+        "The best that can be built: no leaves that meet all requirements are both softer and have a higher first "
+        "interfering frequency. The front ends on the right where the cart would break away within the stroke, at "
+        f"{newtons_per(stiffest, 'mm')}, or where space or available thicknesses end. On this front: "
+        f"{listed(kinds, 'and')}."
     )
     panel = Panel("", *axes, (line,), tuple(points), limits)
     return Figure("design_front", "Pareto front of leaf springs", caption, (panel,))

@@ -52,7 +52,7 @@ def need(design: Design) -> str:
     if not without.hunts:
         return f"No isolator is needed: without one the machine {edge(without)}."
     least = factor * without.highest
-    bound = f"{hertz(least)} or more" if math.isfinite(least) else "higher than was searched"
+    bound = f"{hertz(least)} or more" if math.isfinite(least) else "higher than the range searched"
     above = f"{bound}, {factor:g} times the edge of hunting"
     if design.needed:
         return f"An isolator is needed: without one the crossover must be {above}; the machine allows {limit}."

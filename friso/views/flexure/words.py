@@ -58,7 +58,7 @@ def assumptions(stage: Stage) -> list[str]:
             points.append(f"{point}{' along x' if partly else ''} at {place}")
     parts += [", ".join(points)] if points else []
     if "flexure.load" not in flat:
-        parts.append("no load on the leaves, but the weight of the stage for the margin to buckling")
+        parts.append("no load on the leaves, except the weight of the stage for the buckling margin")
     return [f"Assumed, since [flexure] does not say: {'; '.join(parts)}."] if parts else []
 
 
@@ -107,8 +107,9 @@ def _borne(evaluation: Evaluation) -> list[str]:
     lines, mechanism = [], evaluation.mechanism
     if evaluation.yield_margin < 1:
         lines.append(
-            f"The leaves yield: {megapascals(evaluation.clamp_stress)} at the clamp at {_stroke(evaluation)}, but the "
-            f"material bears {megapascals(mechanism.yield_strength)}. Longer or thinner leaves, or a smaller stroke, "
+            f"The leaves yield: {megapascals(evaluation.clamp_stress)} at the clamp at {_stroke(evaluation)}, but but "
+            f"the material bears {megapascals(mechanism.yield_strength)}. Longer or thinner leaves, or a smaller "
+            "stroke, "
             "would remedy this."
         )
     elif evaluation.fatigue_margin < 1:
