@@ -495,7 +495,7 @@ def test_overrides_are_of_the_stage(
 ) -> None:
     command(RIG, spec, overrides=['name="Another"', 'drive.delay="1 ms"'], out=folder)
     assert finished[-1] == "Another"
-    assert "[drive] counts for the margins" in capsys.readouterr().err
+    assert "[drive] is taken into account for the margins" in capsys.readouterr().err
     with refused():
         command(RIG, spec, overrides=['controller.crosover="8 Hz"'], out=folder)
 
