@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from friso import evidence
 from friso.errors import InputError
 from friso.identify.errors import Residual, SimulationErrors, errors_of, residual_of, unexplained
 from friso.identify.estimate import Estimate
@@ -184,10 +185,15 @@ FEW = 7.0
 RESTS = 0.1
 """Share of the time for which the position rests from which on what repeats is taken for moves."""
 
-FOLLOWED = (
-    "without the machine's own controller the intervals of friction are too narrow: of machines drawn at random "
-    "(benchmarks/identify.py) they held the truth less often than not; give the controller with --stage"
-)
+
+def _without_controller() -> str:
+    """Why the machine's own controller is needed."""
+    held, shown = (evidence.value("identify.without-controller", name) for name in ("held", "shown"))
+    return (
+        "without the machine's own controller the intervals of friction are too narrow: on randomly drawn machines "
+        f"only {held:.0f} of {shown:.0f} contained the true value (python -m benchmarks.identify); specify the "
+        "controller with --stage"
+    )
 
 
 def _claims(course: Course) -> str | None:
@@ -220,7 +226,7 @@ def _notes(results: Sequence[IdentifiedMoves], stage: Stage | None) -> list[str]
     loops = [result for result in results if result.loop] if stage is not None else []
     told = [why_continuous(stage.flat(), result.log.sample_time) for result in loops if stage is not None]
     followed = any(result.loop is None for result in results)
-    return [*(sentence for sentence in dict.fromkeys(told) if sentence), *([FOLLOWED] if followed else [])]
+    return [*(sentence for sentence in dict.fromkeys(told) if sentence), *([_without_controller()] if followed else [])]
 
 
 def _predict(result: IdentifiedMoves, log: Log, settings: AnalysisSettings) -> SimulatedLog | None:

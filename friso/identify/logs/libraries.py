@@ -22,7 +22,7 @@ def library(module: str, extra: str, path: Path) -> Any:
 
 def broken(kind: str, error: Exception, path: Path) -> LogError:
     """The error for a file of a kind at which its library stumbles."""
-    return LogError("log", f"a {kind} file that cannot be read ({error})", f"a whole {kind} file", "", str(path))
+    return LogError("log", f"a {kind} file that cannot be read ({error})", f"a complete {kind} file", "", str(path))
 
 
 def named_table(kind: str, channels: list[Channel], notes: list[str], path: Path) -> ChannelTable:
