@@ -136,7 +136,7 @@ def _range(name: str, text: str, reader: _Reader, log: bool) -> Range:
     first, last = reader.text(match["first"]), reader.text(match["last"])
     if not first < last:
         order = "empty" if first == last else "reversed"
-        raise InputError("", quoted(text, f"{order} range"), "a range that rises", RANGE_EXAMPLE)
+        raise InputError("", quoted(text, f"{order} range"), "an increasing range", RANGE_EXAMPLE)
     scale: Scale = cast(Scale, match["scale"] or ("log" if log else "linear"))
     if scale == "log" and first <= 0:
         range_text = quoted(text, "a logarithmic axis never reaches 0")
