@@ -12,7 +12,7 @@ import numpy as np
 
 from friso.stage import Stage
 from friso.studies.rig.excitation import excite
-from friso.studies.rig.experiments.compare import on_rail, started, varied
+from friso.studies.rig.experiments.compare import MOTORS, on_rail, started, varied
 from friso.studies.rig.experiments.frf import (
     SETTINGS,
     MeasuredLoop,

@@ -10,7 +10,7 @@ from friso.studies.rig.experiments.compare import AS_SLOW, MOTORS, SIMILAR
 from friso.studies.rig.experiments.in_position import BITS, InPosition
 from friso.studies.rig.experiments.stroke_crossover import StrokeCrossover
 from friso.studies.rig.hunted import Hunted
-from friso.studies.thesis.as_built import AS_BUILT, Cycles, Moves
+from friso.studies.thesis.as_built import AS_BUILT, COULOMB_LEVEL, Cycles, Moves
 from friso.studies.thesis.claims import ORDER, Evidence, Finding, Part, about, judges
 from friso.studies.thesis.experiments import GRID, MOVES, ON_RAILS, STANDSTILL
 
