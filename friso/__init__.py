@@ -3,7 +3,8 @@
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-import friso.equations.friction  # registers the friction laws with the stage file
+import friso.equations.controllers  # registers the controllers with the stage file
+import friso.equations.friction  # and the friction laws
 import friso.flexure.joint  # noqa: F401 (and what follows from leaf springs)
 from friso.errors import InputError, LogError, SpecError, StageError, StoreError
 from friso.stage import Stage, load, loads, save

@@ -19,8 +19,9 @@ from friso.engine.batch import Options, prepare, run_batch, settings_of
 from friso.engine.kernel import Kernel, Wanted, empty_results, kernel, kernels
 from friso.engine.simulate import simulate
 from friso.equations.as_built import NEUTRAL, AsBuilt, _command
+from friso.equations.blocks import Loop
 from friso.equations.component import Held, key, state
-from friso.equations.pid import Loop
+from friso.equations.controllers.pid_gains import Terms
 from friso.equations.sampled import sampled_controller
 from friso.equations.structure import ControllerForm
 from friso.stage import Stage
@@ -349,12 +350,12 @@ def test_eq_7_is_its_bilinear_transform() -> None:
     """The whole controller, its low-pass and the integral of what that lets through (a trapezoid)."""
     k_p, tau_z, tau_i, tau_p = van_dijk()
     error = np.random.default_rng(4).normal(0, 1e-3, 300)
-    command, held = sampled_controller(ControllerForm(tuned=True), SEEN, 1)
+    command, held = sampled_controller(ControllerForm("pid", "VanDijk", None, integral=True), SEEN, 1)
     outputs = iterated(command, held, keys(axis()) | TUNED, {"error": error})
     force = bilinear([k_p * tau_z * tau_i, k_p * (tau_z + tau_i), k_p], [tau_i * tau_p, tau_i, 0.0], error)
     assert outputs["commanded"] == pytest.approx(force, rel=1e-9, abs=1e-9)
     passed = bilinear([1.0], [tau_p, 1.0], error)
-    assert outputs["low_passed"] == pytest.approx(passed, abs=1e-14)
+    assert outputs["low_passed_error"] == pytest.approx(passed, abs=1e-14)
     assert outputs["integral"] == pytest.approx(bilinear([1.0], [1.0, 0.0], passed), abs=1e-14)
 
 
@@ -362,7 +363,9 @@ def test_eq_7_is_its_bilinear_transform() -> None:
 def test_eq_6_with_a_filter_is_its_bilinear_transform(derivative_on: Literal["error", "measurement"]) -> None:
     """But for its integral, which is a sum."""
     error, position = np.random.default_rng(5).normal(0, 1e-3, (2, 300))
-    command, held = sampled_controller(ControllerForm(tuned=False, derivative_on=derivative_on), SEEN, 1)
+    command, held = sampled_controller(
+        ControllerForm("pid", "PidGains", Terms(True, True, derivative_on), integral=True), SEEN, 1
+    )
     inputs = {"error": error, "position": position}
     outputs = iterated(command, held, keys(axis()) | {"controller.tau": TAU}, inputs)
     rate = bilinear([KD, 0.0], [TAU, 1.0], error if derivative_on == "error" else -position)

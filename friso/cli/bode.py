@@ -93,7 +93,7 @@ def bode_document(found: Bode) -> dict[str, Any]:
     """The JSON document of `bode`; infinite and undefined numbers are null."""
     given = found.stage.joint
     own = "given" if given is None else ("locked" if given.locked else "free")
-    crossover = "controller.crossover" in found.stage.flat()
+    crossover = found.stage.controller.bandwidth_key is not None
     return {
         "stage": found.stage.name,
         "cases": {name: _margins(case.margins) for name, case in found.cases.items()},

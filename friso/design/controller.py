@@ -10,6 +10,7 @@ import numpy as np
 
 from friso.design.modal import Modal
 from friso.design.population import Population
+from friso.equations.controllers.van_dijk import ALPHA, BETA, CROSSOVER, TUNED_MASS
 from friso.flexure.evaluation import Evaluation
 from friso.frequency.crossover import Limits
 from friso.frequency.ranges import Range, shared
@@ -74,15 +75,15 @@ def comfortable(stage: Stage, leaves: Evaluation, population: Population) -> tup
 def controller(stage: Stage, leaves: Evaluation, ranges: Limits, population: Population) -> Controller:
     """The controller of a stage with leaf springs, its crossover chosen."""
     flat = stage.flat()
-    gains = tuning(*(flat[f"controller.{name}"] for name in ("crossover", "alpha", "beta", "tuned_mass")))
+    gains = tuning(*(flat[key] for key in (CROSSOVER, ALPHA, BETA, TUNED_MASS)))
     corners = np.array([_margin({**flat, **population.of(k)}, leaves) for k in range(population.count)])
     tried = dampings(flat)
     damping = Damping(tried, np.array([_margin({**flat, "joint.damping": trial}, leaves) for trial in tried]))
-    return Controller(flat["controller.crossover"], gains, ranges, _margin(flat, leaves), corners, damping)
+    return Controller(flat[CROSSOVER], gains, ranges, _margin(flat, leaves), corners, damping)
 
 
 def _margin(flat: Mapping[str, Any], leaves: Evaluation) -> float:
-    return float(Modal.of(flat, leaves).margin(flat["controller.crossover"])[0])
+    return float(Modal.of(flat, leaves).margin(flat[CROSSOVER])[0])
 
 
 def dampings(flat: Mapping[str, Any]) -> np.ndarray:

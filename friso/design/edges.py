@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from friso.design.population import Population
+from friso.equations.controllers.van_dijk import CROSSOVER
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import hunting_cycles
 from friso.hunting.persistence import DISTANCES, hunts_somehow
@@ -64,7 +65,7 @@ def edges_over(
 ) -> Corners:
     """The edges of the stage `flat` in all corners, searched from `low` to `high` [Hz], tuned by van Dijk's rules: on a
     grid, and between the last point at which a cycle attracts and the next. `tell` gets steps done and steps in all."""
-    ensemble = Ensemble.held(population.over({**flat, "controller.crossover": np.nan}), population.count)
+    ensemble = Ensemble.held(population.over({**flat, CROSSOVER: np.nan}), population.count)
     grid, every = np.log(np.geomspace(low, high, steps)), np.arange(population.count)
     attracts, decided = _attracts(ensemble, np.repeat(every, steps), np.tile(grid, population.count))
     attracts, decided = attracts.reshape(-1, steps), decided.reshape(-1, steps)
@@ -89,7 +90,7 @@ def edges_over(
 def _attracts(ensemble: Ensemble, which: np.ndarray, crossover: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Whether a cycle attracts, or may for all that is known, in corners at logarithms of crossovers; whether it is."""
     some = ensemble.take(which)
-    stages = Ensemble.held({**some.flat, "controller.crossover": np.exp(crossover)}, len(which))
+    stages = Ensemble.held({**some.flat, CROSSOVER: np.exp(crossover)}, len(which))
     cycles = hunting_cycles(stages, RTOL)
     attracts, decided = cycles.attracting.copy(), np.ones(len(which), bool)
     unsure = np.flatnonzero(cycles.uncertain)

@@ -9,6 +9,7 @@ import numpy as np
 from friso.design.population import Population, typical_move
 from friso.design.spec import Spec
 from friso.design.verification import tried
+from friso.equations.controllers.van_dijk import CROSSOVER
 from friso.stage import Stage
 
 CROSSOVERS, STROKES = 24, 16
@@ -33,16 +34,14 @@ def hunting_map(stage: Stage, spec: Spec, population: Population) -> HuntingMap:
     flat = stage.flat()
     crossovers, strokes = (
         np.geomspace(low * flat[key], high * flat[key], count)
-        for key, (low, high), count in zip(
-            ("controller.crossover", "joint.stroke"), REACH, (CROSSOVERS, STROKES), strict=True
-        )
+        for key, (low, high), count in zip((CROSSOVER, "joint.stroke"), REACH, (CROSSOVERS, STROKES), strict=True)
     )
     shape = (STROKES, CROSSOVERS, population.count)
     stroke, crossover, number = (
         axis.ravel() for axis in np.meshgrid(strokes, crossovers, np.arange(population.count), indexing="ij")
     )
     machines = {key: value[number] for key, value in population.keys.items()}
-    runs = {**flat, **machines, **typical_move(spec), "controller.crossover": crossover, "joint.stroke": stroke}
+    runs = {**flat, **machines, **typical_move(spec), CROSSOVER: crossover, "joint.stroke": stroke}
     outcome = tried(runs, len(number), float(spec.position.window), patient=False)
     share = np.where(outcome.completed, outcome.hunts, np.nan).reshape(shape).mean(axis=2)
     return HuntingMap(crossovers, strokes, share)

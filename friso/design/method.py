@@ -21,6 +21,7 @@ from friso.design.relax import Relaxation, relaxations
 from friso.design.requirements import Task
 from friso.design.spec import Spec
 from friso.design.verification import Verification, verification
+from friso.equations.controllers.van_dijk import CROSSOVER
 from friso.frequency.crossover import Limits, limits
 from friso.stage import Stage
 
@@ -128,7 +129,7 @@ def design(stage: Stage, spec: Spec, progress: Progress = lambda what, done, tot
     task, candidates = leaves(spec, flat, friction, progress)
     progress("leaves and crossover", 0, 1)
     fit = fitted(base, task, candidates, population)
-    crossover, tell = fit.stage.flat()["controller.crossover"], partial(progress, "hunting with isolator")
+    crossover, tell = fit.stage.flat()[CROSSOVER], partial(progress, "hunting with isolator")
     tell(0, 1)
     stiffest = fit.stage.flat()["joint.stiffness"] * (1 + spec.safety.stiffness_tolerance)
     worst = {**fit.stage.flat(), "joint.stiffness": stiffest}
@@ -150,7 +151,7 @@ def with_damping(fit: Fitted) -> tuple[Relaxation | None, float]:
     crossover [Hz]; none where it is already, or where damping does not help."""
     flat, spec = fit.stage.flat(), fit.task.spec
     target = min(spec.limit, fit.choice.frequency / spec.safety.parasitic)
-    if flat["controller.crossover"] >= ALIKE * target:
+    if flat[CROSSOVER] >= ALIKE * target:
         return None, target
     for damping in dampings(flat)[1::2]:
         ranges = Modal.of({**flat, "joint.damping": damping}, fit.choice.beams).comfortable
@@ -209,7 +210,7 @@ def fitted(base: Stage, task: Task, candidates: list[Candidate], population: Pop
         if best is None:
             raise NoDesign(f"up to {target:.3g} Hz there is no crossover with a modulus margin of 0.5")
         if best >= ALIKE * target:
-            return Fitted(task, choice, stage.replace({"controller.crossover": f"{_down(best):.6g} Hz"}), ranges)
+            return Fitted(task, choice, stage.replace({CROSSOVER: f"{_down(best):.6g} Hz"}), ranges)
         target = best
     raise NoDesign(
         f"none of the {len(candidates)} leaf springs on the front, in sizes rounded to tenths of a millimetre, is "
@@ -225,7 +226,7 @@ def _down(crossover: float) -> float:
 
 def _does_not_hunt(fit: Fitted, edges: Corners) -> None:
     """Raises NoDesign where the crossover does not keep its distance from the edge of hunting."""
-    spec, crossover = fit.task.spec, fit.stage.flat()["controller.crossover"]
+    spec, crossover = fit.task.spec, fit.stage.flat()[CROSSOVER]
     needed = spec.safety.hunting * edges.highest
     if not edges.hunts or needed <= crossover:
         return

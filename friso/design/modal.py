@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from friso.equations.bandwidth import faster
+from friso.equations.controllers.van_dijk import CROSSOVER
 from friso.flexure.evaluation import Evaluation
 from friso.frequency.crossover import DENSITY, STEPS, WANTED, searched, settled_members
 from friso.frequency.drive import Drive
@@ -56,7 +57,7 @@ class Modal:
         return float(distance_to_lines(loop).min()) if stable.all() else 0.0
 
     def _at(self, crossover: np.ndarray) -> dict[str, Any]:
-        return faster(self.flat, crossover / self.flat["controller.crossover"])
+        return faster(self.flat, crossover / self.flat[CROSSOVER])
 
     @property
     def comfortable(self) -> tuple[Range, ...]:
@@ -83,7 +84,7 @@ def compliance(leaves: Evaluation, omega: np.ndarray) -> np.ndarray:
 
 def _frequencies(flat: Mapping[str, Any], leaves: Evaluation, drive: Drive) -> np.ndarray:
     """Angular frequencies that show the loop at all crossovers, and every mode."""
-    ends = [grid(faster(flat, np.array(end / flat["controller.crossover"])), DENSITY) for end in searched(flat)]
+    ends = [grid(faster(flat, np.array(end / flat[CROSSOVER])), DENSITY) for end in searched(flat)]
     zeta = float(leaves.mechanism.damping_ratio)
     about = [2 * np.pi * mode.frequency * (1 + zeta * AROUND) for mode in leaves.modes[1:]]
     every = np.unique(np.concatenate([*ends, *about]))

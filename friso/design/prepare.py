@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from friso.design.geometry import Geometry, moved_along
 from friso.design.spec import Spec
+from friso.equations.controllers.van_dijk import CROSSOVER, TUNED_MASS
 from friso.errors import InputError
 from friso.stage import Stage
 
@@ -23,7 +24,7 @@ def prepared(stage: Stage, spec: Spec) -> Stage:
         if (mass := getattr(spec.masses, name)) is not None
     }
     if masses and "tuned_mass" in stage.controller.given():
-        masses["controller.tuned_mass"] = None  # it follows the masses
+        masses[TUNED_MASS] = None  # it follows the masses
     sizes = {f"flexure.{name}": f"{section.space(name)[1]!r} m" for name in ("length", "width", "spacing")}
     leaves = {
         "flexure.leaves": section.leaves[0],
@@ -31,7 +32,7 @@ def prepared(stage: Stage, spec: Spec) -> Stage:
         "flexure.material": section.materials[0],
         "joint.locked": False,
         "joint.stroke": f"{high!r} m",
-        "controller.crossover": f"{spec.limit!r} Hz",
+        CROSSOVER: f"{spec.limit!r} Hz",
     }
     joint = stage.joint
     removed = {"joint.stiffness": None} if joint and joint.stiffness is not None else {}
@@ -61,6 +62,6 @@ def _can_be_isolated(stage: Stage) -> None:
         raise InputError(
             "friction", "none", "friction, without which no isolator is needed", '[friction] model = "lugre" ...'
         )
-    if "controller.crossover" not in stage.flat():
+    if CROSSOVER not in stage.flat():
         expected = "a controller tuned by van Dijk's rules; its crossover follows from the design"
         raise InputError("controller", "gains", expected, 'crossover = "8 Hz", alpha = 0.1, beta = 2')

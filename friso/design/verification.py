@@ -14,6 +14,7 @@ from friso.design.spec import Spec
 from friso.engine.arrays import Status
 from friso.engine.batch import Options, run_chunks
 from friso.engine.kernel import kernel
+from friso.equations.controllers.van_dijk import TUNED_MASS
 from friso.equations.motion import last_corner
 from friso.equations.structure import shared_structure
 from friso.stage import Stage
@@ -159,7 +160,7 @@ def _worst_stage(stage: Stage, keys: dict[str, float], time: float) -> Stage:
     numbers: of which size of the leaves its stiffness is off is not told apart."""
     flat = stage.flat()
     follow = ("joint.stiffness", "parasitic.frequency", "parasitic.mass", "parasitic.damping_ratio")
-    joint = {key: float(flat[key]) for key in (*follow, "controller.tuned_mass")}
+    joint = {key: float(flat[key]) for key in (*follow, TUNED_MASS)}
     moved = stage.replace({"motion": THERE_AND_BACK})
     corner = float(last_corner({**flat, **moved.flat(), **keys}))
     numbers = joint | keys | {"motion.duration": corner + time}

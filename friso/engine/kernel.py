@@ -64,7 +64,7 @@ class Kernel:
         return self.module.CART_VELOCITY
 
     def having(self, role: Role) -> list[int]:
-        """Which states have a role."""
+        """Which of the states and of the numbers held have a role."""
         return [i for i, state_role in enumerate(self.module.ROLES) if state_role == role]
 
     @property

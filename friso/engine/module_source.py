@@ -67,7 +67,7 @@ def _numbers(model: Model, writer: StepWriter, lanes: int) -> str:
     lines = [
         f"LANES = {lanes}",
         f"STATE_NAMES = {tuple(states)!r}",
-        f"ROLES = {tuple(each.role.value for each in model.states)!r}",
+        f"ROLES = {tuple(each.role.value for each in (*model.states, *model.held))!r}",
         f"PARAMETERS = {tuple(map(str, model.parameters))!r}",
         f"KINK_NAMES = {tuple(kink.name for kink in model.kinks)!r}",
         f"OUTPUTS = { {name: (each.unit, each.label) for name, each in model.outputs.items()}!r}",

@@ -108,8 +108,9 @@ def _drive(form: AsBuilt) -> Control:
     """Everything between the encoder and the motor's force."""
     from sympy import pi
 
+    from friso.equations.blocks import Controller, Loop
     from friso.equations.component import STEADY, Component, Held, Output, Role, State, key, state
-    from friso.equations.pid import Controller, Loop, loop_stiffness
+    from friso.equations.model import loop_stiffness
 
     def control(loop: Loop, length: sp.Expr, rate: sp.Expr) -> Controller:
         reading, command, kept = _command(form, loop)
@@ -133,9 +134,9 @@ def _command(form: AsBuilt, loop: Any) -> tuple[sp.Expr, sp.Expr, tuple[Any, ...
     """What the encoder reads [m], what the controller commands [N], and what it keeps for the next sample."""
     import sympy as sp
 
+    from friso.equations.blocks import Loop
     from friso.equations.component import STEADY, TICK, Held, gaussian, key, quantised, state
     from friso.equations.model import REFERENCE
-    from friso.equations.pid import Loop
     from friso.equations.sampled import Rest, sampled_controller
 
     assert form.structure.controller is not None
@@ -151,7 +152,7 @@ def _command(form: AsBuilt, loop: Any) -> tuple[sp.Expr, sp.Expr, tuple[Any, ...
         rests=sp.Abs(error) < drive["integrator_deadband"],
         restarts=sp.And(drive["integrator_reset"] > 0, error * before < 0),
     )
-    known = Loop(error, reading, loop.velocity, speed)
+    known = Loop(error, reading, loop.velocity, speed, acceleration)
     extra = ahead + state(INJECTED)
     command, held = sampled_controller(form.structure.controller, known, form.velocity_samples, extra, rest)
     last = sp.Piecewise((error, error**2 > 0), (before, True))  # a reading in whole digits may find none

@@ -1,14 +1,50 @@
-"""A controller made faster or slower as a whole."""
+"""How fast a controller is, and the same controller made faster or slower as a whole."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
+
+from friso.stage.controllers import KIND, controller_of
+
+
+def bandwidth(flat: Mapping[str, Any]) -> Any:
+    """The bandwidth [Hz] that the keys of a controller tell; None for one that is given by its gains, for instance,
+    and without a controller."""
+    key = controller_of(flat).bandwidth_key if KIND in flat else None
+    return None if key is None else flat[key]
+
+
+def at_bandwidth(flat: Mapping[str, Any], bandwidth: Any) -> dict[str, Any]:
+    """Stages with their controllers at bandwidths [Hz]; at factors of it where no key tells a bandwidth."""
+    key = controller_of(flat).bandwidth_key
+    return faster(flat, bandwidth) if key is None else {**flat, key: bandwidth}
 
 
 def faster(flat: Mapping[str, Any], factor: Any) -> dict[str, Any]:
-    """Stages whose controller is faster by a factor, all its poles and zeros and the crossover being scaled."""
-    if "controller.crossover" in flat:
-        return {**flat, "controller.crossover": flat["controller.crossover"] * factor}
-    powers = {"kp": 2, "ki": 3, "kd": 1, "tau": -1}
-    return {**flat, **{f"controller.{name}": flat[f"controller.{name}"] * factor**n for name, n in powers.items()}}
+    """Stages whose controller is faster by a factor, all its poles and zeros and its bandwidth being scaled."""
+    return {**flat, **sped_up(flat, factor)}
+
+
+def sped_up(flat: Mapping[str, Any], factor: Any) -> dict[str, Any]:
+    """The keys that change in a controller that is faster by a factor, to their new values."""
+    law = controller_of(flat)
+    powers = {law.key(name): power for name, power in law.speeds_up.items()}
+    return {key: flat[key] * factor**power for key, power in powers.items() if key in flat}
+
+
+@dataclass(frozen=True)
+class _Numbers:
+    """The keys of a controller as numbers."""
+
+    flat: Mapping[str, Any]
+
+    def key(self, name: str) -> Any:
+        return self.flat[controller_of(self.flat).key(name)]
+
+
+def proportional_stiffness(flat: Mapping[str, Any]) -> float:
+    """The proportional stiffness of the loop of a stage given as flat keys [N/m]."""
+    law = controller_of(flat)
+    return float(law.stiffness(_Numbers(flat), law.variant(flat)))

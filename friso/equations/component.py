@@ -52,12 +52,13 @@ class State:
 
 @dataclass(frozen=True)
 class Held:
-    """A number that is held between samples, what it becomes at one, in terms of what held just before, and its value
-    in a steady motion that has lasted, in terms of `STEADY`."""
+    """A number that is held between samples, what it becomes at one, in terms of what held just before, its value in a
+    steady motion that has lasted, in terms of `STEADY`, and its role."""
 
     symbol: sp.Symbol
     update: sp.Expr
     settled: sp.Expr = sp.S.Zero
+    role: Role = Role.FILTER
 
 
 TICK = sp.Symbol("tick", real=True)

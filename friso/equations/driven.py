@@ -37,14 +37,18 @@ def driven(form: Driven) -> Model:
 
 def _sampled(form: Driven) -> Control:
     """The controller as a drive carries it out, whose samples are the corners of the reference."""
+    from dataclasses import replace
+
+    from friso.equations.blocks import Controller, Loop
     from friso.equations.component import TIME, Component, Held, Output, state
-    from friso.equations.pid import Controller, Loop
     from friso.equations.sampled import sampled_controller
 
     def control(loop: Loop, length: sp.Expr, rate: sp.Expr) -> Controller:
         assert form.structure.controller is not None
         now = state("held_force")
-        at_corner = Loop(loop.error.subs(TIME, 0), loop.position, loop.velocity, loop.reference_velocity.subs(TIME, 0))
+        at_corner = replace(
+            loop, error=loop.error.subs(TIME, 0), reference_velocity=loop.reference_velocity.subs(TIME, 0)
+        )
         force, held = sampled_controller(form.structure.controller, at_corner, form.velocity_samples)
         component = Component(outputs={"force": Output(now, "N", "actuator force")})
         return Controller(now, component, (*held, Held(now, force)))

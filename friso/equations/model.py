@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 import sympy as sp
 
+from friso.equations.blocks import Controller, Loop
 from friso.equations.component import STEADY, TICK, TIME, Clock, Component, Held, Kink, Output, State, Switch, key
+from friso.equations.continuous import Continuous, continuous_controller
 from friso.equations.friction.common import Friction
 from friso.equations.joint import joint
 from friso.equations.masses import Body, parasitic_force, position_outputs
-from friso.equations.pid import Controller, Loop, controller, loop_stiffness
-from friso.equations.structure import Structure
+from friso.equations.structure import ControllerForm, Structure
 from friso.stage.tables import friction_law
 
 REFERENCE = tuple(key(f"reference.{name}") for name in ("position", "velocity", "acceleration"))
@@ -126,9 +128,11 @@ def assemble(structure: Structure, external: External | None = None, control: Co
     reference_velocity = velocity + acceleration * TIME
     moving = cart.mass + (stage.mass if stage is not cart else 0) + (parasitic.mass if parasitic else 0)
     length, rate = _scales(structure, friction, moving)
-    loop = Loop(reference - stage.position, stage.position, stage.velocity, reference_velocity)
+    loop = Loop(reference - stage.position, stage.position, stage.velocity, reference_velocity, acceleration)
     form = structure.controller
-    acting = control(loop, length, rate) if control else controller(form, loop, length, rate) if form else None
+    if control is None and form is not None:
+        control = partial(continuous_controller, form)
+    acting = control(loop, length, rate) if control else None
     forces = (acting.force if acting else sp.S.Zero) + (external(stage) if external else sp.S.Zero)
     bodies, parts = _mechanics(structure, (cart, stage, parasitic), friction, forces, (length, rate))
     if acting:
@@ -155,6 +159,11 @@ def assemble(structure: Structure, external: External | None = None, control: Co
         jumps=resets(kinks),
         held=acting.held if acting else (),
     )
+
+
+def loop_stiffness(form: ControllerForm | None) -> sp.Expr:
+    """Proportional stiffness of the loop [N/m]; 0 without a controller."""
+    return form.law.stiffness(Continuous(sp.S.One), form.variant) if form else sp.S.Zero
 
 
 def _bodies(structure: Structure) -> tuple[Body, Body, Body | None]:

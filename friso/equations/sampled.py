@@ -1,18 +1,18 @@
-"""The PID controller as a drive carries it out: a force computed at every sample and held until the next.
+"""Controllers as a drive carries them out: a force computed at every sample and held until the next.
 
-Filters and what they feed are discretised by the bilinear transform (Tustin), as in `friso.frequency.drive`: Eq. 7
-wholly, Eq. 6 but for its integral, which is a sum. Without a filter the velocity is a difference of positions.
+Filters, and what they feed, are discretised by the bilinear transform (Tustin), as in `friso.frequency.drive`;
+integrals as their controller says. Without a filter a derivative is a difference over samples.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, Literal
 
 import sympy as sp
 
-from friso.equations.component import STEADY, Held, key, state
-from friso.equations.pid import Loop, van_dijk_gains
+from friso.equations.blocks import Blocks, Loop, Polynomial, Signal, force_limit, measured, wound_up
+from friso.equations.component import Held, Role, key, state
 from friso.equations.structure import ControllerForm
 
 SAMPLE_TIME = key("drive.sample_time")
@@ -20,7 +20,7 @@ SAMPLE_TIME = key("drive.sample_time")
 
 @dataclass(frozen=True)
 class Rest:
-    """When the integrator rests for a sample, and when it begins anew, besides at the limit of the force."""
+    """When the integrators rest for a sample, and when they begin anew, besides at the limit of the force."""
 
     rests: Any = sp.false
     restarts: Any = sp.false
@@ -31,62 +31,123 @@ def sampled_controller(
 ) -> tuple[sp.Expr, tuple[Held, ...]]:
     """The force [N] commanded at a sample, an `extra` one added before it is limited, and what is kept for the next.
 
-    `loop` holds what is known at the sample. The velocity of a controller without a filter is a difference over
-    `velocity_samples`. An integrator that would drive a force beyond its limit further rests for the sample.
+    `loop` holds what is known at the sample. A derivative without a filter is a difference over `velocity_samples`. An
+    integrator that would drive a force beyond its limit further rests for the sample.
     """
-    terms = _filtered if form.tuned or form.filtered else _differences
-    demand, gain, share, held = terms(form, loop, velocity_samples)
-    demand += extra
-    if form.integral:
-        integral = _integral(form, gain, share, demand, rest)
-        demand, held = demand + gain * integral.update, (*held, integral)
-    limit = key("controller.force_limit")
-    return sp.Max(-limit, sp.Min(limit, demand)) if form.limited else demand, held
+    blocks = Sampled(velocity_samples)
+    shares = form.law.declare(measured(loop, sp.S.One, sp.S.One), blocks, form.variant)
+    demand = sum(shares.values(), start=Blocks.nothing)
+    limit = force_limit() if form.limited else None
+    force, held = blocks.finished(replace(demand, value=demand.value + extra), limit, rest)
+    return sp.Max(-limit, sp.Min(limit, force)) if limit is not None else force, held
 
 
-Terms = tuple[sp.Expr, sp.Expr, sp.Expr, tuple[Held, ...]]
-"""Proportional and derivative share [N], gain of the integral [N/(m s)], what a sample adds to it [m s], and what is
-kept."""
+@dataclass(frozen=True)
+class _Integral:
+    """An integrator's number, its next one, what a sample adds to it, its gain, and the limit of its output."""
+
+    symbol: sp.Symbol
+    next: sp.Symbol
+    share: sp.Expr
+    gain: sp.Expr
+    limit: sp.Expr | None
 
 
-def _differences(form: ControllerForm, loop: Loop, velocity_samples: int) -> Terms:
-    """Eq. 6 without a filter."""
-    kp, ki, kd = (key(f"controller.{name}") for name in ("kp", "ki", "kd"))
-    demand, held = kp * loop.error, ()
-    if form.derivative_on != "none":
-        past = [state(f"position_before_{n}") for n in range(1, velocity_samples + 1)]
-        demand -= kd * (loop.position - past[-1]) / (velocity_samples * SAMPLE_TIME)
-        held = tuple(
-            Held(old, new, STEADY.position - n * SAMPLE_TIME * STEADY.velocity)
-            for n, (old, new) in enumerate(zip(past, [loop.position, *past], strict=False), start=1)
-        )
-    return demand, ki, SAMPLE_TIME * loop.error, held
+class Sampled(Blocks):
+    """Blocks whose memories are numbers held from one sample to the next."""
+
+    def __init__(self, velocity_samples: int) -> None:
+        self.velocity_samples = velocity_samples
+        self.held: list[Held] = []
+        self._integrals: list[_Integral] = []
+
+    def _kept(self, name: str, value: sp.Expr, settled: sp.Expr) -> sp.Symbol:
+        """The number that a value was at the sample before."""
+        symbol = state(name)
+        self.held.append(Held(symbol, value, settled))
+        return symbol
+
+    def low_pass(self, signal: Signal, tau: sp.Expr, name: str) -> Signal:
+        before, low = state(f"signal_before_{name}"), state(f"low_passed_{name}")
+        passed = ((2 * tau - SAMPLE_TIME) * low + SAMPLE_TIME * (signal.value + before)) / (2 * tau + SAMPLE_TIME)
+        self.held += [Held(before, signal.value, signal.settled), Held(low, passed, signal.settled)]
+        return replace(signal, value=passed, rate=None, before=low)
+
+    def derivative(self, signal: Signal, name: str, tau: sp.Expr | None = None) -> Signal:
+        scale = signal.scale / SAMPLE_TIME
+        if tau is not None:
+            slope = (signal.value - self.low_pass(signal, tau, name).value) / tau
+            return Signal(slope, scale, signal.settled_rate, sp.S.Zero)
+        count, past = self.velocity_samples, signal.value
+        for n in range(1, count + 1):
+            past = self._kept(f"{name}_before_{n}", past, signal.settled - n * SAMPLE_TIME * signal.settled_rate)
+        return Signal((signal.value - past) / (count * SAMPLE_TIME), scale, signal.settled_rate, sp.S.Zero)
+
+    def integral(
+        self,
+        signal: Signal,
+        gain: sp.Expr,
+        name: str = "integral",
+        rule: Literal["bilinear", "sum"] = "bilinear",
+        limit: sp.Expr | None = None,
+    ) -> Signal:
+        symbol, following = state(name), state(f"next_{name}")
+        share = SAMPLE_TIME * signal.value
+        if rule == "bilinear":
+            before = signal.before
+            if before is None:
+                before = self._kept(f"{name}_signal_before", signal.value, signal.settled)
+            share = SAMPLE_TIME / 2 * (signal.value + before)
+        self._integrals.append(_Integral(symbol, following, share, gain, limit))
+        return Signal(gain * following, gain * signal.scale * SAMPLE_TIME, gain * symbol, sp.S.Zero)
+
+    def biquad(self, signal: Signal, upper: Polynomial, lower: Polynomial, name: str) -> Signal:
+        (b0, b1, b2), (a0, a1, a2) = map(_tustin, (upper, lower))
+        settled = upper[0] * signal.settled + upper[1] * signal.settled_rate
+        back = SAMPLE_TIME * signal.settled_rate
+        u1, u2 = state(f"signal_before_{name}"), state(f"signal_before_{name}_2")
+        y1, y2 = state(f"filtered_{name}"), state(f"filtered_{name}_2")
+        value = (b0 * signal.value + b1 * u1 + b2 * u2 - a1 * y1 - a2 * y2) / a0
+        self.held += [
+            Held(u1, signal.value, signal.settled),
+            Held(u2, u1, signal.settled - back),
+            Held(y1, value, settled),
+            Held(y2, y1, settled - upper[0] * back),
+        ]
+        return Signal(value, signal.scale, settled, upper[0] * signal.settled_rate, before=y1)
+
+    def limiter(self, signal: Signal, limit: sp.Expr, name: str) -> Signal:
+        return replace(signal, value=sp.Max(-limit, sp.Min(limit, signal.value)), rate=None, before=None)
+
+    def finished(self, demand: Signal, limit: sp.Expr | None, rest: Rest) -> tuple[sp.Expr, tuple[Held, ...]]:
+        """The force before it is limited, and all that is held, the integrators resting where the force would be driven
+        beyond its limit, and their output beyond a limit of its own."""
+        new: dict[Any, Any] = {}
+        for each in self._integrals:
+            new[each.next] = each.symbol + each.share.xreplace(new)
+        wanted = demand.value.xreplace(new)
+        updates: dict[Any, Any] = {}
+        for each in self._integrals:
+            share: Any = each.share.xreplace(updates)
+            rests = rest.rests
+            for value, end in ((wanted, limit), (each.gain * new[each.next], each.limit)):
+                if end is not None:
+                    winding = sp.Or(sp.And(value > end, share > 0), sp.And(value < -end, share < 0))
+                    rests = sp.Or(rests, winding)
+            updates[each.next] = sp.Piecewise((share, rest.restarts), (each.symbol, rests), (each.symbol + share, True))
+        steady: dict[Any, Any] = {**wound_up(demand.settled, [each.symbol for each in self._integrals])}
+        known: list[tuple[Any, Any]] = [(each.update, each.settled) for each in self.held]
+        held = [
+            replace(each, update=update.xreplace(updates), settled=settled.xreplace(steady))
+            for each, (update, settled) in zip(self.held, known, strict=True)
+        ]
+        held += [Held(e.symbol, updates[e.next], steady[e.symbol], Role.INTEGRAL) for e in self._integrals]
+        force: Any = demand.value
+        return force.xreplace(updates), tuple(held)
 
 
-def _filtered(form: ControllerForm, loop: Loop, velocity_samples: int) -> Terms:
-    """Eq. 7 with its low-pass before everything, or Eq. 6 with one before the derivative alone."""
-    on_error = form.tuned or form.derivative_on == "error"
-    signal = loop.error if on_error else -loop.position
-    before, low = state("signal_before"), state("low_passed")
-    gains = van_dijk_gains()
-    tau = gains["tau_p"] if form.tuned else key("controller.tau")
-    passed = ((2 * tau - SAMPLE_TIME) * low + SAMPLE_TIME * (signal + before)) / (2 * tau + SAMPLE_TIME)
-    settled = STEADY.error if on_error else -STEADY.position
-    held = (Held(before, signal, settled), Held(low, passed, settled))
-    if form.tuned:
-        k_p, tau_z, tau_i = gains["k_p"], gains["tau_z"], gains["tau_i"]
-        demand = k_p * (1 + tau_z / tau_i) * passed + k_p * tau_z / tau * (signal - passed)
-        return demand, k_p / tau_i, SAMPLE_TIME / 2 * (passed + low), held
-    kp, ki, kd = (key(f"controller.{name}") for name in ("kp", "ki", "kd"))
-    return kp * loop.error + kd * (signal - passed) / tau, ki, SAMPLE_TIME * loop.error, held
-
-
-def _integral(form: ControllerForm, gain: sp.Expr, share: sp.Expr, demand: sp.Expr, rest: Rest) -> Held:
-    """The integral [m s], which a sample adds a share to unless it rests; `demand` [N] is the rest of the force."""
-    old = state("integral")
-    new, rests = old + share, rest.rests
-    if form.limited:
-        wanted, limit = demand + gain * new, key("controller.force_limit")
-        winding = sp.Or(sp.And(wanted > limit, share > 0), sp.And(wanted < -limit, share < 0))
-        rests = sp.Or(rests, winding)
-    return Held(old, sp.Piecewise((share, rest.restarts), (old, rests), (new, True)))
+def _tustin(polynomial: Polynomial) -> Polynomial:
+    """The coefficients of 1, 1/z and 1/z^2 of a polynomial in s by the bilinear transform, times (1 + 1/z)^2."""
+    double = 2 / SAMPLE_TIME
+    p0, p1, p2 = polynomial[0], polynomial[1] * double, polynomial[2] * double**2
+    return p0 + p1 + p2, 2 * p0 - 2 * p2, p0 - p1 + p2

@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from friso.stage.controllers import CONTROLLERS, FORCE_LIMIT, KIND, ControllerSection, controller_of
 from friso.stage.tables import friction_law
 
 JointForm = Literal["rigid", "locked", "free", "touching"]
@@ -15,13 +16,19 @@ JointForm = Literal["rigid", "locked", "free", "touching"]
 
 @dataclass(frozen=True)
 class ControllerForm:
-    """Which terms the controller has; each absent term is absent from the equations."""
+    """Which controller, by its kind and the name of the class of its form; what else its equations depend on; whether
+    it has integral action, and whether its force is limited."""
 
-    tuned: bool
-    integral: bool = True
-    filtered: bool = True
-    derivative_on: Literal["none", "error", "measurement"] = "error"
+    kind: str
+    form: str
+    variant: Hashable
+    integral: bool
     limited: bool = False
+
+    @property
+    def law(self) -> type[ControllerSection]:
+        """The class that declares its blocks."""
+        return CONTROLLERS.form(self.kind, self.form)
 
 
 @dataclass(frozen=True)
@@ -50,7 +57,7 @@ def structure(flat: Mapping[str, Any]) -> Structure:
         parasitic="parasitic.frequency" in flat,
         friction=law,
         friction_variant=friction_law(law).variant(flat),
-        controller=_controller_form(flat) if "controller.kind" in flat else None,
+        controller=controller_form(flat) if KIND in flat else None,
         biased=tuple(name for name in ("cart", "stage") if flat.get(f"bias.{name}", 0.0) != 0),
     )
 
@@ -62,9 +69,9 @@ def shared_structure(flat: Mapping[str, Any]) -> Structure:
 
 def decisive_keys(flat: Mapping[str, Any]) -> tuple[str, ...]:
     """The numeric keys on which the structure depends, by being zero or a whole number, for instance."""
-    law = friction_law(flat["friction.model"])
-    own = ("joint.stroke", "controller.ki", "controller.kd", "controller.tau", "bias.cart", "bias.stage")
-    return (*own, *law.decisive)
+    law, control = friction_law(flat["friction.model"]), controller_of(flat)
+    own = ("joint.stroke", "bias.cart", "bias.stage")
+    return (*own, *map(control.key, control.decisive), *law.decisive)
 
 
 def _joint_form(flat: Mapping[str, Any]) -> JointForm:
@@ -75,15 +82,13 @@ def _joint_form(flat: Mapping[str, Any]) -> JointForm:
     return "touching" if flat["joint.stroke"] == 0 else "free"
 
 
-def _controller_form(flat: Mapping[str, Any]) -> ControllerForm:
-    limited = "controller.force_limit" in flat
-    if "controller.crossover" in flat:
-        return ControllerForm(tuned=True, limited=limited)
-    filtered = flat["controller.tau"] > 0
+def controller_form(flat: Mapping[str, Any]) -> ControllerForm:
+    """The form of the controller of a stage given as flat mapping."""
+    law = controller_of(flat)
     return ControllerForm(
-        tuned=False,
-        integral=flat["controller.ki"] > 0,
-        filtered=filtered and flat["controller.kd"] > 0,
-        derivative_on=flat["controller.derivative_on"] if flat["controller.kd"] > 0 else "none",
-        limited=limited,
+        kind=flat[KIND],
+        form=law.__name__,
+        variant=law.variant(flat),
+        integral=law.integrates(flat),
+        limited=FORCE_LIMIT in flat,
     )

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from friso.equations.bandwidth import faster
+from friso.equations.bandwidth import bandwidth, faster
 from friso.frequency.drive import Drive
 from friso.frequency.family import PoleStability, controller, distance_to_lines, grid, plants, scan, stability_by_poles
 from friso.frequency.members import Members, family, joined, limit_cases
@@ -63,7 +63,7 @@ class Limits:
 def limits(flat: Mapping[str, Any]) -> Limits:
     """The crossovers at which a stage is stable, and comfortably so."""
     ends, members = searched(flat), settled_members(flat)
-    crossover = flat.get("controller.crossover", 1.0)
+    crossover = _own(flat)
     stable = stable_crossovers(flat, members)
     close = ranges_below(np.geomspace(*ends, STEPS), lambda f: WANTED - _distance(flat, members, f).min(axis=1))
     comfortable = shared(close, stable)
@@ -96,7 +96,7 @@ def end_of(ranges: Sequence[Range], crossover: float) -> float | None:
 def searched(flat: Mapping[str, Any]) -> Range:
     """The crossovers that are searched; those of a sampled drive end below half the sampling frequency."""
     drive = Drive.of(flat)
-    if "controller.crossover" not in flat:
+    if bandwidth(flat) is None:
         return 1 / 100.0, 1000.0
     return LOWEST, min(HIGHEST, 0.999 * drive.highest / (2 * np.pi))
 
@@ -114,8 +114,14 @@ def settled_members(flat: Mapping[str, Any]) -> Members:
     return joined([*limit_cases(flat).values(), every[every.stuck]])
 
 
+def _own(flat: Mapping[str, Any]) -> float:
+    """The crossover of a stage [Hz]; 1 where its controller tells none."""
+    own = bandwidth(flat)
+    return 1.0 if own is None else own
+
+
 def _at(flat: Mapping[str, Any], crossover: np.ndarray) -> dict[str, Any]:
-    return faster(flat, crossover / flat.get("controller.crossover", 1.0))
+    return faster(flat, crossover / _own(flat))
 
 
 def _abscissa(flat: Mapping[str, Any], members: Members, crossover: np.ndarray) -> np.ndarray:

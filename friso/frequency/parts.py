@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 import sympy as sp
 
+from friso.equations.blocks import Loop
+from friso.equations.continuous import continuous_controller
 from friso.equations.model import assemble
-from friso.equations.pid import Loop, controller
 from friso.equations.roles import Role
 from friso.equations.structure import ControllerForm, Structure, shared_structure
 from friso.errors import InputError
@@ -91,7 +92,7 @@ def cart_states(flat: Mapping[str, Any]) -> tuple[str, str]:
 @cache
 def _compensator(form: ControllerForm) -> Declared:
     loop = Loop(_REFERENCE - _POSITION, _POSITION, _VELOCITY, sp.S.Zero)
-    control = controller(form, loop, sp.S.One, sp.S.One)
+    control = continuous_controller(form, loop, sp.S.One, sp.S.One)
     states = control.component.states
     symbols, rates = tuple(state.symbol for state in states), tuple(state.derivative for state in states)
     return Declared(symbols, rates, _CONTROLLER_INPUTS, {FORCE: control.force})

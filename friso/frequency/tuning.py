@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from friso.equations.pid import van_dijk_numbers
+from friso.equations.controllers.van_dijk import numbers, tuned
 from friso.errors import InputError
 from friso.frequency.margins import Margins, margins
 from friso.frequency.members import member
@@ -31,16 +31,8 @@ class Tuning:
 def tuning(crossover: float, alpha: float, beta: float, mass: float) -> Tuning:
     """The controller for a mass [kg] at a crossover [Hz], by van Dijk's rules with `alpha` and `beta`, and how it does
     on that mass. Raises InputError for numbers that no stage file may have."""
-    flat = {
-        "friction.model": "none",
-        "masses.stage": mass,
-        "controller.kind": "pid",
-        "controller.crossover": crossover,
-        "controller.alpha": alpha,
-        "controller.beta": beta,
-        "controller.tuned_mass": mass,
-    }
+    flat = {"friction.model": "none", "masses.stage": mass, **tuned(crossover, alpha, beta, mass)}
     for key, item in numeric_keys({**flat, "motion.kind": "hold"}).items():
         if key in flat and not item.bound.holds(flat[key]):
             raise InputError(key.split(".")[1], str(flat[key]), item.bound.text, "friso.tuning(8.0, 0.1, 2.0, 1.7)")
-    return Tuning(**van_dijk_numbers(flat), margins=margins(flat, member()))
+    return Tuning(**numbers(flat), margins=margins(flat, member()))

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from friso.equations.bandwidth import faster
+from friso.equations.bandwidth import bandwidth, faster
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import Cycles, hunting_cycles
 from friso.stage import Stage
@@ -56,7 +56,8 @@ def margin(stage: Stage, attracting: bool) -> Margin | None:
         for _ in range(ROUNDS):
             edge = (_last if attracting else _next)(flat, np.geomspace(edge.low, edge.high, FINER)) or edge
     factor = edge.low * (edge.high / edge.low) ** edge.share
-    crossover = flat["controller.crossover"] * factor if "controller.crossover" in flat else None
+    own = bandwidth(flat)
+    crossover = None if own is None else own * factor
     return Margin(factor, crossover, edge.certain)
 
 

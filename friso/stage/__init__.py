@@ -1,6 +1,7 @@
 """The stage file: a positioning stage, its controller and its motion, with units, checked."""
 
 from friso.quantities import Number, Quantity, Value
+from friso.stage.controllers import ControllerSection, register_controller
 from friso.stage.files import load, loads, parse_set, save
 from friso.stage.lists import Several, Values, element_keys
 from friso.stage.section import Rule, Section
@@ -8,6 +9,7 @@ from friso.stage.stage import Stage, numeric_keys, violations
 from friso.stage.tables import FrictionSection, register_friction
 
 __all__ = [
+    "ControllerSection",
     "FrictionSection",
     "Number",
     "Quantity",
@@ -22,6 +24,7 @@ __all__ = [
     "loads",
     "numeric_keys",
     "parse_set",
+    "register_controller",
     "register_friction",
     "save",
     "violations",

@@ -19,6 +19,7 @@ import numpy as np
 from friso.errors import InputError, StageError
 from friso.intervals import COVERAGE
 from friso.quantities import as_toml, quoted
+from friso.stage.controllers import as_tuned
 from friso.stage.files import parsed, text_of, write_whole
 from friso.stage.section import unknown_key
 from friso.stage.stage import Stage, numeric_keys, violations
@@ -216,5 +217,4 @@ def _allowed(stage: Stage, keys: Mapping[str, np.ndarray], count: int) -> tuple[
 def laid_over(stage: Stage, keys: Mapping[str, np.ndarray]) -> dict[str, Any]:
     """The flat keys of drawn stages. The controller stays as tuned: it does not know the mass that was drawn."""
     flat = stage.flat()
-    tuned = {key: flat[key] for key in ("controller.tuned_mass",) if key in flat}
-    return stage.flat(tuned | dict(keys))
+    return stage.flat(as_tuned(flat) | dict(keys))

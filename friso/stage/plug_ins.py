@@ -1,5 +1,7 @@
 """Where registered sections come from that are not friso's own, so that another process can register them too.
 
+Installed packages name theirs in entry points, which are read when a name in a stage file is not friso's own.
+
 A kernel is built in a process of its own, which gets the plug-ins with its task: a friction law or a controller from
 another package, from one file, or from the script that runs.
 """
@@ -12,7 +14,10 @@ import importlib.util
 import sys
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
+
+from friso.errors import InputError
 
 OWN = "friso"
 SCRIPT = "__main__"
@@ -61,3 +66,19 @@ def plug_in_of(cls: type) -> PlugIn | None:
 def plug_ins(classes: Iterable[type]) -> tuple[PlugIn, ...]:
     """The plug-ins that these classes come from, each once."""
     return tuple(dict.fromkeys(plug_in for cls in classes if (plug_in := plug_in_of(cls))))
+
+
+@cache
+def load_installed(group: str) -> None:
+    """Import what installed packages name in the entry points of a group: each registers its sections. Raises
+    InputError for one that cannot be imported or registers a name that is taken."""
+    from importlib.metadata import entry_points  # costs as much as all of friso's stage file
+
+    for point in sorted(entry_points(group=group), key=lambda point: point.name):
+        try:
+            point.load()
+        except InputError as error:
+            raise error.under(f"{group}: {point.name}") from None
+        except Exception as error:
+            given = f"{point.value}, which cannot be imported: {error}"
+            raise InputError(f"{group}: {point.name}", given, "a module that registers its class") from error

@@ -20,6 +20,7 @@ from friso.errors import InputError
 from friso.intervals import Interval, UncertainValue, is_range, uncertain_value
 from friso.quantities import Number, Quantity, as_toml, quoted
 from friso.stage.lists import Several, Values
+from friso.stage.plug_ins import load_installed
 
 
 @dataclass(frozen=True)
@@ -112,22 +113,41 @@ class Table:
 
 
 class Variants:
-    """Sections distinguished by one of their keys, the tag: `kind` of [motion], `model` of [friction]."""
+    """Sections distinguished by one of their keys, the tag: `kind` of [motion], `model` of [friction].
 
-    def __init__(self, tag: str) -> None:
-        self.tag = tag
+    Installed packages may declare more in the entry points of a `group`; they are imported where a name is not known.
+    """
+
+    def __init__(self, tag: str, group: str = "") -> None:
+        self.tag, self.group = tag, group
         self.classes: dict[str, type[Section]] = {}
 
+    def name_of(self, cls: type[Section]) -> str:
+        """The name that a variant declares as `kind: Literal["step"]`."""
+        return get_args(cls.model_fields[self.tag].annotation)[0]
+
     def register(self, cls: SectionClass) -> SectionClass:
-        """Class decorator: add a variant, which declares its name as `kind: Literal["step"]`."""
-        self.classes[get_args(cls.model_fields[self.tag].annotation)[0]] = cls
+        """Class decorator: add a variant. Raises InputError where its name is taken."""
+        name = self.name_of(cls)
+        taken = self.classes.get(name, cls)
+        if (taken.__module__, taken.__qualname__) != (cls.__module__, cls.__qualname__):
+            given = f"{as_toml(name)}, which {cls.__module__}.{cls.__qualname__} registers"
+            expected = f"a name that is not taken: {taken.__module__}.{taken.__qualname__} has it"
+            raise InputError(self.tag, given, expected, f'{self.tag}: Literal["my_{name}"]')
+        self.classes[name] = cls
         return cls
+
+    def named(self, name: Any) -> type[Section] | None:
+        """The class of a variant; None for a name that nobody declares."""
+        if name not in self.classes and self.group:
+            load_installed(self.group)
+        return self.classes.get(name)
 
     def pick(self, table: dict[str, Any]) -> type[Section]:
         """The class for a table. Raises InputError when the tag is missing or unknown."""
         name = table.get(self.tag)
-        if isinstance(name, str) and name in self.classes:
-            return self.classes[name]
+        if isinstance(name, str) and (cls := self.named(name)):
+            return cls
         example = nearest(name, self.classes) or next(iter(self.classes))
         expected = f"one of {', '.join(map(as_toml, self.classes))}"
         raise InputError(self.tag, quoted(name), expected, f"{self.tag} = {as_toml(example)}")

@@ -9,6 +9,15 @@ from pydantic import field_validator, model_validator
 from friso.errors import InputError, StageError
 from friso.intervals import Interval
 from friso.quantities import Number, Quantity, as_toml, quoted
+from friso.stage.controllers import (
+    ANTI_WINDUP,
+    CONTROLLER,
+    CONTROLLERS,
+    FORCE_LIMIT,
+    KIND,
+    ControllerSection,
+    controller_of,
+)
 from friso.stage.flexure import Flexure, derived, with_material
 from friso.stage.lists import element_keys
 from friso.stage.rig import Cable, Drive, Floor, Rail
@@ -16,17 +25,13 @@ from friso.stage.section import Rule, Section, Table, UncertainSection, list_fie
 from friso.stage.tables import (
     FRICTION,
     MOTION,
-    ROUNDING,
     Bias,
-    Controller,
     FrictionSection,
-    GainsController,
     Joint,
     Masses,
     Motion,
     Parasitic,
-    TunedController,
-    controller_form,
+    friction_law,
 )
 
 _FRICTION = Table(FRICTION.pick, '[friction] model = "lugre" ...')
@@ -34,7 +39,7 @@ _JOINT = Table(lambda _: Joint, '[joint] stiffness = "2.4 N/mm" ...')
 _FLEXURE = Table(lambda _: Flexure, '[flexure] leaves = 2, length = "70 mm", width = "45 mm" ...')
 _PARASITIC = Table(lambda _: Parasitic, '[parasitic] frequency = "300 Hz" ...')
 _BIAS = Table(lambda _: Bias, '[bias] cart = "0.2 N"')
-_CONTROLLER = Table(controller_form, '[controller] kind = "pid", crossover = "8 Hz", alpha = 0.1, beta = 2')
+_CONTROLLER = Table(CONTROLLERS.pick, '[controller] kind = "pid", crossover = "8 Hz", alpha = 0.1, beta = 2')
 _DRIVE = Table(lambda _: Drive, '[drive] sample_time = "50 us"')
 _RAIL = Table(lambda _: Rail, '[rail] seed = 1, static_deviation = 0.2, correlation_length = "5 mm" ...')
 _CABLE = Table(lambda _: Cable, '[cable] stiffness = "50 N/m"')
@@ -55,7 +60,7 @@ class Stage(Section):
     flexure: Annotated[Flexure | None, _FLEXURE] = None  # type: ignore[valid-type]
     parasitic: Annotated[Parasitic | None, _PARASITIC] = None
     bias: Annotated[Bias | None, _BIAS] = None
-    controller: Annotated[Controller, _CONTROLLER]
+    controller: Annotated[ControllerSection, _CONTROLLER]
     drive: Annotated[Drive | None, _DRIVE] = None
     rail: Annotated[Rail | None, _RAIL] = None
     cable: Annotated[Cable | None, _CABLE] = None
@@ -68,16 +73,6 @@ class Stage(Section):
             lambda f: "parasitic.mass" not in f or f["parasitic.mass"] < f["masses.stage"],
             "a parasitic mass smaller than the stage mass, of which it is a part",
             '[parasitic] mass = "0.25 kg" with [masses] stage = "0.5 kg"',
-        ),
-        Rule(
-            ("controller.crossover", "drive.sample_time"),
-            lambda f: (
-                "drive.sample_time" not in f
-                or "controller.crossover" not in f
-                or f["controller.crossover"] * f["drive.sample_time"] <= 1 / 10 * (1 + ROUNDING)
-            ),
-            "a sample time of at most a tenth of the crossover's period",
-            '[drive] sample_time = "50 us" (20 kHz) with crossover = "8 Hz"',
         ),
     )
 
@@ -233,7 +228,7 @@ def _tables(flat: Mapping[str, Any]) -> dict[str, type[Section]]:
     """The classes of the tables in a flat mapping."""
     classes = {
         "masses": Masses,
-        "friction": FRICTION.classes[flat["friction.model"]],
+        "friction": friction_law(flat["friction.model"]),
         "flexure": Flexure,  # before what follows from it: the first mistake is the one to be told
         "joint": Joint,
         "parasitic": Parasitic,
@@ -241,7 +236,7 @@ def _tables(flat: Mapping[str, Any]) -> dict[str, type[Section]]:
         "drive": Drive,
         "rail": Rail,
         "cable": Cable,
-        "controller": TunedController if "controller.crossover" in flat else GainsController,
+        **({CONTROLLER: controller_of(flat)} if KIND in flat else {}),
         "motion": MOTION.classes[flat["motion.kind"]],
     }
     present = {key.split(".")[0] for key in flat}
@@ -265,10 +260,10 @@ def _plain(value: Any) -> Any:
 
 def _with_defaults(flat: dict[str, Any]) -> dict[str, Any]:
     """Fill in the defaults that follow other keys."""
-    if "controller.crossover" in flat and "controller.tuned_mass" not in flat:
-        flat["controller.tuned_mass"] = flat.get("masses.cart", 0.0) + flat.get("masses.stage", 0.0)
-    if "controller.force_limit" in flat:
-        flat.setdefault("controller.anti_windup", "clamp")
+    for key, value in controller_of(flat).with_defaults(flat).items():
+        flat.setdefault(key, value)
+    if FORCE_LIMIT in flat:
+        flat.setdefault(ANTI_WINDUP, "clamp")
     return with_material(flat)
 
 

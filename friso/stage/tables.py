@@ -1,4 +1,4 @@
-"""The tables of a stage file: masses, friction, joint, parasitic mode, controller, motion."""
+"""The tables of a stage file: masses, friction, joint, parasitic mode, motion."""
 
 from collections.abc import Hashable, Mapping
 from typing import Annotated, Any, ClassVar, Literal, Self, cast
@@ -11,12 +11,10 @@ from friso.quantities import (
     Quantity,
     Value,
     any_sign,
-    at_least_1,
-    inside_0_1,
     non_negative,
     positive,
 )
-from friso.stage.section import Rule, Section, UncertainSection, Variants
+from friso.stage.section import Rule, UncertainSection, Variants
 
 
 class Masses(UncertainSection):
@@ -50,13 +48,13 @@ class FrictionSection(UncertainSection):
         return None
 
 
-FRICTION = Variants("model")
+FRICTION = Variants("model", "friso.friction")
 register_friction = FRICTION.register
 
 
 def friction_law(name: str) -> type[FrictionSection]:
     """The class of the registered law called `name`."""
-    return cast(type[FrictionSection], FRICTION.classes[name])
+    return cast(type[FrictionSection], FRICTION.named(name))
 
 
 class Joint(UncertainSection):
@@ -91,65 +89,6 @@ class Bias(UncertainSection):
 
     cart: Annotated[Value | None, Quantity("N", any_sign, "0.2 N")] = None
     stage: Annotated[Value | None, Quantity("N", any_sign, "0.2 N")] = None
-
-
-class Controller(UncertainSection):
-    """What both forms of the controller share."""
-
-    kind: Literal["pid"]
-    force_limit: Annotated[Value | None, Quantity("N", positive, "200 N")] = None
-    anti_windup: Literal["clamp"] | None = None
-
-    @model_validator(mode="after")
-    def _anti_windup_has_a_limit(self) -> Self:
-        if self.anti_windup and self.force_limit is None:
-            raise StageError("anti_windup", '"clamp"', "a force_limit as well", 'force_limit = "200 N"')
-        return self
-
-
-class TunedController(Controller):
-    """PID by van Dijk's tuning rules (thesis, Eq. 7, 8)."""
-
-    crossover: Annotated[Value, Quantity("Hz", positive, "8 Hz")]
-    alpha: Annotated[float, Number(inside_0_1, "0.1")]
-    beta: Annotated[float, Number(at_least_1, "2")]
-    tuned_mass: Annotated[Value | None, Quantity("kg", positive, "1.7 kg")] = None
-
-
-class GainsController(Controller):
-    """PID by its gains (thesis, Eq. 6); a gain left out is 0."""
-
-    kp: Annotated[Value, Quantity("N/m", non_negative, "3 N/m")] = Value(0, "0 N/m")
-    ki: Annotated[Value, Quantity("N/(m*s)", non_negative, "4 N/(m*s)")] = Value(0, "0 N/(m*s)")
-    kd: Annotated[Value, Quantity("N*s/m", non_negative, "6 N*s/m")] = Value(0, "0 N*s/m")
-    tau: Annotated[Value, Quantity("s", non_negative, "1 ms")] = Value(0, "0 s")
-    derivative_on: Literal["error", "measurement"] = "error"
-
-    rules: ClassVar[tuple[Rule, ...]] = (
-        Rule(
-            ("controller.derivative_on", "controller.kd", "controller.tau"),
-            lambda f: (
-                (f["controller.derivative_on"] != "error") | (f["controller.kd"] == 0) | (f["controller.tau"] > 0)
-            ),
-            "a filter (tau > 0) for the derivative of the error, or the derivative of the measurement",
-            'tau = "1 ms", or derivative_on = "measurement"',
-        ),
-    )
-
-
-_EITHER_FORM = 'crossover = "8 Hz", alpha = 0.1, beta = 2 or kp = "3 N/m", ki = "4 N/(m*s)", kd = "6 N*s/m"'
-
-
-def controller_form(table: dict[str, Any]) -> type[Section]:
-    """The class for a [controller] table: by rules or by gains. Raises StageError for both or neither."""
-    rules = [key for key in TunedController.model_fields if key in table and key not in Controller.model_fields]
-    gains = [key for key in GainsController.model_fields if key in table and key not in Controller.model_fields]
-    if rules and gains:
-        text = f"{', '.join(rules)} (van Dijk's rules) together with {', '.join(gains)} (gains)"
-        raise StageError("", text, "one form, not both", _EITHER_FORM)
-    if not rules and not {"kp", "ki", "kd"} & {*gains}:
-        raise StageError("", "neither crossover nor any of kp, ki, kd", "one of the two forms", _EITHER_FORM)
-    return TunedController if rules else GainsController
 
 
 ROUNDING = 1e-12

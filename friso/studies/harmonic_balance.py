@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from friso.equations.bandwidth import at_bandwidth
 from friso.errors import InputError
 from friso.frequency.describing.balance import single_harmonic
 from friso.frequency.describing.function import checked_positive
@@ -45,11 +46,12 @@ def harmonic_balance(
 
     rates = checked_positive("crossovers", crossovers, "4 Hz")
     flat = stage.flat()
-    if "controller.crossover" not in flat:
+    key = stage.controller.bandwidth_key
+    if key is None:
         raise InputError("controller", "gains", "a crossover", 'crossover = "8 Hz", alpha = 0.1, beta = 2')
-    stages = Ensemble.held({**flat, "controller.crossover": rates}, len(rates))
+    stages = Ensemble.held(at_bandwidth(flat, rates), len(rates))
     cycles = _symmetric(stages, rtol)
-    singles = [single_harmonic(stage.replace({"controller.crossover": f"{rate!r} Hz"})) for rate in map(float, rates)]
+    singles = [single_harmonic(stage.replace({key: f"{rate!r} Hz"})) for rate in map(float, rates)]
     columns = {
         "period": (cycles.period, "s"),
         "amplitude": (cycles.amplitude, "m"),

@@ -56,7 +56,7 @@ class Request:
         checked_rtol(rtol)
         read = self._read(self.axes)
         if not read and self.samples is None:
-            example = '{"controller.crossover": ["4 Hz", "8 Hz"]}'
+            example = '{"joint.stroke": ["0.1 mm", "1 mm"]}'
             raise InputError("axes", "none", "at least one key with its values", example)
         dimensions = [Dimension(axis.name, (_gridded(axis),)) for axis in read]
         if self.samples is not None:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from friso.equations.bandwidth import bandwidth
 from friso.identify.combine import Correlated
 from friso.identify.estimate import Estimate
 from friso.identify.kind import AnalysisSettings, ExperimentKind, Prior, Source, independent
@@ -27,7 +28,7 @@ class FrictionAtSpeeds:
 def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> FrictionAtSpeeds:
     (log,) = logs
     assert isinstance(log, Log)
-    mass, crossover = sum(prior.masses(log)), prior.flat(log).get("controller.crossover")
+    mass, crossover = sum(prior.masses(log)), bandwidth(prior.flat(log))
     return FrictionAtSpeeds(friction_velocity(log, mass), friction_position(log, mass, crossover))
 
 

@@ -12,13 +12,14 @@ import numpy as np
 from friso.engine.arrays import Status
 from friso.engine.driven import Followed, Inputs, follow
 from friso.engine.kernel import Kernel, kernel
+from friso.equations.controllers.pid_gains import proportional_derivative
 from friso.equations.driven import Driven
-from friso.equations.pid import van_dijk_numbers
 from friso.equations.roles import Role, Steady
-from friso.equations.structure import ControllerForm, structure
+from friso.equations.structure import structure
 from friso.identify.inverse_model import SMOOTH, motion
 from friso.identify.logs.log import Log
 from friso.identify.output_error.parameters import MASS, FitParameter, stages
+from friso.stage.controllers import CONTROLLER
 
 STEP = 1e-4
 """Steps of the fitted numbers for derivatives: shares of the value for logarithmic ones."""
@@ -116,7 +117,8 @@ class Problem:
     def _starts(self, flat: Mapping[str, Any], runs: int) -> np.ndarray:
         """Where the log begins and as fast, the bristles bent as far as the first force bends them."""
         position, velocity = self.start
-        beginning = Steady(float(self.inputs.reference[0]) - position, position, velocity)
+        speed = np.gradient(self.inputs.reference[:3], self.inputs.sample_time)[0]
+        beginning = Steady(self.inputs.reference[0] - position, position, velocity, speed, self.wanted[0])
         whole = {**flat, "motion.size": np.nan, "motion.duration": np.inf}
         starts = self.kernel.settled(whole, beginning, runs)
         if bristles := self.kernel.having(Role.BRISTLE):
@@ -124,20 +126,7 @@ class Problem:
             held = flat.get("friction.static", flat["friction.coulomb"])
             bent = np.clip(pull, -held, held) / flat["friction.bristle_stiffness"]
             starts[:, bristles] = np.reshape(bent, (-1, 1))
-        if self.closed and "integral" in self.kernel.kept:
-            starts[:, self.kernel.kept.index("integral")] = self._integral(flat, position, velocity)
         return starts
-
-    def _integral(self, flat: Mapping[str, Any], position: float, velocity: float) -> Any:
-        """The integral [m s] with which the controller gives the log's first force, its filters settled."""
-        error, force = float(self.inputs.reference[0]) - position, self.wanted[0]
-        if "controller.crossover" in flat:
-            gains = van_dijk_numbers(flat)
-            return (force / gains["k_p"] - error) * gains["tau_i"] - error * gains["tau_z"]
-        speed = -velocity
-        if flat["controller.derivative_on"] == "error":
-            speed += float(np.gradient(self.inputs.reference[:3], self.inputs.sample_time)[0])
-        return (force - flat["controller.kp"] * error - flat["controller.kd"] * speed) / flat["controller.ki"]
 
     def _record(self, flat: Mapping[str, Any], runs: Followed) -> Simulated:
         position, velocity = (runs.states[:, :, i] for i in (self.kernel.position, self.kernel.velocity))
@@ -200,12 +189,11 @@ def tracking(
     omega = 2 * np.pi * min(bandwidth, SLOW)
     smooth = motion(log["position"][part], log.sample_time, SMOOTH * bandwidth).position
     mass = next(each.start for each in parameters if each.name == MASS)
-    kept = {key: value for key, value in flat.items() if not key.startswith("controller.")}
-    gains = {"controller.kp": mass * omega**2, "controller.kd": 2 * mass * omega, "controller.ki": 0.0}
-    form = replace(structure(flat), controller=ControllerForm(False, integral=False, filtered=False))
+    held = {key: value for key, value in flat.items() if not key.startswith(f"{CONTROLLER}.")}
+    held |= proportional_derivative(mass * omega**2, 2 * mass * omega)
     return Problem(
-        kept | gains,
-        Driven(form),
+        held,
+        Driven(structure(held)),
         Inputs(smooth, log["force"][part], log.sample_time, _is_held(flat, log)),
         np.zeros(part.stop - part.start),
         tuple(parameters),

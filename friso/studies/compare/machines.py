@@ -13,6 +13,7 @@ from scipy.linalg import block_diag
 from friso.errors import InputError
 from friso.rig.run import SAMPLE_TIME
 from friso.stage import Stage, numeric_keys
+from friso.stage.controllers import CONTROLLER, as_tuned
 from friso.stage.correlations import Correlations, Drawn, draw
 
 LEAST, MOST = 20, 100_000
@@ -45,7 +46,7 @@ they are identified."""
 TOGETHER, TOGETHER_BY = ("friction.static", "friction.coulomb"), 0.8
 """Keys that follow the preload alike, and their correlation, where neither is uncertain in the file: our choice."""
 
-HELD = ("controller.", "motion.", "drive.sample_time", "drive.delay", "drive.velocity_samples")
+HELD = (f"{CONTROLLER}.", "motion.", "drive.sample_time", "drive.delay", "drive.velocity_samples")
 """What is set and not found: alike on all machines, even where the file calls it uncertain."""
 
 SIGNS = int.from_bytes(b"signs")
@@ -81,9 +82,7 @@ class Machines:
 
     def changes(self, changes: Mapping[str, Any]) -> dict[str, Any]:
         """What an option changes, and what the machines do, of the keys of the stage."""
-        flat = self.stage.flat()
-        tuned = {key: flat[key] for key in ("controller.tuned_mass",) if key in flat}
-        return {**tuned, **self.keys, **changes}
+        return {**as_tuned(self.stage.flat()), **self.keys, **changes}
 
 
 def draw_machines(stage: Stage, correlations: Correlations, count: int, seed: int) -> Machines:

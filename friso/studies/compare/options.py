@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from friso.equations.bandwidth import faster
+from friso.equations.bandwidth import bandwidth, sped_up
 from friso.frequency.crossover import WANTED, limits
 from friso.stage import Stage
+from friso.stage.controllers import controller_of
 from friso.studies.compare.machines import Machines
 
 DEADBAND = 0.5
@@ -22,9 +23,6 @@ MODEL_ERROR = 0.2
 
 PER_PERIOD = 10
 """Samples that a period of the crossover has at least, as the stage file demands."""
-
-GAINS = ("controller.tuned_mass", "controller.kp", "controller.ki", "controller.kd")
-"""Keys with which the gain of the loop goes, those of either form of the controller."""
 
 NAMES = {
     "a": "as is",
@@ -76,8 +74,8 @@ def linear_flat(stage: Stage, flat: Mapping[str, Any]) -> dict[str, Any]:
     late = own.get("drive.delay", 0.0)
     if "drive.current_bandwidth" in own:
         late += 1 / (2 * np.pi * own["drive.current_bandwidth"])
-    ratio = flat.get("drive.motor_constant_ratio", 1.0)
-    return {**flat, **{key: ratio * flat[key] for key in GAINS if key in flat}, "drive.delay": late}
+    ratio, law = flat.get("drive.motor_constant_ratio", 1.0), controller_of(flat)
+    return {**flat, **{key: ratio * flat[key] for key in map(law.key, law.loop_gain)}, "drive.delay": late}
 
 
 def options(machines: Machines, within: float) -> Options:
@@ -110,22 +108,22 @@ def _faster(letter: str, stage: Stage, left_out: dict[str, str]) -> list[Option]
     machine, and all others get its settings. Nothing, and why not, where it is that fast already."""
     flat = stage.flat()
     highest = limits(linear_flat(stage, flat)).highest_comfortable
-    own = flat.get("controller.crossover", 1.0)
-    if "controller.crossover" in flat and highest is not None:
+    told = bandwidth(flat)
+    own = 1.0 if told is None else told
+    if told is not None and highest is not None:
         highest = min(highest, 1 / (PER_PERIOD * flat["drive.sample_time"]))
     if highest is None or highest <= own:
         left_out[letter] = f"no higher bandwidth keeps a modulus margin of {WANTED:g}"
         return []
     factor = float(highest / own)
-    scaled = faster(flat, factor)
-    changes = {key: scaled[key] for key in flat if key.startswith("controller.") and scaled[key] != flat[key]}
+    changes = {key: value for key, value in sped_up(flat, factor).items() if value != flat[key]}
     return [Option(letter, stage.with_numbers(changes), factor=factor)]
 
 
 def _integrates(stage: Stage) -> bool:
     """Whether there is an integrator that could rest."""
     flat = stage.flat()
-    return "controller.crossover" in flat or flat["controller.ki"] > 0
+    return controller_of(flat).integrates(flat)
 
 
 def _feedforward(machines: Machines) -> dict[str, np.ndarray]:

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from friso.equations.controllers.van_dijk import ALPHA, BETA, CROSSOVER, TUNED_MASS, tuned
 from friso.equations.model import assemble
 from friso.equations.structure import structure
 from friso.errors import InputError
@@ -49,10 +50,10 @@ PARAMETERS: Mapping[str, Parameter] = {
     "sigma_0": Parameter("sigma_0", ("friction.bristle_stiffness",)),
     "sigma_1": Parameter("sigma_1", ("friction.bristle_damping",)),
     "sigma_2": Parameter("sigma_2", ("friction.viscous",)),
-    "omega_c": Parameter("omega_c", ("controller.crossover",), lambda crossover: 2 * np.pi * crossover),
-    "alpha": Parameter("alpha", ("controller.alpha",)),
-    "beta": Parameter("beta", ("controller.beta",)),
-    "tuned_mass": Parameter("m_t", ("controller.tuned_mass",)),
+    "omega_c": Parameter("omega_c", (CROSSOVER,), lambda crossover: 2 * np.pi * crossover),
+    "alpha": Parameter("alpha", (ALPHA,)),
+    "beta": Parameter("beta", (BETA,)),
+    "tuned_mass": Parameter("m_t", (TUNED_MASS,)),
     "k_j": Parameter("k_j", ("joint.stiffness",)),
     "d_j": Parameter("d_j", ("joint.damping",)),
     "stroke": Parameter("S_j", ("joint.stroke",)),
@@ -217,7 +218,7 @@ def values_of(flat: Mapping[str, Any]) -> dict[str, Any]:
 
     Raises InputError for a stage without LuGre friction or without van Dijk's rules.
     """
-    if flat.get("friction.model") != "lugre" or "controller.crossover" not in flat:
+    if flat.get("friction.model") != "lugre" or CROSSOVER not in flat:
         expected = "LuGre friction and a controller by van Dijk's rules, for which the groups are derived"
         raise InputError("stage", "one with other friction, or with gains", expected, 'crossover = "8 Hz", alpha = 0.1')
     parts = {"stage", *(part for part, key in _TELLING.items() if key in flat)}
@@ -243,11 +244,9 @@ def flat_of(values: Values, scale: Scale = _UNIT) -> dict[str, Any]:
         "friction.bristle_stiffness": stiffness,
         "friction.bristle_damping": 2 * values["bristle_damping"] * impedance,
         "friction.viscous": 2 * values["viscous"] * impedance,
-        "controller.kind": "pid",
-        "controller.crossover": values["crossover"] * scale.rate / (2 * np.pi),
-        "controller.alpha": values["alpha"],
-        "controller.beta": values["beta"],
-        "controller.tuned_mass": values["tuned_mass"] * mass,
+        **tuned(
+            values["crossover"] * scale.rate / (2 * np.pi), values["alpha"], values["beta"], values["tuned_mass"] * mass
+        ),
     }
     return flat | (_joint(values, flat, scale) if "joint" in values else {})
 

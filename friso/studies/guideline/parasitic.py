@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from friso.equations.controllers.van_dijk import CROSSOVER
 from friso.frequency import crossover
 from friso.frequency.crossover import limits
 from friso.frequency.ranges import Range
@@ -40,7 +41,7 @@ def parasitic_limits(stage: Stage) -> list[Parasitic]:
         for frequency in FREQUENCIES:
             mode = {"parasitic.frequency": f"{frequency!r} Hz", "parasitic.damping_ratio": damping, **DRIVE}
             flats = [stage.replace({**mode, "joint.locked": held}).flat() for held in (True, False)]
-            locked, free = (holding(limits(flat).comfortable, flat["controller.crossover"]) for flat in flats)
+            locked, free = (holding(limits(flat).comfortable, flat[CROSSOVER]) for flat in flats)
             modes.append(Parasitic(frequency, damping, locked, free))
     return modes
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from friso.equations.controllers.van_dijk import CROSSOVER
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.edges import ABOVE, BELOW, FLIP, find_edges
 from friso.hunting.margin import margin
@@ -92,7 +93,7 @@ def cases(laws: Laws, changes: Sequence[Changes], free: bool) -> list[Case]:
 
     def stages(which: np.ndarray, crossover: np.ndarray) -> Ensemble:
         some = {key: value[which] if np.ndim(value) else value for key, value in flat.items()}
-        return Ensemble.held(some | {"controller.crossover": crossover}, len(which))
+        return Ensemble.held(some | {CROSSOVER: crossover}, len(which))
 
     grid = FREE_GRID if free else RIGID_GRID
     edges = find_edges(stages, np.broadcast_to(grid, (len(changes), len(grid))))

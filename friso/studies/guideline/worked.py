@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import brentq
 
+from friso.equations.controllers.van_dijk import CROSSOVER, TUNED_MASS
 from friso.studies.guideline.parasitic import settled_margin
 from friso.studies.guideline.rig import FREE_GRID, Case, Laws, cases, direct, plain
 from friso.studies.guideline.sweeps import LOCKED_BOX
@@ -156,7 +157,7 @@ def machines(laws: Laws) -> tuple[Machine, ...]:
             locked,
             direct(stage.replace({"joint.locked": True})),
         ),
-        Machine("joint free, parasitic mode at 300 Hz", free, direct(stage.replace({"controller.crossover": "5 Hz"}))),
+        Machine("joint free, parasitic mode at 300 Hz", free, direct(stage.replace({CROSSOVER: "5 Hz"}))),
     )
 
 
@@ -193,7 +194,7 @@ def _design(laws: Laws, limit: float, aim: float) -> Design:
     stroke = _root(lambda log: over(stiffness, np.exp(log)), np.log(1e-7), np.log(AMPLE))
     changes = [pair | {"joint.stiffness": stiffness, "joint.stroke": stroke} for pair in forces]
     joint = {"joint.stiffness": stiffness, "joint.stroke": stroke}
-    margin = settled_margin(rig(), joint | {"controller.crossover": limit})
+    margin = settled_margin(rig(), joint | {CROSSOVER: limit})
     return Design(limit, aim, stiffness, stroke, tuple(cases(laws, changes, free=True)), margin)
 
 
@@ -230,7 +231,7 @@ def _studies() -> dict[str, tuple[Sequence[Mapping[str, float]], bool]]:
         {
             "masses.cart": n * flat["masses.cart"],
             "masses.stage": n * flat["masses.stage"],
-            "controller.tuned_mass": n * mass,
+            TUNED_MASS: n * mass,
         }
         for n in (0.5, 1.0, 1.5, 2.0, 3.0)
     ]

@@ -10,11 +10,13 @@ import numpy as np
 
 from friso.engine.arrays import Status
 from friso.equations import motion
+from friso.equations.bandwidth import bandwidth
 from friso.errors import InputError
 from friso.hunting.peaks import COUNTED_ABOVE, SWING, WINDOW, scan
 from friso.rig.run import Recorded, run
 from friso.rig.task import Task, point_to_point
 from friso.stage import Stage
+from friso.stage.controllers import CONTROLLER
 from friso.studies.draws import Fates, Share
 from friso.studies.rig.outcome import Progress, silent
 from friso.studies.rig.sizes import interval, jointed
@@ -54,8 +56,8 @@ def move(stage: Stage) -> Task:
     """The move from 0 with the acceleration of the stage's motion, after which it stands; of a motion that tells none,
     with one that the loop can just follow (a move then takes two of its time constants)."""
     flat, way = stage.flat(), distance(stage)
-    bandwidth = 2 * np.pi * flat.get("controller.crossover", 1.0)
-    acceleration = flat.get("motion.acceleration", way * bandwidth**2)
+    rate = 2 * np.pi * (bandwidth(flat) or 1.0)
+    acceleration = flat.get("motion.acceleration", way * rate**2)
     rows = point_to_point([0.0, way], acceleration, np.inf, 0.0).pieces
     return Task(rows[1:], duration(stage))
 
@@ -72,11 +74,16 @@ def with_joint(stage: Stage, locked: bool) -> Stage:
 
 def crossover(stage: Stage) -> float:
     """Of the stage's controller [Hz]. Raises InputError for one that is given by its gains."""
-    flat = stage.flat()
-    if "controller.crossover" not in flat:
+    return float(stage.flat()[crossover_key(stage)])
+
+
+def crossover_key(stage: Stage) -> str:
+    """The key that tells it. Raises InputError for a controller that is given by its gains."""
+    key = stage.controller.bandwidth_key
+    if key is None:
         given, expected = "gains", "a controller tuned by its crossover, which the experiment varies"
-        raise InputError("controller.crossover", given, expected, 'crossover = "8 Hz"')
-    return float(flat["controller.crossover"])
+        raise InputError(CONTROLLER, given, expected, 'crossover = "8 Hz"')
+    return key
 
 
 def rails(stage: Stage) -> np.ndarray:

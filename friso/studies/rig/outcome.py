@@ -14,6 +14,7 @@ from friso.identify.logs.log import Log
 from friso.identify.readings.common import record
 from friso.rig.run import Recorded
 from friso.stage import Stage
+from friso.stage.controllers import FORCE_LIMIT
 
 Progress = Callable[[int, int, str], None]
 """Is told the number of steps done, of all, and what comes next."""
@@ -87,7 +88,7 @@ either limit where it is not."""
 def _swings_between_limits(force: np.ndarray, stage: Stage) -> int:
     """The number of samples after which a command [N] of shape (n,) does nothing but swing between its limits; 0 where
     it comes to rest, or has none."""
-    limit = stage.flat().get("controller.force_limit", np.inf)
+    limit = stage.flat().get(FORCE_LIMIT, np.inf)
     parts = np.array_split(force, WINDOWS)
     ways = [(np.mean(part >= 0.999 * limit), np.mean(part <= -0.999 * limit)) for part in parts]
     swings = np.array([min(way) > 0 and sum(way) > SATURATED for way in ways])

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from friso.equations.bandwidth import faster
+from friso.equations.bandwidth import bandwidth, proportional_stiffness, sped_up
 from friso.errors import InputError
 from friso.rig.run import as_built_keys
 from friso.rig.task import own_motion
@@ -52,9 +52,10 @@ def locked(stage: Stage) -> Stage:
 def pace(stage: Stage) -> float:
     """The controller's crossover [Hz]; for plain gains, that of a van Dijk controller of the same proportional gain."""
     flat = stage.flat()
-    if "controller.crossover" in flat:
-        return float(flat["controller.crossover"])
-    return float(np.sqrt(flat["controller.kp"] / (moving_mass(stage) * np.sqrt(ALPHA)))) / (2 * np.pi)
+    own = bandwidth(flat)
+    if own is not None:
+        return float(own)
+    return float(np.sqrt(proportional_stiffness(flat) / (moving_mass(stage) * np.sqrt(ALPHA)))) / (2 * np.pi)
 
 
 def moving_mass(stage: Stage) -> float:
@@ -83,8 +84,7 @@ def longest_way(stage: Stage) -> float:
 
 def quicker(stage: Stage, factors: Any) -> dict[str, Any]:
     """The keys of a controller made faster by factors."""
-    flat = stage.flat()
-    return {key: value for key, value in faster(flat, factors).items() if value is not flat[key]}
+    return sped_up(stage.flat(), factors)
 
 
 def interval(stage: Stage, wanted: float) -> float:

@@ -10,7 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from friso.equations.controllers.van_dijk import CROSSOVER
 from friso.stage import Stage
+from friso.stage.controllers import ANTI_WINDUP, FORCE_LIMIT
 from friso.studies.rig.excitation import excite
 from friso.studies.rig.experiments.compare import MOTORS, on_rail, started, varied
 from friso.studies.rig.experiments.frf import (
@@ -40,8 +42,8 @@ from friso.studies.rig.sizes import freed, locked, pace, travel
 
 AS_BUILT: Mapping[str, Any] = MappingProxyType(
     {
-        "controller.force_limit": "200 N",
-        "controller.anti_windup": "clamp",
+        FORCE_LIMIT: "200 N",
+        ANTI_WINDUP: "clamp",
         "drive.sample_time": "50 us",
         "drive.delay": "50 us",
         "drive.current_bandwidth": "2 kHz",
@@ -108,7 +110,7 @@ def moves(stage: Stage) -> Moves:
     machine = as_built(stage)
     locked, free = (with_joint(machine, held) for held in (True, False))
     seeds, frequencies = 1.0 + np.arange(float(RAILS)), crossover(machine) * CROSSOVERS
-    keys = "controller.crossover"
+    keys = CROSSOVER
     held = follow(
         locked, move(machine), numbers_of(SEED, len(CROSSOVERS), RAILS), on_rails(machine, {keys: frequencies}, seeds)
     )

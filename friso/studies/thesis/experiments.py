@@ -22,6 +22,7 @@ from friso.identify.logs.log import Log
 from friso.identify.readings.common import record
 from friso.identify.readings.friction_position import FrictionPosition, friction_position
 from friso.stage import Stage, loads
+from friso.stage.controllers import CONTROLLER
 from friso.studies.rig.experiments.in_position import InPosition
 from friso.studies.rig.experiments.stroke_crossover import StrokeCrossover
 from friso.studies.thesis.as_built import Cycles, Moves, RigLoops, cycles, grid, moves, rig_loops, standstill
@@ -122,7 +123,7 @@ MOVES, GRID, ON_RAILS, STANDSTILL = "moves", "grid", "cycles", "standstill"
 
 EXPERIMENTS: Mapping[str, Need] = MappingProxyType(
     {
-        LINE: Need(("motion.", "controller.", "friction."), locked=True),
+        LINE: Need(("motion.", f"{CONTROLLER}.", "friction."), locked=True),
         STEPPED: Need(("motion.",)),
         SLIPS: Need(("motion.",)),
         SPEEDY: Need(("motion.",)),

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, Literal
 
+from friso.equations.controllers.van_dijk import ALPHA, BETA
 from friso.studies.thesis.studies import NOTHING, ThesisStudy
 
 if TYPE_CHECKING:
@@ -68,8 +69,8 @@ def _path(acceleration: str, time: str) -> dict[str, str]:
 
 
 OPEN: tuple[Variant, ...] = (
-    *_of_key("alpha", "controller.alpha", (0.2, 0.3), "Sec. 3.2.4: often chosen between 0.1 and 0.3 (baseline 0.1)"),
-    *_of_key("beta", "controller.beta", (1.0, 3.0), "Table 3: studied from 1 to 3 (baseline 2)"),
+    *_of_key("alpha", ALPHA, (0.2, 0.3), "Sec. 3.2.4: often chosen between 0.1 and 0.3 (baseline 0.1)"),
+    *_of_key("beta", BETA, (1.0, 3.0), "Table 3: studied from 1 to 3 (baseline 2)"),
     *_of_key(
         "d_j",
         "joint.damping",

@@ -9,6 +9,7 @@ from importlib.resources import files
 from types import MappingProxyType
 from typing import Any
 
+from friso.equations.controllers.van_dijk import ALPHA, BETA, CROSSOVER, TUNED_MASS
 from friso.stage import Stage, loads
 
 NOTHING: Mapping[str, Any] = MappingProxyType({})
@@ -79,15 +80,15 @@ _FRICTION_ZEROS = (
 )
 _STROKE = Span("joint.stroke", 0.0, 1e-3, "m")
 _STROKE_ZERO = "Stroke 0: the joint always rests on its limiter, k_j + k_l."
-_CROSSOVER = (Span("controller.crossover", 1.0, 16.0, "Hz"), _STROKE)
-_CROSSOVER_MARKER = {"controller.crossover": 8.0, "joint.stroke": 1e-3}
+_CROSSOVER = (Span(CROSSOVER, 1.0, 16.0, "Hz"), _STROKE)
+_CROSSOVER_MARKER = {CROSSOVER: 8.0, "joint.stroke": 1e-3}
 
 # The mass of the rig, 1.7 kg, is 1.2 kg of cart and 0.5 kg of stage, half of which is the parasitic mode's: kept.
 _SAME_SHARES = {
     "masses.cart": "mass*1.2/1.7",
     "masses.stage": "mass*0.5/1.7",
     "parasitic.mass": "mass*0.25/1.7",
-    "controller.tuned_mass": "mass",
+    TUNED_MASS: "mass",
 }
 
 _ALL = (
@@ -104,8 +105,8 @@ _ALL = (
         "system",
         "11B",
         "System parameters",
-        (Span("controller.crossover", 1.0, 40.0, "Hz"), Span("mass", 0.1, 5.1, "kg")),
-        {"controller.crossover": 8.0, "mass": 1.7},
+        (Span(CROSSOVER, 1.0, 40.0, "Hz"), Span("mass", 0.1, 5.1, "kg")),
+        {CROSSOVER: 8.0, "mass": 1.7},
         LOCKED,
         _SAME_SHARES,
     ),
@@ -114,8 +115,8 @@ _ALL = (
         "control",
         "12B",
         "Control parameters",
-        (Span("controller.alpha", 0.1, 0.3), Span("controller.beta", 1.0, 3.0)),
-        {"controller.alpha": 0.1, "controller.beta": 2.0},
+        (Span(ALPHA, 0.1, 0.3), Span(BETA, 1.0, 3.0)),
+        {ALPHA: 0.1, BETA: 2.0},
         LOCKED,
     ),
     ThesisStudy(
@@ -139,7 +140,7 @@ _ALL = (
         "Masses of cart and stage",
         (Span("masses.cart", 0.5, 3.0, "kg"), Span("masses.stage", 0.1, 1.0, "kg")),
         {"masses.cart": 1.2, "masses.stage": 0.5},
-        links={"parasitic.mass": "0.5*masses.stage", "controller.tuned_mass": "masses.cart + masses.stage"},
+        links={"parasitic.mass": "0.5*masses.stage", TUNED_MASS: "masses.cart + masses.stage"},
     ),
     ThesisStudy(
         "isolator-friction", "15B", "Friction forces, isolated", _FRICTION, _FRICTION_MARKER, zeros=_FRICTION_ZEROS

@@ -93,7 +93,7 @@ def caveats(bode: Bode) -> list[str]:
 
 def _crossing(bode: Bode) -> bool:
     """Whether the controller has a crossover, or is given by its gains."""
-    return "controller.crossover" in bode.stage.flat()
+    return bode.stage.controller.bandwidth_key is not None
 
 
 def _subject(bode: Bode) -> str:

@@ -5,9 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-import numpy as np
-
-from friso.equations.bandwidth import faster
 from friso.hunting.basin import SHARES
 from friso.hunting.margin import FARTHEST
 from friso.hunting.verdict import LONG
@@ -18,7 +15,6 @@ if TYPE_CHECKING:
     from friso.hunting import Case, Margin
 
 _MICRON, _TEN_MICRON = BANDS
-_GAINS = ("kp", "ki", "kd", "tau")
 
 
 def verdict_sentence(item: Shown, cases: Mapping[str, Case]) -> str:
@@ -129,9 +125,10 @@ def _faster(case: Case, edge: Margin) -> str:
     if edge.crossover is not None:
         more = edge.crossover * (1 - 1 / edge.factor)
         about = "" if edge.certain else "about "
-        return f"raise the crossover by {about}{with_unit(more, 'Hz')} (to {with_unit(edge.crossover, 'Hz')})"
-    changes = faster({f"controller.{name}": 1.0 for name in _GAINS}, np.array(edge.factor))
-    gains = [f"{name} × {changes[f'controller.{name}']:.3g}" for name in _GAINS if getattr(controller, name)]
+        by, to = with_unit(more, "Hz"), with_unit(edge.crossover, "Hz")
+        return f"raise the {controller.bandwidth_name} by {about}{by} (to {to})"
+    powers = controller.speeds_up.items()
+    gains = [f"{name} × {edge.factor**power:.3g}" for name, power in powers if getattr(controller, name)]
     return f"make the controller {edge.factor:.3g} times faster ({', '.join(gains)})"
 
 

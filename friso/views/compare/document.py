@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
+from friso.equations.bandwidth import bandwidth
 from friso.studies.compare.options import DEADBAND, MODEL_ERROR
 from friso.studies.compare.study import LONGER, Comparison, Result
 from friso.views.compare.words import (
@@ -47,7 +48,7 @@ def document(found: Comparison) -> dict[str, Any]:
 
 def _option(found: Comparison, result: Result) -> dict[str, Any]:
     pair = found.paired(result)
-    crossover = result.option.stage.flat().get("controller.crossover")
+    crossover = bandwidth(result.option.stage.flat())
     return {
         "name": result.option.name,
         "crossover_hz": crossover,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+from friso.equations.bandwidth import bandwidth
 from friso.evidence import value
 from friso.frequency.crossover import WANTED
 from friso.studies.compare.options import JOINT, MODEL_ERROR, Option
@@ -57,9 +58,11 @@ def _about(option: Option, found: Comparison) -> str:
 
 
 def _bandwidth(option: Option, found: Comparison) -> str:
-    own = found.stage.flat().get("controller.crossover")
-    to = f"a crossover of {with_unit(own * option.factor, 'Hz')} instead of {with_unit(own, 'Hz')}" if own else ""
-    faster = to or f"a controller {option.factor:.3g} times as fast"
+    own = bandwidth(found.stage.flat())
+    faster = f"a controller {option.factor:.3g} times as fast"
+    if own is not None:
+        raised, before = with_unit(own * option.factor, "Hz"), with_unit(own, "Hz")
+        faster = f"a {found.stage.controller.bandwidth_name} of {raised} instead of {before}"
     return f"{faster}, the highest at which the machine of the file keeps a modulus margin of {WANTED:g}"
 
 

@@ -64,7 +64,7 @@ def map_panel(
     if len(axes) != 2 or SAMPLE in runs.dims:
         raise ValueError(
             f"map_panel: got runs over {', '.join(map(str, runs.sizes))}, expected two axes; cut the others, "
-            'e.g. runs.sel({"controller.crossover": 8.0}, method="nearest")'
+            'e.g. runs.sel({"joint.stroke": 1e-3}, method="nearest")'
         )
     if title is None:
         title = ", ".join([variable(metric), *cuts(runs)])

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from friso.stage.controllers import CONTROLLER, CONTROLLERS, FORCE_LIMIT
 from friso.views.drawing.figure import GREY, INK, ORANGE, PINK, VERMILLION, Kind
 
 if TYPE_CHECKING:
@@ -17,11 +18,7 @@ AT_ONCE = 1_000_000
 """Texts that are counted at a time."""
 
 _QUANTITIES = {
-    "controller.alpha": "Controller α",
-    "controller.beta": "Controller β",
-    "controller.crossover": "Crossover",
-    "controller.force_limit": "Force limit",
-    "controller.tuned_mass": "Tuned mass",
+    FORCE_LIMIT: "Force limit",
     "friction.bristle_damping": "Bristle damping",
     "friction.bristle_stiffness": "Bristle stiffness",
     "friction.coulomb": "Coulomb friction",
@@ -80,9 +77,10 @@ _NO_NUMBER = "#e8dcc6"
 def quantity(key: Hashable) -> str:
     """An axis in words: "joint.stroke" is "Joint stroke", a free name is itself."""
     name = str(key)
-    if name in _QUANTITIES:
-        return _QUANTITIES[name]
-    words = name.removeprefix("controller.").removeprefix("motion.").replace("_", " ").replace(".", " ")
+    known = _QUANTITIES | CONTROLLERS.words
+    if name in known:
+        return known[name]
+    words = name.removeprefix(f"{CONTROLLER}.").removeprefix("motion.").replace("_", " ").replace(".", " ")
     return words[:1].upper() + words[1:]
 
 

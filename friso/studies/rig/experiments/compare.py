@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from friso.equations.controllers.van_dijk import ALPHA, BETA, CROSSOVER, TUNED_MASS
 from friso.rig.rail import friction_factors
 from friso.rig.task import Task
 from friso.stage import Stage
@@ -225,17 +226,15 @@ def levels(stage: Stage, seed: int, progress: Progress) -> Hunted:
 def others(stage: Stage, seed: int, progress: Progress) -> dict[str, Hunted]:
     """Cycles with one thing changed, by its name."""
     flat = stage.flat()
-    mass = flat["controller.tuned_mass"]
+    mass = flat[TUNED_MASS]
     motor = {"drive.motor_constant_ratio": flat.get("drive.motor_constant_ratio", 1.0) / MASS_FACTOR}
     named = {
         f"motor gives {MOTORS[1]:.2g} of the force, tuned as before": motor,
         f"motor gives {MOTORS[1]:.2g} of the force, tuned for {MASS_FACTOR:g} times the mass": motor
-        | {"controller.tuned_mass": MASS_FACTOR * mass},
-        "alpha twice as large": {"controller.alpha": 2 * flat["controller.alpha"]},
-        "beta one and a half times as large": {"controller.beta": 1.5 * flat["controller.beta"]},
-        f"crossover {1 / MASS_FACTOR:.2g} times as high": {
-            "controller.crossover": flat["controller.crossover"] / MASS_FACTOR
-        },
+        | {TUNED_MASS: MASS_FACTOR * mass},
+        "alpha twice as large": {ALPHA: 2 * flat[ALPHA]},
+        "beta one and a half times as large": {BETA: 1.5 * flat[BETA]},
+        f"crossover {1 / MASS_FACTOR:.2g} times as high": {CROSSOVER: flat[CROSSOVER] / MASS_FACTOR},
         "cables ten times as stiff, with ten times the drag": {
             key: 10 * flat[key] for key in ("cable.stiffness", "cable.drag") if key in flat
         },

@@ -17,6 +17,7 @@ from friso.studies.draws import Share
 from friso.studies.rig.hunted import (
     Hunted,
     crossover,
+    crossover_key,
     distance,
     follow,
     joined,
@@ -105,7 +106,7 @@ def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
     a crossover or a motion that moves the stage."""
     stages = {case: with_joint(stage, locked) for case, locked in CASES.items()}
     frequencies, seeds = crossover(stage) * CROSSOVERS, rails(stage)
-    changes = on_rails(stage, {"controller.crossover": frequencies}, seeds)
+    changes = on_rails(stage, {crossover_key(stage): frequencies}, seeds)
     found = {}
     for case, each in stages.items():
         numbers = numbers_of(seed, len(frequencies), len(seeds))
@@ -113,7 +114,7 @@ def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
         found[case] = runs.shaped(len(frequencies), len(seeds))
     started = _releases(stages["locked"], seed, frequencies, seeds, progress)
     rail = int(np.argmax(found["locked"].peaks[SHOWN[0]] > 0))
-    machine = on_rails(stage, {"controller.crossover": frequencies}, seeds[[rail]])
+    machine = on_rails(stage, {crossover_key(stage): frequencies}, seeds[[rail]])
     again = {case: once(each, move(stage), [seed + rail] * len(frequencies), machine) for case, each in stages.items()}
     traces = {(case, row): _trace(again[case], row) for case in CASES for row in range(len(frequencies))}
     startable = _startable(stages["locked"], seed, frequencies, seeds, found["locked"], started)
@@ -124,7 +125,7 @@ def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
     logs = []
     for case, row in product(CASES, SHOWN):
         name = f"hunting_{case}_{frequencies[row]:.3g}_hz"
-        file = machine_file(stages[case], seeds[rail], {"controller.crossover": f"{frequencies[row]:.6g} Hz"})
+        file = machine_file(stages[case], seeds[rail], {crossover_key(stage): f"{frequencies[row]:.6g} Hz"})
         logs.append(rig_log(again[case], row, name, "moves", file, seed + rail))
     return Outcome("hunting", stage, seed, tuple(logs), result, _notes(stage, result))
 
@@ -136,7 +137,7 @@ def machine_file(stage: Stage, rail: float, changes: Mapping[str, str]) -> Stage
 
 def _releases(stage: Stage, seed: int, frequencies: np.ndarray, seeds: np.ndarray, progress: Progress) -> Hunted:
     """Releases at crossovers [Hz] on all rails, shape (displacements, crossovers, rails)."""
-    changes = on_rails(stage, {"controller.crossover": frequencies}, seeds)
+    changes = on_rails(stage, {crossover_key(stage): frequencies}, seeds)
     numbers = numbers_of(seed, len(frequencies), len(seeds))
     tasks = [released(stage, share * distance(stage)) for share in DISPLACEMENTS]
     parts = [follow(stage, task, numbers, changes, progress, "releases, joint locked") for task in tasks]
@@ -153,7 +154,7 @@ def _startable(
         return None
     row, size, rail = map(int, places[0])
     displacement = DISPLACEMENTS[size] * distance(stage)
-    changes = on_rails(stage, {"controller.crossover": frequencies[[row]]}, seeds[[rail]])
+    changes = on_rails(stage, {crossover_key(stage): frequencies[[row]]}, seeds[[rail]])
     tasks = (move(stage), released(stage, displacement))
     quiet, hunts = (_trace(once(stage, task, [seed + rail], changes), 0) for task in tasks)
     return Startable(quiet, hunts, float(frequencies[row]), rail, displacement)

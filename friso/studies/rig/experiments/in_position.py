@@ -15,7 +15,8 @@ from scipy.signal import welch
 from friso.rig.run import Recorded, as_built_keys, run
 from friso.rig.task import Task, standing
 from friso.stage import Stage
-from friso.studies.rig.hunted import crossover, move, with_joint
+from friso.stage.controllers import FORCE_LIMIT
+from friso.studies.rig.hunted import crossover, crossover_key, move, with_joint
 from friso.studies.rig.outcome import Outcome, Progress, rig_log
 from friso.studies.rig.sizes import interval
 
@@ -102,7 +103,7 @@ def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
 
 def in_position(stage: Stage, seed: int, progress: Progress) -> tuple[InPosition, dict[str, tuple[Recorded, Stage]]]:
     """All standstills, and by case the run with all disturbances and its stage."""
-    fast = with_joint(stage, locked=False).replace({"controller.crossover": f"{FASTER * crossover(stage):.6g} Hz"})
+    fast = with_joint(stage, locked=False).replace({crossover_key(stage): f"{FASTER * crossover(stage):.6g} Hz"})
     shaken = fast if stage.floor is not None else fast.replace({f"floor.{key}": value for key, value in FLOOR.items()})
     quiet = fast.replace({"floor": None}) if stage.floor is not None else fast
     force = amplifier_noise(stage)
@@ -141,7 +142,7 @@ def in_position(stage: Stage, seed: int, progress: Progress) -> tuple[InPosition
 def amplifier_noise(stage: Stage) -> float:
     """RMS [N] of the noise of the drive's force: that of rounding to `BITS` between its limits."""
     flat = stage.flat()
-    limit = flat.get("controller.force_limit", LIMIT_FACTOR * flat.get("friction.static", 1.0))
+    limit = flat.get(FORCE_LIMIT, LIMIT_FACTOR * flat.get("friction.static", 1.0))
     return float(2 * limit / 2**BITS / np.sqrt(12))
 
 

@@ -9,13 +9,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from friso.equations.pid import van_dijk_numbers
+from friso.equations.continuous import slow_gains
 from friso.identify.experiments.steps import StepStiffness, stiffness_from_steps
 from friso.rig.run import run
 from friso.rig.task import staircase
 from friso.stage import Stage
+from friso.stage.controllers import as_tuned
 from friso.studies.rig.outcome import Outcome, Progress, RigLog, rig_log
-from friso.studies.rig.sizes import FIXED, freed, interval, moving_mass, pace
+from friso.studies.rig.sizes import FIXED, freed, interval, pace
 
 STEP, WAYS = 0.3, (1, 1, -1, -1, 1, -1)
 """A step in strokes, 0.3 mm on the thesis's rig (Sec. 4.2.2), and the directions of the steps, our choice."""
@@ -59,9 +60,8 @@ def steps(stage: Stage, seed: int) -> RigLog:
     step = STEP * stage.flat()["joint.stroke"]
     stands = np.clip(SETTLED * pulling_time(free), STANDS * period, LONGEST * period)
     task = staircase([way * step for way in WAYS], float(stands))
-    tuned = stage.flat().get("controller.tuned_mass", moving_mass(stage))
     held = {"masses.cart": np.array([FIXED])}
-    held |= {"controller.tuned_mass": np.array([tuned])} if "controller.crossover" in stage.flat() else {}
+    held |= {key: np.array([value]) for key, value in as_tuned(stage.flat()).items()}
     (recorded,) = run(free, task, [seed], interval(stage, period / SAMPLES), held)
     return rig_log(recorded, 0, "steps", "steps", free, seed)
 
@@ -70,12 +70,7 @@ def pulling_time(stage: Stage) -> float:
     """Time constant [s] with which the integrator pulls the joint the last bit of the way, the cart fixed:
     proportional gain plus the joint's stiffness over the integral gain; 0 without an integrator."""
     flat = stage.flat()
-    if "controller.crossover" in flat:
-        gains = van_dijk_numbers({"controller.tuned_mass": moving_mass(stage), **flat})
-        integral = gains["k_p"] / gains["tau_i"]
-        proportional = gains["k_p"] + integral * gains["tau_z"]
-    else:
-        proportional, integral = flat["controller.kp"], flat["controller.ki"]
+    proportional, integral = slow_gains(flat)
     return float((proportional + flat["joint.stiffness"]) / integral) if integral > 0 else 0.0
 
 

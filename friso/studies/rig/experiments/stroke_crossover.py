@@ -13,6 +13,7 @@ from friso.stage import Stage
 from friso.studies.rig.hunted import (
     Hunted,
     crossover,
+    crossover_key,
     follow,
     move,
     numbers_of,
@@ -70,7 +71,7 @@ def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
     """The move at all strokes and crossovers on all rails, the joint free. Raises InputError without a joint."""
     free = with_joint(stage, locked=False)
     result = stroke_crossover(free, seed, STROKES, CROSSOVERS, rails(stage), progress)
-    corners = {"joint.stroke": result.strokes[[0, -1]], "controller.crossover": np.full(2, crossover(stage))}
+    corners = {"joint.stroke": result.strokes[[0, -1]], crossover_key(stage): np.full(2, crossover(stage))}
     recorded = once(free, move(free), [seed, seed], corners)
     logs = []
     for row, stroke in enumerate(corners["joint.stroke"]):
@@ -87,7 +88,7 @@ def stroke_crossover(
     sizes, frequencies = stage.flat()["joint.stroke"] * strokes, crossover(stage) * factors
     cases = {
         "joint.stroke": np.repeat(sizes, len(frequencies)),
-        "controller.crossover": np.tile(frequencies, len(sizes)),
+        crossover_key(stage): np.tile(frequencies, len(sizes)),
     }
     numbers = numbers_of(seed, len(sizes) * len(frequencies), len(seeds))
     runs = follow(stage, move(stage), numbers, on_rails(stage, cases, seeds), progress, "moves, joint free")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from friso.equations.controllers.van_dijk import ALPHA, BETA
 from friso.studies.thesis.claims import ABOUT, FEW, TREND, Evidence, Finding, Part, judges
 from friso.studies.thesis.maps import counts, free_square, share, table, trend
 
@@ -49,7 +50,7 @@ def gap_makes_hunting(evidence: Evidence) -> Finding:
 @judges("F12B", figure="12B", needs=("control",))
 def control_is_no_cure(evidence: Evidence) -> Finding:
     """How the count goes with alpha and beta, and whether either ends hunting."""
-    axes = ("controller.alpha", "controller.beta")
+    axes = (ALPHA, BETA)
     alpha, beta, hunts, valid = table(evidence.maps["control"], *axes)
     peaks = counts(evidence.maps["control"], *axes)
     ones = np.ones(hunts.shape)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from friso.equations.controllers.van_dijk import CROSSOVER
 from friso.studies.thesis.claims import ABOUT, Evidence, Finding, Part, judges
 from friso.studies.thesis.maps import ends, share, table
 
-_AXES = ("controller.crossover", "joint.stroke")
+_AXES = (CROSSOVER, "joint.stroke")
 
 _SAME = 0.15
 """Share by which a limit that "no longer depends" on the stroke may still change."""

@@ -6,6 +6,7 @@ from functools import cache
 
 import numpy as np
 
+from friso.equations.controllers.van_dijk import CROSSOVER
 from friso.frequency.crossover import WANTED, settled_margin
 from friso.hunting.margin import margin
 from friso.studies.thesis.claims import ABOUT, Evidence, Finding, Part, about, judges
@@ -51,7 +52,7 @@ def _needed_ratio() -> float:
     """The least parasitic frequency over the crossover from which the rig has a modulus margin of 0.5 in all settled
     states; NaN if it never has."""
     flat = {**rig().flat(), "joint.locked": False}
-    crossover = flat["controller.crossover"]
+    crossover = flat[CROSSOVER]
     margins = [settled_margin({**flat, "parasitic.frequency": ratio * crossover}) for ratio in _RATIOS]
     short = np.flatnonzero(np.array(margins) < WANTED)
     if not short.size:
@@ -62,7 +63,7 @@ def _needed_ratio() -> float:
 @cache
 def _margins_at_the_top() -> dict[str, float]:
     """The least modulus margin of the settled states at the highest crossover, joint locked and free; 0: unstable."""
-    flat = {**rig().flat(), "controller.crossover": _HIGHEST}
+    flat = {**rig().flat(), CROSSOVER: _HIGHEST}
     return {name: settled_margin({**flat, "joint.locked": name == "locked"}) for name in ("locked", "free")}
 
 
@@ -127,9 +128,9 @@ def _locked_edge() -> str:
 
 def _crossovers(evidence: Evidence) -> tuple[Part, Part]:
     """From where on the isolated and the locked rig do not hunt."""
-    crossover, stroke, hunts, _ = table(evidence.maps["isolator-crossover"], "controller.crossover", "joint.stroke")
+    crossover, stroke, hunts, _ = table(evidence.maps["isolator-crossover"], CROSSOVER, "joint.stroke")
     free = float(np.mean(ends(crossover, hunts)[stroke >= _STROKE]))
-    crossover, mass, hunts, _ = table(evidence.maps["system"], "controller.crossover", "mass")
+    crossover, mass, hunts, _ = table(evidence.maps["system"], CROSSOVER, "mass")
     nearest = int(np.abs(mass - 1.7).argmin())
     locked = float(ends(crossover, hunts)[nearest])
     return (

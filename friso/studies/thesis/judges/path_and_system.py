@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from friso.equations.controllers.van_dijk import CROSSOVER
 from friso.studies.thesis.claims import ABOUT, FEW, TREND, Evidence, Finding, Part, judges
 from friso.studies.thesis.maps import ends, free_square, share, table, trend
 from friso.studies.thesis.studies import STUDIES
@@ -47,7 +48,7 @@ def path_is_no_cure(evidence: Evidence) -> Finding:
 @judges("F11B", figure="11B", needs=("system",))
 def crossover_and_mass_end_hunting(evidence: Evidence) -> Finding:
     """The highest crossover that hunts, over all masses and for each."""
-    crossover, mass, hunts, _ = table(evidence.maps["system"], "controller.crossover", "mass")
+    crossover, mass, hunts, _ = table(evidence.maps["system"], CROSSOVER, "mass")
     by_mass = ends(crossover, hunts)
     highest, falls = by_mass.max(), trend(mass, by_mass)
     marker = hunts[:, np.argmin(np.abs(mass - STUDIES["system"].marker["mass"]))]

@@ -9,6 +9,7 @@ from types import MappingProxyType
 
 from friso.frequency.margins import Margins
 from friso.stage import Stage, loads
+from friso.stage.controllers import CONTROLLER
 from friso.studies.thesis.linear.loops import SETTINGS, Loops, loops_of
 from friso.studies.thesis.linear.plants import PARASITIC, LimitCase, Springs, limit_cases_of, springs_of
 from friso.studies.thesis.linear.speeds import Speeds, speeds_of
@@ -46,7 +47,7 @@ class Need:
 
 NEEDS: Mapping[str, Need] = MappingProxyType(
     {
-        PLANT: Need(("motion.", "controller.")),
+        PLANT: Need(("motion.", f"{CONTROLLER}.")),
         FREE: Need(("motion.",)),
         LOCKED_LOOP: Need(("motion.",), locked=True),
     }

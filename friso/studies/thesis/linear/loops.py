@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from friso.equations.bandwidth import faster
+from friso.equations.controllers.van_dijk import CROSSOVER
 from friso.frequency.crossover import HIGHEST, end_of, searched, stable_crossovers
 from friso.frequency.drive import Drive
 from friso.frequency.family import controller, loops, modes, plants
@@ -83,7 +84,7 @@ def loops_of(stage: Stage, settings: tuple[float, ...]) -> Loops:
 
 
 def _tuned(flat: Mapping[str, Any], crossover: Any) -> dict[str, Any]:
-    return faster(flat, crossover / flat["controller.crossover"])
+    return faster(flat, crossover / flat[CROSSOVER])
 
 
 def _single(flat: Mapping[str, Any]) -> float | None:
@@ -106,7 +107,7 @@ def _single(flat: Mapping[str, Any]) -> float | None:
 def _highest(flat: Mapping[str, Any]) -> float | None:
     """The crossover [Hz] up to which all limit cases are stable; None at the end of the search, 0 where none is."""
     ranges = stable_crossovers(flat, joined([*limit_cases(flat).values()]))
-    end = end_of(ranges, flat["controller.crossover"]) or 0.0
+    end = end_of(ranges, flat[CROSSOVER]) or 0.0
     return None if end == searched(flat)[1] else end
 
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from friso.equations.bandwidth import faster
+from friso.equations.controllers.van_dijk import CROSSOVER
 from friso.frequency.bode import PRESCRIBED
 from friso.frequency.crossover import HIGHEST
 from friso.frequency.family import loops, spectral_abscissa
@@ -47,7 +48,7 @@ class Speeds:
 def speeds_of(flat: Mapping[str, Any]) -> Speeds:
     """The loop of a stage over the speed of its cart."""
     unstable = {touched: _unstable(flat, touched) for touched in (False, True)}
-    tenth = 2 * np.pi * flat["controller.crossover"] * np.array([0.1, 10.0])
+    tenth = 2 * np.pi * flat[CROSSOVER] * np.array([0.1, 10.0])
     size = np.abs(np.array([loops(flat, member(speed), tenth)[0] for speed in PRESCRIBED]))
     slow, fast = (size.max(axis=0) / size.min(axis=0)).tolist()
     return Speeds(
@@ -72,8 +73,8 @@ def _sliding(speed: np.ndarray, touched: bool = False) -> Members:
 
 def _incurable(flat: Mapping[str, Any], unstable: tuple[Range, ...]) -> bool:
     """Whether in the middle of some of the ranges no faster controller is stable."""
-    crossover = np.geomspace(flat["controller.crossover"], HIGHEST, CROSSOVERS)
-    many = faster(flat, crossover / flat["controller.crossover"])
+    crossover = np.geomspace(flat[CROSSOVER], HIGHEST, CROSSOVERS)
+    many = faster(flat, crossover / flat[CROSSOVER])
     middles = [np.full(CROSSOVERS, np.sqrt(low * high)) for low, high in unstable]
     return any(bool((spectral_abscissa(many, _sliding(speed)) > 0).all()) for speed in middles)
 

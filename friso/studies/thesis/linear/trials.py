@@ -8,19 +8,20 @@ from typing import Any
 
 import numpy as np
 
+from friso.equations.controllers.van_dijk import CROSSOVER, TUNED_MASS
 from friso.frequency.margins import Margins, margins
 from friso.frequency.members import limit_cases
 from friso.frequency.stiffness import in_series
 from friso.stage import Stage
 from friso.studies.thesis.studies import LOCKED
 
-IDENTIFIED: Mapping[str, Any] = {"masses.stage": "0.75 kg", "controller.tuned_mass": "2.5 kg"}
+IDENTIFIED: Mapping[str, Any] = {"masses.stage": "0.75 kg", TUNED_MASS: "2.5 kg"}
 """The masses that the thesis identified (Sec. 4.2.1)."""
 
 FURTHER = 600.0
 """Where the thesis measured another crossing [Hz] (Sec. 4.2.4)."""
 
-AT_HIGHEST: Mapping[str, Any] = {**LOCKED, "controller.crossover": "48 Hz"}
+AT_HIGHEST: Mapping[str, Any] = {**LOCKED, CROSSOVER: "48 Hz"}
 """The setting at which it did."""
 
 LITTLE = "1 N*s/m"

@@ -1,0 +1,169 @@
+"""What controllers are made of: signals, and blocks that act on them.
+
+A controller is declared once, in terms of `Blocks`. There are two kinds of these, from which follow its two
+realisations: `friso.equations.continuous`, for cycles, verdicts and Bode plots, and `friso.equations.sampled`, as a
+drive carries it out.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import sympy as sp
+
+from friso.equations.component import STEADY, Component, Held, key
+from friso.stage.controllers import FORCE_LIMIT, ControllerSection
+
+Polynomial = tuple[Any, Any, Any]
+"""Coefficients of 1, s [s] and s^2 [s^2]."""
+
+
+@dataclass(frozen=True)
+class Loop:
+    """What a controller sees: error [m], position [m], its rate, that of the reference [m/s], and its acceleration
+    [m/s^2]."""
+
+    error: sp.Expr
+    position: sp.Expr
+    velocity: sp.Expr
+    reference_velocity: sp.Expr
+    reference_acceleration: sp.Expr = sp.S.Zero
+
+
+@dataclass(frozen=True)
+class Controller:
+    """Actuator force [N], its component, and the numbers that it holds between samples."""
+
+    force: sp.Expr
+    component: Component
+    held: tuple[Held, ...] = ()
+
+
+@dataclass(frozen=True)
+class Signal:
+    """A signal in a controller: its value, the magnitude below which it does not matter, its value and its rate in a
+    steady motion that has lasted (in terms of `STEADY`), and, as far as there are such expressions, its rate in
+    continuous time and its value at the sample before. Signals are added, and multiplied by gains."""
+
+    value: sp.Expr
+    scale: sp.Expr
+    settled: sp.Expr
+    settled_rate: sp.Expr
+    rate: sp.Expr | None = None
+    before: sp.Expr | None = None
+
+    def __add__(self, other: Signal) -> Signal:
+        return Signal(
+            self.value + other.value,
+            self.scale or other.scale,
+            self.settled + other.settled,
+            self.settled_rate + other.settled_rate,
+            None if self.rate is None or other.rate is None else self.rate + other.rate,
+            None if self.before is None or other.before is None else self.before + other.before,
+        )
+
+    def __mul__(self, gain: Any) -> Signal:
+        return Signal(
+            gain * self.value,
+            sp.Abs(gain) * self.scale,
+            gain * self.settled,
+            gain * self.settled_rate,
+            None if self.rate is None else gain * self.rate,
+            None if self.before is None else gain * self.before,
+        )
+
+    def __truediv__(self, divisor: Any) -> Signal:
+        return self * (1 / sp.sympify(divisor))
+
+    def __neg__(self) -> Signal:
+        return self * -1
+
+    def __sub__(self, other: Signal) -> Signal:
+        return self + -other
+
+
+@dataclass(frozen=True)
+class Measured:
+    """What a controller acts on: error and position [m], velocity [m/s] and acceleration [m/s^2] of the reference."""
+
+    error: Signal
+    position: Signal
+    reference_velocity: Signal
+    reference_acceleration: Signal
+
+
+def measured(loop: Loop, length: sp.Expr, rate: sp.Expr) -> Measured:
+    """The signals of a loop, which are as large as a length [m], and change at a rate [1/s]."""
+    drift = STEADY.reference_velocity - STEADY.velocity
+    return Measured(
+        Signal(loop.error, length, STEADY.error, drift, rate=loop.reference_velocity - loop.velocity),
+        Signal(loop.position, length, STEADY.position, STEADY.velocity, rate=loop.velocity),
+        Signal(
+            loop.reference_velocity,
+            length * rate,
+            STEADY.reference_velocity,
+            sp.S.Zero,
+            rate=loop.reference_acceleration,
+        ),
+        Signal(loop.reference_acceleration, length * rate**2, sp.S.Zero, sp.S.Zero, rate=sp.S.Zero),
+    )
+
+
+class Blocks(ABC):
+    """The blocks, which keep what they need beside them. `name` tells a block from others of its kind."""
+
+    nothing = Signal(sp.S.Zero, sp.S.Zero, sp.S.Zero, sp.S.Zero, sp.S.Zero, sp.S.Zero)
+    """A signal that is always 0."""
+
+    def key(self, name: str) -> sp.Symbol:
+        """The parameter with this name in the table [controller] [SI]."""
+        return key(ControllerSection.key(name))
+
+    @abstractmethod
+    def low_pass(self, signal: Signal, tau: sp.Expr, name: str) -> Signal:
+        """1/(1 + tau s), tau [s]."""
+
+    @abstractmethod
+    def derivative(self, signal: Signal, name: str, tau: sp.Expr | None = None) -> Signal:
+        """s/(1 + tau s), tau [s]; the rate of what is measured without a filter, which a drive takes over samples."""
+
+    @abstractmethod
+    def integral(
+        self,
+        signal: Signal,
+        gain: sp.Expr,
+        name: str = "integral",
+        rule: Literal["bilinear", "sum"] = "bilinear",
+        limit: sp.Expr | None = None,
+    ) -> Signal:
+        """gain/s, the gain positive. It rests where the controller's force is at its limit and it would drive it
+        further, and where its own output is at a `limit`. A drive integrates by trapezoids (`bilinear`) or sums up."""
+
+    @abstractmethod
+    def biquad(self, signal: Signal, upper: Polynomial, lower: Polynomial, name: str) -> Signal:
+        """A transfer function of the second order, whose lower polynomial begins with 1: a notch, for one."""
+
+    @abstractmethod
+    def limiter(self, signal: Signal, limit: sp.Expr, name: str) -> Signal:
+        """The signal clamped to plus and minus a limit."""
+
+    def lead(self, signal: Signal, zero: sp.Expr, pole: sp.Expr, name: str) -> Signal:
+        """(1 + zero s)/(1 + pole s), both [s]: a lead where the zero is the longer one, else a lag."""
+        return signal + self.derivative(signal, name, pole) * (zero - pole)
+
+
+def force_limit() -> sp.Symbol:
+    """The limit of the controller's force [N]."""
+    return key(FORCE_LIMIT)
+
+
+def wound_up(force: sp.Expr, integrals: list[sp.Symbol]) -> dict[sp.Symbol, sp.Expr]:
+    """The integrals in a steady motion: the first such that the controller exerts the force of `STEADY`, the others 0;
+    `force` is its own in that motion, in terms of the integrals."""
+    if not integrals:
+        return {}
+    first, *others = integrals
+    rest = force.xreplace(dict.fromkeys(integrals, sp.S.Zero))
+    return {first: (STEADY.force - rest) / sp.diff(force, first), **dict.fromkeys(others, sp.S.Zero)}

@@ -1,0 +1,180 @@
+"""Controllers in continuous time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import sympy as sp
+
+from friso.equations.blocks import (
+    Blocks,
+    Controller,
+    Loop,
+    Polynomial,
+    Signal,
+    force_limit,
+    measured,
+    wound_up,
+)
+from friso.equations.component import STEADY, Component, Kink, Output, Role, State, state
+from friso.equations.structure import ControllerForm, controller_form
+
+UNWINDING_BAND = sp.Rational(1, 1000)
+"""Share of the force limit over which the integrator is brought to rest.
+
+An integrator that stops dead at the limit makes the right-hand side jump, and the solution slides along the limit
+switching for ever; over this narrow band the stop is continuous and the slide is an ordinary, stiff, motion."""
+
+
+def continuous_controller(form: ControllerForm, loop: Loop, length: sp.Expr, rate: sp.Expr) -> Controller:
+    """The controller of the given form; `length` [m] and `rate` [1/s] are the scales of its states."""
+    blocks = Continuous(rate)
+    shares = form.law.declare(measured(loop, length, rate), blocks, form.variant)
+    demand = sum(shares.values(), start=Blocks.nothing)
+    limit = force_limit() if form.limited else None
+    force, kinks = _clamped(demand.value, limit, "force") if limit is not None else (demand.value, ())
+    outputs = {"force": Output(force, "N", "actuator force")}
+    outputs |= {
+        f"force_{term}": Output(shares[term].value, "N", f"{name} share") for term, name in form.law.shares.items()
+    }
+    states, resting = blocks.finished(demand, limit, kinks)
+    return Controller(force, Component(states, (*blocks.kinks, *kinks, *resting), outputs))
+
+
+def slow_gains(flat: Mapping[str, Any]) -> tuple[float, float]:
+    """What a controller does with an error that hardly changes: proportional gain [N/m] and integral gain [N/(m s)]; of
+    a stage given as flat keys, its reference at rest."""
+    form = controller_form(flat)
+    loop = Loop(STEADY.error, STEADY.position, sp.S.Zero, sp.S.Zero)
+    blocks = Continuous(sp.S.One)
+    shares = form.law.declare(measured(loop, sp.S.One, sp.S.One), blocks, form.variant)
+    force = sum(shares.values(), start=Blocks.nothing).settled
+    integral = sum((sp.diff(force, x) * _per_error(u) for x, u in blocks.integrands.items()), start=sp.S.Zero)
+    values = {
+        symbol: flat[str(symbol)] for gain in (force, integral) for symbol in gain.free_symbols if str(symbol) in flat
+    }
+    return float(_per_error(force).subs(values)), float(integral.subs(values))
+
+
+def _per_error(value: sp.Expr) -> sp.Expr:
+    """By how much a value changes with the error of a stage that is displaced the other way."""
+    return sp.diff(value, STEADY.error) - sp.diff(value, STEADY.position)
+
+
+@dataclass(frozen=True)
+class _Integral:
+    """An integrator's state, what it integrates (also in a steady motion), its magnitude, its output, and the limit of
+    that."""
+
+    symbol: sp.Symbol
+    integrand: sp.Expr
+    settled: sp.Expr
+    scale: sp.Expr
+    output: sp.Expr
+    limit: sp.Expr | None
+
+
+class Continuous(Blocks):
+    """Blocks whose memories are states; `rate` [1/s] is that of the motion."""
+
+    def __init__(self, rate: sp.Expr) -> None:
+        self.rate = rate
+        self.states: list[State] = []
+        self.kinks: list[Kink] = []
+        self._integrals: list[_Integral] = []
+
+    @property
+    def integrands(self) -> dict[sp.Symbol, sp.Expr]:
+        """What the integrators integrate in a steady motion."""
+        return {each.symbol: each.settled for each in self._integrals}
+
+    def low_pass(self, signal: Signal, tau: sp.Expr, name: str) -> Signal:
+        low = state(f"filtered_{name}")
+        slope = (signal.value - low) / tau
+        self.states.append(State(low, slope, "m", signal.scale, Role.FILTER, signal.settled))
+        return replace(signal, value=low, rate=slope)
+
+    def derivative(self, signal: Signal, name: str, tau: sp.Expr | None = None) -> Signal:
+        slope = signal.rate if tau is None else self.low_pass(signal, tau, name).rate
+        if slope is None:
+            raise ValueError(f"the derivative of {name} needs a filter")
+        return Signal(slope, signal.scale * self.rate, signal.settled_rate, sp.S.Zero)
+
+    def integral(
+        self,
+        signal: Signal,
+        gain: sp.Expr,
+        name: str = "integral",
+        rule: Literal["bilinear", "sum"] = "bilinear",
+        limit: sp.Expr | None = None,
+    ) -> Signal:
+        symbol = state(name)
+        output = gain * symbol
+        self._integrals.append(_Integral(symbol, signal.value, signal.settled, signal.scale / self.rate, output, limit))
+        return Signal(output, gain * signal.scale / self.rate, output, sp.S.Zero, rate=gain * signal.value)
+
+    def biquad(self, signal: Signal, upper: Polynomial, lower: Polynomial, name: str) -> Signal:
+        low, slope = state(f"filtered_{name}"), state(f"filtered_{name}_rate")
+        bend = (signal.value - low - lower[1] * slope) / lower[2]
+        self.states += [
+            State(low, slope, "m", signal.scale, Role.FILTER, signal.settled),
+            State(slope, bend, "m/s", signal.scale * self.rate, Role.FILTER, signal.settled_rate),
+        ]
+        settled = upper[0] * signal.settled + upper[1] * signal.settled_rate
+        value = upper[0] * low + upper[1] * slope + upper[2] * bend
+        return Signal(value, signal.scale, settled, upper[0] * signal.settled_rate)
+
+    def limiter(self, signal: Signal, limit: sp.Expr, name: str) -> Signal:
+        value, kinks = _clamped(signal.value, limit, name)
+        self.kinks += kinks
+        return replace(signal, value=value, rate=None)
+
+    def finished(
+        self, demand: Signal, limit: sp.Expr | None, kinks: tuple[Kink, ...]
+    ) -> tuple[tuple[State, ...], tuple[Kink, ...]]:
+        """All states, the integrators resting where the demand is beyond its limit, whose kinks are given, or their
+        output beyond a limit of its own; and the kinks of that."""
+        steady = wound_up(demand.settled, [each.symbol for each in self._integrals])
+        states = [replace(each, settled=each.settled.xreplace(steady)) for each in self.states]
+        far: list[Kink] = list(_far(kinks, limit, "rest")) if self._integrals and limit is not None else []
+        winding: list[Kink] = []
+        for each in self._integrals:
+            share = sp.S.One
+            beside = "" if str(each.symbol) == "integral" else f"_{each.symbol}"
+            up = Kink(f"winding_up{beside}", each.integrand)
+            if limit is not None:
+                share -= _resting(kinks, tuple(far[:2]), up, limit)
+            if each.limit is not None:
+                _, ends = _clamped(each.output, each.limit, str(each.symbol))
+                beyond = _far(ends, each.limit, f"rest_{each.symbol}")
+                share -= _resting(ends, beyond, up, each.limit)
+                far += [*ends, *beyond]
+            if share != 1:
+                winding.append(up)
+            derivative = each.integrand * share
+            states.append(State(each.symbol, derivative, "m*s", each.scale, Role.INTEGRAL, steady[each.symbol]))
+        return tuple(states), (*far, *winding)
+
+
+def _clamped(value: sp.Expr, limit: sp.Expr, name: str) -> tuple[sp.Expr, tuple[Kink, ...]]:
+    """A value clamped to its limit, and the kinks at the upper and the lower limit."""
+    upper = Kink(f"{name}_upper", value - limit)
+    lower = Kink(f"{name}_lower", -value - limit)
+    return value + upper.beyond * (limit - value) - lower.beyond * (limit + value), (upper, lower)
+
+
+def _far(limits: tuple[Kink, ...], limit: sp.Expr, name: str) -> tuple[Kink, ...]:
+    """The kinks where an integrator has come to rest: a band beyond the limits."""
+    upper, lower = limits
+    band = UNWINDING_BAND * limit
+    return Kink(f"{name}_upper", upper.surface - band), Kink(f"{name}_lower", lower.surface - band)
+
+
+def _resting(limits: tuple[Kink, ...], far: tuple[Kink, ...], winding: Kink, limit: sp.Expr) -> sp.Expr:
+    """The share by which an integrator rests: while the value is beyond its limit and would be driven further."""
+    band, rest = UNWINDING_BAND * limit, sp.S.Zero
+    for kink, end, inwards in zip(limits, far, (winding.beyond, 1 - winding.beyond), strict=True):
+        rest += inwards * (kink.beyond * (1 - end.beyond) * kink.surface / band + end.beyond)
+    return rest

@@ -1,0 +1,40 @@
+"""What the two forms of the PID controller share: their kind, and how their tables are told apart."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+from typing import Any, ClassVar, Literal, cast
+
+from friso.errors import StageError
+from friso.stage import ControllerSection
+
+EITHER_FORM = 'crossover = "8 Hz", alpha = 0.1, beta = 2 or kp = "3 N/m", ki = "4 N/(m*s)", kd = "6 N*s/m"'
+
+
+class Pid(ControllerSection):
+    """A PID controller."""
+
+    kind: Literal["pid"]
+
+    written: ClassVar[str]
+    """What the keys of a form stand for, in a message."""
+    needed: ClassVar[tuple[str, ...]]
+    """Names of the keys of which a table of this form has at least one."""
+    asked: ClassVar[str]
+    """These keys in a message."""
+    shares: ClassVar[Mapping[str, str]] = MappingProxyType({"p": "proportional", "i": "integral", "d": "derivative"})
+
+    @classmethod
+    def pick(cls, forms: Sequence[type[ControllerSection]], table: Mapping[str, Any]) -> type[Pid]:
+        """By rules or by gains. Raises StageError for both or neither."""
+        by_keys = sorted(cast(Sequence[type[Pid]], forms), key=lambda form: not form.told_by)
+        own = {form: [key for key in form.model_fields if key in {*table} - {*cls.model_fields}] for form in by_keys}
+        used = [form for form, keys in own.items() if keys]
+        if len(used) > 1:
+            given = " together with ".join(f"{', '.join(own[form])} ({form.written})" for form in used)
+            raise StageError("", given, "one form, not both", EITHER_FORM)
+        if not used or not {*used[0].needed} & {*table}:
+            given = f"neither {' nor '.join(form.asked for form in by_keys)}"
+            raise StageError("", given, "one of the two forms", EITHER_FORM)
+        return used[0]

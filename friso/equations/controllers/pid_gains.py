@@ -1,0 +1,91 @@
+"""PID by its gains (thesis, Eq. 6)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, NamedTuple
+
+from friso.equations.controllers.pid import Pid
+from friso.quantities import Quantity, Value, non_negative
+from friso.stage import Rule, register_controller
+from friso.stage.controllers import KIND
+
+if TYPE_CHECKING:
+    import sympy as sp
+
+    from friso.equations.blocks import Blocks, Measured, Signal
+
+KP, KI, KD, TAU, DERIVATIVE_ON = (f"controller.{name}" for name in ("kp", "ki", "kd", "tau", "derivative_on"))
+
+
+class Terms(NamedTuple):
+    """Which terms there are; each absent term is absent from the equations."""
+
+    integral: bool
+    filtered: bool
+    derivative_on: Literal["none", "error", "measurement"]
+
+
+def proportional_derivative(stiffness: float, damping: float) -> dict[str, Any]:
+    """The flat keys of a controller with a stiffness [N/m] and a damping [N s/m]."""
+    return {KIND: "pid", KP: stiffness, KI: 0.0, KD: damping, TAU: 0.0, DERIVATIVE_ON: "error"}
+
+
+@register_controller
+class PidGains(Pid):
+    """PID by its gains (thesis, Eq. 6); a gain left out is 0. The filter acts on the derivative alone."""
+
+    kp: Annotated[Value, Quantity("N/m", non_negative, "3 N/m")] = Value(0, "0 N/m")
+    ki: Annotated[Value, Quantity("N/(m*s)", non_negative, "4 N/(m*s)")] = Value(0, "0 N/(m*s)")
+    kd: Annotated[Value, Quantity("N*s/m", non_negative, "6 N*s/m")] = Value(0, "0 N*s/m")
+    tau: Annotated[Value, Quantity("s", non_negative, "1 ms")] = Value(0, "0 s")
+    derivative_on: Literal["error", "measurement"] = "error"
+
+    written = "gains"
+    needed = ("kp", "ki", "kd")
+    asked = "any of kp, ki, kd"
+    speeds_up: ClassVar[Mapping[str, int]] = MappingProxyType({"kp": 2, "ki": 3, "kd": 1, "tau": -1})
+    loop_gain = ("kp", "ki", "kd")
+    decisive = ("ki", "kd", "tau")
+
+    rules: ClassVar[tuple[Rule, ...]] = (
+        Rule(
+            (DERIVATIVE_ON, KD, TAU),
+            lambda f: (f[DERIVATIVE_ON] != "error") | (f[KD] == 0) | (f[TAU] > 0),
+            "a filter (tau > 0) for the derivative of the error, or the derivative of the measurement",
+            'tau = "1 ms", or derivative_on = "measurement"',
+        ),
+    )
+
+    @classmethod
+    def variant(cls, flat: Mapping[str, Any]) -> Terms:
+        derived = flat[KD] > 0
+        return Terms(
+            integral=bool(flat[KI] > 0),
+            filtered=bool(derived and flat[TAU] > 0),
+            derivative_on=flat[DERIVATIVE_ON] if derived else "none",
+        )
+
+    @classmethod
+    def integrates(cls, flat: Mapping[str, Any]) -> bool:
+        return bool(flat[KI] > 0)
+
+    @classmethod
+    def stiffness(cls, blocks: Blocks, variant: Terms) -> sp.Expr:
+        return blocks.key("kp")
+
+    @classmethod
+    def declare(cls, measured: Measured, blocks: Blocks, variant: Terms) -> Mapping[str, Signal]:
+        kp, ki, kd, tau = map(blocks.key, ("kp", "ki", "kd", "tau"))
+        lag = tau if variant.filtered else None
+        derivative = {
+            "none": lambda: blocks.nothing,
+            "error": lambda: blocks.derivative(measured.error, "error", lag) * kd,
+            "measurement": lambda: -(blocks.derivative(measured.position, "position", lag) * kd),
+        }
+        return {
+            "p": measured.error * kp,
+            "d": derivative[variant.derivative_on](),
+            "i": blocks.integral(measured.error, ki, rule="sum") if variant.integral else blocks.nothing,
+        }

@@ -1,0 +1,102 @@
+"""PID by van Dijk's tuning rules: crossover, alpha, beta and the mass it is tuned for (thesis, Eq. 7 and 8)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+
+from friso.equations.controllers.pid import Pid
+from friso.quantities import Number, Quantity, Value, at_least_1, inside_0_1, positive
+from friso.stage import Rule, register_controller
+from friso.stage.controllers import KIND
+from friso.stage.tables import ROUNDING
+
+if TYPE_CHECKING:
+    import sympy as sp
+
+    from friso.equations.blocks import Blocks, Measured, Signal
+
+CROSSOVER, ALPHA, BETA, TUNED_MASS = (f"controller.{name}" for name in ("crossover", "alpha", "beta", "tuned_mass"))
+
+
+@register_controller
+class VanDijk(Pid):
+    """PID by van Dijk's tuning rules (thesis, Eq. 7, 8): the low-pass comes first, and the three terms act on what it
+    lets through."""
+
+    crossover: Annotated[Value, Quantity("Hz", positive, "8 Hz")]
+    alpha: Annotated[float, Number(inside_0_1, "0.1")]
+    beta: Annotated[float, Number(at_least_1, "2")]
+    tuned_mass: Annotated[Value | None, Quantity("kg", positive, "1.7 kg")] = None
+
+    written = "van Dijk's rules"
+    needed = ("crossover", "alpha", "beta", "tuned_mass")
+    asked = "crossover"
+    told_by = ("crossover",)
+    bandwidth_key = CROSSOVER
+    speeds_up: ClassVar[Mapping[str, int]] = MappingProxyType({"crossover": 1})
+    loop_gain = ("tuned_mass",)
+    words: ClassVar[Mapping[str, str]] = MappingProxyType(
+        {"alpha": "Controller α", "beta": "Controller β", "crossover": "Crossover", "tuned_mass": "Tuned mass"}
+    )
+
+    rules: ClassVar[tuple[Rule, ...]] = (
+        Rule(
+            (CROSSOVER, "drive.sample_time"),
+            lambda f: "drive.sample_time" not in f or f[CROSSOVER] * f["drive.sample_time"] <= 1 / 10 * (1 + ROUNDING),
+            "a sample time of at most a tenth of the crossover's period",
+            '[drive] sample_time = "50 us" (20 kHz) with crossover = "8 Hz"',
+        ),
+    )
+
+    @classmethod
+    def with_defaults(cls, flat: Mapping[str, Any]) -> dict[str, Any]:
+        """It is tuned for what moves."""
+        return {TUNED_MASS: flat.get("masses.cart", 0.0) + flat.get("masses.stage", 0.0)}
+
+    @classmethod
+    def integrates(cls, flat: Mapping[str, Any]) -> bool:
+        return True
+
+    @classmethod
+    def stiffness(cls, blocks: Blocks, variant: None) -> sp.Expr:
+        return gains(blocks)["k_p"]
+
+    @classmethod
+    def declare(cls, measured: Measured, blocks: Blocks, variant: None) -> Mapping[str, Signal]:
+        k_p, tau_z, tau_i, tau_p = gains(blocks).values()
+        passed = blocks.low_pass(measured.error, tau_p, "error")
+        return {
+            "p": passed * (k_p * (1 + tau_z / tau_i)),
+            "i": blocks.integral(passed, k_p / tau_i),
+            "d": (measured.error - passed) * (k_p * tau_z / tau_p),
+        }
+
+
+def tuned(crossover: Any, alpha: Any, beta: Any, mass: Any) -> dict[str, Any]:
+    """The flat keys of a controller for a crossover [Hz] and a mass [kg]."""
+    return {KIND: "pid", CROSSOVER: crossover, ALPHA: alpha, BETA: beta, TUNED_MASS: mass}
+
+
+def numbers(flat: Mapping[str, Any]) -> dict[str, float]:
+    """Gain k_p [N/m] and time constants tau_z, tau_i, tau_p [s] of a stage given as flat keys."""
+    from sympy import S
+
+    from friso.equations.continuous import Continuous
+
+    return {
+        name: float(expression.subs({symbol: flat[str(symbol)] for symbol in expression.free_symbols}))
+        for name, expression in gains(Continuous(S.One)).items()
+    }
+
+
+def gains(blocks: Blocks) -> dict[str, sp.Expr]:
+    """Eq. 8: gain k_p [N/m] and time constants tau_z, tau_i, tau_p [s]."""
+    from sympy import pi, sqrt
+
+    crossover, alpha, beta, mass = map(blocks.key, ("crossover", "alpha", "beta", "tuned_mass"))
+    omega = 2 * pi * crossover
+    root = sqrt(1 / alpha)
+    tau_z = root / omega
+    return {"k_p": mass * omega**2 / root, "tau_z": tau_z, "tau_i": beta * tau_z, "tau_p": 1 / (omega * root)}

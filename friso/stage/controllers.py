@@ -1,0 +1,142 @@
+"""The table [controller]: what the house asks of any controller, and the registry of controllers."""
+
+from collections.abc import Hashable, Mapping, Sequence
+from inspect import get_annotations
+from types import MappingProxyType
+from typing import Annotated, Any, ClassVar, Literal, Self, cast
+
+from pydantic import model_validator
+
+from friso.errors import StageError
+from friso.quantities import Quantity, Value, positive
+from friso.stage.section import Section, SectionClass, UncertainSection, Variants
+
+CONTROLLER = "controller"
+KIND, FORCE_LIMIT, ANTI_WINDUP = (f"{CONTROLLER}.{name}" for name in ("kind", "force_limit", "anti_windup"))
+"""Stage-file keys that every controller has."""
+
+
+class ControllerSection(UncertainSection):
+    """Base of the controllers, each of which declares its keys, `kind: Literal["name"]`, its blocks, and what the house
+    asks of any controller: nobody else asks for its keys.
+
+    Several forms of one kind, told apart by their keys, derive from the class that declares the kind.
+    """
+
+    kind: Any
+    force_limit: Annotated[Value | None, Quantity("N", positive, "200 N")] = None
+    anti_windup: Literal["clamp"] | None = None
+
+    bandwidth_key: ClassVar[str | None] = None
+    """The numeric key [Hz] that tells the bandwidth, where the controller has one."""
+    bandwidth_name: ClassVar[str] = "crossover"
+    """What that key tells, in a sentence."""
+    speeds_up: ClassVar[Mapping[str, int]] = MappingProxyType({})
+    """Names of the keys to the powers of the factor by which they change in a controller that is so many times faster,
+    all its poles and zeros being scaled."""
+    loop_gain: ClassVar[tuple[str, ...]] = ()
+    """Names of the keys in proportion to all of which the gain of the loop goes."""
+    decisive: ClassVar[tuple[str, ...]] = ()
+    """Names of the numeric keys on which `variant` and `integrates` depend, by being zero, for instance."""
+    told_by: ClassVar[tuple[str, ...]] = ()
+    """Names of the keys, any of which tells this form from others of its kind; of these one has none."""
+    shares: ClassVar[Mapping[str, str]] = MappingProxyType({})
+    """The shares of the force and what they are called in plots."""
+    words: ClassVar[Mapping[str, str]] = MappingProxyType({})
+    """Names of keys to what they are called on the axes of maps, where the name itself will not do."""
+
+    @model_validator(mode="after")
+    def _anti_windup_has_a_limit(self) -> Self:
+        if self.anti_windup and self.force_limit is None:
+            raise StageError("anti_windup", '"clamp"', "a force_limit as well", 'force_limit = "200 N"')
+        return self
+
+    @classmethod
+    def pick(cls, forms: "Sequence[type[ControllerSection]]", table: Mapping[str, Any]) -> "type[ControllerSection]":
+        """The form of a [controller] table of this kind. Raises StageError."""
+        return forms[0]
+
+    @classmethod
+    def with_defaults(cls, flat: Mapping[str, Any]) -> dict[str, Any]:
+        """Keys that follow other keys of the stage where its file leaves them out, to their values."""
+        return {}
+
+    @classmethod
+    def variant(cls, flat: Mapping[str, Any]) -> Hashable:
+        """What else than the form the equations depend on, such as terms that are absent."""
+        return None
+
+    @classmethod
+    def integrates(cls, flat: Mapping[str, Any]) -> bool:
+        """Whether there is integral action, which winds up while a stage sticks off its reference."""
+        raise NotImplementedError
+
+    @classmethod
+    def stiffness(cls, blocks: Any, variant: Any) -> Any:
+        """Proportional stiffness of the loop [N/m], from which the scales of the motion are taken."""
+        raise NotImplementedError
+
+    @classmethod
+    def declare(cls, measured: Any, blocks: Any, variant: Any) -> Mapping[str, Any]:
+        """The shares of the force [N], each a signal made by the `blocks` (`friso.equations.blocks`) from what is
+        `measured`."""
+        raise NotImplementedError
+
+    @classmethod
+    def key(cls, name: str) -> str:
+        """The stage-file key of a name in the table."""
+        return f"{CONTROLLER}.{name}"
+
+
+class Controllers(Variants):
+    """The registered controllers: kinds, each of one form or of several that are told apart by their keys."""
+
+    def __init__(self) -> None:
+        super().__init__("kind", "friso.controllers")
+        self.forms: dict[str, list[type[ControllerSection]]] = {}
+
+    def register(self, cls: SectionClass) -> SectionClass:
+        """Class decorator: add a form of a controller. Raises InputError for a kind that another class declares."""
+        form = cast(type[ControllerSection], cls)
+        owner = next(base for base in form.__mro__ if self.tag in get_annotations(base))
+        super().register(owner)
+        self.forms.setdefault(self.name_of(form), []).append(form)
+        return cls
+
+    def pick(self, table: dict[str, Any]) -> type[Section]:
+        """The class for a [controller] table. Raises InputError for an unknown kind, StageError for an unclear form."""
+        owner = cast(type[ControllerSection], super().pick(table))
+        return owner.pick(self.forms[table[self.tag]], table)
+
+    def of(self, flat: Mapping[str, Any]) -> type[ControllerSection]:
+        """The class of the controller of a stage given as flat keys."""
+        kind = flat[KIND]
+        self.named(kind)
+        told = (form for form in self.forms[kind] if any(form.key(name) in flat for name in form.told_by))
+        return next(told, None) or next(form for form in self.forms[kind] if not form.told_by)
+
+    @property
+    def words(self) -> dict[str, str]:
+        """What keys are called on the axes of maps."""
+        every = (form for forms in self.forms.values() for form in forms)
+        return {form.key(name): word for form in every for name, word in form.words.items()}
+
+    def form(self, kind: str, name: str) -> type[ControllerSection]:
+        """The form of a kind whose class has this name."""
+        self.named(kind)
+        return next(form for form in self.forms[kind] if form.__name__ == name)
+
+
+CONTROLLERS = Controllers()
+register_controller = CONTROLLERS.register
+
+
+def controller_of(flat: Mapping[str, Any]) -> type[ControllerSection]:
+    """The class of the controller of a stage given as flat keys."""
+    return CONTROLLERS.of(flat)
+
+
+def as_tuned(flat: Mapping[str, Any]) -> dict[str, Any]:
+    """The keys of a controller that follow other keys of the stage, with the values that they have now: it is set once,
+    and knows nothing of machines that differ from the stage file."""
+    return {key: flat[key] for key in controller_of(flat).with_defaults(flat)}
