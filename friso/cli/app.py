@@ -28,6 +28,7 @@ from friso.cli.reproduce import reproduce
 from friso.cli.rig import listed_experiments, rig
 from friso.cli.simulate import simulate
 from friso.errors import InputError
+from friso.stage.foreign import installed
 from friso.version import VERSION
 
 app = typer.Typer(
@@ -72,6 +73,8 @@ def main() -> NoReturn:
     messages.setFormatter(logging.Formatter("friso: %(message)s"))
     logging.getLogger("friso").addHandler(messages)
     try:
+        if {"-h", "--help"} & {*sys.argv[1:2]}:
+            app.info.epilog = _plug_ins()
         status = app(standalone_mode=False) or 0
         if status == INTERRUPTED:  # typer's word for Ctrl-C
             say("interrupted")
@@ -96,6 +99,12 @@ def main() -> NoReturn:
             say(f"the computation could not be completed: {error}")
             sys.exit(1)
         raise
+
+
+def _plug_ins() -> str:
+    """What installed packages add, for the help. Raises InputError for a name that is taken."""
+    names = installed()
+    return f"From other packages: {', '.join(names)}." if names else ""
 
 
 def _version(wanted: bool) -> None:

@@ -145,7 +145,8 @@ class Wanted:
     def sections(self) -> tuple[type[Section], ...]:
         """The classes of the stage file's sections that declare equations of their own."""
         form = self.structure if isinstance(self.structure, Structure | Imposed) else self.structure.structure
-        return (friction_law(form.friction),)
+        controller = form.controller if isinstance(form, Structure) else None
+        return (friction_law(form.friction), *((controller.law,) if controller else ()))
 
 
 def kernel(structure: Form, variational: bool = False, method: str = "Rodas5P", lanes: int = LANES) -> Kernel:

@@ -10,9 +10,11 @@ from typing import TYPE_CHECKING, Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
+from friso.stage.foreign import foreign
 from friso.version import VERSION
 from friso.views.drawing import matplotlib_renderer, plotly_renderer
 from friso.views.drawing.figure import Figure
+from friso.views.drawing.prefixes import listed
 
 if TYPE_CHECKING:
     from friso.stage import Stage
@@ -45,7 +47,7 @@ def stage_page(
             figures=[(figure, Markup(plotly_renderer.fragment(figure)), print_image(figure)) for figure in figures],
             plotly=Markup(plotly_renderer.script()) if figures else None,
             stage_file=stage.to_toml() if stage else "",
-            version=VERSION,
+            version=" with ".join([VERSION, *filter(None, [listed(foreign(), "and")])]),
             **shown,
         )
     )

@@ -1,0 +1,24 @@
+"""Which controllers and friction laws are not friso's own, for `friso --help` and every report."""
+
+from friso.stage.controllers import CONTROLLERS
+from friso.stage.plug_ins import load_installed, plug_in_of
+from friso.stage.tables import FRICTION
+
+
+def foreign() -> list[str]:
+    """Controllers and friction laws from outside friso that are loaded, each with the module it comes from."""
+    kinds = {
+        "controller": [(name, form) for name, forms in CONTROLLERS.forms.items() for form in forms],
+        "friction law": FRICTION.classes.items(),
+    }
+    return [
+        f"{what} {name} ({cls.__module__})" for what, known in kinds.items() for name, cls in known if plug_in_of(cls)
+    ]
+
+
+def installed() -> list[str]:
+    """The same with all that installed packages name in their entry points. Raises InputError for one that cannot be
+    imported or takes a name."""
+    for registry in (CONTROLLERS, FRICTION):
+        load_installed(registry.group)
+    return foreign()

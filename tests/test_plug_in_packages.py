@@ -1,0 +1,102 @@
+"""Controllers and friction laws from installed packages: found by their entry points, named, and refused."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from friso.errors import InputError
+from friso.stage import ControllerSection, register_controller
+
+TESTS = Path(__file__).parent
+
+LAW = '''
+"""A friction law of another package."""
+
+from typing import Literal
+
+from friso.stage import FrictionSection, register_friction
+
+
+@register_friction
+class Mine(FrictionSection):
+    model: Literal["{name}"]
+'''
+
+STAGE = """
+masses.cart = "1 kg"
+friction.model = "air"
+motion = {kind = "step", size = "1 mm", duration = "20 ms"}
+[controller]
+kind = "pi-d"
+bandwidth = "8 Hz"
+mass = "1 kg"
+"""
+
+
+def package(folder: Path, name: str, **points: str) -> None:
+    """What pip leaves of a package that declares entry points: friso.GROUP = module."""
+    info = folder / f"{name}-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.0\n")
+    lines = [f"[friso.{group}]\n{module} = {module}\n" for group, module in points.items()]
+    (info / "entry_points.txt").write_text("\n".join(lines))
+
+
+def friso_command(folder: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    paths = os.pathsep.join([str(TESTS.parent), str(folder)])
+    return subprocess.run(
+        [sys.executable, "-c", "from friso.cli import main; main()", *arguments],
+        cwd=folder, capture_output=True, text=True, timeout=600, env={**os.environ, "PYTHONPATH": paths},
+    )  # fmt: skip
+
+
+@pytest.fixture
+def installed(tmp_path: Path) -> Path:
+    (tmp_path / "own_controller.py").write_text((TESTS / "own_controller.py").read_text(encoding="utf-8"))
+    (tmp_path / "air_film.py").write_text(LAW.replace("{name}", "air"))
+    package(tmp_path, "other", controllers="own_controller", friction="air_film")
+    (tmp_path / "stage.toml").write_text(STAGE)
+    return tmp_path
+
+
+def test_help_names_them(installed: Path) -> None:
+    done = friso_command(installed, "--help")
+    assert done.returncode == 0, done.stderr
+    assert "controller pi-d (own_controller)" in " ".join(done.stdout.split())
+    assert "friction law air (air_film)" in " ".join(done.stdout.split())
+
+
+def test_a_stage_file_uses_them_and_the_report_names_them(installed: Path) -> None:
+    done = friso_command(installed, "bode", "stage.toml", "--out", "out")
+    assert done.returncode == 0, done.stderr
+    page = next((installed / "out").glob("*.html")).read_text(encoding="utf-8")
+    assert "controller pi-d (own_controller)" in page
+
+
+@pytest.mark.parametrize(("name", "module"), [("lugre", "taken"), ("air", "missing")])
+def test_a_taken_name_or_a_missing_module_is_one_message(name: str, module: str, tmp_path: Path) -> None:
+    (tmp_path / "taken.py").write_text(LAW.replace("{name}", name))
+    package(tmp_path, "other", friction=module)
+    done = friso_command(tmp_path, "--help")
+    assert done.returncode == 2
+    assert "Traceback" not in done.stderr
+    assert ('"lugre"' if module == "taken" else "cannot be imported") in done.stderr
+
+
+def test_a_registered_name_is_refused_in_python() -> None:
+    from typing import Literal
+
+    with pytest.raises(InputError, match="a name that is not taken"):
+
+        @register_controller
+        class Other(ControllerSection):
+            kind: Literal["pid"]
+
+
+def test_friso_without_packages_loads_nothing() -> None:
+    code = "import friso, sys; print('importlib.metadata' in sys.modules and 'sympy' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60)
+    assert done.stdout.strip() == "False"
