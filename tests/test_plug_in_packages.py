@@ -27,7 +27,6 @@ class Mine(FrictionSection):
 
 STAGE = """
 masses.cart = "1 kg"
-friction.model = "air"
 motion = {kind = "step", size = "1 mm", duration = "20 ms"}
 [controller]
 kind = "pi-d"
@@ -69,7 +68,7 @@ def test_help_names_them(installed: Path) -> None:
     assert "friction law air (air_film)" in " ".join(done.stdout.split())
 
 
-def test_a_stage_file_uses_them_and_the_report_names_them(installed: Path) -> None:
+def test_a_stage_file_uses_one_and_the_report_names_it(installed: Path) -> None:
     done = friso_command(installed, "bode", "stage.toml", "--out", "out")
     assert done.returncode == 0, done.stderr
     page = next((installed / "out").glob("*.html")).read_text(encoding="utf-8")
