@@ -71,22 +71,22 @@ def analyse(
     if measured is not None:
         driven, other = as_measured(measured), None
     else:
-        driven, other = _clear([_response(own, logs[0], output, period) for output, own in records.items()])
-    said = [text for own in records.get("position", []) if own.reference is None for text in feedback(own)]
+        driven, other = _clear([_response(of_output, logs[0], output, period) for output, of_output in records.items()])
+    warnings = [text for record in records.get("position", []) if record.reference is None for text in feedback(record)]
     first = band or (float(max(driven.frequency[0], driven.frequency[-1] * ABOVE_FRICTION)), _top(driven))
-    model = _attempt(said, "two masses", fit_two_mass, driven, other, first)
-    departs = _attempt(said, "departure", departure, driven, model.predict) if model else None
+    model = _attempt(warnings, "two masses", fit_two_mass, driven, other, first)
+    departs = _attempt(warnings, "departure", departure, driven, model.predict) if model else None
     used = band or _above(driven, departs)
     if model and len(logs) > 1:
-        model = _attempt(said, "two masses", _of_all, records, logs, driven, other, used, period)
+        model = _attempt(warnings, "two masses", _of_all, records, logs, driven, other, used, period)
     upper = driven.between(*used)
-    drag, explanation = _friction(said, records.get("position", []), driven, departs, model, period)
-    modes = _attempt(said, "modes", fit_modes, upper)
+    drag, explanation = _friction(warnings, records.get("position", []), driven, departs, model, period)
+    modes = _attempt(warnings, "modes", fit_modes, upper)
     return Bench(
         tuple(logs), driven, other, used,
-        _attempt(said, "mass lines", mass_lines, upper) or (), modes, model,
-        _attempt(said, "limit cases", visible, upper, modes), departs, drag, explanation,
-        _left_out(said, records, logs, used, period), tuple(dict.fromkeys([*driven.warnings, *said])),
+        _attempt(warnings, "mass lines", mass_lines, upper) or (), modes, model,
+        _attempt(warnings, "limit cases", visible, upper, modes), departs, drag, explanation,
+        _left_out(warnings, records, logs, used, period), tuple(dict.fromkeys([*driven.warnings, *warnings])),
     )  # fmt: skip
 
 
@@ -97,34 +97,34 @@ def _outputs(logs: Sequence[Log]) -> list[str]:
     return ["position", *(["cart_position"] if all("cart_position" in log for log in logs) else [])]
 
 
-def as_measured(given: MeasuredResponse) -> FrequencyResponse:
+def as_measured(measured: MeasuredResponse) -> FrequencyResponse:
     """A response that somebody else measured: how far it can be believed is told by its scatter alone."""
-    output, _, unit = given.unit.partition("/")
-    unknown, lines = np.full(len(given.frequency), np.nan), len(given.frequency)
+    output, _, unit = measured.unit.partition("/")
+    unknown, lines = np.full(len(measured.frequency), np.nan), len(measured.frequency)
     return FrequencyResponse(
-        given.frequency, given.response, np.zeros(lines), unknown, unknown, np.full(lines, 2.0), "measured",
-        Channels("force", unit or "1", "position", output or "1"), given.coherence,
+        measured.frequency, measured.response, np.zeros(lines), unknown, unknown, np.full(lines, 2.0), "measured",
+        Channels("force", unit or "1", "position", output or "1"), measured.coherence,
         ("the file tells no deviations: the scatter between neighbouring lines stands for them",),
     )  # fmt: skip
 
 
-def predicted(found: Bench, log: Log, period: float | None = None) -> tuple[float, ...]:
+def predicted(bench: Bench, log: Log, period: float | None = None) -> tuple[float, ...]:
     """Relative errors with which the two-mass model predicts the outputs of another log, excited every `period` [s],
     over the band.
 
     Raises InputError where there is no model.
     """
-    if found.two_masses is None:
+    if bench.two_masses is None:
         raise InputError("--predict", "no two-mass model", "a response with an antiresonance and a resonance")
-    return _errors(found.two_masses, log, found.band, period, found.other is not None)
+    return _errors(bench.two_masses, log, bench.band, period, bench.other is not None)
 
 
-def _attempt(said: list[str], what: str, function, *arguments):
+def _attempt(warnings: list[str], what: str, function, *arguments):
     """The answer of an analysis, or None and why it has none."""
     try:
         return function(*arguments)
     except InputError as error:
-        said.append(f"no {what}: {error.given}; expected {error.expected}")
+        warnings.append(f"no {what}: {error.given}; expected {error.expected}")
         return None
 
 
@@ -150,9 +150,9 @@ def _clear(responses: Sequence[FrequencyResponse]) -> tuple[FrequencyResponse, F
 
     Raises InputError where none does.
     """
-    good = np.unique(np.concatenate([each.usable().frequency for each in responses]))
-    kept = [each.at(np.isin(each.frequency, good)) for each in responses]
-    return kept[0], kept[1] if len(kept) > 1 else None
+    good = np.unique(np.concatenate([response.usable().frequency for response in responses]))
+    usable = [response.at(np.isin(response.frequency, good)) for response in responses]
+    return usable[0], usable[1] if len(usable) > 1 else None
 
 
 def _above(driven: FrequencyResponse, departs: Departure | None) -> Range:
@@ -183,12 +183,12 @@ def _single(
     records: dict[str, list[ResponseRecord]], logs: Sequence[Log], which: int, band: Range, period: float | None
 ) -> TwoMass:
     """The two-mass model of one realisation."""
-    responses = [_response([own[which]], logs[which], output, period) for output, own in records.items()]
+    responses = [_response([of_output[which]], logs[which], output, period) for output, of_output in records.items()]
     return fit_two_mass(responses[0], responses[1] if len(responses) > 1 else None, band)
 
 
 def _friction(
-    said: list[str],
+    warnings: list[str],
     records: Sequence[ResponseRecord],
     driven: FrequencyResponse,
     departs: Departure | None,
@@ -203,31 +203,35 @@ def _friction(
     limits = (float(driven.frequency[0]) / 2, min(2 * departs.frequency.high, rigid))
     smooth = butter(4, min(2 * float(driven.frequency[-1]), 0.45 / step), fs=1 / step, output="sos")
     speeds = [sosfiltfilt(smooth, np.gradient(record.output, step)) for record in records]
-    drag = _attempt(said, "friction level", friction_from_departure, driven, speeds, limits, model.signs[0])
+    drag = _attempt(warnings, "friction level", friction_from_departure, driven, speeds, limits, model.signs[0])
     if drag is None or not drag.coulomb.shown or not np.isfinite(drag.coulomb.value):
         return drag, None
-    once = _attempt(said, "explanation", lambda: [_last_period(record, period) for record in records])
+    once = _attempt(warnings, "explanation", lambda: [_last_period(record, period) for record in records])
     if once is None:
         return drag, None
-    return drag, _attempt(said, "explanation", explained, drag, driven, once, step, limits)
+    return drag, _attempt(warnings, "explanation", explained, drag, driven, once, step, limits)
 
 
 def _last_period(record: ResponseRecord, period: float | None) -> np.ndarray:
     """The input over the last whole period. Raises InputError where nothing repeats."""
     driving = record.input if record.reference is None else record.reference
-    found = find_periods(driving, None if period is None else period / record.sample_time)
-    return record.input[found.stop - found.samples : found.stop]
+    periods = find_periods(driving, None if period is None else period / record.sample_time)
+    return record.input[periods.stop - periods.samples : periods.stop]
 
 
 def _left_out(
-    said: list[str], records: dict[str, list[ResponseRecord]], logs: Sequence[Log], band: Range, period: float | None
+    warnings: list[str],
+    records: dict[str, list[ResponseRecord]],
+    logs: Sequence[Log],
+    band: Range,
+    period: float | None,
 ) -> tuple[tuple[str, tuple[float, ...]], ...]:
     """For each log, how the model of one other log predicts it."""
     if len(logs) < 2:
         return ()
     rows = []
     for i, log in enumerate(logs):
-        model = _attempt(said, "two masses", _single, records, logs, (i + 1) % len(logs), band, period)
+        model = _attempt(warnings, "two masses", _single, records, logs, (i + 1) % len(logs), band, period)
         if model is not None:
             rows.append((log.name, _errors(model, log, band, period, len(records) > 1)))
     return tuple(rows)

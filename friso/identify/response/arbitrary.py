@@ -37,13 +37,13 @@ def welch(record: ResponseRecord, resolution: float, channels: Channels | None =
     length = round(1 / (resolution * record.sample_time))
     count = (2 * len(record.input)) // max(length, 1) - 1
     if length < 8 or count < 4:
-        given = f"{resolution:g} Hz: {count} segments of {length} samples"
-        raise InputError("resolution", given, "at least 4 segments of at least 8 samples", "0.5 Hz")
+        text = f"{resolution:g} Hz: {count} segments of {length} samples"
+        raise InputError("resolution", text, "at least 4 segments of at least 8 samples", "0.5 Hz")
     external = record.input if record.reference is None else record.reference
 
-    def spectrum(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-        found = signal.csd(one, other, 1 / record.sample_time, nperseg=length, detrend="linear")
-        return np.asarray(found[1], complex)[1:-1]
+    def spectrum(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+        spectral = signal.csd(first, second, 1 / record.sample_time, nperseg=length, detrend="linear")
+        return np.asarray(spectral[1], complex)[1:-1]
 
     frequency = np.fft.rfftfreq(length, record.sample_time)[1:-1]
     driven, answer = spectrum(external, record.input), spectrum(external, record.output)
@@ -71,8 +71,8 @@ def local_polynomial(record: ResponseRecord, channels: Channels | None = None) -
     record = record.checked(200)
     external = record.input if record.reference is None else record.reference
     size = len(external)
-    driving, given, answer = (
-        np.fft.rfft(each - each.mean()) / size for each in (external, record.input, record.output)
+    driving, excitation, answer = (
+        np.fft.rfft(channel - channel.mean()) / size for channel in (external, record.input, record.output)
     )
     centres = np.arange(1 + HALF, len(driving) - HALF - 1, HALF + 1)
     window = centres[:, None] + np.arange(-HALF, HALF + 1)
@@ -85,10 +85,10 @@ def local_polynomial(record: ResponseRecord, channels: Channels | None = None) -
     columns = np.concatenate([regressors, transient], axis=2)
     q, r = np.linalg.qr(columns)
     row = np.linalg.inv(r)[:, 0, :]
-    fitted = [np.einsum("kij,ki->kj", q.conj(), each[window]) for each in (given, answer)]
-    gain, output = (np.einsum("kj,kj->k", row, each) for each in fitted)
+    fitted = [np.einsum("kij,ki->kj", q.conj(), quantity[window]) for quantity in (excitation, answer)]
+    gain, output = (np.einsum("kj,kj->k", row, quantity) for quantity in fitted)
     response = output / gain
-    left = answer[window] - response[:, None] * given[window]
+    left = answer[window] - response[:, None] * excitation[window]
     left = left - np.einsum("kij,kj->ki", q, np.einsum("kij,ki->kj", q.conj(), left))
     free = window.shape[1] - columns.shape[2]
     variance = np.sum(np.abs(left) ** 2, axis=1) / free

@@ -41,14 +41,14 @@ def feedback(record: ResponseRecord, direct: bool = False) -> tuple[str, ...]:
     `direct` tells that this output can (an acceleration).
     """
     record = record.checked(LEAST)
-    given, answer = _surprising(record)
-    if given is None or answer is None:
+    driven, answer = _surprising(record)
+    if driven is None or answer is None:
         return ()
-    chance, share = _foretold(given, answer, direct)
+    chance, share = _foretold(driven, answer, direct)
     if chance > SURE or share < SHARE:
         return ()
-    told = f"the output foretells {100 * share:.0f} % of the news in the input (chance {chance:.1g})"
-    return (f"{told}: closed loop, a direct estimate is biased; give the force injected, or a reference that moves",)
+    finding = f"the output foretells {100 * share:.0f} % of the news in the input (chance {chance:.1g})"
+    return (f"{finding}: closed loop, a direct estimate is biased; give the force injected, or a reference that moves",)
 
 
 def _surprising(record: ResponseRecord) -> tuple[np.ndarray | None, np.ndarray | None]:
@@ -59,21 +59,21 @@ def _surprising(record: ResponseRecord) -> tuple[np.ndarray | None, np.ndarray |
         return record.input, record.output
     parts = []
     for values in (record.input, record.output):
-        whole = values[periods.start : periods.stop]
-        whole = whole - drift(whole, periods.samples)
-        parts.append((whole.reshape(periods.count, -1) - whole.reshape(periods.count, -1).mean(axis=0)).ravel())
+        samples = values[periods.start : periods.stop]
+        samples = samples - drift(samples, periods.samples)
+        parts.append((samples.reshape(periods.count, -1) - samples.reshape(periods.count, -1).mean(axis=0)).ravel())
     if np.std(parts[0]) <= EXACT * np.std(record.input):
         return None, None
     return parts[0], parts[1]
 
 
-def _foretold(given: np.ndarray, answer: np.ndarray, direct: bool) -> tuple[float, float]:
+def _foretold(driven: np.ndarray, answer: np.ndarray, direct: bool) -> tuple[float, float]:
     """Chance of the F-test that the output's past does not help, and the share of the surprise that it explains."""
-    target = given[OWN:]
-    own = [given[OWN - lag : -lag] for lag in range(1, OWN + 1)]
+    target = driven[OWN:]
+    past = [driven[OWN - lag : -lag] for lag in range(1, OWN + 1)]
     first = int(direct)
     other = [answer[OWN - lag : len(answer) - lag] for lag in range(first, OTHER + first)]
-    before, after = (_left(target, columns) for columns in (own, own + other))
+    before, after = (_left(target, columns) for columns in (past, past + other))
     free = len(target) - OWN - OTHER - 1
     if not after > 0:
         return 1.0, 0.0
@@ -129,10 +129,10 @@ def crossovers(loop: FrequencyResponse) -> tuple[Estimate, ...]:
             groups.append([])
         groups[-1].append((centre - half, centre, centre + half))
     passages = [passage for group in groups for passage in ([_joined(group)] if len(group) % 2 else group)]
-    method, found = "where the open loop passes 0 dB", []
+    method, crossed = "where the open loop passes 0 dB", []
     for number, (low, centre, high) in enumerate(np.exp(passages).reshape(-1, 3).tolist(), 1):
-        found.append(Estimate(f"crossover {number}", "Hz", centre, low, high, method))
-    return tuple(found)
+        crossed.append(Estimate(f"crossover {number}", "Hz", centre, low, high, method))
+    return tuple(crossed)
 
 
 def _joined(group: list[tuple[float, float, float]]) -> tuple[float, float, float]:
@@ -140,6 +140,6 @@ def _joined(group: list[tuple[float, float, float]]) -> tuple[float, float, floa
     return min(low for low, _, _ in group), group[len(group) // 2][1], max(high for _, _, high in group)
 
 
-def _same_lines(one: FrequencyResponse, other: FrequencyResponse) -> None:
-    if not np.array_equal(one.frequency, other.frequency):
+def _same_lines(first: FrequencyResponse, second: FrequencyResponse) -> None:
+    if not np.array_equal(first.frequency, second.frequency):
         raise InputError("response", "responses on different lines", "the same lines", "both from the same record")

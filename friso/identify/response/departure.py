@@ -63,13 +63,13 @@ def departure(response: FrequencyResponse, model: Callable[[np.ndarray], np.ndar
     name, method = "departure frequency", f"mean over {WINDOW} lines, against the linear model"
     if not off.size:
         reason = "the response follows the model down to its lowest line"
-        found = Estimate.unknown(name, "Hz", method, reason, 0.0, float(frequency[0]))
-        return Departure(found, frequency, np.abs(ratio), *_differ(response, slice(None)))
+        onset = Estimate.unknown(name, "Hz", method, reason, 0.0, float(frequency[0]))
+        return Departure(onset, frequency, np.abs(ratio), *_differ(response, slice(None)))
     last = int(off[-1]) + WINDOW - 1
     low, high = frequency[last - WINDOW + 1], frequency[last]
     middle = float(frequency[last - WINDOW // 2])
-    found = Estimate(name, "Hz", middle, float(low), float(high), method)
-    return Departure(found, frequency, np.abs(ratio), *_differ(response, slice(0, last + 1)))
+    onset = Estimate(name, "Hz", middle, float(low), float(high), method)
+    return Departure(onset, frequency, np.abs(ratio), *_differ(response, slice(0, last + 1)))
 
 
 def _differ(response: FrequencyResponse, part: slice) -> tuple[bool | None, float]:
@@ -128,7 +128,7 @@ def friction_from_departure(
     mass = fit.estimate("mass", f"{into} s^2/{out}", method, lambda p: float(np.exp(p[0])), positive=True)
     damping = fit.estimate("equivalent damping", f"{into} s/{out}", method, lambda p: float(p[1]))
     stiffness = fit.estimate("equivalent stiffness", f"{into}/{out}", method, lambda p: float(p[2]))
-    velocity = float(np.sqrt(np.mean([np.var(each) for each in velocities])))
+    velocity = float(np.sqrt(np.mean([np.var(run) for run in velocities])))
     bare = 1 / (np.exp(fit.parameters[0]) * s**2)
     left = np.linalg.norm((values - model(fit.parameters)[0]) / deviation) / np.linalg.norm((values - bare) / deviation)
     warnings = []

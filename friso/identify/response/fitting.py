@@ -82,14 +82,14 @@ def refined(
         return np.stack([error.real, error.imag], axis=-1).ravel()
 
     limits = (lower, upper)
-    found = least_squares(residuals, start, bounds=limits, x_scale="jac", ftol=CLOSE, xtol=CLOSE, max_nfev=200)
-    count, lines = found.fun.size, response.shape[1]
-    free = max(count - len(found.x), 1)
-    inverse = np.linalg.pinv(found.jac.T @ found.jac, rcond=1e-14, hermitian=True)
-    plain = inverse * (2 * found.cost / free)
-    by_line = (found.jac * found.fun[:, None]).reshape(response.shape[0], lines, 2, -1).sum(axis=(0, 2))
+    solution = least_squares(residuals, start, bounds=limits, x_scale="jac", ftol=CLOSE, xtol=CLOSE, max_nfev=200)
+    count, lines = solution.fun.size, response.shape[1]
+    free = max(count - len(solution.x), 1)
+    inverse = np.linalg.pinv(solution.jac.T @ solution.jac, rcond=1e-14, hermitian=True)
+    plain = inverse * (2 * solution.cost / free)
+    by_line = (solution.jac * solution.fun[:, None]).reshape(response.shape[0], lines, 2, -1).sum(axis=(0, 2))
     robust = inverse @ _long_run(by_line) @ inverse * (count / free)
-    return ResponseFit(found.x, _larger(plain, robust), float(2 * found.cost), count)
+    return ResponseFit(solution.x, _larger(plain, robust), float(2 * solution.cost), count)
 
 
 def _long_run(scores: np.ndarray) -> np.ndarray:

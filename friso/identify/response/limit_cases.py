@@ -53,8 +53,12 @@ def _named(modes: Modes | None) -> Mapping[str, float]:
     """Frequencies [Hz] of resonances and antiresonances by name, by frequency."""
     if modes is None:
         return {}
-    found = {each.name.removesuffix(" frequency"): each.value for each in modes.estimates if each.unit == "Hz"}
-    return dict(sorted(found.items(), key=lambda item: item[1]))
+    frequencies = {
+        estimate.name.removesuffix(" frequency"): estimate.value
+        for estimate in modes.estimates
+        if estimate.unit == "Hz"
+    }
+    return dict(sorted(frequencies.items(), key=lambda item: item[1]))
 
 
 def _case(lines: tuple[StraightLine, ...], pairs: Mapping[str, float]) -> str:

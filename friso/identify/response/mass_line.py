@@ -74,23 +74,23 @@ def straight_lines(
     `sign` is 1 or -1 where it is known which way the input acts (default: what most of the band says).
     """
     ordered = response.at((response.frequency > 0) & (np.abs(response.response) > 0))
-    found: list[tuple[int, int, float]] = []
+    bands: list[tuple[int, int, float]] = []
     pieces = [(0, len(ordered.frequency))]
-    while pieces and len(found) < most:
+    while pieces and len(bands) < most:
         piece = pieces.pop(0)
         band = _widest(ordered, slope, sign, *piece)
         if band is None:
             continue
-        if _clear(ordered, slope, band) and all(_parted(ordered, slope, band, other) for other in found):
-            found.append(band)
+        if _clear(ordered, slope, band) and all(_parted(ordered, slope, band, other) for other in bands):
+            bands.append(band)
         pieces += [(piece[0], band[0]), (band[1] + 1, piece[1])]
-    lines = [_line(ordered, slope, its_sign, slice(first, last + 1)) for first, last, its_sign in found]
+    lines = [_line(ordered, slope, its_sign, slice(first, last + 1)) for first, last, its_sign in bands]
     return tuple(sorted(lines, key=lambda line: line.low))
 
 
 def _clear(response: FrequencyResponse, slope: int, band: tuple[int, int, float]) -> bool:
     """Whether the slope of a band is known well enough to tell it from the slopes one less and one more."""
-    frequency, level, _, relative = (each[band[0] : band[1] + 1] for each in _flat(response, slope, band[2]))
+    frequency, level, _, relative = (quantity[band[0] : band[1] + 1] for quantity in _flat(response, slope, band[2]))
     weight = 1 / (relative**2 / 2 + WIGGLE**2)
     octave = np.log(frequency) - np.average(np.log(frequency), weights=weight)
     spread = np.sum(weight * octave**2)
@@ -98,10 +98,10 @@ def _clear(response: FrequencyResponse, slope: int, band: tuple[int, int, float]
 
 
 def _parted(
-    response: FrequencyResponse, slope: int, one: tuple[int, int, float], other: tuple[int, int, float]
+    response: FrequencyResponse, slope: int, first: tuple[int, int, float], second: tuple[int, int, float]
 ) -> bool:
     """Whether there is a mode between two bands."""
-    lower, upper = sorted([one, other])
+    lower, upper = sorted([first, second])
     level = _flat(response, slope, 1.0)[1]
     between = level[lower[1] + 1 : upper[0]]
     means = [np.mean(level[band[0] : band[1] + 1]) for band in (lower, upper)]
@@ -114,15 +114,17 @@ def _widest(
 ) -> tuple[int, int, float] | None:
     """First and last line of the widest straight band among those from start to stop, with its sign, or None."""
     signs = (1.0, -1.0) if sign is None else (sign,)
-    bands = [(*band, one) for one in signs if (band := _straight(response, slope, one, start, stop))]
-    return max(bands, key=lambda one: response.frequency[one[1]] / response.frequency[one[0]]) if bands else None
+    bands = [(*band, its_sign) for its_sign in signs if (band := _straight(response, slope, its_sign, start, stop))]
+    return (
+        max(bands, key=lambda limits: response.frequency[limits[1]] / response.frequency[limits[0]]) if bands else None
+    )
 
 
 def _straight(response: FrequencyResponse, slope: int, sign: float, start: int, stop: int) -> tuple[int, int] | None:
     """The widest band from start to stop with acceptable chi-square and phase, by sums over all pairs of ends."""
     if stop - start < LINES:
         return None
-    frequency, level, phase, relative = (each[start:stop] for each in _flat(response, slope, sign))
+    frequency, level, phase, relative = (quantity[start:stop] for quantity in _flat(response, slope, sign))
     weight = 2 / (relative**2 + 2 * WIGGLE**2)
     sums = np.stack([weight, weight * level, weight * level**2, np.abs(phase) > TURNED + 2 * relative])
     sums = np.concatenate([np.zeros((4, 1)), np.cumsum(sums, axis=1)], axis=1)
@@ -174,21 +176,23 @@ def _level(response: FrequencyResponse, slope: int, sign: float, band: slice) ->
     friction makes neighbouring lines scatter, it also makes the mass read high, by up to as much: by 0.1 to 1.0 times
     the scatter on 23 machines drawn at random (`benchmarks/identify.py`).
     """
-    _, level, phase, relative = (each[band] for each in _flat(response, slope, sign))
+    _, level, phase, relative = (quantity[band] for quantity in _flat(response, slope, sign))
     weight = 1 / (relative**2 / 2 + WIGGLE**2)
-    columns, found = _bent(_bends(response, slope, band), level, weight)
+    columns, coefficients = _bent(_bends(response, slope, band), level, weight)
     inverse = np.linalg.inv(columns.T @ (weight[:, None] * columns))
-    residual = level - columns @ found
+    residual = level - columns @ coefficients
     independent = _independent(residual)
-    free = max(independent - len(found), 1.0)
+    free = max(independent - len(coefficients), 1.0)
     scale = np.average(residual**2, weights=weight) * np.sum(weight) / free
     scatter = float(np.sqrt(scale * inverse[0, 0]))
     gains = inverse[0] @ (columns * weight[:, None]).T
     noise = float(np.sqrt(np.sum(gains**2 * relative**2 / 2)))
-    known = stats.t.ppf(0.975, free) * scatter if scatter > noise else COVERAGE * noise
+    half_width = stats.t.ppf(0.975, free) * scatter if scatter > noise else COVERAGE * noise
     turned = float(np.average(-np.log(np.cos(phase)), weights=weight))
-    half = float(np.hypot(known, np.sum(found[1:] ** 2) / 2)) + max(turned, 0.0) + float(np.median(relative))
-    return float(found[0]), half, independent
+    half = (
+        float(np.hypot(half_width, np.sum(coefficients[1:] ** 2) / 2)) + max(turned, 0.0) + float(np.median(relative))
+    )
+    return float(coefficients[0]), half, independent
 
 
 def _independent(residual: np.ndarray) -> float:
@@ -221,13 +225,13 @@ def _bends(response: FrequencyResponse, slope: int, band: slice) -> list[np.ndar
 def _bent(shapes: list[np.ndarray], level: np.ndarray, weight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Columns (lines, 1 or 2) and coefficients of the line: straight, or bent where an F-test at 1 % asks for that."""
     ones = np.ones((len(level), 1))
-    columns, found = ones, np.array([np.average(level, weights=weight)])
-    straight = squares = float(np.sum(weight * (level - found[0]) ** 2))
+    columns, coefficients = ones, np.array([np.average(level, weights=weight)])
+    straight = squares = float(np.sum(weight * (level - coefficients[0]) ** 2))
     for shape in shapes:
         tried = np.hstack([ones, shape[:, None]])
         fitted = np.linalg.solve(tried.T @ (weight[:, None] * tried), tried.T @ (weight * level))
         left = float(np.sum(weight * (level - tried @ fitted) ** 2))
         free = max(_independent(level - tried @ fitted) - 2, 1.0)
         if left < squares and straight - left > stats.f.ppf(0.99, 1, free) * left / free:
-            columns, found, squares = tried, fitted, left
-    return columns, found
+            columns, coefficients, squares = tried, fitted, left
+    return columns, coefficients

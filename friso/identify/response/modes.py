@@ -41,7 +41,7 @@ class Modes:
     warnings: tuple[str, ...]
 
     def __getitem__(self, name: str) -> Estimate:
-        return next(each for each in self.estimates if each.name == name)
+        return next(estimate for estimate in self.estimates if estimate.name == name)
 
     def predict(self, frequency: np.ndarray) -> np.ndarray:
         """The fitted response at frequencies [Hz], complex, same shape."""
@@ -70,9 +70,17 @@ def fit_modes(
     limits = (float(part.frequency[0]), float(part.frequency[-1]))
     low_level, high_level = (_level(fit, shape, scale, which, response) for which in ("low", "high"))
     warnings = (f"the fit misses by more than the deviations (reduced chi-square {fit.reduced:.3g})",)
-    found = _pairs(fit, shape, scale, limits)
+    estimates = _pairs(fit, shape, scale, limits)
     return Modes(
-        shape, fit, scale, found, low_level, high_level, _told(shape, rows), limits, warnings if fit.reduced > 3 else ()
+        shape,
+        fit,
+        scale,
+        estimates,
+        low_level,
+        high_level,
+        _described(shape, rows),
+        limits,
+        warnings if fit.reduced > 3 else (),
     )
 
 
@@ -84,7 +92,7 @@ def _told(shape: RationalShape, rows: list[Row]) -> str:
 
 def _pairs(fit: ResponseFit, shape: RationalShape, scale: float, band: tuple[float, float]) -> tuple[Estimate, ...]:
     """Frequencies and damping ratios of resonances and antiresonances within the band, by frequency."""
-    found: list[Estimate] = []
+    estimates: list[Estimate] = []
     for kind, which in (("resonance", 0), ("antiresonance", 1)):
         inside = [
             root
@@ -94,19 +102,19 @@ def _pairs(fit: ResponseFit, shape: RationalShape, scale: float, band: tuple[flo
         for number, root in enumerate(inside, 1):
             tracked = _tracked(shape, which, root)
             name = f"{kind} {number}"
-            found += [
+            estimates += [
                 fit.estimate(f"{name} frequency", "Hz", METHOD, lambda p, t=tracked: abs(t(p)) * scale, positive=True),
                 fit.estimate(f"{name} damping ratio", "1", METHOD, lambda p, t=tracked: -t(p).real / abs(t(p))),
             ]
-    return tuple(found)
+    return tuple(estimates)
 
 
 def _tracked(shape: RationalShape, which: int, root: complex) -> Callable[[np.ndarray], complex]:
     """The root that is nearest to a given one, as a function of the parameters."""
 
     def nearest(parameters: np.ndarray) -> complex:
-        found = roots(parameters, shape)[which]
-        return complex(found[np.argmin(np.abs(found - root))]) if found.size else complex(np.nan, np.nan)
+        candidates = roots(parameters, shape)[which]
+        return complex(candidates[np.argmin(np.abs(candidates - root))]) if candidates.size else complex(np.nan, np.nan)
 
     return nearest
 

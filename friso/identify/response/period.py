@@ -114,5 +114,7 @@ def _repeating(signal: np.ndarray, samples: int) -> tuple[int, int]:
     return start, stop
 
 
-def _not_periodic(given: str) -> InputError:
-    return InputError("period", given, "an input that repeats at least twice", "a multisine of 5 s, repeated 20 times")
+def _not_periodic(problem: str) -> InputError:
+    return InputError(
+        "period", problem, "an input that repeats at least twice", "a multisine of 5 s, repeated 20 times"
+    )

@@ -33,23 +33,23 @@ def multisine(
     records that are not periodic or do not belong together.
     """
     every = _together([spectra(record, period) for record in records])
-    excited = np.logical_and.reduce([one.excited for one in every])
+    excited = np.logical_and.reduce([realisation.excited for realisation in every])
     if not excited.any():
         raise InputError(
             "records", "realisations without a common line", "the same excited lines", "one period for all"
         )
     response, noise = _averaged(every, excited)
-    degrees = np.full(response.shape, 2.0 * sum(len(one.input) - 1 for one in every))
+    degrees = np.full(response.shape, 2.0 * sum(len(realisation.input) - 1 for realisation in every))
     if len(every) > 1:
         total, total_degrees = _total(every, excited, response)
-        distortion, known = np.sqrt(np.maximum(total**2 - noise**2, 0.0)), True
+        distortion, distortion_known = np.sqrt(np.maximum(total**2 - noise**2, 0.0)), True
         degrees = np.where(distortion > 0, total_degrees, degrees)
     else:
         distortion = _at_free_lines(every[0], excited, response)
-        known = bool(np.isfinite(distortion).any())
+        distortion_known = bool(np.isfinite(distortion).any())
     deviation = np.hypot(noise, np.nan_to_num(distortion))
-    warnings = dict.fromkeys(text for one in every for text in one.warnings)
-    if not known:
+    warnings = dict.fromkeys(text for realisation in every for text in realisation.warnings)
+    if not distortion_known:
         warnings["one realisation with all lines excited: the deviation covers noise, not nonlinear distortion"] = None
     frequency = every[0].frequency[excited]
     known_channels = channels or Channels()
@@ -62,10 +62,10 @@ def _together(every: list[Spectra]) -> list[Spectra]:
     """The realisations, if they have the same lines. Raises InputError."""
     if not every:
         raise InputError("records", "none", "at least one record", "two realisations of a multisine")
-    spacings = [one.frequency[0] for one in every]
-    if np.ptp(spacings) > 1e-6 * spacings[0] or len({len(one.frequency) for one in every}) > 1:
-        given = "periods of " + ", ".join(f"{1 / spacing:.6g} s" for spacing in spacings)
-        raise InputError("records", given, "realisations with the same period and sample time", "5 s each")
+    spacings = [realisation.frequency[0] for realisation in every]
+    if np.ptp(spacings) > 1e-6 * spacings[0] or len({len(realisation.frequency) for realisation in every}) > 1:
+        text = "periods of " + ", ".join(f"{1 / spacing:.6g} s" for spacing in spacings)
+        raise InputError("records", text, "realisations with the same period and sample time", "5 s each")
     return every
 
 
@@ -75,16 +75,18 @@ def _averaged(every: list[Spectra], excited: np.ndarray) -> tuple[np.ndarray, np
     gain = inputs.mean(axis=0)
     response = outputs.mean(axis=0) / gain
     variance = np.zeros(len(response))
-    for one in every:
-        residuals = (one.output[:, excited] - response * one.input[:, excited]) / one.reference[excited]
+    for realisation in every:
+        residuals = (realisation.output[:, excited] - response * realisation.input[:, excited]) / realisation.reference[
+            excited
+        ]
         variance += np.var(residuals, axis=0, ddof=1) / len(residuals)
     return response, np.sqrt(variance) / (len(every) * np.abs(gain))
 
 
 def _relative(every: list[Spectra], excited: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Output and input over the external signal, averaged over periods, each (realisations, lines)."""
-    outputs = [one.output[:, excited].mean(axis=0) / one.reference[excited] for one in every]
-    inputs = [one.input[:, excited].mean(axis=0) / one.reference[excited] for one in every]
+    outputs = [realisation.output[:, excited].mean(axis=0) / realisation.reference[excited] for realisation in every]
+    inputs = [realisation.input[:, excited].mean(axis=0) / realisation.reference[excited] for realisation in every]
     return np.array(outputs), np.array(inputs)
 
 
@@ -94,15 +96,15 @@ def _total(every: list[Spectra], excited: np.ndarray, response: np.ndarray) -> t
     count = len(every)
     squares = np.sum(np.abs(outputs - response * inputs) ** 2, axis=0)
     relative = squares / (count * (count - 1)) / np.abs(outputs.mean(axis=0)) ** 2
-    own = 2 * (count - 1)
-    width = 1 if own >= FEW else min(LINES, len(relative))
+    freedom = 2 * (count - 1)
+    width = 1 if freedom >= FEW else min(LINES, len(relative))
     window = np.ones(width)
     shared = np.convolve(np.ones(len(relative)), window, "same")
     relative = np.convolve(relative, window, "same") / shared
-    return np.sqrt(relative) * np.abs(response), own * shared
+    return np.sqrt(relative) * np.abs(response), freedom * shared
 
 
-def _at_free_lines(one: Spectra, excited: np.ndarray, response: np.ndarray) -> np.ndarray:
+def _at_free_lines(realisation: Spectra, excited: np.ndarray, response: np.ndarray) -> np.ndarray:
     """Distortion (lines,) from what the output holds, beyond noise, at lines in the band that are not excited.
 
     What the input itself holds there is taken off with the interpolated response. NaN where there are no such lines.
@@ -112,8 +114,8 @@ def _at_free_lines(one: Spectra, excited: np.ndarray, response: np.ndarray) -> n
     if len(free) < 2:
         return np.full(len(places), np.nan)
     parts = [np.interp(free, places, part) for part in (np.real(response), np.imag(response))]
-    left = one.output[:, free] - (parts[0] + 1j * parts[1]) * one.input[:, free]
+    left = realisation.output[:, free] - (parts[0] + 1j * parts[1]) * realisation.input[:, free]
     power = np.abs(left.mean(axis=0)) ** 2 - np.var(left, axis=0, ddof=1) / len(left)
     near = np.argsort(np.abs(free[:, None] - places), axis=0, kind="stable")[:LINES]
     local = np.maximum(power[near].mean(axis=0), 0.0)
-    return np.sqrt(local) / np.abs(one.input.mean(axis=0)[places])
+    return np.sqrt(local) / np.abs(realisation.input.mean(axis=0)[places])

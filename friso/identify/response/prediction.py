@@ -21,9 +21,9 @@ def relative_error(
     `model` gives complex responses at frequencies [Hz]; U and Y are averaged over periods. `period` [s] is about how
     long one is (default: found). Raises InputError where the record is not periodic or no line lies in the band.
     """
-    found = spectra(record, period)
-    inside = found.excited & (found.frequency >= band[0]) & (found.frequency <= band[1])
+    measured = spectra(record, period)
+    inside = measured.excited & (measured.frequency >= band[0]) & (measured.frequency <= band[1])
     if not inside.any():
         raise InputError("band", f"{band[0]:g} to {band[1]:g} Hz", "a band that holds excited lines", "3 to 20 Hz")
-    given, reaction = found.input.mean(axis=0)[inside], found.output.mean(axis=0)[inside]
-    return float(np.linalg.norm(model(found.frequency[inside]) * given - reaction) / np.linalg.norm(reaction))
+    force, reaction = measured.input.mean(axis=0)[inside], measured.output.mean(axis=0)[inside]
+    return float(np.linalg.norm(model(measured.frequency[inside]) * force - reaction) / np.linalg.norm(reaction))

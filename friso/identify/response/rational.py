@@ -129,14 +129,14 @@ def _another(
 ) -> np.ndarray:
     """Nonlinear parameters with one more mode, at the place and damping that leave the least."""
     before = shape.modes - 1
-    best, found = np.inf, nonlinear
+    best, best_parameters = np.inf, nonlinear
     for place in np.geomspace(np.abs(s[0]), np.abs(s[-1]), PLACES):
         for damping in DAMPINGS:
             tried = np.insert(np.append(nonlinear, np.log(damping)), 2 + before, np.log(place))
             left = _solved(_columns(tried, shape, s), values, deviation)[1]
             if left @ left < best:
-                best, found = left @ left, tried
-    return found
+                best, best_parameters = left @ left, tried
+    return best_parameters
 
 
 def _eliminated(
@@ -147,7 +147,7 @@ def _eliminated(
     def left(nonlinear: np.ndarray) -> np.ndarray:
         return _solved(_columns(nonlinear, shape, s), values, deviation)[1]
 
-    lower, upper = (each[: shape.nonlinear] for each in bounds(shape, s))
+    lower, upper = (limit[: shape.nonlinear] for limit in bounds(shape, s))
     return least_squares(left, np.clip(start, lower, upper), bounds=(lower, upper), ftol=CLOSE, max_nfev=60).x
 
 

@@ -51,10 +51,10 @@ class ResponseRecord:
 
 
 def from_log(
-    log: Log, given: str = "force", output: str = "position", reference: str | None = None
+    log: Log, driving: str = "force", output: str = "position", reference: str | None = None
 ) -> tuple[ResponseRecord, Channels]:
     """The longest segment of a log as a record, by roles, with names and units. Raises InputError for a missing one."""
-    roles = [given, output] + ([reference] if reference else [])
+    roles = [driving, output] + ([reference] if reference else [])
     for role in roles:
         if role not in log:
             raise InputError(
@@ -62,9 +62,9 @@ def from_log(
             )
     part = log.longest
     record = ResponseRecord(
-        log[given][part], log[output][part], log.sample_time, log[reference][part] if reference else None
+        log[driving][part], log[output][part], log.sample_time, log[reference][part] if reference else None
     )
-    return record, Channels(given, log.unit(given), output, log.unit(output))
+    return record, Channels(driving, log.unit(driving), output, log.unit(output))
 
 
 def _check_signal(name: str, values: np.ndarray, least: int) -> None:
@@ -105,18 +105,20 @@ def spectra(record: ResponseRecord, period: float | None = None) -> Spectra:
     external = record.input if record.reference is None else record.reference
     expected = None if period is None else period / record.sample_time
     periods = find_periods(external, expected)
-    given, reaction, driving = (_harmonics(signal, periods) for signal in (record.input, record.output, external))
+    driven, reaction, driving = (_harmonics(signal, periods) for signal in (record.input, record.output, external))
     alike = _alike(driving)
     excited = _excited(driving[alike])
     if not excited.any():
         raise InputError("excitation", "no line above the noise", "a periodic input with lines", "a multisine")
     first = _settled(reaction[alike][:, excited])
-    kept = np.flatnonzero(alike)[first:]
+    stationary = np.flatnonzero(alike)[first:]
     warnings = (*periods.warnings, *_left_out(alike, first))
-    if len(kept) < 2:
-        raise InputError("period", f"{len(kept)} period without transient", "at least two", "a longer record")
-    frequency = np.arange(1, given.shape[1] + 1) / (periods.samples * record.sample_time)
-    return Spectra(frequency, driving[kept].mean(axis=0), given[kept], reaction[kept], excited, warnings)
+    if len(stationary) < 2:
+        raise InputError("period", f"{len(stationary)} period without transient", "at least two", "a longer record")
+    frequency = np.arange(1, driven.shape[1] + 1) / (periods.samples * record.sample_time)
+    return Spectra(
+        frequency, driving[stationary].mean(axis=0), driven[stationary], reaction[stationary], excited, warnings
+    )
 
 
 def _left_out(alike: np.ndarray, first: int) -> Iterator[str]:
@@ -128,8 +130,8 @@ def _left_out(alike: np.ndarray, first: int) -> Iterator[str]:
 
 def _harmonics(signal: np.ndarray, periods: Periods) -> np.ndarray:
     """Amplitudes of the harmonics in every period, shape (periods, lines), the signal's drift taken out."""
-    whole = signal[periods.start : periods.stop]
-    cut = (whole - drift(whole, periods.samples)).reshape(periods.count, periods.samples)
+    samples = signal[periods.start : periods.stop]
+    cut = (samples - drift(samples, periods.samples)).reshape(periods.count, periods.samples)
     return np.fft.rfft(cut, axis=1)[:, 1 : (periods.samples - 1) // 2 + 1] * (2 / periods.samples)
 
 
@@ -184,7 +186,7 @@ def _settled(reaction: np.ndarray) -> int:
     return int(np.flatnonzero(off <= FAR * off[later].max())[0])
 
 
-def _distance(one: np.ndarray, others: np.ndarray) -> float:
+def _distance(single: np.ndarray, others: np.ndarray) -> float:
     """How far a period lies from the mean of others, in units of their variance, on the middle one of its lines."""
     variance = np.maximum(np.var(others, axis=0, ddof=1), np.finfo(float).tiny)
-    return float(np.median(np.abs(one - others.mean(axis=0)) ** 2 / variance))
+    return float(np.median(np.abs(single - others.mean(axis=0)) ** 2 / variance))

@@ -102,9 +102,9 @@ class FrequencyResponse:
         """The lines from `low` to `high` [Hz], both included. Raises InputError where there are none."""
         inside = (self.frequency >= low) & (self.frequency <= high)
         if not inside.any():
-            given = f"{low:g} to {high:g} Hz"
+            text = f"{low:g} to {high:g} Hz"
             held = f"{self.frequency.min():g} to {self.frequency.max():g} Hz" if self.frequency.size else "no lines"
-            raise InputError("band", given, f"a band that holds lines of the response, which has {held}", "3 to 20 Hz")
+            raise InputError("band", text, f"a band that holds lines of the response, which has {held}", "3 to 20 Hz")
         return self.at(inside)
 
     def usable(self, ratio: float = 3.0, coherence: float = 0.5) -> FrequencyResponse:
@@ -117,18 +117,18 @@ class FrequencyResponse:
             enough &= self.coherence >= coherence
         if not enough.any():
             best = np.max(np.abs(self.response) / np.maximum(self.deviation, np.finfo(float).tiny), initial=0.0)
-            given = f"no line stands out of the noise (at best {best:.2g} standard deviations)"
+            text = f"no line stands out of the noise (at best {best:.2g} standard deviations)"
             if self.coherence is not None and self.coherence.size:
-                given += f", coherence at most {np.max(self.coherence):.2g}"
+                text += f", coherence at most {np.max(self.coherence):.2g}"
             expected = f"a response of {ratio:g} deviations and a coherence of {coherence:g} on some line"
-            raise InputError("excitation", given, expected, "a larger force, or a longer record")
+            raise InputError("excitation", text, expected, "a larger force, or a longer record")
         if enough.all():
             return self
         lost = self.frequency[~enough]
-        told = (
+        warning = (
             f"{lost.size} of {enough.size} lines left out, too weakly excited ({lost.min():.3g} to {lost.max():.3g} Hz)"
         )
-        return replace(self.at(enough), warnings=(*self.warnings, told))
+        return replace(self.at(enough), warnings=(*self.warnings, warning))
 
     def scatter(self) -> np.ndarray:
         """Deviations (lines,) raised to the scatter between neighbouring lines where that is larger.

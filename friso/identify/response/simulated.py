@@ -49,9 +49,9 @@ def explained(
     forces = np.concatenate([factor * drag.sign * np.stack(inputs) for factor in factors])
     spring = max(drag.stiffness.value, 0.0)
     positions = slid(np.tile(forces, PERIODS), sample_time, drag.mass.value, drag.coulomb.value, spring)[0]
-    kept = slice(4 * forces.shape[1], None)
+    settled = slice(4 * forces.shape[1], None)
     records = [
-        ResponseRecord(drag.sign * np.tile(force, PERIODS)[kept], position[kept], sample_time)
+        ResponseRecord(drag.sign * np.tile(force, PERIODS)[settled], position[settled], sample_time)
         for force, position in zip(forces, positions, strict=True)
     ]
     groups = {factor: records[i * len(inputs) : (i + 1) * len(inputs)] for i, factor in enumerate(factors)}
@@ -86,5 +86,5 @@ def _left(drag: Drag, measured: FrequencyResponse, simulated: FrequencyResponse)
     )
     line = -drag.sign / (drag.mass.value * (2 * np.pi * measured.frequency) ** 2)
     weight = 1 / measured.scatter()
-    off = [np.linalg.norm(weight * (measured.response - each)) for each in (real + 1j * imaginary, line)]
+    off = [np.linalg.norm(weight * (measured.response - model)) for model in (real + 1j * imaginary, line)]
     return float(off[0] / off[1])

@@ -48,7 +48,7 @@ class TwoMass:
     warnings: tuple[str, ...] = ()
 
     def __getitem__(self, name: str) -> Estimate:
-        return next(each for each in self.estimates if each.name == name)
+        return next(estimate for estimate in self.estimates if estimate.name == name)
 
     def predict(self, frequency: np.ndarray, collocated: bool = True) -> np.ndarray:
         """The response at frequencies [Hz] of the driven mass, or of the other one; complex, same shape."""
@@ -79,25 +79,25 @@ def fit_two_mass(
     """
     responses = [collocated] if noncollocated is None else [collocated, noncollocated]
     if band is not None:
-        responses = [one.between(*band) for one in responses]
+        responses = [response.between(*band) for response in responses]
     frequency = responses[0].frequency
     if len(frequency) < 8:
         raise InputError("band", f"{len(frequency)} lines", "at least 8 lines for a two-mass model", "3 to 20 Hz")
     if len(responses) > 1 and not np.array_equal(frequency, responses[1].frequency):
         raise InputError("response", "responses on different lines", "both outputs of the same records", "one period")
-    values = np.stack([one.response for one in responses])
-    deviation = np.stack([_deviation(one) for one in responses])
+    values = np.stack([response.response for response in responses])
+    deviation = np.stack([_deviation(response) for response in responses])
     sign = _sign(values[0])
     options = [(sign, sign), (sign, -sign)][: len(responses)]
     seen = cache(lambda: _from_modes(responses[0]))
     fits = [(_best(np.array(pair)[: len(values), None] * values, deviation, frequency, seen), pair) for pair in options]
-    fit, signs = min(fits, key=lambda each: each[0].squares)
+    fit, signs = min(fits, key=lambda candidate: candidate[0].squares)
     _follows(np.array(signs)[: len(values), None] * values, two_masses(fit.parameters, frequency)[: len(values)])
     limits = (float(frequency[0]), float(frequency[-1]))
     return TwoMass(signs, fit, _estimates(fit, collocated), limits, tuple(_warnings(signs, fit)))
 
 
-def widened(found: TwoMass, apart: Sequence[TwoMass]) -> TwoMass:
+def widened(fitted: TwoMass, apart: Sequence[TwoMass]) -> TwoMass:
     """The estimates with intervals that also explain how far fits of single realisations, `apart`, lie from each other.
 
     Where these scatter more than their intervals allow, friction moves the parameters from one realisation to the next,
@@ -106,17 +106,17 @@ def widened(found: TwoMass, apart: Sequence[TwoMass]) -> TwoMass:
     """
     if len(apart) < 2:
         raise InputError("records", f"{len(apart)} single fits", "at least two realisations", "exp1 and exp2")
-    rows = [_scaled(each, [one[each.name] for one in apart]) for each in found.estimates]
-    return replace(found, estimates=tuple(rows))
+    rows = [_scaled(estimate, [fit[estimate.name] for fit in apart]) for estimate in fitted.estimates]
+    return replace(fitted, estimates=tuple(rows))
 
 
 def _scaled(estimate: Estimate, others: Sequence[Estimate]) -> Estimate:
     """An estimate with its interval scaled by the ratio of external to internal scatter of the others, if above 1."""
-    if not estimate.shown or not all(one.shown and one.half_width > 0 for one in others):
+    if not estimate.shown or not all(another.shown and another.half_width > 0 for another in others):
         return estimate
     values, weights = (
-        np.array([one.value for one in others]),
-        np.array([(COVERAGE / one.half_width) ** 2 for one in others]),
+        np.array([another.value for another in others]),
+        np.array([(COVERAGE / another.half_width) ** 2 for another in others]),
     )
     off = values - np.average(values, weights=weights)
     ratio = max(float(np.sqrt(np.sum(weights * off**2) / (len(others) - 1))), 1.0)
@@ -141,9 +141,9 @@ def _follows(values: np.ndarray, model: np.ndarray) -> None:
     """Raises InputError where a model is nowhere near the response, shape (outputs, lines)."""
     off = float(np.sqrt(np.mean(np.abs(np.log(np.abs(values) / np.abs(model))) ** 2)))
     if off > MISSES:
-        given = f"a response that two masses and a joint miss by a factor of {np.exp(off):.2g} on average"
+        text = f"a response that two masses and a joint miss by a factor of {np.exp(off):.2g} on average"
         expected = "the response of a driven mass, and of the other one: are the two positions exchanged?"
-        raise InputError("response", given, expected, '--band "3 Hz .. 20 Hz"')
+        raise InputError("response", text, expected, '--band "3 Hz .. 20 Hz"')
 
 
 def _from_modes(response: FrequencyResponse) -> list[np.ndarray]:
@@ -152,7 +152,7 @@ def _from_modes(response: FrequencyResponse) -> list[np.ndarray]:
         modes = fit_modes(response)
     except InputError:
         return []
-    values = {each.name: each.value for each in modes.estimates}
+    values = {mode.name: mode.value for mode in modes.estimates}
     names = ("antiresonance 1 frequency", "resonance 1 frequency", "resonance 1 damping ratio")
     zero, pole, damping = (values.get(name, np.nan) for name in names)
     if not 0 < zero < pole:
@@ -183,7 +183,7 @@ def _best(
     def starts() -> Iterator[np.ndarray]:
         first, second, *_ = sorted(_starts(values[0], frequency), key=misfit)
         yield first
-        yield from (_scaled_to(each, values[0], frequency) for each in seen())
+        yield from (_scaled_to(visible, values[0], frequency) for visible in seen())
         yield second
 
     fits = []
@@ -253,8 +253,8 @@ def _root(parameters: np.ndarray, zero: bool) -> complex:
     first = np.array([driven, parameters[DRAG] + damping, stiffness])
     second = np.array([other, parameters[OTHER_DRAG] + damping, stiffness])
     joint = np.array([damping, stiffness])
-    whole = second if zero else np.polysub(np.polymul(first, second), np.polymul(joint, joint))
-    roots = np.roots(whole)
+    characteristic = second if zero else np.polysub(np.polymul(first, second), np.polymul(joint, joint))
+    roots = np.roots(characteristic)
     upper = roots[roots.imag > 0]
     return complex(upper[np.argmax(np.abs(upper))]) if upper.size else complex(np.nan, np.nan)
 
