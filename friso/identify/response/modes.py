@@ -84,7 +84,7 @@ def fit_modes(
     )
 
 
-def _told(shape: RationalShape, rows: list[Row]) -> str:
+def _described(shape: RationalShape, rows: list[Row]) -> str:
     """How the order was chosen."""
     tried = ", ".join(f"{row.shape.words}: {row.bic:.4g}" for row in rows)
     return f"{shape.words} by the Bayesian information criterion ({tried})"

@@ -10,17 +10,25 @@ from friso.identify.estimate import Estimate
 from friso.identify.stage_file import written
 
 
-def ends_document(it: Estimate) -> dict[str, Any]:
-    return {"value": it.value, "low": it.low, "high": it.high}
+def ends_document(estimate: Estimate) -> dict[str, Any]:
+    return {"value": estimate.value, "low": estimate.low, "high": estimate.high}
 
 
-def estimate_document(it: Estimate) -> dict[str, Any]:
-    about = {"unit": it.unit, **ends_document(it), "shown": it.shown, "method": it.method, "reason": it.reason or None}
-    return {"name": it.name, **about}
+def estimate_document(estimate: Estimate) -> dict[str, Any]:
+    about = {
+        "unit": estimate.unit,
+        **ends_document(estimate),
+        "shown": estimate.shown,
+        "method": estimate.method,
+        "reason": estimate.reason or None,
+    }
+    return {"name": estimate.name, **about}
 
 
-def key_document(it: Estimate) -> dict[str, Any]:
+def key_document(estimate: Estimate) -> dict[str, Any]:
     """An estimate of a key of the stage file, with the text that stands there."""
-    told = estimate_document(it)
-    text = written(it) if np.isfinite([it.low, it.high]).all() and it.high > it.low else None
-    return {"key": told.pop("name"), **told, "written": text}
+    document = estimate_document(estimate)
+    text = (
+        written(estimate) if np.isfinite([estimate.low, estimate.high]).all() and estimate.high > estimate.low else None
+    )
+    return {"key": document.pop("name"), **document, "written": text}

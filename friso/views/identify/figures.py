@@ -48,19 +48,21 @@ def _intervals(identification: Identification) -> list[Figure]:
     if len(bounded) < 2:
         return []
     bounded = bounded[::-1]  # the first on top
-    half = np.array([each.half_width for each in bounded])
-    middle = np.array([abs(each.value) if each.shown else (each.low + each.high) / 2 for each in bounded])
+    half = np.array([estimate.half_width for estimate in bounded])
+    middle = np.array(
+        [abs(estimate.value) if estimate.shown else (estimate.low + estimate.high) / 2 for estimate in bounded]
+    )
     share = 100 * half / np.maximum(np.abs(middle), 1e-3 * half)
-    shown = np.array([each.shown for each in bounded])
+    visible = np.array([estimate.shown for estimate in bounded])
     places = np.arange(len(bounded), dtype=float)
     left = 0.5 * float(share.min())
     stems = [
         Series(np.array([left, x]), np.full(2, y), "", BLUE if ok else ORANGE, width=2.0)
-        for x, y, ok in zip(share, places, shown, strict=True)
+        for x, y, ok in zip(share, places, visible, strict=True)
     ]
     kinds: tuple[tuple[np.ndarray, str, str, Symbol], ...] = (
-        (shown, "shown", BLUE, "circle"),
-        (~shown, "not shown: the range left", ORANGE, "triangle"),
+        (visible, "shown", BLUE, "circle"),
+        (~visible, "not shown: the range left", ORANGE, "triangle"),
     )
     points = [
         Markers(share[chosen], places[chosen], label, colour, symbol)
@@ -72,7 +74,7 @@ def _intervals(identification: Identification) -> list[Figure]:
         "",
         "",
         (-0.6, len(bounded) - 0.4),
-        words=tuple(SHORT.get(each.name, each.name.split(".")[-1]) for each in bounded),
+        words=tuple(SHORT.get(estimate.name, estimate.name.split(".")[-1]) for estimate in bounded),
     )
     caption = "The shorter, the better known; 100 % and more: not even its sign or its order of magnitude."
     panel = Panel("", x, y, tuple(stems), tuple(points))

@@ -39,29 +39,29 @@ WIDE = 8.0
 PALE = "#dbe9f4"
 
 
-def moves_figures(it: IdentifiedMoves, name: str) -> list[Figure]:
+def moves_figures(moves: IdentifiedMoves, name: str) -> list[Figure]:
     """All figures of one log of moves; their names begin with this one."""
-    flat = it.fit.problem.flat
+    flat = moves.fit.problem.flat
     apart = "joint.stiffness" in flat and not flat["joint.locked"]  # a cart of its own, whose speed has to be measured
-    friction = [_friction(it, name)] if not apart or cart(it.log) is not None else []
-    return [_traces(it, name), _residual(it, name), *friction, _profiles(it, name)]
+    friction = [_friction(moves, name)] if not apart or cart(moves.log) is not None else []
+    return [_traces(moves, name), _residual(moves, name), *friction, _profiles(moves, name)]
 
 
-def _traces(it: IdentifiedMoves, name: str) -> Figure:
+def _traces(moves: IdentifiedMoves, name: str) -> Figure:
     """Measured and simulated over time."""
-    if it.loop is not None:
+    if moves.loop is not None:
         caption = (
             "The identified machine in its own loop, on the reference of the log; the measured motion does not enter."
         )
-        panels = record_panels(it.log, it.part, it.simulated)
+        panels = record_panels(moves.log, moves.part, moves.simulated)
         return Figure(f"{name}_traces", "Measured and simulated", caption, panels)
-    time, force = it.log.time[it.part], it.log["force"][it.part]
+    time, force = moves.log.time[moves.part], moves.log["force"][moves.part]
     caption = (
         "The force that the identified machine needs to move as measured, and what of the measured force it leaves."
     )
     panels = (
-        Panel("", TIME, Axis("Force", "N"), _both(time, force, force - it.fit.residual, "needed")),
-        _left(time, it.fit.residual),
+        Panel("", TIME, Axis("Force", "N"), _both(time, force, force - moves.fit.residual, "needed")),
+        _left(time, moves.fit.residual),
     )
     return Figure(f"{name}_traces", "Measured and simulated force", caption, panels)
 
@@ -69,13 +69,13 @@ def _traces(it: IdentifiedMoves, name: str) -> Figure:
 def record_panels(log: Log, part: slice, simulated: Simulated) -> tuple[Panel, ...]:
     """Position, force and what is left of both, of a record simulated in closed loop."""
     time, position, force = log.time[part], log["position"][part], log["force"][part]
-    found = simulated.force + (log["disturbance"][part] if "disturbance" in log else 0.0)
+    expected = simulated.force + (log["disturbance"][part] if "disturbance" in log else 0.0)
     apart = Series(time, position - simulated.position, "", VERMILLION, width=1.0)
     return (
         Panel("", TIME, Axis("Position", "m"), _both(time, position, simulated.position, "simulated")),
         Panel("", TIME, Axis("Measured − simulated", "m"), (apart,)),
-        Panel("", TIME, Axis("Force", "N"), _both(time, force, found, "simulated")),
-        _left(time, force - found),
+        Panel("", TIME, Axis("Force", "N"), _both(time, force, expected, "simulated")),
+        _left(time, force - expected),
     )
 
 
@@ -87,10 +87,10 @@ def _left(time: Array, left: Array) -> Panel:
     return Panel("", TIME, Axis("Measured − simulated", "N"), (Series(time, left, "", VERMILLION, width=0.9),))
 
 
-def _residual(it: IdentifiedMoves, name: str) -> Figure:
+def _residual(moves: IdentifiedMoves, name: str) -> Figure:
     """What is left of the force, over place and speed."""
-    moved = motion(it.log["position"][it.part], it.log.sample_time, SMOOTH * it.inverse.bandwidth)
-    left, axis = it.fit.residual, Axis("Force left", "N")
+    moved = motion(moves.log["position"][moves.part], moves.log.sample_time, SMOOTH * moves.inverse.bandwidth)
+    left, axis = moves.fit.residual, Axis("Force left", "N")
     panels = (
         Panel("", Axis("Position", "m"), axis, (Series(moved.position, left, "", VERMILLION, width=0.5),)),
         Panel("", Axis("Velocity", "m/s"), axis, (Series(moved.velocity, left, "", VERMILLION, width=0.5),)),
@@ -102,21 +102,21 @@ def _residual(it: IdentifiedMoves, name: str) -> Figure:
     return Figure(f"{name}_residual", "What is left of the force", caption, panels, columns=2)
 
 
-def _friction(it: IdentifiedMoves, name: str) -> Figure:
+def _friction(moves: IdentifiedMoves, name: str) -> Figure:
     """Force less inertia over velocity, and the friction found."""
-    flat = it.flat
+    flat = moves.flat
     masses = [flat.get(f"masses.{name}", 0.0) for name in ("cart", "stage")]
     moved, stage = (
-        motion(position[it.part], it.log.sample_time, SMOOTH * it.inverse.bandwidth)
-        for position in (on_bearing(it.log), it.log["position"])
+        motion(position[moves.part], moves.log.sample_time, SMOOTH * moves.inverse.bandwidth)
+        for position in (on_bearing(moves.log), moves.log["position"])
     )
-    friction = it.log["force"][it.part] - masses[0] * moved.acceleration - masses[1] * stage.acceleration
+    friction = moves.log["force"][moves.part] - masses[0] * moved.acceleration - masses[1] * stage.acceleration
     inner = slice(EDGE, -EDGE)  # at the ends of a record the filter swings in
     loops = Series(moved.velocity[inner], friction[inner], "measured force less inertia", GREY, width=0.6)
     top = float(np.abs(moved.velocity).max())
     reach = 1.1 * float(np.percentile(np.abs(friction), 99.5))
-    low, high = it.covered.gap
-    sides = [(low, min(high, top)), (-min(high, top), -low)] if it.covered.steady.size else []
+    low, high = moves.covered.gap
+    sides = [(low, min(high, top)), (-min(high, top), -low)] if moves.covered.steady.size else []
     bands = tuple(
         Band(np.array(ends), np.full(2, -reach), np.full(2, reach), "no steady motion" if i == 0 else "", PALE)
         for i, ends in enumerate(sides)
@@ -124,7 +124,7 @@ def _friction(it: IdentifiedMoves, name: str) -> Figure:
     speeds = np.concatenate([-np.geomspace(top, top / 1e4, 200), [np.nan], np.geomspace(top / 1e4, top, 200)])
     curve = Series(speeds, steady_friction(flat, speeds), "identified", BLUE, width=1.8)
     axes = Axis("Velocity", "m/s", (-1.05 * top, 1.05 * top)), Axis("Friction", "N", (-reach, reach))
-    unshown = any(each.name == "friction.static" and not each.shown for each in it.estimates)
+    unshown = any(estimate.name == "friction.static" and not estimate.shown for estimate in moves.estimates)
     caption = "Loops: the measured force less masses times accelerations; they swing where the motion turns."
     if sides:
         caption += f" Shaded: {range_with_unit(low, high, 'm/s')}, where nothing moves steadily"
@@ -141,24 +141,24 @@ def steady_friction(flat: dict, speeds: Array) -> Array:
     falls = np.exp(
         -((size / flat.get("friction.stribeck_velocity", 1.0)) ** flat.get("friction.stribeck_exponent", 2.0))
     )
-    way = np.sign(speeds)
-    skew = 1 + way * flat.get("friction.viscous_asymmetry", 0.0)
+    sign = np.sign(speeds)
+    skew = 1 + sign * flat.get("friction.viscous_asymmetry", 0.0)
     constant = flat.get("bias.cart", 0.0) + flat.get("bias.stage", 0.0)
-    return way * (coulomb + rise * falls) + viscous * skew * speeds - constant
+    return sign * (coulomb + rise * falls) + viscous * skew * speeds - constant
 
 
-def _profiles(it: IdentifiedMoves, name: str) -> Figure:
+def _profiles(moves: IdentifiedMoves, name: str) -> Figure:
     """How much worse the fit gets as one parameter is moved."""
-    best = it.fit.cost
-    known = {each.name: each for each in it.fit.problem.parameters}
-    fitted = {it.fit.problem.parameters[number].name for number in it.fit.free}
-    panels = tuple(_profile(each, known[key], best, key in fitted) for key, each in it.profiles.items())
+    best = moves.fit.cost
+    parameters = {parameter.name: parameter for parameter in moves.fit.problem.parameters}
+    fitted = {moves.fit.problem.parameters[number].name for number in moves.fit.free}
+    panels = tuple(_profile(profile, parameters[key], best, key in fitted) for key, profile in moves.profiles.items())
     caption = (
         "How much worse the best fit gets while one parameter is held at other values and the others follow; 1 ends "
         f"the 95 % interval (shaded), drawn up to {WORST:g}. A curve that stays below 1 to an end of its range is of a "
         "parameter that the record does not show."
     )
-    if any((each.cost < best - (each.limit - best)).any() for each in it.profiles.values()):
+    if any((profile.cost < best - (profile.limit - best)).any() for profile in moves.profiles.values()):
         caption += (
             " Below 0 the fit is better than the one chosen, by a parameter whose effect the motion does not cover: it "
             "makes up for other errors of the model."
@@ -166,17 +166,17 @@ def _profiles(it: IdentifiedMoves, name: str) -> Figure:
     return Figure(f"{name}_profiles", "Profiles of the fit", caption, panels, columns=2)
 
 
-def _profile(it: Profile, parameter: FitParameter, best: float, fitted: bool) -> Panel:
+def _profile(profile: Profile, parameter: FitParameter, best: float, fitted: bool) -> Panel:
     """One parameter's panel."""
-    worse = (it.cost - best) / (it.limit - best)
-    log = parameter.logarithmic and it.values[-1] > WIDE * it.values[0]
+    worse = (profile.cost - best) / (profile.limit - best)
+    log = parameter.logarithmic and profile.values[-1] > WIDE * profile.values[0]
     lowest = min(-0.2, 1.2 * float(worse.min()))
     y = Axis("Worse by", "", (lowest, WORST))
     unit = unit_of(parameter.unit)
-    ends = (float(it.values[0]), float(it.values[-1]))
-    x = Axis(name_of(it.name), unit, ends, log=log, prefixed=log or unit.startswith("m"))
-    shade = Band(np.array([it.low, it.high]), np.full(2, lowest), np.full(2, WORST), "", PALE)
+    ends = (float(profile.values[0]), float(profile.values[-1]))
+    x = Axis(name_of(profile.name), unit, ends, log=log, prefixed=log or unit.startswith("m"))
+    shade = Band(np.array([profile.low, profile.high]), np.full(2, lowest), np.full(2, WORST), "", PALE)
     colour = BLUE if fitted else ORANGE
-    line = Series(it.values, np.where(np.isfinite(worse), worse, np.nan), "", colour)
-    points = Markers(it.values, np.where(worse <= WORST, worse, np.nan), "", colour)
+    line = Series(profile.values, np.where(np.isfinite(worse), worse, np.nan), "", colour)
+    points = Markers(profile.values, np.where(worse <= WORST, worse, np.nan), "", colour)
     return Panel("", x, y, (line,), (points,), (Limit((1.0,), "", INK),), bands=(shade,))

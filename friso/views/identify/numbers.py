@@ -51,40 +51,40 @@ def within(key: str) -> str:
 def unit_of(unit: str) -> str:
     """A unit as prefixes know it: "N s/m" is "N*s/m", and ones are left out, "1 s^2/1" is "s^2"."""
     top, *below = unit.split("/")
-    factors = [each for each in top.replace("*", " ").split() if each != "1"]
-    below = [each for each in below if each != "1"]
+    factors = [part for part in top.replace("*", " ").split() if part != "1"]
+    below = [part for part in below if part != "1"]
     return "/".join(["*".join(factors) or ("1" if below else ""), *below])
 
 
-def value_text(it: Estimate) -> str:
+def value_text(estimate: Estimate) -> str:
     """A value with its unit, e.g. "95.28 kg"; a dash where there is none."""
-    if not math.isfinite(it.value):
+    if not math.isfinite(estimate.value):
         return NOTHING
-    factor, unit = _scale(it)
-    return f"{_written(it.value, factor, _places(it, factor))} {unit}".rstrip()
+    factor, unit = _scale(estimate)
+    return f"{_written(estimate.value, factor, _places(estimate, factor))} {unit}".rstrip()
 
 
-def interval_text(it: Estimate) -> str:
+def interval_text(estimate: Estimate) -> str:
     """The interval, e.g. "94.84 to 95.72 kg"; of what is not shown, what is left possible."""
-    low, high = math.isfinite(it.low), math.isfinite(it.high)
+    low, high = math.isfinite(estimate.low), math.isfinite(estimate.high)
     if not (low or high):
         return NOTHING
-    factor, unit = _scale(it)
-    if low and high and 0 < it.low < 1e-2 * it.high:  # a range over decades: each end has digits of its own
-        return f"{digits(it.low, unit_of(it.unit))} to {digits(it.high, unit_of(it.unit))}"
-    places = _places(it, factor)
-    ends = [_written(each, factor, places) for each in (it.low, it.high)]
+    factor, unit = _scale(estimate)
+    if low and high and 0 < estimate.low < 1e-2 * estimate.high:  # a range over decades: each end has digits of its own
+        return f"{digits(estimate.low, unit_of(estimate.unit))} to {digits(estimate.high, unit_of(estimate.unit))}"
+    places = _places(estimate, factor)
+    ends = [_written(number, factor, places) for number in (estimate.low, estimate.high)]
     if low and high:
         return f"{ends[0]} to {ends[1]} {unit}".rstrip()
     return f"{'at least' if low else 'at most'} {ends[0] if low else ends[1]} {unit}".rstrip()
 
 
-def with_interval(it: Estimate) -> str:
+def with_interval(estimate: Estimate) -> str:
     """Both in a sentence, e.g. "95.28 kg (94.84 to 95.72)"."""
-    if not it.shown:
-        return f"not shown ({it.reason})"
-    unit = _scale(it)[1]
-    return f"{value_text(it)} ({interval_text(it).removesuffix(unit).rstrip()})"
+    if not estimate.shown:
+        return f"not shown ({estimate.reason})"
+    unit = _scale(estimate)[1]
+    return f"{value_text(estimate)} ({interval_text(estimate).removesuffix(unit).rstrip()})"
 
 
 def listed(estimates: Sequence[Estimate]) -> str:
@@ -105,21 +105,25 @@ def percent(share: float) -> str:
     return f"{100 * share:.3g} %" if math.isfinite(share) else NOTHING
 
 
-def _scale(it: Estimate) -> tuple[float, str]:
+def _scale(estimate: Estimate) -> tuple[float, str]:
     """Factor and unit with prefix that suit the value, or what is left possible."""
-    known = [it.value] if math.isfinite(it.value) else [it.low, it.high]
-    unit, size = unit_of(it.unit), max((abs(each) for each in known if math.isfinite(each)), default=0.0)
+    finite = [estimate.value] if math.isfinite(estimate.value) else [estimate.low, estimate.high]
+    unit, size = unit_of(estimate.unit), max((abs(number) for number in finite if math.isfinite(number)), default=0.0)
     if unit.startswith("N") and FORCES[0] < size < FORCES[1]:
         return 1.0, pretty(unit)
-    return choose(np.array(known), unit)
+    return choose(np.array(finite), unit)
 
 
-def _places(it: Estimate, factor: float) -> int:
+def _places(estimate: Estimate, factor: float) -> int:
     """Decimal places that the interval allows."""
-    half = it.half_width * factor
+    half = estimate.half_width * factor
     if not (math.isfinite(half) and half > 0):
-        known = [abs(each) * factor for each in (it.value, it.low, it.high) if math.isfinite(each) and each != 0]
-        return MOST - 1 - math.floor(math.log10(max(known))) if known else 0
+        finite = [
+            abs(number) * factor
+            for number in (estimate.value, estimate.low, estimate.high)
+            if math.isfinite(number) and number != 0
+        ]
+        return MOST - 1 - math.floor(math.log10(max(finite))) if finite else 0
     return DIGITS - 1 - math.floor(math.log10(half))
 
 

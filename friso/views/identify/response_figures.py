@@ -31,39 +31,39 @@ from friso.views.identify.numbers import percent, unit_of, with_interval
 FACTOR_COLOURS = (GREEN, BLUE, PINK)
 
 
-def response_figures(it: Bench, name: str) -> list[Figure]:
+def response_figures(bench: Bench, name: str) -> list[Figure]:
     """All figures of one bench; their names begin with this one."""
-    figures = [_bode(it, name), *_levels(it, name)]
-    if it.departs is not None:
-        figures.append(_departure(it, name))
-    if it.explanation is not None:
-        figures.append(_amplitudes(it, name))
+    figures = [_bode(bench, name), *_levels(bench, name)]
+    if bench.departs is not None:
+        figures.append(_departure(bench, name))
+    if bench.explanation is not None:
+        figures.append(_amplitudes(bench, name))
     return figures
 
 
-def _bode(it: Bench, name: str) -> Figure:
+def _bode(bench: Bench, name: str) -> Figure:
     """Magnitude over phase, a column for each output."""
-    outputs = [each for each in (it.driven, it.other) if each is not None]
-    columns = [_column(it, each, number == 0) for number, each in enumerate(outputs)]
+    outputs = [response for response in (bench.driven, bench.other) if response is not None]
+    columns = [_column(bench, response, number == 0) for number, response in enumerate(outputs)]
     panels = tuple(column[row] for row in range(2) for column in columns)
     caption = "Measured with its 95 % band; fits drawn over the band in which they were fitted."
-    if it.lines:
-        caption += f" Mass line: {' and '.join(with_interval(line.value) for line in it.lines)}."
-    if it.departs is not None and it.departs.frequency.shown:
+    if bench.lines:
+        caption += f" Mass line: {' and '.join(with_interval(line.value) for line in bench.lines)}."
+    if bench.departs is not None and bench.departs.frequency.shown:
         caption += " Below their band the response leaves the linear model."
     return Figure(f"{name}_bode", "Frequency response", caption, panels, columns=len(outputs))
 
 
-def _column(it: Bench, response: FrequencyResponse, driven: bool) -> tuple[Panel, Panel]:
+def _column(bench: Bench, response: FrequencyResponse, driven: bool) -> tuple[Panel, Panel]:
     """Magnitude and phase of one output."""
     hertz = response.frequency
-    inside = hertz[(hertz >= it.band[0]) & (hertz <= it.band[1])]
+    inside = hertz[(hertz >= bench.band[0]) & (hertz <= bench.band[1])]
     fine = np.geomspace(inside[0], inside[-1], 400)
     curves: list[tuple[str, str, Dash, Array]] = []
-    if it.two_masses is not None:
-        curves.append(("two masses", BLUE, "solid", it.two_masses.predict(fine, driven)))
-    if driven and it.modes is not None:
-        curves.append(("modes", ORANGE, "dashed", it.modes.predict(fine)))
+    if bench.two_masses is not None:
+        curves.append(("two masses", BLUE, "solid", bench.two_masses.predict(fine, driven)))
+    if driven and bench.modes is not None:
+        curves.append(("modes", ORANGE, "dashed", bench.modes.predict(fine)))
     (angle,) = phases([response.response])
     aligned = [_beside(hertz, angle, fine, np.degrees(np.unwrap(np.angle(curve[3])))) for curve in curves]
     band = response.band()
@@ -72,7 +72,7 @@ def _column(it: Bench, response: FrequencyResponse, driven: bool) -> tuple[Panel
     area = Band(hertz, np.maximum(band.magnitude_low, lowest), band.magnitude_high, "", AREA)
     measured = Series(hertz, np.abs(response.response), "measured", GREY, width=1.1)
     lines = tuple(Series(fine, np.abs(values), label, colour, dash, 1.5) for label, colour, dash, values in curves)
-    masses = tuple(_mass_line(line, hertz, i == 0) for i, line in enumerate(it.lines)) if driven else ()
+    masses = tuple(_mass_line(line, hertz, i == 0) for i, line in enumerate(bench.lines)) if driven else ()
     frequency = _frequency(hertz)
     gain = Axis("Magnitude", _unit(response), log=True, prefixed=False)
     above = Panel(_title(response), frequency, gain, (measured, *lines, *masses), bands=(area,))
@@ -115,14 +115,14 @@ def _title(response: FrequencyResponse) -> str:
 
 def _around(*several: Array) -> tuple[float, float]:
     """Limits of a logarithmic axis a little beyond all values above 0."""
-    values = np.concatenate([each[np.isfinite(each) & (each > 0)] for each in several])
+    values = np.concatenate([estimate[np.isfinite(estimate) & (estimate > 0)] for estimate in several])
     return float(values.min()) / 1.2, float(values.max()) * 1.2
 
 
-def _levels(it: Bench, name: str) -> list[Figure]:
+def _levels(bench: Bench, name: str) -> list[Figure]:
     """Response, noise and distortion, where the record tells these."""
-    outputs = [each for each in (it.driven, it.other) if each is not None]
-    panels = tuple(_level_panel(each) for each in outputs)
+    outputs = [response for response in (bench.driven, bench.other) if response is not None]
+    panels = tuple(_level_panel(response) for response in outputs)
     if min(len(panel.series) for panel in panels) < 2:
         return []
     caption = (
@@ -147,9 +147,9 @@ def _level_panel(response: FrequencyResponse) -> Panel:
     return Panel(_title(response), _frequency(response.frequency), gain, lines)
 
 
-def _departure(it: Bench, name: str) -> Figure:
+def _departure(bench: Bench, name: str) -> Figure:
     """Response over model, and where it leaves it."""
-    departs = it.departs
+    departs = bench.departs
     assert departs is not None
     limits = _around(departs.excess)
     line, bands = Series(departs.lines, departs.excess, "", GREY), ()
@@ -158,32 +158,32 @@ def _departure(it: Bench, name: str) -> Figure:
         bands = (Band(ends, np.full(2, limits[0]), np.full(2, limits[1]), "", AREA),)
     ratio = Axis("|G / G model|", "", limits, log=True)
     panel = Panel("", _frequency(departs.lines), ratio, (line,), limits=(Limit((1.0,), "", INK),), bands=bands)
-    said = with_interval(departs.frequency)
-    caption = f"The driven mass's response over that of the two-mass model; departure: {said}."
+    text = with_interval(departs.frequency)
+    caption = f"The driven mass's response over that of the two-mass model; departure: {text}."
     if departs.differ:
         caption += " Below, realisations differ by more than noise: what acts there is not linear."
     return Figure(f"{name}_departure", "Departure from the linear model", caption, (panel,))
 
 
-def _amplitudes(it: Bench, name: str) -> Figure:
+def _amplitudes(bench: Bench, name: str) -> Figure:
     """Measured and simulated accelerations per input at low frequency."""
-    assert it.explanation is not None
-    assert it.drag is not None
-    top = max(each.frequency[-1] for each in it.explanation.responses.values())
-    high = 2 * it.departs.frequency.high if it.departs else top
-    measured = _rising(it.driven, high)
+    assert bench.explanation is not None
+    assert bench.drag is not None
+    top = max(response.frequency[-1] for response in bench.explanation.responses.values())
+    high = 2 * bench.departs.frequency.high if bench.departs else top
+    measured = _rising(bench.driven, high)
     lines = [Series(*measured, "measured", INK, width=1.8)]
-    for (factor, response), colour in zip(it.explanation.responses.items(), FACTOR_COLOURS, strict=False):
+    for (factor, response), colour in zip(bench.explanation.responses.items(), FACTOR_COLOURS, strict=False):
         label = "simulated" if factor == 1 else f"simulated, {factor:g} times the input"
         lines.append(Series(*_rising(response, high), label, colour, "solid" if factor == 1 else "dashed"))
-    level = Limit((1 / it.drag.mass.value,), "mass line", GREY, "dotted")
-    limits, unit = _around(*(line.y for line in lines)), _unit(it.driven, "/s^2")
+    level = Limit((1 / bench.drag.mass.value,), "mass line", GREY, "dotted")
+    limits, unit = _around(*(line.y for line in lines)), _unit(bench.driven, "/s^2")
     size = Axis("Acceleration per input", unit, limits, log=True, prefixed=False)
     panel = Panel("", _frequency(measured[0]), size, tuple(lines), limits=(level,))
     caption = (
-        f"A mass with a Coulomb friction of {with_interval(it.drag.coulomb)} on a spring, simulated with the recorded "
-        f"input, a smaller and a larger one: it accounts for {percent(1 - it.explanation.left)} of the departure. The "
-        "response depends on the size of the input: it is not linear."
+        f"A mass with a Coulomb friction of {with_interval(bench.drag.coulomb)} on a spring, simulated with the "
+        f"recorded input, a smaller and a larger one: it accounts for {percent(1 - bench.explanation.left)} of the "
+        "departure. The response depends on the size of the input: it is not linear."
     )
     return Figure(f"{name}_amplitudes", "Friction at low frequency", caption, (panel,))
 

@@ -55,18 +55,23 @@ class EstimateRow:
 def headline(identification: Identification) -> list[tuple[str, str]]:
     """What is shown, what is not and why, and how well other logs are predicted; each with its colour."""
     estimates = ordered(identification.estimates)
-    shown = [estimate for estimate in estimates if estimate.shown]
-    own = [VIEWS[experiment.kind].headline(experiment.result) for experiment in identification.experiments]
-    own = [sentence for sentence in own if sentence]
+    visible = [estimate for estimate in estimates if estimate.shown]
+    headlines = [VIEWS[experiment.kind].headline(experiment.result) for experiment in identification.experiments]
+    headlines = [sentence for sentence in headlines if sentence]
     lines = []
-    if shown:
-        lines.append((GREEN, f"Shown: {'; '.join(f'{within(each.name)} {with_interval(each)}' for each in shown)}."))
-    elif not own:
+    if visible:
+        lines.append(
+            (
+                GREEN,
+                f"Shown: {'; '.join(f'{within(estimate.name)} {with_interval(estimate)}' for estimate in visible)}.",
+            )
+        )
+    elif not headlines:
         lines.append((VERMILLION, "No key of the stage file is shown by these logs."))
-    lines += [(GREEN, sentence) for sentence in own]
+    lines += [(GREEN, sentence) for sentence in headlines]
     if identification.stage is None:
         lines.append((ORANGE, NO_STAGE))
-    if len(shown) < len(estimates):
+    if len(visible) < len(estimates):
         lines.append((ORANGE, f"Not shown: {missing(estimates)}."))
     return lines
 
@@ -74,9 +79,9 @@ def headline(identification: Identification) -> list[tuple[str, str]]:
 def missing(estimates: Sequence[Estimate]) -> str:
     """What is not shown, together with its reason, which several may share."""
     names: dict[str, list[str]] = {}
-    for each in estimates:
-        if not each.shown:
-            names.setdefault(each.reason, []).append(within(each.name))
+    for estimate in estimates:
+        if not estimate.shown:
+            names.setdefault(estimate.reason, []).append(within(estimate.name))
     return "; ".join(f"{', '.join(group)} ({reason})" for reason, group in names.items())
 
 
@@ -96,19 +101,21 @@ def prediction_line(prediction: Prediction) -> tuple[str, str]:
 
 def estimate_rows(identification: Identification) -> list[EstimateRow]:
     """The table of estimates, in words of `COLUMNS`."""
-    return [_row(each) for each in ordered(identification.estimates)]
+    return [_row(estimate) for estimate in ordered(identification.estimates)]
 
 
 def ordered(estimates: Sequence[Estimate]) -> list[Estimate]:
     """The estimates in the order of the stage file's tables; others last."""
     tables = ("masses", "friction", "bias", "joint")
     places = {name: number for number, name in enumerate(tables)}
-    return sorted(estimates, key=lambda each: places.get(each.name.split(".")[0], len(tables)))
+    return sorted(estimates, key=lambda estimate: places.get(estimate.name.split(".")[0], len(tables)))
 
 
-def _row(it: Estimate) -> EstimateRow:
-    value = value_text(it) if it.shown else LEFT
-    return EstimateRow(it.shown, (name_of(it.name), value, interval_text(it), it.reason or it.method))
+def _row(estimate: Estimate) -> EstimateRow:
+    value = value_text(estimate) if estimate.shown else LEFT
+    return EstimateRow(
+        estimate.shown, (name_of(estimate.name), value, interval_text(estimate), estimate.reason or estimate.method)
+    )
 
 
 def summaries(identification: Identification) -> list[ExperimentSummary]:
@@ -140,42 +147,45 @@ def _used(logs: Sequence[Source]) -> Facts:
 
 def labels(identification: Identification) -> list[str]:
     """A name for every experiment, of which those of its figures are made: its kind, numbered where there are more."""
-    kinds = [each.kind for each in identification.experiments]
+    kinds = [experiment.kind for experiment in identification.experiments]
     return [
         kind.replace("-", "_") + (str(kinds[: i + 1].count(kind)) if kinds.count(kind) > 1 else "")
         for i, kind in enumerate(kinds)
     ]
 
 
-def read_rows(given: Sequence[LogFile]) -> list[tuple[str, tuple[str, ...], tuple[str, ...]]]:
+def read_rows(files: Sequence[LogFile]) -> list[tuple[str, tuple[str, ...], tuple[str, ...]]]:
     """For every file: what it counts as and why, what was read, and what to know before believing it."""
-    return [(_counts_as(each), (*each.source.read, *_kept(each)), _warned(each)) for each in given]
+    return [(_counts_as(file), (*file.source.read, *_mapping_kept(file)), _warned(file)) for file in files]
 
 
-def _counts_as(it: LogFile) -> str:
-    return f"{it.path.name}: {it.kind} ({it.reason})"
+def _counts_as(file: LogFile) -> str:
+    return f"{file.path.name}: {file.kind} ({file.reason})"
 
 
-def _kept(it: LogFile) -> tuple[str, ...]:
-    return () if it.kept is None else (f"mapping kept in {it.kept.name}",)
+def _mapping_kept(file: LogFile) -> tuple[str, ...]:
+    return () if file.kept is None else (f"mapping kept in {file.kept.name}",)
 
 
-def _warned(it: LogFile) -> tuple[str, ...]:
-    return getattr(it.source, "warnings", ())
+def _warned(file: LogFile) -> tuple[str, ...]:
+    return getattr(file.source, "warnings", ())
 
 
-def answer(identification: Identification, given: Sequence[LogFile], predictions: Sequence[Prediction]) -> list[str]:
+def answer(identification: Identification, files: Sequence[LogFile], predictions: Sequence[Prediction]) -> list[str]:
     """The lines of the terminal: what was read, what was found, and what to know about it."""
     lines = []
-    for title, read, warned in read_rows(given):
-        lines += [title, *(f"  {each}" for each in read), *(f"  note: {each}" for each in warned)]
+    for title, read, warned in read_rows(files):
+        lines += [title, *(f"  {text}" for text in read), *(f"  note: {text}" for text in warned)]
     for part in summaries(identification):
-        lines += ["", part.title, *(f"  {each}" for each in part.sentences)]
-        lines += [*(f"  {name}: {text}" for name, text in part.facts), *(f"  note: {each}" for each in part.warnings)]
+        lines += ["", part.title, *(f"  {sentence}" for sentence in part.sentences)]
+        lines += [
+            *(f"  {name}: {text}" for name, text in part.facts),
+            *(f"  note: {warning}" for warning in part.warnings),
+        ]
     rows = estimate_rows(identification)
     lines += [*(["", *_aligned(rows)] if rows else []), "", *(sentence for _, sentence in headline(identification))]
-    lines += [prediction_line(each)[1] for each in predictions]
-    return lines + [f"note: {each}" for each in identification.warnings]
+    lines += [prediction_line(prediction)[1] for prediction in predictions]
+    return lines + [f"note: {warning}" for warning in identification.warnings]
 
 
 def _aligned(rows: Sequence[EstimateRow]) -> list[str]:

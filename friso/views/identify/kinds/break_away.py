@@ -16,41 +16,43 @@ from friso.views.identify.kind_view import AREA, WAYS, Facts, KindView
 from friso.views.identify.numbers import with_interval
 
 
-def _facts(it: BreakAway) -> Facts:
+def _facts(result: BreakAway) -> Facts:
     facts = [
-        ("Static friction", with_interval(it.static)),
-        ("Forward", with_interval(it.forward)),
-        ("Backward", with_interval(it.backward)),
-        ("Ramps", str(len(it.times))),
+        ("Static friction", with_interval(result.static)),
+        ("Forward", with_interval(result.forward)),
+        ("Backward", with_interval(result.backward)),
+        ("Ramps", str(len(result.times))),
     ]
-    if len(it.rates):
-        facts.append(("Force rates", range_with_unit(float(it.rates.min()), float(it.rates.max()), "N/s")))
+    if len(result.rates):
+        facts.append(("Force rates", range_with_unit(float(result.rates.min()), float(result.rates.max()), "N/s")))
     return tuple(facts)
 
 
-def _numbers(it: BreakAway) -> dict[str, Any]:
-    several = {"static": it.static, "forward": it.forward, "backward": it.backward}
-    told = {name: estimate_document(each) for name, each in several.items()}
-    ramps = {"forces_n": it.forces, "rates_n_per_s": it.rates, "directions": it.directions}
-    return {**told, **ramps, "warnings": list(it.warnings)}
+def _numbers(result: BreakAway) -> dict[str, Any]:
+    several = {"static": result.static, "forward": result.forward, "backward": result.backward}
+    estimates = {name: estimate_document(estimate) for name, estimate in several.items()}
+    ramps = {"forces_n": result.forces, "rates_n_per_s": result.rates, "directions": result.directions}
+    return {**estimates, **ramps, "warnings": list(result.warnings)}
 
 
-def _figures(it: BreakAway, logs: Sequence[Source], name: str) -> list[Figure]:
+def _figures(result: BreakAway, logs: Sequence[Source], name: str) -> list[Figure]:
     """Break-away force over force rate."""
-    if not len(it.times):
+    if not len(result.times):
         return []
     points = tuple(
-        Markers(it.rates[chosen], it.forces[chosen], word, WAYS[word])
-        for word, chosen in (("forward", it.directions > 0), ("backward", it.directions < 0))
+        Markers(result.rates[chosen], result.forces[chosen], word, WAYS[word])
+        for word, chosen in (("forward", result.directions > 0), ("backward", result.directions < 0))
         if chosen.any()
     )
-    low, high = float(it.rates.min()) / 1.3, float(it.rates.max()) * 1.3
+    low, high = float(result.rates.min()) / 1.3, float(result.rates.max()) * 1.3
     bands, limits = (), ()
-    if np.isfinite([it.static.low, it.static.high]).all():
+    if np.isfinite([result.static.low, result.static.high]).all():
         ends = np.array([low, high])
-        bands = (Band(ends, np.full(2, it.static.low), np.full(2, it.static.high), "static friction, 95 %", AREA),)
-    if it.static.shown:
-        limits = (Limit((it.static.value,), "", INK),)
+        bands = (
+            Band(ends, np.full(2, result.static.low), np.full(2, result.static.high), "static friction, 95 %", AREA),
+        )
+    if result.static.shown:
+        limits = (Limit((result.static.value,), "", INK),)
     panel = Panel(
         "",
         Axis("Force rate", "N/s", (low, high), log=True),
@@ -60,7 +62,7 @@ def _figures(it: BreakAway, logs: Sequence[Source], name: str) -> list[Figure]:
         limits,
         bands=bands,
     )
-    caption = f"Each ramp from rest. Static friction, as of the slowest ramps: {with_interval(it.static)}."
+    caption = f"Each ramp from rest. Static friction, as of the slowest ramps: {with_interval(result.static)}."
     return [Figure(f"{name}_rates", "Break-away force over force rate", caption, (panel,))]
 
 

@@ -29,119 +29,122 @@ from friso.views.identify.kind_view import WAYS, Facts, KindView
 from friso.views.identify.numbers import digits, listed, with_interval, within
 
 
-def _facts(it: FrictionAtSpeeds) -> Facts:
-    facts = [(f"Friction {name}", _direction_text(each)) for name, each in it.velocity.directions.items()]
+def _facts(result: FrictionAtSpeeds) -> Facts:
+    facts = [(f"Friction {name}", _direction_text(side)) for name, side in result.velocity.directions.items()]
     facts += [
-        ("Friction, both directions", _direction_text(it.velocity.both)),
-        ("Constant force", with_interval(it.velocity.bias)),
-        ("Repeatability along the rail", with_interval(it.position.repeatability)),
+        ("Friction, both directions", _direction_text(result.velocity.both)),
+        ("Constant force", with_interval(result.velocity.bias)),
+        ("Repeatability along the rail", with_interval(result.position.repeatability)),
     ]
     facts += [
-        (f"Along the rail at {digits(each.velocity, 'm/s')}", f"mean {with_interval(each.mean)}, standard deviation "
-         f"{digits(each.spread, 'N')}; correlation length {with_interval(each.correlation_length)}")
-        for each in it.position.passes
-    ]  # fmt: skip
+        (
+            f"Along the rail at {digits(stretch.velocity, 'm/s')}",
+            f"mean {with_interval(stretch.mean)}, standard deviation {digits(stretch.spread, 'N')}; "
+            f"correlation length {with_interval(stretch.correlation_length)}",
+        )
+        for stretch in result.position.passes
+    ]
     return tuple(facts)
 
 
-def _direction_text(it: Direction) -> str:
-    several = (it.coulomb, it.viscous, it.static, it.stribeck_velocity)
-    shown = [each for each in several if each.shown]
-    reasons = {each.reason: None for each in several if not each.shown}
-    names = [within(each.name) for each in several if not each.shown]
+def _direction_text(direction: Direction) -> str:
+    several = (direction.coulomb, direction.viscous, direction.static, direction.stribeck_velocity)
+    visible = [estimate for estimate in several if estimate.shown]
+    reasons = {estimate.reason: None for estimate in several if not estimate.shown}
+    names = [within(estimate.name) for estimate in several if not estimate.shown]
     lost = f"not shown: {', '.join(names)} ({'; '.join(reasons)})" if names else ""
-    return "; ".join(text for text in (listed(shown), lost) if text)
+    return "; ".join(text for text in (listed(visible), lost) if text)
 
 
-def _numbers(it: FrictionAtSpeeds) -> dict[str, Any]:
-    sides = {**it.velocity.directions, "both": it.velocity.both}
+def _numbers(result: FrictionAtSpeeds) -> dict[str, Any]:
+    sides = {**result.velocity.directions, "both": result.velocity.both}
     passes = [
         {
-            "velocity_m_per_s": each.velocity,
-            "mean": estimate_document(each.mean),
-            "spread_n": each.spread,
-            "correlation_length": estimate_document(each.correlation_length),
-            "steady": each.steady,
+            "velocity_m_per_s": stretch.velocity,
+            "mean": estimate_document(stretch.mean),
+            "spread_n": stretch.spread,
+            "correlation_length": estimate_document(stretch.correlation_length),
+            "steady": stretch.steady,
         }
-        for each in it.position.passes
+        for stretch in result.position.passes
     ]
     return {
-        "directions": {name: _direction_numbers(each) for name, each in sides.items()},
-        "bias": estimate_document(it.velocity.bias),
-        "velocities_m_per_s": it.velocity.velocities,
-        "forces_n": it.velocity.forces,
-        "unsteady_m_per_s": it.velocity.unsteady,
+        "directions": {name: _direction_numbers(side) for name, side in sides.items()},
+        "bias": estimate_document(result.velocity.bias),
+        "velocities_m_per_s": result.velocity.velocities,
+        "forces_n": result.velocity.forces,
+        "unsteady_m_per_s": result.velocity.unsteady,
         "passes": passes,
-        "repeatability": estimate_document(it.position.repeatability),
-        "separated": it.position.separated,
-        "verdict": it.position.verdict,
-        "warnings": [*it.velocity.warnings, *it.position.warnings],
+        "repeatability": estimate_document(result.position.repeatability),
+        "separated": result.position.separated,
+        "verdict": result.position.verdict,
+        "warnings": [*result.velocity.warnings, *result.position.warnings],
     }
 
 
-def _direction_numbers(it: Direction) -> dict[str, Any]:
-    several = {"coulomb": it.coulomb, "viscous": it.viscous, "static": it.static}
-    several["stribeck_velocity"] = it.stribeck_velocity
-    return {name: estimate_document(each) for name, each in several.items()}
+def _direction_numbers(direction: Direction) -> dict[str, Any]:
+    several = {"coulomb": direction.coulomb, "viscous": direction.viscous, "static": direction.static}
+    several["stribeck_velocity"] = direction.stribeck_velocity
+    return {name: estimate_document(estimate) for name, estimate in several.items()}
 
 
-def _velocity(it: FrictionVelocity, name: str) -> list[Figure]:
+def _velocity(friction: FrictionVelocity, name: str) -> list[Figure]:
     """Friction over velocity with intervals and the fit of each direction."""
-    if not len(it.velocities):
+    if not len(friction.velocities):
         return []
     series, markers = [], []
-    for word, chosen in (("forward", it.velocities > 0), ("backward", it.velocities < 0)):
+    for word, chosen in (("forward", friction.velocities > 0), ("backward", friction.velocities < 0)):
         if not chosen.any():
             continue
-        v, f, half = it.velocities[chosen], it.forces[chosen], it.half_widths[chosen]
+        v, f, half = friction.velocities[chosen], friction.forces[chosen], friction.half_widths[chosen]
         gap = np.full(len(v), np.nan)
         bars = np.stack([v, v, gap], axis=1).ravel(), np.stack([f - half, f + half, gap], axis=1).ravel()
-        series += [Series(*bars, "", WAYS[word], width=1.2), *_fit(it.directions[word], v, word)]
+        series += [Series(*bars, "", WAYS[word], width=1.2), *_fit(friction.directions[word], v, word)]
         markers.append(Markers(v, f, f"{word}, with 95 % interval", WAYS[word]))
     panel = Panel("", Axis("Velocity", "m/s"), Axis("Friction", "N"), tuple(series), tuple(markers))
     caption = "Mean force less inertia over stretches of constant velocity."
-    if len(it.unsteady):
-        caption += f" {len(it.unsteady)} stretches were not steady and are left out."
+    if len(friction.unsteady):
+        caption += f" {len(friction.unsteady)} stretches were not steady and are left out."
     return [Figure(f"{name}_velocity", "Friction over velocity", caption, (panel,))]
 
 
-def _fit(it: Direction, velocities: Array, word: str) -> list[Series]:
+def _fit(direction: Direction, velocities: Array, word: str) -> list[Series]:
     """The curve fitted to one direction, over the velocities it was fitted to."""
-    if not (it.coulomb.shown and it.viscous.shown):
+    if not (direction.coulomb.shown and direction.viscous.shown):
         return []
     size = np.geomspace(np.abs(velocities).min(), np.abs(velocities).max(), 200)
-    friction = it.coulomb.value + it.viscous.value * size
-    if it.static.shown and it.stribeck_velocity.shown:
-        rise = it.static.value - it.coulomb.value
-        friction = friction + rise * np.exp(-((size / it.stribeck_velocity.value) ** 2))
-    way = 1.0 if word == "forward" else -1.0
-    return [Series(way * size, way * friction, f"fit, {word}", WAYS[word], "dashed")]
+    friction = direction.coulomb.value + direction.viscous.value * size
+    if direction.static.shown and direction.stribeck_velocity.shown:
+        rise = direction.static.value - direction.coulomb.value
+        friction = friction + rise * np.exp(-((size / direction.stribeck_velocity.value) ** 2))
+    sign = 1.0 if word == "forward" else -1.0
+    return [Series(sign * size, sign * friction, f"fit, {word}", WAYS[word], "dashed")]
 
 
-def _position(it: FrictionPosition, name: str) -> list[Figure]:
+def _position(friction: FrictionPosition, name: str) -> list[Figure]:
     """Force over the place, pass by pass."""
-    if not it.passes:
+    if not friction.passes:
         return []
     colours = cycle((BLUE, ORANGE, GREEN, PINK, SKY, VERMILLION))
     lines = tuple(
         Series(
-            each.places,
-            np.sign(each.velocity) * each.force,
-            f"{digits(each.velocity, 'm/s')}{'' if each.steady else ', not steady'}",
+            stretch.places,
+            np.sign(stretch.velocity) * stretch.force,
+            f"{digits(stretch.velocity, 'm/s')}{'' if stretch.steady else ', not steady'}",
             colour,
             width=1.0,
         )
-        for each, colour in zip(it.passes, colours, strict=False)
+        for stretch, colour in zip(friction.passes, colours, strict=False)
     )
     panel = Panel("", Axis("Position", "m"), Axis("Friction", "N"), lines)
-    return [Figure(f"{name}_position", "Friction along the rail", it.verdict, (panel,))]
+    return [Figure(f"{name}_position", "Friction along the rail", friction.verdict, (panel,))]
 
 
 VIEW = KindView[FrictionAtSpeeds](
     "Constant speed",
     _facts,
     _numbers,
-    lambda it, logs, name: [*_velocity(it.velocity, name), *_position(it.position, name)],
-    sentences=lambda it: (it.position.verdict,),
-    warnings=lambda it: (*it.velocity.warnings, *it.position.warnings),
+    lambda result, logs, name: [*_velocity(result.velocity, name), *_position(result.position, name)],
+    sentences=lambda result: (result.position.verdict,),
+    warnings=lambda result: (*result.velocity.warnings, *result.position.warnings),
 )

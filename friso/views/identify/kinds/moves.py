@@ -20,17 +20,17 @@ SUFFIXES = {"N": "n", "kg": "kg", "N*s/m": "n_s_per_m"}
 """Of keys, by unit, of what the inverse model tells."""
 
 
-def _sentences(it: IdentifiedMoves) -> tuple[str, ...]:
+def _sentences(moves: IdentifiedMoves) -> tuple[str, ...]:
     """How it was fitted, and what the motion covers."""
-    low, high = it.covered.gap
+    low, high = moves.covered.gap
     along = "the machine was simulated along the position of the log: what is compared is the force that it takes."
-    if it.fit.problem.closed:
+    if moves.fit.problem.closed:
         how = "The machine was simulated in its own loop, on the reference of the log."
-    elif it.loop is not None:
+    elif moves.loop is not None:
         how = f"In its own loop the simulated machine gets out of step with the log. For the fit, {along}"
     else:
         how = f"{along[0].upper()}{along[1:]}"
-    if not it.covered.steady.size:
+    if not moves.covered.steady.size:
         return how, "The motion is nowhere steady for long enough to show friction at a speed."
     gap = range_with_unit(low, high, "m/s")
     return (
@@ -39,29 +39,29 @@ def _sentences(it: IdentifiedMoves) -> tuple[str, ...]:
     )
 
 
-def _facts(it: IdentifiedMoves) -> Facts:
+def _facts(moves: IdentifiedMoves) -> Facts:
     """Both fits of the inverse model, the errors of the output-error fit, and what is left."""
-    left = it.residual
+    left = moves.residual
     alike = (
         "neighbouring samples do not resemble each other"
         if left.white
         else (f"alike over {digits(left.correlation_time, 's')}")
     )
     return (
-        ("Inverse model", _inverse_text(it.inverse)),
-        ("Inverse model, per direction", _inverse_text(it.by_direction)),
-        ("Bandwidth of the motion", digits(it.inverse.bandwidth, "Hz")),
-        ("Relative errors of the simulation", _errors(it)),
+        ("Inverse model", _inverse_text(moves.inverse)),
+        ("Inverse model, per direction", _inverse_text(moves.by_direction)),
+        ("Bandwidth of the motion", digits(moves.inverse.bandwidth, "Hz")),
+        ("Relative errors of the simulation", _errors(moves)),
         ("Force left unexplained", f"{digits(left.rms, 'N')} (root mean square), {alike}"),
         ("Of its power, the mean explains", f"{percent(left.by_position)} over places along the rail, "
          f"{percent(left.by_velocity)} over speeds"),
     )  # fmt: skip
 
 
-def _errors(it: IdentifiedMoves) -> str:
+def _errors(moves: IdentifiedMoves) -> str:
     """The relative errors of the simulated record; along the log's position, that of the force alone says anything."""
-    errors = it.errors
-    if it.loop is None:
+    errors = moves.errors
+    if moves.loop is None:
         return f"force {percent(errors.force)}"
     return (
         f"position {percent(errors.position)}, velocity {percent(errors.velocity)}, acceleration "
@@ -69,41 +69,47 @@ def _errors(it: IdentifiedMoves) -> str:
     )
 
 
-def _inverse_text(it: InverseModel) -> str:
-    return f"{listed(it.estimates)}; force error {percent(it.error)}"
+def _inverse_text(model: InverseModel) -> str:
+    return f"{listed(model.estimates)}; force error {percent(model.error)}"
 
 
-def _numbers(it: IdentifiedMoves) -> dict[str, Any]:
-    low, high = it.covered.gap
+def _numbers(moves: IdentifiedMoves) -> dict[str, Any]:
+    low, high = moves.covered.gap
     parameters = {
-        each.name: {"unit": each.unit, "value": it.fit.value(each.name)} for each in it.fit.problem.parameters
+        parameter.name: {"unit": parameter.unit, "value": moves.fit.value(parameter.name)}
+        for parameter in moves.fit.problem.parameters
     }
-    fitted = [it.fit.problem.parameters[number].name for number in it.fit.free]
+    fitted = [moves.fit.problem.parameters[number].name for number in moves.fit.free]
     return {
-        "inverse_model": _inverse_numbers(it.inverse),
-        "inverse_model_by_direction": _inverse_numbers(it.by_direction),
+        "inverse_model": _inverse_numbers(moves.inverse),
+        "inverse_model_by_direction": _inverse_numbers(moves.by_direction),
         "output_error": {
-            "loop": "follows the log" if it.loop is None else "closed",
-            "fitted_in_loop": it.fit.problem.closed,
-            "errors": asdict(it.errors),
-            "residual": _residual_numbers(it),
+            "loop": "follows the log" if moves.loop is None else "closed",
+            "fitted_in_loop": moves.fit.problem.closed,
+            "errors": asdict(moves.errors),
+            "residual": _residual_numbers(moves),
             "parameters": parameters,
             "fitted": fitted,
-            "profiles": {name: _profile_numbers(each) for name, each in it.profiles.items()},
+            "profiles": {name: _profile_numbers(profile) for name, profile in moves.profiles.items()},
         },
-        "not_shown": [{"key": each.name, "reason": each.reason} for each in it.estimates if not each.shown],
+        "not_shown": [
+            {"key": estimate.name, "reason": estimate.reason} for estimate in moves.estimates if not estimate.shown
+        ],
         "no_steady_motion_m_per_s": [low, high],
-        "samples_used": it.part.stop - it.part.start,
+        "samples_used": moves.part.stop - moves.part.start,
     }
 
 
-def _inverse_numbers(it: InverseModel) -> dict[str, Any]:
-    named = {f"{each.name.replace(' ', '_')}_{SUFFIXES[each.unit]}": ends_document(each) for each in it.estimates}
-    return {**named, "force_error": it.error, "bandwidth_hz": it.bandwidth}
+def _inverse_numbers(model: InverseModel) -> dict[str, Any]:
+    named = {
+        f"{estimate.name.replace(' ', '_')}_{SUFFIXES[estimate.unit]}": ends_document(estimate)
+        for estimate in model.estimates
+    }
+    return {**named, "force_error": model.error, "bandwidth_hz": model.bandwidth}
 
 
-def _residual_numbers(it: IdentifiedMoves) -> dict[str, Any]:
-    left = it.residual
+def _residual_numbers(moves: IdentifiedMoves) -> dict[str, Any]:
+    left = moves.residual
     return {
         "rms_n": left.rms,
         "mean_n": left.mean,
@@ -114,26 +120,26 @@ def _residual_numbers(it: IdentifiedMoves) -> dict[str, Any]:
     }
 
 
-def _profile_numbers(it: Profile) -> dict[str, Any]:
-    ends = {"low": it.low, "high": it.high, "open_low": it.open_low, "open_high": it.open_high}
-    return {**ends, "values": it.values, "mean_squares_n2": it.cost, "limit_n2": it.limit}
+def _profile_numbers(profile: Profile) -> dict[str, Any]:
+    ends = {"low": profile.low, "high": profile.high, "open_low": profile.open_low, "open_high": profile.open_high}
+    return {**ends, "values": profile.values, "mean_squares_n2": profile.cost, "limit_n2": profile.limit}
 
 
-def _prediction_sentence(it: SimulatedLog) -> str:
-    errors = it.errors
+def _prediction_sentence(simulated: SimulatedLog) -> str:
+    errors = simulated.errors
     return (
         f"relative errors of position {percent(errors.position)}, velocity {percent(errors.velocity)}, acceleration "
         f"{percent(errors.acceleration)}, force {percent(errors.force)}."
     )
 
 
-def _prediction_figures(log: Log, it: SimulatedLog, number: int) -> list[Figure]:
+def _prediction_figures(log: Log, simulated: SimulatedLog, number: int) -> list[Figure]:
     """The log as measured and as simulated."""
     caption = (
         f"{log.name}: simulated with what was found in the other logs; relative error of the position "
-        f"{percent(it.errors.position)}, of the force {percent(it.errors.force)}."
+        f"{percent(simulated.errors.position)}, of the force {percent(simulated.errors.force)}."
     )
-    panels = record_panels(log, it.part, it.simulated)
+    panels = record_panels(log, simulated.part, simulated.simulated)
     return [Figure(f"identify_prediction{number}", f"Predicted: {log.name}", caption, panels)]
 
 
@@ -141,14 +147,14 @@ VIEW = KindView[IdentifiedMoves](
     "Moves",
     _facts,
     _numbers,
-    lambda it, logs, name: moves_figures(it, name),
+    lambda result, logs, name: moves_figures(result, name),
     sentences=_sentences,
-    warnings=lambda it: (),
+    warnings=lambda result: (),
     longest=True,
     prediction=PredictionView[SimulatedLog](
-        worst=lambda it: it.errors.force,
+        worst=lambda result: result.errors.force,
         sentence=_prediction_sentence,
-        numbers=lambda it: {"errors": asdict(it.errors)},
+        numbers=lambda result: {"errors": asdict(result.errors)},
         figures=_prediction_figures,
     ),
 )

@@ -13,48 +13,48 @@ from friso.views.identify.kind_view import TIME, Facts, KindView
 from friso.views.identify.numbers import with_interval
 
 
-def _facts(it: Presliding) -> Facts:
+def _facts(result: Presliding) -> Facts:
     facts = [
-        ("Stiffness of the bristles", with_interval(it.stiffness)),
-        ("Damping of the bristles", with_interval(it.damping)),
-        ("Moving mass", with_interval(it.mass)),
+        ("Stiffness of the bristles", with_interval(result.stiffness)),
+        ("Damping of the bristles", with_interval(result.damping)),
+        ("Moving mass", with_interval(result.mass)),
     ]
-    if len(it.time):
-        facts += [("Friction left unexplained", f"{it.unexplained:.1%} of its standard deviation")]
+    if len(result.time):
+        facts += [("Friction left unexplained", f"{result.unexplained:.1%} of its standard deviation")]
     return tuple(facts)
 
 
-def _numbers(it: Presliding) -> dict[str, Any]:
-    several = {"stiffness": it.stiffness, "damping": it.damping, "mass": it.mass}
+def _numbers(result: Presliding) -> dict[str, Any]:
+    several = {"stiffness": result.stiffness, "damping": result.damping, "mass": result.mass}
     return {
-        **{name: estimate_document(each) for name, each in several.items()},
-        "unexplained": it.unexplained,
-        "warnings": list(it.warnings),
+        **{name: estimate_document(estimate) for name, estimate in several.items()},
+        "unexplained": result.unexplained,
+        "warnings": list(result.warnings),
     }
 
 
-def _figures(it: Presliding, logs: Sequence[Source], name: str) -> list[Figure]:
+def _figures(result: Presliding, logs: Sequence[Source], name: str) -> list[Figure]:
     """Force and model, and the motion, over the last tenth of the record."""
-    if not len(it.model):
+    if not len(result.model):
         return []
-    return [Figure(f"{name}_force", "Motion before sliding", presliding_caption(it), presliding_panels(it))]
+    return [Figure(f"{name}_force", "Motion before sliding", presliding_caption(result), presliding_panels(result))]
 
 
-def presliding_caption(it: Presliding) -> str:
+def presliding_caption(result: Presliding) -> str:
     """What the bristles are, and how much of the force they explain."""
     return (
-        f"The last tenth of the record. Stiffness of the bristles: {with_interval(it.stiffness)}; damping: "
-        f"{with_interval(it.damping)}. {it.unexplained:.1%} of the friction are left unexplained."
+        f"The last tenth of the record. Stiffness of the bristles: {with_interval(result.stiffness)}; damping: "
+        f"{with_interval(result.damping)}. {result.unexplained:.1%} of the friction are left unexplained."
     )
 
 
-def presliding_panels(it: Presliding) -> tuple[Panel, ...]:
+def presliding_panels(result: Presliding) -> tuple[Panel, ...]:
     """Force and model, and the motion, over the last tenth of the record."""
-    late = slice(-(len(it.time) // 10), None)
-    time, motion = it.time[late], it.position[late] - it.position[late].mean()
+    late = slice(-(len(result.time) // 10), None)
+    time, motion = result.time[late], result.position[late] - result.position[late].mean()
     lines = (
-        Series(time, it.force[late], "force, low-passed", INK, width=1.6),
-        Series(time, it.model[late], "mass and bristles", ORANGE, "dashed", 1.2),
+        Series(time, result.force[late], "force, low-passed", INK, width=1.6),
+        Series(time, result.model[late], "mass and bristles", ORANGE, "dashed", 1.2),
     )
     return (
         Panel("", TIME, Axis("Force", "N"), lines),

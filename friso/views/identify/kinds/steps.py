@@ -15,33 +15,35 @@ from friso.views.identify.kind_view import AREA, TIME, Facts, KindView
 from friso.views.identify.numbers import with_interval
 
 
-def _facts(it: StepStiffness) -> Facts:
+def _facts(result: StepStiffness) -> Facts:
     return (
-        ("Joint stiffness", with_interval(it.stiffness)),
-        ("Steps up", with_interval(it.up)),
-        ("Steps down", with_interval(it.down)),
-        ("Hysteresis", with_interval(it.hysteresis)),
-        ("Settled windows", str(len(it.windows))),
+        ("Joint stiffness", with_interval(result.stiffness)),
+        ("Steps up", with_interval(result.up)),
+        ("Steps down", with_interval(result.down)),
+        ("Hysteresis", with_interval(result.hysteresis)),
+        ("Settled windows", str(len(result.windows))),
     )
 
 
-def _sentences(it: StepStiffness) -> tuple[str, ...]:
+def _sentences(result: StepStiffness) -> tuple[str, ...]:
     """Whether the cart moved, where that was measured."""
-    fixed = {True: "The cart stood still.", False: "The cart moved.", None: ""}[it.cart_fixed]
+    fixed = {True: "The cart stood still.", False: "The cart moved.", None: ""}[result.cart_fixed]
     return (fixed,) if fixed else ()
 
 
-def _numbers(it: StepStiffness) -> dict[str, Any]:
-    windows = [{"start_s": w.start, "end_s": w.end, "deflection_m": w.position, "force_n": w.force} for w in it.windows]
-    several = {"stiffness": it.stiffness, "up": it.up, "down": it.down, "hysteresis": it.hysteresis}
-    told = {name: estimate_document(each) for name, each in several.items()}
-    return {**told, "windows": windows, "cart_fixed": it.cart_fixed, "warnings": list(it.warnings)}
+def _numbers(result: StepStiffness) -> dict[str, Any]:
+    windows = [
+        {"start_s": w.start, "end_s": w.end, "deflection_m": w.position, "force_n": w.force} for w in result.windows
+    ]
+    several = {"stiffness": result.stiffness, "up": result.up, "down": result.down, "hysteresis": result.hysteresis}
+    estimates = {name: estimate_document(estimate) for name, estimate in several.items()}
+    return {**estimates, "windows": windows, "cart_fixed": result.cart_fixed, "warnings": list(result.warnings)}
 
 
-def _figures(it: StepStiffness, logs: Sequence[Source], name: str) -> list[Figure]:
+def _figures(result: StepStiffness, logs: Sequence[Source], name: str) -> list[Figure]:
     """Deflection and force over time with the settled windows, and the one over the other."""
     panels = []
-    for quantity, unit, values in (("Deflection", "m", it.position), ("Force", "N", it.force)):
+    for quantity, unit, values in (("Deflection", "m", result.position), ("Force", "N", result.force)):
         low, high = float(values.min()), float(values.max())
         room = 0.06 * (high - low)
         bands = tuple(
@@ -52,23 +54,23 @@ def _figures(it: StepStiffness, logs: Sequence[Source], name: str) -> list[Figur
                 "settled" if i == 0 else "",
                 AREA,
             )
-            for i, w in enumerate(it.windows)
+            for i, w in enumerate(result.windows)
         )
-        line = Series(it.time, values, quantity.lower() + ("" if unit == "m" else ", low-passed"), INK, width=1.0)
+        line = Series(result.time, values, quantity.lower() + ("" if unit == "m" else ", low-passed"), INK, width=1.0)
         panels.append(Panel("", TIME, Axis(quantity, unit, (low - room, high + room)), (line,), bands=bands))
     caption = "Shaded: where both had settled, and their means were taken."
     figures = [Figure(f"{name}_record", "Steps of the position", caption, tuple(panels))]
-    if len(it.windows) < 2:
+    if len(result.windows) < 2:
         return figures
-    x, y = np.array([[w.position, w.force] for w in it.windows]).T
+    x, y = np.array([[w.position, w.force] for w in result.windows]).T
     lines = ()
-    if it.stiffness.shown:
+    if result.stiffness.shown:
         ends = np.array([x.min(), x.max()])
-        line = y.mean() + it.stiffness.value * (ends - x.mean())
-        lines = (Series(ends, line, f"stiffness {with_interval(it.stiffness)}", BLUE),)
+        line = y.mean() + result.stiffness.value * (ends - x.mean())
+        lines = (Series(ends, line, f"stiffness {with_interval(result.stiffness)}", BLUE),)
     points = Markers(x, y, "settled windows", INK)
     panel = Panel("", Axis("Deflection", "m"), Axis("Force", "N"), lines, (points,))
-    caption = f"Means of the settled windows. Hysteresis: {with_interval(it.hysteresis)}."
+    caption = f"Means of the settled windows. Hysteresis: {with_interval(result.hysteresis)}."
     return [*figures, Figure(f"{name}_stiffness", "Force over deflection", caption, (panel,))]
 
 

@@ -18,47 +18,47 @@ from friso.views.identify.kind_view import TIME, WAYS, Facts, KindView
 from friso.views.identify.numbers import with_interval
 
 
-def _facts(it: StickSlip) -> Facts:
+def _facts(result: StickSlip) -> Facts:
     facts = [
-        ("Static friction", with_interval(it.static)),
-        ("Forward", with_interval(it.forward)),
-        ("Backward", with_interval(it.backward)),
-        ("Break-away force as measured, forward", with_interval(it.break_away_forward)),
-        ("Break-away force as measured, backward", with_interval(it.break_away_backward)),
-        ("Force common to both directions", with_interval(it.offset)),
-        ("Stiffness of the joint", with_interval(it.stiffness)),
-        ("Slips", str(len(it.times))),
+        ("Static friction", with_interval(result.static)),
+        ("Forward", with_interval(result.forward)),
+        ("Backward", with_interval(result.backward)),
+        ("Break-away force as measured, forward", with_interval(result.break_away_forward)),
+        ("Break-away force as measured, backward", with_interval(result.break_away_backward)),
+        ("Force common to both directions", with_interval(result.offset)),
+        ("Stiffness of the joint", with_interval(result.stiffness)),
+        ("Slips", str(len(result.times))),
     ]
-    if len(it.times):
-        facts.append(("Break-away forces, 5 % to 95 % of the slips", range_with_unit(*it.spread, "N")))
+    if len(result.times):
+        facts.append(("Break-away forces, 5 % to 95 % of the slips", range_with_unit(*result.spread, "N")))
     return tuple(facts)
 
 
-def _numbers(it: StickSlip) -> dict[str, Any]:
+def _numbers(result: StickSlip) -> dict[str, Any]:
     several = {
-        "static": it.static,
-        "forward": it.forward,
-        "backward": it.backward,
-        "break_away_forward": it.break_away_forward,
-        "break_away_backward": it.break_away_backward,
-        "offset": it.offset,
-        "stiffness": it.stiffness,
+        "static": result.static,
+        "forward": result.forward,
+        "backward": result.backward,
+        "break_away_forward": result.break_away_forward,
+        "break_away_backward": result.break_away_backward,
+        "offset": result.offset,
+        "stiffness": result.stiffness,
     }
-    told = {name: estimate_document(each) for name, each in several.items()}
-    return {**told, "slips": len(it.times), "spread_n": list(it.spread), "warnings": list(it.warnings)}
+    estimates = {name: estimate_document(estimate) for name, estimate in several.items()}
+    return {**estimates, "slips": len(result.times), "spread_n": list(result.spread), "warnings": list(result.warnings)}
 
 
-def _figures(it: StickSlip, logs: Sequence[Source], name: str) -> list[Figure]:
+def _figures(result: StickSlip, logs: Sequence[Source], name: str) -> list[Figure]:
     """Force on the cart with its peaks, and the cart's speed, over time."""
     (log,) = logs
     assert isinstance(log, Log)
-    pull = Series(log.time, _broken(it.pull, log), "force on the cart", GREY, width=1.0)
+    pull = Series(log.time, _broken(result.pull, log), "force on the cart", GREY, width=1.0)
     peaks = tuple(
-        Markers(it.times[chosen], way * it.forces[chosen], f"break-away, {word}", WAYS[word], "triangle")
-        for word, way, chosen in (("forward", 1, it.directions > 0), ("backward", -1, it.directions < 0))
+        Markers(result.times[chosen], sign * result.forces[chosen], f"break-away, {word}", WAYS[word], "triangle")
+        for word, sign, chosen in (("forward", 1, result.directions > 0), ("backward", -1, result.directions < 0))
         if chosen.any()
     )
-    speed = Series(log.time, _broken(it.cart_velocity, log), "", INK, width=0.9)
+    speed = Series(log.time, _broken(result.cart_velocity, log), "", INK, width=0.9)
     time = replace(TIME, limits=(float(log.time[0]), float(log.time[-1])))
     panels = (
         Panel("", time, Axis("Force on the cart", "N"), (pull,), peaks),
@@ -66,7 +66,7 @@ def _figures(it: StickSlip, logs: Sequence[Source], name: str) -> list[Figure]:
     )
     caption = (
         "While the cart sticks, the force on it grows; at the peak it breaks away, and its velocity shows a spike. "
-        f"Static friction: {with_interval(it.static)}."
+        f"Static friction: {with_interval(result.static)}."
     )
     return [Figure(f"{name}_slips", "Stick-slip", caption, panels)]
 
