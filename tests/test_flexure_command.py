@@ -193,7 +193,7 @@ def test_a_failure_of_the_beams_leaves_the_closed_forms(
     document = _strict(shown.out)
     assert document["model"] == "closed forms"
     assert "reduce the stroke" in document["failure"]
-    assert "the beam model found no answer" in shown.err
+    assert "the beam model found no solution" in shown.err
     with pytest.raises(typer.Exit):
         command(path)
     said = " ".join(capsys.readouterr().out.split())
