@@ -251,6 +251,12 @@ def test_the_drive_as_built() -> None:
     assert np.ptp(position) > 1e-5
 
 
+def test_a_rail_along_which_nothing_varies_is_refused() -> None:
+    railed = MOVES.replace({"rail": {"seed": 1}})
+    with pytest.raises(InputError, match="rail"):
+        next(run(railed, own_motion(railed), [0], 1e-3))
+
+
 def test_identification_refuses_a_law_it_does_not_know() -> None:
     levels = {"mass": 1.7, "coulomb": 1.0, "viscous": 0.5, "offset": 0.0}
     with pytest.raises(InputError, match="maxwell_slip") as refused:

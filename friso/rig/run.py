@@ -27,6 +27,9 @@ RTOL, METHOD = 1e-4, "Rodas4"
 BUDGET = 200
 """Steps that a run may take per sample on average."""
 
+LEVELS = ("friction.static", "friction.coulomb")
+"""Keys of the levels of friction that vary along a rail."""
+
 MOST_SAMPLES = 64
 """Longest delay, in samples."""
 
@@ -81,7 +84,7 @@ def run(
 
     `changes` are flat keys to SI numbers, or arrays of one for each run: of a sweep, or of machines drawn at random.
     The runs come chunk by chunk; they are the same for any number of threads. Raises InputError for an interval that
-    does not fit the samples.
+    does not fit the samples, and for a [rail] along which this law does not vary.
     """
     flat = as_built_keys(stage, changes)
     _check(flat, interval)
@@ -96,7 +99,11 @@ def run(
 
 
 def _check(flat: Mapping[str, Any], interval: float) -> None:
-    """Raises InputError for an interval that is no whole number of samples, and for a delay of too many."""
+    """Raises InputError for an interval that is no whole number of samples, for a delay of too many, and for a rail
+    along which nothing of the friction law varies."""
+    if "rail.seed" in flat and flat["friction.model"] != "none" and not any(level in flat for level in LEVELS):
+        given = f'a [rail], but friction "{flat["friction.model"]}" without a static or Coulomb level to vary along it'
+        raise InputError("rail", given, "no [rail], or a law with such a level", 'model = "lugre"')
     if whole_samples(flat) > MOST_SAMPLES:
         given = f"{flat['drive.delay']:g} s, {whole_samples(flat)} samples of {flat['drive.sample_time']:g} s"
         raise InputError("drive.delay", given, f"at most {MOST_SAMPLES} samples", 'delay = "100 us"')
