@@ -13,8 +13,8 @@ import numpy as np
 from benchmarks.report import Goal, clock, print_table, spread
 from benchmarks.rigs import RTOLS, Rig
 from friso.engine.batch import Options, Runs, run_chunks
-from friso.hunting.measures import measure, options
-from friso.hunting.peaks import COUNTED_AFTER, SWING, scan
+from friso.hunting.criteria import COUNTED_AFTER, distinct_peaks
+from friso.hunting.measures import RESOLVED, measure, options
 
 STRICT = 1e-9
 """rtol whose verdicts the others are compared with."""
@@ -57,7 +57,7 @@ def both_maps(locked: Rig, free: Rig) -> list[Map]:
 
 def friso_map(case: Map, rtol: float) -> tuple[np.ndarray, float]:
     """Peak counts of all cells, and the rejected share of steps: the work that the prototype does."""
-    settings = Options(rtol=rtol, record_from=0.8 * COUNTED_AFTER, least_swing=SWING / 4)
+    settings = Options(rtol=rtol, record_from=0.8 * COUNTED_AFTER, least_swing=RESOLVED)
     chunks = list(run_chunks(case.rig.kernel, case.flat, len(case.prototype), settings))
     peaks = np.empty(len(case.prototype))
     for chunk in chunks:
@@ -73,8 +73,7 @@ def _count(chunk: Runs) -> np.ndarray:
     results = chunk.results
     room = max(1, int(results.turn_counts.max(initial=0)))
     times, values = results.turn_times[:, :room], results.turn_values[:, :room]
-    nothing = np.zeros(len(results.turn_counts))
-    return scan(times, values, results.turn_counts, nothing, nothing)[0].sum(axis=1)
+    return distinct_peaks(times, values, results.turn_counts).sum(axis=1)
 
 
 def _measured_map(case: Map, rtol: float) -> None:

@@ -17,12 +17,14 @@ HUNTS, FAILED = 7, -1
 
 
 def hunted(peaks: Any, **given: Any) -> Hunted:
-    """Runs of so many peaks, which swing by 1 mm in 0.5 s, evenly, unless `given` otherwise."""
+    """Runs of so many peaks, which swing by 1 mm in 0.5 s to the end, evenly, unless `given` otherwise."""
     counts = np.array(peaks)
-    every = {"swing": 1e-3, "period": 0.5, "ending": 1e-3, "above": 5e-4, "below": 5e-4, "rising": 0.5}
+    every = {"swing": 1e-3, "period": 0.5, "above": 5e-4, "below": 5e-4, "rising": 0.5}
     every |= {"period_scatter": 0.0, "height_scatter": 0.0, **given}
+    swings = np.broadcast_to(np.array(every.pop("swings", True)), counts.shape)
+    words = np.where(counts == FAILED, "failed", np.where(swings, "swings", "rests"))
     whole = {name: np.broadcast_to(np.array(value, float), counts.shape) for name, value in every.items()}
-    return Hunted(np.maximum(counts, 0), failed=counts == FAILED, **whole)
+    return Hunted(np.maximum(counts, 0), words, **whole)
 
 
 def moves(first: Any, free: Any = (0, 0, 0, 0), middle: Any = (0, 0, 0, 0), high: Any = (0, 0, 0, 0),
@@ -40,7 +42,7 @@ def grid(*highest: int, runs: Any = None) -> StrokeCrossover:
     return StrokeCrossover(np.array([2e-5, 3e-4, 1e-3]), crossovers, np.array([1.0, 2.0]), 8.0, hunted(peaks))
 
 
-SLOW = {"period": 1.0, "swing": 1.2e-3, "ending": 1.2e-3, "above": 7e-4, "below": 5e-4, "period_scatter": 0.1}
+SLOW = {"period": 1.0, "swing": 1.2e-3, "above": 7e-4, "below": 5e-4, "period_scatter": 0.1}
 """Cycles of a rail that varies, as the thesis has them."""
 
 

@@ -12,7 +12,7 @@ from variants import VARIANTS, lugre, stage, there_and_back, van_dijk
 
 import friso
 from friso.equations.bandwidth import faster
-from friso.hunting.basin import EDGE, MOVES, SHARES, Kick, Moves, displacements, ends_hunting, moves, pushes
+from friso.hunting.basin import EDGE, MOVES, SHARES, Kick, Moves, displacements, ends_in, moves, pushes
 from friso.hunting.cycle.ensemble import Ensemble, done
 from friso.hunting.cycle.hunting import Cycle, hunting
 from friso.hunting.cycle.rest import pushed
@@ -88,9 +88,7 @@ def test_edges_of_the_windows_by_single_runs(edge: int) -> None:
 def test_mirrored_releases_start_hunting_as_well() -> None:
     several = np.geomspace(1e-3, 0.1, 32)
     flat = rigid(8).flat()
-    one, other = (
-        ends_hunting({**flat, "motion.displacement": sign * several}, 32, cycle())[0].tolist() for sign in (1, -1)
-    )
+    one, other = (ends_in({**flat, "motion.displacement": sign * several}, 32, cycle())[0].tolist() for sign in (1, -1))
     assert one == other
     assert True in one
     assert False in one
@@ -142,7 +140,7 @@ def test_moves_by_single_runs() -> None:
     assert found is not None
     drawn = qmc.scale(qmc.Sobol(2, rng=0).random(MOVES), *zip(found.accelerations, found.times, strict=True))
     own = MOVING.flat() | {"motion.acceleration": drawn[:, 0], "motion.acceleration_time": drawn[:, 1]}
-    each, completed = ends_hunting(own, MOVES, cycle())
+    each, completed = ends_in(own, MOVES, cycle())
     assert completed.all()
     assert each.sum() == found.hunting
     assert 0 < found.hunting < MOVES

@@ -18,14 +18,16 @@ from snapshots import Snapshots
 from friso.frequency import crossover
 from friso.frequency.margins import margins
 from friso.frequency.members import limit_cases, member
+from friso.hunting.criteria import end_of_traces, outcomes
 from friso.stage import Stage, load
 from friso.stage.correlations import Correlations
 from friso.studies.compare import measures, study
 from friso.studies.compare.machines import SPREADS, TOGETHER_BY, Machines, draw_machines
-from friso.studies.compare.measures import lasting_swing, linear_loops, settling_time
+from friso.studies.compare.measures import linear_loops, settling_time
 from friso.studies.compare.options import DEADBAND, MODEL_ERROR, Option, Options, linear_flat, options
-from friso.studies.compare.statistics import difference, median, share
+from friso.studies.compare.statistics import difference, median
 from friso.studies.compare.study import Comparison, Result, compare
+from friso.studies.shares import share
 from friso.views.compare.document import document, page
 from friso.views.compare.figures import figures
 from friso.views.compare.words import paired_rows, sentences, table_rows
@@ -215,12 +217,17 @@ TIME = np.arange(0, 20, 0.01)
 frequencies, sizes = st.floats(0.25, 5.0), st.floats(1e-5, 1e-2)
 
 
+def words(deviation: np.ndarray, within: float) -> list[str]:
+    """What runs do at their end."""
+    return outcomes(end_of_traces(TIME, deviation, within), within).tolist()
+
+
 @settings(max_examples=40, deadline=None)
 @given(frequencies, sizes, st.floats(0.05, 2.0), st.floats(-1e-3, 1e-3))
-def test_what_swings_on_hunts(frequency: float, size: float, within: float, offset: float) -> None:
+def test_what_goes_to_and_fro_swings(frequency: float, size: float, within: float, offset: float) -> None:
     swing = offset + size * np.sin(2 * np.pi * frequency * TIME)[None]
-    assert lasting_swing(TIME, swing, within * 1e-6).all()
-    assert not lasting_swing(TIME, swing, 1.1 * size).any()
+    assert words(swing, within * 1e-6) == ["swings"]
+    assert words(swing, 1.1 * size) != ["swings"]
 
 
 @settings(max_examples=40, deadline=None)
@@ -228,7 +235,7 @@ def test_what_swings_on_hunts(frequency: float, size: float, within: float, offs
 def test_what_dies_out_or_creeps_does_not(frequency: float, size: float, decay: float, offset: float) -> None:
     dying = size * np.exp(-TIME / decay) * np.cos(2 * np.pi * frequency * TIME)
     creeping = offset - size * TIME
-    assert not lasting_swing(TIME, np.array([dying, creeping, offset + 0 * TIME]), 1e-6).any()
+    assert "swings" not in words(np.array([dying, creeping, offset + 0 * TIME]), 1e-6)
 
 
 @settings(max_examples=40, deadline=None)
@@ -286,16 +293,16 @@ def test_runs_that_fail_count_either_way() -> None:
     assert share(flags, done).high == share(np.arange(100) < 20, np.ones(100, bool)).high
 
 
-def test_the_isolator_and_bandwidth_stop_what_hunts(found: Comparison) -> None:
+def test_the_isolator_and_bandwidth_stop_what_swings(found: Comparison) -> None:
     """Thesis, Sec. 4.3: the locked rig hunts at 8 Hz and not above 15 Hz; the isolated one does not at 8 Hz."""
     results = {each.letter: each for each in found.results}
-    assert results["a"].hunting.probability > 0.2
+    assert results["a"].swinging.probability > 0.2
     assert results["b"].option.stage.flat()["controller.crossover"] > 15
     for letter in "bcg":
-        assert results[letter].settles
+        assert results[letter].rests
         assert results[letter].in_position_count == COUNT
-        assert results[letter].hunting.probability == 0
-        assert found.paired(results[letter]).hunting.high < 0
+        assert results[letter].swinging.probability == 0
+        assert found.paired(results[letter]).swinging.high < 0
         assert results[letter].settling.high < results["a"].settling.high
     assert results["b"].margin.value < results["a"].margin.value
 
@@ -303,8 +310,8 @@ def test_the_isolator_and_bandwidth_stop_what_hunts(found: Comparison) -> None:
 def test_an_integrator_that_starts_anew_does_not_stay(found: Comparison) -> None:
     """Without its integral the stage breaks away again, so slowly that only the longer run shows it."""
     reset = found.results[4]
-    assert reset.hunting.probability < found.results[0].hunting.probability
-    assert not reset.settles
+    assert reset.swinging.probability < found.results[0].swinging.probability
+    assert not reset.rests
     assert reset.stays.high < 0.9
 
 
@@ -319,27 +326,27 @@ def test_options_share_their_machines(built: Stage, found: Comparison) -> None:
     assert not np.array_equal(found.results[5].found.force, base.found.force)
 
 
-def test_hardly_any_friction_never_hunts(built: Stage) -> None:
+def test_hardly_any_friction_never_swings(built: Stage) -> None:
     ideal = {"friction.static": "1 mN +/- 1e-6 %", "friction.coulomb": "1 mN +/- 1e-6 %"}
     machines = draw_machines(built.replace(ideal), Correlations(), 20, 1)
     work = study._Work(machines, study.own_motion(built), study._corner(built), 1e-6, study.silent, 1)
     for letter, variant in (("a", "locked"), ("c", "free")):
         runs = work.runs(Option(letter, machines.stage.variants()[variant]), 0)
         assert runs.done.all()
-        assert not runs.hunts.any()
+        assert not runs.swings.any()
         assert np.isfinite(runs.settling).all()
 
 
-def test_a_run_that_fails_is_no_hunter(found: Comparison) -> None:
+def test_a_run_that_fails_does_not_swing(found: Comparison) -> None:
     base = found.results[0]
     part = measures.Found(
         **{name: np.array(getattr(base.found, name)) for name in measures.Found.__dataclass_fields__}
-        | {"done": np.zeros(COUNT, bool), "settling": np.full(COUNT, np.nan)}
+        | {"outcome": np.full(COUNT, "failed"), "settling": np.full(COUNT, np.nan)}
     )
     result = replace(base, found=part)
-    assert (result.failed, result.hunting.low, result.hunting.high) == (COUNT, 0, 1)
-    assert np.isnan(result.hunting.probability)
-    assert not result.settles
+    assert (result.failed, result.swinging.low, result.swinging.high) == (COUNT, 0, 1)
+    assert np.isnan(result.swinging.probability)
+    assert not result.rests
 
 
 def test_words_follow_the_numbers(found: Comparison) -> None:
@@ -349,7 +356,7 @@ def test_words_follow_the_numbers(found: Comparison) -> None:
     )
     assert "settings achieve what a joint achieves: b faster" in says
     no_settings = replace(found, results=tuple(each for each in found.results if each.letter != "b"))
-    assert "only the joint settles them: c isolator or g b and c" in " ".join(sentences(no_settings))
+    assert "only the joint brings them to rest: c isolator or g b and c" in " ".join(sentences(no_settings))
     no_joint = replace(found, results=tuple(each for each in found.results if each.letter not in "cg"))
     assert "settings suffice: b faster." in " ".join(sentences(no_joint))
     none = replace(found, results=(found.results[0], *found.results[3:6]))
@@ -359,7 +366,7 @@ def test_words_follow_the_numbers(found: Comparison) -> None:
 
 @pytest.fixture
 def made_up(every: Options, machines: Machines) -> Comparison:
-    """Options a and c on 20 machines: c settles 12 sooner, 3 later, and 5 never with either."""
+    """Options a and c on 20 machines: c is in position 12 times sooner, 3 later, and 5 never with either."""
     still, count = np.ones(COUNT, bool), COUNT
     settling = {"a": np.full(count, 5.0), "c": np.repeat([2.0, 7.0, np.inf], [12, 3, 5])}
     settling["a"][15:] = np.inf
@@ -367,7 +374,9 @@ def made_up(every: Options, machines: Machines) -> Comparison:
     results = tuple(
         Result(
             every.every["abc".index(letter)],
-            measures.Found(still, ~still, np.zeros(count, int), settling[letter], rms[letter], np.ones(count)),
+            measures.Found(
+                np.full(count, "rests"), np.zeros(count, int), settling[letter], rms[letter], np.ones(count)
+            ),
             measures.Later(still, still),
             measures.Loops(still, np.full(count, 0.6)),
         )
@@ -399,7 +408,7 @@ def test_standstill_is_compared_on_a_floor_only(made_up: Comparison) -> None:
     shaken = _shaken(quiet)
     assert "stands still to" not in " ".join(sentences(quiet))
     assert "not compared: the stage file has no [floor]" in sentences(quiet)[-1]
-    assert "c isolator: settles in 1.00 s (median), stands still to 1.00 nm RMS" in " ".join(sentences(shaken))
+    assert "c isolator: in position in 1.00 s (median), stands still to 1.00 nm RMS" in " ".join(sentences(shaken))
     assert "not compared" not in " ".join(sentences(shaken))
     assert [paired_rows(each)[0][1][2] for each in (quiet, shaken)] == [
         "not compared: no [floor]", "0.5 (0.5 to 0.5)",
@@ -427,7 +436,7 @@ def test_command_writes_page_and_figures(
     document = json.loads(done.stdout)
     assert [*document["options"]] == [*"abcdefg"]
     for each in document["options"].values():
-        assert each["hunts"]["low"] <= each["hunts"]["probability"] <= each["hunts"]["high"]
+        assert each["swings"]["low"] <= each["swings"]["probability"] <= each["swings"]["high"]
     assert document["options"]["d"]["settling_time_s"]["high"] is None
     assert {each.name for each in (tmp_path / "out").iterdir()} == {
         "compare.html", "compare.pdf", "compare.png", "compare.svg",

@@ -18,10 +18,14 @@ def made(name: str, hunts: Callable[[np.ndarray, np.ndarray], Any]) -> xr.Datase
     """A map of the study `name` that hunts where a function of both coordinates is true."""
     spans = STUDIES[name].spans
     x, y = (np.linspace(span.low, span.high, POINTS) for span in spans)
-    words = np.where(np.broadcast_to(hunts(x[:, None], y[None, :]), (POINTS, POINTS)), "hunts", "settles")
+    hunting = np.broadcast_to(hunts(x[:, None], y[None, :]), (POINTS, POINTS))
+    words, dims = np.where(hunting, "swings", "rests"), tuple(span.key for span in spans)
     return xr.Dataset(
-        {"verdict": (tuple(span.key for span in spans), words)},
-        coords=dict(zip((s.key for s in spans), (x, y), strict=True)),
+        {
+            name: (tuple(span.key for span in spans), values)
+            for name, values in (("hunting", hunting), ("outcome", words))
+        },
+        coords=dict(zip(dims, (x, y), strict=True)),
     )
 
 

@@ -199,13 +199,13 @@ def test_the_document_tells_front_controller_and_moves(found: Design) -> None:
     assert tuned["kp_n_per_m"] == pytest.approx(1.5 * tuned["k_p_n_per_m"])  # beta = 2
     assert parallel_gains(found)[1:] == (tuned["ki_n_per_m_s"], tuned["kd_n_s_per_m"])
     moves = document["verification"]
-    assert (moves["moves"], moves["hunting"], moves["settling_time_met"]) == (64, 0, True)
+    assert (moves["moves"], moves["not_at_rest"], moves["settling_time_met"]) == (64, 0, True)
     assert moves["locked"]["moves"] == 64
     assert moves["settling_median_s"] <= moves["settling_95_s"]
 
 
 def test_what_is_not_finite_is_null(found: Design) -> None:
-    never = replace(found.verification.free, settling=np.full(64, np.nan), hunts=np.ones(64, bool))
+    never = replace(found.verification.free, settling=np.full(64, np.nan), words=np.full(64, "swings"))
     nowhere = replace(found.without, edges=np.zeros(found.without.population.count), unknown=1)
     other = replace(found, without=nowhere, verification=replace(found.verification, free=never))
     document = design_document(other)
@@ -312,29 +312,41 @@ def test_damping_that_is_worth_adding_or_not(found: Design) -> None:
     assert damped(0.57, 0.59, 0.6).startswith("More damping in the joint is not worth adding")
 
 
-def test_moves_that_hunt_or_take_too_long(found: Design) -> None:
-    hunts = np.arange(64) < 2
-    free = replace(found.verification.free, hunts=hunts, settling=np.where(hunts, np.nan, 2.0), swing=hunts * 1e-3)
+def restless(count: int) -> np.ndarray:
+    """Words of 64 moves of which so many do not come to rest: the first creeps, the others swing."""
+    words = np.where(np.arange(64) < count, "swings", "rests").astype(object)
+    words[0] = "creeps"
+    return words
+
+
+def test_moves_that_swing_or_take_too_long(found: Design) -> None:
+    off = np.arange(64) < 2
+    free = replace(
+        found.verification.free,
+        words=restless(2),
+        settling=np.where(off, np.nan, 2.0),
+        swing=off * np.arange(64) * 1e-3,
+    )
     other = replace(found, verification=replace(found.verification, free=free))
     step = moves_step(other)
-    assert step.title == "Verification: 64 moves, 2 hunt"
+    assert step.title == "Verification: 64 moves, 2 do not come to rest in position (1 swing, 1 creep)"
     said = " ".join(step.sentences)
     assert "Specified for 95 % of the moves: 1.00 s; that is NOT met." in said
     assert "The worst move, which swings over 1 mm" in said
     assert "not as specified" in headline(other)[-1][1]
-    lost = replace(free, completed=np.arange(64) > 3)
+    lost = replace(free, words=np.where(np.arange(64) > 3, free.words, "failed"))
     step = moves_step(replace(found, verification=replace(found.verification, free=lost)))
     assert "4 moves could not be simulated" in " ".join(step.sentences)
 
 
-def test_moves_of_a_locked_joint_that_hunts(found: Design) -> None:
-    hunts = np.arange(64) < 20
-    locked = replace(found.verification.locked, hunts=hunts, settling=np.where(hunts, np.nan, 3.0))
+def test_moves_of_a_locked_joint_that_swings(found: Design) -> None:
+    off = np.arange(64) < 20
+    locked = replace(found.verification.locked, words=restless(20), settling=np.where(off, np.nan, 3.0))
     other = replace(found, verification=replace(found.verification, locked=locked))
     said = " ".join(moves_step(other).sentences)
-    assert "With the joint locked: half of them settle in 3.00 s, fewer than 95 % at all, and 20 hunt." in said
-    assert "none hunts (with the joint locked, 20 hunt)" in headline(other)[-1][1]
-    never = replace(locked, hunts=np.ones(64, bool), settling=np.full(64, np.nan))
+    assert "With the joint locked: half of them settle in 3.00 s, fewer than 95 % at all, and 20 do not " in said
+    assert "all come to rest in position (with the joint locked, 20 do not" in headline(other)[-1][1]
+    never = replace(locked, words=np.full(64, "swings"), settling=np.full(64, np.nan))
     assert settling(never) == "Fewer than half of them settle"
     assert "instead of never" in brings(replace(found, verification=replace(found.verification, locked=never)))
 
@@ -404,9 +416,9 @@ def test_window_with_edges_beyond_the_search(found: Design) -> None:
     assert panel.series[0].x == pytest.approx([found.controller.crossover] * 2)
 
 
-def test_settling_ends_where_moves_hunt(found: Design) -> None:
-    hunts = np.arange(64) < 16
-    free = replace(found.verification.free, hunts=hunts, settling=np.where(hunts, np.nan, 0.2))
+def test_settling_ends_where_moves_do_not_rest(found: Design) -> None:
+    off = np.arange(64) < 16
+    free = replace(found.verification.free, words=restless(16), settling=np.where(off, np.nan, 0.2))
     none = replace(free, settling=np.full(64, np.nan))
     other = replace(found, verification=replace(found.verification, free=free, locked=none))
     (panel,) = _figures(other)["design_settling"].panels

@@ -297,7 +297,7 @@ def test_tried_moves_agree_with_check(base: Stage) -> None:
     for held, hunts in ((True, True), (False, False)):
         found = tried({**flat, "joint.locked": held}, 1, 1e-6)
         assert found.tried == 1
-        assert found.hunts[0] == hunts
+        assert (found.words[0] == "swings") == hunts
     case = friso.check(rig)["free"]
     assert found.settling[0] == pytest.approx(case.settling_time[1e-6], rel=1e-2)
 
@@ -309,8 +309,8 @@ def test_verification_counts_and_its_worst_is_reproduced(base: Stage, monkeypatc
     stage = with_leaves(base, Geometry(60e-3, 18e-3, 50e-3, Sheet(2.0, 0.3e-3, "stainless 1.4310")), 1e-3)
     found = verification(stage.replace({"controller.crossover": "9 Hz"}), SPEC, 0.3, lambda *told: None)
     assert found.free.tried == found.locked.tried == 200
-    assert found.free.hunting == 0
-    assert found.locked.hunting > 20
+    assert found.free.missed == 0
+    assert found.locked.missed >= found.locked.swinging > 20
     low, high = found.free.interval
     assert low == 0
     assert high == pytest.approx(1 - 0.025 ** (1 / 200), rel=1e-6)  # Clopper and Pearson for none of 200
@@ -319,14 +319,13 @@ def test_verification_counts_and_its_worst_is_reproduced(base: Stage, monkeypatc
     assert again.settling[0] == pytest.approx(found.free.settling[worst], rel=1e-3)
 
 
-def test_an_outcome_ranks_hunting_before_slow_settling() -> None:
+def test_an_outcome_ranks_what_does_not_rest_before_slow_settling() -> None:
     found = Outcome(
-        np.ones(4, bool),
-        np.array([False, True, True, False]),
+        np.array(["rests", "swings", "creeps", "rests"], dtype=object),
         np.array([0.1, np.nan, np.nan, 3.0]),
         np.array([0, 1e-3, 2e-3, 0]),
     )
     assert found.worst == 2
-    assert found.hunting == 2
+    assert (found.missed, found.swinging) == (2, 1)
     assert found.slower_than(0.05) == np.inf
-    assert replace(found, hunts=np.zeros(4, bool), settling=np.array([0.1, 0.2, 0.3, 3.0])).worst == 3
+    assert replace(found, words=np.full(4, "rests"), settling=np.array([0.1, 0.2, 0.3, 3.0])).worst == 3

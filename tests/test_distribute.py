@@ -97,7 +97,7 @@ def test_a_killed_worker_costs_only_its_blocks(rig: Stage, tmp_path: Path) -> No
         found = store.read().load()
     assert sum(computed) == study.cells  # every block was handed over once
     whole = friso.sweep(rig, AXES, rtol=1e-9)
-    for name in ("verdict", "status"):
+    for name in ("outcome", "status"):
         found[name] = found[name].astype(object)
     xr.testing.assert_identical(found, whole)
 
@@ -171,4 +171,4 @@ def test_ctrl_c_leaves_no_task_behind(rig: Stage, cluster: LocalCluster) -> None
         with pytest.raises(KeyboardInterrupt):
             run_in_memory([Request(rig, AXES).study(rtol=1e-8)], crew, 0.0, interrupt)
         (found,) = run_in_memory([Request(rig, AXES).study()], crew)
-    assert (found.verdict != "").all()
+    assert (found.outcome != "").all()

@@ -11,9 +11,10 @@ from scipy.stats import beta
 
 import friso
 from friso.cli import main
+from friso.hunting.criteria import ATTRACTED, VERDICTS
 from friso.stage import Stage, save
 from friso.stage.correlations import Correlations, Drawn, draw
-from friso.studies.draws import ATTRACTED, WORDS, Fates, different, fates
+from friso.studies.draws import Fates, different, fates
 from friso.views.check.draws import Drawing, draws_document, draws_figure, draws_rows, draws_sentences
 
 pytestmark = pytest.mark.xdist_group("rig")
@@ -148,7 +149,7 @@ def test_document_rows_and_sentences() -> None:
 
 def test_the_figure_holds_every_draw() -> None:
     (panel,) = draws_figure(drawing(made(60, 30, 10))).panels
-    assert [band.label for band in panel.bands] == [word for word in WORDS if word in ("hunts", "settles", "failed")]
+    assert [band.label for band in panel.bands] == [word for word in VERDICTS if word in ("hunts", "settles", "failed")]
     assert panel.bands[-1].high[::2].sum() == 100
     assert panel.x.label == "friction.coulomb [N]"
     assert draws_figure(drawing(made(0, 30))).panels[0].title == "As given: all settles"
@@ -178,7 +179,7 @@ def test_check_draws(
     said = capsys.readouterr()
     assert "centre" not in said.err
     draws = json.loads(said.out)["cases"]["given"]["draws"]
-    assert set(draws["verdicts"]) == set(WORDS)
+    assert set(draws["verdicts"]) == set(VERDICTS)
     assert sum(draws["verdicts"].values()) == 8
     assert draws["attracting_cycle"]["probability"] == 0
     page = (tmp_path / "report.html").read_text(encoding="utf-8")

@@ -230,7 +230,7 @@ def test_swept_by_friso(stage: Stage) -> None:
         stage.replace({"joint.locked": True, "motion.duration": "6 s"}),
         {"flexure.thickness": ["0.35 mm", "30 mm", "9 mm"]},
     )
-    assert (runs.verdict.values == "invalid").tolist() == [False, True, True]
+    assert (runs.outcome.values == "invalid").tolist() == [False, True, True]
     assert all("flexure.thickness" in reason for reason in runs.status.values[1:])
 
 

@@ -213,7 +213,7 @@ def test_failed_simulation_is_not_one_that_settles(monkeypatch: pytest.MonkeyPat
     def failing(stages: Ensemble, begin: Any, periods: float) -> tuple[np.ndarray, np.ndarray]:
         return np.zeros(stages.count, bool), np.arange(stages.count) > 0
 
-    monkeypatch.setattr(persistence, "still_hunts", failing)
+    monkeypatch.setattr(persistence, "still_swings", failing)
     assert [each.tolist() for each in hunts_somehow(at(JUMPS, 0.1))] == [[False], [False]]
     found = swept(FAR_FLIP)
     assert found.kind[0] == UNKNOWN

@@ -46,7 +46,7 @@ def test_files_and_document(mapped: tuple[Path, dict]) -> None:
     runs = xr.open_zarr(folder / "a.zarr")
     assert runs.peaks.dims == ("controller.crossover", "joint.stroke")
     assert document["cells"] == 20
-    assert document["verdicts"]["hunts"] == int((runs.verdict == "hunts").sum())
+    assert document["outcomes"]["swings"] == int((runs.outcome == "swings").sum())
     assert document["verified"]["cells"] == 20
     assert 0 < document["verified"]["surviving"] <= 20
     assert document["axes"]["joint.stroke"] == {"points": 4, "unit": "m", "first": 0.0, "last": 1e-3}
@@ -60,7 +60,8 @@ def test_a_cell_is_run_again_alone(mapped: tuple[Path, dict]) -> None:
     assert json.loads(done.stdout)["solver"]["steps"] == runs.steps.values[2, 1]
     assert "a_cell_2_1.toml" in done.stdout
     again = friso_inside(folder, "check", "a_cell_2_1.toml", "--json")
-    assert json.loads(again.stdout)["cases"]["given"]["verdict"] == runs.verdict.values[2, 1]
+    case = json.loads(again.stdout)["cases"]["given"]
+    assert (case["peaks"], case["peak_to_peak_m"]) == (runs.peaks.values[2, 1], runs.peak_to_peak.values[2, 1])
 
 
 def test_files_of_the_user_are_not_overwritten(tmp_path: Path) -> None:
@@ -75,9 +76,9 @@ def test_files_of_the_user_are_not_overwritten(tmp_path: Path) -> None:
 
 def test_a_finished_map_is_drawn_again_from_its_store_alone(mapped: tuple[Path, dict]) -> None:
     folder, document = mapped
-    done = friso_inside(folder, "map", "a.zarr", "--metric", "verdict", "--json")
+    done = friso_inside(folder, "map", "a.zarr", "--metric", "peaks", "--json")
     assert done.returncode == 0, done.stderr
-    assert json.loads(done.stdout)["verdicts"] == document["verdicts"]
+    assert json.loads(done.stdout)["outcomes"] == document["outcomes"]
 
 
 @pytest.mark.parametrize(
@@ -124,7 +125,7 @@ def test_ctrl_c_says_how_to_go_on(tmp_path: Path) -> None:
     assert time.monotonic() - start < 20
     assert b"to go on: friso map a.zarr" in seen
     with xr.open_zarr(tmp_path / "a.zarr") as found:
-        kept = int((found.verdict != "").sum())
+        kept = int((found.outcome != "").sum())
     assert 0 < kept < 12000
 
 
@@ -192,6 +193,6 @@ def test_samples_links_and_a_local_cluster(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     with xr.open_zarr(tmp_path / "a.zarr") as found:
         assert found["mass"].dims == ("sample",)
-        assert found.verdict.shape == (16,)
+        assert found.outcome.shape == (16,)
     again = friso_inside(tmp_path, "map", RIG, *options, *links, "--out", "b.zarr", "--json")
-    assert json.loads(again.stdout)["verdicts"] == json.loads(done.stdout)["verdicts"]
+    assert json.loads(again.stdout)["outcomes"] == json.loads(done.stdout)["outcomes"]

@@ -25,8 +25,9 @@ from friso.views.drawing.figure import Cloud, Figure, Kind, Map
 from friso.views.map.cells import axes_of, look, pick
 from friso.views.map.data import MOST, NONE
 from friso.views.map.figures import SLICES, map_figure, map_panel
+from friso.views.map.findings import headline, statement, verification
 from friso.views.map.page import map_html, write_map_page
-from friso.views.map.words import FAILED, INFERRED, INVALID, NOT_RUN, QUIET, VERDICTS, quantity, statement, verification
+from friso.views.map.words import FAILED, INFERRED, INVALID, KINDS, NOT_RUN, QUIET, quantity
 
 CROSSOVER, STROKE, DAMPING, LOCKED = (
     "controller.crossover",
@@ -39,7 +40,7 @@ RERUN = "friso simulate --cell map.zarr {indices}"
 
 
 def made_up(axes: dict[str, Any], log: tuple[str, ...] = (), **attrs: Any) -> xr.Dataset:
-    """Runs over these axes whose every cell has its own numbers; the verdict follows the count of peaks."""
+    """Runs over these axes whose every cell has its own numbers; the outcome follows the count of peaks."""
     dims = tuple(axes)
     shape = tuple(len(values) for values in axes.values())
     cell = np.arange(math.prod(shape), dtype=float).reshape(shape)
@@ -51,7 +52,7 @@ def made_up(axes: dict[str, Any], log: tuple[str, ...] = (), **attrs: Any) -> xr
         "settling_time_10um": (np.where(peaks > 0, np.nan, 0.3 + cell / 9), "s"),
     }
     variables: dict[str, Any] = {name: (dims, array, {"units": unit}) for name, (array, unit) in numbers.items()}
-    variables["verdict"] = (dims, np.where(peaks > 0, "hunts", "settles").astype("<U9"))
+    variables["outcome"] = (dims, np.where(peaks > 0, "swings", "rests").astype("<U9"))
     variables["status"] = (dims, np.full(shape, "done", dtype="<U60"))
     coords = {key: (key, values, {"units": UNITS.get(key, "")}) for key, values in axes.items()}
     runs = xr.Dataset(variables, coords, {"name": "Rig", "stage": 'name = "Rig"\n', "friso": "1", "rtol": 1e-4} | attrs)
@@ -68,9 +69,9 @@ def troubled() -> xr.Dataset:
     """Row by row along the crossover: an invalid, a failed, a missing and two inferred cells; the others ran."""
     runs = plain()
     cells = [("invalid", "invalid: x"), ("failed", "step budget used up"), ("", "not run: interrupted")]
-    cells += [("hunts", "inferred: neighbours agree"), ("settles", "inferred: neighbours agree")]
+    cells += [("swings", "inferred: neighbours agree"), ("rests", "inferred: neighbours agree")]
     for i, (verdict, status) in enumerate(cells):
-        runs["verdict"][0, i], runs["status"][0, i] = verdict, status
+        runs["outcome"][0, i], runs["status"][0, i] = verdict, status
         for name in ("peaks", "peak_to_peak", "period", "settling_time_10um"):
             runs[name][0, i] = np.nan
     runs["peaks"][0, 1] = 3.0  # counted before the run failed: not to be trusted
@@ -92,7 +93,7 @@ def kinds_shown(field: Map | Cloud) -> list[list[Kind | None]]:
 
 def test_axes_are_written_in_the_words_of_an_engineer():
     runs = made_up({DAMPING: np.geomspace(0.1, 1e3, 5), STROKE: np.linspace(0, 1e-3, 3)}, log=(DAMPING,))
-    panel = drawable(map_figure(runs)).panels[0]
+    panel = drawable(map_figure(runs, "peaks")).panels[0]
     assert (panel.x.label, panel.y.label) == ("Limiter damping [N·s/m]", "Joint stroke [mm]")
     assert (panel.x.log, panel.y.log) == (True, False)
     assert [quantity(key) for key in (CROSSOVER, "mass", "joint.stiffness", "controller.kp", "motion.duration")] == [
@@ -105,25 +106,29 @@ def test_axes_are_written_in_the_words_of_an_engineer():
 
 
 def test_the_verification_stands_on_the_figure():
-    figure = map_figure(plain(verified_cells=84, verified_surviving=81, verified_rtol=1e-6))
+    figure = map_figure(plain(verified_cells=84, verified_surviving=81, verified_rtol=1e-6), "peaks")
     share, z = 81 / 84, 1.959963984540054
     middle = (share + z**2 / 168) / (1 + z**2 / 84)
     half = z * math.sqrt(share * (1 - share) / 84 + z**2 / (4 * 84**2)) / (1 + z**2 / 84)  # Wilson (1927)
     said = (
-        "96.4 % of 84 verdicts checked survive rtol 1e-06 "
+        "96.4 % of 84 outcomes checked survive rtol 1e-06 "
         f"(95 % confidence: {100 * (middle - half):.1f} to {100 * (middle + half):.1f} %)."
     )
-    assert figure.note.splitlines() == [said, "20 runs at rtol 0.0001: hunts 15, settles 5."]
+    assert figure.note.splitlines() == [
+        "Peaks are counted in 75 % of the map, over the whole range of every axis.",
+        said,
+        "20 runs at rtol 0.0001: swings 15, rests 5.",
+    ]
     on_paper = " ".join(text.get_text() for text in matplotlib_renderer.render(figure).texts)
     assert said in on_paper
     assert said in plotly_renderer.render(figure).layout.annotations[0].text
-    assert verification(plain()) == "Not verified: no verdict was checked at a tighter tolerance."
+    assert verification(plain()) == "Not verified: no outcome was checked at a tighter tolerance."
 
 
 def test_runs_that_were_not_made_are_not_counted():
-    assert statement(troubled()).splitlines()[1] == (
+    assert statement(troubled(), "outcome").splitlines()[2] == (
         "16 runs at rtol 0.0001, 2 cells inferred from their neighbours: "
-        "hunts 13, settles 4, failed 1, invalid 1, not run 1."
+        "swings 13, rests 4, failed 1, invalid 1, not run 1."
     )
 
 
@@ -133,34 +138,34 @@ def test_runs_that_were_not_made_are_not_counted():
 def test_cells_without_number_are_told_apart_and_never_zero():
     field = only_map(map_figure(troubled(), "peaks"))
     column = [row[0] for row in kinds_shown(field)]
-    assert column == [INVALID, FAILED, NOT_RUN, INFERRED["hunts"], INFERRED["settles"]]
+    assert column == [INVALID, FAILED, NOT_RUN, INFERRED["swings"], INFERRED["rests"]]
     assert np.isnan(field.z[:, 0]).all()
     assert np.array_equal(field.z[:, 1:], troubled().peaks.values[1:].T)
     assert all(kind is None for row in kinds_shown(field) for kind in row[1:])
     everything = [
         QUIET,
         *ramp(11),
-        *(kind.colour for kind in {*field.kinds, *VERDICTS.values()} if kind.label != "settles"),
+        *(kind.colour for kind in {*field.kinds, *KINDS["outcome"].values()} if kind.label != "rests"),
     ]
     assert len(set(everything)) == len(everything)
 
 
 def test_a_number_that_a_run_does_not_have_is_named():
     never = only_map(map_figure(troubled(), "settling_time_10um"))
-    assert kinds_shown(never)[1][1] == Kind("never settles into 10 µm", never.kinds[-1].colour)
+    assert kinds_shown(never)[1][1] == Kind("does not stay within 10 µm", never.kinds[-1].colour)
     assert kinds_shown(only_map(map_figure(plain(), "period")))[0][0].label == "no period"
 
 
-def test_verdicts_have_their_own_colours_in_the_order_of_severity():
+def test_outcomes_have_their_own_colours_in_the_order_of_severity():
     runs = troubled()
-    runs["verdict"][3, 0] = "strange"
-    field = only_map(map_figure(runs, "verdict"))
+    runs["outcome"][3, 0] = "strange"
+    field = only_map(map_figure(runs, "outcome"))
     names = [kind.label for kind in field.kinds]
-    assert names == ["hunts", "settles", "failed", "invalid", "not run", "strange"]
+    assert names == ["swings", "rests", "failed", "invalid", "not run", "strange"]
     shown = [[kind.label for kind in row] for row in kinds_shown(field)]
-    expected = np.where(runs.verdict.values == "", "not run", runs.verdict.values).T
+    expected = np.where(runs.outcome.values == "", "not run", runs.outcome.values).T
     assert shown == expected.tolist()
-    kinds, _ = colour_key(map_figure(runs, "verdict"))
+    kinds, _ = colour_key(map_figure(runs, "outcome"))
     assert [kind.label for kind in kinds] == names
     assert not field.has_numbers
 
@@ -168,11 +173,11 @@ def test_verdicts_have_their_own_colours_in_the_order_of_severity():
 def test_peaks_have_one_colour_per_count():
     runs = plain()
     runs["peaks"][0, 0] = 30
-    drawn = scale(only_map(map_figure(runs)))
+    drawn = scale(only_map(map_figure(runs, "peaks")))
     assert (drawn.low, drawn.high, len(drawn.colours)) == (-0.5, 30.5, 31)
     assert drawn.colours[0] == QUIET
     assert len(set(drawn.colours)) == 31
-    mesh = matplotlib_renderer.render(map_figure(plain())).axes[0].collections[0]
+    mesh = matplotlib_renderer.render(map_figure(plain(), "peaks")).axes[0].collections[0]
     assert [to_hex(mesh.to_rgba(float(count))) for count in range(4)] == [QUIET, *ramp(3)]
 
 
@@ -191,9 +196,9 @@ def test_variables_may_be_missing():
     runs = plain()[["peak_to_peak"]]
     runs["peak_to_peak"][1, 1] = np.nan
     assert kinds_shown(only_map(map_figure(runs, "peak_to_peak")))[1][1].label == "no value"
-    assert "20 runs" in statement(runs)
-    by_status = troubled().drop_vars("verdict")
-    assert kinds_shown(only_map(map_figure(by_status)))[1][0] is FAILED
+    assert "20 runs" in statement(runs, "peaks")
+    by_status = troubled().drop_vars("outcome")
+    assert kinds_shown(only_map(map_figure(by_status, "peaks")))[1][0] is FAILED
     with pytest.raises(ValueError, match=r"metric: got 'peaks', expected one of peak_to_peak"):
         map_figure(runs, "peaks")
 
@@ -207,7 +212,7 @@ def test_logarithmic_cells_are_centred_by_ratio():
     assert cell_edges(np.array([0.0, 1.0, 4.0])) == pytest.approx([-0.5, 0.5, 2.5, 5.5])
     assert cell_edges(np.array([0.0])) == pytest.approx([-0.5, 0.5])
     assert cell_edges(np.array([8.0]), log=True) == pytest.approx([4.0, 16.0])
-    figure = map_figure(made_up({DAMPING: values, STROKE: [0.0, 1e-3]}, log=(DAMPING,)))
+    figure = map_figure(made_up({DAMPING: values, STROKE: [0.0, 1e-3]}, log=(DAMPING,)), "peaks")
     axes = matplotlib_renderer.render(figure).axes[0]
     corners = np.asarray(axes.collections[0].get_coordinates())
     assert corners[0, :, 0] == pytest.approx(cell_edges(values, log=True))
@@ -224,7 +229,7 @@ def test_unsorted_axes_are_drawn_in_order():
 
 
 def test_words_and_a_logarithm_of_zero_become_named_cells():
-    figure = map_figure(made_up({LOCKED: [True, False], DAMPING: [0.0, 1.0, 10.0]}, log=(DAMPING,)))
+    figure = map_figure(made_up({LOCKED: [True, False], DAMPING: [0.0, 1.0, 10.0]}, log=(DAMPING,)), "peaks")
     panel = figure.panels[0]
     assert panel.x.words == ("locked", "free")
     assert panel.y.words == ("0 N·s/m", "1 N·s/m", "10 N·s/m")
@@ -252,9 +257,9 @@ def test_the_evaluation_point_is_marked():
 def test_a_slice_says_where_it_was_cut():
     runs = made_up({CROSSOVER: np.linspace(1, 16, 4), STROKE: np.linspace(0, 1e-3, 5), LOCKED: [True, False]})
     cut = runs.isel({LOCKED: 1})
-    assert map_panel(cut).title == "Counted peaks, Joint free"
+    assert map_panel(cut, "peaks").title == "Counted peaks, Joint free"
     assert map_panel(cut, title="A").title == "A"
-    assert np.array_equal(map_panel(cut).maps[0].z, cut.peaks.values.T)
+    assert np.array_equal(map_panel(cut, "peaks").maps[0].z, cut.peaks.values.T)
     with pytest.raises(ValueError, match=r"map_panel: got runs over .*joint.locked, expected two axes"):
         map_panel(runs)
 
@@ -262,7 +267,7 @@ def test_a_slice_says_where_it_was_cut():
 def test_two_maps_side_by_side_keep_their_own_scales():
     other = plain()
     other["peaks"][0, 0] = 9
-    panels = tuple(map_panel(runs, title=title) for runs, title in ((plain(), "A"), (other, "B")))
+    panels = tuple(map_panel(runs, "peaks", title=title) for runs, title in ((plain(), "A"), (other, "B")))
     figure = Figure("both", "Both", "", panels, columns=2)
     bars = [
         trace.colorbar.x for trace in plotly_renderer.render(figure).data if trace.type == "heatmap" and trace.showscale
@@ -282,7 +287,7 @@ def test_further_axes_become_slices_on_one_scale():
         "mass": np.arange(1.0, 8),
     }
     runs = made_up(axes)
-    figure = map_figure(runs, marker={CROSSOVER: 6.0, STROKE: 0.0, LOCKED: False})
+    figure = map_figure(runs, "peaks", marker={CROSSOVER: 6.0, STROKE: 0.0, LOCKED: False})
     assert len(figure.panels) == 8 <= SLICES
     titles = [panel.title for panel in figure.panels]
     assert titles[:2] == ["Joint locked, Mass 1", "Joint locked, Mass 3"]
@@ -297,8 +302,8 @@ def test_further_axes_become_slices_on_one_scale():
 
 def test_a_panel_without_numbers_leaves_the_colour_bar_to_another():
     runs = made_up({CROSSOVER: [1.0, 2.0], STROKE: [0.0, 1e-3], LOCKED: [True, False]})
-    runs["verdict"][:, :, 0], runs["peaks"][:, :, 0] = "invalid", np.nan
-    traces = plotly_renderer.render(map_figure(runs)).data
+    runs["outcome"][:, :, 0], runs["peaks"][:, :, 0] = "invalid", np.nan
+    traces = plotly_renderer.render(map_figure(runs, "peaks")).data
     assert [trace.xaxis for trace in traces if trace.type == "heatmap" and trace.showscale] == ["x2"]
 
 
@@ -317,14 +322,14 @@ def test_a_single_axis_is_a_line_with_what_has_no_number_under_it():
     runs = troubled().isel({CROSSOVER: 0})
     runs["peaks"][3], runs["status"][3] = 5.0, "done"
     runs["peaks"][4], runs["status"][4] = 2.0, "done"
-    panel = map_figure(runs).panels[0]
+    panel = map_figure(runs, "peaks").panels[0]
     assert panel.series[0].y == pytest.approx([np.nan, np.nan, np.nan, 5, 2], nan_ok=True)
     under = {marker.label: marker for marker in panel.markers[1:]}
     assert list(under) == ["failed", "invalid", "not run"]
     assert under["failed"].x.tolist() == [0.25e-3]
     assert all(marker.y.max() < 2.0 for marker in under.values())
-    verdicts = map_figure(runs, "verdict").panels[0]
-    assert verdicts.y.words == ("hunts", "settles", "failed", "invalid", "not run")
+    verdicts = map_figure(runs, "outcome").panels[0]
+    assert verdicts.y.words == ("swings", "rests", "failed", "invalid", "not run")
     assert [marker.x.tolist() for marker in verdicts.markers[:2]] == [[pytest.approx(0.75e-3)], [1e-3]]
 
 
@@ -332,7 +337,7 @@ def sampled(**attrs: Any) -> xr.Dataset:
     runs = made_up({"sample": np.arange(12)}, **attrs).drop_vars("sample")
     keys = {"mass": (1.0 + np.arange(12), "kg"), STROKE: (1e-3 / (1 + np.arange(12)), "m"), "x": (np.ones(12), "")}
     runs = runs.assign_coords({key: ("sample", values, {"units": unit}) for key, (values, unit) in keys.items()})
-    runs["verdict"][3], runs["peaks"][3] = "invalid", np.nan
+    runs["outcome"][3], runs["peaks"][3] = "invalid", np.nan
     return runs
 
 
@@ -353,11 +358,11 @@ def test_samples_are_points_over_the_first_two_keys():
 
 EVERY = {
     "troubled": map_figure(troubled(), marker={CROSSOVER: 8.0, STROKE: 3e-4}),
-    "verdict": map_figure(troubled(), "verdict"),
-    "slices": map_figure(made_up({CROSSOVER: [1.0, 2.0], STROKE: [0.0, 1e-3], LOCKED: [True, False]})),
+    "outcome": map_figure(troubled(), "outcome"),
+    "slices": map_figure(made_up({CROSSOVER: [1.0, 2.0], STROKE: [0.0, 1e-3], LOCKED: [True, False]}), "peaks"),
     "line": map_figure(plain().isel({CROSSOVER: 0}), "settling_time_10um"),
-    "rows": map_figure(plain().isel({CROSSOVER: 0}), "verdict"),
-    "samples": map_figure(sampled()),
+    "rows": map_figure(plain().isel({CROSSOVER: 0}), "outcome"),
+    "samples": map_figure(sampled(), "peaks"),
     "one cell": map_figure(plain().isel({CROSSOVER: [1], STROKE: [0]}), "peak_to_peak"),
 }
 
@@ -387,8 +392,8 @@ def test_both_renderers_draw_the_same(figure):
 
 def test_a_large_map_is_a_picture_inside_a_vector_file():
     runs = made_up({CROSSOVER: np.linspace(1, 16, 150), STROKE: np.linspace(0, 1e-3, 150)})
-    assert b"data:image/png" in matplotlib_renderer.image(map_figure(runs), "svg")
-    assert b"data:image/png" not in matplotlib_renderer.image(map_figure(plain()), "svg")
+    assert b"data:image/png" in matplotlib_renderer.image(map_figure(runs, "peaks"), "svg")
+    assert b"data:image/png" not in matplotlib_renderer.image(map_figure(plain(), "peaks"), "svg")
 
 
 # ---------------------------------------------------------------- page
@@ -415,21 +420,21 @@ def test_a_click_finds_every_value_of_its_cell():
     assert crossover["values"] == [1.0, 6.0, 11.0, 16.0]
     assert stroke["values"] == pytest.approx([0, 0.25, 0.5, 0.75, 1.0])
     shown = {item["name"]: item for item in data["variables"]}
-    assert list(shown) == ["peaks", "peak_to_peak", "period", "settling_time_10um", "verdict"]
+    assert list(shown) == ["peaks", "peak_to_peak", "period", "settling_time_10um", "outcome"]
     factors = {"peak_to_peak": 1e6}
     for name in list(shown)[:-1]:
         expected = runs[name].values[places].ravel() * factors.get(name, 1.0)
         assert unpacked(shown[name]["numbers"], "<f4") == pytest.approx(expected, rel=1e-5, nan_ok=True)
     assert (shown["peak_to_peak"]["unit"], shown["peak_to_peak"]["label"]) == ("µm", "Peak to peak, last quarter")
     texts = {item["name"]: item for item in data["texts"]}
-    for name in ("verdict", "status"):
+    for name in ("outcome", "status"):
         words = np.array(texts[name]["words"])[unpacked(texts[name]["codes"], "<u4")]
         assert words.tolist() == runs[name].values[places].ravel().tolist()
 
 
 def test_the_page_colours_cells_as_the_figure_does():
     runs = troubled()
-    for name in ("peaks", "verdict", "settling_time_10um"):
+    for name in ("peaks", "outcome", "settling_time_10um"):
         shown = look(runs, name)
         item = {item["name"]: item for item in page_data(map_html(runs, name, RERUN))["variables"]}[name]
         codes = unpacked(item["codes"], "u1").astype(float)
@@ -450,10 +455,10 @@ def test_the_page_opens_offline_and_says_what_it_shows():
     assert "default-src 'none'" in page
     assert not re.findall(r"https?://[^\"'<> ]*", page.replace(plotly_renderer.script(), ""))
     for text in (
-        "90.0 % of 10 verdicts checked survive rtol 1e-07",
+        "90.0 % of 10 outcomes checked survive rtol 1e-07",
         "1 to 16 Hz, 4 values (controller.crossover)",
         "0 to 1 mm, 5 values (joint.stroke)",
-        "hunts 13, settles 4, failed 1, invalid 1, not run 1",
+        "swings 13, rests 4, failed 1, invalid 1, not run 1",
         "step budget used up",
         "relative tolerance 0.0001",
         'name = "Rig"',
@@ -463,7 +468,7 @@ def test_the_page_opens_offline_and_says_what_it_shows():
 
 
 def test_a_page_of_samples_names_their_numbers():
-    data = page_data(map_html(sampled(), "verdict", RERUN))
+    data = page_data(map_html(sampled(), "outcome", RERUN))
     assert (data["sampled"], data["order"], data["indices"]) == (True, [0, 1, 2], [list(range(12))])
     assert [len(axis["values"]) for axis in data["axes"]] == [12, 12, 12]
     single = page_data(map_html(plain().isel({CROSSOVER: 0}), "peaks", RERUN))
@@ -471,7 +476,7 @@ def test_a_page_of_samples_names_their_numbers():
 
 
 def test_a_page_too_large_is_thinned_and_says_so():
-    runs = made_up({CROSSOVER: np.linspace(1, 16, 1000), STROKE: np.linspace(0, 1e-3, 400)})[["peaks", "verdict"]]
+    runs = made_up({CROSSOVER: np.linspace(1, 16, 1000), STROKE: np.linspace(0, 1e-3, 400)})[["peaks", "outcome"]]
     page = map_html(runs, "peaks", RERUN)
     data = page_data(page)
     rows, columns = (np.array(indices) for indices in data["indices"])
@@ -488,7 +493,7 @@ EVIL = '</script><script>alert("x")</script><img src=x onerror=alert(1)>$&'
 def test_names_states_and_words_cannot_inject_markup():
     def runs(word: str) -> xr.Dataset:
         table = made_up({CROSSOVER: [1.0, 2.0], word: ["a", word]}, name=word, stage=word)
-        table["verdict"][0, 0], table["status"] = "failed", table.status.astype("<U99")
+        table["outcome"][0, 0], table["status"] = "failed", table.status.astype("<U99")
         table["status"][0, 0] = word
         table["peaks"].attrs["units"] = word
         table[CROSSOVER].attrs["units"] = word
@@ -539,8 +544,83 @@ def test_files_are_the_same_bytes_in_every_process(request, tmp_path):
 
 
 def test_arrays_of_different_shape_are_refused():
-    field = only_map(map_figure(plain()))
+    field = only_map(map_figure(plain(), "peaks"))
     with pytest.raises(ValueError, match=r"codes have the shape \(2,\), expected that of z, \(5, 4\)"):
         replace(field, codes=np.zeros(2))
     with pytest.raises(ValueError, match=r"expected one length"):
         Cloud(np.zeros(2), np.zeros(2), np.zeros(3), "Peaks", "")
+
+
+# ---------------------------------------------------------------- what a map says first
+
+
+def swinging(where: np.ndarray) -> xr.Dataset:
+    """The plain map, 4 crossovers by 5 strokes, whose runs swing where told and rest elsewhere."""
+    runs = plain()
+    runs["outcome"] = (runs.outcome.dims, np.where(where, "swings", "rests"))
+    runs["peaks"] = (runs.peaks.dims, np.where(where, 2.0, 0.0))
+    return runs
+
+
+@pytest.mark.parametrize(
+    ("rows", "columns", "said"),
+    [
+        (slice(0, 2), slice(None), "The run swings at its end in 50 % of the map: at crossover up to 6 Hz"),
+        (slice(2, 4), slice(None), "The run swings at its end in 50 % of the map: at crossover from 11 Hz"),
+        (
+            slice(1, 2),
+            slice(0, 2),
+            "10 % of the map: at crossover 6 Hz and joint stroke up to 250 µm (everywhere there)",
+        ),
+        (
+            slice(1, 3),
+            slice(1, 3),
+            "crossover from 6 Hz to 11 Hz and joint stroke from 250 µm to 500 µm (everywhere there).",
+        ),
+        (slice(0, 0), slice(None), "The run swings at its end nowhere in the map."),
+        (slice(None), slice(None), "The run swings at its end everywhere in the map."),
+    ],
+)
+def test_a_map_says_first_where_runs_swing(rows: slice, columns: slice, said: str) -> None:
+    where = np.zeros((4, 5), bool)
+    where[rows, columns] = True
+    runs = swinging(where)
+    assert said in headline(runs, "outcome")
+    assert headline(runs, "period") == headline(runs, "outcome")
+    assert headline(runs, "peaks") == headline(runs, "outcome").replace(
+        "The run swings at its end", "Peaks are counted"
+    )
+    assert map_figure(runs).note.splitlines()[0] == headline(runs, "outcome")
+    backwards = runs.isel({CROSSOVER: slice(None, None, -1)})
+    assert headline(backwards, "outcome") == headline(runs, "outcome")
+
+
+def test_where_runs_swing_holds_for_every_cell() -> None:
+    """Of any map: no cell outside of the ranges told swings, and so many of those inside do."""
+    rng = np.random.default_rng(2)
+    where = rng.random((4, 5)) < 0.4
+    where[3], where[:, 4] = False, False
+    text = headline(swinging(where), "outcome")
+    strokes = "" if where[:, 3].any() else "?"
+    assert "crossover up to 11 Hz" in text
+    assert strokes or "joint stroke up to 750 µm" in text
+    assert f"{100 * where.sum() / 12:.0f} % of the cells there" in text
+    spread = np.zeros((4, 5), bool)
+    spread[0, 0] = spread[3, 4] = True
+    assert headline(swinging(spread), "outcome").endswith("10 % of the map, over the whole range of every axis.")
+
+
+def test_words_samples_and_verdicts_have_their_sentence() -> None:
+    runs = made_up({LOCKED: [True, False], CROSSOVER: np.linspace(1, 16, 4)})
+    runs["outcome"] = (runs.outcome.dims, [["swings"] * 4, ["rests"] * 4])
+    assert headline(runs, "outcome").endswith("50 % of the map: at joint locked (everywhere there).")
+    runs["verdict"] = (runs.outcome.dims, [["settles"] * 4, ["settles", "bistable", "hunts", "settles"]])
+    said = "A cycle of the stage attracts in 25 % of the map: at joint free and crossover from 6 Hz to 11 Hz"
+    assert headline(runs, "verdict") == f"{said} (everywhere there)."
+    assert "verdicts hunts 1, bistable 1, settles 6" in statement(runs, "verdict")
+    drawn = sampled()
+    drawn["outcome"] = (drawn.outcome.dims, np.where(drawn["mass"] < drawn["mass"].median(), "swings", "creeps"))
+    assert "The run swings at its end in 50 % of the map: at mass" in headline(drawn, "outcome")
+    nothing = troubled()
+    nothing["outcome"][:] = "invalid"
+    assert headline(nothing, "outcome") == "The run swings at its end nowhere: no cell of the map has a result."

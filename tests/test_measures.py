@@ -11,27 +11,24 @@ from scipy.signal import find_peaks
 from friso.engine.batch import run_chunks
 from friso.engine.kernel import kernel
 from friso.equations.structure import structure
-from friso.hunting import peaks as scanning
+from friso.hunting import turns as scanning
+from friso.hunting.criteria import APART, COUNTED_ABOVE, COUNTED_AFTER, distinct_peaks
 from friso.hunting.measures import measure, options
-from friso.hunting.peaks import COUNTED_ABOVE, COUNTED_AFTER, scan
-from friso.hunting.turning import APART
+from friso.hunting.turns import scan
 from friso.stage import Stage
 from friso.studies.request import Request
 from friso.studies.samples import Samples
 
 
 def peaks(turns: list[tuple[float, float]]) -> list[float]:
-    """Times of the counted peaks among the (time, value) turning points of one run."""
+    """Times of the distinct peaks among the (time, value) turning points of one run."""
     times, values = (np.array([column]) for column in zip(*turns, strict=True))
-    return times[scan(times, values, np.array([len(turns)]), NOTHING, NOTHING)[0]].tolist()
+    return times[distinct_peaks(times, values, np.array([len(turns)]))].tolist()
 
 
 def periods(times: np.ndarray, values: np.ndarray, counts: np.ndarray, amplitude: np.ndarray) -> np.ndarray:
     """Periods of the cycles [s] in runs of 20 s."""
-    return scan(times, values, counts, amplitude, np.full(len(counts), 20.0))[1]
-
-
-NOTHING = np.zeros(1)
+    return scan(times, values, counts, amplitude, np.full(len(counts), 20.0)).period
 
 
 def test_only_late_and_tall_maxima_count() -> None:
@@ -57,7 +54,7 @@ def test_what_counts_at_the_edge() -> None:
 def test_runs_of_a_batch_do_not_mix() -> None:
     times = np.array([[11.0, 11.5, 12.0], [11.0, 11.5, 12.0]])
     values = np.array([[1e-3, -1e-3, 1e-3], [1e-3, -1e-3, 1e-3]])
-    assert scan(times, values, np.array([3, 1]), np.zeros(2), np.zeros(2))[0].sum(axis=1).tolist() == [2, 0]
+    assert distinct_peaks(times, values, np.array([3, 1])).sum(axis=1).tolist() == [2, 0]
 
 
 @given(st.lists(st.tuples(st.floats(0.01, 0.4), st.integers(-500, 500)), min_size=2, max_size=60))
@@ -129,13 +126,15 @@ def test_compiled_loops_do_what_the_plain_ones_do(monkeypatch: pytest.MonkeyPatc
     rng = np.random.default_rng(1)
     times = np.sort(rng.uniform(8, 20, (300, 40)), axis=1)
     values = rng.normal(0, 3e-4, (300, 40)) * (-1.0) ** np.arange(40)
+    values[::2] = 2e-4 + 1e-3 * values[::2]  # ripple
     counts, amplitude = rng.integers(0, 41, 300), rng.uniform(0, 1e-3, 300)
     compiled = scan(times, values, counts, amplitude, np.full(300, 20.0))
     monkeypatch.setattr(scanning, "MANY", np.inf)
     plain = scan(times, values, counts, amplitude, np.full(300, 20.0))
-    assert np.array_equal(compiled[0], plain[0])
-    assert np.array_equal(compiled[1], plain[1], equal_nan=True)
-    assert 0 < np.isnan(plain[1]).sum() < 300
+    for name in ("peaks", "distinct", "period", "earlier"):
+        assert np.array_equal(getattr(compiled, name), getattr(plain, name), equal_nan=name == "period")
+    assert 0 < np.isnan(plain.period).sum() < 300
+    assert plain.peaks.sum() > plain.distinct.sum() > 0
 
 
 @pytest.mark.xdist_group("rig")
@@ -150,10 +149,12 @@ def test_small_swings_that_are_passed_over_change_no_measure(rig: Stage, rtol: f
     shape = kernel(structure(flat))
     found = {}
     for least in (options(rtol).least_swing, 0.0):
-        columns = [np.full(256, np.nan) for _ in range(6)]
+        columns = [np.full(256, np.nan) for _ in range(7)]
         for runs in run_chunks(shape, flat, 256, replace(options(rtol), least_swing=least)):
             each = measure(runs.part(flat), runs)
-            measured = (each.peaks, each.period, each.peak_to_peak, *each.settling_time, runs.results.turn_counts)
+            swings = each.outcome == "swings"
+            measured = (each.distinct_peaks, each.period, each.peak_to_peak, *each.settling_time, swings)
+            measured = (*measured, runs.results.turn_counts)
             for column, values in zip(columns, measured, strict=True):
                 column[runs.numbers] = values
         found[least] = columns

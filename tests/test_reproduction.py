@@ -41,7 +41,7 @@ from friso.studies.thesis.judges.shares import NARROW, WIDE
 from friso.studies.thesis.linear import NEEDS
 from friso.studies.thesis.maps import begins, ends, free_square, trend
 from friso.studies.thesis.open_parameters import METHOD, OPEN
-from friso.studies.thesis.reproduce import _changed, _coarser, _enters, lasting
+from friso.studies.thesis.reproduce import _changed, _coarser, _enters, counted, lasting
 from friso.studies.thesis.verdicts import not_covered, verdict
 from friso.views.reproduce.figures import reproduction_figures
 from friso.views.reproduce.page import claims_document, reproduction_html, write_reproduction
@@ -194,17 +194,19 @@ def made(name: str, count: Callable[[np.ndarray, np.ndarray], Any], points: int 
     spans = STUDIES[name].spans
     x, y = (np.geomspace(s.low, s.high, points) if s.log else np.linspace(s.low, s.high, points) for s in spans)
     peaks = np.broadcast_to(np.asarray(count(x[:, None], y[None, :]), dtype=float), (points, points))
-    words = np.where(peaks < 0, "invalid", np.where(peaks > 0, "hunts", "settles"))
+    words = np.where(peaks < 0, "invalid", np.where(peaks > 0, "swings", "rests"))
     dims = tuple(span.key for span in spans)
-    return xr.Dataset(
-        {"peaks": (dims, np.where(peaks < 0, np.nan, peaks)), "verdict": (dims, words)},
-        coords={dims[0]: x, dims[1]: y},
+    return counted(
+        xr.Dataset(
+            {"distinct_peaks": (dims, np.where(peaks < 0, np.nan, peaks)), "outcome": (dims, words)},
+            coords={dims[0]: x, dims[1]: y},
+        )
     )
 
 
 def cell(peaks: int = 6, amplitude: float = 0.5e-3, period: float = 1.6) -> Response:
-    values = {"peaks": peaks, "peak_to_peak": 2 * amplitude, "period": period}
-    return Response(xr.Dataset({**values, "verdict": "hunts" if peaks else "settles"}), xr.Dataset())
+    values = {"distinct_peaks": peaks, "peak_to_peak": 2 * amplitude, "period": period}
+    return Response(counted(xr.Dataset({**values, "outcome": "swings" if peaks else "rests"})), xr.Dataset())
 
 
 def sticks(time: float, integral: float) -> Response:
@@ -405,30 +407,32 @@ def test_zero_rows_have_their_meaning() -> None:
     still = found["path"]
     for key in ("motion.acceleration", "motion.acceleration_time"):
         assert still[key].values[0] == 0
-        assert set(still.verdict.sel({key: 0.0}).values) == {"settles"}
+        assert set(still.outcome.sel({key: 0.0}).values) == {"rests"}
         assert (still.largest_force.sel({key: 0.0}) == 0).all()
     friction = found["friction"]
     for key in ("friction.static", "friction.coulomb"):
-        assert set(friction.verdict.sel({key: 0.0}).values) == {"invalid"}
+        assert set(friction.outcome.sel({key: 0.0}).values) == {"invalid"}
     assert all(
-        "friction." in text for text in friction.status.where(friction.verdict == "invalid", "friction.").values.flat
+        "friction." in text for text in friction.status.where(friction.outcome == "invalid", "friction.").values.flat
     )
     assert np.isnan(friction.peaks.sel({"friction.coulomb": 0.0})).all()
     none = found["isolator-stiffness"].sel({"joint.stroke": 0.0})
-    assert set(none.verdict.values) == {"hunts"}
+    assert none.hunting.all()
+    assert set(none.outcome.values) == {"swings"}
 
 
 def test_lasting_hunting() -> None:
     runs = xr.Dataset(
         {
-            "peaks": ("x", [5.0, 3.0, 0.0, np.nan]),
-            "peak_to_peak": ("x", [1e-3, 1e-6, 1e-3, np.nan]),
-            "verdict": ("x", ["hunts", "hunts", "transient", "invalid"]),
+            "distinct_peaks": ("x", [5.0, 3.0, 0.0, np.nan]),
+            "outcome": ("x", ["swings", "rests", "swings", "invalid"]),
         }
     )
-    judged = lasting(runs)
-    assert judged.verdict.values.tolist() == ["hunts", "settles", "hunts", "invalid"]
-    assert judged.peaks.values[:3].tolist() == [5.0, 0.0, 0.0]
+    assert counted(runs).hunting.values.tolist() == [True, True, False, False]
+    ended = lasting(runs)
+    assert ended.hunting.values.tolist() == [True, False, True, False]
+    assert ended.distinct_peaks.values[:3].tolist() == [5.0, 0.0, 0.0]
+    assert "swings" in ended.hunting.attrs["criterion"]
 
 
 def test_a_part_of_the_studies_covers_its_claims_only() -> None:
@@ -494,8 +498,8 @@ def test_the_command_writes_its_page_and_claims(
 def test_fig_14b_at_both_tolerances(small: Reproduction) -> None:
     assert [runs.attrs["rtol"] for runs in small.tolerances.values()] == [1e-4, 1e-8]
     loose, tight = small.tolerances.values()
-    assert small.changed[0] == pytest.approx(float((loose.verdict != tight.verdict).mean()))
-    assert small.changed[1] == pytest.approx(float((loose.peaks != tight.peaks).mean()))
+    assert small.changed[0] == pytest.approx(float((loose.hunting != tight.hunting).mean()))
+    assert small.changed[1] == pytest.approx(float((loose.distinct_peaks != tight.distinct_peaks).mean()))
 
 
 def test_a_count_unknown_at_both_tolerances_does_not_differ(small: Reproduction) -> None:

@@ -46,7 +46,7 @@ def test_a_cycle_of_known_shape() -> None:
     phase = time % 1.6
     deviation = np.where(phase < 0.4, -0.2 + 2 * phase, 0.6 - (phase - 0.4) * 2 / 3) * 1e-3
     found = hunted(recorded(deviation))
-    assert found.lives[0]
+    assert found.swings[0]
     assert found.swing[0] == pytest.approx(0.8e-3, rel=1e-2)
     assert found.period[0] == pytest.approx(1.6, rel=1e-3)
     assert (found.above[0], found.below[0]) == pytest.approx((0.6e-3, 0.2e-3), rel=1e-2)
@@ -55,12 +55,12 @@ def test_a_cycle_of_known_shape() -> None:
     assert found.peaks[0] == 7  # maxima at 10.0, 11.6, ..., 19.6 s
 
 
-def test_a_cycle_that_dies_out_counts_but_does_not_live() -> None:
+def test_swings_that_die_out_count_but_do_not_last() -> None:
     time = np.arange(0, 20, 1e-3)
     dying = np.where(time < 16.5, 5e-4 * np.sin(2 * np.pi * time), 0.0)
     found = hunted(recorded(dying))
     assert found.peaks[0] == 7  # maxima at 10.25, 11.25, ..., 16.25 s
-    assert not found.lives[0]
+    assert not found.swings[0]
 
 
 def test_runs_that_failed_neither_hunt_nor_settle() -> None:
@@ -114,7 +114,7 @@ def test_hunting_ends_at_more_crossover(moved: Hunted) -> None:
     """Fig. 25: it hunts at 8 Hz, here on some rails, and no more at 14.3 Hz."""
     assert 2 <= (moved.peaks[0] > 0).sum() < 8
     assert not moved.peaks[1].any()
-    lives = moved.lives[0]
+    lives = moved.swings[0]
     assert moved.swing[0, lives] == pytest.approx(1e-3, rel=0.5)
 
 
@@ -124,7 +124,7 @@ def test_hunting_can_be_started() -> None:
     tasks = [move(machine), *(released(machine, place) for place in (-5e-3, -5e-4, 1e-3))]
     after_move, *after_release = (follow(machine, task, [20], {}) for task in tasks)
     assert after_move.peaks[0] == 0
-    assert sum(bool(each.lives[0]) for each in after_release) >= 2
+    assert sum(bool(each.swings[0]) for each in after_release) >= 2
 
 
 SMALL = {
@@ -164,7 +164,7 @@ def test_an_even_rail_has_a_symmetric_cycle_and_an_uneven_one_has_not() -> None:
     assert one.above[0] == pytest.approx(one.below[0], rel=0.1)
     assert asymmetry[:4] == pytest.approx(0.0, abs=1e-12)
     assert several.swing[:4] == pytest.approx(one.swing[0], rel=0.02)
-    lives = several.lives[4:]
+    lives = several.swings[4:]
     larger = (several.above > several.below)[4:][lives]
     assert lives.any()
     assert (larger == (asymmetry[4:][lives] < 0)).all()  # it overshoots to where friction is less

@@ -35,7 +35,7 @@ MADE: dict[str, list[tuple[Any, tuple[bool, ...]]]] = {
         (moves((H, 0, 0, 0), middle=(H, 0, H, 0), released=(H, 0, H, 0)), (Y, Y, N)),  # no other than those of moves
         (moves((H, 0, 0, 0), middle=(H, H, H, H), released=(H, H, H, H)), (Y, N, N)),
         (moves((H, 0, 0, 0), middle=(H, 0, 0, 0)), (Y, Y, N)),
-        (moves((H, 0, 0, 0), middle=(H, 0, 0, 0), released=(0, 0, 0, 1), ending=0.0), (Y, Y, N)),  # dies out
+        (moves((H, 0, 0, 0), middle=(H, 0, 0, 0), released=(0, 0, 0, 1), swings=False), (Y, Y, N)),  # dies out
         (moves((H, 0, 0, 0), middle=(H, 0, 0, 0), released=(0, 0, 0, H)), (Y, Y, Y)),
         (moves((H, 0, 0, 0), high=(0, 0, 0, 1), released=(0, H, 0, 0)), (N, N, Y)),
         (moves((0, 0, 0, 0), middle=(0, 0, 0, H), released=(0, H, 0, 0)), (N, Y, Y)),
@@ -53,22 +53,22 @@ MADE: dict[str, list[tuple[Any, tuple[bool, ...]]]] = {
     ],
     "F27": [
         (cycles(), (Y, Y, Y, Y)),
-        (cycles({"swing": 4e-3, "ending": 4e-3}), (N, N, Y, Y)),
+        (cycles({"swing": 4e-3}), (N, N, Y, Y)),
         (cycles({"above": 8e-4, "below": 2e-4}), (N, Y, Y, Y)),
-        (cycles({"ending": 0.0}), (N, Y, Y, Y)),
-        (cycles({"period": np.nan, "swing": 1e-6, "ending": 1e-6}), (N, N, Y, Y)),  # no cycle to compare with
+        (cycles({"swings": False}), (N, Y, Y, Y)),
+        (cycles({"period": np.nan, "swing": 1e-6, "swings": False}), (N, N, Y, Y)),  # no cycle to compare with
         (cycles(period=0.8), (Y, N, Y, Y)),
-        (cycles(swing=2e-3, ending=2e-3), (Y, N, Y, Y)),  # slow, but larger
-        (cycles(swing=[1e-3, 1e-3, 3e-3, 3e-3], ending=3e-3), (Y, Y, Y, Y)),  # half of those that live
-        (cycles(swing=[1e-3, 3e-3, 3e-3, 3e-3], ending=3e-3), (Y, N, Y, Y)),  # all that are similar, but one of four
-        (cycles(period=[1.0, 0.5, 0.5, 1.0], ending=[1e-3, 1e-3, 0, 0]), (Y, Y, Y, Y)),  # two of four have died
-        (cycles(period=[0.5, 0.5, 1.0, 1.0], ending=[1e-3, 1e-3, 0, 0]), (Y, N, Y, Y)),
+        (cycles(swing=2e-3), (Y, N, Y, Y)),  # slow, but larger
+        (cycles(swing=[1e-3, 1e-3, 3e-3, 3e-3]), (Y, Y, Y, Y)),  # half of those that live
+        (cycles(swing=[1e-3, 3e-3, 3e-3, 3e-3]), (Y, N, Y, Y)),  # all that are similar, but one of four
+        (cycles(period=[1.0, 0.5, 0.5, 1.0], swings=[True, True, False, False]), (Y, Y, Y, Y)),  # two of four have died
+        (cycles(period=[0.5, 0.5, 1.0, 1.0], swings=[True, True, False, False]), (Y, N, Y, Y)),
         (cycles(above=5.2e-4), (Y, Y, N, Y)),
         (cycles(above=[5e-4, 5e-4, 5e-4, 9e-4]), (Y, Y, N, Y)),
         (cycles(above=4e-4, below=6e-4), (Y, Y, Y, Y)),  # either side may be the larger
         (cycles(period_scatter=0.04), (Y, Y, Y, N)),
         (cycles(period_scatter=[0.1, 0.1, np.nan, 0.0]), (Y, Y, Y, Y)),
-        (cycles(ending=0.0, period_scatter=np.nan), (Y, N, N, N)),  # none lives on
+        (cycles(swings=False, period_scatter=np.nan), (Y, N, N, N)),  # none lives on
     ],
     "F28": [
         (standstill(), (Y, Y, Y)),

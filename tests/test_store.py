@@ -15,6 +15,7 @@ import xarray as xr
 from refusals import Refused
 
 import friso
+from friso.errors import StoreError
 from friso.stage import Stage
 from friso.studies import refine
 from friso.studies import store as storing
@@ -39,7 +40,7 @@ def whole(rig: Stage) -> xr.Dataset:
 def same(stored: xr.Dataset, whole: xr.Dataset) -> None:
     """Equal to the last bit, coordinates and attributes included."""
     loaded = stored.load()
-    for name in ("verdict", "status"):
+    for name in ("outcome", "status"):
         loaded[name] = loaded[name].astype(object)
     xr.testing.assert_identical(loaded, whole)
 
@@ -194,7 +195,7 @@ def test_a_store_of_nearly_the_same_study_is_refused(
 def test_chunks_that_a_power_cut_took_are_run_again(rig: Stage, whole: xr.Dataset, tmp_path: Path) -> None:
     path = tmp_path / "a.zarr"
     friso.sweep(rig, AXES, store=path)
-    chunks = [sorted((path / name).glob("[0-9]*")) for name in ("peaks", "verdict")]
+    chunks = [sorted((path / name).glob("[0-9]*")) for name in ("peaks", "outcome")]
     chunks[0][1].unlink()
     chunks[1][3].write_bytes(b"")
     with Store.opened(path, Request(rig, AXES).study()) as store:
@@ -307,7 +308,7 @@ def test_export(rig: Stage, whole: xr.Dataset, tmp_path: Path) -> None:
     with xr.open_dataset(tmp_path / "map.nc") as found:
         assert np.array_equal(found.peaks, whole.peaks)
         assert found.attrs["stage"] == rig.to_toml()
-        assert found.verdict.astype(str).values.tolist() == whole.verdict.values.tolist()
+        assert found.outcome.astype(str).values.tolist() == whole.outcome.values.tolist()
     export(whole, tmp_path / "map.csv")
     table = pd.read_csv(tmp_path / "map.csv")
     assert len(table) == 12 * 16
@@ -315,3 +316,11 @@ def test_export(rig: Stage, whole: xr.Dataset, tmp_path: Path) -> None:
     assert np.array_equal(table["largest_force [N]"], whole.largest_force.values.ravel())
     with pytest.raises(ValueError, match=r"\.nc or \.csv"):
         export(whole, tmp_path / "map.xls")
+
+
+def test_a_store_whose_verdicts_are_by_the_peak_count_is_refused(tmp_path: Path) -> None:
+    """Written before outcomes: it says why, and what to do."""
+    old = xr.Dataset({"verdict": ("x", ["hunts"])}, attrs={"equations": "0.1.0"})
+    old.to_zarr(tmp_path / "old.zarr", zarr_format=2)
+    with pytest.raises(StoreError, match=r"earlier friso, whose verdicts are by the peak count[\s\S]*under a new name"):
+        read_store(tmp_path / "old.zarr")

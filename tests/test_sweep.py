@@ -13,11 +13,12 @@ import friso
 from friso.engine.batch import run_chunks
 from friso.engine.kernel import kernel
 from friso.equations.structure import structure
-from friso.hunting.basin import ends_hunting
+from friso.hunting.basin import ends_in
 from friso.hunting.cycle.hunting import hunting
 from friso.hunting.measures import Measures, measure, options
 from friso.hunting.verdict import judge
 from friso.stage import Stage
+from friso.studies.cells import USUAL
 from friso.studies.request import Request
 from friso.studies.samples import Samples
 from friso.studies.study import study_of
@@ -31,7 +32,7 @@ pytestmark = pytest.mark.xdist_group("rig")
 def judged(stage: Stage, found: Measures) -> str:
     """The verdict of a check; of a stage whose motion ends in its cycle without what a check tells of that besides."""
     known = hunting(stage)
-    if known.attracting and ends_hunting(stage.flat(), 1, known.attracting[0])[0][0]:
+    if known.attracting and ends_in(stage.flat(), 1, known.attracting[0])[0][0]:
         return "hunts"
     return judge(stage, found, 1e-6).verdict
 
@@ -39,7 +40,10 @@ def judged(stage: Stage, found: Measures) -> str:
 def test_cells_equal_runs_alone(rig: Stage) -> None:
     """Any cell, run alone as a stage of its own, gives the same numbers bit for bit, and the verdict of a check."""
     runs = friso.sweep(
-        rig, {"joint.locked": [True, False], "controller.crossover": (np.array([4.0, 8.0, 20.0]), "Hz")}, rtol=1e-6
+        rig,
+        {"joint.locked": [True, False], "controller.crossover": (np.array([4.0, 8.0, 20.0]), "Hz")},
+        metrics=[*USUAL, "verdict"],
+        rtol=1e-6,
     )
     assert runs.peaks.dims == ("joint.locked", "controller.crossover")
     assert runs["controller.crossover"].attrs["units"] == "Hz"
@@ -50,7 +54,8 @@ def test_cells_equal_runs_alone(rig: Stage) -> None:
             flat = alone.flat()
             (single,) = run_chunks(kernel(structure(flat)), flat, 1, options(1e-6))
             case = measure(flat, single)
-            assert (cell.verdict.item(), cell.peaks.item()) == (judged(alone, case), case.peaks[0])
+            assert (cell.verdict.item(), cell.outcome.item()) == (judged(alone, case), case.outcome[0])
+            assert (cell.peaks.item(), cell.distinct_peaks.item()) == (case.peaks[0], case.distinct_peaks[0])
             assert cell.peak_to_peak.item() == case.peak_to_peak[0]
             assert cell.largest_force.item() == case.largest_force[0]
             assert cell.steps.item() == case.steps[0]
@@ -67,7 +72,7 @@ def test_a_defaulted_tuned_mass_follows_a_swept_mass(rig: Stage) -> None:
 def test_impossible_cells_are_marked_and_the_others_run(rig: Stage) -> None:
     locked = rig.replace({"joint.locked": True})
     runs = friso.sweep(locked, {"friction.static": "0 N..4 N:3", "controller.crossover": ["8 Hz", "-1 Hz"]})
-    assert (runs.verdict.values == "invalid").tolist() == [[True, True], [False, True], [False, True]]
+    assert (runs.outcome.values == "invalid").tolist() == [[True, True], [False, True], [False, True]]
     reasons = runs.status.values
     assert "friction.static must be greater than 0" in reasons[0, 0]
     assert "controller.crossover must be greater than 0" in reasons[1, 1]
@@ -75,7 +80,7 @@ def test_impossible_cells_are_marked_and_the_others_run(rig: Stage) -> None:
     assert reasons[1, 0] == "done"
     below = friso.sweep(locked, {"friction.coulomb": ["1 N", "3.5 N"]})
     assert "friction.coulomb" in below.status.values[1]
-    assert below.verdict.values.tolist() == ["hunts", "invalid"]
+    assert below.outcome.values.tolist() == ["swings", "invalid"]
 
 
 def test_a_link_moves_the_keys_that_follow(rig: Stage) -> None:
@@ -90,14 +95,14 @@ def test_a_link_moves_the_keys_that_follow(rig: Stage) -> None:
     links = {"friction.static": "max(friction.static, friction.coulomb)"}
     axes = {"friction.static": "1 N..3 N:2", "friction.coulomb": "0.5 N..3 N:2"}
     runs = friso.sweep(rig, axes, links=links)
-    assert "invalid" not in runs.verdict.values
+    assert "invalid" not in runs.outcome.values
     assert study_of(runs).cell_stage((0, 1)).friction.static == 3.0
 
 
 def test_samples_vary_several_keys_at_once(rig: Stage) -> None:
     ranges = {"controller.crossover": "2 Hz..16 Hz", "joint.stroke": "10 um..1 mm:log"}
     runs = friso.sweep(rig, {"joint.locked": [True, False]}, Samples(ranges, 16))
-    assert runs.verdict.dims == ("joint.locked", "sample")
+    assert runs.outcome.dims == ("joint.locked", "sample")
     assert runs["joint.stroke"].dims == ("sample",)
     assert (runs["joint.stroke"] < 1e-4).sum() == 8  # even in the logarithm
     index = (1, 5)
@@ -134,7 +139,7 @@ def test_ranges_and_lists_as_texts(rig: Stage) -> None:
 
 def test_only_the_metrics_asked_for_are_kept(rig: Stage) -> None:
     runs = friso.sweep(rig, {"controller.crossover": ["4 Hz", "8 Hz"]}, metrics=["peaks"])
-    assert set(runs.data_vars) == {"peaks", "verdict", "status"}
+    assert set(runs.data_vars) == {"peaks", "outcome", "status"}
 
 
 @settings(deadline=None, max_examples=40)
@@ -249,7 +254,7 @@ def test_measures_of_the_hunting_cycle_are_those_of_the_stage_alone(rig: Stage) 
     locked = rig.replace({"joint.locked": True})
     axes = {"controller.crossover": ["4 Hz", "8 Hz", "30 Hz"], "motion.acceleration": ["1 m/s^2", "100 m/s^2"]}
     runs = friso.sweep(locked, axes, metrics=["multiplier", "amplitude", "cycle_period", "peaks"])
-    assert set(runs.data_vars) == {"peaks", "multiplier", "amplitude", "cycle_period", "verdict", "status"}
+    assert set(runs.data_vars) == {"peaks", "multiplier", "amplitude", "cycle_period", "outcome", "status"}
     for name in ("multiplier", "amplitude", "cycle_period"):
         assert np.array_equal(runs[name].values[:, 0], runs[name].values[:, 1], equal_nan=True)
         assert np.isnan(runs[name].values[2]).all()

@@ -31,7 +31,7 @@ def test_verification_tells_what_a_tighter_sweep_would(rig: Stage) -> None:
     axes = {"controller.crossover": "2 Hz..8 Hz:12", "joint.stroke": "0.1 mm..1 mm:12"}
     runs = friso.sweep(rig, axes, rtol=1e-2, verify=1.0)
     tighter = friso.sweep(rig, axes, rtol=1e-4)
-    same = int((runs.verdict == tighter.verdict).sum())
+    same = int((runs.outcome == tighter.outcome).sum())
     assert runs.attrs["verified_cells"] == 144
     assert runs.attrs["verified_rtol"] == pytest.approx(1e-4)
     assert runs.attrs["verified_surviving"] == same < 144
@@ -40,7 +40,7 @@ def test_verification_tells_what_a_tighter_sweep_would(rig: Stage) -> None:
 def test_only_cells_that_were_run_are_verified(rig: Stage) -> None:
     axes = {"friction.static": "0 N..4 N:6", "friction.coulomb": "0 N..4 N:6"}
     runs = friso.sweep(rig, axes, rtol=1e-4, verify=1.0)
-    assert runs.attrs["verified_cells"] == int((runs.verdict != "invalid").sum()) == 15
+    assert runs.attrs["verified_cells"] == int((runs.outcome != "invalid").sum()) == 15
     nothing = friso.sweep(rig, {"friction.coulomb": "4 N..5 N:3"}, verify=1.0)
     assert "verified_cells" not in nothing.attrs
 
@@ -61,14 +61,14 @@ def test_cells_are_drawn_evenly_once_and_always_the_same(count: int, points: int
 
 def test_the_loosest_safe_tolerance_is_chosen(rig: Stage, monkeypatch: pytest.MonkeyPatch) -> None:
     study = Request(rig, {"controller.crossover": "1 Hz..16 Hz:400"}).study()
-    right = np.where(np.arange(400) < 200, "hunts", "settles")
+    right = np.where(np.arange(400) < 200, "swings", "rests")
 
     def pretended(study: Study, cells: np.ndarray, crew: object) -> Columns:
         """Wrong in 2 % of the cells down to 1e-5, right from there on."""
         verdicts = right.copy()
         if study.rtol > 1.5e-5:
-            verdicts[:8] = "settles"
-        return {"verdict": verdicts}
+            verdicts[:8] = "rests"
+        return {"outcome": verdicts}
 
     monkeypatch.setattr(verify, "run_scattered", pretended)
     with local_crew(1) as crew:
@@ -77,7 +77,7 @@ def test_the_loosest_safe_tolerance_is_chosen(rig: Stage, monkeypatch: pytest.Mo
         assert shares == {1e-3: 0.98, 1e-4: 0.98, 1e-5: 1.0}
         rng = np.random.default_rng(1)
         monkeypatch.setattr(
-            verify, "run_scattered", lambda *_: {"verdict": np.where(rng.random(400) < 0.5, "hunts", "settles")}
+            verify, "run_scattered", lambda *_: {"outcome": np.where(rng.random(400) < 0.5, "swings", "rests")}
         )
         rtol, shares, _ = loosest_rtol(study, crew)
     assert len(shares) == 6
@@ -90,17 +90,17 @@ def test_the_tolerance_is_chosen_on_cells_that_a_stage_may_have(rig: Stage, monk
 
     def pretended(study: Study, cells: np.ndarray, crew: object) -> Columns:
         seen.append(study.columns(cells)["friction.coulomb"])
-        return {"verdict": np.full(len(cells), "failed")}
+        return {"outcome": np.full(len(cells), "failed")}
 
     monkeypatch.setattr(verify, "run_scattered", pretended)
     with local_crew(1) as crew:
         _, shares, cells = loosest_rtol(study, crew)
     assert max(seen[0]) <= 3.0
     assert cells == len(seen[0]) == 34
-    assert set(shares.values()) == {0.0}  # a failed run has no verdict that could survive
+    assert set(shares.values()) == {0.0}  # a failed run has no outcome that could survive
 
 
-def test_inferred_verdicts_are_checked_apart(rig: Stage) -> None:
+def test_inferred_outcomes_are_checked_apart(rig: Stage) -> None:
     axes = {"controller.crossover": "2 Hz..12 Hz:9", "joint.stroke": "0.1 mm..1 mm:9"}
     runs = friso.sweep(rig, axes, rtol=1e-4, refine=True, verify=1.0)
     guessed = np.char.startswith(runs.status.values.astype(str), "inferred")
@@ -108,7 +108,7 @@ def test_inferred_verdicts_are_checked_apart(rig: Stage) -> None:
     assert runs.attrs["verified_cells"] == (~guessed).sum()
     fine = {"controller.crossover": "2 Hz..12 Hz:33", "joint.stroke": "0.1 mm..1 mm:33"}
     full = friso.sweep(rig, fine, rtol=1e-6)
-    assert runs.attrs["inferred_confirmed"] == (full.verdict == runs.verdict).values[guessed].sum() < guessed.sum()
+    assert runs.attrs["inferred_confirmed"] == (full.outcome == runs.outcome).values[guessed].sum() < guessed.sum()
     assert (~guessed).sum() >= 81  # of a small grid no fewer runs than it has
 
 
@@ -119,7 +119,7 @@ def test_a_share_that_is_none_is_refused(rig: Stage, share: float, refused: Refu
 
 
 def boundary(hunts: np.ndarray) -> np.ndarray:
-    """The cells at which the verdict changes."""
+    """The cells at which the outcome changes."""
     cells = np.zeros_like(hunts)
     for axis in (0, 1):
         along, mark = np.moveaxis(hunts, axis, 0), np.moveaxis(cells, axis, 0)
@@ -135,8 +135,8 @@ def hausdorff(a: np.ndarray, b: np.ndarray) -> float:
     return max(distance_transform_edt(~first)[second].max(), distance_transform_edt(~second)[first].max())
 
 
-def asked(study: Study, verdict: np.ndarray, settling: np.ndarray | None = None) -> tuple[Columns, int]:
-    """The refined map of verdicts that are already known, and how many cells it asked for."""
+def asked(study: Study, outcome: np.ndarray, settling: np.ndarray | None = None) -> tuple[Columns, int]:
+    """The refined map of outcomes that are already known, and how many cells it asked for."""
     count = 0
 
     def ask(cells: np.ndarray) -> Columns:
@@ -145,7 +145,7 @@ def asked(study: Study, verdict: np.ndarray, settling: np.ndarray | None = None)
         columns: Columns = {name: np.zeros(len(cells)) for name in UNITS}
         if settling is not None:
             columns["settling_time_10um"] = settling.flat[cells]
-        return columns | {"verdict": verdict.flat[cells], "status": np.full(len(cells), "done")}
+        return columns | {"outcome": outcome.flat[cells], "status": np.full(len(cells), "done")}
 
     return refine(study, ask), count
 
@@ -156,9 +156,9 @@ def test_a_smooth_boundary_is_found_as_on_the_full_grid(rig: Stage) -> None:
     assert study.axes[0].values[::FINER] == pytest.approx(np.linspace(1, 40, 41))
     x, y = np.meshgrid(np.linspace(0, 1, 161), np.linspace(0, 1, 161), indexing="ij")
     hunts = (x - 0.3) ** 2 + (y - 0.4) ** 2 < 0.06 + 0.02 * np.sin(9 * x)
-    found, count = asked(study, np.where(hunts, "hunts", "settles"))
+    found, count = asked(study, np.where(hunts, "swings", "rests"))
     assert count <= SHARE * study.cells
-    assert np.array_equal(found["verdict"].reshape(study.shape) == "hunts", hunts)
+    assert np.array_equal(found["outcome"].reshape(study.shape) == "swings", hunts)
     guessed = np.char.startswith(found["status"].astype(str), "inferred")
     assert guessed.sum() == study.cells - count
     assert np.isnan(found["peaks"][guessed]).all()
@@ -182,9 +182,9 @@ def test_the_boundary_of_the_locked_rig(rig: Stage) -> None:
         assert np.array_equal(
             refined[name].values[ran],
             full[name].values[ran],
-            **({} if name in ("verdict", "status") else {"equal_nan": True}),
+            **({} if name in ("outcome", "status") else {"equal_nan": True}),
         )
-    a, b = (runs.verdict.values == "hunts" for runs in (refined, full))
+    a, b = (runs.outcome.values == "swings" for runs in (refined, full))
     assert (a == b).mean() > 0.995
 
     def outline(hunts: np.ndarray) -> np.ndarray:

@@ -48,9 +48,11 @@ def map_cells(
     metric: Annotated[
         str,
         typer.Option(
-            metavar="NAME", help="Quantity that colours the map; of the cycle: multiplier, amplitude, period."
+            metavar="NAME",
+            help="Quantity that colours the map; of runs: outcome (what they do at their end), peaks, ...; "
+            "of the cycles of the stage: verdict, multiplier, amplitude, period.",
         ),
-    ] = "peaks",
+    ] = "outcome",
     rtol: Annotated[
         str | None,
         typer.Option(metavar="NUMBER|auto", help="Relative tolerance, default 1e-6; auto: the loosest safe one."),
@@ -110,7 +112,7 @@ def map_cells(
     else:
         say(f"no figure and no page of {study.cells:.3g} cells")
         files = write_exports(runs, exports)
-    _report(runs, study, store, files, as_json)
+    _report(runs, study, store, coloured_by(study, metric), files, as_json)
 
 
 def _chosen_rtol(text: str, study: Study, crew: Crew) -> float:
@@ -122,9 +124,9 @@ def _chosen_rtol(text: str, study: Study, crew: Crew) -> float:
     rtol, shares, cells = loosest_rtol(study, crew)
     found = f"of {cells} cells, " + ", ".join(f"{share:.1%} at {each:g}" for each, share in shares.items())
     if shares.get(rtol, 0.0) >= WANTED:
-        say(f"rtol {rtol:g} is the loosest at which {WANTED:.0%} of the verdicts survive ({found})")
+        say(f"rtol {rtol:g} is the loosest at which {WANTED:.0%} of the outcomes survive ({found})")
     else:
-        say(f"at no tolerance do {WANTED:.0%} of the verdicts survive ({found}); rtol {rtol:g} is used")
+        say(f"at no tolerance do {WANTED:.0%} of the outcomes survive ({found}); rtol {rtol:g} is used")
     return rtol
 
 
@@ -182,10 +184,10 @@ def _checked_exports(export: list[Path] | None) -> list[Path]:
     return list(export or [])
 
 
-def _report(runs: xr.Dataset, study: Study, store: Path, files: list[Path], as_json: bool) -> None:
+def _report(runs: xr.Dataset, study: Study, store: Path, metric: str, files: list[Path], as_json: bool) -> None:
     from friso.cli.map_study import document, sentences
 
     if as_json:
-        print(json.dumps(document(runs, study, store, files), allow_nan=False))
+        print(json.dumps(document(runs, study, store, metric, files), allow_nan=False))
     else:
-        print("\n".join([*sentences(runs, study), f"store: {store}", *(f"wrote {file}" for file in files)]))
+        print("\n".join([*sentences(runs, study, metric), f"store: {store}", *(f"wrote {file}" for file in files)]))

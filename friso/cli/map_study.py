@@ -13,7 +13,7 @@ import numpy as np
 from friso.cli.common import key_values
 from friso.errors import InputError
 from friso.stage import Stage
-from friso.studies.cells import CYCLE_UNITS, USUAL
+from friso.studies.cells import BY_CYCLES, CYCLE_UNITS, USUAL
 from friso.studies.execute import Crew
 from friso.studies.refine import FINER, SHARE, finer
 from friso.studies.request import Request
@@ -69,7 +69,8 @@ def study_for(stage: Stage, varied: Varied, metric: str, refine: bool, most: int
     runs = int(request.size() * (SHARE * FINER ** len(axes) if refine else 1))
     if most is not None and runs > most:
         raise _too_large(runs, request.trial(), crew)
-    wanted = (*USUAL, *CYCLE_UNITS) if metric in (*CYCLE_UNITS, "period") else None
+    wanted = (*USUAL, *CYCLE_UNITS) if metric in (*BY_CYCLES, "period") else USUAL
+    wanted = (*wanted, "verdict") if metric == "verdict" else wanted
     study = _with_metric(request.study(wanted), metric)
     return finer(study) if refine else study
 
@@ -152,22 +153,28 @@ def write_exports(runs: xr.Dataset, paths: list[Path]) -> list[Path]:
     return paths
 
 
-def sentences(runs: xr.Dataset, study: Study) -> list[str]:
-    """What was found, for the terminal."""
-    from friso.views.map.words import caveats, failures, verdict_counts, verification
+def sentences(runs: xr.Dataset, study: Study, metric: str) -> list[str]:
+    """What was found, for the terminal: first what share of the map swings, and where."""
+    from friso.views.map.findings import caveats, failures, headline, verification
+    from friso.views.map.words import KINDS, word_counts
 
-    counts = verdict_counts(runs)
-    found = ", ".join(f"{count} {verdict}" for verdict, count in counts.items())
+    words = "; ".join(
+        ", ".join(f"{count} {word}" for word, count in counts.items())
+        for name in KINDS
+        if (counts := word_counts(runs, name))
+    )
     size = " x ".join(map(str, study.shape))
     reasons = [f"{count} without result: {reason}" for reason, count in failures(runs).items()]
-    head = f"{study.stage.name or 'stage'}: {size} cells at rtol {study.rtol:g}: {found}"
-    return [head, verification(runs), *caveats(runs), *reasons]
+    extent = f"{study.stage.name or 'stage'}: {size} cells at rtol {study.rtol:g}: {words}"
+    return [headline(runs, metric), extent, verification(runs), *caveats(runs, metric), *reasons]
 
 
-def document(runs: xr.Dataset, study: Study, store: Path, files: list[Path]) -> dict[str, Any]:
+def document(runs: xr.Dataset, study: Study, store: Path, metric: str, files: list[Path]) -> dict[str, Any]:
     """The JSON document of `map`."""
-    from friso.views.map.words import verdict_counts
+    from friso.views.map.findings import headline
+    from friso.views.map.words import word_counts
 
+    criteria = {name: text for name in map(str, runs.data_vars) if (text := runs[name].attrs.get("criterion"))}
     verified = {name: runs.attrs[f"verified_{name}"] for name in ("cells", "surviving", "rtol") if _verified(runs)}
     return {
         "stage": study.stage.name,
@@ -179,7 +186,10 @@ def document(runs: xr.Dataset, study: Study, store: Path, files: list[Path]) -> 
         },
         "cells": study.cells,
         "rtol": study.rtol,
-        "verdicts": verdict_counts(runs),
+        "conclusion": headline(runs, metric),
+        "outcomes": word_counts(runs, "outcome"),
+        "verdicts": word_counts(runs, "verdict") or None,
+        "criteria": criteria,
         "verified": verified or None,
         "files": [str(path) for path in files],
     }

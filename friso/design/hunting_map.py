@@ -1,4 +1,4 @@
-"""Hunting over crossover and stroke about a design, over the corners of its specification."""
+"""Where moves come to rest over crossover and stroke about a design, over the corners of its specification."""
 
 from __future__ import annotations
 
@@ -43,5 +43,5 @@ def hunting_map(stage: Stage, spec: Spec, population: Population) -> HuntingMap:
     machines = {key: value[number] for key, value in population.keys.items()}
     runs = {**flat, **machines, **typical_move(spec), CROSSOVER: crossover, "joint.stroke": stroke}
     outcome = tried(runs, len(number), float(spec.position.window), patient=False)
-    share = np.where(outcome.completed, outcome.hunts, np.nan).reshape(shape).mean(axis=2)
+    share = np.where(outcome.completed, outcome.restless, np.nan).reshape(shape).mean(axis=2)
     return HuntingMap(crossovers, strokes, share)

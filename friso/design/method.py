@@ -108,7 +108,7 @@ class Design:
     def meets(self) -> bool:
         """Whether no move hunts, and moves settle in the time specified."""
         limit, free = self.spec.position.settling_time, self.verification.free
-        return not free.hunting and (limit is None or free.slower_than(SLOW) <= limit)
+        return not free.missed and (limit is None or free.slower_than(SLOW) <= limit)
 
     @property
     def needed(self) -> bool:

@@ -11,12 +11,13 @@ from scipy.stats import binomtest
 
 from friso.design.population import Population, sampled
 from friso.design.spec import Spec
-from friso.engine.arrays import Status
 from friso.engine.batch import Options, run_chunks
 from friso.engine.kernel import kernel
 from friso.equations.controllers.van_dijk import TUNED_MASS
 from friso.equations.motion import last_corner
 from friso.equations.structure import shared_structure
+from friso.hunting.criteria.run_outcome import CREEPS, FAILED, RESTS, SWINGS, outcomes
+from friso.hunting.measures import end_of, turns_of
 from friso.stage import Stage
 
 MACHINES = 10_000
@@ -44,15 +45,25 @@ RTOL = 1e-5
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of the machines, arrays of shape (count,): whether the run was `completed`, whether the stage
-    `hunts` (it leaves the window about its reference in the last quarter of a run ten times as long as the others),
-    the time [s] after the last corner of the reference from which on it stays in the window (NaN: never), and its
-    swing, peak to peak, in the last quarter [m]."""
+    """What became of the machines, arrays of shape (count,): what the run did at its end (`words`, of
+    `friso.hunting.criteria.run_outcome`, the band being the position window; a run rests that has been in it for the
+    last quarter; of those that do not, the words are of a run ten times as long), the time [s] after the last corner of
+    the reference from which on it stays in the window (NaN: it does not rest), and its swing, peak to peak, in the last
+    quarter [m]."""
 
-    completed: np.ndarray
-    hunts: np.ndarray
+    words: np.ndarray
     settling: np.ndarray
     swing: np.ndarray
+
+    @property
+    def completed(self) -> np.ndarray:
+        """Which runs were completed, shape (count,)."""
+        return self.words != FAILED
+
+    @property
+    def restless(self) -> np.ndarray:
+        """Which machines swing or creep at the end, shape (count,)."""
+        return np.isin(self.words, (SWINGS, CREEPS))
 
     @property
     def tried(self) -> int:
@@ -60,19 +71,25 @@ class Outcome:
         return int(self.completed.sum())
 
     @property
-    def hunting(self) -> int:
-        return int(self.hunts.sum())
+    def missed(self) -> int:
+        """Moves after which the stage does not come to rest in the window."""
+        return int(self.restless.sum())
+
+    @property
+    def swinging(self) -> int:
+        """Those of them after which it swings."""
+        return int(np.count_nonzero(self.words == SWINGS))
 
     @property
     def interval(self) -> tuple[float, float]:
-        """The range that holds the probability of hunting with 95 % (Clopper and Pearson)."""
+        """The range that holds the probability of not coming to rest with 95 % (Clopper and Pearson)."""
         if not self.tried:
             return 0.0, 1.0
-        proportion = binomtest(self.hunting, self.tried).proportion_ci(0.95, method="exact")
+        proportion = binomtest(self.missed, self.tried).proportion_ci(0.95, method="exact")
         return float(proportion.low), float(proportion.high)
 
     def slower_than(self, share: float) -> float:
-        """The settling time [s] that is exceeded by a share of the moves; infinite where more of them hunt."""
+        """The settling time [s] that is exceeded by a share of the moves; infinite where more of them do not settle."""
         times = np.where(np.isnan(self.settling), np.inf, self.settling)[self.completed]
         return float(np.quantile(times, 1 - share, method="higher")) if times.size else np.inf
 
@@ -83,8 +100,8 @@ class Outcome:
 
     @property
     def worst(self) -> int:
-        """The number of the move that hunts with the largest swing, or else settles last."""
-        rank = np.where(self.hunts, self.swing + 1e9, np.nan_to_num(self.settling, nan=-1.0))
+        """The number of the move that does not come to rest and has the largest swing, or else rests last."""
+        rank = np.where(self.restless, self.swing + 1e9, np.nan_to_num(self.settling, nan=-1.0))
         return int(np.where(self.completed, rank, -np.inf).argmax())
 
 
@@ -125,12 +142,12 @@ def tried(
     """The moves of stages given as flat keys, arrays of shape (count,); if `patient`, those that are not in position
     again, for longer."""
     first = _followed(flat, count, window, FOLLOWED, progress)
-    again = np.flatnonzero(first.completed & first.hunts & patient)
+    again = np.flatnonzero(first.restless & patient)
     if again.size:
         keys = {key: value[again] if np.ndim(value) else value for key, value in flat.items()}
         longer = _followed(keys, again.size, window, LONGER * FOLLOWED, lambda done: None)
-        better = np.flatnonzero(longer.completed)  # where the long run fails, the first verdict stays
-        for name in ("hunts", "settling", "swing"):
+        better = np.flatnonzero(longer.completed)  # where the long run fails, the first word stays
+        for name in ("words", "settling", "swing"):
             getattr(first, name)[again[better]] = getattr(longer, name)[better]
     return first
 
@@ -139,17 +156,17 @@ def _followed(flat: dict[str, Any], count: int, window: float, time: float, prog
     """The moves, each followed for a time [s] after its last corner."""
     corner = np.broadcast_to(np.asarray(last_corner(flat), float), (count,))
     keys = {**flat, "motion.duration": corner + time}
-    options = Options(rtol=RTOL, bands=(window, 10 * window), window=1 - LAST, record_from=0.0, least_swing=np.inf)
-    outcome = Outcome(np.zeros(count, bool), np.zeros(count, bool), np.full(count, np.nan), np.full(count, np.nan))
+    options = Options(
+        rtol=RTOL, bands=(window, 10 * window), window=1 - LAST, record_from=np.inf, least_swing=window / 4
+    )
+    outcome = Outcome(np.full(count, FAILED, dtype=object), np.full(count, np.nan), np.full(count, np.nan))
     done = 0
     for runs in run_chunks(kernel(shared_structure(keys)), keys, count, options):
-        numbers, ended, left = runs.numbers, runs.statistic("ended"), runs.statistic("inner_exit")
-        completed = runs.results.statuses == Status.DONE
-        outcome.completed[numbers] = completed
-        outcome.hunts[numbers] = completed & (left > (1 - LAST) * ended)
-        settled = completed & ~outcome.hunts[numbers]
-        outcome.settling[numbers] = np.where(settled, np.maximum(left - corner[numbers], 0.0), np.nan)
-        outcome.swing[numbers] = runs.statistic("deviation_max") - runs.statistic("deviation_min")
+        numbers, end = runs.numbers, end_of(runs, turns_of(runs), "inner")
+        words = outcomes(end, window, hold=LAST * end.ended)
+        outcome.words[numbers] = words
+        outcome.settling[numbers] = np.where(words == RESTS, np.maximum(end.outside - corner[numbers], 0.0), np.nan)
+        outcome.swing[numbers] = end.swing
         done += len(numbers)
         progress(done)
     return outcome

@@ -2,9 +2,10 @@
 
 from friso.hunting.basin import Kick, Moves
 from friso.hunting.check import Case, Solver, check
+from friso.hunting.criteria import COUNTED_ABOVE, COUNTED_AFTER
 from friso.hunting.cycle.hunting import Cycle, Hunting, hunting
 from friso.hunting.margin import Margin
-from friso.hunting.measures import BANDS, COUNTED_ABOVE, COUNTED_AFTER, Measures, measure
+from friso.hunting.measures import BANDS, Measures, measure
 from friso.hunting.verdict import Judgement
 
 __all__ = [

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from scipy.stats import binomtest, qmc
@@ -14,9 +14,11 @@ from friso.engine.batch import Options, run_chunks
 from friso.engine.kernel import kernel
 from friso.equations.motion import last_corner
 from friso.equations.structure import shared_structure
+from friso.hunting.criteria.run_outcome import lasts
 from friso.hunting.cycle.ensemble import Ensemble, without_motion
 from friso.hunting.cycle.hunting import Cycle
 from friso.hunting.cycle.rest import pushed
+from friso.hunting.measures import swing_of
 from friso.stage import Stage
 
 PERIODS, LAST = (60.0, 600.0), 1.5
@@ -41,6 +43,18 @@ SHARES = (0.1, 2.0)
 """Range of the moves drawn, in units of the acceleration and of the acceleration time of the stage file."""
 
 
+class Swing(Protocol):
+    """The size of a cycle, or of many, arrays of shape (count,): its amplitude [m], half of peak to peak, its period
+    [s], and the time constant of deviations from it [s]."""
+
+    @property
+    def amplitude(self) -> Any: ...
+    @property
+    def period(self) -> Any: ...
+    @property
+    def time_constant(self) -> Any: ...
+
+
 @dataclass(frozen=True)
 class Kick:
     """Kicks of a stage at rest at its reference that start hunting: a displacement [m] (everything displaced, then let
@@ -58,7 +72,7 @@ class Kick:
 
 @dataclass(frozen=True)
 class Moves:
-    """Share of moves that end in hunting, of a Sobol sample over acceleration [m/s^2] and acceleration time [s]: how
+    """Share of moves that end in the cycle, of a Sobol sample over acceleration [m/s^2] and acceleration time [s]: how
     many were drawn (and run to their end), how many hunt, and the ranges they were drawn from."""
 
     drawn: int
@@ -77,21 +91,23 @@ class Moves:
         return float(found.low), float(found.high)
 
 
-def ends_hunting(
-    flat: Mapping[str, Any], count: int, cycle: Cycle, starts: np.ndarray | None = None, rtol: float = RTOL
+def ends_in(
+    flat: Mapping[str, Any], count: int, cycle: Swing, starts: np.ndarray | None = None, rtol: float = RTOL, **how: Any
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Which stages, given as flat keys to SI numbers or arrays (count,), still swing like the cycle long after their
-    motion, and which runs were completed, both of shape (count,)."""
+    """Which runs of stages, given as flat keys to SI numbers or arrays (count,), end in a cycle of the stage: they
+    still swing like it long after their motion, by half its peak to peak or more; and which were completed; both of
+    shape (count,). The cycle is the same for all, or there is one for each: arrays (count,). `how` as in `Options`."""
     periods = np.clip(CONSTANTS * cycle.time_constant / cycle.period, *PERIODS)
-    end = float(np.max(last_corner(flat)) + periods * cycle.period)
+    end = np.broadcast_to(np.max(last_corner(flat)) + periods * cycle.period, (count,))
+    band = np.broadcast_to(cycle.amplitude / 2, (count,))
     long = {**flat, "motion.duration": end}
-    options = Options(rtol=rtol, window=1 - LAST * cycle.period / end, record_from=end)
-    hunts, completed = np.zeros(count, bool), np.zeros(count, bool)
+    window = float(np.min(1 - LAST * cycle.period / end))
+    options = Options(rtol=rtol, window=window, record_from=np.inf, least_swing=np.inf, **how)
+    ends, completed = np.zeros(count, bool), np.zeros(count, bool)
     for runs in run_chunks(kernel(shared_structure(flat)), long, count, options, starts):
-        swing = runs.statistic("deviation_max") - runs.statistic("deviation_min")
         completed[runs.numbers] = runs.results.statuses == Status.DONE
-        hunts[runs.numbers] = (swing > cycle.amplitude) & completed[runs.numbers]
-    return hunts, completed
+        ends[runs.numbers] = lasts(swing_of(runs), 0.0, band[runs.numbers]) & completed[runs.numbers]
+    return ends, completed
 
 
 def displacements(stage: Stage, cycle: Cycle) -> Kick:
@@ -99,7 +115,7 @@ def displacements(stage: Stage, cycle: Cycle) -> Kick:
     flat = {**without_motion(stage.flat()), "motion.kind": "release"}
 
     def hunts(kicks: np.ndarray) -> np.ndarray:
-        return ends_hunting({**flat, "motion.displacement": kicks}, len(kicks), cycle)[0]
+        return ends_in({**flat, "motion.displacement": kicks}, len(kicks), cycle)[0]
 
     return _kick(hunts, cycle.amplitude)
 
@@ -111,7 +127,7 @@ def pushes(stage: Stage, cycle: Cycle) -> Kick:
     def hunts(kicks: np.ndarray) -> np.ndarray:
         several = stages.take(np.zeros(len(kicks), np.int64))
         own = {**several.flat, "motion.displacement": float(stages.length[0])}
-        return ends_hunting(own, len(kicks), cycle, pushed(several, kicks))[0]
+        return ends_in(own, len(kicks), cycle, pushed(several, kicks))[0]
 
     return _kick(hunts, cycle.amplitude * float(stages.number("rate")[0]))
 
@@ -142,5 +158,5 @@ def moves(stage: Stage, cycle: Cycle) -> Moves | None:
     times = (SHARES[0] * time, min(SHARES[1] * time, flat["motion.return_at"] / 2))
     drawn = qmc.scale(qmc.Sobol(2, rng=0).random(MOVES), *zip(accelerations, times, strict=True))
     own = {**flat, "motion.acceleration": drawn[:, 0], "motion.acceleration_time": drawn[:, 1]}
-    hunts, completed = ends_hunting(own, MOVES, cycle)
+    hunts, completed = ends_in(own, MOVES, cycle)
     return Moves(int(completed.sum()), int(hunts.sum()), accelerations, times) if completed.any() else None

@@ -21,7 +21,8 @@ def compile_run(module: ModuleType) -> None:
     """Compile (or load from Numba's cache) `run` for the arrays it is called with."""
     whole = np.zeros((2, 2))
     square, flat = whole[:, :1], whole[:, 0]  # as parts of larger arrays, for which whole ones can stand in
-    arguments = (square, square, np.zeros(1, np.int64), flat, flat, np.zeros((1, 1), np.bool_), np.zeros(1))
+    marks, numbers = np.zeros((1, 1), np.bool_), np.zeros(1)
+    arguments = (square, square, np.zeros(1, np.int64), flat, flat, marks, marks, numbers, numbers)
     module.run.compile(tuple(numba.typeof(argument) for argument in arguments))
     module.run.disable_compile()
 

@@ -13,9 +13,10 @@ from friso.engine.kernel import Wanted, kernel, kernels
 from friso.engine.simulate import simulate
 from friso.engine.tolerance import checked_rtol
 from friso.equations.structure import structure
+from friso.hunting.criteria import Verdict
 from friso.hunting.cycle.hunting import cannot_hunt
 from friso.hunting.measures import BANDS, measure, options
-from friso.hunting.verdict import Judgement, Word, judge
+from friso.hunting.verdict import Judgement, judge
 from friso.stage import Stage
 
 if TYPE_CHECKING:
@@ -59,7 +60,7 @@ class Case:
     trace: xr.Dataset | None = None
 
     @property
-    def verdict(self) -> Word:
+    def verdict(self) -> Verdict:
         """ "hunts", "bistable", "transient", "settles" or "failed" (see `Judgement`)."""
         return self.judgement.verdict
 

@@ -11,38 +11,37 @@ import numpy as np
 from friso.engine.arrays import Status
 from friso.engine.batch import Options, Runs
 from friso.equations.motion import last_corner
-from friso.hunting.peaks import COUNTED_ABOVE, COUNTED_AFTER, SWING, WINDOW, scan
+from friso.hunting.criteria.run_outcome import BAND, End, outcomes
+from friso.hunting.turning import COUNTED_AFTER, DISTINCT, WINDOW
+from friso.hunting.turns import Turns, scan
 
-__all__ = ["BANDS", "COUNTED_ABOVE", "COUNTED_AFTER", "WINDOW", "Measures", "measure", "options"]
-
-BANDS = (1e-6, 1e-5)
+BANDS = (1e-6, BAND)
 """Bands about the reference into which a stage settles [m]."""
+
+RESOLVED = DISTINCT / 4
+"""Swings [m] that are passed over when turning points are kept: peaks, periods and outcomes look at larger ones."""
 
 
 @dataclass(frozen=True)
 class Measures:
-    """Measures of runs, each of shape (runs,): peak count, peak-to-peak amplitude [m] and period [s] over the last
-    quarter (NaN: no cycle), time [s] from the last corner of the reference until the deviation stays within each of
-    `BANDS` (NaN: not within the run), largest actuator force [N]; status, and steps attempted and rejected. `turns`
-    tells which turning points are counted peaks, shape (runs, room)."""
+    """Measures of runs, each of shape (runs,): the thesis's peak count (`peaks`), and that of distinct peaks (see
+    `friso.hunting.criteria.peak_count`); peak-to-peak deviation [m] of the last quarter and its period [s] (NaN: none);
+    time [s] from the last corner of the reference until the deviation stays within each of `BANDS` (NaN: not within the
+    run); what the run did at its end (`outcome`, words of `friso.hunting.criteria.run_outcome`); largest actuator force
+    [N]; status, and steps attempted and rejected. `turns` tells which turning points are counted peaks, shape
+    (runs, room)."""
 
     peaks: np.ndarray
+    distinct_peaks: np.ndarray
     peak_to_peak: np.ndarray
     period: np.ndarray
     settling_time: tuple[np.ndarray, np.ndarray]
+    outcome: np.ndarray
     largest_force: np.ndarray
     status: np.ndarray
     steps: np.ndarray
     rejected: np.ndarray
     turns: np.ndarray
-
-    @property
-    def verdict(self) -> np.ndarray:
-        """By the peak count "hunts", else "settles", or "transient" if the deviation still swings at the end (a run
-        too short for the count, or a reference that moves); "failed" where the run was not completed."""
-        swinging = np.isnan(self.settling_time[1]) & (self.peak_to_peak > COUNTED_ABOVE)
-        words = np.where(self.peaks > 0, "hunts", np.where(swinging, "transient", "settles"))
-        return np.where(self.status == Status.DONE, words, "failed")
 
 
 def options(rtol: float, threads: int | None = None, cancel: np.ndarray | None = None) -> Options:
@@ -52,24 +51,44 @@ def options(rtol: float, threads: int | None = None, cancel: np.ndarray | None =
         bands=BANDS,
         window=WINDOW,
         record_from=0.8 * COUNTED_AFTER,
-        least_swing=SWING / 4,  # peaks and periods look at larger ones only
+        least_swing=RESOLVED,
         threads=threads,
         cancel=cancel,
+    )
+
+
+def turns_of(runs: Runs) -> Turns:
+    """What the turning points of a chunk of runs tell, `room` being that of the run with most of them."""
+    results = runs.results
+    room = max(1, int(results.turn_counts.max(initial=0)))
+    times, values = results.turn_times[:, :room], results.turn_values[:, :room]
+    return scan(times, values, results.turn_counts, swing_of(runs), runs.statistic("ended"))
+
+
+def swing_of(runs: Runs) -> np.ndarray:
+    """Peak-to-peak deviation [m] over the window at the end of each run (see `Options`), shape (runs,)."""
+    return runs.statistic("deviation_max") - runs.statistic("deviation_min")
+
+
+def end_of(runs: Runs, turns: Turns, outside: str) -> End:
+    """How a chunk of runs ends, with respect to the "inner" or "outer" of their bands."""
+    return End(
+        completed=np.equal(runs.results.statuses, Status.DONE),
+        swing=swing_of(runs),
+        earlier=turns.earlier,
+        period=turns.period,
+        outside=runs.statistic(f"{outside}_exit"),
+        ended=runs.statistic("ended"),
     )
 
 
 def measure(flat: Mapping[str, Any], runs: Runs) -> Measures:
     """The measures of a chunk of runs of the stages `flat`, arrays of which have one entry per run of the chunk."""
     results = runs.results
-    count = len(results.statuses)
-    room = max(1, int(results.turn_counts.max(initial=0)))
-    times, values = results.turn_times[:, :room], results.turn_values[:, :room]
-    ended = runs.statistic("ended")
-    corner = np.broadcast_to(last_corner(flat), (count,))
-    amplitude = runs.statistic("deviation_max") - runs.statistic("deviation_min")
-    turns, period = scan(times, values, results.turn_counts, amplitude, ended)
+    ended, turns = runs.statistic("ended"), turns_of(runs)
+    corner = np.broadcast_to(last_corner(flat), (len(results.statuses),))
+    passing = np.nan_to_num(turns.period) / 2  # a cycle that crosses the reference as the run ends has not settled
     exits = (runs.statistic("inner_exit"), runs.statistic("outer_exit"))
-    passing = np.nan_to_num(period) / 2  # a cycle that crosses the reference as the run ends has not settled
     inner, outer = (np.where(e + passing < ended, np.maximum(e - corner, 0.0), np.nan) for e in exits)
     done = results.statuses == Status.DONE
 
@@ -77,13 +96,15 @@ def measure(flat: Mapping[str, Any], runs: Runs) -> Measures:
         return np.where(done, array, np.nan)
 
     return Measures(
-        peaks=np.where(done, turns.sum(axis=1), 0),
-        peak_to_peak=finished(amplitude),
-        period=finished(period),
+        peaks=np.where(done, turns.peaks.sum(axis=1), 0),
+        distinct_peaks=np.where(done, turns.distinct.sum(axis=1), 0),
+        peak_to_peak=finished(swing_of(runs)),
+        period=finished(turns.period),
         settling_time=(finished(inner), finished(outer)),
+        outcome=outcomes(end_of(runs, turns, "outer"), BAND, passing),
         largest_force=finished(runs.statistic("force_peak")),
         status=results.statuses,
         steps=runs.statistic("attempted").astype(np.int64),
         rejected=runs.statistic("rejected").astype(np.int64),
-        turns=turns,
+        turns=turns.peaks,
     )

@@ -1,4 +1,5 @@
-"""Whether stages still hunt after a long simulation, however they began."""
+"""Whether stages still swing after a long simulation, however they began: the evidence that something attracts where
+no orbit could be closed."""
 
 from __future__ import annotations
 
@@ -11,16 +12,18 @@ import numpy as np
 from friso.engine.arrays import Status
 from friso.engine.batch import Options, run_chunks
 from friso.engine.kernel import kernel
+from friso.hunting.criteria.run_outcome import lasts
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.rest import stuck, wait
+from friso.hunting.measures import swing_of
 
 DISTANCES = np.geomspace(0.02, 2.0, 95)
 """Where a stage sticks at first, in units of the deflection of the loop by the break-away force: 5 % apart, about every
 cycle, whose own distance is 0.03 (at the smallest friction gaps) to 1.5 of them."""
 
-SMALL = 0.01
-"""Peak to peak, in the same units, up to which a motion does not count as hunting: the smallest cycles of the sweeps,
-those of the smallest friction gaps, swing by 0.06 and more."""
+SMALL = 0.005
+"""Band about the reference, in the same units, within which a motion rests: the smallest cycles of the sweeps, those of
+the smallest friction gaps, swing by 0.06 from peak to peak and more."""
 
 SLOW = 0.05
 """Distance, in the same units, whose cycle tells how long is simulated: a stage waits the longer the nearer it sticks,
@@ -49,27 +52,34 @@ def from_rest(stages: Ensemble, distances: np.ndarray) -> Begin:
 
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
-def still_hunts(stages: Ensemble, begin: Begin, periods: float = PERIODS) -> tuple[np.ndarray, np.ndarray]:
-    """Which stages still hunt at the end, and which runs were completed, both of shape (count,)."""
+def still_swings(stages: Ensemble, begin: Begin, periods: float = PERIODS) -> tuple[np.ndarray, np.ndarray]:
+    """Which stages still swing at the end, and which runs were completed, both of shape (count,)."""
     period = 2 * (wait(stages, SLOW * stages.length) + 2 * np.pi / stages.number("rate"))
     end = begin.over + periods * period
-    options = Options(rtol=RTOL, window=1 - LAST / periods, record_from=float(np.min(end)) / 2, least_swing=np.inf)
+    options = Options(
+        rtol=RTOL,
+        window=1 - LAST / periods,
+        record_from=float(np.min(end)) / 2,
+        least_swing=np.inf,
+        threads=stages.threads,
+        cancel=stages.cancel,
+    )
     flat = {**stages.flat, **begin.motion, "motion.duration": end}
-    hunts, completed = np.zeros(stages.count, bool), np.zeros(stages.count, bool)
+    swings, completed = np.zeros(stages.count, bool), np.zeros(stages.count, bool)
     for runs in run_chunks(kernel(stages.structure), flat, stages.count, options, begin.starts):
-        swing = runs.statistic("deviation_max") - runs.statistic("deviation_min")
         completed[runs.numbers] = np.equal(runs.results.statuses, Status.DONE)
-        hunts[runs.numbers] = completed[runs.numbers] & (swing > SMALL * stages.length[runs.numbers])
-    return hunts, completed
+        lasting = lasts(swing_of(runs), 0.0, SMALL * stages.length[runs.numbers])
+        swings[runs.numbers] = completed[runs.numbers] & lasting
+    return swings, completed
 
 
 def hunts_somehow(
     stages: Ensemble, periods: float = PERIODS, distances: np.ndarray = DISTANCES
 ) -> tuple[np.ndarray, np.ndarray]:
     """Which stages hunt for ever from some of the distances, and of which that is known, both of shape (count,): a
-    stage of which a run failed, while none hunts, may hunt or not."""
+    stage of which a run failed, while no other swings on, may hunt or not."""
     several = stages.take(np.repeat(np.arange(stages.count), len(distances)))
-    runs = still_hunts(several, from_rest(several, np.tile(distances, stages.count)), periods)
-    hunts, completed = (each.reshape(stages.count, -1) for each in runs)
-    some = np.any(hunts, axis=1)
+    runs = still_swings(several, from_rest(several, np.tile(distances, stages.count)), periods)
+    swings, completed = (each.reshape(stages.count, -1) for each in runs)
+    some = np.any(swings, axis=1)
     return np.asarray(some), np.asarray(some | np.all(completed, axis=1))

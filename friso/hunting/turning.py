@@ -1,6 +1,6 @@
-"""Peaks and periods of runs from their turning points, as plain loops over runs.
+"""Counted peaks, periods and swings of runs from their turning points, as plain loops over runs.
 
-A few runs are scanned by this module as it stands. For many, `friso.hunting.peaks` has it compiled, all of this file
+A few runs are scanned by this module as it stands. For many, `friso.hunting.turns` has it compiled, all of this file
 with every function in machine code, so it uses numbers and arrays only.
 """
 
@@ -15,15 +15,33 @@ COUNTED_ABOVE = 1e-4
 APART = 0.5
 """Time by which peaks are apart [s] (thesis, Sec. 3.2.2)."""
 
-SWING = 1e-6
-"""Swing below which a turning point is none [m]: a stage stuck off its reference turns by rounding alone."""
+DISTINCT = 1e-6
+"""Depth [m] of the valleys on both sides of a distinct peak (ours): shallower ripple is noise, of the solver or of an
+encoder, on a stage that stands off its reference."""
 
-WINDOW = 0.75
-"""Share of the run after which amplitude and period are taken."""
+WINDOW, HALF = 0.75, 0.5
+"""Shares of the run after which its last quarter and its last half begin."""
+
+
+def maxima(values, count, kinds):
+    """Mark the local maxima with 1 and all others with 0; of a level stretch the first point stands for all. The ends
+    are maxima where they are higher than what is beside them: turning points, as a rule, are."""
+    kinds[:count] = 0
+    k = 0
+    while k < count:
+        last = k
+        while last + 1 < count and values[last + 1] == values[k]:
+            last += 1
+        rises = k == 0 or values[k - 1] < values[k]
+        falls = last == count - 1 or values[last + 1] < values[k]
+        alone = k == 0 and last == count - 1
+        if rises and falls and not alone:
+            kinds[k] = 1
+        k = last + 1
 
 
 def zigzag(values, count, least, kinds):
-    """Tell the extrema of a zigzag through the turning points `values` whose legs are at least `least`: 1 for its
+    """Mark the extrema of a zigzag through the turning points `values` whose legs are at least `least`: 1 for its
     maxima, -1 for its minima, 0 for the others. A first and last turning point that end such a leg are among them."""
     kinds[:count] = 0
     way, high, low = 0, 0, 0
@@ -64,39 +82,52 @@ def keep_tallest(times, values, count, kinds, peaks):
 
 
 def mean_period(times, count, kinds, ended):
-    """Mean time between the cycle's maxima, or else minima, in the last quarter [s], NaN without a cycle; of a cycle
-    longer than that, the last two of the last half."""
+    """Mean time between the maxima of a zigzag, or else its minima, in the last quarter [s], NaN where it has no two of
+    a kind; of a swing slower than that, between the last two of the last half."""
     last = -1  # its swing is not over yet
     for k in range(count):
         if kinds[k] != 0:
             last = k
-    for share in (WINDOW, 0.5):
+    for share in (WINDOW, HALF):
         for kind in (1, -1):
-            found, first, before, latest = 0, 0.0, 0.0, 0.0
+            number, first, before, latest = 0, 0.0, 0.0, 0.0
             for k in range(count):
                 if kinds[k] == kind and k != last and times[k] >= share * ended:
-                    if found == 0:
+                    if number == 0:
                         first = times[k]
                     before, latest = latest, times[k]
-                    found += 1
-            if found > 1:
-                return (latest - first) / (found - 1) if share == WINDOW else latest - before
+                    number += 1
+            if number > 1:
+                return (latest - first) / (number - 1) if share == WINDOW else latest - before
     return np.nan
 
 
-def run(times, values, counts, amplitude, ended, peaks, period):
-    """Fill `peaks`, shape (runs, room), and `period`, shape (runs,); see `friso.hunting.peaks.scan`."""
+def span(times, values, count, since):
+    """Peak to peak of the turning points from a time on [m]."""
+    low, high = np.inf, -np.inf
+    for k in range(count):
+        if times[k] >= since:
+            low, high = min(low, values[k]), max(high, values[k])
+    return max(high - low, 0.0)
+
+
+def run(times, values, counts, swing, ended, peaks, distinct, period, earlier):
+    """Fill `peaks` and `distinct`, shape (runs, room), `period` and `earlier`, shape (runs,); see
+    `friso.hunting.turns.scan`."""
     kinds = np.zeros(times.shape[1], np.int64)
     for j in range(counts.size):
         count = counts[j]
         period[j] = np.nan
+        earlier[j] = max(swing[j], span(times[j], values[j], count, HALF * ended[j]))
         tall = False
         for k in range(count):
             if times[j, k] >= COUNTED_AFTER and values[j, k] > COUNTED_ABOVE:
                 tall = True
         if tall:
-            zigzag(values[j], count, SWING, kinds)
+            maxima(values[j], count, kinds)
             keep_tallest(times[j], values[j], count, kinds, peaks[j])
-        if amplitude[j] > SWING:
-            zigzag(values[j], count, amplitude[j] / 2, kinds)
+            zigzag(values[j], count, DISTINCT, kinds)
+            keep_tallest(times[j], values[j], count, kinds, distinct[j])
+        if swing[j] > DISTINCT:
+            zigzag(values[j], count, swing[j] / 2, kinds)
             period[j] = mean_period(times[j], count, kinds, ended[j])

@@ -1,24 +1,30 @@
-"""The verdict on a stage: whether there is a cycle that attracts, and whether the stage's own motion ends in it."""
+"""The verdict on stages: whether there is a cycle that attracts, and whether their own motion ends in it.
+
+`judge` tells of one stage what its verdict rests on; `judge_many` gives those of many stages at once.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
 from friso.engine.arrays import Status
-from friso.engine.batch import run_chunks
+from friso.engine.batch import Options, run_chunks
 from friso.engine.kernel import kernel
 from friso.equations.motion import last_corner
-from friso.equations.structure import structure
-from friso.hunting.basin import Kick, Moves, displacements, ends_hunting, moves, pushes
-from friso.hunting.cycle.hunting import Cycle, Hunting, cannot_hunt, hunting
+from friso.equations.structure import shared_structure
+from friso.hunting.attractors import Attractors, attractors
+from friso.hunting.basin import Kick, Moves, displacements, ends_in, moves, pushes
+from friso.hunting.criteria import COUNTED_ABOVE, Verdict, lasts, verdicts
+from friso.hunting.cycle.ensemble import Ensemble
+from friso.hunting.cycle.hunting import Cycle, Hunting, cannot_hunt, hunting, why_not
 from friso.hunting.margin import Margin, margin
-from friso.hunting.measures import COUNTED_ABOVE, Measures, measure, options
+from friso.hunting.measures import Measures, measure, options
+from friso.hunting.persistence import Begin, still_swings
 from friso.stage import Stage
-
-Word = Literal["hunts", "bistable", "transient", "settles", "failed"]
 
 LONG = 1000.0
 """Time [s] for which a motion that has not settled at its end is followed."""
@@ -32,17 +38,15 @@ STEADY = 0.01
 
 @dataclass(frozen=True)
 class Judgement:
-    """The verdict and what it rests on.
+    """The verdict (see `friso.hunting.criteria.stage_verdict`) and what it rests on.
 
-    "hunts": there is a cycle that attracts, and this motion ends in it; "bistable": there is one, but this motion
-    settles; "transient": there is none, and the motion has not settled at its end; "settles": there is none, and it
-    has; "failed": the run of the motion was not completed. `displacement`, `push` and `moves` tell what starts
-    hunting, where there is a cycle that attracts; `margin` the edge of hunting nearest in bandwidth; `settled_after`
-    the time [s] after the last corner of the reference from which on this motion stays within 10 um, up to 1000 s.
-    `observed`: no cycle could be found, yet the motion swings on steadily, and so the verdict is that of the motion.
+    `displacement`, `push` and `moves` tell what starts hunting, where there is a cycle that attracts; `margin` the edge
+    of hunting nearest in bandwidth; `settled_after` the time [s] after the last corner of the reference from which on
+    this motion stays within 10 um, up to 1000 s. `observed`: no cycle could be found, yet the motion swings on
+    steadily, and so the verdict is that of the motion.
     """
 
-    verdict: Word
+    verdict: Verdict
     hunting: Hunting
     displacement: Kick | None = None
     push: Kick | None = None
@@ -57,59 +61,168 @@ class Judgement:
         return next(iter((*self.hunting.attracting, *self.hunting.cycles)), None)
 
 
-def judge(stage: Stage, found: Measures, rtol: float) -> Judgement:
+@dataclass(frozen=True)
+class Motions:
+    """How the stages' own motions went, arrays of shape (count,): whether they were `completed`, the thesis's `peaks`,
+    peak to peak of the last quarter, `swing` [m], and the time from the last corner of the reference until they stay
+    within 10 um, `settling` [s] (NaN: not within the run)."""
+
+    completed: np.ndarray
+    peaks: np.ndarray
+    swing: np.ndarray
+    settling: np.ndarray
+
+    @classmethod
+    def of(cls, measures: Measures) -> Motions:
+        completed = np.equal(measures.status, Status.DONE)
+        return cls(completed, measures.peaks, measures.peak_to_peak, measures.settling_time[1])
+
+    def take(self, numbers: np.ndarray) -> Motions:
+        """Those of the stages with these numbers."""
+        return Motions(*(array[numbers] for array in (self.completed, self.peaks, self.swing, self.settling)))
+
+
+def judge(stage: Stage, ran: Measures, rtol: float) -> Judgement:
     """The verdict on a stage whose motion was run and measured at a relative tolerance."""
-    moves_on = _keeps_moving(stage) and not cannot_hunt(stage)
+    flat, motions = stage.flat(), Motions.of(ran)
+    moves_on = _keeps_moving(flat) and not cannot_hunt(stage)
     known = Hunting((), MOVING, True, None) if moves_on else hunting(stage)
-    if found.status[0] != Status.DONE:
+    if not motions.completed[0]:
         return Judgement("failed", known)
     if known.attracting:
-        return _with_a_cycle(stage, found, known, known.attracting[0])
-    settled, after, steady = _settling(stage, found, rtol, possible=known.returns is not None)
-    observed = steady and not settled
-    word: Word = "hunts" if observed else "settles" if settled else "transient"
+        return _with_a_cycle(stage, motions, known, known.attracting[0])
+    rest = _rest(flat, motions, 1, options(rtol), possible=known.returns is not None)
+    observed = bool(rest.steady[0])
+    after = float(rest.after[0]) if np.isfinite(rest.after[0]) else None
     edge = margin(stage, attracting=False) if known.returns is not None and not observed else None
+    word = verdicts(motions.completed, rest.steady, rest.steady, rest.rests)[0]
     return Judgement(word, known, margin=edge, settled_after=after, observed=observed)
 
 
-def _keeps_moving(stage: Stage) -> bool:
-    flat = stage.flat()
-    return flat["motion.kind"] == "ramp" and flat["motion.velocity"] != 0
-
-
-def _with_a_cycle(stage: Stage, found: Measures, known: Hunting, cycle: Cycle) -> Judgement:
-    (hunts,), (completed,) = ends_hunting(stage.flat(), 1, cycle)
-    if not completed:
+def _with_a_cycle(stage: Stage, motions: Motions, known: Hunting, cycle: Cycle) -> Judgement:
+    ends, completed = ends_in(stage.flat(), 1, cycle)
+    if not completed[0]:
         return Judgement("failed", known)
-    within = float(found.settling_time[1][0])
+    within = float(motions.settling[0])
     return Judgement(
-        "hunts" if hunts else "bistable",
+        verdicts(completed, np.ones(1, bool), ends, np.zeros(1, bool))[0],
         known,
         displacements(stage, cycle),
         pushes(stage, cycle),
         moves(stage, cycle),
         margin(stage, attracting=True) if known.cycles[0].attracts else None,
-        None if hunts or not np.isfinite(within) else within,
+        None if ends[0] or not np.isfinite(within) else within,
     )
 
 
-def _settling(stage: Stage, found: Measures, rtol: float, possible: bool) -> tuple[bool, float | None, bool]:
-    """Whether the motion has settled at its end; after which time [s], if it is followed for long; and whether it does
-    neither settle nor decay then. Where hunting is not `possible`, a stage may rest off its reference."""
-    within, still = found.settling_time[1][0], found.peak_to_peak[0] <= COUNTED_ABOVE
-    if np.isfinite(within):
-        return True, float(within), False
+def _keeps_moving(flat: Mapping[str, Any]) -> bool:
+    return flat["motion.kind"] == "ramp" and bool(np.any(flat["motion.velocity"]))
+
+
+def can_hunt(flat: Mapping[str, Any]) -> bool:
+    """Whether stages of one structure may hunt: there is friction to stick to, integral action that winds up, and a
+    reference that stands still."""
+    return not why_not(shared_structure(flat)) and not _keeps_moving(flat)
+
+
+@np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
+def judge_many(flat: Mapping[str, Any], count: int, rtol: float) -> np.ndarray:
+    """The verdicts on stages of one structure, given as flat keys to SI numbers or arrays of shape (count,).
+
+    They are those of `judge`, but where an orbit may be that could not be closed, simulations from many places decide
+    whether something attracts; those that fail leave the verdict "failed".
+    """
+    known = attractors(Ensemble.held(flat, count, form=shared_structure(flat))) if can_hunt(flat) else None
+    return judge_runs(flat, _motions(flat, count, options(rtol)), known, rtol)
+
+
+@np.errstate(all="ignore")
+def judge_runs(
+    flat: Mapping[str, Any],
+    motions: Motions,
+    known: Attractors | None,
+    rtol: float,
+    threads: int | None = None,
+    cancel: np.ndarray | None = None,
+) -> np.ndarray:
+    """The same where the stages' own motions were run, and what attracts is known already (None: they cannot hunt);
+    `threads` and `cancel` as in `Options`."""
+    count = len(motions.completed)
+    sure, attracts = motions.completed.copy(), np.zeros(count, bool)
+    if known is not None:
+        sure &= known.known
+        attracts = known.attracts.copy()
+    in_cycle, rests = np.zeros(count, bool), np.zeros(count, bool)
+    drawn = np.flatnonzero(sure & attracts)
+    if known is not None and drawn.size:
+        in_cycle[drawn], sure[drawn] = _end_in_a_cycle(_part(flat, drawn), known.take(drawn), threads, cancel)
+    free = np.flatnonzero(sure & ~attracts)
+    if free.size:
+        how = options(rtol, threads, cancel)
+        rest = _rest(_part(flat, free), motions.take(free), free.size, how, possible=known is not None)
+        rests[free], attracts[free], in_cycle[free] = rest.rests, rest.steady, rest.steady
+    return verdicts(sure, attracts, in_cycle, rests)
+
+
+def _end_in_a_cycle(
+    flat: Mapping[str, Any], known: Attractors, threads: int | None, cancel: np.ndarray | None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Which stages' own motions end in the cycle that attracts, and which runs were completed. Where it attracts by
+    simulation alone, a motion that still swings after a long one does."""
+    count = len(known.attracts)
+    ends, completed = np.zeros(count, bool), np.zeros(count, bool)
+    sized = np.isfinite(known.amplitude + known.period + known.time_constant)
+    if (which := np.flatnonzero(sized)).size:
+        ends[which], completed[which] = ends_in(
+            _part(flat, which), which.size, known.take(which), threads=threads, cancel=cancel
+        )
+    if (which := np.flatnonzero(~sized)).size:
+        own = _part(flat, which)
+        motion = {key: value for key, value in own.items() if key.startswith("motion.")}
+        stages = Ensemble.held(own, which.size, form=shared_structure(own), threads=threads, cancel=cancel)
+        ends[which], completed[which] = still_swings(stages, Begin(motion, over=last_corner(own)))
+    return ends, completed
+
+
+@dataclass(frozen=True)
+class _Rest:
+    """Of motions of stages without an attracting cycle, arrays of shape (count,): whether they have come to rest at
+    their end; the time [s] after which they have, if they are followed for long (NaN: not then either, or unknown); and
+    whether they swing on `steady`, neither settling nor decaying."""
+
+    rests: np.ndarray
+    after: np.ndarray
+    steady: np.ndarray
+
+
+def _rest(flat: Mapping[str, Any], motions: Motions, count: int, how: Options, possible: bool) -> _Rest:
+    """Where hunting is not `possible`, a stage may rest off its reference; else a motion that has not come to rest at
+    its end is followed."""
+    after, steady = motions.settling.copy(), np.zeros(count, bool)
+    rests = np.isfinite(motions.settling)
     if not possible:
-        return bool(still and found.peaks[0] == 0), None, False
-    flat = stage.flat()
-    end = max(LONG, flat["motion.duration"]) + float(last_corner(flat))
-    last, half = (_followed({**flat, "motion.duration": end}, rtol, window) for window in (0.75, 0.5))
-    swing, after = last.peak_to_peak[0], last.settling_time[1][0]
-    steady = swing > COUNTED_ABOVE and abs(half.peak_to_peak[0] / swing - 1) < STEADY  # and not NaN: it was completed
-    return False, float(after) if np.isfinite(after) else None, bool(steady)
+        still = (motions.swing <= COUNTED_ABOVE) & (motions.peaks == 0)
+        return _Rest(rests | still, after, steady)
+    if (on := np.flatnonzero(~rests)).size:
+        own = _part(flat, on)
+        end = np.maximum(LONG, own["motion.duration"]) + last_corner(own)
+        long = {**own, "motion.duration": end}
+        last, half = (_motions(long, on.size, replace(how, window=window)) for window in (0.75, 0.5))
+        after[on] = last.settling
+        steady[on] = lasts(last.swing, half.swing, COUNTED_ABOVE / 2, 1 / (1 + STEADY))
+    return _Rest(rests, after, steady)
 
 
-def _followed(flat: dict[str, Any], rtol: float, window: float) -> Measures:
-    """Measures of a run, its swing over the part of it that comes after `window`, a share of the whole."""
-    (runs,) = run_chunks(kernel(structure(flat)), flat, 1, replace(options(rtol), window=window))
-    return measure(flat, runs)
+def _motions(flat: Mapping[str, Any], count: int, how: Options) -> Motions:
+    """The motions of stages of one structure, run and measured."""
+    columns = [np.zeros(count, bool), *(np.full(count, np.nan) for _ in range(3))]
+    for runs in run_chunks(kernel(shared_structure(flat)), flat, count, how):
+        part = Motions.of(measure(runs.part(flat), runs))
+        for column, values in zip(columns, (part.completed, part.peaks, part.swing, part.settling), strict=True):
+            column[runs.numbers] = values
+    return Motions(*columns)
+
+
+def _part(columns: Mapping[str, Any], which: np.ndarray) -> dict[str, Any]:
+    """Some entries of the arrays among the values."""
+    return {key: value[which] if np.ndim(value) else value for key, value in columns.items()}

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
-from typing import Any
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -11,10 +11,13 @@ from friso.engine.arrays import Status
 from friso.engine.batch import Runs, run_chunks
 from friso.engine.kernel import kernel
 from friso.equations.structure import Structure, decisive_keys, structure
+from friso.hunting.attractors import Attractors, attractors
+from friso.hunting.criteria import peak_count, run_outcome, stage_verdict
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import Cycles, hunting_cycles
 from friso.hunting.cycle.hunting import why_not
 from friso.hunting.measures import BANDS, Measures, measure, options
+from friso.hunting.verdict import Motions, can_hunt, judge_runs
 from friso.stage import Stage, numeric_keys, violations
 from friso.studies.links import linked
 
@@ -23,6 +26,7 @@ Columns = dict[str, np.ndarray]
 
 RUN_UNITS = {
     "peaks": "1",
+    "distinct_peaks": "1",
     "peak_to_peak": "m",
     "period": "s",
     "settling_time": "s",
@@ -39,14 +43,28 @@ CYCLE_UNITS = {"multiplier": "1", "amplitude": "m", "cycle_period": "s"}
 UNITS = RUN_UNITS | CYCLE_UNITS
 """All numeric measures and their units."""
 
-WORDS = {"verdict": "<U9", "status": "<U160"}
+WORDS = {"outcome": "<U9", "verdict": "<U9", "status": "<U160"}
 """The measures that are words, and how they are stored; a status longer than that is cut."""
 
-USUAL = (*RUN_UNITS, *WORDS)
+ALWAYS = ("outcome", "status")
+"""The words of every cell; the verdict, which needs the cycles, is found if asked for."""
+
+USUAL = (*RUN_UNITS, *ALWAYS)
 """What is known of every cell."""
+
+BY_CYCLES = (*CYCLE_UNITS, "verdict")
+"""What needs the hunting cycles, and is computed if asked for."""
 
 METRICS = (*RUN_UNITS, *CYCLE_UNITS, *WORDS)
 """Everything that may be known of a cell."""
+
+CRITERIA = {
+    "outcome": run_outcome.CRITERION,
+    "verdict": stage_verdict.CRITERION,
+    "peaks": peak_count.CRITERION,
+    "distinct_peaks": peak_count.DISTINCT_CRITERION,
+}
+"""By which criterion (`friso.hunting.criteria`) a measure tells of hunting."""
 
 INFERRED = "inferred"
 """How the status of a cell begins that was not run, but lies among cells that agree."""
@@ -55,8 +73,9 @@ INFERRED = "inferred"
 def attributes_of(metric: str) -> dict[str, Any]:
     """The attributes of the variable of a metric."""
     attributes: dict[str, Any] = {"units": UNITS[metric]} if metric in UNITS else {}
-    bands = dict(zip(("settling_time", "settling_time_10um"), BANDS, strict=True))
-    return attributes | ({"band_m": bands[metric]} if metric in bands else {})
+    bands = {"settling_time": BANDS[0], "settling_time_10um": BANDS[1], "outcome": run_outcome.BAND}
+    attributes |= {"band_m": bands[metric]} if metric in bands else {}
+    return attributes | ({"criterion": CRITERIA[metric]} if metric in CRITERIA else {})
 
 
 def run_cells(
@@ -64,28 +83,32 @@ def run_cells(
     links: Mapping[str, str],
     columns: Mapping[str, np.ndarray],
     rtol: float,
-    cycles: bool = False,
+    metrics: Sequence[str] = USUAL,
     threads: int | None = 1,
     cancel: np.ndarray | None = None,
 ) -> Columns:
     """Run one stage per entry of the columns: axis names to SI values, words or booleans, each of shape (cells,).
 
-    The result holds `USUAL`, with `cycles` also the measures of the hunting cycle, each of shape (cells,). A cell that
-    no stage may have has the verdict "invalid" and the reason in its status; one that a run did not complete for has
-    "failed". Setting cancel[0] from another thread ends the work early: cells not run by then keep the verdict "".
+    The result holds `USUAL`, and of `BY_CYCLES` what is among the metrics, each of shape (cells,). A cell that no stage
+    may have has the outcome (and the verdict) "invalid" and the reason in its status; one that a run did not complete
+    for has "failed". Setting cancel[0] from another thread ends the work early: cells not run by then keep the outcome
+    "".
     """
-    table = _Table(len(next(iter(columns.values()))), UNITS if cycles else RUN_UNITS)
-    for part, cells in _by_words(stage, columns):
-        flat = flat_cells(part, links, {name: column[cells] for name, column in columns.items()})
+    table = _Table(len(next(iter(columns.values()))), (*USUAL, *(name for name in BY_CYCLES if name in metrics)))
+    parts = list(_by_words(stage, links, columns))
+    for flat, cells in parts:
         table.invalidate(cells, flat)
-        for shape, members in _by_structure(flat, table.valid(cells), len(cells)):
-            keys = {key: value[members] if np.ndim(value) else value for key, value in flat.items()}
-            for runs in run_chunks(kernel(shape), keys, len(members), options(rtol, threads, cancel)):
-                table.write(cells[members[runs.numbers]], measure(runs.part(keys), runs), runs)
-    if cycles:
-        valid = table.valid(np.arange(table.count))
-        for which, described in cell_cycles(stage, links, columns, valid, threads, cancel):
-            table.write_cycles(which, described)
+    for flat, cells, shape in _groups(parts, table.valid):
+        for runs in run_chunks(kernel(shape), flat, len(cells), options(rtol, threads, cancel)):
+            table.write(cells[runs.numbers], measure(runs.part(flat), runs), runs)
+    if "verdict" in metrics:
+        for flat, cells, shape in _groups(parts, table.ran):
+            known = _once(attractors, flat, len(cells), shape, threads, cancel) if can_hunt(flat) else None
+            words = judge_runs(flat, table.motions(cells), known, rtol, threads, cancel)
+            table.write_verdicts(cells, words, known)
+    elif any(name in metrics for name in CYCLE_UNITS):
+        for cells, cycles in cell_cycles(stage, links, columns, table.valid, threads, cancel):
+            table.write_cycles(cells, cycles)
     return table.columns
 
 
@@ -101,27 +124,37 @@ def cell_cycles(
 
     The motion plays no part: of cells that differ in it alone one is computed.
     """
-    for part, cells in _by_words(stage, columns):
-        flat = flat_cells(part, links, {name: column[cells] for name, column in columns.items()})
-        for shape, members in _by_structure(flat, valid[cells], len(cells)):
-            if why_not(shape):
-                continue
-            varied = [np.zeros(len(members))]
-            varied += [
-                value[members] for key, value in flat.items() if np.ndim(value) and not key.startswith("motion.")
-            ]
-            _, first, again = np.unique(np.stack(varied), axis=1, return_index=True, return_inverse=True)
-            keys = {key: value[members[first]] if np.ndim(value) else value for key, value in flat.items()}
-            stages = Ensemble.held(keys, len(first), form=shape, threads=threads, cancel=cancel)
-            yield cells[members], hunting_cycles(stages).take(again.ravel())
+    for flat, cells, shape in _groups(_by_words(stage, links, columns), valid):
+        if not why_not(shape):
+            yield cells, _once(hunting_cycles, flat, len(cells), shape, threads, cancel)
+
+
+_Found = TypeVar("_Found", Cycles, Attractors)
+
+
+def _once(
+    find: Callable[[Ensemble], _Found],
+    flat: Mapping[str, Any],
+    count: int,
+    shape: Structure,
+    threads: int | None,
+    cancel: np.ndarray | None,
+) -> _Found:
+    """What is found of stages of one structure, looked for once for all that differ in their motion alone."""
+    varied = [np.zeros(count)]
+    varied += [value for key, value in flat.items() if np.ndim(value) and not key.startswith("motion.")]
+    _, first, again = np.unique(np.stack(varied), axis=1, return_index=True, return_inverse=True)
+    own = {key: value[first] if np.ndim(value) else value for key, value in flat.items()}
+    stages = Ensemble.held(own, len(first), form=shape, threads=threads, cancel=cancel)
+    return find(stages).take(again.ravel())
 
 
 def allowed(stage: Stage, links: Mapping[str, str], columns: Mapping[str, np.ndarray]) -> np.ndarray:
     """Which cells a stage may have, shape (cells,)."""
-    table = _Table(len(next(iter(columns.values()))), {})
-    for part, cells in _by_words(stage, columns):
-        table.invalidate(cells, flat_cells(part, links, {name: column[cells] for name, column in columns.items()}))
-    return table.columns["verdict"] != "invalid"
+    table = _Table(len(next(iter(columns.values()))), ALWAYS)
+    for flat, cells in _by_words(stage, links, columns):
+        table.invalidate(cells, flat)
+    return table.valid
 
 
 def flat_cells(stage: Stage, links: Mapping[str, str], columns: Mapping[str, np.ndarray]) -> dict[str, Any]:
@@ -133,18 +166,31 @@ def flat_cells(stage: Stage, links: Mapping[str, str], columns: Mapping[str, np.
     return stage.flat(keys | linked(links, stage.flat(keys) | dict(columns)))
 
 
-def _by_words(stage: Stage, columns: Mapping[str, np.ndarray]) -> Iterator[tuple[Stage, np.ndarray]]:
-    """For each combination of words and booleans among the columns: the stage and the numbers of its cells."""
+def _groups(
+    parts: Iterable[tuple[dict[str, Any], np.ndarray]], chosen: np.ndarray
+) -> Iterator[tuple[dict[str, Any], np.ndarray, Structure]]:
+    """The cells that are chosen, shape (cells,), by the equations they need: their flat SI form, numbers, structure."""
+    for flat, cells in parts:
+        for shape, members in _by_structure(flat, chosen[cells], len(cells)):
+            own = {key: value[members] if np.ndim(value) else value for key, value in flat.items()}
+            yield own, cells[members], shape
+
+
+def _by_words(
+    stage: Stage, links: Mapping[str, str], columns: Mapping[str, np.ndarray]
+) -> Iterator[tuple[dict[str, Any], np.ndarray]]:
+    """For each combination of words and booleans among the columns: the flat SI form and the numbers of its cells."""
     words = {name: column for name, column in columns.items() if column.dtype.kind in "bU"}
     count = len(next(iter(columns.values())))
     if not words:
-        yield stage, np.arange(count)
+        yield flat_cells(stage, links, columns), np.arange(count)
         return
     codes = np.stack([np.unique(column, return_inverse=True)[1] for column in words.values()], axis=1)
     kinds, which = np.unique(codes, axis=0, return_inverse=True)
     for k in range(len(kinds)):
         cells = np.flatnonzero(which.ravel() == k)
-        yield stage.replace({name: column[cells[0]].item() for name, column in words.items()}), cells
+        part = stage.replace({name: column[cells[0]].item() for name, column in words.items()})
+        yield flat_cells(part, links, {name: column[cells] for name, column in columns.items()}), cells
 
 
 def _by_structure(flat: Mapping[str, Any], valid: np.ndarray, count: int) -> Iterator[tuple[Structure, np.ndarray]]:
@@ -165,36 +211,65 @@ def _by_structure(flat: Mapping[str, Any], valid: np.ndarray, count: int) -> Ite
         yield shape, np.sort(np.concatenate(members))
 
 
+_SAME = ("peaks", "distinct_peaks", "peak_to_peak", "period", "outcome", "largest_force", "steps", "rejected")
+"""Measures that `Measures` has under the same name."""
+
 _STATUS = np.array([status.text for status in Status], dtype=object)
 
 
 class _Table:
     """The growing measures, one entry per cell."""
 
-    def __init__(self, count: int, numeric: Iterable[str]) -> None:
+    def __init__(self, count: int, names: Iterable[str]) -> None:
         self.count = count
-        self.columns: Columns = {name: np.full(count, np.nan) for name in numeric}
-        self.columns |= {name: np.full(count, "", dtype=object) for name in WORDS}
+        self.columns: Columns = {
+            name: np.full(count, "", dtype=object) if name in WORDS else np.full(count, np.nan) for name in names
+        }
 
     def invalidate(self, cells: np.ndarray, flat: Mapping[str, Any]) -> None:
         """Mark the cells that no stage may have, each with the first reason found."""
         for broken, why in violations(flat):
-            which = cells[np.broadcast_to(broken, cells.shape) & self.valid(cells)]
-            self.columns["verdict"][which], self.columns["status"][which] = "invalid", f"invalid: {why}"
+            which = cells[np.broadcast_to(broken, cells.shape) & self.valid[cells]]
+            for name in ("outcome", "verdict"):
+                if name in self.columns:
+                    self.columns[name][which] = "invalid"
+            self.columns["status"][which] = f"invalid: {why}"
 
-    def valid(self, cells: np.ndarray) -> np.ndarray:
-        return self.columns["verdict"][cells] != "invalid"
+    @property
+    def valid(self) -> np.ndarray:
+        """Which cells a stage may have, shape (cells,)."""
+        return self.columns["outcome"] != "invalid"
+
+    @property
+    def ran(self) -> np.ndarray:
+        """Which cells were run, to their end or not, shape (cells,)."""
+        return ~np.isin(self.columns["outcome"], ("invalid", ""))
+
+    def motions(self, cells: np.ndarray) -> Motions:
+        """How the motions of the cells went."""
+        columns = (self.columns[name][cells] for name in ("peaks", "peak_to_peak", "settling_time_10um"))
+        return Motions(self.columns["outcome"][cells] != run_outcome.FAILED, *columns)
 
     def write(self, which: np.ndarray, measures: Measures, runs: Runs) -> None:
         """Write the measures of the cells that were run."""
         ran = runs.results.statuses != Status.NOT_RUN
         inner, outer = measures.settling_time
-        numbers = (measures.peaks, measures.peak_to_peak, measures.period, inner, outer, measures.largest_force)
-        words = (measures.verdict, _STATUS[measures.status])
-        for name, column in zip(USUAL, (*numbers, measures.steps, measures.rejected, *words), strict=True):
+        written = {
+            "settling_time": inner,
+            "settling_time_10um": outer,
+            "status": _STATUS[measures.status],
+        } | {name: getattr(measures, name) for name in _SAME}
+        for name, column in written.items():
             self.columns[name][which[ran]] = column[ran]
 
-    def write_cycles(self, which: np.ndarray, cycles: Cycles) -> None:
-        """Write the measures of hunting cycles."""
+    def write_verdicts(self, cells: np.ndarray, words: np.ndarray, known: Attractors | None) -> None:
+        """Write the verdicts on the stages of the cells, and the measures of their cycles."""
+        self.columns["verdict"][cells] = words
+        if known is not None:
+            self.write_cycles(cells, known.cycles)
+
+    def write_cycles(self, cells: np.ndarray, cycles: Cycles) -> None:
+        """Write those measures of hunting cycles that the table has."""
         for name, column in zip(CYCLE_UNITS, (cycles.multiplier, cycles.amplitude, cycles.period), strict=True):
-            self.columns[name][which] = column
+            if name in self.columns:
+                self.columns[name][cells] = column

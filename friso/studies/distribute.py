@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import CancelledError
 from contextlib import contextmanager
 from typing import Any
@@ -70,13 +70,13 @@ def run_checked(
     links: Mapping[str, str],
     columns: Mapping[str, np.ndarray],
     rtol: float,
-    cycles: bool,
+    metrics: Sequence[str],
     expected: str,
 ) -> Columns:
     """`run_cells` on a worker whose friso has to be the expected one: one that joined later was not asked before."""
     if equations_version() != expected:
         raise _stranger("a worker", equations_version())
-    return run_cells(stage, links, columns, rtol, cycles)
+    return run_cells(stage, links, columns, rtol, metrics)
 
 
 def _refuse_strangers(client: Any) -> None:

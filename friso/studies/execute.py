@@ -82,7 +82,7 @@ class Crew:
     def _submit(self, study: Study, block: Block) -> Future[Columns]:
         columns = study.block_columns(block)
         return self.executor.submit(
-            self.task, study.stage, study.links, columns, study.rtol, study.cycles, **self.arguments
+            self.task, study.stage, study.links, columns, study.rtol, study.metrics, **self.arguments
         )
 
 

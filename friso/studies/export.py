@@ -22,9 +22,9 @@ def export(runs: xr.Dataset, path: Path) -> None:
     Columns of a CSV file are named with their units.
     """
     if path.suffix == ".nc":
-        runs.assign({name: runs[name].copy(data=_bytes(runs[name].values)) for name in WORDS}).to_netcdf(
-            path, engine="scipy"
-        )
+        runs.assign(
+            {name: runs[name].copy(data=_bytes(runs[name].values)) for name in WORDS if name in runs}
+        ).to_netcdf(path, engine="scipy")
     elif path.suffix == ".csv":
         _write_csv(runs, path)
     else:
@@ -42,8 +42,8 @@ def _bytes(texts: np.ndarray) -> np.ndarray:
 def _write_csv(runs: xr.Dataset, path: Path) -> None:
     import pandas as pd
 
-    dims = [str(dim) for dim in runs["verdict"].dims]
-    shape = runs["verdict"].shape
+    dims = [str(dim) for dim in runs["outcome"].dims]
+    shape = runs["outcome"].shape
     rows = max(1, ROWS // max(1, int(np.prod(shape[1:]))))
     with path.open("w", encoding="utf-8", newline="") as file:
         for first in range(0, shape[0], rows):

@@ -1,7 +1,8 @@
-"""Adaptive sampling: the verdicts of a grid four times finer per axis for a fifth of its runs.
+"""Adaptive sampling: what runs do over a grid four times finer per axis, for a fifth of its runs.
 
 A lattice of every second cell of the given grid is run first. Wherever neighbouring cells differ, both have to be run,
-until every change of verdict has been seen from both sides; so a boundary that was met once is followed to its end.
+until every change of outcome (or of verdict, if that is asked for) has been seen from both sides; so a boundary that
+was met once is followed to its end.
 The runs that are left are spent where the next surprise is likely: far from any run, near boundaries, and where runs
 settle late.
 """
@@ -17,6 +18,7 @@ import numpy as np
 from scipy.ndimage import distance_transform_edt
 
 from friso.errors import InputError
+from friso.hunting.criteria.run_outcome import SWINGS
 from friso.studies.axes import Axis
 from friso.studies.cells import INFERRED, UNITS, Columns
 from friso.studies.samples import SAMPLE
@@ -36,7 +38,7 @@ BATCHES = 100
 """Into how many batches the runs are split: each is chosen after the last one's results."""
 
 LATE = 10.0
-"""Time of settling [s] from which on a run counts as much as one that hunts: the thesis counts peaks after it."""
+"""Time of settling [s] from which on a run counts as much as one that swings: the thesis counts peaks after it."""
 
 Ask = Callable[[np.ndarray], Columns]
 """Gives the measures of the cells with these numbers."""
@@ -68,7 +70,8 @@ def _finer(axis: Axis) -> Axis:
 def refine(study: Study, ask: Ask) -> Columns:
     """The measures of a fine study, each of shape (cells,), from the cells asked for.
 
-    A cell that was not asked for has the verdict of the nearest one that was, a status that says so, and no numbers.
+    A cell that was not asked for has the outcome (and the verdict) of the nearest one that was, a status that says so,
+    and no numbers.
     """
     grid = _Known(study)
     grid.learn(_lattice(study.shape), ask)
@@ -97,6 +100,7 @@ class _Known:
         coarse = math.prod(size // FINER + 1 for size in study.shape)
         self.budget = max(int(SHARE * study.cells), min(3 * coarse // 2, study.cells))
         self.columns: Columns = {}
+        self.words = tuple(name for name in ("outcome", "verdict") if name in study.metrics)
         self.asked = np.zeros(study.shape, bool)
         self.runs = 0
 
@@ -107,7 +111,7 @@ class _Known:
             empty = np.full(self.asked.size, np.nan) if name in UNITS else np.full(self.asked.size, "", dtype=object)
             self.columns.setdefault(name, empty)[cells] = columns[name]
         self.asked.flat[cells] = True
-        self.runs += int(np.sum(columns["verdict"] != "invalid"))
+        self.runs += int(np.sum(columns["outcome"] != "invalid"))
 
     def _nearest(self) -> tuple[np.ndarray, np.ndarray]:
         """Distance to the nearest cell asked for, and its number, both of the study's shape."""
@@ -116,18 +120,19 @@ class _Known:
         return distance, np.asarray(np.ravel_multi_index(tuple(places), self.shape))
 
     def _changes(self, nearest: np.ndarray) -> np.ndarray:
-        """Which cells have a neighbour of another verdict, where each has that of the nearest cell asked for."""
-        verdicts = np.unique(self.columns["verdict"].astype(str), return_inverse=True)[1].ravel()[nearest]
+        """Which cells have a neighbour with other words, where each has those of the nearest cell asked for."""
+        both = np.sum([self.columns[name] + " " for name in self.words], axis=0).astype(str)
+        words = np.unique(both, return_inverse=True)[1].ravel()[nearest]
         changes = np.zeros(self.shape, bool)
         for axis in range(changes.ndim):
-            along, beside = np.moveaxis(verdicts, axis, 0), np.moveaxis(changes, axis, 0)
+            along, beside = np.moveaxis(words, axis, 0), np.moveaxis(changes, axis, 0)
             differ = along[1:] != along[:-1]
             beside[1:] |= differ
             beside[:-1] |= differ
         return changes
 
     def unseen_changes(self) -> np.ndarray:
-        """Numbers of the cells at a change of verdict that were not yet asked for."""
+        """Numbers of the cells at a change of words that were not yet asked for."""
         _, nearest = self._nearest()
         return np.flatnonzero(self._changes(nearest) & ~self.asked)
 
@@ -137,7 +142,7 @@ class _Known:
         changes = self._changes(nearest)
         from_change: Any = distance_transform_edt(~changes) if changes.any() else np.ones(self.shape)
         settling = np.nan_to_num(self.columns["settling_time_10um"], nan=LATE)
-        late = np.where(self.columns["verdict"] == "hunts", 1.0, np.minimum(settling / LATE, 1.0))
+        late = np.where(self.columns["outcome"] == SWINGS, 1.0, np.minimum(settling / LATE, 1.0))
         worth = np.where(self.asked, 0.0, distance * late[nearest] / np.cbrt(np.maximum(from_change, 1.0)))
         best = np.argsort(-worth, axis=None, kind="stable")[: max(count, 0)]
         return best[worth.flat[best] > 0]
@@ -146,6 +151,6 @@ class _Known:
         """The measures of all cells, those not asked for inferred."""
         _, nearest = self._nearest()
         guessed = ~self.asked.ravel()
-        verdicts = self.columns["verdict"][nearest.ravel()]
+        words = {name: self.columns[name][nearest.ravel()] for name in self.words}
         status = np.where(guessed, f"{INFERRED} from the nearest cell that was run", self.columns["status"])
-        return self.columns | {"verdict": verdicts, "status": status}
+        return self.columns | words | {"status": status}

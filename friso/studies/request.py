@@ -13,7 +13,7 @@ from friso.errors import InputError
 from friso.stage import Stage
 from friso.studies import links as linking
 from friso.studies.axes import Axis, Range, Values, read_axes
-from friso.studies.cells import METRICS, UNITS, USUAL
+from friso.studies.cells import ALWAYS, METRICS, USUAL
 from friso.studies.samples import SAMPLE, Samples, sampled
 from friso.studies.study import Dimension, Study
 
@@ -89,9 +89,9 @@ def _gridded(axis: Axis | Range) -> Axis:
 
 
 def _checked_metrics(metrics: Sequence[str] | None) -> tuple[str, ...]:
-    """The metrics asked for, with verdict and status, in their usual order."""
+    """The metrics asked for, with outcome and status, in their usual order."""
     for name in metrics or ():
         if name not in METRICS:
             raise InputError("metrics", name, f"some of {', '.join(METRICS)}", '["peaks", "period"]')
     requested = metrics or USUAL
-    return tuple(name for name in METRICS if name in requested or name not in UNITS)
+    return tuple(name for name in METRICS if name in requested or name in ALWAYS)

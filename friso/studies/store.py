@@ -1,7 +1,7 @@
 """A study on disk: a Zarr store that is written block by block and resumed where it was left.
 
-The store is made whole, without results, under another name and then moved into place; a block's verdicts are
-written after its other variables, and Zarr moves each file into place. So a block whose verdicts are there is done,
+The store is made whole, without results, under another name and then moved into place; a block's outcomes are
+written after its other variables, and Zarr moves each file into place. So a block whose outcomes are there is done,
 whenever the process was killed.
 """
 
@@ -101,27 +101,27 @@ class Store:
 
     def missing(self) -> Iterator[Block]:
         """The blocks not yet done."""
-        verdicts = self.read()["verdict"]
+        outcomes = self.read()["outcome"]
         for block in self.study.blocks(self.blocks):
-            if not self._is_done(block, verdicts):
+            if not self._is_done(block, outcomes):
                 yield block
 
-    def _is_done(self, block: Block, verdicts: xr.DataArray) -> bool:
-        """Whether all files of a block are there and its verdicts can be read; a power cut may take either."""
+    def _is_done(self, block: Block, outcomes: xr.DataArray) -> bool:
+        """Whether all files of a block are there and its outcomes can be read; a power cut may take either."""
         number = ".".join(str(part.start // size) for part, size in zip(block, self.blocks, strict=True))
         if not all((self.path / name / number).exists() for name in self.study.metrics):
             return False
         try:
-            return not np.any(verdicts[block].values == "")
+            return not np.any(outcomes[block].values == "")
         except (OSError, RuntimeError, ValueError):
             return False
 
     def write(self, block: Block, columns: Mapping[str, np.ndarray]) -> None:
-        """Write the measures of a block, its verdicts last. Raises OSError where the disk is full."""
+        """Write the measures of a block, its outcomes last. Raises OSError where the disk is full."""
         shape = tuple(part.stop - part.start for part in block)
         region = dict(zip(self.study.names, block, strict=True))
-        self._write([name for name in self.study.metrics if name != "verdict"], columns, shape, region)
-        self._write(["verdict"], columns, shape, region)
+        self._write([name for name in self.study.metrics if name != "outcome"], columns, shape, region)
+        self._write(["outcome"], columns, shape, region)
 
     def _write(
         self, names: list[str], columns: Mapping[str, np.ndarray], shape: tuple[int, ...], region: dict[str, slice]
@@ -185,8 +185,9 @@ def read_store(path: str | os.PathLike[str]) -> xr.Dataset:
 
 def in_memory(runs: xr.Dataset) -> xr.Dataset:
     """The study of an opened store in memory, each text once: as stored, a status takes a hundred times the room."""
-    loaded = runs.drop_vars(list(WORDS)).load()
-    return loaded.assign({name: (runs[name].dims, _shared(runs[name]), runs[name].attrs) for name in WORDS})
+    words = [name for name in WORDS if name in runs]
+    loaded = runs.drop_vars(words).load()
+    return loaded.assign({name: (runs[name].dims, _shared(runs[name]), runs[name].attrs) for name in words})
 
 
 def _shared(texts: xr.DataArray) -> np.ndarray:
@@ -222,12 +223,17 @@ def _refuse_foreign(path: Path) -> None:
         raise StoreError("", "nothing there", expected, "friso map STAGE.toml ... --out study.zarr", str(path))
     try:
         with xr.open_zarr(path, chunks=None, zarr_format=_FORMAT) as dataset:
-            if "verdict" in dataset and "equations" in dataset.attrs:
+            if "equations" in dataset.attrs and "outcome" in dataset:
                 return
+            old = "equations" in dataset.attrs and "verdict" in dataset
     except (OSError, ValueError, KeyError):
-        pass
-    text = "a folder with other things in it" if path.is_dir() else "a file"
-    raise StoreError("", f"{text}; nothing was overwritten", expected, "--out study.zarr", str(path))
+        old = False
+    if old:
+        given = "a store of an earlier friso, whose verdicts are by the peak count of the runs"
+        expected = "a store that tells what the runs did (outcome): run the study again under a new name"
+        raise StoreError("", given, expected, "friso map STAGE.toml ... --out study.zarr", str(path))
+    given = "a folder with other things in it" if path.is_dir() else "a file"
+    raise StoreError("", f"{given}; nothing was overwritten", expected, "--out study.zarr", str(path))
 
 
 def _refuse_other(path: Path, study: Study) -> None:

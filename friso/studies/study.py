@@ -15,7 +15,7 @@ import numpy as np
 from friso.engine.cache import code_digest, machine
 from friso.stage import Stage, loads
 from friso.studies.axes import Axis
-from friso.studies.cells import CYCLE_UNITS, METRICS, flat_cells
+from friso.studies.cells import BY_CYCLES, METRICS, flat_cells
 from friso.studies.samples import SAMPLE
 from friso.version import VERSION
 
@@ -58,8 +58,8 @@ class Study:
 
     @property
     def cycles(self) -> bool:
-        """Whether measures of the hunting cycle are wanted."""
-        return any(name in self.metrics for name in CYCLE_UNITS)
+        """Whether anything is wanted that needs the hunting cycles."""
+        return any(name in self.metrics for name in BY_CYCLES)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -189,7 +189,7 @@ def equations_version() -> str:
 def study_of(runs: xr.Dataset) -> Study:
     """The study that a dataset or an opened store holds the results of."""
     dimensions, order = [], json.loads(runs.attrs["axes"])
-    for name in runs["verdict"].dims:
+    for name in runs["outcome"].dims:
         axes = tuple(_stored_axis(runs[axis]) for axis in order if runs[axis].dims == (name,))
         dimensions.append(Dimension(str(name), axes))
     stage = loads(runs.attrs["stage"])

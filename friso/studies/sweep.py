@@ -46,18 +46,21 @@ def sweep(
     once (see `Samples`). `links` are SI expressions for keys that follow: with ``{"mass": (masses, "kg")}`` as axis,
     ``{"masses.cart": "0.7 * mass", "masses.stage": "0.3 * mass"}``.
 
-    The result has one dimension per axis with SI coordinates, and the variables (or the `metrics` among them) peaks,
-    verdict, peak_to_peak [m], period [s], settling_time [s] into 1 um, settling_time_10um [s], largest_force [N],
-    steps, rejected and status; a cell that no stage may have is "invalid", with the reason in its status. Asked for by
-    name, `metrics` are also those of the hunting cycle itself: multiplier (the cycle attracts where its modulus is
-    below 1), amplitude [m] and cycle_period [s]; they are smooth, whatever the motion does.
+    The result has one dimension per axis with SI coordinates, and the variables (or the `metrics` among them) outcome
+    (what the run did at its end: "swings", "creeps", "rests" or "failed"), peaks (the thesis's count), distinct_peaks,
+    peak_to_peak [m], period [s], settling_time [s] into 1 um, settling_time_10um [s], largest_force [N], steps,
+    rejected and status; a cell that no stage may have is "invalid", with the reason in its status. Asked for by name,
+    `metrics` are also those of the hunting cycle itself, which are smooth, whatever the motion does: multiplier (the
+    cycle attracts where its modulus is below 1), amplitude [m] and cycle_period [s]; and the verdict on the stage by
+    its cycles ("hunts", "bistable", "transient", "settles" or "failed"). The attribute `criterion` of a variable says
+    by what it tells of hunting (`friso.hunting.criteria`).
 
-    A verdict is as good as its tolerance: with `verify` that share of the cells is run again at rtol/100, and the
-    attributes verified_cells, verified_surviving and verified_rtol count the verdicts that survived. With `refine` the
-    grid is made four times finer, of which a fifth is run, along the changes of verdict; the other cells are
-    inferred, which their status says. With `store`, a folder, results are written there in Zarr as they come, and a
-    study that was interrupted resumes. Raises InputError for a wrong axis, link or store, ValueError for a tolerance
-    that is not usable.
+    An outcome is as good as its tolerance: with `verify` that share of the cells is run again at rtol/100, and the
+    attributes verified_cells, verified_surviving and verified_rtol count the outcomes that survived. With `refine` the
+    grid is made four times finer, of which a fifth is run, along the changes of outcome (and of verdict, if it is asked
+    for); the other cells are inferred, which their status says. With `store`, a folder, results are written there in
+    Zarr as they come, and a study that was interrupted resumes. Raises InputError for a wrong axis, link or store,
+    ValueError for a tolerance that is not usable.
     """
     study = Request(stage, axes, samples, links or {}).study(metrics, rtol)
     study = finer(study) if refine else study
@@ -79,7 +82,7 @@ def run_in_memory(
         for name in study.metrics:
             target = columns[number[id(study)]][name][block]
             target[...] = columns_of_block[name].reshape(target.shape)
-        progress(len(columns_of_block["verdict"]))
+        progress(len(columns_of_block["outcome"]))
     results = [dataset(study, columns_of_study) for study, columns_of_study in zip(studies, columns, strict=True)]
     for study, runs in zip(studies, results, strict=True):
         runs.attrs |= verified(study, runs, crew, verify)
@@ -108,7 +111,7 @@ def run_in_store(
             missing = []
         for _, block, measures in crew.compute((study, block) for block in missing):
             store.write(block, measures)
-            progress(len(measures["verdict"]))
+            progress(len(measures["outcome"]))
         runs = store.read()
         if verify and runs.attrs.get("verified_share") != verify:
             store.annotate(verified(study, runs, crew, verify))
@@ -117,7 +120,7 @@ def run_in_store(
 
 def _refined(study: Study, crew: Crew, progress: Progress, keeping: Callable[[Ask], Ask] = lambda ask: ask) -> Columns:
     """The measures of a refined study, each of its shape; `keeping` may keep the answers of a resumed one."""
-    everything = replace(study, metrics=METRICS if study.cycles else USUAL)
+    everything = replace(study, metrics=tuple(name for name in METRICS if name in (*USUAL, *study.metrics)))
 
     def ask(cells: np.ndarray) -> Columns:
         columns = run_scattered(everything, cells, crew)

@@ -10,7 +10,7 @@ import numpy as np
 
 from friso.engine.tolerance import TIGHTEST
 from friso.errors import InputError
-from friso.studies.cells import INFERRED, WORDS, allowed
+from friso.studies.cells import ALWAYS, INFERRED, allowed
 from friso.studies.execute import Crew, run_scattered
 from friso.studies.study import Study
 
@@ -24,7 +24,7 @@ LEAST = 50
 """Least number of cells checked, if there are as many: fewer give no meaningful share."""
 
 WANTED = 0.99
-"""Share of the verdicts that shall survive at an automatic tolerance."""
+"""Share of the outcomes that shall survive at an automatic tolerance."""
 
 CANDIDATES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8)
 """Tolerances among which the automatic one is chosen, the loosest first."""
@@ -41,21 +41,21 @@ def checked_share(share: float) -> float:
 
 
 def verified(study: Study, runs: xr.Dataset, crew: Crew, share: float) -> dict[str, Any]:
-    """Run a share of the cells again at rtol/100; attributes with the share of verdicts that survived.
+    """Run a share of the cells again at rtol/100; attributes with the share of outcomes that survived.
 
     The same cells for the same study. Of a refined map cells that were inferred are run too, and counted apart
-    (inferred_checked, inferred_confirmed). Invalid and failed cells have no verdict that could survive; nothing is
+    (inferred_checked, inferred_confirmed). Invalid and failed cells have no outcome that could survive; nothing is
     told where there are no others, or no share was asked for.
     """
     if not share or study.rtol < 10 * TIGHTEST:  # there is no tolerance to check it with
         return {}
     count, rtol = max(LEAST, round(share * study.cells)), max(study.rtol / TIGHTER, TIGHTEST)
-    tighter = replace(study, rtol=rtol, metrics=tuple(WORDS))
+    tighter = replace(study, rtol=rtol, metrics=ALWAYS)
 
     def same(kind: str) -> tuple[int, int]:
         picked = sampled(study, count, lambda cells: _kinds(runs, study, cells) == kind)
-        again = run_scattered(tighter, picked, crew)["verdict"] if picked.size else np.empty(0)
-        return len(picked), int(np.sum(_at(runs["verdict"], study, picked) == again))
+        again = run_scattered(tighter, picked, crew)["outcome"] if picked.size else np.empty(0)
+        return len(picked), int(np.sum(_at(runs["outcome"], study, picked) == again))
 
     cells, surviving = same("run")
     if not cells:
@@ -68,7 +68,7 @@ def verified(study: Study, runs: xr.Dataset, crew: Crew, share: float) -> dict[s
 
 
 def loosest_rtol(study: Study, crew: Crew) -> tuple[float, dict[float, float], int]:
-    """The loosest tolerance at which `WANTED` of the verdicts survive, the surviving share at each one tried, and on
+    """The loosest tolerance at which `WANTED` of the outcomes survive, the surviving share at each one tried, and on
     how many cells that was found (none, and the tightest, where no cell has a stage).
 
     If no tolerance is good enough it is the one at which most survive.
@@ -76,12 +76,12 @@ def loosest_rtol(study: Study, crew: Crew) -> tuple[float, dict[float, float], i
     picked = sampled(study, TRIED, lambda cells: allowed(study.stage, study.links, study.columns(cells)))
     if not picked.size:
         return CANDIDATES[-1], {}, 0
-    verdicts: dict[float, np.ndarray] = {}
+    outcomes: dict[float, np.ndarray] = {}
 
     def at(rtol: float) -> np.ndarray:
-        if rtol not in verdicts:
-            verdicts[rtol] = run_scattered(replace(study, rtol=rtol), picked, crew)["verdict"]
-        return verdicts[rtol]
+        if rtol not in outcomes:
+            outcomes[rtol] = run_scattered(replace(study, rtol=rtol, metrics=ALWAYS), picked, crew)["outcome"]
+        return outcomes[rtol]
 
     shares: dict[float, float] = {}
     for rtol in CANDIDATES:
@@ -118,6 +118,6 @@ def _at(values: xr.DataArray, study: Study, cells: np.ndarray) -> np.ndarray:
 
 def _kinds(runs: xr.Dataset, study: Study, cells: np.ndarray) -> np.ndarray:
     """Of each cell, whether it was "run" to its end, is `INFERRED`, or "" neither."""
-    status, verdict = (_at(runs[name], study, cells).astype(str) for name in ("status", "verdict"))
-    kinds = np.where(np.isin(verdict, ["invalid", "failed", ""]), "", "run")
+    status, outcome = (_at(runs[name], study, cells).astype(str) for name in ("status", "outcome"))
+    kinds = np.where(np.isin(outcome, ["invalid", "failed", ""]), "", "run")
     return np.where(np.char.startswith(status, INFERRED), INFERRED, kinds)

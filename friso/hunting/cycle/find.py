@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 
 import numpy as np
@@ -48,6 +49,11 @@ UNCERTAIN = (NOT_CLOSED, NO_MULTIPLIER)
 """Reasons why no cycle was found although there may be one."""
 
 
+def time_constant(returned: np.ndarray, multiplier: np.ndarray) -> np.ndarray:
+    """Time [s] in which a deviation changes by the factor e that is multiplied within a time `returned` [s]."""
+    return returned / np.maximum(np.abs(np.log(np.abs(multiplier))), 1e-12)
+
+
 @dataclass(frozen=True)
 class Cycles:
     """One cycle per stage, or none.
@@ -77,6 +83,11 @@ class Cycles:
     def attracting(self) -> np.ndarray:
         """Which of them attract, shape (count,)."""
         return self.found & (np.abs(self.multiplier) < 1)
+
+    @property
+    def time_constant(self) -> np.ndarray:
+        """Time [s] in which a small deviation from the cycle shrinks, or grows, by the factor e, shape (count,)."""
+        return time_constant(self.orbits.times, self.multiplier)
 
     @property
     def uncertain(self) -> np.ndarray:
@@ -111,6 +122,11 @@ def hunting_cycles(stages: Ensemble, rtol: float = RTOL) -> Cycles:
     symmetric = stages.symmetric
     kinds = ((symmetric, symmetric_cycles), (~symmetric, whole_cycles))
     parts = [(which, find(stages.take(which), rtol)) for mask, find in kinds if (which := np.flatnonzero(mask)).size]
+    return joined(parts)
+
+
+def joined(parts: Sequence[tuple[np.ndarray, Cycles]]) -> Cycles:
+    """The cycles of all stages from those of some and others, with the numbers of these."""
     if len(parts) == 1:
         return parts[0][1]
     order = np.argsort(np.concatenate([which for which, _ in parts]))

@@ -12,7 +12,7 @@ from friso.engine.simulate import output_variables, time_axis
 from friso.engine.tolerance import checked_rtol
 from friso.equations.structure import Structure, structure
 from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.find import ROUGH, RTOL, Cycles, families
+from friso.hunting.cycle.find import ROUGH, RTOL, Cycles, families, time_constant
 from friso.hunting.cycle.multipliers import returns_of
 from friso.hunting.cycle.neighbours import pair_beside, partner
 from friso.hunting.cycle.return_map import ReturnMap, return_map
@@ -63,7 +63,7 @@ class Cycle:
     def time_constant(self) -> float:
         """Time [s] in which a small deviation from the cycle shrinks, or grows, by the factor e."""
         returned = self.period / 2 if self.symmetric else self.period
-        return float(returned / max(abs(np.log(abs(self.multiplier))), 1e-12))
+        return float(time_constant(np.array(returned), np.array(self.multiplier)))
 
 
 @dataclass(frozen=True)

@@ -13,12 +13,11 @@ from friso.frequency.drive import Drive
 from friso.frequency.family import stability_by_poles
 from friso.frequency.loops import poles
 from friso.frequency.members import limit_cases
-from friso.hunting.peaks import COUNTED_AFTER, WINDOW, scan
+from friso.hunting.criteria import COUNTED_AFTER, distinct_peaks, end_of_traces, outcomes
+from friso.hunting.criteria.run_outcome import FAILED, RESTS, SWINGS, last_outside
+from friso.hunting.turning import WINDOW
 from friso.rig.run import Recorded
 from friso.stage import Stage
-
-LASTING = 0.5
-"""A swing of the last quarter lasts if it is at least this share of that of the last half."""
 
 DENSITY, SLOWEST = 100, 0.1
 """Frequencies per decade at which loops are looked at, besides those about resonances, and the lowest, as a share of
@@ -27,17 +26,27 @@ the slowest pole; the highest is half that of sampling."""
 
 @dataclass(frozen=True)
 class Found:
-    """Measures of runs, arrays of shape (count,): whether the run was completed (`done`), whether it `hunts` (it swings
-    on beyond the tolerance), peaks `counted` as in the thesis (Sec. 3.2.2), the time of `settling` [s] from the last
-    corner of the reference until the stage stays in position (infinite: never), root mean squares of the deviation
-    `in_position`, in the last quarter of the run [m], and of the commanded `force`, over all of it [N]."""
+    """Measures of runs, arrays of shape (count,): what each did at its end (`outcome`, words of
+    `friso.hunting.criteria.run_outcome`, the band being the tolerance), its distinct peaks `counted`, the time of
+    `settling` [s] from the last corner of the reference until the stage stays in position (infinite: it swings, or
+    creeps), root mean squares of the deviation `in_position`, in the last quarter of the run [m], and of the commanded
+    `force`, over all of it [N]."""
 
-    done: np.ndarray
-    hunts: np.ndarray
+    outcome: np.ndarray
     counted: np.ndarray
     settling: np.ndarray
     in_position: np.ndarray
     force: np.ndarray
+
+    @property
+    def done(self) -> np.ndarray:
+        """Which runs were completed, shape (count,)."""
+        return self.outcome != FAILED
+
+    @property
+    def swings(self) -> np.ndarray:
+        """Which runs swing at their end, shape (count,)."""
+        return self.outcome == SWINGS
 
 
 Measures = TypeVar("Measures", "Found", "Later")
@@ -55,15 +64,13 @@ def measured(recorded: Recorded, corner: float, within: float) -> Found:
     the drive logs counts for the peaks, what really moves for the rest."""
     time, reference = recorded.time, recorded.logged["reference"]
     deviation = recorded.true["position"] - reference
-    counted, _ = _peaks_and_period(time, recorded.logged["position"] - reference, np.full(len(deviation), np.inf))
     done = recorded.statuses == Status.DONE
-    hunts = done & lasting_swing(time, deviation, within)
+    outcome = outcomes(end_of_traces(time, deviation, within, done), within)
     late = deviation[:, time >= WINDOW * time[-1]]
-    settling = np.where(hunts, np.inf, settling_time(time, deviation, corner, within))
+    settling = np.where(outcome == RESTS, settling_time(time, deviation, corner, within), np.inf)
     return Found(
-        done=done,
-        hunts=hunts,
-        counted=np.where(done, counted, 0),
+        outcome=outcome,
+        counted=np.where(done, _counted(time, recorded.logged["position"] - reference), 0),
         settling=np.where(done, settling, np.nan),
         in_position=np.where(done, _rms(late), np.nan),
         force=np.where(done, _rms(recorded.logged["force"]), np.nan),
@@ -73,7 +80,7 @@ def measured(recorded: Recorded, corner: float, within: float) -> Found:
 @dataclass(frozen=True)
 class Later:
     """Some of the runs followed for longer, arrays of shape (some,): whether they were completed (`done`), and whether
-    the stage `stays` in position throughout the last half."""
+    the stage `stays` in position throughout the last half (it rests, and has done so for that long)."""
 
     done: np.ndarray
     stays: np.ndarray
@@ -82,40 +89,27 @@ class Later:
 @np.errstate(all="ignore")
 def followed(recorded: Recorded, within: float) -> Later:
     """Of a chunk of runs, whether they stay in position, `within` [m]."""
-    late = recorded.time >= 0.5 * recorded.time[-1]
-    deviation = (recorded.true["position"] - recorded.logged["reference"])[:, late]
+    deviation = recorded.true["position"] - recorded.logged["reference"]
     done = recorded.statuses == Status.DONE
-    return Later(done, done & (np.abs(deviation).max(axis=1) <= within))
-
-
-def lasting_swing(time: np.ndarray, deviation: np.ndarray, within: float) -> np.ndarray:
-    """Which deviations [m], shape (runs, n), over times [s], shape (n,), swing on at the end, shape (runs,): to and fro
-    by more than twice the tolerance in the last quarter, and no less than half as far as in the last half."""
-    last, half = (np.ptp(deviation[:, time >= share * time[-1]], axis=1) for share in (WINDOW, 0.5))
-    wide = (last > 2 * within) & (last >= LASTING * half)
-    wide[wide] = np.isfinite(_peaks_and_period(time, deviation[wide], last[wide])[1])
-    return wide
+    words = outcomes(end_of_traces(recorded.time, deviation, within, done), within, hold=recorded.time[-1] / 2)
+    return Later(done, words == RESTS)
 
 
 def settling_time(time: np.ndarray, deviation: np.ndarray, corner: float, within: float) -> np.ndarray:
     """Time [s] from the corner on until the deviation [m], shape (runs, n), stays within; infinite where it is not at
     the end, shape (runs,)."""
-    outside = ~(np.abs(deviation) <= within)
-    last = deviation.shape[1] - 1 - outside[:, ::-1].argmax(axis=1)
-    following = time[np.minimum(last + 1, len(time) - 1)]
-    found = np.where(outside.any(axis=1), following, 0.0)
-    return np.where(outside[:, -1], np.inf, np.maximum(found - corner, 0.0))
+    following = np.searchsorted(time, last_outside(time, deviation, within), side="right")
+    inside = np.append(time, np.inf)[following]
+    return np.maximum(inside - corner, 0.0)
 
 
-def _peaks_and_period(time: np.ndarray, deviation: np.ndarray, amplitude: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """How many peaks are counted, and the period of each run [s] of this amplitude [m], shape (runs,); what is before a
-    little before the first peak that may count, and before the last half, does not matter."""
-    some = time >= min(0.8 * COUNTED_AFTER, 0.5 * time[-1])
+def _counted(time: np.ndarray, deviation: np.ndarray) -> np.ndarray:
+    """Distinct peaks of logged deviations [m], shape (runs, n), over times [s], shape (n,): a count a run, shape
+    (runs,). What is long before the first peak that may count does not matter."""
+    some = time >= min(0.8 * COUNTED_AFTER, time[-1] / 2)
     values = np.ascontiguousarray(deviation[:, some])
-    times = np.tile(time[some], (len(values), 1))
-    counts, ended = np.full(len(values), values.shape[1]), np.full(len(values), time[-1])
-    peaks, period = scan(times, values, counts, amplitude, ended)
-    return peaks.sum(axis=1), period
+    whole = np.full(len(values), values.shape[1])
+    return distinct_peaks(np.tile(time[some], (len(values), 1)), values, whole).sum(axis=1)
 
 
 def _rms(values: np.ndarray) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Shares, medians and paired differences of machines, with 95 % intervals."""
+"""Medians and paired differences of machines, with 95 % intervals."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ import numpy as np
 from scipy.stats import binom
 
 from friso.intervals import COVERAGE
-from friso.studies.draws import Fates, Share
 
 
 @dataclass(frozen=True)
@@ -18,12 +17,6 @@ class Estimate:
     value: float
     low: float
     high: float
-
-
-def share(flags: np.ndarray, done: np.ndarray) -> Share:
-    """The probability of something, with the interval of Clopper and Pearson; runs that are not done count either way
-    in it."""
-    return Fates(np.where(done, np.where(flags, "hunts", "settles"), "failed")).share(("hunts",))
 
 
 def median(values: np.ndarray) -> Estimate:

@@ -16,21 +16,21 @@ from friso.stage.correlations import Correlations
 from friso.studies.compare.machines import Machines, draw_machines
 from friso.studies.compare.measures import Found, Later, Loops, followed, joined, linear_loops, measured
 from friso.studies.compare.options import NAMES, Option, Options, linear_flat, options
-from friso.studies.compare.statistics import Estimate, difference, median, share
-from friso.studies.draws import Share
+from friso.studies.compare.statistics import Estimate, difference, median
 from friso.studies.rig.outcome import Progress, silent
+from friso.studies.shares import Share, share
 
 INTERVAL = 1e-3
 """Time [s] between what is looked at, at least: the next whole number of samples."""
 
 FOLLOWED, LONGER = 40, 6
-"""Machines that are run again for so many times as long: an integrator that was reset may hunt that slowly."""
+"""Machines that are run again for so many times as long: an integrator that was reset may swing that slowly."""
 
 ENOUGH = 0.99
-"""Share of the machines that an option has to bring into position to be called one that settles them."""
+"""Share of the machines that an option has to bring into position to be called one that brings them to rest."""
 
 LATEST = 0.5
-"""Share of the run by which the reference has to stand: hunting is looked for in what follows."""
+"""Share of the run by which the reference has to stand: lasting swings are looked for in what follows."""
 
 
 @dataclass(frozen=True)
@@ -47,12 +47,13 @@ class Result:
         return self.option.letter
 
     @property
-    def hunting(self) -> Share:
-        return share(self.found.hunts, self.found.done)
+    def swinging(self) -> Share:
+        """The probability of swinging at the end of the run."""
+        return share(self.found.swings, self.found.done)
 
     @property
     def counted(self) -> Share:
-        """The probability of a peak that counts as in the thesis."""
+        """The probability of a distinct peak (see `friso.hunting.criteria.peak_count`)."""
         return share(self.found.counted > 0, self.found.done)
 
     @property
@@ -96,18 +97,18 @@ class Result:
         return int(np.isfinite(self.found.settling).sum())
 
     @property
-    def settles(self) -> bool:
+    def rests(self) -> bool:
         """Whether `ENOUGH` of the machines are in position by the end, and of those that are followed stay there."""
         return self.in_position_count >= ENOUGH * len(self.found.settling) and bool(self.later.stays.mean() >= ENOUGH)
 
 
 @dataclass(frozen=True)
 class Paired:
-    """An option against option a on the same machines: by how much hunting is more probable, the shares of machines
-    that settle `sooner`, `later` and `alike` (never with both, too), and the medians of what root mean squares in
-    position and of the force are multiplied by."""
+    """An option against option a on the same machines: by how much swinging at the end is more probable, the shares of
+    machines in position `sooner`, `later` and `alike` (never with both, too), and the medians of what root mean squares
+    in position and of the force are multiplied by."""
 
-    hunting: Estimate
+    swinging: Estimate
     sooner: Share
     later: Share
     alike: Share
@@ -144,7 +145,7 @@ class Comparison:
                 getattr(one, name)[both] / getattr(base, name)[both] for name in ("in_position", "force")
             )
         return Paired(
-            hunting=difference(one.hunts[both], base.hunts[both]),
+            swinging=difference(one.swings[both], base.swings[both]),
             sooner=share(one.settling < base.settling, both),
             later=share(one.settling > base.settling, both),
             alike=share(one.settling == base.settling, both),
@@ -255,10 +256,10 @@ def _troubles(results: list[Result], count: int) -> list[str]:
     failed = "they count either way in the intervals of probabilities and are left out of medians"
     found = []
     for result in results:
-        hunting, both = result.found.hunts, result.found.hunts & ~result.loops.stable
+        swings, both = result.found.swings, result.found.swings & ~result.loops.stable
         unstable = (
-            "these are simulated and counted like the others; among the machines that hunt they are "
-            f"{both.sum()} of {hunting.sum()}"
+            "these are simulated and counted like the others; among the machines that swing at the "
+            f"end they are {both.sum()} of {swings.sum()}"
         )
         troubles = (
             ("linear loops that are not stable", result.unstable, unstable),

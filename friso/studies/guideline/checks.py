@@ -9,7 +9,7 @@ import numpy as np
 from scipy.stats import qmc
 
 from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.persistence import DISTANCES, Begin, from_rest, still_hunts
+from friso.hunting.persistence import DISTANCES, Begin, from_rest, still_swings
 from friso.studies.guideline.groups import flat_of
 from friso.studies.guideline.sweeps import Sweep
 
@@ -58,13 +58,13 @@ _How = Callable[[Ensemble, np.ndarray, int], Begin]
 
 
 def _hunts(sweep: Sweep, share: float, how: _How, tried: int) -> tuple[np.ndarray, np.ndarray]:
-    """Which runs of each sample still hunt at the end, and which were completed, shape (samples, tried)."""
+    """Which runs of each sample still swing at the end, and which were completed, shape (samples, tried)."""
     count = len(sweep.edge)
     which = np.repeat(np.arange(count), tried)
     values = {name: value[which] for name, value in sweep.values.items()} | {"crossover": share * sweep.edge[which]}
     stages = Ensemble.held(flat_of(values), len(which))
-    hunts, completed = still_hunts(stages, how(stages, values["crossover"], count), PERIODS[share])
-    return hunts.reshape(count, tried), completed.reshape(count, tried)
+    swings, completed = still_swings(stages, how(stages, values["crossover"], count), PERIODS[share])
+    return swings.reshape(count, tried), completed.reshape(count, tried)
 
 
 def _stuck(stages: Ensemble, crossover: np.ndarray, count: int) -> Begin:

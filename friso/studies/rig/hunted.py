@@ -12,14 +12,16 @@ from friso.engine.arrays import Status
 from friso.equations import motion
 from friso.equations.bandwidth import bandwidth
 from friso.errors import InputError
-from friso.hunting.peaks import COUNTED_ABOVE, SWING, WINDOW, scan
+from friso.hunting.criteria.run_outcome import FAILED, SWINGS, End, last_outside, outcomes
+from friso.hunting.turning import COUNTED_ABOVE, DISTINCT, HALF, WINDOW, zigzag
+from friso.hunting.turns import scan
 from friso.rig.run import Recorded, run
 from friso.rig.task import Task, point_to_point
 from friso.stage import Stage
 from friso.stage.controllers import CONTROLLER
-from friso.studies.draws import Fates, Share
 from friso.studies.rig.outcome import Progress, silent
 from friso.studies.rig.sizes import interval, jointed
+from friso.studies.shares import Share, share
 
 RAILS = 20
 """Rails on which a machine is repeated: the issue's number, ours."""
@@ -30,8 +32,8 @@ DURATION = 20.0
 INTERVAL = 1e-3
 """Between the samples of a log, at most [s]: the thesis tells none."""
 
-ENDING = 0.875
-"""Share of a run after which its end begins."""
+BAND = COUNTED_ABOVE
+"""Band about the reference [m] within which a run rests: the height from which the thesis counts peaks."""
 
 ROUND = (1.0, 2.0, 5.0, 10.0)
 """What a length is rounded to, times a power of ten."""
@@ -110,37 +112,46 @@ def numbers_of(seed: int, cases: int, machines: int) -> list[int]:
 class Hunted:
     """What became of runs, each of shape (runs,).
 
-    By the thesis's metric the `peaks`; over the last quarter `swing` [m] from peak to peak and `period` [s] (NaN: no
-    cycle); over the last eighth `ending` [m] from peak to peak. Of the cycles after half of the run: mean heights of
-    both sides, `above` and `below` the reference [m], shares of the period that a cycle rises (`rising`), and the
-    scatter from cycle to cycle (standard deviation) of the period over its mean (`period_scatter`) and of the heights
-    over the swing (`height_scatter`), NaN of less than three cycles. `failed` runs have NaN, and no peaks.
+    The number of distinct `peaks` (see `friso.hunting.criteria.peak_count`); what it did at its end (`outcome`, words
+    of `friso.hunting.criteria.run_outcome`, the band being `BAND`); over the last quarter `swing` [m] from peak to
+    peak and `period` [s] (NaN: none). Of the swings after half of the run: mean heights of both sides, `above` and
+    `below` the reference [m], shares of the period that the deviation rises (`rising`), and the scatter from swing to
+    swing (standard deviation) of the period over its mean (`period_scatter`) and of the heights over the swing
+    (`height_scatter`), NaN of less than three swings. Runs that failed have NaN, and no peaks.
     """
 
     peaks: np.ndarray
+    outcome: np.ndarray
     swing: np.ndarray
     period: np.ndarray
-    ending: np.ndarray
     above: np.ndarray
     below: np.ndarray
     rising: np.ndarray
     period_scatter: np.ndarray
     height_scatter: np.ndarray
-    failed: np.ndarray
 
     @property
-    def lives(self) -> np.ndarray:
-        """Whether it still swings, by twice the height from which peaks count and as before, when the run ends."""
-        return np.isfinite(self.period) & (self.swing > 2 * COUNTED_ABOVE) & (self.ending > self.swing / 2)
+    def swings(self) -> np.ndarray:
+        """Which runs swing at their end."""
+        return self.outcome == SWINGS
+
+    @property
+    def failed(self) -> np.ndarray:
+        """Which runs failed."""
+        return self.outcome == FAILED
+
+    @property
+    def counted(self) -> np.ndarray:
+        """Which runs have a peak that counts."""
+        return self.peaks > 0
 
     def shaped(self, *shape: int) -> Hunted:
         """With arrays of another shape."""
         return Hunted(**{each.name: getattr(self, each.name).reshape(shape) for each in fields(self)})
 
     def share(self, which: Any = ...) -> Share:
-        """The share of some runs that hunts, with its 95 % interval."""
-        words = np.where(self.failed, "failed", np.where(self.peaks > 0, "hunts", "settles"))
-        return Fates(np.ravel(words[which])).share(("hunts",))
+        """The share of some runs that have a peak that counts, with its 95 % interval."""
+        return share(self.counted[which], ~self.failed[which])
 
 
 def once(stage: Stage, task: Task, seeds: Sequence[int], changes: Mapping[str, Any] | None = None) -> Recorded:
@@ -183,15 +194,16 @@ def hunted(recorded: Recorded) -> Hunted:
     times, values = np.zeros((2, len(turns), max(1, counts.max(initial=0))))
     for row, (at, value) in enumerate(turns):
         times[row, : len(at)], values[row, : len(at)] = at, value
-    swing, ending = (np.ptp(deviation[:, time >= share * time[-1]], axis=1) for share in (WINDOW, ENDING))
-    peaks, period = scan(times, values, counts, np.nan_to_num(swing), np.full(len(turns), time[-1]))
+    swing, earlier = (np.ptp(deviation[:, time >= part * time[-1]], axis=1) for part in (WINDOW, HALF))
+    ended = np.full(len(turns), time[-1])
+    found = scan(times, values, counts, swing, ended)
+    end = End(~failed, swing, earlier, found.period, last_outside(time, deviation, BAND), ended)
     shapes = [cycle_shape(*each, size, time[-1]) for each, size in zip(turns, swing, strict=True)]
     known = np.where(failed, np.nan, 1.0)
     above, below, rising, periods, heights = np.array(shapes).T * known
-    counted = np.where(failed, 0, peaks.sum(axis=1))
-    return Hunted(
-        counted, swing * known, period * known, ending * known, above, below, rising, periods, heights, failed
-    )
+    counted = np.where(failed, 0, found.distinct.sum(axis=1))
+    words = outcomes(end, BAND)
+    return Hunted(counted, words, swing * known, found.period * known, above, below, rising, periods, heights)
 
 
 def turning_points(time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -203,12 +215,10 @@ def turning_points(time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np
 
 
 def cycle_shape(times: np.ndarray, values: np.ndarray, swing: float, ended: float) -> tuple[float, ...]:
-    """Of the cycles in the last half of a run, from its turning points, times [s] and values [m]: above, below,
+    """Of the swings in the last half of a run, from its turning points, times [s] and values [m]: above, below,
     rising, scatter of period and of height, as in `Hunted`."""
-    from friso.hunting.turning import zigzag
-
     nothing = (np.nan,) * 5
-    if not swing > max(SWING, 2 * COUNTED_ABOVE):
+    if not swing > max(DISTINCT, 2 * BAND):
         return nothing
     late = times >= ended / 2
     at, value = times[late], values[late]

@@ -132,7 +132,7 @@ def cycles(stage: Stage) -> Cycles:
     machine = as_built(stage)
     even = on_rail(with_joint(machine, locked=True))
     run = started(even, SEED, {}, 1, silent, "")
-    swing = float(run.swing[0]) if run.lives[0] else 0.01 * distance(machine)
+    swing = float(run.swing[0]) if run.swings[0] else 0.01 * distance(machine)
     flat = machine.flat()
     cases = {f"rail.{name}": np.array([flat[f"rail.{name}"]]) for name in _FIELD}
     rails, asymmetry = varied(even, SEED, cases, 1.0 + np.arange(float(RAILS)), swing, silent, "")

@@ -38,9 +38,9 @@ class Edge:
 
 @dataclass(frozen=True)
 class Comparison:
-    """What the peak count and the cycle say of the cells compared: both hunting (`agreed`) or both not (`quiet`), peaks
-    counted although no cycle attracts (`transient`), a cycle that attracts although no peaks are counted (`dormant`:
-    another move would start it), and cells of which the cycle could not be computed."""
+    """What the peak count and the cycle say of the cells compared: peaks counted where a cycle attracts (`agreed`) or
+    neither (`quiet`), peaks counted although no cycle attracts (`transient`), a cycle that attracts although no peaks
+    are counted (`dormant`: another move would start it), and cells of which the cycle could not be computed."""
 
     cells: int
     agreed: int
@@ -66,11 +66,11 @@ def cycles(study: ThesisStudy, runs: xr.Dataset) -> Cycles:
 def _comparison(runs: xr.Dataset) -> Comparison:
     coarse = runs.isel(dict.fromkeys(runs.dims, slice(None, None, EVERY)))
     study = study_of(coarse)
-    valid = (coarse["verdict"].values != "invalid").ravel()
+    valid = (coarse["outcome"].values != "invalid").ravel()
     attracts, decided = np.zeros(study.cells, bool), np.zeros(study.cells, bool)
     for which, cycles in cell_cycles(study.stage, study.links, study.columns(np.arange(study.cells)), valid):
         attracts[which], decided[which] = cycles.attracting, ~cycles.uncertain
-    peaks = (coarse["peaks"].values > 0).ravel()
+    peaks = coarse["hunting"].values.ravel()
     decided &= valid
     return Comparison(
         cells=int(valid.sum()),

@@ -7,20 +7,23 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.stats import rankdata
 
+from friso.hunting.criteria.run_outcome import FAILED
+
 if TYPE_CHECKING:
     import xarray as xr
 
 
 def table(runs: xr.Dataset, rows: str, columns: str) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Coordinates of rows and columns [SI], hunting (bool) and valid (bool), both of shape (rows, columns)."""
-    verdict = runs["verdict"].transpose(rows, columns).values
-    valid = (verdict != "invalid") & (verdict != "failed")
-    return runs[rows].values, runs[columns].values, verdict == "hunts", valid
+    """Coordinates of rows and columns [SI], hunting by the criterion of the runs (its attribute; the thesis's count, or
+    the end of the run) and valid, both booleans of shape (rows, columns)."""
+    hunting, outcome = (runs[name].transpose(rows, columns).values for name in ("hunting", "outcome"))
+    valid = (outcome != "invalid") & (outcome != FAILED)
+    return runs[rows].values, runs[columns].values, hunting & valid, valid
 
 
 def counts(runs: xr.Dataset, rows: str, columns: str) -> np.ndarray:
-    """Peak counts, shape (rows, columns)."""
-    return runs["peaks"].transpose(rows, columns).values
+    """Counts of distinct peaks, shape (rows, columns)."""
+    return runs["distinct_peaks"].transpose(rows, columns).values
 
 
 def ends(values: np.ndarray, hunts: np.ndarray) -> np.ndarray:

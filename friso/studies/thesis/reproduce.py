@@ -11,7 +11,8 @@ import numpy as np
 from friso.engine.simulate import simulate
 from friso.errors import InputError
 from friso.frequency.bode import Bode, bode
-from friso.hunting import COUNTED_ABOVE
+from friso.hunting.criteria.peak_count import DISTINCT_CRITERION
+from friso.hunting.criteria.run_outcome import CREEPS, CRITERION, RESTS, SWINGS
 from friso.studies.sweep import sweep
 from friso.studies.thesis.claims import Claim, Evidence, Finding, Registered, Response, claims, registered
 from friso.studies.thesis.cycles import Cycles, cycles
@@ -55,9 +56,9 @@ class Reproduction:
     """All that was found.
 
     Maps by study name and responses by name; the linear analysis of the rig, and in `bode` its curves over the
-    frequency; the map of Fig. 14B by relative tolerance and the shares of its cells whose verdict, and whose peak
-    count, differs between them (NaN if not computed); a verdict per claim; the hunting cycles behind each map by study
-    name; values per axis of the maps (`points`), which are those of every variant too.
+    frequency; the map of Fig. 14B by relative tolerance and the shares of its cells in which peaks are counted at one
+    of them only, and whose peak count differs between them (NaN if not computed); a verdict per claim; the hunting
+    cycles behind each map by study name; values per axis of the maps (`points`), which are those of every variant too.
     """
 
     maps: Mapping[str, xr.Dataset]
@@ -193,36 +194,40 @@ def _maps(
 def _map(
     study: ThesisStudy, changes: Mapping[str, object], points: int, rtol: float, verify: float = 0.0
 ) -> xr.Dataset:
-    return sweep(study.stage(changes), study.axes(points), links=dict(study.links), rtol=rtol, verify=verify)
+    runs = sweep(study.stage(changes), study.axes(points), links=dict(study.links), rtol=rtol, verify=verify)
+    return counted(runs)
 
 
 def _response(own_changes: Mapping[str, object], changes: Mapping[str, object], rtol: float) -> Response:
     """One run in time; a variant's changes come before the run's own, which distinguish it from the others."""
     stage = rig().replace(dict(changes)).replace(dict(own_changes))
     cell = sweep(stage, {"joint.locked": [stage.flat()["joint.locked"]]}, rtol=rtol).isel({"joint.locked": 0})
-    return Response(cell, simulate(stage, rtol))
+    return Response(counted(cell), simulate(stage, rtol))
+
+
+def counted(runs: xr.Dataset) -> xr.Dataset:
+    """The runs with `hunting` by the thesis's metric: where distinct peaks are counted."""
+    hunting = (runs["distinct_peaks"] > 0).assign_attrs(criterion=DISTINCT_CRITERION)
+    return runs.assign(hunting=hunting)
 
 
 def lasting(runs: xr.Dataset) -> xr.Dataset:
-    """The runs with a verdict by what is left at their end: "hunts" where the last quarter still swings by twice the
-    height from which peaks count, else "settles", with no peaks; invalid and failed cells stay."""
-    swings = runs["peak_to_peak"] > 2 * COUNTED_ABOVE
-    judged = runs["verdict"].isin(["hunts", "settles", "transient"])
-    words = np.where(swings, "hunts", "settles")
-    verdict = runs["verdict"].copy(data=np.where(judged, words, runs["verdict"]))
-    peaks = runs["peaks"].where(swings | ~judged, 0.0)
-    return runs.assign(verdict=verdict, peaks=peaks)
+    """The same by what is left at the end: where the run swings; others have no peaks then, but for invalid and failed
+    cells."""
+    swings = (runs["outcome"] == SWINGS).assign_attrs(criterion=CRITERION)
+    ended = runs["outcome"].isin([SWINGS, CREEPS, RESTS])
+    return runs.assign(hunting=swings, distinct_peaks=runs["distinct_peaks"].where(swings | ~ended, 0.0))
 
 
 def _changed(tolerances: Mapping[float, xr.Dataset]) -> tuple[float, float]:
-    """Shares of cells whose verdict, and whose peak count, differs between the two tolerances; a count that is unknown
-    in both does not differ."""
+    """Shares of cells in which peaks are counted at one of the two tolerances only, and whose peak count differs; a
+    count that is unknown in both does not differ."""
     if not tolerances:
         return np.nan, np.nan
     loose, tight = tolerances.values()
-    first, second = loose["peaks"].values, tight["peaks"].values
+    first, second = loose["distinct_peaks"].values, tight["distinct_peaks"].values
     other_count = (first != second) & ~(np.isnan(first) & np.isnan(second))
-    return float((loose["verdict"] != tight["verdict"]).mean()), float(other_count.mean())
+    return float((loose["hunting"] != tight["hunting"]).mean()), float(other_count.mean())
 
 
 def _judged(

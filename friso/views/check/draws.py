@@ -8,7 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from friso.studies.draws import ATTRACTED, WORDS, Fates, Share
+from friso.hunting.criteria import ATTRACTED, VERDICTS
+from friso.hunting.criteria.stage_verdict import CRITERION
+from friso.studies.draws import Fates
+from friso.studies.shares import Share
 from friso.views.drawing.figure import BLUE, GREY, ORANGE, SKY, VERMILLION, Axis, Band, Figure, Panel
 from friso.views.drawing.prefixes import NOTHING
 
@@ -45,6 +48,7 @@ def draws_document(drawing: Drawing, case: str) -> dict[str, Any]:
         "left_out": drawing.drawn.left_out,
         "hunts": _share_document(found.share(("hunts",))),
         "attracting_cycle": _share_document(found.share(ATTRACTED)),
+        "criterion": CRITERION,
         "verdicts": found.counts,
         "separation": found.separations(drawing.drawn.keys),
     }
@@ -61,7 +65,7 @@ def draws_rows(drawing: Drawing) -> list[tuple[str, list[str]]]:
     rows = [
         ("Hunts after this move", [_percent(each.share(("hunts",))) for each in found]),
         ("A cycle attracts", [_percent(each.share(ATTRACTED)) for each in found]),
-        *((f"Verdict {word}", [str(each.counts[word]) for each in found]) for word in WORDS),
+        *((f"Verdict {word}", [str(each.counts[word]) for each in found]) for word in VERDICTS),
     ]
     known = [each.separations(drawing.drawn.keys) for each in found]
     strength = {key: max((abs(each[key]) for each in known if each), default=0.0) for key in drawing.drawn.keys}
@@ -116,7 +120,7 @@ def _panel(label: str, found: Fates, drawing: Drawing) -> Panel:
     key = next(iter(found.separations(keys) or keys))
     edges = np.histogram_bin_edges(keys[key], BINS)
     x, bands, below = np.repeat(edges, 2)[1:-1], [], np.zeros(2 * BINS)
-    for word in WORDS:
+    for word in VERDICTS:
         counts = np.repeat(np.histogram(keys[key][found.verdicts == word], edges)[0], 2).astype(float)
         if counts.any():
             bands.append(Band(x, below, below + counts, word, COLOURS[word]))

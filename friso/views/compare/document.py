@@ -7,6 +7,8 @@ from dataclasses import asdict
 from typing import Any
 
 from friso.equations.bandwidth import bandwidth
+from friso.hunting.criteria.peak_count import DISTINCT_CRITERION as PEAKS
+from friso.hunting.criteria.run_outcome import CRITERION as OUTCOME
 from friso.studies.compare.options import DEADBAND, MODEL_ERROR
 from friso.studies.compare.study import LONGER, Comparison, Result
 from friso.views.compare.words import (
@@ -31,6 +33,7 @@ def document(found: Comparison) -> dict[str, Any]:
             "stage": found.stage.name,
             "seed": found.seed,
             "machines": machines.count,
+            "criteria": {"swings": f"{OUTCOME}; band: within_m", "distinct_peaks": PEAKS},
             "within_m": found.within,
             "deadband_m": found.options.deadband,
             "sample_time_s": found.stage.flat()["drive.sample_time"],
@@ -53,8 +56,8 @@ def _option(found: Comparison, result: Result) -> dict[str, Any]:
         "name": result.option.name,
         "crossover_hz": crossover,
         "bandwidth_factor": result.option.factor,
-        "hunts": asdict(result.hunting),
-        "counted": asdict(result.counted),
+        "swings": asdict(result.swinging),
+        "distinct_peaks": asdict(result.counted),
         "in_position": asdict(result.settled),
         "stays": asdict(result.stays),
         "settling_time_s": asdict(result.settling),
@@ -64,9 +67,9 @@ def _option(found: Comparison, result: Result) -> dict[str, Any]:
         "unstable": result.unstable,
         "failed": result.failed,
         "machines_in_position": result.in_position_count,
-        "settles": result.settles,
+        "rests": result.rests,
         "against_a": {
-            "hunts": asdict(pair.hunting),
+            "swings": asdict(pair.swinging),
             "sooner": asdict(pair.sooner),
             "later": asdict(pair.later),
             "alike": asdict(pair.alike),

@@ -1,4 +1,4 @@
-"""Isolator or firmware, drawn: who hunts, when they settle, how still they stand."""
+"""Isolator or firmware, drawn: which machines swing on, when they settle, how still they stand."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 
 from friso.equations.motion import last_corner
 from friso.studies.compare.study import LONGER, Comparison, Result
-from friso.studies.draws import Share
+from friso.studies.shares import Share
 from friso.views.compare.words import label
 from friso.views.drawing.figure import (
     BLUE,
@@ -68,7 +68,7 @@ def _names(found: Comparison) -> Axis:
 
 def _probabilities(found: Comparison) -> Panel:
     kinds = (
-        ("hunts at the end", VERMILLION, [each.hunting for each in found.results]),
+        ("swings at the end", VERMILLION, [each.swinging for each in found.results]),
         ("not in position at the end", BLUE, [_other(each.settled) for each in found.results]),
         (f"does not stay there ({LONGER} times as long)", GREY, [_other(each.stays) for each in found.results]),
     )

@@ -11,12 +11,12 @@ from friso.frequency.crossover import WANTED
 from friso.studies.compare.options import JOINT, MODEL_ERROR, Option
 from friso.studies.compare.statistics import Estimate
 from friso.studies.compare.study import ENOUGH, FOLLOWED, LONGER, Comparison, Paired, Result
-from friso.studies.draws import Share
+from friso.studies.shares import Share
 from friso.views.drawing.prefixes import NOTHING, listed, range_with_unit, with_unit
 
 COLUMNS = (
-    "Hunts at the end",
-    "Counted as in the thesis",
+    "Swings at the end",
+    "Counts a distinct peak",
     "In position at the end",
     "Stays there later",
     "Settling time",
@@ -25,7 +25,7 @@ COLUMNS = (
     "Modulus margin",
 )
 
-PAIRED = ("Hunts more often by", "Settles sooner, later, alike", "In-position RMS times", "Force RMS times")
+PAIRED = ("Swings more often by", "In position sooner, later, alike", "In-position RMS times", "Force RMS times")
 
 UNSHAKEN = "not compared: no [floor]"
 
@@ -72,7 +72,7 @@ def table_rows(found: Comparison) -> list[Row]:
         (
             label(each),
             [
-                *(percent(share) for share in (each.hunting, each.counted, each.settled, each.stays)),
+                *(percent(share) for share in (each.swinging, each.counted, each.settled, each.stays)),
                 _time(each.settling),
                 *(_length(value, unit) for value, unit in ((each.in_position, "m"), (each.force, "N"))),
                 _margin(each, found),
@@ -87,7 +87,7 @@ def paired_rows(found: Comparison) -> list[Row]:
     rows = []
     for each in found.results[1:]:
         pair = found.paired(each)
-        points = [100 * value for value in (pair.hunting.value, pair.hunting.low, pair.hunting.high)]
+        points = [100 * value for value in (pair.swinging.value, pair.swinging.low, pair.swinging.high)]
         more = f"{points[0]:+.1f} points ({points[1]:+.1f} to {points[2]:+.1f})"
         still = _ratio(pair.in_position) if found.shaken else UNSHAKEN
         rows.append((label(each), [more, _when(pair), still, _ratio(pair.force)]))
@@ -139,11 +139,11 @@ def _margin(result: Result, found: Comparison) -> str:
 
 def sentences(found: Comparison) -> list[str]:
     """What follows for the one who has to choose between a joint and settings."""
-    return [_who_settles(found), *_costs(found), *_others(found), _choice(found), *_standstill(found)]
+    return [_who_rests(found), *_costs(found), *_others(found), _choice(found), *_standstill(found)]
 
 
-def _who_settles(found: Comparison) -> str:
-    count, settling = found.machines.count, _settling(found)
+def _who_rests(found: Comparison) -> str:
+    count, settling = found.machines.count, _resting(found)
     within = f"within {with_unit(found.within, 'm')}"
     some = min(FOLLOWED, count)
     if not settling:
@@ -165,13 +165,13 @@ def _how_many(result: Result, count: int) -> str:
 
 
 def _costs(found: Comparison) -> list[str]:
-    """The price of each option that settles all machines."""
+    """The price of each option that brings the machines to rest."""
     own = found.results[0].margin.value
     return [
-        f"{label(each)}: settles in {with_unit(each.settling.value, 's')} (median), {_still(each, found)}takes "
+        f"{label(each)}: in position in {with_unit(each.settling.value, 's')} (median), {_still(each, found)}takes "
         f"{found.paired(each).force.value:.3g} times the force RMS of a, and has a modulus margin of "
         f"{each.margin.value:.2f} instead of {own:.2f}{_robust(each, found)}."
-        for each in _settling(found)
+        for each in _resting(found)
         if each.letter != "a"
     ]
 
@@ -203,31 +203,31 @@ def _robust(result: Result, found: Comparison) -> str:
 
 
 def _others(found: Comparison) -> list[str]:
-    """What is left of hunting with the other options."""
+    """What the machines do at the end with the other options."""
     return [
-        f"{label(each)} does not settle them: {percent(each.hunting)} hunt at the end, {percent(each.settled)} are in "
-        f"position then, and {percent(each.stays)} stay there later."
+        f"{label(each)} does not bring them to rest: {percent(each.swinging)} swing at the end, "
+        f"{percent(each.settled)} are in position then, and {percent(each.stays)} stay there later."
         for each in found.results
-        if not each.settles
+        if not each.rests
     ]
 
 
 def _choice(found: Comparison) -> str:
-    settling = _settling(found)
+    settling = _resting(found)
     joint, settings = ([each for each in settling if (each.letter in JOINT) is bought] for bought in (True, False))
     if joint and settings:
         return (
-            f"On these machines controller settings achieve what a joint achieves: {_names(settings)} settles them "
-            f"without one, {_names(joint)} with one. The joint is for machines on which those settings are not "
+            f"On these machines controller settings achieve what a joint achieves: {_names(settings)} brings them to "
+            f"rest without one, {_names(joint)} with one. The joint is for machines on which those settings are not "
             "possible."
         )
     if joint:
-        return f"On these machines only the joint settles them: {_names(joint)}; no controller setting alone does."
+        return f"On these machines only the joint brings them to rest: {_names(joint)}; no setting alone does."
     if settings:
         said = "and no option with a joint does" if any(each.letter in JOINT for each in found.results) else ""
         return f"On these machines controller settings suffice: {_names(settings)}{', ' + said if said else ''}."
     return (
-        "On these machines neither a joint nor controller settings settle enough of them: see the table for what each "
+        "On these machines neither a joint nor controller settings bring enough of them to rest: see the table for what each "
         "achieves."
     )
 
@@ -236,8 +236,8 @@ def _names(some: Sequence[Result]) -> str:
     return listed([label(each) for each in some], "or")
 
 
-def _settling(found: Comparison) -> list[Result]:
-    return [each for each in found.results if each.settles]
+def _resting(found: Comparison) -> list[Result]:
+    return [each for each in found.results if each.rests]
 
 
 def population(found: Comparison) -> list[str]:

@@ -9,10 +9,10 @@ from friso.views.design.window import Bound, comfortable, lower, upper
 from friso.views.design.words import (
     Step,
     hertz,
-    hunting,
     percent,
     plain,
     probability,
+    restless,
     seconds,
     settling,
 )
@@ -124,9 +124,9 @@ def _damping(design: Design) -> str:
 def moves_step(design: Design) -> Step:
     """What the simulated moves show."""
     free, locked = design.verification.free, design.verification.locked
-    sentences = [f"Of {free.tried} moves over all ranges and tolerances {hunting(free)}: {probability(free)}."]
+    sentences = [f"Of {free.tried} moves over all ranges and tolerances {restless(free)}: {probability(free)}."]
     other = settling(locked)
-    sentences.append(f"{settling(free)}. With the joint locked: {other[0].lower()}{other[1:]}, and {hunting(locked)}.")
+    sentences.append(f"{settling(free)}. With the joint locked: {other[0].lower()}{other[1:]}, and {restless(locked)}.")
     broken = len(free.completed) - free.tried
     if broken:
         sentences.append(f"{broken} moves could not be simulated to the end and do not count.")
@@ -135,7 +135,7 @@ def moves_step(design: Design) -> Step:
         *(row for name, outcome in (("free", free), ("locked", locked)) for row in _outcome(name, outcome)),
         ("In position", f"within ±{plain(design.spec.position.window, 'm')} of the reference"),
     )
-    title = f"Verification: {free.tried} moves, {hunting(free)}"
+    title = f"Verification: {free.tried} moves, {restless(free)}"
     return Step(title, tuple(sentence for sentence in sentences if sentence), facts, ("design_settling",))
 
 
@@ -148,8 +148,8 @@ def _met(design: Design) -> str:
 
 def _worst(outcome: Outcome) -> str:
     k = outcome.worst
-    if outcome.hunts[k]:
-        return f"The worst move, which swings over {plain(outcome.swing[k], 'm')}"
+    if outcome.restless[k]:
+        return f"The worst move, which {outcome.words[k]} over {plain(outcome.swing[k], 'm')}"
     return f"The worst move, which takes {seconds(float(outcome.settling[k]))} to settle"
 
 
@@ -157,7 +157,10 @@ def _outcome(name: str, outcome: Outcome) -> tuple[tuple[str, str], ...]:
     """The rows of one state of the joint."""
     low, high = outcome.interval
     return (
-        (f"Joint {name}: hunting", f"{outcome.hunting} of {outcome.tried}, {percent(low)} to {percent(high)}"),
+        (
+            f"Joint {name}: not at rest in position",
+            f"{outcome.missed} of {outcome.tried}, {percent(low)} to {percent(high)}",
+        ),
         (
             f"Joint {name}: settling, median and 95 %",
             f"{seconds(outcome.slower_than(0.5))}, {seconds(outcome.slower_than(0.05))}",

@@ -165,7 +165,8 @@ def _outcome(outcome: Outcome) -> dict[str, Any]:
     return {
         "moves": outcome.tried,
         "not_completed": len(outcome.completed) - outcome.tried,
-        "hunting": outcome.hunting,
+        "not_at_rest": outcome.missed,
+        "swinging": outcome.swinging,
         "probability_low": low,
         "probability_high": high,
         "settling_median_s": outcome.slower_than(0.5),

@@ -1,4 +1,4 @@
-"""The figures of a design: Pareto front, modes, hunting map, margins over damping, settling times."""
+"""The figures of a design: Pareto front, modes, map of moves, margins over damping, settling times."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ WIDE, FEW = 30.0, 0.01
 SHARES = 401
 """Points of a distribution."""
 
-KINDS = (Kind("settles in all corners", QUIET), Kind("run failed", INK))
+KINDS = (Kind("rests in all corners", QUIET), Kind("run failed", INK))
 
 
 def design_figures(design: Design) -> tuple[Figure, ...]:
@@ -98,7 +98,7 @@ def _points(several: Sequence[Candidate | Confirmed]) -> tuple[Array, Array]:
 
 
 def _map(design: Design) -> Figure:
-    """Hunting over crossover and stroke."""
+    """Whether moves come to rest, over crossover and stroke."""
     hunting_map, crossover, stroke = design.map, design.controller.crossover, design.fitted.task.stroke
     codes = np.where(np.isnan(hunting_map.share), 1.0, np.where(hunting_map.share == 0, 0.0, np.nan))
     percents = np.where(np.isnan(codes), 100 * hunting_map.share, np.nan)
@@ -120,10 +120,10 @@ def _map(design: Design) -> Figure:
     panel = Panel("", *axes, tuple(upright), (point,), maps=(field,))
     caption = (
         f"The share of the {design.edges.population.count} corners of friction and masses in which the stage is not in "
-        "position a quarter of a minute after a typical move: it hunts, or creeps so slowly that it might as well "
-        "hunt. Drive stiffness as chosen."
+        "position a quarter of a minute after a typical move: it swings, or creeps so slowly that it might as "
+        "well swing. Drive stiffness as chosen."
     )
-    return Figure("design_map", "Hunting over crossover and stroke", caption, (panel,))
+    return Figure("design_map", "Where moves do not come to rest, over crossover and stroke", caption, (panel,))
 
 
 def _reach(centres: Array) -> tuple[float, float]:
@@ -169,7 +169,7 @@ def _settling(design: Design) -> Figure:
     caption = (
         f"The share of the {free.tried} simulated moves that are in position for good, over the time since the last "
         "corner of the reference; the same machines with the joint free and locked. If a curve ends below 100 %, the "
-        "remaining moves hunt."
+        "remaining moves do not come to rest."
     )
     return Figure("design_settling", "Settling times", caption, (panel,))
 

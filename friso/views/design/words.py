@@ -88,25 +88,29 @@ def leaf_words(geometry: Geometry) -> str:
 
 def _verified(design: Design) -> tuple[str, str]:
     free, locked, limit = design.verification.free, design.verification.locked, design.spec.position.settling_time
-    held = f" (with the joint locked, {hunting(locked)})" if locked.hunting else ""
-    text = f"Of {free.tried} simulated moves {hunting(free)}{held}: {probability(free)}. {settling(free)}"
+    held = f" (with the joint locked, {restless(locked)})" if locked.missed else ""
+    text = f"Of {free.tried} simulated moves {restless(free)}{held}: {probability(free)}. {settling(free)}"
     if limit is None:
-        return (VERMILLION if free.hunting else GREEN), f"{text}."
+        return (VERMILLION if free.missed else GREEN), f"{text}."
     met = free.slower_than(0.05) <= limit
-    colour = VERMILLION if free.hunting or not met else GREEN
+    colour = VERMILLION if free.missed or not met else GREEN
     return colour, f"{text}; {'as' if met else 'not as'} specified ({seconds(float(limit))})."
 
 
-def hunting(outcome: Outcome) -> str:
-    """How many moves hunt."""
-    return {0: "none hunts", 1: "one hunts"}.get(outcome.hunting, f"{outcome.hunting} hunt")
+def restless(outcome: Outcome) -> str:
+    """How many moves do not come to rest in the window, and how many of these swing."""
+    if not outcome.missed:
+        return "all come to rest in position"
+    count, swinging = outcome.missed, outcome.swinging
+    how = f"{swinging} swing, {count - swinging} creep"
+    return f"{count} {'does' if count == 1 else 'do'} not come to rest in position ({how})"
 
 
 def probability(outcome: Outcome) -> str:
-    """The interval of the probability of hunting."""
+    """The interval of the probability that a move does not come to rest in position."""
     low, high = outcome.interval
-    within = f"below {percent(high)}" if not outcome.hunting else f"{percent(low)} to {percent(high)}"
-    return f"the probability of hunting is {within} (with 95 % confidence)"
+    within = f"below {percent(high)}" if not outcome.missed else f"{percent(low)} to {percent(high)}"
+    return f"the probability that a move does not is {within} (with 95 % confidence)"
 
 
 def settling(outcome: Outcome) -> str:
@@ -163,8 +167,8 @@ def refusal(failure: NoDesign) -> str:
 def shortfall(design: Design) -> str:
     """What of the specification the design does not meet."""
     free = design.verification.free
-    hunts = [f"of {free.tried} moves {hunting(free)}"] if free.hunting else []
-    return "; ".join([*hunts, *map(relaxation, design.unmet)])
+    missed = [f"of {free.tried} moves {restless(free)}"] if free.missed else []
+    return "; ".join([*missed, *map(relaxation, design.unmet)])
 
 
 def relaxation(change: Relaxation) -> str:

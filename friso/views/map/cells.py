@@ -17,6 +17,7 @@ from friso.views.map.words import (
     FAILED,
     INFERRED,
     INVALID,
+    KINDS,
     NOT_RUN,
     QUIET,
     in_order,
@@ -24,7 +25,7 @@ from friso.views.map.words import (
     quantity,
     unit_of,
     variable,
-    verdict_kind,
+    word_kind,
     words_of,
 )
 
@@ -55,7 +56,11 @@ class CellAxis:
 
     def text(self, position: int) -> str:
         """The value of one cell, e.g. "Crossover 8 Hz"."""
-        return f"{self.quantity} {self.words[position] if self.words else _value(self.positions[position], self.unit)}"
+        return f"{self.quantity} {self.value(position)}"
+
+    def value(self, position: int) -> str:
+        """The same without the quantity."""
+        return self.words[position] if self.words else _value(self.positions[position], self.unit)
 
     def span(self) -> str:
         """All values in a few words, e.g. "1 to 16 Hz, 41 values"."""
@@ -164,15 +169,16 @@ def plane_first(axes: Sequence[CellAxis]) -> list[CellAxis]:
 
 
 def look(runs: xr.Dataset, metric: str) -> Look:
-    """How `metric` is coloured: a numeric variable or "verdict". ValueError for others."""
+    """How `metric` is coloured: a numeric variable, "outcome" or "verdict". ValueError for others."""
     if metric not in metrics(runs):
         raise ValueError(f"metric: got {metric!r}, expected one of {', '.join(metrics(runs))}")
-    if metric == "verdict":
+    if metric in KINDS:
         codes, words = words_of(runs, metric)
         template = runs[metric]
         numbers = template.copy(data=np.full(template.shape, np.nan))
-        kinds = in_order(map(verdict_kind, words))
-        table = np.array([kinds.index(verdict_kind(word)) for word in words], dtype=float)
+        own = [word_kind(metric, word) for word in words]
+        kinds = in_order(own)
+        table = np.array([kinds.index(kind) for kind in own], dtype=float)
         return Look(variable(metric), "", None, False, (), kinds, numbers, template.copy(data=table[codes]))
     given = np.asarray(runs[metric].values, dtype=float)
     kinds, codes = _without_number(runs, metric, given)
@@ -183,9 +189,9 @@ def look(runs: xr.Dataset, metric: str) -> Look:
 
 
 def metrics(runs: xr.Dataset) -> list[str]:
-    """The variables that a map can show, the verdict last."""
+    """The variables that a map can show, the words last."""
     numeric = [str(name) for name, array in runs.data_vars.items() if array.dtype.kind in "iuf"]
-    return numeric + (["verdict"] if "verdict" in runs else [])
+    return numeric + [name for name in KINDS if name in runs]
 
 
 def _range(metric: str, numbers: np.ndarray) -> tuple[tuple[float, float] | None, bool, tuple[str, ...]]:
@@ -200,7 +206,7 @@ def _range(metric: str, numbers: np.ndarray) -> tuple[tuple[float, float] | None
     low, high = float(finite.min()), float(finite.max())
     if metric == "multiplier":
         return (-2.0, 0.0), False, ()
-    if metric == "peaks":
+    if metric in ("peaks", "distinct_peaks"):
         return None, False, (QUIET, *ramp(max(1, int(high))))
     positive = finite[finite > 0]
     if low >= 0 and positive.size and high > 1e3 * float(positive.min()):
@@ -211,13 +217,13 @@ def _range(metric: str, numbers: np.ndarray) -> tuple[tuple[float, float] | None
 def _without_number(runs: xr.Dataset, metric: str, given: np.ndarray) -> tuple[tuple[Kind, ...], np.ndarray]:
     """The kinds of the cells that have no number to show, and their codes; NaN where a number counts."""
     shape, dims = runs[metric].shape, runs[metric].dims
-    verdict = _texts(runs, "verdict", dims)
+    outcome = _texts(runs, "outcome", dims)
     status = _texts(runs, "status", dims)
-    pairs = [_state(v, s) for v in verdict[1] for s in status[1]]
+    pairs = [_state(word, reason) for word in outcome[1] for reason in status[1]]
     none = no_number(metric)
     kinds = in_order(kind for kind in (*pairs, none) if kind is not None)
     table = np.array([np.nan if kind is None else kinds.index(kind) for kind in pairs], dtype=float)
-    codes = np.broadcast_to(table[verdict[0] * len(status[1]) + status[0]], shape).copy()
+    codes = np.broadcast_to(table[outcome[0] * len(status[1]) + status[0]], shape).copy()
     codes[np.isnan(codes) & ~np.isfinite(given)] = kinds.index(none)
     return kinds, codes
 
@@ -229,16 +235,16 @@ def _texts(runs: xr.Dataset, name: str, dims: tuple[Hashable, ...]) -> tuple[np.
     return words_of(runs.transpose(*dims), name)
 
 
-def _state(verdict: str | None, status: str | None) -> Kind | None:
+def _state(outcome: str | None, status: str | None) -> Kind | None:
     """Why a cell has no numbers of its own; None where it was run to its end."""
     reason = status or ""
     if reason.startswith("inferred"):
-        return INFERRED.get(verdict or "") or Kind("inferred", "#eeeeee")
-    if verdict == "" or reason.startswith("not run"):
+        return INFERRED.get(outcome or "") or Kind("inferred", "#eeeeee")
+    if outcome == "" or reason.startswith("not run"):
         return NOT_RUN
-    if verdict == "invalid" or reason.startswith("invalid"):
+    if outcome == "invalid" or reason.startswith("invalid"):
         return INVALID
-    if verdict == "failed" or (verdict is None and reason not in ("", "done")):
+    if outcome == "failed" or (outcome is None and reason not in ("", "done")):
         return FAILED
     return None
 

@@ -12,7 +12,7 @@ from friso.views.drawing.drawable import colour_prefix
 from friso.views.drawing.figure import Array, Cloud, Kind
 from friso.views.drawing.prefixes import choose
 from friso.views.map.cells import SAMPLE, CellAxis, axes_of, look, metrics, pick, plane_first
-from friso.views.map.words import variable, words_of
+from friso.views.map.words import KINDS, variable, words_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -94,7 +94,7 @@ def _coloured(runs: xr.Dataset, name: str, cells: _Cells) -> dict[str, Any]:
     limits = None if shown.limits is None else (shown.limits[0] * factor, shown.limits[1] * factor)
     drawn = scale(Cloud(none, none, numbers * factor, shown.quantity, unit, limits, shown.log, shown.colours))
     codes = cells.take(shown.codes)
-    own = runs[name] if name != "verdict" else shown.numbers
+    own = shown.numbers if name in KINDS else runs[name]
     kinds = [_kind(kind) for kind in shown.kinds]
     return {
         "name": name,

@@ -12,7 +12,8 @@ import numpy as np
 from friso.views.drawing.drawable import cell_edges
 from friso.views.drawing.figure import BLUE, INK, Axis, Cloud, Figure, Map, Markers, Panel, Series
 from friso.views.map.cells import SAMPLE, CellAxis, Look, axes_of, cuts, look, pick, plane_first
-from friso.views.map.words import statement, variable
+from friso.views.map.findings import statement
+from friso.views.map.words import variable
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -23,12 +24,12 @@ RED = "#e3001b"  # the evaluation marker of the thesis
 _LISTED = 12  # left-out values named one by one
 
 
-def map_figure(runs: xr.Dataset, metric: str = "peaks", marker: Mapping[str, float] | None = None) -> Figure:
+def map_figure(runs: xr.Dataset, metric: str = "outcome", marker: Mapping[str, float] | None = None) -> Figure:
     """One variable of a map: over one axis as a line, over two as cells, over more as slices; samples as points.
 
-    `runs`: what friso.sweep returns; `metric`: a numeric variable or "verdict"; `marker`: the evaluation point, SI
-    values (or words) by key. Raises ValueError for a metric that is not there, runs without dimensions, or a marker
-    that lacks an axis.
+    `runs`: what friso.sweep returns; `metric`: a numeric variable, "outcome" or "verdict"; `marker`: the evaluation
+    point, SI values (or words) by key. Raises ValueError for a metric that is not there, runs without dimensions, or a
+    marker that lacks an axis.
     """
     axes, colouring = axes_of(runs), look(runs, metric)
     caption, columns = "", 1
@@ -48,12 +49,12 @@ def map_figure(runs: xr.Dataset, metric: str = "peaks", marker: Mapping[str, flo
         panels=tuple(panels),
         columns=columns,
         subject=str(runs.attrs.get("name", "")),
-        note=statement(runs) + (f"\n{caption}" if caption else ""),
+        note=statement(runs, metric) + (f"\n{caption}" if caption else ""),
     )
 
 
 def map_panel(
-    runs: xr.Dataset, metric: str = "peaks", marker: Mapping[str, float] | None = None, title: str | None = None
+    runs: xr.Dataset, metric: str = "outcome", marker: Mapping[str, float] | None = None, title: str | None = None
 ) -> Panel:
     """One variable over the two axes of a map, the first one to the right; for figures of several maps.
 

@@ -14,7 +14,8 @@ from friso.views.drawing import plotly_renderer
 from friso.views.map.cells import SAMPLE, axes_of
 from friso.views.map.data import packed, picked
 from friso.views.map.figures import map_figure
-from friso.views.map.words import MEANINGS, caveats, failures, grouped, verdict_counts, verification
+from friso.views.map.findings import caveats, failures, headline, meanings, verification
+from friso.views.map.words import KINDS, grouped, variable, word_counts
 from friso.views.pages import environment, print_image
 
 if TYPE_CHECKING:
@@ -42,8 +43,9 @@ def map_html(runs: xr.Dataset, metric: str, rerun: str) -> str:
         .get_template("map.html")
         .render(
             name=runs.attrs.get("name") or "Unnamed stage",
+            headline=headline(runs, metric),
             verification=verification(runs),
-            facts=_facts(runs),
+            facts=_facts(runs, metric),
             thinned=_thinned(runs),
             data=_json(packed(runs, metric, rerun)),
             figure=figure,
@@ -57,16 +59,18 @@ def map_html(runs: xr.Dataset, metric: str, rerun: str) -> str:
     )
 
 
-def _facts(runs: xr.Dataset) -> list[tuple[str, str]]:
+def _facts(runs: xr.Dataset, metric: str) -> list[tuple[str, str]]:
     """The table under the map: what was varied, how well it was computed, and what came out."""
     facts = [("Stage", str(runs.attrs.get("name", "")))]
     facts += [(axis.quantity, f"{axis.span()} ({axis.key})") for axis in axes_of(runs)]
     facts.append(("Relative tolerance", f"{float(runs.attrs['rtol']):g}"))
     facts.append(("Verification", verification(runs)))
-    verdicts = ", ".join(f"{label} {grouped(number)}" for label, number in verdict_counts(runs).items())
-    facts += [("Verdicts", verdicts)] if verdicts else []
-    facts += [(f"{label}", MEANINGS[label]) for label in verdict_counts(runs) if label in MEANINGS]
-    facts += [("Mind", " ".join(found))] if (found := caveats(runs)) else []
+    for name in KINDS:
+        words = ", ".join(f"{label} {grouped(number)}" for label, number in word_counts(runs, name).items())
+        facts += [(variable(name), words)] if words else []
+    facts += meanings(runs)
+    facts += [("Criterion", text)] if (text := runs[metric].attrs.get("criterion")) and metric not in KINDS else []
+    facts += [("Note", " ".join(found))] if (found := caveats(runs, metric)) else []
     links = json.loads(runs.attrs.get("links", "{}"))
     facts += [("Links", "; ".join(f"{key} = {text}" for key, text in links.items()))] if links else []
     facts += [(f"Without result: {grouped(number)}", reason) for reason, number in failures(runs).items()]

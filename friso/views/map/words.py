@@ -1,4 +1,4 @@
-"""What the axes, variables and cells of a map are called, and what is said about the whole of it."""
+"""What the axes, variables and cells of a map are called, and how many cells have which word."""
 
 from __future__ import annotations
 
@@ -35,8 +35,10 @@ _QUANTITIES = {
     "motion.acceleration_time": "Acceleration time",
 }
 _VARIABLES = {
+    "outcome": "What the run does at its end",
+    "verdict": "Verdict on the stage",
     "peaks": "Counted peaks",
-    "verdict": "Verdict",
+    "distinct_peaks": "Counted peaks, distinct ones",
     "status": "Status",
     "peak_to_peak": "Peak to peak, last quarter",
     "period": "Period",
@@ -50,26 +52,32 @@ _VARIABLES = {
     "rejected": "Rejected solver steps",
 }
 
-QUIET = "#d3e6f3"  # no hunting: a pale blue, far from every colour of hunting and from white and grey
+QUIET = "#d3e6f3"  # rest: a pale blue, far from every colour of swings and from white and grey
 INVALID = Kind("invalid", "#b4b4b4")
 FAILED = Kind("failed", INK)
 NOT_RUN = Kind("not run", "#ffffff")
-VERDICTS = {
-    "hunts": Kind("hunts", VERMILLION),
-    "bistable": Kind("bistable", PINK),
-    "transient": Kind("transient", ORANGE),
-    "settles": Kind("settles", QUIET),
-    "failed": FAILED,
-    "invalid": INVALID,
-    "": NOT_RUN,
+_NO_RESULT = {"failed": FAILED, "invalid": INVALID, "": NOT_RUN}
+KINDS = {
+    "outcome": {
+        "swings": Kind("swings", VERMILLION),
+        "creeps": Kind("creeps", ORANGE),
+        "rests": Kind("rests", QUIET),
+        **_NO_RESULT,
+    },
+    "verdict": {
+        "hunts": Kind("hunts", VERMILLION),
+        "bistable": Kind("bistable", PINK),
+        "transient": Kind("transient", ORANGE),
+        "settles": Kind("settles", QUIET),
+        **_NO_RESULT,
+    },
 }
-"""The verdicts a cell can have, the worst first, in the colours of every map."""
-# Cells without numbers of their own: paler than the verdict they are said to have, so that both can stand in a map.
+"""By variable the words that a cell can have, the worst first, in the colours of every map."""
+# Cells without numbers of their own: paler than the word they are said to have, so that both can stand in a map.
 INFERRED = {
-    "hunts": Kind("hunts (inferred)", "#f3c39e"),
-    "bistable": Kind("bistable (inferred)", "#ecd3e0"),
-    "transient": Kind("transient (inferred)", "#f7dfa8"),
-    "settles": Kind("settles (inferred)", "#e4efe0"),
+    "swings": Kind("swings (inferred)", "#f3c39e"),
+    "creeps": Kind("creeps (inferred)", "#f7dfa8"),
+    "rests": Kind("rests (inferred)", "#e4efe0"),
 }
 _NO_NUMBER = "#e8dcc6"
 
@@ -84,21 +92,27 @@ def quantity(key: Hashable) -> str:
     return words[:1].upper() + words[1:]
 
 
+def in_sentence(key: Hashable) -> str:
+    """An axis within a sentence: "joint stroke"; names of people keep their capital."""
+    name = quantity(key)
+    return name if name.startswith(("Coulomb", "Stribeck")) else name[0].lower() + name[1:]
+
+
 def variable(name: Hashable) -> str:
     """A variable in words: "period" is "Period"."""
     return _VARIABLES.get(str(name)) or quantity(name)
 
 
-def verdict_kind(word: str) -> Kind:
-    """Label and colour of a verdict; one that is not known here is grey, under its own name."""
-    return VERDICTS.get(word) or Kind(word, GREY)
+def word_kind(name: str, word: str) -> Kind:
+    """Label and colour of a word of the variable `name`; one that is not known here is grey, under its own name."""
+    return KINDS[name].get(word) or Kind(word, GREY)
 
 
 def no_number(name: str) -> Kind:
     """What it means that a run that was completed has no such number."""
     if name.startswith("settling_time"):
         band = variable(name).removeprefix("Settling time into ")
-        return Kind(f"never settles into {band}", _NO_NUMBER)
+        return Kind(f"does not stay within {band}", _NO_NUMBER)
     if name in ("multiplier", "amplitude", "cycle_period"):
         return Kind("no cycle found", _NO_NUMBER)
     return Kind("no period" if name == "period" else "no value", _NO_NUMBER)
@@ -110,8 +124,9 @@ def grouped(number: int) -> str:
 
 
 def in_order(kinds: Iterable[Kind]) -> tuple[Kind, ...]:
-    """Each kind once, in the order of every legend: verdicts, the worst first, then what has no verdict."""
-    order = [*VERDICTS.values(), *INFERRED.values()]
+    """Each kind once, in the order of every legend: words, the worst first, then what has none."""
+    words = {kind: None for kinds in KINDS.values() for kind in kinds.values()}
+    order = [*(kind for kind in words if kind not in _NO_RESULT.values()), *_NO_RESULT.values(), *INFERRED.values()]
     return tuple(sorted(dict.fromkeys(kinds), key=lambda kind: order.index(kind) if kind in order else len(order)))
 
 
@@ -152,67 +167,7 @@ def failures(runs: xr.Dataset) -> dict[str, int]:
     }
 
 
-def verdict_counts(runs: xr.Dataset) -> dict[str, int]:
-    """How many cells have each verdict, in the order of the legend."""
-    found = {verdict_kind(word): number for word, number in counts(runs, "verdict").items()}
+def word_counts(runs: xr.Dataset, name: str) -> dict[str, int]:
+    """How many cells have each word of the variable `name`, in the order of the legend; none without that variable."""
+    found = {word_kind(name, word): number for word, number in counts(runs, name).items()}
     return {kind.label: found[kind] for kind in in_order(found)}
-
-
-def verification(runs: xr.Dataset) -> str:
-    """How many of the verdicts checked survive a tighter tolerance, with Wilson's 95 % confidence interval."""
-    checked = int(runs.attrs.get("verified_cells", 0))
-    if not checked:
-        return "Not verified: no verdict was checked at a tighter tolerance."
-    from scipy.stats import binomtest
-
-    surviving = int(runs.attrs["verified_surviving"])
-    interval = binomtest(surviving, checked).proportion_ci(0.95, method="wilson")
-    rtol = float(runs.attrs["verified_rtol"])
-    text = (
-        f"{100 * surviving / checked:.1f} % of {grouped(checked)} verdicts checked survive rtol {rtol:g} "
-        f"(95 % confidence: {100 * interval.low:.1f} to {100 * interval.high:.1f} %)."
-    )
-    if inferred := int(runs.attrs.get("inferred_checked", 0)):
-        confirmed = int(runs.attrs["inferred_confirmed"])
-        text += f" Of {grouped(inferred)} inferred verdicts {100 * confirmed / inferred:.1f} % are confirmed by a run."
-    return text
-
-
-def statement(runs: xr.Dataset) -> str:
-    """What stands on every figure of a map: its verification, its tolerance and its number of runs."""
-    return "\n".join([verification(runs), _extent(runs), *([" ".join(found)] if (found := caveats(runs)) else [])])
-
-
-MEANINGS = {
-    "hunts": "has counted peaks: late (after 10 s), tall (above 0.1 mm) and apart (0.5 s); one alone is no cycle",
-    "transient": "has none, but still swings by more than 0.1 mm at the end and is not within 10 µm",
-    "settles": "has none, and swings no more than 0.1 mm at the end",
-    "failed": "the run was not completed",
-    "invalid": "no stage may have these values",
-}
-"""What the verdicts of a map mean."""
-
-
-def caveats(runs: xr.Dataset) -> list[str]:
-    """What the peak count alone does not tell: settled cells that do not stay in their band, hunting that has ended."""
-    if not {"settling_time_10um", "verdict", "status"} <= set(runs.data_vars):
-        return []
-    verdict, never = runs["verdict"].values, np.isnan(runs["settling_time_10um"].values)
-    codes, words = words_of(runs, "status")
-    ran = np.array([not word.startswith("inferred") for word in words])[codes]
-    off, over = int(((verdict == "settles") & never & ran).sum()), int(((verdict == "hunts") & ~never & ran).sum())
-    found = [f"{grouped(off)} of the cells that settle do not stay within 10 µm of the reference."] if off else []
-    return found + ([f"{grouped(over)} of those that hunt have settled by the end of the run."] if over else [])
-
-
-def _extent(runs: xr.Dataset) -> str:
-    cells = int(np.prod(list(runs.sizes.values())))
-    status = counts(runs, "status")
-    inferred = sum(number for reason, number in status.items() if reason.startswith("inferred"))
-    verdicts = verdict_counts(runs)
-    idle = sum(verdicts.get(kind.label, 0) for kind in (INVALID, NOT_RUN))
-    runs_text = f"{grouped(cells - idle - inferred)} runs at rtol {float(runs.attrs['rtol']):g}"
-    if inferred:
-        runs_text += f", {grouped(inferred)} cells inferred from their neighbours"
-    listed = ", ".join(f"{label} {grouped(number)}" for label, number in verdicts.items())
-    return f"{runs_text}: {listed}." if listed else f"{runs_text}."

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from friso.hunting import COUNTED_ABOVE, COUNTED_AFTER
-from friso.hunting.peaks import scan
+from friso.hunting.criteria import distinct_peaks
 from friso.studies.thesis.judges.shares import NARROW, WIDE
 from friso.studies.thesis.studies import STUDIES, ThesisStudy
 from friso.views.check.figures import SHARES
 from friso.views.drawing.figure import GREY, INK, PINK, VERMILLION, Axis, Figure, Limit, Markers, Panel, Series
 from friso.views.map.figures import map_panel
-from friso.views.map.words import statement
+from friso.views.map.findings import statement
 from friso.views.reproduce.loops import loop_figures
 
 if TYPE_CHECKING:
@@ -50,14 +50,14 @@ def _maps(reproduction: Reproduction, number: str) -> Figure:
             continue
         letter = study.panel[-1]
         for title, runs in _shown(reproduction, study, letter).items():
-            panels.append(_with_edges(map_panel(runs, "peaks", study.marker, title), reproduction, study))
-            statements.append(f"{title}. {statement(runs)}".replace("\n", " "))
+            panels.append(_with_edges(map_panel(runs, "distinct_peaks", study.marker, title), reproduction, study))
+            statements.append(f"{title}. {statement(runs, 'distinct_peaks')}".replace("\n", " "))
         zeros += [f"{letter}: {study.zeros}"] if study.zeros else []
     if number == "14" and reproduction.tolerances:
         verdicts, counts = reproduction.changed
         zeros.append(
-            f"B: at the thesis's relative tolerance {verdicts:.1%} of the cells get another verdict, and {counts:.1%} "
-            "another peak count, than at the tight one."
+            f"B: at the thesis's relative tolerance {verdicts:.1%} of the cells have counted peaks where the tight one "
+            f"has none, or the other way round, and {counts:.1%} another count."
         )
     return Figure(
         f"figure-{number}",
@@ -98,8 +98,7 @@ def _response(reproduction: Reproduction) -> Figure:
     late = time >= _SHOWN_FROM
     deviation = (trace["position"] - trace["reference"]).values
     turns = [trace[name].values for name in ("turning_time", "turning_deviation")]
-    amplitude = np.array([float(response.cell["peak_to_peak"])])
-    (peaks,), _ = scan(turns[0][None], turns[1][None], np.array([turns[0].size]), amplitude, time[-1:])
+    (peaks,) = distinct_peaks(turns[0][None], turns[1][None], np.array([turns[0].size]))
     markers = ()
     if peaks.any():
         markers = (Markers(turns[0][peaks], turns[1][peaks], f"counted peaks: {peaks.sum()}", INK, "triangle"),)

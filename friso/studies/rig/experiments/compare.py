@@ -19,7 +19,6 @@ from friso.equations.controllers.van_dijk import ALPHA, BETA, CROSSOVER, TUNED_M
 from friso.rig.rail import friction_factors
 from friso.rig.task import Task
 from friso.stage import Stage
-from friso.studies.draws import Fates, Share
 from friso.studies.rig.experiments.hunting import Trace
 from friso.studies.rig.hunted import (
     Hunted,
@@ -35,6 +34,7 @@ from friso.studies.rig.hunted import (
     with_joint,
 )
 from friso.studies.rig.outcome import Outcome, Progress, rig_log
+from friso.studies.shares import Share, share
 
 DEVIATIONS = (0.02, 0.05, 0.1, 0.2, 0.3)
 """Of static and Coulomb friction alike, over their means: our choice."""
@@ -99,12 +99,12 @@ class Compared:
     slowest: tuple[float, float, float] | None
 
     def slower(self, runs: Hunted) -> np.ndarray:
-        """Periods over that of the even rail, NaN of runs that end without a cycle."""
-        return np.where(runs.lives, runs.period, np.nan) / self.even.period[0]
+        """Periods over that of the even rail, NaN of runs that do not swing at their end."""
+        return np.where(runs.swings, runs.period, np.nan) / self.even.period[0]
 
     def larger(self, runs: Hunted) -> np.ndarray:
-        """Swings over that of the even rail, NaN of runs that end without a cycle."""
-        return np.where(runs.lives, runs.swing, np.nan) / self.even.swing[0]
+        """Swings over that of the even rail, NaN of runs that do not swing at their end."""
+        return np.where(runs.swings, runs.swing, np.nan) / self.even.swing[0]
 
     def as_measured(self, runs: Hunted) -> np.ndarray:
         """Which runs have nearly twice the period of the even rail at a similar swing."""
@@ -118,10 +118,9 @@ class Compared:
         size, rows = np.abs(self.asymmetry), []
         for low, high in pairwise(BINS):
             inside = (size >= low) & (size < high)
-            words = np.where(self.field.failed, "failed", np.where(self.field.lives, "hunts", "settles"))[inside]
-            share = Fates(words).share(("hunts",)) if len(words) else Share(np.nan, 0.0, 1.0)
+            swinging = share(self.field.swings[inside], ~self.field.failed[inside])
             slower = self.slower(self.field)[inside]
-            rows.append((share, float(np.nanmedian(slower)) if np.isfinite(slower).any() else np.nan))
+            rows.append((swinging, float(np.nanmedian(slower)) if np.isfinite(slower).any() else np.nan))
         return rows
 
 
@@ -151,7 +150,7 @@ def compared(
     """The cycles of a stage with its joint locked, on so many rails of each kind."""
     even = on_rail(stage)
     own = started(even, seed, {}, 1, progress, "an even rail")
-    swing = float(own.swing[0]) if own.lives[0] else 0.01 * distance(stage)
+    swing = float(own.swing[0]) if own.swings[0] else 0.01 * distance(stage)
     long = swing * np.array(lengths)
     seeds = even.flat()["rail.seed"] + np.arange(float(machines))
     first, second = (each.ravel() for each in np.meshgrid(deviations, long, indexing="ij"))
@@ -183,11 +182,11 @@ def _longer(task: Task) -> Task:
 
 
 def started(stage: Stage, seed: int, changes: Mapping[str, Any], count: int, progress: Progress, what: str) -> Hunted:
-    """What became of machines, shape (count,), at the first start after which each hunts; else after the move."""
+    """What became of machines, shape (count,), at the first start after which each swings on; else after the move."""
     tasks = [move(stage) if share == 0 else released(stage, share * distance(stage)) for share in STARTS]
     runs = [follow(stage, _longer(task), [seed] * count, changes, progress, what) for task in tasks]
     every = joined(runs).shaped(len(tasks), count)
-    first = np.argmax(every.lives, axis=0)
+    first = np.argmax(every.swings, axis=0)
     return Hunted(**{each.name: getattr(every, each.name)[first, np.arange(count)] for each in fields(Hunted)})
 
 

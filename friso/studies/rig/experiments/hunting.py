@@ -13,7 +13,6 @@ import numpy as np
 
 from friso.rig.run import Recorded
 from friso.stage import Stage
-from friso.studies.draws import Share
 from friso.studies.rig.hunted import (
     Hunted,
     crossover,
@@ -30,6 +29,7 @@ from friso.studies.rig.hunted import (
     with_joint,
 )
 from friso.studies.rig.outcome import Outcome, Progress, rig_log
+from friso.studies.shares import Share
 
 CROSSOVERS = np.array([6.0, 7.0, 8.0, 9.5, 11.0, 12.5, 14.3, 16.0, 20.0]) / 8
 """Over that of the stage: 8, 9.5 and 14.3 Hz are the thesis's (Sec. 4.3.2), the others ours."""
@@ -53,8 +53,8 @@ class Trace:
 
 @dataclass(frozen=True)
 class Startable:
-    """The same machine `after_move`, where it settles, and `after_release`, where it hunts for as long as it is
-    watched: its crossover [Hz], the number of its rail, and the displacement [m] of the release."""
+    """The same machine `after_move`, where no peaks are counted, and `after_release`, where it swings for as long as it
+    is watched: its crossover [Hz], the number of its rail, and the displacement [m] of the release."""
 
     after_move: Trace
     after_release: Trace
@@ -70,8 +70,8 @@ class HuntingResult:
 
     `started`: of releases with the joint locked, shape (displacements, crossovers, rails), by `displacements` [m].
     `rail` is the number of the rail that the `traces` (by case and number of the crossover) and the logs show: the
-    first that hunts locked at the stage's own crossover, or else the stage's own; the crossovers `shown` (numbers) are
-    the thesis's. `startable` is a machine that settles after the move, None where there is none.
+    first with counted peaks locked at the stage's own crossover, or else the stage's own; the crossovers `shown`
+    (numbers) are the thesis's. `startable` is a machine that comes to rest after the move, None where there is none.
     """
 
     distance: float
@@ -86,19 +86,19 @@ class HuntingResult:
     startable: Startable | None
 
     def shares(self, case: str) -> list[Share]:
-        """The share of rails that hunts, by crossover."""
+        """The share of rails on which peaks are counted, by crossover."""
         return [self.cases[case].share(row) for row in range(len(self.crossovers))]
 
     def limit(self, case: str, rail: int | None = None) -> float:
-        """The highest crossover [Hz] at which one rail (None: any) hunts; NaN for none."""
-        peaks = self.cases[case].peaks if rail is None else self.cases[case].peaks[:, [rail]]
-        found = np.flatnonzero((peaks > 0).any(axis=1))
+        """The highest crossover [Hz] at which peaks are counted on one rail (None: any); NaN for none."""
+        counted = self.cases[case].counted if rail is None else self.cases[case].counted[:, [rail]]
+        found = np.flatnonzero(counted.any(axis=1))
         return float(self.crossovers[found[-1]]) if len(found) else np.nan
 
     @property
     def can_start(self) -> np.ndarray:
-        """Whether a rail hunts after the move or a release with the joint locked, shape (crossovers, rails)."""
-        return (self.started.peaks > 0).any(axis=0) | (self.cases["locked"].peaks > 0)
+        """Whether peaks are counted after the move or a release with the joint locked, shape (crossovers, rails)."""
+        return self.started.counted.any(axis=0) | self.cases["locked"].counted
 
 
 def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
@@ -113,7 +113,7 @@ def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
         runs = follow(each, move(stage), numbers, changes, progress, f"moves, joint {case}")
         found[case] = runs.shaped(len(frequencies), len(seeds))
     started = _releases(stages["locked"], seed, frequencies, seeds, progress)
-    rail = int(np.argmax(found["locked"].peaks[SHOWN[0]] > 0))
+    rail = int(np.argmax(found["locked"].counted[SHOWN[0]]))
     machine = on_rails(stage, {crossover_key(stage): frequencies}, seeds[[rail]])
     again = {case: once(each, move(stage), [seed + rail] * len(frequencies), machine) for case, each in stages.items()}
     traces = {(case, row): _trace(again[case], row) for case in CASES for row in range(len(frequencies))}
@@ -147,8 +147,9 @@ def _releases(stage: Stage, seed: int, frequencies: np.ndarray, seeds: np.ndarra
 def _startable(
     stage: Stage, seed: int, frequencies: np.ndarray, seeds: np.ndarray, moved: Hunted, started: Hunted
 ) -> Startable | None:
-    """Of the rails that settle after the move and hunt after a release until the end, one at the lowest crossover."""
-    lasts = (started.peaks > 0) & started.lives & (moved.peaks == 0)
+    """Of the rails on which no peaks are counted after the move, and which swing at the end after a release, one at the
+    lowest crossover."""
+    lasts = started.counted & started.swings & ~moved.counted
     places = np.argwhere(lasts.swapaxes(0, 1))
     if not len(places):
         return None
@@ -156,8 +157,8 @@ def _startable(
     displacement = DISPLACEMENTS[size] * distance(stage)
     changes = on_rails(stage, {crossover_key(stage): frequencies[[row]]}, seeds[[rail]])
     tasks = (move(stage), released(stage, displacement))
-    quiet, hunts = (_trace(once(stage, task, [seed + rail], changes), 0) for task in tasks)
-    return Startable(quiet, hunts, float(frequencies[row]), rail, displacement)
+    quiet, swings = (_trace(once(stage, task, [seed + rail], changes), 0) for task in tasks)
+    return Startable(quiet, swings, float(frequencies[row]), rail, displacement)
 
 
 def _trace(recorded: Recorded, row: int) -> Trace:
@@ -171,12 +172,12 @@ def _notes(stage: Stage, result: HuntingResult) -> tuple[str, ...]:
         notes.append("the stage file has no [rail], so friction is uniform and there is only one machine")
     elif result.rail:
         own, shown = result.rails[0], result.rails[result.rail]
-        notes.append(f"figure and logs show rail {shown:g}: the stage's own, {own:g}, does not hunt locked")
+        notes.append(f"figure and logs show rail {shown:g}: the stage's own, {own:g}, has no counted peaks locked")
     failed = sum(int(each.failed.sum()) for each in (*result.cases.values(), result.started))
     if failed:
-        notes.append(f"{failed} runs failed and count as neither hunting nor settled")
+        notes.append(f"{failed} runs failed: whether they have counted peaks is unknown")
     notes.append(
-        "logs of moves that settle at once may contain too little motion for friso identify; those of moves that hunt "
+        "logs of moves that come to rest at once may contain too little motion for friso identify; those of moves that swing "
         "contain enough"
     )
     return tuple(notes)

@@ -1,4 +1,4 @@
-"""Which share of rails hunts, over stroke and crossover.
+"""On which share of rails peaks are counted, over stroke and crossover.
 
 Thesis, Fig. 26.
 """
@@ -44,11 +44,11 @@ class StrokeCrossover:
 
     @property
     def share(self) -> np.ndarray:
-        """The share of rails that hunts, shape (strokes, crossovers); NaN where all runs failed."""
+        """The share of rails on which peaks are counted, shape (strokes, crossovers); NaN where all runs failed."""
         done = ~self.runs.failed
         count = done.sum(axis=2)
-        hunting = ((self.runs.peaks > 0) & done).sum(axis=2)
-        return np.divide(hunting, count, out=np.full(count.shape, np.nan), where=count > 0)
+        counted = (self.runs.counted & done).sum(axis=2)
+        return np.divide(counted, count, out=np.full(count.shape, np.nan), where=count > 0)
 
     @property
     def own(self) -> int:
@@ -57,13 +57,13 @@ class StrokeCrossover:
 
     @property
     def limits(self) -> np.ndarray:
-        """By stroke the crossover [Hz] halfway from the last at which any rail hunts to the next, shape (strokes,): 0
-        where none does, infinite where some do at the highest."""
+        """By stroke the crossover [Hz] halfway from the last at which any rail has counted peaks to the next, shape
+        (strokes,): 0 where none has, infinite where some have at the highest."""
         found = np.zeros(len(self.strokes))
-        for row, hunts in enumerate(self.share > 0):
-            if hunts.any():
-                last = int(np.flatnonzero(hunts)[-1])
-                found[row] = np.inf if last + 1 == len(hunts) else self.crossovers[last : last + 2].mean()
+        for row, counted in enumerate(self.share > 0):
+            if counted.any():
+                last = int(np.flatnonzero(counted)[-1])
+                found[row] = np.inf if last + 1 == len(counted) else self.crossovers[last : last + 2].mean()
         return found
 
 

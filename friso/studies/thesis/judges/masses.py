@@ -11,7 +11,7 @@ from friso.studies.thesis.studies import STUDIES
 
 @judges("F15A", figure="15A", needs=("isolator-masses",))
 def mass_ratio_hardly_matters(evidence: Evidence) -> Finding:
-    """Cells whose verdict is not that of the marker."""
+    """Cells that are otherwise than the marker."""
     cart, stage, hunts, valid = table(evidence.maps["isolator-masses"], "masses.cart", "masses.stage")
     marker = STUDIES["isolator-masses"].marker
     row = int(np.argmin(np.abs(cart - marker["masses.cart"])))
@@ -25,7 +25,7 @@ def mass_ratio_hardly_matters(evidence: Evidence) -> Finding:
     return Finding(
         (
             Part(
-                f"few cells (at most {FEW:.0%}) have another verdict than the marker's masses, which settle",
+                f"few cells (at most {FEW:.0%}) hunt, unlike the marker's masses, which do not",
                 bool(not hunts[row, column] and share(other, valid) <= FEW),
                 text,
             ),

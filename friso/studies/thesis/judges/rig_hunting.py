@@ -26,10 +26,10 @@ _RECOVERED = 0.5
 """Share of a difference from which a thing is taken for its cause."""
 
 
-def _hunting(runs: Hunted, which: Any = ...) -> tuple[int, int]:
-    """How many runs hunt, of how many."""
+def _counted(runs: Hunted, which: Any = ...) -> tuple[int, int]:
+    """On how many runs peaks are counted, of how many."""
     done = ~runs.failed[which]
-    return int(((runs.peaks[which] > 0) & done).sum()), int(done.sum())
+    return int((runs.counted[which] & done).sum()), int(done.sum())
 
 
 @judges("F24", figure="24", needs=(MOVES,))
@@ -40,16 +40,16 @@ def locked_hunts_and_free_settles(evidence: Evidence) -> Finding:
 
 def judged_move(moves: Moves) -> Finding:
     """The finding from the moves on several rails."""
-    locked, free = _hunting(moves.locked, 0), _hunting(moves.free)
+    locked, free = _counted(moves.locked, 0), _counted(moves.free)
     return Finding(
         (
             Part(
-                "with the joint locked it hunts, on at least half of the rails",
+                "with the joint locked peaks are counted, on at least half of the rails",
                 2 * locked[0] >= locked[1] > 0,
                 f"{locked[0]} of {locked[1]} rails. {_ASSUMED}",
-                why="where friction differs between the two places at which the stage sticks, hunting dies out",
+                why="where friction differs between the two places at which the stage sticks, its swings die out",
             ),
-            Part("with the joint free none does", free[0] == 0 < free[1], f"{free[0]} of {free[1]} rails"),
+            Part("with the joint free on none", free[0] == 0 < free[1], f"{free[0]} of {free[1]} rails"),
         )
     )
 
@@ -62,25 +62,25 @@ def locked_needs_crossover(evidence: Evidence) -> Finding:
 
 def judged_crossovers(moves: Moves) -> Finding:
     """The finding from moves and releases with the joint locked."""
-    low, middle, high = (_hunting(moves.locked, row) for row in range(3))
-    settle = (moves.locked.peaks[1] == 0) & ~moves.locked.failed[1]
-    lasts = (moves.released.peaks > 0) & moves.released.lives
+    low, middle, high = (_counted(moves.locked, row) for row in range(3))
+    settle = ~moves.locked.counted[1] & ~moves.locked.failed[1]
+    lasts = moves.released.counted & moves.released.swings
     started = int((lasts.any(axis=0) & settle).sum())
     return Finding(
         (
             Part(
-                f"none hunts at {moves.crossovers[2]:g} Hz, some at {moves.crossovers[0]:g} Hz",
+                f"peaks are counted on no rail at {moves.crossovers[2]:g} Hz, on some at {moves.crossovers[0]:g} Hz",
                 high[0] == 0 < low[0],
                 f"{low[0]} of {low[1]} rails at {moves.crossovers[0]:g} Hz, {high[0]} of {high[1]} at "
                 f"{moves.crossovers[2]:g} Hz. {_ASSUMED}",
             ),
             Part(
-                f"at {moves.crossovers[1]:g} Hz the same move hunts on some rails and settles on others",
+                f"at {moves.crossovers[1]:g} Hz peaks are counted after the same move on some rails, not on all",
                 0 < middle[0] < middle[1],
-                f"{middle[0]} of {middle[1]} rails hunt",
+                f"{middle[0]} of {middle[1]} rails",
             ),
             Part(
-                f"at {moves.crossovers[1]:g} Hz a rail that settles after the move keeps hunting after a release",
+                f"at {moves.crossovers[1]:g} Hz a rail without peaks after the move keeps swinging after a release",
                 started > 0,
                 f"{started} of {int(settle.sum())} do, released 5 mm to either side",
                 why="here the place on the rail decides, not the start; friso rig hunting finds such rails at other "
@@ -105,9 +105,9 @@ def judged_grid(grid: StrokeCrossover) -> Finding:
     return Finding(
         (
             Part(
-                "at the highest crossover none hunts at any stroke, at the lowest some do at every stroke",
+                "at the highest crossover no peaks are counted at any stroke, at the lowest some are at every stroke",
                 bool((share[:, -1] == 0).all() and (share[:, 0] > 0).all()),
-                f"none hunts above {named} ({len(grid.rails)} rails a cell). {_ASSUMED}",
+                f"none above {named} ({len(grid.rails)} rails a cell). {_ASSUMED}",
             ),
             Part(
                 "the limit of the crossover is lower at the largest stroke than at the smallest, as in Fig. 16A",
@@ -127,37 +127,39 @@ def simulated_cycles_are_faster(evidence: Evidence) -> Finding:
 def judged_cycles(cycles: Cycles) -> Finding:
     """The finding from the cycles on an even rail, which is the simulation of the thesis, and on rails that vary."""
     even, rails = cycles.even, cycles.rails
-    hunts, lives = bool(even.lives[0]), rails.lives
-    slower = np.where(lives, rails.period, np.nan) / even.period[0]
-    larger = np.where(lives, rails.swing, np.nan) / even.swing[0]
-    similar = lives & (abs(np.log(larger)) <= np.log(SIMILAR))
-    sides = np.where(lives, rails.above / rails.below, np.nan)
+    swings = rails.swings
+    slower = np.where(swings, rails.period, np.nan) / even.period[0]
+    larger = np.where(swings, rails.swing, np.nan) / even.swing[0]
+    similar = swings & (abs(np.log(larger)) <= np.log(SIMILAR))
+    sides = np.where(swings, rails.above / rails.below, np.nan)
     lopsided = abs(np.log(sides[np.isfinite(sides)]))
-    swinging = f"{int(lives.sum())} of {len(lives)} rails still swing at the end"
+    swinging = f"{int(swings.sum())} of {len(swings)} rails still swing at the end"
     times = f", with {np.nanmin(slower):.3g} to {np.nanmax(slower):.3g} times its period" if similar.any() else ""
     scatter = float(np.nanmedian(rails.period_scatter)) if np.isfinite(rails.period_scatter).any() else np.nan
     return Finding(
         (
             Part(
                 "on an even rail the cycle is symmetric, of the order of a millimetre from peak to peak",
-                hunts and about(float(even.swing[0]), 1e-3, ORDER) and about(float(even.above[0] / even.below[0]), 1.0),
+                bool(even.swings[0])
+                and about(float(even.swing[0]), 1e-3, ORDER)
+                and about(float(even.above[0] / even.below[0]), 1.0),
                 f"{even.swing[0] * 1e3:.3g} mm, period {even.period[0]:.3g} s, one side "
                 f"{even.above[0] / even.below[0]:.3g} times the other",
-                why="no cycle on an even rail",
+                why="no lasting swing on an even rail",
             ),
             Part(
                 f"on a rail that varies its period is nearly twice as long (at least {AS_SLOW:g} times) at a similar "
-                f"swing (within a factor of {SIMILAR:g}), on at least half of those that hunt",
-                bool(lives.any() and 2 * (slower[similar] >= AS_SLOW).sum() >= lives.sum()),
+                f"swing (within a factor of {SIMILAR:g}), on at least half of those that swing on",
+                bool(swings.any() and 2 * (slower[similar] >= AS_SLOW).sum() >= swings.sum()),
                 f"{swinging}{times}. {_ASSUMED}",
                 why="not because of the rail: friction that differs between the two sides slows a cycle down, and ends "
                 f"it before it is twice as slow. {_weak_motor(cycles)}",
             ),
             Part(
-                "there its two sides differ (by more than a tenth, on at least half of those that hunt)",
+                "there its two sides differ (by more than a tenth, on at least half of those that swing on)",
                 bool(len(lopsided) and np.median(lopsided) > np.log(1.1)),
                 f"larger side over the other, median {np.exp(np.median(lopsided)) if len(lopsided) else np.nan:.3g}",
-                why="too few cycles persist",
+                why="too few keep swinging",
             ),
             Part(
                 "there it is less regular from cycle to cycle (period scatters by more than a twentieth)",

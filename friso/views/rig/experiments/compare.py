@@ -11,7 +11,7 @@ from friso.studies.rig.hunted import Hunted
 from friso.studies.rig.outcome import Outcome
 from friso.views.drawing.figure import BLUE, INK, VERMILLION, Axis, Band, Figure, Limit, Map, Markers, Panel, Series
 from friso.views.drawing.prefixes import with_unit
-from friso.views.rig.experiments.hunting import runs_document, share_document
+from friso.views.rig.experiments.hunting import CRITERIA, runs_document, share_document
 from friso.views.rig.outcome_view import OutcomeView
 
 AREA = "#cfdfee"
@@ -25,8 +25,8 @@ def sentences(outcome: Outcome) -> list[str]:
     """The even rail's cycle, what rails that vary make of it, and what else makes it as slow."""
     it: Compared = outcome.result
     even = it.even
-    if not even.lives[0]:
-        return ["On an even rail this stage is not in a cycle when the run ends: there is nothing to compare with."]
+    if not even.swings[0]:
+        return ["On an even rail this stage does not swing when the run ends: there is nothing to compare with."]
     return [
         f"On an even rail the cycle swings by {with_unit(float(even.swing[0]), 'm')} from peak to peak with a period "
         f"of {with_unit(float(even.period[0]), 's')}; from cycle to cycle its period scatters by "
@@ -42,10 +42,10 @@ def sentences(outcome: Outcome) -> list[str]:
 
 def _field(it: Compared) -> str:
     found, done = it.as_measured(it.field), int((~it.field.failed).sum())
-    lives = int(it.field.lives.sum())
-    slowest = np.nanmax(it.slower(it.field)) if lives else np.nan
+    swings = int(it.field.swings.sum())
+    slowest = np.nanmax(it.slower(it.field)) if swings else np.nan
     return (
-        f"On rails with a random field {lives} of {done} runs still swing at their end; {int(found.sum())} of them "
+        f"On rails with a random field {swings} of {done} runs still swing at their end; {int(found.sum())} of them "
         f"have at least {AS_SLOW:g} times that period at a similar swing (within a factor of {SIMILAR:g}); the slowest "
         f"has {slowest:.3g} times."
     )
@@ -69,8 +69,8 @@ def _asymmetry(it: Compared) -> str:
 
 
 def _rolling(it: Compared) -> str:
-    lives = (it.rolling.lives & ~it.rolling.failed).mean(axis=1)
-    parts = [f"{share:.0%} at {size:.0%}" for share, size in zip(lives, it.harmonics, strict=True)]
+    swings = it.rolling.swings.mean(axis=1)
+    parts = [f"{share:.0%} at {size:.0%}" for share, size in zip(swings, it.harmonics, strict=True)]
     return (
         f"With rolling elements of {with_unit(it.pitch, 'm')} pitch, the following shares keep swinging, by first "
         "harmonic: "
@@ -80,12 +80,12 @@ def _rolling(it: Compared) -> str:
 
 def _irregular(it: Compared) -> str:
     """How the cycles of varied rails are irregular."""
-    lives = it.field.lives & np.isfinite(it.field.rising)
-    if not lives.any():
+    swings = it.field.swings & np.isfinite(it.field.rising)
+    if not swings.any():
         return "No cycle on a varied rail is long enough to tell how regular it is."
-    above, below = it.field.above[lives], it.field.below[lives]
+    above, below = it.field.above[swings], it.field.below[swings]
     sides = np.median(np.maximum(above, below) / np.minimum(above, below))
-    scatter, heights = (np.median(each[lives]) for each in (it.field.period_scatter, it.field.height_scatter))
+    scatter, heights = (np.median(each[swings]) for each in (it.field.period_scatter, it.field.height_scatter))
     return (
         f"Such cycles are lopsided: one side is {sides:.2g} times as high as the other (median). From cycle to "
         f"cycle they repeat: the period scatters by {scatter:.1%}, the heights by {heights:.1%} of the swing. "
@@ -130,7 +130,7 @@ def _others(it: Compared) -> str:
 def figures(outcome: Outcome) -> list[Figure]:
     """Fig. 27, the maps of the rails with a field, the cycles by their asymmetry, and the friction levels."""
     it: Compared = outcome.result
-    if not it.even.lives[0]:
+    if not it.even.swings[0]:
         return [_cycles(it)]
     return [_cycles(it), _maps(it), _by_asymmetry(it), _level_maps(it)]
 
@@ -156,7 +156,7 @@ def _maps(it: Compared) -> Figure:
     lengths, deviations = ([with_unit(each, "m") for each in it.lengths], [f"{each:.0%}" for each in it.deviations])
     x, y = Axis("Correlation length", "", words=(*lengths,)), Axis("Deviation of friction", "", words=(*deviations,))
     columns, rows = (np.arange(float(len(words))) for words in (lengths, deviations))
-    shares = it.field.lives.mean(axis=2)
+    shares = it.field.swings.mean(axis=2)
     slow = _medians(it.slower(it.field))
     quantities = (
         ("Share of rails still swinging", shares, (0.0, 1.0)),
@@ -166,7 +166,7 @@ def _maps(it: Compared) -> Figure:
         Panel("", x, y, maps=(Map(columns, rows, values, name, "", limits=limits),))
         for name, values, limits in quantities
     )
-    caption = f"{it.field.lives.shape[2]} rails in each cell; the period is the median of those that keep swinging."
+    caption = f"{it.field.swings.shape[2]} rails in each cell; the period is the median of those that keep swinging."
     return Figure("compare_rails", "Rails with a random field of friction", caption, panels, columns=2)
 
 
@@ -233,6 +233,7 @@ def numbers(outcome: Outcome) -> dict[str, Any]:
     rolling = {"harmonics": it.harmonics, "pitch_m": it.pitch, "asymmetry": it.rolling_asymmetry}
     levels = {"motors": np.array(MOTORS), "static_over_file": np.array(STATIC), "coulomb_over_file": np.array(COULOMB)}
     return {
+        "criteria": CRITERIA,
         "even_rail": _cycle_document(it.even),
         "field": field | _cycle_document(it.field),
         "by_asymmetry": classes,

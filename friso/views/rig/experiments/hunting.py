@@ -1,4 +1,4 @@
-"""What `friso rig hunting` shows: Fig. 24 and 25 of the thesis, and the share of rails that hunts."""
+"""What `friso rig hunting` shows: Fig. 24 and 25 of the thesis, and the share of rails with counted peaks."""
 
 from __future__ import annotations
 
@@ -6,11 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from friso.hunting import COUNTED_ABOVE
-from friso.studies.draws import Share
+from friso.hunting.criteria.peak_count import COUNTED_ABOVE, CRITERION, DISTINCT_CRITERION
+from friso.hunting.criteria.run_outcome import CRITERION as OUTCOME
 from friso.studies.rig.experiments.hunting import HuntingResult, Trace
-from friso.studies.rig.hunted import Hunted
+from friso.studies.rig.hunted import BAND, Hunted
 from friso.studies.rig.outcome import Outcome
+from friso.studies.shares import Share
 from friso.views.drawing.figure import (
     BLUE,
     GREEN,
@@ -44,62 +45,65 @@ def share_text(share: Share, count: int) -> str:
 
 
 def sentences(outcome: Outcome) -> list[str]:
-    """What hunts at which crossover, on the stage's own rail and on repeated ones."""
+    """Where peaks are counted and what swings on, by crossover, on the stage's own rail and on repeated ones."""
     it: HuntingResult = outcome.result
     own = it.shown[0]
     count = len(it.rails)
     return [
-        f"A move of {with_unit(it.distance, 'm')} at {it.crossovers[own]:.3g} Hz hunts with the joint locked on "
-        f"{share_text(it.shares('locked')[own], count)}, with it free on {share_text(it.shares('free')[own], count)} "
-        "(95 % intervals).",
-        _cycle(it),
+        f"After a move of {with_unit(it.distance, 'm')} at {it.crossovers[own]:.3g} Hz peaks are counted with the "
+        f"joint locked on {share_text(it.shares('locked')[own], count)}, with it free on "
+        f"{share_text(it.shares('free')[own], count)} (95 % intervals).",
+        _swings(it),
         f"Joint locked: {_limit(it, 'locked')} Joint free: {_limit(it, 'free')}",
         *_started(it),
     ]
 
 
-def _cycle(it: HuntingResult) -> str:
-    """The cycle at the stage's own crossover with the joint locked."""
+def _swings(it: HuntingResult) -> str:
+    """The swings at the stage's own crossover with the joint locked."""
     runs = it.cases["locked"]
-    lives = runs.lives[it.shown[0]]
-    hunting = int((runs.peaks[it.shown[0]] > 0).sum())
-    if not lives.any():
-        return "With the joint locked no rail is in a cycle when the run ends."
-    swing, period = runs.swing[it.shown[0]][lives], runs.period[it.shown[0]][lives]
+    swings, counted = runs.swings[it.shown[0]], int(runs.counted[it.shown[0]].sum())
+    if not swings.any():
+        return "With the joint locked the stage swings on no rail when the run ends."
+    swing, period = runs.swing[it.shown[0]][swings], runs.period[it.shown[0]][swings]
     return (
-        f"Of the {hunting} locked ones that hunt by the thesis's metric, {int(lives.sum())} still do when the run "
-        f"ends, swinging by {with_unit(float(np.median(swing)), 'm')} from peak to peak with a period "
+        f"With the joint locked the stage still swings at the end of the run on {int(swings.sum())} rails (peaks are "
+        f"counted on {counted}), by {with_unit(float(np.median(swing)), 'm')} from peak to peak with a period "
         f"of {with_unit(float(np.median(period)), 's')} (medians)."
     )
 
 
 def _limit(it: HuntingResult, case: str) -> str:
-    """Where hunting ends, on any rail and on the one shown."""
+    """Up to where peaks are counted, on any rail and on the one shown."""
     last, shown = it.limit(case), it.limit(case, it.rail)
     if np.isnan(last):
-        return f"no rail hunts from {it.crossovers[0]:.3g} to {it.crossovers[-1]:.3g} Hz."
+        return f"no peaks are counted from {it.crossovers[0]:.3g} to {it.crossovers[-1]:.3g} Hz."
     above = it.crossovers[it.crossovers > last]
     bound = it.shares(case)[-1].high
     beyond = f"none from {above[0]:.3g} Hz on (at most {bound:.0%} of all rails)" if len(above) else "none tried above"
     name = f"rail {it.rails[it.rail]:.0f}" if len(it.rails) > 1 else "it"
-    own = f"{name} hunts up to {shown:.3g} Hz" if np.isfinite(shown) else f"{name} does not hunt"
-    return f"some rails hunt up to {last:.3g} Hz, {beyond}; {own}."
+    own = f"on {name} up to {shown:.3g} Hz" if np.isfinite(shown) else f"none on {name}"
+    return f"peaks are counted on some rails up to {last:.3g} Hz, {beyond}; {own}."
 
 
 def _started(it: HuntingResult) -> list[str]:
     """What a release starts that the move does not."""
     counts = [
-        f"{int((it.cases['locked'].peaks[row] > 0).sum())} and {int(it.can_start[row].sum())} of {len(it.rails)} at "
+        f"{int(it.cases['locked'].counted[row].sum())} and {int(it.can_start[row].sum())} of {len(it.rails)} at "
         f"{it.crossovers[row]:.3g} Hz"
         for row in it.shown
     ]
     listed = ", ".join(with_unit(each, "m") for each in it.displacements)
-    found = [f"Rails that hunt locked after the move, and after it or a release from {listed}: {'; '.join(counts)}."]
+    found = [
+        f"Rails with counted peaks, joint locked, after the move, and after it or a release from {listed}: "
+        f"{'; '.join(counts)}."
+    ]
     if it.startable is not None:
         found.append(
-            f"At {it.startable.crossover:.3g} Hz rail {it.rails[it.startable.rail]:.0f} settles after the move and "
-            f"hunts until the end once released from {with_unit(it.startable.displacement, 'm')}: a run without "
-            "hunting does not show that there is none."
+            f"At {it.startable.crossover:.3g} Hz no peaks are counted on rail "
+            f"{it.rails[it.startable.rail]:.0f} after the move, and once released from "
+            f"{with_unit(it.startable.displacement, 'm')} the stage swings to the end: a run that rests does not show "
+            "that the stage cannot hunt."
         )
     return found
 
@@ -174,14 +178,14 @@ def _shares(it: HuntingResult) -> Figure:
         share = np.array([each.probability for each in found])
         bands.append(Band(it.crossovers, low, high, f"95 % interval, {case}", AREAS[case]))
         lines.append(Series(it.crossovers, share, f"joint {case}", colour))
-    lasting = it.cases["locked"].lives.mean(axis=1)
-    lines.append(Series(it.crossovers, lasting, "locked, still swinging at the end", VERMILLION, "dashed"))
+    swings = it.cases["locked"].swings.mean(axis=1)
+    lines.append(Series(it.crossovers, swings, "locked, swings at the end", VERMILLION, "dashed"))
     lines.append(Series(it.crossovers, it.can_start.mean(axis=1), "locked, after it or a release", INK, "dotted"))
     panel = Panel("", Axis("Crossover", "Hz"), Axis("Share of rails", "", (-0.03, 1.03)), tuple(lines))
     return Figure(
         "hunting_shares",
-        f"Share of {len(it.rails)} rails that hunts after the move",
-        "By the thesis's metric: peaks after 10 s, higher than 0.1 mm.",
+        f"Share of {len(it.rails)} rails with counted peaks after the move",
+        f"{CRITERION[0].upper()}{CRITERION[1:]}.",
         (Panel(panel.title, panel.x, panel.y, panel.series, bands=tuple(bands[:1])),),
     )
 
@@ -197,20 +201,22 @@ def _startable(it: HuntingResult) -> Figure:
     reach = _reach([found.after_move, found.after_release])
     return Figure(
         "hunting_started",
-        f"{found.crossover:.3g} Hz, joint locked, rail {it.rails[found.rail]:.0f}: hunting once started",
+        f"{found.crossover:.3g} Hz, joint locked, rail {it.rails[found.rail]:.0f}: swinging once started",
         "The same machine twice.",
         (Panel("", TIME, Axis("Position minus reference", "m", (-reach, reach)), lines),),
     )
 
 
+CRITERIA = {"outcome": OUTCOME, "band_m": BAND, "distinct_peaks": DISTINCT_CRITERION}
+
+
 def runs_document(runs: Hunted) -> dict[str, Any]:
     """What became of runs, as a document: arrays of the shape of the runs."""
     return {
-        "peaks": runs.peaks.tolist(),
+        "distinct_peaks": runs.peaks.tolist(),
+        "outcome": runs.outcome.tolist(),
         "peak_to_peak_m": runs.swing,
         "period_s": runs.period,
-        "lives": runs.lives,
-        "failed": runs.failed,
     }
 
 
@@ -223,11 +229,12 @@ def numbers(outcome: Outcome) -> dict[str, Any]:
     """All that was found."""
     it: HuntingResult = outcome.result
     cases = {
-        case: {**runs_document(runs), "hunts": [share_document(each) for each in it.shares(case)]}
+        case: {**runs_document(runs), "counted": [share_document(each) for each in it.shares(case)]}
         for case, runs in it.cases.items()
     }
     started = {"displacements_m": it.displacements}
     return {
+        "criteria": CRITERIA,
         "distance_m": it.distance,
         "crossovers_hz": it.crossovers,
         "rail_seeds": it.rails,

@@ -1,0 +1,24 @@
+"""What words and numbers on hunting mean, all on arrays: the verdict on a stage (`stage_verdict`), what a run did
+(`run_outcome`), and the thesis's peak count of a run (`peak_count`)."""
+
+from friso.hunting.criteria.peak_count import APART, COUNTED_ABOVE, COUNTED_AFTER, counted_peaks, distinct_peaks
+from friso.hunting.criteria.run_outcome import BAND, OUTCOMES, End, end_of_traces, lasts, outcomes
+from friso.hunting.criteria.stage_verdict import ATTRACTED, VERDICTS, Verdict, verdicts
+
+__all__ = [
+    "APART",
+    "ATTRACTED",
+    "BAND",
+    "COUNTED_ABOVE",
+    "COUNTED_AFTER",
+    "OUTCOMES",
+    "VERDICTS",
+    "End",
+    "Verdict",
+    "counted_peaks",
+    "distinct_peaks",
+    "end_of_traces",
+    "lasts",
+    "outcomes",
+    "verdicts",
+]

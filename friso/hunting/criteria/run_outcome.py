@@ -1,0 +1,97 @@
+"""What a run did at its end: it swings, creeps or rests, or it failed. It says nothing on what the stage can do.
+
+- *swings*: over the last quarter the deviation goes to and fro by more than twice the band; it does so again and again
+  (it has a period); and it lasts: it is at least half of what it was over the last half of the run.
+- *rests*: it does not swing, and stays within the band about the reference to the end.
+- *creeps*: neither: it is outside the band at its end without swinging. It drifts, sticks there, or dies out.
+- *failed*: the run was not completed.
+
+Just one of the four holds. The band is that of the question: `BAND` for sweeps and maps, the position window of a
+specification, what a user calls in position. A swing slower than the run is long looks like creeping.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Final
+
+import numpy as np
+
+from friso.hunting.turning import HALF, WINDOW
+from friso.hunting.turns import scan
+
+SWINGS: Final = "swings"
+CREEPS: Final = "creeps"
+RESTS: Final = "rests"
+FAILED: Final = "failed"
+
+OUTCOMES = (SWINGS, CREEPS, RESTS, FAILED)
+"""The words, the worst first."""
+
+BAND = 1e-5
+"""Band about the reference [m] within which a run of a sweep rests: ours; of `friso.hunting.measures.BANDS` the
+wider."""
+
+LASTING = 0.5
+"""Share of the peak-to-peak deviation of the last half that the last quarter has at least where a swing lasts: what
+dies out at a tenth of the rate at which it swings is gone by then."""
+
+CRITERION = "what the run does at its end: swings (a lasting swing), creeps (outside the band without), rests (inside)"
+
+
+@dataclass(frozen=True)
+class End:
+    """How runs end, arrays of shape (runs,): whether each was `completed`; peak to peak of its deviation over the last
+    quarter, `swing` [m], and over the last half, `earlier` [m]; the `period` of the swing [s] (NaN: none); when it was
+    outside the band for the last time, `outside` [s], and when it `ended` [s]."""
+
+    completed: np.ndarray
+    swing: np.ndarray
+    earlier: np.ndarray
+    period: np.ndarray
+    outside: np.ndarray
+    ended: np.ndarray
+
+
+def lasts(
+    swing: np.ndarray, earlier: np.ndarray | float, band: np.ndarray | float, lasting: float = LASTING
+) -> np.ndarray:
+    """Which deviations still go to and fro by more than twice the `band` [m]: peak to peak `swing` [m], at least the
+    share `lasting` of what it was `earlier` [m]. Runs that are followed for so long that nothing else is left need no
+    earlier swing to compare with (0)."""
+    return (swing > 2 * np.asarray(band)) & (swing >= lasting * np.asarray(earlier))
+
+
+def outcomes(end: End, band: np.ndarray | float = BAND, hold: np.ndarray | float = 0.0) -> np.ndarray:
+    """The word of `OUTCOMES` for every run, shape (runs,): of runs that rest the band [m] was left for the last time
+    more than `hold` [s] before the end."""
+    with np.errstate(invalid="ignore"):
+        swings = lasts(end.swing, end.earlier, band) & np.isfinite(end.period)
+        rests = end.outside + hold < end.ended
+    words = np.where(swings, SWINGS, np.where(rests, RESTS, CREEPS))
+    return np.where(end.completed, words, FAILED).astype(object)
+
+
+@np.errstate(all="ignore")  # runs that fail leave infinities and NaN behind
+def end_of_traces(time: np.ndarray, deviation: np.ndarray, band: float, completed: np.ndarray | None = None) -> End:
+    """How sampled runs end: deviations [m], shape (runs, n), over times [s], shape (n,); all `completed` unless told.
+
+    A run outside the band at its last sample was outside when it ended.
+    """
+    runs = len(deviation)
+    swing, earlier = (np.ptp(deviation[:, time >= share * time[-1]], axis=1) for share in (WINDOW, HALF))
+    late = time >= HALF * time[-1]
+    values = np.ascontiguousarray(deviation[:, late])
+    ended = np.full(runs, time[-1])
+    whole = np.full(runs, values.shape[1])
+    period = scan(np.tile(time[late], (runs, 1)), values, whole, np.nan_to_num(swing), ended).period
+    done = np.ones(runs, bool) if completed is None else completed
+    return End(done, swing, earlier, period, last_outside(time, deviation, band), ended)
+
+
+def last_outside(time: np.ndarray, deviation: np.ndarray, band: float) -> np.ndarray:
+    """When deviations [m], shape (runs, n), over times [s], shape (n,), were outside the band [m] (or NaN) for the last
+    time [s], shape (runs,); -inf where they never were."""
+    outside = ~(np.abs(deviation) <= band)
+    last = len(time) - 1 - outside[:, ::-1].argmax(axis=1)
+    return np.where(outside.any(axis=1), time[last], -np.inf)

@@ -1,0 +1,39 @@
+"""The verdict on a stage: by the cycles that attract, and by where its own motion ends; by nothing else.
+
+| verdict | a cycle attracts | the stage's own motion |
+|---|---|---|
+| hunts | yes | ends in it |
+| bistable | yes | rests; a kick or another move starts hunting |
+| transient | no | has not come to rest at its end |
+| settles | no | has come to rest |
+| failed | | the run of the motion was not completed, or whether a cycle attracts is unknown |
+
+Just one of them holds. A run alone gives no verdict (see `friso.hunting.criteria.run_outcome` for what a run did), with
+one exception, which is named where it is told ("observed"): no cycle could be closed, and a motion followed for 1000 s
+neither decays nor grows.
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+
+Verdict = Literal["hunts", "bistable", "transient", "settles", "failed"]
+
+VERDICTS: tuple[Verdict, ...] = ("hunts", "bistable", "transient", "settles", "failed")
+"""The words, the worst first."""
+
+ATTRACTED: tuple[Verdict, ...] = ("hunts", "bistable")
+"""Those of stages with a cycle that attracts."""
+
+CRITERION = "verdict on the stage, by its attracting cycles and where its own motion ends"
+
+
+def verdicts(known: np.ndarray, attracts: np.ndarray, ends_in_cycle: np.ndarray, rests: np.ndarray) -> np.ndarray:
+    """The word of `VERDICTS` for every stage, all arrays of shape (count,): whether what follows is `known`; whether a
+    cycle `attracts`; and of the stage's own motion whether it `ends_in_cycle` (asked where one attracts) and `rests`
+    in the end (asked where none does)."""
+    drawn = np.where(ends_in_cycle, "hunts", "bistable")
+    free = np.where(rests, "settles", "transient")
+    return np.where(known, np.where(attracts, drawn, free), "failed").astype(object)

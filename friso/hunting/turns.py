@@ -1,0 +1,49 @@
+"""What the turning points of many runs tell: counted peaks, period, and how far they swung before."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from types import ModuleType
+
+import numpy as np
+
+from friso.engine.cache import code_digest, load_or_build
+from friso.hunting import turning
+
+MANY = 100
+"""Turning points, of all runs together, from which on the compiled loops are loaded; they take as long as so many."""
+
+
+@dataclass(frozen=True)
+class Turns:
+    """Of runs: which turning points are counted `peaks` and which `distinct` ones, shape (runs, room) (see
+    `friso.hunting.criteria.peak_count`); the `period` of the swing [s] (NaN: none), and peak to peak of the last half
+    of the run, `earlier` [m], shape (runs,) (see `friso.hunting.criteria.run_outcome`)."""
+
+    peaks: np.ndarray
+    distinct: np.ndarray
+    period: np.ndarray
+    earlier: np.ndarray
+
+
+def scan(times: np.ndarray, values: np.ndarray, counts: np.ndarray, swing: np.ndarray, ended: np.ndarray) -> Turns:
+    """Scan the turning points of runs: `times` [s] and `values` [m] of position minus reference, shape (runs, room),
+    valid up to `counts`, shape (runs,).
+
+    `swing` [m], shape (runs,), is the peak-to-peak deviation of the last quarter, of which legs of a half or more make
+    the period: ringing on top of it does not count. `ended` [s], shape (runs,), is the end of each run.
+    """
+    runs = len(counts)
+    turns = Turns(np.zeros(times.shape, np.bool_), np.zeros(times.shape, np.bool_), np.empty(runs), np.empty(runs))
+    loops = turning if counts.sum() < MANY else _compiled()
+    loops.run(times, values, counts, swing, ended, turns.peaks, turns.distinct, turns.period, turns.earlier)
+    return turns
+
+
+@cache
+def _compiled() -> ModuleType:
+    from friso.hunting.build import compile_run
+
+    version = code_digest("hunting/turning.py", "hunting/build.py")
+    return load_or_build(f"turning points {version}", "friso.hunting.build", b"", compile_run)

@@ -1,0 +1,209 @@
+"""What a map says, in sentences: what share of it swings and where, how far that can be trusted, what words mean."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from friso.hunting.criteria import ATTRACTED
+from friso.hunting.criteria.run_outcome import CREEPS, RESTS, SWINGS
+from friso.views.drawing.prefixes import listed
+from friso.views.map.cells import SAMPLE, CellAxis, axes_of
+from friso.views.map.words import AT_ONCE, INVALID, NOT_RUN, counts, grouped, in_sentence, word_counts
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+MEANINGS = {
+    "outcome": {
+        SWINGS: "the run swings at its end: to and fro by more than 20 µm in the last quarter, again and again, and by "
+        "at least half as much as in the last half",
+        CREEPS: "the run is outside 10 µm of its reference at its end without swinging: it drifts, sticks or dies out",
+        RESTS: "the run stays within 10 µm of its reference to its end",
+    },
+    "verdict": {
+        "hunts": "a cycle of the stage attracts, and the motion of the stage file ends in it",
+        "bistable": "a cycle attracts, but this motion comes to rest; a kick or another move starts hunting",
+        "transient": "no cycle attracts, and this motion has not come to rest at its end",
+        "settles": "no cycle attracts, and this motion comes to rest",
+    },
+}
+"""What the words of a map mean, by variable."""
+
+_NO_RESULT = {"failed": "the run was not completed", "invalid": "no stage may have these values"}
+
+PEAKS = ("peaks", "distinct_peaks")
+
+
+@dataclass(frozen=True)
+class Question:
+    """What a map is asked first: in which cells something holds, by the values of a variable, and how that is said."""
+
+    variable: str
+    said: str
+
+    def holds(self, values: np.ndarray) -> np.ndarray:
+        """Where it does."""
+        if self.variable in PEAKS:
+            return values.astype(float) > 0
+        return np.isin(values.astype(str), [SWINGS] if self.variable == "outcome" else ATTRACTED)
+
+
+def _question(runs: xr.Dataset, metric: str) -> Question | None:
+    """What a map of this variable is asked; of runs that do not tell, nothing."""
+    if metric in runs and (metric == "verdict" or metric in PEAKS):
+        said = "A cycle of the stage attracts" if metric == "verdict" else "Peaks are counted"
+        return Question(metric, said)
+    return Question("outcome", "The run swings at its end") if "outcome" in runs else None
+
+
+def headline(runs: xr.Dataset, metric: str) -> str:
+    """What share of the map swings (of a map of verdicts: has an attracting cycle; of counts: has counted peaks), and
+    where: the ranges of the axes outside of which no cell does. Empty where the runs do not tell."""
+    asked = _question(runs, metric)
+    if asked is None:
+        return ""
+    holds, known = _flags(runs, asked)
+    if not known.any():
+        return f"{asked.said} nowhere: no cell of the map has a result."
+    if not holds.any() or np.array_equal(holds, known):
+        return f"{asked.said} {'everywhere' if holds.any() else 'nowhere'} in the map."
+    share = f"{asked.said} in {_percent(holds.sum(), known.sum())} of the map"
+    axes, inside = axes_of(runs), known.copy()
+    where = []
+    for k, axis in enumerate(axes):
+        dim = _dims(runs).index(SAMPLE) if SAMPLE in runs.dims else k
+        line = np.asarray(holds.any(axis=tuple(other for other in range(holds.ndim) if other != dim)))
+        box = _box(axis, line[axis.places])
+        where += [_range(axis, box)] if not box.all() else []
+        along = np.zeros(len(line), bool)
+        along[axis.places] = box
+        inside &= along.reshape([-1 if other == dim else 1 for other in range(holds.ndim)])
+    if not where:
+        return f"{share}, over the whole range of {'the axis' if len(axes) == 1 else 'every axis'}."
+    part = f"in {_percent(holds.sum(), inside.sum())} of the cells there"
+    filled = "everywhere there" if np.array_equal(inside, holds) else part
+    return f"{share}: at {listed(where, 'and')} ({filled})."
+
+
+def _flags(runs: xr.Dataset, asked: Question) -> tuple[np.ndarray, np.ndarray]:
+    """Where it holds, and where runs have a result, both of the shape of the runs: a large store is read in parts."""
+    values = runs[asked.variable]
+    holds, known = np.zeros(values.shape, bool), np.zeros(values.shape, bool)
+    rows = max(1, AT_ONCE // max(1, int(np.prod(values.shape[1:]))))
+    for first in range(0, len(values), rows):
+        part = np.asarray(values[first : first + rows].values)
+        ran = np.isfinite(part) if asked.variable in PEAKS else ~np.isin(part.astype(str), ["", *_NO_RESULT])
+        known[first : first + rows] = ran
+        holds[first : first + rows] = ran & asked.holds(part)
+    return holds, known
+
+
+def _dims(runs: xr.Dataset) -> list[str]:
+    return [str(dim) for dim in max((array.dims for array in runs.data_vars.values()), key=len)]
+
+
+def _box(axis: CellAxis, cells: np.ndarray) -> np.ndarray:
+    """Which positions of an axis lie between the first and the last at which it holds (of words: at which it does)."""
+    held = axis.positions[cells]
+    if axis.words:
+        return np.isin(axis.positions, held)
+    return (axis.positions >= held.min()) & (axis.positions <= held.max())
+
+
+def _range(axis: CellAxis, box: np.ndarray) -> str:
+    """The positions of a box along an axis in words."""
+    name, inside = in_sentence(axis.key), axis.positions[box]
+    if axis.words:
+        return f"{name} {listed([axis.words[int(k)] for k in np.unique(inside)], 'or')}"
+    low, high = (axis.value(int(np.flatnonzero(axis.positions == end)[0])) for end in (inside.min(), inside.max()))
+    if inside.min() == inside.max():
+        return f"{name} {low}"
+    if inside.min() == axis.positions.min():
+        return f"{name} up to {high}"
+    return f"{name} from {low}" if inside.max() == axis.positions.max() else f"{name} from {low} to {high}"
+
+
+def _percent(part: int, whole: int) -> str:
+    """A share, which looks like 0 or 100 % only where it is."""
+    share = 100 * part / whole
+    if 1 <= share <= 99:
+        return f"{share:.0f} %"
+    return f"{share:.2g} %" if share < 1 else f"{np.floor(share * 10) / 10:g} %"
+
+
+def verification(runs: xr.Dataset) -> str:
+    """How many of the outcomes checked survive a tighter tolerance, with Wilson's 95 % confidence interval."""
+    checked = int(runs.attrs.get("verified_cells", 0))
+    if not checked:
+        return "Not verified: no outcome was checked at a tighter tolerance."
+    from scipy.stats import binomtest
+
+    surviving = int(runs.attrs["verified_surviving"])
+    interval = binomtest(surviving, checked).proportion_ci(0.95, method="wilson")
+    rtol = float(runs.attrs["verified_rtol"])
+    text = (
+        f"{100 * surviving / checked:.1f} % of {grouped(checked)} outcomes checked survive rtol {rtol:g} "
+        f"(95 % confidence: {100 * interval.low:.1f} to {100 * interval.high:.1f} %)."
+    )
+    if inferred := int(runs.attrs.get("inferred_checked", 0)):
+        confirmed = int(runs.attrs["inferred_confirmed"])
+        text += f" Of {grouped(inferred)} inferred outcomes {100 * confirmed / inferred:.1f} % are confirmed by a run."
+    return text
+
+
+def statement(runs: xr.Dataset, metric: str) -> str:
+    """What stands on every figure of a map: what it says first, its verification, its tolerance and number of runs."""
+    caveat = " ".join(caveats(runs, metric))
+    return "\n".join(text for text in (headline(runs, metric), verification(runs), _extent(runs), caveat) if text)
+
+
+def meanings(runs: xr.Dataset) -> list[tuple[str, str]]:
+    """What the words mean that stand in a map."""
+    return [
+        (word, text)
+        for name, known in MEANINGS.items()
+        for word in word_counts(runs, name)
+        if (text := (known | _NO_RESULT).get(word))
+    ]
+
+
+def caveats(runs: xr.Dataset, metric: str) -> list[str]:
+    """Where the peak count, if a map shows it, says something else than the end of the run."""
+    if metric not in PEAKS or not {metric, "outcome"} <= set(runs.data_vars):
+        return []
+    counted, outcome = runs[metric].values > 0, runs["outcome"].values
+    over, missed = (
+        int((counted & (outcome == RESTS)).sum()),
+        int(((runs[metric].values == 0) & (outcome == SWINGS)).sum()),
+    )
+    found = [f"In {grouped(over)} of the cells with counted peaks the run rests at its end."] if over else []
+    return found + ([f"In {grouped(missed)} of those without it swings."] if missed else [])
+
+
+def _extent(runs: xr.Dataset) -> str:
+    cells = int(np.prod(list(runs.sizes.values())))
+    status = counts(runs, "status")
+    inferred = sum(number for reason, number in status.items() if reason.startswith("inferred"))
+    words = word_counts(runs, "outcome")
+    idle = sum(words.get(kind.label, 0) for kind in (INVALID, NOT_RUN))
+    text = f"{grouped(cells - idle - inferred)} runs at rtol {float(runs.attrs['rtol']):g}"
+    if inferred:
+        text += f", {grouped(inferred)} cells inferred from their neighbours"
+    listing = [", ".join(f"{label} {grouped(number)}" for label, number in words.items())] if words else []
+    if "verdict" in runs:
+        listing.append(
+            "verdicts " + ", ".join(f"{word} {grouped(n)}" for word, n in word_counts(runs, "verdict").items())
+        )
+    return f"{text}: {'; '.join(listing)}." if listing else f"{text}."
+
+
+def failures(runs: xr.Dataset) -> dict[str, int]:
+    """How many cells have no result, by the reason in their status."""
+    return {
+        reason: number
+        for reason, number in counts(runs, "status").items()
+        if reason != "done" and not reason.startswith("inferred")
+    }

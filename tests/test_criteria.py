@@ -1,0 +1,241 @@
+"""The criteria on hunting: words that exclude each other and leave nothing out, in batches and alone, mirrored, and
+the thesis's peak count against scipy."""
+
+from __future__ import annotations
+
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from scipy.signal import find_peaks
+
+import friso
+from friso.engine.batch import run_chunks
+from friso.engine.kernel import kernel
+from friso.equations.structure import structure
+from friso.hunting.criteria import (
+    APART,
+    ATTRACTED,
+    BAND,
+    COUNTED_ABOVE,
+    COUNTED_AFTER,
+    OUTCOMES,
+    VERDICTS,
+    End,
+    counted_peaks,
+    distinct_peaks,
+    end_of_traces,
+    lasts,
+    outcomes,
+    verdicts,
+)
+from friso.hunting.measures import measure, options
+from friso.hunting.turns import scan
+from friso.hunting.verdict import judge_many
+from friso.stage import Stage
+from friso.studies.rig.hunted import turning_points
+
+STEP, DURATION = 1 / 128, 20.0
+TIME = np.arange(0, DURATION + STEP / 2, STEP)
+
+flags = st.lists(st.booleans(), min_size=1, max_size=30)
+lengths = st.floats(1e-8, 1e-1)
+
+
+def one(end: End, k: int) -> End:
+    """The end of one of several runs."""
+    return End(*(getattr(end, each.name)[[k]] for each in fields(End)))
+
+
+# ---------------------------------------------------------------- the verdict on a stage
+
+
+@given(st.tuples(*[st.booleans()] * 4))
+def test_a_stage_has_just_one_verdict(known: tuple[bool, bool, bool, bool]) -> None:
+    """By the table of `friso.hunting.criteria.stage_verdict`, entry by entry."""
+    sure, attracts, in_cycle, rests = known
+    (word,) = verdicts(*(np.array([flag]) for flag in known))
+    assert word in VERDICTS
+    assert (word == "failed") == (not sure)
+    assert (word in ATTRACTED) == (sure and attracts)
+    assert (word == "hunts") == (sure and attracts and in_cycle)
+    assert (word == "bistable") == (sure and attracts and not in_cycle)
+    assert (word == "settles") == (sure and not attracts and rests)
+    assert (word == "transient") == (sure and not attracts and not rests)
+
+
+@given(st.lists(st.tuples(*[st.booleans()] * 4), min_size=1, max_size=30))
+def test_verdicts_of_a_batch_are_those_of_each(several: list[tuple[bool, bool, bool, bool]]) -> None:
+    columns = np.array(several).T
+    together = verdicts(*columns)
+    assert together.tolist() == [verdicts(*columns[:, [k]])[0] for k in range(len(several))]
+
+
+@pytest.mark.xdist_group("rig")
+def test_check_is_the_batch_of_one(rig: Stage) -> None:
+    """Four verdicts of stages alone, and the same stages in one batch."""
+    crossovers = np.array([8.0, 10.0, 12.0, 4.0])
+    locked = rig.replace({"joint.locked": True})
+    flat = locked.flat({"controller.crossover": crossovers})
+    alone = [friso.check(locked.replace({"controller.crossover": f"{f} Hz"}))["locked"].verdict for f in crossovers]
+    assert judge_many(flat, 4, 1e-6).tolist() == alone
+    assert judge_many(locked.flat({"controller.crossover": crossovers[:1]}), 1, 1e-6).tolist() == alone[:1]
+    assert set(alone) == {"hunts", "transient", "settles"}
+
+
+# ---------------------------------------------------------------- what a run did
+
+
+ends = st.tuples(
+    st.booleans(), lengths, lengths, st.floats(0.1, 10.0) | st.just(np.nan), st.floats(0.0, DURATION) | st.just(-np.inf)
+)
+
+
+@given(st.lists(ends, min_size=1, max_size=20), st.floats(1e-7, 1e-3), st.floats(0.0, 5.0))
+def test_a_run_has_just_one_outcome(several: list[tuple], band: float, hold: float) -> None:
+    """By the definitions of `friso.hunting.criteria.run_outcome`; and a batch is all of its runs."""
+    done, swing, before, period, outside = (np.array(column) for column in zip(*several, strict=True))
+    earlier = np.maximum(swing, before)
+    end = End(done, swing, earlier, period, outside, np.full(len(several), DURATION))
+    words = outcomes(end, band, hold)
+    for k in range(len(several)):
+        swings = swing[k] > 2 * band and swing[k] >= earlier[k] / 2 and np.isfinite(period[k])
+        rests = not swings and outside[k] + hold < DURATION
+        expected = [not done[k], swings, rests, not swings and not rests]
+        assert words[k] == ("failed" if not done[k] else ("swings", "rests", "creeps")[expected[1:].index(True)])
+        assert words[k] in OUTCOMES
+        assert sum(expected[1:]) == 1
+        assert outcomes(one(end, k), band, hold)[0] == words[k]
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.floats(0.3, 5.0), st.floats(1e-5, 1e-2), st.floats(-1e-3, 1e-3), st.floats(0.5, 50.0), st.floats(1e-7, 1e-2))
+def test_outcomes_of_traces(frequency: float, size: float, offset: float, decay: float, band: float) -> None:
+    """What swings, drifts, stands or dies out, and the mirror image of each."""
+    swing = offset + size * np.sin(2 * np.pi * frequency * TIME)
+    dying = size * np.exp(-TIME / decay) * np.cos(2 * np.pi * frequency * TIME)
+    runs = np.array([swing, dying, offset + 0 * TIME, offset + size * TIME])
+    words = outcomes(end_of_traces(TIME, runs, band), band)
+    mirrored = outcomes(end_of_traces(TIME, -runs, band), band)
+    assert words.tolist() == mirrored.tolist()
+    if size < 0.49 * band or size > 1.1 * band:  # sampling sees the extremes to a tenth
+        assert (words[0] == "swings") == (size > band)
+    assert words[2] == ("rests" if abs(offset) <= band else "creeps")
+    assert words[3] != "swings"
+    if decay < 3:
+        assert words[1] != "swings"
+    alone = [outcomes(end_of_traces(TIME, row[None], band), band)[0] for row in runs]
+    assert alone == words.tolist()
+
+
+@given(lengths, lengths, st.floats(1e-8, 1e-1))
+def test_a_wider_band_makes_no_swing(swing: float, earlier: float, band: float) -> None:
+    wide, narrow = lasts(np.array([swing]), earlier, 2 * band), lasts(np.array([swing]), earlier, band)
+    assert not (wide & ~narrow).any()
+
+
+def test_a_run_that_failed_has_failed_whatever_it_did() -> None:
+    swing = 1e-3 * np.sin(TIME * 5)[None]
+    assert outcomes(end_of_traces(TIME, swing, BAND, np.zeros(1, bool))).tolist() == ["failed"]
+    assert outcomes(end_of_traces(TIME, swing, BAND)).tolist() == ["swings"]
+    assert outcomes(end_of_traces(TIME, np.full((1, len(TIME)), np.nan), BAND)).tolist() == ["creeps"]
+
+
+def test_rest_may_be_asked_for_some_time() -> None:
+    late = np.where(TIME < 18, 1e-3, 0.0)[None]
+    end = end_of_traces(TIME, late, BAND)
+    assert [outcomes(end, BAND, hold)[0] for hold in (0.0, 1.9, 2.1)] == ["rests", "rests", "creeps"]
+
+
+@pytest.mark.xdist_group("rig")
+def test_outcomes_of_runs_are_those_of_their_traces(rig: Stage) -> None:
+    """The statistics and turning points of the kernel against samples of the same runs; each alone and together."""
+    crossovers = np.array([2.0, 5.0, 8.0, 9.5, 12.0, 16.0])
+    flat = rig.replace({"joint.locked": True}).flat({"controller.crossover": crossovers})
+    (runs,) = run_chunks(kernel(structure({**flat, "controller.crossover": 8.0})), flat, 6, options(1e-6))
+    words = measure(runs.part(flat), runs).outcome
+    assert set(words) > {"swings", "rests"}
+    for k, crossover in enumerate(crossovers):
+        stage = rig.replace({"joint.locked": True, "controller.crossover": f"{crossover} Hz"})
+        trace = friso.simulate(stage, rtol=1e-6, sample_time=1e-3)
+        deviation = (trace.position - trace.reference).values[None]
+        assert outcomes(end_of_traces(trace.time.values, deviation, BAND), BAND)[0] == words[k]
+        (alone,) = run_chunks(kernel(structure(stage.flat())), stage.flat(), 1, options(1e-6))
+        assert measure(stage.flat(), alone).outcome[0] == words[k]
+
+
+# ---------------------------------------------------------------- the peak count
+
+
+def sampled_peaks(values: np.ndarray) -> list[float]:
+    """Times of the counted peaks of samples by scipy: maxima late and tall, of which the tallest are kept first."""
+    maxima, _ = find_peaks(values, height=np.nextafter(COUNTED_ABOVE, 1))
+    spikes = np.zeros(len(values))
+    late = maxima[TIME[maxima] >= COUNTED_AFTER]
+    spikes[late] = values[late]
+    return TIME[find_peaks(spikes, distance=round(APART / STEP))[0]].tolist()
+
+
+waves = st.lists(st.tuples(st.floats(0.1, 4.0), st.floats(1e-5, 1e-3), st.floats(0, 6.28)), min_size=1, max_size=4)
+
+
+@settings(max_examples=150, deadline=None)
+@given(waves, st.floats(-1e-3, 1e-3))
+def test_peaks_of_sampled_traces_agree_with_scipy(parts: list[tuple[float, float, float]], offset: float) -> None:
+    """The thesis's rule is that of findpeaks: it asks for no prominence."""
+    values = offset + sum(size * np.sin(2 * np.pi * rate * TIME + phase) for rate, size, phase in parts)
+    times, turns = turning_points(TIME, values)
+    assume(len(times) > 1 and len({*turns}) == len(turns))  # of equals either may stay
+    marked = counted_peaks(times[None], turns[None], np.array([len(times)]))[0]
+    assert times[marked].tolist() == sampled_peaks(values)
+
+
+@given(st.lists(st.tuples(st.floats(0.01, 1.0), st.integers(-500, 500)), min_size=2, max_size=60))
+def test_distinct_peaks_are_fewer(gaps: list[tuple[float, int]]) -> None:
+    """A distinct peak is late, tall and apart as well; without small ripple both rules say the same."""
+    values = 1e-6 * np.array([[value for _, value in gaps]])
+    times = 9.0 + np.cumsum([[gap for gap, _ in gaps]], axis=1)
+    count = np.array([len(gaps)])
+    plain, distinct = counted_peaks(times, values, count)[0], distinct_peaks(times, values, count)[0]
+    for marks in (plain, distinct):
+        assert (times[0, marks] >= COUNTED_AFTER).all()
+        assert (values[0, marks] > COUNTED_ABOVE).all()
+        assert (np.diff(times[0, marks]) >= APART - 1e-12).all()
+    assert bool(plain.any()) >= bool(distinct.any())
+    if (np.abs(np.diff(values[0])) >= 1e-6).all():
+        assert plain.tolist() == distinct.tolist()
+
+
+def test_ripple_is_counted_by_the_thesis_and_is_not_distinct() -> None:
+    """A stage that breaks away on its way back springs forward by half a micrometre first."""
+    times = np.array([[10.5, 11.5, 11.501, 12.5]])
+    values = np.array([[1e-3, 5e-4, 5e-4 + 5e-7, -1e-3]])
+    assert counted_peaks(times, values, np.array([4])).sum() == 2
+    assert distinct_peaks(times, values, np.array([4])).sum() == 1
+
+
+@given(st.lists(st.tuples(st.floats(0.01, 1.0), st.floats(-1e-3, 1e-3)), min_size=2, max_size=40))
+def test_a_batch_of_turning_points_is_all_of_its_runs(gaps: list[tuple[float, float]]) -> None:
+    times = 5.0 + np.cumsum([gap for gap, _ in gaps])
+    values = np.array([value for _, value in gaps])
+    room = len(times) + 3
+    pad = np.zeros((3, room))
+    both = np.array([values, -values, values[::-1]])
+    pad[:, : len(times)] = both
+    at = np.tile(np.pad(times, (0, 3)), (3, 1))
+    swing, ended, counts = np.ptp(both, axis=1), np.full(3, 1.1 * times[-1]), np.full(3, len(times))
+    together = scan(at, pad, counts, swing, ended)
+    for k in range(3):
+        alone = scan(at[[k]], pad[[k]], counts[[k]], swing[[k]], ended[[k]])
+        for each in fields(together):
+            whole, single = getattr(together, each.name)[k], getattr(alone, each.name)[0]
+            assert np.array_equal(whole, single, equal_nan=each.name in ("period", "earlier"))
+    assert together.earlier[0] == together.earlier[1]  # a mirror image swings as far
+
+
+def test_an_end_is_made_of_arrays_of_one_length() -> None:
+    end = end_of_traces(TIME, np.zeros((3, len(TIME))), BAND)
+    assert {getattr(end, each.name).shape for each in fields(End)} == {(3,)}
+    assert outcomes(replace(end, completed=np.array([True, False, True]))).tolist() == ["rests", "failed", "rests"]
