@@ -227,8 +227,8 @@ def _choice(found: Comparison) -> str:
         said = "and no option with a joint does" if any(each.letter in JOINT for each in found.results) else ""
         return f"On these machines controller settings suffice: {_names(settings)}{', ' + said if said else ''}."
     return (
-        "On these machines neither a joint nor controller settings bring enough of them to rest: see the table for what each "
-        "achieves."
+        "On these machines neither a joint nor controller settings bring enough of them to rest: see the table for "
+        "what each achieves."
     )
 
 

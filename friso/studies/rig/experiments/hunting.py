@@ -177,7 +177,7 @@ def _notes(stage: Stage, result: HuntingResult) -> tuple[str, ...]:
     if failed:
         notes.append(f"{failed} runs failed: whether they have counted peaks is unknown")
     notes.append(
-        "logs of moves that come to rest at once may contain too little motion for friso identify; those of moves that swing "
-        "contain enough"
+        "logs of moves that come to rest at once may contain too little motion for friso identify; those of "
+        "moves that swing contain enough"
     )
     return tuple(notes)

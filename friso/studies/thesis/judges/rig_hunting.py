@@ -178,7 +178,7 @@ def _weak_motor(cycles: Cycles) -> str:
         f"On an even rail, with a motor that gives {MOTORS[1]:.2g} of its force, which would explain the mass line, "
         f"and {COULOMB_LEVEL:g} times the Coulomb friction,"
     )
-    if not (cycles.weak.lives[0] and cycles.even.lives[0]):
+    if not (cycles.weak.swings[0] and cycles.even.swings[0]):
         return f"{cause} there is no cycle to compare"
     period, swing = (float(getattr(cycles.weak, name)[0] / getattr(cycles.even, name)[0]) for name in _COMPARED)
     return f"{cause} the period is {period:.3g} times as long at {swing:.3g} times the swing (friso rig compare)"
