@@ -176,7 +176,7 @@ def test_ctrl_c_leaves_nothing(
 BAD_OPTIONS = [
     (["--map", "position=Nowhere"], "Nowhere"),
     (["--map", "speed=ActPos"], "one of time, reference"),
-    (["--map", "position"], "two texts with = between"),
+    (["--map", "position"], "two texts separated by ="),
     (["--as", "dance"], "one of break-away, constant-speed, frequency, moves"),
     (["--unit", "ActPos=parrots"], "parrots"),
     (["--scale", "force=heavy"], "heavy"),
