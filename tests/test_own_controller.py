@@ -7,13 +7,27 @@ import numpy as np
 import own_controller
 import pytest
 from inside import friso_inside
+from patched import patched
 
 import friso
 from friso.engine.arrays import Status
+from friso.equations.as_built import AsBuilt
 from friso.equations.bandwidth import bandwidth, faster
 from friso.equations.continuous import slow_gains
 from friso.equations.structure import structure
+from friso.frequency import crossover
+from friso.identify.experiments.moves import identify_moves
+from friso.identify.output_error.problem import closed_loop
+from friso.identify.readings.common import record
+from friso.rig.run import as_built_keys
 from friso.stage import Stage, save
+from friso.studies.compare import study
+from friso.studies.compare.study import compare
+from friso.studies.rig.experiments import hunting
+from friso.studies.rig.hunted import rails
+from friso.studies.rig.outcome import silent
+from friso.views.compare.words import sentences as comparison_sentences
+from friso.views.rig.page import sentences
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "thesis_drive.toml"
 CONTROLLER = {"kind": "pi-d", "bandwidth": "6 Hz", "mass": "1.7 kg", "force_limit": "200 N"}
@@ -105,3 +119,42 @@ def test_bode_with_sampling_and_delay(whole: Stage, tmp_path: Path) -> None:
     found = json.loads(done.stdout)
     slow = friso.bode(whole.replace({"drive.delay": None, "drive.sample_time": None}))
     assert found["highest_stable_crossover_hz"] < slow.limits["free"].highest_stable
+
+
+def small(stage: Stage) -> np.ndarray:
+    return rails(stage)[:2]
+
+
+def test_rig_hunting(whole: Stage) -> None:
+    sizes = {"CROSSOVERS": np.array([1.0, 3.0]), "SHOWN": (0, 1), "DISPLACEMENTS": (0.02,), "rails": small}
+    with patched({hunting: sizes}):
+        outcome = hunting.run_experiment(whole, 1, silent)
+    assert outcome.result.crossovers == pytest.approx([6.0, 18.0])
+    assert all(sentences(outcome))
+    assert AsBuilt.of(as_built_keys(whole)).structure.controller is not None
+
+
+def test_compare(whole: Stage) -> None:
+    with patched({crossover: {"STEPS": 21, "BIASES": 3}, study: {"FOLLOWED": 6, "LONGER": 3}}):
+        found = compare(whole, 20, 1)
+    letters = {result.option.letter: result.option for result in found.results}
+    assert {"a", "c", "d", "e", "f"} <= {*letters}
+    assert all(comparison_sentences(found))
+    if "b" in letters:
+        assert letters["b"].stage.flat()[BANDWIDTH] == pytest.approx(6.0 * letters["b"].factor)
+
+
+def test_identify_in_its_own_loop(locked: Stage) -> None:
+    """A log that its own sampled loop wrote gives mass and friction back."""
+    rigid = locked.replace({"joint": None, "rail": None, "cable": None, "drive": {"sample_time": "1 ms"}})
+    flat, time = rigid.flat(), np.arange(4000) * 1e-3
+    reference = 0.02 * (1 - np.cos(2 * np.pi * time))
+    blank = record("given", 1e-3, reference=reference, position=0 * reference, force=0 * reference)
+    problem = closed_loop(flat, blank, blank.segments[0], ())
+    assert problem.form.velocity_samples == 1
+    one = problem.record(np.zeros(0))
+    log = record("moves", 1e-3, reference=reference, position=one.position, force=one.force)
+    found = identify_moves(log, flat, own_loop=True)
+    estimates = {each.name: each.value for each in found.estimates}
+    assert estimates["mass"] == pytest.approx(1.7, rel=0.01)
+    assert estimates["friction.coulomb"] == pytest.approx(1.0, rel=0.05)
