@@ -91,12 +91,14 @@ class Continuous(Blocks):
         return {each.symbol: each.settled for each in self._integrals}
 
     def low_pass(self, signal: Signal, tau: sp.Expr, name: str) -> Signal:
+        """By a state, the filtered signal; `tau` [s]."""
         low = state(f"filtered_{name}")
         slope = (signal.value - low) / tau
         self.states.append(State(low, slope, "m", signal.scale, Role.FILTER, signal.settled))
         return replace(signal, value=low, rate=slope)
 
     def derivative(self, signal: Signal, name: str, tau: sp.Expr | None = None) -> Signal:
+        """With a filter by the state of that; `tau` [s]."""
         slope = signal.rate if tau is None else self.low_pass(signal, tau, name).rate
         if slope is None:
             raise ValueError(f"the derivative of {name} needs a filter")
@@ -110,12 +112,14 @@ class Continuous(Blocks):
         rule: Literal["bilinear", "sum"] = "bilinear",
         limit: sp.Expr | None = None,
     ) -> Signal:
+        """By a state, which rests as the base class tells; `gain` in N per unit of the state."""
         symbol = state(name)
         output = gain * symbol
         self._integrals.append(_Integral(symbol, signal.value, signal.settled, signal.scale / self.rate, output, limit))
         return Signal(output, gain * signal.scale / self.rate, output, sp.S.Zero, rate=gain * signal.value)
 
     def biquad(self, signal: Signal, upper: Polynomial, lower: Polynomial, name: str) -> Signal:
+        """By two states: the signal through the lower polynomial, and its rate."""
         low, slope = state(f"filtered_{name}"), state(f"filtered_{name}_rate")
         bend = (signal.value - low - lower[1] * slope) / lower[2]
         self.states += [
@@ -127,6 +131,7 @@ class Continuous(Blocks):
         return Signal(value, signal.scale, settled, upper[0] * signal.settled_rate)
 
     def limiter(self, signal: Signal, limit: sp.Expr, name: str) -> Signal:
+        """With a kink at either limit."""
         value, kinks = _clamped(signal.value, limit, name)
         self.kinks += kinks
         return replace(signal, value=value, rate=None)

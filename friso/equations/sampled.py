@@ -68,12 +68,14 @@ class Sampled(Blocks):
         return symbol
 
     def low_pass(self, signal: Signal, tau: sp.Expr, name: str) -> Signal:
+        """By the bilinear transform; `tau` [s]."""
         before, low = state(f"signal_before_{name}"), state(f"low_passed_{name}")
         passed = ((2 * tau - SAMPLE_TIME) * low + SAMPLE_TIME * (signal.value + before)) / (2 * tau + SAMPLE_TIME)
         self.held += [Held(before, signal.value, signal.settled), Held(low, passed, signal.settled)]
         return replace(signal, value=passed, rate=None, before=low)
 
     def derivative(self, signal: Signal, name: str, tau: sp.Expr | None = None) -> Signal:
+        """With a filter by the bilinear transform, else a difference over samples; `tau` [s]."""
         scale = signal.scale / SAMPLE_TIME
         if tau is not None:
             slope = (signal.value - self.low_pass(signal, tau, name).value) / tau
@@ -91,6 +93,7 @@ class Sampled(Blocks):
         rule: Literal["bilinear", "sum"] = "bilinear",
         limit: sp.Expr | None = None,
     ) -> Signal:
+        """A number that a sample adds to; `gain` in N per unit of it."""
         symbol, following = state(name), state(f"next_{name}")
         share = SAMPLE_TIME * signal.value
         if rule == "bilinear":
@@ -102,6 +105,7 @@ class Sampled(Blocks):
         return Signal(gain * following, gain * signal.scale * SAMPLE_TIME, gain * symbol, sp.S.Zero)
 
     def biquad(self, signal: Signal, upper: Polynomial, lower: Polynomial, name: str) -> Signal:
+        """By the bilinear transform, from two samples back."""
         (b0, b1, b2), (a0, a1, a2) = map(_tustin, (upper, lower))
         settled = upper[0] * signal.settled + upper[1] * signal.settled_rate
         back = SAMPLE_TIME * signal.settled_rate
@@ -117,6 +121,7 @@ class Sampled(Blocks):
         return Signal(value, signal.scale, settled, upper[0] * signal.settled_rate, before=y1)
 
     def limiter(self, signal: Signal, limit: sp.Expr, name: str) -> Signal:
+        """As it is at a sample."""
         return replace(signal, value=sp.Max(-limit, sp.Min(limit, signal.value)), rate=None, before=None)
 
     def finished(self, demand: Signal, limit: sp.Expr | None, rest: Rest) -> tuple[sp.Expr, tuple[Held, ...]]:

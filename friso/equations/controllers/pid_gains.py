@@ -60,6 +60,7 @@ class PidGains(Pid):
 
     @classmethod
     def variant(cls, flat: Mapping[str, Any]) -> Terms:
+        """Which terms there are."""
         derived = flat[KD] > 0
         return Terms(
             integral=bool(flat[KI] > 0),
@@ -69,14 +70,17 @@ class PidGains(Pid):
 
     @classmethod
     def integrates(cls, flat: Mapping[str, Any]) -> bool:
+        """Whether the gain of the integral is not 0."""
         return bool(flat[KI] > 0)
 
     @classmethod
     def stiffness(cls, blocks: Blocks, variant: Terms) -> sp.Expr:
+        """The proportional gain [N/m]."""
         return blocks.key("kp")
 
     @classmethod
     def declare(cls, measured: Measured, blocks: Blocks, variant: Terms) -> Mapping[str, Signal]:
+        """The three shares [N] of Eq. 6."""
         kp, ki, kd, tau = map(blocks.key, ("kp", "ki", "kd", "tau"))
         lag = tau if variant.filtered else None
         derivative = {

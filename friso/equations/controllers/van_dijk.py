@@ -57,14 +57,17 @@ class VanDijk(Pid):
 
     @classmethod
     def integrates(cls, flat: Mapping[str, Any]) -> bool:
+        """Always."""
         return True
 
     @classmethod
     def stiffness(cls, blocks: Blocks, variant: None) -> sp.Expr:
+        """The gain k_p of Eq. 8 [N/m]."""
         return gains(blocks)["k_p"]
 
     @classmethod
     def declare(cls, measured: Measured, blocks: Blocks, variant: None) -> Mapping[str, Signal]:
+        """The three shares [N] of Eq. 7."""
         k_p, tau_z, tau_i, tau_p = gains(blocks).values()
         passed = blocks.low_pass(measured.error, tau_p, "error")
         return {
