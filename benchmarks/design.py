@@ -54,7 +54,7 @@ def steps() -> tuple[list[tuple[str, float]], float]:
     reported: list[tuple[str, float]] = []
     start = time.perf_counter()
 
-    def progress(what: str, done: int, total: int) -> None:
+    def progress(done: int, total: int, what: str) -> None:
         if not reported or reported[-1][0] != what:
             reported.append((what, time.perf_counter()))
 

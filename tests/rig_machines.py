@@ -16,7 +16,7 @@ from machines import Machine, drawn
 
 import friso
 from friso.identify.kind import Source
-from friso.identify.logs.mapping import Mapping, save
+from friso.identify.logs.mapping import Mapping, mapping_text, sidecar
 from friso.identify.readings.friction_velocity import friction_velocity
 from friso.identify.sources import LogFile, read_all
 from friso.rig.log_files import write_csv
@@ -69,7 +69,7 @@ def through_files(logs: Iterable[RigLog], folder: Path) -> list[LogFile]:
         paths.append(folder / f"{log.name}.csv")
         write_csv(paths[-1], log.interval, log.logged, f"friso rig, seed {log.seed}")
         if log.kind is not None:
-            save(Mapping(experiment=log.kind), paths[-1])
+            sidecar(paths[-1]).write_text(mapping_text(Mapping(experiment=log.kind)))
     return read_all(paths, Mapping(), folder)
 
 

@@ -16,9 +16,10 @@ from refusals import Refused
 
 import friso
 from friso.cli.bode import bode as command
-from friso.cli.bode import bode_document
+from friso.cli.output import MARKER
 from friso.frequency.bode import Bode, Unstable, bode
 from friso.stage import Stage
+from friso.views.bode.document import bode_document
 from friso.views.bode.figures import bode_figures, phases
 from friso.views.bode.states import shown_states
 from friso.views.bode.table import rows
@@ -275,7 +276,7 @@ def test_no_texts_but_json_on_standard_output(capsys: pytest.CaptureFixture) -> 
 def test_files_and_page(written: tuple[dict, Path]) -> None:
     _, folder = written
     pictures = {f"{name}.{form}" for name in FIGURES for form in ("png", "svg", "pdf")}
-    assert {path.name for path in folder.iterdir()} == pictures | {"bode.html"}
+    assert {path.name for path in folder.iterdir()} == pictures | {"bode.html", MARKER}
     assert (folder / "bode_plant.png").read_bytes().startswith(b"\x89PNG")
     assert (folder / "bode_nyquist.pdf").read_bytes().startswith(b"%PDF")
     page = Page((folder / "bode.html").read_text(encoding="utf-8"))

@@ -11,6 +11,7 @@ import pytest
 from inside import friso_inside
 from refusals import Refused
 
+from friso.cli.output import MARKER
 from friso.hunting.boundary import Branch, Curve, Diagram, Found, Kind, Plane, Point, Range, Space, Spot
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import NOT_CLOSED, Cycles, symmetric_cycles
@@ -71,7 +72,7 @@ def test_the_document_of_one_key(single: tuple[dict, Path]) -> None:
 def test_the_files_of_one_key(single: tuple[dict, Path]) -> None:
     document, folder = single
     names = {f"thesis_rig_boundary.{ending}" for ending in ("png", "svg", "pdf", "csv")}
-    assert {path.name for path in folder.iterdir()} == names
+    assert {path.name for path in folder.iterdir()} == {*names, MARKER}
     table = pd.read_csv(folder / "thesis_rig_boundary.csv")
     special = table[table.kind.notna()].sort_values("controller.crossover [Hz]")
     assert list(special.kind) == [point["kind"] for point in document["points"]]

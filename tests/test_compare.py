@@ -15,6 +15,7 @@ from patched import patched
 from refusals import Refused
 from snapshots import Snapshots
 
+from friso.cli.output import MARKER
 from friso.frequency import crossover
 from friso.frequency.margins import margins
 from friso.frequency.members import limit_cases, member
@@ -28,8 +29,9 @@ from friso.studies.compare.options import DEADBAND, MODEL_ERROR, Option, Options
 from friso.studies.compare.statistics import difference, median
 from friso.studies.compare.study import Comparison, Result, compare
 from friso.studies.shares import share
-from friso.views.compare.document import document, page
+from friso.views.compare.document import compare_document
 from friso.views.compare.figures import figures
+from friso.views.compare.page import page
 from friso.views.compare.words import paired_rows, sentences, table_rows
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "thesis_drive.toml"
@@ -399,7 +401,7 @@ def test_sooner_later_and_alike(made_up: Comparison) -> None:
     assert [each.probability for each in (pair.sooner, pair.later, pair.alike)] == [0.6, 0.15, 0.25]
     when = paired_rows(made_up)[0][1][1]
     assert [part.split(" (")[0] for part in when.split("; ")] == ["sooner 60.0 %", "later 15.0 %", "alike 25.0 %"]
-    assert document(made_up)["options"]["c"]["against_a"]["later"]["probability"] == 0.15
+    assert compare_document(made_up)["options"]["c"]["against_a"]["later"]["probability"] == 0.15
 
 
 def test_standstill_is_compared_on_a_floor_only(made_up: Comparison) -> None:
@@ -414,7 +416,7 @@ def test_standstill_is_compared_on_a_floor_only(made_up: Comparison) -> None:
         "not compared: no [floor]", "0.5 (0.5 to 0.5)",
     ]  # fmt: skip
     for each, compared in ((quiet, False), (shaken, True)):
-        known, text = document(each), Page(page(each, [])).text
+        known, text = compare_document(each), Page(page(each, [])).text
         ratio = known["options"]["c"]["against_a"]["in_position_rms"]
         assert (known["standstill_compared"], ratio is not None) == (compared, compared)
         assert any("no [floor]" in note for note in known["notes"]) is not compared
@@ -439,7 +441,7 @@ def test_command_writes_page_and_figures(
         assert each["swings"]["low"] <= each["swings"]["probability"] <= each["swings"]["high"]
     assert document["options"]["d"]["settling_time_s"]["high"] is None
     assert {each.name for each in (tmp_path / "out").iterdir()} == {
-        "compare.html", "compare.pdf", "compare.png", "compare.svg",
+        MARKER, "compare.html", "compare.pdf", "compare.png", "compare.svg",
     }  # fmt: skip
     page = Page((tmp_path / "out" / "compare.html").read_text(encoding="utf-8"))
     snapshots.check("compare", "page", page.lines)

@@ -23,12 +23,14 @@ from snapshots import Snapshots
 import friso
 from friso.cli.app import main
 from friso.cli.design import design as command
+from friso.cli.output import MARKER
 from friso.design import choice, controller, edges, front, hunting_map, method, population, verification
 from friso.design.edges import Corners
 from friso.design.geometry import Geometry, Sheet
-from friso.design.method import Design, NoDesign, Progress
+from friso.design.method import Design, NoDesign
 from friso.design.relax import Relaxation
 from friso.design.spec import Position, Spec, load_spec
+from friso.progress import Progress
 from friso.stage import Stage
 from friso.views.design.control import controller_step, moves_step, parallel_gains
 from friso.views.design.document import design_document, refused_document
@@ -90,7 +92,7 @@ def finished(found: Design) -> Iterator[list[str]]:
     told: list[str] = []
 
     def design(stage: Stage, spec: Spec, progress: Progress) -> Design:
-        progress("leaf springs", 0, 1)
+        progress(0, 1, "leaf springs")
         told.append(stage.name)
         return found
 
@@ -116,10 +118,9 @@ def folder(written: tuple[Path, str]) -> Path:
 
 @pytest.fixture
 def quick(written: tuple[Path, str], monkeypatch: pytest.MonkeyPatch) -> None:
-    """Figures are not drawn again."""
-    folder, _ = written
-    names = ("design.toml", "worst.toml", "design.html")
-    monkeypatch.setattr("friso.cli.design._write", lambda found, out, progress: [folder / name for name in names])
+    """Figures are not drawn again, and nothing is written."""
+    monkeypatch.setattr("friso.cli.output.write", lambda files, progress: [])
+    monkeypatch.setattr("friso.views.design.page.design_figures", lambda design: ())
 
 
 @pytest.fixture
@@ -151,7 +152,7 @@ def _figures(found: Design) -> dict[str, Figure]:
 def test_all_files_are_written_and_the_stages_load(found: Design, folder: Path) -> None:
     pictures = {f"{name}.svg" for name in FIGURES}
     own = {"design.toml", "worst.toml", "design.html", "design_drawing.svg"}
-    assert {path.name for path in folder.iterdir()} == pictures | own
+    assert {path.name for path in folder.iterdir()} == pictures | own | {MARKER}
     stage, worst = friso.load(folder / "design.toml"), friso.load(folder / "worst.toml")
     assert stage.flat()["joint.stiffness"] == pytest.approx(found.fitted.choice.beams.drive[0], rel=0.02)
     assert worst.flat()["friction.static"] == found.verification.worst.flat()["friction.static"]

@@ -20,6 +20,7 @@ from refusals import Refused
 import friso
 from friso.cli.flexure import EXAMPLE
 from friso.cli.flexure import flexure as command
+from friso.cli.output import MARKER
 from friso.errors import InputError
 from friso.flexure.beams import BeamFailure, beams
 from friso.flexure.closed_model import closed
@@ -285,7 +286,7 @@ def test_without_a_mode_that_interferes_there_is_no_limit(found: Found) -> None:
 
 def test_files_and_page(folder: Path) -> None:
     pictures = {f"{name}.{form}" for name in FIGURES for form in ("png", "svg", "pdf")}
-    assert {path.name for path in folder.iterdir()} == pictures | {"flexure.html", "flexure_drawing.svg"}
+    assert {path.name for path in folder.iterdir()} == pictures | {"flexure.html", "flexure_drawing.svg", MARKER}
     assert (folder / "flexure_modes.png").read_bytes().startswith(b"\x89PNG")
     assert (folder / "flexure_force.pdf").read_bytes().startswith(b"%PDF")
     page = Page((folder / "flexure.html").read_text(encoding="utf-8"))

@@ -18,6 +18,7 @@ from snapshots import Snapshots
 from variants import VARIANTS
 
 from friso.cli import main
+from friso.cli.output import write
 from friso.equations.model import assemble
 from friso.equations.structure import structure
 from friso.hunting import persistence
@@ -25,6 +26,7 @@ from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import hunting_cycles
 from friso.hunting.edges import ABOVE, BELOW, FLIP, JUMP, LOST, UNKNOWN, Edges, find_edges
 from friso.hunting.persistence import hunts_somehow
+from friso.progress import Tally, silent
 from friso.stage import Stage
 from friso.studies.guideline import checks, compute, parasitic, sweeps, worked
 from friso.studies.guideline.claims import claims, least_gap
@@ -425,9 +427,11 @@ def test_parasitic_rows_say_what_the_page_says_of_them(quick: compute.Guideline)
 
 
 def test_page_renders_with_its_charts(quick: compute.Guideline, tmp_path: Path, snapshots: Snapshots) -> None:
-    from friso.views.guideline.page import guideline_document, write_guideline
+    from friso.views.guideline.document import guideline_document
+    from friso.views.guideline.page import guideline_files
 
-    files = {path.name: path for path in write_guideline(quick, tmp_path)}
+    paths = write({tmp_path / name: content for name, content in guideline_files(quick).items()})
+    files = {path.name: path for path in paths}
     page = files["guideline.md"].read_text()
     snapshots.check("guideline", "page", page)
     assert not re.search(r"\bnan\b", page)
@@ -455,11 +459,11 @@ def test_interrupted_sweep_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(sweeps, "find_edges", stopping)
     keep = sweeps.Keep(tmp_path / "kept")
     with pytest.raises(KeyboardInterrupt):
-        sweeps.locked_sweep(96, 1, keep, lambda what, done: None)
+        sweeps.locked_sweep(96, 1, keep, Tally(silent, 96))
     assert keep.count == 1
-    resumed = sweeps.locked_sweep(96, 1, keep, lambda what, done: None)
+    resumed = sweeps.locked_sweep(96, 1, keep, Tally(silent, 96))
     assert calls == [32] * 4
-    whole = sweeps.locked_sweep(96, 1, sweeps.Keep(), lambda what, done: None)
+    whole = sweeps.locked_sweep(96, 1, sweeps.Keep(), Tally(silent, 96))
     assert np.array_equal(resumed.edge, whole.edge, equal_nan=True)
     keep.clear()
     assert keep.count == 0

@@ -14,7 +14,7 @@ GUIDE = PACKAGE.parent / "CONTRIBUTING.md"
 KNOW_CONTROLLERS = ("equations/controllers/", "stage/", "templates/")
 """Where keys of a controller may be named: its own files, the stage file's schema, and the template of one."""
 
-SHARED_VIEWS = {"__init__.py", "documents.py", "pages.py", "report.py"}
+SHARED_VIEWS = {"__init__.py", "documents.py", "files.py", "pages.py", "report.py"}
 """Modules of views that belong to no command; the rest stands in the command's folder or in drawing/."""
 
 ONE_MEANING = ("Moves", "Shown", "Found", "Options", "Estimate", "Case")

@@ -21,6 +21,7 @@ from snapshots import Snapshots
 
 import friso
 from friso.cli import main
+from friso.cli.output import write
 from friso.studies.thesis import (
     STUDIES,
     Evidence,
@@ -43,8 +44,9 @@ from friso.studies.thesis.maps import begins, ends, free_square, trend
 from friso.studies.thesis.open_parameters import METHOD, OPEN
 from friso.studies.thesis.reproduce import _changed, _coarser, _enters, counted, lasting
 from friso.studies.thesis.verdicts import not_covered, verdict
+from friso.views.reproduce.document import claims_document
 from friso.views.reproduce.figures import reproduction_figures
-from friso.views.reproduce.page import claims_document, reproduction_html, write_reproduction
+from friso.views.reproduce.page import reproduction_files, reproduction_html
 
 ROOT = Path(__file__).parent.parent
 POINTS = 21
@@ -464,7 +466,7 @@ def test_document_and_page_have_every_claim(small: Reproduction, tmp_path: Path)
     for number in ("5", "7", "8", "11", "12", "13", "14", "15", "16", "22", "23"):
         assert f'id="figure-figure-{number}"' in page
     assert "default-src 'none'" in page
-    paths = write_reproduction(small, tmp_path / "new" / "folder")
+    paths = write({tmp_path / "new" / name: content for name, content in reproduction_files(small).items()})
     assert all(path.stat().st_size > 1000 for path in paths)
     assert {path.suffix for path in paths} == {".html", ".json", ".png", ".svg"}
 

@@ -10,6 +10,7 @@ from refusals import Refused
 
 from friso import load
 from friso.engine.arrays import Status
+from friso.progress import silent
 from friso.rig.run import Recorded
 from friso.stage import Stage
 from friso.studies.rig.experiments import compare, hunting, in_position, stroke_crossover
@@ -26,8 +27,8 @@ from friso.studies.rig.hunted import (
     turning_points,
     with_joint,
 )
-from friso.studies.rig.outcome import silent
-from friso.views.rig.page import document, figures, sentences
+from friso.views.rig.document import rig_document
+from friso.views.rig.page import figures, sentences
 
 RIG = load(Path(__file__).parents[1] / "examples" / "thesis_drive.toml")
 
@@ -151,7 +152,7 @@ def test_free_joint_does_not_hunt_and_its_stroke_matters() -> None:
     for outcome in (told, grid):
         assert all(sentences(outcome))
         assert figures(outcome)
-        assert document(outcome)["found"]
+        assert rig_document(outcome)["found"]
 
 
 def test_an_even_rail_has_a_symmetric_cycle_and_an_uneven_one_has_not() -> None:

@@ -8,10 +8,11 @@ from refusals import Refused
 
 import friso
 from friso.identify.experiments.stick_slip import static_from_stick_slip
+from friso.progress import silent
 from friso.stage import Stage
 from friso.studies.rig import excitation, many_speeds, sizes
 from friso.studies.rig.experiments import constant_speed, frf, stiction, stiffness
-from friso.studies.rig.outcome import rig_log, silent
+from friso.studies.rig.outcome import rig_log
 
 PLACE = 0.02
 

@@ -7,13 +7,13 @@ from refusals import Refused
 
 import friso
 from friso.identify.kind import as_set_up
-from friso.identify.logs.mapping import Mapping, load, save
+from friso.identify.logs.mapping import Mapping, load, mapping_text, sidecar
 from friso.identify.sources import read_all
+from friso.progress import silent
 from friso.rig.log_files import write_csv
 from friso.stage import Stage
 from friso.studies.rig.experiments import constant_speed, presliding, stiction
 from friso.studies.rig.experiments.stiffness import steps
-from friso.studies.rig.outcome import silent
 from friso.views.rig.page import sentences
 
 
@@ -26,26 +26,18 @@ def test_how_the_stage_was_set_up_goes_with_the_log(built: Stage, tmp_path: Path
     """For the analysis of that log alone: the stage file keeps its own stroke."""
     log, path = steps(built, 1), tmp_path / "steps.csv"
     write_csv(path, log.interval, log.logged, "")
-    save(Mapping(experiment="steps", setup={"joint.stroke": "8 mm", "cable.drag": "1 N*s/m"}), path)
+    sidecar(path).write_text(
+        mapping_text(Mapping(experiment="steps", setup={"joint.stroke": "8 mm", "cable.drag": "1 N*s/m"}))
+    )
     assert load(path) == Mapping(experiment="steps", setup={"joint.stroke": "8 mm", "cable.drag": "1 N*s/m"})
     (given,) = read_all([path], Mapping(), tmp_path)
     flat = as_set_up(built, given.source)
     assert flat["joint.stroke"] == pytest.approx(8e-3)
     assert built.flat()["joint.stroke"] == pytest.approx(1e-3)
-    save(Mapping(experiment="steps", setup={"joint.stroke": "8 volts"}), path)
+    sidecar(path).write_text(mapping_text(Mapping(experiment="steps", setup={"joint.stroke": "8 volts"})))
     (wrong,) = read_all([path], Mapping(), tmp_path)
     with refused("joint.stroke"):
         as_set_up(built, wrong.source)
-
-
-def test_a_log_has_its_name_once_it_is_whole(built: Stage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def interrupted(*_: object, **__: object) -> None:
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("numpy.savetxt", interrupted)
-    with pytest.raises(KeyboardInterrupt):
-        write_csv(tmp_path / "log.csv", 1e-3, {"position": [0.0, 1.0]}, "")  # type: ignore[dict-item]
-    assert not (tmp_path / "log.csv").exists()
 
 
 def test_friction_without_what_is_looked_for_is_refused(built: Stage, refused: Refused) -> None:

@@ -26,7 +26,7 @@ from friso.hunting.cycle.return_map import ReturnMap
 from friso.version import VERSION
 from friso.views.check.cases import COLOURS, Shown, shown_cases
 from friso.views.check.figures import check_figures, response_figure
-from friso.views.check.page import conclusion, report_html, verdict_sentence, write_report
+from friso.views.check.page import conclusion, report_html, verdict_sentence
 from friso.views.check.table import rows
 from friso.views.drawing import matplotlib_renderer, plotly_renderer
 from friso.views.drawing.drawable import drawable
@@ -663,12 +663,6 @@ def test_report_without_traces_has_the_table_and_no_script():
     page = report_html(cases)
     assert "<script" not in page
     assert "Locked: hunts" in page
-
-
-def test_report_is_written_as_utf8(tmp_path):
-    path = tmp_path / "report.html"
-    write_report({"given": replace(fake_case(stage=fake_stage("Führung µ")), trace=None)}, path)
-    assert "Führung µ" in path.read_bytes().decode("utf-8")
 
 
 def sentence(judgement: Judgement, cases: Any = None, locked: bool | None = None, **changes: Any) -> str:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-import os
 import shutil
 import sys
 import textwrap
@@ -32,16 +30,10 @@ Overrides = Annotated[
 RTOL_HELP = "Relative tolerance of the solver, 1e-12 to 1e-2."
 Tolerance = Annotated[str, typer.Option("--rtol", metavar="NUMBER", help=RTOL_HELP)]
 AsJson = Annotated[bool, typer.Option("--json", help="One JSON document on standard output, nothing else.")]
-OutFolder = Annotated[Path | None, typer.Option("--out", metavar="DIR", help="Folder for the files written.")]
 
 
 def say(message: str) -> None:
     print(f"friso: {message}", file=sys.stderr)
-
-
-def finite(value: float) -> float | None:
-    """A number for a JSON document, which knows no infinite and undefined ones."""
-    return float(value) if math.isfinite(value) else None
 
 
 def print_table(title: str, columns: Sequence[str], rows: Iterable[tuple[str, list[str]]], below: list[str]) -> None:
@@ -109,37 +101,6 @@ def key_values(given: list[tuple[str, str]], example: str) -> dict[str, str]:
             raise InputError(option, f"{key} a second time", "each key once", example)
         pairs[key] = value.strip()
     return pairs
-
-
-def made_folder(path: Path) -> Path:
-    """The folder, made if it is not there. Raises InputError."""
-    try:
-        path.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        expected = f"a folder that can be written ({error.strerror})"
-        raise InputError("--out", str(path), expected, "--out report") from None
-    return path
-
-
-def check_place(folder: Path, written: Sequence[str], page: str, given: Sequence[Path]) -> None:
-    """Raises InputError where one of the files written would cost one that is read here, or that is not of an earlier
-    run (which has left its `page` beside it), and where the folder cannot be written."""
-    for path in (folder / name for name in written):
-        if not path.exists():
-            continue
-        expected = "another folder, or a folder without these files"
-        if any(each.exists() and path.samefile(each) for each in given):
-            raise InputError("--out", f"{folder}, from which {path.name} is read", expected, f"--out {folder}-2")
-        if not (folder / page).exists():
-            raise InputError(
-                "--out", f"{folder}, with a {path.name} that is not from an earlier run", expected, f"--out {folder}-2"
-            )
-    was_there = folder.exists()
-    made_folder(folder)  # now, not after a minute of computing
-    if not os.access(folder, os.W_OK):
-        raise InputError("--out", str(folder), "a folder that can be written", f"--out {folder}-2")
-    if not was_there:
-        folder.rmdir()
 
 
 def read_tolerance(text: str) -> float:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import json
-import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -12,16 +10,14 @@ import typer
 
 from friso.cli.common import (
     AsJson,
-    OutFolder,
     Overrides,
     StageFile,
-    check_place,
-    made_folder,
     print_table,
     print_wrapped,
     read_stage,
 )
-from friso.cli.progress import step_bar
+from friso.cli.output import OutFolder, Overwrite, place, print_document
+from friso.cli.progress import ProgressBar
 from friso.errors import InputError
 from friso.quantities import Quantity, positive
 from friso.stage import Stage, load
@@ -29,8 +25,6 @@ from friso.stage import Stage, load
 if TYPE_CHECKING:
     from friso.stage.correlations import Correlations
     from friso.studies.compare.study import Comparison
-
-PAGE = "compare.html"
 
 Machines = Annotated[
     int, typer.Option("--machines", metavar="N", help="Number of machines drawn around the stage, 20 or more.")
@@ -48,6 +42,7 @@ def compare(
     seed: Seed = 1,
     within: Within = "1 um",
     out: OutFolder = None,
+    overwrite: Overwrite = False,
     as_json: AsJson = False,
 ) -> None:
     """Buy a joint or change settings: seven ways to settle the same machines, drawn around a stage.
@@ -57,19 +52,21 @@ def compare(
     Example: friso compare examples/thesis_drive.toml --machines 200 --out compare
     """
     from friso.studies.compare.study import compare as compared
-    from friso.studies.rig.outcome import silent
 
     stage = read_stage(stage_file, overrides, leaves_out=(), drawn=True)
-    tolerance, known = _tolerance(within), _correlations(stage_file, stage)
-    if out is not None:
-        check_place(out, [PAGE], PAGE, [stage_file])
-    with step_bar() as bar:
-        found = compared(stage, machines, seed, tolerance, known, bar or silent)
-    files = [] if out is None else _written(found, out)
-    if as_json:
-        from friso.views.compare.document import document
+    tolerance, correlations = _tolerance(within), _correlations(stage_file, stage)
+    target = place("compare", out, overwrite, [stage_file])
+    files = []
+    with ProgressBar() as progress:
+        found = compared(stage, machines, seed, tolerance, correlations, progress)
+        if target is not None:
+            from friso.views.compare.page import compare_files
 
-        print(json.dumps(document(found), allow_nan=False))
+            files = target.write(compare_files(found), progress)
+    if as_json:
+        from friso.views.compare.document import compare_document
+
+        print_document(compare_document(found))
     else:
         _print(found, files)
     if any(result.failed for result in found.results):
@@ -109,28 +106,3 @@ def _print(found: Comparison, files: Sequence[Path]) -> None:
     notes = (f"note: {note}" for note in found.notes)
     for sentence in (*population(found), *notes, *sentences(found), *(f"wrote {file}" for file in files)):
         print_wrapped(sentence)
-
-
-def _written(found: Comparison, folder: Path) -> list[Path]:
-    """Figures and page, drawn before any of them is written."""
-    from friso.views.compare.document import page
-    from friso.views.compare.figures import figures
-    from friso.views.drawing.matplotlib_renderer import FORMATS, image
-
-    drawn = figures(found)
-    contents = {f"{figure.name}.{form}": image(figure, form) for figure in drawn for form in FORMATS}
-    contents[PAGE] = page(found, drawn).encode()
-    return _put(contents, made_folder(folder))
-
-
-def _put(contents: Mapping[str, bytes], folder: Path) -> list[Path]:
-    """Write files, each whole or not at all."""
-    written = []
-    for name, content in contents.items():
-        draft = folder / f".{name}.{os.getpid()}"
-        try:
-            draft.write_bytes(content)
-            written.append(draft.replace(folder / name))
-        finally:
-            draft.unlink(missing_ok=True)
-    return written

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NoReturn
 
@@ -13,28 +12,27 @@ from friso.cli.common import (
     AsJson,
     Overrides,
     StageFile,
-    check_place,
-    made_folder,
     print_wrapped,
     read_stage,
     say,
 )
-from friso.cli.progress import step_bar
-
-if TYPE_CHECKING:
-    from friso.design.method import Design, NoDesign, Progress
-    from friso.design.spec import Spec
-    from friso.stage import Stage
+from friso.cli.output import DefaultFolder, Overwrite, Place, print_document
+from friso.cli.progress import ProgressBar
 
 STAGES = ("design.toml", "worst.toml")
-PAGE = "design.html"
+
+if TYPE_CHECKING:
+    from friso.design.method import Design, NoDesign
+    from friso.design.spec import Spec
+    from friso.stage import Stage
 
 
 def design(
     stage_file: StageFile,
     spec_file: Annotated[Path, typer.Argument(metavar="SPEC.toml", help="The specification.")],
     overrides: Overrides = None,
-    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for the files written.")] = Path("design"),
+    out: DefaultFolder = Path("design"),
+    overwrite: Overwrite = False,
     as_json: AsJson = False,
 ) -> None:
     """From a specification to leaf springs, stroke and controller that do not hunt: design.toml, and why it is so.
@@ -48,15 +46,16 @@ def design(
     spec = load_spec(spec_file)
     if stage.drive:
         say("[drive] is taken into account for the margins; hunting and moves are simulated in continuous time")
-    check_place(out, STAGES, PAGE, (stage_file, spec_file))
+    target = Place("design", out, overwrite, [stage_file, spec_file])
+    target.check(STAGES)
     try:
-        found, files = _designed(stage, spec, out)
+        found, files = _designed(stage, spec, target)
     except NoDesign as failure:
         _refuse(failure, stage, spec, as_json)
     if as_json:
         from friso.views.design.document import design_document
 
-        print(json.dumps(design_document(found) | {"files": [str(file) for file in files]}, allow_nan=False))
+        print_document(design_document(found), files)
     else:
         _print(found, files)
     if not found.meets:
@@ -66,39 +65,14 @@ def design(
         raise typer.Exit(2)
 
 
-def _designed(stage: Stage, spec: Spec, out: Path) -> tuple[Design, list[Path]]:
+def _designed(stage: Stage, spec: Spec, target: Place) -> tuple[Design, list[Path]]:
     """The design and its files, with progress on a terminal. Raises InputError, NoDesign."""
     from friso.design.method import design as method
+    from friso.views.design.page import design_files
 
-    with step_bar() as bar:
-
-        def progress(what: str, done: int, total: int) -> None:
-            if bar:
-                bar(done, total, what)
-
+    with ProgressBar() as progress:
         found = method(stage, spec, progress)
-        return found, _write(found, made_folder(out), progress)
-
-
-def _write(found: Design, folder: Path, progress: Progress) -> list[Path]:
-    """The stages, the page, the drawing, and every figure in all formats."""
-    from friso.stage.files import save as save_stage
-    from friso.views.design.figures import design_figures
-    from friso.views.design.page import design_html, drawing
-    from friso.views.drawing.matplotlib_renderer import FORMATS, save
-
-    figures = design_figures(found)
-    page, sheet = folder / PAGE, folder / "design_drawing.svg"
-    page.write_text(design_html(found, figures), encoding="utf-8", newline="\n")
-    sheet.write_text(drawing(found), encoding="utf-8", newline="\n")
-    stages = [folder / name for name in STAGES]
-    for path, stage in zip(stages, (found.stage, found.verification.worst), strict=True):
-        save_stage(stage, path, overwrite=True)
-    pictures = {folder / f"{figure.name}.{form}": figure for figure in figures for form in FORMATS}
-    for number, (path, figure) in enumerate(pictures.items()):
-        progress("figures", number, len(pictures))
-        save(figure, path)
-    return [*stages, page, sheet, *pictures]
+        return found, target.write(design_files(found), progress)
 
 
 def _refuse(failure: NoDesign, stage: Stage, spec: Spec, as_json: bool) -> NoReturn:
@@ -107,7 +81,7 @@ def _refuse(failure: NoDesign, stage: Stage, spec: Spec, as_json: bool) -> NoRet
     from friso.views.design.words import refusal
 
     if as_json:
-        print(json.dumps(refused_document(stage.name, spec.name, failure), allow_nan=False))
+        print_document(refused_document(stage.name, spec.name, failure))
     say(f"no design: {refusal(failure)}")
     raise typer.Exit(2)
 

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from friso.cli.common import AsJson, OutFolder, Overrides, StageFile, leave, made_folder, print_table, read_stage, say
-from friso.cli.progress import busy
+from friso.cli.common import AsJson, Overrides, StageFile, leave, print_table, read_stage, say
+from friso.cli.output import OutFolder, Overwrite, place, print_document, print_written
+from friso.cli.progress import ProgressBar
 from friso.errors import InputError
 from friso.quantities import Quantity, positive, quoted
 from friso.stage import Stage
@@ -35,6 +34,7 @@ def flexure(
     ] = None,
     overrides: Overrides = None,
     out: OutFolder = None,
+    overwrite: Overwrite = False,
     as_json: AsJson = False,
 ) -> None:
     """What are the leaf springs of a joint worth: stiffness, modes, stress, fatigue and buckling, and a drawing.
@@ -44,18 +44,21 @@ def flexure(
     stage = read_stage(stage_file, overrides, leaves_out=())
     mechanism = _mechanism(stage, str(stage_file))
     deflection = _stroke(stroke, stage, mechanism)
-    folder = None if out is None else made_folder(out)
-    with busy("bending the leaves"):
+    target = place("flexure", out, overwrite, [stage_file])
+    files = []
+    with ProgressBar("bending the leaves") as progress:
         found = _evaluate(stage, mechanism, deflection)
-        files = [] if folder is None else _write(found, folder)
+        if target is not None:
+            from friso.views.flexure.page import flexure_files
+
+            files = target.write(flexure_files(found), progress)
     if as_json:
         from friso.views.flexure.document import flexure_document
 
-        print(json.dumps(flexure_document(found), allow_nan=False))
+        print_document(flexure_document(found))
     else:
         _print(found)
-        for file in files:
-            print(f"wrote {file}")
+        print_written(files)
     if found.failure:
         say(f"the beam model found no solution: {found.failure}")
     leave(not found.failure)
@@ -107,19 +110,3 @@ def _print(found: Found) -> None:
     from friso.views.flexure.words import sentences
 
     print_table(found.stage.name, list(found.models), rows(found), sentences(found))
-
-
-def _write(found: Found, folder: Path) -> list[Path]:
-    """The page, the drawing, and every figure in all formats."""
-    from friso.views.drawing.matplotlib_renderer import FORMATS, save
-    from friso.views.flexure.figures import flexure_figures
-    from friso.views.flexure.page import drawing, flexure_html
-
-    figures = flexure_figures(found)
-    pictures = {folder / f"{figure.name}.{form}": figure for figure in figures for form in FORMATS}
-    for path, figure in pictures.items():
-        save(figure, path)
-    page, sheet = folder / "flexure.html", folder / "flexure_drawing.svg"
-    sheet.write_text(drawing(found), encoding="utf-8", newline="\n")
-    page.write_text(flexure_html(found, figures), encoding="utf-8", newline="\n")
-    return [page, sheet, *pictures]

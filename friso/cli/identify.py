@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from friso.cli.common import AsJson, Overrides, check_place, made_folder, print_wrapped, with_overrides
-from friso.cli.progress import step_bar
+from friso.cli.common import AsJson, Overrides, print_wrapped, with_overrides
+from friso.cli.output import DefaultFolder, Overwrite, Place, print_document
+from friso.cli.progress import ProgressBar
 from friso.errors import InputError
 from friso.quantities import Quantity, positive
 from friso.stage import load
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from friso.identify.method import Identification, Prediction
     from friso.identify.sources import LogFile
 
-STAGE, PAGE = "identified.toml", "identify.html"
+STAGE = "identified.toml"
 
 Many = list[str] | None
 _HERTZ, _SECONDS = Quantity("Hz", positive, "20 Hz"), Quantity("s", positive, "5 s")
@@ -60,9 +60,8 @@ def identify(
     period: Annotated[
         str | None, typer.Option("--period", metavar="TIME", help="Period of a periodic excitation.")
     ] = None,
-    out: Annotated[Path, typer.Option("--out", metavar="DIR", help="Folder for the files written.")] = Path(
-        "identified"
-    ),
+    out: DefaultFolder = Path("identified"),
+    overwrite: Overwrite = False,
     as_json: AsJson = False,
 ) -> None:
     """A stage file with uncertainties from measured logs: mass, friction, stiffness, and what the logs cannot show.
@@ -71,25 +70,23 @@ def identify(
     """
     from friso.identify.logs.mapping import from_options
     from friso.identify.method import identify as found_in
-    from friso.identify.sources import keep, read_all
+    from friso.identify.sources import kept, read_all
 
     known = None if stage is None else with_overrides(load(stage), overrides)
     if known is None and overrides:
         raise InputError("--set", overrides[0], "a stage whose keys to override", "--stage stage.toml")
     settings = _settings(bandwidth, band, period)
     told = from_options(maps or (), units or (), scales or (), dt, kind)
-    check_place(out, (STAGE,), PAGE, [*logs, *(predict or []), *([stage] if stage else [])])
+    target = Place("identify", out, overwrite, [*logs, *(predict or []), *([stage] if stage else [])])
+    target.check([STAGE])
     given = read_all([*logs, *(predict or [])], told, out)
-    with step_bar() as bar:
-
-        def progress(what: str, done: int, total: int) -> None:
-            if bar:
-                bar(done, total, what)
-
+    with ProgressBar() as progress:
         found = found_in([(each.source, each.kind) for each in given[: len(logs)]], known, settings, progress)
         predictions = _predictions(found, given[len(logs) :], settings)
-        given = [keep(each, out) for each in given]
-        files = _write(found, given, predictions, made_folder(out), progress)
+        given = [kept(each, out) for each in given]
+        from friso.views.identify.files import identify_files, mappings
+
+        files = target.write(identify_files(found, given, predictions), progress, beside=mappings(given))
     _answer(found, given, predictions, files, as_json)
 
 
@@ -122,41 +119,6 @@ def _predictions(found: Identification, given: Sequence[LogFile], settings: Anal
     return [predict(found, log, settings) for log in logs]
 
 
-def _write(
-    found: Identification,
-    given: Sequence[LogFile],
-    predictions: Sequence[Prediction],
-    folder: Path,
-    progress: Callable[[str, int, int], None],
-) -> list[Path]:
-    """The stage file, the correlations beside it, the page, and every figure in all formats."""
-    from friso.stage.correlations import beside, write_correlations
-    from friso.stage.files import save as save_stage
-    from friso.views.drawing.matplotlib_renderer import FORMATS, save
-    from friso.views.identify.figures import identify_figures
-    from friso.views.identify.page import identify_html
-
-    figures = identify_figures(found, predictions)
-    page, stage = folder / PAGE, folder / STAGE
-    page.write_text(identify_html(found, given, predictions, figures), encoding="utf-8", newline="\n")
-    files = [page]
-    if found.stage is not None:
-        save_stage(found.stage, stage, overwrite=True)
-        files.insert(0, stage)
-    else:
-        stage.unlink(missing_ok=True)  # an earlier run's, as are the correlations below
-    if found.stage is not None and found.correlations.keys:
-        write_correlations(found.correlations, found.stage, beside(stage), overwrite=True)
-        files.insert(1, beside(stage))
-    else:
-        beside(stage).unlink(missing_ok=True)
-    pictures = {folder / f"{figure.name}.{form}": figure for figure in figures for form in FORMATS}
-    for number, (path, figure) in enumerate(pictures.items()):
-        progress("figures", number, len(pictures))
-        save(figure, path)
-    return [*files, *pictures]
-
-
 def _answer(
     found: Identification, given: Sequence[LogFile], predictions: Sequence[Prediction], files: list[Path], as_json: bool
 ) -> None:
@@ -164,8 +126,7 @@ def _answer(
     if as_json:
         from friso.views.identify.document import identify_document
 
-        document = identify_document(found, given, predictions) | {"files": [str(file) for file in files]}
-        print(json.dumps(document, allow_nan=False))
+        print_document(identify_document(found, given, predictions), files)
         return
     from friso.views.identify.words import answer
 

@@ -8,20 +8,25 @@ from typing import Annotated
 
 import typer
 
+from friso.cli.output import Overwrite, write
 from friso.errors import InputError
 
 
 def init(
     path: Annotated[Path, typer.Argument(metavar="STAGE.toml", help="The file to write.")] = Path("stage.toml"),
+    overwrite: Overwrite = False,
 ) -> None:
     """Write a commented stage file to start from.
 
     Example: friso init my_stage.toml
     """
     template = files("friso").joinpath("templates/stage.toml").read_text(encoding="utf-8")
+    if path.exists() and not overwrite:
+        expected = "a new file, or --overwrite; nothing was overwritten"
+        raise InputError("STAGE.toml", f"{path}, which already exists", expected, "friso init new.toml")
     try:
-        with path.open("x", encoding="utf-8") as file:
-            file.write(template)
+        path.parent.stat()  # a folder that is missing is a mistake, not one to make
+        write({path: template})
     except OSError as error:
         expected = f"a new file in a folder that can be written ({error.strerror}); nothing was overwritten"
         raise InputError("STAGE.toml", str(path), expected, "friso init new.toml") from None

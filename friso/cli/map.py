@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -13,7 +12,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from friso.cli.common import AsJson, Overrides, read_stage, read_tolerance, say
-from friso.cli.progress import progress_bar
+from friso.cli.output import Overwrite, print_document, print_written, write
+from friso.cli.progress import ProgressBar
 from friso.errors import InputError
 
 if TYPE_CHECKING:
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
     from friso.studies.execute import Crew
     from friso.studies.study import Study
+    from friso.views.files import Content
 
 LARGE = 10_000_000
 """Cells from which on a study has to be confirmed: minutes of computation and a gigabyte."""
@@ -71,6 +72,7 @@ def map_cells(
     out: Annotated[
         Path | None, typer.Option(metavar="STORE", help="Folder of the results, resumed if it exists.")
     ] = None,
+    overwrite: Overwrite = False,
     yes: Annotated[bool, typer.Option("--yes", help="Confirm a study of more than ten million cells.")] = False,
     as_json: AsJson = False,
 ) -> None:
@@ -82,11 +84,11 @@ def map_cells(
     from friso.cli.map_study import (
         Varied,
         coloured_by,
+        export_files,
         refuse_overwriting,
         stored_study,
         study_for,
-        write_exports,
-        write_views,
+        view_files,
     )
     from friso.studies.store import in_memory
     from friso.studies.verify import checked_share
@@ -104,14 +106,15 @@ def map_cells(
             store = out or Path(f"{source.stem}_map.zarr")
             study = study_for(stage, varied, metric, refine, None if yes else LARGE, crew)
             study = replace(study, rtol=_chosen_rtol(rtol or "1e-6", study, crew))
-        refuse_overwriting(store, exports)
+        refuse_overwriting(store, exports, overwrite)
         runs = _run(study, store, crew, share)
+    views: dict[Path, Content] = {}
     if study.cells <= LARGE:
         runs = in_memory(runs)
-        files = [*write_views(runs, store, coloured_by(study, metric)), *write_exports(runs, exports)]
+        views = view_files(runs, store, coloured_by(study, metric))
     else:
         say(f"no figure and no page of {study.cells:.3g} cells")
-        files = write_exports(runs, exports)
+    files = write({**views, **export_files(runs, exports)})
     _report(runs, study, store, coloured_by(study, metric), files, as_json)
 
 
@@ -159,19 +162,19 @@ def _run(study: Study, store: Path, crew: Crew, share: float) -> xr.Dataset:
     """Run what the store lacks. Whatever ends it early, the message says where the rest is."""
     from friso.studies.sweep import run_in_store
 
-    done = 0
-    with progress_bar(store.name, study.cells) as advance:
+    kept = 0
+    with ProgressBar(store.name) as bar:
 
-        def count(cells: int) -> None:
-            nonlocal done
-            done += cells
-            advance(cells)
+        def progress(done: int, total: int, what: str) -> None:
+            nonlocal kept
+            kept = done
+            bar(done, total, store.name)
 
         try:
-            return run_in_store(study, store, crew, share, count)
+            return run_in_store(study, store, crew, share, progress)
         except (KeyboardInterrupt, OSError, RuntimeError):
             if store.exists():
-                say(f"{done} of {study.cells} cells are kept; to resume: friso map {store}")
+                say(f"{kept} of {study.cells} cells are kept; to resume: friso map {store}")
             raise
 
 
@@ -185,9 +188,12 @@ def _checked_exports(export: list[Path] | None) -> list[Path]:
 
 
 def _report(runs: xr.Dataset, study: Study, store: Path, metric: str, files: list[Path], as_json: bool) -> None:
-    from friso.cli.map_study import document, sentences
-
     if as_json:
-        print(json.dumps(document(runs, study, store, metric, files), allow_nan=False))
+        from friso.views.map.document import map_document
+
+        print_document(map_document(runs, study, store, metric), files)
     else:
-        print("\n".join([*sentences(runs, study, metric), f"store: {store}", *(f"wrote {file}" for file in files)]))
+        from friso.views.map.findings import sentences
+
+        print("\n".join([*sentences(runs, study, metric), f"store: {store}"]))
+        print_written(files)

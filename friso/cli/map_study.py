@@ -1,12 +1,12 @@
-"""What `friso map` is asked for and answers: the study, what it would cost, files, sentences, the JSON document."""
+"""What `friso map` is asked for and answers: the study, what it would cost, files."""
 
 from __future__ import annotations
 
-import math
 import time
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -22,6 +22,8 @@ from friso.studies.study import Study, study_of
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from friso.views.files import Content
 
 AXIS_EXAMPLE = '--x controller.crossover="1 Hz..40 Hz:41"'
 
@@ -109,96 +111,32 @@ def _too_large(runs: int, trial: Study, crew: Crew) -> InputError:
     return InputError("--yes", given, "--yes, or fewer points; nothing was run", "--yes")
 
 
-def write_views(runs: xr.Dataset, store: Path, metric: str) -> list[Path]:
+def view_files(runs: xr.Dataset, store: Path, metric: str) -> dict[Path, Content]:
     """The figure and the page of a map, beside its store."""
-    from friso.views.map.page import write_map_page
+    from friso.views.map.page import map_files
 
-    paths = _view_paths(store)
-    _save_figure(runs, metric, paths[:-1])
-    write_map_page(runs, paths[-1], metric, f"friso simulate --cell {store} {{indices}}")
-    return paths
+    files = map_files(runs, metric, f"friso simulate --cell {store} {{indices}}")
+    return {_beside(store, form): content for form, content in files.items()}
 
 
-def _save_figure(runs: xr.Dataset, metric: str, paths: list[Path]) -> None:
-    from friso.views.drawing.matplotlib_renderer import save
-    from friso.views.map.figures import map_figure
-
-    figure = map_figure(runs, metric)
-    for path in paths:
-        save(figure, path)
-
-
-def refuse_overwriting(store: Path, exports: list[Path]) -> None:
-    """Refuse to write over files that are no earlier result of this study. Raises InputError."""
-    for path in exports if store.exists() else [*_view_paths(store), *exports]:
-        if path.exists() or path == store:
-            raise InputError(
-                "--out", f"{path} already exists", "another name; nothing was overwritten", "--out new.zarr"
-            )
-
-
-def _view_paths(store: Path) -> list[Path]:
-    from friso.views.drawing.matplotlib_renderer import FORMATS
-
-    stem = store.with_suffix("") if store.suffix == ".zarr" else store
-    return [stem.with_name(f"{stem.name}.{form}") for form in (*FORMATS, "html")]
-
-
-def write_exports(runs: xr.Dataset, paths: list[Path]) -> list[Path]:
+def export_files(runs: xr.Dataset, paths: list[Path]) -> dict[Path, Content]:
     """The study as NetCDF or CSV, by the suffix."""
     from friso.studies.export import export
 
-    for path in paths:
-        export(runs, path)
-    return paths
+    return dict.fromkeys(paths, partial(export, runs))
 
 
-def sentences(runs: xr.Dataset, study: Study, metric: str) -> list[str]:
-    """What was found, for the terminal: first what share of the map swings, and where."""
-    from friso.views.map.findings import caveats, failures, headline, verification
-    from friso.views.map.words import KINDS, word_counts
+def refuse_overwriting(store: Path, exports: list[Path], overwrite: bool) -> None:
+    """Refuse to write over files that are no earlier result of this study. Raises InputError."""
+    from friso.views.map.page import FORMS
 
-    words = "; ".join(
-        ", ".join(f"{count} {word}" for word, count in counts.items())
-        for name in KINDS
-        if (counts := word_counts(runs, name))
-    )
-    size = " x ".join(map(str, study.shape))
-    reasons = [f"{count} without result: {reason}" for reason, count in failures(runs).items()]
-    extent = f"{study.stage.name or 'stage'}: {size} cells at rtol {study.rtol:g}: {words}"
-    return [headline(runs, metric), extent, verification(runs), *caveats(runs, metric), *reasons]
+    views = [] if store.exists() else [_beside(store, form) for form in FORMS]
+    for path in [*views, *exports]:
+        if path == store or (path.exists() and not overwrite):
+            expected = "another name, or --overwrite; nothing was overwritten"
+            raise InputError("--out", f"{path} already exists", expected, "--out new.zarr")
 
 
-def document(runs: xr.Dataset, study: Study, store: Path, metric: str, files: list[Path]) -> dict[str, Any]:
-    """The JSON document of `map`."""
-    from friso.views.map.findings import headline
-    from friso.views.map.words import word_counts
-
-    criteria = {name: text for name in map(str, runs.data_vars) if (text := runs[name].attrs.get("criterion"))}
-    verified = {name: runs.attrs[f"verified_{name}"] for name in ("cells", "surviving", "rtol") if _verified(runs)}
-    return {
-        "stage": study.stage.name,
-        "store": str(store),
-        "axes": {
-            axis.name: {"points": len(axis.values), "unit": axis.unit, "first": _plain(axis.values[0])}
-            | {"last": _plain(axis.values[-1])}
-            for axis in study.axes
-        },
-        "cells": study.cells,
-        "rtol": study.rtol,
-        "conclusion": headline(runs, metric),
-        "outcomes": word_counts(runs, "outcome"),
-        "verdicts": word_counts(runs, "verdict") or None,
-        "criteria": criteria,
-        "verified": verified or None,
-        "files": [str(path) for path in files],
-    }
-
-
-def _verified(runs: xr.Dataset) -> bool:
-    return "verified_cells" in runs.attrs
-
-
-def _plain(value: Any) -> Any:
-    plain = value.item()
-    return plain if not isinstance(plain, float) or math.isfinite(plain) else None
+def _beside(store: Path, form: str) -> Path:
+    stem = store.with_suffix("") if store.suffix == ".zarr" else store
+    return stem.with_name(f"{stem.name}.{form}")

@@ -1,19 +1,45 @@
-"""A progress bar on the terminal: cells done, cells per second, time left."""
+"""The progress bar on the terminal."""
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
+from typing import TYPE_CHECKING, Self
+
+if TYPE_CHECKING:
+    from rich.progress import Progress as Display
+    from rich.progress import TaskID
 
 
-@contextmanager
-def progress_bar(what: str, cells: int) -> Iterator[Callable[[int], None]]:
-    """A bar on standard error for as long as the block lasts, nothing where that is no terminal; call what it gives
-    with the number of cells just done."""
-    if not sys.stderr.isatty():
-        yield lambda done: None
-        return
+class ProgressBar(AbstractContextManager["ProgressBar"]):
+    """A bar on standard error for as long as the `with` block lasts, nothing where that is no terminal.
+
+    It is a `friso.progress.Progress`; before its first call, and without a total, it shows `what` and only moves.
+    """
+
+    def __init__(self, what: str = "") -> None:
+        self.what = what
+        self.display: Display | None = None
+        self.task: TaskID | None = None
+
+    def __enter__(self) -> Self:
+        if sys.stderr.isatty():
+            self.display = _display()
+            self.task = self.display.add_task(self.what, total=None)
+            self.display.start()
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        if self.display is not None:
+            self.display.stop()
+            self.display = None
+
+    def __call__(self, done: int, total: int, what: str, /) -> None:
+        if self.display is not None and self.task is not None:
+            self.display.update(self.task, completed=done, total=total or None, description=what)
+
+
+def _display() -> Display:
     from rich.console import Console
     from rich.progress import (
         BarColumn,
@@ -27,36 +53,10 @@ def progress_bar(what: str, cells: int) -> Iterator[Callable[[int], None]]:
     from rich.text import Text
 
     class Rate(ProgressColumn):
+        """Steps per second, where they are many."""
+
         def render(self, task: Task) -> Text:
-            return Text("" if not task.speed else f"{task.speed:,.0f} cells/s")
+            return Text(f"{task.speed:,.0f}/s" if task.speed and task.speed >= 1 else "")
 
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), Rate(), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(what, total=cells)
-        yield lambda done: bar.advance(task, done)
-
-
-@contextmanager
-def step_bar() -> Iterator[Callable[[int, int, str], None] | None]:
-    """A bar for work in steps; call what it gives with steps done, steps in all, and what comes next."""
-    if not sys.stderr.isatty():
-        yield None
-        return
-    from rich.console import Console
-    from rich.progress import Progress
-
-    with Progress(console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("", total=None)
-        yield lambda done, total, what: bar.update(task, completed=done, total=total, description=what)
-
-
-@contextmanager
-def busy(what: str) -> Iterator[None]:
-    """A sign of life on standard error for as long as the block lasts, for work whose length is not known."""
-    if not sys.stderr.isatty():
-        yield
-        return
-    from rich.console import Console
-
-    with Console(stderr=True).status(what):
-        yield
+    return Progress(*columns, console=Console(stderr=True), transient=True)

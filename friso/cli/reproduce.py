@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import json
 from collections import Counter
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from friso.cli.common import AsJson, OutFolder, Tolerance, made_folder, read_tolerance
-from friso.cli.progress import step_bar
+from friso.cli.common import AsJson, Tolerance, read_tolerance
+from friso.cli.output import DefaultFolder, Overwrite, Place, print_document, print_written
+from friso.cli.progress import ProgressBar
 
 
 def reproduce(
@@ -19,7 +19,8 @@ def reproduce(
     ] = None,
     points: Annotated[int, typer.Option(metavar="NUMBER", help="Values per axis of every map.")] = 41,
     rtol: Tolerance = "1e-6",
-    out: OutFolder = Path("reproduction"),
+    out: DefaultFolder = Path("reproduction"),
+    overwrite: Overwrite = False,
     as_json: AsJson = False,
 ) -> None:
     """Every figure and claim of the thesis that computation decides, judged: reproduction.html, claims.json.
@@ -28,16 +29,17 @@ def reproduce(
     One study: friso reproduce isolator-crossover
     """
     tolerance = read_tolerance(rtol)
-    folder = made_folder(out or Path("reproduction"))
+    target = Place("reproduce", out, overwrite)
     from friso.studies.thesis.reproduce import reproduce as reproduce_thesis
-    from friso.views.reproduce.page import claims_document, write_reproduction
+    from friso.views.reproduce.document import claims_document
+    from friso.views.reproduce.page import reproduction_files
 
-    with step_bar() as progress:
+    with ProgressBar() as progress:
         found = reproduce_thesis(names, points, tolerance, progress)
-    files = write_reproduction(found, folder)
+        files = target.write(reproduction_files(found), progress)
     document = claims_document(found)
     if as_json:
-        print(json.dumps(document | {"files": [str(path) for path in files]}, allow_nan=False))
+        print_document(document, files)
         return
     for claim in document["claims"]:
         if claim["judgement"] != "not yet covered":
@@ -49,4 +51,4 @@ def reproduce(
         )
     counts = Counter(claim["judgement"] for claim in document["claims"])
     print(", ".join(f"{count} {judgement}" for judgement, count in counts.items()))
-    print("\n".join(f"wrote {path}" for path in files if path.suffix in (".html", ".json")))
+    print_written(path for path in files if path.suffix in (".html", ".json"))

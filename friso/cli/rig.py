@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from friso.cli.common import AsJson, Overrides, StageFile, check_place, made_folder, print_wrapped, say, with_overrides
-from friso.cli.progress import step_bar
+from friso.cli.common import AsJson, Overrides, StageFile, print_wrapped, say, with_overrides
+from friso.cli.output import OutFolder, Overwrite, place, print_document, print_written
+from friso.cli.progress import ProgressBar
 from friso.errors import InputError
 from friso.stage import Stage, load
 
 if TYPE_CHECKING:
-    from friso.studies.rig.outcome import Outcome, RigLog
-
-PAGE, TRUTH = "rig.html", "truth"
+    from friso.studies.rig.outcome import Outcome
 
 Experiment = Annotated[
     str,
@@ -25,9 +23,6 @@ Experiment = Annotated[
         metavar="EXPERIMENT",
         help="One of those below.",
     ),
-]
-OutFolder = Annotated[
-    Path | None, typer.Option("--out", metavar="DIR", help="Folder for logs, true signals and figures.")
 ]
 Seed = Annotated[
     int, typer.Option("--seed", metavar="NUMBER", help="Seed of the noise; the rail has its own, rail.seed.")
@@ -45,6 +40,7 @@ def rig(
     overrides: Overrides = None,
     seed: Seed = 1,
     out: OutFolder = None,
+    overwrite: Overwrite = False,
     as_json: AsJson = False,
 ) -> None:
     """Rehearse an experiment on the machine as built: sampled, quantised, saturated, on a rail that varies.
@@ -53,7 +49,6 @@ def rig(
 
     Example: friso rig stiffness examples/thesis_drive.toml --out rig
     """
-    from friso.studies.rig.outcome import silent
     from friso.studies.rig.registry import RIG_EXPERIMENTS
 
     run = RIG_EXPERIMENTS[RIG_EXPERIMENTS.checked(experiment, "EXPERIMENT", "friso rig {} rig.toml")]
@@ -61,21 +56,20 @@ def rig(
     _told(stage)
     if not 0 <= seed < MOST_SEED:
         raise InputError("--seed", str(seed), f"a whole number from 0, below {MOST_SEED:g}", "--seed 1")
-    if out is not None:
-        check_place(out, [f"{TRUTH}/stage.toml"], PAGE, [stage_file])
-        if out.is_dir() and any(out.iterdir()) and not (out / TRUTH / "stage.toml").exists():
-            given, expected = (
-                f"{out}, with files that are not from an earlier friso rig",
-                "an empty folder, or a new one",
-            )
-            raise InputError("--out", given, expected, f"--out {out}-2")
-    with step_bar() as bar:
-        outcome = run(stage, seed, bar or silent)
-    files = [] if out is None else _written(outcome, made_folder(out))
-    if as_json:
-        from friso.views.rig.page import document
+    target = place("rig", out, overwrite, [stage_file])
+    if target is not None:
+        target.check(["truth/stage.toml"])
+    files = []
+    with ProgressBar() as progress:
+        outcome = run(stage, seed, progress)
+        if target is not None:
+            from friso.views.rig.page import rig_files
 
-        print(json.dumps(document(outcome), allow_nan=False))
+            files = target.write(rig_files(outcome), progress)
+    if as_json:
+        from friso.views.rig.document import rig_document
+
+        print_document(rig_document(outcome))
     else:
         _print(outcome, files)
     failed = [log for log in outcome.logs if log.failure]
@@ -107,54 +101,7 @@ def _print(outcome: Outcome, files: Sequence[Path]) -> None:
     print(f"seed of the noise: {outcome.seed}")
     for note in outcome.notes:
         print_wrapped(f"note: {note}")
-    for file in files:
-        print(f"wrote {file}")
-
-
-def _written(outcome: Outcome, folder: Path) -> list[Path]:
-    """Logs with how they are to be read, the truth in a folder of its own, figures and page."""
-    from friso.views.drawing.matplotlib_renderer import FORMATS, save
-    from friso.views.rig.page import figures, page
-
-    truth = made_folder(folder / TRUTH)
-    files = [_write_log(log, outcome.stage, folder, truth) for log in outcome.logs]
-    _write_stage(outcome.stage, truth / "stage.toml", outcome.seed)
-    drawn = figures(outcome)
-    pictures = {folder / f"{figure.name}.{form}": figure for figure in drawn for form in FORMATS}
-    for path, figure in pictures.items():
-        save(figure, path)
-    (folder / PAGE).write_text(page(outcome, drawn), encoding="utf-8", newline="\n")
-    return [folder / PAGE, *files, truth / "stage.toml", *pictures]
-
-
-def _write_log(log: RigLog, stage: Stage, folder: Path, truth: Path) -> Path:
-    """The log as the drive writes it, how to read it beside it, and the truth in its own folder."""
-    from friso.identify.logs.mapping import Mapping, save
-    from friso.rig.log_files import write_csv
-
-    path = folder / f"{log.name}.csv"
-    said = f"friso rig, seed {log.seed}"
-    write_csv(path, log.interval, log.logged, said)
-    if log.kind is not None:
-        save(Mapping(experiment=log.kind, setup=_setup(log.stage, stage)), path)
-    write_csv(truth / path.name, log.interval, log.true, f"{said}: the truth behind {path.name}")
-    _write_stage(log.stage, truth / f"{log.name}.toml", log.seed)
-    return path
-
-
-def _setup(own: Stage, stage: Stage) -> dict[str, str]:
-    """What of joint and controller was set otherwise for a log than in the stage file, as texts with units."""
-    was, now = stage.given(), own.given()
-    return {
-        f"{table}.{key}": text
-        for table in ("joint", "controller")
-        for key, text in now.get(table, {}).items()
-        if isinstance(text, str) and text != was.get(table, {}).get(key)
-    }
-
-
-def _write_stage(stage: Stage, path: Path, seed: int) -> None:
-    path.write_text(f"# friso rig, seed {seed}\n{stage.to_toml()}", encoding="utf-8", newline="\n")
+    print_written(files)
 
 
 def listed_experiments() -> list[tuple[str, str]]:

@@ -6,7 +6,7 @@ closed: a design asks for 1 or 2 % in seconds, and simulates all its moves after
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,6 +17,7 @@ from friso.equations.controllers.van_dijk import CROSSOVER
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import hunting_cycles
 from friso.hunting.persistence import DISTANCES, hunts_somehow
+from friso.progress import Progress, silent
 
 ROUNDS = 4
 """Bisections of the step that holds an edge: to 1 or 2 % of it on the grids here."""
@@ -61,10 +62,11 @@ def edges_over(
     low: float,
     high: float,
     steps: int,
-    tell: Callable[[int, int], None] = lambda done, total: None,
+    progress: Progress = silent,
+    what: str = "",
 ) -> Corners:
     """The edges of the stage `flat` in all corners, searched from `low` to `high` [Hz], tuned by van Dijk's rules: on a
-    grid, and between the last point at which a cycle attracts and the next. `tell` gets steps done and steps in all."""
+    grid, and between the last point at which a cycle attracts and the next. `what` names the search to the progress."""
     ensemble = Ensemble.held(population.over({**flat, CROSSOVER: np.nan}), population.count)
     grid, every = np.log(np.geomspace(low, high, steps)), np.arange(population.count)
     attracts, decided = _attracts(ensemble, np.repeat(every, steps), np.tile(grid, population.count))
@@ -73,7 +75,7 @@ def edges_over(
     inside, outside = grid[last], grid[np.minimum(last + 1, steps - 1)]
     open_ = np.flatnonzero(attracts.any(axis=1) & (last < steps - 1))
     for k in range(ROUNDS if open_.size else 0):
-        tell(k + 1, ROUNDS + 1)
+        progress(k + 1, ROUNDS + 1, what)
         middle = (inside[open_] + outside[open_]) / 2
         within, _ = _attracts(ensemble, open_, middle)
         inside[open_], outside[open_] = (

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -23,6 +22,7 @@ from friso.design.spec import Spec
 from friso.design.verification import Verification, verification
 from friso.equations.controllers.van_dijk import CROSSOVER
 from friso.frequency.crossover import Limits, limits
+from friso.progress import Progress, silent
 from friso.stage import Stage
 
 STROKES = 4
@@ -42,9 +42,6 @@ ROUNDS, LOWER = 12, 0.97
 
 ALIKE = 0.98
 """Share of the requested crossover from which a crossover is accepted, instead of choosing softer leaves for it."""
-
-Progress = Callable[[str, int, int], None]
-"""Called with what is being done, how much of it is done, and how much there is."""
 
 
 class NoDesign(Exception):
@@ -116,28 +113,31 @@ class Design:
         return self.spec.safety.hunting * self.without.highest > self.spec.limit
 
 
-def design(stage: Stage, spec: Spec, progress: Progress = lambda what, done, total: None) -> Design:
+def design(stage: Stage, spec: Spec, progress: Progress = silent) -> Design:
     """Carry the method out. Raises InputError for input that cannot be used, NoDesign if nothing meets the
     specification."""
     base = prepared(stage, spec)
     flat, population, limit = base.flat(), corners(spec, base.flat()), spec.limit
-    tell = partial(progress, "hunting without isolator")
-    without = edges_over(rigid(flat), population, FIRST * limit, BEYOND * limit, STEPS, tell)
+    without = edges_over(
+        rigid(flat), population, FIRST * limit, BEYOND * limit, STEPS, progress, "hunting without isolator"
+    )
     friction = least_friction(population, flat)
     if friction <= 0:
         raise NoDesign("the bias force on the cart exceeds the least static friction: no joint is soft enough")
     task, candidates = leaves(spec, flat, friction, progress)
-    progress("leaves and crossover", 0, 1)
+    progress(0, 1, "leaves and crossover")
     fit = fitted(base, task, candidates, population)
-    crossover, tell = fit.stage.flat()[CROSSOVER], partial(progress, "hunting with isolator")
-    tell(0, 1)
+    crossover = fit.stage.flat()[CROSSOVER]
+    progress(0, 1, "hunting with isolator")
     stiffest = fit.stage.flat()["joint.stiffness"] * (1 + spec.safety.stiffness_tolerance)
     worst = {**fit.stage.flat(), "joint.stiffness": stiffest}
-    edges = edges_over(worst, population, FIRST * crossover, ABOVE * crossover, STEPS, tell)
+    edges = edges_over(
+        worst, population, FIRST * crossover, ABOVE * crossover, STEPS, progress, "hunting with isolator"
+    )
     _does_not_hunt(fit, edges)
-    progress("margins", 0, 1)
+    progress(0, 1, "margins")
     control = controller(fit.stage, fit.choice.beams, fit.limits, population)
-    progress("hunting map", 0, 1)
+    progress(0, 1, "hunting map")
     edges_map = hunting_map(fit.stage, spec, population)
     by_beams = tuple(confirmed(fit.task, candidates))
     tried = verification(fit.stage, spec, fit.task.load / fit.choice.beams.buckling, progress)
@@ -177,7 +177,7 @@ def leaves(spec: Spec, flat: Mapping[str, Any], friction: float, progress: Progr
     several = stroke.high > stroke.low
     strokes = np.geomspace(stroke.high, stroke.low, STROKES).tolist() if several else [stroke.high]
     for k, size in enumerate(strokes):
-        progress("leaf springs", k, len(strokes))
+        progress(k, len(strokes), "leaf springs")
         task = Task(spec, size, spec.limit, friction, flat)
         if candidates := front(task):
             choices.append((task, candidates))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,6 +17,7 @@ from friso.equations.motion import last_corner
 from friso.equations.structure import shared_structure
 from friso.hunting.criteria.run_outcome import CREEPS, FAILED, RESTS, SWINGS, outcomes
 from friso.hunting.measures import end_of, turns_of
+from friso.progress import Progress, silent
 from friso.stage import Stage
 
 MACHINES = 10_000
@@ -116,7 +116,7 @@ class Verification:
     worst: Stage
 
 
-def verification(stage: Stage, spec: Spec, softening: float, progress: Callable[[str, int, int], None]) -> Verification:
+def verification(stage: Stage, spec: Spec, softening: float, progress: Progress) -> Verification:
     """Try the design in all that the specification allows; its load takes a share of the drive stiffness, `softening`,
     or none of it."""
     flat = stage.flat()
@@ -125,9 +125,7 @@ def verification(stage: Stage, spec: Spec, softening: float, progress: Callable[
     outcomes: list[Outcome] = []
     for name, held in (("joint free", False), ("joint locked", True)):
         keys = machines.over(flat) | {"joint.locked": held, "motion.kind": "there_and_back"}
-        outcomes.append(
-            tried(keys, machines.count, window, lambda done, name=name: progress(name, done, machines.count))
-        )
+        outcomes.append(tried(keys, machines.count, window, progress, name))
     free, locked = outcomes
     return Verification(machines, free, locked, _worst_stage(stage, machines.of(free.worst), free.followed(free.worst)))
 
@@ -136,23 +134,24 @@ def tried(
     flat: dict[str, Any],
     count: int,
     window: float,
-    progress: Callable[[int], None] = lambda done: None,
+    progress: Progress = silent,
+    what: str = "moves",
     patient: bool = True,
 ) -> Outcome:
     """The moves of stages given as flat keys, arrays of shape (count,); if `patient`, those that are not in position
     again, for longer."""
-    first = _followed(flat, count, window, FOLLOWED, progress)
+    first = _followed(flat, count, window, FOLLOWED, progress, what)
     again = np.flatnonzero(first.restless & patient)
     if again.size:
         keys = {key: value[again] if np.ndim(value) else value for key, value in flat.items()}
-        longer = _followed(keys, again.size, window, LONGER * FOLLOWED, lambda done: None)
+        longer = _followed(keys, again.size, window, LONGER * FOLLOWED, silent, what)
         better = np.flatnonzero(longer.completed)  # where the long run fails, the first word stays
         for name in ("words", "settling", "swing"):
             getattr(first, name)[again[better]] = getattr(longer, name)[better]
     return first
 
 
-def _followed(flat: dict[str, Any], count: int, window: float, time: float, progress: Callable[[int], None]) -> Outcome:
+def _followed(flat: dict[str, Any], count: int, window: float, time: float, progress: Progress, what: str) -> Outcome:
     """The moves, each followed for a time [s] after its last corner."""
     corner = np.broadcast_to(np.asarray(last_corner(flat), float), (count,))
     keys = {**flat, "motion.duration": corner + time}
@@ -168,7 +167,7 @@ def _followed(flat: dict[str, Any], count: int, window: float, time: float, prog
         outcome.settling[numbers] = np.where(words == RESTS, np.maximum(end.outside - corner[numbers], 0.0), np.nan)
         outcome.swing[numbers] = end.swing
         done += len(numbers)
-        progress(done)
+        progress(done, count, what)
     return outcome
 
 

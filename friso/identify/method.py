@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,6 +16,7 @@ from friso.identify.kinds import KINDS, in_order
 from friso.identify.logs.log import Log
 from friso.identify.stage_file import identified
 from friso.identify.stage_keys import Fitting, fitting
+from friso.progress import Progress, silent
 from friso.stage import Stage
 from friso.stage.correlations import Correlations
 
@@ -56,7 +57,7 @@ def identify(
     logs: Sequence[tuple[Source, str]],
     base: Stage | None = None,
     settings: AnalysisSettings = NOTHING_CHOSEN,
-    progress: Callable[[str, int, int], None] = lambda what, done, total: None,
+    progress: Progress = silent,
 ) -> Identification:
     """The stage behind logs, each with its kind of experiment, and what is known of it beforehand, `base`.
 
@@ -67,7 +68,7 @@ def identify(
     stage = base or _around(logs)
     experiments: list[Experiment] = []
     for number, (kind, group) in enumerate(groups):
-        progress(f"{kind}: {', '.join(log.name for log in group)}", number, len(groups))
+        progress(number, len(groups), f"{kind}: {', '.join(log.name for log in group)}")
         best = combined(_every_estimate(experiments))[0]
         prior = Prior(stage, base is not None, {estimate.name: estimate for estimate in best if estimate.shown})
         result = KINDS[kind].analyse(group, prior, settings)

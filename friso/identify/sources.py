@@ -11,7 +11,7 @@ from friso.identify.kind import Source
 from friso.identify.kinds import KINDS
 from friso.identify.logs.assemble import read_log
 from friso.identify.logs.log import Log
-from friso.identify.logs.mapping import Mapping, load, save
+from friso.identify.logs.mapping import Mapping, load, place_for
 from friso.identify.logs.read import is_frequency_response, read_frequency_response, read_table
 from friso.identify.logs.roles import find
 from friso.identify.readings.course import Course
@@ -79,12 +79,12 @@ def _read(path: Path, options: Mapping, folder: Path) -> LogFile:
     return LogFile(path, _log(path, mapping, kind) if KINDS[kind].si else log, kind, reason, mapping)
 
 
-def keep(file: LogFile, folder: Path) -> LogFile:
-    """The file with its mapping kept beside it, or in `folder`, for the next time: once something came of it. Raises
-    InputError."""
+def kept(file: LogFile, folder: Path) -> LogFile:
+    """The file with the place where its mapping is kept for the next time, if there is anything to keep: beside it, or
+    in `folder`."""
     if file.mapping == Mapping():
         return file
-    return replace(file, kept=save(file.mapping, file.path, folder))
+    return replace(file, kept=place_for(file.path, folder))
 
 
 def _log(path: Path, mapping: Mapping, kind: str) -> Log:

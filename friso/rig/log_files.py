@@ -13,15 +13,10 @@ UNITS = {"force": "N", "disturbance": "N", "velocity": "m/s", "cart_velocity": "
 
 def write_csv(path: Path, interval: float, signals: Mapping[str, np.ndarray], heading: str) -> None:
     """Signals of shape (n,) by role, every `interval` [s], below a line of comment (OSError where that is
-    impossible); under its name once it is whole. Twelve digits: a nanometre in a kilometre."""
+    impossible). Twelve digits: a nanometre in a kilometre."""
     names = ["time [s]", *(f"{role} [{UNITS.get(role, 'm')}]" for role in signals)]
     count = len(next(iter(signals.values())))
     columns = np.column_stack([np.arange(count) * interval, *signals.values()])
-    unfinished = path.with_name(f"{path.name}.unfinished")
-    try:
-        with unfinished.open("w", encoding="utf-8", newline="\n") as file:
-            file.write(f"# {heading}\n{','.join(names)}\n")
-            np.savetxt(file, columns, fmt="%.12g", delimiter=",")
-        unfinished.replace(path)
-    finally:
-        unfinished.unlink(missing_ok=True)
+    with path.open("w", encoding="utf-8", newline="\n") as file:
+        file.write(f"# {heading}\n{','.join(names)}\n")
+        np.savetxt(file, columns, fmt="%.12g", delimiter=",")

@@ -20,7 +20,7 @@ from friso.errors import InputError, StageError
 from friso.intervals import COVERAGE
 from friso.quantities import as_toml, quoted
 from friso.stage.controllers import as_tuned
-from friso.stage.files import parsed, text_of, write_whole
+from friso.stage.files import parsed, text_of
 from friso.stage.section import unknown_key
 from friso.stage.stage import Stage, numeric_keys, violations
 
@@ -95,19 +95,12 @@ def read_correlations(path: str | os.PathLike[str], stage: Stage) -> Correlation
     return correlations
 
 
-def write_correlations(
-    correlations: Correlations, stage: Stage, path: str | os.PathLike[str], overwrite: bool = False
-) -> None:
-    """Write the correlations of uncertain keys of the stage, all of the file or nothing.
-
-    Raises StageError where they do not belong to the stage, where there is a file already (unless `overwrite`) or the
-    place cannot be written to.
-    """
+def correlations_text(correlations: Correlations, stage: Stage) -> str:
+    """The file of the correlations of uncertain keys of the stage. Raises StageError where they are not of it."""
     _belongs(correlations, stage)
     rows = [f"  [{', '.join(repr(float(value)) for value in row)}]," for row in correlations.matrix]
     names = [f"  {as_toml(key)}," for key in correlations.keys]
-    text = "\n".join(["keys = [", *names, "]", "matrix = [", *rows, "]", ""])
-    write_whole(text, Path(path), overwrite)
+    return "\n".join(["keys = [", *names, "]", "matrix = [", *rows, "]", ""])
 
 
 def _from(document: dict[str, Any]) -> Correlations:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +13,8 @@ from friso.equations.structure import shared_structure
 from friso.hunting.criteria import ATTRACTED, VERDICTS
 from friso.hunting.cycle.hunting import why_not
 from friso.hunting.verdict import judge_many
-from friso.stage import Stage
+from friso.progress import Progress, Tally, silent
+from friso.stage import Stage, numeric_keys
 from friso.stage.correlations import Drawn, laid_over
 from friso.studies.shares import Share, share
 
@@ -57,18 +58,31 @@ class Fates:
         return dict(sorted(found.items(), key=lambda item: -abs(item[1])))
 
 
-def fates(
-    stage: Stage, drawn: Drawn, rtol: float, progress: Callable[[int], None] = lambda done: None
-) -> dict[str, Fates]:
-    """The fates of the drawn stages as given and, with a joint, locked and free; `progress` gets stages just done."""
+def fates(stage: Stage, drawn: Drawn, rtol: float, progress: Progress = silent) -> dict[str, Fates]:
+    """The fates of the drawn stages as given and, with a joint, locked and free."""
     variants = different(stage)
     wanted = [shared_structure(laid_over(variant, drawn.keys)) for variant in variants.values()]
     kernels([Wanted(form, variational) for form in wanted for variational in (False, not why_not(form))])
-    found = {name: _fates(variant, drawn, rtol, progress) for name, variant in variants.items()}
+    tally = Tally(progress, drawn.count * len(variants))
+    found = {name: _fates(variant, drawn, rtol, tally) for name, variant in variants.items()}
     return {
         name: found[next(other for other, known in variants.items() if known == variant)]
         for name, variant in stage.variants().items()
     }
+
+
+@dataclass(frozen=True)
+class Draws:
+    """Stages drawn from an uncertain one with a seed, and their fates case by case."""
+
+    stage: Stage
+    drawn: Drawn
+    seed: int
+    fates: Mapping[str, Fates]
+
+    def unit(self, key: str) -> str:
+        """The SI unit of a key."""
+        return numeric_keys(self.stage.flat())[key].unit
 
 
 def different(stage: Stage) -> dict[str, Stage]:
@@ -80,11 +94,11 @@ def different(stage: Stage) -> dict[str, Stage]:
     return kept
 
 
-def _fates(stage: Stage, drawn: Drawn, rtol: float, progress: Callable[[int], None]) -> Fates:
+def _fates(stage: Stage, drawn: Drawn, rtol: float, tally: Tally) -> Fates:
     words = np.full(drawn.count, "failed", dtype=object)
     for first in range(0, drawn.count, CHUNK):
         some = slice(first, min(first + CHUNK, drawn.count))
         keys = {key: values[some] for key, values in drawn.keys.items()}
         words[some] = judge_many(laid_over(stage, keys), some.stop - first, rtol)
-        progress(some.stop - first)
+        tally.add(some.stop - first, "draws")
     return Fates(words)

@@ -18,9 +18,6 @@ LARGEST_BLOCK = 2048
 CYCLES_BLOCK = 256
 """Cells of a block where cycles are wanted, for each of which a hundred runs are needed."""
 
-Progress = Callable[[int], None]
-"""Called with the number of cells just done."""
-
 
 @dataclass
 class Crew:

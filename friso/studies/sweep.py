@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from friso.progress import Progress, Tally, silent
 from friso.stage import Stage
 from friso.studies.axes import Values
 from friso.studies.cells import METRICS, USUAL, WORDS, Columns, attributes_of
-from friso.studies.execute import Crew, Progress, local_crew, run_scattered
+from friso.studies.execute import Crew, local_crew, run_scattered
 from friso.studies.refine import Ask, finer
 from friso.studies.refine import refine as refine_study
 from friso.studies.request import Request
@@ -24,6 +25,9 @@ from friso.studies.verify import checked_share, verified
 
 if TYPE_CHECKING:
     import xarray as xr
+
+CELLS = "cells"
+"""What a sweep tells its progress that it is doing."""
 
 
 def sweep(
@@ -72,17 +76,18 @@ def sweep(
 
 
 def run_in_memory(
-    studies: Sequence[Study], crew: Crew, verify: float = 0.0, progress: Progress = lambda cells: None
+    studies: Sequence[Study], crew: Crew, verify: float = 0.0, progress: Progress = silent
 ) -> list[xr.Dataset]:
     """Run studies side by side (refined ones one by one), verify a share of each; their results as datasets."""
-    refined = {id(study): _refined(study, crew, progress) for study in studies if study.refined}
+    tally = Tally(progress, sum(study.cells for study in studies))
+    refined = {id(study): _refined(study, crew, tally) for study in studies if study.refined}
     columns = [refined.get(id(study)) or _room(study) for study in studies]
     number = {id(study): k for k, study in enumerate(studies)}
     for study, block, columns_of_block in crew.compute(crew.jobs([study for study in studies if not study.refined])):
         for name in study.metrics:
             target = columns[number[id(study)]][name][block]
             target[...] = columns_of_block[name].reshape(target.shape)
-        progress(len(columns_of_block["outcome"]))
+        tally.add(len(columns_of_block["outcome"]), CELLS)
     results = [dataset(study, columns_of_study) for study, columns_of_study in zip(studies, columns, strict=True)]
     for study, runs in zip(studies, results, strict=True):
         runs.attrs |= verified(study, runs, crew, verify)
@@ -96,35 +101,34 @@ def _room(study: Study) -> Columns:
     }
 
 
-def run_in_store(
-    study: Study, path: Path, crew: Crew, verify: float = 0.0, progress: Progress = lambda cells: None
-) -> xr.Dataset:
+def run_in_store(study: Study, path: Path, crew: Crew, verify: float = 0.0, progress: Progress = silent) -> xr.Dataset:
     """Run what a store lacks of its study, block by block, and verify a share; the opened store. Raises InputError."""
     with Store.opened(path, study) as store:
         missing = list(store.missing())
-        progress(study.cells - sum(map(cells_of, missing)))
+        tally = Tally(progress, study.cells)
+        tally.add(study.cells - sum(map(cells_of, missing)), CELLS)
         if missing and study.refined:
-            columns = _refined(study, crew, progress, store.keeping)
+            columns = _refined(study, crew, tally, store.keeping)
             for block in missing:
                 store.write(block, {name: columns[name][block] for name in study.metrics})
             store.forget_answers()
             missing = []
         for _, block, measures in crew.compute((study, block) for block in missing):
             store.write(block, measures)
-            progress(len(measures["outcome"]))
+            tally.add(len(measures["outcome"]), CELLS)
         runs = store.read()
         if verify and runs.attrs.get("verified_share") != verify:
             store.annotate(verified(study, runs, crew, verify))
         return store.read()
 
 
-def _refined(study: Study, crew: Crew, progress: Progress, keeping: Callable[[Ask], Ask] = lambda ask: ask) -> Columns:
+def _refined(study: Study, crew: Crew, tally: Tally, keeping: Callable[[Ask], Ask] = lambda ask: ask) -> Columns:
     """The measures of a refined study, each of its shape; `keeping` may keep the answers of a resumed one."""
     everything = replace(study, metrics=tuple(name for name in METRICS if name in (*USUAL, *study.metrics)))
 
     def ask(cells: np.ndarray) -> Columns:
         columns = run_scattered(everything, cells, crew)
-        progress(len(cells))
+        tally.add(len(cells), CELLS)
         return columns
 
     columns = refine_study(study, keeping(ask))

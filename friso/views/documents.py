@@ -9,15 +9,15 @@ import numpy as np
 
 
 def plain_json(value: Any) -> Any:
-    """What JSON knows: plain numbers, lists and nothing; neither infinite nor undefined numbers."""
+    """What JSON knows: plain numbers, texts, lists and tables; null for infinite and undefined numbers."""
     if isinstance(value, dict):
-        return {key: plain_json(each) for key, each in value.items()}
-    if isinstance(value, np.ndarray | list):
-        return [plain_json(each) for each in value]
+        return {key: plain_json(item) for key, item in value.items()}
+    if isinstance(value, np.ndarray | list | tuple):
+        return [plain_json(item) for item in value]
     if isinstance(value, bool | np.bool_):
         return bool(value)
-    if isinstance(value, int):
-        return value
-    if isinstance(value, float):
+    if isinstance(value, int | np.integer):
+        return int(value)
+    if isinstance(value, float | np.floating):
         return float(value) if math.isfinite(value) else None
     return value

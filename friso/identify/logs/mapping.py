@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import stat
 import tomllib
 from collections.abc import Iterable
@@ -83,9 +84,8 @@ def sidecar(log: Path, folder: Path | None = None) -> Path:
     return (log.parent if folder is None else folder) / f"{log.name}{SUFFIX}"
 
 
-def save(mapping: Mapping, log: Path, folder: Path | None = None) -> Path:
-    """Write the mapping beside the log, or into the folder where that cannot be written; the path written to.
-    Raises LogError."""
+def mapping_text(mapping: Mapping) -> str:
+    """The mapping as it is kept beside a log."""
     lines = ["# How this log was read by `friso identify`: reused next time, options override it."]
     if mapping.sample_time is not None:
         lines.append(f'sample_time = "{mapping.sample_time!r} s"')
@@ -95,18 +95,15 @@ def save(mapping: Mapping, log: Path, folder: Path | None = None) -> Path:
         table = getattr(mapping, name)
         rows = [f"{as_toml(key)} = {as_toml(value)}" for key, value in table.items()]
         lines += ["", f"[{name}]", *rows] if rows else []
-    places = [sidecar(log)] + ([sidecar(log, folder)] if folder is not None else [])
-    for place in places:
-        if place.parent.is_dir() and not place.parent.stat().st_mode & stat.S_IWUSR:
-            continue  # kept from writing on purpose: a superuser could all the same
-        try:
-            if place != places[0]:
-                place.parent.mkdir(parents=True, exist_ok=True)
-            place.write_text("\n".join(lines) + "\n", encoding="utf-8")
-        except OSError:
-            continue
-        return place
-    raise LogError("mapping", str(log.parent), "a folder that can be written", "--out results")
+    return "\n".join(lines) + "\n"
+
+
+def place_for(log: Path, folder: Path) -> Path:
+    """Where the mapping of a log can be kept: beside it, or in the folder where that cannot be written. What is kept
+    from writing on purpose stays so for a superuser, who could all the same."""
+    beside = sidecar(log)
+    writable = os.access(beside.parent, os.W_OK) and beside.parent.stat().st_mode & stat.S_IWUSR
+    return beside if writable else sidecar(log, folder)
 
 
 def load(log: Path, folder: Path | None = None) -> Mapping | None:

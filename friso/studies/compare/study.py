@@ -9,6 +9,7 @@ import numpy as np
 
 from friso.equations.motion import last_corner
 from friso.errors import InputError
+from friso.progress import Progress, silent
 from friso.rig.run import Recorded, run
 from friso.rig.task import Task, own_motion
 from friso.stage import Stage
@@ -17,7 +18,6 @@ from friso.studies.compare.machines import Machines, draw_machines
 from friso.studies.compare.measures import Found, Later, Loops, followed, joined, linear_loops, measured
 from friso.studies.compare.options import NAMES, Option, Options, linear_flat, options
 from friso.studies.compare.statistics import Estimate, difference, median
-from friso.studies.rig.outcome import Progress, silent
 from friso.studies.shares import Share, share
 
 INTERVAL = 1e-3

@@ -14,17 +14,19 @@ import numpy as np
 from friso.engine.kernel import Wanted, kernels
 from friso.errors import InputError
 from friso.hunting.cycle.ensemble import shared_structure
+from friso.progress import Progress, Tally, silent
 from friso.studies.guideline.checks import Checked, checked
 from friso.studies.guideline.groups import Count, counted, values_of
 from friso.studies.guideline.laws import FREE_LAW, LOCKED_LAW, Errors, Fitted, fitted
 from friso.studies.guideline.parasitic import Parasitic, parasitic_limits
 from friso.studies.guideline.rig import Laws, plain
 from friso.studies.guideline.sweeps import (
-    FREE,
     FREE_FIT,
     FREE_TEST,
+    LOCKED,
     LOCKED_FIT,
     LOCKED_TEST,
+    STEPS,
     Keep,
     Sweep,
     free_sweep,
@@ -48,13 +50,8 @@ fit."""
 CHECKED = 1 / 8
 """Samples that are simulated, per one of the locked fit."""
 
-WEIGHT = 8
-"""Time of a sample with a free joint, in that of one of a rigid mass: for the progress bar."""
-
 RATIOS = (0.0, 0.05, 0.3, 3.0, 20.0, np.inf)
 """Ratios of slip to drop that separate the bins for errors of the locked law."""
-
-Progress = Callable[[int, int, str], None]
 
 
 @dataclass(frozen=True)
@@ -152,7 +149,7 @@ def _ratio(law: Fitted, values: Mapping[str, np.ndarray]) -> np.ndarray:
     return slip / drop
 
 
-def guideline(samples: int = SAMPLES, keep: Path | None = None, progress: Progress | None = None) -> Guideline:
+def guideline(samples: int = SAMPLES, keep: Path | None = None, progress: Progress = silent) -> Guideline:
     """Compute the guideline. `keep` is a folder for what is done, from which an interrupted run goes on;
     `progress` gets what is done.
 
@@ -161,21 +158,21 @@ def guideline(samples: int = SAMPLES, keep: Path | None = None, progress: Progre
     checked_samples(samples)
     begin = time.perf_counter()
     sizes = _sizes(samples)
-    announce = _announcer(sizes, progress)
+    tally = Tally(progress, _steps(sizes))
     parts = Keep(keep)
     resumed = parts.count
-    announce("compiling", 0)
+    tally.add(0, "compiling")
     _compile()
 
-    rigid = locked_sweep(sizes["locked fit"], LOCKED_FIT, parts, announce)
-    rigid_test = locked_sweep(sizes["locked test"], LOCKED_TEST, parts, announce)
-    free, beside = free_sweep(sizes["free fit"], FREE_FIT, parts, announce)
-    free_test, beside_test = free_sweep(sizes["free test"], FREE_TEST, parts, announce)
-    announce("laws and simulations", 0)
+    rigid = locked_sweep(sizes["locked fit"], LOCKED_FIT, parts, tally)
+    rigid_test = locked_sweep(sizes["locked test"], LOCKED_TEST, parts, tally)
+    free, beside = free_sweep(sizes["free fit"], FREE_FIT, parts, tally)
+    free_test, beside_test = free_sweep(sizes["free test"], FREE_TEST, parts, tally)
+    tally.add(0, "laws and simulations")
     few = max(8, int(samples * CHECKED))
     locked_fit = _locked(rigid, together(rigid_test, beside, beside_test), few)
     free_fit = _free(free, free_test, locked_fit.law, few)
-    announce("worked steps", 0)
+    tally.add(0, "worked steps")
     laws = Laws(locked_fit.law, free_fit.law)
     steps = worked(laws, safe_over_friction(locked_fit), free_fit.on_test.safe)
     modes = parasitic_limits(rig())
@@ -204,17 +201,10 @@ def _sizes(samples: int) -> dict[str, int]:
     }
 
 
-def _announcer(sizes: Mapping[str, int], progress: Progress | None) -> Callable[[str, int], None]:
-    total = sum(size * (WEIGHT + 1 if name.startswith("free") else 1) for name, size in sizes.items())
-    done = 0
-
-    def announce(what: str, more: int) -> None:
-        nonlocal done
-        done += more * (WEIGHT if what == FREE else 1)
-        if progress is not None:
-            progress(done, total, what)
-
-    return announce
+def _steps(sizes: Mapping[str, int]) -> int:
+    """The steps of all sweeps; a sample with a free joint is computed with the joint locked, too."""
+    both = sum(STEPS.values())
+    return sum(size * (both if name.startswith("free") else STEPS[LOCKED]) for name, size in sizes.items())
 
 
 def _compile() -> None:

@@ -7,7 +7,7 @@ import os
 import shutil
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
-from functools import cache, partial
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -18,14 +18,15 @@ from friso.hunting import edges as edges_module
 from friso.hunting import persistence
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.edges import ROUNDS, Edges, find_edges, joined
+from friso.progress import Tally
 from friso.studies.guideline import groups
 from friso.studies.guideline.groups import flat_of
 from friso.version import VERSION
 
-Progress = Callable[[str, int], None]
-"""Called with what was done, of `LOCKED` and `FREE`, and how many samples of it."""
-
 LOCKED, FREE = "edges of rigid masses", "edges with a free joint"
+
+STEPS = {LOCKED: 1, FREE: 8}
+"""Steps of the progress that a sample counts: one with a free joint takes as long as eight rigid masses."""
 
 Box = Mapping[str, tuple[float, float]]
 """The range of each group from which it is drawn, evenly in the logarithm."""
@@ -148,38 +149,38 @@ def sampled(box: Box, count: int, seed: int) -> dict[str, np.ndarray]:
     return dict(zip(box, np.exp(low + points * (high - low)).T, strict=True))
 
 
-def locked_sweep(count: int, seed: int, keep: Keep, progress: Progress) -> Sweep:
+def locked_sweep(count: int, seed: int, keep: Keep, tally: Tally) -> Sweep:
     """The edges of samples of rigid masses, which locked joints are apart from the contact of their fixtures."""
     values = sampled(LOCKED_BOX, count, seed)
     grid = np.broadcast_to(LOCKED_GRID, (count, len(LOCKED_GRID)))
-    edges = _in_parts(f"locked {seed} {count}", values, grid, keep, partial(progress, LOCKED))
+    edges = _in_parts(f"locked {seed} {count}", values, grid, keep, tally, LOCKED)
     return Sweep(values, edges.crossover, edges)
 
 
-def free_sweep(count: int, seed: int, keep: Keep, progress: Progress) -> tuple[Sweep, Sweep]:
+def free_sweep(count: int, seed: int, keep: Keep, tally: Tally) -> tuple[Sweep, Sweep]:
     """The edges of samples with a free joint, of those that have one with the joint locked; and those of all samples
     with their joints locked, to which the frequency of the joint is drawn relative."""
     drawn_values = sampled({**LOCKED_BOX, **JOINT_BOX}, count, seed)
     rigid = {name: drawn_values[name] for name in LOCKED_BOX}
     grid = np.broadcast_to(LOCKED_GRID, (count, len(LOCKED_GRID)))
-    locked = _in_parts(f"locked beside free {seed} {count}", rigid, grid, keep, partial(progress, LOCKED))
+    locked = _in_parts(f"locked beside free {seed} {count}", rigid, grid, keep, tally, LOCKED)
     has = np.flatnonzero(locked.known)
     values = {name: value[has] for name, value in drawn_values.items() if name != "ratio"}
     at = locked.crossover[has]
     values["joint"] = (drawn_values["ratio"][has] * at) ** 2
-    edges = _in_parts(f"free {seed} {count}", values, at[:, None] * FREE_GRID, keep, partial(progress, FREE))
+    edges = _in_parts(f"free {seed} {count}", values, at[:, None] * FREE_GRID, keep, tally, FREE)
     return Sweep(values, at, edges), Sweep(rigid, locked.crossover, locked)
 
 
 def _in_parts(
-    name: str, values: Mapping[str, np.ndarray], grid: np.ndarray, keep: Keep, progress: Callable[[int], None]
+    name: str, values: Mapping[str, np.ndarray], grid: np.ndarray, keep: Keep, tally: Tally, what: str
 ) -> Edges:
     parts = []
     for first in range(0, len(grid), PART):
         here = slice(first, first + PART)
         some = {group: value[here] for group, value in values.items()}
         parts.append(keep.part(f"{name} {first}", lambda some=some, here=here: find_edges(_stages(some), grid[here])))
-        progress(len(grid[here]))
+        tally.add(STEPS[what] * len(grid[here]), what)
     return joined(parts)
 
 

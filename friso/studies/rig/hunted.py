@@ -15,11 +15,11 @@ from friso.errors import InputError
 from friso.hunting.criteria.run_outcome import FAILED, SWINGS, End, last_outside, outcomes
 from friso.hunting.turning import COUNTED_ABOVE, DISTINCT, HALF, WINDOW, zigzag
 from friso.hunting.turns import scan
+from friso.progress import Progress, silent
 from friso.rig.run import Recorded, run
 from friso.rig.task import Task, point_to_point
 from friso.stage import Stage
 from friso.stage.controllers import CONTROLLER
-from friso.studies.rig.outcome import Progress, silent
 from friso.studies.rig.sizes import interval, jointed
 from friso.studies.shares import Share, share
 

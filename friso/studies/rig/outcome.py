@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,13 +15,6 @@ from friso.identify.readings.common import record
 from friso.rig.run import Recorded
 from friso.stage import Stage
 from friso.stage.controllers import FORCE_LIMIT
-
-Progress = Callable[[int, int, str], None]
-"""Is told the number of steps done, of all, and what comes next."""
-
-
-def silent(done: int, total: int, what: str) -> None:
-    """A progress that nobody looks at."""
 
 
 @dataclass(frozen=True)

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 from friso.registry import Registry
 
 if TYPE_CHECKING:  # the names are asked for by --help
+    from friso.progress import Progress
     from friso.stage import Stage
-    from friso.studies.rig.outcome import Outcome, Progress
+    from friso.studies.rig.outcome import Outcome
 
 RIG_EXPERIMENTS: Registry[Callable[[Stage, int, Progress], Outcome]] = Registry(
     "friso.studies.rig.experiments", "run_experiment"

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from friso.equations.controllers.van_dijk import CROSSOVER
+from friso.progress import silent
 from friso.stage import Stage
 from friso.stage.controllers import ANTI_WINDUP, FORCE_LIMIT
 from friso.studies.rig.excitation import excite
@@ -37,7 +38,7 @@ from friso.studies.rig.hunted import (
     released,
     with_joint,
 )
-from friso.studies.rig.outcome import rig_log, silent
+from friso.studies.rig.outcome import rig_log
 from friso.studies.rig.sizes import freed, locked, pace, travel
 
 AS_BUILT: Mapping[str, Any] = MappingProxyType(

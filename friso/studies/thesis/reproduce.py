@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -13,6 +13,7 @@ from friso.errors import InputError
 from friso.frequency.bode import Bode, bode
 from friso.hunting.criteria.peak_count import DISTINCT_CRITERION
 from friso.hunting.criteria.run_outcome import CREEPS, CRITERION, RESTS, SWINGS
+from friso.progress import Progress, Tally, silent
 from friso.studies.sweep import sweep
 from friso.studies.thesis.claims import Claim, Evidence, Finding, Registered, Response, claims, registered
 from friso.studies.thesis.cycles import Cycles, cycles
@@ -48,8 +49,6 @@ SHOWN = (1e-2, 3e3)
 _PARTS = {**NEEDS, **EXPERIMENTS}
 """What every evidence has besides maps and responses."""
 
-Progress = Callable[[int, int, str], None]
-
 
 @dataclass(frozen=True)
 class Reproduction:
@@ -77,7 +76,7 @@ def reproduce(
     names: Iterable[str] | None = None,
     points: int = POINTS,
     rtol: float = 1e-6,
-    progress: Progress | None = None,
+    progress: Progress = silent,
     with_cycles: bool = True,
 ) -> Reproduction:
     """Run the studies `names` (default: all of Table 3), `points` values per axis, and judge the claims.
@@ -90,12 +89,12 @@ def reproduce(
     if points < 3:
         raise InputError("points", str(points), "3 or more values per axis", "41")
     variants = (*OPEN, *METHOD)
-    tell = _Teller(progress, 2 + len(variants) + (len(studies) if with_cycles else 0) + 1)
-    tell("maps")
+    tally = Tally(progress, 2 + len(variants) + (len(studies) if with_cycles else 0))
+    tally.add(0, "maps")
     responses = {name: _response(changes, NOTHING, rtol) for name, changes in RESPONSES.items()}
     maps = _maps(studies, points, rtol, VERIFIED)
     baseline = Evidence(maps, responses, analysed(rig()), experiments_on(rig()))
-    tell("Fig. 14B at two tolerances")
+    tally.add(1, "Fig. 14B at two tolerances")
     tolerances = {
         tolerance: _map(s, NOTHING, points, tolerance)
         for s in studies
@@ -105,13 +104,13 @@ def reproduce(
     entries = {claim: entry for claim, entry in registered().items() if not _missing(entry, baseline)}
     varied: list[tuple[Variant, Mapping[str, Finding]]] = []
     for variant in variants:
-        tell(f"{variant.parameter} {variant.value}")
+        tally.add(1, f"{variant.parameter} {variant.value}")
         varied.append((variant, _findings(entries, _varied(studies, points, rtol, variant, baseline))))
     behind: dict[str, Cycles] = {}
     for study in studies if with_cycles else ():
-        tell(f"hunting cycles, {study.name}")
+        tally.add(1, f"hunting cycles, {study.name}")
         behind[study.name] = cycles(study, baseline.maps[study.name])
-    tell("done")
+    tally.add(1, "done")
     verdicts, curves = _verdicts(entries, baseline, varied), bode(rig(), SHOWN, series=True)
     results = (baseline.maps, baseline.responses, baseline.analysis, curves)
     return Reproduction(*results, tolerances, _changed(tolerances), verdicts, behind, points, rtol)
@@ -132,18 +131,6 @@ def _chosen(names: Iterable[str] | None) -> tuple[ThesisStudy, ...]:
         if name not in STUDIES:
             raise InputError("study", repr(name), f"one of {', '.join(STUDIES)}", "path")
     return tuple(study for name, study in STUDIES.items() if name in chosen)
-
-
-class _Teller:
-    """Counts the steps for a progress callback, which may be missing."""
-
-    def __init__(self, progress: Progress | None, total: int) -> None:
-        self.progress, self.total, self.done = progress, total, 0
-
-    def __call__(self, what: str) -> None:
-        if self.progress:
-            self.progress(self.done, self.total, what)
-        self.done += 1
 
 
 def _coarser(evidence: Evidence) -> Evidence:

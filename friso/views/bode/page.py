@@ -5,12 +5,20 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from friso.frequency.bode import Bode
+from friso.views.bode.figures import bode_figures
 from friso.views.bode.states import shown_states
 from friso.views.bode.table import rows
 from friso.views.bode.words import caveats, crossover_heading, crossovers, stability
 from friso.views.check.cases import COLOURS
 from friso.views.drawing.figure import GREEN, VERMILLION, Figure
+from friso.views.files import Content, pictures
 from friso.views.pages import stage_page
+
+
+def bode_files(bode: Bode) -> dict[str, Content]:
+    """The page, and every figure in all formats."""
+    figures = bode_figures(bode)
+    return {"bode.html": bode_html(bode, figures), **pictures(figures)}
 
 
 def bode_html(bode: Bode, figures: Sequence[Figure]) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -11,6 +11,7 @@ from friso.views.drawing.figure import BLUE, GREEN, VERMILLION
 
 if TYPE_CHECKING:
     from friso.hunting import Case
+    from friso.stage import Stage
 
 COLOURS = {"given": BLUE, "locked": VERMILLION, "free": GREEN}
 LABELS = {"given": "As given", "locked": "Locked", "free": "Free"}
@@ -29,14 +30,18 @@ class Shown:
 
 def shown_cases(cases: Mapping[str, Case]) -> tuple[Shown, ...]:
     """The cases, each once: where "given" repeats the locked or the free case, that one says "(as given)"."""
-    twin = _twin(cases)
-    keys = [key for key in COLOURS if key in cases and not (key == "given" and twin)]
-    labels = {key: LABELS[key] + (" (as given)" if key == twin else "") for key in keys}
-    return tuple(Shown(key, labels[key], COLOURS[key], cases[key]) for key in keys)
+    labels = _labels([*cases], cases["given"].stage if "given" in cases else None)
+    return tuple(Shown(key, label, COLOURS[key], cases[key]) for key, label in labels.items())
 
 
-def _twin(cases: Mapping[str, Case]) -> str | None:
-    """The key of the case that "given" repeats, if any."""
-    joint = cases["given"].stage.joint if "given" in cases else None
-    key = None if joint is None else ("locked" if joint.locked else "free")
-    return key if key in cases else None
+def case_labels(stage: Stage) -> dict[str, str]:
+    """The names of the cases of a stage that are shown, to what they are called."""
+    return _labels([*stage.variants()], stage)
+
+
+def _labels(names: Collection[str], given: Stage | None) -> dict[str, str]:
+    joint = given.joint if given else None
+    own = "locked" if joint and joint.locked else "free"
+    twin = own if joint and own in names else None
+    shown = [name for name in COLOURS if name in names and not (name == "given" and twin)]
+    return {name: LABELS[name] + (" (as given)" if name == twin else "") for name in shown}

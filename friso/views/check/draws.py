@@ -1,22 +1,15 @@
-"""What stages drawn from an uncertain one do: the document, the table, the sentences and the figure."""
+"""What stages drawn from an uncertain one do: the table, the sentences and the figure."""
 
 from __future__ import annotations
-
-from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from friso.hunting.criteria import ATTRACTED, VERDICTS
-from friso.hunting.criteria.stage_verdict import CRITERION
-from friso.studies.draws import Fates
+from friso.studies.draws import Draws, Fates
 from friso.studies.shares import Share
+from friso.views.check.cases import case_labels
 from friso.views.drawing.figure import BLUE, GREY, ORANGE, SKY, VERMILLION, Axis, Band, Figure, Panel
 from friso.views.drawing.prefixes import NOTHING
-
-if TYPE_CHECKING:
-    from friso.stage.correlations import Drawn
 
 COLOURS = {"hunts": VERMILLION, "bistable": ORANGE, "transient": SKY, "settles": BLUE, "failed": GREY}
 
@@ -27,57 +20,25 @@ TOLD = 4
 """Keys of which the table tells how far they decide, at most."""
 
 
-@dataclass(frozen=True)
-class Drawing:
-    """The stages drawn with a seed, what became of them case by case, the labels of the cases that are shown (each
-    once, though it has two names), and the SI units of the keys."""
-
-    drawn: Drawn
-    seed: int
-    cases: Mapping[str, Fates]
-    labels: Mapping[str, str]
-    units: Mapping[str, str]
-
-
-def draws_document(drawing: Drawing, case: str) -> dict[str, Any]:
-    """What the JSON document of a check says of the draws, under the name of a case."""
-    found = drawing.cases[case]
-    return {
-        "count": drawing.drawn.count,
-        "seed": drawing.seed,
-        "left_out": drawing.drawn.left_out,
-        "hunts": _share_document(found.share(("hunts",))),
-        "attracting_cycle": _share_document(found.share(ATTRACTED)),
-        "criterion": CRITERION,
-        "verdicts": found.counts,
-        "separation": found.separations(drawing.drawn.keys),
-    }
-
-
-def _share_document(share: Share) -> dict[str, float | None]:
-    known = share.probability == share.probability
-    return {"probability": share.probability if known else None, "low": share.low, "high": share.high}
-
-
-def draws_rows(drawing: Drawing) -> list[tuple[str, list[str]]]:
+def draws_rows(draws: Draws) -> list[tuple[str, list[str]]]:
     """The rows of the table of draws, one text per case."""
-    found = [drawing.cases[name] for name in drawing.labels]
+    found = [draws.fates[name] for name in case_labels(draws.stage)]
     rows = [
         ("Hunts after this move", [_percent(each.share(("hunts",))) for each in found]),
         ("A cycle attracts", [_percent(each.share(ATTRACTED)) for each in found]),
         *((f"Verdict {word}", [str(each.counts[word]) for each in found]) for word in VERDICTS),
     ]
-    known = [each.separations(drawing.drawn.keys) for each in found]
-    strength = {key: max((abs(each[key]) for each in known if each), default=0.0) for key in drawing.drawn.keys}
+    known = [each.separations(draws.drawn.keys) for each in found]
+    strength = {key: max((abs(each[key]) for each in known if each), default=0.0) for key in draws.drawn.keys}
     told = sorted(strength, key=lambda key: -strength[key])[:TOLD]
     rows += [(f"Decided by {key}", [f"{each[key]:+.2f}" if each else NOTHING for each in known]) for key in told]
     return rows
 
 
-def draws_sentences(drawing: Drawing) -> list[str]:
+def draws_sentences(draws: Draws) -> list[str]:
     """What the draws say, a sentence per case, and what was left out."""
-    drawn = drawing.drawn
-    says = [f"{label}: {_sentence(drawing.cases[name], drawing)}" for name, label in drawing.labels.items()]
+    drawn = draws.drawn
+    says = [f"{label}: {_sentence(draws.fates[name], draws)}" for name, label in case_labels(draws.stage).items()]
     if drawn.left_out:
         reasons = [f"{count}: {why}" for why, count in drawn.broken.items()]
         beyond = [f"{drawn.beyond}: a key beyond its bounds"] if drawn.beyond else []
@@ -85,10 +46,10 @@ def draws_sentences(drawing: Drawing) -> list[str]:
     return says
 
 
-def _sentence(found: Fates, drawing: Drawing) -> str:
-    failed, keys = found.counts["failed"], found.separations(drawing.drawn.keys)
+def _sentence(found: Fates, draws: Draws) -> str:
+    failed, keys = found.counts["failed"], found.separations(draws.drawn.keys)
     says = [
-        f"of {drawing.drawn.count} draws, hunts with a probability of {_percent(found.share(('hunts',)))}, "
+        f"of {draws.drawn.count} draws, hunts with a probability of {_percent(found.share(('hunts',)))}, "
         f"has a cycle that attracts with {_percent(found.share(ATTRACTED))}."
     ]
     if failed:
@@ -105,18 +66,18 @@ def _percent(share: Share) -> str:
     return f"{middle} ({low} to {high} %)"
 
 
-def draws_figure(drawing: Drawing) -> Figure:
+def draws_figure(draws: Draws) -> Figure:
     """The verdicts over the key that decides most, case by case, as bars on top of each other."""
-    panels = [_panel(label, drawing.cases[name], drawing) for name, label in drawing.labels.items()]
+    panels = [_panel(label, draws.fates[name], draws) for name, label in case_labels(draws.stage).items()]
     caption = (
-        f"{drawing.drawn.count} stages drawn from the uncertain keys (seed {drawing.seed}), by the key that best "
+        f"{draws.drawn.count} stages drawn from the uncertain keys (seed {draws.seed}), by the key that best "
         "separates those with an attracting cycle from the others; all other uncertain keys vary too."
     )
     return Figure("draws", "What if the parameters are wrong?", caption, tuple(panels), min(2, len(panels)))
 
 
-def _panel(label: str, found: Fates, drawing: Drawing) -> Panel:
-    keys = drawing.drawn.keys
+def _panel(label: str, found: Fates, draws: Draws) -> Panel:
+    keys = draws.drawn.keys
     key = next(iter(found.separations(keys) or keys))
     edges = np.histogram_bin_edges(keys[key], BINS)
     x, bands, below = np.repeat(edges, 2)[1:-1], [], np.zeros(2 * BINS)
@@ -126,6 +87,6 @@ def _panel(label: str, found: Fates, drawing: Drawing) -> Panel:
             bands.append(Band(x, below, below + counts, word, COLOURS[word]))
             below = below + counts
     limits = (0.0, 1.05 * float(below.max()))
-    x_axis = Axis(key, drawing.units[key], (float(edges[0]), float(edges[-1])))
+    x_axis = Axis(key, draws.unit(key), (float(edges[0]), float(edges[-1])))
     title = f"{label}: all {bands[0].label}" if len(bands) == 1 else label  # one band alone has no legend
     return Panel(title, x_axis, Axis("Draws", "", limits), bands=tuple(bands))

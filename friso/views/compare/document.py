@@ -1,31 +1,21 @@
-"""Isolator or firmware: the JSON document and the page."""
+"""Isolator or firmware: the JSON document."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
 from friso.equations.bandwidth import bandwidth
 from friso.hunting.criteria.peak_count import DISTINCT_CRITERION as PEAKS
 from friso.hunting.criteria.run_outcome import CRITERION as OUTCOME
-from friso.studies.compare.options import DEADBAND, MODEL_ERROR
-from friso.studies.compare.study import LONGER, Comparison, Result
+from friso.studies.compare.study import Comparison, Result
 from friso.views.compare.words import (
-    COLUMNS,
-    PAIRED,
-    options_rows,
-    paired_rows,
-    population,
     sentences,
-    table_rows,
 )
 from friso.views.documents import plain_json
-from friso.views.drawing.figure import Figure
-from friso.views.pages import stage_page
 
 
-def document(found: Comparison) -> dict[str, Any]:
+def compare_document(found: Comparison) -> dict[str, Any]:
     """The JSON document: SI units, the unit in the key's suffix; an infinite time (never) is null."""
     machines = found.machines
     return plain_json(
@@ -77,25 +67,3 @@ def _option(found: Comparison, result: Result) -> dict[str, Any]:
             "force_rms": asdict(pair.force),
         },
     }
-
-
-def page(found: Comparison, drawn: Sequence[Figure]) -> str:
-    """The page with its figures."""
-    return stage_page(
-        "compare.html",
-        found.stage,
-        drawn,
-        sentences=sentences(found),
-        population=population(found),
-        notes=found.notes,
-        options=options_rows(found),
-        columns=COLUMNS,
-        rows=table_rows(found),
-        paired_columns=PAIRED,
-        paired=paired_rows(found),
-        seed=found.seed,
-        deadband=DEADBAND,
-        model_error=100 * MODEL_ERROR,
-        longer=LONGER,
-        shaken=found.shaken,
-    )

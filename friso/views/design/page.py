@@ -8,15 +8,30 @@ from markupsafe import Markup
 
 from friso.design.method import Design
 from friso.materials import materials
+from friso.views.design.figures import design_figures
 from friso.views.design.leaves import requirement_rows
 from friso.views.design.steps import steps
 from friso.views.design.words import headline
 from friso.views.drawing.figure import Figure
+from friso.views.files import Content, pictures
 from friso.views.flexure.drawing import drawing_svg
 from friso.views.pages import stage_page
 
 LEAVES = 2
 """The step that shows the drawing and the requirements."""
+
+
+def design_files(design: Design) -> dict[str, Content]:
+    """The stages (the design, and the worst machine tried with it), the page, the drawing, and every figure in all
+    formats."""
+    figures = design_figures(design)
+    return {
+        "design.toml": design.stage.to_toml(),
+        "worst.toml": design.verification.worst.to_toml(),
+        "design.html": design_html(design, figures),
+        "design_drawing.svg": drawing(design),
+        **pictures(figures),
+    }
 
 
 def design_html(design: Design, figures: Sequence[Figure]) -> str:

@@ -9,7 +9,9 @@ from markupsafe import Markup
 
 from friso.materials import materials
 from friso.views.drawing.figure import GREEN, VERMILLION, Figure
+from friso.views.files import Content, pictures
 from friso.views.flexure.drawing import drawing_svg
+from friso.views.flexure.figures import flexure_figures
 from friso.views.flexure.findings import COLOURS, Found
 from friso.views.flexure.table import rows
 from friso.views.flexure.words import assumptions, findings, warnings
@@ -21,6 +23,16 @@ class Column(NamedTuple):
 
     label: str
     colour: str
+
+
+def flexure_files(flexure: Found) -> dict[str, Content]:
+    """The page, the drawing, and every figure in all formats."""
+    figures = flexure_figures(flexure)
+    return {
+        "flexure.html": flexure_html(flexure, figures),
+        "flexure_drawing.svg": drawing(flexure),
+        **pictures(figures),
+    }
 
 
 def flexure_html(flexure: Found, figures: Sequence[Figure]) -> str:

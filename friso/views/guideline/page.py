@@ -1,12 +1,10 @@
-"""The guideline as a page with its charts, its edges as a table, and all of it as one document."""
+"""The guideline as a page with its charts, and its edges as a table."""
 
 from __future__ import annotations
 
 import math
 from collections import Counter
 from collections.abc import Mapping
-from dataclasses import asdict
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,17 +12,17 @@ import numpy as np
 from friso.evidence import value
 from friso.hunting.edges import KINDS, STEP
 from friso.hunting.persistence import DISTANCES
-from friso.studies.guideline import Fit, Guideline
+from friso.studies.guideline import Guideline
 from friso.studies.guideline.checks import ABOVE, BELOW, MOVES, PERIODS
 from friso.studies.guideline.claims import claims
 from friso.studies.guideline.groups import GROUPS, LIMITER_OVER_BRISTLES, values_of
-from friso.studies.guideline.laws import FOLDS, GAIN, Errors, Fitted
+from friso.studies.guideline.laws import FOLDS, GAIN, Errors
 from friso.studies.guideline.parasitic import DRIVE
 from friso.studies.guideline.rig import Case, plain
 from friso.studies.guideline.sweeps import FREE_GRID, JOINT_BOX, LOCKED_BOX, LOCKED_GRID, Sweep
-from friso.studies.guideline.worked import CLAIMED_AT, GAPS, MARGIN, STATIC, STUDIED, Design
+from friso.studies.guideline.worked import CLAIMED_AT, GAPS, MARGIN, STATIC, STUDIED
 from friso.version import VERSION
-from friso.views.drawing import matplotlib_renderer
+from friso.views.files import Content, pictures
 from friso.views.guideline.figures import guideline_figures
 from friso.views.guideline.words import formulas, number, parasitic_edges, parasitic_sentences, percent
 from friso.views.pages import environment
@@ -50,16 +48,10 @@ CONSTANTS: Mapping[str, Any] = {
 """Settings of the computation that the page tells."""
 
 
-def write_guideline(found: Guideline, folder: Path) -> list[Path]:
-    """The page, its charts and the table of edges; their paths. OSError where that is impossible."""
-    figures = guideline_figures(found)
-    paths = [folder / PAGE, folder / TABLE]
-    paths[0].write_text(guideline_page(found), encoding="utf-8")
-    paths[1].write_text(edges_table(found), encoding="utf-8")
-    for figure in figures:
-        paths.append(folder / f"{figure.name}.png")
-        matplotlib_renderer.save(figure, paths[-1])
-    return paths
+def guideline_files(found: Guideline) -> dict[str, Content]:
+    """The page, the table of edges, and the charts."""
+    charts = pictures(guideline_figures(found), ("png",))
+    return {PAGE: guideline_page(found), TABLE: edges_table(found), **charts}
 
 
 def guideline_page(found: Guideline) -> str:
@@ -71,7 +63,7 @@ def guideline_page(found: Guideline) -> str:
         free=found.free,
         steps=found.worked,
         formulas=formulas(found),
-        groups=_groups(found),
+        groups=group_rows(found),
         figures={figure.name: figure for figure in guideline_figures(found)},
         claims=claims(found.worked),
         parasitic=found.parasitic,
@@ -139,7 +131,7 @@ def _between(low: float, high: float) -> str:
     return f"below {high:g}" if low == 0 else f"above {low:g}" if math.isinf(high) else f"{low:g} to {high:g}"
 
 
-def _groups(found: Guideline) -> list[dict[str, Any]]:
+def group_rows(found: Guideline) -> list[dict[str, Any]]:
     """One row per group: how it is written, what it means, its range in the sweeps, and its value for the rig."""
     ranges = dict(LOCKED_BOX) | {name: ends for name, ends in JOINT_BOX.items() if name in GROUPS}
     used = found.free.whole.usable
@@ -199,76 +191,3 @@ def _cells(sweep: Sweep, law: np.ndarray, names: list[str]) -> list[list[str]]:
 
 def _cell(value: float) -> str:
     return f"{value:.4g}" if np.isfinite(value) else ""
-
-
-def guideline_document(found: Guideline) -> dict[str, Any]:
-    """Laws, errors, checks and the worked steps, ready for JSON."""
-    steps = found.worked
-    return _finite(
-        {
-            "friso": VERSION,
-            "samples": found.samples,
-            "seconds_s": found.seconds,
-            "cores": found.cores,
-            "parts_resumed": found.resumed,
-            "groups": {name: asdict(count) | {"groups": count.groups} for name, count in found.counts.items()},
-            "ranges": {row["written"]: row["range"] for row in _groups(found) if row["range"]},
-            "laws": {"locked": _law(found.locked), "free": _law(found.free)},
-            "rig": {
-                "rates_hz": dict(steps.rates),
-                "machines": [asdict(machine) for machine in steps.machines],
-                "friction": [_case(case) for case in steps.friction],
-                "highest_locked_edge_hz": steps.bound,
-                "safe_factor": steps.safe,
-                "designs": [[_designed(each) for each in designs] for designs in steps.designs],
-                "studies": {name: [_case(case) for case in cases] for name, cases in steps.studies.items()},
-            },
-            "parasitic": [asdict(each) for each in found.parasitic],
-            "claims": [asdict(claim) for claim in claims(steps)],
-        }
-    )
-
-
-def _designed(design: Design) -> dict[str, Any]:
-    return {
-        "limit_hz": design.limit,
-        "aim_hz": design.aim,
-        "stiffness_n_per_m": design.stiffness,
-        "stroke_m": design.stroke,
-        "worst_edge_hz": design.worst,
-        "modulus_margin": design.margin,
-        "cases": [_case(case) for case in design.cases],
-    }
-
-
-def _case(case: Case) -> dict[str, Any]:
-    return {"changes": dict(case.changes), "law_hz": case.law, "computed_hz": case.computed, "kind": case.kind}
-
-
-def _law(fit: Fit) -> dict[str, Any]:
-    return {
-        "rates": _rates(fit.law),
-        "validation": list(fit.law.path),
-        "errors": {"fit": asdict(fit.on_fit), "held_out": asdict(fit.on_test), "locked_given": asdict(fit.given)},
-        "samples": dict(fit.kinds),
-        "attracting_again": fit.again,
-        "simulated": asdict(fit.checked),
-    }
-
-
-def _rates(law: Fitted) -> dict[str, Any]:
-    return {
-        rate.name: {"factor": law.factors[number], "base": dict(rate.base), "exponents": law.of(number)}
-        for number, rate in enumerate(law.law.rates)
-    }
-
-
-def _finite(data: Any) -> Any:
-    """Numbers that JSON does not know become null."""
-    if isinstance(data, dict):
-        return {key: _finite(value) for key, value in data.items()}
-    if isinstance(data, list | tuple):
-        return [_finite(value) for value in data]
-    if isinstance(data, float):
-        return data if math.isfinite(data) else None
-    return data

@@ -11,10 +11,12 @@ from friso.hunting.criteria import ATTRACTED
 from friso.hunting.criteria.run_outcome import CREEPS, RESTS, SWINGS
 from friso.views.drawing.prefixes import listed
 from friso.views.map.cells import SAMPLE, CellAxis, axes_of
-from friso.views.map.words import AT_ONCE, INVALID, NOT_RUN, counts, grouped, in_sentence, word_counts
+from friso.views.map.words import AT_ONCE, INVALID, KINDS, NOT_RUN, counts, grouped, in_sentence, word_counts
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from friso.studies.study import Study
 
 MEANINGS = {
     "outcome": {
@@ -207,3 +209,16 @@ def failures(runs: xr.Dataset) -> dict[str, int]:
         for reason, number in counts(runs, "status").items()
         if reason != "done" and not reason.startswith("inferred")
     }
+
+
+def sentences(runs: xr.Dataset, study: Study, metric: str) -> list[str]:
+    """What was found, for the terminal: first what share of the map swings, and where."""
+    words = "; ".join(
+        ", ".join(f"{count} {word}" for word, count in counts.items())
+        for name in KINDS
+        if (counts := word_counts(runs, name))
+    )
+    size = " x ".join(map(str, study.shape))
+    reasons = [f"{count} without result: {reason}" for reason, count in failures(runs).items()]
+    extent = f"{study.stage.name or 'stage'}: {size} cells at rtol {study.rtol:g}: {words}"
+    return [headline(runs, metric), extent, verification(runs), *caveats(runs, metric), *reasons]

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from functools import partial
 from importlib import resources
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from markupsafe import Markup
 
-from friso.views.drawing import plotly_renderer
+from friso.views.drawing import matplotlib_renderer, plotly_renderer
+from friso.views.files import Content
 from friso.views.map.cells import SAMPLE, axes_of
 from friso.views.map.data import packed, picked
 from friso.views.map.figures import map_figure
@@ -21,10 +22,16 @@ from friso.views.pages import environment, print_image
 if TYPE_CHECKING:
     import xarray as xr
 
+FORMS = (*matplotlib_renderer.FORMATS, "html")
+"""Suffixes of the files of a map."""
 
-def write_map_page(runs: xr.Dataset, path: Path, metric: str, rerun: str) -> None:
-    """Write `map_html(runs, metric, rerun)` to `path` (OSError where that is impossible)."""
-    path.write_text(map_html(runs, metric, rerun), encoding="utf-8", newline="\n")
+
+def map_files(runs: xr.Dataset, metric: str, rerun: str) -> dict[str, Content]:
+    """The figure in all formats and the page of a map, by their suffixes in the order of `FORMS`; `rerun` as in
+    `map_html`."""
+    figure = map_figure(runs, metric)
+    files: dict[str, Content] = {form: partial(matplotlib_renderer.save, figure) for form in FORMS[:-1]}
+    return {**files, FORMS[-1]: map_html(runs, metric, rerun)}
 
 
 def map_html(runs: xr.Dataset, metric: str, rerun: str) -> str:

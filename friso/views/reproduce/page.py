@@ -1,4 +1,4 @@
-"""The page, the claims and the figure files of a reproduction of the thesis."""
+"""The page of `friso reproduce`, and its files."""
 
 from __future__ import annotations
 
@@ -6,8 +6,7 @@ import base64
 import json
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from markupsafe import Markup
 
@@ -15,7 +14,9 @@ from friso.studies.thesis import CONVENTIONS, STUDIES, rig
 from friso.version import VERSION
 from friso.views.drawing import matplotlib_renderer, plotly_renderer
 from friso.views.drawing.figure import GREEN, GREY, ORANGE, VERMILLION, Figure
+from friso.views.files import Content, pictures
 from friso.views.pages import environment, print_image
+from friso.views.reproduce.document import claims_document, numbers
 from friso.views.reproduce.figures import reproduction_figures
 
 if TYPE_CHECKING:
@@ -35,73 +36,15 @@ class Section:
     verdicts: tuple[Verdict, ...]
 
 
-def write_reproduction(reproduction: Reproduction, folder: Path) -> list[Path]:
-    """Write reproduction.html, claims.json and the figures (PNG and SVG, in `figures`) into the folder, which is made
-    where it is missing. Returns the paths; OSError where that is impossible."""
-    folder.mkdir(parents=True, exist_ok=True)
-    page, document = folder / "reproduction.html", folder / "claims.json"
-    page.write_text(reproduction_html(reproduction), encoding="utf-8", newline="\n")
+def reproduction_files(reproduction: Reproduction) -> dict[str, Content]:
+    """The page, the claims, and every figure as PNG and SVG in a folder of its own."""
     text = json.dumps(claims_document(reproduction), indent=2, ensure_ascii=False, allow_nan=False)
-    document.write_text(text + "\n", encoding="utf-8", newline="\n")
-    return [page, document, *write_figures(reproduction, folder / "figures")]
-
-
-def write_figures(reproduction: Reproduction, folder: Path) -> list[Path]:
-    """Every figure as PNG and SVG. Returns the paths; OSError where that is impossible."""
-    folder.mkdir(parents=True, exist_ok=True)
-    paths = []
-    for figure in reproduction_figures(reproduction).values():
-        for form in ("png", "svg"):
-            paths.append(folder / f"{figure.name}.{form}")
-            matplotlib_renderer.save(figure, paths[-1])
-    return paths
-
-
-def claims_document(reproduction: Reproduction) -> dict[str, Any]:
-    """All claims with their judgements, ready for JSON; how they were judged stands before them."""
-    tolerances = sorted(reproduction.tolerances)
-    verdicts, counts = reproduction.changed
+    drawn = pictures(reproduction_figures(reproduction).values(), ("png", "svg"))
     return {
-        "source": rig().source,
-        "friso": VERSION,
-        "points": reproduction.points,
-        "rtol": reproduction.rtol,
-        "conventions": CONVENTIONS,
-        "figure_14b": {"rtol": tolerances, "verdicts_changed": verdicts, "counts_changed": counts}
-        if tolerances
-        else None,
-        "cycles": {name: vars(found.comparison) for name, found in reproduction.cycles.items()},
-        "claims": [_entry(verdict) for verdict in reproduction.verdicts],
+        "reproduction.html": reproduction_html(reproduction),
+        "claims.json": text + "\n",
+        **{f"figures/{name}": content for name, content in drawn.items()},
     }
-
-
-def _entry(verdict: Verdict) -> dict[str, Any]:
-    return {
-        "id": verdict.claim.id,
-        "where": verdict.claim.where,
-        "claim": verdict.claim.text,
-        "judgement": verdict.judgement,
-        "figure": verdict.figure or None,
-        "number": numbers(verdict) or None,
-        "criterion": "; ".join(part.criterion for part in verdict.finding.parts) if verdict.finding else None,
-        "reason": verdict.reason or None,
-        "values_varied": verdict.tried if verdict.finding else None,
-        "depends_on": [
-            {
-                "kind": each.variant.kind,
-                "parameter": each.variant.parameter,
-                "value": each.variant.value,
-                "judgement": each.judgement,
-                "number": "; ".join(each.numbers),
-            }
-            for each in (*verdict.depends_on, *verdict.hangs_on)
-        ],
-    }
-
-
-def numbers(verdict: Verdict) -> str:
-    """The numbers of all parts in one line; empty for a claim that is not covered."""
-    return "; ".join(part.number for part in verdict.finding.parts) if verdict.finding else ""
 
 
 def reproduction_html(reproduction: Reproduction) -> str:

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from friso.equations.controllers.van_dijk import ALPHA, BETA, CROSSOVER, TUNED_MASS
+from friso.progress import Progress
 from friso.rig.rail import friction_factors
 from friso.rig.task import Task
 from friso.stage import Stage
@@ -33,7 +34,7 @@ from friso.studies.rig.hunted import (
     released,
     with_joint,
 )
-from friso.studies.rig.outcome import Outcome, Progress, rig_log
+from friso.studies.rig.outcome import Outcome, rig_log
 from friso.studies.shares import Share, share
 
 DEVIATIONS = (0.02, 0.05, 0.1, 0.2, 0.3)

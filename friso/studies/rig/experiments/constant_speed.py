@@ -11,11 +11,12 @@ import numpy as np
 
 from friso.identify.readings.friction_position import FrictionPosition, friction_position
 from friso.identify.readings.friction_velocity import FrictionVelocity, friction_velocity
+from friso.progress import Progress
 from friso.rig.run import run
 from friso.rig.task import legs
 from friso.stage import Stage
 from friso.studies.rig.many_speeds import SAMPLES, STANDS, ManySpeeds, many_speeds, mean_friction
-from friso.studies.rig.outcome import Outcome, Progress, RigLog, rig_log, stopped
+from friso.studies.rig.outcome import Outcome, RigLog, rig_log, stopped
 from friso.studies.rig.sizes import freed, interval, locked, longest_way, moving_mass, pace, travel
 from friso.studies.rig.slow_sliding import Slow, slow_sliding
 

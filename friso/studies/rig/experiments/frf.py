@@ -13,11 +13,12 @@ from friso.identify.estimate import Estimate
 from friso.identify.response.closed_loop import crossovers
 from friso.identify.response.mass_line import mass_lines
 from friso.identify.response.response import FrequencyResponse
+from friso.progress import Progress
 from friso.rig.run import run
 from friso.rig.task import standing
 from friso.stage import Stage
 from friso.studies.rig.excitation import excite, loop, plant
-from friso.studies.rig.outcome import Outcome, Progress, RigLog, rig_log
+from friso.studies.rig.outcome import Outcome, RigLog, rig_log
 from friso.studies.rig.sizes import WIDE, freed, interval, jointed, locked, pace, quicker, travel
 
 PLACES, FREE_PLACES = 10, 3

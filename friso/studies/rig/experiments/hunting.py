@@ -11,6 +11,7 @@ from itertools import product
 
 import numpy as np
 
+from friso.progress import Progress
 from friso.rig.run import Recorded
 from friso.stage import Stage
 from friso.studies.rig.hunted import (
@@ -28,7 +29,7 @@ from friso.studies.rig.hunted import (
     released,
     with_joint,
 )
-from friso.studies.rig.outcome import Outcome, Progress, rig_log
+from friso.studies.rig.outcome import Outcome, rig_log
 from friso.studies.shares import Share
 
 CROSSOVERS = np.array([6.0, 7.0, 8.0, 9.5, 11.0, 12.5, 14.3, 16.0, 20.0]) / 8

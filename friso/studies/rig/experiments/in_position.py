@@ -12,12 +12,13 @@ from typing import Any
 import numpy as np
 from scipy.signal import welch
 
+from friso.progress import Progress
 from friso.rig.run import Recorded, as_built_keys, run
 from friso.rig.task import Task, standing
 from friso.stage import Stage
 from friso.stage.controllers import FORCE_LIMIT
 from friso.studies.rig.hunted import crossover, crossover_key, move, with_joint
-from friso.studies.rig.outcome import Outcome, Progress, rig_log
+from friso.studies.rig.outcome import Outcome, rig_log
 from friso.studies.rig.sizes import interval
 
 FASTER = 2.0

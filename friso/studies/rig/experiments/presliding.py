@@ -13,10 +13,11 @@ import numpy as np
 from friso.errors import InputError
 from friso.identify.experiments.presliding import Presliding, bristles_from_presliding
 from friso.identify.readings.at_bearing import between
+from friso.progress import Progress
 from friso.rig.run import as_built_keys
 from friso.stage import Stage
 from friso.studies.rig.excitation import Excitation, excite
-from friso.studies.rig.outcome import Outcome, Progress, RigLog, rig_log
+from friso.studies.rig.outcome import Outcome, RigLog, rig_log
 from friso.studies.rig.sizes import locked, pace, travel
 
 PLACES = 3

@@ -13,11 +13,12 @@ import numpy as np
 
 from friso.errors import InputError
 from friso.identify.experiments.stick_slip import StickSlip, static_from_stick_slip
+from friso.progress import Progress
 from friso.rig.rail import friction_factors
 from friso.rig.run import Recorded, run
 from friso.rig.task import legs
 from friso.stage import Stage
-from friso.studies.rig.outcome import Outcome, Progress, RigLog, rig_log
+from friso.studies.rig.outcome import Outcome, RigLog, rig_log
 from friso.studies.rig.sizes import freed, friction, interval, pace, travel
 
 RAILS = 10

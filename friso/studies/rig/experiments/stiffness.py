@@ -11,11 +11,12 @@ import numpy as np
 
 from friso.equations.continuous import slow_gains
 from friso.identify.experiments.steps import StepStiffness, stiffness_from_steps
+from friso.progress import Progress
 from friso.rig.run import run
 from friso.rig.task import staircase
 from friso.stage import Stage
 from friso.stage.controllers import as_tuned
-from friso.studies.rig.outcome import Outcome, Progress, RigLog, rig_log
+from friso.studies.rig.outcome import Outcome, RigLog, rig_log
 from friso.studies.rig.sizes import FIXED, freed, interval, pace
 
 STEP, WAYS = 0.3, (1, 1, -1, -1, 1, -1)

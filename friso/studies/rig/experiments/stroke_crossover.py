@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from friso.progress import Progress
 from friso.stage import Stage
 from friso.studies.rig.hunted import (
     Hunted,
@@ -22,7 +23,7 @@ from friso.studies.rig.hunted import (
     rails,
     with_joint,
 )
-from friso.studies.rig.outcome import Outcome, Progress, rig_log
+from friso.studies.rig.outcome import Outcome, rig_log
 
 CROSSOVERS = np.array([3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 14.0]) / 8
 """Over that of the stage: the thesis's range for its rig (Table 3, Fig. 16), the steps ours."""

@@ -1,0 +1,115 @@
+"""Files that appear under their names together, or not at all: drafts first, which are renamed in the end."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import signal
+import tempfile
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from friso.views.files import Content
+
+DRAFTS = ".friso-draft-"
+"""How the folder of drafts begins; one that a killed process left behind may be deleted."""
+
+
+class Drafts:
+    """Drafts of files on the disk where they are to be, gone at the end of the `with` block unless put in place."""
+
+    def __init__(self) -> None:
+        self.folders: dict[Path, Path] = {}
+        self.drafts: list[tuple[Path | None, Path]] = []
+
+    def __enter__(self) -> Drafts:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        for folder in self.folders.values():
+            shutil.rmtree(folder, ignore_errors=True)
+
+    def add(self, path: Path, content: Content) -> None:
+        """The draft of a file; None: an earlier one is deleted in the end."""
+        if path.is_dir():
+            raise IsADirectoryError(f"{path} is a folder")
+        if content is None:
+            self.drafts.append((None, path))
+            return
+        draft = self._spare(path)
+        if callable(content):
+            content(draft)
+        else:
+            draft.write_bytes(content.encode() if isinstance(content, str) else content)
+        self.drafts.append((draft, path))
+
+    def put_in_place(self) -> None:
+        """Give all drafts their names. An error on the way, and all is as it was before; Ctrl-C waits until the end."""
+        undo: list[Callable[[], object]] = []
+        with _signals_held():
+            try:
+                for draft, path in self.drafts:
+                    undo += [folder.rmdir for folder in made(path.parent)]
+                    if os.path.lexists(path):
+                        kept = self._spare(path)
+                        path.rename(kept)
+                        undo.append(partial(kept.rename, path))
+                    if draft is not None:
+                        draft.rename(path)
+                        undo.append(path.unlink)
+            except BaseException:
+                for step in reversed(undo):
+                    step()
+                raise
+
+    def _spare(self, path: Path) -> Path:
+        """A path that is free, on the disk of `path`, with its suffix."""
+        root = next(folder for folder in path.absolute().parents if folder.exists())
+        if root not in self.folders:
+            self.folders[root] = Path(tempfile.mkdtemp(prefix=DRAFTS, dir=root))
+        folder = self.folders[root]
+        return folder / f"{len(list(folder.iterdir()))}{path.suffix}"
+
+
+def made(folder: Path) -> list[Path]:
+    """Make a folder and those above it that are missing; those made, outermost first. Raises OSError, with none of
+    them left."""
+    missing = [path for path in (folder, *folder.parents) if not path.exists()]
+    done: list[Path] = []
+    try:
+        for path in reversed(missing):
+            path.mkdir()
+            done.append(path)
+        if not folder.is_dir():
+            raise NotADirectoryError(20, "Not a directory", str(folder))
+    except BaseException:
+        for path in reversed(done):
+            path.rmdir()
+        raise
+    return done
+
+
+@contextmanager
+def _signals_held() -> Iterator[None]:
+    """Ctrl-C and a termination wait for the end of the block."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    came: list[int] = []
+    before = {
+        number: signal.signal(number, lambda number, frame: came.append(number))
+        for number in (signal.SIGINT, signal.SIGTERM)
+    }
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+        if came:
+            signal.raise_signal(came[0])

@@ -1,0 +1,96 @@
+"""The JSON document of `friso check` (design.md, section 3)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from friso.views.documents import plain_json
+
+if TYPE_CHECKING:
+    from friso.hunting import Case, Cycle, Judgement, Margin
+    from friso.studies.draws import Draws
+    from friso.studies.shares import Share
+
+
+def check_document(cases: Mapping[str, Case], draws: Draws | None = None) -> dict[str, Any]:
+    """The cases with their verdicts, and what stages drawn from an uncertain one do."""
+    document = {name: _case(case) for name, case in cases.items()}
+    if draws is not None:
+        for name, case in document.items():
+            case["draws"] = draws_document(draws, name)
+    return plain_json({"stage": cases["given"].stage.name, "cases": document})
+
+
+def _case(case: Case) -> dict[str, Any]:
+    into_1um, into_10um = case.settling_time.values()
+    judgement = case.judgement
+    return {
+        "verdict": case.verdict,
+        "peaks": case.peaks,
+        "peak_to_peak_m": case.peak_to_peak,
+        "period_s": case.period,
+        "settling_time_s": into_1um,
+        "settling_time_10um_s": into_10um,
+        "largest_force_n": case.largest_force,
+        "cycle": _cycle(judgement.cycle) if judgement.cycle else None,
+        "cycles": len(judgement.hunting.cycles),
+        "reason": judgement.hunting.reason or None,
+        "settled_after_s": judgement.settled_after,
+        "margin": _margin(judgement.margin) if judgement.margin else None,
+        "kick": _kick(judgement),
+        "moves": {"drawn": judgement.moves.drawn, "hunting": judgement.moves.hunting} if judgement.moves else None,
+        "observed": judgement.observed,
+        "solver": {
+            "status": case.solver.status,
+            "steps": case.solver.steps,
+            "rejected": case.solver.rejected,
+            "rtol": case.solver.rtol,
+        },
+    }
+
+
+def _cycle(cycle: Cycle) -> dict[str, Any]:
+    return {
+        "amplitude_m": cycle.amplitude,
+        "period_s": cycle.period,
+        "multiplier": cycle.multiplier,
+        "symmetric": cycle.symmetric,
+        "attracts": cycle.attracts,
+        "slope": cycle.slope,
+        "growth": cycle.growth,
+        "residual": cycle.residual,
+        "time_constant_s": cycle.time_constant,
+    }
+
+
+def _kick(judgement: Judgement) -> dict[str, Any] | None:
+    if judgement.displacement is None or judgement.push is None:
+        return None
+    return {"displacement_m": judgement.displacement.windows, "velocity_m_per_s": judgement.push.windows}
+
+
+def _margin(edge: Margin) -> dict[str, Any]:
+    return {"factor": edge.factor, "crossover_hz": edge.crossover, "certain": edge.certain}
+
+
+def draws_document(draws: Draws, case: str) -> dict[str, Any]:
+    """What became of the stages drawn, in a case."""
+    from friso.hunting.criteria import ATTRACTED
+    from friso.hunting.criteria.stage_verdict import CRITERION
+
+    fates = draws.fates[case]
+    return {
+        "count": draws.drawn.count,
+        "seed": draws.seed,
+        "left_out": draws.drawn.left_out,
+        "hunts": _share(fates.share(("hunts",))),
+        "attracting_cycle": _share(fates.share(ATTRACTED)),
+        "criterion": CRITERION,
+        "verdicts": fates.counts,
+        "separation": fates.separations(draws.drawn.keys),
+    }
+
+
+def _share(share: Share) -> dict[str, float]:
+    return {"probability": share.probability, "low": share.low, "high": share.high}

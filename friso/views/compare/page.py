@@ -1,0 +1,49 @@
+"""The page of `friso compare`: one file that opens offline, prints, and is the same bytes on every run."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from friso.studies.compare.options import DEADBAND, MODEL_ERROR
+from friso.studies.compare.study import LONGER, Comparison
+from friso.views.compare.figures import figures as compare_figures
+from friso.views.compare.words import (
+    COLUMNS,
+    PAIRED,
+    options_rows,
+    paired_rows,
+    population,
+    sentences,
+    table_rows,
+)
+from friso.views.drawing.figure import Figure
+from friso.views.files import Content, pictures
+from friso.views.pages import stage_page
+
+
+def compare_files(found: Comparison) -> dict[str, Content]:
+    """The page, and every figure in all formats."""
+    figures = compare_figures(found)
+    return {"compare.html": page(found, figures), **pictures(figures)}
+
+
+def page(found: Comparison, drawn: Sequence[Figure]) -> str:
+    """The page with its figures."""
+    return stage_page(
+        "compare.html",
+        found.stage,
+        drawn,
+        sentences=sentences(found),
+        population=population(found),
+        notes=found.notes,
+        options=options_rows(found),
+        columns=COLUMNS,
+        rows=table_rows(found),
+        paired_columns=PAIRED,
+        paired=paired_rows(found),
+        seed=found.seed,
+        deadband=DEADBAND,
+        model_error=100 * MODEL_ERROR,
+        longer=LONGER,
+        shaken=found.shaken,
+    )

@@ -1,0 +1,77 @@
+"""The JSON document of `friso guideline`."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Any
+
+from friso.studies.guideline import Fit, Guideline
+from friso.studies.guideline.claims import claims
+from friso.studies.guideline.laws import Fitted
+from friso.studies.guideline.rig import Case
+from friso.studies.guideline.worked import Design
+from friso.version import VERSION
+from friso.views.documents import plain_json
+from friso.views.guideline.page import group_rows
+
+
+def guideline_document(found: Guideline) -> dict[str, Any]:
+    """Laws, errors, checks and the worked steps, ready for JSON."""
+    steps = found.worked
+    return plain_json(
+        {
+            "friso": VERSION,
+            "samples": found.samples,
+            "seconds_s": found.seconds,
+            "cores": found.cores,
+            "parts_resumed": found.resumed,
+            "groups": {name: asdict(count) | {"groups": count.groups} for name, count in found.counts.items()},
+            "ranges": {row["written"]: row["range"] for row in group_rows(found) if row["range"]},
+            "laws": {"locked": _law(found.locked), "free": _law(found.free)},
+            "rig": {
+                "rates_hz": dict(steps.rates),
+                "machines": [asdict(machine) for machine in steps.machines],
+                "friction": [_case(case) for case in steps.friction],
+                "highest_locked_edge_hz": steps.bound,
+                "safe_factor": steps.safe,
+                "designs": [[_designed(each) for each in designs] for designs in steps.designs],
+                "studies": {name: [_case(case) for case in cases] for name, cases in steps.studies.items()},
+            },
+            "parasitic": [asdict(each) for each in found.parasitic],
+            "claims": [asdict(claim) for claim in claims(steps)],
+        }
+    )
+
+
+def _designed(design: Design) -> dict[str, Any]:
+    return {
+        "limit_hz": design.limit,
+        "aim_hz": design.aim,
+        "stiffness_n_per_m": design.stiffness,
+        "stroke_m": design.stroke,
+        "worst_edge_hz": design.worst,
+        "modulus_margin": design.margin,
+        "cases": [_case(case) for case in design.cases],
+    }
+
+
+def _case(case: Case) -> dict[str, Any]:
+    return {"changes": dict(case.changes), "law_hz": case.law, "computed_hz": case.computed, "kind": case.kind}
+
+
+def _law(fit: Fit) -> dict[str, Any]:
+    return {
+        "rates": _rates(fit.law),
+        "validation": list(fit.law.path),
+        "errors": {"fit": asdict(fit.on_fit), "held_out": asdict(fit.on_test), "locked_given": asdict(fit.given)},
+        "samples": dict(fit.kinds),
+        "attracting_again": fit.again,
+        "simulated": asdict(fit.checked),
+    }
+
+
+def _rates(law: Fitted) -> dict[str, Any]:
+    return {
+        rate.name: {"factor": law.factors[number], "base": dict(rate.base), "exponents": law.of(number)}
+        for number, rate in enumerate(law.law.rates)
+    }

@@ -1,0 +1,43 @@
+"""The JSON document of `friso map`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from friso.views.documents import plain_json
+from friso.views.map.findings import headline
+from friso.views.map.words import word_counts
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from friso.studies.study import Study
+
+
+def map_document(runs: xr.Dataset, study: Study, store: Path, metric: str) -> dict[str, Any]:
+    """The axes, what came out, and how much of it survives a tighter tolerance."""
+    criteria = {name: text for name in map(str, runs.data_vars) if (text := runs[name].attrs.get("criterion"))}
+    names = ("cells", "surviving", "rtol")
+    verified = {name: runs.attrs[f"verified_{name}"] for name in names if "verified_cells" in runs.attrs}
+    document = {
+        "stage": study.stage.name,
+        "store": str(store),
+        "axes": {
+            axis.name: {
+                "points": len(axis.values),
+                "unit": axis.unit,
+                "first": axis.values[0].item(),
+                "last": axis.values[-1].item(),
+            }
+            for axis in study.axes
+        },
+        "cells": study.cells,
+        "rtol": study.rtol,
+        "conclusion": headline(runs, metric),
+        "outcomes": word_counts(runs, "outcome"),
+        "verdicts": word_counts(runs, "verdict") or None,
+        "criteria": criteria,
+        "verified": verified or None,
+    }
+    return plain_json(document)

@@ -1,0 +1,19 @@
+"""The JSON document of `friso rig`: SI units, the unit in the key's suffix."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from friso.studies.rig.outcome import Outcome
+from friso.views.documents import plain_json
+from friso.views.rig.outcome_view import OUTCOME_VIEWS
+
+
+def rig_document(outcome: Outcome) -> dict[str, Any]:
+    """What was found, and the logs with the seeds of their noise."""
+    logs = [
+        {"name": log.name, "seed": log.seed, "interval_s": log.interval, "failure": log.failure or None}
+        for log in outcome.logs
+    ]
+    head = {"experiment": outcome.experiment, "stage": outcome.stage.name, "seed": outcome.seed, "logs": logs}
+    return plain_json({**head, "found": OUTCOME_VIEWS[outcome.experiment].numbers(outcome), "notes": [*outcome.notes]})

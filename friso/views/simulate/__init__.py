@@ -1,0 +1,1 @@
+"""What `friso simulate` shows: the document, and the files of a time response."""
