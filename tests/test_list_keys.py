@@ -12,7 +12,7 @@ from friso.engine.kernel import Wanted
 from friso.equations.structure import structure
 from friso.errors import InputError, StageError
 from friso.stage import Stage, numeric_keys, parse_set, violations
-from friso.stage.correlations import Correlations, draw, read_correlations, write_correlations
+from friso.stage.correlations import Correlations, correlations_text, draw, read_correlations
 from friso.stage.plug_ins import plug_ins
 from friso.studies.axes import Axis, read_axis
 from friso.studies.cells import allowed, flat_cells
@@ -115,7 +115,7 @@ def test_elements_are_uncertain_and_drawn(three: Stage, tmp_path) -> None:
     assert [*intervals] == [f"{STRENGTH}.2", f"{STRENGTH}.3"]
     assert (intervals[f"{STRENGTH}.3"].low, intervals[f"{STRENGTH}.3"].high) == (1.0, 3.0)
     known = Correlations((f"{STRENGTH}.2", f"{STRENGTH}.3"), np.array([[1.0, 0.9], [0.9, 1.0]]))
-    write_correlations(known, three, tmp_path / "c.toml")
+    (tmp_path / "c.toml").write_text(correlations_text(known, three))
     read = read_correlations(tmp_path / "c.toml", three)
     assert np.array_equal(read.matrix, known.matrix)
     drawn = draw(three, read, 512, 1)
