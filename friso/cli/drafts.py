@@ -10,6 +10,7 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import partial
+from itertools import count
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING
@@ -27,6 +28,7 @@ class Drafts:
     def __init__(self) -> None:
         self.folders: dict[Path, Path] = {}
         self.drafts: list[tuple[Path | None, Path]] = []
+        self.numbers = count()
 
     def __enter__(self) -> Drafts:
         return self
@@ -73,8 +75,7 @@ class Drafts:
         root = next(folder for folder in path.absolute().parents if folder.exists())
         if root not in self.folders:
             self.folders[root] = Path(tempfile.mkdtemp(prefix=DRAFTS, dir=root))
-        folder = self.folders[root]
-        return folder / f"{len(list(folder.iterdir()))}{path.suffix}"
+        return self.folders[root] / f"{next(self.numbers)}{path.suffix}"
 
 
 def made(folder: Path) -> list[Path]:

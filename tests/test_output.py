@@ -1,0 +1,234 @@
+"""Files of a command: all of them or none, in a folder that is the command's to write into."""
+
+import os
+import signal
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+import typer
+from inside import friso_inside
+from refusals import Refused
+
+from friso.cli.app import app
+from friso.cli.drafts import DRAFTS
+from friso.cli.output import MARKER, UNFINISHED, Place, write
+from friso.errors import InputError
+from friso.views.files import Content
+
+EXAMPLES = Path(__file__).parent.parent / "examples"
+RIG, DRIVE, LEAVES = (EXAMPLES / f"thesis_{name}.toml" for name in ("rig", "drive", "leaves"))
+
+NEEDS: dict[str, tuple[object, ...]] = {
+    "check": (RIG,),
+    "simulate": (RIG,),
+    "bode": (RIG,),
+    "boundary": (RIG, "--x", "controller.crossover=4 Hz..8 Hz"),
+    "flexure": (LEAVES,),
+    "design": (RIG, EXAMPLES / "specs" / "thesis.toml"),
+    "identify": (RIG,),
+    "rig": ("stiffness", DRIVE),
+    "compare": (DRIVE,),
+    "reproduce": (),
+    "guideline": (),
+}
+"""Commands that write into a folder, with what they need to get as far as looking at it."""
+
+
+def commands_with(option: str) -> set[str]:
+    """The commands of friso that take an option."""
+    group = typer.main.get_command(app)
+    return {name for name, command in group.commands.items() if option in {o for p in command.params for o in p.opts}}
+
+
+def tree(folder: Path) -> dict[str, bytes | None]:
+    """All that is in a folder, files with what they hold."""
+    return {str(path.relative_to(folder)): None if path.is_dir() else path.read_bytes() for path in folder.rglob("*")}
+
+
+def test_every_command_that_writes_can_be_told_to_overwrite() -> None:
+    assert commands_with("--overwrite") == {*NEEDS, "map", "init"}
+    assert commands_with("--out") <= commands_with("--overwrite")
+
+
+@pytest.mark.parametrize("command", NEEDS)
+def test_a_folder_of_others_is_refused_before_anything_is_computed(command: str, tmp_path: Path) -> None:
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "mine.txt").write_text("precious")
+    before = tree(tmp_path)
+    done = friso_inside(tmp_path, command, *NEEDS[command], "--out", "out")
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "--overwrite" in done.stderr
+    assert tree(tmp_path) == before
+
+
+@pytest.mark.parametrize("command", NEEDS)
+def test_a_folder_of_another_command_is_refused(command: str, tmp_path: Path) -> None:
+    Place("another", tmp_path / "out", False).write({"page.html": "its page"})
+    before = tree(tmp_path)
+    done = friso_inside(tmp_path, command, *NEEDS[command], "--out", "out")
+    assert done.returncode == 2
+    assert "friso another" in done.stderr
+    assert tree(tmp_path) == before
+
+
+def place(folder: Path, overwrite: bool = False, inputs: tuple[Path, ...] = ()) -> Place:
+    return Place("check", folder, overwrite, inputs)
+
+
+def test_a_place_may_be_new_empty_or_its_own(tmp_path: Path) -> None:
+    out = tmp_path / "a" / "b"
+    new = place(out)
+    assert not (tmp_path / "a").exists()  # looking leaves nothing
+    assert new.write({"page.html": "1", "logs/a.csv": b"2"}) == [out / "page.html", out / "logs" / "a.csv"]
+    place(out).write({"page.html": "3", "logs/a.csv": None})
+    assert {name for name, content in tree(out).items() if content is not None} == {"page.html", MARKER}
+    assert (out / "page.html").read_text() == "3"
+    empty = tmp_path / "empty"
+    (empty / UNFINISHED).mkdir(parents=True)
+    place(empty).write({"page.html": ""})
+
+
+def test_a_file_that_friso_has_not_written_stays(tmp_path: Path, refused: Refused) -> None:
+    """Not even in a folder of its own, unless told."""
+    place(tmp_path / "out").write({"page.html": ""})
+    (tmp_path / "out" / "figure.png").write_text("mine")
+    with refused():
+        place(tmp_path / "out").write({"page.html": "", "figure.png": ""})
+    assert (tmp_path / "out" / "figure.png").read_text() == "mine"
+    place(tmp_path / "out", overwrite=True).write({"figure.png": "friso's"})
+    assert (tmp_path / "out" / "figure.png").read_text() == "friso's"
+
+
+def test_overwriting_does_not_make_the_folder_friso_s(tmp_path: Path) -> None:
+    (tmp_path / "mine.txt").write_text("mine")
+    place(tmp_path, overwrite=True).write({"page.html": ""})
+    assert {path.name for path in tmp_path.iterdir()} == {"mine.txt", "page.html"}
+    with pytest.raises(InputError):
+        place(tmp_path)
+
+
+@pytest.mark.parametrize("overwrite", [False, True])
+def test_what_is_read_is_never_replaced(tmp_path: Path, overwrite: bool, refused: Refused) -> None:
+    place(tmp_path / "out").write({"stage.toml": "read"})
+    stage = tmp_path / "out" / "stage.toml"
+    with refused():
+        place(tmp_path / "out", overwrite, (stage,))
+    (tmp_path / "other.toml").write_text("read too")
+    other = Place("check", tmp_path, True, (tmp_path / "other.toml",))
+    with pytest.raises(InputError):
+        other.write({"other.toml": ""})
+    assert (stage.read_text(), (tmp_path / "other.toml").read_text()) == ("read", "read too")
+
+
+# all or nothing
+
+
+NAMES = ("a.txt", "b.txt", "sub/c.txt", "new/folder/d.txt")
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """Two of the files are there from an earlier run."""
+    (tmp_path / "sub").mkdir()
+    for name in ("b.txt", "sub/c.txt"):
+        (tmp_path / name).write_text("old")
+    return tmp_path
+
+
+def contents(folder: Path, **others: Content) -> dict[Path, Content]:
+    return {folder / name: others.get(Path(name).stem, "new") for name in NAMES}
+
+
+@pytest.mark.parametrize("number", range(len(NAMES)))
+@pytest.mark.parametrize("error", [OSError("disk full"), KeyboardInterrupt(), MemoryError()])
+def test_an_error_while_a_file_is_written_leaves_all_as_it_was(folder: Path, number: int, error: Any) -> None:
+    def half(path: Path) -> None:
+        path.write_text("half")
+        raise error
+
+    before = tree(folder)
+    with pytest.raises(type(error)):
+        write(contents(folder, **{Path(NAMES[number]).stem: half}))
+    assert tree(folder) == before
+
+
+def failing(real: Callable[..., Any], after: int, error: BaseException) -> Callable[..., Any]:
+    calls = [0]
+
+    def call(*arguments: Any, **named: Any) -> Any:
+        calls[0] += 1
+        if calls[0] == after:
+            raise error
+        return real(*arguments, **named)
+
+    return call
+
+
+@pytest.mark.parametrize("method", ["rename", "mkdir"])
+@pytest.mark.parametrize("after", range(1, 7))
+def test_an_error_while_files_get_their_names_is_undone(
+    folder: Path, method: str, after: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Two renames for each file that is there, one for each that is not; two folders to make."""
+    before = tree(folder)
+    steps = {"rename": 6, "mkdir": 2}[method]
+    files = contents(folder, a=None)
+    with monkeypatch.context() as patch:
+        patch.setattr(Path, method, failing(getattr(Path, method), after, OSError("no")))
+        if after <= steps - (method == "rename"):
+            with pytest.raises(OSError, match="no"):
+                write(files)
+    assert not [name for name in tree(folder) if DRAFTS in name]
+    if after <= steps - (method == "rename"):
+        assert tree(folder) == before
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_while_files_get_their_names_waits(
+    folder: Path, number: signal.Signals, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """All files are there when it arrives."""
+    seen: list[int] = []
+    real = Path.rename
+
+    def rename(path: Path, target: Path) -> Path:
+        os.kill(os.getpid(), number)
+        return real(path, target)
+
+    monkeypatch.setattr(Path, "rename", rename)
+    before = signal.signal(number, lambda number, frame: seen.append(number))
+    try:
+        write(contents(folder))
+    finally:
+        signal.signal(number, before)
+    assert seen == [number]
+    assert {(folder / name).read_text() for name in NAMES} == {"new"}
+
+
+def test_files_that_are_there_are_replaced(folder: Path) -> None:
+    assert write(contents(folder, a=None)) == [folder / name for name in NAMES[1:]]
+    written = {name: content for name, content in tree(folder).items() if content is not None}
+    assert {name: content for name, content in tree(folder).items() if content is not None} == dict.fromkeys(
+        names, b"new"
+    )
+
+
+def test_a_folder_in_the_way_is_not_moved(folder: Path) -> None:
+    (folder / "a.txt").mkdir()
+    before = tree(folder)
+    with pytest.raises(IsADirectoryError):
+        write(contents(folder))
+    assert tree(folder) == before
+
+
+@pytest.mark.parametrize("command", ["check", "bode"])
+def test_a_command_that_fails_while_writing_leaves_nothing(
+    command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("friso.cli.drafts.Drafts.put_in_place", failing(lambda self: None, 1, OSError("disk full")))
+    done = friso_inside(tmp_path, command, RIG, "--out", "out")
+    assert done.returncode == 1
+    assert "could not be completed: disk full" in done.stderr
+    assert tree(tmp_path) == {}
