@@ -89,19 +89,24 @@ def test_check_is_the_batch_of_one(rig: Stage) -> None:
 
 
 ends = st.tuples(
-    st.booleans(), lengths, lengths, st.floats(0.1, 10.0) | st.just(np.nan), st.floats(0.0, DURATION) | st.just(-np.inf)
+    st.booleans(),
+    lengths,
+    lengths,
+    st.floats(0.1, 10.0) | st.just(np.nan),
+    st.floats(0.0, DURATION) | st.just(-np.inf),
+    st.floats(0.0, DURATION) | st.just(-np.inf),
 )
 
 
 @given(st.lists(ends, min_size=1, max_size=20), st.floats(1e-7, 1e-3), st.floats(0.0, 5.0))
 def test_a_run_has_just_one_outcome(several: list[tuple], band: float, hold: float) -> None:
     """By the definitions of `friso.hunting.criteria.run_outcome`; and a batch is all of its runs."""
-    done, swing, before, period, outside = (np.array(column) for column in zip(*several, strict=True))
+    done, swing, before, period, turned, outside = (np.array(column) for column in zip(*several, strict=True))
     earlier = np.maximum(swing, before)
-    end = End(done, swing, earlier, period, outside, np.full(len(several), DURATION))
+    end = End(done, swing, earlier, period, turned, outside, np.full(len(several), DURATION))
     words = outcomes(end, band, hold)
     for k in range(len(several)):
-        swings = swing[k] > 2 * band and swing[k] >= earlier[k] / 2 and np.isfinite(period[k])
+        swings = swing[k] > 2 * band and swing[k] >= earlier[k] / 2 and DURATION - turned[k] <= period[k]
         rests = not swings and outside[k] + hold < DURATION
         expected = [not done[k], swings, rests, not swings and not rests]
         assert words[k] == ("failed" if not done[k] else ("swings", "rests", "creeps")[expected[1:].index(True)])
@@ -141,6 +146,14 @@ def test_a_run_that_failed_has_failed_whatever_it_did() -> None:
     assert outcomes(end_of_traces(TIME, swing, BAND, np.zeros(1, bool))).tolist() == ["failed"]
     assert outcomes(end_of_traces(TIME, swing, BAND)).tolist() == ["swings"]
     assert outcomes(end_of_traces(TIME, np.full((1, len(TIME)), np.nan), BAND)).tolist() == ["creeps"]
+
+
+@pytest.mark.parametrize("until", [15.5, 17.0, 18.5])
+def test_a_swing_that_stops_before_the_end_rests(until: float) -> None:
+    """However large the last quarter is; one that is going on swings."""
+    stopped = np.where(until > TIME, 1e-3 * np.sin(2 * np.pi * TIME), 0.0)[None]
+    assert outcomes(end_of_traces(TIME, stopped, BAND)).tolist() == ["rests"]
+    assert outcomes(end_of_traces(TIME, 1e-3 + stopped, BAND)).tolist() == ["creeps"]
 
 
 def test_rest_may_be_asked_for_some_time() -> None:

@@ -131,7 +131,7 @@ def test_compiled_loops_do_what_the_plain_ones_do(monkeypatch: pytest.MonkeyPatc
     compiled = scan(times, values, counts, amplitude, np.full(300, 20.0))
     monkeypatch.setattr(scanning, "MANY", np.inf)
     plain = scan(times, values, counts, amplitude, np.full(300, 20.0))
-    for name in ("peaks", "distinct", "period", "earlier"):
+    for name in ("peaks", "distinct", "period", "turned", "earlier"):
         assert np.array_equal(getattr(compiled, name), getattr(plain, name), equal_nan=name == "period")
     assert 0 < np.isnan(plain.period).sum() < 300
     assert plain.peaks.sum() > plain.distinct.sum() > 0

@@ -22,7 +22,7 @@ def compile_run(module: ModuleType) -> None:
     whole = np.zeros((2, 2))
     square, flat = whole[:, :1], whole[:, 0]  # as parts of larger arrays, for which whole ones can stand in
     marks, numbers = np.zeros((1, 1), np.bool_), np.zeros(1)
-    arguments = (square, square, np.zeros(1, np.int64), flat, flat, marks, marks, numbers, numbers)
+    arguments = (square, square, np.zeros(1, np.int64), flat, flat, marks, marks, numbers, numbers, numbers)
     module.run.compile(tuple(numba.typeof(argument) for argument in arguments))
     module.run.disable_compile()
 

@@ -77,6 +77,7 @@ def end_of(runs: Runs, turns: Turns, outside: str) -> End:
         swing=swing_of(runs),
         earlier=turns.earlier,
         period=turns.period,
+        turned=turns.turned,
         outside=runs.statistic(f"{outside}_exit"),
         ended=runs.statistic("ended"),
     )

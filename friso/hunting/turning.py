@@ -111,13 +111,22 @@ def span(times, values, count, since):
     return max(high - low, 0.0)
 
 
-def run(times, values, counts, swing, ended, peaks, distinct, period, earlier):
-    """Fill `peaks` and `distinct`, shape (runs, room), `period` and `earlier`, shape (runs,); see
+def last_turn(times, count, kinds):
+    """Time of the last extremum of a zigzag [s], -inf where it has none."""
+    last = -np.inf
+    for k in range(count):
+        if kinds[k] != 0:
+            last = times[k]
+    return last
+
+
+def run(times, values, counts, swing, ended, peaks, distinct, period, turned, earlier):
+    """Fill `peaks` and `distinct`, shape (runs, room), `period`, `turned` and `earlier`, shape (runs,); see
     `friso.hunting.turns.scan`."""
     kinds = np.zeros(times.shape[1], np.int64)
     for j in range(counts.size):
         count = counts[j]
-        period[j] = np.nan
+        period[j], turned[j] = np.nan, -np.inf
         earlier[j] = max(swing[j], span(times[j], values[j], count, HALF * ended[j]))
         tall = False
         for k in range(count):
@@ -131,3 +140,4 @@ def run(times, values, counts, swing, ended, peaks, distinct, period, earlier):
         if swing[j] > DISTINCT:
             zigzag(values[j], count, swing[j] / 2, kinds)
             period[j] = mean_period(times[j], count, kinds, ended[j])
+            turned[j] = last_turn(times[j], count, kinds)

@@ -18,12 +18,14 @@ MANY = 100
 @dataclass(frozen=True)
 class Turns:
     """Of runs: which turning points are counted `peaks` and which `distinct` ones, shape (runs, room) (see
-    `friso.hunting.criteria.peak_count`); the `period` of the swing [s] (NaN: none), and peak to peak of the last half
-    of the run, `earlier` [m], shape (runs,) (see `friso.hunting.criteria.run_outcome`)."""
+    `friso.hunting.criteria.peak_count`); the `period` of the swing [s] (NaN: none), when it `turned` for the last time
+    [s] (-inf: never), and peak to peak of the last half of the run, `earlier` [m], shape (runs,) (see
+    `friso.hunting.criteria.run_outcome`)."""
 
     peaks: np.ndarray
     distinct: np.ndarray
     period: np.ndarray
+    turned: np.ndarray
     earlier: np.ndarray
 
 
@@ -35,10 +37,11 @@ def scan(times: np.ndarray, values: np.ndarray, counts: np.ndarray, swing: np.nd
     the period: ringing on top of it does not count. `ended` [s], shape (runs,), is the end of each run.
     """
     runs = len(counts)
-    turns = Turns(np.zeros(times.shape, np.bool_), np.zeros(times.shape, np.bool_), np.empty(runs), np.empty(runs))
+    peaks, distinct = (np.zeros(times.shape, np.bool_) for _ in range(2))
+    period, turned, earlier = (np.empty(runs) for _ in range(3))
     loops = turning if counts.sum() < MANY else _compiled()
-    loops.run(times, values, counts, swing, ended, turns.peaks, turns.distinct, turns.period, turns.earlier)
-    return turns
+    loops.run(times, values, counts, swing, ended, peaks, distinct, period, turned, earlier)
+    return Turns(peaks, distinct, period, turned, earlier)
 
 
 @cache

@@ -1,7 +1,8 @@
 """What a run did at its end: it swings, creeps or rests, or it failed. It says nothing on what the stage can do.
 
 - *swings*: over the last quarter the deviation goes to and fro by more than twice the band; it does so again and again
-  (it has a period); and it lasts: it is at least half of what it was over the last half of the run.
+  (it has a period); and it lasts: it is at least half of what it was over the last half of the run, and since it last
+  turned no more than a period has passed.
 - *rests*: it does not swing, and stays within the band about the reference to the end.
 - *creeps*: neither: it is outside the band at its end without swinging. It drifts, sticks there, or dies out.
 - *failed*: the run was not completed.
@@ -42,13 +43,15 @@ CRITERION = "what the run does at its end: swings (a lasting swing), creeps (out
 @dataclass(frozen=True)
 class End:
     """How runs end, arrays of shape (runs,): whether each was `completed`; peak to peak of its deviation over the last
-    quarter, `swing` [m], and over the last half, `earlier` [m]; the `period` of the swing [s] (NaN: none); when it was
-    outside the band for the last time, `outside` [s], and when it `ended` [s]."""
+    quarter, `swing` [m], and over the last half, `earlier` [m]; the `period` of the swing [s] (NaN: none), and when it
+    `turned` for the last time [s] (-inf: never); when it was outside the band for the last time, `outside` [s], and
+    when it `ended` [s]."""
 
     completed: np.ndarray
     swing: np.ndarray
     earlier: np.ndarray
     period: np.ndarray
+    turned: np.ndarray
     outside: np.ndarray
     ended: np.ndarray
 
@@ -66,7 +69,7 @@ def outcomes(end: End, band: np.ndarray | float = BAND, hold: np.ndarray | float
     """The word of `OUTCOMES` for every run, shape (runs,): of runs that rest the band [m] was left for the last time
     more than `hold` [s] before the end."""
     with np.errstate(invalid="ignore"):
-        swings = lasts(end.swing, end.earlier, band) & np.isfinite(end.period)
+        swings = lasts(end.swing, end.earlier, band) & (end.ended - end.turned <= end.period)
         rests = end.outside + hold < end.ended
     words = np.where(swings, SWINGS, np.where(rests, RESTS, CREEPS))
     return np.where(end.completed, words, FAILED).astype(object)
@@ -84,9 +87,9 @@ def end_of_traces(time: np.ndarray, deviation: np.ndarray, band: float, complete
     values = np.ascontiguousarray(deviation[:, late])
     ended = np.full(runs, time[-1])
     whole = np.full(runs, values.shape[1])
-    period = scan(np.tile(time[late], (runs, 1)), values, whole, np.nan_to_num(swing), ended).period
+    turns = scan(np.tile(time[late], (runs, 1)), values, whole, np.nan_to_num(swing), ended)
     done = np.ones(runs, bool) if completed is None else completed
-    return End(done, swing, earlier, period, last_outside(time, deviation, band), ended)
+    return End(done, swing, earlier, turns.period, turns.turned, last_outside(time, deviation, band), ended)
 
 
 def last_outside(time: np.ndarray, deviation: np.ndarray, band: float) -> np.ndarray:

@@ -197,7 +197,7 @@ def hunted(recorded: Recorded) -> Hunted:
     swing, earlier = (np.ptp(deviation[:, time >= part * time[-1]], axis=1) for part in (WINDOW, HALF))
     ended = np.full(len(turns), time[-1])
     found = scan(times, values, counts, swing, ended)
-    end = End(~failed, swing, earlier, found.period, last_outside(time, deviation, BAND), ended)
+    end = End(~failed, swing, earlier, found.period, found.turned, last_outside(time, deviation, BAND), ended)
     shapes = [cycle_shape(*each, size, time[-1]) for each, size in zip(turns, swing, strict=True)]
     known = np.where(failed, np.nan, 1.0)
     above, below, rising, periods, heights = np.array(shapes).T * known

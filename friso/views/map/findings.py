@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 
 MEANINGS = {
     "outcome": {
-        SWINGS: "the run swings at its end: to and fro by more than 20 µm in the last quarter, again and again, and by "
-        "at least half as much as in the last half",
+        SWINGS: "the run swings at its end: to and fro by more than 20 µm in the last quarter, again and again, by at "
+        "least half as much as in the last half, and so to the end",
         CREEPS: "the run is outside 10 µm of its reference at its end without swinging: it drifts, sticks or dies out",
         RESTS: "the run stays within 10 µm of its reference to its end",
     },
