@@ -253,7 +253,7 @@ def test_an_isolator_that_is_needed_says_why(found: Design) -> None:
 
 def test_the_joint_is_held_below_the_static_friction(found: Design) -> None:
     said = " ".join(joint_step(found).sentences)
-    assert "The cart breaks away at 1 N at the least" in said
+    assert "The cart breaks away at no less than 1 N" in said
     assert "with the safety factor of 1.1 and a stiffness error of 10% that allows 0.826 N" in said
     assert "The stroke of 1 mm is the one specified." in said
     unknown = replace(found.edges, unknown=2)
