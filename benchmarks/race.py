@@ -16,7 +16,7 @@ from benchmarks.peers import NAMED, piecewise, race
 from benchmarks.prototype import run as run_prototype
 from benchmarks.report import Goal, clock, print_table, spread
 from benchmarks.rigs import RTOLS, SAMPLE, Rig
-from friso.engine.batch import Options, run_chunks
+from friso.engine.batch import RunOptions, run_chunks
 from friso.hunting import measures
 from friso.system import usable_cores
 
@@ -61,7 +61,7 @@ def reference_trace(rig: Rig, equations: Compiled, radau: Any) -> np.ndarray:
 
 def friso_trace(rig: Rig, rtol: float) -> tuple[np.ndarray, Any]:
     """friso's positions on the grid [m] and its results, of a single run."""
-    (runs,) = run_chunks(rig.kernel, rig.flat, 1, Options(rtol=rtol, interval=SAMPLE, budget=10_000_000))
+    (runs,) = run_chunks(rig.kernel, rig.flat, 1, RunOptions(rtol=rtol, interval=SAMPLE, budget=10_000_000))
     return runs.results.samples[0][:, rig.kernel.states.index("position")], runs
 
 

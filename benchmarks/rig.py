@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.report import Goal, clock, print_goals, print_table, spread
-from friso.engine.batch import Options, run_chunks
+from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import kernel
 from friso.equations.structure import structure
 from friso.rig.run import RTOL, run
@@ -34,7 +34,7 @@ def sampled(stage: Stage) -> Callable[[], object]:
 
 def continuous(stage: Stage) -> Callable[[], object]:
     """As many runs of the stage's own motion without a drive."""
-    shape, options = kernel(structure(stage.flat())), Options(rtol=RTOL, interval=INTERVAL, threads=1)
+    shape, options = kernel(structure(stage.flat())), RunOptions(rtol=RTOL, interval=INTERVAL, threads=1)
     return lambda: list(run_chunks(shape, stage.flat(), RUNS, options))
 
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from benchmarks.report import Goal, clock, print_table, spread
 from benchmarks.rigs import RTOLS, Rig
-from friso.engine.batch import Options, Runs, run_chunks
+from friso.engine.batch import RunOptions, Runs, run_chunks
 from friso.hunting.criteria import COUNTED_AFTER, distinct_peaks
 from friso.hunting.measures import RESOLVED, measure, options
 
@@ -57,7 +57,7 @@ def both_maps(locked: Rig, free: Rig) -> list[Map]:
 
 def friso_map(case: Map, rtol: float) -> tuple[np.ndarray, float]:
     """Peak counts of all cells, and the rejected share of steps: the work that the prototype does."""
-    settings = Options(rtol=rtol, record_from=0.8 * COUNTED_AFTER, least_swing=RESOLVED)
+    settings = RunOptions(rtol=rtol, record_from=0.8 * COUNTED_AFTER, least_swing=RESOLVED)
     chunks = list(run_chunks(case.rig.kernel, case.flat, len(case.prototype), settings))
     peaks = np.empty(len(case.prototype))
     for chunk in chunks:

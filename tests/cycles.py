@@ -4,7 +4,7 @@ import numpy as np
 from variants import gains, limit, lugre, release, stage
 
 from friso.engine.arrays import Status
-from friso.engine.batch import Options, run_chunks
+from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import kernel
 from friso.equations.structure import structure
 from friso.stage import Stage
@@ -13,7 +13,7 @@ from friso.stage import Stage
 def turning_points(stage: Stage, rtol: float) -> tuple[np.ndarray, np.ndarray]:
     """Times [s] and values [m] of all extrema of position minus reference."""
     flat = stage.flat()
-    (runs,) = run_chunks(kernel(structure(flat)), flat, 1, Options(rtol=rtol))
+    (runs,) = run_chunks(kernel(structure(flat)), flat, 1, RunOptions(rtol=rtol))
     assert runs.results.statuses[0] == Status.DONE
     count = int(runs.results.turn_counts[0])
     return runs.results.turn_times[0, :count], runs.results.turn_values[0, :count]

@@ -10,7 +10,7 @@ from friso.studies.rig.experiments.frf import MeasuredLoop
 from friso.studies.rig.experiments.in_position import InPosition, Standstill
 from friso.studies.rig.experiments.stroke_crossover import StrokeCrossover
 from friso.studies.rig.hunted import Hunted
-from friso.studies.thesis.as_built import Cycles, Moves, RigLoops
+from friso.studies.thesis.as_built import CyclesOnRails, MovesOnRails, RigLoops
 
 HUNTS, FAILED = 7, -1
 """Peaks of a run that hunts; of one that failed, which says nothing."""
@@ -28,10 +28,10 @@ def hunted(peaks: Any, **given: Any) -> Hunted:
 
 
 def moves(first: Any, free: Any = (0, 0, 0, 0), middle: Any = (0, 0, 0, 0), high: Any = (0, 0, 0, 0),
-          released: Any = (0, 0, 0, 0), **cycle: Any) -> Moves:  # fmt: skip
+          released: Any = (0, 0, 0, 0), **cycle: Any) -> MovesOnRails:  # fmt: skip
     """On four rails; releases to one side start nothing, those to the other a `cycle`."""
     let_go = hunted([(0, 0, 0, 0), released], **cycle)
-    return Moves(np.array([8.0, 9.5, 14.3]), hunted([first, middle, high]), hunted(free), let_go)
+    return MovesOnRails(np.array([8.0, 9.5, 14.3]), hunted([first, middle, high]), hunted(free), let_go)
 
 
 def grid(*highest: int, runs: Any = None) -> StrokeCrossover:
@@ -46,8 +46,8 @@ SLOW = {"period": 1.0, "swing": 1.2e-3, "above": 7e-4, "below": 5e-4, "period_sc
 """Cycles of a rail that varies, as the thesis has them."""
 
 
-def cycles(even: dict[str, Any] | None = None, **rails: Any) -> Cycles:
-    return Cycles(hunted([HUNTS], **(even or {})), hunted([HUNTS] * 4, **{**SLOW, **rails}), np.zeros(4),
+def cycles(even: dict[str, Any] | None = None, **rails: Any) -> CyclesOnRails:
+    return CyclesOnRails(hunted([HUNTS], **(even or {})), hunted([HUNTS] * 4, **{**SLOW, **rails}), np.zeros(4),
                   hunted([HUNTS], **SLOW))  # fmt: skip
 
 

@@ -12,7 +12,7 @@ from variants import VARIANTS, lugre, stage, there_and_back, van_dijk
 
 import friso
 from friso.equations.bandwidth import faster
-from friso.hunting.basin import EDGE, MOVES, SHARES, Kick, Moves, displacements, ends_in, moves, pushes
+from friso.hunting.basin import EDGE, MOVES, SHARES, Kick, MoveShare, displacements, ends_in, moves, pushes
 from friso.hunting.cycle.ensemble import Ensemble, done
 from friso.hunting.cycle.hunting import Cycle, hunting
 from friso.hunting.cycle.rest import pushed
@@ -171,7 +171,7 @@ def test_motions_without_acceleration_have_no_share() -> None:
 def test_interval_holds_the_share(drawn: int, data: st.DataObject) -> None:
     """Wilson 1927, doi:10.1080/01621459.1927.10502953: at its ends the share p is 1.96 sqrt(p (1-p)/n) off."""
     hunting = data.draw(st.integers(0, drawn))
-    found = Moves(drawn, hunting, (1.0, 2.0), (1.0, 2.0))
+    found = MoveShare(drawn, hunting, (1.0, 2.0), (1.0, 2.0))
     low, high = found.interval
     assert 0 <= low <= found.fraction <= high <= 1
     for p in (low, high):

@@ -9,7 +9,7 @@ from refusals import Refused
 from variants import VARIANTS
 
 import friso
-from friso.hunting.boundary import Diagram, Found, Plane, Range, Space, diagram, plane
+from friso.hunting.boundary import Diagram, KeyRange, LocatedPoint, Plane, Space, diagram, plane
 from friso.hunting.boundary.branch import Point, Tracer
 from friso.hunting.cycle.find import symmetric_cycles
 from friso.stage import Stage
@@ -18,7 +18,7 @@ pytestmark = pytest.mark.xdist_group("rigid")
 
 RIGID = VARIANTS["rigid"]
 AT_8_HZ = RIGID.replace({"controller.crossover": "8 Hz"})
-CROSSOVER = Range("controller.crossover", 1.0, 40.0, unit="Hz")
+CROSSOVER = KeyRange("controller.crossover", 1.0, 40.0, unit="Hz")
 
 
 @pytest.fixture(scope="module")
@@ -27,9 +27,9 @@ def over_crossover() -> Diagram:
     return diagram(Space.of(RIGID, [CROSSOVER]))
 
 
-def special(found: Diagram, symmetric: bool) -> dict[str, list[tuple[float, Found]]]:
+def special(found: Diagram, symmetric: bool) -> dict[str, list[tuple[float, LocatedPoint]]]:
     """The special points of the symmetric or of the asymmetric branches by kind, with their values."""
-    points: dict[str, list[tuple[float, Found]]] = {"flip": [], "fold": [], "torus": []}
+    points: dict[str, list[tuple[float, LocatedPoint]]] = {"flip": [], "fold": [], "torus": []}
     for branch, own in zip(found.branches, found.special, strict=True):
         if (branch.sign < 0) == symmetric:
             for each in own:
@@ -96,7 +96,7 @@ def test_a_branch_does_not_depend_on_where_it_is_begun(over_crossover: Diagram) 
 
 @pytest.fixture(scope="module")
 def over_friction() -> Plane:
-    axes = [Range("friction.static", 1.0, 6.0, unit="N"), Range("friction.coulomb", 0.3, 2.5, unit="N")]
+    axes = [KeyRange("friction.static", 1.0, 6.0, unit="N"), KeyRange("friction.coulomb", 0.3, 2.5, unit="N")]
     return plane(Space.of(AT_8_HZ, axes), nodes=9)
 
 
@@ -115,7 +115,7 @@ def test_every_curve_lies_where_the_multiplier_says(over_friction: Plane) -> Non
 
 def test_curves_in_two_keys_pass_through_the_points_in_one(over_friction: Plane) -> None:
     """At 1 N of Coulomb friction: folds and flips of the diagram over static friction lie on the curves."""
-    static = Range("friction.static", 1.0, 6.0, unit="N")
+    static = KeyRange("friction.static", 1.0, 6.0, unit="N")
     single = diagram(Space.of(AT_8_HZ.replace({"friction.coulomb": "1 N"}), [static]))
     for kind, points in special(single, symmetric=True).items():
         crossings = [
@@ -157,14 +157,16 @@ def refined(points: np.ndarray) -> np.ndarray:
 
 def test_an_asymmetric_stage_loses_its_cycle_in_a_fold() -> None:
     """Unequal friction unfolds the pitchfork: what was a flip of the half period is a fold of the whole one."""
-    found = diagram(Space.of(RIGID.replace({"friction.asymmetry": 0.005}), [Range("controller.crossover", 4.0, 12.0)]))
+    found = diagram(
+        Space.of(RIGID.replace({"friction.asymmetry": 0.005}), [KeyRange("controller.crossover", 4.0, 12.0)])
+    )
     assert {branch.sign for branch in found.branches} == {1.0}
     kinds = {each.kind for own in found.special for each in own}
     assert "fold" in kinds
 
 
 def test_a_range_without_a_boundary_has_no_points() -> None:
-    found = diagram(Space.of(RIGID, [Range("controller.crossover", 4.0, 6.0)]), seeds=5)
+    found = diagram(Space.of(RIGID, [KeyRange("controller.crossover", 4.0, 6.0)]), seeds=5)
     assert found.cycles.attracting.all()
     assert not any(found.special)
 

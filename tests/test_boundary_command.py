@@ -12,13 +12,13 @@ from inside import friso_inside
 from refusals import Refused
 
 from friso.cli.output import MARKER
-from friso.hunting.boundary import Branch, Curve, Diagram, Found, Kind, Plane, Point, Range, Space, Spot
+from friso.hunting.boundary import Branch, Curve, Diagram, KeyRange, Kind, LocatedPoint, Plane, Point, Space, Spot
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import NOT_CLOSED, Cycles, symmetric_cycles
 from friso.stage import Stage
 from friso.views.boundary.data import corner_verdicts, end_verdicts, lines
 from friso.views.boundary.figures import boundary_figure
-from friso.views.boundary.words import Shown, sentences
+from friso.views.boundary.words import ShownKey, sentences
 from friso.views.drawing import matplotlib_renderer, plotly_renderer
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
@@ -184,12 +184,15 @@ def point(place: float, multiplier: float, distance: float = 0.0) -> Point:
     return Point(place, distance, 0.0, cycles([multiplier]))
 
 
-def found(kind: Kind, place: float, multiplier: float, distance: float = 0.0) -> Found:
-    return Found(kind, point(place, multiplier, distance), np.array([1.0, 0.0, 0.0]), 1e-6)
+def found(kind: Kind, place: float, multiplier: float, distance: float = 0.0) -> LocatedPoint:
+    return LocatedPoint(kind, point(place, multiplier, distance), np.array([1.0, 0.0, 0.0]), 1e-6)
 
 
-STROKE, GAIN = Range("joint.stroke", 1e-3, 2e-3, unit="m"), Range("controller.kp", 1.0, 100.0, log=True, unit="N/m")
-MM = Shown("joint.stroke", "mm", 1e-3)
+STROKE, GAIN = (
+    KeyRange("joint.stroke", 1e-3, 2e-3, unit="m"),
+    KeyRange("controller.kp", 1.0, 100.0, log=True, unit="N/m"),
+)
+MM = ShownKey("joint.stroke", "mm", 1e-3)
 
 
 @pytest.fixture
@@ -247,7 +250,7 @@ def crossing() -> Plane:
 
 
 def test_sentences_of_two_keys(crossing: Plane) -> None:
-    curve, meaning, *corners, lost = sentences(crossing, (MM, Shown("controller.kp", "N/m")))
+    curve, meaning, *corners, lost = sentences(crossing, (MM, ShownKey("controller.kp", "N/m")))
     assert curve == (
         "Flip of the hunting cycle: 3 points, joint.stroke 1.5 to 1.5 mm, controller.kp 1 to 100 N/m; "
         "ends: end of the range; largest error: 1e-06 mm, 0 N/m."
@@ -261,7 +264,7 @@ def test_sentences_of_two_keys(crossing: Plane) -> None:
 
 
 def test_the_figure_of_two_keys_shows_nodes_and_curves_in_one_legend(crossing: Plane) -> None:
-    figure = boundary_figure(crossing, (MM, Shown("controller.kp", "N/m")))
+    figure = boundary_figure(crossing, (MM, ShownKey("controller.kp", "N/m")))
     (panel,) = figure.panels
     assert panel.y.log
     assert not panel.x.log

@@ -15,7 +15,7 @@ from scipy.linalg import expm
 
 from friso.engine import simd_math
 from friso.engine.arrays import Results, Status, Tables
-from friso.engine.batch import Options, prepare, run_batch, settings_of
+from friso.engine.batch import RunOptions, prepare, run_batch, settings_of
 from friso.engine.kernel import Kernel, Wanted, empty_results, kernel, kernels
 from friso.engine.simulate import simulate
 from friso.equations.as_built import NEUTRAL, AsBuilt, _command
@@ -70,7 +70,7 @@ def run(
 ) -> tuple[Kernel, Results]:
     shape = kernel(AsBuilt.of({name: np.ravel(value)[0] for name, value in flat.items()}))
     threads = options.pop("threads", None)
-    chosen = Options(**{"rtol": 1e-11, "interval": every * TIME, **options})
+    chosen = RunOptions(**{"rtol": 1e-11, "interval": every * TIME, **options})
     batch = prepare(shape, flat, runs, chosen)._replace(tables=tables)
     assert chosen.interval is not None
     results = empty_results(runs, 1, round(0.4 / chosen.interval) + 1, len(shape.kept))

@@ -25,7 +25,7 @@ from friso.stage.correlations import Correlations
 from friso.studies.compare import measures, study
 from friso.studies.compare.machines import SPREADS, TOGETHER_BY, Machines, draw_machines
 from friso.studies.compare.measures import linear_loops, settling_time
-from friso.studies.compare.options import DEADBAND, MODEL_ERROR, Option, Options, linear_flat, options
+from friso.studies.compare.options import DEADBAND, MODEL_ERROR, CompareOptions, Option, linear_flat, options
 from friso.studies.compare.statistics import difference, median
 from friso.studies.compare.study import Comparison, Result, compare
 from friso.studies.shares import share
@@ -60,7 +60,7 @@ def machines(built: Stage) -> Machines:
 
 
 @pytest.fixture(scope="module")
-def every(machines: Machines) -> Options:
+def every(machines: Machines) -> CompareOptions:
     return options(machines, 1e-6)
 
 
@@ -116,7 +116,7 @@ def test_a_drive_without_a_clock_gets_one(built: Stage) -> None:
     assert any("no [rail]" in note for note in machines.notes)
 
 
-def test_the_seven_options(every: Options, machines: Machines) -> None:
+def test_the_seven_options(every: CompareOptions, machines: Machines) -> None:
     stages = {each.letter: each.stage.flat() for each in every.every}
     assert "".join(stages) == "abcdefg"
     assert [letter for letter, flat in stages.items() if not flat["joint.locked"]] == ["c", "g"]
@@ -130,7 +130,7 @@ def test_the_seven_options(every: Options, machines: Machines) -> None:
 
 
 @pytest.mark.parametrize("letter", ["b", "g"])
-def test_faster_up_to_the_margin(every: Options, letter: str) -> None:
+def test_faster_up_to_the_margin(every: CompareOptions, letter: str) -> None:
     option = next(each for each in every.every if each.letter == letter)
     assert option.factor > 1.2
     assert option.stage.flat()["controller.crossover"] == pytest.approx(8 * option.factor)
@@ -141,7 +141,7 @@ def test_faster_up_to_the_margin(every: Options, letter: str) -> None:
     assert beyond < margin - 0.01
 
 
-def test_margins_of_many_are_those_of_each(every: Options, machines: Machines) -> None:
+def test_margins_of_many_are_those_of_each(every: CompareOptions, machines: Machines) -> None:
     option = every.every[2]
     loops = linear_loops(option.stage, linear_flat(option.stage, machines.flat(option.stage, {})), machines.count)
     for number in (0, int(np.where(loops.stable, loops.margin, np.inf).argmin())):
@@ -179,7 +179,7 @@ def test_a_weak_motor_leaves_room_for_bandwidth(built: Stage) -> None:
     assert other.every[1].factor > 1.02 * known.every[1].factor
 
 
-def test_unstable_loops_are_told(machines: Machines, every: Options) -> None:
+def test_unstable_loops_are_told(machines: Machines, every: CompareOptions) -> None:
     fast = every.every[0].stage.replace({"controller.crossover": "390 Hz"})
     loops = linear_loops(fast, linear_flat(fast, machines.flat(fast, {})), machines.count)
     assert not loops.stable.any()
@@ -341,8 +341,8 @@ def test_hardly_any_friction_never_swings(built: Stage) -> None:
 
 def test_a_run_that_fails_does_not_swing(found: Comparison) -> None:
     base = found.results[0]
-    part = measures.Found(
-        **{name: np.array(getattr(base.found, name)) for name in measures.Found.__dataclass_fields__}
+    part = measures.MachineMeasures(
+        **{name: np.array(getattr(base.found, name)) for name in measures.MachineMeasures.__dataclass_fields__}
         | {"outcome": np.full(COUNT, "failed"), "settling": np.full(COUNT, np.nan)}
     )
     result = replace(base, found=part)
@@ -367,7 +367,7 @@ def test_words_follow_the_numbers(found: Comparison) -> None:
 
 
 @pytest.fixture
-def made_up(every: Options, machines: Machines) -> Comparison:
+def made_up(every: CompareOptions, machines: Machines) -> Comparison:
     """Options a and c on 20 machines: c is in position 12 times sooner, 3 later, and 5 never with either."""
     still, count = np.ones(COUNT, bool), COUNT
     settling = {"a": np.full(count, 5.0), "c": np.repeat([2.0, 7.0, np.inf], [12, 3, 5])}
@@ -376,11 +376,11 @@ def made_up(every: Options, machines: Machines) -> Comparison:
     results = tuple(
         Result(
             every.every["abc".index(letter)],
-            measures.Found(
+            measures.MachineMeasures(
                 np.full(count, "rests"), np.zeros(count, int), settling[letter], rms[letter], np.ones(count)
             ),
             measures.Later(still, still),
-            measures.Loops(still, np.full(count, 0.6)),
+            measures.LoopRobustness(still, np.full(count, 0.6)),
         )
         for letter in "ac"
     )

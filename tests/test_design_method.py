@@ -20,9 +20,9 @@ from friso.design.modal import Modal
 from friso.design.population import Population, corners
 from friso.design.prepare import prepared, with_leaves
 from friso.design.relax import relaxations
-from friso.design.requirements import PARASITIC, RESERVE, Task, requirements
+from friso.design.requirements import PARASITIC, RESERVE, LeafTask, requirements
 from friso.design.spec import Spec, load_spec
-from friso.design.verification import Outcome, tried, verification
+from friso.design.verification import MachineOutcomes, tried, verification
 from friso.flexure import beams as beams_module
 from friso.flexure import closed_forms
 from friso.flexure.beams import BeamFailure
@@ -45,12 +45,12 @@ def base() -> Stage:
 
 
 @pytest.fixture(scope="module")
-def task(base: Stage) -> Task:
-    return Task(SPEC, 1e-3, 48.0, 1.0, base.flat())
+def task(base: Stage) -> LeafTask:
+    return LeafTask(SPEC, 1e-3, 48.0, 1.0, base.flat())
 
 
 @pytest.fixture(scope="module")
-def candidates(task: Task) -> list[Candidate]:
+def candidates(task: LeafTask) -> list[Candidate]:
     return front(task)
 
 
@@ -68,7 +68,7 @@ def tables(*names: str) -> dict[str, object]:
 # --- leaf springs -----------------------------------------------------------------------------------------------------
 
 
-def test_the_front_is_a_front(task: Task, candidates: list[Candidate]) -> None:
+def test_the_front_is_a_front(task: LeafTask, candidates: list[Candidate]) -> None:
     """No candidate is beaten in both, all meet the requirements, and no random geometry beats one by a tenth."""
     stiffness, frequency = (
         np.array([getattr(each, name) for each in candidates]) for name in ("stiffness", "frequency")
@@ -90,7 +90,7 @@ def test_the_front_is_a_front(task: Task, candidates: list[Candidate]) -> None:
     assert not np.any(tried_.frequency[allowed] > better * 1.1)
 
 
-def test_better_than_the_thesis_in_both(task: Task, candidates: list[Candidate]) -> None:
+def test_better_than_the_thesis_in_both(task: LeafTask, candidates: list[Candidate]) -> None:
     """At the thesis's own specification the method beats 70 x 45 x 0.35 mm in stiffness and in parasitic frequency."""
     thesis = Geometry(70e-3, 45e-3, 60e-3, Sheet(2.0, 0.35e-3, "stainless 1.4310"))
     own = closed(mechanisms(task.flat, sizes_of([thesis]), [thesis.sheet]).member(0), 1e-3)
@@ -103,7 +103,7 @@ def test_better_than_the_thesis_in_both(task: Task, candidates: list[Candidate])
     assert np.all(choice.excess <= 1)
 
 
-def test_requirements_by_the_evaluation(task: Task) -> None:
+def test_requirements_by_the_evaluation(task: LeafTask) -> None:
     """The requirements, written for arrays, against the figures of one mechanism."""
     geometry = Geometry(60e-3, 20e-3, 50e-3, Sheet(2.0, 0.3e-3, "stainless 1.4310"))
     it = mechanisms(task.flat, sizes_of([geometry]), [geometry.sheet]).member(0)
@@ -137,7 +137,7 @@ def replace_leaves(it: Mechanism) -> Mechanism:
 
 
 def test_a_geometry_at_which_beams_fail_is_marked(
-    task: Task, candidates: list[Candidate], monkeypatch: pytest.MonkeyPatch
+    task: LeafTask, candidates: list[Candidate], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The search goes on without it."""
     from friso.design import choice as choice_module
@@ -164,7 +164,7 @@ def test_relaxed_alone_a_requirement_lets_leaves_do(base: Stage, monkeypatch: py
     """What is said to be enough is enough, and a tenth less is not."""
     monkeypatch.setattr(front_module, "GENERATIONS", 60)
     monkeypatch.setattr(relax_module, "GENERATIONS", 60)
-    task = Task(loaded(force_x="200 N"), 1e-3, 0.0, 1.0, base.flat())
+    task = LeafTask(loaded(force_x="200 N"), 1e-3, 0.0, 1.0, base.flat())
     assert not front(task)
     found = {each.key: each for each in relaxations(task)}
     assert {"load.force_x", "friction.static"} <= found.keys()
@@ -218,7 +218,7 @@ def test_a_stage_that_never_hunts_has_no_edge(base: Stage) -> None:
     assert found.highest == 4.0
 
 
-def test_modes_count_in_the_margin(base: Stage, task: Task) -> None:
+def test_modes_count_in_the_margin(base: Stage, task: LeafTask) -> None:
     """With the one mode that the equations have, the margin is theirs; where actuator and sensor move against each
     other the loop is found unstable, as the poles of the state space are."""
     leaves_ = Geometry(60e-3, 18e-3, 50e-3, Sheet(2.0, 0.3e-3, "stainless 1.4310"))
@@ -278,7 +278,7 @@ def test_the_least_friction_is_that_of_the_range(base: Stage) -> None:
 
 
 def test_without_a_comfortable_crossover_there_is_no_design(
-    base: Stage, task: Task, candidates: list[Candidate], monkeypatch: pytest.MonkeyPatch
+    base: Stage, task: LeafTask, candidates: list[Candidate], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from friso.design import method
 
@@ -320,7 +320,7 @@ def test_verification_counts_and_its_worst_is_reproduced(base: Stage, monkeypatc
 
 
 def test_an_outcome_ranks_what_does_not_rest_before_slow_settling() -> None:
-    found = Outcome(
+    found = MachineOutcomes(
         np.array(["rests", "swings", "creeps", "rests"], dtype=object),
         np.array([0.1, np.nan, np.nan, 3.0]),
         np.array([0, 1e-3, 2e-3, 0]),

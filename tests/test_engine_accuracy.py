@@ -13,7 +13,7 @@ from scipy.optimize import brentq
 from variants import PARASITIC, TOUCHING, VARIANTS, lugre, stage, step, van_dijk
 
 from friso.engine.arrays import Results, Settings, Status
-from friso.engine.batch import Options, prepare, run_chunks
+from friso.engine.batch import RunOptions, prepare, run_chunks
 from friso.engine.kernel import empty_results, kernel
 from friso.engine.shared_queue import new_queue
 from friso.equations import motion
@@ -49,7 +49,7 @@ def fixed_steps(h: float, interval: float, changes: dict[str, Any]) -> tuple[Res
     """The linear stage in steps of h (shorter to a corner): results, sampled states, exact states."""
     flat = LINEAR.flat() | changes
     shape = kernel(structure(LINEAR.flat()))
-    options = Options(rtol=1e-2, interval=interval)
+    options = RunOptions(rtol=1e-2, interval=interval)
     batch = prepare(shape, flat, 1, options)
     batch.first_steps[:] = h
     batch.longest[:] = h
@@ -89,7 +89,7 @@ def test_samples_and_turning_points_are_as_good_as_the_steps(rtol: float) -> Non
     """Everywhere within some rtol of the size of the motion; a straight line between steps would miss by far."""
     flat = LINEAR.flat() | MOVE
     shape = kernel(structure(LINEAR.flat()))
-    (runs,) = run_chunks(shape, flat, 1, Options(rtol=rtol, interval=7e-4))
+    (runs,) = run_chunks(shape, flat, 1, RunOptions(rtol=rtol, interval=7e-4))
     times = np.arange(runs.results.samples.shape[1]) * 7e-4
     expected = exact(flat, shape.states, times)
     sizes = np.max(np.abs(expected), axis=0)
@@ -155,7 +155,7 @@ def test_runs_against_radau(chosen: Stage, changes: dict[str, Any]) -> None:
         flat["motion.return_at"] = 0.6 * flat["motion.duration"]
     shape = kernel(structure(flat))
     interval = flat["motion.duration"] / 100
-    (runs,) = run_chunks(shape, flat, 1, Options(rtol=1e-11, interval=interval))
+    (runs,) = run_chunks(shape, flat, 1, RunOptions(rtol=1e-11, interval=interval))
     assert runs.results.statuses[0] == Status.DONE
     times = np.arange(runs.results.samples.shape[1]) * interval
     ours = runs.results.samples[0]
@@ -170,7 +170,7 @@ def test_runs_against_radau(chosen: Stage, changes: dict[str, Any]) -> None:
 def test_the_last_sample_is_taken(duration: float) -> None:
     """Where rounding puts the end of the run an ulp before the last instant, too."""
     flat = LINEAR.flat() | MOVE | {"motion.duration": duration}
-    (runs,) = run_chunks(kernel(structure(LINEAR.flat())), flat, 1, Options(rtol=1e-6, interval=duration / 24))
+    (runs,) = run_chunks(kernel(structure(LINEAR.flat())), flat, 1, RunOptions(rtol=1e-6, interval=duration / 24))
     assert runs.results.samples.shape[1] == 25
     assert np.all(np.isfinite(runs.results.samples))
 
@@ -180,7 +180,7 @@ def test_turning_points_against_a_tighter_run() -> None:
     """On a stretch with stops: at rtol 1e-6 they are within some 1e-6 of those at 1e-11."""
     flat = VARIANTS["rigid"].flat() | {"motion.duration": 8.0}
     shape = kernel(structure(flat))
-    rough, fine = (next(iter(run_chunks(shape, flat, 1, Options(rtol=rtol)))).results for rtol in (1e-6, 1e-11))
+    rough, fine = (next(iter(run_chunks(shape, flat, 1, RunOptions(rtol=rtol)))).results for rtol in (1e-6, 1e-11))
     count = int(fine.turn_counts[0])
     assert count > 10
     assert rough.turn_counts[0] == count

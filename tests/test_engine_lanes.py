@@ -7,14 +7,14 @@ import pytest
 from variants import VARIANTS, gains, lugre, release, stage
 
 from friso.engine.arrays import Results, Status
-from friso.engine.batch import Options, run_chunks
+from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import Kernel, kernel
 from friso.equations.structure import structure
 
 pytestmark = pytest.mark.xdist_group("rigid")
 
 RUNS = 83
-BASE = Options(rtol=1e-5, interval=5e-3)
+BASE = RunOptions(rtol=1e-5, interval=5e-3)
 Flat = dict[str, Any]
 
 
@@ -36,7 +36,7 @@ def eight() -> Kernel:
     return kernel(structure(VARIANTS["rigid"].flat()))
 
 
-def run(shape: Kernel, flat: Flat, options: Options, runs: int = RUNS) -> Results:
+def run(shape: Kernel, flat: Flat, options: RunOptions, runs: int = RUNS) -> Results:
     """The results of all chunks in one piece. Turning points and samples that are not there are NaN."""
     chunks = list(run_chunks(shape, flat, runs, options))
     order, parts = np.argsort(np.concatenate([chunk.numbers for chunk in chunks])), [chunk.results for chunk in chunks]
@@ -76,7 +76,7 @@ def reference(eight: Kernel, flat: Flat) -> Results:
 def test_any_number_of_threads_and_chunks(
     eight: Kernel, flat: Flat, reference: Results, threads: int, chunk: int
 ) -> None:
-    assert_identical(run(eight, flat, Options(1e-5, interval=5e-3, threads=threads, chunk=chunk)), reference)
+    assert_identical(run(eight, flat, RunOptions(1e-5, interval=5e-3, threads=threads, chunk=chunk)), reference)
 
 
 def test_alone_or_in_company(eight: Kernel, flat: Flat, reference: Results) -> None:
@@ -114,7 +114,7 @@ def test_again(eight: Kernel, flat: Flat, reference: Results) -> None:
 def test_a_run_out_of_steps_harms_no_other(eight: Kernel, flat: Flat, reference: Results) -> None:
     attempted = reference.statistics[:, 5]
     budget = int(np.median(attempted))
-    results = run(eight, flat, Options(1e-5, interval=5e-3, budget=budget))
+    results = run(eight, flat, RunOptions(1e-5, interval=5e-3, budget=budget))
     short = results.statuses == Status.BUDGET
     assert np.array_equal(short, attempted > budget)
     assert 0 < np.count_nonzero(short) < RUNS
@@ -139,7 +139,7 @@ def test_an_unstable_run_harms_no_other(eight: Kernel, flat: Flat, reference: Re
 def test_a_run_that_is_not_a_number_ends_at_once(eight: Kernel, flat: Flat, reference: Results) -> None:
     bad = np.arange(RUNS) % 11 == 3
     mass = np.where(bad, np.nan, flat["masses.cart"])
-    results = run(eight, flat | {"masses.cart": mass}, Options(1e-5, interval=5e-3, budget=20_000))
+    results = run(eight, flat | {"masses.cart": mass}, RunOptions(1e-5, interval=5e-3, budget=20_000))
     assert np.all(results.statuses[bad] == Status.UNDERFLOW)
     assert_identical(results, reference, ~bad)
 
@@ -148,7 +148,9 @@ def test_runs_of_different_length(eight: Kernel, flat: Flat) -> None:
     """Neither does the length of the others change a run."""
     lengths = np.random.default_rng(3).uniform(0.2, 3, RUNS)
     together = run(eight, flat | {"motion.duration": lengths}, BASE)
-    assert_identical(run(eight, flat | {"motion.duration": lengths}, Options(1e-5, interval=5e-3, chunk=7)), together)
+    assert_identical(
+        run(eight, flat | {"motion.duration": lengths}, RunOptions(1e-5, interval=5e-3, chunk=7)), together
+    )
 
 
 @pytest.mark.parametrize(
@@ -170,7 +172,7 @@ def test_many_turning_points_get_room() -> None:
     spring = stage(release("1 mm", "100 s"), "cart", lugre(2), controller=gains(4e3))
     changes = {"friction.static": 1e-9, "friction.coulomb": 1e-9, "friction.viscous": 0.0}
     flat = spring.flat() | changes | {"friction.bristle_stiffness": 1e-3, "friction.bristle_damping": 0.0}
-    (runs,) = run_chunks(kernel(structure(spring.flat())), flat, 1, Options(rtol=1e-6))
+    (runs,) = run_chunks(kernel(structure(spring.flat())), flat, 1, RunOptions(rtol=1e-6))
     assert runs.results.statuses[0] == Status.DONE
     expected = 100 * np.sqrt(4e3) / np.pi
     assert runs.results.turn_counts[0] == pytest.approx(expected, abs=1)

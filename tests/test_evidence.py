@@ -8,7 +8,7 @@ import pytest
 from benchmarks import evidence as command
 from benchmarks.canonical import differ, reference_numbers
 from friso.evidence import entries, equations, value
-from friso.studies.guideline.parasitic import Parasitic
+from friso.studies.guideline.parasitic import ParasiticLimits
 from friso.views.guideline.words import parasitic_sentences
 
 ROOT = Path(__file__).parent.parent
@@ -68,9 +68,9 @@ def test_findings_say_what_their_values_say() -> None:
 
 def test_parasitic_modes_in_words() -> None:
     modes = [
-        Parasitic(100.0, 0.01, (0.1, 69.2), None),
-        Parasitic(300.0, 0.01, (0.1, 69.9), (3.82, 14.2)),
-        Parasitic(100.0, 0.001, None, None),
+        ParasiticLimits(100.0, 0.01, (0.1, 69.2), None),
+        ParasiticLimits(300.0, 0.01, (0.1, 69.9), (3.82, 14.2)),
+        ParasiticLimits(100.0, 0.001, None, None),
     ]
     locked, light, free, lost, conclusion = parasitic_sentences(modes)
     assert locked.endswith(

@@ -16,12 +16,12 @@ from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
 from friso.flexure import closed_forms, curved, plate
-from friso.flexure.beam_system import BeamFailure, Leaves, Place
+from friso.flexure.beam_system import BeamFailure, Configuration, LeafBeams
 from friso.flexure.beams import beams
 from friso.flexure.closed_model import closed
 from friso.flexure.evaluation import VISIBLE
 from friso.flexure.joint import first_interfering, parasitic_mode
-from friso.flexure.mechanism import Body, Mechanism, cube_inertia
+from friso.flexure.mechanism import Mechanism, MovingBody, cube_inertia
 
 MANY = settings(max_examples=40, deadline=None, derandomize=True)
 FEW = settings(max_examples=10, deadline=None, derandomize=True)
@@ -39,7 +39,7 @@ def mechanism(
 ) -> Mechanism:
     """The thesis's leaves; the centre of mass of the stage, where it is pushed and seen, is `off` the leaf ends [m]."""
     centre = (length + off[0], off[1], off[2])
-    body = Body(mass, (0.0, 0.0, 0.0), centre)
+    body = MovingBody(mass, (0.0, 0.0, 0.0), centre)
     base = Mechanism(
         leaves, length, width, thickness, spacing, 210e9, poisson, 7850.0, 1.1e9, 4e8, body, centre, centre, 0.01
     )
@@ -73,7 +73,7 @@ def scaled(value: Any, factors: dict[str, float]) -> Any:
     changed = {}
     for item in fields(value):
         now = getattr(value, item.name)
-        if isinstance(now, Body):
+        if isinstance(now, MovingBody):
             changed[item.name] = scaled(now, factors)
         else:
             factor = factors.get(item.name, 1.0)
@@ -87,8 +87,10 @@ def together(many: list[Mechanism]) -> Mechanism:
     def stacked(values: list[Any]) -> Any:
         if isinstance(values[0], tuple):
             return tuple(map(stacked, zip(*values, strict=True)))
-        if isinstance(values[0], Body):
-            return Body(*(stacked([getattr(value, field.name) for value in values]) for field in fields(Body)))
+        if isinstance(values[0], MovingBody):
+            return MovingBody(
+                *(stacked([getattr(value, field.name) for value in values]) for field in fields(MovingBody))
+            )
         return np.array(values, dtype=float)
 
     return Mechanism(*(stacked([getattr(alone, field.name) for alone in many]) for field in fields(Mechanism)))
@@ -340,7 +342,7 @@ def lateral_load_without_warping(springs: Mechanism) -> float:
 def lateral_load_by_beams(springs: Mechanism) -> float:
     """Force across the ends of straight leaves [N] at which their tangent stiffness is singular, linearised: the stage
     free along y and z and to turn about z."""
-    leaves = Leaves(springs, elements=32)
+    leaves = LeafBeams(springs, elements=32)
     node = np.arange(6, 6 * leaves.nodes).reshape(-1, 6)
     plane = np.concatenate([node[:-1, [1, 5]].ravel(), node[-1, [1, 5]]])
     out = np.concatenate([node[:-1, [2, 3, 4]].ravel(), node[-1, [2]]])
@@ -432,7 +434,7 @@ class Pushed:
     and a rotation vector [rad] about axes at rest, on top of a turn [rad] about y; its inner nodes are solved for."""
 
     def __init__(self, springs: Mechanism) -> None:
-        self.leaves, self.offsets = Leaves(springs), springs.offsets
+        self.leaves, self.offsets = LeafBeams(springs), springs.offsets
         self.state = np.zeros((self.leaves.count, self.leaves.nodes, 6))
 
     def ends(self, move: np.ndarray, turn: float) -> np.ndarray:
@@ -504,11 +506,11 @@ def test_a_stage_that_turns_as_it_is_pushed() -> None:
 def test_mirrored_motion(leaves: int) -> None:
     """Pushed either way by the same amount, leaves in a row that is even about its middle answer the same."""
     springs = mechanism(leaves=leaves)
-    system = Leaves(springs)
+    system = LeafBeams(springs)
     rng = np.random.default_rng(leaves)
     inner = rng.standard_normal((leaves, system.nodes - 2, 3)) * np.array([1e-6, 1e-4, 1e-3])
-    place = Place(inner, np.array([-2e-6, 5e-4, 1e-5]))
-    mirrored = Place(inner[::-1] * [1, -1, -1], place.stage * [1, -1, -1])
+    place = Configuration(inner, np.array([-2e-6, 5e-4, 1e-5]))
+    mirrored = Configuration(inner[::-1] * [1, -1, -1], place.stage * [1, -1, -1])
     there, back = (system.forces(configuration.state(springs.offsets)) for configuration in (place, mirrored))
     assert np.allclose(back[::-1, :, 0::2] * [1, -1, -1], there[:, :, 0::2], atol=1e-9 * np.max(np.abs(there)))
 

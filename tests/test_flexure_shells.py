@@ -14,7 +14,7 @@ import shells
 from friso.flexure.beams import beams
 from friso.flexure.closed_model import closed
 from friso.flexure.evaluation import Evaluation, Model
-from friso.flexure.mechanism import Body, Mechanism, cube_inertia
+from friso.flexure.mechanism import Mechanism, MovingBody, cube_inertia
 from friso.materials import materials
 
 MODELS: dict[str, Model] = {"closed forms": closed, "beams": beams}
@@ -61,10 +61,10 @@ def mechanism(name: str) -> Mechanism:
         spacing,
         *(float(data.young), data.poisson, float(data.density)),
         *(float(data.yield_strength), float(data.fatigue)),
-        Body(mass, (0.0, 0.0, 0.0), (length + beyond, 0.0, 0.0)),
+        MovingBody(mass, (0.0, 0.0, 0.0), (length + beyond, 0.0, 0.0)),
         *((length + beyond, 0.0, 0.0),) * 2,
     )
-    return Mechanism(**{**bare.__dict__, "body": Body(mass, cube_inertia(mass), bare.body.centre)})
+    return Mechanism(**{**bare.__dict__, "body": MovingBody(mass, cube_inertia(mass), bare.body.centre)})
 
 
 @cache

@@ -17,7 +17,7 @@ from friso.equations.structure import structure
 from friso.errors import InputError
 from friso.frequency.bode import bode
 from friso.frequency.crossover import WANTED, limits, settled_members
-from friso.frequency.drive import Drive, exponentials
+from friso.frequency.drive import DriveTiming, exponentials
 from friso.frequency.family import impedance, loops, plants, scan, spectral_abscissa
 from friso.frequency.friction import level
 from friso.frequency.loops import closed_loop, open_loop, poles, response
@@ -214,12 +214,12 @@ CASES = ("stuck", "sliding", "stuck-touched", "sliding-touched")
 def growing(flat: dict, one: Members) -> int:
     """Closed-loop poles in the right half-plane of a loop in continuous time, by how often 1 + L turns round 0 along a
     line just right of the imaginary axis (Nyquist), with the delay as it is."""
-    known = poles(flat, one, Drive(0.0, 0.0))
+    known = poles(flat, one, DriveTiming(0.0, 0.0))
     aside = 1e-3 * np.abs(known.closed).min()
     resonant = np.abs(np.concatenate([known.closed[0], known.cut[0]]).imag)
     near = (resonant[resonant > 0][:, None] * (1 + np.linspace(-0.05, 0.05, 401))).ravel()
     omega = np.unique(np.concatenate([aside * np.geomspace(1e-3, 1e13, 20_001), near, [0.0]]))
-    seen = 1 + response(flat, one, Drive.of(flat))(omega - 1j * aside)
+    seen = 1 + response(flat, one, DriveTiming.of(flat))(omega - 1j * aside)
     turned = np.angle(seen[1:] / seen[:-1]).sum()
     return int((known.cut.real > aside).sum()) - round(turned / np.pi)
 
@@ -230,7 +230,7 @@ def test_margins_take_the_loop_to_the_edge(rig: Stage, changes: dict, case: str,
     flat = rig.replace({**changes, **drive_keys}).flat()
     one = limit_cases(flat)[case]
     found = margins(flat, one)
-    loop, drive = open_loop(flat, one), Drive.of(flat)
+    loop, drive = open_loop(flat, one), DriveTiming.of(flat)
     at = response(flat, one, drive)
     if not drive.sample_time:
         assert growing(flat, one) == np.count_nonzero(found.poles.real > 0)
@@ -317,17 +317,19 @@ def test_a_sampled_loop_is_the_sum_of_its_aliases(rig: Stage) -> None:
     z = np.exp(1j * omega * step)
     bilinear = 2 / step * (z - 1) / (z + 1)
     compensated = -np.array([answer(w)[0, answer.input_labels.index("stage")] for w in bilinear])
-    found = response(flat, one, Drive.of(flat))(omega)
+    found = response(flat, one, DriveTiming.of(flat))(omega)
     assert found == pytest.approx(held * compensated, rel=1e-4)
 
 
 def test_sampling_ever_faster_is_continuous(rig: Stage) -> None:
     """Poles of the sampled loop go to those of the continuous one with the sample time: half a sample of delay."""
     flat, one = rig.flat(), limit_cases(rig.flat())["sliding"]
-    exact = poles(flat, one, Drive(0.0, 0.0)).in_s[0]
+    exact = poles(flat, one, DriveTiming(0.0, 0.0)).in_s[0]
     slow = exact[np.abs(exact) < 2000]
     steps = np.array([4e-5, 2e-5, 1e-5])
-    off = [max(np.abs(poles(flat, one, Drive(step, 0.0)).in_s[0] - pole).min() for pole in slow) for step in steps]
+    off = [
+        max(np.abs(poles(flat, one, DriveTiming(step, 0.0)).in_s[0] - pole).min() for pole in slow) for step in steps
+    ]
     assert np.log2(np.array(off[:-1]) / off[1:]) == pytest.approx(1, abs=0.1)
 
 
@@ -387,14 +389,16 @@ def by_gains(rig: Stage, **gains: str) -> Stage:
     return Stage(**tables)
 
 
-@pytest.mark.parametrize("drive", [Drive(0.0, 2e-4), Drive(0.0, 5e-3), Drive(1e-4, 1e-4), Drive(1e-3, 1.5e-3)])
+@pytest.mark.parametrize(
+    "drive", [DriveTiming(0.0, 2e-4), DriveTiming(0.0, 5e-3), DriveTiming(1e-4, 1e-4), DriveTiming(1e-3, 1.5e-3)]
+)
 @pytest.mark.parametrize("turn", [1e-10, 1e-8, 1e-5, 1e-4])
-def test_slow_poles_are_where_the_loop_is_minus_1(rig: Stage, turn: float, drive: Drive) -> None:
+def test_slow_poles_are_where_the_loop_is_minus_1(rig: Stage, turn: float, drive: DriveTiming) -> None:
     """Stuck, an integral acts on a spring: its pole, so many radians in the delay, is neither lost in the rounding of
     the fast ones nor taken where it is without delay."""
     rigid = by_gains(rig, kp="0 N/m", ki="1 N/(m*s)").replace({"joint.locked": True, "parasitic": None})
     one = limit_cases(rigid.flat())["stuck"]
-    speed = 1e-3 * abs(response(rigid.flat(), one, Drive(0.0, 0.0))(np.array([1e-3]))[0])
+    speed = 1e-3 * abs(response(rigid.flat(), one, DriveTiming(0.0, 0.0))(np.array([1e-3]))[0])
     slow = turn / drive.delay
     flat = {**rigid.flat(), "controller.ki": slow / speed}
     at = response(flat, one, drive)

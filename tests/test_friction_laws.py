@@ -14,7 +14,7 @@ from variants import VARIANTS
 
 import friso
 from friso.engine.arrays import Results, Status
-from friso.engine.batch import Options, run_chunks
+from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import kernel
 from friso.equations.structure import structure
 from friso.stage.tables import FRICTION
@@ -41,7 +41,7 @@ def test_a_law_mentions_no_solver(file: Path) -> None:
 def run(changes: dict[str, Any], rtol: float = 1e-8, interval: float = 1e-3) -> Results:
     """A rigid mass with LuGre friction and a van Dijk controller, released."""
     flat = VARIANTS["rigid"].flat() | changes
-    (runs,) = run_chunks(kernel(structure(VARIANTS["rigid"].flat())), flat, 1, Options(rtol=rtol, interval=interval))
+    (runs,) = run_chunks(kernel(structure(VARIANTS["rigid"].flat())), flat, 1, RunOptions(rtol=rtol, interval=interval))
     assert runs.results.statuses[0] == Status.DONE
     return runs.results
 

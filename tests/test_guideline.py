@@ -33,14 +33,14 @@ from friso.studies.guideline.claims import claims, least_gap
 from friso.studies.guideline.groups import (
     GROUPS,
     PARAMETERS,
-    Scale,
+    GroupScale,
     counted,
     dimensions,
     flat_of,
     parameters_of,
     values_of,
 )
-from friso.studies.guideline.laws import FREE_LAW, LOCKED_LAW, Errors, Law, Rate, fitted, in_series
+from friso.studies.guideline.laws import FREE_LAW, LOCKED_LAW, EdgeLaw, Errors, Rate, fitted, in_series
 from friso.studies.guideline.parasitic import holding
 from friso.studies.guideline.rig import plain
 from friso.studies.thesis.studies import rig
@@ -62,7 +62,7 @@ def multiplier(flat: dict[str, Any]) -> float:
     return float(found)
 
 
-UNSCALED, SCALED = Scale(1.7, 1e5, 3.0), Scale(30.0, 2e7, 11.0)
+UNSCALED, SCALED = GroupScale(1.7, 1e5, 3.0), GroupScale(30.0, 2e7, 11.0)
 
 
 def with_mode(flat: dict[str, Any], values: dict[str, Any]) -> dict[str, Any]:
@@ -116,7 +116,7 @@ def test_groups_and_back() -> None:
 def test_equal_groups_equal_multiplier(mass: float, stiffness: float, force: float) -> None:
     """Whatever mass, stiffness and force are, to a thousandth and a thousand times as large."""
     values = values_of(rigid().replace({"controller.crossover": "6 Hz"}).flat())
-    scaled = flat_of(values, Scale(10**mass, 10**stiffness, 10**force))
+    scaled = flat_of(values, GroupScale(10**mass, 10**stiffness, 10**force))
     assert multiplier(scaled) == pytest.approx(multiplier(flat_of(values)), rel=1e-5)
 
 
@@ -276,7 +276,7 @@ def test_law_is_not_led_astray_by_outliers() -> None:
 
 def test_held_out_errors_tell_a_law_of_the_wrong_shape() -> None:
     values, edges = made(256, 1, 0.0)
-    wrong = fitted(Law((Rate("one", {"gap": 1.0}, ("alpha",)),), partial(in_series, 1.0)), values, edges)
+    wrong = fitted(EdgeLaw((Rate("one", {"gap": 1.0}, ("alpha",)),), partial(in_series, 1.0)), values, edges)
     others, held_out = made(256, 2, 0.0)
     assert Errors.between(wrong.edge(others), held_out).rms > 0.5
 
@@ -302,7 +302,7 @@ def studied(edge: Any, kind: str = FLIP) -> worked.Worked:
         for name, (changes, _) in worked._studies().items()  # pyright: ignore[reportPrivateUsage]
     }
     friction = tuple(worked.Case(each, 9.0, edge("friction", flat | each), kind) for each in worked.friction_range())
-    machines = tuple(worked.Machine(name, 9.0, value) for name, value in (("", 9.8), ("", 9.7), ("", 5.4)))
+    machines = tuple(worked.WorkedMachine(name, 9.0, value) for name, value in (("", 9.8), ("", 9.7), ("", 5.4)))
     return worked.Worked({}, machines, friction, 13.0, 1.1, (), (), studies)
 
 
@@ -333,9 +333,9 @@ def test_claims_hold_differ_or_are_unknown() -> None:
 def test_edges_below_the_grid_are_good_ones() -> None:
     """They are neither unknown nor the worst."""
     below = worked.Case({}, 2.0, np.nan, BELOW)
-    design = worked.Design(8.0, 7.0, 1e3, 1e-3, (below, worked.Case({}, 2.0, 3.0)), 0.5)
+    design = worked.WorkedDesign(8.0, 7.0, 1e3, 1e-3, (below, worked.Case({}, 2.0, 3.0)), 0.5)
     assert (design.worst, design.does) == (3.0, True)
-    lost = worked.Design(8.0, 7.0, 1e3, 1e-3, (below, worked.Case({}, 2.0, np.nan, UNKNOWN)), 0.5)
+    lost = worked.WorkedDesign(8.0, 7.0, 1e3, 1e-3, (below, worked.Case({}, 2.0, np.nan, UNKNOWN)), 0.5)
     assert (lost.worst, lost.unknown) == (1.0, 1)
     assert not lost.does
     share = claims(studied(lambda name, flat: np.nan if name == "share" else as_claimed(name, flat), BELOW))[1]

@@ -14,8 +14,8 @@ from friso.frequency.describing import balance
 from friso.frequency.describing.balance import FREQUENCIES, single_harmonic
 from friso.frequency.describing.function import dynamic_stiffness
 from friso.frequency.describing.loop import receptance
-from friso.frequency.describing.multi import DONE, OPEN, REST, Series, balanced
-from friso.frequency.describing.waveform import Law, friction_answer
+from friso.frequency.describing.multi import DONE, OPEN, REST, HarmonicSeries, balanced
+from friso.frequency.describing.waveform import OneStateLaw, friction_answer
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import hunting_cycles
 from friso.stage import Stage
@@ -131,11 +131,13 @@ def test_multi_harmonic_balance_finds_it_too() -> None:
     assert many.amplitude / one.amplitude - 1 == pytest.approx(-0.0156, abs=2e-4)
 
 
-def at_start(flat: dict[str, float], series: Series) -> dict[str, float]:
+def at_start(flat: dict[str, float], series: HarmonicSeries) -> dict[str, float]:
     """States of a balanced motion of the rigid mass with Dahl friction at time 0."""
     turns = 1j * series.orders * series.omega
     middles = np.outer((np.arange(8192) + 0.5) / 8192 * series.period, turns)
-    answer = friction_answer(Law.of(flat), np.real(np.exp(middles) @ (turns * series.cart)), series.period / 8192, 1.0)
+    answer = friction_answer(
+        OneStateLaw.of(flat), np.real(np.exp(middles) @ (turns * series.cart)), series.period / 8192, 1.0
+    )
     return {
         "position": float(np.sum(np.real(series.cart))),
         "velocity": float(np.sum(np.real(turns * series.cart))),
@@ -155,7 +157,7 @@ def test_friction_on_a_sine_has_its_describing_function(friction: str) -> None:
         for count in (2000, 8000):
             angles = halves * np.pi * (np.arange(count) + 0.5) / count
             velocity = -2 * np.pi * frequency * amplitude * np.sin(angles)
-            force = friction_answer(Law.of(flat), velocity, halves / (2 * frequency * count), sign).force
+            force = friction_answer(OneStateLaw.of(flat), velocity, halves / (2 * frequency * count), sign).force
             errors.append(abs(2 * np.mean(force * np.exp(-1j * angles)) / amplitude / expected - 1))
         assert errors[1] < 1e-4
         assert errors[1] < errors[0] / 10 or errors[1] < 1e-7
@@ -166,7 +168,7 @@ def test_derivative_of_the_force_by_the_motion() -> None:
     angles = np.pi * (np.arange(400) + 0.5) / 400
     velocity = 3e-3 * np.sin(angles) + 1e-3 * np.sin(3 * angles + 1)
     aside = rng.normal(size=(400, 2)) * 1e-9
-    law, interval = Law.of(flat), 1e-3
+    law, interval = OneStateLaw.of(flat), 1e-3
     found = friction_answer(law, velocity, interval, -1.0).along(aside)
     for k in range(2):
         ahead, behind = (friction_answer(law, velocity + s * aside[:, k], interval, -1.0).force for s in (1, -1))

@@ -17,17 +17,6 @@ KNOW_CONTROLLERS = ("equations/controllers/", "stage/", "templates/")
 SHARED_VIEWS = {"__init__.py", "documents.py", "files.py", "pages.py", "report.py"}
 """Modules of views that belong to no command; the rest stands in the command's folder or in drawing/."""
 
-ONE_MEANING = ("Moves", "Shown", "Found", "Options", "Estimate", "Case")
-"""Names that stood for several things."""
-
-TWICE = {
-    *("Axis", "Body", "Bound", "Case", "Choice", "Claim", "Comparison", "Controller", "Curve", "Cycles", "Design"),
-    *("Drawing", "Drive", "Driven", "Estimate", "Fitted", "Found", "Friction", "Held", "Law", "Leaves", "Loops"),
-    *("Machine", "Moves", "Need", "Options", "Outcome", "Parasitic", "Range", "Scale", "Section", "Series", "Shown"),
-    *("Span", "Steady", "Step", "Task"),
-}
-"""Names that stand for several classes today; those of a subject may share one, no further ones do."""
-
 RECIPES = {
     "controller": "equations/controllers",
     "friction law": "equations/friction",
@@ -58,14 +47,8 @@ def test_keys_of_a_controller_are_known_to_controllers_alone() -> None:
     assert [name for name in knowing if not name.startswith(KNOW_CONTROLLERS)] == []
 
 
-@pytest.mark.xfail(reason="names are being told apart (issue 20, parts 4 and 6)", strict=True)
-def test_a_name_stands_for_one_thing() -> None:
-    modules = classes()
-    assert {name: modules[name] for name in ONE_MEANING if len(modules[name]) > 1} == {}
-
-
-def test_no_further_name_stands_for_two_things() -> None:
-    assert {name: where for name, where in classes().items() if len(where) > 1 and name not in TWICE} == {}
+def test_a_class_name_stands_for_one_thing() -> None:
+    assert {name: where for name, where in classes().items() if len(where) > 1} == {}
 
 
 def test_views_stand_in_the_folder_of_their_command() -> None:

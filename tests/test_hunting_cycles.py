@@ -13,7 +13,7 @@ from cycles import swings
 from variants import LOCKED, PARASITIC, VARIANTS, free, lugre, release, stage, van_dijk
 
 from friso.engine.arrays import Status
-from friso.engine.batch import Options, run_chunks
+from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import kernel
 from friso.equations.structure import structure
 from friso.hunting.cycle.ensemble import Ensemble
@@ -307,7 +307,7 @@ def last_swing(chosen: Stage, displacements: np.ndarray, duration: float, last: 
     """Half of peak to peak [m] over the `last` seconds after releases, shape (displacements,)."""
     count = displacements.size
     flat = chosen.flat() | {"motion.displacement": displacements, "motion.duration": duration}
-    options = Options(rtol=1e-6, window=1 - last / duration, record_from=duration)
+    options = RunOptions(rtol=1e-6, window=1 - last / duration, record_from=duration)
     (runs,) = run_chunks(kernel(structure(chosen.flat())), flat, count, options)
     assert np.all(runs.results.statuses == Status.DONE)
     return (runs.statistic("deviation_max") - runs.statistic("deviation_min")) / 2

@@ -14,7 +14,7 @@ from friso.errors import InputError, StageError
 from friso.stage import Stage, numeric_keys, parse_set, violations
 from friso.stage.correlations import Correlations, correlations_text, draw, read_correlations
 from friso.stage.plug_ins import plug_ins
-from friso.studies.axes import Axis, read_axis
+from friso.studies.axes import SweptAxis, read_axis
 from friso.studies.cells import allowed, flat_cells
 from friso.studies.links import check_links, linked
 
@@ -91,7 +91,7 @@ def test_what_is_wrong_is_told(three: Stage, changes: dict, parts: list[str]) ->
 
 def test_an_element_is_swept_and_linked(three: Stage) -> None:
     axis = read_axis(three, f"{STRENGTH}.3", "1 N..3 N:3", False)
-    assert not isinstance(axis, Axis)
+    assert not isinstance(axis, SweptAxis)
     values = axis.axis().values
     assert values == pytest.approx([1.0, 2.0, 3.0])
     links = {f"{STRENGTH}.1": f"0.25 * {STRENGTH}.3 + 0.5", f"{STIFFNESS}.1": f"{STRENGTH}.1 / 1e-7"}

@@ -9,7 +9,7 @@ from scipy.optimize import least_squares
 
 import friso
 from friso.engine.arrays import Status
-from friso.engine.batch import Options, run_chunks
+from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import Kernel, kernel
 from friso.engine.simulate import sampled_outputs
 from friso.equations.structure import structure
@@ -52,7 +52,7 @@ class Steady:
 
     def run(self, starts: np.ndarray, duration: float, interval: float) -> tuple[np.ndarray, np.ndarray]:
         """States over time from each start, shape (runs, samples, states), and the times [s]."""
-        options = Options(rtol=1e-11, interval=interval)
+        options = RunOptions(rtol=1e-11, interval=interval)
         flat = {**self.flat, "motion.duration": duration}
         (runs,) = run_chunks(self.kernel, flat, len(starts), options, starts)
         assert (runs.results.statuses == Status.DONE).all()

@@ -125,10 +125,10 @@ def test_a_number_of_leaves_is_certain(refused: Refused) -> None:
 
 def test_specifications_take_no_uncertain_value(refused: Refused) -> None:
     """One value is meant there, or a range that is allowed: not what is known of a machine."""
-    from friso.design.spec import Machine
+    from friso.design.spec import SpecMachine
 
     with refused("bandwidth_limit"):
-        Machine(bandwidth_limit="48 Hz +/- 5 Hz")
+        SpecMachine(bandwidth_limit="48 Hz +/- 5 Hz")
 
 
 def test_single_valued_commands_say_that_centres_are_used(

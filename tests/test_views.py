@@ -21,10 +21,10 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from pages import Page
 
-from friso.hunting import Cycle, Hunting, Judgement, Kick, Margin, Moves
+from friso.hunting import Cycle, Hunting, Judgement, Kick, Margin, MoveShare
 from friso.hunting.cycle.return_map import ReturnMap
 from friso.version import VERSION
-from friso.views.check.cases import COLOURS, Shown, shown_cases
+from friso.views.check.cases import COLOURS, ShownCase, shown_cases
 from friso.views.check.figures import check_figures, response_figure
 from friso.views.check.page import conclusion, report_html, verdict_sentence
 from friso.views.check.table import rows
@@ -80,7 +80,7 @@ def hunts(**changes: Any) -> Judgement:
         fake_hunting(fake_cycle()),
         Kick(((1.72e-3, 10.8e-3), (22.7e-3, 43.3e-3), (59.3e-3, 0.156)), (1.73e-5, 0.156)),
         Kick(((0.0231, 0.0734),), (5e-4, 4.4)),
-        Moves(128, 111, (10.0, 200.0), (0.003, 0.06)),
+        MoveShare(128, 111, (10.0, 200.0), (0.003, 0.06)),
         Margin(1.2187, 9.7496, True),
     )
     return replace(found, **changes)
@@ -667,7 +667,7 @@ def test_report_without_traces_has_the_table_and_no_script():
 
 def sentence(judgement: Judgement, cases: Any = None, locked: bool | None = None, **changes: Any) -> str:
     case = replace(fake_case(stage=fake_stage(locked=locked)), judgement=judgement, **changes)
-    return verdict_sentence(Shown("given", "As given", "#000000", case), cases or {"given": case})
+    return verdict_sentence(ShownCase("given", "As given", "#000000", case), cases or {"given": case})
 
 
 NEVER = {1e-6: None, 1e-5: None}
@@ -739,7 +739,7 @@ def test_what_is_not_certain_is_said():
 
 
 def row(name: str, judgement: Judgement, **changes: Any) -> str | None:
-    item = Shown("given", "As given", "#000000", replace(fake_case(), judgement=judgement, **changes))
+    item = ShownCase("given", "As given", "#000000", replace(fake_case(), judgement=judgement, **changes))
     return dict(rows((item,))).get(name, [None])[0]
 
 

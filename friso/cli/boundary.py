@@ -21,8 +21,8 @@ from friso.cli.progress import ProgressBar
 from friso.quantities import Quantity, any_sign
 
 if TYPE_CHECKING:
-    from friso.hunting.boundary import Range
-    from friso.views.boundary.words import Shown
+    from friso.hunting.boundary import KeyRange
+    from friso.views.boundary.words import ShownKey
 
 RANGE = 'KEY="FIRST..LAST"'
 
@@ -72,10 +72,10 @@ def boundary(
         print_written(files)
 
 
-def _shown(one: Range, text: str) -> Shown:
+def _shown(one: KeyRange, text: str) -> ShownKey:
     """A key in the unit in which its range was given, that of the last value."""
-    from friso.views.boundary.words import Shown
+    from friso.views.boundary.words import ShownKey
 
     match = re.search(r"\.\.\s*[-+.\deE]*\s*([^:]*)", text)
     unit = match[1].strip() if match else ""
-    return Shown(one.key, unit, Quantity(one.unit, any_sign, "").factor(unit)) if unit else Shown(one.key)
+    return ShownKey(one.key, unit, Quantity(one.unit, any_sign, "").factor(unit)) if unit else ShownKey(one.key)

@@ -9,7 +9,7 @@ import numpy as np
 
 from friso.design.front import Candidate, judged
 from friso.design.geometry import Geometry, mechanisms, rounded, sizes_of
-from friso.design.requirements import Requirement, Task, buckling_share, load_stress, requirements
+from friso.design.requirements import LeafTask, Requirement, buckling_share, load_stress, requirements
 from friso.flexure.beams import BeamFailure, beams
 from friso.flexure.evaluation import Evaluation
 from friso.flexure.joint import first_interfering
@@ -33,7 +33,7 @@ class Confirmed:
 
 
 @dataclass(frozen=True)
-class Choice:
+class ChosenLeaves:
     """The geometry chosen, by the beam model; its requirements, and by what factor it breaks each by closed forms (at
     most 1); and of the geometries that were passed over, what beams found or why they failed."""
 
@@ -50,7 +50,7 @@ class Choice:
         return min(mode.frequency if mode else np.inf, float(first_interfering(self.beams.mechanism)))
 
 
-def chosen(task: Task, candidates: Sequence[Candidate]) -> Choice | None:
+def chosen(task: LeafTask, candidates: Sequence[Candidate]) -> ChosenLeaves | None:
     """The softest geometry that meets all requirements, by closed forms and by beams; None if there is none."""
     needs, passed = requirements(task), []
     for geometry, excess in _in_order(task, needs, candidates):
@@ -59,14 +59,14 @@ def chosen(task: Task, candidates: Sequence[Candidate]) -> Choice | None:
         except BeamFailure as failure:
             passed.append(str(failure))
             continue
-        choice = Choice(geometry, evaluation, tuple(needs), excess, tuple(passed))
+        choice = ChosenLeaves(geometry, evaluation, tuple(needs), excess, tuple(passed))
         if choice.frequency >= task.spec.safety.parasitic * task.crossover and _bears(task, evaluation):
             return choice
         passed.append(f"beams: {evaluation.drive[0]:.4g} N/m, {choice.frequency:.4g} Hz")
     return None
 
 
-def _bears(task: Task, by_beams: Evaluation) -> bool:
+def _bears(task: LeafTask, by_beams: Evaluation) -> bool:
     """Whether by beams, too, the cart does not break away inside the stroke and the leaves bear bending and load."""
     safety = task.spec.safety
     stays = safety.breakaway * (1 + safety.stiffness_tolerance) * by_beams.forces[-1] <= task.friction
@@ -76,7 +76,7 @@ def _bears(task: Task, by_beams: Evaluation) -> bool:
 
 
 def _in_order(
-    task: Task, needs: list[Requirement], candidates: Sequence[Candidate]
+    task: LeafTask, needs: list[Requirement], candidates: Sequence[Candidate]
 ) -> Iterator[tuple[Geometry, np.ndarray]]:
     """Geometries in whole sizes that meet the requirements by closed forms, the softest first."""
     enough = task.spec.safety.parasitic * task.crossover
@@ -90,12 +90,12 @@ def _in_order(
             yield sizes[k], judgement.excess[k]
 
 
-def evaluated(task: Task, geometry: Geometry) -> Evaluation:
+def evaluated(task: LeafTask, geometry: Geometry) -> Evaluation:
     """A geometry by the beam model. Raises BeamFailure."""
     return beams(mechanisms(task.flat, sizes_of([geometry]), [geometry.sheet]).member(0), task.stroke)
 
 
-def confirmed(task: Task, candidates: Sequence[Candidate]) -> Iterable[Confirmed]:
+def confirmed(task: LeafTask, candidates: Sequence[Candidate]) -> Iterable[Confirmed]:
     """Some of the front, evenly, by the beam model; where that fails, why."""
     for k in np.unique(np.linspace(0, len(candidates) - 1, SHOWN).astype(int)):
         candidate = candidates[k]

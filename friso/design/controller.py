@@ -38,7 +38,7 @@ class Damping:
 
 
 @dataclass(frozen=True)
-class Controller:
+class DesignedController:
     """Gains by van Dijk's rules at the `crossover` [Hz] chosen; the ranges of crossovers that are stable and
     comfortable; the least modulus margin of the settled states, in the stage of the design and in each corner (n,); and
     what joint damping adds."""
@@ -72,14 +72,14 @@ def comfortable(stage: Stage, leaves: Evaluation, population: Population) -> tup
     return ranges
 
 
-def controller(stage: Stage, leaves: Evaluation, ranges: Limits, population: Population) -> Controller:
+def controller(stage: Stage, leaves: Evaluation, ranges: Limits, population: Population) -> DesignedController:
     """The controller of a stage with leaf springs, its crossover chosen."""
     flat = stage.flat()
     gains = tuning(*(flat[key] for key in (CROSSOVER, ALPHA, BETA, TUNED_MASS)))
     corners = np.array([_margin({**flat, **population.of(k)}, leaves) for k in range(population.count)])
     tried = dampings(flat)
     damping = Damping(tried, np.array([_margin({**flat, "joint.damping": trial}, leaves) for trial in tried]))
-    return Controller(flat[CROSSOVER], gains, ranges, _margin(flat, leaves), corners, damping)
+    return DesignedController(flat[CROSSOVER], gains, ranges, _margin(flat, leaves), corners, damping)
 
 
 def _margin(flat: Mapping[str, Any], leaves: Evaluation) -> float:

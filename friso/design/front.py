@@ -9,7 +9,7 @@ import numpy as np
 from scipy.optimize import differential_evolution
 
 from friso.design.geometry import Geometry, Sheet, box, mechanisms, sheets
-from friso.design.requirements import PARASITIC, Requirement, Task, requirements
+from friso.design.requirements import PARASITIC, LeafTask, Requirement, requirements
 from friso.flexure import closed_forms
 from friso.flexure.joint import first_interfering
 
@@ -32,7 +32,7 @@ class Candidate:
     frequency: float
 
 
-def front(task: Task) -> list[Candidate]:
+def front(task: LeafTask) -> list[Candidate]:
     """The front, by rising stiffness (NSGA-II, doi:10.1109/4235.996017); empty where no geometry meets the requirements
     except the one on the frequency, which is an objective here."""
     from pymoo.algorithms.moo.nsga2 import NSGA2
@@ -61,13 +61,13 @@ def front(task: Task) -> list[Candidate]:
     return sorted(candidates, key=lambda candidate: candidate.stiffness)
 
 
-def _ends(task: Task) -> tuple[np.ndarray, np.ndarray]:
+def _ends(task: LeafTask) -> tuple[np.ndarray, np.ndarray]:
     """The least and the largest variables, each (4,): logarithms of the sizes, and the number of the sheet."""
     low, high = box(task.spec)
     return np.append(np.log(low), 0.0), np.append(np.log(high), len(sheets(task.spec)) - 1e-9)
 
 
-def _problem(task: Task, needs: list[Requirement]) -> Any:
+def _problem(task: LeafTask, needs: list[Requirement]) -> Any:
     """The two objectives and the requirements, as pymoo takes them."""
     from pymoo.core.problem import Problem
 
@@ -83,7 +83,7 @@ def _problem(task: Task, needs: list[Requirement]) -> Any:
     return Leaves(n_var=len(low), n_obj=2, n_ieq_constr=len(needs), xl=low, xu=high)
 
 
-def closest(task: Task, needs: list[Requirement]) -> np.ndarray | None:
+def closest(task: LeafTask, needs: list[Requirement]) -> np.ndarray | None:
     """A geometry, as the logarithms of its sizes and the number of its sheet (4,), that meets the requirements with the
     most to spare, by differential evolution; None if none meets them."""
     bought = sheets(task.spec)
@@ -110,7 +110,7 @@ class Judged:
     excess: np.ndarray
 
 
-def judged(task: Task, needs: list[Requirement], sizes: np.ndarray, bought: list[Sheet]) -> Judged:
+def judged(task: LeafTask, needs: list[Requirement], sizes: np.ndarray, bought: list[Sheet]) -> Judged:
     """Geometries by closed forms."""
     many = mechanisms(task.flat, sizes, bought)
     excess = [np.broadcast_to(requirement.excess(many), (len(sizes),)) for requirement in needs]

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from friso.design.choice import Choice, Confirmed, chosen, confirmed
-from friso.design.controller import Controller, comfortable, comfortable_below, controller, dampings
+from friso.design.choice import ChosenLeaves, Confirmed, chosen, confirmed
+from friso.design.controller import DesignedController, comfortable, comfortable_below, controller, dampings
 from friso.design.edges import Corners, edges_over, rigid
 from friso.design.front import Candidate, front
 from friso.design.hunting_map import HuntingMap, hunting_map
@@ -17,7 +17,7 @@ from friso.design.modal import Modal
 from friso.design.population import Population, corners
 from friso.design.prepare import prepared, with_leaves
 from friso.design.relax import Relaxation, relaxations
-from friso.design.requirements import Task
+from friso.design.requirements import LeafTask
 from friso.design.spec import Spec
 from friso.design.verification import Verification, verification
 from friso.equations.controllers.van_dijk import CROSSOVER
@@ -53,12 +53,12 @@ class NoDesign(Exception):
 
 
 @dataclass(frozen=True)
-class Fitted:
+class LeavesAndCrossover:
     """Leaves and crossover that go together: the task the leaves were chosen for, the choice, the stage with both, and
     how fast its controller may be."""
 
-    task: Task
-    choice: Choice
+    task: LeafTask
+    choice: ChosenLeaves
     stage: Stage
     limits: Limits
 
@@ -78,9 +78,9 @@ class Design:
     without: Corners
     candidates: tuple[Candidate, ...]
     confirmed: tuple[Confirmed, ...]
-    fitted: Fitted
+    fitted: LeavesAndCrossover
     edges: Corners
-    controller: Controller
+    controller: DesignedController
     map: HuntingMap
     verification: Verification
     damped: Relaxation | None
@@ -146,7 +146,7 @@ def design(stage: Stage, spec: Spec, progress: Progress = silent) -> Design:
     return Design(spec, stage, *results)
 
 
-def with_damping(fit: Fitted) -> tuple[Relaxation | None, float]:
+def with_damping(fit: LeavesAndCrossover) -> tuple[Relaxation | None, float]:
     """The least joint damping of those tried with which the crossover could be what leaves and machine allow, and that
     crossover [Hz]; none where it is already, or where damping does not help."""
     flat, spec = fit.stage.flat(), fit.task.spec
@@ -170,7 +170,9 @@ def least_friction(population: Population, flat: Mapping[str, Any]) -> float:
     return float(np.min(population.keys.get(key, flat[key]))) * weaker - abs(flat.get("bias.cart", 0.0))
 
 
-def leaves(spec: Spec, flat: Mapping[str, Any], friction: float, progress: Progress) -> tuple[Task, list[Candidate]]:
+def leaves(
+    spec: Spec, flat: Mapping[str, Any], friction: float, progress: Progress
+) -> tuple[LeafTask, list[Candidate]]:
     """The front for the largest stroke that allows the machine's limit; else that which allows the highest crossover.
     Raises NoDesign where no leaf springs meet the requirements."""
     stroke, choices = spec.leaves.stroke, []
@@ -178,24 +180,24 @@ def leaves(spec: Spec, flat: Mapping[str, Any], friction: float, progress: Progr
     strokes = np.geomspace(stroke.high, stroke.low, STROKES).tolist() if several else [stroke.high]
     for k, size in enumerate(strokes):
         progress(k, len(strokes), "leaf springs")
-        task = Task(spec, size, spec.limit, friction, flat)
+        task = LeafTask(spec, size, spec.limit, friction, flat)
         if candidates := front(task):
             choices.append((task, candidates))
             if allowed(task, candidates) >= spec.limit:
                 break
     if not choices:
         raise NoDesign(
-            "no leaf springs meet the specification", relaxations(Task(spec, strokes[-1], 0.0, friction, flat))
+            "no leaf springs meet the specification", relaxations(LeafTask(spec, strokes[-1], 0.0, friction, flat))
         )
     return max(choices, key=lambda pair: min(allowed(*pair), spec.limit))
 
 
-def allowed(task: Task, candidates: list[Candidate]) -> float:
+def allowed(task: LeafTask, candidates: list[Candidate]) -> float:
     """The highest crossover [Hz] whose multiple is still below a first interfering frequency of the front."""
     return max(candidate.frequency for candidate in candidates) / task.spec.safety.parasitic
 
 
-def fitted(base: Stage, task: Task, candidates: list[Candidate], population: Population) -> Fitted:
+def fitted(base: Stage, task: LeafTask, candidates: list[Candidate], population: Population) -> LeavesAndCrossover:
     """Leaves as soft as the crossover allows, that as high as leaves and margins allow. Raises NoDesign."""
     target = min(task.spec.limit, allowed(task, candidates))
     for _ in range(ROUNDS):
@@ -210,7 +212,7 @@ def fitted(base: Stage, task: Task, candidates: list[Candidate], population: Pop
         if best is None:
             raise NoDesign(f"up to {target:.3g} Hz there is no crossover with a modulus margin of 0.5")
         if best >= ALIKE * target:
-            return Fitted(task, choice, stage.replace({CROSSOVER: f"{_down(best):.6g} Hz"}), ranges)
+            return LeavesAndCrossover(task, choice, stage.replace({CROSSOVER: f"{_down(best):.6g} Hz"}), ranges)
         target = best
     raise NoDesign(
         f"none of the {len(candidates)} leaf springs on the front, in sizes rounded to tenths of a millimetre, is "
@@ -224,7 +226,7 @@ def _down(crossover: float) -> float:
     return float(np.floor(crossover / step * (1 + 1e-9)) * step)
 
 
-def _does_not_hunt(fit: Fitted, edges: Corners) -> None:
+def _does_not_hunt(fit: LeavesAndCrossover, edges: Corners) -> None:
     """Raises NoDesign where the crossover does not keep its distance from the edge of hunting."""
     spec, crossover = fit.task.spec, fit.stage.flat()[CROSSOVER]
     needed = spec.safety.hunting * edges.highest
@@ -240,7 +242,7 @@ def _does_not_hunt(fit: Fitted, edges: Corners) -> None:
     raise NoDesign(reason, tuple(_ways_out(fit, edges.highest, needed, crossover)))
 
 
-def _ways_out(fit: Fitted, edge: float, needed: float, crossover: float) -> Iterator[Relaxation]:
+def _ways_out(fit: LeavesAndCrossover, edge: float, needed: float, crossover: float) -> Iterator[Relaxation]:
     """What would let the crossover keep its distance from the edge [Hz]."""
     spec, name = fit.task.spec, "crossover above the edge of hunting"
     above = [max(low, needed) for low, high in fit.limits.comfortable if high > needed]

@@ -12,7 +12,7 @@ from friso.equations.bandwidth import faster
 from friso.equations.controllers.van_dijk import CROSSOVER
 from friso.flexure.evaluation import Evaluation
 from friso.frequency.crossover import DENSITY, STEPS, WANTED, searched, settled_members
-from friso.frequency.drive import Drive
+from friso.frequency.drive import DriveTiming
 from friso.frequency.family import controller, distance_to_lines, grid, plants, stability_by_poles
 from friso.frequency.members import Members
 from friso.frequency.ranges import Range, ranges_below
@@ -39,7 +39,7 @@ class Modal:
     def of(cls, flat: Mapping[str, Any], leaves: Evaluation) -> Modal:
         """A stage given as flat keys with the modes of its leaf springs."""
         rigid = {key: value for key, value in flat.items() if not key.startswith("parasitic.")}
-        members, drive = settled_members(rigid), Drive.of(rigid)
+        members, drive = settled_members(rigid), DriveTiming.of(rigid)
         omega = _frequencies(rigid, leaves, drive)
         bare = plants(rigid, members, omega) * drive.transfer(omega)
         return cls(rigid, members, omega, bare, bare + compliance(leaves, omega) * drive.transfer(omega))
@@ -82,7 +82,7 @@ def compliance(leaves: Evaluation, omega: np.ndarray) -> np.ndarray:
     return np.sum(parts, axis=0)
 
 
-def _frequencies(flat: Mapping[str, Any], leaves: Evaluation, drive: Drive) -> np.ndarray:
+def _frequencies(flat: Mapping[str, Any], leaves: Evaluation, drive: DriveTiming) -> np.ndarray:
     """Angular frequencies that show the loop at all crossovers, and every mode."""
     ends = [grid(faster(flat, np.array(end / flat[CROSSOVER])), DENSITY) for end in searched(flat)]
     zeta = float(leaves.mechanism.damping_ratio)

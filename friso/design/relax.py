@@ -10,7 +10,7 @@ import numpy as np
 from scipy.optimize import differential_evolution
 
 from friso.design.geometry import SIZES, Geometry, Sheet, box, mechanisms
-from friso.design.requirements import Requirement, Task, less, more, requirements
+from friso.design.requirements import LeafTask, Requirement, less, more, requirements
 from friso.flexure.mechanism import Mechanism
 
 BEYOND = 3.0
@@ -40,7 +40,7 @@ class Relaxation:
     geometry: Geometry | None = None
 
 
-def relaxations(task: Task) -> tuple[Relaxation, ...]:
+def relaxations(task: LeafTask) -> tuple[Relaxation, ...]:
     """For each requirement, by how much it has to be relaxed if all others stand; those that can be, the least change
     first. Empty where no single one is enough."""
     needs = [*requirements(task), *_space(task)]
@@ -53,7 +53,7 @@ def _change(relaxation: Relaxation) -> float:
     return float(abs(np.log(relaxation.needed / relaxation.value))) if relaxation.needed > 0 else np.inf
 
 
-def _space(task: Task) -> list[Requirement]:
+def _space(task: LeafTask) -> list[Requirement]:
     """The limits of space and sheets as requirements."""
     low, high = box(task.spec)
     gauges = sorted(map(float, task.spec.leaves.thickness))
@@ -79,7 +79,7 @@ class _Trials:
     """Geometries in more space than is allowed, as variables: logarithms of length, width, spacing and thickness, and
     the number of the kind. The thickness is `free`, or that of the next available sheet."""
 
-    task: Task
+    task: LeafTask
     free: bool
 
     @property
@@ -107,7 +107,7 @@ class _Trials:
         return sizes[:, :3], [Sheet(count, float(t), of) for t, (count, of) in zip(thickness, chosen, strict=True)]
 
 
-def _alone(task: Task, needs: list[Requirement], k: int) -> Iterator[Relaxation]:
+def _alone(task: LeafTask, needs: list[Requirement], k: int) -> Iterator[Relaxation]:
     """The least relaxation of requirement `k` with which the others can be met."""
     of_sheets = np.array([requirement.ways[0].key == "leaves.thickness" for requirement in needs])
     trials = _Trials(task, free=bool(of_sheets[k]))

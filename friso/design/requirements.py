@@ -19,7 +19,7 @@ that the beam model confirms them."""
 
 
 @dataclass(frozen=True)
-class Task:
+class LeafTask:
     """What leaf springs are designed for: the specification, a stroke [m], the crossover [Hz] whose multiple the first
     interfering frequency has to be, the least static friction [N], and the flat keys of the stage without its joint's
     leaves."""
@@ -76,7 +76,7 @@ def factor(key: str, value: float) -> Way:
 BREAKAWAY, PARASITIC = "the cart must not break away inside the stroke", "first interfering frequency"
 
 
-def requirements(task: Task) -> list[Requirement]:
+def requirements(task: LeafTask) -> list[Requirement]:
     """All requirements except those on space and sheets."""
     spec, safety, stroke = task.spec, task.spec.safety, task.stroke
     shorter = less("leaves.stroke", stroke, "m")
@@ -117,7 +117,7 @@ def requirements(task: Task) -> list[Requirement]:
     ]
 
 
-def _lighter(task: Task) -> tuple[Way, ...]:
+def _lighter(task: LeafTask) -> tuple[Way, ...]:
     """A smaller load along the leaves, if that is all there is; the weight of the stage stays."""
     load = task.spec.load
     force = float(load.force_x)
@@ -148,27 +148,27 @@ def _support(spec: Spec, stroke: float) -> list[Requirement]:
     ]
 
 
-def buckling_share(mechanism: Mechanism, task: Task, buckling: Any) -> Any:
+def buckling_share(mechanism: Mechanism, task: LeafTask, buckling: Any) -> Any:
     """How much of what makes the leaves give way is there: the largest force along a leaf, as if it pressed on all,
     over the `buckling` load [N], and the force across them over that at which they give way sideways."""
     across = float(task.spec.load.force_y) / closed_forms.lateral_load(mechanism)
     return leaf_load(mechanism, task) * mechanism.leaves / buckling + across
 
 
-def leaf_load(mechanism: Mechanism, task: Task) -> Any:
+def leaf_load(mechanism: Mechanism, task: LeafTask) -> Any:
     """The largest force along a leaf [N]: its share of the load, and what a moment about the width adds."""
     outermost = mechanism.depth / 2 / mechanism.offset_squares
     return task.load / mechanism.leaves + float(task.spec.load.moment_y) * outermost
 
 
-def static_stress(mechanism: Mechanism, task: Task) -> Any:
+def static_stress(mechanism: Mechanism, task: LeafTask) -> Any:
     """Largest stress at the clamps [Pa] at full stroke under all loads at once, with the concentration there."""
     return mechanism.stress_concentration * closed_forms.max_stress(mechanism, task.stroke) + load_stress(
         mechanism, task
     )
 
 
-def load_stress(mechanism: Mechanism, task: Task) -> Any:
+def load_stress(mechanism: Mechanism, task: LeafTask) -> Any:
     """Of it, what the loads make [Pa]: a force across the leaf ends bends them in their plane as cantilevers, since
     nothing else holds the stage about z; a moment about x as leaves whose ends stay parallel."""
     load, middle = task.spec.load, mechanism.width / 2 / mechanism.edgewise

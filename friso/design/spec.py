@@ -30,7 +30,7 @@ from friso.stage.section import Section, Table
 
 
 @dataclass(frozen=True)
-class Choice:
+class OneOrMany:
     """A key that takes one item or a list of them, each read by `read_one`, which raises SpecError."""
 
     of: Quantity | Number | None
@@ -72,7 +72,7 @@ GAUGES = (0.05, 0.08, 0.1, 0.12, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.5, 0.6, 0.7,
 
 
 @dataclass(frozen=True)
-class Gauges(Choice):
+class Gauges(OneOrMany):
     """A list of thicknesses, or a range that stands for the usual gauges in it."""
 
     def read(self, entry: Any) -> tuple[Any, ...]:
@@ -99,12 +99,12 @@ _GAUGE = Quantity("m", positive, "0.3 mm")
 _GAUGES = 'thickness = ["0.2 mm", "0.25 mm", "0.3 mm"]'
 
 
-class Machine(Section):
+class SpecMachine(Section):
     """How fast the controller of the machine may be, or the parasitic frequencies that decide it."""
 
     bandwidth_limit: Annotated[Value | None, Quantity("Hz", positive, "48 Hz")] = None
     parasitic_frequencies: Annotated[
-        tuple[Any, ...] | None, Choice(Quantity("Hz", positive, "480 Hz"), '["480 Hz", "730 Hz"]')
+        tuple[Any, ...] | None, OneOrMany(Quantity("Hz", positive, "480 Hz"), '["480 Hz", "730 Hz"]')
     ] = None
 
     @model_validator(mode="after")
@@ -116,7 +116,7 @@ class Machine(Section):
         return self
 
 
-class Friction(Section):
+class SpecFriction(Section):
     """Ranges of the friction of the bearing; a key left out stays as in the stage file."""
 
     static: Annotated[Interval | None, Span(Quantity("N", positive, "3 N"), "1 N .. 3 N")] = None
@@ -148,7 +148,7 @@ class SpecMasses(Section):
     stage: Annotated[Interval | None, Span(_MASS, "0.5 kg +/- 5 %")] = None
 
 
-class Moves(Section):
+class SpecMoves(Section):
     """The moves: travel and acceleration, each from its range."""
 
     travel: Annotated[Interval, Span(Quantity("m", positive, "10 mm"), "1 mm .. 100 mm")]
@@ -175,18 +175,18 @@ class Load(Section):
     support_y: Annotated[Value | None, _SUPPORT] = None
 
 
-class Leaves(Section):
+class SpecLeaves(Section):
     """What can be built: the space for the leaves, the available sheets and materials, and the stroke.
 
     A single length, width or spacing is the largest allowed, a tenth of it the least.
     """
 
-    leaves: Annotated[tuple[Any, ...], Choice(Number(leaf_count, "2"), "leaves = 2")] = (2,)
+    leaves: Annotated[tuple[Any, ...], OneOrMany(Number(leaf_count, "2"), "leaves = 2")] = (2,)
     length: Annotated[Interval, Span(_LENGTH, "30 mm .. 70 mm")]
     width: Annotated[Interval, Span(_LENGTH, "10 mm .. 45 mm")]
     spacing: Annotated[Interval, Span(_LENGTH, "20 mm .. 60 mm")]
     thickness: Annotated[tuple[Any, ...], Gauges(_GAUGE, _GAUGES)]
-    materials: Annotated[tuple[Any, ...], Choice(None, 'materials = ["stainless 1.4310"]')]
+    materials: Annotated[tuple[Any, ...], OneOrMany(None, 'materials = ["stainless 1.4310"]')]
     stroke: Annotated[Interval, Span(_LENGTH, "0.3 mm .. 1 mm")]
 
     def space(self, name: str) -> tuple[float, float]:
@@ -230,13 +230,13 @@ class Safety(Section):
     """Share by which the drive stiffness may be off: the thickness, in its cube, by a third of that."""
 
 
-_MACHINE = Table(lambda _: Machine, '[machine] bandwidth_limit = "48 Hz"')
-_FRICTION = Table(lambda _: Friction, '[friction] static = "1 N .. 3 N"')
+_MACHINE = Table(lambda _: SpecMachine, '[machine] bandwidth_limit = "48 Hz"')
+_FRICTION = Table(lambda _: SpecFriction, '[friction] static = "1 N .. 3 N"')
 _MASSES = Table(lambda _: SpecMasses, '[masses] stage = "0.5 kg +/- 5 %"')
-_MOVES = Table(lambda _: Moves, '[moves] travel = "1 mm .. 100 mm", acceleration = "10 m/s^2 .. 100 m/s^2"')
+_MOVES = Table(lambda _: SpecMoves, '[moves] travel = "1 mm .. 100 mm", acceleration = "10 m/s^2 .. 100 m/s^2"')
 _POSITION = Table(lambda _: Position, '[position] window = "1 um"')
 _LOAD = Table(lambda _: Load, '[load] force_x = "20 N"')
-_LEAVES = Table(lambda _: Leaves, '[leaves] length = "30 mm .. 70 mm", ...')
+_LEAVES = Table(lambda _: SpecLeaves, '[leaves] length = "30 mm .. 70 mm", ...')
 _SAFETY = Table(lambda _: Safety, "[safety] buckling = 3")
 
 
@@ -247,13 +247,13 @@ class Spec(Section):
 
     name: str = ""
     source: str = ""
-    machine: Annotated[Machine, _MACHINE]
-    friction: Annotated[Friction, _FRICTION]
+    machine: Annotated[SpecMachine, _MACHINE]
+    friction: Annotated[SpecFriction, _FRICTION]
     masses: Annotated[SpecMasses, _MASSES] = SpecMasses()
-    moves: Annotated[Moves, _MOVES]
+    moves: Annotated[SpecMoves, _MOVES]
     position: Annotated[Position, _POSITION]
     load: Annotated[Load, _LOAD] = Load()
-    leaves: Annotated[Leaves, _LEAVES]
+    leaves: Annotated[SpecLeaves, _LEAVES]
     safety: Annotated[Safety, _SAFETY] = Safety()
 
     @property

@@ -10,7 +10,7 @@ from scipy.stats import binomtest
 
 from friso.design.population import Population, sampled
 from friso.design.spec import Spec
-from friso.engine.batch import Options, run_chunks
+from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import kernel
 from friso.equations.controllers.van_dijk import TUNED_MASS
 from friso.equations.motion import last_corner
@@ -44,7 +44,7 @@ RTOL = 1e-5
 
 
 @dataclass(frozen=True)
-class Outcome:
+class MachineOutcomes:
     """What became of the machines, arrays of shape (count,): what the run did at its end (`words`, of
     `friso.hunting.criteria.run_outcome`, the band being the position window; a run rests that has been in it for the
     last quarter; of those that do not, the words are of a run ten times as long), the time [s] after the last corner of
@@ -111,8 +111,8 @@ class Verification:
     ones as a stage."""
 
     population: Population
-    free: Outcome
-    locked: Outcome
+    free: MachineOutcomes
+    locked: MachineOutcomes
     worst: Stage
 
 
@@ -122,7 +122,7 @@ def verification(stage: Stage, spec: Spec, softening: float, progress: Progress)
     flat = stage.flat()
     machines = sampled(spec, flat, MACHINES, softening)
     window = float(spec.position.window)
-    outcomes: list[Outcome] = []
+    outcomes: list[MachineOutcomes] = []
     for name, held in (("joint free", False), ("joint locked", True)):
         keys = machines.over(flat) | {"joint.locked": held, "motion.kind": "there_and_back"}
         outcomes.append(tried(keys, machines.count, window, progress, name))
@@ -137,7 +137,7 @@ def tried(
     progress: Progress = silent,
     what: str = "moves",
     patient: bool = True,
-) -> Outcome:
+) -> MachineOutcomes:
     """The moves of stages given as flat keys, arrays of shape (count,); if `patient`, those that are not in position
     again, for longer."""
     first = _followed(flat, count, window, FOLLOWED, progress, what)
@@ -151,14 +151,16 @@ def tried(
     return first
 
 
-def _followed(flat: dict[str, Any], count: int, window: float, time: float, progress: Progress, what: str) -> Outcome:
+def _followed(
+    flat: dict[str, Any], count: int, window: float, time: float, progress: Progress, what: str
+) -> MachineOutcomes:
     """The moves, each followed for a time [s] after its last corner."""
     corner = np.broadcast_to(np.asarray(last_corner(flat), float), (count,))
     keys = {**flat, "motion.duration": corner + time}
-    options = Options(
+    options = RunOptions(
         rtol=RTOL, bands=(window, 10 * window), window=1 - LAST, record_from=np.inf, least_swing=window / 4
     )
-    outcome = Outcome(np.full(count, FAILED, dtype=object), np.full(count, np.nan), np.full(count, np.nan))
+    outcome = MachineOutcomes(np.full(count, FAILED, dtype=object), np.full(count, np.nan), np.full(count, np.nan))
     done = 0
     for runs in run_chunks(kernel(shared_structure(keys)), keys, count, options):
         numbers, end = runs.numbers, end_of(runs, turns_of(runs), "inner")

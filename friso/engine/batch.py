@@ -31,7 +31,7 @@ MOST_TURNS = 1 << 20
 
 
 @dataclass(frozen=True)
-class Options:
+class RunOptions:
     """How to run: relative tolerance, bands of settling [m], start of the window for extremes as a share of the run,
     time [s] from which turning points are kept (at most half of the run), the least swing [m] between two of them
     (the smaller ones of a zigzag are passed over), sampling interval [s] (None: no samples), step budget, threads,
@@ -70,7 +70,7 @@ def _part(flat: Mapping[str, Any], numbers: np.ndarray) -> dict[str, Any]:
 
 
 def run_chunks(
-    kernel: Kernel, flat: Mapping[str, Any], runs: int, options: Options, starts: np.ndarray | None = None
+    kernel: Kernel, flat: Mapping[str, Any], runs: int, options: RunOptions, starts: np.ndarray | None = None
 ) -> Iterator[Runs]:
     """Run `runs` stages of one structure, given as flat keys to SI numbers or arrays of shape (runs,).
 
@@ -85,7 +85,7 @@ def run_chunks(
 
 
 def prepare(
-    kernel: Kernel, flat: Mapping[str, Any], runs: int, options: Options, starts: np.ndarray | None = None
+    kernel: Kernel, flat: Mapping[str, Any], runs: int, options: RunOptions, starts: np.ndarray | None = None
 ) -> Batch:
     """The kernel's input for the runs of one chunk, from the states `starts` unless as the motion says."""
     values = kernel.values({**flat, "motion.size": motion.size(flat)}, runs)
@@ -142,7 +142,7 @@ def _run_with_room(
     flat: Mapping[str, Any],
     numbers: np.ndarray,
     room: int,
-    options: Options,
+    options: RunOptions,
     starts: np.ndarray | None,
 ) -> Iterator[Runs]:
     """Run the runs with these numbers; those with more turning points than there is room for again, fewer at a time
@@ -170,7 +170,7 @@ def _run_with_room(
         yield from _run_with_room(kernel, flat, again[first : first + fewer], 4 * room, options, starts)
 
 
-def settings_of(options: Options) -> Settings:
+def settings_of(options: RunOptions) -> Settings:
     """The options as the kernel takes them."""
     return Settings(
         rtol=float(options.rtol),

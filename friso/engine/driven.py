@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from friso.engine.batch import Options, prepare, run_batch, settings_of
+from friso.engine.batch import RunOptions, prepare, run_batch, settings_of
 from friso.engine.kernel import Kernel, empty_results
 
 BUDGET = 200
@@ -60,7 +60,9 @@ def follow(
     `starts`, shape (runs, kept); they come chunk by chunk. A failed run is NaN from there on, and has its status.
     """
     count, segments = len(inputs.reference), inputs.segments
-    options = Options(rtol=rtol, bands=(np.inf, np.inf), record_from=np.inf, least_swing=np.inf, budget=BUDGET * count)
+    options = RunOptions(
+        rtol=rtol, bands=(np.inf, np.inf), record_from=np.inf, least_swing=np.inf, budget=BUDGET * count
+    )
     size = float(np.abs(inputs.reference - starts[0, kernel.position]).max())
     settings = settings_of(replace(options, interval=inputs.sample_time))
     for first in range(0, runs, CHUNK):

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from friso.engine.arrays import Status
-from friso.engine.batch import Options, Runs, run_chunks
+from friso.engine.batch import RunOptions, Runs, run_chunks
 from friso.engine.kernel import Kernel, kernel
 from friso.engine.tolerance import checked_rtol
 from friso.equations import motion
@@ -44,7 +44,7 @@ def simulate(stage: Stage, rtol: float = 1e-6, sample_time: float | None = None)
         text, expected = f"{interval:g} s", f"from {duration / MOST_SAMPLES:g} s to the duration, {duration:g} s"
         raise InputError("sample_time", text, expected, "1 ms")
     shape = kernel(structure(flat))
-    (runs,) = run_chunks(shape, flat, 1, Options(rtol=checked_rtol(rtol), interval=interval))
+    (runs,) = run_chunks(shape, flat, 1, RunOptions(rtol=checked_rtol(rtol), interval=interval))
     time = np.arange(runs.results.samples.shape[1]) * interval
     return _dataset(stage, shape, flat, runs, time, rtol)
 

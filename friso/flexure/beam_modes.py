@@ -13,7 +13,7 @@ import numpy as np
 from scipy.linalg import eigh
 
 from friso.flexure import plate
-from friso.flexure.beam_system import COORDINATES, Leaves
+from friso.flexure.beam_system import COORDINATES, LeafBeams
 from friso.flexure.closed_forms import axial, body_mass
 from friso.flexure.evaluation import Mode, peak_of
 from friso.flexure.mechanism import Mechanism, along_motion
@@ -161,7 +161,7 @@ def _rows(offsets: np.ndarray) -> np.ndarray:
     return np.linalg.qr(powers)[0].T
 
 
-def buckling_load(mechanism: Mechanism, leaves: Leaves, straight: np.ndarray, load: float) -> float:
+def buckling_load(mechanism: Mechanism, leaves: LeafBeams, straight: np.ndarray, load: float) -> float:
     """Least load [N] along the leaves, shared by them, at which the stage sways, `straight` being the stiffness of a
     leaf without load and `load` a guess [N], at which it is linearised."""
     state = np.zeros((1, leaves.nodes, COORDINATES))

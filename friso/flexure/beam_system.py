@@ -31,7 +31,7 @@ class BeamFailure(RuntimeError):
     """A mechanism that the beam model cannot evaluate."""
 
 
-class Leaves:
+class LeafBeams:
     """The leaves, all identical and with free ends: exudyn holds one leaf and evaluates each state in turn.
     States and forces are of shape (leaves, nodes, 6), the cart end first."""
 
@@ -81,7 +81,7 @@ class Leaves:
 
 
 @dataclass(frozen=True)
-class Place:
+class Configuration:
     """A configuration in the plane of motion: displacements of the `inner` nodes (leaves, nodes between the ends, 3)
     and of the `stage` (x, z, about y)."""
 
@@ -89,13 +89,13 @@ class Place:
     stage: np.ndarray
 
     @classmethod
-    def rest(cls, leaves: Leaves) -> Place:
+    def rest(cls, leaves: LeafBeams) -> Configuration:
         """The configuration without deflection."""
         return cls(np.zeros((leaves.count, leaves.nodes - 2, 3)), np.zeros(3))
 
-    def plus(self, rate: Place, factor: float = 1.0) -> Place:
+    def plus(self, rate: Configuration, factor: float = 1.0) -> Configuration:
         """The configuration moved along a rate, a factor times."""
-        return Place(self.inner + factor * rate.inner, self.stage + factor * rate.stage)
+        return Configuration(self.inner + factor * rate.inner, self.stage + factor * rate.stage)
 
     def state(self, offsets: np.ndarray) -> np.ndarray:
         """That of all nodes, shape (leaves, nodes, 6)."""

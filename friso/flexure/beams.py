@@ -13,7 +13,7 @@ import numpy as np
 
 from friso.flexure import closed_forms, plate
 from friso.flexure.beam_modes import Reduced, buckling_load, modes
-from friso.flexure.beam_system import ELEMENTS, BeamFailure, Condensed, Leaves, Place
+from friso.flexure.beam_system import ELEMENTS, BeamFailure, Condensed, Configuration, LeafBeams
 from friso.flexure.evaluation import Evaluation
 from friso.flexure.mechanism import Mechanism
 
@@ -35,12 +35,12 @@ PLANE, ACROSS = slice(0, None, 2), slice(1, None, 2)
 
 
 @dataclass(frozen=True)
-class Held:
+class HeldEquilibrium:
     """Equilibrium with the stage held at z: the place and its rate per z, the force along z and the tangent stiffness
     (6, 6) of the stage."""
 
-    place: Place
-    rate: Place
+    place: Configuration
+    rate: Configuration
     force: float
     stiffness: np.ndarray
 
@@ -50,7 +50,7 @@ def beams(mechanism: Mechanism, stroke: float, elements: int = ELEMENTS) -> Eval
     _check(mechanism, stroke)
     try:
         with np.errstate(all="ignore"):  # what comes out as no number is found by Leaves
-            return _evaluate(mechanism, float(stroke), Leaves(mechanism, elements))
+            return _evaluate(mechanism, float(stroke), LeafBeams(mechanism, elements))
     except BeamFailure:
         raise
     except (ValueError, ArithmeticError, RuntimeError) as error:  # of numpy, scipy and exudyn
@@ -67,9 +67,9 @@ def _check(mechanism: Mechanism, stroke: float) -> None:
             raise BeamFailure(f"The beams need a positive {name}, not {float(value):.6g}.")
 
 
-def _evaluate(mechanism: Mechanism, stroke: float, leaves: Leaves) -> Evaluation:
+def _evaluate(mechanism: Mechanism, stroke: float, leaves: LeafBeams) -> Evaluation:
     deflections = np.linspace(0, stroke, POINTS)
-    rest = Place.rest(leaves)
+    rest = Configuration.rest(leaves)
     straight = np.repeat(leaves.stiffness(rest.state(mechanism.offsets)[:1]), leaves.count, axis=0)
     unloaded = np.zeros((leaves.count, leaves.nodes, 6))
     held = [_held(mechanism, rest, _solved(mechanism, rest, straight, unloaded), straight, unloaded)]
@@ -94,7 +94,7 @@ def _evaluate(mechanism: Mechanism, stroke: float, leaves: Leaves) -> Evaluation
     )
 
 
-def _pushed(mechanism: Mechanism, leaves: Leaves, held: list[Held], z: float) -> Held:
+def _pushed(mechanism: Mechanism, leaves: LeafBeams, held: list[HeldEquilibrium], z: float) -> HeldEquilibrium:
     """The next equilibrium, in as few steps as it can be reached."""
     nearest = held[-2:]
     start = nearest[-1].place.stage[1]
@@ -111,7 +111,7 @@ def _pushed(mechanism: Mechanism, leaves: Leaves, held: list[Held], z: float) ->
     raise BeamFailure(f"The beams find no equilibrium at a deflection of {z * 1e3:.4g} mm: reduce the stroke.")
 
 
-def _predicted(reached: list[Held], z: float) -> Place:
+def _predicted(reached: list[HeldEquilibrium], z: float) -> Configuration:
     """Extrapolation to z through the last two equilibria and their rates, or along the rate of the only one."""
     last = reached[-1]
     if len(reached) == 1:
@@ -121,13 +121,13 @@ def _predicted(reached: list[Held], z: float) -> Place:
     s = (z - before.place.stage[1]) / step
     weights = (1 + s**2 * (2 * s - 3), s**2 * (3 - 2 * s), step * s * (s - 1) ** 2, step * s**2 * (s - 1))
     parts = (before.place, last.place, before.rate, last.rate)
-    return Place(
+    return Configuration(
         np.sum([weight * part.inner for weight, part in zip(weights, parts, strict=True)], axis=0),
         np.sum([weight * part.stage for weight, part in zip(weights, parts, strict=True)], axis=0),
     )
 
 
-def _equilibrium(mechanism: Mechanism, leaves: Leaves, place: Place) -> Held:
+def _equilibrium(mechanism: Mechanism, leaves: LeafBeams, place: Configuration) -> HeldEquilibrium:
     """The equilibrium at the z of this place by Newton's method."""
     z = place.stage[1]
     close = CLOSE * (float(mechanism.thickness) / z) ** 2 * float(closed_forms.drive_stiffness(mechanism)) * z**2
@@ -148,12 +148,12 @@ class Solved:
     """A configuration linearised in the plane: the change that leads to equilibrium at the same z, and its energy."""
 
     plane: Condensed
-    change: Place
+    change: Configuration
     force: float
     energy: float
 
 
-def _solved(mechanism: Mechanism, place: Place, stiffness: np.ndarray, forces: np.ndarray) -> Solved:
+def _solved(mechanism: Mechanism, place: Configuration, stiffness: np.ndarray, forces: np.ndarray) -> Solved:
     """The stiffness of the leaves and the forces on their nodes, condensed onto the stage."""
     offsets, turn = mechanism.offsets, place.stage[2]
     ends = np.tile(np.eye(3), (len(offsets), 1, 1))
@@ -163,13 +163,15 @@ def _solved(mechanism: Mechanism, place: Place, stiffness: np.ndarray, forces: n
     free = plane.stiffness[::2, ::2]
     move = np.zeros(3)
     move[::2] = -np.linalg.solve(free, plane.force[::2])
-    change = Place((plane.settle + plane.follow @ move).reshape(place.inner.shape), move)
+    change = Configuration((plane.settle + plane.follow @ move).reshape(place.inner.shape), move)
     at_ends = np.einsum("li,lij,j", forces[:, -1, PLANE], ends, move)
     energy = abs(np.sum(forces[:, 1:-1, PLANE] * change.inner) + at_ends)
     return Solved(plane, change, float(plane.force[1] + plane.stiffness[1] @ move), float(energy))
 
 
-def _held(mechanism: Mechanism, place: Place, solved: Solved, stiffness: np.ndarray, forces: np.ndarray) -> Held:
+def _held(
+    mechanism: Mechanism, place: Configuration, solved: Solved, stiffness: np.ndarray, forces: np.ndarray
+) -> HeldEquilibrium:
     """The equilibrium next to this place."""
     plane = solved.plane
     rate = np.array([0.0, 1.0, 0.0])
@@ -177,9 +179,9 @@ def _held(mechanism: Mechanism, place: Place, solved: Solved, stiffness: np.ndar
     matrix = np.zeros((6, 6))
     matrix[PLANE, PLANE] = plane.stiffness
     matrix[ACROSS, ACROSS] = _across(mechanism, place.stage[2], stiffness, forces)
-    return Held(
+    return HeldEquilibrium(
         place.plus(solved.change),
-        Place((plane.follow @ rate).reshape(place.inner.shape), rate),
+        Configuration((plane.follow @ rate).reshape(place.inner.shape), rate),
         solved.force,
         matrix,
     )

@@ -23,7 +23,7 @@ ALUMINIUM = 2700.0
 
 
 @dataclass(frozen=True)
-class Body:
+class MovingBody:
     """The stage: mass [kg], moments of inertia [kg m^2] about axes through its centre of mass, and where that is [m],
     each a triple for x, y, z. Products of inertia are 0."""
 
@@ -52,7 +52,7 @@ class Mechanism:
     density: Any
     yield_strength: Any
     fatigue: Any
-    body: Body
+    body: MovingBody
     actuation: tuple[Any, Any, Any]
     sensor: tuple[Any, Any, Any]
     damping_ratio: Any = 0.01
@@ -69,7 +69,7 @@ class Mechanism:
             **shape,
             yield_strength=section["yield"],
             fatigue=section.get("fatigue", np.nan),
-            body=Body(flat["masses.stage"], (0.0, 0.0, 0.0), (section["length"], 0.0, 0.0)),
+            body=MovingBody(flat["masses.stage"], (0.0, 0.0, 0.0), (section["length"], 0.0, 0.0)),
             actuation=(section["length"], 0.0, 0.0),
             sensor=(section["length"], 0.0, 0.0),
             damping_ratio=section["damping_ratio"],
@@ -81,7 +81,7 @@ class Mechanism:
         actuation = _triple(section, "actuation", centre)
         return replace(
             bare,
-            body=Body(bare.body.mass, inertia, centre),
+            body=MovingBody(bare.body.mass, inertia, centre),
             actuation=actuation,
             sensor=_triple(section, "sensor", actuation),
         )
@@ -92,8 +92,8 @@ class Mechanism:
         def pick(value: Any) -> Any:
             if isinstance(value, tuple):
                 return tuple(map(pick, value))
-            if isinstance(value, Body):
-                return Body(*(pick(getattr(value, field.name)) for field in fields(Body)))
+            if isinstance(value, MovingBody):
+                return MovingBody(*(pick(getattr(value, field.name)) for field in fields(MovingBody)))
             return float(value[number]) if np.ndim(value) else value
 
         return Mechanism(*(pick(getattr(self, field.name)) for field in fields(Mechanism)))

@@ -10,7 +10,7 @@ import numpy as np
 
 from friso.errors import InputError
 from friso.frequency.crossover import Limits, limits
-from friso.frequency.drive import Drive
+from friso.frequency.drive import DriveTiming
 from friso.frequency.family import Scan, closed, loops, modes, scan, spectral_abscissa
 from friso.frequency.friction import steady_force
 from friso.frequency.loops import response
@@ -33,7 +33,7 @@ PRESCRIBED = (0.0, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1)
 
 
 @dataclass(frozen=True)
-class Case:
+class BodeCase:
     """A limit case: the state, its plant, stage position over force [m/N], and its loop L over `Bode.omega`, complex,
     both of shape (k,), and its margins."""
 
@@ -77,7 +77,7 @@ class Bode:
 
     stage: Stage
     omega: np.ndarray
-    cases: Mapping[str, Case]
+    cases: Mapping[str, BodeCase]
     scan: Scan
     loops: np.ndarray
     worst: tuple[Members, Margins]
@@ -95,7 +95,7 @@ class Bode:
 def bode(stage: Stage, band: Range | None = None, series: bool = False) -> Bode:
     """The linear analysis of a stage, its curves over frequencies `band` [Hz] (default: those that matter); with
     `series`, the thesis's formula for a touched limiter is added. Raises InputError for frequencies that are not
-    usable, a controller that exerts no force, and a delay that is too long (see `Drive`)."""
+    usable, a controller that exerts no force, and a delay that is too long (see `DriveTiming`)."""
     if band is not None and not 0 < band[0] < band[1] < np.inf:
         raise InputError("band", repr(band), "two rising frequencies [Hz]", "friso.bode(stage, (0.1, 1000.0))")
     flat = stage.flat()
@@ -113,8 +113,11 @@ def bode(stage: Stage, band: Range | None = None, series: bool = False) -> Bode:
         stage=stage,
         omega=omega,
         cases={
-            name: Case(
-                member, _plant(keys, member, omega), response(keys, member, Drive.of(keys))(omega), margins_of[name]
+            name: BodeCase(
+                member,
+                _plant(keys, member, omega),
+                response(keys, member, DriveTiming.of(keys))(omega),
+                margins_of[name],
             )
             for name, (keys, member) in states.items()
         },
@@ -149,7 +152,7 @@ def _mattering(flat: Mapping[str, Any], all_margins: Iterable[Margins]) -> Range
         [*(f for case_margins in all_margins for f in case_margins.crossovers), *resonances[resonances > 1e-3]]
     )
     places = places if places.size else np.ones(1)
-    return float(places.min()) / AROUND, min(float(places.max()) * AROUND, Drive.of(flat).highest / (2 * np.pi))
+    return float(places.min()) / AROUND, min(float(places.max()) * AROUND, DriveTiming.of(flat).highest / (2 * np.pi))
 
 
 def _prescribed(flat: Mapping[str, Any], omega: np.ndarray) -> tuple[Prescribed, ...]:
@@ -160,7 +163,7 @@ def _prescribed(flat: Mapping[str, Any], omega: np.ndarray) -> tuple[Prescribed,
     states = joined([member(speed, touched=touched) for speed in PRESCRIBED])
     every = zip(PRESCRIBED, spectral_abscissa(flat, states) < 0, strict=True)
     return tuple(
-        Prescribed(speed, response(flat, states[k], Drive.of(flat))(omega), bool(stable))
+        Prescribed(speed, response(flat, states[k], DriveTiming.of(flat))(omega), bool(stable))
         for k, (speed, stable) in enumerate(every)
     )
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from friso.equations.bandwidth import bandwidth, faster
-from friso.frequency.drive import Drive
+from friso.frequency.drive import DriveTiming
 from friso.frequency.family import PoleStability, controller, distance_to_lines, grid, plants, scan, stability_by_poles
 from friso.frequency.members import Members, family, joined, limit_cases
 from friso.frequency.ranges import Range, ranges_below, shared
@@ -95,7 +95,7 @@ def end_of(ranges: Sequence[Range], crossover: float) -> float | None:
 
 def searched(flat: Mapping[str, Any]) -> Range:
     """The crossovers that are searched; those of a sampled drive end below half the sampling frequency."""
-    drive = Drive.of(flat)
+    drive = DriveTiming.of(flat)
     if bandwidth(flat) is None:
         return 1 / 100.0, 1000.0
     return LOWEST, min(HIGHEST, 0.999 * drive.highest / (2 * np.pi))
@@ -133,7 +133,7 @@ def _distance(flat: Mapping[str, Any], members: Members, crossover: np.ndarray) 
     """Least distance of the loop from -1, shape (crossovers, members)."""
     # frequencies that show the loop at all crossovers searched, always the same: the distance stays a smooth function
     omega = np.unique(np.concatenate([grid(_at(flat, np.array(end)), DENSITY) for end in searched(flat)]))
-    bare = plants(flat, members, omega) * Drive.of(flat).transfer(omega)
+    bare = plants(flat, members, omega) * DriveTiming.of(flat).transfer(omega)
     shared = np.array([distance_to_lines(bare * controller(_at(flat, f), omega)) for f in crossover])
     return np.minimum(shared, _stability(flat, members, crossover).resonant.reshape(shared.shape))
 

@@ -35,14 +35,14 @@ SCALED = 0.5
 
 
 @dataclass(frozen=True)
-class Drive:
+class DriveTiming:
     """Sample time [s], 0 for a controller in continuous time, and delay between measurement and force [s]."""
 
     sample_time: float
     delay: float
 
     @classmethod
-    def of(cls, flat: Mapping[str, Any]) -> Drive:
+    def of(cls, flat: Mapping[str, Any]) -> DriveTiming:
         """The drive of a stage. Raises InputError for a delay of more samples than are followed."""
         drive = cls(flat.get("drive.sample_time", 0.0), flat.get("drive.delay", 0.0))
         if drive.sample_time and drive.delay > MOST_SAMPLES * drive.sample_time * (1 + 1e-9):

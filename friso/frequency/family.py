@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from friso.equations.structure import shared_structure
-from friso.frequency.drive import LIGHT, Drive
+from friso.frequency.drive import LIGHT, DriveTiming
 from friso.frequency.friction import law_of, operating_point
 from friso.frequency.loops import Poles, poles
 from friso.frequency.margins import frequencies, margins
@@ -83,7 +83,7 @@ class PoleStability(NamedTuple):
 
 def stability_by_poles(flat: Mapping[str, Any], members: Members) -> PoleStability:
     """Every member by its own poles; `flat` may hold arrays of shape (members,), except in the drive's keys."""
-    drive, by_poles = Drive.of(flat), PoleStability(np.empty(len(members)), np.empty(len(members)))
+    drive, by_poles = DriveTiming.of(flat), PoleStability(np.empty(len(members)), np.empty(len(members)))
 
     def look(which: np.ndarray) -> None:
         keys = {key: value[which] if np.ndim(value) else value for key, value in flat.items()}
@@ -121,12 +121,12 @@ def grid(flat: Mapping[str, Any], density: float) -> np.ndarray:
     """Angular frequencies [rad/s] that show the loops in all limit cases: so many per decade, and more about the
     resonances of plant and closed loop."""
     cases = joined([*limit_cases(flat).values()])
-    return frequencies(flat, cases, Drive.of(flat), density, [modes(flat, cases), closed(flat, cases)])
+    return frequencies(flat, cases, DriveTiming.of(flat), density, [modes(flat, cases), closed(flat, cases)])
 
 
 def closed(flat: Mapping[str, Any], members: Members) -> Complex:
     """Finite closed-loop poles [rad/s] of members."""
-    drive = Drive.of(flat)
+    drive = DriveTiming.of(flat)
     every = np.concatenate([poles(flat, kind, drive).in_s.ravel() for kind in members.kinds])
     return every[np.isfinite(every)]
 
@@ -161,13 +161,13 @@ def _cart_held(flat: Mapping[str, Any], masses: System, s: np.ndarray) -> Comple
 
 def loops(flat: Mapping[str, Any], members: Members, omega: np.ndarray) -> Complex:
     """L at angular frequencies [rad/s], shape (members, k); of a sampled loop without the aliases of the plant."""
-    drive = Drive.of(flat)
+    drive = DriveTiming.of(flat)
     return plants(flat, members, omega) * controller(flat, omega) * drive.transfer(omega)
 
 
 def controller(flat: Mapping[str, Any], omega: np.ndarray) -> Complex:
     """Force over a deviation of the stage from its reference [N/m], its sign reversed, shape (k,)."""
-    s = Drive.of(flat).controller_s(omega)
+    s = DriveTiming.of(flat).controller_s(omega)
     answers = compensator(flat, 1).take((STAGE, VELOCITY, REFERENCE), ("force",)).at(s)[0, :, 0]
     return -(answers[:, 0] + 1j * omega * answers[:, 1])
 

@@ -36,7 +36,7 @@ BRISTLES = 1e-6
 
 
 @dataclass(frozen=True)
-class Law:
+class LinearFriction:
     """A friction law as a linear system from the velocity of the cart to its force, and its steady states: those of its
     internal states, and then of its modes that remember, that slide at a velocity, and that bear a bias force at rest;
     and the lengths [m] among the scales of its states."""
@@ -53,14 +53,14 @@ class Law:
         return tuple(map(str, self.declared.states))
 
 
-def law_of(flat: Mapping[str, Any]) -> Law | None:
+def law_of(flat: Mapping[str, Any]) -> LinearFriction | None:
     """The law of a stage; None without friction."""
     form = shared_structure(flat)
     return _law(form.friction, form.friction_variant)
 
 
 @cache
-def _law(name: str, variant: Hashable) -> Law | None:
+def _law(name: str, variant: Hashable) -> LinearFriction | None:
     friction = friction_law(name).declare(VELOCITY, variant)
     if friction is None:
         return None
@@ -73,7 +73,7 @@ def _law(name: str, variant: Hashable) -> Law | None:
     slid: dict[Any, Any] = {x: sp.sympify(sliding.get(x, 0)) for x in (*states, *modes)}
     stuck = _stuck(states, [rate.subs(left) for rate in rates], friction.force.subs(left)) | left
     lengths = [state.scale for state in component.states if state.unit == "m"]
-    return Law(
+    return LinearFriction(
         Declared(states, rates, {"velocity": VELOCITY}, {"force": friction.force}),
         tuple(map(str, modes)),
         _compiled([*slid.values()]),

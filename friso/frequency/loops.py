@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from friso.frequency.drive import Drive, bilinear, delayed, fastest, waited, zero_order_hold
+from friso.frequency.drive import DriveTiming, bilinear, delayed, fastest, waited, zero_order_hold
 from friso.frequency.members import Members
 from friso.frequency.parts import DISTURBANCE, FORCE, NOISE, REFERENCE, STAGE, VELOCITY, compensator, plant
 from friso.frequency.system import Complex, System
@@ -68,7 +68,7 @@ class Poles:
     closed: Complex
     cut: Complex
     continuous: Complex
-    drive: Drive
+    drive: DriveTiming
 
     @property
     def in_s(self) -> Complex:
@@ -97,7 +97,7 @@ class Poles:
         return distance
 
 
-def poles(flat: Mapping[str, Any], members: Members, drive: Drive) -> Poles:
+def poles(flat: Mapping[str, Any], members: Members, drive: DriveTiming) -> Poles:
     """Poles of the loop, of members all of which are stuck or none; those of a delay in continuous time are of rational
     functions that stand for it. Raises InputError for a delay that is too long for these."""
     machine, control = plant(flat, members).take((FORCE,), (STAGE, VELOCITY)), compensator(flat, len(members))
@@ -114,7 +114,7 @@ def poles(flat: Mapping[str, Any], members: Members, drive: Drive) -> Poles:
     return Poles(closed, cut, closed if loop is bare else _shut(bare), drive)
 
 
-def response(flat: Mapping[str, Any], member: Members, drive: Drive) -> Callable[[np.ndarray], Complex]:
+def response(flat: Mapping[str, Any], member: Members, drive: DriveTiming) -> Callable[[np.ndarray], Complex]:
     """L over angular frequencies [rad/s], exactly, of a stage in one state."""
     if not drive.sample_time:
         loop = open_loop(flat, member)

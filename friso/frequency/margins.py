@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
-from friso.frequency.drive import Drive, resonances
+from friso.frequency.drive import DriveTiming, resonances
 from friso.frequency.loops import poles, response
 from friso.frequency.members import Members
 from friso.frequency.system import Complex
@@ -77,8 +77,8 @@ class Margins:
 
 
 def margins(flat: Mapping[str, Any], member: Members) -> Margins:
-    """The margins of a stage in one of its states. Raises InputError for a delay that is too long (see `Drive`)."""
-    drive = Drive.of(flat)
+    """The margins of a stage in one of its states. Raises InputError for too long a delay (see `DriveTiming`)."""
+    drive = DriveTiming.of(flat)
     closed_poles, at = poles(flat, member, drive), response(flat, member, drive)
     closed = closed_poles.in_s[0]
     omega = frequencies(flat, member, drive, DENSITY, [closed, drive.to_s(closed_poles.cut[0])])
@@ -87,11 +87,11 @@ def margins(flat: Mapping[str, Any], member: Members) -> Margins:
 
 
 def frequencies(
-    flat: Mapping[str, Any], members: Members, drive: Drive, density: float, resonant: Sequence[Complex]
+    flat: Mapping[str, Any], members: Members, drive: DriveTiming, density: float, resonant: Sequence[Complex]
 ) -> np.ndarray:
     """Angular frequencies [rad/s] that show all that loops of these states do, up to the highest the drive knows: so
     many per decade, and more about the resonances among the poles `resonant`."""
-    size = np.concatenate([np.abs(poles(flat, kind, Drive(0.0, 0.0)).closed).ravel() for kind in members.kinds])
+    size = np.concatenate([np.abs(poles(flat, kind, DriveTiming(0.0, 0.0)).closed).ravel() for kind in members.kinds])
     size = size[size > NEGLIGIBLE * size.max(initial=0.0)] if size.any() else np.ones(1)
     low, high = size.min() / BEYOND, min(size.max() * BEYOND, drive.highest)
     return with_resonances(np.geomspace(low, high, int(density * np.log10(high / low)) + 2), resonant)

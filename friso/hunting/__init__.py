@@ -1,6 +1,6 @@
 """What the numbers mean for hunting: peak count, hunting cycles, what starts them, margins, verdict."""
 
-from friso.hunting.basin import Kick, Moves
+from friso.hunting.basin import Kick, MoveShare
 from friso.hunting.check import Case, Solver, check
 from friso.hunting.criteria import COUNTED_ABOVE, COUNTED_AFTER
 from friso.hunting.cycle.hunting import Cycle, Hunting, hunting
@@ -19,7 +19,7 @@ __all__ = [
     "Kick",
     "Margin",
     "Measures",
-    "Moves",
+    "MoveShare",
     "Solver",
     "check",
     "hunting",

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.stats import binomtest, qmc
 
 from friso.engine.arrays import Status
-from friso.engine.batch import Options, run_chunks
+from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import kernel
 from friso.equations.motion import last_corner
 from friso.equations.structure import shared_structure
@@ -71,7 +71,7 @@ class Kick:
 
 
 @dataclass(frozen=True)
-class Moves:
+class MoveShare:
     """Share of moves that end in the cycle, of a Sobol sample over acceleration [m/s^2] and acceleration time [s]: how
     many were drawn (and run to their end), how many hunt, and the ranges they were drawn from."""
 
@@ -96,13 +96,13 @@ def ends_in(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Which runs of stages, given as flat keys to SI numbers or arrays (count,), end in a cycle of the stage: they
     still swing like it long after their motion, by half its peak to peak or more; and which were completed; both of
-    shape (count,). The cycle is the same for all, or there is one for each: arrays (count,). `how` as in `Options`."""
+    shape (count,). The cycle is the same for all, or there is one for each: arrays (count,). `how`: `RunOptions`."""
     periods = np.clip(CONSTANTS * cycle.time_constant / cycle.period, *PERIODS)
     end = np.broadcast_to(np.max(last_corner(flat)) + periods * cycle.period, (count,))
     band = np.broadcast_to(cycle.amplitude / 2, (count,))
     long = {**flat, "motion.duration": end}
     window = float(np.min(1 - LAST * cycle.period / end))
-    options = Options(rtol=rtol, window=window, record_from=np.inf, least_swing=np.inf, **how)
+    options = RunOptions(rtol=rtol, window=window, record_from=np.inf, least_swing=np.inf, **how)
     ends, completed = np.zeros(count, bool), np.zeros(count, bool)
     for runs in run_chunks(kernel(shared_structure(flat)), long, count, options, starts):
         completed[runs.numbers] = runs.results.statuses == Status.DONE
@@ -148,7 +148,7 @@ def _kick(hunts: Callable[[np.ndarray], np.ndarray], unit: float) -> Kick:
     return Kick(windows, (float(kicks[0]), float(kicks[-1])))
 
 
-def moves(stage: Stage, cycle: Cycle) -> Moves | None:
+def moves(stage: Stage, cycle: Cycle) -> MoveShare | None:
     """The share of moves that end in hunting; None for motions that have no acceleration, or if every run fails."""
     flat = stage.flat()
     if flat["motion.kind"] != "there_and_back" or not flat["motion.acceleration"] * flat["motion.acceleration_time"]:
@@ -159,4 +159,4 @@ def moves(stage: Stage, cycle: Cycle) -> Moves | None:
     drawn = qmc.scale(qmc.Sobol(2, rng=0).random(MOVES), *zip(accelerations, times, strict=True))
     own = {**flat, "motion.acceleration": drawn[:, 0], "motion.acceleration_time": drawn[:, 1]}
     hunts, completed = ends_in(own, MOVES, cycle)
-    return Moves(int(completed.sum()), int(hunts.sum()), accelerations, times) if completed.any() else None
+    return MoveShare(int(completed.sum()), int(hunts.sum()), accelerations, times) if completed.any() else None

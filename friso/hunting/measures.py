@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from friso.engine.arrays import Status
-from friso.engine.batch import Options, Runs
+from friso.engine.batch import RunOptions, Runs
 from friso.equations.motion import last_corner
 from friso.hunting.criteria.run_outcome import BAND, End, outcomes
 from friso.hunting.turning import COUNTED_AFTER, DISTINCT, WINDOW
@@ -44,9 +44,9 @@ class Measures:
     turns: np.ndarray
 
 
-def options(rtol: float, threads: int | None = None, cancel: np.ndarray | None = None) -> Options:
+def options(rtol: float, threads: int | None = None, cancel: np.ndarray | None = None) -> RunOptions:
     """How to run for these measures; turning points are kept from a little before the first that may count."""
-    return Options(
+    return RunOptions(
         rtol=rtol,
         bands=BANDS,
         window=WINDOW,
@@ -66,7 +66,7 @@ def turns_of(runs: Runs) -> Turns:
 
 
 def swing_of(runs: Runs) -> np.ndarray:
-    """Peak-to-peak deviation [m] over the window at the end of each run (see `Options`), shape (runs,)."""
+    """Peak-to-peak deviation [m] over the window at the end of each run (see `RunOptions`), shape (runs,)."""
     return runs.statistic("deviation_max") - runs.statistic("deviation_min")
 
 

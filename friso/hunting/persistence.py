@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from friso.engine.arrays import Status
-from friso.engine.batch import Options, run_chunks
+from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import kernel
 from friso.hunting.criteria.run_outcome import lasts
 from friso.hunting.cycle.ensemble import Ensemble
@@ -56,7 +56,7 @@ def still_swings(stages: Ensemble, begin: Begin, periods: float = PERIODS) -> tu
     """Which stages still swing at the end, and which runs were completed, both of shape (count,)."""
     period = 2 * (wait(stages, SLOW * stages.length) + 2 * np.pi / stages.number("rate"))
     end = begin.over + periods * period
-    options = Options(
+    options = RunOptions(
         rtol=RTOL,
         window=1 - LAST / periods,
         record_from=float(np.min(end)) / 2,

@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 
 from friso.engine.arrays import Status
-from friso.engine.batch import Options, run_chunks
+from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import kernel
 from friso.equations.motion import last_corner
 from friso.equations.structure import shared_structure
 from friso.hunting.attractors import Attractors, attractors
-from friso.hunting.basin import Kick, Moves, displacements, ends_in, moves, pushes
+from friso.hunting.basin import Kick, MoveShare, displacements, ends_in, moves, pushes
 from friso.hunting.criteria import COUNTED_ABOVE, Verdict, lasts, verdicts
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.hunting import Cycle, Hunting, cannot_hunt, hunting, why_not
@@ -50,7 +50,7 @@ class Judgement:
     hunting: Hunting
     displacement: Kick | None = None
     push: Kick | None = None
-    moves: Moves | None = None
+    moves: MoveShare | None = None
     margin: Margin | None = None
     settled_after: float | None = None
     observed: bool = False
@@ -146,7 +146,7 @@ def judge_runs(
     cancel: np.ndarray | None = None,
 ) -> np.ndarray:
     """The same where the stages' own motions were run, and what attracts is known already (None: they cannot hunt);
-    `threads` and `cancel` as in `Options`."""
+    `threads` and `cancel` as in `RunOptions`."""
     count = len(motions.completed)
     sure, attracts = motions.completed.copy(), np.zeros(count, bool)
     if known is not None:
@@ -195,7 +195,7 @@ class _Rest:
     steady: np.ndarray
 
 
-def _rest(flat: Mapping[str, Any], motions: Motions, count: int, how: Options, possible: bool) -> _Rest:
+def _rest(flat: Mapping[str, Any], motions: Motions, count: int, how: RunOptions, possible: bool) -> _Rest:
     """Where hunting is not `possible`, a stage may rest off its reference; else a motion that has not come to rest at
     its end is followed."""
     after, steady = motions.settling.copy(), np.zeros(count, bool)
@@ -213,7 +213,7 @@ def _rest(flat: Mapping[str, Any], motions: Motions, count: int, how: Options, p
     return _Rest(rests, after, steady)
 
 
-def _motions(flat: Mapping[str, Any], count: int, how: Options) -> Motions:
+def _motions(flat: Mapping[str, Any], count: int, how: RunOptions) -> Motions:
     """The motions of stages of one structure, run and measured."""
     columns = [np.zeros(count, bool), *(np.full(count, np.nan) for _ in range(3))]
     for runs in run_chunks(kernel(shared_structure(flat)), flat, count, how):

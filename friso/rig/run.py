@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 
 from friso.engine.arrays import Status
-from friso.engine.batch import Options, prepare, run_batch, settings_of
+from friso.engine.batch import RunOptions, prepare, run_batch, settings_of
 from friso.engine.kernel import Kernel, empty_results, kernel
 from friso.equations.as_built import COMMANDED, NEUTRAL, READING, AsBuilt, whole_samples
 from friso.equations.roles import Role, Steady
 from friso.errors import InputError
 from friso.rig.surroundings import MARGIN, tables
-from friso.rig.task import Task
+from friso.rig.task import MoveTask
 from friso.stage import Stage
 
 SAMPLE_TIME = 50e-6
@@ -74,7 +74,7 @@ def as_built_keys(stage: Stage, changes: Mapping[str, Any] | None = None) -> dic
 
 def run(
     stage: Stage,
-    task: Task,
+    task: MoveTask,
     seeds: Sequence[int],
     interval: float,
     changes: Mapping[str, Any] | None = None,
@@ -119,7 +119,7 @@ def _recorded(
     shape: Kernel,
     flat: dict[str, Any],
     stage: Stage,
-    task: Task,
+    task: MoveTask,
     seeds: np.ndarray,
     numbers: np.ndarray,
     how: tuple[float, int, int | None],
@@ -128,7 +128,7 @@ def _recorded(
     flat = {**flat, "drive.seed": seeds.astype(float)}
     low, high = task.span
     motion = {"motion.kind": "step", "motion.size": (high - low) or MARGIN, "motion.duration": task.duration}
-    options = Options(
+    options = RunOptions(
         rtol=RTOL, bands=(np.inf, np.inf), record_from=np.inf, least_swing=np.inf, interval=interval,
         budget=int(BUDGET * task.duration / flat["drive.sample_time"]),
     )  # fmt: skip
@@ -148,7 +148,7 @@ def _recorded(
 
 
 def _signals(
-    shape: Kernel, samples: np.ndarray, flat: Mapping[str, Any], task: Task, seeds: np.ndarray, interval: float
+    shape: Kernel, samples: np.ndarray, flat: Mapping[str, Any], task: MoveTask, seeds: np.ndarray, interval: float
 ) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
     """What the drive logs, and what is true."""
     time = np.arange(samples.shape[1]) * interval
@@ -180,7 +180,7 @@ def _sensor(seed: int) -> np.random.Generator:
     return np.random.Generator(np.random.Philox(key=[seed, SENSOR]))
 
 
-def reference(task: Task, time: np.ndarray) -> np.ndarray:
+def reference(task: MoveTask, time: np.ndarray) -> np.ndarray:
     """The reference [m] at times [s]."""
     rows = task.pieces[np.searchsorted(task.pieces[:, 0], time * (1 + 1e-12), side="right") - 1]
     since = time - rows[:, 0]

@@ -10,7 +10,7 @@ import numpy as np
 from friso.engine.arrays import Tables
 from friso.rig.floor import floor_acceleration
 from friso.rig.rail import friction_factors
-from friso.rig.task import Task
+from friso.rig.task import MoveTask
 from friso.stage.rig import Floor
 
 PER_LENGTH, PER_WAVE = 12, 40
@@ -25,7 +25,7 @@ PER_PERIOD = 10
 """Points of the floor's acceleration per period of its highest frequency."""
 
 
-def tables(flat: Mapping[str, Any], floor: Floor | None, task: Task, seeds: Sequence[int]) -> Tables:
+def tables(flat: Mapping[str, Any], floor: Floor | None, task: MoveTask, seeds: Sequence[int]) -> Tables:
     """The tables of the runs whose noise has these seeds, from flat keys to SI numbers or arrays of shape (runs,).
 
     The rails are the machines': their seeds are "rail.seed". All runs share one table where they do not differ.
@@ -41,7 +41,7 @@ def _one(flat: Mapping[str, Any], run: int) -> dict[str, Any]:
     return {key: value[run] if np.ndim(value) else value for key, value in flat.items()}
 
 
-def _places(flat: Mapping[str, Any], task: Task) -> tuple[np.ndarray, np.ndarray]:
+def _places(flat: Mapping[str, Any], task: MoveTask) -> tuple[np.ndarray, np.ndarray]:
     """The places [m] of the tables, evenly spaced, and their grid, shape (1, 2): first place, points per metre."""
     low, high = task.span
     margin = max(MARGIN, BEYOND * (high - low))
@@ -62,7 +62,7 @@ def _over_places(flat: Mapping[str, Any], places: np.ndarray) -> np.ndarray:
     return np.array([*friction_factors(flat, places), ripple])
 
 
-def _over_time(floor: Floor | None, task: Task, seeds: Sequence[int]) -> tuple[np.ndarray, float]:
+def _over_time(floor: Floor | None, task: MoveTask, seeds: Sequence[int]) -> tuple[np.ndarray, float]:
     """Injected force and floor's acceleration, shape (runs or 1, 2, points), and their points per second."""
     injected = len(task.injected) > 0
     if floor is None and not injected:

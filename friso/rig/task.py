@@ -13,7 +13,7 @@ from friso.stage import Stage
 
 
 @dataclass(frozen=True)
-class Task:
+class MoveTask:
     """Pieces of the reference, shape (pieces, 4): start [s], position [m], velocity [m/s], acceleration [m/s^2] there;
     its duration [s]; and the injected force [N] every `injected_each` [s], shape (n,), empty for none; the drive logs
     it unless it is `unknown` to it.
@@ -40,34 +40,34 @@ class Task:
         return min(*places, places[0] + self.displacement), max(*places, places[0] + self.displacement)
 
 
-def own_motion(stage: Stage) -> Task:
+def own_motion(stage: Stage) -> MoveTask:
     """The motion of the stage file."""
     flat = stage.flat()
     displacement = float(motion.initial_displacement(flat))
-    return Task(motion.pieces(flat, 1)[0], flat["motion.duration"], displacement=displacement)
+    return MoveTask(motion.pieces(flat, 1)[0], flat["motion.duration"], displacement=displacement)
 
 
-def standing(place: float, duration: float) -> Task:
+def standing(place: float, duration: float) -> MoveTask:
     """A reference that stays at a place [m]."""
-    return Task(np.array([[0.0, place, 0.0, 0.0]]), duration)
+    return MoveTask(np.array([[0.0, place, 0.0, 0.0]]), duration)
 
 
-def staircase(steps: Sequence[float], stands: float, start: float = 0.0) -> Task:
+def staircase(steps: Sequence[float], stands: float, start: float = 0.0) -> MoveTask:
     """Steps of the reference [m], one after the other, before and after each of which it stands for a time [s]."""
     places = start + np.cumsum([0.0, *steps])
     rows = [[number * stands, place, 0.0, 0.0] for number, place in enumerate(places)]
-    return Task(np.array(rows), stands * len(places))
+    return MoveTask(np.array(rows), stands * len(places))
 
 
-def legs(start: float, parts: Sequence[tuple[float, float]]) -> Task:
+def legs(start: float, parts: Sequence[tuple[float, float]]) -> MoveTask:
     """Constant velocities [m/s], each for a time [s], one after the other from a place [m]; 0 is a standstill."""
     times = np.cumsum([0.0, *(time for _, time in parts)])
     places = start + np.cumsum([0.0, *(velocity * time for velocity, time in parts)])
     rows = [[t, p, v, 0.0] for t, p, (v, _) in zip(times[:-1], places[:-1], parts, strict=True)]
-    return Task(np.array(rows), float(times[-1]))
+    return MoveTask(np.array(rows), float(times[-1]))
 
 
-def point_to_point(places: Sequence[float], acceleration: float, top_speed: float, stands: float) -> Task:
+def point_to_point(places: Sequence[float], acceleration: float, top_speed: float, stands: float) -> MoveTask:
     """Moves from place to place [m] with bounded acceleration [m/s^2] and speed [m/s], after each of which the
     reference stands for a time [s]."""
     rows, now = [[0.0, places[0], 0.0, 0.0]], stands
@@ -82,4 +82,4 @@ def point_to_point(places: Sequence[float], acceleration: float, top_speed: floa
         now += 2 * ramp + cruise
         rows.append([now, end, 0.0, 0.0])
         now += stands
-    return Task(np.array(rows), now)
+    return MoveTask(np.array(rows), now)

@@ -26,7 +26,7 @@ _RANGE = re.compile(rf"(?P<first>[^:]*?)\.\.(?P<last>[^:]*?)(?::(?!\s*(?:linear|
 
 
 @dataclass(frozen=True)
-class Axis:
+class SweptAxis:
     """A swept key or a free name that links use: SI values (or words and booleans), their unit, and their scale."""
 
     name: str
@@ -37,7 +37,7 @@ class Axis:
 
 
 @dataclass(frozen=True)
-class Range:
+class SweptRange:
     """The ends of a range [SI unit], how many points it has (None: not said) and how they are spaced."""
 
     name: str
@@ -53,14 +53,14 @@ class Range:
             return np.exp(np.log(self.first) + share * (np.log(self.last) - np.log(self.first)))
         return self.first + share * (self.last - self.first)
 
-    def axis(self) -> Axis:
+    def axis(self) -> SweptAxis:
         """The axis with `count` points, both ends exactly as given."""
         space = np.geomspace if self.scale == "log" else np.linspace
-        return Axis(self.name, space(self.first, self.last, cast(int, self.count)), self.unit, self.scale)
+        return SweptAxis(self.name, space(self.first, self.last, cast(int, self.count)), self.unit, self.scale)
 
 
-def read_axis(stage: Stage, name: str, values: Values, free: bool, log: bool = False) -> Axis | Range:
-    """An axis of a stage from a text, a list or an array with a unit; a range stays a `Range`.
+def read_axis(stage: Stage, name: str, values: Values, free: bool, log: bool = False) -> SweptAxis | SweptRange:
+    """An axis of a stage from a text, a list or an array with a unit; a range stays a `SweptRange`.
 
     `free`: links use the name, so it need not be a key. With `log` a range that does not say how
     it is spaced is logarithmic. Raises InputError.
@@ -129,7 +129,7 @@ def _number(value: Any) -> float | None:
         return None
 
 
-def _range(name: str, text: str, reader: _Reader, log: bool) -> Range:
+def _range(name: str, text: str, reader: _Reader, log: bool) -> SweptRange:
     match = _RANGE.fullmatch(text)
     if match is None:
         raise InputError("", quoted(text), "FIRST..LAST:POINTS, with :log behind it if so wanted", RANGE_EXAMPLE)
@@ -141,7 +141,7 @@ def _range(name: str, text: str, reader: _Reader, log: bool) -> Range:
     if scale == "log" and first <= 0:
         range_text = quoted(text, "a logarithmic axis never reaches 0")
         raise InputError("", range_text, "a logarithmic range that begins above 0", '"10 um..1 cm:41:log"')
-    return Range(name, first, last, reader.unit, _count(text, match["count"]), scale)
+    return SweptRange(name, first, last, reader.unit, _count(text, match["count"]), scale)
 
 
 def _count(text: str, digits: str | None) -> int | None:
@@ -154,7 +154,7 @@ def _count(text: str, digits: str | None) -> int | None:
     return count
 
 
-def _listed(name: str, values: Values, reader: _Reader) -> Axis:
+def _listed(name: str, values: Values, reader: _Reader) -> SweptAxis:
     if isinstance(values, tuple) and len(values) == 2 and isinstance(values[1], str) and np.ndim(values[0]):
         si = np.asarray(values[0], dtype=float) * reader.factor(values[1])
     elif isinstance(values, str):
@@ -167,10 +167,10 @@ def _listed(name: str, values: Values, reader: _Reader) -> Axis:
         raise InputError("", "no values", "a list or one-dimensional array of values", '["4 Hz", "8 Hz"]')
     if not np.all(np.isfinite(si)):
         raise InputError("", "values that are not finite", "finite numbers", '(np.linspace(1, 40, 41), "Hz")')
-    return Axis(name, si, reader.unit)
+    return SweptAxis(name, si, reader.unit)
 
 
-def _words(stage: Stage, key: str, values: Values) -> Axis:
+def _words(stage: Stage, key: str, values: Values) -> SweptAxis:
     """An axis of words or booleans, each of which the stage takes."""
     options = [parse_set(f"{key}={word}")[1] for word in values.split(",")] if isinstance(values, str) else list(values)
     table, _, rest = key.partition(".")
@@ -184,11 +184,11 @@ def _words(stage: Stage, key: str, values: Values) -> Axis:
         stage.replace({key: value})
     if not options:
         raise InputError(key, "no values", "a list of values", "[true, false]")
-    return Axis(key, np.array(options), numeric=False)
+    return SweptAxis(key, np.array(options), numeric=False)
 
 
 def read_axes(
     stage: Stage, axes: Mapping[str, Values], free: frozenset[str], log: bool = False
-) -> tuple[Axis | Range, ...]:
+) -> tuple[SweptAxis | SweptRange, ...]:
     """All axes, as `read_axis` reads them. Raises InputError."""
     return tuple(read_axis(stage, name, values, name in free, log) for name, values in axes.items())

@@ -7,11 +7,11 @@ from collections.abc import Mapping
 from friso.engine.kernel import Wanted, kernels
 from friso.engine.tolerance import checked_rtol
 from friso.errors import InputError
-from friso.hunting.boundary import Diagram, Plane, Range, Space, diagram, plane
+from friso.hunting.boundary import Diagram, KeyRange, Plane, Space, diagram, plane
 from friso.hunting.cycle.find import RTOL
 from friso.hunting.cycle.hunting import cannot_hunt
 from friso.stage import Stage, numeric_keys, violations
-from friso.studies.axes import Axis, read_axis
+from friso.studies.axes import SweptAxis, read_axis
 from friso.studies.cells import flat_cells
 from friso.studies.links import check_links, names
 
@@ -67,11 +67,11 @@ def _refuse_impossible(space: Space) -> None:
         raise InputError(key, "ranges that no stage may have", why, EXAMPLE)
 
 
-def _range(stage: Stage, name: str, text: str, free: frozenset[str], log: bool) -> Range:
+def _range(stage: Stage, name: str, text: str, free: frozenset[str], log: bool) -> KeyRange:
     read = read_axis(stage, name, text, name in free, log)
-    if isinstance(read, Axis) or read.count is not None:
+    if isinstance(read, SweptAxis) or read.count is not None:
         raise InputError(name, repr(text), "a range FIRST..LAST, without a number of points", EXAMPLE)
     field = numeric_keys(stage.flat()).get(name)
     if field is not None and not (field.bound.holds(read.first) and field.bound.holds(read.last)):
         raise InputError(name, repr(text), f"values {field.bound.text}", EXAMPLE)
-    return Range(name, read.first, read.last, read.scale == "log", read.unit)
+    return KeyRange(name, read.first, read.last, read.scale == "log", read.unit)

@@ -19,7 +19,7 @@ from scipy.ndimage import distance_transform_edt
 
 from friso.errors import InputError
 from friso.hunting.criteria.run_outcome import SWINGS
-from friso.studies.axes import Axis
+from friso.studies.axes import SweptAxis
 from friso.studies.cells import INFERRED, UNITS, Columns
 from friso.studies.samples import SAMPLE
 from friso.studies.study import Dimension, Study
@@ -53,7 +53,7 @@ def finer(study: Study) -> Study:
     return replace(study, dimensions=dimensions, refined=True)
 
 
-def _finer(axis: Axis) -> Axis:
+def _finer(axis: SweptAxis) -> SweptAxis:
     """The axis with cells between its own: those of a range as if it had been given so many points."""
     log = axis.scale == "log"
     space, ends = np.geomspace if log else np.linspace, (axis.values[0], axis.values[-1])

@@ -12,7 +12,7 @@ from friso.engine.tolerance import checked_rtol
 from friso.errors import InputError
 from friso.stage import Stage
 from friso.studies import links as linking
-from friso.studies.axes import Axis, Range, Values, read_axes
+from friso.studies.axes import SweptAxis, SweptRange, Values, read_axes
 from friso.studies.cells import ALWAYS, METRICS, USUAL
 from friso.studies.samples import SAMPLE, Samples, sampled
 from friso.studies.study import Dimension, Study
@@ -32,7 +32,7 @@ class Request:
     links: Mapping[str, str] = field(default_factory=dict)
     log: bool = False
 
-    def _read(self, axes: Mapping[str, Values]) -> tuple[Axis | Range, ...]:
+    def _read(self, axes: Mapping[str, Values]) -> tuple[SweptAxis | SweptRange, ...]:
         return read_axes(self.stage, axes, linking.names(self.links), self.log)
 
     def size(self) -> int:
@@ -45,8 +45,8 @@ class Request:
         rng = np.random.default_rng(0)
         axes = []
         for axis in self._read({**self.axes, **(self.samples.ranges if self.samples else {})}):
-            if isinstance(axis, Range):
-                axes.append(Axis(axis.name, axis.at(rng.random(TRIED)), axis.unit, axis.scale))
+            if isinstance(axis, SweptRange):
+                axes.append(SweptAxis(axis.name, axis.at(rng.random(TRIED)), axis.unit, axis.scale))
             else:
                 axes.append(replace(axis, values=rng.choice(axis.values, TRIED)))
         return Study(self.stage, (Dimension(SAMPLE, tuple(axes)),), dict(self.links), USUAL, 1e-6)
@@ -70,8 +70,8 @@ class Request:
         return Study(self.stage, tuple(dimensions), dict(self.links), _checked_metrics(metrics), rtol)
 
 
-def _points(axis: Axis | Range) -> int:
-    if isinstance(axis, Axis):
+def _points(axis: SweptAxis | SweptRange) -> int:
+    if isinstance(axis, SweptAxis):
         return len(axis.values)
     if axis.count is None:
         text = f"{axis.first:g}..{axis.last:g} {axis.unit}, without a number of points"
@@ -79,8 +79,8 @@ def _points(axis: Axis | Range) -> int:
     return axis.count
 
 
-def _gridded(axis: Axis | Range) -> Axis:
-    if isinstance(axis, Axis):
+def _gridded(axis: SweptAxis | SweptRange) -> SweptAxis:
+    if isinstance(axis, SweptAxis):
         if len(np.unique(axis.values)) < len(axis.values):
             raise InputError(axis.name, "values that occur twice", "every value once", '["4 Hz", "8 Hz"]')
         return axis

@@ -9,7 +9,7 @@ import numpy as np
 
 from friso.errors import InputError
 from friso.stage import Stage
-from friso.studies.axes import Axis, Range, Values, read_axes
+from friso.studies.axes import SweptAxis, SweptRange, Values, read_axes
 
 SAMPLE = "sample"
 """Name of the dimension along which samples lie."""
@@ -29,10 +29,10 @@ class Samples:
     seed: int = field(default=0)
 
 
-def sampled(stage: Stage, samples: Samples, free: frozenset[str], log: bool = False) -> tuple[Axis, ...]:
+def sampled(stage: Stage, samples: Samples, free: frozenset[str], log: bool = False) -> tuple[SweptAxis, ...]:
     """The sampled axes, all of one length. Raises InputError."""
     read = read_axes(stage, samples.ranges, free, log)
-    ranges = [axis for axis in read if isinstance(axis, Range)]
+    ranges = [axis for axis in read if isinstance(axis, SweptRange)]
     if not ranges:
         return _values(read)
     if len(ranges) < len(read):
@@ -41,11 +41,11 @@ def sampled(stage: Stage, samples: Samples, free: frozenset[str], log: bool = Fa
         if axis.count is not None:
             raise InputError(axis.name, f"a range with {axis.count} points", "for samples, FIRST..LAST alone")
     points = _points(len(ranges), samples)
-    return tuple(Axis(axis.name, axis.at(points[:, i]), axis.unit, axis.scale) for i, axis in enumerate(ranges))
+    return tuple(SweptAxis(axis.name, axis.at(points[:, i]), axis.unit, axis.scale) for i, axis in enumerate(ranges))
 
 
-def _values(read: tuple[Axis | Range, ...]) -> tuple[Axis, ...]:
-    axes = tuple(axis for axis in read if isinstance(axis, Axis))
+def _values(read: tuple[SweptAxis | SweptRange, ...]) -> tuple[SweptAxis, ...]:
+    axes = tuple(axis for axis in read if isinstance(axis, SweptAxis))
     if len({len(axis.values) for axis in axes}) != 1:
         lengths = ", ".join(f"{axis.name} {len(axis.values)}" for axis in axes) or "none"
         raise InputError("samples", f"lengths: {lengths}", "keys with equally many values each")

@@ -14,7 +14,7 @@ import numpy as np
 
 from friso.engine.cache import code_digest, machine
 from friso.stage import Stage, loads
-from friso.studies.axes import Axis
+from friso.studies.axes import SweptAxis
 from friso.studies.cells import BY_CYCLES, METRICS, flat_cells
 from friso.studies.samples import SAMPLE
 from friso.version import VERSION
@@ -31,7 +31,7 @@ class Dimension:
     """A dimension of the result: one axis, or several that run side by side (samples)."""
 
     name: str
-    axes: tuple[Axis, ...]
+    axes: tuple[SweptAxis, ...]
 
     def __len__(self) -> int:
         return len(self.axes[0].values)
@@ -67,7 +67,7 @@ class Study:
         return tuple(dimension.name for dimension in self.dimensions)
 
     @property
-    def axes(self) -> tuple[Axis, ...]:
+    def axes(self) -> tuple[SweptAxis, ...]:
         """The axes of all dimensions."""
         return tuple(axis for dimension in self.dimensions for axis in dimension.axes)
 
@@ -119,7 +119,9 @@ class Study:
     def at(self, cells: np.ndarray) -> Study:
         """A study of just these cells, side by side."""
         columns = self.columns(cells)
-        axes = tuple(Axis(axis.name, columns[axis.name], axis.unit, axis.scale, axis.numeric) for axis in self.axes)
+        axes = tuple(
+            SweptAxis(axis.name, columns[axis.name], axis.unit, axis.scale, axis.numeric) for axis in self.axes
+        )
         return replace(self, dimensions=(Dimension(SAMPLE, axes),), refined=False)
 
     def coordinates(self) -> dict[str, Any]:
@@ -198,13 +200,15 @@ def study_of(runs: xr.Dataset) -> Study:
     return Study(stage, tuple(dimensions), links, metrics, rtol, bool(runs.attrs["refined"]))
 
 
-def _stored_axis(coordinate: xr.DataArray) -> Axis:
+def _stored_axis(coordinate: xr.DataArray) -> SweptAxis:
     values = coordinate.values
     attributes = coordinate.attrs
-    return Axis(str(coordinate.name), values, attributes["units"], attributes["scale"], values.dtype.kind not in "bUT")
+    return SweptAxis(
+        str(coordinate.name), values, attributes["units"], attributes["scale"], values.dtype.kind not in "bUT"
+    )
 
 
-def _described(axis: Axis) -> str:
+def _described(axis: SweptAxis) -> str:
     """An axis in short; equal texts mean equal values."""
     digest = hashlib.sha256(np.ascontiguousarray(axis.values).tobytes()).hexdigest()[:8]
     first, last = axis.values[0], axis.values[-1]

@@ -39,7 +39,7 @@ class Friction:
         self.force, self.breakaway, self.component, self.sliding = force, breakaway, component, sliding
 
 
-class Curve(NamedTuple):
+class StribeckCurve(NamedTuple):
     """What the equations of a Stribeck curve depend on: the exponent where it is a small whole number (then it is
     written out as products), else None; and whether friction, and viscous friction, differ between the directions."""
 
@@ -67,17 +67,17 @@ class StribeckSection(FrictionSection):
     )
 
     @staticmethod
-    def variant(flat: Mapping[str, Any]) -> Curve:
+    def variant(flat: Mapping[str, Any]) -> StribeckCurve:
         """What of the curve decides on its code: the exponent where it is a small whole number, and asymmetries."""
         exponent = float(flat["friction.stribeck_exponent"])
-        return Curve(
+        return StribeckCurve(
             int(exponent) if exponent in (1.0, 2.0, 3.0, 4.0) else None,
             flat.get("friction.asymmetry", 0.0) != 0,
             flat.get("friction.viscous_asymmetry", 0.0) != 0,
         )
 
 
-def stribeck_level(velocity: sp.Expr, sign: sp.Expr, curve: Curve) -> sp.Expr:
+def stribeck_level(velocity: sp.Expr, sign: sp.Expr, curve: StribeckCurve) -> sp.Expr:
     """g(v) of Eq. 4 [N]: F_c + (F_s - F_c) exp(-abs(v/v_s)^j), smooth in v while the sign is held."""
     from sympy import exp
 
@@ -95,7 +95,7 @@ def stribeck_level(velocity: sp.Expr, sign: sp.Expr, curve: Curve) -> sp.Expr:
     return level * (1 + key("friction.asymmetry") * sign) if curve.asymmetric else level
 
 
-def viscous_force(velocity: sp.Expr, sign: sp.Expr, curve: Curve) -> sp.Expr:
+def viscous_force(velocity: sp.Expr, sign: sp.Expr, curve: StribeckCurve) -> sp.Expr:
     """The viscous share [N], smooth in v while the sign is held."""
     from friso.equations.component import key
 

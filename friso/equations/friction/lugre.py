@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from friso.equations.friction.common import Curve, Friction, StribeckSection, stribeck_level, viscous_force
+from friso.equations.friction.common import Friction, StribeckCurve, StribeckSection, stribeck_level, viscous_force
 from friso.quantities import Quantity, Value, non_negative, positive
 from friso.stage import register_friction
 
@@ -21,7 +21,7 @@ class LuGre(StribeckSection):
     bristle_damping: Annotated[Value, Quantity("N*s/m", non_negative, "316 N*s/m")]
 
     @staticmethod
-    def declare(velocity: sp.Symbol, variant: Curve) -> Friction:
+    def declare(velocity: sp.Symbol, variant: StribeckCurve) -> Friction:
         """Friction on a body moving at `velocity` [m/s]."""
         from friso.equations.component import Component, Kink, Output, Role, State, key, state
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from friso.equations.friction.common import Curve, Friction, StribeckSection, stribeck_level, viscous_force
+from friso.equations.friction.common import Friction, StribeckCurve, StribeckSection, stribeck_level, viscous_force
 from friso.quantities import Quantity, Value, positive
 from friso.stage import register_friction
 
@@ -21,7 +21,7 @@ class Stribeck(StribeckSection):
     regularisation_velocity: Annotated[Value, Quantity("m/s", positive, "10 um/s")]
 
     @staticmethod
-    def declare(velocity: sp.Symbol, variant: Curve) -> Friction:
+    def declare(velocity: sp.Symbol, variant: StribeckCurve) -> Friction:
         """Friction on a body moving at `velocity` [m/s]."""
         from sympy import tanh
 

@@ -44,7 +44,7 @@ STEPS = 60
 
 
 @dataclass(frozen=True)
-class Driven:
+class DrivenPlant:
     """A plant at some frequencies [Hz] (frequencies,), with its compliances without friction [m/N], complex, shape
     (frequencies, 2, 2): positions of stage and cart for forces on stage and cart."""
 
@@ -54,7 +54,7 @@ class Driven:
     rtol: float
 
     @classmethod
-    def of(cls, flat: Mapping[str, Any], frequencies: np.ndarray, rtol: float = RTOL) -> Driven:
+    def of(cls, flat: Mapping[str, Any], frequencies: np.ndarray, rtol: float = RTOL) -> DrivenPlant:
         """The plant of a stage whose limiter is not touched, at frequencies [Hz]."""
         (compliances,) = mechanics(flat, np.zeros(1, bool)).at(2j * np.pi * frequencies)
         return cls(flat, frequencies, compliances, rtol)
@@ -131,7 +131,7 @@ class Roots:
     unknown: np.ndarray
 
 
-def roots(driven: Driven, forces: np.ndarray) -> Roots:
+def roots(driven: DrivenPlant, forces: np.ndarray) -> Roots:
     """All amplitudes at which forces [N] move the cart, as far as the grid resolves them."""
     amplitudes, reached, inside = driven.grid(forces)
     above = reached >= forces[:, None, None]

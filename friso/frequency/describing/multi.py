@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from friso.frequency.describing.loop import TOUCHES, beyond_stroke, receptance
-from friso.frequency.describing.waveform import Answer, Law, friction_answer
+from friso.frequency.describing.waveform import Answer, OneStateLaw, friction_answer
 
 OVERSAMPLED = 32
 """Time intervals per period and harmonic at least."""
@@ -42,7 +42,7 @@ DONE, REST, OPEN = "done", "only the rest at the reference was found", "no serie
 
 
 @dataclass(frozen=True)
-class Series:
+class HarmonicSeries:
     """A periodic motion: harmonics of cart and stage [m], complex, at `orders` of the angular frequency [rad/s], of
     position = Re(sum of harmonic exp(i order omega t)); the `step` that Newton's method took last, as a share of the
     known amplitude, and the `status`: what is in it is a motion only if that is "done"."""
@@ -106,14 +106,14 @@ def balanced(
     harmonics: int,
     mirrored: bool = True,
     intervals: int | None = None,
-) -> Series:
+) -> HarmonicSeries:
     """The periodic motion near a known one, with harmonics up to the order `harmonics`.
 
     `time` [s] and `position` [m] of the cart, shape (samples,), are one period of the known motion, the last sample one
     interval before the first comes again. A `mirrored` motion is its own mirror image after half a period. Raises
     InputError for a stage without friction or for a law with more than one state of its own.
     """
-    law, size = Law.of(flat), intervals or max(FINEST, OVERSAMPLED * harmonics)
+    law, size = OneStateLaw.of(flat), intervals or max(FINEST, OVERSAMPLED * harmonics)
     basis = Basis.of(harmonics, mirrored, 2 * (size // 2))
     spectrum = np.fft.rfft(position)[basis.orders] / len(position) * np.where(basis.orders == 0, 1, 2)
     length = float(np.ptp(position) / 2)
@@ -124,11 +124,11 @@ def balanced(
     cart, speed = problem.split(state)
     _, stage = receptance(flat, basis.orders * speed / (2 * np.pi))
     force = basis.harmonics(problem.answer(state).force[:, None])[:, 0]
-    series = Series(basis.orders, cart, stage * force, speed, step, DONE)
+    series = HarmonicSeries(basis.orders, cart, stage * force, speed, step, DONE)
     return replace(series, status=_status(flat, series, length))
 
 
-def _status(flat: Mapping[str, Any], series: Series, length: float) -> str:
+def _status(flat: Mapping[str, Any], series: HarmonicSeries, length: float) -> str:
     """What became of a series that was to be found near a motion of this amplitude [m]."""
     if series.amplitude < RESTING * length:
         return REST
@@ -144,7 +144,7 @@ class _Problem:
     length, and the logarithm of omega over the known one; the phase is held against a shift of the known motion."""
 
     flat: Mapping[str, Any]
-    law: Law
+    law: OneStateLaw
     basis: Basis
     length: float
     omega: float

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from friso.engine.tolerance import checked_rtol
-from friso.frequency.describing.driven import CLOSE, Driven, Roots, roots
+from friso.frequency.describing.driven import CLOSE, DrivenPlant, Roots, roots
 from friso.frequency.describing.function import checked_positive
 from friso.frequency.describing.loop import TOUCHES, beyond_stroke
 from friso.frequency.describing.steady import RTOL
@@ -48,7 +48,7 @@ def plant_response(
     import xarray as xr
 
     sizes, rates = checked_positive("forces", forces, "2 N"), checked_positive("frequencies", frequencies, "10 Hz")
-    driven = Driven.of(stage.flat(), rates, checked_rtol(rtol))
+    driven = DrivenPlant.of(stage.flat(), rates, checked_rtol(rtol))
     branch_points = roots(driven, sizes)
     plane, place, count = ("force", "frequency"), *_branches(branch_points, (len(sizes), len(rates)))
     columns = _columns(driven, branch_points)
@@ -71,7 +71,7 @@ def plant_response(
     return xr.Dataset(variables, coords, {"stage": stage.to_toml(), "rtol": rtol})
 
 
-def _columns(driven: Driven, branch_points: Roots) -> dict[str, tuple[np.ndarray, str, str]]:
+def _columns(driven: DrivenPlant, branch_points: Roots) -> dict[str, tuple[np.ndarray, str, str]]:
     """The columns for every root, with units and text."""
     _, positions, stiffness = driven.answer(branch_points.amplitude, branch_points.frequency)
     return {

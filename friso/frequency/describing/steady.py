@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from friso.engine.arrays import Results, Status
-from friso.engine.batch import Options, run_chunks
+from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import Kernel, kernel
 from friso.equations.imposed import FREQUENCY, imposed_form
 from friso.equations.roles import Role
@@ -105,7 +105,7 @@ class Imposition:
         starts[:, self.inner] = inner
         interval = 1 / samples if samples else None
         chunk = max(8, min(2048, ROOM // max(samples, 1)))
-        options = Options(rtol=self.rtol, interval=interval, chunk=chunk)
+        options = RunOptions(rtol=self.rtol, interval=interval, chunk=chunk)
         for part in run_chunks(self.kernel, {**self.flat, "motion.duration": share}, self.count, options, starts):
             yield part.numbers, part.results
 
@@ -120,7 +120,7 @@ def closed(rtol: float) -> float:
 
 
 @dataclass(frozen=True)
-class Steady:
+class PeriodicStates:
     """Periodic steady states: the law's own states at the farthest point of the motion (count, inner), the `gap` that
     is left after a period as a share of their scales, and whether every run was completed, both of shape (count,)."""
 
@@ -129,7 +129,7 @@ class Steady:
     done: np.ndarray
 
 
-def steady(friction: Imposition) -> Steady:
+def steady(friction: Imposition) -> PeriodicStates:
     """The periodic steady states; half a period does where the law is symmetric."""
     count, size = friction.count, len(friction.inner)
     inner, gap, done = np.zeros((count, size)), np.zeros(count), np.ones(count, bool)
@@ -145,7 +145,7 @@ def steady(friction: Imposition) -> Steady:
         inner[open_[far]] += step[far]
         width[open_[far]] = np.clip(np.abs(step[far]), FINEST * scales[far], scales[far])
         open_ = open_[far]
-    return Steady(inner, gap, done)
+    return PeriodicStates(inner, gap, done)
 
 
 def share_of_period(friction: Imposition) -> tuple[float, float]:

@@ -27,7 +27,7 @@ STEPS, CLOSE = 30, 1e-12
 
 
 @dataclass(frozen=True)
-class Law:
+class OneStateLaw:
     """A friction law with at most one state of its own, z: functions of the parameters by name, of velocity and z, that
     give the rate of z with its derivatives by z and velocity, and the force with its derivatives by the same."""
 
@@ -37,7 +37,7 @@ class Law:
     remembers: bool
 
     @classmethod
-    def of(cls, flat: Mapping[str, Any]) -> Law:
+    def of(cls, flat: Mapping[str, Any]) -> OneStateLaw:
         """The law of a stage. Raises InputError for a stage without friction, or a law with more
         states or with modes that remember."""
         form = imposed_form(flat)
@@ -113,7 +113,7 @@ def _middles(z: np.ndarray) -> np.ndarray:
     return (z[:-1] + z[1:]) / 2
 
 
-def friction_answer(law: Law, velocity: np.ndarray, interval: float, sign: float) -> Answer:
+def friction_answer(law: OneStateLaw, velocity: np.ndarray, interval: float, sign: float) -> Answer:
     """The friction on a motion with these velocities [m/s] at the middles (M,) of intervals [s], after which it comes
     back (sign 1) or comes to its mirror image (-1)."""
     z = np.zeros(len(velocity) + 1)

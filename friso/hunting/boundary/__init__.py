@@ -3,19 +3,19 @@
 from friso.hunting.boundary.branch import Branch, Point
 from friso.hunting.boundary.curve import Curve, Spot
 from friso.hunting.boundary.diagram import Diagram, diagram
-from friso.hunting.boundary.locate import Found, Kind
+from friso.hunting.boundary.locate import Kind, LocatedPoint
 from friso.hunting.boundary.plane import Plane, plane
-from friso.hunting.boundary.space import Range, Space
+from friso.hunting.boundary.space import KeyRange, Space
 
 __all__ = [
     "Branch",
     "Curve",
     "Diagram",
-    "Found",
+    "KeyRange",
     "Kind",
+    "LocatedPoint",
     "Plane",
     "Point",
-    "Range",
     "Space",
     "Spot",
     "diagram",

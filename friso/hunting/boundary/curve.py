@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from friso.hunting.boundary.branch import END_OF_RANGE, Tracer
-from friso.hunting.boundary.locate import Found, Kind, corrected
+from friso.hunting.boundary.locate import Kind, LocatedPoint, corrected
 from friso.hunting.boundary.space import Space
 from friso.hunting.cycle.find import RTOL
 
@@ -40,7 +40,7 @@ class Spot:
     the line across the curve on which it was located, shape (2,)."""
 
     at: np.ndarray
-    special: Found
+    special: LocatedPoint
     across: np.ndarray
 
     @property

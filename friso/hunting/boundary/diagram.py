@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from friso.hunting.boundary.branch import Branch, Point, Tracer
-from friso.hunting.boundary.locate import Found, special_points
+from friso.hunting.boundary.locate import LocatedPoint, special_points
 from friso.hunting.boundary.space import Space
 from friso.hunting.cycle.find import ROUGH, RTOL, Cycles, families
 from friso.hunting.cycle.return_map import return_map
@@ -27,7 +27,7 @@ class Diagram:
 
     space: Space
     branches: tuple[Branch, ...]
-    special: tuple[tuple[Found, ...], ...]
+    special: tuple[tuple[LocatedPoint, ...], ...]
     places: np.ndarray
     cycles: Cycles
 
@@ -35,7 +35,7 @@ class Diagram:
         """The value of the key [SI] at a place."""
         return float(self.space.ranges[0].at(np.array(place)))
 
-    def error(self, special: Found) -> float:
+    def error(self, special: LocatedPoint) -> float:
         """By how much the value [SI] of a special point changes when it is computed to a hundredth of the tolerance."""
         return abs(self.value(special.point.place + special.error) - self.value(special.point.place))
 
@@ -48,11 +48,11 @@ def diagram(space: Space, rtol: float = RTOL, seeds: int = SEEDS) -> Diagram:
     stages = space.stages(places[:, None])
     sought = families(stages, return_map(stages, ROUGH), rtol)
     branches: list[Branch] = []
-    special: list[tuple[Found, ...]] = []
+    special: list[tuple[LocatedPoint, ...]] = []
     for cycles in sought:
         tracer = Tracer(space.lines(np.zeros((1, 1)), np.ones((1, 1))), cycles.sign, rtol)
-        for k in np.flatnonzero(cycles.found):
-            start = Point.of(stages.take(k[None]), float(places[k]), cycles.take(k[None]))
+        for k in np.flatnonzero(cycles.found)[:, None]:
+            start = Point.of(stages.take(k), float(places[k[0]]), cycles.take(k))
             if not any(_passes(branch, start) for branch in branches):
                 branch = tracer.branch(start)
                 branches.append(branch)

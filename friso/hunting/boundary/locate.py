@@ -24,7 +24,7 @@ TIGHTER = 0.01
 
 
 @dataclass(frozen=True)
-class Found:
+class LocatedPoint:
     """A point at which a branch stops attracting (or begins to), with the direction of the branch there, and by how
     much its place may be off: what the search has left, and the change at a hundredth of the tolerance."""
 
@@ -55,7 +55,7 @@ def _complex(point: Point) -> bool:
     return bool(abs(leading.imag) > 1e-3 and np.isclose(abs(leading), point.multiplier))
 
 
-def located(tracer: Tracer, first: Point, second: Point, kind: Kind) -> Found | None:
+def located(tracer: Tracer, first: Point, second: Point, kind: Kind) -> LocatedPoint | None:
     """The point between two neighbours on a branch at which it happens; None if it cannot be reached."""
     direction = second.vector - first.vector
     length = float(np.linalg.norm(direction))
@@ -89,18 +89,18 @@ def _slope(kind: Kind, met: dict[float, Point]) -> float:
     return (distance_to(kind, second) - distance_to(kind, first)) / (b - a)
 
 
-def _special_point(tracer: Tracer, kind: Kind, point: Point, direction: np.ndarray, slope: float) -> Found:
+def _special_point(tracer: Tracer, kind: Kind, point: Point, direction: np.ndarray, slope: float) -> LocatedPoint:
     """The point with its error; infinite where it cannot be computed at the tighter tolerance."""
     tight = Tracer(tracer.family, tracer.sign, tracer.rtol * TIGHTER).solve(point, point.vector, direction)
     if tight is None:
-        return Found(kind, point, direction, np.inf)
+        return LocatedPoint(kind, point, direction, np.inf)
     moved = (abs(distance_to(kind, tight) - distance_to(kind, point)) + abs(distance_to(kind, point))) / abs(slope)
-    return Found(kind, point, direction, abs(tight.place - point.place) + moved * abs(float(direction[0])))
+    return LocatedPoint(kind, point, direction, abs(tight.place - point.place) + moved * abs(float(direction[0])))
 
 
 def corrected(
     tracer: Tracer, near: Point, origin: np.ndarray, direction: np.ndarray, kind: Kind, reach: float
-) -> Found | None:
+) -> LocatedPoint | None:
     """The point at which it happens, by the secant method along a direction from an origin (place, log distance, log
     time), not farther from it than `reach`, from a cycle near it; None if there is none."""
     met: dict[float, Point] = {}
@@ -125,13 +125,13 @@ def corrected(
     return None
 
 
-def special_points(tracer: Tracer, branch: Branch) -> list[Found]:
+def special_points(tracer: Tracer, branch: Branch) -> list[LocatedPoint]:
     """All points of a branch at which a multiplier passes the unit circle."""
     specials = [located(tracer, *pair, kind) for pair in pairwise(branch.points) for kind in changes(*pair)]
     return [special for special in specials if special and not _meets_symmetric(tracer, special)]
 
 
-def _meets_symmetric(tracer: Tracer, special: Found) -> bool:
+def _meets_symmetric(tracer: Tracer, special: LocatedPoint) -> bool:
     """Whether what looks like a fold of an asymmetric branch is where it meets the symmetric cycle."""
     cycle = special.point.cycle
     leans = abs(cycle.middle[0]) > 0.02 * cycle.amplitude[0]

@@ -22,7 +22,7 @@ Flat = Callable[[Mapping[str, np.ndarray]], Mapping[str, Any]]
 
 
 @dataclass(frozen=True)
-class Range:
+class KeyRange:
     """A key (or a free name that others follow) from `low` to `high` [SI `unit`], on a logarithmic scale if `log`."""
 
     key: str
@@ -48,11 +48,11 @@ class Range:
 class Space:
     """Stages with one key varied, or several, over their ranges."""
 
-    ranges: tuple[Range, ...]
+    ranges: tuple[KeyRange, ...]
     flat: Flat
 
     @classmethod
-    def of(cls, stage: Stage, ranges: Sequence[Range]) -> Space:
+    def of(cls, stage: Stage, ranges: Sequence[KeyRange]) -> Space:
         """The stages around one, over ranges of its keys."""
         return cls(tuple(ranges), stage.flat)
 

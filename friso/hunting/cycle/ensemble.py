@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from friso.engine.arrays import Results, Status
-from friso.engine.batch import Options, run_chunks
+from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import Kernel, kernel
 from friso.equations.roles import Role, Steady
 from friso.equations.structure import Structure, shared_structure
@@ -21,7 +21,7 @@ class Ensemble:
     """Stages of one structure, given as flat keys to SI numbers or arrays of shape (count,).
 
     `form` is their structure where the first of them does not tell it. `threads` bounds the threads of their runs,
-    `cancel` is a flag that stops them (see `Options`).
+    `cancel` is a flag that stops them (see `RunOptions`).
     """
 
     flat: Mapping[str, Any]
@@ -118,9 +118,9 @@ class Ensemble:
         with_modes: bool = False,
         **how: Any,
     ) -> Results:
-        """Run each stage from its state for its duration [s]; `how` as in `Options`. Modes that remember are those in
-        which a run begins in that state; `ends` are states alone unless they are to be `with_modes` too."""
-        options = Options(rtol=rtol, threads=self.threads, cancel=self.cancel, **how)
+        """Run each stage from its state for its duration [s]; `how` as in `RunOptions`. Modes that remember are those
+        in which a run begins in that state; `ends` are states alone unless they are to be `with_modes` too."""
+        options = RunOptions(rtol=rtol, threads=self.threads, cancel=self.cancel, **how)
         flat = {**self.flat, "motion.duration": durations, "motion.displacement": self.length}
         parts = list(run_chunks(kernel(self.structure, variational), flat, self.count, options, starts))
         order = np.argsort(np.concatenate([part.numbers for part in parts]))

@@ -13,7 +13,7 @@ from friso.identify.logs.format import FORMATS
 from friso.identify.logs.log import ROLES, Log
 from friso.identify.logs.mapping import Mapping
 from friso.identify.logs.read import file_format
-from friso.identify.logs.roles import Choice, choose, role_of
+from friso.identify.logs.roles import AssignedRole, choose, role_of
 from friso.identify.logs.signals import Reading, Told, instants, no_time, signal, unused, with_told_units
 from friso.identify.logs.time_base import Track, together, track
 from friso.quantities import quoted
@@ -53,7 +53,7 @@ def read_log(
     )  # fmt: skip
 
 
-def _tracks(chosen: dict[str, Choice], reading: Reading, told: Told, needed: Sequence[str]) -> dict[str, Track]:
+def _tracks(chosen: dict[str, AssignedRole], reading: Reading, told: Told, needed: Sequence[str]) -> dict[str, Track]:
     """Each role's channel on even instants in the unit of the role. A channel that was only proposed and that nobody
     needs is left out, which is told, where it has no instants or no unit; others raise LogError."""
     clock = chosen.get("time")
@@ -91,7 +91,7 @@ def _tracks(chosen: dict[str, Choice], reading: Reading, told: Told, needed: Seq
     return tracks
 
 
-def _clocks(clock: Choice | None, reading: Reading) -> list[str]:
+def _clocks(clock: AssignedRole | None, reading: Reading) -> list[str]:
     """Where the instants come from, in words."""
     if reading.mapping.sample_time is not None:
         return [
@@ -104,7 +104,7 @@ def _clocks(clock: Choice | None, reading: Reading) -> list[str]:
     return [f"time: {c.name} ({c.source}), in {c.unit}" for c in columns] or ["time: as stored with the signals"]
 
 
-def _track(role: str, choice: Choice, time: np.ndarray, values: np.ndarray, told: Told) -> Track:
+def _track(role: str, choice: AssignedRole, time: np.ndarray, values: np.ndarray, told: Told) -> Track:
     """One track, its lines told."""
     each = track(role, time, values)
     told.read += each.read

@@ -31,7 +31,7 @@ _KEYS = {
 
 
 @dataclass(frozen=True)
-class Choice:
+class AssignedRole:
     """A channel for a role and why; `told` where the user said so."""
 
     role: str
@@ -86,12 +86,14 @@ def listing(table: ChannelTable) -> str:
     return f"one of the channels {text}{objects}"
 
 
-def choose(table: ChannelTable, told: Names[str, str], needed: Sequence[str], origin: str = "") -> dict[str, Choice]:
+def choose(
+    table: ChannelTable, told: Names[str, str], needed: Sequence[str], origin: str = ""
+) -> dict[str, AssignedRole]:
     """Roles with their channels: first what the user told, then what the names tell.
 
     Raises LogError for a name that is not there, for two candidates, and for a role that is needed and not found.
     """
-    chosen = {role: Choice(role, find(table, name, role, origin), "as told", True) for role, name in told.items()}
+    chosen = {role: AssignedRole(role, find(table, name, role, origin), "as told", True) for role, name in told.items()}
     taken = {id(choice.channel) for choice in chosen.values()}
     candidates: dict[str, list[tuple[Channel, str]]] = {}
     for channel in table.channels:
@@ -107,7 +109,7 @@ def choose(table: ChannelTable, told: Names[str, str], needed: Sequence[str], or
                 role, f"{len(found)} candidates: {names}", "one channel", f'--map {role}="{found[0][0].name}"', origin
             )
         channel, word = found[0]
-        chosen[role] = Choice(role, channel, f'the name says "{word}"', False)
+        chosen[role] = AssignedRole(role, channel, f'the name says "{word}"', False)
     for role in needed:
         if role not in chosen:
             example = f'--map {role}="{table.channels[0].name}"'

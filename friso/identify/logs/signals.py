@@ -12,7 +12,7 @@ from friso.identify.logs.channel import Channel, ChannelTable
 from friso.identify.logs.checks import unwrapped
 from friso.identify.logs.log import ROLES
 from friso.identify.logs.mapping import Mapping
-from friso.identify.logs.roles import Choice, find
+from friso.identify.logs.roles import AssignedRole, find
 from friso.identify.logs.text import with_times
 from friso.identify.logs.units import factor, in_si, read_scale
 from friso.quantities import quoted
@@ -58,7 +58,7 @@ def with_told_units(table: ChannelTable, mapping: Mapping, times: bool, origin: 
     return replace(table, channels=kept)
 
 
-def signal(choice: Choice, reading: Reading, told: Told) -> np.ndarray:
+def signal(choice: AssignedRole, reading: Reading, told: Told) -> np.ndarray:
     """Values of a channel in the unit of its role, with what was done to them told. Raises LogError."""
     channel, role = choice.channel, choice.role
     values, bits = unwrapped(channel.values) if ROLES[role] == "m" else (channel.values, 0)  # encoders overflow
@@ -98,7 +98,7 @@ def _scaled(role: str, scale: str, unit: str, origin: str) -> tuple[float, str]:
         raise error.found_in(origin) from None
 
 
-def _wrong_unit(choice: Choice, unit: str, si: str, reading: Reading) -> LogError:
+def _wrong_unit(choice: AssignedRole, unit: str, si: str, reading: Reading) -> LogError:
     """The error for a channel whose unit is none of the role's kind, or that has none."""
     role, name = choice.role, choice.channel.name
     if not unit:
@@ -110,7 +110,7 @@ def _wrong_unit(choice: Choice, unit: str, si: str, reading: Reading) -> LogErro
     return LogError(role, f"{quoted(name)} in {unit}", f"a scale to {ROLES[role]}", example, reading.origin)
 
 
-def instants(choice: Choice, clock: Choice | None, reading: Reading, told: Told) -> np.ndarray | None:
+def instants(choice: AssignedRole, clock: AssignedRole | None, reading: Reading, told: Told) -> np.ndarray | None:
     """Instants of a channel [s]: from the sample time that the user said, the time channel, or the file; None where
     there are none. Raises LogError."""
     channel = choice.channel
@@ -121,7 +121,7 @@ def instants(choice: Choice, clock: Choice | None, reading: Reading, told: Told)
     return channel.time
 
 
-def _seconds(clock: Choice, reading: Reading, told: Told) -> float:
+def _seconds(clock: AssignedRole, reading: Reading, told: Told) -> float:
     """Seconds in the unit of the time channel. Raises LogError for none."""
     name, unit = clock.channel.name, clock.channel.unit
     if not unit and clock.told and reading.bare:
@@ -156,7 +156,7 @@ def _offers(table: ChannelTable) -> str:
     return "; ".join(offers)
 
 
-def unused(mapping: Mapping, chosen: Roles[str, Choice], origin: str) -> None:
+def unused(mapping: Mapping, chosen: Roles[str, AssignedRole], origin: str) -> None:
     """Raises LogError for a scale of a role that has no channel."""
     for role in mapping.scales:
         if role not in chosen:

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from friso.engine.arrays import Status
-from friso.frequency.drive import Drive
+from friso.frequency.drive import DriveTiming
 from friso.frequency.family import stability_by_poles
 from friso.frequency.loops import poles
 from friso.frequency.members import limit_cases
@@ -25,7 +25,7 @@ the slowest pole; the highest is half that of sampling."""
 
 
 @dataclass(frozen=True)
-class Found:
+class MachineMeasures:
     """Measures of runs, arrays of shape (count,): what each did at its end (`outcome`, words of
     `friso.hunting.criteria.run_outcome`, the band being the tolerance), its distinct peaks `counted`, the time of
     `settling` [s] from the last corner of the reference until the stage stays in position (infinite: it swings, or
@@ -49,7 +49,7 @@ class Found:
         return self.outcome == SWINGS
 
 
-Measures = TypeVar("Measures", "Found", "Later")
+Measures = TypeVar("Measures", "MachineMeasures", "Later")
 
 
 def joined(parts: Sequence[Measures]) -> Measures:
@@ -59,7 +59,7 @@ def joined(parts: Sequence[Measures]) -> Measures:
 
 
 @np.errstate(all="ignore")  # runs that fail leave infinities and NaN behind
-def measured(recorded: Recorded, corner: float, within: float) -> Found:
+def measured(recorded: Recorded, corner: float, within: float) -> MachineMeasures:
     """The measures of a chunk of runs whose reference stands from `corner` [s] on; in position is `within` [m]. What
     the drive logs counts for the peaks, what really moves for the rest."""
     time, reference = recorded.time, recorded.logged["reference"]
@@ -68,7 +68,7 @@ def measured(recorded: Recorded, corner: float, within: float) -> Found:
     outcome = outcomes(end_of_traces(time, deviation, within, done), within)
     late = deviation[:, time >= WINDOW * time[-1]]
     settling = np.where(outcome == RESTS, settling_time(time, deviation, corner, within), np.inf)
-    return Found(
+    return MachineMeasures(
         outcome=outcome,
         counted=np.where(done, _counted(time, recorded.logged["position"] - reference), 0),
         settling=np.where(done, settling, np.nan),
@@ -117,7 +117,7 @@ def _rms(values: np.ndarray) -> np.ndarray:
 
 
 @dataclass(frozen=True)
-class Loops:
+class LoopRobustness:
     """Of the linear loop of each machine, arrays of shape (count,): whether it is `stable` in all limit cases, and the
     least modulus `margin` of these (0 where it is not stable)."""
 
@@ -125,9 +125,9 @@ class Loops:
     margin: np.ndarray
 
 
-def linear_loops(stage: Stage, flat: Mapping[str, Any], count: int) -> Loops:
+def linear_loops(stage: Stage, flat: Mapping[str, Any], count: int) -> LoopRobustness:
     """The loops of machines, given as flat keys to SI numbers or arrays; the limit cases are those of the stage."""
-    drive, stable, margin = Drive.of(flat), np.ones(count, bool), np.full(count, np.inf)
+    drive, stable, margin = DriveTiming.of(flat), np.ones(count, bool), np.full(count, np.inf)
     for one in limit_cases(stage.flat()).values():
         machines = one.repeated(count)
         known, looked = poles(flat, machines, drive), stability_by_poles(flat, machines)
@@ -137,4 +137,4 @@ def linear_loops(stage: Stage, flat: Mapping[str, Any], count: int) -> Loops:
         shared = known.distance(np.broadcast_to(omega, (count, len(omega)))).min(axis=1)
         stable &= looked.abscissa < 0
         margin = np.minimum(margin, np.minimum(shared, looked.resonant))
-    return Loops(stable, np.where(stable, margin, 0.0))
+    return LoopRobustness(stable, np.where(stable, margin, 0.0))

@@ -59,7 +59,7 @@ class Option:
 
 
 @dataclass(frozen=True)
-class Options:
+class CompareOptions:
     """Those that the stage can have, a to g; why others are left out; and the deadband of the integrator [m]."""
 
     every: tuple[Option, ...]
@@ -78,7 +78,7 @@ def linear_flat(stage: Stage, flat: Mapping[str, Any]) -> dict[str, Any]:
     return {**flat, **{key: ratio * flat[key] for key in map(law.key, law.loop_gain)}, "drive.delay": late}
 
 
-def options(machines: Machines, within: float) -> Options:
+def options(machines: Machines, within: float) -> CompareOptions:
     """The options of machines that are to be in position `within` a tolerance [m]."""
     stage = machines.stage
     variants = stage.variants()
@@ -100,7 +100,7 @@ def options(machines: Machines, within: float) -> Options:
         left_out["f"] = "the stage file has neither Coulomb nor viscous friction"
     if free:
         found += _faster("g", free, left_out)
-    return Options(tuple(found), dict(sorted(left_out.items())), deadband)
+    return CompareOptions(tuple(found), dict(sorted(left_out.items())), deadband)
 
 
 def _faster(letter: str, stage: Stage, left_out: dict[str, str]) -> list[Option]:

@@ -11,7 +11,7 @@ from friso.intervals import COVERAGE
 
 
 @dataclass(frozen=True)
-class Estimate:
+class EstimatedValue:
     """A value and its 95 % interval; NaN where nothing is known."""
 
     value: float
@@ -19,15 +19,15 @@ class Estimate:
     high: float
 
 
-def median(values: np.ndarray) -> Estimate:
+def median(values: np.ndarray) -> EstimatedValue:
     """The median, with the interval of order statistics (David, Nagaraja 2003, Order Statistics, Sec. 7.1), which holds
     for any distribution; infinite values are allowed, NaN are left out."""
     known = np.sort(values[~np.isnan(values)])
     if not known.size:
-        return Estimate(np.nan, np.nan, np.nan)
+        return EstimatedValue(np.nan, np.nan, np.nan)
     rank = int(binom.ppf(0.025, known.size, 0.5))
     low, high = (known[rank - 1], known[-rank]) if rank else (-np.inf, np.inf)
-    return Estimate(_middle(known), float(low), float(high))
+    return EstimatedValue(_middle(known), float(low), float(high))
 
 
 def _middle(ordered: np.ndarray) -> float:
@@ -36,14 +36,14 @@ def _middle(ordered: np.ndarray) -> float:
     return float(low if low == high else (low + high) / 2)
 
 
-def difference(flags: np.ndarray, before: np.ndarray) -> Estimate:
+def difference(flags: np.ndarray, before: np.ndarray) -> EstimatedValue:
     """How much more probable something is than before, on the same machines (Agresti, Min 2005,
     doi:10.1002/sim.1781: the interval of Wald, half a machine being added to every cell)."""
     count = len(flags)
     if not count:
-        return Estimate(np.nan, np.nan, np.nan)
+        return EstimatedValue(np.nan, np.nan, np.nan)
     gained, lost = (int(np.count_nonzero(cell)) for cell in (flags & ~before, ~flags & before))
     more, less, total = gained + 0.5, lost + 0.5, count + 2
     centre = (more - less) / total
     half = COVERAGE * np.sqrt((more + less) - (more - less) ** 2 / total) / total
-    return Estimate((gained - lost) / count, max(-1.0, float(centre - half)), min(1.0, float(centre + half)))
+    return EstimatedValue((gained - lost) / count, max(-1.0, float(centre - half)), min(1.0, float(centre + half)))

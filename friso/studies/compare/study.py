@@ -11,13 +11,21 @@ from friso.equations.motion import last_corner
 from friso.errors import InputError
 from friso.progress import Progress, silent
 from friso.rig.run import Recorded, run
-from friso.rig.task import Task, own_motion
+from friso.rig.task import MoveTask, own_motion
 from friso.stage import Stage
 from friso.stage.correlations import Correlations
 from friso.studies.compare.machines import Machines, draw_machines
-from friso.studies.compare.measures import Found, Later, Loops, followed, joined, linear_loops, measured
-from friso.studies.compare.options import NAMES, Option, Options, linear_flat, options
-from friso.studies.compare.statistics import Estimate, difference, median
+from friso.studies.compare.measures import (
+    Later,
+    LoopRobustness,
+    MachineMeasures,
+    followed,
+    joined,
+    linear_loops,
+    measured,
+)
+from friso.studies.compare.options import NAMES, CompareOptions, Option, linear_flat, options
+from friso.studies.compare.statistics import EstimatedValue, difference, median
 from friso.studies.shares import Share, share
 
 INTERVAL = 1e-3
@@ -38,9 +46,9 @@ class Result:
     """An option, what became of each machine with it, of the first of them `later`, and the linear loop of each."""
 
     option: Option
-    found: Found
+    found: MachineMeasures
     later: Later
-    loops: Loops
+    loops: LoopRobustness
 
     @property
     def letter(self) -> str:
@@ -67,20 +75,20 @@ class Result:
         return share(self.later.stays, self.later.done)
 
     @property
-    def settling(self) -> Estimate:
+    def settling(self) -> EstimatedValue:
         """Median [s] over all machines, those that never settle included."""
         return median(self.found.settling)
 
     @property
-    def in_position(self) -> Estimate:
+    def in_position(self) -> EstimatedValue:
         return median(self.found.in_position)
 
     @property
-    def force(self) -> Estimate:
+    def force(self) -> EstimatedValue:
         return median(self.found.force)
 
     @property
-    def margin(self) -> Estimate:
+    def margin(self) -> EstimatedValue:
         return median(self.loops.margin)
 
     @property
@@ -108,12 +116,12 @@ class Paired:
     machines in position `sooner`, `later` and `alike` (never with both, too), and the medians of what root mean squares
     in position and of the force are multiplied by."""
 
-    swinging: Estimate
+    swinging: EstimatedValue
     sooner: Share
     later: Share
     alike: Share
-    in_position: Estimate
-    force: Estimate
+    in_position: EstimatedValue
+    force: EstimatedValue
 
 
 @dataclass(frozen=True)
@@ -121,7 +129,7 @@ class Comparison:
     """The results of the options on the machines drawn with a seed, tolerance [m] included; and notes."""
 
     machines: Machines
-    options: Options
+    options: CompareOptions
     results: tuple[Result, ...]
     within: float
     seed: int
@@ -202,13 +210,13 @@ class _Work:
     is told of the progress, and how many options there are."""
 
     machines: Machines
-    task: Task
+    task: MoveTask
     corner: float
     within: float
     progress: Progress
     options: int
 
-    def runs(self, option: Option, before: int) -> Found:
+    def runs(self, option: Option, before: int) -> MachineMeasures:
         """An option on all machines, after some other options."""
         count, parts = self.machines.count, []
         label, total = f"{option.letter} {option.name}", count * self.options
@@ -224,7 +232,7 @@ class _Work:
         some = min(FOLLOWED, self.machines.count)
         return joined([followed(recorded, self.within) for recorded in self._recorded(option, task, some, LONGER)])
 
-    def _recorded(self, option: Option, task: Task, count: int, coarser: int) -> Iterator[Recorded]:
+    def _recorded(self, option: Option, task: MoveTask, count: int, coarser: int) -> Iterator[Recorded]:
         """The runs of the first machines, chunk by chunk."""
         sample = self.machines.stage.flat()["drive.sample_time"]
         interval = coarser * max(1, int(np.ceil(INTERVAL / sample * (1 - 1e-9)))) * sample
@@ -233,7 +241,7 @@ class _Work:
         return run(option.stage, task, self.machines.seeds[:count].tolist(), interval, changes)
 
 
-def _loops(machines: Machines, option: Option) -> Loops:
+def _loops(machines: Machines, option: Option) -> LoopRobustness:
     flat = linear_flat(option.stage, machines.flat(option.stage, option.changes))
     return linear_loops(option.stage, flat, machines.count)
 

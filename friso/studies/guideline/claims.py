@@ -10,7 +10,7 @@ import numpy as np
 
 from friso.hunting.edges import ABOVE, BELOW, KINDS
 from friso.hunting.edges import UNKNOWN as NOT_TOLD
-from friso.studies.guideline.rig import Case
+from friso.studies.guideline.rig import RigCase
 from friso.studies.guideline.worked import CLAIMED_AT, STUDIED, Worked
 from friso.studies.thesis.claims import ABOUT, about
 
@@ -24,7 +24,7 @@ NEAR = 1.1
 
 
 @dataclass(frozen=True)
-class Claim:
+class GuidelineClaim:
     """What the thesis says, where, what was found, and whether the claim holds by the rule given (unknown
     where an edge is: what was found says why)."""
 
@@ -35,17 +35,17 @@ class Claim:
     judgement: str
 
 
-def claims(worked: Worked) -> tuple[Claim, ...]:
+def claims(worked: Worked) -> tuple[GuidelineClaim, ...]:
     """The claims of the thesis that the edge decides, judged by computed edges, not by the laws."""
     return _gap(worked), _share(worked), _mass(worked), _stiffness(worked), _stroke(worked), _edges(worked)
 
 
-def _gap(worked: Worked) -> Claim:
+def _gap(worked: Worked) -> GuidelineClaim:
     cases = worked.studies["gap"]
     forces = sorted({case.changes["friction.static"] for case in cases})
     gaps = [least_gap(cases, force) for force in forces]
     words = ", ".join(f"{gap.words} at F_s = {force:g} N" for force, gap in zip(forces, gaps, strict=True))
-    return Claim(
+    return GuidelineClaim(
         "Sec. 4.3.3",
         "hunting needs a friction gap of about 1 N",
         f"locked, at {CLAIMED_AT:g} Hz a cycle attracts from a gap of {words}; by the law this gap grows with the "
@@ -55,7 +55,7 @@ def _gap(worked: Worked) -> Claim:
     )
 
 
-def _share(worked: Worked) -> Claim:
+def _share(worked: Worked) -> GuidelineClaim:
     cases = worked.studies["share"]
     edges = _computed(cases)
     at = [STUDIED["share"](case.changes) for case in cases]
@@ -63,7 +63,7 @@ def _share(worked: Worked) -> Claim:
         f", a spread by a factor of {edges.max() / edges.min():.2g}" if np.all(np.isfinite(edges) & (edges > 0)) else ""
     )
     ends = ", ".join(f"{_edge(case)} at {share:.0%}" for share, case in zip(at, cases, strict=True))
-    return Claim(
+    return GuidelineClaim(
         "Fig. 15A",
         "the mass ratio does not affect the isolator",
         f"edge by the share of the stage in the mass: {ends}{spread}",
@@ -72,7 +72,7 @@ def _share(worked: Worked) -> Claim:
     )
 
 
-def _mass(worked: Worked) -> Claim:
+def _mass(worked: Worked) -> GuidelineClaim:
     cases = worked.studies["mass"]
     edges = _computed(cases)
     at = [STUDIED["mass"](case.changes) for case in cases]
@@ -81,23 +81,23 @@ def _mass(worked: Worked) -> Claim:
     )
     falls = [_verdict(after < before, before, after) for before, after in pairwise(edges)]
     falls = falls if None in falls else [all(falls)]
-    return Claim("Fig. 11B", "more mass helps", text, "the edge falls monotonically", _judged(falls))
+    return GuidelineClaim("Fig. 11B", "more mass helps", text, "the edge falls monotonically", _judged(falls))
 
 
-def _stiffness(worked: Worked) -> Claim:
+def _stiffness(worked: Worked) -> GuidelineClaim:
     cases = {round(STUDIED["stiffness"](case.changes)): case for case in worked.studies["stiffness"]}
     soft, stiff = cases[1000], cases[2400]
     lower = _verdict(soft.ranked < stiff.ranked, soft.ranked, stiff.ranked)
     text = f"edge {_edge(soft)} at 1 N/mm, {_edge(stiff)} at 2.4 N/mm"
-    return Claim("Fig. 16B", "a softer joint lowers the limit", text, "it is lower", _judged([lower]))
+    return GuidelineClaim("Fig. 16B", "a softer joint lowers the limit", text, "it is lower", _judged([lower]))
 
 
-def _stroke(worked: Worked) -> Claim:
+def _stroke(worked: Worked) -> GuidelineClaim:
     cases = {round(1e3 * STUDIED["stroke"](case.changes), 6): case for case in worked.studies["stroke"]}
     words = ", ".join(f"{_edge(case)} at {stroke:g} mm" for stroke, case in cases.items())
     short, long, longest = (cases[stroke].ranked for stroke in (0.3, 1.0, 2.0))
     same = abs(long - longest) < 0.02 * longest
-    return Claim(
+    return GuidelineClaim(
         "Sec. 4.1, 4.3.3",
         "a stroke of 0.3 mm is enough; above some stroke the limit no longer changes",
         f"edge {words}",
@@ -112,7 +112,7 @@ def _stroke(worked: Worked) -> Claim:
     )
 
 
-def _edges(worked: Worked) -> Claim:
+def _edges(worked: Worked) -> GuidelineClaim:
     _, locked, free = (machine.computed for machine in worked.machines)
     worst = worked.worst
     text = (
@@ -122,7 +122,7 @@ def _edges(worked: Worked) -> Claim:
     ends = [FREE_EDGE[0] / NEAR, FREE_EDGE[1] * NEAR]
     near = [_verdict(ends[0] <= free <= ends[1], free)]
     near += [_verdict(about(worst.ranked, edge), worst.ranked) for edge in LOCKED_EDGES]
-    return Claim(
+    return GuidelineClaim(
         "Sec. 4.3.3, 6",
         "the isolator works from 5 to 5.5 Hz, the locked rig needs about 15 Hz (hunting was gone at 14.3 Hz)",
         text,
@@ -142,11 +142,11 @@ def _judged(parts: Sequence[bool | None]) -> str:
     return HOLDS if all(parts) else IN_PART if any(parts) else DIFFERS
 
 
-def _computed(cases: Sequence[Case]) -> np.ndarray:
+def _computed(cases: Sequence[RigCase]) -> np.ndarray:
     return np.array([case.ranked for case in cases])
 
 
-def _edge(case: Case) -> str:
+def _edge(case: RigCase) -> str:
     """A computed edge in words, or why there is none."""
     if np.isfinite(case.computed):
         return _hertz(case.computed)
@@ -179,7 +179,7 @@ class LeastGap:
         return True if least <= self.low and self.high <= most else None
 
 
-def least_gap(cases: Sequence[Case], static: float, crossover: float = CLAIMED_AT) -> LeastGap:
+def least_gap(cases: Sequence[RigCase], static: float, crossover: float = CLAIMED_AT) -> LeastGap:
     """The friction gap F_s - F_c from which on the rig of a static friction [N] hunts at a crossover [Hz], straight
     between the points of its edge in logarithms."""
     at_force = [case for case in cases if case.changes["friction.static"] == static]

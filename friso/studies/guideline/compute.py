@@ -17,8 +17,8 @@ from friso.hunting.cycle.ensemble import shared_structure
 from friso.progress import Progress, Tally, silent
 from friso.studies.guideline.checks import Checked, checked
 from friso.studies.guideline.groups import Count, counted, values_of
-from friso.studies.guideline.laws import FREE_LAW, LOCKED_LAW, Errors, Fitted, fitted
-from friso.studies.guideline.parasitic import Parasitic, parasitic_limits
+from friso.studies.guideline.laws import FREE_LAW, LOCKED_LAW, Errors, FittedLaw, fitted
+from friso.studies.guideline.parasitic import ParasiticLimits, parasitic_limits
 from friso.studies.guideline.rig import Laws, plain
 from friso.studies.guideline.sweeps import (
     FREE_FIT,
@@ -60,7 +60,7 @@ class Fit:
     free joint the locked edge is that computed in `on_fit`, that of the locked law in `on_test`, where `given` has the
     errors with the computed one. `checked` holds simulations of samples of the test."""
 
-    law: Fitted
+    law: FittedLaw
     fit: Sweep
     test: Sweep
     on_fit: Errors
@@ -95,7 +95,7 @@ class Guideline:
     locked: Fit
     free: Fit
     worked: Worked
-    parasitic: list[Parasitic]
+    parasitic: list[ParasiticLimits]
     seconds: float
     cores: int
     resumed: int
@@ -144,7 +144,7 @@ def safe_over_friction(locked: Fit) -> float:
     return max(decade.errors.safe if decade.errors else locked.on_test.safe for decade in bins)
 
 
-def _ratio(law: Fitted, values: Mapping[str, np.ndarray]) -> np.ndarray:
+def _ratio(law: FittedLaw, values: Mapping[str, np.ndarray]) -> np.ndarray:
     slip, drop = np.exp(law.log_rates(values))
     return slip / drop
 
@@ -220,7 +220,7 @@ def _locked(fit: Sweep, test: Sweep, few: int) -> Fit:
     return Fit(law, fit, test, Errors.between(law.edge(used.values), used.edge), errors, errors, checked(test, few))
 
 
-def _free(fit: Sweep, test: Sweep, locked: Fitted, few: int) -> Fit:
+def _free(fit: Sweep, test: Sweep, locked: FittedLaw, few: int) -> Fit:
     used, held = fit.usable, test.usable
     law = fitted(FREE_LAW, used.values, used.edge, used.locked)
     from_simulated = Errors.between(law.edge(held.values, held.locked), held.edge)

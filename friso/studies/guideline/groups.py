@@ -155,7 +155,7 @@ Values = Mapping[str, Any]
 
 
 @dataclass(frozen=True)
-class Scale:
+class GroupScale:
     """What the groups leave open: the unit of mass [kg], of stiffness [N/m] and of force [N]."""
 
     mass: float = 1.0
@@ -168,7 +168,7 @@ class Scale:
         return float(np.sqrt(self.stiffness / self.mass))
 
 
-_UNIT = Scale()
+_UNIT = GroupScale()
 
 
 @dataclass(frozen=True)
@@ -225,7 +225,7 @@ def values_of(flat: Mapping[str, Any]) -> dict[str, Any]:
     return {name: group.of(flat) for name, group in GROUPS.items() if group.part in parts}
 
 
-def flat_of(values: Values, scale: Scale = _UNIT) -> dict[str, Any]:
+def flat_of(values: Values, scale: GroupScale = _UNIT) -> dict[str, Any]:
     """Flat keys to SI values of stages with these groups: rigid, or with a joint that is free if `joint` is among them.
 
     The inverse of `values_of`; `scale` decides on what the groups leave open.
@@ -251,7 +251,7 @@ def flat_of(values: Values, scale: Scale = _UNIT) -> dict[str, Any]:
     return flat | (_joint(values, flat, scale) if "joint" in values else {})
 
 
-def _joint(values: Values, flat: Mapping[str, Any], scale: Scale) -> dict[str, Any]:
+def _joint(values: Values, flat: Mapping[str, Any], scale: GroupScale) -> dict[str, Any]:
     stiffness = values["joint"] * scale.stiffness
     limiter = values.get("limiter", LIMITER_OVER_BRISTLES) * scale.stiffness
     return {

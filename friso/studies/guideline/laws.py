@@ -67,7 +67,7 @@ Exponent = tuple[int, str]
 
 
 @dataclass(frozen=True)
-class Law:
+class EdgeLaw:
     """Rates, and how the edge follows from them."""
 
     rates: tuple[Rate, ...]
@@ -79,11 +79,11 @@ class Law:
 
 
 @dataclass(frozen=True)
-class Fitted:
+class FittedLaw:
     """A law with its numbers: the `factors` of the rates and the `exponents` that were chosen, in their order; `path`,
     the cross-validated loss (rms-like, see `loss`) with none, one, two, ... of them."""
 
-    law: Law
+    law: EdgeLaw
     factors: tuple[float, ...]
     exponents: Mapping[Exponent, float]
     path: tuple[float, ...] = ()
@@ -148,7 +148,9 @@ def beside_locked(rates: np.ndarray, locked: np.ndarray) -> tuple[np.ndarray, np
     return log, np.where(np.arange(len(rates))[:, None] == largest, weights[0], 0.0)
 
 
-def fitted(law: Law, values: Values, edges: np.ndarray, locked: np.ndarray | None = None, seed: int = 0) -> Fitted:
+def fitted(
+    law: EdgeLaw, values: Values, edges: np.ndarray, locked: np.ndarray | None = None, seed: int = 0
+) -> FittedLaw:
     """The law fitted to edges, shape (count,), its exponents chosen by cross-validation."""
     target = np.log(edges)
     offset = np.zeros(len(edges)) if locked is None else np.log(locked)
@@ -165,7 +167,7 @@ def fitted(law: Law, values: Values, edges: np.ndarray, locked: np.ndarray | Non
     solution = _solved(law, chosen, values, target, offset)
     rates = len(law.rates)
     factors = tuple(float(factor) for factor in np.exp(solution[:rates]))
-    return Fitted(law, factors, dict(zip(chosen, map(float, solution[rates:]), strict=True)), tuple(path))
+    return FittedLaw(law, factors, dict(zip(chosen, map(float, solution[rates:]), strict=True)), tuple(path))
 
 
 def loss(off: np.ndarray) -> float:
@@ -174,7 +176,12 @@ def loss(off: np.ndarray) -> float:
 
 
 def _validated(
-    law: Law, chosen: tuple[Exponent, ...], values: Values, target: np.ndarray, offset: np.ndarray, folds: np.ndarray
+    law: EdgeLaw,
+    chosen: tuple[Exponent, ...],
+    values: Values,
+    target: np.ndarray,
+    offset: np.ndarray,
+    folds: np.ndarray,
 ) -> float:
     """The loss on each part of the samples of the law fitted to the others."""
     off = np.empty(len(target))
@@ -187,7 +194,7 @@ def _validated(
 
 
 def _solved(
-    law: Law, chosen: tuple[Exponent, ...], values: Values, target: np.ndarray, offset: np.ndarray
+    law: EdgeLaw, chosen: tuple[Exponent, ...], values: Values, target: np.ndarray, offset: np.ndarray
 ) -> np.ndarray:
     """Logarithms of the factors, then the exponents."""
     features = _features(law, chosen, values)
@@ -204,7 +211,7 @@ def _solved(
     return least_squares(off, start, slopes, loss="soft_l1", f_scale=SCALE).x  # type: ignore[arg-type]
 
 
-def _features(law: Law, chosen: tuple[Exponent, ...], values: Values) -> np.ndarray:
+def _features(law: EdgeLaw, chosen: tuple[Exponent, ...], values: Values) -> np.ndarray:
     """Derivatives of the logarithms of the rates by the parameters, shape (rates, parameters, count)."""
     count, rates = len(next(iter(values.values()))), len(law.rates)
     features = np.zeros((rates, rates + len(chosen), count))
@@ -214,7 +221,7 @@ def _features(law: Law, chosen: tuple[Exponent, ...], values: Values) -> np.ndar
     return features
 
 
-def _log_rates(law: Law, chosen: tuple[Exponent, ...], values: Values, parameters: np.ndarray) -> np.ndarray:
+def _log_rates(law: EdgeLaw, chosen: tuple[Exponent, ...], values: Values, parameters: np.ndarray) -> np.ndarray:
     fixed = np.stack([np.broadcast_to(rate.fixed(values), values["gap"].shape) for rate in law.rates])
     return fixed + np.einsum("rpc,p->rc", _features(law, chosen, values), parameters)
 
@@ -239,5 +246,5 @@ JOINT = Rate("joint", {"joint": 0.5}, (*_TUNING, *_FRICTION, *_JOINT))
 STROKE = Rate("stroke", {"joint": 0.5, "stroke": -0.5}, (*_TUNING, *_FRICTION, *_JOINT))
 """sqrt(F_s/(m S_j))"""
 
-LOCKED_LAW = Law((SLIP, DROP), partial(in_series, 1.0))
-FREE_LAW = Law((JOINT, STROKE), beside_locked)
+LOCKED_LAW = EdgeLaw((SLIP, DROP), partial(in_series, 1.0))
+FREE_LAW = EdgeLaw((JOINT, STROKE), beside_locked)

@@ -23,7 +23,7 @@ DRIVE = {"drive.sample_time": "50 us", "drive.delay": "50 us"}
 
 
 @dataclass(frozen=True)
-class Parasitic:
+class ParasiticLimits:
     """A parasitic mode at a frequency [Hz] with a damping ratio, and the range of crossovers [Hz], joint locked and
     free, that holds the stage's own and in which the modulus margin is 0.5 in all settled states; None where the stage
     lacks it at its own crossover."""
@@ -34,7 +34,7 @@ class Parasitic:
     free: Range | None
 
 
-def parasitic_limits(stage: Stage) -> list[Parasitic]:
+def parasitic_limits(stage: Stage) -> list[ParasiticLimits]:
     """The stage with each of these modes instead of its own, sampled as the thesis's drive."""
     modes = []
     for damping in DAMPING_RATIOS:
@@ -42,7 +42,7 @@ def parasitic_limits(stage: Stage) -> list[Parasitic]:
             mode = {"parasitic.frequency": f"{frequency!r} Hz", "parasitic.damping_ratio": damping, **DRIVE}
             flats = [stage.replace({**mode, "joint.locked": held}).flat() for held in (True, False)]
             locked, free = (holding(limits(flat).comfortable, flat[CROSSOVER]) for flat in flats)
-            modes.append(Parasitic(frequency, damping, locked, free))
+            modes.append(ParasiticLimits(frequency, damping, locked, free))
     return modes
 
 

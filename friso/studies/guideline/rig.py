@@ -14,7 +14,7 @@ from friso.hunting.edges import ABOVE, BELOW, FLIP, find_edges
 from friso.hunting.margin import margin
 from friso.stage import Stage
 from friso.studies.guideline.groups import values_of
-from friso.studies.guideline.laws import Fitted
+from friso.studies.guideline.laws import FittedLaw
 from friso.studies.thesis.studies import rig
 
 RIGID_GRID = np.geomspace(2.0, 60.0, 14)
@@ -26,7 +26,7 @@ Changes = Mapping[str, Any]
 
 
 @dataclass(frozen=True)
-class Case:
+class RigCase:
     """A stage of the rig's kind: what is changed, and its edge [Hz] by the law and as computed (NaN: none found), with
     its `kind`, one of `KINDS`, which says why there is none."""
 
@@ -46,8 +46,8 @@ class Case:
 class Laws:
     """The two laws that give the edge of any stage."""
 
-    locked: Fitted
-    free: Fitted
+    locked: FittedLaw
+    free: FittedLaw
 
     def locked_edge(self, flat: Mapping[str, Any]) -> np.ndarray:
         """The edge [Hz] with the joint locked of stages given by flat keys to SI numbers or arrays."""
@@ -83,7 +83,7 @@ def plain(part: str = "") -> dict[str, Any]:
     return {key: value for key, value in rig().flat().items() if not key.startswith(dropped)}
 
 
-def cases(laws: Laws, changes: Sequence[Changes], free: bool) -> list[Case]:
+def cases(laws: Laws, changes: Sequence[Changes], free: bool) -> list[RigCase]:
     """The rig with each of these changes, rigid or with its joint free."""
     base = (
         rig().flat() if any("parasitic.frequency" in change for change in changes) else plain("joint" if free else "")
@@ -100,7 +100,7 @@ def cases(laws: Laws, changes: Sequence[Changes], free: bool) -> list[Case]:
     with_joint = plain("joint") | {key: value for key, value in flat.items() if not key.startswith("parasitic.")}
     law = np.broadcast_to(laws.free_edge(with_joint) if free else laws.locked_edge(with_joint), edges.kind.shape)
     columns = law.tolist(), edges.crossover.tolist(), edges.kind.astype(str).tolist()
-    return [Case(*row) for row in zip(changes, *columns, strict=True)]
+    return [RigCase(*row) for row in zip(changes, *columns, strict=True)]
 
 
 def direct(stage: Stage) -> float:

@@ -12,7 +12,7 @@ from scipy.optimize import brentq
 
 from friso.equations.controllers.van_dijk import CROSSOVER, TUNED_MASS
 from friso.studies.guideline.parasitic import settled_margin
-from friso.studies.guideline.rig import FREE_GRID, Case, Laws, cases, direct, plain
+from friso.studies.guideline.rig import FREE_GRID, Laws, RigCase, cases, direct, plain
 from friso.studies.guideline.sweeps import LOCKED_BOX
 from friso.studies.thesis.studies import rig
 
@@ -45,7 +45,7 @@ STUDIED: Mapping[str, Callable[[Mapping[str, Any]], float]] = {
 
 
 @dataclass(frozen=True)
-class Machine:
+class WorkedMachine:
     """A machine of the rig's kind by its name: its edge [Hz] by the law and as `friso check` finds it."""
 
     name: str
@@ -54,7 +54,7 @@ class Machine:
 
 
 @dataclass(frozen=True)
-class Design:
+class WorkedDesign:
     """An isolator for a bandwidth limit [Hz]: the edge [Hz] for which it is laid out by the law, `aim`; its stiffness
     [N/m], the stroke that it needs [m] and the `force` at full stroke [N]; its edges over the friction range, and the
     least modulus `margin` of the settled states at the limit, with the rig's own friction and parasitic mode."""
@@ -63,7 +63,7 @@ class Design:
     aim: float
     stiffness: float
     stroke: float
-    cases: tuple[Case, ...]
+    cases: tuple[RigCase, ...]
     margin: float
 
     @property
@@ -87,7 +87,7 @@ class Design:
 
 
 @dataclass(frozen=True)
-class Need:
+class IsolatorNeed:
     """Whether a machine with a bandwidth limit [Hz] needs an isolator: if that is below `edge` [Hz], the highest locked
     edge by the law over the friction range, with its safety factor."""
 
@@ -108,16 +108,16 @@ class Worked:
     the thesis, by name."""
 
     rates: Mapping[str, float]
-    machines: tuple[Machine, ...]
-    friction: tuple[Case, ...]
+    machines: tuple[WorkedMachine, ...]
+    friction: tuple[RigCase, ...]
     bound: float
     safe: float
-    needs: tuple[Need, ...]
-    designs: tuple[tuple[Design, ...], ...]
-    studies: Mapping[str, tuple[Case, ...]]
+    needs: tuple[IsolatorNeed, ...]
+    designs: tuple[tuple[WorkedDesign, ...], ...]
+    studies: Mapping[str, tuple[RigCase, ...]]
 
     @property
-    def worst(self) -> Case:
+    def worst(self) -> RigCase:
         """The case of the friction range with the highest computed edge, or one of which it is not known."""
         return max(self.friction, key=lambda case: case.ranked if case.ranked == case.ranked else np.inf)
 
@@ -131,7 +131,7 @@ def worked(laws: Laws, safe_locked: float, safe_free: float) -> Worked:
     """The worked steps with these laws; crossovers are kept above them by the safety factors."""
     friction = cases(laws, friction_range(), free=False)
     highest_law = safe_locked * max(case.law for case in friction)
-    needs = tuple(Need(limit, highest_law) for limit in LIMITS)
+    needs = tuple(IsolatorNeed(limit, highest_law) for limit in LIMITS)
     return Worked(
         {name: float(rate[0]) for name, rate in laws.rates(plain("joint")).items()},
         machines(laws),
@@ -144,20 +144,20 @@ def worked(laws: Laws, safe_locked: float, safe_free: float) -> Worked:
     )
 
 
-def machines(laws: Laws) -> tuple[Machine, ...]:
+def machines(laws: Laws) -> tuple[WorkedMachine, ...]:
     """The rig as one rigid mass, locked and free."""
     flat = plain("joint")
     locked, free = (float(edge(flat)[0]) for edge in (laws.locked_edge, laws.free_edge))
     stage = rig()
     rigid = stage.model_copy(update={"joint": None, "parasitic": None})
     return (
-        Machine("one rigid mass of 1.7 kg", locked, direct(rigid)),
-        Machine(
+        WorkedMachine("one rigid mass of 1.7 kg", locked, direct(rigid)),
+        WorkedMachine(
             "joint locked by its fixtures, parasitic mode at 300 Hz",
             locked,
             direct(stage.replace({"joint.locked": True})),
         ),
-        Machine("joint free, parasitic mode at 300 Hz", free, direct(stage.replace({CROSSOVER: "5 Hz"}))),
+        WorkedMachine("joint free, parasitic mode at 300 Hz", free, direct(stage.replace({CROSSOVER: "5 Hz"}))),
     )
 
 
@@ -169,7 +169,7 @@ def highest(laws: Laws) -> float:
     return float(laws.locked_edge(flat).max())
 
 
-def designed(laws: Laws, limit: float, safe: float) -> tuple[Design, ...]:
+def designed(laws: Laws, limit: float, safe: float) -> tuple[WorkedDesign, ...]:
     """The isolator by the law, its edge by a safety factor below the limit; then, as long as computed edges are above
     the limit, again with the aim lowered by as much, and where one is unknown at least by `BLIND`."""
     designs = [_design(laws, limit, limit / safe)]
@@ -179,7 +179,7 @@ def designed(laws: Laws, limit: float, safe: float) -> tuple[Design, ...]:
     return tuple(designs)
 
 
-def _design(laws: Laws, limit: float, aim: float) -> Design:
+def _design(laws: Laws, limit: float, aim: float) -> WorkedDesign:
     """Nine tenths of the stiffest joint whose edge by the law stays below the aim over the friction range, with the
     least stroke with which it still does."""
     forces = friction_range(DESIGN_GAPS)
@@ -195,7 +195,7 @@ def _design(laws: Laws, limit: float, aim: float) -> Design:
     changes = [pair | {"joint.stiffness": stiffness, "joint.stroke": stroke} for pair in forces]
     joint = {"joint.stiffness": stiffness, "joint.stroke": stroke}
     margin = settled_margin(rig(), joint | {CROSSOVER: limit})
-    return Design(limit, aim, stiffness, stroke, tuple(cases(laws, changes, free=True)), margin)
+    return WorkedDesign(limit, aim, stiffness, stroke, tuple(cases(laws, changes, free=True)), margin)
 
 
 DESIGN_GAPS = (0.3, 0.6, 0.85)

@@ -17,7 +17,7 @@ from friso.hunting.turning import COUNTED_ABOVE, DISTINCT, HALF, WINDOW, zigzag
 from friso.hunting.turns import scan
 from friso.progress import Progress, silent
 from friso.rig.run import Recorded, run
-from friso.rig.task import Task, point_to_point
+from friso.rig.task import MoveTask, point_to_point
 from friso.stage import Stage
 from friso.stage.controllers import CONTROLLER
 from friso.studies.rig.sizes import interval, jointed
@@ -54,19 +54,19 @@ def duration(stage: Stage) -> float:
     return max(DURATION, float(stage.flat()["motion.duration"]))
 
 
-def move(stage: Stage) -> Task:
+def move(stage: Stage) -> MoveTask:
     """The move from 0 with the acceleration of the stage's motion, after which it stands; of a motion that tells none,
     with one that the loop can just follow (a move then takes two of its time constants)."""
     flat, way = stage.flat(), distance(stage)
     rate = 2 * np.pi * (bandwidth(flat) or 1.0)
     acceleration = flat.get("motion.acceleration", way * rate**2)
     rows = point_to_point([0.0, way], acceleration, np.inf, 0.0).pieces
-    return Task(rows[1:], duration(stage))
+    return MoveTask(rows[1:], duration(stage))
 
 
-def released(stage: Stage, displacement: float) -> Task:
+def released(stage: Stage, displacement: float) -> MoveTask:
     """A release at the end of the move, `displacement` [m] beside it."""
-    return Task(np.array([[0.0, distance(stage), 0.0, 0.0]]), duration(stage), displacement=displacement)
+    return MoveTask(np.array([[0.0, distance(stage), 0.0, 0.0]]), duration(stage), displacement=displacement)
 
 
 def with_joint(stage: Stage, locked: bool) -> Stage:
@@ -154,7 +154,7 @@ class Hunted:
         return share(self.counted[which], ~self.failed[which])
 
 
-def once(stage: Stage, task: Task, seeds: Sequence[int], changes: Mapping[str, Any] | None = None) -> Recorded:
+def once(stage: Stage, task: MoveTask, seeds: Sequence[int], changes: Mapping[str, Any] | None = None) -> Recorded:
     """A few runs, all samples of which are kept."""
     (recorded,) = run(stage, task, seeds, interval(stage, INTERVAL), changes)
     return recorded
@@ -169,7 +169,7 @@ def joined(parts: list[Hunted]) -> Hunted:
 
 def follow(
     stage: Stage,
-    task: Task,
+    task: MoveTask,
     seeds: Sequence[int],
     changes: Mapping[str, Any],
     progress: Progress = silent,

@@ -79,7 +79,7 @@ STROKES, LOOPS, GRID_RAILS = np.array([0.02, 0.3, 1.0]), np.array([4.0, 6.0, 8.0
 
 
 @dataclass(frozen=True)
-class Moves:
+class MovesOnRails:
     """Fig. 24, 25: moves with the joint `locked`, shape (crossovers, rails), and `free` at the first crossover, shape
     (rails,); releases with it locked at the second, shape (displacements, rails). Crossovers [Hz]."""
 
@@ -90,7 +90,7 @@ class Moves:
 
 
 @dataclass(frozen=True)
-class Cycles:
+class CyclesOnRails:
     """Fig. 27: the cycle on an even rail, one run, and those on rails that vary, shape (rails,), with the asymmetry of
     their friction about the target; `weak` is the even rail again, one run, with a motor so weak that the mass line
     shows the mass measured (`MOTORS`) and `COULOMB_LEVEL` times the Coulomb friction."""
@@ -106,7 +106,7 @@ def as_built(stage: Stage) -> Stage:
     return stage.replace(dict(AS_BUILT))
 
 
-def moves(stage: Stage) -> Moves:
+def moves(stage: Stage) -> MovesOnRails:
     """The moves of Fig. 24 and 25, on several rails."""
     machine = as_built(stage)
     locked, free = (with_joint(machine, held) for held in (True, False))
@@ -119,7 +119,7 @@ def moves(stage: Stage) -> Moves:
     loose = follow(free, move(machine), numbers_of(SEED, 1, RAILS), first)
     tasks = [released(machine, share * distance(machine)) for share in DISPLACEMENTS]
     let_go = joined([follow(locked, task, numbers_of(SEED, 1, RAILS), second) for task in tasks])
-    return Moves(frequencies, held.shaped(len(CROSSOVERS), RAILS), loose, let_go.shaped(len(tasks), RAILS))
+    return MovesOnRails(frequencies, held.shaped(len(CROSSOVERS), RAILS), loose, let_go.shaped(len(tasks), RAILS))
 
 
 def grid(stage: Stage) -> StrokeCrossover:
@@ -128,7 +128,7 @@ def grid(stage: Stage) -> StrokeCrossover:
     return stroke_crossover(with_joint(as_built(stage), locked=False), SEED, STROKES, LOOPS, seeds, silent)
 
 
-def cycles(stage: Stage) -> Cycles:
+def cycles(stage: Stage) -> CyclesOnRails:
     """Fig. 27: an even rail and rails that vary, the joint locked."""
     machine = as_built(stage)
     even = on_rail(with_joint(machine, locked=True))
@@ -141,7 +141,7 @@ def cycles(stage: Stage) -> Cycles:
         "drive.motor_constant_ratio": np.array([MOTORS[1] * flat.get("drive.motor_constant_ratio", 1.0)]),
         "friction.coulomb": np.array([COULOMB_LEVEL * flat["friction.coulomb"]]),
     }
-    return Cycles(run, rails, asymmetry, started(even, SEED, changes, 1, silent, ""))
+    return CyclesOnRails(run, rails, asymmetry, started(even, SEED, changes, 1, silent, ""))
 
 
 _FIELD = ("static_deviation", "coulomb_deviation", "correlation_length")

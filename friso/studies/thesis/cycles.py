@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from friso.hunting.boundary import Kind, Range, Space, plane
+from friso.hunting.boundary import KeyRange, Kind, Space, plane
 from friso.studies.cells import cell_cycles, flat_cells
 from friso.studies.study import study_of
 from friso.studies.thesis.studies import ThesisStudy
@@ -37,7 +37,7 @@ class Edge:
 
 
 @dataclass(frozen=True)
-class Comparison:
+class PeaksAgainstCycles:
     """What the peak count and the cycle say of the cells compared: peaks counted where a cycle attracts (`agreed`) or
     neither (`quiet`), peaks counted although no cycle attracts (`transient`), a cycle that attracts although no peaks
     are counted (`dormant`: another move would start it), and cells of which the cycle could not be computed."""
@@ -51,19 +51,19 @@ class Comparison:
 
 
 @dataclass(frozen=True)
-class Cycles:
+class CyclesOnMap:
     """The curves over a map of the thesis, and the comparison with its peak counts."""
 
     edges: tuple[Edge, ...]
-    comparison: Comparison
+    comparison: PeaksAgainstCycles
 
 
-def cycles(study: ThesisStudy, runs: xr.Dataset) -> Cycles:
+def cycles(study: ThesisStudy, runs: xr.Dataset) -> CyclesOnMap:
     """The hunting cycles over a map of the thesis, from the study and its runs."""
-    return Cycles(_edges(study, runs), _comparison(runs))
+    return CyclesOnMap(_edges(study, runs), _comparison(runs))
 
 
-def _comparison(runs: xr.Dataset) -> Comparison:
+def _comparison(runs: xr.Dataset) -> PeaksAgainstCycles:
     coarse = runs.isel(dict.fromkeys(runs.dims, slice(None, None, EVERY)))
     study = study_of(coarse)
     valid = (coarse["outcome"].values != "invalid").ravel()
@@ -72,7 +72,7 @@ def _comparison(runs: xr.Dataset) -> Comparison:
         attracts[which], decided[which] = cycles.attracting, ~cycles.uncertain
     peaks = coarse["hunting"].values.ravel()
     decided &= valid
-    return Comparison(
+    return PeaksAgainstCycles(
         cells=int(valid.sum()),
         agreed=int((decided & attracts & peaks).sum()),
         quiet=int((decided & ~attracts & ~peaks).sum()),
@@ -95,6 +95,6 @@ def _edges(study: ThesisStudy, runs: xr.Dataset) -> tuple[Edge, ...]:
     return tuple(Edge(curve.kind, curve.sign < 0, line[x], line[y]) for curve, line in zip(curves, lines, strict=True))
 
 
-def _range(values: np.ndarray, key: str, log: bool) -> Range:
+def _range(values: np.ndarray, key: str, log: bool) -> KeyRange:
     low, high = float(values[0]), float(values[-1])
-    return Range(key, low if low > 0 else SMALLEST * high, high, log)
+    return KeyRange(key, low if low > 0 else SMALLEST * high, high, log)

@@ -25,8 +25,17 @@ from friso.stage import Stage, loads
 from friso.stage.controllers import CONTROLLER
 from friso.studies.rig.experiments.in_position import InPosition
 from friso.studies.rig.experiments.stroke_crossover import StrokeCrossover
-from friso.studies.thesis.as_built import Cycles, Moves, RigLoops, cycles, grid, moves, rig_loops, standstill
-from friso.studies.thesis.linear import Need
+from friso.studies.thesis.as_built import (
+    CyclesOnRails,
+    MovesOnRails,
+    RigLoops,
+    cycles,
+    grid,
+    moves,
+    rig_loops,
+    standstill,
+)
+from friso.studies.thesis.linear import PartNeeded
 from friso.studies.thesis.studies import LOCKED
 
 FORCE = 5.0
@@ -105,9 +114,9 @@ class Experiments:
     joint_steps: JointSteps
     slow_motion: tuple[SlowMotion, ...]
     constant_speed: tuple[ConstantSpeed, ConstantSpeed]
-    moves: Moves
+    moves: MovesOnRails
     grid: StrokeCrossover
-    cycles: Cycles
+    cycles: CyclesOnRails
     standstill: InPosition
     rig_loops: RigLoops
 
@@ -121,17 +130,17 @@ BUILT = "rig_loops"
 MOVES, GRID, ON_RAILS, STANDSTILL = "moves", "grid", "cycles", "standstill"
 """Those of the rig as built (Sec. 4.3.2)."""
 
-EXPERIMENTS: Mapping[str, Need] = MappingProxyType(
+EXPERIMENTS: Mapping[str, PartNeeded] = MappingProxyType(
     {
-        LINE: Need(("motion.", f"{CONTROLLER}.", "friction."), locked=True),
-        STEPPED: Need(("motion.",)),
-        SLIPS: Need(("motion.",)),
-        SPEEDY: Need(("motion.",)),
-        BUILT: Need(()),
-        MOVES: Need(()),
-        GRID: Need(()),
-        ON_RAILS: Need((), locked=True),
-        STANDSTILL: Need(("motion.",)),
+        LINE: PartNeeded(("motion.", f"{CONTROLLER}.", "friction."), locked=True),
+        STEPPED: PartNeeded(("motion.",)),
+        SLIPS: PartNeeded(("motion.",)),
+        SPEEDY: PartNeeded(("motion.",)),
+        BUILT: PartNeeded(()),
+        MOVES: PartNeeded(()),
+        GRID: PartNeeded(()),
+        ON_RAILS: PartNeeded((), locked=True),
+        STANDSTILL: PartNeeded(("motion.",)),
     }
 )
 """What of the stage file plays no part: the first is without its controller, and all have motions of their own."""

@@ -12,7 +12,7 @@ from friso.equations.controllers.van_dijk import ALPHA, BETA
 from friso.studies.thesis.studies import NOTHING, ThesisStudy
 
 if TYPE_CHECKING:
-    from friso.studies.thesis.linear import Need
+    from friso.studies.thesis.linear import PartNeeded
 
 Kind = Literal["unknown parameter", "solver tolerance", "metric"]
 
@@ -49,7 +49,7 @@ class Variant:
         decided = fixed | _OPEN_JOINT_KEYS if locked else fixed
         return self.kind != "unknown parameter" or not self.changes.keys() <= decided
 
-    def touches_part(self, need: Need) -> bool:
+    def touches_part(self, need: PartNeeded) -> bool:
         """Whether that part of the linear analysis, or that experiment, can be another: the former knows no solver, the
         latter keeps its own tolerance, and neither counts peaks."""
         outside = {key for key in self.changes if key.startswith(need.outside)}

@@ -16,7 +16,7 @@ from friso.hunting.criteria.run_outcome import CREEPS, CRITERION, RESTS, SWINGS
 from friso.progress import Progress, Tally, silent
 from friso.studies.sweep import sweep
 from friso.studies.thesis.claims import Claim, Evidence, Finding, Registered, Response, claims, registered
-from friso.studies.thesis.cycles import Cycles, cycles
+from friso.studies.thesis.cycles import CyclesOnMap, cycles
 from friso.studies.thesis.experiments import EXPERIMENTS, experiment, experiments_on
 from friso.studies.thesis.judges.shares import NARROW, WIDE
 from friso.studies.thesis.linear import NEEDS, Linear, analysed
@@ -67,7 +67,7 @@ class Reproduction:
     tolerances: Mapping[float, xr.Dataset]
     changed: tuple[float, float]
     verdicts: tuple[Verdict, ...]
-    cycles: Mapping[str, Cycles]
+    cycles: Mapping[str, CyclesOnMap]
     points: int
     rtol: float
 
@@ -106,7 +106,7 @@ def reproduce(
     for variant in variants:
         tally.add(1, f"{variant.parameter} {variant.value}")
         varied.append((variant, _findings(entries, _varied(studies, points, rtol, variant, baseline))))
-    behind: dict[str, Cycles] = {}
+    behind: dict[str, CyclesOnMap] = {}
     for study in studies if with_cycles else ():
         tally.add(1, f"hunting cycles, {study.name}")
         behind[study.name] = cycles(study, baseline.maps[study.name])

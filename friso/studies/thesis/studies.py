@@ -16,7 +16,7 @@ NOTHING: Mapping[str, Any] = MappingProxyType({})
 
 
 @dataclass(frozen=True)
-class Span:
+class AxisSpan:
     """The range of one axis: the stage-file key (or free name), its ends [unit], and whether it is logarithmic."""
 
     key: str
@@ -43,7 +43,7 @@ class ThesisStudy:
     name: str
     panel: str
     title: str
-    spans: tuple[Span, Span]
+    spans: tuple[AxisSpan, AxisSpan]
     marker: Mapping[str, float]
     changes: Mapping[str, Any] = field(default_factory=lambda: NOTHING)
     links: Mapping[str, str] = field(default_factory=lambda: NOTHING)
@@ -72,15 +72,15 @@ def rig() -> Stage:
 LOCKED: Mapping[str, Any] = MappingProxyType({"joint.locked": True})
 SOFT: Mapping[str, Any] = MappingProxyType({"joint.stiffness": "1e3 N/m"})
 
-_FRICTION = (Span("friction.static", 0.0, 4.9, "N"), Span("friction.coulomb", 0.0, 4.9, "N"))
+_FRICTION = (AxisSpan("friction.static", 0.0, 4.9, "N"), AxisSpan("friction.coulomb", 0.0, 4.9, "N"))
 _FRICTION_MARKER = {"friction.static": 3.0, "friction.coulomb": 1.0}
 _FRICTION_ZEROS = (
     "F_s or F_c of 0 N divides by zero in the LuGre model, and F_c above F_s leaves no stick-slip model: such cells "
     "are invalid."
 )
-_STROKE = Span("joint.stroke", 0.0, 1e-3, "m")
+_STROKE = AxisSpan("joint.stroke", 0.0, 1e-3, "m")
 _STROKE_ZERO = "Stroke 0: the joint always rests on its limiter, k_j + k_l."
-_CROSSOVER = (Span(CROSSOVER, 1.0, 16.0, "Hz"), _STROKE)
+_CROSSOVER = (AxisSpan(CROSSOVER, 1.0, 16.0, "Hz"), _STROKE)
 _CROSSOVER_MARKER = {CROSSOVER: 8.0, "joint.stroke": 1e-3}
 
 # The mass of the rig, 1.7 kg, is 1.2 kg of cart and 0.5 kg of stage, half of which is the parasitic mode's: kept.
@@ -96,7 +96,7 @@ _ALL = (
         "path",
         "11A",
         "Path",
-        (Span("motion.acceleration", 0.0, 150.0, "m/s^2"), Span("motion.acceleration_time", 0.0, 0.15, "s")),
+        (AxisSpan("motion.acceleration", 0.0, 150.0, "m/s^2"), AxisSpan("motion.acceleration_time", 0.0, 0.15, "s")),
         {"motion.acceleration": 100.0, "motion.acceleration_time": 0.03},
         LOCKED,
         zeros="No acceleration or no time of acceleration: the stage is not moved, and stays at rest.",
@@ -105,7 +105,7 @@ _ALL = (
         "system",
         "11B",
         "System parameters",
-        (Span(CROSSOVER, 1.0, 40.0, "Hz"), Span("mass", 0.1, 5.1, "kg")),
+        (AxisSpan(CROSSOVER, 1.0, 40.0, "Hz"), AxisSpan("mass", 0.1, 5.1, "kg")),
         {CROSSOVER: 8.0, "mass": 1.7},
         LOCKED,
         _SAME_SHARES,
@@ -115,7 +115,7 @@ _ALL = (
         "control",
         "12B",
         "Control parameters",
-        (Span(ALPHA, 0.1, 0.3), Span(BETA, 1.0, 3.0)),
+        (AxisSpan(ALPHA, 0.1, 0.3), AxisSpan(BETA, 1.0, 3.0)),
         {ALPHA: 0.1, BETA: 2.0},
         LOCKED,
     ),
@@ -123,7 +123,7 @@ _ALL = (
         "isolator-stiffness",
         "14A",
         "Joint stiffness and stroke",
-        (Span("joint.stiffness", 0.5e3, 15e3, "N/m"), _STROKE),
+        (AxisSpan("joint.stiffness", 0.5e3, 15e3, "N/m"), _STROKE),
         {"joint.stiffness": 2.4e3, "joint.stroke": 1e-3},
         zeros=_STROKE_ZERO,
     ),
@@ -131,14 +131,17 @@ _ALL = (
         "isolator-damping",
         "14B",
         "Limiter damping and stroke",
-        (Span("joint.limiter_damping", 1e-2, 1e4, "N*s/m", log=True), Span("joint.stroke", 1e-5, 1e-2, "m", log=True)),
+        (
+            AxisSpan("joint.limiter_damping", 1e-2, 1e4, "N*s/m", log=True),
+            AxisSpan("joint.stroke", 1e-5, 1e-2, "m", log=True),
+        ),
         {"joint.limiter_damping": 100.0, "joint.stroke": 1e-3},
     ),
     ThesisStudy(
         "isolator-masses",
         "15A",
         "Masses of cart and stage",
-        (Span("masses.cart", 0.5, 3.0, "kg"), Span("masses.stage", 0.1, 1.0, "kg")),
+        (AxisSpan("masses.cart", 0.5, 3.0, "kg"), AxisSpan("masses.stage", 0.1, 1.0, "kg")),
         {"masses.cart": 1.2, "masses.stage": 0.5},
         links={"parasitic.mass": "0.5*masses.stage", TUNED_MASS: "masses.cart + masses.stage"},
     ),

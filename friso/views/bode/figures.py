@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from friso.frequency.bode import Bode, Case
+from friso.frequency.bode import Bode, BodeCase
 from friso.frequency.crossover import WANTED
 from friso.views.bode.states import SERIES, colour, dash, has_family, has_limiter, label
 from friso.views.bode.table import decibels
@@ -64,7 +64,7 @@ def bode_figures(bode: Bode) -> tuple[Figure, ...]:
 
 
 @dataclass(frozen=True)
-class Curve:
+class ResponseCurve:
     """A complex frequency response, shape (k,), as a Bode plot draws it."""
 
     response: np.ndarray
@@ -132,13 +132,16 @@ def _speeds(bode: Bode) -> Figure:
     count = len(bode.prescribed)
     styles = zip(ramp(count + 1)[:count], np.linspace(2.6, 1.2, count), strict=True)  # the last shade is light
     curves = [
-        _marked(Curve(at.loop, with_unit(at.speed, "m/s", 1) if at.speed else "stuck", shade, width=width), at.stable)
+        _marked(
+            ResponseCurve(at.loop, with_unit(at.speed, "m/s", 1) if at.speed else "stuck", shade, width=width),
+            at.stable,
+        )
         for at, (shade, width) in zip(bode.prescribed, styles, strict=True)
     ]
     return Figure("bode_speeds", "Open loop, prescribed cart speeds", caption, loop_panels(_hertz(bode), curves))
 
 
-def _marked(curve: Curve, stable: bool) -> Curve:
+def _marked(curve: ResponseCurve, stable: bool) -> ResponseCurve:
     """The curve of a loop; dashed, and labelled so, if it is not stable."""
     return curve if stable else replace(curve, label=f"{curve.label} (unstable)", dash="dashed")
 
@@ -204,7 +207,7 @@ def _sensitivity(bode: Bode) -> Figure:
     return Figure("bode_sensitivity", "Sensitivity", caption, (panel,), note=note)
 
 
-def loop_panels(hertz: Array, curves: Sequence[Curve]) -> tuple[Panel, ...]:
+def loop_panels(hertz: Array, curves: Sequence[ResponseCurve]) -> tuple[Panel, ...]:
     """Magnitude [dB] and phase [deg] of loops over frequencies (k,) [Hz], with the lines at 0 dB and half a turn; none
     of no loops."""
     if not curves:
@@ -218,12 +221,12 @@ def loop_panels(hertz: Array, curves: Sequence[Curve]) -> tuple[Panel, ...]:
     return replace(above, limits=(Limit((0.0,), "", INK),)), replace(below, limits=(Limit(halves, "", INK),))
 
 
-def _magnitudes(hertz: Array, curves: Sequence[Curve], axis: Axis, of: Callable[[np.ndarray], Array]) -> Panel:
+def _magnitudes(hertz: Array, curves: Sequence[ResponseCurve], axis: Axis, of: Callable[[np.ndarray], Array]) -> Panel:
     lines = (Series(hertz, of(curve.response), curve.label, curve.colour, curve.dash, curve.width) for curve in curves)
     return Panel("", _frequency(hertz), axis, tuple(lines))
 
 
-def _phases(hertz: Array, curves: Sequence[Curve]) -> Panel:
+def _phases(hertz: Array, curves: Sequence[ResponseCurve]) -> Panel:
     """The phases, without labels: those stand above the magnitudes."""
     angles = zip(curves, phases([curve.response for curve in curves]), strict=True)
     lines = tuple(Series(hertz, y, "", curve.colour, curve.dash, curve.width) for curve, y in angles)
@@ -236,12 +239,12 @@ def _phases(hertz: Array, curves: Sequence[Curve]) -> Panel:
     return Panel("", _frequency(hertz), Axis("Phase", "°", view, step=step), lines)
 
 
-def _curve(name: str, response: np.ndarray) -> Curve:
+def _curve(name: str, response: np.ndarray) -> ResponseCurve:
     """A response of a limit case."""
-    return Curve(response, label(name), colour(name), dash(name), WIDTHS["touched" in name])
+    return ResponseCurve(response, label(name), colour(name), dash(name), WIDTHS["touched" in name])
 
 
-def _loop_of(name: str, case: Case) -> Curve:
+def _loop_of(name: str, case: BodeCase) -> ResponseCurve:
     return _marked(_curve(name, case.loop), case.margins.stable)
 
 

@@ -20,7 +20,7 @@ _ENDINGS = {"touched": "limiter touched", "touched-series": "limiter in series"}
 
 
 @dataclass(frozen=True)
-class Shown:
+class ShownState:
     """A state with its margins, always under this label, in this colour; `where` says which state it is, if the label
     does not."""
 
@@ -30,15 +30,17 @@ class Shown:
     margins: Margins
 
 
-def shown_states(bode: Bode) -> tuple[Shown, ...]:
+def shown_states(bode: Bode) -> tuple[ShownState, ...]:
     """The limit cases, the worst of all settled states, and the worst of the whole family, if that is another one."""
-    cases = [Shown(label(name), colour(name), _speed(case.members), case.margins) for name, case in bode.cases.items()]
+    cases = [
+        ShownState(label(name), colour(name), _speed(case.members), case.margins) for name, case in bode.cases.items()
+    ]
     if not has_family(bode):
         return tuple(cases)
     (settled, margins), (worst, lost) = bode.settled, bode.worst
-    cases.append(Shown("Worst settled", GREY, place(settled, bode), margins))
+    cases.append(ShownState("Worst settled", GREY, place(settled, bode), margins))
     if worst != settled:
-        cases.append(Shown("Worst of the family", GREY, place(worst, bode), lost))
+        cases.append(ShownState("Worst of the family", GREY, place(worst, bode), lost))
     return tuple(cases)
 
 

@@ -8,14 +8,14 @@ from collections.abc import Callable
 import numpy as np
 
 from friso.frequency.margins import Margins
-from friso.views.bode.states import Shown
+from friso.views.bode.states import ShownState
 from friso.views.drawing.prefixes import NOTHING, with_unit
 
 ANY = "no limit"
 """Stands where nothing takes a loop to the edge of its stability."""
 
 
-def rows(states: tuple[Shown, ...]) -> list[tuple[str, list[str]]]:
+def rows(states: tuple[ShownState, ...]) -> list[tuple[str, list[str]]]:
     """The rows of which some state has something to say."""
     texts = [("State", [item.where or NOTHING for item in states])]
     texts += [(name, [text(item.margins) for item in states]) for name, text in _ROWS.items()]

@@ -8,7 +8,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from friso.hunting.boundary import Branch, Curve, Diagram, Found, Plane, Space
+from friso.hunting.boundary import Branch, Curve, Diagram, LocatedPoint, Plane, Space
 from friso.hunting.cycle.find import Cycles
 from friso.views.drawing.figure import Array
 
@@ -74,7 +74,7 @@ def lines(result: Diagram | Plane) -> tuple[Line, ...]:
     return tuple(_line(result, *pair) for pair in zip(result.curves, rows, strict=True))
 
 
-def _of_branch(branch: Branch, special: tuple[Found, ...]) -> list[_Row]:
+def _of_branch(branch: Branch, special: tuple[LocatedPoint, ...]) -> list[_Row]:
     """The points of a branch with those of its special points that are inside the range, in order."""
     path = np.array([point.vector for point in branch.points])
     placed = [(float(k), point, np.nan, "") for k, point in enumerate(branch.points)]

@@ -12,19 +12,19 @@ import numpy as np
 from friso.hunting.boundary import Diagram, Plane
 from friso.views.boundary.data import Line, corner_verdicts, end_verdicts, lines, lost_places
 from friso.views.boundary.figures import boundary_figure
-from friso.views.boundary.words import Shown
+from friso.views.boundary.words import ShownKey
 from friso.views.documents import plain_json
 from friso.views.drawing.matplotlib_renderer import FORMATS, save
 from friso.views.files import Content
 
 
-def boundary_document(found: Diagram | Plane, shown: tuple[Shown, ...]) -> dict[str, Any]:
+def boundary_document(found: Diagram | Plane, shown: tuple[ShownKey, ...]) -> dict[str, Any]:
     """The JSON document of `boundary`; values of the keys in the units of the command line."""
     document = _of_diagram(found, shown[0]) if isinstance(found, Diagram) else _of_plane(found, shown)
     return plain_json(document)
 
 
-def _of_diagram(found: Diagram, key: Shown) -> dict[str, Any]:
+def _of_diagram(found: Diagram, key: ShownKey) -> dict[str, Any]:
     branches = lines(found)
     points = [_point(line, k, key) for line in branches for k in line.special]
     return {
@@ -36,7 +36,7 @@ def _of_diagram(found: Diagram, key: Shown) -> dict[str, Any]:
     }
 
 
-def _point(line: Line, k: int, key: Shown) -> dict[str, Any]:
+def _point(line: Line, k: int, key: ShownKey) -> dict[str, Any]:
     return {
         "value": key.number(line.at[k, 0]),
         "kind": line.kinds[k],
@@ -47,7 +47,7 @@ def _point(line: Line, k: int, key: Shown) -> dict[str, Any]:
     }
 
 
-def _branch(line: Line, key: Shown) -> dict[str, Any]:
+def _branch(line: Line, key: ShownKey) -> dict[str, Any]:
     multiplier = line.multiplier[line.ordinary]
     return {
         "cycle": line.shape,
@@ -60,7 +60,7 @@ def _branch(line: Line, key: Shown) -> dict[str, Any]:
     }
 
 
-def _of_plane(found: Plane, shown: tuple[Shown, ...]) -> dict[str, Any]:
+def _of_plane(found: Plane, shown: tuple[ShownKey, ...]) -> dict[str, Any]:
     x, y = shown
     verdicts = [verdict for _, _, verdict in corner_verdicts(found)]
     return {
@@ -72,7 +72,7 @@ def _of_plane(found: Plane, shown: tuple[Shown, ...]) -> dict[str, Any]:
     }
 
 
-def _curve(line: Line, shown: tuple[Shown, ...]) -> dict[str, Any]:
+def _curve(line: Line, shown: tuple[ShownKey, ...]) -> dict[str, Any]:
     return {
         "kind": line.kinds[0],
         "cycle": line.shape,
@@ -84,12 +84,12 @@ def _curve(line: Line, shown: tuple[Shown, ...]) -> dict[str, Any]:
     }
 
 
-def _numbers(values: np.ndarray, shown: tuple[Shown, ...]) -> list[list[float]]:
+def _numbers(values: np.ndarray, shown: tuple[ShownKey, ...]) -> list[list[float]]:
     """Values of both keys [SI], shape (n, 2), in the units shown."""
     return [[key.number(value) for key, value in zip(shown, row, strict=True)] for row in values.tolist()]
 
 
-def boundary_files(found: Diagram | Plane, shown: tuple[Shown, ...], name: str, stem: str) -> dict[str, Content]:
+def boundary_files(found: Diagram | Plane, shown: tuple[ShownKey, ...], name: str, stem: str) -> dict[str, Content]:
     """The figure in all formats, and the table of its points."""
     figure = boundary_figure(found, shown, name)
     drawn: dict[str, Content] = {f"{stem}.{form}": partial(save, figure) for form in FORMATS}

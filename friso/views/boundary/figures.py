@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from friso.hunting.boundary import Diagram, Plane, Range
+from friso.hunting.boundary import Diagram, KeyRange, Plane
 from friso.views.boundary.data import ATTRACTS, INVALID, REPELS, UNKNOWN, Line, Shape, lines, node_verdicts
-from friso.views.boundary.words import BASIN, CYCLES, MEANINGS, Shown, end_sentence
+from friso.views.boundary.words import BASIN, CYCLES, MEANINGS, ShownKey, end_sentence
 from friso.views.drawing.figure import (
     BLUE,
     GREY,
@@ -50,13 +50,13 @@ MARGIN = 0.02
 """Share of a range by which the plane of two keys is drawn larger, so that nodes at its sides are seen whole."""
 
 
-def boundary_figure(traced: Diagram | Plane, keys: tuple[Shown, ...], subject: str = "") -> Figure:
+def boundary_figure(traced: Diagram | Plane, keys: tuple[ShownKey, ...], subject: str = "") -> Figure:
     """What was found over one key, or in the plane of two; special points are named in the units shown."""
     figure = _diagram(traced, keys[0]) if isinstance(traced, Diagram) else _plane(traced)
     return replace(figure, subject=subject)
 
 
-def _diagram(traced: Diagram, key: Shown) -> Figure:
+def _diagram(traced: Diagram, key: ShownKey) -> Figure:
     """Amplitude, period and multiplier of all cycles over the key; the legend stands above the first of them."""
     branches, x = lines(traced), _axis(traced.space.ranges[0])
     sizes = [size for line in branches for size in line.amplitude]
@@ -73,7 +73,7 @@ def _diagram(traced: Diagram, key: Shown) -> Figure:
     return Figure("boundary", "Hunting cycles", note, panels, note=note)
 
 
-def _panel(branches: tuple[Line, ...], measure: str, x: Axis, y: Axis, key: Shown | None = None) -> Panel:
+def _panel(branches: tuple[Line, ...], measure: str, x: Axis, y: Axis, key: ShownKey | None = None) -> Panel:
     """One measure of all branches, with their special points; with labels if there is a key."""
     labels: set[str] = set()
     series = []
@@ -126,6 +126,6 @@ def _plane(traced: Plane) -> Figure:
     return Figure("boundary", "Edge of hunting", note, (Panel("", x, y, series, clouds=(nodes,)),), note=note)
 
 
-def _axis(swept: Range, margin: float = 0.0) -> Axis:
+def _axis(swept: KeyRange, margin: float = 0.0) -> Axis:
     low, high = swept.at(np.array([-margin, 1 + margin])).tolist()
     return Axis(quantity(swept.key), swept.unit, (low, high), swept.log)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from friso.hunting.boundary import Diagram, Plane, Range, Space
+from friso.hunting.boundary import Diagram, KeyRange, Plane, Space
 from friso.views.boundary.data import (
     ATTRACTS,
     INVALID,
@@ -43,7 +43,7 @@ BASIN = "Asymmetric cycles bound the basin of the hunting cycle."
 
 
 @dataclass(frozen=True)
-class Shown:
+class ShownKey:
     """A key and the unit in which its values are printed: its name, and its value in SI."""
 
     key: str
@@ -64,7 +64,7 @@ class Shown:
             return f"{self.text(value)} (error unknown)"
         return self._with_unit(f"{self.number(value):.6g} ± {self.number(error):.1g}")
 
-    def extent(self, values: Array, swept: Range) -> str:
+    def extent(self, values: Array, swept: KeyRange) -> str:
         """From the lowest value [SI] to the highest inside a range."""
         low, high = self.number(max(swept.low, float(values.min()))), self.number(min(swept.high, float(values.max())))
         return self._with_unit(f"{low:.6g} to {high:.6g}")
@@ -73,19 +73,19 @@ class Shown:
         return f"{numbers} {pretty(self.unit)}".rstrip()
 
 
-def sentences(traced: Diagram | Plane, keys: tuple[Shown, ...]) -> list[str]:
+def sentences(traced: Diagram | Plane, keys: tuple[ShownKey, ...]) -> list[str]:
     """What was found, for the terminal."""
     return _of_diagram(traced, keys[0]) if isinstance(traced, Diagram) else _of_plane(traced, keys)
 
 
-def _of_diagram(traced: Diagram, key: Shown) -> list[str]:
+def _of_diagram(traced: Diagram, key: ShownKey) -> list[str]:
     branches = lines(traced)
     turns = sorted((line.at[k, 0], _turn(line, k, key)) for line in branches for k in line.special)
     boundaries = [text for _, text in turns] or [_no_boundary(traced.space, (key,))]
     return [end_sentence(traced, key), *boundaries, *(_followed(line, key, traced.space) for line in branches)]
 
 
-def _turn(line: Line, k: int, key: Shown) -> str:
+def _turn(line: Line, k: int, key: ShownKey) -> str:
     """What happens to a cycle at a special point of its branch as the key rises."""
     value = float(line.at[k, 0])
     above = [j for j in (k - 1, k + 1) if 0 <= j < len(line.at) and line.at[j, 0] > value]
@@ -105,21 +105,21 @@ _VERBS = {
 }
 
 
-def _followed(line: Line, key: Shown, space: Space) -> str:
+def _followed(line: Line, key: ShownKey, space: Space) -> str:
     """Over which values a branch was followed, and how it ends."""
     pair = "Asymmetric cycles, which bound the basin of the hunting cycle where they repel,"
     name = pair if line.shape == "asymmetric" else "Hunting cycles"
     return f"{name} were followed over {key.extent(line.at[:, 0], space.ranges[0])}; ends: {_ends(line)}."
 
 
-def end_sentence(traced: Diagram, key: Shown) -> str:
+def end_sentence(traced: Diagram, key: ShownKey) -> str:
     """The verdicts at both ends of the range."""
     swept = traced.space.ranges[0]
     first, last = end_verdicts(traced)
     return f"At {key.text(swept.low)}: {VERDICTS[first]}; at {key.text(swept.high)}: {VERDICTS[last]}."
 
 
-def _of_plane(traced: Plane, keys: tuple[Shown, ...]) -> list[str]:
+def _of_plane(traced: Plane, keys: tuple[ShownKey, ...]) -> list[str]:
     curves = lines(traced)
     text = [_curve(line, keys, traced.space) for line in curves] or [_no_boundary(traced.space, keys)]
     text += [
@@ -129,7 +129,7 @@ def _of_plane(traced: Plane, keys: tuple[Shown, ...]) -> list[str]:
     return [*text, *_corners(traced, keys), *_lost(traced, keys)]
 
 
-def _curve(line: Line, keys: tuple[Shown, ...], space: Space) -> str:
+def _curve(line: Line, keys: tuple[ShownKey, ...], space: Space) -> str:
     """How many points a curve has, where it runs, how it ends, and its largest errors."""
     sides = zip(keys, line.at.T, space.ranges, strict=True)
     extents = ", ".join(f"{key.key} {key.extent(values, swept)}" for key, values, swept in sides)
@@ -138,7 +138,7 @@ def _curve(line: Line, keys: tuple[Shown, ...], space: Space) -> str:
     return f"{head}; ends: {_ends(line)}; largest error: {errors}."
 
 
-def _corners(traced: Plane, keys: tuple[Shown, ...]) -> list[str]:
+def _corners(traced: Plane, keys: tuple[ShownKey, ...]) -> list[str]:
     """The verdicts at the corners, in one sentence where they agree."""
     corners = corner_verdicts(traced)
     if len({verdict for _, _, verdict in corners}) == 1:
@@ -146,16 +146,16 @@ def _corners(traced: Plane, keys: tuple[Shown, ...]) -> list[str]:
     return [f"At {_place((x, y), keys)}: {VERDICTS[verdict]}." for x, y, verdict in corners]
 
 
-def _lost(traced: Plane, keys: tuple[Shown, ...]) -> list[str]:
+def _lost(traced: Plane, keys: tuple[ShownKey, ...]) -> list[str]:
     places = [_place(values, keys) for values in lost_places(traced).tolist()]
     return [f"A change was found near {'; '.join(places)}, but no curve could be started there."] if places else []
 
 
-def _place(values: Sequence[float], keys: tuple[Shown, ...]) -> str:
+def _place(values: Sequence[float], keys: tuple[ShownKey, ...]) -> str:
     return ", ".join(f"{key.key} = {key.text(value)}" for key, value in zip(keys, values, strict=True))
 
 
-def _no_boundary(space: Space, keys: tuple[Shown, ...]) -> str:
+def _no_boundary(space: Space, keys: tuple[ShownKey, ...]) -> str:
     between = (
         f"{key.key} {key.text(swept.low)} to {key.text(swept.high)}"
         for key, swept in zip(keys, space.ranges, strict=True)

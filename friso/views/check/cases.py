@@ -19,7 +19,7 @@ BANDS = dict(zip(SETTLING_BANDS, ("1 µm", "10 µm"), strict=True))
 
 
 @dataclass(frozen=True)
-class Shown:
+class ShownCase:
     """One case as the figures and the report show it: always under this label, in this colour."""
 
     key: str
@@ -28,10 +28,10 @@ class Shown:
     case: Case
 
 
-def shown_cases(cases: Mapping[str, Case]) -> tuple[Shown, ...]:
+def shown_cases(cases: Mapping[str, Case]) -> tuple[ShownCase, ...]:
     """The cases, each once: where "given" repeats the locked or the free case, that one says "(as given)"."""
     labels = _labels([*cases], cases["given"].stage if "given" in cases else None)
-    return tuple(Shown(key, label, COLOURS[key], cases[key]) for key, label in labels.items())
+    return tuple(ShownCase(key, label, COLOURS[key], cases[key]) for key, label in labels.items())
 
 
 def case_labels(stage: Stage) -> dict[str, str]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from friso.equations.motion import last_corner
-from friso.views.check.cases import Shown
+from friso.views.check.cases import ShownCase
 from friso.views.check.traces import common_range, samples, subject, trace_of
 from friso.views.drawing.figure import GREY, INK, Array, Axis, Dash, Figure, Markers, Panel, Series
 
@@ -20,12 +20,12 @@ _DASHES: dict[bool, Dash] = {True: "solid", False: "dashed"}
 _WORDS = {True: "attracts", False: "repels"}
 
 
-def cycle_figures(shown: list[Shown]) -> tuple[Figure, Figure]:
+def cycle_figures(shown: list[ShownCase]) -> tuple[Figure, Figure]:
     """The return maps and the cycles of cases with time responses; without panels where there are none."""
     return _return_maps(shown), _cycles(shown)
 
 
-def _return_maps(shown: list[Shown]) -> Figure:
+def _return_maps(shown: list[ShownCase]) -> Figure:
     """How far each swing reaches against the one before: the map, and this motion's own swings."""
     panels = tuple(panel for item in shown for panel in _return_map(item))
     caption = (
@@ -44,7 +44,7 @@ def _return_maps(shown: list[Shown]) -> Figure:
     return Figure("return-map", "Does the next swing reach as far?", caption, panels, 2, subject(shown))
 
 
-def _return_map(item: Shown) -> list[Panel]:
+def _return_map(item: ShownCase) -> list[Panel]:
     hunting = item.case.judgement.hunting
     if hunting.returns is None or not np.any(hunting.returns.returns > 0):
         return []
@@ -62,7 +62,7 @@ def _return_map(item: Shown) -> list[Panel]:
     return [Panel(item.label, x, y, tuple(series), _fixed_points(hunting.cycles))]
 
 
-def _swings(item: Shown) -> Array:
+def _swings(item: ShownCase) -> Array:
     """How far the stage swings to one side and the other in turn [m], after the last corner of the reference."""
     trace = trace_of(item)
     late = samples(trace, "turning_time") > last_corner(item.case.stage.flat())
@@ -86,7 +86,7 @@ def _fixed_points(cycles: tuple[Cycle, ...]) -> tuple[Markers, ...]:
     return tuple(markers)
 
 
-def _cycles(shown: list[Shown]) -> Figure:
+def _cycles(shown: list[ShownCase]) -> Figure:
     """One period of every cycle in time, and as a loop of velocity over position."""
     panels = tuple(panel for item in shown if item.case.judgement.hunting.cycles for panel in _cycle_panels(item))
     caption = (
@@ -97,7 +97,7 @@ def _cycles(shown: list[Shown]) -> Figure:
     return Figure("cycle", "The hunting cycle", caption, panels, 3, subject(shown))
 
 
-def _cycle_panels(item: Shown) -> list[Panel]:
+def _cycle_panels(item: ShownCase) -> list[Panel]:
     cycles = item.case.judgement.hunting.cycles
     time = Axis("Time", "s", (0.0, max(cycle.period for cycle in cycles)))
     names = ["stage"] if len(cycles) == 1 else [_WORDS[cycle.attracts] for cycle in cycles]

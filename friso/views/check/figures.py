@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from friso.hunting import COUNTED_ABOVE, COUNTED_AFTER
-from friso.views.check.cases import BANDS, Shown, shown_cases
+from friso.views.check.cases import BANDS, ShownCase, shown_cases
 from friso.views.check.cycle_figures import cycle_figures
 from friso.views.check.traces import common_range, samples, subject, trace_of
 from friso.views.drawing.figure import (
@@ -71,7 +71,7 @@ def response_figure(trace: xr.Dataset) -> Figure:
 _TIME = Axis("Time", "s")
 
 
-def _settled(shown: list[Shown]) -> Figure:
+def _settled(shown: list[ShownCase]) -> Figure:
     """Deviation after the move with the counted peaks (thesis, Fig. 5), and how each case settles."""
     start, end = _window(shown)
     lines, peaks = [], []
@@ -101,7 +101,7 @@ def _settled(shown: list[Shown]) -> Figure:
     return Figure("settled", "Does it hunt?", caption, (zoom, _settling(shown)), subject=subject(shown))
 
 
-def _settling(shown: list[Shown]) -> Panel:
+def _settling(shown: list[ShownCase]) -> Panel:
     """Size of the deviation over the whole run on a logarithmic scale, with the settling bands."""
     lines = []
     for item in shown:
@@ -114,7 +114,7 @@ def _settling(shown: list[Shown]) -> Panel:
     return Panel("Whole run: size of the deviation", _TIME, axis, tuple(lines), limits=bands)
 
 
-def _overview(shown: list[Shown]) -> Figure:
+def _overview(shown: list[ShownCase]) -> Figure:
     """Reference and position, and the actuator force, over the whole run, the cases side by side."""
     view = common_range([samples(trace_of(item), "position") for item in shown], least=2 * min(BANDS))
     panels = []
@@ -136,7 +136,7 @@ def _overview(shown: list[Shown]) -> Figure:
     return Figure("overview", "The motion", caption, tuple(panels), len(shown), subject(shown))
 
 
-def _force_limit(shown: list[Shown]) -> tuple[Limit, ...]:
+def _force_limit(shown: list[ShownCase]) -> tuple[Limit, ...]:
     """The force limit of the controller, where a case comes near it: a distant one would flatten all."""
     bound = shown[0].case.stage.controller.force_limit
     forces = np.abs(np.concatenate([samples(trace_of(item), "force") for item in shown]))
@@ -145,7 +145,7 @@ def _force_limit(shown: list[Shown]) -> tuple[Limit, ...]:
     return (Limit((-float(bound), float(bound)), "force limit"),)
 
 
-def _shares(shown: list[Shown]) -> Figure:
+def _shares(shown: list[ShownCase]) -> Figure:
     """P, I and D shares of the actuator force after the move (thesis, Fig. 13), one scale for all cases."""
     start, end = _window(shown)
     periods = [item.case.period for item in shown if item.case.period and np.isfinite(item.case.period)]
@@ -170,7 +170,7 @@ def _shares(shown: list[Shown]) -> Figure:
     return Figure("shares", "What the controller does", caption, tuple(panels), subject=subject(shown))
 
 
-def _joint(shown: list[Shown]) -> Figure:
+def _joint(shown: list[ShownCase]) -> Figure:
     """Joint deflection with its limits, over the whole run and its settled part, where the joint is free."""
     start, end = _window(shown)
     panels = []
@@ -192,7 +192,7 @@ def _joint(shown: list[Shown]) -> Figure:
     return Figure("joint", "The joint", caption, tuple(panels), columns=2, subject=subject(shown))
 
 
-def _friction(shown: list[Shown]) -> Figure:
+def _friction(shown: list[ShownCase]) -> Figure:
     """Friction against velocity and displacement of the cart: while a case hunts, else the whole run."""
     cases = [item for item in shown if "friction_force" in trace_of(item)]
     hunting = any(item.case.peaks for item in cases)
@@ -230,7 +230,7 @@ def _loops(title: str, x: Axis, y: Axis, lines: list[Series]) -> Panel:
     return Panel(title, x, y, tuple(moving), tuple(points))
 
 
-def _window(shown: list[Shown]) -> tuple[float, float]:
+def _window(shown: list[ShownCase]) -> tuple[float, float]:
     """Begin and end [s] of the settled part: from where peaks count, or the later half of a shorter run."""
     end = max(float(samples(trace_of(item), "time")[-1]) for item in shown)
     return (COUNTED_AFTER if end > COUNTED_AFTER else end / 2), end
@@ -240,11 +240,11 @@ def _any(trace: xr.Dataset, name: str) -> bool:
     return bool(np.any(samples(trace, name)))
 
 
-def _deviation(item: Shown) -> Array:
+def _deviation(item: ShownCase) -> Array:
     return samples(trace_of(item), "position") - samples(trace_of(item), "reference")
 
 
-def _cut(item: Shown, values: Array, start: float, end: float) -> tuple[Array, Array]:
+def _cut(item: ShownCase, values: Array, start: float, end: float) -> tuple[Array, Array]:
     """Time [s] and values between start and end [s]."""
     time = samples(trace_of(item), "time")
     inside = (time >= start) & (time <= end)

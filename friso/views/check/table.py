@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from friso.hunting import COUNTED_ABOVE, COUNTED_AFTER
-from friso.views.check.cases import BANDS, Shown
+from friso.views.check.cases import BANDS, ShownCase
 from friso.views.check.words import at_the_end
 from friso.views.drawing.prefixes import NOTHING, plus_minus, range_with_unit, window_with_unit, with_unit
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 _WINDOWS = 4  # windows of kicks that are listed, at most
 
 
-def rows(shown: tuple[Shown, ...]) -> list[tuple[str, list[str]]]:
+def rows(shown: tuple[ShownCase, ...]) -> list[tuple[str, list[str]]]:
     """The rows of which some case has something to say."""
     texts = [(name, [text(item.case) for item in shown]) for name, text in _COLUMNS.items()]
     return [(name, row) for name, row in texts if set(row) != {NOTHING}]

@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from friso.views.check.cases import Shown
+from friso.views.check.cases import ShownCase
 from friso.views.drawing.figure import Array
 
 if TYPE_CHECKING:
     import xarray as xr
 
 
-def trace_of(item: Shown) -> xr.Dataset:
+def trace_of(item: ShownCase) -> xr.Dataset:
     """The time response of a case that has one."""
     assert item.case.trace is not None  # check_figures let no other through
     return item.case.trace
@@ -36,6 +36,6 @@ def common_range(arrays: Sequence[Array], least: float = 0.0) -> tuple[float, fl
     return low - margin, high + margin
 
 
-def subject(shown: Sequence[Shown]) -> str:
+def subject(shown: Sequence[ShownCase]) -> str:
     """The stage that the cases are of, as figures name it."""
     return str(shown[0].case.stage.name)

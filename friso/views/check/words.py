@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from friso.hunting.basin import SHARES
 from friso.hunting.margin import FARTHEST
 from friso.hunting.verdict import LONG
-from friso.views.check.cases import BANDS, Shown
+from friso.views.check.cases import BANDS, ShownCase
 from friso.views.drawing.prefixes import listed, plus_minus, with_unit
 
 if TYPE_CHECKING:
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 _MICRON, _TEN_MICRON = BANDS
 
 
-def verdict_sentence(item: Shown, cases: Mapping[str, Case]) -> str:
+def verdict_sentence(item: ShownCase, cases: Mapping[str, Case]) -> str:
     """What a case does, and what to do about it, for the engineer who decides; `cases` are all of the check."""
     case = item.case
     says = {"hunts": _hunting, "bistable": _bistable, "transient": _transient, "settles": _settling}
@@ -109,7 +109,7 @@ def _below(edge: Margin) -> str:
     return f"below {with_unit(edge.crossover, 'Hz')}"
 
 
-def _remedy(item: Shown, cases: Mapping[str, Case]) -> list[str]:
+def _remedy(item: ShownCase, cases: Mapping[str, Case]) -> list[str]:
     """What keeps a case from hunting."""
     known = item.case.judgement
     ways = [_faster(item.case, known.margin)] if known.margin else []
@@ -132,7 +132,7 @@ def _faster(case: Case, edge: Margin) -> str:
     return f"make the controller {edge.factor:.3g} times faster ({', '.join(gains)})"
 
 
-def _freeing_helps(item: Shown, cases: Mapping[str, Case]) -> bool:
+def _freeing_helps(item: ShownCase, cases: Mapping[str, Case]) -> bool:
     joint, free = item.case.stage.joint, cases.get("free")
     if free is None or joint is None or not joint.locked:
         return False

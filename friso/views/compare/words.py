@@ -9,7 +9,7 @@ from friso.equations.bandwidth import bandwidth
 from friso.evidence import value
 from friso.frequency.crossover import WANTED
 from friso.studies.compare.options import JOINT, MODEL_ERROR, Option
-from friso.studies.compare.statistics import Estimate
+from friso.studies.compare.statistics import EstimatedValue
 from friso.studies.compare.study import ENOUGH, FOLLOWED, LONGER, Comparison, Paired, Result
 from friso.studies.shares import Share
 from friso.views.drawing.prefixes import NOTHING, listed, range_with_unit, with_unit
@@ -110,7 +110,7 @@ def _percent(part: float) -> str:
     return f"{100 * part:.{digits}f}"
 
 
-def _time(found: Estimate) -> str:
+def _time(found: EstimatedValue) -> str:
     """A median of settling times, of which more than half may never come."""
     if math.isfinite(found.high):
         return f"{with_unit(found.value, 's')} ({range_with_unit(found.low, found.high, 's')})"
@@ -118,13 +118,13 @@ def _time(found: Estimate) -> str:
     return middle if middle == low else f"{middle} ({low} to never)"
 
 
-def _length(found: Estimate, unit: str) -> str:
+def _length(found: EstimatedValue, unit: str) -> str:
     if not all(map(math.isfinite, (found.value, found.low, found.high))):
         return NOTHING
     return f"{with_unit(found.value, unit)} ({range_with_unit(found.low, found.high, unit)})"
 
 
-def _ratio(found: Estimate) -> str:
+def _ratio(found: EstimatedValue) -> str:
     if not all(map(math.isfinite, (found.value, found.low, found.high))):
         return NOTHING
     return f"{found.value:.3g} ({found.low:.3g} to {found.high:.3g})"

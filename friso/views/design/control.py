@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from friso.design.method import Design
-from friso.design.verification import Outcome
+from friso.design.verification import MachineOutcomes
 from friso.frequency.crossover import WANTED
-from friso.views.design.window import Bound, comfortable, lower, upper
+from friso.views.design.window import CrossoverBound, comfortable, lower, upper
 from friso.views.design.words import (
-    Step,
+    DesignStep,
     hertz,
     percent,
     plain,
@@ -25,14 +25,14 @@ LITTLE = 0.1
 """Share by which more joint damping has to raise the modulus margin to be worth its trouble."""
 
 
-def controller_step(design: Design) -> Step:
+def controller_step(design: Design) -> DesignStep:
     """The crossover, why it is no other, and the gains."""
     controller = design.controller
     gains = f"Gains of a PID (kp, ki, kd): {_parallel(design)} of {plain(controller.gains.tau_p, 's')}."
     faster = [_faster(design)] if design.damped else []
     sentences = (_not_higher(design), *faster, _not_lower(design), gains, _margin(design), _damping(design))
     figures = ("design_window", "design_damping")
-    return Step(f"Controller: crossover {hertz(controller.crossover)}", sentences, _gains(design), figures)
+    return DesignStep(f"Controller: crossover {hertz(controller.crossover)}", sentences, _gains(design), figures)
 
 
 def _gains(design: Design) -> tuple[tuple[str, str], ...]:
@@ -94,7 +94,7 @@ def _not_lower(design: Design) -> str:
     return f"Not lower: it is limited from below by {_listed(bounds)}; above that, a higher crossover settles faster."
 
 
-def _listed(bounds: list[Bound]) -> str:
+def _listed(bounds: list[CrossoverBound]) -> str:
     return listed([f"{hertz(bound.value)} ({bound.reason})" for bound in bounds], "and")
 
 
@@ -121,7 +121,7 @@ def _damping(design: Design) -> str:
     )
 
 
-def moves_step(design: Design) -> Step:
+def moves_step(design: Design) -> DesignStep:
     """What the simulated moves show."""
     free, locked = design.verification.free, design.verification.locked
     sentences = [f"Of {free.tried} moves over all ranges and tolerances {restless(free)}: {probability(free)}."]
@@ -136,7 +136,7 @@ def moves_step(design: Design) -> Step:
         ("In position", f"within ±{plain(design.spec.position.window, 'm')} of the reference"),
     )
     title = f"Verification: {free.tried} moves, {restless(free)}"
-    return Step(title, tuple(sentence for sentence in sentences if sentence), facts, ("design_settling",))
+    return DesignStep(title, tuple(sentence for sentence in sentences if sentence), facts, ("design_settling",))
 
 
 def _met(design: Design) -> str:
@@ -146,14 +146,14 @@ def _met(design: Design) -> str:
     return f"Specified for 95 % of the moves: {seconds(float(limit))}; that is {'' if time <= limit else 'NOT '}met."
 
 
-def _worst(outcome: Outcome) -> str:
+def _worst(outcome: MachineOutcomes) -> str:
     k = outcome.worst
     if outcome.restless[k]:
         return f"The worst move, which {outcome.words[k]} over {plain(outcome.swing[k], 'm')}"
     return f"The worst move, which takes {seconds(float(outcome.settling[k]))} to settle"
 
 
-def _outcome(name: str, outcome: Outcome) -> tuple[tuple[str, str], ...]:
+def _outcome(name: str, outcome: MachineOutcomes) -> tuple[tuple[str, str], ...]:
     """The rows of one state of the joint."""
     low, high = outcome.interval
     return (

@@ -13,7 +13,7 @@ from friso.design.front import Candidate
 from friso.design.geometry import Geometry
 from friso.design.method import SLOW, Design, NoDesign
 from friso.design.relax import Relaxation
-from friso.design.verification import Outcome
+from friso.design.verification import MachineOutcomes
 from friso.stage.stage import numeric_keys
 from friso.views.design.control import parallel_gains
 from friso.views.design.window import lower, upper
@@ -160,7 +160,7 @@ def _verification(design: Design) -> dict[str, Any]:
     return {**_outcome(verification.free), "settling_time_met": met, "locked": _outcome(verification.locked)}
 
 
-def _outcome(outcome: Outcome) -> dict[str, Any]:
+def _outcome(outcome: MachineOutcomes) -> dict[str, Any]:
     low, high = outcome.interval
     return {
         "moves": outcome.tried,

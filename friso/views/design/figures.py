@@ -10,7 +10,7 @@ import numpy as np
 from friso.design.choice import Confirmed
 from friso.design.front import Candidate
 from friso.design.method import Design
-from friso.design.verification import Outcome
+from friso.design.verification import MachineOutcomes
 from friso.frequency.crossover import WANTED
 from friso.views.design.window_figure import window_figure
 from friso.views.design.words import hertz, size
@@ -174,7 +174,7 @@ def _settling(design: Design) -> Figure:
     return Figure("design_settling", "Settling times", caption, (panel,))
 
 
-def _distribution(outcome: Outcome) -> tuple[Array, Array]:
+def _distribution(outcome: MachineOutcomes) -> tuple[Array, Array]:
     """Settling times [s] and the shares of the moves [%] that have settled by then."""
     times = np.sort(np.maximum(outcome.settling[outcome.completed & np.isfinite(outcome.settling)], 1e-6))
     if not times.size:

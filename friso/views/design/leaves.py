@@ -9,7 +9,7 @@ import numpy as np
 
 from friso.design.method import Design
 from friso.design.requirements import Requirement, Way
-from friso.views.design.words import Step, hertz, leaves, percent, plain, size
+from friso.views.design.words import DesignStep, hertz, leaves, percent, plain, size
 from friso.views.drawing.prefixes import listed
 from friso.views.flexure.table import megapascals, newtons_per
 from friso.views.flexure.words import assumptions
@@ -18,11 +18,11 @@ BINDS = 0.95
 """Share of what is required from which on a requirement is said to bind."""
 
 
-def leaves_step(design: Design) -> Step:
+def leaves_step(design: Design) -> DesignStep:
     """Which leaf springs, and why these."""
     sentences = (_interfering(design), _strength(design), _why(design), _confirmed(design), *assumptions(design.stage))
     figures = ("design_front", "design_modes")
-    return Step(f"Leaf springs: {leaves(design)}", sentences, (*_sizes(design), *_numbers(design)), figures)
+    return DesignStep(f"Leaf springs: {leaves(design)}", sentences, (*_sizes(design), *_numbers(design)), figures)
 
 
 def requirement_rows(design: Design) -> list[tuple[str, str, str, str]]:

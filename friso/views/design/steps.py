@@ -8,19 +8,19 @@ from friso.design.edges import Corners
 from friso.design.method import Design
 from friso.views.design.control import controller_step, moves_step
 from friso.views.design.leaves import leaves_step
-from friso.views.design.words import Step, brings, corner, edge, gaps, hertz, plain, size
+from friso.views.design.words import DesignStep, brings, corner, edge, gaps, hertz, plain, size
 from friso.views.flexure.table import newtons_per
 
 GAP = 1.0
 """Static less Coulomb friction [N] that hunting needs at least, as the thesis found (Sec. 4.3.1)."""
 
 
-def steps(design: Design) -> tuple[Step, ...]:
+def steps(design: Design) -> tuple[DesignStep, ...]:
     """All steps of the method, in order."""
     return isolator_step(design), joint_step(design), leaves_step(design), controller_step(design), moves_step(design)
 
 
-def isolator_step(design: Design) -> Step:
+def isolator_step(design: Design) -> DesignStep:
     """Whether an isolator is needed."""
     corners, flat = design.without, design.given.flat()
     sentences = [f"Without isolator the machine {edge(corners)}.", *_worst(corners, design), *_gap(design)]
@@ -36,10 +36,10 @@ def isolator_step(design: Design) -> Step:
     losses = gaps(corners, flat)
     facts += [] if losses is None else [("Static less Coulomb friction", f"{losses.min():.3g} to {losses.max():.3g} N")]
     answer = "yes" if design.needed else "no"
-    return Step(f"Is an isolator needed: {answer}", tuple(sentences), tuple(facts), ())
+    return DesignStep(f"Is an isolator needed: {answer}", tuple(sentences), tuple(facts), ())
 
 
-def joint_step(design: Design) -> Step:
+def joint_step(design: Design) -> DesignStep:
     """How soft, and with which stroke."""
     task, beams, safety = design.fitted.task, design.fitted.choice.beams, design.spec.safety
     allowed = task.friction / safety.breakaway / (1 + safety.stiffness_tolerance)
@@ -69,7 +69,7 @@ def joint_step(design: Design) -> Step:
         ),
         ("Edge of hunting with isolator", _edge(design.edges)),
     )
-    return Step(f"Joint: {stiffness}, stroke {size(task.stroke)} mm", tuple(sentences), facts, ("design_map",))
+    return DesignStep(f"Joint: {stiffness}, stroke {size(task.stroke)} mm", tuple(sentences), facts, ("design_map",))
 
 
 def _edge(corners: Corners, factor: float = 1.0) -> str:

@@ -12,7 +12,7 @@ from friso.frequency.ranges import Range
 
 
 @dataclass(frozen=True)
-class Bound:
+class CrossoverBound:
     """A bound of the crossover [Hz] and its reason."""
 
     value: float
@@ -30,29 +30,29 @@ def stiffest(design: Design) -> float:
     return max(candidate.frequency for candidate in design.candidates) / design.spec.safety.parasitic
 
 
-def upper(design: Design) -> list[Bound]:
+def upper(design: Design) -> list[CrossoverBound]:
     """What bounds the crossover from above, the lowest first."""
     multiple = design.spec.safety.parasitic
     front = f"the highest first interfering frequency of the front over {multiple:g}"
     bounds = [
-        Bound(design.spec.limit, "the machine's limit"),
-        Bound(stiffest(design), front),
-        Bound(comfortable(design)[1], f"above it the modulus margin is below {WANTED:g}"),
+        CrossoverBound(design.spec.limit, "the machine's limit"),
+        CrossoverBound(stiffest(design), front),
+        CrossoverBound(comfortable(design)[1], f"above it the modulus margin is below {WANTED:g}"),
     ]
     return sorted((bound for bound in bounds if np.isfinite(bound.value)), key=lambda bound: bound.value)
 
 
-def lower(design: Design) -> list[Bound]:
+def lower(design: Design) -> list[CrossoverBound]:
     """What bounds the crossover from below, the highest first."""
     factor, edges = design.spec.safety.hunting, design.edges
     low = comfortable(design)[0]
     bounds = (
-        [Bound(low, f"below it the modulus margin is below {WANTED:g}")]
+        [CrossoverBound(low, f"below it the modulus margin is below {WANTED:g}")]
         if low > design.fitted.limits.searched[0]
         else []
     )
     if edges.hunts:
-        bounds.append(Bound(factor * edges.highest, f"{factor:g} times the edge of hunting"))
+        bounds.append(CrossoverBound(factor * edges.highest, f"{factor:g} times the edge of hunting"))
     return sorted(bounds, key=lambda bound: -bound.value)
 
 

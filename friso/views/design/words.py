@@ -13,7 +13,7 @@ from friso.design.edges import Corners
 from friso.design.geometry import Geometry
 from friso.design.method import Design, NoDesign
 from friso.design.relax import Relaxation
-from friso.design.verification import Outcome
+from friso.design.verification import MachineOutcomes
 from friso.stage.stage import numeric_keys
 from friso.views.drawing.figure import GREEN, ORANGE, VERMILLION
 from friso.views.drawing.prefixes import choose, pretty, with_unit
@@ -24,7 +24,7 @@ SHOWN = 5
 
 
 @dataclass(frozen=True)
-class Step:
+class DesignStep:
     """A step of the method: its result as a title, the reasons, its numbers by name, and the names of its figures."""
 
     title: str
@@ -97,7 +97,7 @@ def _verified(design: Design) -> tuple[str, str]:
     return colour, f"{text}; {'as' if met else 'not as'} specified ({seconds(float(limit))})."
 
 
-def restless(outcome: Outcome) -> str:
+def restless(outcome: MachineOutcomes) -> str:
     """How many moves do not come to rest in the window, and how many of these swing."""
     if not outcome.missed:
         return "all come to rest in position"
@@ -106,14 +106,14 @@ def restless(outcome: Outcome) -> str:
     return f"{count} {'does' if count == 1 else 'do'} not come to rest in position ({how})"
 
 
-def probability(outcome: Outcome) -> str:
+def probability(outcome: MachineOutcomes) -> str:
     """The interval of the probability that a move does not come to rest in position."""
     low, high = outcome.interval
     within = f"below {percent(high)}" if not outcome.missed else f"{percent(low)} to {percent(high)}"
     return f"the probability that a move does not is {within} (with 95 % confidence)"
 
 
-def settling(outcome: Outcome) -> str:
+def settling(outcome: MachineOutcomes) -> str:
     """Within what time moves settle."""
     half, most = outcome.slower_than(0.5), outcome.slower_than(0.05)
     if not math.isfinite(half):

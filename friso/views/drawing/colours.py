@@ -25,7 +25,7 @@ VIRIDIS = (
 
 
 @dataclass(frozen=True)
-class Scale:
+class ColourScale:
     """The colours of the drawn numbers from `low` to `high`: even `steps`, or else blending into each other.
 
     `ticks` (drawn numbers) and `texts` are written at the colour bar; none: as the renderer likes.
@@ -55,20 +55,20 @@ def painted(field: Coloured) -> Array:
     return np.log10(np.maximum(field.z, low))
 
 
-def scale(field: Coloured) -> Scale:
+def scale(field: Coloured) -> ColourScale:
     """The scale of a map or cloud."""
     if field.colours:
         count = len(field.colours)
         ticks = tuple(range(0, count, -(-count // 12)))
-        return Scale(-0.5, count - 0.5, field.colours, True, ticks, tuple(map(str, ticks)))
+        return ColourScale(-0.5, count - 0.5, field.colours, True, ticks, tuple(map(str, ticks)))
     low, high = _limits(field)
     if not field.log:
-        return Scale(low, high, VIRIDIS)
+        return ColourScale(low, high, VIRIDIS)
     low, high = math.log10(low), math.log10(high)
     every = max(1, math.ceil((high - low) / 6))
     decades = range(math.ceil(low + 0.3), math.floor(high + 1e-9) + 1, every)
     texts = (f"≤ {10.0**low:.2g}", *(f"{10.0**decade:g}" for decade in decades))  # `painted` lifts what is lower
-    return Scale(low, high, VIRIDIS, False, (low, *decades), texts)
+    return ColourScale(low, high, VIRIDIS, False, (low, *decades), texts)
 
 
 def ramp(count: int) -> tuple[str, ...]:

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure as Canvas
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from friso.views.drawing.colours import Scale, painted, scale
+from friso.views.drawing.colours import ColourScale, painted, scale
 from friso.views.drawing.drawable import cell_edges, colour_key, line_key
 from friso.views.drawing.figure import GREY, INK, Array, Coloured, Figure, Map, Panel
 
@@ -62,7 +62,7 @@ def add_colour_bars(canvas: Canvas, axes: Sequence[Axes], panels: Sequence[Panel
         _bar(canvas, [axes[i]], colour_scale, label)
 
 
-def _bar(canvas: Canvas, axes: list[Axes], colour_scale: Scale, label: str) -> None:
+def _bar(canvas: Canvas, axes: list[Axes], colour_scale: ColourScale, label: str) -> None:
     mappable = ScalarMappable(Normalize(colour_scale.low, colour_scale.high), _colour_map(colour_scale))
     bar = canvas.colorbar(
         mappable, ax=axes, ticks=list(colour_scale.ticks) or None, fraction=0.05, pad=0.015, aspect=28
@@ -73,7 +73,7 @@ def _bar(canvas: Canvas, axes: list[Axes], colour_scale: Scale, label: str) -> N
     bar.set_label(label, parse_math=False)
 
 
-def _colour_map(colour_scale: Scale) -> Colormap:
+def _colour_map(colour_scale: ColourScale) -> Colormap:
     if colour_scale.steps:
         return ListedColormap(list(colour_scale.colours))
     return LinearSegmentedColormap.from_list("friso", list(colour_scale.colours))

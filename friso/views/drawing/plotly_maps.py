@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import plotly.graph_objects as go
 
-from friso.views.drawing.colours import Scale, painted, scale
+from friso.views.drawing.colours import ColourScale, painted, scale
 from friso.views.drawing.drawable import cell_edges, colour_key, line_key
 from friso.views.drawing.figure import GREY, INK, Array, Axis, Coloured, Figure, Map, Panel
 
@@ -48,7 +48,7 @@ def coloured_traces(panel: Panel, place: dict[str, Any], bar: dict[str, Any] | N
         colouring = _colouring(scale(field), bar if field.has_numbers else None, field.label)
         traces.append(_layer(panel, field, painted(field), colouring, place))
         if field.codes is not None and field.kinds:
-            kinds = Scale(-0.5, len(field.kinds) - 0.5, tuple(kind.colour for kind in field.kinds), steps=True)
+            kinds = ColourScale(-0.5, len(field.kinds) - 0.5, tuple(kind.colour for kind in field.kinds), steps=True)
             traces.append(_layer(panel, field, field.codes, _colouring(kinds, None, ""), place))
     return traces
 
@@ -80,7 +80,7 @@ def _hover(name: str, axis: Axis) -> str:
     return f"%{{{name}}}" if axis.words else f"%{{{name}:.5~g}} {html.escape(axis.unit)}"
 
 
-def _colouring(colour_scale: Scale, bar: dict[str, Any] | None, label: str) -> dict[str, Any]:
+def _colouring(colour_scale: ColourScale, bar: dict[str, Any] | None, label: str) -> dict[str, Any]:
     colouring = {
         "colorscale": colour_scale.stops,
         "zmin": colour_scale.low,

@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from friso.flexure.mechanism import Mechanism
-from friso.views.flexure.layout import ABOVE, CLAMP, FOOT, RIM, SCALES, STOP, WIDTH, Drawing, block_size
+from friso.views.flexure.layout import ABOVE, CLAMP, FOOT, RIM, SCALES, STOP, WIDTH, PaperDrawing, block_size
 from friso.views.flexure.svg import (
     TEXT,
     Point,
@@ -37,9 +37,10 @@ CLOSE = 1e-6
 def drawing_svg(mechanism: Mechanism, stroke: float, *, title: str = "", material: str = "") -> str:
     """The drawing of a mechanism with its stroke [m], which is the gap to the limiter on each side."""
     fitting = next(
-        (candidate for candidate in (Drawing(mechanism, stroke, scale) for scale in SCALES) if candidate.fits), None
+        (candidate for candidate in (PaperDrawing(mechanism, stroke, scale) for scale in SCALES) if candidate.fits),
+        None,
     )
-    drawing = fitting or Drawing(mechanism, stroke, SCALES[-1])
+    drawing = fitting or PaperDrawing(mechanism, stroke, SCALES[-1])
     label = f"Leaf springs{': ' if title else ''}{title}"
     parts = [
         *_side_view(drawing),
@@ -51,7 +52,7 @@ def drawing_svg(mechanism: Mechanism, stroke: float, *, title: str = "", materia
     return sheet(WIDTH, drawing.height, label, parts)
 
 
-def _side_view(drawing: Drawing) -> list[str]:
+def _side_view(drawing: PaperDrawing) -> list[str]:
     mechanism = drawing.mechanism
     start, end = drawing.x0, drawing.x0 + drawing.size(mechanism.length)
     row = drawing.size(mechanism.depth) / 2
@@ -69,7 +70,7 @@ def _side_view(drawing: Drawing) -> list[str]:
     return parts + _side_dimensions(drawing, start, end, row)
 
 
-def _bent(drawing: Drawing, height: float, side: int) -> list[Point]:
+def _bent(drawing: PaperDrawing, height: float, side: int) -> list[Point]:
     """A leaf at the stroke, its ends parallel."""
     s = np.linspace(0, 1, 33)
     x, z = (
@@ -79,13 +80,13 @@ def _bent(drawing: Drawing, height: float, side: int) -> list[Point]:
     return list(zip(x.tolist(), z.tolist(), strict=True))
 
 
-def _stop(drawing: Drawing, end: float, edge: float, side: int) -> list[str]:
+def _stop(drawing: PaperDrawing, end: float, edge: float, side: int) -> list[str]:
     """A stop of the limiter, the travel away from the stage's clamp; it belongs to the cart."""
     near, far = edge + side * drawing.travel, edge + side * (drawing.travel + STOP)
     return [box((end, near), (end + CLAMP, far), fill="url(#leaf-hatch)")]
 
 
-def _side_dimensions(drawing: Drawing, start: float, end: float, row: float) -> list[str]:
+def _side_dimensions(drawing: PaperDrawing, start: float, end: float, row: float) -> list[str]:
     mechanism, left = drawing.mechanism, drawing.x0 + drawing.spans[0][0]
     below = drawing.z0 - drawing.spans[1][0]
     top = drawing.z0 - row
@@ -108,7 +109,7 @@ def _side_dimensions(drawing: Drawing, start: float, end: float, row: float) -> 
     return parts + _axes(drawing.z0 - drawing.spans[1][0] + 6, "z") + _stage_note(drawing)
 
 
-def _stage_note(drawing: Drawing) -> list[str]:
+def _stage_note(drawing: PaperDrawing) -> list[str]:
     """Which part is the stage."""
     (_, right), (low, high) = drawing.block[0], drawing.block[1]
     tip = (
@@ -122,7 +123,7 @@ def _stage_note(drawing: Drawing) -> list[str]:
     )
 
 
-def _block(drawing: Drawing, view: int, middle: float) -> list[str]:
+def _block(drawing: PaperDrawing, view: int, middle: float) -> list[str]:
     """The stage as a block in the view from the side (1) or from above (2); what has no room is cut off."""
     (x1, x2), (low, high) = drawing.block[0], drawing.block[view]
     (left, right), (bottom, top) = drawing.spans[0], drawing.spans[view]
@@ -138,7 +139,7 @@ def _block(drawing: Drawing, view: int, middle: float) -> list[str]:
     return [fill, *(path(ends, "phantom") for inside, ends in edges if inside)]
 
 
-def _top_view(drawing: Drawing) -> list[str]:
+def _top_view(drawing: PaperDrawing) -> list[str]:
     mechanism = drawing.mechanism
     start, end, half = drawing.x0, drawing.x0 + drawing.size(mechanism.length), drawing.size(mechanism.width) / 2
     left = drawing.x0 + drawing.spans[0][0]
@@ -164,7 +165,7 @@ def _axes(y: float, up: str) -> list[str]:
     return [*parts, words((18.2, y + 1), "x"), words((8.0, y - 9.2), up)]
 
 
-def _marks(drawing: Drawing) -> list[str]:
+def _marks(drawing: PaperDrawing) -> list[str]:
     """Where the actuator pushes, the sensor looks and the centre of mass is, in both views."""
     parts = []
     for view, up in ((drawing.side, 2), (drawing.top, 1)):
@@ -203,7 +204,7 @@ def _push_mark(at: Point, sideways: bool) -> list[str]:
     return [line, arrow((x, y - 6.5), (0, -1), "#D55E00"), arrow((x, y + 6.5), (0, 1), "#D55E00")]
 
 
-def _legend(drawing: Drawing) -> list[str]:
+def _legend(drawing: PaperDrawing) -> list[str]:
     """What the letters mean and what is not to scale."""
     names = {"A": "actuation along z", "S": "sensor", "C": "centre of mass"}
     texts = [
@@ -222,7 +223,7 @@ def _legend(drawing: Drawing) -> list[str]:
     return [words((5, drawing.foot + 4 + 4.5 * k), line, size=2.8) for k, line in enumerate(lines)]
 
 
-def _title_block(drawing: Drawing, title: str, material: str) -> list[str]:
+def _title_block(drawing: PaperDrawing, title: str, material: str) -> list[str]:
     mechanism, top, split = drawing.mechanism, drawing.height - FOOT - 5, 138.0
     stuff = f"E {mechanism.young / 1e9:.4g} GPa, ν {mechanism.poisson:g}, {mechanism.density:.4g} kg/m³"
     strength = f"yield {mechanism.yield_strength / 1e6:.4g} MPa"
@@ -244,7 +245,7 @@ def _title_block(drawing: Drawing, title: str, material: str) -> list[str]:
     return parts + _scale_bar(drawing, (split + 3, top + 17))
 
 
-def _scale_bar(drawing: Drawing, at: Point) -> list[str]:
+def _scale_bar(drawing: PaperDrawing, at: Point) -> list[str]:
     """A bar of a round length, in halves; it stays true where the sheet is printed at another size."""
     length = max(
         nice

@@ -41,7 +41,7 @@ def block_size(mechanism: Mechanism) -> tuple[float, float, float]:
 
 
 @dataclass(frozen=True)
-class Drawing:
+class PaperDrawing:
     """A mechanism on paper at a scale: places in paper millimetres, y downwards."""
 
     mechanism: Mechanism

@@ -7,9 +7,9 @@ from typing import Any
 
 from friso.studies.guideline import Fit, Guideline
 from friso.studies.guideline.claims import claims
-from friso.studies.guideline.laws import Fitted
-from friso.studies.guideline.rig import Case
-from friso.studies.guideline.worked import Design
+from friso.studies.guideline.laws import FittedLaw
+from friso.studies.guideline.rig import RigCase
+from friso.studies.guideline.worked import WorkedDesign
 from friso.version import VERSION
 from friso.views.documents import plain_json
 from friso.views.guideline.page import group_rows
@@ -43,7 +43,7 @@ def guideline_document(found: Guideline) -> dict[str, Any]:
     )
 
 
-def _designed(design: Design) -> dict[str, Any]:
+def _designed(design: WorkedDesign) -> dict[str, Any]:
     return {
         "limit_hz": design.limit,
         "aim_hz": design.aim,
@@ -55,7 +55,7 @@ def _designed(design: Design) -> dict[str, Any]:
     }
 
 
-def _case(case: Case) -> dict[str, Any]:
+def _case(case: RigCase) -> dict[str, Any]:
     return {"changes": dict(case.changes), "law_hz": case.law, "computed_hz": case.computed, "kind": case.kind}
 
 
@@ -70,7 +70,7 @@ def _law(fit: Fit) -> dict[str, Any]:
     }
 
 
-def _rates(law: Fitted) -> dict[str, Any]:
+def _rates(law: FittedLaw) -> dict[str, Any]:
     return {
         rate.name: {"factor": law.factors[number], "base": dict(rate.base), "exponents": law.of(number)}
         for number, rate in enumerate(law.law.rates)

@@ -10,7 +10,7 @@ from friso.hunting.edges import FLIP, FOLD, JUMP, LOST
 from friso.studies.guideline import Fit, Guideline
 from friso.studies.guideline.rig import Laws, plain
 from friso.studies.guideline.sweeps import Sweep
-from friso.studies.guideline.worked import STUDIED, Case
+from friso.studies.guideline.worked import STUDIED, RigCase
 from friso.views.drawing.figure import (
     BLUE,
     GREEN,
@@ -160,7 +160,7 @@ PANELS: Mapping[str, tuple[str, Axis]] = {
 }
 
 
-def _studied(title: str, x: Axis, cases: Sequence[Case], laws: Laws) -> Panel:
+def _studied(title: str, x: Axis, cases: Sequence[RigCase], laws: Laws) -> Panel:
     name = next(name for name, (known, _) in PANELS.items() if known == title)
     at, computed = np.array([(STUDIED[name](case.changes), case.computed) for case in cases]).T
     places = np.linspace(0, len(cases) - 1, FINER * (len(cases) - 1) + 1)

@@ -18,7 +18,7 @@ from friso.studies.guideline.claims import claims
 from friso.studies.guideline.groups import GROUPS, LIMITER_OVER_BRISTLES, values_of
 from friso.studies.guideline.laws import FOLDS, GAIN, Errors
 from friso.studies.guideline.parasitic import DRIVE
-from friso.studies.guideline.rig import Case, plain
+from friso.studies.guideline.rig import RigCase, plain
 from friso.studies.guideline.sweeps import FREE_GRID, JOINT_BOX, LOCKED_BOX, LOCKED_GRID, Sweep
 from friso.studies.guideline.worked import CLAIMED_AT, GAPS, MARGIN, STATIC, STUDIED
 from friso.version import VERSION
@@ -156,7 +156,7 @@ def _span(x: np.ndarray) -> tuple[float, float]:
     return float(x.min()), float(x.max())
 
 
-def _rows(name: str, cases: tuple[Case, ...]) -> list[tuple[float, float, float]]:
+def _rows(name: str, cases: tuple[RigCase, ...]) -> list[tuple[float, float, float]]:
     """What a study varies, the edge by the law, and that computed."""
     return [(STUDIED[name](case.changes), case.law, case.computed) for case in cases]
 

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 
 from friso.studies.guideline import Guideline
 from friso.studies.guideline.groups import GROUPS
-from friso.studies.guideline.laws import REFERENCE, Fitted
-from friso.studies.guideline.parasitic import Parasitic
-from friso.studies.guideline.rig import Case
+from friso.studies.guideline.laws import REFERENCE, FittedLaw
+from friso.studies.guideline.parasitic import ParasiticLimits
+from friso.studies.guideline.rig import RigCase
 from friso.views.drawing.prefixes import listed
 
 BASES = {
@@ -38,7 +38,7 @@ def formulas(found: Guideline) -> str:
     return "\n".join(lines)
 
 
-def _rates(law: Fitted) -> list[str]:
+def _rates(law: FittedLaw) -> list[str]:
     return [
         f"{f'omega_{rate.name}':<12} = {number(law.factors[place])} {BASES[rate.name]}"
         + "".join(f"  {_power(group, value)}" for group, value in sorted(law.of(place).items(), key=_order))
@@ -71,7 +71,7 @@ def percent(off: float) -> str:
     return f"{100 * math.expm1(off):.0f} %"
 
 
-def parasitic_edges(cases: Sequence[Case]) -> str:
+def parasitic_edges(cases: Sequence[RigCase]) -> str:
     """How far the parasitic mode moves the edge of hunting."""
     edges = [case.computed for case in cases if math.isfinite(case.computed)]
     if not edges:
@@ -80,7 +80,7 @@ def parasitic_edges(cases: Sequence[Case]) -> str:
     return f"Over these modes the edge differs by at most {100 * spread:.0f} %."
 
 
-def parasitic_sentences(modes: Sequence[Parasitic]) -> list[str]:
+def parasitic_sentences(modes: Sequence[ParasiticLimits]) -> list[str]:
     """Where the ranges of crossovers end, joint locked and free, by the damping ratio of the mode; and whether one
     multiple of the crossover is a rule for all modes."""
     ratios = [mode.frequency / end[1] for mode in modes for end in (mode.locked, mode.free) if end]
@@ -97,7 +97,7 @@ def parasitic_sentences(modes: Sequence[Parasitic]) -> list[str]:
     ]
 
 
-def _ranges(state: str, damping: float, modes: Sequence[Parasitic]) -> str:
+def _ranges(state: str, damping: float, modes: Sequence[ParasiticLimits]) -> str:
     """Of one state of the joint and one damping ratio."""
     ends = {mode.frequency: getattr(mode, state) for mode in modes if mode.damping_ratio == damping}
     usable = {frequency: end for frequency, end in ends.items() if end}

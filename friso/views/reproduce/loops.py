@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from friso.views.bode.figures import Curve, bode_figures, phases, size
+from friso.views.bode.figures import ResponseCurve, bode_figures, phases, size
 from friso.views.drawing.colours import ramp
 from friso.views.drawing.figure import INK, Axis, Figure, Limit, Panel, Series
 
 if TYPE_CHECKING:
     from friso.studies.thesis import Reproduction
-    from friso.studies.thesis.linear import Loops
+    from friso.studies.thesis.linear import CrossoverLoops
 
 _SHOWN = {
     "7": (
@@ -44,28 +44,28 @@ def loop_figures(reproduction: Reproduction) -> dict[str, Figure]:
     return shown | {"22": _locked(reproduction.linear.locked), "23": _free(reproduction.linear.free)}
 
 
-def _locked(loops: Loops) -> Figure:
+def _locked(loops: CrossoverLoops) -> Figure:
     caption = "The loop of the model with its joint locked, sliding, at the crossovers at which the thesis measured it."
     return _of_loops("22", "open loop, joint locked, at several crossovers", caption, loops)
 
 
-def _free(loops: Loops) -> Figure:
+def _free(loops: CrossoverLoops) -> Figure:
     caption = "The loop of the model with its joint free, sliding, the controller tuned for the whole mass."
     return _of_loops("23", "open loop, joint free, tuned to 8 Hz", caption, loops)
 
 
-def _of_loops(number: str, title: str, caption: str, loops: Loops) -> Figure:
+def _of_loops(number: str, title: str, caption: str, loops: CrossoverLoops) -> Figure:
     """Magnitude and phase of the loops at every crossover."""
     shades = ramp(len(loops.curves) + 1)  # its last shade is light
     curves = [
-        Curve(response, f"tuned to {crossover:g} Hz", shade)
+        ResponseCurve(response, f"tuned to {crossover:g} Hz", shade)
         for (crossover, response), shade in zip(loops.curves.items(), shades, strict=False)
     ]
     panels = _panels(loops.omega / (2 * np.pi), curves)
     return Figure(f"figure-{number}", f"Figure {number}: {title}", caption, panels)
 
 
-def _panels(hertz: np.ndarray, curves: Sequence[Curve]) -> tuple[Panel, Panel]:
+def _panels(hertz: np.ndarray, curves: Sequence[ResponseCurve]) -> tuple[Panel, Panel]:
     x = Axis("Frequency", "Hz", (float(hertz[0]), float(hertz[-1])), log=True)
     above = tuple(Series(hertz, size(one.response), one.label, one.colour) for one in curves)
     turns = zip(curves, phases([one.response for one in curves]), strict=True)

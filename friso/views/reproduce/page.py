@@ -26,7 +26,7 @@ _COLOURS = {"holds": GREEN, "holds in part": ORANGE, "differs": VERMILLION, "not
 
 
 @dataclass(frozen=True)
-class Section:
+class FigureSection:
     """One figure of the thesis with the verdicts on the claims that it bears out; `figure` is None where the evidence
     is no drawing."""
 
@@ -74,7 +74,7 @@ def reproduction_html(reproduction: Reproduction) -> str:
     )
 
 
-def sections(figures: Mapping[str, Figure], verdicts: Iterable[Verdict]) -> tuple[Section, ...]:
+def sections(figures: Mapping[str, Figure], verdicts: Iterable[Verdict]) -> tuple[FigureSection, ...]:
     """The figures in their order, then whatever else judges name as evidence; claims that are not covered stand in
     the table alone. A panel's claims, such as those of "11A", stand with the figure."""
     groups: dict[str, list[Verdict]] = {number: [] for number in figures}
@@ -82,7 +82,7 @@ def sections(figures: Mapping[str, Figure], verdicts: Iterable[Verdict]) -> tupl
         if verdict.finding:
             groups.setdefault(verdict.figure.rstrip("ABCD"), []).append(verdict)
     return tuple(
-        Section(
+        FigureSection(
             f"section-{place}",
             figures[number].title if number in figures else _untitled(number),
             figures.get(number),

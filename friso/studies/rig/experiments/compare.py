@@ -18,7 +18,7 @@ import numpy as np
 from friso.equations.controllers.van_dijk import ALPHA, BETA, CROSSOVER, TUNED_MASS
 from friso.progress import Progress
 from friso.rig.rail import friction_factors
-from friso.rig.task import Task
+from friso.rig.task import MoveTask
 from friso.stage import Stage
 from friso.studies.rig.experiments.hunting import Trace
 from friso.studies.rig.hunted import (
@@ -178,7 +178,7 @@ def on_rail(stage: Stage) -> Stage:
     return bare.replace({"rail.seed": seed, "rail.offset": level, "rail.correlation_length": "5 mm"})
 
 
-def _longer(task: Task) -> Task:
+def _longer(task: MoveTask) -> MoveTask:
     return replace(task, duration=LONGER * task.duration)
 
 

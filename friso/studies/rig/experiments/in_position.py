@@ -14,7 +14,7 @@ from scipy.signal import welch
 
 from friso.progress import Progress
 from friso.rig.run import Recorded, as_built_keys, run
-from friso.rig.task import Task, standing
+from friso.rig.task import MoveTask, standing
 from friso.stage import Stage
 from friso.stage.controllers import FORCE_LIMIT
 from friso.studies.rig.hunted import crossover, crossover_key, move, with_joint
@@ -147,7 +147,7 @@ def amplifier_noise(stage: Stage) -> float:
     return float(2 * limit / 2**BITS / np.sqrt(12))
 
 
-def with_noise(task: Task, force: float, seed: int, each: float) -> Task:
+def with_noise(task: MoveTask, force: float, seed: int, each: float) -> MoveTask:
     """The task with a force of an RMS [N], unknown to the drive, that is another at every sample of it, `each` [s]."""
     noise = np.random.default_rng(seed).standard_normal(int(np.ceil(task.duration / each)) + 1)
     return replace(task, injected=force * noise, injected_each=each, unknown=True)
@@ -161,7 +161,7 @@ def _silenced(stage: Stage, source: str) -> dict[str, Any]:
 
 
 def _recorded(
-    stage: Stage, task: Task, seed: int, changes: Mapping[str, Any] | None = None, count: int = 1
+    stage: Stage, task: MoveTask, seed: int, changes: Mapping[str, Any] | None = None, count: int = 1
 ) -> Recorded:
     (recorded,) = run(stage, task, [seed] * count, interval(stage, INTERVAL), changes)
     return recorded

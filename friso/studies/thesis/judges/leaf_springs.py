@@ -9,7 +9,7 @@ import numpy as np
 
 from friso.flexure.beams import beams
 from friso.flexure.evaluation import Evaluation
-from friso.flexure.mechanism import Body, Mechanism, cube_inertia
+from friso.flexure.mechanism import Mechanism, MovingBody, cube_inertia
 from friso.materials import materials
 from friso.studies.thesis.claims import ABOUT, Evidence, Finding, Part, judges
 from friso.studies.thesis.studies import rig
@@ -47,7 +47,7 @@ def _mechanism(young: float, spacing: float, height: float) -> Mechanism:
         density=float(steel.density),
         yield_strength=float(steel.yield_strength),
         fatigue=float(steel.fatigue),
-        body=Body(mass, cube_inertia(mass), centre),
+        body=MovingBody(mass, cube_inertia(mass), centre),
         actuation=(0.0, 0.0, 0.0),  # "underneath the flexure mechanism" (Sec. 3.4.1)
         sensor=(0.0, 0.0, 0.0),
     )

@@ -10,7 +10,7 @@ from friso.frequency.ranges import Range
 from friso.studies.thesis.claims import ABOUT, ORDER, Evidence, Finding, Part, about, judges
 from friso.studies.thesis.experiments import BUILT
 from friso.studies.thesis.judges.rig_loops import measured_free, measured_locked, on_the_rig
-from friso.studies.thesis.linear import FREE, FURTHER, LOCKED_LOOP, Contact, Linear, Loops, Speeds
+from friso.studies.thesis.linear import FREE, FURTHER, LOCKED_LOOP, Contact, CrossoverLoops, Linear, Speeds
 
 _SIMULATED, _MEASURED = 60.0, 48.0
 """The highest crossovers of the simulation (Sec. 3.4.2) and of the rig (Sec. 4.2.4) [Hz]."""
@@ -45,7 +45,7 @@ def stable_at_every_speed(evidence: Evidence) -> Finding:
     )
 
 
-def _beyond(locked: Loops) -> str:
+def _beyond(locked: CrossoverLoops) -> str:
     """What crosses 0 dB besides, at the highest setting."""
     further = _further(locked.margins[_MEASURED]["sliding"], _MEASURED)
     return f"a mode reaches it too (locked, tuned to {_MEASURED:g} Hz: {_listed(further)})"

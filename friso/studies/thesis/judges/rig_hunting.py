@@ -10,7 +10,7 @@ from friso.studies.rig.experiments.compare import AS_SLOW, MOTORS, SIMILAR
 from friso.studies.rig.experiments.in_position import BITS, InPosition
 from friso.studies.rig.experiments.stroke_crossover import StrokeCrossover
 from friso.studies.rig.hunted import Hunted
-from friso.studies.thesis.as_built import AS_BUILT, COULOMB_LEVEL, Cycles, Moves
+from friso.studies.thesis.as_built import AS_BUILT, COULOMB_LEVEL, CyclesOnRails, MovesOnRails
 from friso.studies.thesis.claims import ORDER, Evidence, Finding, Part, about, judges
 from friso.studies.thesis.experiments import GRID, MOVES, ON_RAILS, STANDSTILL
 
@@ -38,7 +38,7 @@ def locked_hunts_and_free_settles(evidence: Evidence) -> Finding:
     return judged_move(evidence.experiments.moves)
 
 
-def judged_move(moves: Moves) -> Finding:
+def judged_move(moves: MovesOnRails) -> Finding:
     """The finding from the moves on several rails."""
     locked, free = _counted(moves.locked, 0), _counted(moves.free)
     return Finding(
@@ -60,7 +60,7 @@ def locked_needs_crossover(evidence: Evidence) -> Finding:
     return judged_crossovers(evidence.experiments.moves)
 
 
-def judged_crossovers(moves: Moves) -> Finding:
+def judged_crossovers(moves: MovesOnRails) -> Finding:
     """The finding from moves and releases with the joint locked."""
     low, middle, high = (_counted(moves.locked, row) for row in range(3))
     settle = ~moves.locked.counted[1] & ~moves.locked.failed[1]
@@ -124,7 +124,7 @@ def simulated_cycles_are_faster(evidence: Evidence) -> Finding:
     return judged_cycles(evidence.experiments.cycles)
 
 
-def judged_cycles(cycles: Cycles) -> Finding:
+def judged_cycles(cycles: CyclesOnRails) -> Finding:
     """The finding from the cycles on an even rail, which is the simulation of the thesis, and on rails that vary."""
     even, rails = cycles.even, cycles.rails
     swings = rails.swings
@@ -172,7 +172,7 @@ def judged_cycles(cycles: Cycles) -> Finding:
     )
 
 
-def _weak_motor(cycles: Cycles) -> str:
+def _weak_motor(cycles: CyclesOnRails) -> str:
     """What a weaker motor and more Coulomb friction do to the cycle on an even rail."""
     cause = (
         f"On an even rail, with a motor that gives {MOTORS[1]:.2g} of its force, which would explain the mass line, "

@@ -10,7 +10,7 @@ from types import MappingProxyType
 from friso.frequency.margins import Margins
 from friso.stage import Stage, loads
 from friso.stage.controllers import CONTROLLER
-from friso.studies.thesis.linear.loops import SETTINGS, Loops, loops_of
+from friso.studies.thesis.linear.loops import SETTINGS, CrossoverLoops, loops_of
 from friso.studies.thesis.linear.plants import PARASITIC, LimitCase, Springs, limit_cases_of, springs_of
 from friso.studies.thesis.linear.speeds import Speeds, speeds_of
 from friso.studies.thesis.linear.trials import FURTHER, Contact, identified, soft_contact
@@ -24,10 +24,10 @@ __all__ = [
     "PARASITIC",
     "PLANT",
     "Contact",
+    "CrossoverLoops",
     "LimitCase",
     "Linear",
-    "Loops",
-    "Need",
+    "PartNeeded",
     "Speeds",
     "Springs",
     "analysed",
@@ -37,7 +37,7 @@ PLANT, FREE, LOCKED_LOOP = "limit cases", "loop, joint free", "loop, joint locke
 
 
 @dataclass(frozen=True)
-class Need:
+class PartNeeded:
     """A part of the analysis that a judge may name: the tables of the stage file that play no part in it, and whether
     its joint is locked, which leaves the joint's own damping out."""
 
@@ -45,11 +45,11 @@ class Need:
     locked: bool = False
 
 
-NEEDS: Mapping[str, Need] = MappingProxyType(
+NEEDS: Mapping[str, PartNeeded] = MappingProxyType(
     {
-        PLANT: Need(("motion.", f"{CONTROLLER}.")),
-        FREE: Need(("motion.",)),
-        LOCKED_LOOP: Need(("motion.",), locked=True),
+        PLANT: PartNeeded(("motion.", f"{CONTROLLER}.")),
+        FREE: PartNeeded(("motion.",)),
+        LOCKED_LOOP: PartNeeded(("motion.",), locked=True),
     }
 )
 
@@ -65,8 +65,8 @@ class Linear:
 
     plants: Mapping[str, LimitCase]
     springs: Springs
-    free: Loops
-    locked: Loops
+    free: CrossoverLoops
+    locked: CrossoverLoops
     speeds: Speeds
     identified: Margins
     contact: Contact

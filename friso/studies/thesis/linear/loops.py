@@ -11,7 +11,7 @@ import numpy as np
 from friso.equations.bandwidth import faster
 from friso.equations.controllers.van_dijk import CROSSOVER
 from friso.frequency.crossover import HIGHEST, end_of, searched, stable_crossovers
-from friso.frequency.drive import Drive
+from friso.frequency.drive import DriveTiming
 from friso.frequency.family import controller, loops, modes, plants
 from friso.frequency.margins import DENSITY, Margins, frequencies, margins, with_resonances
 from friso.frequency.members import joined, limit_cases
@@ -42,7 +42,7 @@ LOWEST, STEPS = 1.0, 61
 
 
 @dataclass(frozen=True)
-class Loops:
+class CrossoverLoops:
     """The loops of a rig with its joint free or locked, tuned to each crossover [Hz].
 
     `margins` by crossover and limit case; over `omega` [rad/s], the loop of the sliding cart, its limiter free if it
@@ -62,7 +62,7 @@ class Loops:
     delay_at: Mapping[float, float]
 
 
-def loops_of(stage: Stage, settings: tuple[float, ...]) -> Loops:
+def loops_of(stage: Stage, settings: tuple[float, ...]) -> CrossoverLoops:
     """The loops of a stage, tuned to the crossovers `settings` [Hz]."""
     flat = stage.flat()
     tuned = {f: _tuned(flat, f) for f in settings}
@@ -70,7 +70,7 @@ def loops_of(stage: Stage, settings: tuple[float, ...]) -> Loops:
     omega = with_resonances(np.geomspace(*CURVE, POINTS) * 2 * np.pi, [resonances])
     moving = limit_cases(flat)["sliding"]
     drive = stage.replace({"drive.sample_time": SAMPLED}).flat()
-    return Loops(
+    return CrossoverLoops(
         margins={
             f: {name: margins(keys, member) for name, member in limit_cases(keys).items()} for f, keys in tuned.items()
         },
@@ -88,11 +88,11 @@ def _tuned(flat: Mapping[str, Any], crossover: Any) -> dict[str, Any]:
 
 
 def _single(flat: Mapping[str, Any]) -> float | None:
-    """See `Loops`; the free joint's limiter is touched, since the controller is tuned for all the mass. None where the
-    end of the search comes first, 0 without any such crossover."""
+    """See `CrossoverLoops`; the free joint's limiter is touched, since the controller is tuned for all the mass. None
+    where the end of the search comes first, 0 without any such crossover."""
     cases = limit_cases(flat)
     member = cases.get("sliding-touched", cases["sliding"])
-    omega = frequencies(flat, member, Drive.of(flat), DENSITY, [modes(flat, member)])
+    omega = frequencies(flat, member, DriveTiming.of(flat), DENSITY, [modes(flat, member)])
     bare = plants(flat, member, omega)[0]
 
     def more(crossover: np.ndarray) -> np.ndarray:
