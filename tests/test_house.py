@@ -55,15 +55,7 @@ def test_views_stand_in_the_folder_of_their_command() -> None:
     assert {path.name for path in (PACKAGE / "views").glob("*.py")} - SHARED_VIEWS == set()
 
 
-TO_BE_WRITTEN = ("page",)
-"""Recipes that CONTRIBUTING.md does not have yet (issue 20)."""
-
-_MARKS = {
-    kind: pytest.mark.xfail(reason="the recipe is being written (issue 20)", strict=True) for kind in TO_BE_WRITTEN
-}
-
-
-@pytest.mark.parametrize("kind", [pytest.param(kind, marks=_MARKS.get(kind, ())) for kind in RECIPES])
+@pytest.mark.parametrize("kind", RECIPES)
 def test_there_is_a_recipe(kind: str) -> None:
     """A heading for what is added, and below it the folder of its file."""
     sections = GUIDE.read_text(encoding="utf-8").split("\n#")
