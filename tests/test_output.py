@@ -13,7 +13,7 @@ from refusals import Refused
 
 from friso.cli.app import app
 from friso.cli.drafts import DRAFTS
-from friso.cli.output import MARKER, UNFINISHED, Place, write
+from friso.cli.output import MARKER, UNFINISHED, OutputFolder, write
 from friso.errors import InputError
 from friso.views.files import Content
 
@@ -65,7 +65,7 @@ def test_a_folder_of_others_is_refused_before_anything_is_computed(command: str,
 
 @pytest.mark.parametrize("command", NEEDS)
 def test_a_folder_of_another_command_is_refused(command: str, tmp_path: Path) -> None:
-    Place("another", tmp_path / "out", False).write({"page.html": "its page"})
+    OutputFolder("another", tmp_path / "out", False).write({"page.html": "its page"})
     before = tree(tmp_path)
     done = friso_inside(tmp_path, command, *NEEDS[command], "--out", "out")
     assert done.returncode == 2
@@ -73,8 +73,8 @@ def test_a_folder_of_another_command_is_refused(command: str, tmp_path: Path) ->
     assert tree(tmp_path) == before
 
 
-def place(folder: Path, overwrite: bool = False, inputs: tuple[Path, ...] = ()) -> Place:
-    return Place("check", folder, overwrite, inputs)
+def place(folder: Path, overwrite: bool = False, inputs: tuple[Path, ...] = ()) -> OutputFolder:
+    return OutputFolder("check", folder, overwrite, inputs)
 
 
 def test_a_place_may_be_new_empty_or_its_own(tmp_path: Path) -> None:
@@ -116,7 +116,7 @@ def test_what_is_read_is_never_replaced(tmp_path: Path, overwrite: bool, refused
     with refused():
         place(tmp_path / "out", overwrite, (stage,))
     (tmp_path / "other.toml").write_text("read too")
-    other = Place("check", tmp_path, True, (tmp_path / "other.toml",))
+    other = OutputFolder("check", tmp_path, True, (tmp_path / "other.toml",))
     with pytest.raises(InputError):
         other.write({"other.toml": ""})
     assert (stage.read_text(), (tmp_path / "other.toml").read_text()) == ("read", "read too")

@@ -15,7 +15,7 @@ from friso.cli.common import (
     read_stage,
     say,
 )
-from friso.cli.output import OutFolder, Overwrite, place, print_document, print_written
+from friso.cli.output import OutFolder, Overwrite, output_folder, print_document, print_written
 from friso.cli.progress import ProgressBar
 from friso.errors import InputError
 from friso.quantities import Bound, Quantity, quoted
@@ -50,7 +50,7 @@ def bode(
     if stage.drive and stage.drive.velocity_samples is not None:
         say("drive.velocity_samples is ignored: the derivative is that of the bilinear transform")
     shown = None if frequencies is None else _read_frequencies(frequencies, stage)
-    target = place("bode", out, overwrite, [stage_file])
+    target = output_folder("bode", out, overwrite, [stage_file])
     from friso.frequency.bode import bode as analysis
 
     files = []

@@ -16,7 +16,7 @@ from friso.cli.common import (
     read_stage,
     read_tolerance,
 )
-from friso.cli.output import OutFolder, Overwrite, place, print_document, print_written
+from friso.cli.output import OutFolder, Overwrite, output_folder, print_document, print_written
 from friso.cli.progress import ProgressBar
 from friso.quantities import Quantity, any_sign
 
@@ -50,7 +50,7 @@ def boundary(
     stage, tolerance = read_stage(stage_file, overrides), read_tolerance(rtol)
     axes = key_values([("--x", x)] + ([("--y", y)] if y else []), '--x controller.crossover="1 Hz..40 Hz"')
     links = key_values([("--link", text) for text in link or []], '--link masses.cart="0.7 * mass"')
-    target = place("boundary", out, overwrite, [stage_file])
+    target = output_folder("boundary", out, overwrite, [stage_file])
     from friso.studies.boundary import boundary as boundary_of
 
     files = []

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from friso.cli.common import AsJson, Overrides, StageFile, Tolerance, leave, print_table, read_stage, read_tolerance
-from friso.cli.output import OutFolder, Overwrite, place, print_document
+from friso.cli.output import OutFolder, Overwrite, output_folder, print_document
 from friso.cli.progress import ProgressBar
 from friso.errors import InputError
 from friso.stage import Stage, load
@@ -47,7 +47,7 @@ def check(
     """
     stage, tolerance = read_stage(stage_file, overrides, drawn=count is not None), read_tolerance(rtol)
     drawn = None if count is None else _drawn(stage, stage_file, count, seed)
-    target = place("check", out, overwrite, [stage_file])
+    target = output_folder("check", out, overwrite, [stage_file])
     from friso.hunting import check as check_stage
 
     cases = check_stage(stage, rtol=tolerance, traces=target is not None)

@@ -16,7 +16,7 @@ from friso.cli.common import (
     print_wrapped,
     read_stage,
 )
-from friso.cli.output import OutFolder, Overwrite, place, print_document
+from friso.cli.output import OutFolder, Overwrite, output_folder, print_document
 from friso.cli.progress import ProgressBar
 from friso.errors import InputError
 from friso.quantities import Quantity, positive
@@ -55,7 +55,7 @@ def compare(
 
     stage = read_stage(stage_file, overrides, leaves_out=(), drawn=True)
     tolerance, correlations = _tolerance(within), _correlations(stage_file, stage)
-    target = place("compare", out, overwrite, [stage_file])
+    target = output_folder("compare", out, overwrite, [stage_file])
     files = []
     with ProgressBar() as progress:
         found = compared(stage, machines, seed, tolerance, correlations, progress)

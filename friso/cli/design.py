@@ -16,7 +16,7 @@ from friso.cli.common import (
     read_stage,
     say,
 )
-from friso.cli.output import DefaultFolder, Overwrite, Place, print_document
+from friso.cli.output import DefaultFolder, OutputFolder, Overwrite, print_document
 from friso.cli.progress import ProgressBar
 
 STAGES = ("design.toml", "worst.toml")
@@ -46,7 +46,7 @@ def design(
     spec = load_spec(spec_file)
     if stage.drive:
         say("[drive] is taken into account for the margins; hunting and moves are simulated in continuous time")
-    target = Place("design", out, overwrite, [stage_file, spec_file])
+    target = OutputFolder("design", out, overwrite, [stage_file, spec_file])
     target.check(STAGES)
     try:
         found, files = _designed(stage, spec, target)
@@ -65,7 +65,7 @@ def design(
         raise typer.Exit(2)
 
 
-def _designed(stage: Stage, spec: Spec, target: Place) -> tuple[Design, list[Path]]:
+def _designed(stage: Stage, spec: Spec, target: OutputFolder) -> tuple[Design, list[Path]]:
     """The design and its files, with progress on a terminal. Raises InputError, NoDesign."""
     from friso.design.method import design as method
     from friso.views.design.page import design_files

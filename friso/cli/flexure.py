@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from friso.cli.common import AsJson, Overrides, StageFile, leave, print_table, read_stage, say
-from friso.cli.output import OutFolder, Overwrite, place, print_document, print_written
+from friso.cli.output import OutFolder, Overwrite, output_folder, print_document, print_written
 from friso.cli.progress import ProgressBar
 from friso.errors import InputError
 from friso.quantities import Quantity, positive, quoted
@@ -44,7 +44,7 @@ def flexure(
     stage = read_stage(stage_file, overrides, leaves_out=())
     mechanism = _mechanism(stage, str(stage_file))
     deflection = _stroke(stroke, stage, mechanism)
-    target = place("flexure", out, overwrite, [stage_file])
+    target = output_folder("flexure", out, overwrite, [stage_file])
     files = []
     with ProgressBar("bending the leaves") as progress:
         found = _evaluate(stage, mechanism, deflection)

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from friso.cli.common import AsJson, say
-from friso.cli.output import DefaultFolder, Overwrite, Place, print_document, print_written
+from friso.cli.output import DefaultFolder, OutputFolder, Overwrite, print_document, print_written
 from friso.cli.progress import ProgressBar
 
 
@@ -32,7 +32,7 @@ def guideline(
     from friso.studies.guideline.compute import checked_samples
 
     checked_samples(samples)
-    target = Place("guideline", out, overwrite)
+    target = OutputFolder("guideline", out, overwrite)
     from friso.studies.guideline.sweeps import Keep
     from friso.views.guideline.document import guideline_document
     from friso.views.guideline.page import guideline_files

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from friso.cli.common import AsJson, Overrides, print_wrapped, with_overrides
-from friso.cli.output import DefaultFolder, Overwrite, Place, print_document
+from friso.cli.output import DefaultFolder, OutputFolder, Overwrite, print_document
 from friso.cli.progress import ProgressBar
 from friso.errors import InputError
 from friso.quantities import Quantity, positive
@@ -77,7 +77,7 @@ def identify(
         raise InputError("--set", overrides[0], "a stage whose keys to override", "--stage stage.toml")
     settings = _settings(bandwidth, band, period)
     told = from_options(maps or (), units or (), scales or (), dt, kind)
-    target = Place("identify", out, overwrite, [*logs, *(predict or []), *([stage] if stage else [])])
+    target = OutputFolder("identify", out, overwrite, [*logs, *(predict or []), *([stage] if stage else [])])
     target.check([STAGE])
     given = read_all([*logs, *(predict or [])], told, out)
     with ProgressBar() as progress:

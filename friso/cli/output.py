@@ -37,7 +37,7 @@ Overwrite = Annotated[
 ]
 
 
-class Place:
+class OutputFolder:
     """The folder that a command writes into; `inputs` are the files that it reads."""
 
     def __init__(self, command: str, folder: Path, overwrite: bool, inputs: Sequence[Path] = ()) -> None:
@@ -90,9 +90,11 @@ class Place:
         return "\n".join(["# Made by friso, which replaces these files when the command is run again.", *lines, ""])
 
 
-def place(command: str, folder: Path | None, overwrite: bool, inputs: Sequence[Path] = ()) -> Place | None:
-    """The folder that a command writes into, if it is to write. Raises InputError as `Place`."""
-    return None if folder is None else Place(command, folder, overwrite, inputs)
+def output_folder(
+    command: str, folder: Path | None, overwrite: bool, inputs: Sequence[Path] = ()
+) -> OutputFolder | None:
+    """The folder that a command writes into, if it is to write. Raises InputError as `OutputFolder`."""
+    return None if folder is None else OutputFolder(command, folder, overwrite, inputs)
 
 
 def write(files: Mapping[Path, Content], progress: Progress = silent) -> list[Path]:

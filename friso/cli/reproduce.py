@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from friso.cli.common import AsJson, Tolerance, read_tolerance
-from friso.cli.output import DefaultFolder, Overwrite, Place, print_document, print_written
+from friso.cli.output import DefaultFolder, OutputFolder, Overwrite, print_document, print_written
 from friso.cli.progress import ProgressBar
 
 
@@ -29,7 +29,7 @@ def reproduce(
     One study: friso reproduce isolator-crossover
     """
     tolerance = read_tolerance(rtol)
-    target = Place("reproduce", out, overwrite)
+    target = OutputFolder("reproduce", out, overwrite)
     from friso.studies.thesis.reproduce import reproduce as reproduce_thesis
     from friso.views.reproduce.document import claims_document
     from friso.views.reproduce.page import reproduction_files

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from friso.cli.common import AsJson, Overrides, StageFile, print_wrapped, say, with_overrides
-from friso.cli.output import OutFolder, Overwrite, place, print_document, print_written
+from friso.cli.output import OutFolder, Overwrite, output_folder, print_document, print_written
 from friso.cli.progress import ProgressBar
 from friso.errors import InputError
 from friso.stage import Stage, load
@@ -56,7 +56,7 @@ def rig(
     _told(stage)
     if not 0 <= seed < MOST_SEED:
         raise InputError("--seed", str(seed), f"a whole number from 0, below {MOST_SEED:g}", "--seed 1")
-    target = place("rig", out, overwrite, [stage_file])
+    target = output_folder("rig", out, overwrite, [stage_file])
     if target is not None:
         target.check(["truth/stage.toml"])
     files = []

@@ -17,7 +17,7 @@ from friso.cli.common import (
     read_tolerance,
     with_overrides,
 )
-from friso.cli.output import DefaultFolder, Overwrite, Place, print_document, print_written
+from friso.cli.output import DefaultFolder, OutputFolder, Overwrite, print_document, print_written
 from friso.errors import InputError
 from friso.stage import Stage
 
@@ -44,7 +44,7 @@ def simulate(
     interval = None if sample_time is None else read_sample_time(sample_time)
     tolerance = None if rtol is None else read_tolerance(rtol)
     stage, name, its_rtol = _stage(arguments, overrides) if cell is None else _cell(cell, arguments, overrides)
-    target = Place("simulate", out, overwrite, [] if cell else [Path(arguments[0])])
+    target = OutputFolder("simulate", out, overwrite, [] if cell else [Path(arguments[0])])
     from friso.engine.simulate import simulate as simulate_stage
     from friso.views.simulate.document import simulate_document, simulate_files
 
