@@ -376,7 +376,8 @@ def test_mapping_is_kept_and_overridden(tmp_path: Path) -> None:
     log = log_files.write_text(tmp_path / "a.csv", NAMES, columns())
     assert mappings.load(log) is None
     first = from_options(["position=ä b=c"[:12]], ['x y="mm"'], ["force=35.1507 N/V"], "1 ms", "steps")
-    assert mappings.save(first, log) == tmp_path / "a.csv.friso.toml"
+    assert mappings.place_for(log, tmp_path / "elsewhere") == tmp_path / "a.csv.friso.toml"
+    mappings.sidecar(log).write_text(mappings.mapping_text(first), encoding="utf-8")
     assert mappings.load(log) == first
     second = from_options(["position=other"], dt="2 ms").over(first)
     assert second.roles == {"position": "other"}
@@ -392,17 +393,22 @@ def test_mapping_is_kept_and_overridden(tmp_path: Path) -> None:
 def test_any_mapping_comes_back(tmp_path_factory: pytest.TempPathFactory, roles: dict[str, str], step: float) -> None:
     log = tmp_path_factory.mktemp("kept") / "log.csv"
     mapping = Mapping(roles, dict.fromkeys(roles.values(), "mm"), {}, step)
-    mappings.save(mapping, log)
+    mappings.sidecar(log).write_text(mappings.mapping_text(mapping), encoding="utf-8")
     assert mappings.load(log) == mapping
 
 
-def test_mapping_in_another_folder(tmp_path: Path, refused: Refused) -> None:
-    log = tmp_path / "gone" / "a.csv"  # a folder that cannot be written: there is none
-    place = mappings.save(Mapping({"position": "x"}), log, tmp_path)
+def test_mapping_in_another_folder(tmp_path: Path) -> None:
+    folder = tmp_path / "closed"
+    folder.mkdir()
+    log = folder / "a.csv"
+    folder.chmod(0o500)
+    try:
+        place = mappings.place_for(log, tmp_path)
+    finally:
+        folder.chmod(0o700)
     assert place == tmp_path / "a.csv.friso.toml"
+    place.write_text(mappings.mapping_text(Mapping({"position": "x"})), encoding="utf-8")
     assert mappings.load(log, tmp_path) == Mapping({"position": "x"})
-    with refused("mapping"):
-        mappings.save(Mapping(), log)
 
 
 @pytest.mark.parametrize(

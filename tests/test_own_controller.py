@@ -19,13 +19,13 @@ from friso.frequency import crossover
 from friso.identify.experiments.moves import identify_moves
 from friso.identify.output_error.problem import closed_loop
 from friso.identify.readings.common import record
+from friso.progress import silent
 from friso.rig.run import as_built_keys
 from friso.stage import Stage, save
 from friso.studies.compare import study
 from friso.studies.compare.study import compare
 from friso.studies.rig.experiments import hunting
 from friso.studies.rig.hunted import rails
-from friso.studies.rig.outcome import silent
 from friso.views.compare.words import sentences as comparison_sentences
 from friso.views.rig.page import sentences
 
