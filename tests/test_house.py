@@ -63,3 +63,9 @@ def test_there_is_a_recipe(kind: str) -> None:
     assert recipes
     assert any(RECIPES[kind] in recipe for recipe in recipes)
     assert any((PACKAGE / RECIPES[kind]).glob("*"))
+
+
+def test_the_drawing_of_the_house_names_every_folder() -> None:
+    drawing = (PACKAGE.parent / "docs" / "architecture.md").read_text(encoding="utf-8")
+    folders = {path.name for path in PACKAGE.iterdir() if (path / "__init__.py").exists()}
+    assert {name for name in folders if name not in drawing} == set()
