@@ -1,10 +1,10 @@
-"""What the pages that friso writes share: their templates, figures as pictures for paper, and the page of a stage."""
+"""Every page that friso writes: one skeleton, the answer first, whose blocks the template of a command fills."""
 
 from __future__ import annotations
 
 import base64
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -20,34 +20,56 @@ if TYPE_CHECKING:
     from friso.stage import Stage
 
 
+def made_with() -> str:
+    """The version of friso, and what other packages bring to it."""
+    return " with ".join([VERSION, *filter(None, [listed(foreign(), "and")])])
+
+
+@dataclass(frozen=True)
+class Report:
+    """A page: the name at its head, its figures, the stage file and its source, and what else the command's `template`
+    names, `values`.
+
+    Templates extend `page.html` and fill its blocks: answer, table, figures, footer. `scripted` pages load plotly
+    without figures of their own kind.
+    """
+
+    template: str
+    name: str
+    figures: Sequence[Figure] = ()
+    stage_file: str = ""
+    source: str = ""
+    version: str = field(default_factory=made_with)
+    scripted: bool = False
+    values: Mapping[str, Any] = field(default_factory=dict)
+
+    @classmethod
+    def of_stage(
+        cls, template: str, stage: Stage | None, figures: Sequence[Figure], name: str = "Unnamed stage", **values: Any
+    ) -> Report:
+        """The page about a stage, or about none; `name` stands at the head where the stage has none."""
+        if stage is None:
+            return cls(template, name, figures, values=values)
+        return cls(template, stage.name or name, figures, stage.to_toml(), stage.source, values=values)
+
+    def html(self) -> str:
+        """The page: it opens offline, prints, and is the same bytes on every run."""
+        figures = [(figure, Markup(plotly_renderer.fragment(figure)), print_image(figure)) for figure in self.figures]
+        scripts = Markup(plotly_renderer.script()) if figures or self.scripted else None
+        own = {name: getattr(self, name) for name in ("name", "stage_file", "source", "version")}
+        return environment().get_template(self.template).render(figures=figures, plotly=scripts, **own, **self.values)
+
+
 def environment() -> Environment:
     """The templates of friso/views/templates; texts are escaped, a name without a value is an error."""
-    return Environment(
+    templates = Environment(
         loader=PackageLoader("friso.views"), autoescape=True, undefined=StrictUndefined, trim_blocks=True
     )
+    templates.tests["starting"] = str.startswith
+    return templates
 
 
 def print_image(figure: Figure) -> str:
     """The figure as an SVG data address: what is printed, and what is seen without scripts."""
     svg = matplotlib_renderer.image(replace(figure, title="", subject=""), "svg")
     return "data:image/svg+xml;base64," + base64.b64encode(svg).decode("ascii")
-
-
-def stage_page(
-    template: str, stage: Stage | None, figures: Sequence[Figure], name: str = "Unnamed stage", **shown: Any
-) -> str:
-    """The page of a template about a stage (or None) and its figures; `name` is told where the stage has none, `shown`
-    are the other values that the template names."""
-    return (
-        environment()
-        .get_template(template)
-        .render(
-            name=stage.name if stage and stage.name else name,
-            source=stage.source if stage else "",
-            figures=[(figure, Markup(plotly_renderer.fragment(figure)), print_image(figure)) for figure in figures],
-            plotly=Markup(plotly_renderer.script()) if figures else None,
-            stage_file=stage.to_toml() if stage else "",
-            version=" with ".join([VERSION, *filter(None, [listed(foreign(), "and")])]),
-            **shown,
-        )
-    )

@@ -12,7 +12,7 @@ from friso.views.bode.words import caveats, crossover_heading, crossovers, stabi
 from friso.views.check.cases import COLOURS
 from friso.views.drawing.figure import GREEN, VERMILLION, Figure
 from friso.views.files import Content, pictures
-from friso.views.pages import stage_page
+from friso.views.pages import Report
 
 
 def bode_files(bode: Bode) -> dict[str, Content]:
@@ -25,7 +25,7 @@ def bode_html(bode: Bode, figures: Sequence[Figure]) -> str:
     """The whole page of a linear analysis and its figures."""
     states = shown_states(bode)
     verdict, *further = stability(bode)
-    return stage_page(
+    return Report.of_stage(
         "bode.html",
         bode.stage,
         figures,
@@ -37,4 +37,4 @@ def bode_html(bode: Bode, figures: Sequence[Figure]) -> str:
         shown=states,
         rows=rows(states),
         states=len(bode.scan.members),
-    )
+    ).html()

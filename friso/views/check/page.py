@@ -11,7 +11,7 @@ from friso.views.check.draws import draws_figure, draws_sentences
 from friso.views.check.figures import check_figures
 from friso.views.check.table import rows
 from friso.views.check.words import conclusion, verdict_sentence
-from friso.views.pages import stage_page
+from friso.views.pages import Report
 
 if TYPE_CHECKING:
     from friso.hunting import Case
@@ -22,8 +22,8 @@ def report_html(cases: Mapping[str, Case], draws: Draws | None = None) -> str:
     adds what stages drawn from an uncertain one do."""
     shown = shown_cases(cases)
     stage = shown[0].case.stage if "given" not in cases else cases["given"].stage
-    return stage_page(
-        "report.html",
+    return Report.of_stage(
+        "check.html",
         stage,
         (*check_figures(cases), *([draws_figure(draws)] if draws else [])),
         shown=shown,
@@ -32,4 +32,4 @@ def report_html(cases: Mapping[str, Case], draws: Draws | None = None) -> str:
         rows=rows(shown),
         draws=draws_sentences(draws) if draws else [],
         rtol=", ".join(sorted({f"{item.case.solver.rtol:g}" for item in shown})),
-    )
+    ).html()

@@ -18,7 +18,7 @@ from friso.views.compare.words import (
 )
 from friso.views.drawing.figure import Figure
 from friso.views.files import Content, pictures
-from friso.views.pages import stage_page
+from friso.views.pages import Report
 
 
 def compare_files(found: Comparison) -> dict[str, Content]:
@@ -29,7 +29,7 @@ def compare_files(found: Comparison) -> dict[str, Content]:
 
 def page(found: Comparison, drawn: Sequence[Figure]) -> str:
     """The page with its figures."""
-    return stage_page(
+    return Report.of_stage(
         "compare.html",
         found.stage,
         drawn,
@@ -46,4 +46,4 @@ def page(found: Comparison, drawn: Sequence[Figure]) -> str:
         model_error=100 * MODEL_ERROR,
         longer=LONGER,
         shaken=found.shaken,
-    )
+    ).html()

@@ -15,7 +15,7 @@ from friso.views.design.words import headline
 from friso.views.drawing.figure import Figure
 from friso.views.files import Content, pictures
 from friso.views.flexure.drawing import drawing_svg
-from friso.views.pages import stage_page
+from friso.views.pages import Report
 
 LEAVES = 2
 """The step that shows the drawing and the requirements."""
@@ -36,7 +36,7 @@ def design_files(design: Design) -> dict[str, Content]:
 
 def design_html(design: Design, figures: Sequence[Figure]) -> str:
     """The whole page of a design and its figures."""
-    return stage_page(
+    return Report.of_stage(
         "design.html",
         design.stage,
         figures,
@@ -46,7 +46,7 @@ def design_html(design: Design, figures: Sequence[Figure]) -> str:
         leaves=LEAVES,
         drawing=Markup(drawing(design)),
         requirements=requirement_rows(design),
-    )
+    ).html()
 
 
 def drawing(design: Design) -> str:

@@ -15,7 +15,7 @@ from friso.views.flexure.figures import flexure_figures
 from friso.views.flexure.findings import COLOURS, Found
 from friso.views.flexure.table import rows
 from friso.views.flexure.words import assumptions, findings, warnings
-from friso.views.pages import stage_page
+from friso.views.pages import Report
 
 
 class Column(NamedTuple):
@@ -38,7 +38,7 @@ def flexure_files(flexure: Found) -> dict[str, Content]:
 def flexure_html(flexure: Found, figures: Sequence[Figure]) -> str:
     """The whole page of a mechanism and its figures."""
     joint, *further = findings(flexure)
-    return stage_page(
+    return Report.of_stage(
         "flexure.html",
         flexure.stage,
         figures,
@@ -47,7 +47,7 @@ def flexure_html(flexure: Found, figures: Sequence[Figure]) -> str:
         drawing=Markup(drawing(flexure)),
         shown=[Column(name, COLOURS[name]) for name in flexure.models],
         rows=rows(flexure),
-    )
+    ).html()
 
 
 def drawing(flexure: Found) -> str:

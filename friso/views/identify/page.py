@@ -8,7 +8,7 @@ from friso.identify.method import Identification, Prediction
 from friso.identify.sources import LogFile
 from friso.views.drawing.figure import Figure
 from friso.views.identify.words import COLUMNS, estimate_rows, headline, prediction_line, read_rows, summaries
-from friso.views.pages import stage_page
+from friso.views.pages import Report
 
 
 def identify_html(
@@ -18,7 +18,7 @@ def identify_html(
     figures: Sequence[Figure],
 ) -> str:
     """The whole page of an identification and its figures."""
-    return stage_page(
+    return Report.of_stage(
         "identify.html",
         identification.stage,
         figures,
@@ -30,4 +30,4 @@ def identify_html(
         parts=summaries(identification),
         predicted=[prediction_line(prediction) for prediction in predictions],
         warnings=identification.warnings,
-    )
+    ).html()

@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING
 
 from markupsafe import Markup
 
-from friso.views.drawing import matplotlib_renderer, plotly_renderer
+from friso.views.drawing import matplotlib_renderer
 from friso.views.files import Content
 from friso.views.map.cells import SAMPLE, axes_of
 from friso.views.map.data import packed, picked
 from friso.views.map.figures import map_figure
 from friso.views.map.findings import caveats, failures, headline, meanings, verification
 from friso.views.map.words import KINDS, grouped, variable, word_counts
-from friso.views.pages import environment, print_image
+from friso.views.pages import Report, print_image
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -45,25 +45,24 @@ def map_html(runs: xr.Dataset, metric: str, rerun: str) -> str:
             f"rerun: got {rerun!r}, expected {{indices}} in it, e.g. 'friso simulate --cell x {{indices}}'"
         )
     figure = map_figure(runs, metric)
-    return (
-        environment()
-        .get_template("map.html")
-        .render(
-            name=runs.attrs.get("name") or "Unnamed stage",
-            headline=headline(runs, metric),
-            verification=verification(runs),
-            facts=_facts(runs, metric),
-            thinned=_thinned(runs),
-            data=_json(packed(runs, metric, rerun)),
-            figure=figure,
-            printed=print_image(replace(figure, note="")),
-            plotly=Markup(plotly_renderer.script()),
-            script=Markup((resources.files("friso.views") / "templates" / "map.js").read_text(encoding="utf-8")),
-            stage_file=runs.attrs.get("stage", ""),
-            version=runs.attrs.get("friso", ""),
-            rtol=f"{float(runs.attrs['rtol']):g}",
-        )
-    )
+    return Report(
+        "map.html",
+        runs.attrs.get("name") or "Unnamed stage",
+        stage_file=runs.attrs.get("stage", ""),
+        version=runs.attrs.get("friso", ""),
+        scripted=True,
+        values={
+            "headline": headline(runs, metric),
+            "verification": verification(runs),
+            "facts": _facts(runs, metric),
+            "thinned": _thinned(runs),
+            "data": _json(packed(runs, metric, rerun)),
+            "figure": figure,
+            "printed": print_image(replace(figure, note="")),
+            "script": Markup((resources.files("friso.views") / "templates" / "map.js").read_text(encoding="utf-8")),
+            "rtol": f"{float(runs.attrs['rtol']):g}",
+        },
+    ).html()
 
 
 def _facts(runs: xr.Dataset, metric: str) -> list[tuple[str, str]]:

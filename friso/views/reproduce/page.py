@@ -11,11 +11,10 @@ from typing import TYPE_CHECKING
 from markupsafe import Markup
 
 from friso.studies.thesis import CONVENTIONS, STUDIES, rig
-from friso.version import VERSION
 from friso.views.drawing import matplotlib_renderer, plotly_renderer
 from friso.views.drawing.figure import GREEN, GREY, ORANGE, VERMILLION, Figure
 from friso.views.files import Content, pictures
-from friso.views.pages import environment, print_image
+from friso.views.pages import Report, print_image
 from friso.views.reproduce.document import claims_document, numbers
 from friso.views.reproduce.figures import reproduction_figures
 
@@ -51,27 +50,28 @@ def reproduction_html(reproduction: Reproduction) -> str:
     """The whole page: a table of all claims, then the figures with theirs. It opens offline."""
     found = sections(reproduction_figures(reproduction), reproduction.verdicts)
     drawn = [section.figure for section in found if section.figure]
-    return (
-        environment()
-        .get_template("reproduction.html")
-        .render(
-            source=rig().source,
-            verdicts=reproduction.verdicts,
-            counts=_counts(reproduction.verdicts),
-            colours=_COLOURS,
-            numbers=numbers,
-            sections=found,
-            images={figure.name: _printed(figure) for figure in drawn},
-            interactive={figure.name: Markup(plotly_renderer.fragment(replace(figure, note=""))) for figure in drawn},
-            plotly=Markup(plotly_renderer.script()) if drawn else None,
-            conventions=CONVENTIONS,
-            cycles=[(STUDIES[name], found.comparison) for name, found in reproduction.cycles.items()],
-            points=reproduction.points,
-            rtol=f"{reproduction.rtol:g}",
-            stage_file=rig().to_toml(),
-            version=VERSION,
-        )
-    )
+    return Report(
+        "reproduction.html",
+        "Reproduction of the thesis",
+        stage_file=rig().to_toml(),
+        source=rig().source,
+        scripted=bool(drawn),
+        values={
+            "verdicts": reproduction.verdicts,
+            "counts": _counts(reproduction.verdicts),
+            "colours": _COLOURS,
+            "numbers": numbers,
+            "sections": found,
+            "images": {figure.name: _printed(figure) for figure in drawn},
+            "interactive": {
+                figure.name: Markup(plotly_renderer.fragment(replace(figure, note=""))) for figure in drawn
+            },
+            "conventions": CONVENTIONS,
+            "cycles": [(STUDIES[name], edges.comparison) for name, edges in reproduction.cycles.items()],
+            "points": reproduction.points,
+            "rtol": f"{reproduction.rtol:g}",
+        },
+    ).html()
 
 
 def sections(figures: Mapping[str, Figure], verdicts: Iterable[Verdict]) -> tuple[FigureSection, ...]:

@@ -12,7 +12,7 @@ from friso.stage import Stage
 from friso.studies.rig.outcome import Outcome, RigLog
 from friso.views.drawing.figure import Figure
 from friso.views.files import Content, pictures
-from friso.views.pages import stage_page
+from friso.views.pages import Report
 from friso.views.rig.outcome_view import OUTCOME_VIEWS
 
 
@@ -68,7 +68,7 @@ def _stage_text(stage: Stage, seed: int) -> str:
 
 def page(outcome: Outcome, drawn: Sequence[Figure]) -> str:
     """The page with its figures."""
-    return stage_page(
+    return Report.of_stage(
         "rig.html",
         outcome.stage,
         drawn,
@@ -77,4 +77,4 @@ def page(outcome: Outcome, drawn: Sequence[Figure]) -> str:
         sentences=sentences(outcome),
         notes=outcome.notes,
         logs=outcome.logs,
-    )
+    ).html()
