@@ -29,8 +29,10 @@ from friso.hunting.criteria import (
     end_of_traces,
     lasts,
     outcomes,
+    peaks_in_traces,
     verdicts,
 )
+from friso.hunting.criteria.peak_count import DISTINCT
 from friso.hunting.measures import measure, options
 from friso.hunting.turns import scan
 from friso.hunting.verdict import judge_many
@@ -203,6 +205,28 @@ def test_peaks_of_sampled_traces_agree_with_scipy(parts: list[tuple[float, float
     assume(len(times) > 1 and len({*turns}) == len(turns))  # of equals either may stay
     marked = counted_peaks(times[None], turns[None], np.array([len(times)]))[0]
     assert times[marked].tolist() == sampled_peaks(values)
+
+
+def prominent_peaks(values: np.ndarray) -> int:
+    """Counted peaks of samples by scipy, of maxima alone that stand out by `DISTINCT`."""
+    maxima, _ = find_peaks(values, height=np.nextafter(COUNTED_ABOVE, 1), prominence=DISTINCT)
+    spikes = np.zeros(len(values))
+    late = maxima[TIME[maxima] >= COUNTED_AFTER]
+    spikes[late] = values[late]
+    return len(find_peaks(spikes, distance=round(APART / STEP))[0])
+
+
+def test_where_a_trace_ends_is_no_peak() -> None:
+    """Traces that end on their way up, smooth or with noise, have the peaks that scipy finds; a drift has none."""
+    random = np.random.default_rng(5)
+    phases, noise = np.linspace(0, 2 * np.pi, 12), 1e-7 * random.standard_normal((12, len(TIME)))
+    swings = 5e-4 * np.sin(2 * np.pi * 0.31 * TIME + phases[:, None]) + 2e-5 * np.sin(2 * np.pi * 2.3 * TIME)
+    drifts = np.array([1e-5 * TIME, 2e-4 - 1e-6 * TIME, 2e-4 + 0 * TIME])
+    runs = np.vstack([swings, swings + noise, drifts, drifts + noise[:3]])
+    counts = peaks_in_traces(TIME, runs)
+    assert counts.tolist() == [prominent_peaks(values) for values in runs]
+    assert np.any(swings[:, -1] > np.maximum(swings[:, -2], COUNTED_ABOVE))
+    assert counts[24:].tolist() == [0] * 6
 
 
 @given(st.lists(st.tuples(st.floats(0.01, 1.0), st.integers(-500, 500)), min_size=2, max_size=60))

@@ -1,7 +1,14 @@
 """What words and numbers on hunting mean, all on arrays: the verdict on a stage (`stage_verdict`), what a run did
 (`run_outcome`), and the thesis's peak count of a run (`peak_count`)."""
 
-from friso.hunting.criteria.peak_count import APART, COUNTED_ABOVE, COUNTED_AFTER, counted_peaks, distinct_peaks
+from friso.hunting.criteria.peak_count import (
+    APART,
+    COUNTED_ABOVE,
+    COUNTED_AFTER,
+    counted_peaks,
+    distinct_peaks,
+    peaks_in_traces,
+)
 from friso.hunting.criteria.run_outcome import BAND, OUTCOMES, End, end_of_traces, lasts, outcomes
 from friso.hunting.criteria.stage_verdict import ATTRACTED, VERDICTS, Verdict, verdicts
 
@@ -20,5 +27,6 @@ __all__ = [
     "end_of_traces",
     "lasts",
     "outcomes",
+    "peaks_in_traces",
     "verdicts",
 ]

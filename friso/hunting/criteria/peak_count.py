@@ -28,6 +28,7 @@ __all__ = [
     "DISTINCT_CRITERION",
     "counted_peaks",
     "distinct_peaks",
+    "peaks_in_traces",
 ]
 
 CRITERION = "peak count of the thesis: maxima after 10 s, higher than 0.1 mm, 0.5 s apart, the tallest kept first"
@@ -49,3 +50,24 @@ def distinct_peaks(times: np.ndarray, values: np.ndarray, counts: np.ndarray) ->
     """The same of distinct peaks alone, whose valleys on both sides are at least `DISTINCT` deep."""
     nothing = np.zeros(len(counts))
     return scan(times, values, counts, nothing, nothing).distinct
+
+
+def peaks_in_traces(time: np.ndarray, deviation: np.ndarray) -> np.ndarray:
+    """How many distinct peaks sampled runs have, shape (runs,): deviations [m], shape (runs, n), over times [s], shape
+    (n,).
+
+    From a peak the deviation falls on both sides: where a trace ends on its way up, its highest sample is none.
+    """
+    some = time >= min(0.8 * COUNTED_AFTER, time[-1] / 2)  # what is long before the first that may count is idle
+    values = np.ascontiguousarray(deviation[:, some])
+    counts = _until_last_fall(values)
+    return distinct_peaks(np.tile(time[some], (len(values), 1)), values, counts).sum(axis=1)
+
+
+def _until_last_fall(values: np.ndarray) -> np.ndarray:
+    """How many samples of each row there are until the end of the last fall by `DISTINCT`; 0 where nothing falls."""
+    ahead = np.minimum.accumulate(values[:, ::-1], axis=1)[:, ::-1]
+    falls = values - ahead >= DISTINCT
+    last = values.shape[1] - 1 - falls[:, ::-1].argmax(axis=1)
+    following = np.where(np.arange(values.shape[1]) >= last[:, None], values, np.inf)
+    return np.where(falls.any(axis=1), following.argmin(axis=1) + 1, 0)

@@ -13,7 +13,7 @@ from friso.frequency.drive import DriveTiming
 from friso.frequency.family import stability_by_poles
 from friso.frequency.loops import poles
 from friso.frequency.members import limit_cases
-from friso.hunting.criteria import COUNTED_AFTER, distinct_peaks, end_of_traces, outcomes
+from friso.hunting.criteria import end_of_traces, outcomes, peaks_in_traces
 from friso.hunting.criteria.run_outcome import FAILED, RESTS, SWINGS, last_outside
 from friso.hunting.turning import WINDOW
 from friso.rig.run import Recorded
@@ -70,7 +70,7 @@ def measured(recorded: Recorded, corner: float, within: float) -> MachineMeasure
     settling = np.where(outcome == RESTS, settling_time(time, deviation, corner, within), np.inf)
     return MachineMeasures(
         outcome=outcome,
-        counted=np.where(done, _counted(time, recorded.logged["position"] - reference), 0),
+        counted=np.where(done, peaks_in_traces(time, recorded.logged["position"] - reference), 0),
         settling=np.where(done, settling, np.nan),
         in_position=np.where(done, _rms(late), np.nan),
         force=np.where(done, _rms(recorded.logged["force"]), np.nan),
@@ -101,15 +101,6 @@ def settling_time(time: np.ndarray, deviation: np.ndarray, corner: float, within
     following = np.searchsorted(time, last_outside(time, deviation, within), side="right")
     inside = np.append(time, np.inf)[following]
     return np.maximum(inside - corner, 0.0)
-
-
-def _counted(time: np.ndarray, deviation: np.ndarray) -> np.ndarray:
-    """Distinct peaks of logged deviations [m], shape (runs, n), over times [s], shape (n,): a count a run, shape
-    (runs,). What is long before the first peak that may count does not matter."""
-    some = time >= min(0.8 * COUNTED_AFTER, time[-1] / 2)
-    values = np.ascontiguousarray(deviation[:, some])
-    whole = np.full(len(values), values.shape[1])
-    return distinct_peaks(np.tile(time[some], (len(values), 1)), values, whole).sum(axis=1)
 
 
 def _rms(values: np.ndarray) -> np.ndarray:

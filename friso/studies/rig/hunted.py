@@ -12,6 +12,7 @@ from friso.engine.arrays import Status
 from friso.equations import motion
 from friso.equations.bandwidth import bandwidth
 from friso.errors import InputError
+from friso.hunting.criteria.peak_count import peaks_in_traces
 from friso.hunting.criteria.run_outcome import FAILED, SWINGS, End, last_outside, outcomes
 from friso.hunting.turning import COUNTED_ABOVE, DISTINCT, HALF, WINDOW, zigzag
 from friso.hunting.turns import scan
@@ -201,7 +202,7 @@ def hunted(recorded: Recorded) -> Hunted:
     shapes = [cycle_shape(*each, size, time[-1]) for each, size in zip(turns, swing, strict=True)]
     known = np.where(failed, np.nan, 1.0)
     above, below, rising, periods, heights = np.array(shapes).T * known
-    counted = np.where(failed, 0, found.distinct.sum(axis=1))
+    counted = np.where(failed, 0, peaks_in_traces(time, deviation))
     words = outcomes(end, BAND)
     return Hunted(counted, words, swing * known, found.period * known, above, below, rising, periods, heights)
 
