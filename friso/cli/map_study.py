@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -13,7 +14,7 @@ import numpy as np
 from friso.cli.common import key_values
 from friso.errors import InputError
 from friso.stage import Stage
-from friso.studies.cells import BY_CYCLES, CYCLE_UNITS, USUAL
+from friso.studies.cells import BY_CYCLES, CYCLE_UNITS, METRICS, USUAL
 from friso.studies.execute import Crew
 from friso.studies.refine import FINER, SHARE, finer
 from friso.studies.request import Request
@@ -67,13 +68,14 @@ def study_for(stage: Stage, varied: Varied, metric: str, refine: bool, most: int
         axes, samples = {}, Samples(axes, varied.samples, "latin" if varied.latin else "sobol")
     elif varied.latin:
         raise InputError("--latin", "no --samples beside it", "how many samples", "--samples 1024 --latin")
+    _check_metric(metric, METRICS)
     request = Request(stage, axes, samples, links, varied.log)
     runs = int(request.size() * (SHARE * FINER ** len(axes) if refine else 1))
     if most is not None and runs > most:
         raise _too_large(runs, request.trial(), crew)
     wanted = (*USUAL, *CYCLE_UNITS) if metric in (*BY_CYCLES, "period") else USUAL
     wanted = (*wanted, "verdict") if metric == "verdict" else wanted
-    study = _with_metric(request.study(wanted), metric)
+    study = request.study(wanted)
     return finer(study) if refine else study
 
 
@@ -82,15 +84,16 @@ def stored_study(store: Path, metric: str) -> Study:
     from friso.studies.store import read_store
 
     with read_store(store) as runs:
-        return _with_metric(study_of(runs), metric)
-
-
-def _with_metric(study: Study, metric: str) -> Study:
-    """The study, if it has that metric. Raises InputError."""
-    if metric not in study.metrics or metric == "status":
-        expected = f"one of {', '.join(name for name in study.metrics if name != 'status')}"
-        raise InputError("--metric", metric, expected, "--metric peak_to_peak")
+        study = study_of(runs)
+    _check_metric(metric, study.metrics)
     return study
+
+
+def _check_metric(metric: str, possible: Sequence[str]) -> None:
+    """Raises InputError for a metric that there is not."""
+    names = [name for name in possible if name != "status"]
+    if metric not in names:
+        raise InputError("--metric", metric, f"one of {', '.join(names)}", "--metric peak_to_peak")
 
 
 def coloured_by(study: Study, metric: str) -> str:

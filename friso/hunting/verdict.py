@@ -74,6 +74,7 @@ class Motions:
 
     @classmethod
     def of(cls, measures: Measures) -> Motions:
+        """The motions of runs that were measured."""
         completed = np.equal(measures.status, Status.DONE)
         return cls(completed, measures.peaks, measures.peak_to_peak, measures.settling_time[1])
 

@@ -47,7 +47,8 @@ def counted_peaks(times: np.ndarray, values: np.ndarray, counts: np.ndarray) -> 
 
 
 def distinct_peaks(times: np.ndarray, values: np.ndarray, counts: np.ndarray) -> np.ndarray:
-    """The same of distinct peaks alone, whose valleys on both sides are at least `DISTINCT` deep."""
+    """The same of distinct peaks alone, whose valleys on both sides are at least `DISTINCT` deep; times [s] and values
+    [m] of the turning points, shape (runs, room), valid up to counts (runs,)."""
     nothing = np.zeros(len(counts))
     return scan(times, values, counts, nothing, nothing).distinct
 
