@@ -117,6 +117,9 @@ def test_bode_with_sampling_and_delay(whole: Stage, tmp_path: Path) -> None:
     done = friso_inside(tmp_path, "bode", "stage.toml", "--json")
     assert done.returncode == 0, done.stderr
     found = json.loads(done.stdout)
+    said = friso_inside(tmp_path, "bode", "stage.toml")
+    assert said.returncode == 0, said.stderr
+    assert "At 6.00 Hz" in " ".join(said.stdout.split())
     slow = friso.bode(whole.replace({"drive.delay": None, "drive.sample_time": None}))
     assert found["highest_stable_crossover_hz"] < slow.limits["free"].highest_stable
 

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from friso.equations.bandwidth import bandwidth
 from friso.frequency.bode import Bode, Unstable
 from friso.frequency.crossover import WANTED, Limits
 from friso.frequency.margins import Margins
@@ -48,8 +49,8 @@ def _settled(bode: Bode) -> str:
 
 
 def _tuned(bode: Bode) -> str:
-    flat = bode.stage.flat()
-    return f"At {with_unit(flat['controller.crossover'], 'Hz')}" if _crossing(bode) else "As given"
+    crossover = bandwidth(bode.stage.flat())
+    return "As given" if crossover is None else f"At {with_unit(crossover, 'Hz')}"
 
 
 def _margin(margins: Margins) -> str:
@@ -92,12 +93,12 @@ def caveats(bode: Bode) -> list[str]:
 
 
 def _crossing(bode: Bode) -> bool:
-    """Whether the controller has a crossover, or is given by its gains."""
+    """Whether a key of the controller tells its bandwidth."""
     return bode.stage.controller.bandwidth_key is not None
 
 
 def _subject(bode: Bode) -> str:
-    return "in crossovers" if _crossing(bode) else "in multiples of its bandwidth"
+    return f"in {bode.stage.controller.bandwidth_name}s" if _crossing(bode) else "in multiples of its bandwidth"
 
 
 def _unit(bode: Bode) -> str:
