@@ -1,6 +1,7 @@
 """The house: what stands where, so that the fifth example of a pattern goes where the first four are."""
 
 import ast
+import re
 from collections import defaultdict
 from pathlib import Path
 
@@ -16,6 +17,13 @@ KNOW_CONTROLLERS = ("equations/controllers/", "stage/", "templates/")
 
 SHARED_VIEWS = {"__init__.py", "documents.py", "files.py", "pages.py", "report.py"}
 """Modules of views that belong to no command; the rest stands in the command's folder or in drawing/."""
+
+ABOUT_TUNING = (
+    *("design/", "views/design/", "studies/thesis/", "studies/guideline/", "studies/rig/experiments/compare.py"),
+    *("frequency/tuning.py", "identify/stage_file.py", "identify/output_error/problem.py"),
+)
+"""Modules that import a form of the PID controller: the design method, the studies of the thesis and the guideline are
+about van Dijk's rules (Eq. 7, 8); identify makes controllers of its own."""
 
 RECIPES = {
     "controller": "equations/controllers",
@@ -43,8 +51,13 @@ def classes() -> dict[str, list[str]]:
 
 
 def test_keys_of_a_controller_are_known_to_controllers_alone() -> None:
-    knowing = [name for name, text in sources().items() if '"controller.' in text]
+    knowing = [name for name, text in sources().items() if re.search(r"""["']controller\.\w+["']""", text)]
     assert [name for name in knowing if not name.startswith(KNOW_CONTROLLERS)] == []
+
+
+def test_keys_are_imported_where_the_rules_of_tuning_are_the_subject() -> None:
+    importing = [name for name, text in sources().items() if "from friso.equations.controllers." in text]
+    assert [name for name in importing if not name.startswith((*KNOW_CONTROLLERS, *ABOUT_TUNING))] == []
 
 
 def test_a_class_name_stands_for_one_thing() -> None:

@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from friso.equations.bandwidth import faster
-from friso.equations.controllers.van_dijk import CROSSOVER
+from friso.equations.bandwidth import bandwidth, faster
 from friso.flexure.evaluation import Evaluation
 from friso.frequency.crossover import DENSITY, STEPS, WANTED, searched, settled_members
 from friso.frequency.drive import DriveTiming
@@ -57,7 +56,7 @@ class Modal:
         return float(distance_to_lines(loop).min()) if stable.all() else 0.0
 
     def _at(self, crossover: np.ndarray) -> dict[str, Any]:
-        return faster(self.flat, crossover / self.flat[CROSSOVER])
+        return faster(self.flat, crossover / bandwidth(self.flat))
 
     @property
     def comfortable(self) -> tuple[Range, ...]:
@@ -84,7 +83,7 @@ def compliance(leaves: Evaluation, omega: np.ndarray) -> np.ndarray:
 
 def _frequencies(flat: Mapping[str, Any], leaves: Evaluation, drive: DriveTiming) -> np.ndarray:
     """Angular frequencies that show the loop at all crossovers, and every mode."""
-    ends = [grid(faster(flat, np.array(end / flat[CROSSOVER])), DENSITY) for end in searched(flat)]
+    ends = [grid(faster(flat, np.array(end / bandwidth(flat))), DENSITY) for end in searched(flat)]
     zeta = float(leaves.mechanism.damping_ratio)
     about = [2 * np.pi * mode.frequency * (1 + zeta * AROUND) for mode in leaves.modes[1:]]
     every = np.unique(np.concatenate([*ends, *about]))

@@ -17,9 +17,10 @@ def bandwidth(flat: Mapping[str, Any]) -> Any:
 
 
 def at_bandwidth(flat: Mapping[str, Any], bandwidth: Any) -> dict[str, Any]:
-    """Stages with their controllers at bandwidths [Hz]; at factors of it where no key tells a bandwidth."""
+    """Stages with their controllers at bandwidths [Hz], faster or slower as a whole; at factors of it where no key
+    tells a bandwidth."""
     key = controller_of(flat).bandwidth_key
-    return faster(flat, bandwidth) if key is None else {**flat, key: bandwidth}
+    return faster(flat, bandwidth) if key is None else {**faster(flat, bandwidth / flat[key]), key: bandwidth}
 
 
 def faster(flat: Mapping[str, Any], factor: Any) -> dict[str, Any]:

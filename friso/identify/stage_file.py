@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from friso.equations.controllers.van_dijk import table
 from friso.identify.estimate import Estimate
 from friso.identify.inverse_model import SMOOTH, InverseModel, motion
 from friso.identify.logs.log import Log
@@ -44,7 +45,7 @@ def made_up(log: Log, found: InverseModel) -> Stage:
             "bristle_damping": f"{math.sqrt(stiffness * mass):.6g} N*s/m",
             "viscous": f"{viscous:.6g} N*s/m",
         },
-        "controller": {"kind": "pid", "crossover": "10 Hz", "alpha": 0.1, "beta": 2},
+        "controller": table("10 Hz"),
         "motion": {
             "kind": "there_and_back",
             "acceleration": f"{brisk:.4g} m/s^2",

@@ -77,6 +77,11 @@ class VanDijk(Pid):
         }
 
 
+def table(crossover: str) -> dict[str, Any]:
+    """The table [controller] of a stage file for a crossover such as "8 Hz"; alpha and beta as in the examples."""
+    return {"kind": "pid", "crossover": crossover, "alpha": 0.1, "beta": 2}
+
+
 def tuned(crossover: Any, alpha: Any, beta: Any, mass: Any) -> dict[str, Any]:
     """The flat keys of a controller for a crossover [Hz] and a mass [kg]."""
     return {KIND: "pid", CROSSOVER: crossover, ALPHA: alpha, BETA: beta, TUNED_MASS: mass}

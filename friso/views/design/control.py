@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from friso.design.method import Design
 from friso.design.verification import MachineOutcomes
+from friso.equations.controllers.van_dijk import ALPHA, BETA, TUNED_MASS
 from friso.frequency.crossover import WANTED
 from friso.views.design.window import CrossoverBound, comfortable, lower, upper
 from friso.views.design.words import (
@@ -42,8 +43,7 @@ def _gains(design: Design) -> tuple[tuple[str, str], ...]:
         ("Crossover", hertz(controller.crossover)),
         (
             "Tuned for",
-            f"{plain(flat['controller.tuned_mass'], 'kg')}, α = {flat['controller.alpha']:g}, "
-            f"β = {flat['controller.beta']:g}",
+            f"{plain(flat[TUNED_MASS], 'kg')}, α = {flat[ALPHA]:g}, β = {flat[BETA]:g}",
         ),
         ("k_p", plain(gains.k_p, "N/m")),
         ("τ_z, τ_i, τ_p", ", ".join(plain(time, "s") for time in (gains.tau_z, gains.tau_i, gains.tau_p))),
