@@ -138,8 +138,9 @@ class Blocks(ABC):
         rule: Literal["bilinear", "sum"] = "bilinear",
         limit: sp.Expr | None = None,
     ) -> Signal:
-        """gain/s, the gain positive. It rests where the controller's force is at its limit and it would drive it
-        further, and where its own output is at a `limit`. A drive integrates by trapezoids (`bilinear`) or sums up."""
+        """gain/s; the gain is positive, and the controller's force rises with the output. The integrator rests where
+        that force is at its limit and it would drive it further, and where its own output is at a `limit`. A drive
+        integrates by trapezoids (`bilinear`) or sums up."""
 
     @abstractmethod
     def biquad(self, signal: Signal, upper: Polynomial, lower: Polynomial, name: str) -> Signal:

@@ -123,10 +123,10 @@ class Continuous(Blocks):
         low, slope = state(f"filtered_{name}"), state(f"filtered_{name}_rate")
         bend = (signal.value - low - lower[1] * slope) / lower[2]
         self.states += [
-            State(low, slope, "m", signal.scale, Role.FILTER, signal.settled),
+            State(low, slope, "m", signal.scale, Role.FILTER, signal.settled - lower[1] * signal.settled_rate),
             State(slope, bend, "m/s", signal.scale * self.rate, Role.FILTER, signal.settled_rate),
         ]
-        settled = upper[0] * signal.settled + upper[1] * signal.settled_rate
+        settled = upper[0] * signal.settled + (upper[1] - upper[0] * lower[1]) * signal.settled_rate
         value = upper[0] * low + upper[1] * slope + upper[2] * bend
         return Signal(value, signal.scale, settled, upper[0] * signal.settled_rate)
 
@@ -150,11 +150,11 @@ class Continuous(Blocks):
             beside = "" if str(each.symbol) == "integral" else f"_{each.symbol}"
             up = Kink(f"winding_up{beside}", each.integrand)
             if limit is not None:
-                share -= _resting(kinks, tuple(far[:2]), up, limit)
+                share *= 1 - _resting(kinks, tuple(far[:2]), up, limit)
             if each.limit is not None:
                 _, ends = _clamped(each.output, each.limit, str(each.symbol))
                 beyond = _far(ends, each.limit, f"rest_{each.symbol}")
-                share -= _resting(ends, beyond, up, each.limit)
+                share *= 1 - _resting(ends, beyond, up, each.limit)
                 far += [*ends, *beyond]
             if share != 1:
                 winding.append(up)

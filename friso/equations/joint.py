@@ -27,9 +27,7 @@ def joint(form: JointForm, deflection: sp.Expr, rate: sp.Expr) -> tuple[sp.Expr,
         force = leaves + contact
     else:
         stroke = key("joint.stroke")
-        ahead = Kink("stroke_ahead", deflection - stroke)
-        behind = Kink("stroke_behind", -deflection - stroke)
-        kinks = (ahead, behind)
+        ahead, behind = kinks = touching(deflection)
         force = (
             leaves
             + (ahead.beyond + behind.beyond) * contact
@@ -40,3 +38,9 @@ def joint(form: JointForm, deflection: sp.Expr, rate: sp.Expr) -> tuple[sp.Expr,
         "joint_force": Output(force, "N", "joint force"),
     }
     return force, Component(kinks=kinks, outputs=outputs)
+
+
+def touching(deflection: sp.Expr) -> tuple[Kink, Kink]:
+    """Where the limiter of a free joint touches, ahead and behind, for a deflection [m]."""
+    stroke = key("joint.stroke")
+    return Kink("stroke_ahead", deflection - stroke), Kink("stroke_behind", -deflection - stroke)

@@ -107,16 +107,16 @@ class Sampled(Blocks):
     def biquad(self, signal: Signal, upper: Polynomial, lower: Polynomial, name: str) -> Signal:
         """By the bilinear transform, from two samples back."""
         (b0, b1, b2), (a0, a1, a2) = map(_tustin, (upper, lower))
-        settled = upper[0] * signal.settled + upper[1] * signal.settled_rate
+        settled = upper[0] * signal.settled + (upper[1] - upper[0] * lower[1]) * signal.settled_rate
         back = SAMPLE_TIME * signal.settled_rate
         u1, u2 = state(f"signal_before_{name}"), state(f"signal_before_{name}_2")
         y1, y2 = state(f"filtered_{name}"), state(f"filtered_{name}_2")
         value = (b0 * signal.value + b1 * u1 + b2 * u2 - a1 * y1 - a2 * y2) / a0
         self.held += [
-            Held(u1, signal.value, signal.settled),
-            Held(u2, u1, signal.settled - back),
-            Held(y1, value, settled),
-            Held(y2, y1, settled - upper[0] * back),
+            Held(u1, signal.value, signal.settled - back),
+            Held(u2, u1, signal.settled - 2 * back),
+            Held(y1, value, settled - upper[0] * back),
+            Held(y2, y1, settled - 2 * upper[0] * back),
         ]
         return Signal(value, signal.scale, settled, upper[0] * signal.settled_rate, before=y1)
 

@@ -12,6 +12,7 @@ import sympy as sp
 
 from friso.equations.blocks import Loop
 from friso.equations.continuous import continuous_controller
+from friso.equations.joint import touching
 from friso.equations.model import assemble
 from friso.equations.roles import Role
 from friso.equations.structure import ControllerForm, Structure, shared_structure
@@ -35,7 +36,7 @@ def plant(flat: Mapping[str, Any], members: Members) -> System:
     velocity = np.where(members.forward, members.speed, -members.speed)
     values = {**flat, **operating_point(flat, members)}
     values |= dict.fromkeys(form.velocities, velocity)
-    values |= {"beyond_stroke_ahead": members.touched.astype(float), "beyond_stroke_behind": 0.0}
+    values |= _limiter(members.touched)
     system = form.declared.at(values, len(members))
     law = law_of(flat)
     if law is None:
@@ -46,8 +47,13 @@ def plant(flat: Mapping[str, Any], members: Members) -> System:
 def mechanics(flat: Mapping[str, Any], touched: np.ndarray) -> System:
     """The masses without friction: from the forces on stage and cart to their positions, shape of `touched`."""
     declared = _plant(replace(shared_structure(flat), friction="none", friction_variant=None)).declared
-    values = {**flat, "beyond_stroke_ahead": touched.astype(float), "beyond_stroke_behind": 0.0}
-    return declared.at(values, len(touched)).take((FORCE, DISTURBANCE), (STAGE, CART))
+    return declared.at({**flat, **_limiter(touched)}, len(touched)).take((FORCE, DISTURBANCE), (STAGE, CART))
+
+
+def _limiter(touched: np.ndarray) -> dict[str, Any]:
+    """The modes of the limiter by name: free, or touched ahead."""
+    ahead, behind = (str(kink.beyond) for kink in touching(sp.S.Zero))
+    return {ahead: touched.astype(float), behind: 0.0}
 
 
 def compensator(flat: Mapping[str, Any], members: int) -> System:
@@ -94,8 +100,10 @@ def _compensator(form: ControllerForm) -> Declared:
     loop = Loop(_REFERENCE - _POSITION, _POSITION, _VELOCITY, sp.S.Zero)
     control = continuous_controller(form, loop, sp.S.One, sp.S.One)
     states = control.component.states
-    symbols, rates = tuple(state.symbol for state in states), tuple(state.derivative for state in states)
-    return Declared(symbols, rates, _CONTROLLER_INPUTS, {FORCE: control.force})
+    within: dict[Any, Any] = {kink.beyond: sp.S.Zero for kink in control.component.kinks}  # of limits inside it
+    symbols = tuple(state.symbol for state in states)
+    force, *rates = (sp.sympify(e).subs(within) for e in (control.force, *(state.derivative for state in states)))
+    return Declared(symbols, tuple(rates), _CONTROLLER_INPUTS, {FORCE: force})
 
 
 def _following(system: System, cart: tuple[str, str], internal: tuple[str, ...]) -> System:

@@ -8,6 +8,7 @@ from functools import cache
 from typing import Any
 
 import numpy as np
+import sympy as sp
 
 from friso.equations.component import key
 from friso.equations.model import assemble
@@ -22,7 +23,7 @@ TOUCHES = "the joint deflects beyond its stroke: the limiter, which this answer 
 def receptance(flat: Mapping[str, Any], frequencies: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Positions of cart and stage per friction force on the cart [m/N], complex, shape (frequencies,), of a loop whose
     reference rests, whose limiter is not touched and whose force is not limited, at frequencies [Hz]."""
-    loop = _loop(shared_structure(flat)).at({**flat, "beyond_stroke_ahead": 0.0, "beyond_stroke_behind": 0.0}, 1)
+    loop = _loop(shared_structure(flat)).at(flat, 1)
     (answer,) = loop.take((FORCE,), (CART, STAGE)).at(2j * np.pi * frequencies)
     return -answer[:, 0, 0], -answer[:, 1, 0]
 
@@ -34,7 +35,9 @@ def _loop(form: Structure) -> Declared:
     linear = replace(form, friction="none", friction_variant=None, controller=control, biased=("cart",))
     model = assemble(linear)
     outputs = {CART: model.outputs["cart_position"].expression, STAGE: model.outputs["position"].expression}
-    return Declared(model.symbols, model.rhs, {FORCE: key("bias.cart")}, outputs)
+    within: dict[Any, Any] = {kink.beyond: sp.S.Zero for kink in model.kinks}  # the stroke, limits in the controller
+    rates = tuple(sp.sympify(rate).subs(within) for rate in model.rhs)
+    return Declared(model.symbols, rates, {FORCE: key("bias.cart")}, outputs)
 
 
 def beyond_stroke(flat: Mapping[str, Any], deflections: np.ndarray) -> np.ndarray:

@@ -1,0 +1,109 @@
+"""Blocks of controllers, by themselves: steady motions last, and integrators rest at limits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from types import MappingProxyType
+from typing import Annotated, Any, ClassVar, Literal
+
+import numpy as np
+import pytest
+import sympy as sp
+
+from friso.equations.blocks import Blocks, Loop, Measured, Signal, measured
+from friso.equations.component import STEADY, Kink, Role
+from friso.equations.continuous import Continuous
+from friso.equations.sampled import SAMPLE_TIME, Rest, Sampled
+from friso.frequency.describing.loop import receptance
+from friso.frequency.parts import FORCE, STAGE, compensator
+from friso.quantities import Quantity, Value, positive
+from friso.stage import ControllerSection, register_controller
+from friso.stage.controllers import CONTROLLERS
+
+ERROR, POSITION, VELOCITY, SPEED = STEADY[:4]
+GOING = Loop(*STEADY[:4])
+
+BLOCKS: dict[str, Callable[[Blocks, Signal], Signal]] = {
+    "biquad": lambda blocks, signal: blocks.biquad(signal, (2, sp.Rational(1, 50), 3), (1, sp.Rational(1, 20), 1), "n"),
+    "difference": lambda blocks, signal: blocks.derivative(signal, "n"),
+}
+
+
+@pytest.mark.parametrize("name", BLOCKS)
+def test_a_steady_motion_lasts_from_sample_to_sample(name: str) -> None:
+    """What is held becomes at a sample what it is in the same motion a sample later."""
+    blocks = Sampled(3)
+    signal = BLOCKS[name](blocks, measured(GOING, sp.S.One, sp.S.One).position)
+    _, held = blocks.finished(signal, None, Rest())
+    now = {each.symbol: each.settled for each in held}
+    later = {POSITION: POSITION + VELOCITY * SAMPLE_TIME}
+    for each in held:
+        assert sp.simplify(each.update.xreplace(now) - each.settled.xreplace(later)) == 0
+    assert sp.simplify(signal.value.xreplace(now) - signal.settled) == 0
+
+
+def test_a_steady_motion_lasts_in_continuous_time() -> None:
+    blocks = Continuous(sp.S.One)
+    signal = BLOCKS["biquad"](blocks, measured(GOING, sp.S.One, sp.S.One).position)
+    now = {each.symbol: each.settled for each in blocks.states}
+    for each in blocks.states:
+        assert sp.simplify(each.derivative.xreplace(now) - sp.diff(each.settled, POSITION) * VELOCITY) == 0
+    assert sp.simplify(signal.value.xreplace(now) - signal.settled) == 0
+
+
+@pytest.mark.parametrize("beyond", [(), ("force",), ("integral",), ("force", "integral")])
+def test_an_integrator_rests_at_each_limit_and_at_both(beyond: tuple[str, ...]) -> None:
+    """Wound up further than either limit allows, or both, it stays; it does not run back."""
+    blocks = Continuous(sp.S.One)
+    signal = blocks.integral(measured(GOING, sp.S.One, sp.S.One).error, sp.S(2), limit=sp.S(3))
+    kinks = Kink("force_upper", signal.value - 5), Kink("force_lower", -signal.value - 5)
+    states, resting = blocks.finished(signal, sp.S(5), kinks)
+    (integral,) = (each for each in states if each.role == Role.INTEGRAL)
+    modes = {kink.beyond: 0 for kink in (*kinks, *resting)} | {Kink("winding_up", ERROR).beyond: 1}
+    for name in beyond:
+        modes |= {sp.Symbol(f"beyond_{mode}_upper", real=True): 1 for mode in (name, f"rest_{name}")}
+    modes |= {sp.Symbol("beyond_rest_upper", real=True): int("force" in beyond)}
+    assert integral.derivative.subs(modes) == (0 if beyond else ERROR)
+
+
+class LimitedShares(ControllerSection):
+    """PI whose shares are limited one by one."""
+
+    kind: Literal["limited-shares"]
+    gain: Annotated[Value, Quantity("N/m", positive, "3 N/m")]
+    share: Annotated[Value, Quantity("N", positive, "2 N")]
+
+    shares: ClassVar[Mapping[str, str]] = MappingProxyType({"p": "spring", "i": "integral"})
+
+    @classmethod
+    def integrates(cls, flat: Mapping[str, Any]) -> bool:
+        return True
+
+    @classmethod
+    def stiffness(cls, blocks: Blocks, variant: None) -> sp.Expr:
+        return blocks.key("gain")
+
+    @classmethod
+    def declare(cls, measured: Measured, blocks: Blocks, variant: None) -> Mapping[str, Signal]:
+        gain, share = blocks.key("gain"), blocks.key("share")
+        return {
+            "p": blocks.limiter(measured.error * gain, share, "p"),
+            "i": blocks.integral(measured.error, gain, limit=share),
+        }
+
+
+@pytest.fixture
+def limited_shares() -> Iterator[dict[str, Any]]:
+    register_controller(LimitedShares)
+    keys = {"kind": "limited-shares", "gain": 5.0, "share": 2.0}
+    yield {"friction.model": "none", "masses.stage": 1.0} | {f"controller.{key}": value for key, value in keys.items()}
+    del CONTROLLERS.forms["limited-shares"], CONTROLLERS.classes["limited-shares"]
+
+
+def test_small_motions_know_no_limits_inside_a_controller(limited_shares: dict[str, Any]) -> None:
+    """Linear systems are those of gain (1 + 1/s), within every limit."""
+    s = 2j * np.pi * 3.0
+    control = compensator(limited_shares, 1).take((STAGE,), (FORCE,)).at(np.array([s]))
+    assert control[0, 0, 0, 0] == pytest.approx(-5.0 * (1 + 1 / s))
+    cart, _ = receptance(limited_shares, np.array([3.0]))
+    assert cart[0] == pytest.approx(-1 / (s**2 + 5.0 * (1 + 1 / s)))
