@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
-from friso.equations.friction.common import Friction
+from friso.equations.friction.common import Friction, direction
 from friso.quantities import Number, Quantity, Value, inside_0_1, non_negative, positive
 from friso.stage import FrictionSection, Rule, Several, Values, element_keys, register_friction
 
@@ -53,7 +53,7 @@ class MaxwellSlip(FrictionSection):
         """Friction on a body moving at `velocity` [m/s]."""
         from sympy import And, Integer, Piecewise
 
-        from friso.equations.component import Component, Kink, Output, Role, State, Switch, key, state
+        from friso.equations.component import Component, Output, Role, State, Switch, key, state
 
         elements, drops = variant
         share = key("friction.kinetic_share") if drops else Integer(1)
@@ -76,6 +76,6 @@ class MaxwellSlip(FrictionSection):
             switches.append(slip)
             outputs[f"deflection_{number}"] = Output(deflection, "m", f"deflection of element {number}")
             outputs[f"slip_{number}"] = Output(slip.beyond, "1", f"element {number} slips")
-            sliding |= {deflection: Kink("forward", velocity).sign * share * limit, slip.beyond: Integer(1)}
+            sliding |= {deflection: direction(velocity).sign * share * limit, slip.beyond: Integer(1)}
             force, breakaway = force + stiffness * deflection, breakaway + strength
         return Friction(force, breakaway, Component(tuple(states), tuple(switches), outputs), sliding)

@@ -80,14 +80,15 @@ def as_built(form: AsBuilt) -> Model:
     position, cart = model.stage.position, model.cart.position
     places = dict(zip(map(state, PLACES), (cart, cart, position), strict=True))
     clock = Clock(SAMPLE_TIME, key("drive.late"), {state("seen"): position}, places, tuple(map(state, TIMES)))
-    varied = {key(f"friction.{name}"): key(f"friction.{name}") * state(f"{name}_factor") for name in _LEVELS}
+    varied = {key(f"friction.{name}"): key(f"friction.{name}") * state(f"{name}_factor") for name in LEVELS}
     states = tuple(replace(each, derivative=_shaken(each).xreplace(varied)) for each in model.states)
     outputs = {n: replace(each, expression=each.expression.xreplace(varied)) for n, each in model.outputs.items()}
     kinks = tuple(kink.with_values(varied) for kink in model.kinks)
     return replace(model, states=states, outputs=outputs, kinks=kinks, jumps=resets(kinks), clock=clock)
 
 
-_LEVELS = ("static", "coulomb")
+LEVELS = ("static", "coulomb")
+"""Names of the keys of friction that vary along a rail."""
 
 
 def _shaken(each: Any) -> sp.Expr:

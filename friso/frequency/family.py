@@ -28,10 +28,10 @@ CHUNK = 256
 """Members that are computed together: their arrays then stay in the cache."""
 
 DENSITY = 35
-"""Frequencies per decade at which all members are by_poles at, besides those about resonances of the limit cases."""
+"""Frequencies per decade at which all members are looked at, besides those about resonances of the limit cases."""
 
 NEAR = np.array([-1.0, -0.5, 0.0, 0.5, 1.0])
-"""Where a member is by_poles at about its own closed-loop resonances, in units of their half widths."""
+"""Where a member is looked at about its own closed-loop resonances, in units of their half widths."""
 
 CLOSEST = 16
 """Members whose margin is computed exactly."""

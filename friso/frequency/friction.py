@@ -11,6 +11,7 @@ import numpy as np
 import sympy as sp
 
 from friso.equations.component import Switch, state
+from friso.equations.friction.common import direction
 from friso.equations.structure import shared_structure
 from friso.frequency.declared import Declared, solved
 from friso.stage.stage import numeric_keys
@@ -22,7 +23,7 @@ if TYPE_CHECKING:
     from friso.frequency.members import Members
 
 VELOCITY, BIAS = state("velocity"), sp.Symbol("bias", real=True)
-FORWARD = "beyond_forward"
+FORWARD = str(direction(VELOCITY).beyond)
 """Name of the symbol for the direction of the motion."""
 
 SLOWEST, FASTEST = 1e-3, 1e3

@@ -11,7 +11,7 @@ import numpy as np
 from friso.engine.arrays import Status
 from friso.engine.batch import RunOptions, prepare, run_batch, settings_of
 from friso.engine.kernel import Kernel, empty_results, kernel
-from friso.equations.as_built import COMMANDED, NEUTRAL, READING, AsBuilt, whole_samples
+from friso.equations.as_built import COMMANDED, LEVELS, NEUTRAL, READING, AsBuilt, whole_samples
 from friso.equations.roles import Role, Steady
 from friso.errors import InputError
 from friso.rig.surroundings import MARGIN, tables
@@ -26,9 +26,6 @@ RTOL, METHOD = 1e-4, "Rodas4"
 
 BUDGET = 200
 """Steps that a run may take per sample on average."""
-
-LEVELS = ("friction.static", "friction.coulomb")
-"""Keys of the levels of friction that vary along a rail."""
 
 MOST_SAMPLES = 64
 """Longest delay, in samples."""
@@ -101,7 +98,11 @@ def run(
 def _check(flat: Mapping[str, Any], interval: float) -> None:
     """Raises InputError for an interval that is no whole number of samples, for a delay of too many, and for a rail
     along which nothing of the friction law varies."""
-    if "rail.seed" in flat and flat["friction.model"] != "none" and not any(level in flat for level in LEVELS):
+    if (
+        "rail.seed" in flat
+        and flat["friction.model"] != "none"
+        and not any(f"friction.{level}" in flat for level in LEVELS)
+    ):
         given = f'a [rail], but friction "{flat["friction.model"]}" without a static or Coulomb level to vary along it'
         raise InputError("rail", given, "no [rail], or a law with such a level", 'model = "lugre"')
     if whole_samples(flat) > MOST_SAMPLES:

@@ -110,10 +110,9 @@ class Controllers(Variants):
 
     def of(self, flat: Mapping[str, Any]) -> type[ControllerSection]:
         """The class of the controller of a stage given as flat keys."""
-        kind = flat[KIND]
-        self.named(kind)
-        told = (form for form in self.forms[kind] if any(form.key(name) in flat for name in form.told_by))
-        return next(told, None) or next(form for form in self.forms[kind] if not form.told_by)
+        forms = self._forms_of(flat[KIND])
+        recognised = (form for form in forms if any(form.key(name) in flat for name in form.told_by))
+        return next(recognised, None) or next(form for form in forms if not form.told_by)
 
     @property
     def words(self) -> dict[str, str]:
@@ -123,8 +122,12 @@ class Controllers(Variants):
 
     def form(self, kind: str, name: str) -> type[ControllerSection]:
         """The form of a kind whose class has this name."""
+        return next(form for form in self._forms_of(kind) if form.__name__ == name)
+
+    def _forms_of(self, kind: str) -> list[type[ControllerSection]]:
+        """The forms of a kind, which an installed package may declare."""
         self.named(kind)
-        return next(form for form in self.forms[kind] if form.__name__ == name)
+        return self.forms[kind]
 
 
 CONTROLLERS = Controllers()

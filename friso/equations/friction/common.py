@@ -11,7 +11,7 @@ from friso.stage import FrictionSection, Rule
 if TYPE_CHECKING:
     import sympy as sp
 
-    from friso.equations.component import Component
+    from friso.equations.component import Component, Kink
 
 COULOMB_BELOW_STATIC = Rule(
     ("friction.coulomb", "friction.static"),
@@ -37,6 +37,14 @@ class Friction:
         sliding: Mapping[sp.Symbol, sp.Expr] | None = None,
     ) -> None:
         self.force, self.breakaway, self.component, self.sliding = force, breakaway, component, sliding
+
+
+def direction(velocity: sp.Symbol) -> Kink:
+    """The kink of every law that depends on the direction of the motion, beyond which the velocity [m/s] is positive:
+    others know it, and set it."""
+    from friso.equations.component import Kink
+
+    return Kink("forward", velocity)
 
 
 class StribeckCurve(NamedTuple):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from friso.equations.friction.common import Friction
+from friso.equations.friction.common import Friction, direction
 from friso.quantities import Quantity, Value, non_negative, positive
 from friso.stage import FrictionSection, register_friction
 
@@ -24,9 +24,9 @@ class Dahl(FrictionSection):
     @staticmethod
     def declare(velocity: sp.Symbol, variant: None) -> Friction:
         """Friction on a body moving at `velocity` [m/s]."""
-        from friso.equations.component import Component, Kink, Output, Role, State, key, state
+        from friso.equations.component import Component, Output, Role, State, key, state
 
-        forward = Kink("forward", velocity)
+        forward = direction(velocity)
         deflection, stiffness = state("bristle_deflection"), key("friction.bristle_stiffness")
         coulomb = key("friction.coulomb")
         rate = velocity - stiffness * forward.sign * velocity / coulomb * deflection

@@ -4,7 +4,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from friso.equations.friction.common import Friction, StribeckCurve, StribeckSection, stribeck_level, viscous_force
+from friso.equations.friction.common import (
+    Friction,
+    StribeckCurve,
+    StribeckSection,
+    direction,
+    stribeck_level,
+    viscous_force,
+)
 from friso.quantities import Quantity, Value, non_negative, positive
 from friso.stage import register_friction
 
@@ -23,9 +30,9 @@ class LuGre(StribeckSection):
     @staticmethod
     def declare(velocity: sp.Symbol, variant: StribeckCurve) -> Friction:
         """Friction on a body moving at `velocity` [m/s]."""
-        from friso.equations.component import Component, Kink, Output, Role, State, key, state
+        from friso.equations.component import Component, Output, Role, State, key, state
 
-        forward = Kink("forward", velocity)
+        forward = direction(velocity)
         deflection, stiffness = state("bristle_deflection"), key("friction.bristle_stiffness")
         level = stribeck_level(velocity, forward.sign, variant)
         rate = velocity - stiffness * forward.sign * velocity / level * deflection

@@ -5,7 +5,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from friso.equations.friction.common import Friction, StribeckCurve, StribeckSection, stribeck_level, viscous_force
+from friso.equations.friction.common import (
+    Friction,
+    StribeckCurve,
+    StribeckSection,
+    direction,
+    stribeck_level,
+    viscous_force,
+)
 from friso.quantities import Quantity, Value, positive
 from friso.stage import register_friction
 
@@ -25,9 +32,9 @@ class Stribeck(StribeckSection):
         """Friction on a body moving at `velocity` [m/s]."""
         from sympy import tanh
 
-        from friso.equations.component import Component, Kink, key
+        from friso.equations.component import Component, key
 
-        forward = Kink("forward", velocity)
+        forward = direction(velocity)
         level = stribeck_level(velocity, forward.sign, variant)
         force = level * tanh(velocity / key("friction.regularisation_velocity"))
         even = variant.exponent is None or variant.exponent % 2 == 0

@@ -17,7 +17,8 @@ import numpy as np
 import sympy as sp
 from scipy.linalg import solve_banded
 
-from friso.equations.component import Kink, Switch, state
+from friso.equations.component import Switch, state
+from friso.equations.friction.common import direction
 from friso.equations.imposed import Imposed, imposed_form
 from friso.errors import InputError
 from friso.stage.tables import friction_law
@@ -63,7 +64,7 @@ def _compiled(form: Imposed) -> tuple[Callable[..., list[Any]], tuple[str, ...],
         law = f'"{form.friction}", with {len(inner)} states of its own'
         raise InputError("friction.model", law, "a law with at most one", 'model = "lugre"')
     z, rate = (inner[0].symbol, inner[0].derivative) if inner else (none, sp.S.Zero)
-    forward = Kink("forward", velocity).beyond
+    forward = direction(velocity).beyond
     parts = [e for f in (rate, friction.force) for e in (f, sp.diff(f, z), sp.diff(f, velocity))]
     names = sorted(set[Any]().union(*(e.free_symbols for e in parts)) - {velocity, z, forward}, key=str)
     function = sp.lambdify([velocity, z, forward, *names], parts, "numpy", cse=True)

@@ -51,7 +51,7 @@ class Ensemble:
     @property
     def chatters(self) -> bool:
         """Whether the stages have a stroke limiter that may be touched and left many times in a swing."""
-        return "stroke_ahead" in self.kernel.kinks
+        return self.structure.joint == "free"
 
     @cached_property
     def symmetric(self) -> np.ndarray:
