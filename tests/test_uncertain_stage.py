@@ -141,7 +141,7 @@ def test_single_valued_commands_say_that_centres_are_used(
     assert "4 keys are uncertain (masses.cart, friction.static, friction.coulomb, ...)" in line
     assert "their centres are used" in line
     assert "friso check --draws 1000" in line
-    read_stage(path, None, drawn=True)
+    read_stage(path, None, uncertain_too=True)
     assert capsys.readouterr().err == ""
 
 

@@ -107,8 +107,8 @@ def _plug_ins() -> str:
     return f"From other packages: {', '.join(names)}." if names else ""
 
 
-def _version(wanted: bool) -> None:
-    if wanted:
+def _version(requested: bool) -> None:
+    if requested:
         print(f"friso {VERSION}")
         raise typer.Exit
 

@@ -49,23 +49,23 @@ def bode(
     stage = read_stage(stage_file, overrides, leaves_out=AS_BUILT[1:])
     if stage.drive and stage.drive.velocity_samples is not None:
         say("drive.velocity_samples is ignored: the derivative is that of the bilinear transform")
-    shown = None if frequencies is None else _read_frequencies(frequencies, stage)
+    states = None if frequencies is None else _read_frequencies(frequencies, stage)
     target = output_folder("bode", out, overwrite, [stage_file])
     from friso.frequency.bode import bode as analysis
 
     files = []
     with ProgressBar("analysing all states") as progress:
-        found = analysis(stage, shown, series)
+        result = analysis(stage, states, series)
         if target is not None:
             from friso.views.bode.page import bode_files
 
-            files = target.write(bode_files(found), progress)
+            files = target.write(bode_files(result), progress)
     if as_json:
         from friso.views.bode.document import bode_document
 
-        print_document(bode_document(found))
+        print_document(bode_document(result))
         return
-    _print(found)
+    _print(result)
     print_written(files)
 
 
@@ -88,10 +88,10 @@ def _read_frequencies(text: str, stage: Stage) -> tuple[float, float]:
     return low, high
 
 
-def _print(found: Bode) -> None:
+def _print(result: Bode) -> None:
     from friso.views.bode.states import shown_states
     from friso.views.bode.table import rows
     from friso.views.bode.words import sentences
 
-    shown = shown_states(found)
-    print_table(found.stage.name, [item.label for item in shown], rows(shown), sentences(found))
+    states = shown_states(result)
+    print_table(result.stage.name, [item.label for item in states], rows(states), sentences(result))

@@ -55,27 +55,27 @@ def boundary(
 
     files = []
     with ProgressBar(f"following cycles over {' and '.join(axes)}") as progress:
-        found = boundary_of(stage, axes, links, tolerance, log)
-        shown = tuple(_shown(one, text) for one, text in zip(found.space.ranges, axes.values(), strict=True))
+        traced = boundary_of(stage, axes, links, tolerance, log)
+        keys = tuple(_printed(swept, text) for swept, text in zip(traced.space.ranges, axes.values(), strict=True))
         if target is not None:
             from friso.views.boundary.document import boundary_files
 
-            files = target.write(boundary_files(found, shown, stage.name, f"{stage_file.stem}_boundary"), progress)
+            files = target.write(boundary_files(traced, keys, stage.name, f"{stage_file.stem}_boundary"), progress)
     if as_json:
         from friso.views.boundary.document import boundary_document
 
-        print_document(boundary_document(found, shown))
+        print_document(boundary_document(traced, keys))
     else:
         from friso.views.boundary.words import sentences
 
-        print("\n".join(sentences(found, shown)))
+        print("\n".join(sentences(traced, keys)))
         print_written(files)
 
 
-def _shown(one: KeyRange, text: str) -> ShownKey:
+def _printed(swept: KeyRange, text: str) -> ShownKey:
     """A key in the unit in which its range was given, that of the last value."""
     from friso.views.boundary.words import ShownKey
 
     match = re.search(r"\.\.\s*[-+.\deE]*\s*([^:]*)", text)
     unit = match[1].strip() if match else ""
-    return ShownKey(one.key, unit, Quantity(one.unit, any_sign, "").factor(unit)) if unit else ShownKey(one.key)
+    return ShownKey(swept.key, unit, Quantity(swept.unit, any_sign, "").factor(unit)) if unit else ShownKey(swept.key)

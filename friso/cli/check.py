@@ -45,13 +45,13 @@ def check(
 
     Example: friso check examples/thesis_rig.toml --set controller.crossover="12 Hz" --out report
     """
-    stage, tolerance = read_stage(stage_file, overrides, drawn=count is not None), read_tolerance(rtol)
-    drawn = None if count is None else _drawn(stage, stage_file, count, seed)
+    stage, tolerance = read_stage(stage_file, overrides, uncertain_too=count is not None), read_tolerance(rtol)
+    sample = None if count is None else _sample(stage, stage_file, count, seed)
     target = output_folder("check", out, overwrite, [stage_file])
     from friso.hunting import check as check_stage
 
     cases = check_stage(stage, rtol=tolerance, traces=target is not None)
-    draws = None if drawn is None else _draws(stage, drawn, seed, tolerance)
+    draws = None if sample is None else _draws(stage, sample, seed, tolerance)
     files = []
     if target is not None:
         from friso.views.check.page import report_html
@@ -70,7 +70,7 @@ def check(
     leave(all(case.solver.done for case in cases.values()))
 
 
-def _drawn(stage: Stage, path: Path, count: int, seed: int) -> Drawn:
+def _sample(stage: Stage, path: Path, count: int, seed: int) -> Drawn:
     """Stages drawn, correlated as a file beside the stage file says. Raises InputError."""
     from friso.stage.correlations import Correlations, beside, draw, read_correlations
     from friso.studies.draws import MOST
@@ -85,12 +85,12 @@ def _drawn(stage: Stage, path: Path, count: int, seed: int) -> Drawn:
         raise error if error.origin else error.found_in("--draws") from None
 
 
-def _draws(stage: Stage, drawn: Drawn, seed: int, tolerance: float) -> Draws:
+def _draws(stage: Stage, sample: Drawn, seed: int, tolerance: float) -> Draws:
     """What becomes of the stages drawn."""
     from friso.studies.draws import Draws, fates
 
     with ProgressBar("draws") as progress:
-        return Draws(stage, drawn, seed, fates(stage, drawn, tolerance, progress))
+        return Draws(stage, sample, seed, fates(stage, sample, tolerance, progress))
 
 
 def _print_draws(draws: Draws) -> None:
@@ -108,7 +108,9 @@ def _print_cases(stage: Stage, cases: dict[str, Case]) -> None:
     from friso.views.check.table import rows
     from friso.views.check.words import conclusion, verdict_sentence
 
-    shown = shown_cases(cases)
-    sentences = [f"{item.label}: {verdict_sentence(item, cases)}" for item in shown]
+    listed = shown_cases(cases)
+    sentences = [f"{item.label}: {verdict_sentence(item, cases)}" for item in listed]
     summary = conclusion(cases)
-    print_table(stage.name, [item.label for item in shown], rows(shown), [*sentences, *([summary] if summary else [])])
+    print_table(
+        stage.name, [item.label for item in listed], rows(listed), [*sentences, *([summary] if summary else [])]
+    )

@@ -64,12 +64,12 @@ def leave(done: bool) -> None:
 
 
 def read_stage(
-    path: Path, overrides: list[str] | None, leaves_out: Sequence[str] = AS_BUILT, drawn: bool = False
+    path: Path, overrides: list[str] | None, leaves_out: Sequence[str] = AS_BUILT, uncertain_too: bool = False
 ) -> Stage:
     """The stage of the file with the overrides; tables that the command leaves out are mentioned, and that the centres
-    of uncertain keys are used unless they are `drawn`. Raises InputError."""
+    of uncertain keys are used, unless these are wanted too (`uncertain_too`). Raises InputError."""
     stage = with_overrides(load(path), overrides)
-    keys = [] if drawn else [*stage.uncertain()]
+    keys = [] if uncertain_too else [*stage.uncertain()]
     if keys:
         several = f"{len(keys)} keys are" if len(keys) > 1 else "1 key is"
         some = ", ".join([*keys[:_NAMED], *(["..."] if len(keys) > _NAMED else [])])
@@ -89,10 +89,10 @@ def with_overrides(stage: Stage, overrides: list[str] | None) -> Stage:
     return stage.replace(changes) if changes else stage
 
 
-def key_values(given: list[tuple[str, str]], example: str) -> dict[str, str]:
+def key_values(options: list[tuple[str, str]], example: str) -> dict[str, str]:
     """Keys to values from options with their KEY=VALUE. Raises InputError."""
     pairs: dict[str, str] = {}
-    for option, text in given:
+    for option, text in options:
         key, equals, value = text.partition("=")
         key = key.strip()
         if not (equals and key and value.strip()):

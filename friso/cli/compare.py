@@ -53,7 +53,7 @@ def compare(
     """
     from friso.studies.compare.study import compare as compared
 
-    stage = read_stage(stage_file, overrides, leaves_out=(), drawn=True)
+    stage = read_stage(stage_file, overrides, leaves_out=(), uncertain_too=True)
     tolerance, correlations = _tolerance(within), _correlations(stage_file, stage)
     target = output_folder("compare", out, overwrite, [stage_file])
     files = []
@@ -84,11 +84,11 @@ def _correlations(path: Path, stage: Stage) -> Correlations:
     """Those beside the stage file. Raises InputError."""
     from friso.stage.correlations import Correlations, beside, read_correlations
 
-    known = read_correlations(beside(path), load(path)) if beside(path).exists() else Correlations()
-    return known.among(stage.uncertain())
+    correlations = read_correlations(beside(path), load(path)) if beside(path).exists() else Correlations()
+    return correlations.among(stage.uncertain())
 
 
-def _print(found: Comparison, files: Sequence[Path]) -> None:
+def _print(result: Comparison, files: Sequence[Path]) -> None:
     from friso.views.compare.words import (
         COLUMNS,
         PAIRED,
@@ -99,10 +99,10 @@ def _print(found: Comparison, files: Sequence[Path]) -> None:
         table_rows,
     )
 
-    for label, text in options_rows(found):
+    for label, text in options_rows(result):
         print_wrapped(f"{label}: {text}")
-    print_table(found.stage.name, COLUMNS, table_rows(found), [])
-    print_table("Compared with a, machine by machine", PAIRED, paired_rows(found), [])
-    notes = (f"note: {note}" for note in found.notes)
-    for sentence in (*population(found), *notes, *sentences(found), *(f"wrote {file}" for file in files)):
+    print_table(result.stage.name, COLUMNS, table_rows(result), [])
+    print_table("Compared with a, machine by machine", PAIRED, paired_rows(result), [])
+    notes = (f"note: {note}" for note in result.notes)
+    for sentence in (*population(result), *notes, *sentences(result), *(f"wrote {file}" for file in files)):
         print_wrapped(sentence)

@@ -49,19 +49,19 @@ def design(
     target = OutputFolder("design", out, overwrite, [stage_file, spec_file])
     target.check(STAGES)
     try:
-        found, files = _designed(stage, spec, target)
+        result, files = _designed(stage, spec, target)
     except NoDesign as failure:
         _refuse(failure, stage, spec, as_json)
     if as_json:
         from friso.views.design.document import design_document
 
-        print_document(design_document(found), files)
+        print_document(design_document(result), files)
     else:
-        _print(found, files)
-    if not found.meets:
+        _print(result, files)
+    if not result.meets:
         from friso.views.design.words import shortfall
 
-        say(f"the design does not meet the specification: {shortfall(found)}")
+        say(f"the design does not meet the specification: {shortfall(result)}")
         raise typer.Exit(2)
 
 
@@ -71,8 +71,8 @@ def _designed(stage: Stage, spec: Spec, target: OutputFolder) -> tuple[Design, l
     from friso.views.design.page import design_files
 
     with ProgressBar() as progress:
-        found = method(stage, spec, progress)
-        return found, target.write(design_files(found), progress)
+        result = method(stage, spec, progress)
+        return result, target.write(design_files(result), progress)
 
 
 def _refuse(failure: NoDesign, stage: Stage, spec: Spec, as_json: bool) -> NoReturn:
@@ -86,14 +86,14 @@ def _refuse(failure: NoDesign, stage: Stage, spec: Spec, as_json: bool) -> NoRet
     raise typer.Exit(2)
 
 
-def _print(found: Design, files: list[Path]) -> None:
+def _print(result: Design, files: list[Path]) -> None:
     """The summary, step by step, and what to do next."""
     from friso.views.design.steps import steps
     from friso.views.design.words import headline
 
-    for _, sentence in headline(found):
+    for _, sentence in headline(result):
         print_wrapped(sentence)
-    for number, step in enumerate(steps(found), 1):
+    for number, step in enumerate(steps(result), 1):
         print(f"\n{number}. {step.title}")
         for sentence in step.sentences:
             print_wrapped(sentence, "   ")

@@ -59,9 +59,9 @@ class Drafts:
                 for draft, path in self.drafts:
                     undo += [folder.rmdir for folder in made(path.parent)]
                     if os.path.lexists(path):
-                        kept = self._spare(path)
-                        path.rename(kept)
-                        undo.append(partial(kept.rename, path))
+                        spare = self._spare(path)
+                        path.rename(spare)
+                        undo.append(partial(spare.rename, path))
                     if draft is not None:
                         draft.rename(path)
                         undo.append(path.unlink)

@@ -47,21 +47,21 @@ def flexure(
     target = output_folder("flexure", out, overwrite, [stage_file])
     files = []
     with ProgressBar("bending the leaves") as progress:
-        found = _evaluate(stage, mechanism, deflection)
+        evaluated = _evaluate(stage, mechanism, deflection)
         if target is not None:
             from friso.views.flexure.page import flexure_files
 
-            files = target.write(flexure_files(found), progress)
+            files = target.write(flexure_files(evaluated), progress)
     if as_json:
         from friso.views.flexure.document import flexure_document
 
-        print_document(flexure_document(found))
+        print_document(flexure_document(evaluated))
     else:
-        _print(found)
+        _print(evaluated)
         print_written(files)
-    if found.failure:
-        say(f"the beam model found no solution: {found.failure}")
-    leave(not found.failure)
+    if evaluated.failure:
+        say(f"the beam model found no solution: {evaluated.failure}")
+    leave(not evaluated.failure)
 
 
 def _mechanism(stage: Stage, origin: str) -> Mechanism:
@@ -78,18 +78,18 @@ def _stroke(text: str | None, stage: Stage, mechanism: Mechanism) -> float:
     """The stroke [m], of the option or else of the joint, which leaves can bend by. Raises InputError."""
     key, example = ("joint.stroke", 'stroke = "1 mm"') if text is None else ("--stroke", '--stroke "1 mm"')
     if text is None:
-        given = stage.joint and stage.joint.stroke
-        if given is None:
+        stroke = stage.joint and stage.joint.stroke
+        if stroke is None:
             raise InputError("--stroke", "nothing", "the stroke, because the joint has none", '--stroke "1 mm"')
     else:
         try:
-            given = STROKE.read(text)
+            stroke = STROKE.read(text)
         except InputError as error:
             raise InputError(key, error.given, error.expected, example) from None
-    if given > mechanism.length / 2:
+    if stroke > mechanism.length / 2:
         expected = f"at most half the length of the leaves, {1e3 * mechanism.length / 2:g} mm"
-        raise InputError(key, quoted(getattr(given, "text", given)), expected, example)
-    return float(given)
+        raise InputError(key, quoted(getattr(stroke, "text", stroke)), expected, example)
+    return float(stroke)
 
 
 def _evaluate(stage: Stage, mechanism: Mechanism, stroke: float) -> Found:
@@ -105,8 +105,8 @@ def _evaluate(stage: Stage, mechanism: Mechanism, stroke: float) -> Found:
         return Found(stage, simple, None, str(failure))
 
 
-def _print(found: Found) -> None:
+def _print(evaluated: Found) -> None:
     from friso.views.flexure.table import rows
     from friso.views.flexure.words import sentences
 
-    print_table(found.stage.name, list(found.models), rows(found), sentences(found))
+    print_table(evaluated.stage.name, list(evaluated.models), rows(evaluated), sentences(evaluated))

@@ -41,16 +41,16 @@ def guideline(
     keep = Keep(target.unfinished)
     try:
         with ProgressBar() as progress:
-            found = compute(samples, keep.folder, progress)
-            files = target.write(guideline_files(found), progress)
+            result = compute(samples, keep.folder, progress)
+            files = target.write(guideline_files(result), progress)
     except KeyboardInterrupt:
         say(f"{keep.count} parts of the sweeps are kept in {keep.folder}; the same command resumes from there")
         raise
     keep.clear()
     if as_json:
-        print_document(guideline_document(found), files)
+        print_document(guideline_document(result), files)
         return
-    for name, fit in (("locked", found.locked), ("free", found.free)):
+    for name, fit in (("locked", result.locked), ("free", result.free)):
         errors = fit.on_test
         print(
             f"{name}: {errors.count} held-out samples, rms error {percent(errors.rms)}, worst {percent(errors.worst)}"

@@ -72,22 +72,22 @@ def identify(
     from friso.identify.method import identify as found_in
     from friso.identify.sources import kept, read_all
 
-    known = None if stage is None else with_overrides(load(stage), overrides)
-    if known is None and overrides:
+    stage_ = None if stage is None else with_overrides(load(stage), overrides)
+    if stage_ is None and overrides:
         raise InputError("--set", overrides[0], "a stage whose keys to override", "--stage stage.toml")
     settings = _settings(bandwidth, band, period)
-    told = from_options(maps or (), units or (), scales or (), dt, kind)
+    options_ = from_options(maps or (), units or (), scales or (), dt, kind)
     target = OutputFolder("identify", out, overwrite, [*logs, *(predict or []), *([stage] if stage else [])])
     target.check([STAGE])
-    given = read_all([*logs, *(predict or [])], told, out)
+    inputs = read_all([*logs, *(predict or [])], options_, out)
     with ProgressBar() as progress:
-        found = found_in([(each.source, each.kind) for each in given[: len(logs)]], known, settings, progress)
-        predictions = _predictions(found, given[len(logs) :], settings)
-        given = [kept(each, out) for each in given]
+        identified = found_in([(item.source, item.kind) for item in inputs[: len(logs)]], stage_, settings, progress)
+        predictions = _predictions(identified, inputs[len(logs) :], settings)
+        inputs = [kept(item, out) for item in inputs]
         from friso.views.identify.files import identify_files, mappings
 
-        files = target.write(identify_files(found, given, predictions), progress, beside=mappings(given))
-    _answer(found, given, predictions, files, as_json)
+        files = target.write(identify_files(identified, inputs, predictions), progress, beside=mappings(inputs))
+    _answer(identified, inputs, predictions, files, as_json)
 
 
 def _settings(bandwidth: str | None, band: str | None, period: str | None) -> AnalysisSettings:
@@ -108,39 +108,43 @@ def _settings(bandwidth: str | None, band: str | None, period: str | None) -> An
     return AnalysisSettings(values[0], None if limits is None else (limits.low, limits.high), values[1])
 
 
-def _predictions(found: Identification, given: Sequence[LogFile], settings: AnalysisSettings) -> list[Prediction]:
+def _predictions(identified: Identification, inputs: Sequence[LogFile], settings: AnalysisSettings) -> list[Prediction]:
     """The other logs, predicted. Raises InputError."""
     from friso.identify.logs.log import Log
     from friso.identify.method import predict
 
-    logs = [each.source for each in given if isinstance(each.source, Log)]
-    if len(logs) < len(given):
+    logs = [item.source for item in inputs if isinstance(item.source, Log)]
+    if len(logs) < len(inputs):
         raise InputError("--predict", "a measured frequency response", "a log over time", "--predict other.mat")
-    return [predict(found, log, settings) for log in logs]
+    return [predict(identified, log, settings) for log in logs]
 
 
 def _answer(
-    found: Identification, given: Sequence[LogFile], predictions: Sequence[Prediction], files: list[Path], as_json: bool
+    identified: Identification,
+    inputs: Sequence[LogFile],
+    predictions: Sequence[Prediction],
+    files: list[Path],
+    as_json: bool,
 ) -> None:
     """What was read and found, on standard output."""
     if as_json:
         from friso.views.identify.document import identify_document
 
-        print_document(identify_document(found, given, predictions), files)
+        print_document(identify_document(identified, inputs, predictions), files)
         return
     from friso.views.identify.words import answer
 
-    for line in answer(found, given, predictions):
+    for line in answer(identified, inputs, predictions):
         print_wrapped(line)
     named = [file for file in files if file.suffix in (".toml", ".html")]
     print(f"\nwrote {', '.join(map(str, named))}, and {len({file.stem for file in files[len(named) :]})} figures")
-    if found.stage is None:
+    if identified.stage is None:
         print(
             "no stage file: a frequency response or a stiffness alone does not make a machine; describe the rest with "
             "--stage"
         )
     else:
-        print(f"next: friso check {files[0]}{' --draws 1000' if found.stage.uncertain() else ''}")
+        print(f"next: friso check {files[0]}{' --draws 1000' if identified.stage.uncertain() else ''}")
 
 
 def listed_kinds() -> list[tuple[str, str]]:

@@ -98,8 +98,8 @@ def map_cells(
     with _crew(workers, scheduler) as crew:
         if source.is_dir():
             if varied != Varied() or overrides or rtol or refine or out:
-                given = "a store together with options that would make it another study"
-                raise InputError(str(source), given, "the store alone: it contains its study", f"friso map {source}")
+                problem = "a store together with options that would make it another study"
+                raise InputError(str(source), problem, "the store alone: it contains its study", f"friso map {source}")
             store, study = source, stored_study(source, metric)
         else:
             stage = read_stage(source, overrides)
@@ -125,11 +125,11 @@ def _chosen_rtol(text: str, study: Study, crew: Crew) -> float:
     from friso.studies.verify import WANTED, loosest_rtol
 
     rtol, shares, cells = loosest_rtol(study, crew)
-    found = f"of {cells} cells, " + ", ".join(f"{share:.1%} at {each:g}" for each, share in shares.items())
+    surviving = f"of {cells} cells, " + ", ".join(f"{share:.1%} at {rtol_:g}" for rtol_, share in shares.items())
     if shares.get(rtol, 0.0) >= WANTED:
-        say(f"rtol {rtol:g} is the loosest at which {WANTED:.0%} of the outcomes survive ({found})")
+        say(f"rtol {rtol:g} is the loosest at which {WANTED:.0%} of the outcomes survive ({surviving})")
     else:
-        say(f"at no tolerance do {WANTED:.0%} of the outcomes survive ({found}); rtol {rtol:g} is used")
+        say(f"at no tolerance do {WANTED:.0%} of the outcomes survive ({surviving}); rtol {rtol:g} is used")
     return rtol
 
 

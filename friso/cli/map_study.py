@@ -73,9 +73,9 @@ def study_for(stage: Stage, varied: Varied, metric: str, refine: bool, most: int
     runs = int(request.size() * (SHARE * FINER ** len(axes) if refine else 1))
     if most is not None and runs > most:
         raise _too_large(runs, request.trial(), crew)
-    wanted = (*USUAL, *CYCLE_UNITS) if metric in (*BY_CYCLES, "period") else USUAL
-    wanted = (*wanted, "verdict") if metric == "verdict" else wanted
-    study = request.study(wanted)
+    metrics = (*USUAL, *CYCLE_UNITS) if metric in (*BY_CYCLES, "period") else USUAL
+    metrics = (*metrics, "verdict") if metric == "verdict" else metrics
+    study = request.study(metrics)
     return finer(study) if refine else study
 
 
@@ -110,8 +110,8 @@ def _too_large(runs: int, trial: Study, crew: Crew) -> InputError:
     run_scattered(trial, np.arange(trial.cells), crew)
     hours = (time.perf_counter() - start) / trial.cells * runs / 3600
     gigabytes = BYTES * len(trial.metrics) * runs / 1e9
-    given = f"{runs:.3g} runs: about {hours:.2g} hours on this machine, and up to {gigabytes:.2g} GB of disk"
-    return InputError("--yes", given, "--yes, or fewer points; nothing was run", "--yes")
+    size = f"{runs:.3g} runs: about {hours:.2g} hours on this machine, and up to {gigabytes:.2g} GB of disk"
+    return InputError("--yes", size, "--yes, or fewer points; nothing was run", "--yes")
 
 
 def view_files(runs: xr.Dataset, store: Path, metric: str) -> dict[Path, Content]:

@@ -35,9 +35,9 @@ def reproduce(
     from friso.views.reproduce.page import reproduction_files
 
     with ProgressBar() as progress:
-        found = reproduce_thesis(names, points, tolerance, progress)
-        files = target.write(reproduction_files(found), progress)
-    document = claims_document(found)
+        result = reproduce_thesis(names, points, tolerance, progress)
+        files = target.write(reproduction_files(result), progress)
+    document = claims_document(result)
     if as_json:
         print_document(document, files)
         return

@@ -53,7 +53,7 @@ def rig(
 
     run = RIG_EXPERIMENTS[RIG_EXPERIMENTS.checked(experiment, "EXPERIMENT", "friso rig {} rig.toml")]
     stage = with_overrides(load(stage_file), overrides)
-    _told(stage)
+    _announce(stage)
     if not 0 <= seed < MOST_SEED:
         raise InputError("--seed", str(seed), f"a whole number from 0, below {MOST_SEED:g}", "--seed 1")
     target = output_folder("rig", out, overwrite, [stage_file])
@@ -79,7 +79,7 @@ def rig(
         raise typer.Exit(1)
 
 
-def _told(stage: Stage) -> None:
+def _announce(stage: Stage) -> None:
     """What to know of the drive before it runs."""
     from friso.equations.as_built import whole_samples
     from friso.rig.run import SAMPLE_TIME, as_built_keys

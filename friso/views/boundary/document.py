@@ -18,20 +18,20 @@ from friso.views.drawing.matplotlib_renderer import FORMATS, save
 from friso.views.files import Content
 
 
-def boundary_document(found: Diagram | Plane, shown: tuple[ShownKey, ...]) -> dict[str, Any]:
+def boundary_document(traced: Diagram | Plane, keys: tuple[ShownKey, ...]) -> dict[str, Any]:
     """The JSON document of `boundary`; values of the keys in the units of the command line."""
-    document = _of_diagram(found, shown[0]) if isinstance(found, Diagram) else _of_plane(found, shown)
+    document = _of_diagram(traced, keys[0]) if isinstance(traced, Diagram) else _of_plane(traced, keys)
     return plain_json(document)
 
 
-def _of_diagram(found: Diagram, key: ShownKey) -> dict[str, Any]:
-    branches = lines(found)
+def _of_diagram(traced: Diagram, key: ShownKey) -> dict[str, Any]:
+    branches = lines(traced)
     points = [_point(line, k, key) for line in branches for k in line.special]
     return {
         "key": key.key,
         "unit": key.unit,
         "points": sorted(points, key=lambda point: point["value"]),
-        "ends": dict(zip(("low", "high"), end_verdicts(found), strict=True)),
+        "ends": dict(zip(("low", "high"), end_verdicts(traced), strict=True)),
         "branches": [_branch(line, key) for line in branches],
     }
 
@@ -60,51 +60,51 @@ def _branch(line: Line, key: ShownKey) -> dict[str, Any]:
     }
 
 
-def _of_plane(found: Plane, shown: tuple[ShownKey, ...]) -> dict[str, Any]:
-    x, y = shown
-    verdicts = [verdict for _, _, verdict in corner_verdicts(found)]
+def _of_plane(traced: Plane, keys: tuple[ShownKey, ...]) -> dict[str, Any]:
+    x, y = keys
+    verdicts = [verdict for _, _, verdict in corner_verdicts(traced)]
     return {
         "x": {"key": x.key, "unit": x.unit},
         "y": {"key": y.key, "unit": y.unit},
-        "curves": [_curve(line, shown) for line in lines(found)],
-        "lost": _numbers(lost_places(found), shown),
+        "curves": [_curve(line, keys) for line in lines(traced)],
+        "lost": _numbers(lost_places(traced), keys),
         "corners": dict(zip(("low low", "low high", "high low", "high high"), verdicts, strict=True)),
     }
 
 
-def _curve(line: Line, shown: tuple[ShownKey, ...]) -> dict[str, Any]:
+def _curve(line: Line, keys: tuple[ShownKey, ...]) -> dict[str, Any]:
     return {
         "kind": line.kinds[0],
         "cycle": line.shape,
-        "points": _numbers(line.at, shown),
-        "error": _numbers(line.error, shown),
+        "points": _numbers(line.at, keys),
+        "error": _numbers(line.error, keys),
         "amplitude_m": line.amplitude.tolist(),
         "period_s": line.period.tolist(),
         "ends": line.ends,
     }
 
 
-def _numbers(values: np.ndarray, shown: tuple[ShownKey, ...]) -> list[list[float]]:
+def _numbers(values: np.ndarray, keys: tuple[ShownKey, ...]) -> list[list[float]]:
     """Values of both keys [SI], shape (n, 2), in the units shown."""
-    return [[key.number(value) for key, value in zip(shown, row, strict=True)] for row in values.tolist()]
+    return [[key.number(value) for key, value in zip(keys, row, strict=True)] for row in values.tolist()]
 
 
-def boundary_files(found: Diagram | Plane, shown: tuple[ShownKey, ...], name: str, stem: str) -> dict[str, Content]:
+def boundary_files(traced: Diagram | Plane, keys: tuple[ShownKey, ...], name: str, stem: str) -> dict[str, Content]:
     """The figure in all formats, and the table of its points."""
-    figure = boundary_figure(found, shown, name)
-    drawn: dict[str, Content] = {f"{stem}.{form}": partial(save, figure) for form in FORMATS}
-    return {**drawn, f"{stem}.csv": partial(_write_table, found)}
+    figure = boundary_figure(traced, keys, name)
+    pictures: dict[str, Content] = {f"{stem}.{form}": partial(save, figure) for form in FORMATS}
+    return {**pictures, f"{stem}.csv": partial(_write_table, traced)}
 
 
-def _write_table(found: Diagram | Plane, path: Path) -> None:
+def _write_table(traced: Diagram | Plane, path: Path) -> None:
     """One row per point of a line: special ones have a kind and an error."""
     import pandas as pd
 
-    keys = [f"{one.key} [{one.unit}]" if one.unit else one.key for one in found.space.ranges]
+    keys = [f"{swept.key} [{swept.unit}]" if swept.unit else swept.key for swept in traced.space.ranges]
     header = ["line", "cycle", "kind", *keys, *(f"error of {key}" for key in keys)]
     rows = [
         row
-        for number, line in enumerate(lines(found))
+        for number, line in enumerate(lines(traced))
         for row in zip(
             repeat(number),
             repeat(line.shape),

@@ -15,29 +15,29 @@ from friso.views.documents import plain_json
 from friso.views.guideline.page import group_rows
 
 
-def guideline_document(found: Guideline) -> dict[str, Any]:
+def guideline_document(guideline: Guideline) -> dict[str, Any]:
     """Laws, errors, checks and the worked steps, ready for JSON."""
-    steps = found.worked
+    steps = guideline.worked
     return plain_json(
         {
             "friso": VERSION,
-            "samples": found.samples,
-            "seconds_s": found.seconds,
-            "cores": found.cores,
-            "parts_resumed": found.resumed,
-            "groups": {name: asdict(count) | {"groups": count.groups} for name, count in found.counts.items()},
-            "ranges": {row["written"]: row["range"] for row in group_rows(found) if row["range"]},
-            "laws": {"locked": _law(found.locked), "free": _law(found.free)},
+            "samples": guideline.samples,
+            "seconds_s": guideline.seconds,
+            "cores": guideline.cores,
+            "parts_resumed": guideline.resumed,
+            "groups": {name: asdict(count) | {"groups": count.groups} for name, count in guideline.counts.items()},
+            "ranges": {row["written"]: row["range"] for row in group_rows(guideline) if row["range"]},
+            "laws": {"locked": _law(guideline.locked), "free": _law(guideline.free)},
             "rig": {
                 "rates_hz": dict(steps.rates),
                 "machines": [asdict(machine) for machine in steps.machines],
                 "friction": [_case(case) for case in steps.friction],
                 "highest_locked_edge_hz": steps.bound,
                 "safe_factor": steps.safe,
-                "designs": [[_designed(each) for each in designs] for designs in steps.designs],
+                "designs": [[_designed(item) for item in designs] for designs in steps.designs],
                 "studies": {name: [_case(case) for case in cases] for name, cases in steps.studies.items()},
             },
-            "parasitic": [asdict(each) for each in found.parasitic],
+            "parasitic": [asdict(item) for item in guideline.parasitic],
             "claims": [asdict(claim) for claim in claims(steps)],
         }
     )

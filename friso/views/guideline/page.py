@@ -48,38 +48,38 @@ CONSTANTS: Mapping[str, Any] = {
 """Settings of the computation that the page tells."""
 
 
-def guideline_files(found: Guideline) -> dict[str, Content]:
+def guideline_files(guideline: Guideline) -> dict[str, Content]:
     """The page, the table of edges, and the charts."""
-    charts = pictures(guideline_figures(found), ("png",))
-    return {PAGE: guideline_page(found), TABLE: edges_table(found), **charts}
+    charts = pictures(guideline_figures(guideline), ("png",))
+    return {PAGE: guideline_page(guideline), TABLE: edges_table(guideline), **charts}
 
 
-def guideline_page(found: Guideline) -> str:
+def guideline_page(guideline: Guideline) -> str:
     """The page in Markdown; its charts and the table stand beside it."""
     template = environment().overlay(autoescape=False).get_template("guideline.md.j2")
     return template.render(
-        found=found,
-        locked=found.locked,
-        free=found.free,
-        steps=found.worked,
-        formulas=formulas(found),
-        groups=group_rows(found),
-        figures={figure.name: figure for figure in guideline_figures(found)},
-        claims=claims(found.worked),
-        parasitic=found.parasitic,
-        parasitic_words=parasitic_sentences(found.parasitic),
-        parasitic_edges=parasitic_edges(found.worked.studies["parasitic"]),
+        found=guideline,
+        locked=guideline.locked,
+        free=guideline.free,
+        steps=guideline.worked,
+        formulas=formulas(guideline),
+        groups=group_rows(guideline),
+        figures={figure.name: figure for figure in guideline_figures(guideline)},
+        claims=claims(guideline.worked),
+        parasitic=guideline.parasitic,
+        parasitic_words=parasitic_sentences(guideline.parasitic),
+        parasitic_edges=parasitic_edges(guideline.worked.studies["parasitic"]),
         rough_minutes=value("guideline.minutes", "rough"),
         drive=DRIVE,
         kinds=KINDS,
-        errors_of=_errors(found),
+        errors_of=_errors(guideline),
         number=number,
         percent=percent,
         studied=STUDIED,
         rows=_rows,
-        worst=_worst(found),
+        worst=_worst(guideline),
         finite=math.isfinite,
-        minutes=found.seconds / 60,
+        minutes=guideline.seconds / 60,
         constants=CONSTANTS,
         grids={"locked": LOCKED_GRID, "free": FREE_GRID},
         version=VERSION,
@@ -93,18 +93,18 @@ FAR = 1.5
 """Factor from which an edge is told of as far off the law."""
 
 
-def _errors(found: Guideline) -> list[tuple[str, Errors]]:
+def _errors(guideline: Guideline) -> list[tuple[str, Errors]]:
     """Errors on held-out samples, by which they are."""
     rows = [
-        ("joint locked", found.locked.on_test),
-        (f"of these {ONE_WINDOW}", found.held_out(False, _one_window)),
+        ("joint locked", guideline.locked.on_test),
+        (f"of these {ONE_WINDOW}", guideline.held_out(False, _one_window)),
         *(
-            (f"omega_slip/omega_drop {_between(each.low, each.high)}", each.errors)
-            for each in found.held_out_by_rates()
+            (f"omega_slip/omega_drop {_between(part.low, part.high)}", part.errors)
+            for part in guideline.held_out_by_rates()
         ),
-        ("joint free, all by law", found.free.on_test),
-        (f"of these {ONE_WINDOW}", found.held_out(True, _one_window)),
-        ("joint free, locked edge as computed", found.free.given),
+        ("joint free, all by law", guideline.free.on_test),
+        (f"of these {ONE_WINDOW}", guideline.held_out(True, _one_window)),
+        ("joint free, locked edge as computed", guideline.free.given),
     ]
     return [(name, errors) for name, errors in rows if errors is not None]
 
@@ -113,11 +113,11 @@ def _one_window(sweep: Sweep) -> np.ndarray:
     return sweep.edges.windows == 1
 
 
-def _worst(found: Guideline) -> dict[str, Any] | None:
+def _worst(guideline: Guideline) -> dict[str, Any] | None:
     """Of the samples, fitted and held out, whose locked edge is off the law by more than a factor: how many, the ends
     of their gap and stribeck groups, and how many of which kind; None without any."""
-    used = found.locked.whole.usable
-    off = np.abs(np.log(used.edge / found.locked.law.edge(used.values)))
+    used = guideline.locked.whole.usable
+    off = np.abs(np.log(used.edge / guideline.locked.law.edge(used.values)))
     far = used.take(off > np.log(FAR))
     if not len(far.edge):
         return None
@@ -131,14 +131,14 @@ def _between(low: float, high: float) -> str:
     return f"below {high:g}" if low == 0 else f"above {low:g}" if math.isinf(high) else f"{low:g} to {high:g}"
 
 
-def group_rows(found: Guideline) -> list[dict[str, Any]]:
+def group_rows(guideline: Guideline) -> list[dict[str, Any]]:
     """One row per group: how it is written, what it means, its range in the sweeps, and its value for the rig."""
     ranges = dict(LOCKED_BOX) | {name: ends for name, ends in JOINT_BOX.items() if name in GROUPS}
-    used = found.free.whole.usable
+    used = guideline.free.whole.usable
     ranges["joint"] = _span(used.values["joint"])
-    edges = (found.locked.whole.usable.edge, used.edge)
+    edges = (guideline.locked.whole.usable.edge, used.edge)
     ranges["crossover"] = _span(np.concatenate(edges))
-    own = values_of(plain("joint"))
+    rig_values = values_of(plain("joint"))
     return [
         {
             "name": name,
@@ -146,7 +146,7 @@ def group_rows(found: Guideline) -> list[dict[str, Any]]:
             "meaning": group.meaning,
             "part": group.part,
             "range": ranges.get(name),
-            "rig": own.get(name),
+            "rig": rig_values.get(name),
         }
         for name, group in GROUPS.items()
     ]
@@ -161,20 +161,20 @@ def _rows(name: str, cases: tuple[RigCase, ...]) -> list[tuple[float, float, flo
     return [(STUDIED[name](case.changes), case.law, case.computed) for case in cases]
 
 
-def edges_table(found: Guideline) -> str:
+def edges_table(guideline: Guideline) -> str:
     """All samples with their groups and edges, as CSV; four digits, which is more than edges are known to."""
     sweeps = {
-        ("locked", "fit"): found.locked.fit,
-        ("locked", "held out"): found.locked.test,
-        ("free", "fit"): found.free.fit,
-        ("free", "held out"): found.free.test,
+        ("locked", "fit"): guideline.locked.fit,
+        ("locked", "held out"): guideline.locked.test,
+        ("free", "fit"): guideline.free.fit,
+        ("free", "held out"): guideline.free.test,
     }
-    names = [name for name in GROUPS if name in found.free.fit.values]
+    names = [name for name in GROUPS if name in guideline.free.fit.values]
     after = ["locked edge", "edge", "law", "kind", "multiplier inside", "outside", "windows"]
     lines = [",".join(["joint state", "half", *names, *after])]
     for (state, half), sweep in sweeps.items():
-        law = found.locked.law.edge(sweep.values)
-        law = found.free.law.edge(sweep.values, law) if state == "free" else law
+        law = guideline.locked.law.edge(sweep.values)
+        law = guideline.free.law.edge(sweep.values, law) if state == "free" else law
         lines += [",".join([state, half, *row]) for row in _cells(sweep, law, names)]
     return "\n".join(lines) + "\n"
 

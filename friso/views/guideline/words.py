@@ -25,9 +25,9 @@ RULE = 2.0
 """Factor up to which multiples of the crossover may differ and still pass for one rule."""
 
 
-def formulas(found: Guideline) -> str:
+def formulas(guideline: Guideline) -> str:
     """Both laws as lines of a formula, to be used by hand."""
-    locked, free = found.locked.law, found.free.law
+    locked, free = guideline.locked.law, guideline.free.law
     lines = [
         *_rates(locked),
         "omega_locked = 1/(1/omega_slip + 1/omega_drop)",

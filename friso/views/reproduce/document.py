@@ -25,7 +25,7 @@ def claims_document(reproduction: Reproduction) -> dict[str, Any]:
         "figure_14b": {"rtol": tolerances, "verdicts_changed": verdicts, "counts_changed": counts}
         if tolerances
         else None,
-        "cycles": {name: vars(found.comparison) for name, found in reproduction.cycles.items()},
+        "cycles": {name: vars(cycles.comparison) for name, cycles in reproduction.cycles.items()},
         "claims": [_entry(verdict) for verdict in reproduction.verdicts],
     }
     return plain_json(document)
@@ -44,13 +44,13 @@ def _entry(verdict: Verdict) -> dict[str, Any]:
         "values_varied": verdict.tried if verdict.finding else None,
         "depends_on": [
             {
-                "kind": each.variant.kind,
-                "parameter": each.variant.parameter,
-                "value": each.variant.value,
-                "judgement": each.judgement,
-                "number": "; ".join(each.numbers),
+                "kind": dependence.variant.kind,
+                "parameter": dependence.variant.parameter,
+                "value": dependence.variant.value,
+                "judgement": dependence.judgement,
+                "number": "; ".join(dependence.numbers),
             }
-            for each in (*verdict.depends_on, *verdict.hangs_on)
+            for dependence in (*verdict.depends_on, *verdict.hangs_on)
         ],
     }
 

@@ -37,9 +37,9 @@ _SHOWN_FROM = 6.0  # [s] the return move is over by then, at the paths of Fig. 5
 
 def reproduction_figures(reproduction: Reproduction) -> dict[str, Figure]:
     """The figures by their number in the thesis, in its order, those whose studies were run."""
-    found = {"5": _response(reproduction), "13": _shares(reproduction), **loop_figures(reproduction)}
-    found |= {number: _maps(reproduction, number) for number in _TITLES}
-    return {number: found[number] for number in sorted(found, key=int) if found[number].panels}
+    figures = {"5": _response(reproduction), "13": _shares(reproduction), **loop_figures(reproduction)}
+    figures |= {number: _maps(reproduction, number) for number in _TITLES}
+    return {number: figures[number] for number in sorted(figures, key=int) if figures[number].panels}
 
 
 def _maps(reproduction: Reproduction, number: str) -> Figure:
@@ -49,7 +49,7 @@ def _maps(reproduction: Reproduction, number: str) -> Figure:
         if study.panel[:-1] != number or study.name not in reproduction.maps:
             continue
         letter = study.panel[-1]
-        for title, runs in _shown(reproduction, study, letter).items():
+        for title, runs in _runs_shown(reproduction, study, letter).items():
             panels.append(_with_edges(map_panel(runs, "distinct_peaks", study.marker, title), reproduction, study))
             statements.append(f"{title}. {statement(runs, 'distinct_peaks')}".replace("\n", " "))
         zeros += [f"{letter}: {study.zeros}"] if study.zeros else []
@@ -71,19 +71,19 @@ def _maps(reproduction: Reproduction, number: str) -> Figure:
 
 def _with_edges(panel: Panel, reproduction: Reproduction, study: ThesisStudy) -> Panel:
     """The map with the curves on which the hunting cycle stops attracting, and on which asymmetric ones appear."""
-    found = reproduction.cycles.get(study.name)
-    if found is None:
+    figures = reproduction.cycles.get(study.name)
+    if figures is None:
         return panel
     lines = tuple(
         Series(
             edge.x, edge.y, *(_HUNTING if edge.symmetric else _PAIR), "solid" if edge.kind == "flip" else "dashed", 2.2
         )
-        for edge in found.edges
+        for edge in figures.edges
     )
     return replace(panel, series=(*panel.series, *lines))
 
 
-def _shown(reproduction: Reproduction, study: ThesisStudy, letter: str) -> Mapping[str, xr.Dataset]:
+def _runs_shown(reproduction: Reproduction, study: ThesisStudy, letter: str) -> Mapping[str, xr.Dataset]:
     """The maps of a study by title: one, or Fig. 14B at the two tolerances."""
     if study.panel == "14B":
         return {f"{letter}: {study.title}, rtol {rtol:g}": runs for rtol, runs in reproduction.tolerances.items()}

@@ -34,14 +34,14 @@ _SHOWN = {
 
 def loop_figures(reproduction: Reproduction) -> dict[str, Figure]:
     """The figures by their number in the thesis."""
-    known = {figure.name: figure for figure in bode_figures(reproduction.bode)}
-    shown = {
+    by_name = {figure.name: figure for figure in bode_figures(reproduction.bode)}
+    figures = {
         number: replace(
-            known[name], name=f"figure-{number}", title=f"Figure {number}: {title}", caption=caption, subject=""
+            by_name[name], name=f"figure-{number}", title=f"Figure {number}: {title}", caption=caption, subject=""
         )
         for number, (name, title, caption) in _SHOWN.items()
     }
-    return shown | {"22": _locked(reproduction.linear.locked), "23": _free(reproduction.linear.free)}
+    return figures | {"22": _locked(reproduction.linear.locked), "23": _free(reproduction.linear.free)}
 
 
 def _locked(loops: CrossoverLoops) -> Figure:
@@ -67,9 +67,9 @@ def _of_loops(number: str, title: str, caption: str, loops: CrossoverLoops) -> F
 
 def _panels(hertz: np.ndarray, curves: Sequence[ResponseCurve]) -> tuple[Panel, Panel]:
     x = Axis("Frequency", "Hz", (float(hertz[0]), float(hertz[-1])), log=True)
-    above = tuple(Series(hertz, size(one.response), one.label, one.colour) for one in curves)
-    turns = zip(curves, phases([one.response for one in curves]), strict=True)
-    below = tuple(Series(hertz, turn, "", one.colour) for one, turn in turns)
+    above = tuple(Series(hertz, size(curve.response), curve.label, curve.colour) for curve in curves)
+    turns = zip(curves, phases([curve.response for curve in curves]), strict=True)
+    below = tuple(Series(hertz, turn, "", curve.colour) for curve, turn in turns)
     return (
         Panel("", x, Axis("Magnitude", "dB", step=30.0), above, limits=(Limit((0.0,), "", INK),)),
         Panel("", x, Axis("Phase", "°", step=90.0), below, limits=(Limit((-180.0,), "", INK),)),

@@ -38,33 +38,33 @@ class FigureSection:
 def reproduction_files(reproduction: Reproduction) -> dict[str, Content]:
     """The page, the claims, and every figure as PNG and SVG in a folder of its own."""
     text = json.dumps(claims_document(reproduction), indent=2, ensure_ascii=False, allow_nan=False)
-    drawn = pictures(reproduction_figures(reproduction).values(), ("png", "svg"))
+    figures = pictures(reproduction_figures(reproduction).values(), ("png", "svg"))
     return {
         "reproduction.html": reproduction_html(reproduction),
         "claims.json": text + "\n",
-        **{f"figures/{name}": content for name, content in drawn.items()},
+        **{f"figures/{name}": content for name, content in figures.items()},
     }
 
 
 def reproduction_html(reproduction: Reproduction) -> str:
     """The whole page: a table of all claims, then the figures with theirs. It opens offline."""
-    found = sections(reproduction_figures(reproduction), reproduction.verdicts)
-    drawn = [section.figure for section in found if section.figure]
+    parts = sections(reproduction_figures(reproduction), reproduction.verdicts)
+    figures = [section.figure for section in parts if section.figure]
     return Report(
         "reproduction.html",
         "Reproduction of the thesis",
         stage_file=rig().to_toml(),
         source=rig().source,
-        scripted=bool(drawn),
+        scripted=bool(figures),
         values={
             "verdicts": reproduction.verdicts,
             "counts": _counts(reproduction.verdicts),
             "colours": _COLOURS,
             "numbers": numbers,
-            "sections": found,
-            "images": {figure.name: _printed(figure) for figure in drawn},
+            "sections": parts,
+            "images": {figure.name: _printed(figure) for figure in figures},
             "interactive": {
-                figure.name: Markup(plotly_renderer.fragment(replace(figure, note=""))) for figure in drawn
+                figure.name: Markup(plotly_renderer.fragment(replace(figure, note=""))) for figure in figures
             },
             "conventions": CONVENTIONS,
             "cycles": [(STUDIES[name], edges.comparison) for name, edges in reproduction.cycles.items()],
@@ -106,5 +106,5 @@ def _untitled(number: str) -> str:
 
 def _counts(verdicts: Iterable[Verdict]) -> dict[str, int]:
     """How many claims got each judgement, those that occur."""
-    found = [verdict.judgement for verdict in verdicts]
-    return {judgement: found.count(judgement) for judgement in _COLOURS if judgement in found}
+    parts = [verdict.judgement for verdict in verdicts]
+    return {judgement: parts.count(judgement) for judgement in _COLOURS if judgement in parts}
