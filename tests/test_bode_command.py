@@ -171,9 +171,9 @@ def test_a_controller_by_gains_has_factors_instead_of_crossovers(emps: Bode) -> 
     assert known == {
         "highest_stable_crossover_factor": 1000.0,
         "still_stable_there": True,
-        "stable_factor": ((0.01, 1000.0),),
-        "modulus_margin_above_half_factor": ((0.01, 1000.0),),
-        "searched_factor": (0.01, 1000.0),
+        "stable_factor": [[0.01, 1000.0]],
+        "modulus_margin_above_half_factor": [[0.01, 1000.0]],
+        "searched_factor": [0.01, 1000.0],
     }
     assert document["cases"].keys() == {"stuck", "sliding"}
     assert document["cases"]["stuck"]["crossovers_hz"] == []

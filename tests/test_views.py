@@ -21,6 +21,8 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from pages import Page
 
+from friso.equations.controllers.pid_gains import PidGains
+from friso.equations.controllers.van_dijk import VanDijk
 from friso.hunting import Cycle, Hunting, Judgement, Kick, Margin, MoveShare
 from friso.hunting.cycle.return_map import ReturnMap
 from friso.version import VERSION
@@ -124,7 +126,12 @@ def fake_stage(name: str = "Thesis rig", locked: bool | None = None, force_limit
         name=name,
         source="made up",
         joint=joint,
-        controller=SimpleNamespace(force_limit=force_limit, kp=3.0, ki=4.0, kd=6.0, tau=0.0),
+        controller=SimpleNamespace(
+            force_limit=force_limit,
+            **{"kp": 3.0, "ki": 4.0, "kd": 6.0, "tau": 0.0},
+            bandwidth_name=VanDijk.bandwidth_name,
+            speeds_up=PidGains.speeds_up,
+        ),
         flat=lambda: {"motion.kind": "hold"},
         to_toml=lambda: f"name = {json.dumps(name)}\n",
     )
