@@ -37,6 +37,9 @@ MASKED = (
     (re.compile(r"\([0-9a-f]{12}\)"), "(DIGEST)"),
     (re.compile(r"127\.0\.0\.1:\d{4,}"), "ADDRESS"),
     (re.compile(r"\b(took|takes) \d+(?:\.\d+)? ?(?:ms|s|min|h)\b"), r"\1 TIME"),
+    (re.compile(r"\b\d+(?:\.\d+)?(?:e[-+]?\d+)? (?=(?:minutes|hours) on )"), "TIME "),
+    (re.compile(r"(?<=VERSION) with (?:controller|friction law) [^)]*\)(?: and friction law [^)]*\))*"), ""),
+    (re.compile(r'(?<="pid"), "[\w-]+"'), ""),
     (re.compile(r"(?<=\d ± )\d+(?:\.\d+)?(?:e-?\d+)?"), "ERROR"),
 )
 

@@ -220,7 +220,7 @@ def test_special_points_stand_in_their_place_on_the_branch(round_a_fold: Diagram
 
 def test_sentences_tell_what_becomes_of_a_cycle_as_the_key_rises(round_a_fold: Diagram) -> None:
     ends, first, second, fold, followed = sentences(round_a_fold, (MM,))
-    assert ends.startswith("At 1 mm: an attracting cycle (hunting is possible); at 2 mm: not known")
+    assert ends.startswith("At 1 mm: an attracting cycle (hunting is possible); at 2 mm: unknown")
     assert "stops attracting at joint.stroke = 1.45 ± 1e-06 mm (flip: above, it still exists" in first
     assert "begins to attract at joint.stroke = 1.72 ± 1e-06 mm (flip: below, it still exists" in second
     assert "vanishes at joint.stroke = 1.73 ± 1e-06 mm (fold: above, it has merged" in fold

@@ -149,7 +149,7 @@ class Twin:
         late = (self.delay - int(self.delay)) * TIME
         parts = self._moving(late), self._moving(TIME - late)
         x, commands, past, integral = np.zeros(3), [0.0] * int(self.delay), [0.0, 0.0], 0.0
-        floor, constant, moved = *self._found(tables, 0, 0.0), []
+        floor, constant, moved = *self._located(tables, 0, 0.0), []
         acting = 0.0
         for n in range(samples):
             reading = DIGIT * np.round((x[0] + NOISE * float(noise(1, n))) / DIGIT)
@@ -163,7 +163,7 @@ class Twin:
             past = [reading, past[0]]
             x = self._move(parts[0], x, constant * acting, floor)
             moved.append(x)
-            floor, constant = self._found(tables, n, x[0])
+            floor, constant = self._located(tables, n, x[0])
             acting = commands[n]
             x = self._move(parts[1], x, constant * acting, floor)
         return np.array(moved), np.array(commands[int(self.delay) :])

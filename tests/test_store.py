@@ -208,8 +208,8 @@ def test_answers_to_other_questions_are_not_taken(rig: Stage, tmp_path: Path, mo
     path, study = tmp_path / "a.zarr", refine.finer(Request(rig, AXES).study())
     asked: list[int] = []
 
-    def stop(cells: int) -> None:
-        asked.append(cells)
+    def stop(done: int, total: int, what: str) -> None:
+        asked.append(done)
         if len(asked) == 3:
             raise KeyboardInterrupt
 
