@@ -92,8 +92,10 @@ def few_variants() -> Iterator[None]:
     made = {LOOPS_BUILT: loops(), MOVES: moves((HUNTS, 0, 0, 0)), GRID: grid(1, 1, 0), ON_RAILS: rail_cycles()}
     runs = {name: lambda stage, it=it: it for name, it in {**made, STANDSTILL: standstill()}.items()}
     reproducing = import_module("friso.studies.thesis.reproduce")
+    experiments._experiment.cache_clear()  # what is made up is kept like any evidence, here and after this file
     with patched({reproducing: {"OPEN": FEW}, experiments: {"_RUNS": {**_RUNS, **runs}}}):
         yield
+    experiments._experiment.cache_clear()
 
 
 @pytest.fixture(scope="module")
