@@ -3,6 +3,7 @@ core to itself, so that its BLAS takes no more."""
 
 import os
 import shutil
+import sys
 import tempfile
 from pathlib import Path
 
@@ -16,6 +17,8 @@ from friso.stage import Stage
 FOLDER = "FRISO_CACHE_DIR"
 MADE = "FRISO_TEST_CACHE_DIR"
 BLAS = "OPENBLAS_NUM_THREADS"
+
+sys.path.append(str(Path(__file__).parents[1]))  # for benchmarks; last, so that friso is the one installed
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

@@ -10,7 +10,8 @@ import pytest
 import friso
 
 PACKAGE = Path(friso.__file__).parent
-GUIDE = PACKAGE.parent / "CONTRIBUTING.md"
+ROOT = Path(__file__).parents[1]
+GUIDE = ROOT / "CONTRIBUTING.md"
 
 KNOW_CONTROLLERS = ("equations/controllers/", "stage/", "templates/")
 """Where keys of a controller may be named: its own files, the stage file's schema, and the template of one."""
@@ -79,6 +80,6 @@ def test_there_is_a_recipe(kind: str) -> None:
 
 
 def test_the_drawing_of_the_house_names_every_folder() -> None:
-    drawing = (PACKAGE.parent / "docs" / "architecture.md").read_text(encoding="utf-8")
+    drawing = (ROOT / "docs" / "architecture.md").read_text(encoding="utf-8")
     folders = {path.name for path in PACKAGE.iterdir() if (path / "__init__.py").exists()}
     assert {name for name in folders if name not in drawing} == set()
