@@ -11,7 +11,7 @@ from friso.cli.common import (
     AsJson,
     Overrides,
     StageFile,
-    print_table,
+    print_answer,
     read_stage,
     say,
 )
@@ -94,4 +94,4 @@ def _print(result: Bode) -> None:
     from friso.views.bode.words import sentences
 
     states = shown_states(result)
-    print_table(result.stage.name, [item.label for item in states], rows(states), sentences(result))
+    print_answer(sentences(result), result.stage.name, [item.label for item in states], rows(states))

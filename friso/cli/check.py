@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from friso.cli.common import AsJson, Overrides, StageFile, Tolerance, leave, print_table, read_stage, read_tolerance
+from friso.cli.common import AsJson, Overrides, StageFile, Tolerance, leave, print_answer, read_stage, read_tolerance
 from friso.cli.output import OutFolder, Overwrite, output_folder, print_document
 from friso.cli.progress import ProgressBar
 from friso.errors import InputError
@@ -94,23 +94,21 @@ def _draws(stage: Stage, sample: Drawn, seed: int, tolerance: float) -> Draws:
 
 
 def _print_draws(draws: Draws) -> None:
-    """The table of the draws, and a sentence per case."""
+    """A sentence per case, and the table of the draws."""
     from friso.views.check.cases import case_labels
     from friso.views.check.draws import draws_rows, draws_sentences
 
     title = f"{draws.drawn.count} stages drawn from the uncertain keys, seed {draws.seed}"
-    print_table(title, [*case_labels(draws.stage).values()], draws_rows(draws), draws_sentences(draws))
+    print_answer(draws_sentences(draws), title, [*case_labels(draws.stage).values()], draws_rows(draws))
 
 
 def _print_cases(stage: Stage, cases: dict[str, Case]) -> None:
-    """The short table of `check`, and a sentence per case."""
+    """A sentence per case, and the short table of `check`."""
     from friso.views.check.cases import shown_cases
     from friso.views.check.table import rows
     from friso.views.check.words import conclusion, verdict_sentence
 
     listed = shown_cases(cases)
     sentences = [f"{item.label}: {verdict_sentence(item, cases)}" for item in listed]
-    summary = conclusion(cases)
-    print_table(
-        stage.name, [item.label for item in listed], rows(listed), [*sentences, *([summary] if summary else [])]
-    )
+    summary = filter(None, [conclusion(cases)])
+    print_answer([*sentences, *summary], stage.name, [item.label for item in listed], rows(listed))

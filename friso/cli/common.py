@@ -36,18 +36,55 @@ def say(message: str) -> None:
     print(f"friso: {message}", file=sys.stderr)
 
 
-def print_table(title: str, columns: Sequence[str], rows: Iterable[tuple[str, list[str]]], below: list[str]) -> None:
-    """A table whose rows have names, and sentences below it."""
+def print_answer(
+    sentences: Iterable[str], title: str, columns: Sequence[str], rows: Sequence[tuple[str, list[str]]]
+) -> None:
+    """What follows for the user, and below it the table from which it follows."""
+    for sentence in sentences:
+        print_wrapped(sentence)
+    print_table(title, columns, rows)
+
+
+def print_table(title: str, columns: Sequence[str], rows: Sequence[tuple[str, list[str]]]) -> None:
+    """A table whose rows have names; columns that do not fit beside each other go into further tables below."""
     from rich.console import Console
     from rich.table import Table
 
     console = Console(highlight=False, markup=False)
-    table = Table("", *columns, title=title or None, title_justify="left")
-    for label, texts in rows:
-        table.add_row(label, *texts)
-    console.print(table)
-    for sentence in below:
-        console.print(sentence)
+    texts = [["", *(label for label, _ in rows)], *zip(columns, *(row for _, row in rows), strict=True)]
+    narrow = [_narrow(column) for column in texts]
+    for part in _side_by_side(narrow, console.width - 1):
+        table = Table(title=title or None, title_justify="left")
+        spare = max(0, console.width - 1 - sum(narrow[k] + _BORDER for k in part))
+        for k in part:
+            width = min(max(map(len, texts[k])), narrow[k] + spare)
+            spare -= width - narrow[k]
+            table.add_column(texts[k][0], width=width)
+        for row in zip(*(texts[k][1:] for k in part), strict=True):
+            table.add_row(*row)
+        console.print(table)
+        title = ""
+
+
+_BORDER = 3
+"""Width of what separates two columns of a table."""
+
+
+def _narrow(texts: Sequence[str]) -> int:
+    """The least width in which each of the texts takes two lines at most, and no word is cut."""
+    words = max((len(word) for text in texts for word in text.split()), default=1)
+    widths = range(words, max(map(len, texts)) + 1)
+    return next((width for width in widths if all(len(textwrap.wrap(text, width)) <= 2 for text in texts)), words)
+
+
+def _side_by_side(narrow: Sequence[int], room: int) -> list[list[int]]:
+    """Which columns stand in a table together: the first in each, and at least one beside it."""
+    parts = [[0]]
+    for k in range(1, len(narrow)):
+        if len(parts[-1]) > 1 and sum(narrow[j] + _BORDER for j in [*parts[-1], k]) > room:
+            parts.append([0])
+        parts[-1].append(k)
+    return parts
 
 
 def print_wrapped(sentence: str, indent: str = "") -> None:

@@ -1,4 +1,4 @@
-"""`friso compare`: isolator or firmware: the same drawn machines settled by a joint, and by settings."""
+"""`friso compare`: isolator or firmware: the same drawn machines with a joint, and with other settings."""
 
 from __future__ import annotations
 
@@ -12,11 +12,12 @@ from friso.cli.common import (
     AsJson,
     Overrides,
     StageFile,
+    print_answer,
     print_table,
     print_wrapped,
     read_stage,
 )
-from friso.cli.output import OutFolder, Overwrite, output_folder, print_document
+from friso.cli.output import OutFolder, Overwrite, output_folder, print_document, print_written
 from friso.cli.progress import ProgressBar
 from friso.errors import InputError
 from friso.quantities import Quantity, positive
@@ -45,7 +46,7 @@ def compare(
     overwrite: Overwrite = False,
     as_json: AsJson = False,
 ) -> None:
-    """Buy a joint or change settings: seven ways to settle the same machines, drawn around a stage.
+    """Buy a joint or change settings: which of seven options brings machines like this one to rest, and at what cost.
 
     Takes about a quarter of an hour for 2000 machines and a run of 20 s on two cores.
 
@@ -58,18 +59,18 @@ def compare(
     target = output_folder("compare", out, overwrite, [stage_file])
     files = []
     with ProgressBar() as progress:
-        found = compared(stage, machines, seed, tolerance, correlations, progress)
+        comparison = compared(stage, machines, seed, tolerance, correlations, progress)
         if target is not None:
             from friso.views.compare.page import compare_files
 
-            files = target.write(compare_files(found), progress)
+            files = target.write(compare_files(comparison), progress)
     if as_json:
         from friso.views.compare.document import compare_document
 
-        print_document(compare_document(found))
+        print_document(compare_document(comparison))
     else:
-        _print(found, files)
-    if any(result.failed for result in found.results):
+        _print(comparison, files)
+    if any(result.failed for result in comparison.results):
         raise typer.Exit(1)
 
 
@@ -88,21 +89,23 @@ def _correlations(path: Path, stage: Stage) -> Correlations:
     return correlations.among(stage.uncertain())
 
 
-def _print(result: Comparison, files: Sequence[Path]) -> None:
+def _print(comparison: Comparison, files: Sequence[Path]) -> None:
     from friso.views.compare.words import (
         COLUMNS,
         PAIRED,
+        answer,
+        details,
         options_rows,
         paired_rows,
         population,
-        sentences,
         table_rows,
     )
 
-    for label, text in options_rows(result):
+    print_answer(answer(comparison), comparison.stage.name, COLUMNS, table_rows(comparison))
+    print_table("Compared with a, machine by machine", PAIRED, paired_rows(comparison))
+    for label, text in options_rows(comparison):
         print_wrapped(f"{label}: {text}")
-    print_table(result.stage.name, COLUMNS, table_rows(result), [])
-    print_table("Compared with a, machine by machine", PAIRED, paired_rows(result), [])
-    notes = (f"note: {note}" for note in result.notes)
-    for sentence in (*population(result), *notes, *sentences(result), *(f"wrote {file}" for file in files)):
+    notes = (f"note: {note}" for note in comparison.notes)
+    for sentence in (*details(comparison), *population(comparison), *notes):
         print_wrapped(sentence)
+    print_written(files)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from friso.cli.common import AsJson, Overrides, StageFile, leave, print_table, read_stage, say
+from friso.cli.common import AsJson, Overrides, StageFile, leave, print_answer, read_stage, say
 from friso.cli.output import OutFolder, Overwrite, output_folder, print_document, print_written
 from friso.cli.progress import ProgressBar
 from friso.errors import InputError
@@ -109,4 +109,4 @@ def _print(evaluated: Found) -> None:
     from friso.views.flexure.table import rows
     from friso.views.flexure.words import sentences
 
-    print_table(evaluated.stage.name, list(evaluated.models), rows(evaluated), sentences(evaluated))
+    print_answer(sentences(evaluated), evaluated.stage.name, list(evaluated.models), rows(evaluated))

@@ -31,7 +31,7 @@ NAMES = {
     "d": "deadband",
     "e": "reset",
     "f": "feedforward",
-    "g": "b and c",
+    "g": "isolator, faster",
 }
 
 JOINT: tuple[str, ...] = ("c", "g")

@@ -43,10 +43,11 @@ LATEST = 0.5
 
 @dataclass(frozen=True)
 class Result:
-    """An option, what became of each machine with it, of the first of them `later`, and the linear loop of each."""
+    """An option with the measures of each machine's run, those of longer runs of the first machines (`later`), and the
+    linear loop of each."""
 
     option: Option
-    found: MachineMeasures
+    measures: MachineMeasures
     later: Later
     loops: LoopRobustness
 
@@ -57,17 +58,17 @@ class Result:
     @property
     def swinging(self) -> Share:
         """The probability of swinging at the end of the run."""
-        return share(self.found.swings, self.found.done)
+        return share(self.measures.swings, self.measures.done)
 
     @property
     def counted(self) -> Share:
         """The probability of a distinct peak (see `friso.hunting.criteria.peak_count`)."""
-        return share(self.found.counted > 0, self.found.done)
+        return share(self.measures.counted > 0, self.measures.done)
 
     @property
     def settled(self) -> Share:
         """The probability of being in position to stay by the end of the run."""
-        return share(np.isfinite(self.found.settling), self.found.done)
+        return share(np.isfinite(self.measures.settling), self.measures.done)
 
     @property
     def stays(self) -> Share:
@@ -77,15 +78,15 @@ class Result:
     @property
     def settling(self) -> EstimatedValue:
         """Median [s] over all machines, those that never settle included."""
-        return median(self.found.settling)
+        return median(self.measures.settling)
 
     @property
     def in_position(self) -> EstimatedValue:
-        return median(self.found.in_position)
+        return median(self.measures.in_position)
 
     @property
     def force(self) -> EstimatedValue:
-        return median(self.found.force)
+        return median(self.measures.force)
 
     @property
     def margin(self) -> EstimatedValue:
@@ -97,17 +98,19 @@ class Result:
 
     @property
     def failed(self) -> int:
-        return int(np.count_nonzero(~self.found.done))
+        return int(np.count_nonzero(~self.measures.done))
 
     @property
     def in_position_count(self) -> int:
         """Machines that are in position to stay by the end of the run."""
-        return int(np.isfinite(self.found.settling).sum())
+        return int(np.isfinite(self.measures.settling).sum())
 
     @property
     def rests(self) -> bool:
         """Whether `ENOUGH` of the machines are in position by the end, and of those that are followed stay there."""
-        return self.in_position_count >= ENOUGH * len(self.found.settling) and bool(self.later.stays.mean() >= ENOUGH)
+        return self.in_position_count >= ENOUGH * len(self.measures.settling) and bool(
+            self.later.stays.mean() >= ENOUGH
+        )
 
 
 @dataclass(frozen=True)
@@ -146,17 +149,17 @@ class Comparison:
 
     def paired(self, result: Result) -> Paired:
         """An option against a, on the machines whose runs were completed with both."""
-        one, base = result.found, self.results[0].found
-        both = one.done & base.done
+        runs, base = result.measures, self.results[0].measures
+        both = runs.done & base.done
         with np.errstate(invalid="ignore", divide="ignore"):
             in_position, force = (
-                getattr(one, name)[both] / getattr(base, name)[both] for name in ("in_position", "force")
+                getattr(runs, name)[both] / getattr(base, name)[both] for name in ("in_position", "force")
             )
         return Paired(
-            swinging=difference(one.swings[both], base.swings[both]),
-            sooner=share(one.settling < base.settling, both),
-            later=share(one.settling > base.settling, both),
-            alike=share(one.settling == base.settling, both),
+            swinging=difference(runs.swings[both], base.swings[both]),
+            sooner=share(runs.settling < base.settling, both),
+            later=share(runs.settling > base.settling, both),
+            alike=share(runs.settling == base.settling, both),
             in_position=median(in_position),
             force=median(force),
         )
@@ -183,9 +186,9 @@ def compare(
     work = _Work(machines, own_motion(machines.stage), corner, within, progress, len(every.every))
     results: list[Result] = []
     for option in every.every:
-        found, later = work.runs(option, len(results)), work.longer(option)
-        known = {result.letter: result.loops for result in results}
-        results.append(Result(option, found, later, known.get(option.loop) or _loops(machines, option)))
+        measures, later = work.runs(option, len(results)), work.longer(option)
+        loops = {result.letter: result.loops for result in results}
+        results.append(Result(option, measures, later, loops.get(option.loop) or _loops(machines, option)))
     left_out = [f"{letter} {NAMES[letter]} is left out: {why}" for letter, why in every.left_out.items()]
     notes = (*machines.notes, *_missing(machines.stage), *left_out, *_troubles(results, count))
     return Comparison(machines, every, tuple(results), within, seed, notes)
@@ -251,29 +254,29 @@ def _missing(stage: Stage) -> list[str]:
     notes = []
     if stage.floor is None:
         notes.append(
-            "the stage file has no [floor]: in-position RMS is that of a machine that nothing shakes from outside, and "
-            "tells whether it rests, not how still it stands in a real room"
+            "the stage file has no [floor]: without vibration from outside the in-position RMS shows whether a machine "
+            "is at rest, not how still it would stand in a real room"
         )
     if stage.cable is not None:
-        notes.append("the linear loops leave the cable out: no modulus margin and no raised bandwidth knows of it")
+        notes.append("the linear loops, and so modulus margins and raised bandwidths, leave the cable out")
     return notes
 
 
 def _troubles(results: list[Result], count: int) -> list[str]:
     """Unstable loops and runs that failed, option by option."""
-    failed = "they count either way in the intervals of probabilities and are left out of medians"
-    found = []
+    failed = "the intervals of probabilities allow for either outcome of these, medians leave them out"
+    notes = []
     for result in results:
-        swings, both = result.found.swings, result.found.swings & ~result.loops.stable
+        swings, both = result.measures.swings, result.measures.swings & ~result.loops.stable
         unstable = (
-            "these are simulated and counted like the others; among the machines that swing at the "
-            f"end they are {both.sum()} of {swings.sum()}"
+            "these machines are simulated and counted like the others; of those that swing at the end they are "
+            f"{both.sum()} of {swings.sum()}"
         )
         troubles = (
             ("linear loops that are not stable", result.unstable, unstable),
             ("failed runs", result.failed, failed),
         )
-        for what, number, told in troubles:
+        for what, number, consequence in troubles:
             if number:
-                found.append(f"{result.letter} {result.option.name}, {what}: {number} of {count}; {told}")
-    return found
+                notes.append(f"{result.letter} {result.option.name}, {what}: {number} of {count}; {consequence}")
+    return notes

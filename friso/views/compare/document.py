@@ -9,38 +9,38 @@ from friso.equations.bandwidth import bandwidth
 from friso.hunting.criteria.peak_count import DISTINCT_CRITERION as PEAKS
 from friso.hunting.criteria.run_outcome import CRITERION as OUTCOME
 from friso.studies.compare.study import Comparison, Result
-from friso.views.compare.words import (
-    sentences,
-)
+from friso.views.compare.words import sentences
 from friso.views.documents import plain_json
 
 
-def compare_document(found: Comparison) -> dict[str, Any]:
+def compare_document(comparison: Comparison) -> dict[str, Any]:
     """The JSON document: SI units, the unit in the key's suffix; an infinite time (never) is null."""
-    machines = found.machines
+    machines = comparison.machines
+    conclusion, *details = sentences(comparison)
     return plain_json(
         {
-            "stage": found.stage.name,
-            "seed": found.seed,
+            "conclusion": conclusion,
+            "details": details,
+            "stage": comparison.stage.name,
+            "seed": comparison.seed,
             "machines": machines.count,
             "criteria": {"swings": f"{OUTCOME}; band: within_m", "distinct_peaks": PEAKS},
-            "within_m": found.within,
-            "deadband_m": found.options.deadband,
-            "sample_time_s": found.stage.flat()["drive.sample_time"],
+            "within_m": comparison.within,
+            "deadband_m": comparison.options.deadband,
+            "sample_time_s": comparison.stage.flat()["drive.sample_time"],
             "from_file": [*machines.from_file],
             "spreads_percent": dict(machines.spreads),
             "left_out_draws": machines.drawn.left_out,
-            "options": {result.letter: _option(found, result) for result in found.results},
-            "left_out": dict(found.options.left_out),
-            "standstill_compared": found.shaken,
-            "conclusion": sentences(found),
-            "notes": [*found.notes],
+            "options": {result.letter: _option(comparison, result) for result in comparison.results},
+            "left_out": dict(comparison.options.left_out),
+            "standstill_compared": comparison.shaken,
+            "notes": [*comparison.notes],
         }
     )
 
 
-def _option(found: Comparison, result: Result) -> dict[str, Any]:
-    pair = found.paired(result)
+def _option(comparison: Comparison, result: Result) -> dict[str, Any]:
+    pair = comparison.paired(result)
     crossover = bandwidth(result.option.stage.flat())
     return {
         "name": result.option.name,
@@ -63,7 +63,7 @@ def _option(found: Comparison, result: Result) -> dict[str, Any]:
             "sooner": asdict(pair.sooner),
             "later": asdict(pair.later),
             "alike": asdict(pair.alike),
-            "in_position_rms": asdict(pair.in_position) if found.shaken else None,
+            "in_position_rms": asdict(pair.in_position) if comparison.shaken else None,
             "force_rms": asdict(pair.force),
         },
     }

@@ -44,42 +44,44 @@ MOST = (5, 95)
 """Percentiles between which most machines are."""
 
 
-def figures(found: Comparison) -> list[Figure]:
+def figures(comparison: Comparison) -> list[Figure]:
     """Probabilities, settling times and standstill in one figure."""
-    within = with_unit(found.within, "m")
+    within = with_unit(comparison.within, "m")
     caption = (
-        f"{found.machines.count} machines drawn with seed {found.seed}, the same in all options; in position is within "
-        f"{within}. Bars of probabilities are 95 % intervals. Machines that never settle keep the line of the "
-        "settling times below 100 %; for standstill, the thin bars contain 90 % of the machines, the thick ones are "
-        "95 % "
-        "intervals of "
-        "the median."
+        f"{comparison.machines.count} machines drawn with seed {comparison.seed}, the same in all options; in position "
+        f"means within {within}. Bars of probabilities are 95 % intervals. The settling curve of an option ends at the "
+        "share of machines that settle at all. Standstill: thin bars contain 90 % of the machines, thick bars are 95 % "
+        "intervals of the median."
     )
-    if not found.shaken:
+    if not comparison.shaken:
         caption += " No floor vibration is included: a machine at rest here need not stand still in a real room."
-    panels = (_probabilities(found), _settling(found, within), _standstill(found))
-    return [Figure("compare", "Isolator or firmware?", caption, panels, subject=found.stage.name)]
+    panels = (_probabilities(comparison), _settling(comparison, within), _standstill(comparison))
+    return [Figure("compare", "Isolator or firmware?", caption, panels, subject=comparison.stage.name)]
 
 
-def _names(found: Comparison) -> Axis:
+def _names(comparison: Comparison) -> Axis:
     """The options side by side."""
-    return Axis("Option", "", (-0.5, len(found.results) - 0.5), words=tuple(map(label, found.results)))
+    return Axis("Option", "", (-0.5, len(comparison.results) - 0.5), words=tuple(map(label, comparison.results)))
 
 
-def _probabilities(found: Comparison) -> Panel:
+def _probabilities(comparison: Comparison) -> Panel:
     kinds = (
-        ("swings at the end", VERMILLION, [each.swinging for each in found.results]),
-        ("not in position at the end", BLUE, [_other(each.settled) for each in found.results]),
-        (f"does not stay there ({LONGER} times as long)", GREY, [_other(each.stays) for each in found.results]),
+        ("swings at the end", VERMILLION, [result.swinging for result in comparison.results]),
+        ("not in position at the end", BLUE, [_other(result.settled) for result in comparison.results]),
+        (
+            f"does not stay there ({LONGER} times as long)",
+            GREY,
+            [_other(result.stays) for result in comparison.results],
+        ),
     )
     series, markers = [], []
     for number, (name, colour, shares) in enumerate(kinds):
         x = np.arange(len(shares), dtype=np.float64) + (number - 1) * BESIDE
-        series.append(_bars(x, [(each.low, each.high) for each in shares], colour, 100))
-        heights = np.array([100 * each.probability for each in shares])
+        series.append(_bars(x, [(share.low, share.high) for share in shares], colour, 100))
+        heights = np.array([100 * share.probability for share in shares])
         markers.append(Markers(x, heights, name, colour))
     y = Axis("Share of machines", "%", (-3.0, 103.0))
-    return Panel("Machines that do not stand still", _names(found), y, tuple(series), tuple(markers))
+    return Panel("Machines that do not come to rest", _names(comparison), y, tuple(series), tuple(markers))
 
 
 def _other(share: Share) -> Share:
@@ -96,37 +98,40 @@ def _bars(
     return Series(places, heights, "", colour, width=width)
 
 
-def _settling(found: Comparison, within: str) -> Panel:
-    flat, count = found.stage.flat(), found.machines.count
+def _settling(comparison: Comparison, within: str) -> Panel:
+    flat, count = comparison.stage.flat(), comparison.machines.count
     end = flat["motion.duration"] - float(last_corner(flat))
-    times = [np.sort(each.found.settling[np.isfinite(each.found.settling)]) for each in found.results]
-    first = min((float(each[0]) for each in times if each.size), default=end)
+    times = [np.sort(result.measures.settling[np.isfinite(result.measures.settling)]) for result in comparison.results]
+    first = min((float(ordered[0]) for ordered in times if ordered.size), default=end)
     start = max(first, 1e-3 * end) / 1.3
     series = []
-    for result, ordered in zip(found.results, times, strict=True):
+    for result, ordered in zip(comparison.results, times, strict=True):
         colour, dash = LINES[result.letter]
         x = np.concatenate([[start], np.repeat(np.maximum(ordered, start), 2), [end]])
         steps = 100 * np.arange(len(ordered) + 1) / count
         series.append(Series(x, np.repeat(steps, 2), label(result), colour, dash))
-    axis = Axis("Time since the end of the move", "s", (start, end), log=True, prefixed=False)
+    axis = Axis("Time after the move", "s", (start, end), log=True, prefixed=False)
     return Panel(f"In position for good, within {within}", axis, Axis("Share", "%", (-3.0, 103.0)), tuple(series))
 
 
-def _standstill(found: Comparison) -> Panel:
-    x, medians = np.arange(len(found.results), dtype=np.float64), [each.in_position for each in found.results]
-    middle = np.array([each.value for each in medians])
+def _standstill(comparison: Comparison) -> Panel:
+    x, medians = (
+        np.arange(len(comparison.results), dtype=np.float64),
+        [result.in_position for result in comparison.results],
+    )
+    middle = np.array([median.value for median in medians])
     series = (
-        _bars(x, [_most(each) for each in found.results], GREY),
-        _bars(x, [(each.low, each.high) for each in medians], BLUE, width=4.0),
+        _bars(x, [_most(result) for result in comparison.results], GREY),
+        _bars(x, [(median.low, median.high) for median in medians], BLUE, width=4.0),
     )
     y = Axis("In-position RMS", "m", log=True)
-    title = "How still they stand" if found.shaken else "Whether they are at rest, without a floor"
-    return Panel(title, _names(found), y, series, (Markers(x, middle, "median", BLUE),))
+    title = "Standstill" if comparison.shaken else "At rest or not (no floor vibration)"
+    return Panel(title, _names(comparison), y, series, (Markers(x, middle, "median", BLUE),))
 
 
 def _most(result: Result) -> tuple[float, float]:
-    known = result.found.in_position[np.isfinite(result.found.in_position)]
-    if not known.size:
+    finite = result.measures.in_position[np.isfinite(result.measures.in_position)]
+    if not finite.size:
         return np.nan, np.nan
-    low, high = np.percentile(known, MOST)
+    low, high = np.percentile(finite, MOST)
     return float(low), float(high)

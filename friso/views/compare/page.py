@@ -21,29 +21,29 @@ from friso.views.files import Content, pictures
 from friso.views.pages import Report
 
 
-def compare_files(found: Comparison) -> dict[str, Content]:
+def compare_files(comparison: Comparison) -> dict[str, Content]:
     """The page, and every figure in all formats."""
-    figures = compare_figures(found)
-    return {"compare.html": page(found, figures), **pictures(figures)}
+    figures = compare_figures(comparison)
+    return {"compare.html": page(comparison, figures), **pictures(figures)}
 
 
-def page(found: Comparison, drawn: Sequence[Figure]) -> str:
+def page(comparison: Comparison, drawn: Sequence[Figure]) -> str:
     """The page with its figures."""
     return Report.of_stage(
         "compare.html",
-        found.stage,
+        comparison.stage,
         drawn,
-        sentences=sentences(found),
-        population=population(found),
-        notes=found.notes,
-        options=options_rows(found),
+        sentences=sentences(comparison),
+        population=population(comparison),
+        notes=comparison.notes,
+        options=options_rows(comparison),
         columns=COLUMNS,
-        rows=table_rows(found),
+        rows=table_rows(comparison),
         paired_columns=PAIRED,
-        paired=paired_rows(found),
-        seed=found.seed,
+        paired=paired_rows(comparison),
+        seed=comparison.seed,
         deadband=DEADBAND,
         model_error=100 * MODEL_ERROR,
         longer=LONGER,
-        shaken=found.shaken,
+        shaken=comparison.shaken,
     ).html()

@@ -5,18 +5,20 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
+import numpy as np
+
 from friso.equations.bandwidth import bandwidth
 from friso.evidence import value
 from friso.frequency.crossover import WANTED
 from friso.studies.compare.options import JOINT, MODEL_ERROR, Option
 from friso.studies.compare.statistics import EstimatedValue
-from friso.studies.compare.study import ENOUGH, FOLLOWED, LONGER, Comparison, Paired, Result
+from friso.studies.compare.study import ENOUGH, FOLLOWED, LONGER, Comparison, Result
 from friso.studies.shares import Share
 from friso.views.drawing.prefixes import NOTHING, listed, range_with_unit, with_unit
 
 COLUMNS = (
     "Swings at the end",
-    "Counts a distinct peak",
+    "Has a distinct peak",
     "In position at the end",
     "Stays there later",
     "Settling time",
@@ -25,78 +27,97 @@ COLUMNS = (
     "Modulus margin",
 )
 
-PAIRED = ("Swings more often by", "In position sooner, later, alike", "In-position RMS times", "Force RMS times")
+PAIRED = (
+    "Swinging, difference",
+    "In position sooner",
+    "In position later",
+    "Alike",
+    "In-position RMS, ratio",
+    "Force RMS, ratio",
+)
 
-UNSHAKEN = "not compared: no [floor]"
+UNSHAKEN = "no [floor]"
 
 Row = tuple[str, list[str]]
+
+
+PROSE = {
+    "a": "the machine as is",
+    "b": "the faster controller",
+    "c": "the isolator",
+    "d": "the deadband",
+    "e": "the reset",
+    "f": "feedforward",
+    "g": "isolator and faster controller",
+}
 
 
 def label(result: Result) -> str:
     return f"{result.letter} {result.option.name}"
 
 
-def options_rows(found: Comparison) -> list[tuple[str, str]]:
+def in_prose(result: Result) -> str:
+    """An option within a sentence."""
+    return f"{PROSE[result.letter]} ({result.letter})"
+
+
+def options_rows(comparison: Comparison) -> list[tuple[str, str]]:
     """What each option is."""
-    return [(label(result), _about(result.option, found)) for result in found.results]
+    return [(label(result), _about(result.option, comparison)) for result in comparison.results]
 
 
-def _about(option: Option, found: Comparison) -> str:
-    joint = "the joint free" if option.letter in JOINT else "the joint locked" if found.stage.joint else "no joint"
-    deadband = with_unit(found.options.deadband, "m")
+def _about(option: Option, comparison: Comparison) -> str:
+    joint = "the joint free" if option.letter in JOINT else "the joint locked" if comparison.stage.joint else "no joint"
+    deadband = with_unit(comparison.options.deadband, "m")
     what = {
-        "a": "the controller as in the file",
-        "b": _bandwidth(option, found),
-        "c": "the controller as in the file",
+        "a": "the controller of the file",
+        "b": _bandwidth(option, comparison),
+        "c": "the controller of the file",
         "d": f"the integrator pauses while the error is below {deadband}",
         "e": "the integrator is reset where the error changes sign",
         "f": f"feedforward of Coulomb and viscous friction, both {100 * MODEL_ERROR:g} % too large or both too small, "
         "drawn for each machine",
-        "g": _bandwidth(option, found),
+        "g": _bandwidth(option, comparison),
     }
     return f"{joint}; {what[option.letter]}"
 
 
-def _bandwidth(option: Option, found: Comparison) -> str:
-    own = bandwidth(found.stage.flat())
+def _bandwidth(option: Option, comparison: Comparison) -> str:
+    present = bandwidth(comparison.stage.flat())
     faster = f"a controller {option.factor:.3g} times as fast"
-    if own is not None:
-        raised, before = with_unit(own * option.factor, "Hz"), with_unit(own, "Hz")
-        faster = f"a {found.stage.controller.bandwidth_name} of {raised} instead of {before}"
-    return f"{faster}, the highest at which the machine of the file keeps a modulus margin of {WANTED:g}"
+    if present is not None:
+        raised, before = with_unit(present * option.factor, "Hz"), with_unit(present, "Hz")
+        faster = f"a {comparison.stage.controller.bandwidth_name} of {raised} instead of {before}"
+    return f"{faster}, the highest at which the machine of the file has a modulus margin of {WANTED:g}"
 
 
-def table_rows(found: Comparison) -> list[Row]:
+def table_rows(comparison: Comparison) -> list[Row]:
     """A row for each option, its texts under `COLUMNS`; 95 % intervals in brackets."""
     return [
         (
-            label(each),
+            label(result),
             [
-                *(percent(share) for share in (each.swinging, each.counted, each.settled, each.stays)),
-                _time(each.settling),
-                *(_length(value, unit) for value, unit in ((each.in_position, "m"), (each.force, "N"))),
-                _margin(each, found),
+                *(percent(share) for share in (result.swinging, result.counted, result.settled, result.stays)),
+                _time(result.settling),
+                *(_length(value, unit) for value, unit in ((result.in_position, "m"), (result.force, "N"))),
+                _margin(result, comparison),
             ],
         )
-        for each in found.results
+        for result in comparison.results
     ]
 
 
-def paired_rows(found: Comparison) -> list[Row]:
+def paired_rows(comparison: Comparison) -> list[Row]:
     """A row for each option but a, its texts under `PAIRED`."""
     rows = []
-    for each in found.results[1:]:
-        pair = found.paired(each)
+    for result in comparison.results[1:]:
+        pair = comparison.paired(result)
         points = [100 * value for value in (pair.swinging.value, pair.swinging.low, pair.swinging.high)]
         more = f"{points[0]:+.1f} points ({points[1]:+.1f} to {points[2]:+.1f})"
-        still = _ratio(pair.in_position) if found.shaken else UNSHAKEN
-        rows.append((label(each), [more, _when(pair), still, _ratio(pair.force)]))
+        still = _ratio(pair.in_position) if comparison.shaken else UNSHAKEN
+        when = [percent(share) for share in (pair.sooner, pair.later, pair.alike)]
+        rows.append((label(result), [more, *when, still, _ratio(pair.force)]))
     return rows
-
-
-def _when(pair: Paired) -> str:
-    shares = {"sooner": pair.sooner, "later": pair.later, "alike": pair.alike}
-    return "; ".join(f"{word} {percent(share)}" for word, share in shares.items())
 
 
 def percent(share: Share) -> str:
@@ -110,148 +131,171 @@ def _percent(part: float) -> str:
     return f"{100 * part:.{digits}f}"
 
 
-def _time(found: EstimatedValue) -> str:
+def _time(median: EstimatedValue) -> str:
     """A median of settling times, of which more than half may never come."""
-    if math.isfinite(found.high):
-        return f"{with_unit(found.value, 's')} ({range_with_unit(found.low, found.high, 's')})"
-    middle, low = ("never" if value == math.inf else with_unit(value, "s") for value in (found.value, found.low))
+    if math.isfinite(median.high):
+        return f"{with_unit(median.value, 's')} ({range_with_unit(median.low, median.high, 's')})"
+    middle, low = ("never" if value == math.inf else with_unit(value, "s") for value in (median.value, median.low))
     return middle if middle == low else f"{middle} ({low} to never)"
 
 
-def _length(found: EstimatedValue, unit: str) -> str:
-    if not all(map(math.isfinite, (found.value, found.low, found.high))):
+def _length(median: EstimatedValue, unit: str) -> str:
+    if not all(map(math.isfinite, (median.value, median.low, median.high))):
         return NOTHING
-    return f"{with_unit(found.value, unit)} ({range_with_unit(found.low, found.high, unit)})"
+    return f"{with_unit(median.value, unit)} ({range_with_unit(median.low, median.high, unit)})"
 
 
-def _ratio(found: EstimatedValue) -> str:
-    if not all(map(math.isfinite, (found.value, found.low, found.high))):
+def _ratio(median: EstimatedValue) -> str:
+    if not all(map(math.isfinite, (median.value, median.low, median.high))):
         return NOTHING
-    return f"{found.value:.3g} ({found.low:.3g} to {found.high:.3g})"
+    return f"{median.value:.3g} ({median.low:.3g} to {median.high:.3g})"
 
 
-def _margin(result: Result, found: Comparison) -> str:
+def _margin(result: Result, comparison: Comparison) -> str:
     least = f"least {result.loops.margin.min():.2f}"
     if result.unstable:
-        least = f"{result.unstable} of {found.machines.count} not stable"
+        least = f"{result.unstable} of {comparison.machines.count} not stable"
     return f"{result.margin.value:.2f} ({least})"
 
 
-def sentences(found: Comparison) -> list[str]:
-    """What follows for the one who has to choose between a joint and settings."""
-    return [_who_rests(found), *_costs(found), *_others(found), _choice(found), *_standstill(found)]
+def sentences(comparison: Comparison) -> list[str]:
+    """What follows for the one who has to choose between a joint and settings, the answer first."""
+    return [*answer(comparison), *details(comparison)]
 
 
-def _who_rests(found: Comparison) -> str:
-    count, settling = found.machines.count, _resting(found)
-    within = f"within {with_unit(found.within, 'm')}"
-    some = min(FOLLOWED, count)
-    if not settling:
-        best = max(found.results, key=lambda each: each.in_position_count)
+def answer(comparison: Comparison) -> list[str]:
+    """Which options bring the machines to rest at what cost, and what to do."""
+    return [conclusion(comparison), *_recommendation(comparison)]
+
+
+def details(comparison: Comparison) -> list[str]:
+    """How well each option does, and what is not compared."""
+    return [*_performance(comparison), *_failing(comparison), *_standstill(comparison)]
+
+
+def conclusion(comparison: Comparison) -> str:
+    """Which options bring the machines to rest, how many of them, and at what cost."""
+    resting, base = _resting(comparison), comparison.results[0]
+    within, count = with_unit(comparison.within, "m"), comparison.machines.count
+    if not resting:
+        best = max(comparison.results, key=lambda result: result.in_position_count)
         return (
-            f"No option brings {100 * ENOUGH:g} % of the {count} machines into position {within} and keeps them "
-            f"there: {label(best)} has the most in position at the end, {percent(best.settled)}."
+            f"No option brings {100 * ENOUGH:g} % of the {count} machines to rest within {within}. The best is "
+            f"{in_prose(best)}, with {best.in_position_count} in position at the end. {_as_is(comparison)}"
         )
-    parts = [f"{label(each)} {_how_many(each, count)}" for each in settling]
-    return (
-        f"Of {count} machines are in position {within} at the end: {listed(parts, 'and')}; of {some} that were "
-        f"followed {LONGER} times as long at least {100 * ENOUGH:g} % stay there."
-    )
+    first, *further = resting
+    brought = [
+        f"{in_prose(first)} {'brings' if first is not base else 'already brings'} {_number(first, count)} machines to "
+        f"rest within {within}{_cost(first, comparison)}",
+        *(f"{in_prose(result)} {_number(result, count)}{_cost(result, comparison)}" for result in further),
+    ]
+    text = "; ".join(brought)
+    return f"{text[0].upper()}{text[1:]}. {_as_is(comparison)}".rstrip()
 
 
-def _how_many(result: Result, count: int) -> str:
-    number = "all" if result.in_position_count == count else str(result.in_position_count)
-    return f"{number} (95 %: at least {_percent(result.settled.low)} %)"
+def _number(result: Result, count: int) -> str:
+    return f"all {count}" if result.in_position_count == count else f"{result.in_position_count} of {count}"
 
 
-def _costs(found: Comparison) -> list[str]:
-    """The price of each option that brings the machines to rest."""
-    own = found.results[0].margin.value
+def _cost(result: Result, comparison: Comparison) -> str:
+    """What an option takes and leaves, against a."""
+    if result.letter == "a":
+        return ""
+    loops = f"modulus margin {result.margin.value:.2f}, least {result.loops.margin.min():.2f}"
+    if result.unstable:
+        loops = f"the linear loop is unstable on {result.unstable} of {comparison.machines.count}"
+    return f" ({comparison.paired(result).force.value:.3g} times the force RMS of a; {loops})"
+
+
+def _as_is(comparison: Comparison) -> str:
+    """What the machines do as they are, where that is not at rest."""
+    base, count = comparison.results[0], comparison.machines.count
+    if base.rests:
+        return ""
+    swinging = int(np.count_nonzero(base.measures.swings))
+    return f"As is (a), {swinging} of {count} swing at the end, modulus margin {base.margin.value:.2f}."
+
+
+def _recommendation(comparison: Comparison) -> list[str]:
+    """Whether to buy a joint."""
+    resting = _resting(comparison)
+    joint, settings = ([result for result in resting if (result.letter in JOINT) is bought] for bought in (True, False))
+    if any(result.letter == "a" for result in settings):
+        return ["These machines need neither a joint nor other settings."]
+    if joint and settings:
+        return [
+            f"Controller settings do what a joint does on these machines: {_names(settings)} needs no joint. Buy a "
+            "joint only if the controller cannot be set that way."
+        ]
+    if joint:
+        return [f"Only a joint brings these machines to rest: {_names(joint)}. No setting does so alone."]
+    if settings:
+        tried = any(result.letter in JOINT for result in comparison.results)
+        return [f"Controller settings are enough: {_names(settings)}{'; a joint is not' if tried else ''}."]
+    return []
+
+
+def _performance(comparison: Comparison) -> list[str]:
+    """How fast the options that bring the machines to rest do so, how still these are then, and how sure that is."""
+    resting, some = _resting(comparison), min(FOLLOWED, comparison.machines.count)
+    says = [
+        f"{label(result)}: in position in {with_unit(result.settling.value, 's')} (median)"
+        f"{_still(result, comparison)}; at least {_percent(result.settled.low)} % of such machines come to rest (95 % "
+        "confidence)."
+        for result in resting
+    ]
+    longer = f"Of {some} machines followed {LONGER} times as long, {100 * ENOUGH:g} % or more stay at rest with "
+    return [*says, f"{longer}{listed([result.letter for result in resting], 'and')}."] if says else []
+
+
+def _still(result: Result, comparison: Comparison) -> str:
+    return f", stands still to {with_unit(result.in_position.value, 'm')} RMS" if comparison.shaken else ""
+
+
+def _failing(comparison: Comparison) -> list[str]:
+    """What the machines do at the end with the other options."""
     return [
-        f"{label(each)}: in position in {with_unit(each.settling.value, 's')} (median), {_still(each, found)}takes "
-        f"{found.paired(each).force.value:.3g} times the force RMS of a, and has a modulus margin of "
-        f"{each.margin.value:.2f} instead of {own:.2f}{_robust(each, found)}."
-        for each in _resting(found)
-        if each.letter != "a"
+        f"{label(result)}: not enough. {percent(result.swinging)} of the machines swing at the end and "
+        f"{percent(result.settled)} are in position; throughout the last half of a run {LONGER} times as long "
+        f"{percent(result.stays)} are."
+        for result in comparison.results
+        if not result.rests
     ]
 
 
-def _still(result: Result, found: Comparison) -> str:
-    return f"stands still to {with_unit(result.in_position.value, 'm')} RMS, " if found.shaken else ""
-
-
-def _standstill(found: Comparison) -> list[str]:
+def _standstill(comparison: Comparison) -> list[str]:
     """Why standstill is no part of the conclusions."""
-    if found.shaken:
+    if comparison.shaken:
         return []
     joint = (
         " On the thesis's rig, with a quiet floor and amplifier noise, the stage on its free joint moves "
         f"{value('rig.in-position', 'rms_ratio'):.2g} times as much (RMS) as with the joint locked "
         "(friso rig in-position)."
     )
-    return [
-        "Standstill is not compared: the stage file has no [floor]. In-position RMS is then that of a "
-        "machine that nothing shakes from outside; it shows whether the machine is at rest, not how still it would "
-        "stand in a real room." + (joint if any(each.letter in JOINT for each in found.results) else "")
-    ]
+    bought = any(result.letter in JOINT for result in comparison.results)
+    return [f"Standstill is not compared: the stage file has no [floor].{joint if bought else ''}"]
 
 
-def _robust(result: Result, found: Comparison) -> str:
-    if result.unstable:
-        return f"; the linear loop of {result.unstable} of {found.machines.count} machines is not stable"
-    return f", {result.loops.margin.min():.2f} in the worst machine"
+def _names(results: Sequence[Result]) -> str:
+    return listed([in_prose(result) for result in results], "or")
 
 
-def _others(found: Comparison) -> list[str]:
-    """What the machines do at the end with the other options."""
-    return [
-        f"{label(each)} does not bring them to rest: {percent(each.swinging)} swing at the end, "
-        f"{percent(each.settled)} are in position then, and {percent(each.stays)} stay there later."
-        for each in found.results
-        if not each.rests
-    ]
+def _resting(comparison: Comparison) -> list[Result]:
+    return [result for result in comparison.results if result.rests]
 
 
-def _choice(found: Comparison) -> str:
-    settling = _resting(found)
-    joint, settings = ([each for each in settling if (each.letter in JOINT) is bought] for bought in (True, False))
-    if joint and settings:
-        return (
-            f"On these machines controller settings achieve what a joint achieves: {_names(settings)} brings them to "
-            f"rest without one, {_names(joint)} with one. The joint is for machines on which those settings are not "
-            "possible."
-        )
-    if joint:
-        return f"On these machines only the joint brings them to rest: {_names(joint)}; no setting alone does."
-    if settings:
-        said = "and no option with a joint does" if any(each.letter in JOINT for each in found.results) else ""
-        return f"On these machines controller settings suffice: {_names(settings)}{', ' + said if said else ''}."
-    return (
-        "On these machines neither a joint nor controller settings bring enough of them to rest: see the table for "
-        "what each achieves."
-    )
-
-
-def _names(some: Sequence[Result]) -> str:
-    return listed([label(each) for each in some], "or")
-
-
-def _resting(found: Comparison) -> list[Result]:
-    return [each for each in found.results if each.rests]
-
-
-def population(found: Comparison) -> list[str]:
+def population(comparison: Comparison) -> list[str]:
     """How the machines were drawn."""
-    machines = found.machines
+    machines = comparison.machines
     says = [
-        f"{machines.count} machines drawn with seed {found.seed}, each the same in all options: parameters, rail, "
-        "noise."
+        f"{machines.count} machines were drawn with seed {comparison.seed}; a machine has the same parameters, rail and "
+        "noise in all options."
     ]
     if machines.from_file:
-        says.append(f"Uncertain as the file says: {', '.join(machines.from_file)}.")
+        says.append(f"Uncertain as in the stage file: {', '.join(machines.from_file)}.")
     if machines.spreads:
         spreads = ", ".join(f"{key} ±{spread:g} %" for key, spread in machines.spreads.items())
-        says.append(f"With default spreads (95 % of the machines) because the file gives none: {spreads}.")
+        says.append(f"Default spreads (95 % of the machines), as the stage file gives none: {spreads}.")
     if "rail.seed" in machines.keys:
-        says.append("Each has its own rail.")
+        says.append("Every machine has a rail of its own.")
     return says
