@@ -16,9 +16,9 @@ from friso.hunting.boundary import Branch, Curve, Diagram, KeyRange, Kind, Locat
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import NOT_CLOSED, Cycles, symmetric_cycles
 from friso.stage import Stage
-from friso.views.boundary.data import corner_verdicts, end_verdicts, lines
-from friso.views.boundary.figures import boundary_figure
-from friso.views.boundary.words import ShownKey, sentences
+from friso.studies.boundary_lines import corner_verdicts, end_verdicts, lines
+from friso.views.boundary.figures import NODES, boundary_figure
+from friso.views.boundary.words import VERDICTS, ShownKey, conclusion, sentences
 from friso.views.drawing import matplotlib_renderer, plotly_renderer
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
@@ -54,7 +54,7 @@ def test_the_locked_rig_flips_at_9_75_hz(single: tuple[dict, Path]) -> None:
 
 def test_the_document_of_one_key(single: tuple[dict, Path]) -> None:
     document, _ = single
-    assert document.keys() == {"key", "unit", "points", "ends", "branches"}
+    assert document.keys() == {"conclusion", "key", "unit", "points", "ends", "branches"}
     assert (document["key"], document["unit"]) == ("controller.crossover", "Hz")
     assert document["ends"] == {"low": "attracting cycle", "high": "no attracting cycle"}
     values = [point["value"] for point in document["points"]]
@@ -94,9 +94,10 @@ def test_values_are_told_in_the_unit_of_the_command_line(tmp_path: Path) -> None
 def test_a_range_without_a_boundary_says_so(tmp_path: Path) -> None:
     done = boundary(tmp_path, *LOCKED, "--x", "controller.crossover=4 Hz..6 Hz")
     assert done.returncode == 0
-    assert "No boundary of hunting over controller.crossover 4 Hz to 6 Hz." in done.stdout
-    hunts = "an attracting cycle (hunting is possible)"
-    assert f"At 4 Hz: {hunts}; at 6 Hz: {hunts}." in done.stdout
+    said = " ".join(done.stdout.split())
+    assert "neither begins nor ends over controller.crossover 4 Hz to 6 Hz." in said
+    hunts = VERDICTS["attracting cycle"]
+    assert f"At 4 Hz: {hunts}; at 6 Hz: {hunts}." in said
     assert list(tmp_path.iterdir()) == []
 
 
@@ -107,7 +108,7 @@ def test_the_curve_of_two_keys_separates_what_attracts(tmp_path: Path, rig: Stag
     )
     assert done.returncode == 0, done.stderr
     document = json.loads(done.stdout)
-    assert document.keys() == {"x", "y", "curves", "lost", "corners"}
+    assert document.keys() == {"conclusion", "x", "y", "curves", "lost", "corners"}
     assert document["y"] == {"key": "masses.cart", "unit": "g"}
     assert document["corners"] == {
         **{"low low": "attracting cycle", "low high": "attracting cycle"},
@@ -219,8 +220,9 @@ def test_special_points_stand_in_their_place_on_the_branch(round_a_fold: Diagram
 
 
 def test_sentences_tell_what_becomes_of_a_cycle_as_the_key_rises(round_a_fold: Diagram) -> None:
-    ends, first, second, fold, followed = sentences(round_a_fold, (MM,))
-    assert ends.startswith("At 1 mm: an attracting cycle (hunting is possible); at 2 mm: unknown")
+    answer, first, second, fold, followed = sentences(round_a_fold, (MM,))
+    assert answer == conclusion(round_a_fold, (MM,))
+    assert "joint.stroke = 1.45 mm, 1.72 mm and 1.73 mm" in answer
     assert "stops attracting at joint.stroke = 1.45 ± 1e-06 mm (flip: above, it still exists" in first
     assert "begins to attract at joint.stroke = 1.72 ± 1e-06 mm (flip: below, it still exists" in second
     assert "vanishes at joint.stroke = 1.73 ± 1e-06 mm (fold: above, it has merged" in fold
@@ -250,7 +252,7 @@ def crossing() -> Plane:
 
 
 def test_sentences_of_two_keys(crossing: Plane) -> None:
-    curve, meaning, *corners, lost = sentences(crossing, (MM, ShownKey("controller.kp", "N/m")))
+    answer, curve, meaning, *corners, lost = sentences(crossing, (MM, ShownKey("controller.kp", "N/m")))
     assert curve == (
         "Flip of the hunting cycle: 3 points, joint.stroke 1.5 to 1.5 mm, controller.kp 1 to 100 N/m; "
         "ends: end of the range; largest error: 1e-06 mm, 0 N/m."
@@ -259,7 +261,8 @@ def test_sentences_of_two_keys(crossing: Plane) -> None:
     assert [verdict for _, _, verdict in corner_verdicts(crossing)] == [
         *("attracting cycle", "unknown", "invalid", "no attracting cycle"),
     ]
-    assert corners[3] == "At joint.stroke = 2 mm, controller.kp = 100 N/m: none (no hunting)."
+    assert "1 of the 4 corners of the plane (unknown at 1)" in answer
+    assert corners[3].startswith("At joint.stroke = 2 mm, controller.kp = 100 N/m: no hunting")
     assert lost.startswith("A change was found near joint.stroke = 1.5 mm, controller.kp = 3.16228 N/m, but no curve")
 
 
@@ -271,8 +274,8 @@ def test_the_figure_of_two_keys_shows_nodes_and_curves_in_one_legend(crossing: P
     canvas = matplotlib_renderer.render(figure)
     texts = [text.get_text() for text in canvas.legends[0].get_texts()]
     assert texts == [
-        *("an attracting cycle: hunting", "none: no hunting", "unknown: orbit not closed"),
-        *("invalid stage", "flip of the hunting cycle"),
+        *(kind.label for kind in NODES.values()),
+        "flip of the hunting cycle",
     ]
     names = [trace.name for trace in plotly_renderer.render(figure).data if trace.mode == "lines"]
     assert "flip of the hunting cycle" in names

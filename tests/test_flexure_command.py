@@ -22,8 +22,8 @@ from friso.cli.flexure import EXAMPLE
 from friso.cli.flexure import flexure as command
 from friso.cli.output import MARKER
 from friso.errors import InputError
-from friso.flexure.beams import BeamFailure, beams
-from friso.flexure.closed_model import closed
+from friso.flexure.beams import BeamFailure
+from friso.flexure.both_models import BEAMS, CLOSED, BothModels, both_models
 from friso.flexure.evaluation import Mode
 from friso.flexure.mechanism import Mechanism
 from friso.stage import Stage
@@ -32,7 +32,6 @@ from friso.views.drawing.figure import Figure
 from friso.views.flexure.document import flexure_document
 from friso.views.flexure.drawing import drawing_svg
 from friso.views.flexure.figures import flexure_figures
-from friso.views.flexure.findings import BEAMS, CLOSED, Found, interferes
 from friso.views.flexure.layout import SCALES, WIDTH, block_size
 from friso.views.flexure.modes import VIEWS, best_view, modes_figure
 from friso.views.flexure.page import flexure_html
@@ -81,9 +80,8 @@ def of_material(stage: Stage, name: str) -> Stage:
     return stage.replace({**MATERIAL, "flexure.material": name})
 
 
-def evaluated(stage: Stage, stroke: float = 1e-3) -> Found:
-    it = Mechanism.of(stage.flat())
-    return Found(stage, closed(it, stroke), beams(it, stroke))
+def evaluated(stage: Stage, stroke: float = 1e-3) -> BothModels:
+    return both_models(stage, Mechanism.of(stage.flat()), stroke)
 
 
 @pytest.fixture(scope="module")
@@ -99,7 +97,7 @@ def stage(path: Path) -> Stage:
 
 
 @pytest.fixture(scope="module")
-def found(stage: Stage) -> Found:
+def found(stage: Stage) -> BothModels:
     return evaluated(stage)
 
 
@@ -118,7 +116,7 @@ def broken(monkeypatch: pytest.MonkeyPatch) -> None:
     def fail(mechanism: Mechanism, stroke: float) -> None:
         raise BeamFailure("The beams find no equilibrium at a deflection of 1 mm: reduce the stroke.")
 
-    monkeypatch.setattr("friso.flexure.beams.beams", fail)
+    monkeypatch.setattr("friso.flexure.both_models.beams", fail)
 
 
 def _strict(text: str) -> dict[str, Any]:
@@ -149,7 +147,7 @@ def test_the_document_has_the_agreed_keys(path: Path, capsys: pytest.CaptureFixt
 
 
 @pytest.mark.parametrize("model", ["beams", "closed forms"])
-def test_the_document_tells_what_textbooks_and_shells_say(found: Found, model: str) -> None:
+def test_the_document_tells_what_textbooks_and_shells_say(found: BothModels, model: str) -> None:
     document = flexure_document(found)
     known = document if model == "beams" else document["closed_forms"]
     assert known["model"] == model
@@ -168,7 +166,7 @@ def test_the_document_tells_what_textbooks_and_shells_say(found: Found, model: s
     assert known["forces_n"][-1] == pytest.approx(known["drive_stiffness_n_per_m"] * 1e-3, rel=5e-3)
 
 
-def test_modes_that_interfere_with_control_are_told_from_the_drive(found: Found) -> None:
+def test_modes_that_interfere_with_control_are_told_from_the_drive(found: BothModels) -> None:
     document = flexure_document(found)
     assert document["names"][0] == "drive"
     assert document["interferes"][0] is False
@@ -205,7 +203,7 @@ def test_a_failure_of_the_beams_leaves_the_closed_forms(
 # ---------------------------------------------------------------- what is said
 
 
-def test_the_table_has_a_row_for_each_mode_by_name(found: Found) -> None:
+def test_the_table_has_a_row_for_each_mode_by_name(found: BothModels) -> None:
     table = dict(rows(found))
     assert table["Drive stiffness"] == ["2.54 N/mm", "2.54 N/mm"]
     assert table["Support stiffness x, straight"] == ["96.1 N/µm", "96.1 N/µm"]
@@ -239,7 +237,7 @@ def test_what_the_leaves_do_not_bear_is_a_warning(
     assert any(warning in said for said in warnings(evaluated(stage.replace(changes), stroke)))
 
 
-def test_models_that_differ_are_a_warning(found: Found) -> None:
+def test_models_that_differ_are_a_warning(found: BothModels) -> None:
     assert not any("differ" in said for said in warnings(found))
     assert found.beams is not None
     other = replace(found, beams=replace(found.beams, stress=found.beams.stress * 0.8, drive=found.beams.drive * 2))
@@ -273,9 +271,9 @@ def test_only_what_is_left_out_is_assumed(stage: Stage) -> None:
     assert said.endswith("cube of 0.5 kg.")
 
 
-def test_without_a_mode_that_interferes_there_is_no_limit(found: Found) -> None:
+def test_without_a_mode_that_interferes_there_is_no_limit(found: BothModels) -> None:
     quiet = tuple(replace(mode, peak=0.0) for mode in found.closed.modes)
-    alone = Found(found.stage, replace(found.closed, modes=quiet), None, "told")
+    alone = BothModels(found.stage, replace(found.closed, modes=quiet), None, "told")
     assert any("the leaves set no limit to the crossover" in said for said in sentences(alone))
     assert flexure_document(alone)["first_interfering_hz"] is None
     assert "The beam model found no solution: told" in Page(flexure_html(alone, ())).text
@@ -297,7 +295,7 @@ def test_files_and_page(folder: Path) -> None:
     assert "thickness = " in page.text
 
 
-def test_force_and_supports_are_drawn_by_both_models(found: Found) -> None:
+def test_force_and_supports_are_drawn_by_both_models(found: BothModels) -> None:
     force, support, _ = flexure_figures(found)
     (panel,) = force.panels
     assert [line.label for line in panel.series] == [BEAMS, CLOSED, "initial stiffness"]
@@ -309,7 +307,7 @@ def test_force_and_supports_are_drawn_by_both_models(found: Found) -> None:
         assert (panel.series[0].y[0] * 1e6, panel.series[0].y[-1] * 1e6) == pytest.approx((expected[0], expected[-1]))
 
 
-def test_modes_are_drawn_with_their_names_and_who_sees_them(found: Found) -> None:
+def test_modes_are_drawn_with_their_names_and_who_sees_them(found: BothModels) -> None:
     figure = modes_figure(found.best)
     titles = [panel.title for panel in figure.panels]
     assert titles[0].startswith("drive, 11.3 Hz")
@@ -336,13 +334,13 @@ def test_modes_are_drawn_with_their_names_and_who_sees_them(found: Found) -> Non
         ((0, 0, 0, 20, 0, 0), "along the leaves"),
     ],
 )
-def test_a_mode_is_seen_from_where_it_moves(found: Found, stage_motion: tuple[float, ...], view: str) -> None:
+def test_a_mode_is_seen_from_where_it_moves(found: BothModels, stage_motion: tuple[float, ...], view: str) -> None:
     mode = Mode("some", 1.0, 0.0, 0.0, 0.0, np.array(stage_motion, float), np.zeros((2, 17, 3)))
     assert best_view(found.mechanism, mode) == view
     assert view in VIEWS
 
 
-def test_the_drive_mode_shifts_the_stage_up_or_down(found: Found) -> None:
+def test_the_drive_mode_shifts_the_stage_up_or_down(found: BothModels) -> None:
     rest, moved = modes_figure(found.best).panels[0].series
     shift = moved.y - rest.y
     block = slice(-6, -1)
@@ -352,7 +350,7 @@ def test_the_drive_mode_shifts_the_stage_up_or_down(found: Found) -> None:
 
 
 @pytest.mark.parametrize("render", [matplotlib_renderer.render, plotly_renderer.render])
-def test_both_renderers_draw_the_figures(found: Found, render: Callable[[Figure], Any]) -> None:
+def test_both_renderers_draw_the_figures(found: BothModels, render: Callable[[Figure], Any]) -> None:
     for figure in flexure_figures(found):
         drawn = render(figure)
         assert len(getattr(drawn, "axes", figure.panels)) == len(figure.panels)
@@ -492,7 +490,8 @@ def test_wrong_input_ends_in_one_message_and_status_2(tmp_path: Path) -> None:
     assert not (tmp_path / "out").exists()
 
 
-def test_interfering_modes_are_those_of_the_evaluation(found: Found) -> None:
+def test_interfering_modes_are_those_of_the_evaluation(found: BothModels) -> None:
     for it in found.models.values():
-        first = next((mode for mode in it.modes if interferes(it, mode)), None)
+        first = next((mode for mode in it.modes[1:] if mode.interferes), None)
         assert first is it.interfering
+        assert [it.interferes(mode) for mode in it.modes] == [False, *(mode.interferes for mode in it.modes[1:])]

@@ -49,9 +49,9 @@ RUNS = {
 
 
 @pytest.fixture(autouse=True)
-def wide(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A terminal, and no time for pictures, which say nothing here."""
-    monkeypatch.setenv("COLUMNS", "120")
+def narrow(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A narrow terminal, and no time for pictures, which say nothing here."""
+    monkeypatch.setenv("COLUMNS", "80")
     monkeypatch.setattr(matplotlib_renderer, "image", lambda figure, form: b"")
 
 

@@ -13,6 +13,7 @@ from friso.cli.common import (
     StageFile,
     Tolerance,
     key_values,
+    print_wrapped,
     read_stage,
     read_tolerance,
 )
@@ -68,7 +69,8 @@ def boundary(
     else:
         from friso.views.boundary.words import sentences
 
-        print("\n".join(sentences(traced, keys)))
+        for sentence in sentences(traced, keys):
+            print_wrapped(sentence)
         print_written(files)
 
 

@@ -14,8 +14,8 @@ from friso.quantities import Quantity, positive, quoted
 from friso.stage import Stage
 
 if TYPE_CHECKING:
+    from friso.flexure.both_models import BothModels
     from friso.flexure.mechanism import Mechanism
-    from friso.views.flexure.findings import Found
 
 STROKE = Quantity("m", positive, "1 mm")
 EXAMPLE = """[flexure]
@@ -44,10 +44,12 @@ def flexure(
     stage = read_stage(stage_file, overrides, leaves_out=())
     mechanism = _mechanism(stage, str(stage_file))
     deflection = _stroke(stroke, stage, mechanism)
+    from friso.flexure.both_models import both_models
+
     target = output_folder("flexure", out, overwrite, [stage_file])
     files = []
     with ProgressBar("bending the leaves") as progress:
-        evaluated = _evaluate(stage, mechanism, deflection)
+        evaluated = both_models(stage, mechanism, deflection)
         if target is not None:
             from friso.views.flexure.page import flexure_files
 
@@ -92,20 +94,7 @@ def _stroke(text: str | None, stage: Stage, mechanism: Mechanism) -> float:
     return float(stroke)
 
 
-def _evaluate(stage: Stage, mechanism: Mechanism, stroke: float) -> Found:
-    """Both models; a failure of the beams is kept as such."""
-    from friso.flexure.beams import BeamFailure, beams
-    from friso.flexure.closed_model import closed
-    from friso.views.flexure.findings import Found
-
-    simple = closed(mechanism, stroke)
-    try:
-        return Found(stage, simple, beams(mechanism, stroke))
-    except BeamFailure as failure:
-        return Found(stage, simple, None, str(failure))
-
-
-def _print(evaluated: Found) -> None:
+def _print(evaluated: BothModels) -> None:
     from friso.views.flexure.table import rows
     from friso.views.flexure.words import sentences
 

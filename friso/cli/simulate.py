@@ -12,6 +12,7 @@ from friso.cli.common import (
     AsJson,
     Overrides,
     leave,
+    print_wrapped,
     read_sample_time,
     read_stage,
     read_tolerance,
@@ -43,21 +44,26 @@ def simulate(
     """
     interval = None if sample_time is None else read_sample_time(sample_time)
     tolerance = None if rtol is None else read_tolerance(rtol)
-    stage, name, its_rtol = _stage(arguments, overrides) if cell is None else _cell(cell, arguments, overrides)
+    stage, name, usual_rtol = _stage(arguments, overrides) if cell is None else _cell(cell, arguments, overrides)
     target = OutputFolder("simulate", out, overwrite, [] if cell else [Path(arguments[0])])
     from friso.engine.simulate import simulate as simulate_stage
+    from friso.studies.response import measured_run
     from friso.views.simulate.document import simulate_document, simulate_files
+    from friso.views.simulate.words import conclusion
 
-    response = simulate_stage(stage, rtol=tolerance or its_rtol, sample_time=interval)
+    response = simulate_stage(stage, rtol=tolerance or usual_rtol, sample_time=interval)
+    measures = measured_run(stage, tolerance or usual_rtol)
     files = simulate_files(response, f"{name}_response")
     written = target.write(files if cell is None else {**files, f"{name}.toml": stage.to_toml()})
-    status = response.attrs["status"]
+    deviation = float(response["position"][-1] - response["reference"][-1])
+    sentence = conclusion(name if cell else stage.name or name, measures, deviation)
     if as_json:
-        print_document(simulate_document(response, stage.name, written))
+        print_document(simulate_document(response, measures, stage.name, sentence, written))
     else:
-        print(f"{name if cell else stage.name or name}: {status} ({response.attrs['steps']} steps)")
+        print_wrapped(sentence)
+        print(f"{response.attrs['steps']} steps of the solver, {response.attrs['rejected']} rejected")
         print_written(written)
-    leave(status == "done")
+    leave(response.attrs["status"] == "done")
 
 
 def _stage(arguments: list[str], overrides: list[str] | None) -> tuple[Stage, str, float]:

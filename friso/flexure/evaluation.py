@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -103,7 +104,21 @@ class Evaluation:
     @property
     def interfering(self) -> Mode | None:
         """The lowest mode other than the drive mode that interferes with control."""
-        return next((mode for mode in self.modes[1:] if mode.interferes), None)
+        return next((mode for mode in self.modes if self.interferes(mode)), None)
+
+    def interferes(self, mode: Mode) -> bool:
+        """Whether a mode disturbs control: all but the drive mode, on which control works, may."""
+        return mode.interferes and mode is not self.modes[0]
+
+    @property
+    def named_modes(self) -> dict[str, Mode]:
+        """The modes by name, in their order; namesakes beyond the first are counted."""
+        seen: Counter[str] = Counter()
+        named = {}
+        for mode in self.modes:
+            seen[mode.name] += 1
+            named[mode.name if seen[mode.name] == 1 else f"{mode.name} ({seen[mode.name]})"] = mode
+        return named
 
 
 def peak_of(mechanism: Mechanism, actuator: float, sensor: float) -> float:

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from friso.hunting.boundary import Diagram, Plane
-from friso.views.boundary.data import Line, corner_verdicts, end_verdicts, lines, lost_places
+from friso.studies.boundary_lines import Line, corner_verdicts, end_verdicts, lines, lost_places
 from friso.views.boundary.figures import boundary_figure
-from friso.views.boundary.words import ShownKey
+from friso.views.boundary.words import ShownKey, conclusion
 from friso.views.documents import plain_json
 from friso.views.drawing.matplotlib_renderer import FORMATS, save
 from friso.views.files import Content
@@ -21,7 +21,7 @@ from friso.views.files import Content
 def boundary_document(traced: Diagram | Plane, keys: tuple[ShownKey, ...]) -> dict[str, Any]:
     """The JSON document of `boundary`; values of the keys in the units of the command line."""
     document = _of_diagram(traced, keys[0]) if isinstance(traced, Diagram) else _of_plane(traced, keys)
-    return plain_json(document)
+    return plain_json({"conclusion": conclusion(traced, keys), **document})
 
 
 def _of_diagram(traced: Diagram, key: ShownKey) -> dict[str, Any]:

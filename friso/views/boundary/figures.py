@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from friso.hunting.boundary import Diagram, KeyRange, Plane
-from friso.views.boundary.data import ATTRACTS, INVALID, REPELS, UNKNOWN, Line, Shape, lines, node_verdicts
+from friso.studies.boundary_lines import ATTRACTS, INVALID, REPELS, UNKNOWN, Line, Shape, lines, node_verdicts
 from friso.views.boundary.words import BASIN, CYCLES, MEANINGS, ShownKey, end_sentence
 from friso.views.drawing.figure import (
     BLUE,
@@ -34,9 +34,9 @@ COLOURS: dict[Shape, str] = {"symmetric": INK, "asymmetric": BLUE, "whole": INK}
 SYMBOLS: dict[str, Symbol] = {"flip": "circle", "fold": "triangle", "torus": "patch"}
 DASHES: dict[str, Dash] = {"flip": "solid", "fold": "dashed", "torus": "dotted"}
 NODES = {
-    ATTRACTS: Kind("an attracting cycle: hunting", VERMILLION),
-    REPELS: Kind("none: no hunting", QUIET),
-    UNKNOWN: Kind("unknown: orbit not closed", "#ffffff"),
+    ATTRACTS: Kind("hunting is possible", VERMILLION),
+    REPELS: Kind("no hunting", QUIET),
+    UNKNOWN: Kind("unknown (orbit not closed)", "#ffffff"),
     INVALID: Kind("invalid stage", LIGHT),
 }
 

@@ -1,13 +1,14 @@
-"""What is said about a boundary of hunting: each special point, branch and curve in a sentence, and the verdicts."""
+"""A boundary of hunting in words: where hunting ends, each special point, branch and curve, and the verdicts."""
 
 from __future__ import annotations
 
 import math
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 from friso.hunting.boundary import Diagram, KeyRange, Plane, Space
-from friso.views.boundary.data import (
+from friso.studies.boundary_lines import (
     ATTRACTS,
     INVALID,
     REPELS,
@@ -20,13 +21,13 @@ from friso.views.boundary.data import (
     lost_places,
 )
 from friso.views.drawing.figure import Array
-from friso.views.drawing.prefixes import plus_minus, pretty, with_unit
+from friso.views.drawing.prefixes import listed, plus_minus, pretty, with_unit
 
 VERDICTS = {
-    ATTRACTS: "an attracting cycle (hunting is possible)",
-    REPELS: "none (no hunting)",
-    UNKNOWN: "unknown (there should be a cycle, but its orbit could not be closed)",
-    INVALID: "invalid stage",
+    ATTRACTS: "hunting is possible (a cycle attracts)",
+    REPELS: "no hunting (no cycle attracts)",
+    UNKNOWN: "unknown (a cycle is expected, but its orbit could not be closed)",
+    INVALID: "not a valid stage",
 }
 CYCLES: dict[Shape, str] = {
     "symmetric": "the hunting cycle",
@@ -74,15 +75,46 @@ class ShownKey:
 
 
 def sentences(traced: Diagram | Plane, keys: tuple[ShownKey, ...]) -> list[str]:
-    """What was found, for the terminal."""
-    return _of_diagram(traced, keys[0]) if isinstance(traced, Diagram) else _of_plane(traced, keys)
+    """All that is said, in order, the answer first."""
+    details = _of_diagram(traced, keys[0]) if isinstance(traced, Diagram) else _of_plane(traced, keys)
+    return [conclusion(traced, keys), *details]
+
+
+def conclusion(traced: Diagram | Plane, keys: tuple[ShownKey, ...]) -> str:
+    """Where hunting is possible, and where it ends."""
+    if isinstance(traced, Diagram):
+        return f"{_edges(traced, keys[0])} {end_sentence(traced, keys[0])}"
+    verdicts = [verdict for _, _, verdict in corner_verdicts(traced)]
+    unknown = f" (unknown at {verdicts.count(UNKNOWN)})" if UNKNOWN in verdicts else ""
+    possible = f"Hunting is possible at {verdicts.count(ATTRACTS)} of the 4 corners of the plane{unknown}."
+    kinds = Counter(f"{line.kinds[0]} of {CYCLES[line.shape]}" for line in lines(traced))
+    curves = listed([f"{kind}{f' ({number} curves)' if number > 1 else ''}" for kind, number in kinds.items()], "and")
+    return f"{possible} Boundaries: {curves}." if kinds else f"{possible} {_no_boundary(traced.space, keys)}"
+
+
+def _edges(traced: Diagram, key: ShownKey) -> str:
+    """Where cycles begin or stop to attract, and so where hunting begins or ends if that is at one place."""
+    values = sorted(
+        {float(line.at[k, 0]) for line in lines(traced) for k in line.special if len({*_beside(line, k)}) == 2}
+    )
+    if not values:
+        return _no_boundary(traced.space, (key,))
+    verb = {(ATTRACTS, REPELS): "ends", (REPELS, ATTRACTS): "begins"}.get(end_verdicts(traced))
+    places = f"{key.key} = {listed([key.text(value) for value in values], 'and')}"
+    if len(values) == 1 and verb:
+        return f"Hunting {verb} at {places}."
+    return f"Cycles begin or stop attracting at {places}."
+
+
+def _beside(line: Line, k: int) -> list[bool]:
+    """Whether the cycle attracts on either side of a special point; beyond the end of a line there is none."""
+    return [0 <= j < len(line.attracts) and bool(line.attracts[j]) for j in (k - 1, k)]
 
 
 def _of_diagram(traced: Diagram, key: ShownKey) -> list[str]:
     branches = lines(traced)
     turns = sorted((line.at[k, 0], _turn(line, k, key)) for line in branches for k in line.special)
-    boundaries = [text for _, text in turns] or [_no_boundary(traced.space, (key,))]
-    return [end_sentence(traced, key), *boundaries, *(_followed(line, key, traced.space) for line in branches)]
+    return [*(text for _, text in turns), *(_followed(line, key, traced.space) for line in branches)]
 
 
 def _turn(line: Line, k: int, key: ShownKey) -> str:
@@ -121,7 +153,7 @@ def end_sentence(traced: Diagram, key: ShownKey) -> str:
 
 def _of_plane(traced: Plane, keys: tuple[ShownKey, ...]) -> list[str]:
     curves = lines(traced)
-    text = [_curve(line, keys, traced.space) for line in curves] or [_no_boundary(traced.space, keys)]
+    text = [_curve(line, keys, traced.space) for line in curves]
     text += [
         f"{kind.capitalize()}: beyond, {MEANINGS[kind]}." for kind in dict.fromkeys(line.kinds[0] for line in curves)
     ]
@@ -160,9 +192,9 @@ def _no_boundary(space: Space, keys: tuple[ShownKey, ...]) -> str:
         f"{key.key} {key.text(swept.low)} to {key.text(swept.high)}"
         for key, swept in zip(keys, space.ranges, strict=True)
     )
-    return f"No boundary of hunting over {', '.join(between)}."
+    return f"Hunting neither begins nor ends over {', '.join(between)}."
 
 
 def _ends(line: Line) -> str:
-    """How a line ends; said once if both ends are the same."""
+    """How a line ends; once where both ends are alike."""
     return "; ".join(dict.fromkeys(line.ends))

@@ -288,7 +288,7 @@ def population(comparison: Comparison) -> list[str]:
     """How the machines were drawn."""
     machines = comparison.machines
     says = [
-        f"{machines.count} machines were drawn with seed {comparison.seed}; a machine has the same parameters, rail and "
+        f"{machines.count} machines were drawn with seed {comparison.seed}; each has the same parameters, rail and "
         "noise in all options."
     ]
     if machines.from_file:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
+from friso.flexure.both_models import BothModels
 from friso.flexure.evaluation import Evaluation
 from friso.views.documents import plain_json
-from friso.views.flexure.findings import Found, interferes
 
 
-def flexure_document(flexure: Found) -> dict[str, Any]:
+def flexure_document(flexure: BothModels) -> dict[str, Any]:
     """The main results, and those of the closed forms for comparison."""
     head = {"stage": flexure.stage.name, "failure": flexure.failure or None}
     return {**head, **_evaluation(flexure.best), "closed_forms": _evaluation(flexure.closed)}
@@ -30,7 +30,7 @@ def _evaluation(evaluation: Evaluation) -> dict[str, Any]:
         },
         "eigenfrequencies_hz": [mode.frequency for mode in evaluation.modes],
         "names": [mode.name for mode in evaluation.modes],
-        "interferes": [interferes(evaluation, mode) for mode in evaluation.modes],
+        "interferes": [evaluation.interferes(mode) for mode in evaluation.modes],
         "first_interfering_hz": None if first is None else first.frequency,
         "max_stress_pa": evaluation.stress,
         "clamp_stress_pa": evaluation.clamp_stress,

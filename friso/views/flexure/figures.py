@@ -8,11 +8,12 @@ from dataclasses import replace
 import numpy as np
 from scipy.interpolate import CubicSpline
 
+from friso.flexure.both_models import BEAMS, CLOSED, BothModels
 from friso.flexure.evaluation import Evaluation
-from friso.views.drawing.figure import GREY, Array, Axis, Dash, Figure, Markers, Panel, Series
-from friso.views.flexure.findings import CLOSED, COLOURS, Found
+from friso.views.drawing.figure import BLUE, GREY, ORANGE, Array, Axis, Dash, Figure, Markers, Panel, Series
 from friso.views.flexure.modes import modes_figure
 
+COLOURS = {BEAMS: BLUE, CLOSED: ORANGE}
 DASHES: dict[str, Dash] = {CLOSED: "dashed"}
 """Closed forms are dashed, so that both are seen where they agree."""
 
@@ -23,13 +24,13 @@ FINE = 101
 """Deflections between which lines are drawn."""
 
 
-def flexure_figures(flexure: Found) -> tuple[Figure, ...]:
+def flexure_figures(flexure: BothModels) -> tuple[Figure, ...]:
     """All figures, in the order in which they are read."""
     figures = (_force(flexure), _support(flexure), modes_figure(flexure.best))
     return tuple(replace(figure, subject=flexure.stage.name) for figure in figures)
 
 
-def _force(flexure: Found) -> Figure:
+def _force(flexure: BothModels) -> Figure:
     """Force over deflection, odd about the middle."""
     reach, steepness = flexure.best.stroke, float(flexure.best.drive[0])
     ends = np.array([0.0, reach])
@@ -43,7 +44,7 @@ def _force(flexure: Found) -> Figure:
     return Figure("flexure_force", "Force over the stroke", caption, (panel,))
 
 
-def _support(flexure: Found) -> Figure:
+def _support(flexure: BothModels) -> Figure:
     """Support stiffness along the leaves and along their width."""
     panels = (
         _supports(flexure, "Along the leaves (x)", lambda evaluation: evaluation.support_x / 1e6),
@@ -56,7 +57,7 @@ def _support(flexure: Found) -> Figure:
     return Figure("flexure_support", "Support stiffness over the deflection", caption, panels, columns=2)
 
 
-def _supports(flexure: Found, title: str, of: Callable[[Evaluation], Array]) -> Panel:
+def _supports(flexure: BothModels, title: str, of: Callable[[Evaluation], Array]) -> Panel:
     """One support stiffness [N/µm], the same to both sides."""
     lines, points = _lines(flexure, of, _even_falling)
     top = 1.1 * max(float(line.y.max()) for line in lines)
@@ -64,7 +65,9 @@ def _supports(flexure: Found, title: str, of: Callable[[Evaluation], Array]) -> 
     return Panel(title, _deflection(flexure), axis, lines, (points,))
 
 
-def _lines(flexure: Found, of: Callable[[Evaluation], Array], smooth: Smooth) -> tuple[tuple[Series, ...], Markers]:
+def _lines(
+    flexure: BothModels, of: Callable[[Evaluation], Array], smooth: Smooth
+) -> tuple[tuple[Series, ...], Markers]:
     """The same quantity by each model, drawn smoothly, and where the model that counts was computed."""
     fine = np.linspace(0.0, flexure.best.stroke, FINE)
     lines = tuple(
@@ -92,5 +95,5 @@ def _even_falling(x: Array, y: Array, at: Array) -> Array:
     return 1 / CubicSpline(np.concatenate([-x[:0:-1], x]), 1 / np.concatenate([y[:0:-1], y]))(at)
 
 
-def _deflection(flexure: Found) -> Axis:
+def _deflection(flexure: BothModels) -> Axis:
     return Axis("Deflection", "m", (0.0, flexure.best.stroke))

@@ -7,12 +7,12 @@ from typing import NamedTuple
 
 from markupsafe import Markup
 
+from friso.flexure.both_models import BothModels
 from friso.materials import materials
 from friso.views.drawing.figure import GREEN, VERMILLION, Figure
 from friso.views.files import Content, pictures
 from friso.views.flexure.drawing import drawing_svg
-from friso.views.flexure.figures import flexure_figures
-from friso.views.flexure.findings import COLOURS, Found
+from friso.views.flexure.figures import COLOURS, flexure_figures
 from friso.views.flexure.table import rows
 from friso.views.flexure.words import assumptions, findings, warnings
 from friso.views.pages import Report
@@ -25,7 +25,7 @@ class Column(NamedTuple):
     colour: str
 
 
-def flexure_files(flexure: Found) -> dict[str, Content]:
+def flexure_files(flexure: BothModels) -> dict[str, Content]:
     """The page, the drawing, and every figure in all formats."""
     figures = flexure_figures(flexure)
     return {
@@ -35,7 +35,7 @@ def flexure_files(flexure: Found) -> dict[str, Content]:
     }
 
 
-def flexure_html(flexure: Found, figures: Sequence[Figure]) -> str:
+def flexure_html(flexure: BothModels, figures: Sequence[Figure]) -> str:
     """The whole page of a mechanism and its figures."""
     joint, *further = findings(flexure)
     return Report.of_stage(
@@ -50,7 +50,7 @@ def flexure_html(flexure: Found, figures: Sequence[Figure]) -> str:
     ).html()
 
 
-def drawing(flexure: Found) -> str:
+def drawing(flexure: BothModels) -> str:
     """The dimensioned drawing of the mechanism, SVG."""
     data = materials().get(str(flexure.stage.flat().get("flexure.material")))
     material = f"{data.name}, {data.grade}" if data else ""

@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
+from friso.flexure.both_models import BothModels
 from friso.flexure.evaluation import Evaluation, Mode
 from friso.views.drawing.prefixes import NOTHING, with_unit
-from friso.views.flexure.findings import Found, interferes, named_modes
 
 INTERFERES = "interferes"
 """Marks a mode that disturbs control: actuator and sensor both see it."""
@@ -16,7 +16,7 @@ UNKNOWN = "unknown"
 """Stands where a number of the material is not known."""
 
 
-def rows(flexure: Found) -> list[tuple[str, list[str]]]:
+def rows(flexure: BothModels) -> list[tuple[str, list[str]]]:
     """The rows: stiffnesses, eigenfrequencies, and what the leaves bear."""
     models = list(flexure.models.values())
     above, below = (
@@ -50,9 +50,9 @@ def _plain(value: float) -> str:
     return with_unit(value, "").strip()
 
 
-def _modes(flexure: Found) -> list[tuple[str, list[str]]]:
+def _modes(flexure: BothModels) -> list[tuple[str, list[str]]]:
     """A row for each mode that some model knows, by name and in the order of frequency, the drive mode first."""
-    named = [(evaluation, named_modes(evaluation)) for evaluation in flexure.models.values()]
+    named = [(evaluation, evaluation.named_modes) for evaluation in flexure.models.values()]
     frequencies: dict[str, float] = {}
     for _, modes in named:
         frequencies = {name: mode.frequency for name, mode in modes.items()} | frequencies
@@ -64,7 +64,7 @@ def _modes(flexure: Found) -> list[tuple[str, list[str]]]:
 def _mode(evaluation: Evaluation, mode: Mode | None) -> str:
     if mode is None:
         return NOTHING
-    return with_unit(mode.frequency, "Hz") + (f" ({INTERFERES})" if interferes(evaluation, mode) else "")
+    return with_unit(mode.frequency, "Hz") + (f" ({INTERFERES})" if evaluation.interferes(mode) else "")
 
 
 _STIFF: dict[str, Callable[[Evaluation], str]] = {

@@ -5,11 +5,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 
+from friso.flexure.both_models import BothModels
 from friso.flexure.evaluation import Evaluation
 from friso.flexure.mechanism import AXES, GRAVITY
 from friso.stage import Stage
 from friso.views.drawing.prefixes import listed, with_unit
-from friso.views.flexure.findings import Found, interferes
 from friso.views.flexure.table import megapascals, newtons_per, percent
 
 RULE = 0.1
@@ -19,18 +19,18 @@ AGREE = 0.1
 """Share by which the models may differ before that is said."""
 
 
-def sentences(flexure: Found) -> list[str]:
+def sentences(flexure: BothModels) -> list[str]:
     """All that is said, in order."""
     joint, *further = findings(flexure)
     return [joint, *warnings(flexure), *further, *assumptions(flexure.stage)]
 
 
-def findings(flexure: Found) -> list[str]:
+def findings(flexure: BothModels) -> list[str]:
     """What the joint is, and what it allows."""
     return [_joint(flexure.best), _control(flexure.best), _endurance(flexure.best)]
 
 
-def warnings(flexure: Found) -> list[str]:
+def warnings(flexure: BothModels) -> list[str]:
     """What is wrong with it."""
     failed = f"The beam model found no solution: {flexure.failure.rstrip('.')}. All results are from the closed forms."
     return [
@@ -144,7 +144,7 @@ def _loaded(evaluation: Evaluation) -> list[str]:
     ]
 
 
-def _breaks_away(flexure: Found) -> list[str]:
+def _breaks_away(flexure: BothModels) -> list[str]:
     static, force = flexure.stage.flat().get("friction.static"), float(flexure.best.forces[-1])
     if static is None or force <= static:
         return []
@@ -157,7 +157,7 @@ def _breaks_away(flexure: Found) -> list[str]:
 
 def _against(evaluation: Evaluation) -> list[str]:
     """Modes in which the sensor sees the opposite of what the actuator does."""
-    modes = [mode for mode in evaluation.modes if interferes(evaluation, mode) and mode.actuator * mode.sensor < 0]
+    modes = [mode for mode in evaluation.modes if evaluation.interferes(mode) and mode.actuator * mode.sensor < 0]
     if not modes:
         return []
     named = listed([f"{mode.name} ({with_unit(mode.frequency, 'Hz')})" for mode in modes], "and")
@@ -168,7 +168,7 @@ def _against(evaluation: Evaluation) -> list[str]:
     ]
 
 
-def _differences(flexure: Found) -> list[str]:
+def _differences(flexure: BothModels) -> list[str]:
     """Where the two models differ so much that one of them is beyond its range."""
     if flexure.beams is None:
         return []

@@ -1,4 +1,4 @@
-"""What a map says, in sentences: what share of it swings and where, how far that can be trusted, what words mean."""
+"""A map in sentences: what share of it swings or hunts and where, how far that can be trusted, what words mean."""
 
 from __future__ import annotations
 
@@ -7,11 +7,21 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from friso.hunting.criteria import ATTRACTED
 from friso.hunting.criteria.run_outcome import CREEPS, RESTS, SWINGS
 from friso.views.drawing.prefixes import listed
 from friso.views.map.cells import SAMPLE, CellAxis, axes_of
-from friso.views.map.words import AT_ONCE, INVALID, KINDS, NOT_RUN, counts, grouped, in_sentence, word_counts
+from friso.views.map.words import (
+    AT_ONCE,
+    INVALID,
+    KINDS,
+    NOT_RUN,
+    counts,
+    failures,
+    grouped,
+    in_sentence,
+    tally,
+    word_counts,
+)
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -20,60 +30,66 @@ if TYPE_CHECKING:
 
 MEANINGS = {
     "outcome": {
-        SWINGS: "the run swings at its end: to and fro by more than 20 µm in the last quarter, again and again, by at "
-        "least half as much as in the last half, and so to the end",
-        CREEPS: "the run is outside 10 µm of its reference at its end without swinging: it drifts, sticks or dies out",
-        RESTS: "the run stays within 10 µm of its reference to its end",
+        SWINGS: "the run still swings at its end: periodically, more than 20 µm peak to peak in the last quarter, by "
+        "at least half as much as in the last half",
+        CREEPS: "the run ends more than 10 µm off its reference without swinging: it drifts, sticks or decays",
+        RESTS: "the run comes to rest within 10 µm of its reference",
     },
     "verdict": {
         "hunts": "a cycle of the stage attracts, and the motion of the stage file ends in it",
-        "bistable": "a cycle attracts, but this motion comes to rest; a kick or another move starts hunting",
-        "transient": "no cycle attracts, and this motion has not come to rest at its end",
+        "bistable": "a cycle attracts, but this motion comes to rest; a kick or another move can start hunting",
+        "transient": "no cycle attracts, but this motion is not at rest by its end",
         "settles": "no cycle attracts, and this motion comes to rest",
     },
 }
 """What the words of a map mean, by variable."""
 
-_NO_RESULT = {"failed": "the run was not completed", "invalid": "no stage may have these values"}
+_NO_RESULT = {"failed": "the run was not completed", "invalid": "these values are not a valid stage"}
 
 PEAKS = ("peaks", "distinct_peaks")
 
 
 @dataclass(frozen=True)
 class Question:
-    """What a map is asked first: in which cells something holds, by the values of a variable, and how that is said."""
+    """What a map is asked first: in which cells the `variable` has one of the `words` (of counts: is more than 0), and
+    the subject and verb of the answer."""
 
     variable: str
-    said: str
+    clause: str
+    words: tuple[str, ...] = ()
 
     def holds(self, values: np.ndarray) -> np.ndarray:
         """Where it does."""
         if self.variable in PEAKS:
             return values.astype(float) > 0
-        return np.isin(values.astype(str), [SWINGS] if self.variable == "outcome" else ATTRACTED)
+        return np.isin(values.astype(str), self.words)
 
 
-def _question(runs: xr.Dataset, metric: str) -> Question | None:
-    """What a map of this variable is asked; of runs that do not tell, nothing."""
-    if metric in runs and (metric == "verdict" or metric in PEAKS):
-        said = "A cycle of the stage attracts" if metric == "verdict" else "Peaks are counted"
-        return Question(metric, said)
-    return Question("outcome", "The run swings at its end") if "outcome" in runs else None
+_HUNTS = Question("verdict", "The stage hunts", ("hunts",))
+_BISTABLE = Question("verdict", "It is bistable (a kick or another move can start hunting)", ("bistable",))
+_SWINGS = Question("outcome", "The run swings at its end", (SWINGS,))
 
 
 def headline(runs: xr.Dataset, metric: str) -> str:
-    """What share of the map swings (of a map of verdicts: has an attracting cycle; of counts: has counted peaks), and
+    """What share of the map swings (of a map of verdicts: hunts, or is bistable; of counts: has counted peaks), and
     where: the ranges of the axes outside of which no cell does. Empty where the runs do not tell."""
-    asked = _question(runs, metric)
-    if asked is None:
-        return ""
-    holds, known = _flags(runs, asked)
-    if not known.any():
-        return f"{asked.said} nowhere: no cell of the map has a result."
-    if not holds.any() or np.array_equal(holds, known):
-        return f"{asked.said} {'everywhere' if holds.any() else 'nowhere'} in the map."
-    share = f"{asked.said} in {_percent(holds.sum(), known.sum())} of the map"
-    axes, inside = axes_of(runs), known.copy()
+    if metric == "verdict" and metric in runs:
+        bistable = [_BISTABLE] if counts(runs, "verdict").get("bistable") else []
+        return " ".join(_answer(runs, question) for question in [_HUNTS, *bistable])
+    if metric in PEAKS and metric in runs:
+        return _answer(runs, Question(metric, "Peaks are counted"))
+    return _answer(runs, _SWINGS) if "outcome" in runs else ""
+
+
+def _answer(runs: xr.Dataset, question: Question) -> str:
+    """In what share of the map it holds, and where."""
+    holds, completed = _flags(runs, question)
+    if not completed.any():
+        return f"{question.clause} nowhere: no cell of the map has a result."
+    if not holds.any() or np.array_equal(holds, completed):
+        return f"{question.clause} {'everywhere' if holds.any() else 'nowhere'} in the map."
+    share = f"{question.clause} in {_percent(holds.sum(), completed.sum())} of the map"
+    axes, inside = axes_of(runs), completed.copy()
     where = []
     for k, axis in enumerate(axes):
         dim = _dims(runs).index(SAMPLE) if SAMPLE in runs.dims else k
@@ -90,17 +106,17 @@ def headline(runs: xr.Dataset, metric: str) -> str:
     return f"{share}: at {listed(where, 'and')} ({filled})."
 
 
-def _flags(runs: xr.Dataset, asked: Question) -> tuple[np.ndarray, np.ndarray]:
+def _flags(runs: xr.Dataset, question: Question) -> tuple[np.ndarray, np.ndarray]:
     """Where it holds, and where runs have a result, both of the shape of the runs: a large store is read in parts."""
-    values = runs[asked.variable]
-    holds, known = np.zeros(values.shape, bool), np.zeros(values.shape, bool)
+    values = runs[question.variable]
+    holds, completed = np.zeros(values.shape, bool), np.zeros(values.shape, bool)
     rows = max(1, AT_ONCE // max(1, int(np.prod(values.shape[1:]))))
     for first in range(0, len(values), rows):
         part = np.asarray(values[first : first + rows].values)
-        ran = np.isfinite(part) if asked.variable in PEAKS else ~np.isin(part.astype(str), ["", *_NO_RESULT])
-        known[first : first + rows] = ran
-        holds[first : first + rows] = ran & asked.holds(part)
-    return holds, known
+        ran = np.isfinite(part) if question.variable in PEAKS else ~np.isin(part.astype(str), ["", *_NO_RESULT])
+        completed[first : first + rows] = ran
+        holds[first : first + rows] = ran & question.holds(part)
+    return holds, completed
 
 
 def _dims(runs: xr.Dataset) -> list[str]:
@@ -147,7 +163,7 @@ def verification(runs: xr.Dataset) -> str:
     interval = binomtest(surviving, checked).proportion_ci(0.95, method="wilson")
     rtol = float(runs.attrs["verified_rtol"])
     text = (
-        f"{100 * surviving / checked:.1f} % of {grouped(checked)} outcomes checked survive rtol {rtol:g} "
+        f"{100 * surviving / checked:.1f} % of {grouped(checked)} outcomes are the same at rtol {rtol:g} "
         f"(95 % confidence: {100 * interval.low:.1f} to {100 * interval.high:.1f} %)."
     )
     if inferred := int(runs.attrs.get("inferred_checked", 0)):
@@ -181,8 +197,8 @@ def caveats(runs: xr.Dataset, metric: str) -> list[str]:
         int((counted & (outcome == RESTS)).sum()),
         int(((runs[metric].values == 0) & (outcome == SWINGS)).sum()),
     )
-    found = [f"In {grouped(over)} of the cells with counted peaks the run rests at its end."] if over else []
-    return found + ([f"In {grouped(missed)} of those without it swings."] if missed else [])
+    over_text = [f"In {grouped(over)} of the cells with counted peaks the run rests at its end."] if over else []
+    return over_text + ([f"In {grouped(missed)} of the cells without any the run swings."] if missed else [])
 
 
 def _extent(runs: xr.Dataset) -> str:
@@ -194,31 +210,14 @@ def _extent(runs: xr.Dataset) -> str:
     text = f"{grouped(cells - idle - inferred)} runs at rtol {float(runs.attrs['rtol']):g}"
     if inferred:
         text += f", {grouped(inferred)} cells inferred from their neighbours"
-    listing = [", ".join(f"{label} {grouped(number)}" for label, number in words.items())] if words else []
-    if "verdict" in runs:
-        listing.append(
-            "verdicts " + ", ".join(f"{word} {grouped(n)}" for word, n in word_counts(runs, "verdict").items())
-        )
-    return f"{text}: {'; '.join(listing)}." if listing else f"{text}."
-
-
-def failures(runs: xr.Dataset) -> dict[str, int]:
-    """How many cells have no result, by the reason in their status."""
-    return {
-        reason: number
-        for reason, number in counts(runs, "status").items()
-        if reason != "done" and not reason.startswith("inferred")
-    }
+    listing = "; ".join(filter(None, (tally(runs, name) for name in KINDS)))
+    return f"{text}: {listing}." if listing else f"{text}."
 
 
 def sentences(runs: xr.Dataset, study: Study, metric: str) -> list[str]:
-    """What was found, for the terminal: first what share of the map swings, and where."""
-    words = "; ".join(
-        ", ".join(f"{count} {word}" for word, count in counts.items())
-        for name in KINDS
-        if (counts := word_counts(runs, name))
-    )
+    """All that is said on the terminal: first what share of the map swings, and where."""
+    words = "; ".join(filter(None, (tally(runs, name) for name in KINDS)))
     size = " x ".join(map(str, study.shape))
-    reasons = [f"{count} without result: {reason}" for reason, count in failures(runs).items()]
+    reasons = [f"{count} cells without a result: {reason}" for reason, count in failures(runs).items()]
     extent = f"{study.stage.name or 'stage'}: {size} cells at rtol {study.rtol:g}: {words}"
     return [headline(runs, metric), extent, verification(runs), *caveats(runs, metric), *reasons]

@@ -16,7 +16,7 @@ from friso.views.map.cells import SAMPLE, axes_of
 from friso.views.map.data import packed, picked
 from friso.views.map.figures import map_figure
 from friso.views.map.findings import caveats, failures, headline, meanings, verification
-from friso.views.map.words import KINDS, grouped, variable, word_counts
+from friso.views.map.words import KINDS, grouped, tally, variable
 from friso.views.pages import Report, print_image
 
 if TYPE_CHECKING:
@@ -72,11 +72,10 @@ def _facts(runs: xr.Dataset, metric: str) -> list[tuple[str, str]]:
     facts.append(("Relative tolerance", f"{float(runs.attrs['rtol']):g}"))
     facts.append(("Verification", verification(runs)))
     for name in KINDS:
-        words = ", ".join(f"{label} {grouped(number)}" for label, number in word_counts(runs, name).items())
-        facts += [(variable(name), words)] if words else []
+        facts += [(variable(name), words)] if (words := tally(runs, name)) else []
     facts += meanings(runs)
     facts += [("Criterion", text)] if (text := runs[metric].attrs.get("criterion")) and metric not in KINDS else []
-    facts += [("Note", " ".join(found))] if (found := caveats(runs, metric)) else []
+    facts += [("Note", " ".join(notes))] if (notes := caveats(runs, metric)) else []
     links = json.loads(runs.attrs.get("links", "{}"))
     facts += [("Links", "; ".join(f"{key} = {text}" for key, text in links.items()))] if links else []
     facts += [(f"Without result: {grouped(number)}", reason) for reason, number in failures(runs).items()]

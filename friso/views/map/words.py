@@ -85,9 +85,9 @@ _NO_NUMBER = "#e8dcc6"
 def quantity(key: Hashable) -> str:
     """An axis in words: "joint.stroke" is "Joint stroke", a free name is itself."""
     name = str(key)
-    known = _QUANTITIES | CONTROLLERS.words
-    if name in known:
-        return known[name]
+    quantities = _QUANTITIES | CONTROLLERS.words
+    if name in quantities:
+        return quantities[name]
     words = name.removeprefix(f"{CONTROLLER}.").removeprefix("motion.").replace("_", " ").replace(".", " ")
     return words[:1].upper() + words[1:]
 
@@ -149,13 +149,13 @@ def counts(runs: xr.Dataset, name: str) -> dict[str, int]:
     """How many cells have each text of a variable, the most frequent first; none where there is no such variable."""
     if name not in runs:
         return {}
-    found: Counter[str] = Counter()
+    cells: Counter[str] = Counter()
     along, shape = str(runs[name].dims[0]), runs[name].shape
     rows = max(1, AT_ONCE // max(1, int(np.prod(shape[1:]))))
     for first in range(0, shape[0], rows):  # a large store is never read whole
         codes, words = words_of(runs.isel({along: slice(first, first + rows)}), name)
-        found.update(dict(zip(words, np.bincount(codes.ravel(), minlength=len(words)).tolist(), strict=True)))
-    return dict(found.most_common())
+        cells.update(dict(zip(words, np.bincount(codes.ravel(), minlength=len(words)).tolist(), strict=True)))
+    return dict(cells.most_common())
 
 
 def failures(runs: xr.Dataset) -> dict[str, int]:
@@ -169,5 +169,19 @@ def failures(runs: xr.Dataset) -> dict[str, int]:
 
 def word_counts(runs: xr.Dataset, name: str) -> dict[str, int]:
     """How many cells have each word of the variable `name`, in the order of the legend; none without that variable."""
-    found = {word_kind(name, word): number for word, number in counts(runs, name).items()}
-    return {kind.label: found[kind] for kind in in_order(found)}
+    cells = {word_kind(name, word): number for word, number in counts(runs, name).items()}
+    return {kind.label: cells[kind] for kind in in_order(cells)}
+
+
+def tally(runs: xr.Dataset, name: str) -> str:
+    """How many cells have each word, in a sentence: "1 swings, 3 creep"; empty without the variable `name`."""
+    return ", ".join(f"{grouped(number)} {_verb(word, number)}" for word, number in word_counts(runs, name).items())
+
+
+def _verb(word: str, number: int) -> str:
+    """A word of a map as it agrees with a number of cells."""
+    first, *rest = word.split(" ")
+    return " ".join([first if number == 1 or first not in _VERBS else first.removesuffix("s"), *rest])
+
+
+_VERBS = ("swings", "creeps", "rests", "hunts", "settles")

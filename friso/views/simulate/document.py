@@ -6,6 +6,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from friso.hunting.criteria.run_outcome import CRITERION
+from friso.hunting.measures import Measures
 from friso.views.check.figures import response_figure
 from friso.views.documents import plain_json
 from friso.views.drawing.matplotlib_renderer import save
@@ -15,10 +17,25 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
-def simulate_document(response: xr.Dataset, name: str, files: list[Path]) -> dict[str, Any]:
-    """The files written for the stage of that name, and how the solver fared."""
-    solver = {key: response.attrs[key] for key in ("status", "steps", "rejected", "rtol")}
-    return plain_json({"stage": name, "files": [str(file) for file in files], "solver": solver})
+def simulate_document(
+    response: xr.Dataset, measures: Measures, name: str, conclusion: str, files: list[Path]
+) -> dict[str, Any]:
+    """What the run of the stage of that name does, the files written, and how the solver fared."""
+    into_1um, into_10um = measures.settling_time
+    return plain_json(
+        {
+            "conclusion": conclusion,
+            "stage": name,
+            "outcome": measures.outcome[0],
+            "criterion": CRITERION,
+            "peak_to_peak_m": measures.peak_to_peak[0],
+            "period_s": measures.period[0],
+            "settling_time_s": into_1um[0],
+            "settling_time_10um_s": into_10um[0],
+            "files": [str(file) for file in files],
+            "solver": {key: response.attrs[key] for key in ("status", "steps", "rejected", "rtol")},
+        }
+    )
 
 
 def simulate_files(response: xr.Dataset, stem: str) -> dict[str, Content]:

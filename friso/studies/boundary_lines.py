@@ -10,7 +10,6 @@ import numpy as np
 
 from friso.hunting.boundary import Branch, Curve, Diagram, LocatedPoint, Plane, Space
 from friso.hunting.cycle.find import Cycles
-from friso.views.drawing.figure import Array
 
 Shape = Literal["symmetric", "asymmetric", "whole"]
 """A cycle that is its own mirror image; one that is not, of a stage that is; one of a stage that is not."""
@@ -29,12 +28,12 @@ class Line:
     """
 
     shape: Shape
-    at: Array
-    error: Array
+    at: np.ndarray
+    error: np.ndarray
     kinds: tuple[str, ...]
-    amplitude: Array
-    period: Array
-    multiplier: Array
+    amplitude: np.ndarray
+    period: np.ndarray
+    multiplier: np.ndarray
     ends: tuple[str, str]
 
     @property
@@ -56,8 +55,8 @@ class Line:
 class _Row(NamedTuple):
     """A point of a line: its place in the box of the keys, by how much that may be wrong, its cycle and its kind."""
 
-    at: Array
-    error: Array
+    at: np.ndarray
+    error: np.ndarray
     cycle: Cycles
     kind: str
 
@@ -89,7 +88,7 @@ def _of_branch(branch: Branch, special: tuple[LocatedPoint, ...]) -> list[_Row]:
     ]
 
 
-def _along(path: Array, vector: Array) -> float:
+def _along(path: np.ndarray, vector: np.ndarray) -> float:
     """How far along a path, in legs, a point on it lies."""
     before, after = (np.linalg.norm(end - vector, axis=1) for end in (path[:-1], path[1:]))
     leg = int(np.argmin(before + after - np.linalg.norm(path[1:] - path[:-1], axis=1)))
@@ -111,7 +110,7 @@ def _line(result: Diagram | Plane, traced: Branch | Curve, rows: list[_Row]) -> 
     )
 
 
-def _values(space: Space, at: Array) -> Array:
+def _values(space: Space, at: np.ndarray) -> np.ndarray:
     return np.stack(list(space.values(at).values()), axis=1)
 
 
@@ -146,7 +145,7 @@ def corner_verdicts(result: Plane) -> list[tuple[float, float, str]]:
     return [nodes[k] for k in (0, last, result.nodes * last, -1)]
 
 
-def lost_places(result: Plane) -> Array:
+def lost_places(result: Plane) -> np.ndarray:
     """Where a change was seen that no curve could be begun at [SI], shape (places, 2)."""
     return _values(result.space, np.reshape(result.lost, (-1, 2)))
 
