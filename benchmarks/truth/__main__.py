@@ -1,0 +1,113 @@
+"""Draws stages, checks them, and tries to refute every verdict and edge: `python -m benchmarks.truth`.
+
+Prints the share of sure verdicts, how many of these are wrong (their stage files, each with a note, are written to a
+folder), and the CPU time of a check. Interrupted, it prints what there is. `--number` takes single stages of a seed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+import time
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from pathlib import Path
+from typing import Any
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # read when NumPy is loaded
+
+import numpy as np
+
+from benchmarks.report import Goal, print_goals, print_table
+from benchmarks.truth.attack import attack
+
+
+def main() -> None:
+    arguments = _arguments()
+    arguments.out.mkdir(parents=True, exist_ok=True)
+    numbers = arguments.number or range(arguments.first, arguments.first + arguments.stages)
+    records: list[dict[str, Any]] = []
+    start = time.perf_counter()
+    try:
+        with (arguments.out / "records.jsonl").open("a") as log:
+            for record in _attacked(arguments, numbers):
+                records.append(record)
+                log.write(json.dumps(record) + "\n")
+                log.flush()
+                print(_line(record), flush=True)
+    except KeyboardInterrupt:
+        print("interrupted")
+    _summary(records, time.perf_counter() - start)
+
+
+def _attacked(arguments: argparse.Namespace, numbers: Any) -> Iterator[dict[str, Any]]:
+    tasks = [(arguments.seed, number, arguments.scipy_share, arguments.out) for number in numbers]
+    if arguments.workers == 1:
+        yield from (attack(*task) for task in tasks)
+        return
+    pool = ProcessPoolExecutor(arguments.workers)
+    try:
+        for job in as_completed([pool.submit(attack, *task) for task in tasks]):
+            yield job.result()
+    finally:
+        pool.shutdown(wait=False, cancel_futures=True)
+
+
+def _line(record: dict[str, Any]) -> str:
+    said = "; ".join(claim["says"] for claim in record["claims"])
+    lines = [f"  {record['number']:5d}  {record['cpu']:6.2f} s  {said}"]
+    for each in record["refuted"]:
+        word = "WRONG" if each["sure"] else "wrong, but not sure"
+        lines.append(f"      {word}: {each['case']}, {each['of']}: {each['why']}")
+    return "\n".join(lines)
+
+
+def _summary(records: list[dict[str, Any]], seconds: float) -> None:
+    if not records:
+        return
+    claims = [claim for record in records for claim in record["claims"]]
+    sure = sum(claim["sure"] for claim in claims)
+    edges = [claim for claim in claims if claim["edge"] is not None]
+    wrong = [record["number"] for record in records if any(each["sure"] for each in record["refuted"])]
+    unsure_wrong = sum(any(not each["sure"] for each in record["refuted"]) for record in records)
+    cpu = [record["cpu"] for record in records]
+    print()
+    print_table(
+        ("", ""),
+        [
+            ["stages, verdicts", f"{len(records)}, {len(claims)}"],
+            ["sure verdicts", f"{sure} ({100 * sure / len(claims):.1f} %)"],
+            ["edges, sure ones", f"{len(edges)}, {sum(claim['edge_sure'] for claim in edges)}"],
+            ["stages with something sure that is wrong", f"{len(wrong)}: {', '.join(map(str, sorted(wrong)))}"],
+            ["stages with something wrong that was not sure", unsure_wrong],
+            ["wall time [s]", f"{seconds:.0f}"],
+        ],
+    )
+    share, median, worst = sure / len(claims), float(np.median(cpu)), max(cpu)
+    print_goals(
+        [
+            Goal("sure verdicts", "97 %", f"{100 * share:.1f} %", share >= 0.97),
+            Goal("wrong among the sure", "none", str(len(wrong)), not wrong),
+            Goal("CPU of a check, median", "0.5 s", f"{median:.2f} s", median <= 0.5),
+            Goal("CPU of a check, worst", "10 s", f"{worst:.1f} s", worst <= 10),
+        ],
+        "Goals of issue 21, section 3",
+    )
+
+
+def _arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.truth", description=__doc__)
+    parser.add_argument("--stages", type=int, default=100)
+    parser.add_argument("--first", type=int, default=0, help="number of the first stage")
+    parser.add_argument("--number", type=int, action="append", help="a single stage; may be repeated")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--scipy-share", type=float, default=0.1, help="share of stages that SciPy looks at too")
+    parser.add_argument("--workers", type=int, default=1)
+    parser.add_argument("--out", type=Path, default=Path("benchmark_results/truth"), help="folder for refuted stages")
+    return parser.parse_args()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

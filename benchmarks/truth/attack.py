@@ -1,0 +1,58 @@
+"""One stage, drawn, checked and attacked; as a record that can be written to a file."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.truth.claims import checked
+from benchmarks.truth.draws import draw
+from benchmarks.truth.refute import refutations
+from friso.stage import Stage
+
+
+@np.errstate(all="ignore")  # runs that fail leave infinities behind
+def attack(seed: int, number: int, scipy_share: float, folder: Path) -> dict[str, Any]:
+    """What friso says of the stage with this number and what refutes it; refuted stages are written to a folder."""
+    stage = draw(seed, number)
+    said = checked(stage)
+    start = time.process_time()
+    refuted = [
+        {"case": claim.case, "of": each.of, "sure": each.sure, "why": each.why}
+        for claim in said.claims
+        for each in refutations(claim, number)
+    ]
+    record = {
+        "seed": seed,
+        "number": number,
+        "cpu": said.cpu,
+        "attack_cpu": time.process_time() - start,
+        "claims": [
+            {
+                "says": str(claim),
+                "case": claim.case,
+                "verdict": claim.verdict,
+                "sure": claim.sure,
+                "edge": claim.edge.factor if claim.edge else None,
+                "edge_sure": bool(claim.edge and claim.edge.sure),
+            }
+            for claim in said.claims
+        ],
+        "refuted": refuted,
+    }
+    if refuted:
+        _write(folder / f"seed{seed}-{number}", stage, record)
+    return record
+
+
+def _write(name: Path, stage: Stage, record: dict[str, Any]) -> None:
+    """The stage file, and a note of what was said and what refutes it."""
+    lines = [f"friso says {claim['says']}" for claim in record["claims"]]
+    for each in record["refuted"]:
+        word = "wrong" if each["sure"] else "wrong (not sure)"
+        lines.append(f"{word}, {each['case']}, {each['of']}: {each['why']}")
+    name.with_suffix(".toml").write_text(stage.to_toml())
+    name.with_suffix(".txt").write_text("\n".join(lines) + "\n")

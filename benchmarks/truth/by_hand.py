@@ -1,0 +1,293 @@
+"""A stage's equations written out by hand, sharing no code with friso but the reading of the stage file; for SciPy.
+
+Sources: thesis, Eq. 3 to 8 and Fig. 3; LuGre: doi:10.1109/9.376053; regularised Stribeck friction:
+doi:10.1016/0005-1098(94)90209-7; Dahl 1968. There are no events: the solver's own error control finds every kink.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numba import njit
+from scipy.integrate import solve_ivp
+
+STATES = ("x", "v", "x_cart", "v_cart", "x_part", "v_part", "z", "filtered", "integral")
+X, V, XC, VC, XP, VP, Z, LOW, INTEGRAL = range(len(STATES))
+
+JOINTS = ("rigid", "locked", "touching", "free")
+LAWS = ("none", "lugre", "dahl", "stribeck")
+
+NAMES = (
+    *("cart", "stage", "part", "mode_stiffness", "mode_damping", "joint"),
+    *("k_joint", "d_joint", "stroke", "k_limiter", "d_limiter"),
+    *("law", "static", "coulomb", "v_stribeck", "exponent", "sigma0", "sigma1", "viscous"),
+    *("asymmetry", "viscous_asymmetry", "v_regular", "tuned", "kp", "ki", "kd", "tau", "on_error", "limit"),
+    *("bias_cart", "bias_stage"),
+)
+"""What the equations contain, in the order of `_rate`."""
+
+REST_BAND = 1e-3
+"""Share of the force limit beyond it over which the integrator comes to rest (clamping)."""
+
+
+class NotWritten(Exception):
+    """The equations of a stage are not among those written out here."""
+
+
+@dataclass(frozen=True)
+class ByHand:
+    """The equations of one stage: `numbers` in the order of `NAMES`, and the pieces of its reference, (pieces, 4):
+    start [s], position [m], velocity [m/s], acceleration [m/s^2]."""
+
+    numbers: np.ndarray
+    pieces: np.ndarray
+
+    def rate(self, time: float, y: np.ndarray, piece: np.ndarray) -> np.ndarray:
+        return _rate(time, y, piece, self.numbers)
+
+    def jacobian(self, time: float, y: np.ndarray, piece: np.ndarray) -> np.ndarray:
+        return _jacobian(time, y, piece, self.numbers, np.maximum(np.abs(y), self.scales))
+
+    @property
+    def scales(self) -> np.ndarray:
+        """Magnitudes of the states: by how much friction deflects the loop and the bristles, per time of the loop."""
+        n = dict(zip(NAMES, self.numbers, strict=True))
+        length, omega = self.length, self.omega
+        bristle = n["static"] / n["sigma0"] if n["sigma0"] else 1.0
+        return np.array([*[length, length * omega] * 3, bristle, length, length / omega])
+
+    @property
+    def stiffness(self) -> float:
+        """Proportional stiffness of the loop [N/m]."""
+        return float(self.numbers[NAMES.index("kp")])
+
+    @property
+    def omega(self) -> float:
+        """Natural frequency of mass and loop [1/s]."""
+        n = dict(zip(NAMES, self.numbers, strict=True))
+        return float(np.sqrt(n["kp"] / (n["cart"] + n["stage"] + n["part"])))
+
+    @property
+    def length(self) -> float:
+        """By how much the break-away force deflects the loop [m]; without friction as much as the bias, or 1 mm."""
+        n = dict(zip(NAMES, self.numbers, strict=True))
+        force = n["static"] or abs(n["bias_cart"]) + abs(n["bias_stage"])
+        return float(force / n["kp"]) or 1e-3
+
+    @property
+    def wait(self) -> float:
+        """Time [s] in which the integrator winds up to the break-away force while the stage sticks at `length`."""
+        n = dict(zip(NAMES, self.numbers, strict=True))
+        return float(n["kp"] / n["ki"]) if n["ki"] else np.inf
+
+    def held(self) -> ByHand:
+        """The same stage, its reference at 0 for ever."""
+        return ByHand(self.numbers, np.zeros((1, 4)))
+
+    def start(self, displacement: float = 0.0) -> np.ndarray:
+        """Everything at rest, displaced [m]; a filter of the position has followed, one of the error has not."""
+        y = np.zeros(len(STATES))
+        y[[X, XC, XP]] = displacement
+        n = dict(zip(NAMES, self.numbers, strict=True))
+        y[LOW] = 0.0 if n["on_error"] else displacement
+        return y
+
+    def run(self, y: np.ndarray, times: np.ndarray, rtol: float = 1e-9, most: int = 4_000_000) -> np.ndarray:
+        """States at the times [s], shape (times, states), from `y` at the first; NaN behind where it does not go on."""
+        out = np.full((len(times), len(STATES)), np.nan)
+        edges = [*self.pieces[1:, 0], np.inf]
+        left = most
+        out[0] = y
+        for piece, end in zip(self.pieces, edges, strict=True):
+            stop = min(end, times[-1])
+            start = max(piece[0], times[0])
+            if stop <= start:
+                continue
+            at = times[(times > start) & (times <= stop)]
+            solution = solve_ivp(
+                self.rate,
+                (start, stop),
+                y,
+                "LSODA",
+                t_eval=np.unique([*at, stop]),
+                args=(piece,),
+                rtol=rtol,
+                atol=rtol * self.scales,
+                jac=self.jacobian,
+                max_step=(stop - start) / 50,
+            )
+            left -= solution.nfev
+            if not solution.success or left < 0:
+                return out
+            y = solution.y[:, -1]
+            here = np.isin(times, at)
+            out[here] = solution.y[:, np.searchsorted(solution.t, times[here])].T
+        return out
+
+
+def by_hand(flat: Mapping[str, Any]) -> ByHand:
+    """The equations of a stage given as flat keys to SI numbers. Raises NotWritten."""
+    law, joint = flat["friction.model"], _joint(flat)
+    if law not in LAWS:
+        raise NotWritten(law)
+    windup = flat.get("controller.anti_windup", "clamp")
+    if flat["controller.kind"] != "pid" or windup != "clamp":
+        raise NotWritten(f"{flat['controller.kind']}, {windup}")
+    part = flat.get("parasitic.mass", 0.0) if joint != "rigid" else 0.0
+    stage = flat.get("masses.stage", 0.0) - part
+    reduced = part * stage / (part + stage) if part else 0.0
+    mode = 2 * np.pi * flat.get("parasitic.frequency", 0.0)
+    values = {
+        "cart": flat.get("masses.cart", 0.0),
+        "stage": stage,
+        "part": part,
+        "mode_stiffness": mode**2 * reduced,
+        "mode_damping": 2 * flat.get("parasitic.damping_ratio", 0.0) * mode * reduced,
+        "joint": JOINTS.index(joint),
+        "k_joint": flat.get("joint.stiffness", 0.0),
+        "d_joint": flat.get("joint.damping", 0.0),
+        "stroke": flat.get("joint.stroke", 0.0),
+        "k_limiter": flat.get("joint.limiter_stiffness", 0.0),
+        "d_limiter": flat.get("joint.limiter_damping", 0.0),
+        "law": LAWS.index(law),
+        "static": flat.get("friction.static", flat.get("friction.coulomb", 0.0)),
+        "coulomb": flat.get("friction.coulomb", 0.0),
+        "v_stribeck": flat.get("friction.stribeck_velocity", 1.0),
+        "exponent": flat.get("friction.stribeck_exponent", 2.0),
+        "sigma0": flat.get("friction.bristle_stiffness", 0.0),
+        "sigma1": flat.get("friction.bristle_damping", 0.0),
+        "viscous": flat.get("friction.viscous", 0.0),
+        "asymmetry": flat.get("friction.asymmetry", 0.0),
+        "viscous_asymmetry": flat.get("friction.viscous_asymmetry", 0.0),
+        "v_regular": flat.get("friction.regularisation_velocity", 1.0),
+        "limit": flat.get("controller.force_limit", np.inf),
+        "bias_cart": flat.get("bias.cart", 0.0),
+        "bias_stage": flat.get("bias.stage", 0.0),
+        **_gains(flat),
+    }
+    return ByHand(np.array([float(values[name]) for name in NAMES]), _pieces(flat))
+
+
+def _joint(flat: Mapping[str, Any]) -> str:
+    if "joint.limiter_stiffness" not in flat:
+        return "rigid"
+    if flat["joint.locked"]:
+        return "locked"
+    return "free" if flat["joint.stroke"] else "touching"
+
+
+def _gains(flat: Mapping[str, Any]) -> dict[str, float]:
+    """Van Dijk's rules (Eq. 7, 8) with kp, ki, kd of (s tau_z + 1)(s tau_i + 1) k_p/(s tau_i), multiplied out; or the
+    gains of Eq. 6."""
+    if "controller.crossover" in flat:
+        omega, alpha = 2 * np.pi * flat["controller.crossover"], flat["controller.alpha"]
+        gain = flat["controller.tuned_mass"] * omega**2 * np.sqrt(alpha)
+        tau_z = 1 / (omega * np.sqrt(alpha))
+        tau_i = flat["controller.beta"] * tau_z
+        tau_p = np.sqrt(alpha) / omega
+        p, i, d = gain * (1 + tau_z / tau_i), gain / tau_i, gain * tau_z
+        return {"tuned": 1.0, "kp": p, "ki": i, "kd": d, "tau": tau_p, "on_error": 1.0}
+    gains = {name: flat[f"controller.{name}"] for name in ("kp", "ki", "kd", "tau")}
+    return {"tuned": 0.0, **gains, "on_error": float(flat["controller.derivative_on"] == "error")}
+
+
+def _pieces(flat: Mapping[str, Any]) -> np.ndarray:
+    kind = flat["motion.kind"]
+    if kind == "there_and_back":
+        a, ramp, back = (flat[f"motion.{name}"] for name in ("acceleration", "acceleration_time", "return_at"))
+        far, fast = a * ramp**2, a * ramp
+        there = [[0.0, 0.0, 0.0, a], [ramp, far / 2, fast, -a], [2 * ramp, far, 0.0, 0.0]]
+        home = [[back, far, 0.0, -a], [back + ramp, far / 2, -fast, a], [back + 2 * ramp, 0.0, 0.0, 0.0]]
+        return np.array(there + home)
+    if kind == "ramp":
+        return np.array([[0.0, 0.0, flat["motion.velocity"], 0.0]])
+    return np.array([[0.0, flat["motion.size"] if kind == "step" else 0.0, 0.0, 0.0]])
+
+
+@njit(cache=True)
+def _rate(time, y, piece, n):  # type: ignore[no-untyped-def]
+    (cart, stage, part, mode_k, mode_d, joint, k_j, d_j, stroke, k_l, d_l) = n[:11]
+    (law, static, coulomb, v_s, exponent, sigma0, sigma1, viscous) = n[11:19]
+    (asymmetry, viscous_asymmetry, v_r, tuned, kp, ki, kd, tau, on_error, limit, bias_cart, bias_stage) = n[19:]
+    out = np.zeros(9)
+    since = time - piece[0]
+    r = piece[1] + since * (piece[2] + since * piece[3] / 2)
+    e = r - y[0]
+
+    integrand = e
+    if tuned > 0:
+        integrand = y[7]
+        demand = kp * y[7] + ki * y[8] + kd * (e - y[7]) / tau
+        out[7] = (e - y[7]) / tau
+    else:
+        source = e if on_error > 0 else y[0]
+        rise = 0.0
+        if tau > 0 and kd > 0:
+            rise = (source - y[7]) / tau
+            out[7] = rise
+        elif kd > 0:
+            rise = y[1]
+        demand = kp * e + ki * y[8] + (kd * rise if on_error > 0 else -kd * rise)
+    share = 1.0
+    beyond = abs(demand) - limit
+    if beyond > 0 and demand * integrand > 0:
+        share = max(0.0, 1 - beyond / (1e-3 * limit))
+    out[8] = integrand * share
+    force = min(max(demand, -limit), limit)
+
+    v = y[1] if joint == 0 else y[3]
+    sign = 1.0 if v > 0 else -1.0
+    friction = 0.0
+    if law > 0:
+        steady = coulomb
+        if law != 2:
+            steady = coulomb + (static - coulomb) * np.exp(-(abs(v / v_s) ** exponent))
+            steady *= 1 + asymmetry * sign
+        rub = viscous * v * (1 + viscous_asymmetry * sign)
+        if law == 3:
+            friction = steady * np.tanh(v / v_r) + rub
+        else:
+            out[6] = v - sigma0 * abs(v) / steady * y[6]
+            friction = sigma0 * y[6] + (sigma1 * out[6] if law == 1 else 0.0) + rub
+
+    out[0] = y[1]
+    if joint == 0:
+        out[1] = (force + bias_cart + bias_stage - friction) / (cart + stage)
+        return out
+    gap, speed = y[0] - y[2], y[1] - y[3]
+    contact = 0.0
+    if joint == 3:
+        if gap > stroke:
+            contact = k_l * (gap - stroke) + d_l * speed
+        elif gap < -stroke:
+            contact = k_l * (gap + stroke) + d_l * speed
+    else:
+        contact = k_l * gap + d_l * speed
+    leaves = k_j * gap + d_j * speed if joint > 1 else 0.0
+    inner = 0.0
+    if part > 0:
+        inner = mode_k * (y[0] - y[4]) + mode_d * (y[1] - y[5])
+        out[4] = y[5]
+        out[5] = inner / part
+    out[1] = (force + bias_stage - leaves - contact - inner) / stage
+    out[2] = y[3]
+    out[3] = (leaves + contact + bias_cart - friction) / cart
+    return out
+
+
+@njit(cache=True)
+def _jacobian(time, y, piece, n, size):  # type: ignore[no-untyped-def]
+    """By differences to the side on which the state is."""
+    base = _rate(time, y, piece, n)
+    out = np.zeros((9, 9))
+    for k in range(9):
+        step = 1e-7 * size[k]
+        if (k == 1 or k == 3) and y[k] < 0:
+            step = -step
+        moved = y.copy()
+        moved[k] += step
+        out[:, k] = (_rate(time, moved, piece, n) - base) / (moved[k] - y[k])
+    return out

@@ -1,0 +1,219 @@
+"""Stages drawn at random: all structures, laws and controllers, log-uniform over what bearings and stages can be.
+
+The stage with a number is the same whatever is drawn beside it. Structures come from a pool, each of whose members is a
+kernel to compile: numbers that differ by the size of the pool share one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from friso.quantities import Quantity
+from friso.stage import Stage
+from friso.stage.section import numeric_fields
+from friso.stage.tables import FRICTION
+
+GRAVITY = 9.81
+SPREAD = 3.0
+"""Factor about its example within which a key that is not known here is drawn."""
+
+
+@dataclass(frozen=True)
+class Form:
+    """What decides on the structure of a stage. `exponent` None: any number; `control`: "rules" of van Dijk, or gains
+    with their derivative "on error", or on the measurement, "filtered" or "plain"; `bias`: the mass it acts on."""
+
+    joint: str
+    friction: str = "lugre"
+    exponent: float | None = 2.0
+    asymmetry: bool = False
+    control: str = "rules"
+    limited: bool = False
+    parasitic: bool = False
+    bias: str = ""
+
+
+_KNOWN = (
+    Form("rigid"),
+    Form("free"),
+    Form("locked"),
+    Form("free", parasitic=True),
+    Form("rigid", bias="stage"),
+    Form("rigid", control="on error"),
+    Form("free", exponent=None),
+    Form("rigid", "stribeck"),
+    Form("free", asymmetry=True),
+    Form("locked", parasitic=True),
+    Form("rigid", "dahl"),
+    Form("free", control="on error", parasitic=True),
+    Form("rigid", exponent=None, asymmetry=True, bias="cart"),
+    Form("free", bias="stage"),
+    Form("rigid", control="plain", limited=True),
+    Form("free", "stribeck", parasitic=True),
+    Form("rigid", limited=True, bias="stage"),
+    Form("touching", control="filtered"),
+    Form("free", limited=True),
+    Form("locked", "dahl", bias="cart", parasitic=True),
+    Form("free", "dahl", control="plain"),
+    Form("rigid", "stribeck", exponent=None, asymmetry=True, control="filtered"),
+    Form("rigid", "none", bias="stage"),
+    Form("free", exponent=1.0, asymmetry=True, bias="cart", control="filtered"),
+)
+"""Structures, as many as there are kernels to compile."""
+
+
+def forms() -> tuple[Form, ...]:
+    """The pool of structures: those above, and one with each law that is registered besides."""
+    others = sorted({*FRICTION.classes} - {form.friction for form in _KNOWN})
+    return (*_KNOWN, *(Form(joint, law) for law in others for joint in ("rigid", "free")))
+
+
+def draw(seed: int, number: int) -> Stage:
+    """The stage with this number of the series that begins with `seed`."""
+    pool = forms()
+    tables = _Draw(np.random.default_rng([seed, number]), pool[number % len(pool)]).tables()
+    return Stage(name=f"seed {seed}, number {number}", **tables)
+
+
+class _Draw:
+    """The tables of one stage."""
+
+    def __init__(self, rng: np.random.Generator, form: Form) -> None:
+        self.rng, self.form = rng, form
+        self.cart = self.log(3e-3, 50.0)
+        self.stage = self.cart * self.log(0.05, 5.0)
+        self.mass = self.cart + self.stage
+        self.crossover = self.log(1.0, 80.0)
+        self.static = self.mass * GRAVITY * self.log(3e-3, 1.0)
+        self.omega = 2 * np.pi * self.crossover
+        self.alpha, self.beta = self.log(0.03, 0.4), self.log(1.3, 8.0)
+
+    def log(self, low: float, high: float) -> float:
+        """Log-uniform between two numbers."""
+        return float(np.exp(self.rng.uniform(np.log(low), np.log(high))))
+
+    def sign(self) -> float:
+        return float(self.rng.choice([-1.0, 1.0]))
+
+    @property
+    def stiffness(self) -> float:
+        """About the proportional stiffness of the loop [N/m]."""
+        return self.mass * self.omega**2 * np.sqrt(self.alpha)
+
+    @property
+    def deflection(self) -> float:
+        """By how much friction deflects the loop [m]."""
+        return self.static / self.stiffness
+
+    def tables(self) -> dict[str, Any]:
+        tables: dict[str, Any] = {
+            "masses": {"cart": _text(self.cart, "kg"), "stage": _text(self.stage, "kg")},
+            "friction": self.friction(),
+            "controller": self.controller(),
+        }
+        if self.form.joint != "rigid":
+            tables["joint"] = self.joint()
+        if self.form.parasitic:
+            tables["parasitic"] = {
+                "frequency": _text(max(self.log(80.0, 2000.0), 6 * self.crossover), "Hz"),
+                "mass": _text(self.stage * self.rng.uniform(0.1, 0.7), "kg"),
+                "damping_ratio": self.log(2e-3, 0.05),
+            }
+        if self.form.bias:
+            tables["bias"] = {self.form.bias: _text(self.sign() * self.static * self.log(0.01, 2.0), "N")}
+        return tables | {"motion": self.motion()}
+
+    def friction(self) -> dict[str, Any]:
+        """Known keys from what bearings are like; others about their examples."""
+        law = FRICTION.classes[self.form.friction]
+        bristles = self.static / self.log(2e-7, 1e-4)
+        known: dict[str, Any] = {
+            "static": _text(self.static, "N"),
+            "coulomb": _text(self.static * self.rng.uniform(0.2, 1.0), "N"),
+            "stribeck_velocity": _text(self.log(1e-4, 5e-2), "m/s"),
+            "stribeck_exponent": self.form.exponent or self.rng.uniform(0.6, 2.6),
+            "bristle_stiffness": _text(bristles, "N/m"),
+            "bristle_damping": _text(2 * self.log(0.03, 1.5) * np.sqrt(bristles * self.mass), "N*s/m"),
+            "viscous": _text(self.mass * self.log(0.01, 10.0) * float(self.rng.random() < 0.8), "N*s/m"),
+            "regularisation_velocity": _text(self.log(1e-6, 1e-3), "m/s"),
+        }
+        if self.form.asymmetry:
+            known["asymmetry"] = self.sign() * self.log(0.01, 0.4)
+        table: dict[str, Any] = {"model": self.form.friction}
+        for name, field in numeric_fields(law).items():
+            if name in known:
+                table[name] = known[name]
+            elif law.model_fields[name].is_required():
+                table[name] = self.about(field)
+        return table
+
+    def about(self, field: Any) -> Any:
+        """A value about the example of a key."""
+        if isinstance(field, Quantity):
+            number, unit = field.example.strip('"').split(maxsplit=1)
+            return _text(float(number) * self.log(1 / SPREAD, SPREAD), unit)
+        return float(field.example) * self.log(1 / SPREAD, 1.0)
+
+    def controller(self) -> dict[str, Any]:
+        table: dict[str, Any] = {"kind": "pid"}
+        if self.form.control == "rules":
+            table |= {"crossover": _text(self.crossover, "Hz"), "alpha": self.alpha, "beta": self.beta}
+            if self.rng.random() < 0.2:
+                table["tuned_mass"] = _text(self.mass * self.log(0.6, 1.6), "kg")
+        else:
+            kp, damping = self.stiffness, self.log(0.3, 1.5)
+            natural = np.sqrt(kp / self.mass)
+            table |= {
+                "kp": _text(kp, "N/m"),
+                "kd": _text(2 * damping * self.mass * natural, "N*s/m"),
+                "ki": _text(kp * natural * damping * self.log(0.03, 1.0), "N/(m*s)"),
+                "derivative_on": "error" if self.form.control == "on error" else "measurement",
+            }
+            if self.form.control != "plain":
+                table["tau"] = _text(1 / (natural * self.log(6.0, 100.0)), "s")
+        if self.form.limited:
+            table["force_limit"] = _text(self.static * self.log(3.0, 60.0), "N")
+        return table
+
+    def joint(self) -> dict[str, Any]:
+        stiffness = self.mass * (self.omega * self.log(0.15, 4.0)) ** 2
+        reduced = self.cart * self.stage / self.mass
+        contact = reduced * (2 * np.pi * max(self.log(300.0, 3000.0), 8 * self.crossover)) ** 2
+        limiter_damping = 2 * self.log(5e-3, 1.0) * np.sqrt(contact * reduced) * float(self.rng.random() > 0.04)
+        stroke = self.static / stiffness * self.log(0.02, 20.0) if self.form.joint != "touching" else 0.0
+        return {
+            "locked": self.form.joint == "locked",
+            "stiffness": _text(stiffness, "N/m"),
+            "damping": _text(2 * self.log(1e-3, 0.1) * np.sqrt(stiffness * self.stage), "N*s/m"),
+            "stroke": _text(stroke, "m"),
+            "limiter_stiffness": _text(contact, "N/m"),
+            "limiter_damping": _text(limiter_damping, "N*s/m"),
+        }
+
+    def motion(self) -> dict[str, Any]:
+        """A move of every kind, from a share of the deflection by friction to a thousand of them."""
+        kind = str(
+            self.rng.choice(["there_and_back", "release", "step", "hold", "ramp"], p=[0.5, 0.18, 0.14, 0.12, 0.06])
+        )
+        size = min(self.deflection * self.log(0.2, 1000.0), 2.0)
+        time = self.log(0.01, 0.3)
+        keys: Mapping[str, dict[str, str]] = {
+            "there_and_back": {
+                "acceleration": _text(size / time**2, "m/s^2"),
+                "acceleration_time": _text(time, "s"),
+                "return_at": "5 s",
+            },
+            "release": {"displacement": _text(self.sign() * size, "m")},
+            "step": {"size": _text(self.sign() * size, "m")},
+            "hold": {},
+            "ramp": {"velocity": _text(self.sign() * self.log(1e-5, 0.3), "m/s")},
+        }
+        return {"kind": kind, **keys[kind], "duration": "20 s"}
+
+
+def _text(value: float, unit: str) -> str:
+    return f"{value:.6g} {unit}"

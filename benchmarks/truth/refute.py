@@ -1,0 +1,170 @@
+"""Attempts to refute what was claimed of a stage; what stands up to a second, finer look is a refutation."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from benchmarks.truth.by_hand import NotWritten, by_hand
+from benchmarks.truth.claims import Claim
+from benchmarks.truth.swings import FAILED, RESTS, SWINGS, UNSURE
+from benchmarks.truth.trials import FINE, ROUGH, ROUNDS, Bench, Trial
+from friso.equations.bandwidth import bandwidth, faster
+
+ALL = (80, 40, 60, 20)
+"""Releases, pushes, stuck and drawn starts of a whole battery."""
+
+FEW = (16, 8, 32, 8)
+"""The same at a crossover beside an edge."""
+
+SECOND = 24
+"""Starts of a battery that are followed at the finer tolerance too."""
+
+ABOVE = (1.01, 1.1, 1.6)
+"""Factors above the edge at which nothing may attract."""
+
+BELOW = (0.995, 0.98, 0.95)
+"""Factors below it; at one of them at least something must."""
+
+SCIPY_PERIODS, ALIKE = 12.0, 0.02
+"""Periods for which SciPy follows a swing, and the share by which its amplitude may differ."""
+
+
+@dataclass(frozen=True)
+class Refutation:
+    """Which claim is wrong ("verdict", "own motion", "edge"), and how that was established."""
+
+    of: str
+    sure: bool
+    why: str
+
+
+def refutations(claim: Claim, seed: int) -> Iterator[Refutation]:
+    """All that is wrong with a claim."""
+    bench = Bench(claim.stage.flat())
+    if claim.verdict == "failed" or not bench.length > 0:
+        return
+    if bench.flat["motion.kind"] != "ramp":  # whose reference never stands still
+        yield from _verdict(claim, bench, seed)
+        yield from _own_motion(claim, bench)
+    if claim.edge is not None:
+        yield from _edge(claim, seed)
+
+
+def _verdict(claim: Claim, bench: Bench, seed: int) -> Iterator[Refutation]:
+    """Whether something attracts."""
+    trial = bench.starts(*ALL, seed)
+    if claim.attracted:
+        if not _hunts(bench, trial, claim.kicks):
+            yield Refutation("verdict", claim.sure, "no start swings on, at either tolerance")
+        return
+    if why := swinging(bench, trial):
+        yield Refutation("verdict", claim.sure, why)
+
+
+def _hunts(bench: Bench, trial: Trial, kicks: tuple[float, ...]) -> bool:
+    """Whether any start swings on: the kicks that are said to, then all of the trial."""
+    if kicks and bench.follow(bench.released(np.array(kicks)), ROUGH).swinging.size:
+        return True
+    return any(bench.follow(trial, rtol).swinging.size for rtol in (ROUGH, FINE))
+
+
+def swinging(bench: Bench, trial: Trial) -> str:
+    """From which start, and how, a stage swings on; "" where it does not. What a run at one tolerance shows has to be
+    shown by another, or by SciPy, from where it has come to."""
+    rough = bench.follow(trial, ROUGH)
+    for start in rough.swinging[:: max(1, len(rough.swinging) // 3)][:3]:
+        one = trial.take(np.array([start]))
+        fine = bench.follow(one, FINE, ROUNDS[1:])
+        if fine.words[0] == SWINGS:
+            return "; ".join(
+                [
+                    f"{one.kinds[0]} {one.sizes[0]:.6g} swings on by {rough.amplitude[start]:.6g} m, "
+                    f"followed for {rough.followed[start]:.4g} s at {ROUGH:g}",
+                    f"by {fine.amplitude[0]:.6g} m for {fine.followed[0]:.4g} s at {FINE:g}",
+                    by_scipy(bench, fine.ends[0], float(fine.amplitude[0])),
+                ]
+            )
+    second = trial.take(np.unique(np.linspace(0, len(trial.kinds) - 1, SECOND).astype(int)))
+    fine = bench.follow(second, FINE)
+    for start in fine.swinging[:1]:
+        about = by_scipy(bench, fine.ends[start], float(fine.amplitude[start]))
+        size, swing = second.sizes[start], fine.amplitude[start]
+        kind, followed = second.kinds[start], fine.followed[start]
+        return f"{kind} {size:.6g} swings on by {swing:.6g} m for {followed:.4g} s at {FINE:g} alone; {about}"
+    return ""
+
+
+def by_scipy(bench: Bench, end: np.ndarray, amplitude: float) -> str:
+    """What the equations by hand say of a swing [m] that a run ended in."""
+    try:
+        equations = by_hand(bench.flat).held()
+    except NotWritten as missing:
+        return f"no equations by hand ({missing})"
+    y = equations.start()
+    for name, value in zip(bench.kernel.states, end, strict=False):
+        y[_PLACES[name]] = value
+    if "cart_position" not in bench.kernel.states:
+        y[2:4] = y[0:2]
+    if "parasitic_position" not in bench.kernel.states:
+        y[4:6] = y[0:2]
+    times = np.linspace(0.0, SCIPY_PERIODS * bench.period, 2000)
+    x = equations.run(y, times)[:, 0]
+    if not np.isfinite(x[-1]):
+        return "SciPy does not get there"
+    half = x[len(x) // 2 :]
+    swing = float(np.ptp(half) / 2)
+    word = "confirms" if abs(swing / amplitude - 1) < ALIKE else "CONTRADICTS"
+    return f"SciPy {word}: {swing:.6g} m over {times[-1]:.4g} s"
+
+
+_PLACES = {
+    "position": 0,
+    "velocity": 1,
+    "cart_position": 2,
+    "cart_velocity": 3,
+    "parasitic_position": 4,
+    "parasitic_velocity": 5,
+    "bristle_deflection": 6,
+    "filtered_error": 7,
+    "filtered_position": 7,
+    "integral": 8,
+}
+
+
+def _own_motion(claim: Claim, bench: Bench) -> Iterator[Refutation]:
+    """Whether the stage's own motion ends as it is said to."""
+    wanted = SWINGS if claim.verdict == "hunts" else RESTS
+    words = {rtol: str(bench.follow_own(rtol).words[0]) for rtol in (ROUGH, FINE)}
+    if all(word not in (wanted, UNSURE, FAILED) for word in words.values()):
+        why = f"the motion followed for long {words[FINE]} at {ROUGH:g} and {FINE:g}"
+        yield Refutation("own motion", claim.sure, why)
+
+
+def _edge(claim: Claim, seed: int) -> Iterator[Refutation]:
+    """Whether nothing attracts on the far side of the edge, and something on the near side."""
+    assert claim.edge
+    edge = claim.edge.factor
+    for factor in ABOVE if claim.attracted else (factor for factor in (*ABOVE[:2], edge**-0.5) if edge * factor < 1):
+        bench = Bench(at(claim, edge * factor))
+        if why := swinging(bench, bench.starts(*FEW, seed)):
+            place = f"at {factor:.4g} times the edge{_crossover(bench.flat)}"
+            yield Refutation("edge", claim.edge.sure, f"{place} {why}")
+            return
+    benches = [Bench(at(claim, edge * factor)) for factor in BELOW]
+    if not any(bench.follow(bench.starts(*ALL, seed), ROUGH).swinging.size for bench in benches):
+        places = ", ".join(f"{factor:g}" for factor in BELOW)
+        yield Refutation("edge", claim.edge.sure, f"at {places} times the edge no start swings on")
+
+
+def at(claim: Claim, factor: float) -> dict[str, Any]:
+    """The stage as flat keys, its controller faster by a factor."""
+    return faster(claim.stage.flat(), factor)
+
+
+def _crossover(flat: Mapping[str, Any]) -> str:
+    own = bandwidth(flat)
+    return "" if own is None else f", {own:.6g} Hz,"

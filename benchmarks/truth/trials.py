@@ -1,0 +1,224 @@
+"""Brute force: a stage started in many ways and followed for long, in the lanes of the engine."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from benchmarks.truth.swings import FAILED, SWINGS, UNSURE, judge, legs
+from friso.engine.arrays import STATISTICS, Status
+from friso.engine.batch import RunOptions, run_chunks
+from friso.engine.kernel import Kernel, kernel
+from friso.equations.motion import last_corner
+from friso.equations.roles import Role, Steady
+from friso.equations.structure import structure
+
+ROUGH, FINE = 1e-6, 1e-9
+"""The two relative tolerances."""
+
+DECADES = (1e-4, 1e3)
+"""Releases and pushes in units of the deflection of the loop by the break-away force, and of that times its natural
+frequency."""
+
+NEAR = (0.01, 10.0)
+"""Where stages that stick begin, in the same unit."""
+
+SMALL = 2e-3
+"""Swings below this share of the same unit, and of the bias, are rest."""
+
+ROUNDS = (150.0, 800.0, 4000.0)
+"""Periods for which a run is followed, and followed on where that does not tell."""
+
+FOLLOWED = 6
+"""Runs that are followed on."""
+
+BUDGET = 30_000_000
+"""Steps that a run may take."""
+
+
+@dataclass(frozen=True)
+class Trial:
+    """Starts of one stage, (starts, states), what each of them is, and the displacement [m] or velocity [m/s]."""
+
+    states: np.ndarray
+    kinds: tuple[str, ...]
+    sizes: np.ndarray
+
+    def take(self, numbers: np.ndarray) -> Trial:
+        return Trial(self.states[numbers], tuple(self.kinds[k] for k in numbers), self.sizes[numbers])
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What became of starts: words of `swings`, half of peak to peak at the end [m], states at the end, and the time
+    [s] for which each was followed."""
+
+    words: np.ndarray
+    amplitude: np.ndarray
+    ends: np.ndarray
+    followed: np.ndarray
+
+    @property
+    def swinging(self) -> np.ndarray:
+        return np.flatnonzero(self.words == SWINGS)
+
+
+@dataclass(frozen=True)
+class Bench:
+    """A stage given as flat keys, its reference held at 0 unless its own motion is followed."""
+
+    flat: Mapping[str, Any]
+
+    @cached_property
+    def kernel(self) -> Kernel:
+        return kernel(structure(dict(self.flat)))
+
+    def _number(self, name: str) -> float:
+        flat = {**self.flat, "motion.size": 1.0, "motion.duration": np.inf}
+        (value,) = getattr(self.kernel.module, name)(self.kernel.values(flat, 1))
+        return float(np.ravel(value)[0])
+
+    @cached_property
+    def length(self) -> float:
+        """By how much the break-away force deflects the loop [m]."""
+        return self._number("breakaway") / self._number("stiffness")
+
+    @cached_property
+    def omega(self) -> float:
+        """Natural frequency of mass and loop [1/s]."""
+        return self._number("rate")
+
+    @cached_property
+    def period(self) -> float:
+        """About the period of a cycle that sticks at a third of that length [s]: twice the time to wind up, by the
+        actuator's force of a stage that stands still, and an oscillation."""
+        n = self.kernel
+        flat = {**self.held, "motion.size": self.length, "motion.duration": np.inf}
+        values = n.values(flat, 1)
+        stands = n.settled(flat, Steady(-self.length, self.length), 1).T[: len(n.states)]
+        modes = np.zeros((len(n.kinks), 1))
+        rows = n.module.right_hand_side(stands, modes, 0.0, np.zeros(3), values)
+        wound = stands + np.array([np.ravel(row)[:1] for row in rows]) * self._integrals[:, None]
+        number = list(n.outputs).index("force")
+        rise = [np.ravel(n.module.outputs(x, modes, 0.0, np.zeros(3), values)[number])[0] for x in (stands, wound)]
+        wait = self._number("breakaway") / abs(rise[1] - rise[0]) * 3
+        return float(2 * (wait + 2 * np.pi / self.omega))
+
+    @property
+    def _integrals(self) -> np.ndarray:
+        mask = np.zeros(len(self.kernel.states))
+        mask[self.kernel.having(Role.INTEGRAL)] = 1.0
+        return mask
+
+    @property
+    def held(self) -> dict[str, Any]:
+        still = {key: value for key, value in self.flat.items() if not key.startswith("motion.")}
+        return {**still, "motion.kind": "release", "motion.displacement": self.length}
+
+    def _settled(self, error: np.ndarray, position: np.ndarray, force: np.ndarray | float = 0.0) -> np.ndarray:
+        flat = {**self.held, "motion.size": np.nan, "motion.duration": np.inf}
+        return self.kernel.settled(flat, Steady(error, position, force=force), len(position))
+
+    def starts(self, releases: int, pushes: int, stuck: int, drawn: int, seed: int) -> Trial:
+        """Releases and pushes over seven decades, to either side in turn; stages stuck with a wound-up integrator; and
+        some drawn at random."""
+        rng = np.random.default_rng([seed, 7])
+        sign = np.where(np.arange(1000) % 2, -1.0, 1.0)
+        released = np.geomspace(*DECADES, releases) * self.length * sign[:releases]
+        pushed = np.geomspace(*DECADES, pushes) * self.length * self.omega * sign[:pushes]
+        stands = np.geomspace(*NEAR, stuck) * self.length * sign[:stuck]
+        places, speeds = (
+            np.exp(rng.uniform(np.log(NEAR[0]), np.log(NEAR[1]), drawn)) * unit * rng.choice([-1, 1], drawn)
+            for unit in (self.length, self.length * self.omega)
+        )
+        forces = rng.uniform(-1, 1, drawn) * self._number("breakaway")
+        blocks = [
+            self._settled(np.zeros(releases), released),
+            self._moving(np.zeros(pushes), pushed),
+            self._settled(-stands, stands),
+            self._moving(places, speeds, forces),
+        ]
+        kinds = ["release"] * releases + ["push"] * pushes + ["stuck at"] * stuck + ["drawn at"] * drawn
+        return Trial(np.vstack(blocks), tuple(kinds), np.concatenate([released, pushed, stands, places]))
+
+    def _moving(self, places: np.ndarray, speeds: np.ndarray, force: np.ndarray | float = 0.0) -> np.ndarray:
+        states = self._settled(-places, places, force)
+        states[:, self.kernel.having(Role.VELOCITY)] = speeds[:, None]
+        return states
+
+    def released(self, displacements: np.ndarray) -> Trial:
+        """Releases from displacements [m]."""
+        return Trial(
+            self._settled(np.zeros(len(displacements)), displacements), ("release",) * len(displacements), displacements
+        )
+
+    def follow(self, trial: Trial, rtol: float, rounds: tuple[float, ...] = ROUNDS) -> Outcome:
+        """What becomes of starts. Of those that are not clear after a round a few go on."""
+        return self._follow(self.held, trial.states, 0.0, rtol, rounds)
+
+    def follow_own(self, rtol: float, longest: float = 100.0) -> Outcome:
+        """What becomes of the stage's own motion, followed as many times its duration, and for `ROUNDS`."""
+        periods = max(ROUNDS[0], min(longest * self.flat["motion.duration"] / self.period, ROUNDS[1]))
+        corner = float(np.max(last_corner(dict(self.flat))))
+        return self._follow(self.flat, None, corner, rtol, (periods, *ROUNDS[1:]))
+
+    def _follow(
+        self, flat: Mapping[str, Any], states: np.ndarray | None, corner: float, rtol: float, rounds: tuple[float, ...]
+    ) -> Outcome:
+        count = 1 if states is None else len(states)
+        words = np.full(count, UNSURE, dtype=object)
+        amplitude, followed = np.zeros(count), np.zeros(count)
+        ends = np.full((count, len(self.kernel.kept)), np.nan)
+        on, begin = np.arange(count), states
+        for number, periods in enumerate(rounds):
+            end = corner + periods * self.period
+            own = {**flat, "motion.duration": end}
+            for part in run_chunks(self.kernel, own, len(on), self._options(rtol), begin):
+                which = on[part.numbers]
+                words[which], amplitude[which] = self._words(part, end, number == len(rounds) - 1)
+                ends[which] = part.results.ends
+                followed[which] += end
+            unsure = np.flatnonzero(words == UNSURE)
+            if not unsure.size or SWINGS in words:
+                break
+            on = unsure[np.unique(np.linspace(0, len(unsure) - 1, FOLLOWED).astype(int))]
+            begin, corner = self._resumed(ends[on], flat), 0.0
+            flat = self._after(flat)
+        return Outcome(words, amplitude, ends, followed)
+
+    def _after(self, flat: Mapping[str, Any]) -> dict[str, Any]:
+        """The stage once its reference has come to rest; positions count from there."""
+        return self.held if flat["motion.kind"] != "ramp" else dict(flat)
+
+    def _resumed(self, ends: np.ndarray, flat: Mapping[str, Any]) -> np.ndarray:
+        """States to go on from: positions, and what filters know of them, count from where the reference rests."""
+        rest = flat["motion.size"] if flat["motion.kind"] == "step" else 0.0
+        ends = ends.copy()
+        ends[:, self.kernel.having(Role.POSITION)] -= rest
+        names = [name for name in self.kernel.states if name.startswith("filtered_position")]
+        ends[:, [self.kernel.states.index(name) for name in names]] -= rest
+        return ends
+
+    def _options(self, rtol: float) -> RunOptions:
+        return RunOptions(
+            rtol=rtol, window=0.75, record_from=np.inf, least_swing=self.small / 4, budget=BUDGET, threads=1
+        )
+
+    @property
+    def small(self) -> float:
+        return SMALL * self.length
+
+    def _words(self, part: Any, end: float, patient: bool) -> tuple[list[str], list[float]]:
+        results = part.results
+        high, low = (results.statistics[:, STATISTICS.index(f"deviation_{side}")] for side in ("max", "min"))
+        words, sizes = [], []
+        for k, count in enumerate(results.turn_counts):
+            seen = legs(results.turn_times[k, :count], results.turn_values[k, :count], end)
+            done = results.statuses[k] == Status.DONE
+            words.append(judge(seen, float(high[k] - low[k]), self.small, patient) if done else FAILED)
+            sizes.append(float(high[k] - low[k]) / 2)
+        return words, sizes
