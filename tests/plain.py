@@ -100,8 +100,11 @@ def control(flat: Flat, s: State, y: float, v: float, r: float, r_rate: float) -
     rates["integral"] = winding
     if "controller.force_limit" not in flat:
         return demand, rates
-    bound = flat["controller.force_limit"]
-    if winding * demand > 0:  # it would wind up further: the integrator rests beyond the limit and a 1000th of it
+    bound, anti_windup = flat["controller.force_limit"], flat.get("controller.anti_windup", "clamp")
+    if anti_windup == "back_calculation":
+        gain = k_p / tau_i if "controller.crossover" in flat else flat["controller.ki"]
+        rates["integral"] += (min(max(demand, -bound), bound) - demand) / gain / flat["controller.anti_windup_time"]
+    if anti_windup == "clamp" and winding * demand > 0:  # it rests beyond the limit and a 1000th
         rates["integral"] = winding * (1 - min(max((abs(demand) - bound) / (bound / 1000), 0.0), 1.0))
     return min(max(demand, -bound), bound), rates
 
@@ -129,6 +132,7 @@ def rates(flat: Flat, names: Sequence[str]) -> Callable[[float, Sequence[float]]
         s = dict(zip(names, x, strict=True))
         y, v = s["position"], s["velocity"]
         force, rate = control(flat, s, y, v, *reference(flat, t))
+        force += flat.get("bias.stage", 0.0)
         rate |= {"position": v}
         cart_velocity = s.get("cart_velocity", v)
         if flat["friction.model"] == "maxwell_slip":
@@ -136,6 +140,7 @@ def rates(flat: Flat, names: Sequence[str]) -> Callable[[float, Sequence[float]]
             rate |= rates_within
         else:
             drag, rate["bristle_deflection"] = friction(flat, cart_velocity, s.get("bristle_deflection", 0.0))
+        drag -= flat.get("bias.cart", 0.0)
         if "joint.limiter_stiffness" not in flat:
             rate["velocity"] = (force - drag) / (flat.get("masses.cart", 0.0) + flat.get("masses.stage", 0.0))
             return [rate[name] for name in names]

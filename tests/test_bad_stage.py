@@ -189,6 +189,16 @@ FREQUENCY = "number and unit in quotes, convertible to Hz, rad/s or rpm, greater
         ),
         (
             'kind = "pid"',
+            'kind = "pid"\nforce_limit = "9 N"\nanti_windup = "back_calculation"',
+            ("controller.anti_windup", '"back_calculation"', "time in which", 'anti_windup_time = "50 ms"'),
+        ),
+        (
+            'kind = "pid"',
+            'kind = "pid"\nforce_limit = "9 N"\nanti_windup_time = "50 ms"',
+            ("controller.anti_windup_time", "no anti_windup", "belongs", 'anti_windup = "back_calculation"'),
+        ),
+        (
+            'kind = "pid"',
             'kind = "pid"\nforce_limit = "0 N"',
             ("controller.force_limit", '"0 N"', "convertible to N, greater than 0", 'force_limit = "200 N"'),
         ),

@@ -9,10 +9,12 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 import pytest
 import sympy as sp
+from variants import limit, lugre, stage, step, van_dijk
 
+import friso
 from friso.equations.blocks import Blocks, Loop, Measured, Signal, measured
 from friso.equations.component import STEADY, Kink, Role
-from friso.equations.continuous import Continuous
+from friso.equations.continuous import Continuous, ForceLimit
 from friso.equations.sampled import SAMPLE_TIME, Rest, Sampled
 from friso.frequency.describing.loop import receptance
 from friso.frequency.parts import FORCE, STAGE, compensator
@@ -56,14 +58,24 @@ def test_an_integrator_rests_at_each_limit_and_at_both(beyond: tuple[str, ...]) 
     """Wound up further than either limit allows, or both, it stays; it does not run back."""
     blocks = Continuous(sp.S.One)
     signal = blocks.integral(measured(GOING, sp.S.One, sp.S.One).error, sp.S(2), limit=sp.S(3))
-    kinks = Kink("force_upper", signal.value - 5), Kink("force_lower", -signal.value - 5)
-    states, resting = blocks.finished(signal, sp.S(5), kinks)
+    bound = ForceLimit.of(signal, "clamp")
+    states, resting = blocks.finished(signal, bound)
     (integral,) = (each for each in states if each.role == Role.INTEGRAL)
-    modes = {kink.beyond: 0 for kink in (*kinks, *resting)} | {Kink("winding_up", ERROR).beyond: 1}
+    modes = {kink.beyond: 0 for kink in (*bound.kinks, *resting)} | {Kink("winding_up", ERROR).beyond: 1}
     for name in beyond:
         modes |= {sp.Symbol(f"beyond_{mode}_upper", real=True): 1 for mode in (name, f"rest_{name}")}
     modes |= {sp.Symbol("beyond_rest_upper", real=True): int("force" in beyond)}
     assert integral.derivative.subs(modes) == (0 if beyond else ERROR)
+
+
+@pytest.mark.parametrize(("anti_windup", "hunts"), [("clamp", False), ("none", True), ("back_calculation", True)])
+def test_anti_windup_decides_on_a_large_step(anti_windup: str, hunts: bool) -> None:
+    """Integrals that wind up on the way carry the stage beyond its reference, from where it sticks and slips."""
+    time = "50 ms" if anti_windup == "back_calculation" else ""
+    controller = van_dijk("8 Hz", limit("6 N", anti_windup, time))
+    run = friso.simulate(stage(step("10 mm", "60 s"), friction=lugre(2), controller=controller))
+    last = run["position"].sel(time=slice(30, 60))
+    assert (float(last.max() - last.min()) > 1e-3) == hunts
 
 
 class LimitedShares(ControllerSection):

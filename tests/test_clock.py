@@ -393,12 +393,17 @@ def plain_drive(flat: Flat, inputs: Mapping[str, np.ndarray]) -> tuple[np.ndarra
     demand = demand + drive["feedforward_mass"] * inputs["reference.acceleration"] + inputs["injected_force"]
     demand += drive["feedforward_viscous"] * speed + drive["feedforward_coulomb"] * np.sign(speed)
     integral, last, commands, integrals = 0.0, 0.0, [], []
+    anti_windup = flat.get("controller.anti_windup", "clamp")
     for n, now in enumerate(error):
         wanted = demand[n] + gain * (integral + added[n])
+        further = abs(wanted) > LIMIT and wanted * added[n] > 0
         if drive["integrator_reset"] and now * last < 0:
             integral = added[n]
-        elif abs(now) >= drive["integrator_deadband"] and (abs(wanted) <= LIMIT or wanted * added[n] <= 0):
+        elif abs(now) >= drive["integrator_deadband"] and not (anti_windup == "clamp" and further):
             integral += added[n]
+            if anti_windup == "back_calculation":
+                cut = np.clip(wanted, -LIMIT, LIMIT) - wanted
+                integral += TIME / flat["controller.anti_windup_time"] * cut / gain
         last = now or last
         integrals.append(integral)
         commands.append(np.clip(demand[n] + gain * integral, -LIMIT, LIMIT))
@@ -445,6 +450,20 @@ def test_command_is_that_of_plain_python(feature: str, tuned: Flat) -> None:
     assert 0.02 < np.mean(np.abs(commands) == LIMIT) < 0.7
     without = plain_drive(keys(axis()) | tuned, inputs)[0]
     assert (np.abs(commands - without).max() > 0.01) == (feature != "plain")
+
+
+@pytest.mark.parametrize("tuned", [{}, TUNED], ids=["eq 6", "eq 7"])
+@pytest.mark.parametrize("anti_windup", ["none", "back_calculation"])
+def test_the_integrator_at_the_limit_of_the_force(anti_windup: str, tuned: Flat) -> None:
+    """It winds up, or unwinds by what is cut off; either differs from the integrator that rests."""
+    how = {"controller.anti_windup": anti_windup, "controller.anti_windup_time": 5 * TIME}
+    flat, inputs = keys(axis()) | tuned | how, motions()
+    held = iterated(*commanded(AsBuilt.of(flat)), flat, inputs)
+    commands, integrals = plain_drive(flat, inputs)
+    assert held["commanded"] == pytest.approx(commands, abs=1e-9)
+    assert held["integral"] == pytest.approx(integrals, abs=1e-12)
+    clamped = plain_drive(keys(axis()) | tuned, inputs)[0]
+    assert np.abs(commands - clamped).max() > 0.01
 
 
 def settled(error: list[float], **drive: float) -> np.ndarray:

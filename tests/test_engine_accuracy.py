@@ -10,7 +10,7 @@ from cycles import by_gains
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 from scipy.optimize import brentq
-from variants import PARASITIC, TOUCHING, VARIANTS, lugre, stage, step, van_dijk
+from variants import HOLD, PARASITIC, TOUCHING, VARIANTS, lugre, stage, step, van_dijk
 
 from friso.engine.arrays import Results, Settings, Status
 from friso.engine.batch import RunOptions, prepare, run_chunks
@@ -144,6 +144,8 @@ TOUCHES = stage(step(), friction=lugre(2), joint=TOUCHING, parasitic=PARASITIC, 
         pytest.param(VARIANTS["free, parasitic"], {"motion.duration": 0.12}, id="free, parasitic"),
         pytest.param(by_gains(8, "6 N"), {"motion.duration": 0.5, "motion.displacement": 1e-2}, id="gains, limit"),
         pytest.param(VARIANTS["rigid, Stribeck 1.5, PD measured"], {"motion.duration": 0.4}, id="Stribeck, measured"),
+        pytest.param(VARIANTS["rigid, limit, wound up"], {"motion.duration": 0.5}, id="wound up"),
+        pytest.param(VARIANTS["rigid, limit, back-calculation"], {"motion.duration": 0.5}, id="back-calculation"),
         pytest.param(TOUCHES, {"motion.duration": 0.06}, id="touching, parasitic"),
     ],
 )
@@ -163,6 +165,20 @@ def test_runs_against_radau(chosen: Stage, changes: dict[str, Any]) -> None:
     theirs = radau(flat, shape.states, scales, times)
     sensitive = 50 if "joint.stroke" in flat else 1  # contacts and the 300 Hz mode multiply small differences
     assert np.max(np.abs(ours - theirs) / scales) < 1e-6 * sensitive
+
+
+@pytest.mark.parametrize("bias", [5.0, -5.0])
+def test_a_reference_that_stands_still_is_no_measure_of_length(bias: float) -> None:
+    """Constant forces set the stage in motion: tolerances follow from the friction, whatever the reference does."""
+    slow = {"bias.cart": f"{bias} N", "bias.stage": "1e-6 N", "controller.crossover": "4 Hz"}
+    flat = stage(HOLD, friction=lugre(2), controller=van_dijk()).replace(slow).flat() | {"motion.duration": 10.0}
+    shape = kernel(structure(flat))
+    (runs,) = run_chunks(shape, flat, 1, RunOptions(interval=0.1))
+    ours, times = runs.results.samples[0], np.arange(101) * 0.1
+    theirs = radau(flat, shape.states, np.max(np.abs(ours), axis=0), times)
+    length = flat["friction.static"] / float(shape.module.stiffness(shape.values(flat | {"motion.size": 0.0}, 1))[0][0])
+    assert np.max(np.abs(theirs[:, shape.position])) > 5e-3
+    assert np.max(np.abs(ours - theirs)[:, shape.position]) < 1e-2 * length
 
 
 @ALONE

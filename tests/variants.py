@@ -82,8 +82,9 @@ def gains(kp: float = 1000, ki: float = 0, kd: float = 0, tau: float = 0, extra:
 MEASURED = 'derivative_on = "measurement"\n'
 
 
-def limit(force: str) -> str:
-    return f'force_limit = "{force}"\n'
+def limit(force: str, anti_windup: str = "", time: str = "") -> str:
+    how = {"force_limit": force, "anti_windup": anti_windup, "anti_windup_time": time}
+    return "".join(f'{key} = "{value}"\n' for key, value in how.items() if value)
 
 
 def there_and_back(duration: str = "20 s", back: str = "5 s", acceleration: str = "100 m/s^2") -> str:
@@ -142,6 +143,12 @@ VARIANTS: dict[str, Stage] = {
         there_and_back(), friction=maxwell(), joint=free(), parasitic=PARASITIC, controller=van_dijk()
     ),
     "rigid, van Dijk, limit": stage(step("10 mm"), friction=lugre(2), controller=van_dijk("8 Hz", limit("6 N"))),
+    "rigid, limit, wound up": stage(
+        step("10 mm"), friction=lugre(2), controller=gains(**FULL, tau=1e-3, extra=limit("6 N", "none"))
+    ),
+    "rigid, limit, back-calculation": stage(
+        step("10 mm"), friction=lugre(2), controller=van_dijk("8 Hz", limit("6 N", "back_calculation", "20 ms"))
+    ),
     "locked": stage(there_and_back(), friction=lugre(2), joint=LOCKED, controller=van_dijk()),
     "locked, parasitic": stage(
         there_and_back(), friction=lugre(2), joint=LOCKED, parasitic=PARASITIC, controller=van_dijk()

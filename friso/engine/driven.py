@@ -80,4 +80,4 @@ def _as_motion(flat: Mapping[str, Any], numbers: np.ndarray, inputs: Inputs, siz
     """The flat keys of some runs, with a motion as long as the log, and as large [m]."""
     part = {key: value[numbers] if np.ndim(value) else value for key, value in flat.items()}
     duration = len(inputs.reference) * inputs.sample_time
-    return part | {"motion.kind": "step", "motion.size": size or np.finfo(float).tiny, "motion.duration": duration}
+    return part | {"motion.kind": "step", "motion.size": size, "motion.duration": duration}

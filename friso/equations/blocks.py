@@ -14,7 +14,7 @@ from typing import Any, Literal
 import sympy as sp
 
 from friso.equations.component import STEADY, Component, Held, key
-from friso.stage.controllers import FORCE_LIMIT, ControllerSection
+from friso.stage.controllers import ANTI_WINDUP_TIME, FORCE_LIMIT, ControllerSection
 
 Polynomial = tuple[Any, Any, Any]
 """Coefficients of 1, s [s] and s^2 [s^2]."""
@@ -138,8 +138,8 @@ class Blocks(ABC):
         rule: Literal["bilinear", "sum"] = "bilinear",
         limit: sp.Expr | None = None,
     ) -> Signal:
-        """gain/s; the gain is positive, and the controller's force rises with the output. The integrator rests where
-        that force is at its limit and it would drive it further, and where its own output is at a `limit`. A drive
+        """gain/s; the gain is positive, and the controller's force rises with the output. Where that force is at its
+        limit, the integrator does as the anti-windup tells; where its own output is at a `limit`, it rests. A drive
         integrates by trapezoids (`bilinear`) or sums up."""
 
     @abstractmethod
@@ -158,6 +158,11 @@ class Blocks(ABC):
 def force_limit() -> sp.Symbol:
     """The limit of the controller's force [N]."""
     return key(FORCE_LIMIT)
+
+
+def unwinding_time() -> sp.Symbol:
+    """The time [s] in which back-calculation unwinds an integrator."""
+    return key(ANTI_WINDUP_TIME)
 
 
 def wound_up(force: sp.Expr, integrals: list[sp.Symbol]) -> dict[sp.Symbol, sp.Expr]:

@@ -16,10 +16,12 @@ from friso.equations.blocks import (
     Signal,
     force_limit,
     measured,
+    unwinding_time,
     wound_up,
 )
 from friso.equations.component import STEADY, Component, Kink, Output, Role, State, state
 from friso.equations.structure import ControllerForm, controller_form
+from friso.stage.controllers import BACK_CALCULATION, AntiWindup
 
 UNWINDING_BAND = sp.Rational(1, 1000)
 """Share of the force limit over which the integrator is brought to rest.
@@ -33,13 +35,13 @@ def continuous_controller(form: ControllerForm, loop: Loop, length: sp.Expr, rat
     blocks = Continuous(rate)
     shares = form.law.declare(measured(loop, length, rate), blocks, form.variant)
     demand = sum(shares.values(), start=Blocks.nothing)
-    limit = force_limit() if form.limited else None
-    force, kinks = _clamped(demand.value, limit, "force") if limit is not None else (demand.value, ())
+    bound = ForceLimit.of(demand, form.anti_windup) if form.anti_windup else None
+    force, kinks = (bound.force, bound.kinks) if bound else (demand.value, ())
     outputs = {"force": Output(force, "N", "actuator force")}
     outputs |= {
         f"force_{term}": Output(shares[term].value, "N", f"{name} share") for term, name in form.law.shares.items()
     }
-    states, resting = blocks.finished(demand, limit, kinks)
+    states, resting = blocks.finished(demand, bound)
     return Controller(force, Component(states, (*blocks.kinks, *kinks, *resting), outputs))
 
 
@@ -61,6 +63,25 @@ def slow_gains(flat: Mapping[str, Any]) -> tuple[float, float]:
 def _per_error(value: sp.Expr) -> sp.Expr:
     """By how much a value changes with the error of a stage that is displaced the other way."""
     return sp.diff(value, STEADY.error) - sp.diff(value, STEADY.position)
+
+
+@dataclass(frozen=True)
+class ForceLimit:
+    """The limit of the force [N], the force that keeps to it, its kinks, by how much [N] it is off the demand, and what
+    integrators do then."""
+
+    limit: sp.Expr
+    force: sp.Expr
+    kinks: tuple[Kink, ...]
+    cut: sp.Expr
+    anti_windup: AntiWindup
+
+    @classmethod
+    def of(cls, demand: Signal, anti_windup: AntiWindup) -> ForceLimit:
+        """That of a demand."""
+        limit = force_limit()
+        force, kinks = _clamped(demand.value, limit, "force")
+        return cls(limit, force, kinks, force - demand.value, anti_windup)
 
 
 @dataclass(frozen=True)
@@ -136,21 +157,20 @@ class Continuous(Blocks):
         self.kinks += kinks
         return replace(signal, value=value, rate=None)
 
-    def finished(
-        self, demand: Signal, limit: sp.Expr | None, kinks: tuple[Kink, ...]
-    ) -> tuple[tuple[State, ...], tuple[Kink, ...]]:
-        """All states, the integrators resting where the demand is beyond its limit, whose kinks are given, or their
-        output beyond a limit of its own; and the kinks of that."""
+    def finished(self, demand: Signal, bound: ForceLimit | None) -> tuple[tuple[State, ...], tuple[Kink, ...]]:
+        """All states, the integrators doing as they are to where the demand is beyond its bound, and resting where
+        their output is beyond a limit of its own; and the kinks of that."""
         steady = wound_up(demand.settled, [each.symbol for each in self._integrals])
         states = [replace(each, settled=each.settled.xreplace(steady)) for each in self.states]
-        far: list[Kink] = list(_far(kinks, limit, "rest")) if self._integrals and limit is not None else []
+        clamp = bound if bound and bound.anti_windup == "clamp" else None
+        far: list[Kink] = list(_far(clamp.kinks, clamp.limit, "rest")) if self._integrals and clamp else []
         winding: list[Kink] = []
         for each in self._integrals:
             share = sp.S.One
             beside = "" if str(each.symbol) == "integral" else f"_{each.symbol}"
             up = Kink(f"winding_up{beside}", each.integrand)
-            if limit is not None:
-                share *= 1 - _resting(kinks, tuple(far[:2]), up, limit)
+            if clamp:
+                share *= 1 - _resting(clamp.kinks, tuple(far[:2]), up, clamp.limit)
             if each.limit is not None:
                 _, ends = _clamped(each.output, each.limit, str(each.symbol))
                 beyond = _far(ends, each.limit, f"rest_{each.symbol}")
@@ -159,6 +179,8 @@ class Continuous(Blocks):
             if share != 1:
                 winding.append(up)
             derivative = each.integrand * share
+            if bound and bound.anti_windup == BACK_CALCULATION:  # Astrom and Hagglund, Advanced PID Control, 3.5
+                derivative += bound.cut / (sp.diff(each.output, each.symbol) * unwinding_time())
             states.append(State(each.symbol, derivative, "m*s", each.scale, Role.INTEGRAL, steady[each.symbol]))
         return tuple(states), (*far, *winding)
 

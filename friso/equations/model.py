@@ -22,11 +22,14 @@ REFERENCE = tuple(key(f"reference.{name}") for name in ("position", "velocity", 
 """Position, velocity and acceleration of the reference at its last corner."""
 
 MOTION_SIZE = key("motion.size")
-"""Length of the motion [m]; infinite where nothing moves, so that it bounds nothing."""
+"""Length of the motion [m]; 0 where the reference stands still."""
 
 
 SMALLEST_LENGTH = sp.Rational(1, 10**4)
 """Share of the motion below which its length scale does not fall, however little friction there is."""
+
+SMALLEST_MOTION = sp.Rational(1, 10**6)
+"""Share of the deflection by the break-away force below which it does not fall, however short the motion."""
 
 
 @dataclass(frozen=True)
@@ -179,12 +182,17 @@ def _bodies(structure: Structure) -> tuple[Body, Body, Body | None]:
 
 
 def _scales(structure: Structure, friction: Friction | None, mass: sp.Expr) -> tuple[sp.Expr, sp.Expr]:
-    """Length [m] by which the break-away force deflects the control loop (at most the motion itself), and the
-    natural frequency of mass and loop [1/s]: a hunting cycle is a few of the one in size and period."""
+    """Length [m] by which the break-away force deflects the control loop (about the motion itself where that is
+    shorter), and the natural frequency of mass and loop [1/s]: a hunting cycle is a few of the one in size and period.
+    Without friction the length is that of the motion, or else the deflection by the forces of [bias]."""
     stiffness = loop_stiffness(structure.controller)
-    length = MOTION_SIZE
-    if friction is not None:
-        length = sp.Max(sp.Min(MOTION_SIZE, friction.breakaway / stiffness), SMALLEST_LENGTH * MOTION_SIZE)
+    if friction is None:
+        bias = sum((sp.Abs(key(f"bias.{name}")) for name in structure.biased), start=sp.S.Zero)
+        length, still = MOTION_SIZE, bias / stiffness if bias else sp.S.Zero
+    else:
+        still = friction.breakaway / stiffness
+        length = sp.Max(sp.Min(MOTION_SIZE, still), SMALLEST_LENGTH * MOTION_SIZE, SMALLEST_MOTION * still)
+    length = sp.Piecewise((length, MOTION_SIZE > 0), (still, True))
     return length, sp.Max(sp.sqrt(stiffness / mass), 1 / key("motion.duration"))
 
 

@@ -60,9 +60,8 @@ def reference(flat: Mapping[str, Any], time: np.ndarray) -> np.ndarray:
 
 
 def size(flat: Mapping[str, Any]) -> Any:
-    """Length of the motion [m]; infinite where nothing moves, so that it bounds no other length."""
-    length = np.abs(_SIZES[flat["motion.kind"]](flat))
-    return np.where(length > 0, length, np.inf)
+    """Length of the motion [m]; 0 where the reference stands still from the start."""
+    return np.abs(_SIZES[flat["motion.kind"]](flat))
 
 
 def initial_displacement(flat: Mapping[str, Any]) -> Any:

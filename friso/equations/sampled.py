@@ -11,9 +11,10 @@ from typing import Any, Literal
 
 import sympy as sp
 
-from friso.equations.blocks import Blocks, Loop, Polynomial, Signal, force_limit, measured, wound_up
+from friso.equations.blocks import Blocks, Loop, Polynomial, Signal, force_limit, measured, unwinding_time, wound_up
 from friso.equations.component import Held, Role, key, state
 from friso.equations.structure import ControllerForm
+from friso.stage.controllers import BACK_CALCULATION, AntiWindup
 
 SAMPLE_TIME = key("drive.sample_time")
 
@@ -32,13 +33,14 @@ def sampled_controller(
     """The force [N] commanded at a sample, an `extra` one added before it is limited, and what is kept for the next.
 
     `loop` holds what is known at the sample. A derivative without a filter is a difference over `velocity_samples`. An
-    integrator that would drive a force beyond its limit further rests for the sample.
+    integrator does at the limit of the force as its anti-windup tells: clamped, it rests for the sample in which it
+    would drive the force further beyond.
     """
     blocks = Sampled(velocity_samples)
     shares = form.law.declare(measured(loop, sp.S.One, sp.S.One), blocks, form.variant)
     demand = sum(shares.values(), start=Blocks.nothing)
-    limit = force_limit() if form.limited else None
-    force, held = blocks.finished(replace(demand, value=demand.value + extra), limit, rest)
+    limit = force_limit() if form.anti_windup else None
+    force, held = blocks.finished(replace(demand, value=demand.value + extra), form.anti_windup, rest)
     return sp.Max(-limit, sp.Min(limit, force)) if limit is not None else force, held
 
 
@@ -124,9 +126,9 @@ class Sampled(Blocks):
         """As it is at a sample."""
         return replace(signal, value=sp.Max(-limit, sp.Min(limit, signal.value)), rate=None, before=None)
 
-    def finished(self, demand: Signal, limit: sp.Expr | None, rest: Rest) -> tuple[sp.Expr, tuple[Held, ...]]:
-        """The force before it is limited, and all that is held, the integrators resting where the force would be driven
-        beyond its limit, and their output beyond a limit of its own."""
+    def finished(self, demand: Signal, anti_windup: AntiWindup | None, rest: Rest) -> tuple[sp.Expr, tuple[Held, ...]]:
+        """The force before it is limited, and all that is held, the integrators doing as they are to where the force
+        would be beyond its limit, and resting where their output would be beyond a limit of its own."""
         new: dict[Any, Any] = {}
         for each in self._integrals:
             new[each.next] = each.symbol + each.share.xreplace(new)
@@ -135,11 +137,16 @@ class Sampled(Blocks):
         for each in self._integrals:
             share: Any = each.share.xreplace(updates)
             rests = rest.rests
-            for value, end in ((wanted, limit), (each.gain * new[each.next], each.limit)):
+            clamp = force_limit() if anti_windup == "clamp" else None
+            for value, end in ((wanted, clamp), (each.gain * new[each.next], each.limit)):
                 if end is not None:
                     winding = sp.Or(sp.And(value > end, share > 0), sp.And(value < -end, share < 0))
                     rests = sp.Or(rests, winding)
-            updates[each.next] = sp.Piecewise((share, rest.restarts), (each.symbol, rests), (each.symbol + share, True))
+            following = each.symbol + share
+            if anti_windup == BACK_CALCULATION:
+                cut = sp.Max(-force_limit(), sp.Min(force_limit(), wanted)) - wanted
+                following += SAMPLE_TIME * cut / (each.gain * unwinding_time())
+            updates[each.next] = sp.Piecewise((share, rest.restarts), (each.symbol, rests), (following, True))
         steady: dict[Any, Any] = {**wound_up(demand.settled, [each.symbol for each in self._integrals])}
         known: list[tuple[Any, Any]] = [(each.update, each.settled) for each in self.held]
         held = [

@@ -8,7 +8,16 @@ from typing import Any, Literal
 
 import numpy as np
 
-from friso.stage.controllers import CONTROLLERS, FORCE_LIMIT, KIND, ControllerSection, controller_of
+from friso.stage.controllers import (
+    ANTI_WINDUP,
+    CONTROLLERS,
+    DEFAULT_ANTI_WINDUP,
+    FORCE_LIMIT,
+    KIND,
+    AntiWindup,
+    ControllerSection,
+    controller_of,
+)
 from friso.stage.tables import friction_law
 
 JointForm = Literal["rigid", "locked", "free", "touching"]
@@ -17,13 +26,13 @@ JointForm = Literal["rigid", "locked", "free", "touching"]
 @dataclass(frozen=True)
 class ControllerForm:
     """Which controller, by its kind and the name of the class of its form; what else its equations depend on; whether
-    it has integral action, and whether its force is limited."""
+    it has integral action; and what that does at the limit of the force (None: there is no limit)."""
 
     kind: str
     form: str
     variant: Hashable
     integral: bool
-    limited: bool = False
+    anti_windup: AntiWindup | None = None
 
     @property
     def law(self) -> type[ControllerSection]:
@@ -90,5 +99,5 @@ def controller_form(flat: Mapping[str, Any]) -> ControllerForm:
         form=law.__name__,
         variant=law.variant(flat),
         integral=law.integrates(flat),
-        limited=FORCE_LIMIT in flat,
+        anti_windup=flat.get(ANTI_WINDUP, DEFAULT_ANTI_WINDUP) if FORCE_LIMIT in flat else None,
     )

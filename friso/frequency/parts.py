@@ -61,7 +61,7 @@ def compensator(flat: Mapping[str, Any], members: int) -> System:
     for one that exerts none."""
     form = shared_structure(flat).controller
     assert form is not None  # a stage file has a controller
-    system = _compensator(replace(form, limited=False)).at(flat, members)
+    system = _compensator(replace(form, anti_windup=None)).at(flat, members)
     if not (system.c.any() or system.d.any()):
         raise InputError("controller", "gains that are all 0", "a controller that acts", 'kp = "3 N/m"')
     return system

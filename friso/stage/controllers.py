@@ -12,8 +12,19 @@ from friso.quantities import Quantity, Value, positive
 from friso.stage.section import Section, SectionClass, UncertainSection, Variants
 
 CONTROLLER = "controller"
-KIND, FORCE_LIMIT, ANTI_WINDUP = (f"{CONTROLLER}.{name}" for name in ("kind", "force_limit", "anti_windup"))
+KIND, FORCE_LIMIT, ANTI_WINDUP, ANTI_WINDUP_TIME = (
+    f"{CONTROLLER}.{name}" for name in ("kind", "force_limit", "anti_windup", "anti_windup_time")
+)
 """Stage-file keys that every controller has."""
+
+AntiWindup = Literal["none", "clamp", "back_calculation"]
+"""What integrators do while the force is at its limit: wind up on; rest while they would drive it further; or unwind in
+proportion to what is cut off."""
+
+DEFAULT_ANTI_WINDUP: AntiWindup = "clamp"
+"""Where a stage file has a limit and does not tell."""
+
+BACK_CALCULATION: AntiWindup = "back_calculation"
 
 
 class ControllerSection(UncertainSection):
@@ -25,7 +36,8 @@ class ControllerSection(UncertainSection):
 
     kind: Any
     force_limit: Annotated[Value | None, Quantity("N", positive, "200 N")] = None
-    anti_windup: Literal["clamp"] | None = None
+    anti_windup: AntiWindup | None = None
+    anti_windup_time: Annotated[Value | None, Quantity("s", positive, "50 ms")] = None
 
     bandwidth_key: ClassVar[str | None] = None
     """The numeric key [Hz] that tells the bandwidth, where the controller has one."""
@@ -46,9 +58,17 @@ class ControllerSection(UncertainSection):
     """Names of keys to what they are called on the axes of maps, where the name itself will not do."""
 
     @model_validator(mode="after")
-    def _anti_windup_has_a_limit(self) -> Self:
+    def _anti_windup_is_whole(self) -> Self:
         if self.anti_windup and self.force_limit is None:
-            raise StageError("anti_windup", '"clamp"', "a force_limit as well", 'force_limit = "200 N"')
+            raise StageError("anti_windup", f'"{self.anti_windup}"', "a force_limit as well", 'force_limit = "200 N"')
+        by_time = self.anti_windup == BACK_CALCULATION
+        if by_time and self.anti_windup_time is None:
+            expected = "the time in which the integrator unwinds as well"
+            raise StageError("anti_windup", f'"{BACK_CALCULATION}"', expected, 'anti_windup_time = "50 ms"')
+        if self.anti_windup_time is not None and not by_time:
+            given = f'anti_windup = "{self.anti_windup}"' if self.anti_windup else "no anti_windup"
+            expected = "the anti-windup to which this time belongs"
+            raise StageError("anti_windup_time", given, expected, f'anti_windup = "{BACK_CALCULATION}"')
         return self
 
     @classmethod

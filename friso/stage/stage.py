@@ -74,6 +74,12 @@ class Stage(Section):
             "a parasitic mass smaller than the stage mass, of which it is a part",
             '[parasitic] mass = "0.25 kg" with [masses] stage = "0.5 kg"',
         ),
+        Rule(
+            ("controller.anti_windup_time", "drive.sample_time"),
+            lambda f: f.get("controller.anti_windup_time", np.inf) >= f.get("drive.sample_time", 0.0),
+            "an anti-windup time of at least one sample: in a shorter one the integrator overshoots at every sample",
+            '[controller] anti_windup_time = "50 ms" with [drive] sample_time = "50 us"',
+        ),
     )
 
     @field_validator("name", "source")

@@ -31,7 +31,7 @@ def receptance(flat: Mapping[str, Any], frequencies: np.ndarray) -> tuple[np.nda
 @cache
 def _loop(form: Structure) -> Declared:
     """The stage's own equations with a force in the place of friction."""
-    control = replace(form.controller, limited=False) if form.controller else None
+    control = replace(form.controller, anti_windup=None) if form.controller else None
     linear = replace(form, friction="none", friction_variant=None, controller=control, biased=("cart",))
     model = assemble(linear)
     outputs = {CART: model.outputs["cart_position"].expression, STAGE: model.outputs["position"].expression}

@@ -44,7 +44,7 @@ def distance(stage: Stage) -> float:
     """Of the move [m]: that of the stage's own motion, rounded to 1, 2 or 5 times a power of ten: 100 mm for the 90 mm
     of the thesis's rig (Sec. 4.3.2). Raises InputError for a motion that goes nowhere."""
     own = float(motion.size(stage.flat()))
-    if not np.isfinite(own):
+    if not own:
         raise InputError("motion.kind", repr(stage.flat()["motion.kind"]), "a motion that moves the stage", '"step"')
     power = 10.0 ** np.floor(np.log10(own))
     return float(power * min(ROUND, key=lambda digit: abs(np.log(digit * power / own))))
