@@ -170,7 +170,8 @@ def _from_scipy(value: Any) -> Any:
     if hasattr(value, "_fieldnames"):
         return {key: _from_scipy(getattr(value, key)) for key in value._fieldnames}
     if type(value).__name__ in ("MatlabOpaque", "MatlabFunction"):
-        kind = value[0]["s2"] if value.dtype.names and "s2" in value.dtype.names else "function"
+        named = {*(value.dtype.names or ())} & {"s2", "_Class"}  # of scipy before 1.18, and since
+        kind = value[0][named.pop()] if named else "function"
         return Opaque(kind.decode() if isinstance(kind, bytes) else str(kind))
     if isinstance(value, np.ndarray) and value.dtype == object:
         return [_from_scipy(each) for each in value.ravel()]
