@@ -105,7 +105,7 @@ def rig_frf() -> Values:
 
 
 def rig_slow_cycles() -> Values:
-    found = rig("compare")
+    found = rig("measured-cycles")
     levels, (lopsided,) = found["levels"], [each for each in found["by_asymmetry"] if each["from"] == 0.05]
     row, column = levels["static_over_file"].index(1.0), levels["coulomb_over_file"].index(2.0)
     weak = {name: levels[name][1][row][column] / found["even_rail"][name][0] for name in ("period_s", "peak_to_peak_m")}

@@ -17,7 +17,7 @@ from friso.frequency.bode import bode
 from friso.frequency.family import DENSITY, grid, scan
 from friso.frequency.members import Members, family
 from friso.stage import Stage
-from friso.studies.thesis.studies import rig
+from friso.studies.thesis.studies import thesis_rig
 
 MEMBERS = 10_000
 ONE_BY_ONE = 50
@@ -37,7 +37,7 @@ def one_by_one(stage: Stage, members: Members, omega: np.ndarray) -> list[float]
 def run(repetitions: int) -> list[Goal]:
     rows, goals = [], []
     for name, changes in DRIVES.items():
-        stage = rig().replace(changes)
+        stage = thesis_rig().replace(changes)
         flat = stage.flat()
         members = family(flat, MEMBERS // 4, MEMBERS // 4)
         times = [clock(lambda: scan(flat, members)) for _ in range(repetitions + 1)][1:]  # noqa: B023

@@ -28,7 +28,7 @@ from friso.studies.request import Request
 from friso.studies.samples import Samples
 from friso.studies.study import Study
 from friso.studies.sweep import run_in_memory, run_in_store
-from friso.studies.thesis.studies import STUDIES, rig
+from friso.studies.thesis.studies import STUDIES, thesis_rig
 from friso.system import usable_cores
 
 RTOLS = (1e-4, 1e-6)
@@ -55,7 +55,7 @@ def thesis_studies(rtol: float, points: int = 41) -> list[Study]:
 
 def large_study(count: int, rtol: float) -> Study:
     """The free rig over a Sobol sample of eight parameters."""
-    return Request(_untuned(rig()), {}, Samples(EIGHT, count)).study(rtol=rtol)
+    return Request(_untuned(thesis_rig()), {}, Samples(EIGHT, count)).study(rtol=rtol)
 
 
 def _untuned(stage: Stage) -> Stage:
@@ -128,7 +128,7 @@ def run_overhead(blocks: int) -> list[Goal]:
     """What a block costs besides its runs: blocks of cells that no stage may have, which need none."""
     rows = []
     axes = {"friction.coulomb": f"3.5 N..4 N:{blocks}", "controller.crossover": "1 Hz..16 Hz:1024"}
-    study = Request(rig(), axes).study()
+    study = Request(thesis_rig(), axes).study()
     with tempfile.TemporaryDirectory(prefix="friso-bench-") as folder:
         for name, crew_of in (("threads of this process", local_crew), ("Dask, 2 processes", lambda: local_cluster(2))):
             with crew_of() as crew:

@@ -58,10 +58,10 @@ def test_rules_of_design_hold_and_differ(monkeypatch: pytest.MonkeyPatch) -> Non
 def test_the_ratio_of_the_parasitic_mode_is_computed() -> None:
     """At a ratio just below the one found, the margin is too small; from it on, never."""
     from friso.frequency.crossover import settled_margin
-    from friso.studies.thesis.studies import rig
+    from friso.studies.thesis.studies import thesis_rig
 
     ratio = design_rules._needed_ratio()
-    flat = {**rig().flat(), "joint.locked": False}
+    flat = {**thesis_rig().flat(), "joint.locked": False}
     tried = design_rules._RATIOS
     below = tried[tried < ratio * 0.999][-1]
     crossover = flat["controller.crossover"]

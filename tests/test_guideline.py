@@ -42,8 +42,8 @@ from friso.studies.guideline.groups import (
 )
 from friso.studies.guideline.laws import FREE_LAW, LOCKED_LAW, EdgeLaw, Errors, Rate, fitted, in_series
 from friso.studies.guideline.parasitic import holding
-from friso.studies.guideline.rig import plain
-from friso.studies.thesis.studies import rig
+from friso.studies.guideline.thesis_rig import plain
+from friso.studies.thesis.studies import thesis_rig
 
 RIGID = pytest.mark.xdist_group("rigid")
 FREE_RIG = pytest.mark.xdist_group("free")
@@ -54,7 +54,7 @@ def rigid() -> Stage:
 
 
 def free_rig() -> Stage:
-    return rig()
+    return thesis_rig()
 
 
 def multiplier(flat: dict[str, Any]) -> float:

@@ -20,7 +20,13 @@ SHARED_VIEWS = {"__init__.py", "documents.py", "files.py", "pages.py", "report.p
 """Modules of views that belong to no command; the rest stands in the command's folder or in drawing/."""
 
 ABOUT_TUNING = (
-    *("design/", "views/design/", "studies/thesis/", "studies/guideline/", "studies/rig/experiments/compare.py"),
+    *(
+        "design/",
+        "views/design/",
+        "studies/thesis/",
+        "studies/guideline/",
+        "studies/rig/experiments/measured_cycles.py",
+    ),
     *("frequency/tuning.py", "identify/stage_file.py", "identify/output_error/problem.py"),
 )
 """Modules that import a form of the PID controller: the design method, the studies of the thesis and the guideline are

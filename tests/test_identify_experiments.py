@@ -45,7 +45,7 @@ from friso.studies.thesis.judges.identified_in_time import judged_slips, judged_
 from friso.studies.thesis.judges.identified_responses import judged_line
 from friso.studies.thesis.linear import analysed
 from friso.studies.thesis.linear.plants import limit_cases_of
-from friso.studies.thesis.studies import rig as rig_of_thesis
+from friso.studies.thesis.studies import thesis_rig as rig_of_thesis
 
 pytestmark = pytest.mark.xdist_group("identify-experiments")
 
@@ -108,7 +108,7 @@ def moved(stage: friso.Stage, **motion: str) -> friso.Stage:
 
 
 @pytest.fixture(scope="module")
-def rig() -> friso.Stage:
+def thesis_rig() -> friso.Stage:
     return friso.load(ROOT / "examples" / "thesis_rig.toml").replace({"joint.stroke": "8 mm"})
 
 

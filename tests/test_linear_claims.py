@@ -12,7 +12,7 @@ import sympy as sp
 from friso.frequency.bode import bode
 from friso.frequency.family import spectral_abscissa
 from friso.frequency.members import Members, joined, limit_cases
-from friso.studies.thesis import Evidence, Finding, rig
+from friso.studies.thesis import Evidence, Finding, thesis_rig
 from friso.studies.thesis.claims import registered
 from friso.studies.thesis.judges.series_stiffness import PRINTED_SENSITIVITY, PRINTED_STIFFNESS, compare, in_the_plant
 from friso.studies.thesis.linear import FREE, LOCKED_LOOP, NEEDS, PLANT, Linear, Springs, analysed
@@ -24,7 +24,7 @@ pytestmark = pytest.mark.xdist_group("linear-claims")
 
 @pytest.fixture(scope="module")
 def linear() -> Linear:
-    return analysed(rig())
+    return analysed(thesis_rig())
 
 
 def judged(claim: str, linear: Linear) -> Finding:
@@ -32,7 +32,7 @@ def judged(claim: str, linear: Linear) -> Finding:
 
 
 def changed(changes: Mapping[str, Any]) -> Linear:
-    return analysed(rig().replace(dict(changes)))
+    return analysed(thesis_rig().replace(dict(changes)))
 
 
 # --- what is found of the rig -----------------------------------------------------------------------------------------
@@ -139,14 +139,14 @@ def test_limit_cases_against_closed_forms(linear: Linear) -> None:
 
 
 def test_unstable_speeds_are_those_of_the_analysis(linear: Linear) -> None:
-    free, touched = bode(rig()).unstable
+    free, touched = bode(thesis_rig()).unstable
     assert linear.speeds.unstable[0] == pytest.approx((free.low, free.high), rel=1e-5)
     assert linear.speeds.unstable_touched[0] == pytest.approx((touched.low, touched.high), rel=1e-5)
 
 
 def test_bristles_in_steady_state_are_the_family() -> None:
     """Friction put on the frictionless loop by hand, its bristles where they belong, gives the family's poles."""
-    flat = rig().flat()
+    flat = thesis_rig().flat()
     speed = np.array([1e-5, 1e-3, 1e-1])
     sliding = Members(speed, np.zeros(3), np.zeros(3, bool), np.ones(3, bool))
     assert abscissa_with_bristles(flat, speed, 1.0) == pytest.approx(spectral_abscissa(flat, sliding), rel=1e-6)
@@ -160,7 +160,7 @@ def test_the_edges_of_stability(linear: Linear, joint: str) -> None:
 
     def rightmost(crossover: float, delay: float) -> float:
         changes = {"drive.sample_time": "50 us", "drive.delay": f"{delay!r} s", "joint.locked": joint == "locked"}
-        flat = rig().replace({**changes, "controller.crossover": f"{crossover!r} Hz"}).flat()
+        flat = thesis_rig().replace({**changes, "controller.crossover": f"{crossover!r} Hz"}).flat()
         return float(spectral_abscissa(flat, joined([*limit_cases(flat).values()])).max())
 
     for crossover, delay in loops.delay_at.items():

@@ -32,7 +32,7 @@ from friso.studies.thesis import (
     claims,
     experiments,
     reproduce,
-    rig,
+    thesis_rig,
 )
 from friso.studies.thesis.claims import _JUDGES, judges, registered
 from friso.studies.thesis.cycles import cycles
@@ -132,8 +132,8 @@ def test_the_markers_are_the_rig() -> None:
 
 
 def test_the_packaged_rig_is_the_example() -> None:
-    assert rig() == friso.load(ROOT / "examples" / "thesis_rig.toml")
-    packaged = files("friso.studies.thesis").joinpath("rig.toml").read_text(encoding="utf-8")
+    assert thesis_rig() == friso.load(ROOT / "examples" / "thesis_rig.toml")
+    packaged = files("friso.studies.thesis").joinpath("thesis_rig.toml").read_text(encoding="utf-8")
     assert packaged == (ROOT / "examples" / "thesis_rig.toml").read_text(encoding="utf-8")
 
 
@@ -421,7 +421,7 @@ def test_zero_rows_have_their_meaning() -> None:
     )
     assert np.isnan(friction.peaks.sel({"friction.coulomb": 0.0})).all()
     none = found["isolator-stiffness"].sel({"joint.stroke": 0.0})
-    assert none.hunting.all()
+    assert none.keeps_moving.all()
     assert set(none.outcome.values) == {"swings"}
 
 
@@ -432,11 +432,11 @@ def test_lasting_hunting() -> None:
             "outcome": ("x", ["swings", "rests", "swings", "invalid"]),
         }
     )
-    assert counted(runs).hunting.values.tolist() == [True, True, False, False]
+    assert counted(runs).keeps_moving.values.tolist() == [True, True, False, False]
     ended = lasting(runs)
-    assert ended.hunting.values.tolist() == [True, False, True, False]
+    assert ended.keeps_moving.values.tolist() == [True, False, True, False]
     assert ended.distinct_peaks.values[:3].tolist() == [5.0, 0.0, 0.0]
-    assert "swings" in ended.hunting.attrs["criterion"]
+    assert "swings" in ended.keeps_moving.attrs["criterion"]
 
 
 def test_a_part_of_the_studies_covers_its_claims_only() -> None:
@@ -502,7 +502,7 @@ def test_the_command_writes_its_page_and_claims(
 def test_fig_14b_at_both_tolerances(small: Reproduction) -> None:
     assert [runs.attrs["rtol"] for runs in small.tolerances.values()] == [1e-4, 1e-8]
     loose, tight = small.tolerances.values()
-    assert small.changed[0] == pytest.approx(float((loose.hunting != tight.hunting).mean()))
+    assert small.changed[0] == pytest.approx(float((loose.keeps_moving != tight.keeps_moving).mean()))
     assert small.changed[1] == pytest.approx(float((loose.distinct_peaks != tight.distinct_peaks).mean()))
 
 

@@ -13,7 +13,7 @@ from friso.engine.arrays import Status
 from friso.progress import silent
 from friso.rig.run import Recorded
 from friso.stage import Stage
-from friso.studies.rig.experiments import compare, hunting, in_position, stroke_crossover
+from friso.studies.rig.experiments import hunting, in_position, measured_cycles, stroke_crossover
 from friso.studies.rig.hunted import (
     Hunted,
     distance,
@@ -98,7 +98,7 @@ def test_a_larger_stage_moves_farther() -> None:
 
 def test_what_has_no_joint_or_goes_nowhere(refused: Refused) -> None:
     bare = RIG.replace({"joint": None, "parasitic": None})
-    for run_experiment in (hunting, stroke_crossover, compare, in_position):
+    for run_experiment in (hunting, stroke_crossover, measured_cycles, in_position):
         with refused("joint"):
             run_experiment.run_experiment(bare, 1, silent)
 
@@ -157,11 +157,14 @@ def test_free_joint_does_not_hunt_and_its_stroke_matters() -> None:
 
 def test_an_even_rail_has_a_symmetric_cycle_and_an_uneven_one_has_not() -> None:
     """Fig. 27."""
-    with patched({compare: {"STARTS": (0.0,)}}):
-        even = compare.on_rail(with_joint(RIG, locked=True))
-        one = compare.started(even, 1, {}, 1, silent, "")
+    with patched({measured_cycles: {"STARTS": (0.0,)}}):
+        even = measured_cycles.on_rail(with_joint(RIG, locked=True))
+        one = measured_cycles.started(even, 1, {}, 1, silent, "")
         cases = {f"rail.{kind}_deviation": np.array([0.0, 0.1]) for kind in ("static", "coulomb")}
-        several, asymmetry = compare.varied(even, 1, cases, np.arange(1.0, 5.0), float(one.swing[0]), silent, "")
+
+        several, asymmetry = measured_cycles.varied(
+            even, 1, cases, np.arange(1.0, 5.0), float(one.swing[0]), silent, ""
+        )
     assert one.above[0] == pytest.approx(one.below[0], rel=0.1)
     assert asymmetry[:4] == pytest.approx(0.0, abs=1e-12)
     assert several.swing[:4] == pytest.approx(one.swing[0], rel=0.02)

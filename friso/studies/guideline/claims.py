@@ -10,7 +10,7 @@ import numpy as np
 
 from friso.hunting.edges import ABOVE, BELOW, KINDS
 from friso.hunting.edges import UNKNOWN as NOT_TOLD
-from friso.studies.guideline.rig import RigCase
+from friso.studies.guideline.thesis_rig import RigCase
 from friso.studies.guideline.worked import CLAIMED_AT, STUDIED, Worked
 from friso.studies.thesis.claims import ABOUT, about
 

@@ -19,7 +19,6 @@ from friso.studies.guideline.checks import Checked, checked
 from friso.studies.guideline.groups import Count, counted, values_of
 from friso.studies.guideline.laws import FREE_LAW, LOCKED_LAW, Errors, FittedLaw, fitted
 from friso.studies.guideline.parasitic import ParasiticLimits, parasitic_limits
-from friso.studies.guideline.rig import Laws, plain
 from friso.studies.guideline.sweeps import (
     FREE_FIT,
     FREE_TEST,
@@ -33,8 +32,9 @@ from friso.studies.guideline.sweeps import (
     locked_sweep,
     together,
 )
+from friso.studies.guideline.thesis_rig import Laws, plain
 from friso.studies.guideline.worked import Worked, friction_range, worked
-from friso.studies.thesis.studies import rig
+from friso.studies.thesis.studies import thesis_rig
 from friso.system import usable_cores
 
 SAMPLES = 512
@@ -175,7 +175,7 @@ def guideline(samples: int = SAMPLES, keep: Path | None = None, progress: Progre
     tally.add(0, "worked steps")
     laws = Laws(locked_fit.law, free_fit.law)
     steps = worked(laws, safe_over_friction(locked_fit), free_fit.on_test.safe)
-    modes = parasitic_limits(rig())
+    modes = parasitic_limits(thesis_rig())
     seconds, cores = time.perf_counter() - begin, usable_cores()
     return Guideline(samples, counts(), locked_fit, free_fit, steps, modes, seconds, cores, resumed)
 
@@ -188,7 +188,7 @@ def checked_samples(samples: int) -> None:
 
 def counts() -> dict[str, Count]:
     """Parameters and groups of the rig rigid, with its joint, and with its parasitic mode as well."""
-    return {"rigid": counted(plain()), "joint": counted(plain("joint")), "parasitic": counted(rig().flat())}
+    return {"rigid": counted(plain()), "joint": counted(plain("joint")), "parasitic": counted(thesis_rig().flat())}
 
 
 def _sizes(samples: int) -> dict[str, int]:
@@ -209,7 +209,7 @@ def _steps(sizes: Mapping[str, int]) -> int:
 
 def _compile() -> None:
     """Compile all equations that are needed, side by side."""
-    flats = (plain(), plain("joint"), rig().flat(), rig().flat() | {"joint.locked": True})
+    flats = (plain(), plain("joint"), thesis_rig().flat(), thesis_rig().flat() | {"joint.locked": True})
     kernels([Wanted(shared_structure(flat), variational) for flat in flats for variational in (False, True)])
 
 

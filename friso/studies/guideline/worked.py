@@ -12,9 +12,9 @@ from scipy.optimize import brentq
 
 from friso.equations.controllers.van_dijk import CROSSOVER, TUNED_MASS
 from friso.studies.guideline.parasitic import settled_margin
-from friso.studies.guideline.rig import FREE_GRID, Laws, RigCase, cases, direct, plain
 from friso.studies.guideline.sweeps import LOCKED_BOX
-from friso.studies.thesis.studies import rig
+from friso.studies.guideline.thesis_rig import FREE_GRID, Laws, RigCase, cases, direct, plain
+from friso.studies.thesis.studies import thesis_rig
 
 STATIC = (1.0, 1.5, 2.0, 2.5)
 """Static friction of the rig [N]: the range that the thesis measured (Fig. 20); Table 2 has 3 N."""
@@ -148,7 +148,7 @@ def machines(laws: Laws) -> tuple[WorkedMachine, ...]:
     """The rig as one rigid mass, locked and free."""
     flat = plain("joint")
     locked, free = (float(edge(flat)[0]) for edge in (laws.locked_edge, laws.free_edge))
-    stage = rig()
+    stage = thesis_rig()
     rigid = stage.model_copy(update={"joint": None, "parasitic": None})
     return (
         WorkedMachine("one rigid mass of 1.7 kg", locked, direct(rigid)),
@@ -194,7 +194,7 @@ def _design(laws: Laws, limit: float, aim: float) -> WorkedDesign:
     stroke = _root(lambda log: over(stiffness, np.exp(log)), np.log(1e-7), np.log(AMPLE))
     changes = [pair | {"joint.stiffness": stiffness, "joint.stroke": stroke} for pair in forces]
     joint = {"joint.stiffness": stiffness, "joint.stroke": stroke}
-    margin = settled_margin(rig(), joint | {CROSSOVER: limit})
+    margin = settled_margin(thesis_rig(), joint | {CROSSOVER: limit})
     return WorkedDesign(limit, aim, stiffness, stroke, tuple(cases(laws, changes, free=True)), margin)
 
 

@@ -2,7 +2,7 @@
 
 from friso.studies.thesis.claims import CONVENTIONS, Claim, Evidence, Finding, Part, Response, claims, judges
 from friso.studies.thesis.reproduce import Reproduction, reproduce
-from friso.studies.thesis.studies import STUDIES, ThesisStudy, rig
+from friso.studies.thesis.studies import STUDIES, ThesisStudy, thesis_rig
 from friso.studies.thesis.verdicts import Verdict
 
 __all__ = [
@@ -19,5 +19,5 @@ __all__ = [
     "claims",
     "judges",
     "reproduce",
-    "rig",
+    "thesis_rig",
 ]

@@ -15,7 +15,6 @@ from friso.progress import silent
 from friso.stage import Stage
 from friso.stage.controllers import ANTI_WINDUP, FORCE_LIMIT
 from friso.studies.rig.excitation import excite
-from friso.studies.rig.experiments.compare import MOTORS, on_rail, started, varied
 from friso.studies.rig.experiments.frf import (
     SETTINGS,
     MeasuredLoop,
@@ -25,6 +24,7 @@ from friso.studies.rig.experiments.frf import (
     stable_settings,
 )
 from friso.studies.rig.experiments.in_position import InPosition, in_position
+from friso.studies.rig.experiments.measured_cycles import MOTORS, on_rail, started, varied
 from friso.studies.rig.experiments.stroke_crossover import StrokeCrossover, stroke_crossover
 from friso.studies.rig.hunted import (
     Hunted,
@@ -62,7 +62,8 @@ AS_BUILT: Mapping[str, Any] = MappingProxyType(
 thesis_drive.toml."""
 
 COULOMB_LEVEL = 2.0
-"""Over the Coulomb friction of the rig, with the weaker motor: our choice among the levels of `friso rig compare`."""
+"""Over the Coulomb friction of the rig, with the weaker motor: our choice among the levels of
+`friso rig measured-cycles`."""
 
 SEED = 1
 RAILS = 20

@@ -70,7 +70,7 @@ def _comparison(runs: xr.Dataset) -> PeaksAgainstCycles:
     attracts, decided = np.zeros(study.cells, bool), np.zeros(study.cells, bool)
     for which, cycles in cell_cycles(study.stage, study.links, study.columns(np.arange(study.cells)), valid):
         attracts[which], decided[which] = cycles.attracting, ~cycles.uncertain
-    peaks = coarse["hunting"].values.ravel()
+    peaks = coarse["keeps_moving"].values.ravel()
     decided &= valid
     return PeaksAgainstCycles(
         cells=int(valid.sum()),

@@ -14,11 +14,11 @@ if TYPE_CHECKING:
 
 
 def table(runs: xr.Dataset, rows: str, columns: str) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Coordinates of rows and columns [SI], hunting by the criterion of the runs (its attribute; the thesis's count, or
-    the end of the run) and valid, both booleans of shape (rows, columns)."""
-    hunting, outcome = (runs[name].transpose(rows, columns).values for name in ("hunting", "outcome"))
+    """Coordinates of rows and columns [SI], whether runs keep moving, by their criterion (its attribute: the thesis's
+    count, or the end of the run), and valid, both booleans of shape (rows, columns)."""
+    moving, outcome = (runs[name].transpose(rows, columns).values for name in ("keeps_moving", "outcome"))
     valid = (outcome != "invalid") & (outcome != FAILED)
-    return runs[rows].values, runs[columns].values, hunting & valid, valid
+    return runs[rows].values, runs[columns].values, moving & valid, valid
 
 
 def counts(runs: xr.Dataset, rows: str, columns: str) -> np.ndarray:

@@ -21,7 +21,7 @@ from friso.studies.thesis.experiments import EXPERIMENTS, experiment, experiment
 from friso.studies.thesis.judges.shares import NARROW, WIDE
 from friso.studies.thesis.linear import NEEDS, Linear, analysed
 from friso.studies.thesis.open_parameters import METHOD, OPEN, RTOL, Variant
-from friso.studies.thesis.studies import LOCKED, NOTHING, STUDIES, ThesisStudy, rig
+from friso.studies.thesis.studies import LOCKED, NOTHING, STUDIES, ThesisStudy, thesis_rig
 from friso.studies.thesis.verdicts import Verdict, not_covered, verdict
 
 if TYPE_CHECKING:
@@ -93,7 +93,7 @@ def reproduce(
     tally.add(0, "maps")
     responses = {name: _response(changes, NOTHING, rtol) for name, changes in RESPONSES.items()}
     maps = _maps(studies, points, rtol, VERIFIED)
-    baseline = Evidence(maps, responses, analysed(rig()), experiments_on(rig()))
+    baseline = Evidence(maps, responses, analysed(thesis_rig()), experiments_on(thesis_rig()))
     tally.add(1, "Fig. 14B at two tolerances")
     tolerances = {
         tolerance: _map(s, NOTHING, points, tolerance)
@@ -111,7 +111,7 @@ def reproduce(
         tally.add(1, f"hunting cycles, {study.name}")
         behind[study.name] = cycles(study, baseline.maps[study.name])
     tally.add(1, "done")
-    verdicts, curves = _verdicts(entries, baseline, varied), bode(rig(), SHOWN, series=True)
+    verdicts, curves = _verdicts(entries, baseline, varied), bode(thesis_rig(), SHOWN, series=True)
     results = (baseline.maps, baseline.responses, baseline.analysis, curves)
     return Reproduction(*results, tolerances, _changed(tolerances), verdicts, behind, points, rtol)
 
@@ -161,7 +161,7 @@ def _varied(studies: Iterable[ThesisStudy], points: int, rtol: float, variant: V
     if variant.kind == "metric":
         maps = {name: lasting(runs) for name, runs in maps.items()}
         responses = {name: Response(lasting(response.cell), response.trace) for name, response in responses.items()}
-    stage, linear = rig().replace(dict(variant.changes)), plain.linear
+    stage, linear = thesis_rig().replace(dict(variant.changes)), plain.linear
     if any(variant.touches_part(need) for need in NEEDS.values()):
         linear = analysed(stage)
     other = {name: experiment(name, stage) for name, need in EXPERIMENTS.items() if variant.touches_part(need)}
@@ -187,23 +187,22 @@ def _map(
 
 def _response(own_changes: Mapping[str, object], changes: Mapping[str, object], rtol: float) -> Response:
     """One run in time; a variant's changes come before the run's own, which distinguish it from the others."""
-    stage = rig().replace(dict(changes)).replace(dict(own_changes))
+    stage = thesis_rig().replace(dict(changes)).replace(dict(own_changes))
     cell = sweep(stage, {"joint.locked": [stage.flat()["joint.locked"]]}, rtol=rtol).isel({"joint.locked": 0})
     return Response(counted(cell), simulate(stage, rtol))
 
 
 def counted(runs: xr.Dataset) -> xr.Dataset:
-    """The runs with `hunting` by the thesis's metric: where distinct peaks are counted."""
-    hunting = (runs["distinct_peaks"] > 0).assign_attrs(criterion=DISTINCT_CRITERION)
-    return runs.assign(hunting=hunting)
+    """The runs with `keeps_moving` by the thesis's metric: whether distinct peaks are counted."""
+    return runs.assign(keeps_moving=(runs["distinct_peaks"] > 0).assign_attrs(criterion=DISTINCT_CRITERION))
 
 
 def lasting(runs: xr.Dataset) -> xr.Dataset:
-    """The same by what is left at the end: where the run swings; others have no peaks then, but for invalid and failed
-    cells."""
+    """The same by the end of the run: whether it swings there; the peaks of others do not count, but for invalid and
+    failed cells."""
     swings = (runs["outcome"] == SWINGS).assign_attrs(criterion=CRITERION)
     ended = runs["outcome"].isin([SWINGS, CREEPS, RESTS])
-    return runs.assign(hunting=swings, distinct_peaks=runs["distinct_peaks"].where(swings | ~ended, 0.0))
+    return runs.assign(keeps_moving=swings, distinct_peaks=runs["distinct_peaks"].where(swings | ~ended, 0.0))
 
 
 def _changed(tolerances: Mapping[float, xr.Dataset]) -> tuple[float, float]:
@@ -214,7 +213,7 @@ def _changed(tolerances: Mapping[float, xr.Dataset]) -> tuple[float, float]:
     loose, tight = tolerances.values()
     first, second = loose["distinct_peaks"].values, tight["distinct_peaks"].values
     other_count = (first != second) & ~(np.isnan(first) & np.isnan(second))
-    return float((loose["hunting"] != tight["hunting"]).mean()), float(other_count.mean())
+    return float((loose["keeps_moving"] != tight["keeps_moving"]).mean()), float(other_count.mean())
 
 
 def _judged(

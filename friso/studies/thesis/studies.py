@@ -60,13 +60,13 @@ class ThesisStudy:
 
     def stage(self, changes: Mapping[str, Any] = NOTHING) -> Stage:
         """The stage of the study; `changes` are made to the rig before those of the study."""
-        return rig().replace(dict(changes)).replace(dict(self.changes))
+        return thesis_rig().replace(dict(changes)).replace(dict(self.changes))
 
 
 @cache
-def rig() -> Stage:
+def thesis_rig() -> Stage:
     """The rig of Table 2 and Sec. 3.5 with our choice of what the thesis leaves open."""
-    return loads(files("friso.studies.thesis").joinpath("rig.toml").read_text(encoding="utf-8"))
+    return loads(files("friso.studies.thesis").joinpath("thesis_rig.toml").read_text(encoding="utf-8"))
 
 
 LOCKED: Mapping[str, Any] = MappingProxyType({"joint.locked": True})

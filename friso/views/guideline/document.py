@@ -8,7 +8,7 @@ from typing import Any
 from friso.studies.guideline import Fit, Guideline
 from friso.studies.guideline.claims import claims
 from friso.studies.guideline.laws import FittedLaw
-from friso.studies.guideline.rig import RigCase
+from friso.studies.guideline.thesis_rig import RigCase
 from friso.studies.guideline.worked import WorkedDesign
 from friso.version import VERSION
 from friso.views.documents import plain_json

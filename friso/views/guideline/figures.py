@@ -8,8 +8,8 @@ import numpy as np
 
 from friso.hunting.edges import FLIP, FOLD, JUMP, LOST
 from friso.studies.guideline import Fit, Guideline
-from friso.studies.guideline.rig import Laws, plain
 from friso.studies.guideline.sweeps import Sweep
+from friso.studies.guideline.thesis_rig import Laws, plain
 from friso.studies.guideline.worked import STUDIED, RigCase
 from friso.views.drawing.figure import (
     BLUE,

@@ -18,8 +18,8 @@ from friso.studies.guideline.claims import claims
 from friso.studies.guideline.groups import GROUPS, LIMITER_OVER_BRISTLES, values_of
 from friso.studies.guideline.laws import FOLDS, GAIN, Errors
 from friso.studies.guideline.parasitic import DRIVE
-from friso.studies.guideline.rig import RigCase, plain
 from friso.studies.guideline.sweeps import FREE_GRID, JOINT_BOX, LOCKED_BOX, LOCKED_GRID, Sweep
+from friso.studies.guideline.thesis_rig import RigCase, plain
 from friso.studies.guideline.worked import CLAIMED_AT, GAPS, MARGIN, STATIC, STUDIED
 from friso.version import VERSION
 from friso.views.files import Content, pictures

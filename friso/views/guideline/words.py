@@ -9,7 +9,7 @@ from friso.studies.guideline import Guideline
 from friso.studies.guideline.groups import GROUPS
 from friso.studies.guideline.laws import REFERENCE, FittedLaw
 from friso.studies.guideline.parasitic import ParasiticLimits
-from friso.studies.guideline.rig import RigCase
+from friso.studies.guideline.thesis_rig import RigCase
 from friso.views.drawing.prefixes import listed
 
 BASES = {

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from friso.studies.thesis import CONVENTIONS, rig
+from friso.studies.thesis import CONVENTIONS, thesis_rig
 from friso.version import VERSION
 from friso.views.documents import plain_json
 
@@ -17,7 +17,7 @@ def claims_document(reproduction: Reproduction) -> dict[str, Any]:
     tolerances = sorted(reproduction.tolerances)
     verdicts, counts = reproduction.changed
     document = {
-        "source": rig().source,
+        "source": thesis_rig().source,
         "friso": VERSION,
         "points": reproduction.points,
         "rtol": reproduction.rtol,

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from markupsafe import Markup
 
-from friso.studies.thesis import CONVENTIONS, STUDIES, rig
+from friso.studies.thesis import CONVENTIONS, STUDIES, thesis_rig
 from friso.views.drawing import matplotlib_renderer, plotly_renderer
 from friso.views.drawing.figure import GREEN, GREY, ORANGE, VERMILLION, Figure
 from friso.views.files import Content, pictures
@@ -53,8 +53,8 @@ def reproduction_html(reproduction: Reproduction) -> str:
     return Report(
         "reproduction.html",
         "Reproduction of the thesis",
-        stage_file=rig().to_toml(),
-        source=rig().source,
+        stage_file=thesis_rig().to_toml(),
+        source=thesis_rig().source,
         scripted=bool(figures),
         values={
             "verdicts": reproduction.verdicts,

@@ -11,7 +11,7 @@ from friso.frequency.crossover import WANTED, settled_margin
 from friso.hunting.margin import margin
 from friso.studies.thesis.claims import ABOUT, Evidence, Finding, Part, about, judges
 from friso.studies.thesis.maps import begins, ends, table
-from friso.studies.thesis.studies import rig
+from friso.studies.thesis.studies import thesis_rig
 
 _STROKE, _GAP, _RATIO = 0.3e-3, 1.0, 10.0
 """Least stroke [m], friction gap [N], and parasitic frequency over crossover."""
@@ -51,7 +51,7 @@ def _soft(evidence: Evidence) -> Part:
 def _needed_ratio() -> float:
     """The least parasitic frequency over the crossover from which the rig has a modulus margin of 0.5 in all settled
     states; NaN if it never has."""
-    flat = {**rig().flat(), "joint.locked": False}
+    flat = {**thesis_rig().flat(), "joint.locked": False}
     crossover = flat[CROSSOVER]
     margins = [settled_margin({**flat, "parasitic.frequency": ratio * crossover}) for ratio in _RATIOS]
     short = np.flatnonzero(np.array(margins) < WANTED)
@@ -63,7 +63,7 @@ def _needed_ratio() -> float:
 @cache
 def _margins_at_the_top() -> dict[str, float]:
     """The least modulus margin of the settled states at the highest crossover, joint locked and free; 0: unstable."""
-    flat = {**rig().flat(), CROSSOVER: _HIGHEST}
+    flat = {**thesis_rig().flat(), CROSSOVER: _HIGHEST}
     return {name: settled_margin({**flat, "joint.locked": name == "locked"}) for name in ("locked", "free")}
 
 
@@ -117,7 +117,7 @@ def _gap(evidence: Evidence) -> Part:
 @cache
 def _locked_edge() -> str:
     """Up to where the cycle of the locked rig attracts, as `friso check` finds it."""
-    edge = margin(rig().replace({"joint.locked": True}), attracting=True)
+    edge = margin(thesis_rig().replace({"joint.locked": True}), attracting=True)
     if edge is None or edge.crossover is None:
         return "with the friction of Table 2 no edge of hunting was found"
     return (

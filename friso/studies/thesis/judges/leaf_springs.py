@@ -12,7 +12,7 @@ from friso.flexure.evaluation import Evaluation
 from friso.flexure.mechanism import Mechanism, MovingBody, cube_inertia
 from friso.materials import materials
 from friso.studies.thesis.claims import ABOUT, Evidence, Finding, Part, judges
-from friso.studies.thesis.studies import rig
+from friso.studies.thesis.studies import thesis_rig
 
 _STROKE, _STIFFNESS, _FIRST, _PARASITIC, _STRESS = 1e-3, 2.4e3, 11.0, 360.0, 50e6
 """What the thesis finds with SPACAR [m, N/m, Hz, Hz, Pa] (Sec. 3.5)."""
@@ -34,7 +34,7 @@ def _evaluated() -> tuple[Evaluation, ...]:
 
 
 def _mechanism(young: float, spacing: float, height: float) -> Mechanism:
-    steel, mass, length = materials()["stainless 1.4310"], rig().flat()["masses.stage"], 70e-3
+    steel, mass, length = materials()["stainless 1.4310"], thesis_rig().flat()["masses.stage"], 70e-3
     centre = (length + height, 0.0, 0.0)
     return Mechanism(
         leaves=2,

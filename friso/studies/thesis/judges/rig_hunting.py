@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from friso.studies.rig.experiments.compare import AS_SLOW, MOTORS, SIMILAR
 from friso.studies.rig.experiments.in_position import BITS, InPosition
+from friso.studies.rig.experiments.measured_cycles import AS_SLOW, MOTORS, SIMILAR
 from friso.studies.rig.experiments.stroke_crossover import StrokeCrossover
 from friso.studies.rig.hunted import Hunted
 from friso.studies.thesis.as_built import AS_BUILT, COULOMB_LEVEL, CyclesOnRails, MovesOnRails
@@ -181,7 +181,9 @@ def _weak_motor(cycles: CyclesOnRails) -> str:
     if not (cycles.weak.swings[0] and cycles.even.swings[0]):
         return f"{cause} there is no cycle to compare"
     period, swing = (float(getattr(cycles.weak, name)[0] / getattr(cycles.even, name)[0]) for name in _COMPARED)
-    return f"{cause} the period is {period:.3g} times as long at {swing:.3g} times the swing (friso rig compare)"
+    return (
+        f"{cause} the period is {period:.3g} times as long at {swing:.3g} times the swing (friso rig measured-cycles)"
+    )
 
 
 _COMPARED = ("period", "swing")

@@ -59,7 +59,7 @@ def stiffness_has_a_limit(evidence: Evidence) -> Finding:
 def _locked_at_no_stroke(runs: xr.Dataset, locked: Response) -> Part:
     """The cells of stroke 0, compared with the locked rig."""
     none = runs.sel({"joint.stroke": 0.0})
-    peaks, same = int(locked.cell["distinct_peaks"]), none["hunting"].values == locked.cell["hunting"].item()
+    peaks, same = int(locked.cell["distinct_peaks"]), none["keeps_moving"].values == locked.cell["keeps_moving"].item()
     counted = none["distinct_peaks"].values
     return Part(
         "at stroke 0 every cell has counted peaks where the locked rig has, and its count within one",
@@ -77,7 +77,7 @@ def damped_limiter_needs_stroke(evidence: Evidence) -> Finding:
     at_large = float(np.median(large))
     locked = evidence.responses["locked"].cell
     amplitude = float(locked["peak_to_peak"]) / 2
-    ratio = at_large / amplitude if bool(locked["hunting"]) else np.nan
+    ratio = at_large / amplitude if bool(locked["keeps_moving"]) else np.nan
     return Finding(
         (
             Part(

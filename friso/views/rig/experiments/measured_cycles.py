@@ -1,4 +1,4 @@
-"""What `friso rig compare` shows: Fig. 27 of the thesis, and what makes simulated cycles as slow as measured ones."""
+"""What `friso rig measured-cycles` shows: Fig. 27 of the thesis, and what makes simulated cycles as slow as those."""
 
 from __future__ import annotations
 
@@ -6,7 +6,15 @@ from typing import Any
 
 import numpy as np
 
-from friso.studies.rig.experiments.compare import AS_SLOW, BINS, COULOMB, MOTORS, SIMILAR, STATIC, Compared
+from friso.studies.rig.experiments.measured_cycles import (
+    AS_SLOW,
+    BINS,
+    COULOMB,
+    MOTORS,
+    SIMILAR,
+    STATIC,
+    CycleComparison,
+)
 from friso.studies.rig.hunted import Hunted
 from friso.studies.rig.outcome import Outcome
 from friso.views.drawing.figure import BLUE, INK, VERMILLION, Axis, Band, Figure, Limit, Map, Markers, Panel, Series
@@ -23,7 +31,7 @@ ASYMMETRY = "Difference of friction between the two sides"
 
 def sentences(outcome: Outcome) -> list[str]:
     """The even rail's cycle, what rails that vary make of it, and what else makes it as slow."""
-    it: Compared = outcome.result
+    it: CycleComparison = outcome.result
     even = it.even
     if not even.swings[0]:
         return ["On an even rail this stage does not swing when the run ends: there is nothing to compare with."]
@@ -40,7 +48,7 @@ def sentences(outcome: Outcome) -> list[str]:
     ]
 
 
-def _field(it: Compared) -> str:
+def _field(it: CycleComparison) -> str:
     found, done = it.as_measured(it.field), int((~it.field.failed).sum())
     swings = int(it.field.swings.sum())
     slowest = np.nanmax(it.slower(it.field)) if swings else np.nan
@@ -51,7 +59,7 @@ def _field(it: Compared) -> str:
     )
 
 
-def _asymmetry(it: Compared) -> str:
+def _asymmetry(it: CycleComparison) -> str:
     """What ends hunting on rails that vary."""
     rows = [(low, high, *row) for low, high, row in zip(BINS[:-1], BINS[1:], it.by_asymmetry, strict=True)]
     low, high, even, slow = rows[0]
@@ -68,7 +76,7 @@ def _asymmetry(it: Compared) -> str:
     )
 
 
-def _rolling(it: Compared) -> str:
+def _rolling(it: CycleComparison) -> str:
     swings = it.rolling.swings.mean(axis=1)
     parts = [f"{share:.0%} at {size:.0%}" for share, size in zip(swings, it.harmonics, strict=True)]
     return (
@@ -78,7 +86,7 @@ def _rolling(it: Compared) -> str:
     )
 
 
-def _irregular(it: Compared) -> str:
+def _irregular(it: CycleComparison) -> str:
     """How the cycles of varied rails are irregular."""
     swings = it.field.swings & np.isfinite(it.field.rising)
     if not swings.any():
@@ -94,7 +102,7 @@ def _irregular(it: Compared) -> str:
     )
 
 
-def _levels(it: Compared) -> str:
+def _levels(it: CycleComparison) -> str:
     """Whether other friction levels make the cycle as slow."""
     slow, swing = it.slower(it.levels), it.larger(it.levels)
     found = np.argwhere(it.as_measured(it.levels))
@@ -119,7 +127,7 @@ def _level(motor: Any, row: Any, column: Any) -> str:
     return named if MOTORS[motor] == 1 else f"motor giving {MOTORS[motor]:.2g} of its force, {named}"
 
 
-def _others(it: Compared) -> str:
+def _others(it: CycleComparison) -> str:
     parts = []
     for name, runs in it.others.items():
         slow, swing = float(it.slower(runs)[0]), float(it.larger(runs)[0])
@@ -129,13 +137,13 @@ def _others(it: Compared) -> str:
 
 def figures(outcome: Outcome) -> list[Figure]:
     """Fig. 27, the maps of the rails with a field, the cycles by their asymmetry, and the friction levels."""
-    it: Compared = outcome.result
+    it: CycleComparison = outcome.result
     if not it.even.swings[0]:
         return [_cycles(it)]
     return [_cycles(it), _maps(it), _by_asymmetry(it), _level_maps(it)]
 
 
-def _cycles(it: Compared) -> Figure:
+def _cycles(it: CycleComparison) -> Figure:
     even, varied = it.traces
     lines = [Series(*_late(even.time, even.deviation), "even rail", BLUE)]
     if varied is not None:
@@ -144,7 +152,7 @@ def _cycles(it: Compared) -> Figure:
         lines.append(Series(*_late(varied.time, varied.deviation), label, VERMILLION))
     panel = Panel("", Axis("Time", "s"), Axis("Position minus reference", "m"), tuple(lines))
     caption = "The slowest cycle of a similar swing among the rails that vary (Fig. 27: measured and simulated)."
-    return Figure("compare_cycles", "Cycles on an even rail and on one that varies", caption, (panel,))
+    return Figure("measured_cycles", "Cycles on an even rail and on one that varies", caption, (panel,))
 
 
 def _late(time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -152,7 +160,7 @@ def _late(time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]
     return time[late], values[late]
 
 
-def _maps(it: Compared) -> Figure:
+def _maps(it: CycleComparison) -> Figure:
     lengths, deviations = ([with_unit(each, "m") for each in it.lengths], [f"{each:.0%}" for each in it.deviations])
     x, y = Axis("Correlation length", "", words=(*lengths,)), Axis("Deviation of friction", "", words=(*deviations,))
     columns, rows = (np.arange(float(len(words))) for words in (lengths, deviations))
@@ -167,7 +175,7 @@ def _maps(it: Compared) -> Figure:
         for name, values, limits in quantities
     )
     caption = f"{it.field.swings.shape[2]} rails in each cell; the period is the median of those that keep swinging."
-    return Figure("compare_rails", "Rails with a random field of friction", caption, panels, columns=2)
+    return Figure("measured_cycles_rails", "Rails with a random field of friction", caption, panels, columns=2)
 
 
 def _medians(values: np.ndarray) -> np.ndarray:
@@ -176,7 +184,7 @@ def _medians(values: np.ndarray) -> np.ndarray:
     return np.where(known, np.nanmedian(np.where(known[..., None], values, 0.0), axis=-1), np.nan)
 
 
-def _by_asymmetry(it: Compared) -> Figure:
+def _by_asymmetry(it: CycleComparison) -> Figure:
     size, slow = np.abs(it.asymmetry).ravel(), it.slower(it.field).ravel()
     alive = np.isfinite(slow)
     largest = float(size.max())
@@ -198,10 +206,12 @@ def _by_asymmetry(it: Compared) -> Figure:
     caption = (
         "The natural logarithm of static friction half a swing to one side of the target, minus that to the other."
     )
-    return Figure("compare_asymmetry", "What slows a cycle down and ends it", caption, (shares, periods), columns=2)
+    return Figure(
+        "measured_cycles_asymmetry", "What slows a cycle down and ends it", caption, (shares, periods), columns=2
+    )
 
 
-def _level_maps(it: Compared) -> Figure:
+def _level_maps(it: CycleComparison) -> Figure:
     x, y = Axis("Static friction over the file's", ""), Axis("Coulomb friction over the file's", "")
     quantities = (("Period over the file's", it.slower(it.levels)), ("Swing over the file's", it.larger(it.levels)))
     panels = tuple(
@@ -210,7 +220,7 @@ def _level_maps(it: Compared) -> Figure:
         for name, values in quantities
     )
     return Figure(
-        "compare_levels",
+        "measured_cycles_levels",
         "Even rail, other friction levels",
         "Empty: no cycle after the move or any of the releases tried.",
         panels,
@@ -223,8 +233,8 @@ def _motor(share: float) -> str:
 
 
 def numbers(outcome: Outcome) -> dict[str, Any]:
-    """All that was found; arrays of runs have the shapes of `Compared`."""
-    it: Compared = outcome.result
+    """All that was found; arrays of runs have the shapes of `CycleComparison`."""
+    it: CycleComparison = outcome.result
     classes = [
         {"from": low, "to": high, **share_document(share), "period_over_even": slow}
         for low, high, (share, slow) in zip(BINS, BINS[1:], it.by_asymmetry, strict=False)

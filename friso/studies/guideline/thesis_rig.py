@@ -15,7 +15,7 @@ from friso.hunting.margin import margin
 from friso.stage import Stage
 from friso.studies.guideline.groups import values_of
 from friso.studies.guideline.laws import FittedLaw
-from friso.studies.thesis.studies import rig
+from friso.studies.thesis.studies import thesis_rig
 
 RIGID_GRID = np.geomspace(2.0, 60.0, 14)
 FREE_GRID = np.geomspace(1.0, 20.0, 28)
@@ -80,14 +80,13 @@ def _shaped(flat: Mapping[str, Any]) -> tuple[dict[str, np.ndarray], np.ndarray]
 def plain(part: str = "") -> dict[str, Any]:
     """The flat keys of the rig without its parasitic mode; without its joint as well unless part is "joint"."""
     dropped = "parasitic." if part == "joint" else ("parasitic.", "joint.")
-    return {key: value for key, value in rig().flat().items() if not key.startswith(dropped)}
+    return {key: value for key, value in thesis_rig().flat().items() if not key.startswith(dropped)}
 
 
 def cases(laws: Laws, changes: Sequence[Changes], free: bool) -> list[RigCase]:
     """The rig with each of these changes, rigid or with its joint free."""
-    base = (
-        rig().flat() if any("parasitic.frequency" in change for change in changes) else plain("joint" if free else "")
-    )
+    mode = any("parasitic.frequency" in change for change in changes)
+    base = thesis_rig().flat() if mode else plain("joint" if free else "")
     keys = {key for change in changes for key in change}
     flat = base | {key: np.array([change.get(key, base[key]) for change in changes], float) for key in keys}
 

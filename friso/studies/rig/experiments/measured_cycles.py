@@ -72,7 +72,7 @@ BINS = (0.0, 0.01, 0.02, 0.03, 0.05, 0.1, np.inf)
 
 
 @dataclass(frozen=True)
-class Compared:
+class CycleComparison:
     """Cycles with the joint locked, at the stage's crossover.
 
     `even`: on an even rail, one run. `field`: of the rails with a random field, shape (deviations, lengths, rails),
@@ -129,17 +129,17 @@ def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
     """All cycles. Raises InputError without a joint, a crossover or a motion that moves the stage."""
     locked = with_joint(stage, locked=True)
     crossover(stage)
-    result = compared(locked, seed, DEVIATIONS, LENGTHS, HARMONICS, len(rails(on_rail(locked))), progress)
+    result = compare_cycles(locked, seed, DEVIATIONS, LENGTHS, HARMONICS, len(rails(on_rail(locked))), progress)
     logs, notes = [], ()
     if result.slowest is None:
         notes = ("no varied rail has a slower cycle of a similar swing",)
     for name, machine, own in _shown(locked, seed, result.slowest):
         recorded = once(machine, _longer(move(machine)), [own])
         logs.append(rig_log(recorded, 0, name, "moves", machine, own))
-    return Outcome("compare", stage, seed, tuple(logs), result, notes)
+    return Outcome("measured-cycles", stage, seed, tuple(logs), result, notes)
 
 
-def compared(
+def compare_cycles(
     stage: Stage,
     seed: int,
     deviations: Sequence[float],
@@ -147,7 +147,7 @@ def compared(
     harmonics: Sequence[float],
     machines: int,
     progress: Progress,
-) -> Compared:
+) -> CycleComparison:
     """The cycles of a stage with its joint locked, on so many rails of each kind."""
     even = on_rail(stage)
     own = started(even, seed, {}, 1, progress, "an even rail")
@@ -162,7 +162,7 @@ def compared(
     rolling = even.replace({"rail.rolling_pitch": f"{pitch!r} m"})
     waves = {"rail.first_harmonic": np.array(harmonics)}
     rolled, rolled_asymmetry = varied(rolling, seed, waves, seeds, swing, progress, "rails with rolling elements")
-    result = Compared(
+    result = CycleComparison(
         own, np.array(deviations), long, field.shaped(*shape), asymmetry.reshape(shape), np.array(harmonics), pitch,
         rolled.shaped(len(harmonics), machines), rolled_asymmetry.reshape(len(harmonics), machines),
         levels(even, seed, progress), others(even, seed, progress), (_trace(even, seed), None), None,
@@ -253,7 +253,7 @@ def others(stage: Stage, seed: int, progress: Progress) -> dict[str, Hunted]:
     }
 
 
-def _with_slowest(result: Compared, even: Stage, seed: int, seeds: np.ndarray) -> Compared:
+def _with_slowest(result: CycleComparison, even: Stage, seed: int, seeds: np.ndarray) -> CycleComparison:
     """The slowest of the cycles of a similar swing on the rails with a field, in time."""
     similar = abs(np.log(result.larger(result.field))) <= np.log(SIMILAR)
     slower = np.where(similar, np.nan_to_num(result.slower(result.field)), 0.0)
