@@ -31,7 +31,7 @@ class Registry(Generic[Declared]):
     def __iter__(self) -> Iterator[str]:
         """The names, in alphabetical order."""
         paths = import_module(self.package).__path__
-        return iter(sorted({each.name.replace("_", "-") for each in iter_modules(paths)} | self.added.keys()))
+        return iter(sorted({module.name.replace("_", "-") for module in iter_modules(paths)} | self.added.keys()))
 
     def __contains__(self, name: object) -> bool:
         return name in tuple(self)

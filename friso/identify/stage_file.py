@@ -64,11 +64,11 @@ def identified(stage: Stage, estimates: Iterable[Estimate], logs: Iterable[str])
     which those of `fitting` do.
     """
     changes: dict[str, object] = {}
-    for each in estimates:
-        if "." not in each.name or (stage.flexure and each.name == "joint.stiffness"):
+    for estimate in estimates:
+        if "." not in estimate.name or (stage.flexure and estimate.name == "joint.stiffness"):
             continue
-        if np.isfinite([each.low, each.high]).all() and each.high > each.low:
-            changes[each.name] = written(each)
+        if np.isfinite([estimate.low, estimate.high]).all() and estimate.high > estimate.low:
+            changes[estimate.name] = written(estimate)
     source = f"identified by friso from {', '.join(logs)}"
     return stage.replace({**changes, "source": f"{source}; {stage.source}" if stage.source else source})
 

@@ -56,7 +56,7 @@ class IdentifiedMoves:
     @property
     def correlated(self) -> tuple[Estimate, ...]:
         """The estimates that the rows of `correlation` stand for."""
-        return tuple(each for each in self.estimates if each.shown and each.half_width > 0)
+        return tuple(estimate for estimate in self.estimates if estimate.shown and estimate.half_width > 0)
 
     @property
     def flat(self) -> dict[str, Any]:
@@ -66,7 +66,10 @@ class IdentifiedMoves:
 
 def fitted_flat(found: OutputErrorFit) -> dict[str, Any]:
     """The stage of a fit as flat keys."""
-    values = {each.name: each.outer(inner) for each, inner in zip(found.problem.parameters, found.inner, strict=True)}
+    values = {
+        parameter.name: parameter.outer(inner)
+        for parameter, inner in zip(found.problem.parameters, found.inner, strict=True)
+    }
     return {**found.problem.flat, **keys_of(found.problem.flat, values)}
 
 
@@ -85,7 +88,7 @@ def identify_moves(
     inverse, by_direction = (inverse_model(log, bandwidth, split, share) for split in (False, True))
     follows, loop = _problems(log, part, flat, inverse, own_loop)
     moved = motion(log["position"][part], log.sample_time, SMOOTH * inverse.bandwidth)
-    starts = {each.name: each.start for each in follows.parameters}
+    starts = {parameter.name: parameter.start for parameter in follows.parameters}
     mass, coulomb = starts[MASS], starts.get("friction.coulomb", np.inf)
     covered = coverage(log["position"][part], moved, mass, coulomb, log.sample_time)
     found, profiles, shown = fit_shown(follows, loop, covered, inverse.bandwidth)
@@ -145,7 +148,7 @@ def _problems(
     levels = _levels(log, flat, inverse)
     position = log["position"][part]
     parameters = parameters_of(flat, levels, speed, float(np.ptp(position)), all(directions(position)))
-    full = {**flat, **keys_of(flat, {each.name: each.start for each in parameters})}
+    full = {**flat, **keys_of(flat, {parameter.name: parameter.start for parameter in parameters})}
     follows = tracking(full, log, part, parameters, inverse.bandwidth)
     return follows, closed_loop(full, log, part, parameters) if own_loop else None
 
@@ -171,11 +174,11 @@ def _levels(log: Log, flat: Mapping[str, Any], inverse: InverseModel) -> dict[st
         mass = flat["masses.cart"] + flat["masses.stage"]
         return {"mass": mass, "coulomb": flat["friction.coulomb"], "viscous": flat["friction.viscous"], "offset": 0.0}
     levels = {"offset": inverse.value("offset")}
-    for each in inverse.estimates:
-        if each.name in ("mass", "viscous", "coulomb"):
-            value = inverse.value(each.name)
-            levels[each.name] = value if value > 0 and not each.low <= 0 else max(each.high / 2, 1e-6)
-            levels[each.name] = levels[each.name] if np.isfinite(levels[each.name]) else max(value, 1e-6)
+    for estimate in inverse.estimates:
+        if estimate.name in ("mass", "viscous", "coulomb"):
+            value = inverse.value(estimate.name)
+            levels[estimate.name] = value if value > 0 and not estimate.low <= 0 else max(estimate.high / 2, 1e-6)
+            levels[estimate.name] = levels[estimate.name] if np.isfinite(levels[estimate.name]) else max(value, 1e-6)
     return levels
 
 

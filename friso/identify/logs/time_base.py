@@ -120,7 +120,7 @@ def together(tracks: Mapping[str, Track]) -> tuple[Track, dict[str, np.ndarray]]
                 f"{name}: sampled at {1 / each.period:.6g} Hz and read at {1 / base.period:.6g} Hz without an "
                 "anti-aliasing filter"
             )
-    covered = np.all([np.isfinite(each) for each in values.values()], axis=0)
+    covered = np.all([np.isfinite(value) for value in values.values()], axis=0)
     segments = [run for part in base.segments for run in _runs(covered, part)]
     short = [run for run in segments if run.stop - run.start < SHORTEST]
     segments = [run for run in segments if run.stop - run.start >= SHORTEST]
@@ -137,7 +137,7 @@ def together(tracks: Mapping[str, Track]) -> tuple[Track, dict[str, np.ndarray]]
         start = kept[-1].stop
     pick = np.concatenate([np.arange(run.start, run.stop) for run in segments])
     whole = Track(base.time[pick], base.values[pick], base.period, kept, read, warnings)
-    return whole, {name: each[pick] for name, each in values.items()}
+    return whole, {name: value[pick] for name, value in values.items()}
 
 
 def _same_instants(one: Track, other: Track) -> bool:

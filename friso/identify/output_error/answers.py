@@ -32,14 +32,14 @@ def estimates_of(
     estimates = []
     for i, key in enumerate(keys):
         owner = _OWNERS.get(key, key)
-        unit = next((each.unit for each in parameters if each.name in (key, owner)), "")
+        unit = next((parameter.unit for parameter in parameters if parameter.name in (key, owner)), "")
         unit = "N" if key == "friction.static" else unit
         if key in unknown or owner in unknown:
             low, high = (-np.inf, np.inf) if key in unknown and owner != key else _range(owner, profiles, values)
             estimates.append(Estimate.unknown(key, unit, METHOD, unknown.get(key) or unknown[owner], low, high))
         else:
             estimates.append(Estimate.normal(key, unit, values[key], deviation[i], METHOD))
-    known = [i for i, each in enumerate(estimates) if each.shown and each.half_width > 0]
+    known = [i for i, estimate in enumerate(estimates) if estimate.shown and estimate.half_width > 0]
     part = covariance[np.ix_(known, known)] / np.outer(deviation[known], deviation[known])
     return tuple(estimates), (part + part.T) / 2
 
@@ -54,8 +54,8 @@ def _reasons(
     """Why parameters, or keys that hang on them, are not shown."""
     parameters = {each.name: each for each in found.problem.parameters}
     unknown = {name: reason(name, covered) for name, each in parameters.items() if name not in shown and not each.core}
-    for name, each in parameters.items():
-        if each.core and (profiles[name].open_low or profiles[name].open_high):
+    for name, parameter in parameters.items():
+        if parameter.core and (profiles[name].open_low or profiles[name].open_high):
             unknown[name] = "the log does not bound it"
     if SHARE in unknown:
         why = f"the log shows the sum of both masses, {found.value(MASS):.4g} kg, not how it is shared"
@@ -80,7 +80,10 @@ def _no_narrower(found: OutputErrorFit, profiles: Mapping[str, Profile]) -> np.n
 
 
 def _keys_at(found: OutputErrorFit, inner: np.ndarray) -> dict[str, float]:
-    values = {each.name: each.outer(number) for each, number in zip(found.problem.parameters, inner, strict=True)}
+    values = {
+        parameter.name: parameter.outer(number)
+        for parameter, number in zip(found.problem.parameters, inner, strict=True)
+    }
     return {key: float(value) for key, value in keys_of(found.problem.flat, values).items()}
 
 

@@ -56,14 +56,14 @@ class OutputErrorFit:
 
     def value(self, name: str) -> float:
         """The SI value of a parameter."""
-        names = [each.name for each in self.problem.parameters]
+        names = [parameter.name for parameter in self.problem.parameters]
         i = names.index(name)
         return float(self.problem.parameters[i].outer(self.inner[i]))
 
 
 def first_values(parameters: Sequence[FitParameter]) -> np.ndarray:
     """The fitted numbers at which the parameters start, shape (parameters,)."""
-    return np.array([each.inner(each.start) for each in parameters])
+    return np.array([parameter.inner(parameter.start) for parameter in parameters])
 
 
 def fit(problem: Problem, free: Sequence[int], starts: np.ndarray) -> OutputErrorFit:
@@ -81,8 +81,10 @@ def everywhere(problem: Problem, free: Sequence[int], first: np.ndarray) -> np.n
     """Thousands of starts over the ranges of the free parameters, shape (starts, parameters), behind the `first`: they
     find parameters that not every motion shows."""
     low, high = bounds_of(problem)
-    core = np.array([each.core for each in problem.parameters])
-    half = np.array([NARROW if each.logarithmic else NARROW * abs(each.start) for each in problem.parameters])
+    core = np.array([parameter.core for parameter in problem.parameters])
+    half = np.array(
+        [NARROW if parameter.logarithmic else NARROW * abs(parameter.start) for parameter in problem.parameters]
+    )
     low, high = np.where(core, first - half, low), np.where(core, first + half, high)
     shares = qmc.Sobol(len(first), rng=SEED).random(STARTS)
     starts = np.where(np.isin(np.arange(len(first)), free), low + shares * (high - low), first)

@@ -111,7 +111,7 @@ def _slow(name: str, unit: str, flat: Mapping[str, Any], low: float, high: float
 
 def stages(flat: Mapping[str, Any], parameters: Sequence[FitParameter], inner: np.ndarray) -> dict[str, Any]:
     """The flat keys of the stages that the numbers fitted, shape (runs, parameters), make of a stage."""
-    values = {each.name: each.outer(column) for each, column in zip(parameters, inner.T, strict=True)}
+    values = {parameter.name: parameter.outer(column) for parameter, column in zip(parameters, inner.T, strict=True)}
     return {**flat, **keys_of(flat, values)}
 
 

@@ -188,7 +188,7 @@ def tracking(
     that of the motion. A faster one, or the noise itself, would shake the bristles of a stage at rest."""
     omega = 2 * np.pi * min(bandwidth, SLOW)
     smooth = motion(log["position"][part], log.sample_time, SMOOTH * bandwidth).position
-    mass = next(each.start for each in parameters if each.name == MASS)
+    mass = next(parameter.start for parameter in parameters if parameter.name == MASS)
     held = {key: value for key, value in flat.items() if not key.startswith(f"{CONTROLLER}.")}
     held |= proportional_derivative(mass * omega**2, 2 * mass * omega)
     return Problem(

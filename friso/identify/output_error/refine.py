@@ -28,8 +28,8 @@ class Refined:
 
 def bounds_of(problem: Problem) -> tuple[np.ndarray, np.ndarray]:
     """Ends of the ranges of the fitted numbers, each of shape (parameters,)."""
-    low = np.array([each.inner(each.low) for each in problem.parameters])
-    high = np.array([each.inner(each.high) for each in problem.parameters])
+    low = np.array([parameter.inner(parameter.low) for parameter in problem.parameters])
+    high = np.array([parameter.inner(parameter.high) for parameter in problem.parameters])
     return low, high
 
 

@@ -38,8 +38,8 @@ def fit_shown(
     it keeps them: their effect is there, and without it friction and mass would have to explain it.
     """
     parameters = follows.parameters
-    names = [each.name for each in parameters]
-    core = {each.name for each in parameters if each.core}
+    names = [parameter.name for parameter in parameters]
+    core = {parameter.name for parameter in parameters if parameter.core}
     asked = {*names} - core
     plain = fit(follows, _numbers(names, core), first_values(parameters)[None])
     hopeful = {name for name in asked if _may_show(name, covered, follows)}
@@ -95,12 +95,12 @@ def _others(names: Sequence[str], number: int, free: Sequence[int]) -> tuple[int
 
 def _may_show(name: str, covered: Coverage, problem: Problem) -> bool:
     """Whether the motion covers anything that the parameter could show itself in."""
-    each = next(each for each in problem.parameters if each.name == name)
+    parameter = next(each for each in problem.parameters if each.name == name)
     if name in STRIBECK:
         return bool(covered.steady.size) and covered.steady[0] < covered.steady[-1] / 10
     if name in BRISTLES:
         return covered.shows_length(min(LONGEST, float(np.ptp(problem.inputs.reference))))
-    return each.unit != "" or name == SHARE
+    return parameter.unit != "" or name == SHARE
 
 
 def _shows(whole: OutputErrorFit, number: int, covered: Coverage) -> bool:

@@ -206,7 +206,7 @@ def _repeatability(maps: tuple[PassMap, ...], pairs: tuple[tuple[int, int, float
         return _no_repeatability("no two passes over the same places")
     z = np.arctanh(np.clip([r for _, _, r in pairs], -0.999999, 0.999999))
     lengths = [m.correlation_length for m in maps]
-    shown = [each.value for each in lengths if each.shown]
+    shown = [length.value for length in lengths if length.shown]
     if not shown:
         return _no_repeatability("the passes are too short against the correlation length of the force")
     travel = min(np.isfinite(m.force).sum() * (m.places[1] - m.places[0]) for m in maps)

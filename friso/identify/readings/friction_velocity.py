@@ -160,7 +160,7 @@ def _direction(speeds: np.ndarray, friction: np.ndarray, errors: np.ndarray, wor
     solution, covariance, freedom = _linear(np.stack([np.ones_like(speeds), speeds], axis=1), friction, errors)
     covariance, freedom = covariance * freedom / (freedom - spent), freedom - spent
     names = (("friction.coulomb", "N"), ("friction.viscous", "N s/m"))
-    coulomb, viscous = (_fitted(*each, i, solution, covariance, freedom, method) for i, each in enumerate(names))
+    coulomb, viscous = (_fitted(*name, i, solution, covariance, freedom, method) for i, name in enumerate(names))
     low, high = speeds.min() * 1e3, speeds.max() * 1e3
     if _distinct(speeds) < STRAIGHT:
         reason = f"two speeds, {low:.3g} and {high:.3g} mm/s, do not show whether friction is still falling at these"

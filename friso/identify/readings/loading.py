@@ -30,7 +30,7 @@ def stiffness_of_loading(
     products = np.array([x @ x.T for x in signals])
     if not products[:, 0, 0].sum() > 0:
         return Estimate.unknown(KEY, UNIT, METHOD, "the deflection stays the same")
-    without = np.array([_spring(products.sum(axis=0) - each) for each in products])
+    without = np.array([_spring(products.sum(axis=0) - product) for product in products])
     error = float(np.sqrt((count - 1) / count * np.sum((without - without.mean()) ** 2)))
     value = _spring(products.sum(axis=0))
     found = by_t(KEY, UNIT, Mean(value, error, count - 1), METHOD, LINEARITY * abs(value), LINEARITY * abs(value))

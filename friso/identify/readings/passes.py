@@ -97,7 +97,7 @@ def on_common_way(log: Log, found: Sequence[Pass], cutoff: float = CUTOFF) -> tu
 def way_of(log: Log, found: Sequence[Pass]) -> tuple[float, float]:
     """The lowest and highest position [m] in passes of a log; NaN without any."""
     places = [on_bearing(log)[each.span] for each in found]
-    return (min(each.min() for each in places), max(each.max() for each in places)) if places else (np.nan, np.nan)
+    return (min(place.min() for place in places), max(place.max() for place in places)) if places else (np.nan, np.nan)
 
 
 def _velocity(log: Log, cutoff: float) -> np.ndarray:
@@ -133,8 +133,8 @@ def _trimmed(mask: np.ndarray, sample_time: float, cutoff: float, share: float) 
     """The stretches of a mask without their ends: what the filter smears, and a share of the start to settle."""
     edge, least = int(1 / (cutoff * sample_time)), max(int(LEAST / sample_time), LEAST_SAMPLES)
     found = []
-    for each in runs(mask):
-        begin, end = each.start + edge + int(share * (each.stop - each.start)), each.stop - edge
+    for run in runs(mask):
+        begin, end = run.start + edge + int(share * (run.stop - run.start)), run.stop - edge
         if end - begin >= least:
             found.append(slice(begin, end))
     return found

@@ -52,15 +52,15 @@ def slips(position: np.ndarray, sample_time: float, cutoff: float) -> Slips:
     edge = int(1 / (cutoff * sample_time))
     found: list[tuple[int, ...]] = []
     rested = 0
-    for each in runs(above):
-        if each.start - rested >= least and each.start > edge and threshold > 0:
-            top = each.start + int(np.argmax(size[each]))
+    for run in runs(above):
+        if run.start - rested >= least and run.start > edge and threshold > 0:
+            top = run.start + int(np.argmax(size[run]))
             level = min(max(STANDS_OUT * noise, VISIBLE * float(size[top])), threshold)
-            quiet = np.flatnonzero(size[rested : each.start] <= level)
+            quiet = np.flatnonzero(size[rested : run.start] <= level)
             onset = rested + int(quiet[-1]) if len(quiet) else rested
             if onset - rested >= SHOWS:
-                found.append((onset, each.start - 1, rested, top, int(np.sign(speed[top]))))
-        rested = each.stop
+                found.append((onset, run.start - 1, rested, top, int(np.sign(speed[top]))))
+        rested = run.stop
     columns = np.array(found, dtype=int).reshape(-1, 5).T
     return Slips(
         columns[0],

@@ -199,7 +199,7 @@ def hunted(recorded: Recorded) -> Hunted:
     ended = np.full(len(turns), time[-1])
     found = scan(times, values, counts, swing, ended)
     end = End(~failed, swing, earlier, found.period, found.turned, last_outside(time, deviation, BAND), ended)
-    shapes = [cycle_shape(*each, size, time[-1]) for each, size in zip(turns, swing, strict=True)]
+    shapes = [cycle_shape(*turn, size, time[-1]) for turn, size in zip(turns, swing, strict=True)]
     known = np.where(failed, np.nan, 1.0)
     above, below, rising, periods, heights = np.array(shapes).T * known
     counted = np.where(failed, 0, peaks_in_traces(time, deviation))

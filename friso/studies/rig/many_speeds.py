@@ -95,7 +95,7 @@ def many_speeds_logs(stage: Stage, seed: int) -> tuple[RigLog, ...]:
     for factor in FASTER:
         quick = stage.with_numbers(quicker(stage, factor))
         logs = tuple(_log(quick, pace(stage), n, low, seed + n) for n, low in enumerate(_begins(stage)))
-        steady = sum(each.steady for log in logs if not log.failure for each in passes(log.log))
+        steady = sum(stretch.steady for log in logs if not log.failure for stretch in passes(log.log))
         if steady > MOST * len(logs) * 2 * SPEEDS:
             return logs
         tried.append((steady, logs))

@@ -59,7 +59,7 @@ def slow_sliding_logs(stage: Stage, passed: Sequence[RigLog], seed: int) -> tupl
     if not _has_falling_bristles(quick) or all(each.failure for each in passed):
         return ()
     period = 1 / pace(stage)
-    parts = [(0.0, STANDS * period), *((float(way * each), LASTS * period) for each in speeds for way in (1, -1))]
+    parts = [(0.0, STANDS * period), *((float(way * speed), LASTS * period) for speed in speeds for way in (1, -1))]
     logs = []
     for number, low in enumerate(np.linspace(*travel(stage), PLACES)):
         (recorded,) = run(quick, legs(low, parts), [seed + number], interval(quick, period / SAMPLES))
@@ -75,11 +75,11 @@ def _edge(passed: Sequence[RigLog]) -> np.ndarray:
     """Speeds [m/s] at the edge of what was steady; where all were, some from the least on."""
     speeds = speeds_of(passed[0].stage)
     unsteady = {
-        int(np.argmin(np.abs(np.log(speeds / abs(each.velocity)))))
+        int(np.argmin(np.abs(np.log(speeds / abs(stretch.velocity)))))
         for log in passed
         if not log.failure
-        for each in passes(log.log)
-        if not each.steady
+        for stretch in passes(log.log)
+        if not stretch.steady
     }
     if not unsteady:
         return speeds[::APART][: UNSTEADY + STEADY]

@@ -100,7 +100,7 @@ def _edges(x: CellAxis, y: CellAxis, multiplier: np.ndarray) -> tuple[Series, ..
     lines = contour_generator(x.positions, y.positions, np.ma.masked_invalid(np.abs(multiplier))).lines(1.0)
     label = "edge of hunting: multiplier of modulus 1"
     corners = [np.asarray(line, dtype=float) for line in lines]
-    return tuple(Series(each[:, 0], each[:, 1], label, INK, width=2.0) for each in corners)
+    return tuple(Series(corner[:, 0], corner[:, 1], label, INK, width=2.0) for corner in corners)
 
 
 def _limits(axis: CellAxis, points: Sequence[np.ndarray]) -> tuple[float, float]:

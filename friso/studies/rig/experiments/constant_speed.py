@@ -57,7 +57,7 @@ def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
     progress(2, 4, "many speeds, joint locked, faster controller")
     many = many_speeds(locked(stage), seed)
     progress(3, 4, "slow sliding, joint locked")
-    slow = slow_sliding(locked(stage), [each.log for each in many.places], seed)
+    slow = slow_sliding(locked(stage), [place.log for place in many.places], seed)
     progress(4, 4, "")
     logs = tuple(each.log for each in (*cases, *many.places, *slow))
     return Outcome("constant-speed", stage, seed, logs, ConstantSpeedResult(speeds(stage), tuple(cases), many, slow))

@@ -95,7 +95,7 @@ def highest_stable(settings: np.ndarray, stable: np.ndarray) -> float:
 
 def nearest(loop: MeasuredLoop) -> float:
     """The crossing of 0 dB [Hz] nearest to where the loop was tuned; NaN without any."""
-    crossed = [each.value for each in loop.crossings]
+    crossed = [crossing.value for crossing in loop.crossings]
     return min(crossed, key=lambda f: abs(np.log(f / loop.tuned)), default=np.nan)
 
 

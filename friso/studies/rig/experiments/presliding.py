@@ -51,7 +51,7 @@ def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
         logs.append(presliding_log(held, f"presliding_{number + 1}", place, seed + number))
     progress(PLACES, PLACES, "")
     known = between(as_built_keys(stage))
-    found = tuple(bristles_from_presliding(each.log, known) for each in logs)
+    found = tuple(bristles_from_presliding(log.log, known) for log in logs)
     true = (flat["friction.bristle_stiffness"], flat.get("friction.bristle_damping", 0.0))
     return Outcome("presliding", stage, seed, tuple(logs), Bristles(found, *map(float, true)), _notes(stage))
 

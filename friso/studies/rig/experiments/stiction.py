@@ -61,10 +61,10 @@ def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
     progress(1, 1, "")
     flat = freed(stage).flat()
     found = tuple(
-        static_from_stick_slip(each.log, flat["joint.stiffness"], flat["masses.stage"], flat["joint.stroke"])
-        for each in logs
+        static_from_stick_slip(log.log, flat["joint.stiffness"], flat["masses.stage"], flat["joint.stroke"])
+        for log in logs
     )
-    true = np.array([true_range(each) for each in logs])
+    true = np.array([true_range(log) for log in logs])
     return Outcome("stiction", stage, seed, logs, Stiction(found, true, slow_speed(stage)), (_note(flat),))
 
 

@@ -26,10 +26,10 @@ def sentences(outcome: Outcome) -> list[str]:
     """What was found."""
     found: ConstantSpeedResult = outcome.result
     said = [f"Joint {each.name}: {each.place.verdict}" for each in found.cases]
-    for each in found.cases:
-        coulomb = each.velocity.both.coulomb
+    for case in found.cases:
+        coulomb = case.velocity.both.coulomb
         told = with_unit(coulomb.value, "N") if coulomb.shown else f"not shown ({coulomb.reason})"
-        said.append(f"Joint {each.name}: Coulomb friction {told}.")
+        said.append(f"Joint {case.name}: Coulomb friction {told}.")
     true = listed(
         [
             f"{with_unit(float(force), 'N')} at {with_unit(speed, 'm/s')}"
@@ -48,16 +48,19 @@ def _slow(found: ConstantSpeedResult) -> list[str]:
     return [head, *map(_slow_place, found.slow)]
 
 
-def _slow_place(it: Slow) -> str:
+def _slow_place(sliding: Slow) -> str:
     names = ("Coulomb friction", "static friction", "the Stribeck velocity")
-    flat = it.log.stage.flat()
-    true = [*it.true, flat["friction.stribeck_velocity"]]
-    shown = [with_interval(each) if each.shown else f"not shown ({each.reason})" for each in it.found.estimates]
+    flat = sliding.log.stage.flat()
+    true = [*sliding.true, flat["friction.stribeck_velocity"]]
+    shown = [
+        with_interval(estimate) if estimate.shown else f"not shown ({estimate.reason})"
+        for estimate in sliding.found.estimates
+    ]
     told = [
         f"{name} {text}, truly {with_unit(float(one), unit)}"
         for name, text, one, unit in zip(names, shown, true, ("N", "N", "m/s"), strict=True)
     ]
-    return f"From {_start(it.log)} on: {'; '.join(told)}."
+    return f"From {_start(sliding.log)} on: {'; '.join(told)}."
 
 
 def _start(log: RigLog) -> str:
@@ -70,7 +73,7 @@ def _many(found: ConstantSpeedResult) -> list[str]:
     """What the many speeds show, at each place."""
     crossover = with_unit(found.many.crossover, "Hz")
     head = f"At many speeds, joint locked, with the crossover at {crossover}:"
-    return [head, *(_place(number, each) for number, each in enumerate(found.many.places, start=1))]
+    return [head, *(_place(number, place) for number, place in enumerate(found.many.places, start=1))]
 
 
 def _place(number: int, place: PlaceOnRail) -> str:
@@ -92,12 +95,12 @@ def figures(outcome: Outcome) -> list[Figure]:
     found: ConstantSpeedResult = outcome.result
     panels = tuple(
         Panel(
-            f"joint {each.name}",
+            f"joint {case.name}",
             Axis("Position", "m"),
             Axis("Force", "N"),
-            tuple(_lines(each, found.speeds)),
+            tuple(_lines(case, found.speeds)),
         )
-        for each in found.cases
+        for case in found.cases
     )
     caption = "Commanded force on the way there, averaged over places; the log also has the way back."
     title = "Force at constant speed"
@@ -149,14 +152,14 @@ def _lines(each: Passes, speeds: tuple[float, ...]) -> list[Series]:
 def numbers(outcome: Outcome) -> dict[str, Any]:
     """As JSON."""
     found: ConstantSpeedResult = outcome.result
-    return {"speeds_m_per_s": [*found.speeds], "cases": {each.name: _numbers(each) for each in found.cases}} | {
+    return {"speeds_m_per_s": [*found.speeds], "cases": {case.name: _numbers(case) for case in found.cases}} | {
         "many_speeds": _many_numbers(found),
         "slow_sliding": [_shown(each.found.estimates) for each in found.slow],
     }
 
 
 def _many_numbers(found: ConstantSpeedResult) -> dict[str, Any]:
-    return {"crossover_hz": found.many.crossover, "places": [_place_numbers(each) for each in found.many.places]}
+    return {"crossover_hz": found.many.crossover, "places": [_place_numbers(place) for place in found.many.places]}
 
 
 def _place_numbers(place: PlaceOnRail) -> dict[str, Any]:

@@ -36,11 +36,11 @@ COLOURS = (BLUE, SKY, GREEN, ORANGE, VERMILLION, PINK)
 def sentences(outcome: Outcome) -> list[str]:
     """What was found."""
     found: Frf = outcome.result
-    measured = [each for each in found.loops if each.measured]
+    measured = [loop for loop in found.loops if loop.measured]
     last = measured[-1]
-    others = [each.value for each in last.crossings if each.value > 2 * last.tuned]
+    others = [crossing.value for crossing in last.crossings if crossing.value > 2 * last.tuned]
     tuned = listed([f"{with_unit(each.tuned, 'Hz')} at {with_unit(nearest(each), 'Hz')}" for each in measured], "and")
-    lost = [f"{each.tuned:.3g} Hz" for each in found.loops if not each.measured]
+    lost = [f"{loop.tuned:.3g} Hz" for loop in found.loops if not loop.measured]
     unstable = f" Tuned to {listed(lost, 'and')} the closed loop is not stable." if lost else ""
     above = f"and once more at {with_unit(max(others), 'Hz')}" if others else "and nowhere above"
     return [
@@ -76,7 +76,7 @@ def _plant(name: str, title: str, plant: Plant, subject: str) -> Figure:
     """All identifications, their average and the mass line, as magnitude over phase."""
     hertz, average = plant.averaged.frequency, plant.averaged.response
     singles = [each.response for each in plant.single]
-    angles = [_turned(each, average) for each in singles]
+    angles = [_turned(single, average) for single in singles]
     lines = [
         Series(each.frequency, np.abs(each.response), "single identifications" * (n == 0), LIGHT, width=0.8)
         for n, each in enumerate(plant.single)
@@ -114,7 +114,7 @@ def _turned(response: Array, average: Array) -> Array:
 
 def _loops(name: str, title: str, loops: tuple[MeasuredLoop, ...], subject: str) -> Figure:
     """Open loops, magnitude over phase."""
-    named = [(each, colour) for each, colour in zip(loops, COLOURS, strict=False) if each.measured]
+    named = [(loop, colour) for loop, colour in zip(loops, COLOURS, strict=False) if loop.measured]
     gains = tuple(
         Series(each.response.frequency, np.abs(each.response.response), f"tuned to {each.tuned:.3g} Hz", colour)
         for each, colour in named
@@ -134,14 +134,17 @@ def _loops(name: str, title: str, loops: tuple[MeasuredLoop, ...], subject: str)
         ),
         Panel("", _frequency(hertz), Axis("Phase", "°", step=90.0), angles, limits=(Limit((-180.0,), "", INK),)),
     )
-    told = "; ".join(f"{each.tuned:.3g} Hz: {_crossings(each)}" for each in loops)
+    told = "; ".join(f"{loop.tuned:.3g} Hz: {_crossings(loop)}" for loop in loops)
     return Figure(f"rig_frf_{name}", title, f"Tuned to, and crossing 0 dB at: {told}.", panels, subject=subject)
 
 
 def _crossings(loop: MeasuredLoop) -> str:
     if not loop.measured:
         return "not stable"
-    return ", ".join(f"{each.value:.3g} ({each.low:.3g} to {each.high:.3g})" for each in loop.crossings) or "nowhere"
+    return (
+        ", ".join(f"{crossing.value:.3g} ({crossing.low:.3g} to {crossing.high:.3g})" for crossing in loop.crossings)
+        or "nowhere"
+    )
 
 
 def _frequency(hertz: Array) -> Axis:
@@ -161,7 +164,7 @@ def numbers(outcome: Outcome) -> dict[str, Any]:
         "motor_constant_ratios": [*RATIOS],
         "apparent_mass_locked_kg": found.apparent[0].tolist(),
         "apparent_mass_free_kg": found.apparent[1].tolist(),
-        "loops": [_loop_numbers(each) for each in found.loops],
+        "loops": [_loop_numbers(loop) for loop in found.loops],
         "free_loop": _loop_numbers(found.free_loop),
         "settings_hz": found.settings.tolist(),
         "stable": found.stable.tolist(),
@@ -183,7 +186,7 @@ def _numbers(plant: Plant) -> dict[str, Any]:
 
 
 def _loop_numbers(loop: MeasuredLoop) -> dict[str, Any]:
-    return {"tuned_hz": loop.tuned, "crossings_hz": [each.value for each in loop.crossings]}
+    return {"tuned_hz": loop.tuned, "crossings_hz": [crossing.value for crossing in loop.crossings]}
 
 
 VIEW = OutcomeView(sentences, figures, numbers)

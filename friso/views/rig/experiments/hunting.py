@@ -46,26 +46,26 @@ def share_text(share: Share, count: int) -> str:
 
 def sentences(outcome: Outcome) -> list[str]:
     """Where peaks are counted and what swings on, by crossover, on the stage's own rail and on repeated ones."""
-    it: HuntingResult = outcome.result
-    own = it.shown[0]
-    count = len(it.rails)
+    moves: HuntingResult = outcome.result
+    own = moves.shown[0]
+    count = len(moves.rails)
     return [
-        f"After a move of {with_unit(it.distance, 'm')} at {it.crossovers[own]:.3g} Hz peaks are counted with the "
-        f"joint locked on {share_text(it.shares('locked')[own], count)}, with it free on "
-        f"{share_text(it.shares('free')[own], count)} (95 % intervals).",
-        _swings(it),
-        f"Joint locked: {_limit(it, 'locked')} Joint free: {_limit(it, 'free')}",
-        *_started(it),
+        f"After a move of {with_unit(moves.distance, 'm')} at {moves.crossovers[own]:.3g} Hz peaks are counted with the "
+        f"joint locked on {share_text(moves.shares('locked')[own], count)}, with it free on "
+        f"{share_text(moves.shares('free')[own], count)} (95 % intervals).",
+        _swings(moves),
+        f"Joint locked: {_limit(moves, 'locked')} Joint free: {_limit(moves, 'free')}",
+        *_started(moves),
     ]
 
 
-def _swings(it: HuntingResult) -> str:
+def _swings(moves: HuntingResult) -> str:
     """The swings at the stage's own crossover with the joint locked."""
-    runs = it.cases["locked"]
-    swings, counted = runs.swings[it.shown[0]], int(runs.counted[it.shown[0]].sum())
+    runs = moves.cases["locked"]
+    swings, counted = runs.swings[moves.shown[0]], int(runs.counted[moves.shown[0]].sum())
     if not swings.any():
         return "With the joint locked the stage swings on no rail when the run ends."
-    swing, period = runs.swing[it.shown[0]][swings], runs.period[it.shown[0]][swings]
+    swing, period = runs.swing[moves.shown[0]][swings], runs.period[moves.shown[0]][swings]
     return (
         f"With the joint locked the stage still swings at the end of the run on {int(swings.sum())} rails (peaks are "
         f"counted on {counted}), by {with_unit(float(np.median(swing)), 'm')} from peak to peak with a period "
@@ -73,36 +73,36 @@ def _swings(it: HuntingResult) -> str:
     )
 
 
-def _limit(it: HuntingResult, case: str) -> str:
+def _limit(moves: HuntingResult, case: str) -> str:
     """Up to where peaks are counted, on any rail and on the one shown."""
-    last, shown = it.limit(case), it.limit(case, it.rail)
+    last, shown = moves.limit(case), moves.limit(case, moves.rail)
     if np.isnan(last):
-        return f"no peaks are counted from {it.crossovers[0]:.3g} to {it.crossovers[-1]:.3g} Hz."
-    above = it.crossovers[it.crossovers > last]
-    bound = it.shares(case)[-1].high
+        return f"no peaks are counted from {moves.crossovers[0]:.3g} to {moves.crossovers[-1]:.3g} Hz."
+    above = moves.crossovers[moves.crossovers > last]
+    bound = moves.shares(case)[-1].high
     beyond = f"none from {above[0]:.3g} Hz on (at most {bound:.0%} of all rails)" if len(above) else "none tried above"
-    name = f"rail {it.rails[it.rail]:.0f}" if len(it.rails) > 1 else "it"
+    name = f"rail {moves.rails[moves.rail]:.0f}" if len(moves.rails) > 1 else "it"
     own = f"on {name} up to {shown:.3g} Hz" if np.isfinite(shown) else f"none on {name}"
     return f"peaks are counted on some rails up to {last:.3g} Hz, {beyond}; {own}."
 
 
-def _started(it: HuntingResult) -> list[str]:
+def _started(moves: HuntingResult) -> list[str]:
     """What a release starts that the move does not."""
     counts = [
-        f"{int(it.cases['locked'].counted[row].sum())} and {int(it.can_start[row].sum())} of {len(it.rails)} at "
-        f"{it.crossovers[row]:.3g} Hz"
-        for row in it.shown
+        f"{int(moves.cases['locked'].counted[row].sum())} and {int(moves.can_start[row].sum())} of {len(moves.rails)} at "
+        f"{moves.crossovers[row]:.3g} Hz"
+        for row in moves.shown
     ]
-    listed = ", ".join(with_unit(each, "m") for each in it.displacements)
+    listed = ", ".join(with_unit(displacement, "m") for displacement in moves.displacements)
     found = [
         f"Rails with counted peaks, joint locked, after the move, and after it or a release from {listed}: "
         f"{'; '.join(counts)}."
     ]
-    if it.startable is not None:
+    if moves.startable is not None:
         found.append(
-            f"At {it.startable.crossover:.3g} Hz no peaks are counted on rail "
-            f"{it.rails[it.startable.rail]:.0f} after the move, and once released from "
-            f"{with_unit(it.startable.displacement, 'm')} the stage swings to the end: a run that rests does not show "
+            f"At {moves.startable.crossover:.3g} Hz no peaks are counted on rail "
+            f"{moves.rails[moves.startable.rail]:.0f} after the move, and once released from "
+            f"{with_unit(moves.startable.displacement, 'm')} the stage swings to the end: a run that rests does not show "
             "that the stage cannot hunt."
         )
     return found
@@ -110,26 +110,26 @@ def _started(it: HuntingResult) -> list[str]:
 
 def figures(outcome: Outcome) -> list[Figure]:
     """Fig. 24, Fig. 25, a start by release, and the share of rails over the crossover."""
-    it: HuntingResult = outcome.result
-    made = [_locked_and_free(it), _crossovers(it), _shares(it)]
-    return [*made, _startable(it)] if it.startable is not None else made
+    moves: HuntingResult = outcome.result
+    made = [_locked_and_free(moves), _crossovers(moves), _shares(moves)]
+    return [*made, _startable(moves)] if moves.startable is not None else made
 
 
-def _locked_and_free(it: HuntingResult) -> Figure:
-    row = it.shown[0]
+def _locked_and_free(moves: HuntingResult) -> Figure:
+    row = moves.shown[0]
     lines = tuple(
-        Series(t.time, t.deviation + it.distance, f"joint {case}", COLOURS[case])
-        for case, t in ((case, it.traces[case, row]) for case in COLOURS)
+        Series(t.time, t.deviation + moves.distance, f"joint {case}", COLOURS[case])
+        for case, t in ((case, moves.traces[case, row]) for case in COLOURS)
     )
-    reach = _reach([it.traces[case, row] for case in COLOURS])
-    zoom = (it.distance - reach, it.distance + reach)
+    reach = _reach([moves.traces[case, row] for case in COLOURS])
+    zoom = (moves.distance - reach, moves.distance + reach)
     return Figure(
         "hunting_locked_and_free",
-        f"Move of {with_unit(it.distance, 'm')} at {it.crossovers[row]:.3g} Hz{_on(it)}",
+        f"Move of {with_unit(moves.distance, 'm')} at {moves.crossovers[row]:.3g} Hz{_on(moves)}",
         "The position that the drive logs (Fig. 24).",
         (
             Panel("A: position", TIME, Axis("Position", "m"), lines),
-            Panel("B: about its end", TIME, Axis("Position", "m", zoom), lines, limits=(_end(it.distance),)),
+            Panel("B: about its end", TIME, Axis("Position", "m", zoom), lines, limits=(_end(moves.distance),)),
         ),
         columns=2,
     )
@@ -139,8 +139,8 @@ def _end(place: float) -> Limit:
     return Limit((place,), "reference", INK, "dotted")
 
 
-def _on(it: HuntingResult) -> str:
-    return f", rail {it.rails[it.rail]:.0f}" if len(it.rails) > 1 else ""
+def _on(moves: HuntingResult) -> str:
+    return f", rail {moves.rails[moves.rail]:.0f}" if len(moves.rails) > 1 else ""
 
 
 def _reach(traces: list[Trace]) -> float:
@@ -149,49 +149,49 @@ def _reach(traces: list[Trace]) -> float:
     return 1.6 * max(float(np.nanmax(late)), 2 * COUNTED_ABOVE)
 
 
-def _crossovers(it: HuntingResult) -> Figure:
+def _crossovers(moves: HuntingResult) -> Figure:
     """One panel for each case, a line for each crossover of the thesis and the one beyond which none hunts."""
     panels = []
-    reach = _reach([it.traces["locked", row] for row in it.shown])
+    reach = _reach([moves.traces["locked", row] for row in moves.shown])
     for case in COLOURS:
         lines = tuple(
-            Series(t.time, t.deviation, f"{it.crossovers[row]:.3g} Hz", LINES[number + 1])
-            for number, row in enumerate(it.shown)
-            for t in (it.traces[case, row],)
+            Series(t.time, t.deviation, f"{moves.crossovers[row]:.3g} Hz", LINES[number + 1])
+            for number, row in enumerate(moves.shown)
+            for t in (moves.traces[case, row],)
         )
         axis = Axis("Position minus reference", "m", (-reach, reach))
         panels.append(Panel(f"joint {case}", TIME, axis, lines))
     return Figure(
         "hunting_crossovers",
-        f"The same move at other crossovers{_on(it)}",
+        f"The same move at other crossovers{_on(moves)}",
         "The error that remains after the move (Fig. 25 shows the joint locked).",
         tuple(panels),
         columns=2,
     )
 
 
-def _shares(it: HuntingResult) -> Figure:
+def _shares(moves: HuntingResult) -> Figure:
     bands, lines = [], []
     for case, colour in COLOURS.items():
-        found = it.shares(case)
+        found = moves.shares(case)
         low, high = (np.array([getattr(each, end) for each in found]) for end in ("low", "high"))
         share = np.array([each.probability for each in found])
-        bands.append(Band(it.crossovers, low, high, f"95 % interval, {case}", AREAS[case]))
-        lines.append(Series(it.crossovers, share, f"joint {case}", colour))
-    swings = it.cases["locked"].swings.mean(axis=1)
-    lines.append(Series(it.crossovers, swings, "locked, swings at the end", VERMILLION, "dashed"))
-    lines.append(Series(it.crossovers, it.can_start.mean(axis=1), "locked, after it or a release", INK, "dotted"))
+        bands.append(Band(moves.crossovers, low, high, f"95 % interval, {case}", AREAS[case]))
+        lines.append(Series(moves.crossovers, share, f"joint {case}", colour))
+    swings = moves.cases["locked"].swings.mean(axis=1)
+    lines.append(Series(moves.crossovers, swings, "locked, swings at the end", VERMILLION, "dashed"))
+    lines.append(Series(moves.crossovers, moves.can_start.mean(axis=1), "locked, after it or a release", INK, "dotted"))
     panel = Panel("", Axis("Crossover", "Hz"), Axis("Share of rails", "", (-0.03, 1.03)), tuple(lines))
     return Figure(
         "hunting_shares",
-        f"Share of {len(it.rails)} rails with counted peaks after the move",
+        f"Share of {len(moves.rails)} rails with counted peaks after the move",
         f"{CRITERION[0].upper()}{CRITERION[1:]}.",
         (Panel(panel.title, panel.x, panel.y, panel.series, bands=tuple(bands[:1])),),
     )
 
 
-def _startable(it: HuntingResult) -> Figure:
-    found = it.startable
+def _startable(moves: HuntingResult) -> Figure:
+    found = moves.startable
     assert found is not None
     both = (
         (found.after_move, "after the move", BLUE),
@@ -201,7 +201,7 @@ def _startable(it: HuntingResult) -> Figure:
     reach = _reach([found.after_move, found.after_release])
     return Figure(
         "hunting_started",
-        f"{found.crossover:.3g} Hz, joint locked, rail {it.rails[found.rail]:.0f}: swinging once started",
+        f"{found.crossover:.3g} Hz, joint locked, rail {moves.rails[found.rail]:.0f}: swinging once started",
         "The same machine twice.",
         (Panel("", TIME, Axis("Position minus reference", "m", (-reach, reach)), lines),),
     )
@@ -227,19 +227,19 @@ def share_document(share: Share) -> dict[str, float]:
 
 def numbers(outcome: Outcome) -> dict[str, Any]:
     """All that was found."""
-    it: HuntingResult = outcome.result
+    moves: HuntingResult = outcome.result
     cases = {
-        case: {**runs_document(runs), "counted": [share_document(each) for each in it.shares(case)]}
-        for case, runs in it.cases.items()
+        case: {**runs_document(runs), "counted": [share_document(share) for share in moves.shares(case)]}
+        for case, runs in moves.cases.items()
     }
-    started = {"displacements_m": it.displacements}
+    started = {"displacements_m": moves.displacements}
     return {
         "criteria": CRITERIA,
-        "distance_m": it.distance,
-        "crossovers_hz": it.crossovers,
-        "rail_seeds": it.rails,
+        "distance_m": moves.distance,
+        "crossovers_hz": moves.crossovers,
+        "rail_seeds": moves.rails,
         "cases": cases,
-        "releases": started | runs_document(it.started),
+        "releases": started | runs_document(moves.started),
     }
 
 

@@ -19,69 +19,77 @@ PARTS = (GREEN, ORANGE, GREY)
 
 def sentences(outcome: Outcome) -> list[str]:
     """How still it stands, what moves it, and what damping does."""
-    it: InPosition = outcome.result
-    locked, free = (it.runs[case, "all"].true[0] for case in CASES)
-    floor = "the floor of the stage file" if it.own_floor else "a quiet laboratory's floor (assumed)"
+    standstill: InPosition = outcome.result
+    locked, free = (standstill.runs[case, "all"].true[0] for case in CASES)
+    floor = "the floor of the stage file" if standstill.own_floor else "a quiet laboratory's floor (assumed)"
     return [
-        f"Settled at {it.crossover:.3g} Hz, the stage deviates by {with_unit(locked[0], 'm')} RMS "
+        f"Settled at {standstill.crossover:.3g} Hz, the stage deviates by {with_unit(locked[0], 'm')} RMS "
         f"(peak {with_unit(locked[1], 'm')}) with the joint locked and by {with_unit(free[0], 'm')} RMS "
-        f"(peak {with_unit(free[1], 'm')}) with it free: {it.ratio('all'):.2g} times as much.",
+        f"(peak {with_unit(free[1], 'm')}) with it free: {standstill.ratio('all'):.2g} times as much.",
         f"The disturbances must be assumed: {floor}, and a noise of the drive's force of "
-        f"{with_unit(it.amplifier, 'N')} RMS (assumed: rounding to {BITS} bits). Each one alone, RMS with the joint "
-        f"locked and free: {'; '.join(_source(it, source) for source in SOURCES[:-1])}.",
-        _damping(it),
-        *_after(it),
+        f"{with_unit(standstill.amplifier, 'N')} RMS (assumed: rounding to {BITS} bits). Each one alone, RMS with the joint "
+        f"locked and free: {'; '.join(_source(standstill, source) for source in SOURCES[:-1])}.",
+        _damping(standstill),
+        *_after(standstill),
     ]
 
 
-def _source(it: InPosition, source: str) -> str:
-    locked, free = (with_unit(it.runs[case, source].true[0, 0], "m") for case in CASES)
+def _source(standstill: InPosition, source: str) -> str:
+    locked, free = (with_unit(standstill.runs[case, source].true[0, 0], "m") for case in CASES)
     return f"{source} {locked} and {free}"
 
 
-def _damping(it: InPosition) -> str:
-    recovered = it.recovered
+def _damping(standstill: InPosition) -> str:
+    recovered = standstill.recovered
     best = int(np.argmax(recovered))
-    factor = it.damping / it.own
+    factor = standstill.damping / standstill.own
     ten = int(np.argmin(abs(np.log(factor / 10))))
     if recovered[best] < 0.01:
         return "More damping in the joint recovers none of the difference."
     return (
         f"Damping in the joint recovers little of the difference: {recovered[ten]:.0%} at {factor[ten]:.3g} times its "
-        f"own {with_unit(it.own, 'N*s/m')}, and at most {recovered[best]:.0%}, at "
-        f"{with_unit(it.damping[best], 'N*s/m')}. The rest is due to stiffness: the locked stage is held by the "
+        f"own {with_unit(standstill.own, 'N*s/m')}, and at most {recovered[best]:.0%}, at "
+        f"{with_unit(standstill.damping[best], 'N*s/m')}. The rest is due to stiffness: the locked stage is held by the "
         "sticking bearing, the free one only by the joint and the controller."
         if recovered[ten] < 0.5
         else f"Damping in the joint recovers {recovered[ten]:.0%} of the difference at {factor[ten]:.3g} times its own "
-        f"{with_unit(it.own, 'N*s/m')}, and {recovered[best]:.0%} at {with_unit(it.damping[best], 'N*s/m')}."
+        f"{with_unit(standstill.own, 'N*s/m')}, and {recovered[best]:.0%} at {with_unit(standstill.damping[best], 'N*s/m')}."
     )
 
 
-def _after(it: InPosition) -> list[str]:
-    creeps = {case: abs(float(it.after_move[case].mean[0])) for case in CASES}
+def _after(standstill: InPosition) -> list[str]:
+    creeps = {case: abs(float(standstill.after_move[case].mean[0])) for case in CASES}
     parts = [f"{with_unit(value, 'm')} with the joint {case}" for case, value in creeps.items()]
     return [f"From {SETTLING:.3g} s after a move on, the mean is still off by {' and '.join(parts)}."]
 
 
 def figures(outcome: Outcome) -> list[Figure]:
     """Position over time, spectra, and RMS over the damping."""
-    it: InPosition = outcome.result
-    return [_over_time(it), _spectra(it), _over_damping(it)]
+    standstill: InPosition = outcome.result
+    return [_over_time(standstill), _spectra(standstill), _over_damping(standstill)]
 
 
-def _over_time(it: InPosition) -> Figure:
-    lines = tuple(Series(*it.traces[case], f"joint {case}", COLOURS[case], width=0.8) for case in ("free", "locked"))
+def _over_time(standstill: InPosition) -> Figure:
+    lines = tuple(
+        Series(*standstill.traces[case], f"joint {case}", COLOURS[case], width=0.8) for case in ("free", "locked")
+    )
     panel = Panel("", Axis("Time", "s"), Axis("Position minus reference", "m"), lines)
     caption = "The true position, all disturbances (Fig. 28)."
-    return Figure("in_position", f"Standstill at {it.crossover:.3g} Hz", caption, (panel,))
+    return Figure("in_position", f"Standstill at {standstill.crossover:.3g} Hz", caption, (panel,))
 
 
-def _spectra(it: InPosition) -> Figure:
+def _spectra(standstill: InPosition) -> Figure:
     panels = []
     above = slice(1, None)
     for case, colour in COLOURS.items():
         lines = [
-            Series(it.frequencies[above], it.runs[case, source].spectrum[0, above], source, line, width=width)
+            Series(
+                standstill.frequencies[above],
+                standstill.runs[case, source].spectrum[0, above],
+                source,
+                line,
+                width=width,
+            )
             for source, line, width in zip(SOURCES, (*PARTS, colour), (1.0, 1.0, 1.0, 1.6), strict=True)
         ]
         densities = Axis("Amplitude density", "m/Hz^0.5", (1e-14, 1e-6), log=True)
@@ -90,31 +98,35 @@ def _spectra(it: InPosition) -> Figure:
     return Figure("in_position_spectra", title, "One-sided spectra of the true position.", tuple(panels), columns=2)
 
 
-def _over_damping(it: InPosition) -> Figure:
-    free = Series(it.damping, it.damped.true[:, 0], "joint free", BLUE)
+def _over_damping(standstill: InPosition) -> Figure:
+    free = Series(standstill.damping, standstill.damped.true[:, 0], "joint free", BLUE)
     limits = (
-        Limit((float(it.runs["locked", "all"].true[0, 0]),), "joint locked", VERMILLION),
-        Limit((float(it.runs["free", "all"].true[0, 0]),), f"joint free, its own {with_unit(it.own, 'N*s/m')}", GREY),
+        Limit((float(standstill.runs["locked", "all"].true[0, 0]),), "joint locked", VERMILLION),
+        Limit(
+            (float(standstill.runs["free", "all"].true[0, 0]),),
+            f"joint free, its own {with_unit(standstill.own, 'N*s/m')}",
+            GREY,
+        ),
     )
-    y = Axis("RMS deviation", "m", (0.0, 1.2 * float(it.damped.true[:, 0].max())))
+    y = Axis("RMS deviation", "m", (0.0, 1.2 * float(standstill.damped.true[:, 0].max())))
     panel = Panel("", Axis("Damping of the joint", "N*s/m", log=True), y, (free,), limits=limits)
     return Figure("in_position_damping", "What damping in the joint recovers", "All disturbances.", (panel,))
 
 
 def numbers(outcome: Outcome) -> dict[str, Any]:
     """All that was found."""
-    it: InPosition = outcome.result
+    standstill: InPosition = outcome.result
     return {
-        "crossover_hz": it.crossover,
-        "amplifier_noise_n": it.amplifier,
-        "floor_of_the_stage": it.own_floor,
-        "runs": {case: {source: _document(it.runs[case, source]) for source in SOURCES} for case in CASES},
-        "after_move": {case: _document(it.after_move[case]) for case in CASES},
-        "frequencies_hz": it.frequencies,
-        "spectra_m_per_root_hz": {case: it.runs[case, "all"].spectrum[0] for case in CASES},
-        "damping_ns_per_m": it.damping,
-        "damped_rms_m": it.damped.true[:, 0],
-        "recovered": it.recovered,
+        "crossover_hz": standstill.crossover,
+        "amplifier_noise_n": standstill.amplifier,
+        "floor_of_the_stage": standstill.own_floor,
+        "runs": {case: {source: _document(standstill.runs[case, source]) for source in SOURCES} for case in CASES},
+        "after_move": {case: _document(standstill.after_move[case]) for case in CASES},
+        "frequencies_hz": standstill.frequencies,
+        "spectra_m_per_root_hz": {case: standstill.runs[case, "all"].spectrum[0] for case in CASES},
+        "damping_ns_per_m": standstill.damping,
+        "damped_rms_m": standstill.damped.true[:, 0],
+        "recovered": standstill.recovered,
     }
 
 

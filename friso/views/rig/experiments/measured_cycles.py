@@ -31,27 +31,27 @@ ASYMMETRY = "Difference of friction between the two sides"
 
 def sentences(outcome: Outcome) -> list[str]:
     """The even rail's cycle, what rails that vary make of it, and what else makes it as slow."""
-    it: CycleComparison = outcome.result
-    even = it.even
+    comparison: CycleComparison = outcome.result
+    even = comparison.even
     if not even.swings[0]:
         return ["On an even rail this stage does not swing when the run ends: there is nothing to compare with."]
     return [
         f"On an even rail the cycle swings by {with_unit(float(even.swing[0]), 'm')} from peak to peak with a period "
         f"of {with_unit(float(even.period[0]), 's')}; from cycle to cycle its period scatters by "
         f"{float(even.period_scatter[0]):.1%}.",
-        _field(it),
-        _asymmetry(it),
-        _rolling(it),
-        _irregular(it),
-        _levels(it),
-        _others(it),
+        _field(comparison),
+        _asymmetry(comparison),
+        _rolling(comparison),
+        _irregular(comparison),
+        _levels(comparison),
+        _others(comparison),
     ]
 
 
-def _field(it: CycleComparison) -> str:
-    found, done = it.as_measured(it.field), int((~it.field.failed).sum())
-    swings = int(it.field.swings.sum())
-    slowest = np.nanmax(it.slower(it.field)) if swings else np.nan
+def _field(comparison: CycleComparison) -> str:
+    found, done = comparison.as_measured(comparison.field), int((~comparison.field.failed).sum())
+    swings = int(comparison.field.swings.sum())
+    slowest = np.nanmax(comparison.slower(comparison.field)) if swings else np.nan
     return (
         f"On rails with a random field {swings} of {done} runs still swing at their end; {int(found.sum())} of them "
         f"have at least {AS_SLOW:g} times that period at a similar swing (within a factor of {SIMILAR:g}); the slowest "
@@ -59,9 +59,9 @@ def _field(it: CycleComparison) -> str:
     )
 
 
-def _asymmetry(it: CycleComparison) -> str:
+def _asymmetry(comparison: CycleComparison) -> str:
     """What ends hunting on rails that vary."""
-    rows = [(low, high, *row) for low, high, row in zip(BINS[:-1], BINS[1:], it.by_asymmetry, strict=True)]
+    rows = [(low, high, *row) for low, high, row in zip(BINS[:-1], BINS[1:], comparison.by_asymmetry, strict=True)]
     low, high, even, slow = rows[0]
     parts = [f"{even.probability:.0%} keep swinging where it differs by less than {high:.0%} (period {slow:.3g} times)"]
     for low, high, share, slow in rows[1:]:
@@ -76,24 +76,26 @@ def _asymmetry(it: CycleComparison) -> str:
     )
 
 
-def _rolling(it: CycleComparison) -> str:
-    swings = it.rolling.swings.mean(axis=1)
-    parts = [f"{share:.0%} at {size:.0%}" for share, size in zip(swings, it.harmonics, strict=True)]
+def _rolling(comparison: CycleComparison) -> str:
+    swings = comparison.rolling.swings.mean(axis=1)
+    parts = [f"{share:.0%} at {size:.0%}" for share, size in zip(swings, comparison.harmonics, strict=True)]
     return (
-        f"With rolling elements of {with_unit(it.pitch, 'm')} pitch, the following shares keep swinging, by first "
+        f"With rolling elements of {with_unit(comparison.pitch, 'm')} pitch, the following shares keep swinging, by first "
         "harmonic: "
         f"{', '.join(parts)}."
     )
 
 
-def _irregular(it: CycleComparison) -> str:
+def _irregular(comparison: CycleComparison) -> str:
     """How the cycles of varied rails are irregular."""
-    swings = it.field.swings & np.isfinite(it.field.rising)
+    swings = comparison.field.swings & np.isfinite(comparison.field.rising)
     if not swings.any():
         return "No cycle on a varied rail is long enough to tell how regular it is."
-    above, below = it.field.above[swings], it.field.below[swings]
+    above, below = comparison.field.above[swings], comparison.field.below[swings]
     sides = np.median(np.maximum(above, below) / np.minimum(above, below))
-    scatter, heights = (np.median(each[swings]) for each in (it.field.period_scatter, it.field.height_scatter))
+    scatter, heights = (
+        np.median(each[swings]) for each in (comparison.field.period_scatter, comparison.field.height_scatter)
+    )
     return (
         f"Such cycles are lopsided: one side is {sides:.2g} times as high as the other (median). From cycle to "
         f"cycle they repeat: the period scatters by {scatter:.1%}, the heights by {heights:.1%} of the swing. "
@@ -102,10 +104,10 @@ def _irregular(it: CycleComparison) -> str:
     )
 
 
-def _levels(it: CycleComparison) -> str:
+def _levels(comparison: CycleComparison) -> str:
     """Whether other friction levels make the cycle as slow."""
-    slow, swing = it.slower(it.levels), it.larger(it.levels)
-    found = np.argwhere(it.as_measured(it.levels))
+    slow, swing = comparison.slower(comparison.levels), comparison.larger(comparison.levels)
+    found = np.argwhere(comparison.as_measured(comparison.levels))
     if not len(found):
         best = np.unravel_index(np.nanargmax(slow), slow.shape)
         return (
@@ -127,28 +129,28 @@ def _level(motor: Any, row: Any, column: Any) -> str:
     return named if MOTORS[motor] == 1 else f"motor giving {MOTORS[motor]:.2g} of its force, {named}"
 
 
-def _others(it: CycleComparison) -> str:
+def _others(comparison: CycleComparison) -> str:
     parts = []
-    for name, runs in it.others.items():
-        slow, swing = float(it.slower(runs)[0]), float(it.larger(runs)[0])
+    for name, runs in comparison.others.items():
+        slow, swing = float(comparison.slower(runs)[0]), float(comparison.larger(runs)[0])
         parts.append(f"{name}: {f'{slow:.3g} and {swing:.3g}' if np.isfinite(slow) else 'no cycle'}")
     return f"Other changes on an even rail, period and swing over those of the file: {'; '.join(parts)}."
 
 
 def figures(outcome: Outcome) -> list[Figure]:
     """Fig. 27, the maps of the rails with a field, the cycles by their asymmetry, and the friction levels."""
-    it: CycleComparison = outcome.result
-    if not it.even.swings[0]:
-        return [_cycles(it)]
-    return [_cycles(it), _maps(it), _by_asymmetry(it), _level_maps(it)]
+    comparison: CycleComparison = outcome.result
+    if not comparison.even.swings[0]:
+        return [_cycles(comparison)]
+    return [_cycles(comparison), _maps(comparison), _by_asymmetry(comparison), _level_maps(comparison)]
 
 
-def _cycles(it: CycleComparison) -> Figure:
-    even, varied = it.traces
+def _cycles(comparison: CycleComparison) -> Figure:
+    even, varied = comparison.traces
     lines = [Series(*_late(even.time, even.deviation), "even rail", BLUE)]
     if varied is not None:
-        assert it.slowest is not None
-        label = f"deviation {it.slowest[0]:.0%} over {with_unit(it.slowest[1], 'm')}, rail {it.slowest[2]:.0f}"
+        assert comparison.slowest is not None
+        label = f"deviation {comparison.slowest[0]:.0%} over {with_unit(comparison.slowest[1], 'm')}, rail {comparison.slowest[2]:.0f}"
         lines.append(Series(*_late(varied.time, varied.deviation), label, VERMILLION))
     panel = Panel("", Axis("Time", "s"), Axis("Position minus reference", "m"), tuple(lines))
     caption = "The slowest cycle of a similar swing among the rails that vary (Fig. 27: measured and simulated)."
@@ -160,12 +162,15 @@ def _late(time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]
     return time[late], values[late]
 
 
-def _maps(it: CycleComparison) -> Figure:
-    lengths, deviations = ([with_unit(each, "m") for each in it.lengths], [f"{each:.0%}" for each in it.deviations])
+def _maps(comparison: CycleComparison) -> Figure:
+    lengths, deviations = (
+        [with_unit(length, "m") for length in comparison.lengths],
+        [f"{length:.0%}" for length in comparison.deviations],
+    )
     x, y = Axis("Correlation length", "", words=(*lengths,)), Axis("Deviation of friction", "", words=(*deviations,))
     columns, rows = (np.arange(float(len(words))) for words in (lengths, deviations))
-    shares = it.field.swings.mean(axis=2)
-    slow = _medians(it.slower(it.field))
+    shares = comparison.field.swings.mean(axis=2)
+    slow = _medians(comparison.slower(comparison.field))
     quantities = (
         ("Share of rails still swinging", shares, (0.0, 1.0)),
         ("Period over that of the even rail", slow, None),
@@ -174,7 +179,9 @@ def _maps(it: CycleComparison) -> Figure:
         Panel("", x, y, maps=(Map(columns, rows, values, name, "", limits=limits),))
         for name, values, limits in quantities
     )
-    caption = f"{it.field.swings.shape[2]} rails in each cell; the period is the median of those that keep swinging."
+    caption = (
+        f"{comparison.field.swings.shape[2]} rails in each cell; the period is the median of those that keep swinging."
+    )
     return Figure("measured_cycles_rails", "Rails with a random field of friction", caption, panels, columns=2)
 
 
@@ -184,12 +191,15 @@ def _medians(values: np.ndarray) -> np.ndarray:
     return np.where(known, np.nanmedian(np.where(known[..., None], values, 0.0), axis=-1), np.nan)
 
 
-def _by_asymmetry(it: CycleComparison) -> Figure:
-    size, slow = np.abs(it.asymmetry).ravel(), it.slower(it.field).ravel()
+def _by_asymmetry(comparison: CycleComparison) -> Figure:
+    size, slow = np.abs(comparison.asymmetry).ravel(), comparison.slower(comparison.field).ravel()
     alive = np.isfinite(slow)
     largest = float(size.max())
     points = Markers(size[alive], slow[alive], "rails that keep swinging", BLUE)
-    known = [(low, min(high, largest), row[0]) for low, high, row in zip(BINS, BINS[1:], it.by_asymmetry, strict=False)]
+    known = [
+        (low, min(high, largest), row[0])
+        for low, high, row in zip(BINS, BINS[1:], comparison.by_asymmetry, strict=False)
+    ]
     known = [row for row in known if np.isfinite(row[2].probability)]
     middle = np.array([(low + high) / 2 for low, high, _ in known])
     ends = ("probability", "low", "high")
@@ -211,9 +221,12 @@ def _by_asymmetry(it: CycleComparison) -> Figure:
     )
 
 
-def _level_maps(it: CycleComparison) -> Figure:
+def _level_maps(comparison: CycleComparison) -> Figure:
     x, y = Axis("Static friction over the file's", ""), Axis("Coulomb friction over the file's", "")
-    quantities = (("Period over the file's", it.slower(it.levels)), ("Swing over the file's", it.larger(it.levels)))
+    quantities = (
+        ("Period over the file's", comparison.slower(comparison.levels)),
+        ("Swing over the file's", comparison.larger(comparison.levels)),
+    )
     panels = tuple(
         Panel(_motor(motor), x, y, maps=(Map(np.array(STATIC), np.array(COULOMB), values[row].T, name, ""),))
         for row, motor in enumerate(MOTORS)
@@ -234,22 +247,30 @@ def _motor(share: float) -> str:
 
 def numbers(outcome: Outcome) -> dict[str, Any]:
     """All that was found; arrays of runs have the shapes of `CycleComparison`."""
-    it: CycleComparison = outcome.result
+    comparison: CycleComparison = outcome.result
     classes = [
         {"from": low, "to": high, **share_document(share), "period_over_even": slow}
-        for low, high, (share, slow) in zip(BINS, BINS[1:], it.by_asymmetry, strict=False)
+        for low, high, (share, slow) in zip(BINS, BINS[1:], comparison.by_asymmetry, strict=False)
     ]
-    field = {"deviations": it.deviations, "correlation_lengths_m": it.lengths, "asymmetry": it.asymmetry}
-    rolling = {"harmonics": it.harmonics, "pitch_m": it.pitch, "asymmetry": it.rolling_asymmetry}
+    field = {
+        "deviations": comparison.deviations,
+        "correlation_lengths_m": comparison.lengths,
+        "asymmetry": comparison.asymmetry,
+    }
+    rolling = {
+        "harmonics": comparison.harmonics,
+        "pitch_m": comparison.pitch,
+        "asymmetry": comparison.rolling_asymmetry,
+    }
     levels = {"motors": np.array(MOTORS), "static_over_file": np.array(STATIC), "coulomb_over_file": np.array(COULOMB)}
     return {
         "criteria": CRITERIA,
-        "even_rail": _cycle_document(it.even),
-        "field": field | _cycle_document(it.field),
+        "even_rail": _cycle_document(comparison.even),
+        "field": field | _cycle_document(comparison.field),
         "by_asymmetry": classes,
-        "rolling": rolling | _cycle_document(it.rolling),
-        "levels": levels | _cycle_document(it.levels),
-        "others": {name: _cycle_document(runs) for name, runs in it.others.items()},
+        "rolling": rolling | _cycle_document(comparison.rolling),
+        "levels": levels | _cycle_document(comparison.levels),
+        "others": {name: _cycle_document(runs) for name, runs in comparison.others.items()},
     }
 
 

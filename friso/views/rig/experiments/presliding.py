@@ -22,8 +22,8 @@ def sentences(outcome: Outcome) -> list[str]:
     return [*said, f"The true values of the bristles are {stiffness} and {damping}."]
 
 
-def _place(it: Presliding) -> str:
-    shown = {"stiffness": it.stiffness, "damping": it.damping, "moving mass": it.mass}
+def _place(result: Presliding) -> str:
+    shown = {"stiffness": result.stiffness, "damping": result.damping, "moving mass": result.mass}
     return "; ".join(
         f"{words} {with_interval(each)}" if each.shown else f"{words} not shown ({each.reason})"
         for words, each in shown.items()
@@ -33,11 +33,15 @@ def _place(it: Presliding) -> str:
 def figures(outcome: Outcome) -> list[Figure]:
     """Force and model at the first place that shows the bristles."""
     found: Bristles = outcome.result
-    it = next((each for each in found.found if len(each.model)), None)
-    if it is None:
+    result = next((each for each in found.found if len(each.model)), None)
+    if result is None:
         return []
     title = "Small motion before sliding"
-    return [Figure("rig_presliding", title, presliding_caption(it), presliding_panels(it), subject=outcome.stage.name)]
+    return [
+        Figure(
+            "rig_presliding", title, presliding_caption(result), presliding_panels(result), subject=outcome.stage.name
+        )
+    ]
 
 
 def numbers(outcome: Outcome) -> dict[str, Any]:
@@ -45,12 +49,12 @@ def numbers(outcome: Outcome) -> dict[str, Any]:
     found: Bristles = outcome.result
     places = [
         {
-            "stiffness_n_per_m": [it.stiffness.value, it.stiffness.low, it.stiffness.high],
-            "damping_n_s_per_m": [it.damping.value, it.damping.low, it.damping.high],
-            "mass_kg": [it.mass.value, it.mass.low, it.mass.high],
-            "unexplained": it.unexplained,
+            "stiffness_n_per_m": [result.stiffness.value, result.stiffness.low, result.stiffness.high],
+            "damping_n_s_per_m": [result.damping.value, result.damping.low, result.damping.high],
+            "mass_kg": [result.mass.value, result.mass.low, result.mass.high],
+            "unexplained": result.unexplained,
         }
-        for it in found.found
+        for result in found.found
     ]
     return {"places": places, "true_stiffness_n_per_m": found.stiffness, "true_damping_n_s_per_m": found.damping}
 

@@ -17,8 +17,8 @@ from friso.views.rig.outcome_view import OutcomeView
 
 def sentences(outcome: Outcome) -> list[str]:
     """From which crossover and stroke on no rail has counted peaks."""
-    it: StrokeCrossover = outcome.result
-    count, cells = len(it.rails), it.share
+    counts: StrokeCrossover = outcome.result
+    count, cells = len(counts.rails), counts.share
     some = np.isfinite(cells) & (cells > 0)
     if not some.any():
         return [f"On none of {count} rails are peaks counted, at any stroke or crossover."]
@@ -26,49 +26,51 @@ def sentences(outcome: Outcome) -> list[str]:
         f"In {some.sum()} of {some.size} cells peaks are counted on at least one of {count} rails, in "
         f"{(cells >= 0.5).sum()} on at least half of them."
     )
-    return [first, *_needed(it)]
+    return [first, *_needed(counts)]
 
 
-def _limit(it: StrokeCrossover, row: int) -> str:
-    limit = it.limits[row]
+def _limit(counts: StrokeCrossover, row: int) -> str:
+    limit = counts.limits[row]
     if limit == 0:
         return "no peaks"
     return "peaks up to the highest crossover" if np.isinf(limit) else f"none above {limit:.3g} Hz"
 
 
-def _needed(it: StrokeCrossover) -> list[str]:
+def _needed(counts: StrokeCrossover) -> list[str]:
     """The crossover limits by stroke, and from which stroke on none are counted at the stage's own crossover."""
-    named = [f"{with_unit(float(stroke), 'm')} {_limit(it, row)}" for row, stroke in enumerate(it.strokes)]
+    named = [f"{with_unit(float(stroke), 'm')} {_limit(counts, row)}" for row, stroke in enumerate(counts.strokes)]
     found = [f"Counted peaks by stroke: {'; '.join(named)}."]
-    some = np.flatnonzero(it.share[:, it.own] > 0)
-    if len(some) and some[-1] + 1 < len(it.strokes):
-        least = float(it.strokes[some[-1] + 1])
+    some = np.flatnonzero(counts.share[:, counts.own] > 0)
+    if len(some) and some[-1] + 1 < len(counts.strokes):
+        least = float(counts.strokes[some[-1] + 1])
         found.append(
-            f"At {it.crossovers[it.own]:.3g} Hz no peaks are counted from a stroke of {with_unit(least, 'm')} on."
+            f"At {counts.crossovers[counts.own]:.3g} Hz no peaks are counted from a stroke of {with_unit(least, 'm')} on."
         )
     return found
 
 
 def figures(outcome: Outcome) -> list[Figure]:
     """The map."""
-    it: StrokeCrossover = outcome.result
-    finite = np.isfinite(it.limits) & (it.limits > 0)
-    border = Series(it.strokes[finite], it.limits[finite], "no counted peaks above", INK, width=2.0)
-    field = Map(it.strokes, it.crossovers, it.share.T, "Share of rails with counted peaks", "", limits=(0.0, 1.0))
+    counts: StrokeCrossover = outcome.result
+    finite = np.isfinite(counts.limits) & (counts.limits > 0)
+    border = Series(counts.strokes[finite], counts.limits[finite], "no counted peaks above", INK, width=2.0)
+    field = Map(
+        counts.strokes, counts.crossovers, counts.share.T, "Share of rails with counted peaks", "", limits=(0.0, 1.0)
+    )
     panel = Panel("", Axis("Stroke", "m", log=True), Axis("Crossover", "Hz"), (border,), maps=(field,))
-    caption = f"Each cell: {len(it.rails)} rails, one move each, {CRITERION} (Fig. 26: of one run)."
+    caption = f"Each cell: {len(counts.rails)} rails, one move each, {CRITERION} (Fig. 26: of one run)."
     return [Figure("stroke_crossover", "Joint free: share of rails with counted peaks", caption, (panel,))]
 
 
 def numbers(outcome: Outcome) -> dict[str, Any]:
     """All that was found; arrays have the shape (strokes, crossovers, rails), shares (strokes, crossovers)."""
-    it: StrokeCrossover = outcome.result
+    counts: StrokeCrossover = outcome.result
     shares = [
-        [share_document(it.runs.share((row, column))) for column in range(len(it.crossovers))]
-        for row in range(len(it.strokes))
+        [share_document(counts.runs.share((row, column))) for column in range(len(counts.crossovers))]
+        for row in range(len(counts.strokes))
     ]
-    axes = {"strokes_m": it.strokes, "crossovers_hz": it.crossovers, "rail_seeds": it.rails}
-    return {"criteria": CRITERIA, **axes, "counted": shares, "limits_hz": it.limits, **runs_document(it.runs)}
+    axes = {"strokes_m": counts.strokes, "crossovers_hz": counts.crossovers, "rail_seeds": counts.rails}
+    return {"criteria": CRITERIA, **axes, "counted": shares, "limits_hz": counts.limits, **runs_document(counts.runs)}
 
 
 VIEW = OutcomeView(sentences, figures, numbers)
