@@ -102,7 +102,7 @@ def _strict(text: str) -> dict[str, Any]:
 def test_the_document_has_the_agreed_keys(written: tuple[dict, Path]) -> None:
     document, _ = written
     assert document.keys() == {
-        *("stage", "cases", "worst", "worst_settled", "unstable_speeds_m_per_s", "limits"),
+        *("conclusion", "stage", "cases", "worst", "worst_settled", "unstable_speeds_m_per_s", "limits"),
         *("highest_stable_crossover_hz", "still_stable_there"),
     }
     assert document["stage"] == "Thesis rig"

@@ -172,7 +172,18 @@ def test_the_document_has_the_agreed_keys(
     document = _strict(shown.out)
     assert shown.err == ""
     assert document.keys() == {
-        *("stage", "spec", "feasible", "needed", "machine_limit_hz", "without", "joint", "leaves", "front"),
+        *(
+            "conclusion",
+            "stage",
+            "spec",
+            "feasible",
+            "needed",
+            "machine_limit_hz",
+            "without",
+            "joint",
+            "leaves",
+            "front",
+        ),
         *("controller", "verification", "files", "relax"),
     }
     assert (document["stage"], document["feasible"], document["needed"]) == ("Thesis rig", True, False)
@@ -453,7 +464,7 @@ def test_no_design_as_a_document(no_design: None, tmp_path: Path, capsys: pytest
         command(RIG, SPEC, out=tmp_path / "out", as_json=True)
     shown = capsys.readouterr()
     document = _strict(shown.out)
-    assert document.keys() == {"stage", "spec", "feasible", "reason", "relax"}
+    assert document.keys() == {"conclusion", "stage", "spec", "feasible", "reason", "relax"}
     assert document["feasible"] is False
     assert document["relax"][1] == {
         "key": "leaves.length",

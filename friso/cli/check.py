@@ -106,9 +106,7 @@ def _print_cases(stage: Stage, cases: dict[str, Case]) -> None:
     """A sentence per case, and the short table of `check`."""
     from friso.views.check.cases import shown_cases
     from friso.views.check.table import rows
-    from friso.views.check.words import conclusion, verdict_sentence
+    from friso.views.check.words import answer
 
-    listed = shown_cases(cases)
-    sentences = [f"{item.label}: {verdict_sentence(item, cases)}" for item in listed]
-    summary = filter(None, [conclusion(cases)])
-    print_answer([*sentences, *summary], stage.name, [item.label for item in listed], rows(listed))
+    shown = shown_cases(cases)
+    print_answer(answer(cases), stage.name, [item.label for item in shown], rows(shown))

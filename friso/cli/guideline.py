@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from friso.cli.common import AsJson, say
+from friso.cli.common import AsJson, print_wrapped, say
 from friso.cli.output import DefaultFolder, OutputFolder, Overwrite, print_document, print_written
 from friso.cli.progress import ProgressBar
 
@@ -36,7 +36,7 @@ def guideline(
     from friso.studies.guideline.sweeps import Keep
     from friso.views.guideline.document import guideline_document
     from friso.views.guideline.page import guideline_files
-    from friso.views.guideline.words import percent
+    from friso.views.guideline.words import accuracy
 
     keep = Keep(target.unfinished)
     try:
@@ -50,9 +50,6 @@ def guideline(
     if as_json:
         print_document(guideline_document(result), files)
         return
-    for name, fit in (("locked", result.locked), ("free", result.free)):
-        errors = fit.on_test
-        print(
-            f"{name}: {errors.count} held-out samples, rms error {percent(errors.rms)}, worst {percent(errors.worst)}"
-        )
+    for sentence in accuracy(result):
+        print_wrapped(sentence)
     print_written(files)

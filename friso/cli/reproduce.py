@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from friso.cli.common import AsJson, Tolerance, read_tolerance
+from friso.cli.common import AsJson, Tolerance, print_wrapped, read_tolerance
 from friso.cli.output import DefaultFolder, OutputFolder, Overwrite, print_document, print_written
 from friso.cli.progress import ProgressBar
 
@@ -41,14 +40,13 @@ def reproduce(
     if as_json:
         print_document(document, files)
         return
+    print_wrapped(document["conclusion"])
     for claim in document["claims"]:
         if claim["judgement"] != "not yet covered":
             print(f"{claim['id']:5} {claim['judgement']:14} {claim['number']}")
     for name, cells in document["cycles"].items():
-        print(
-            f"{name}: of {cells['cells']} cells {cells['transient']} count peaks although no cycle attracts, and "
-            f"{cells['dormant']} count none although one does"
+        print_wrapped(
+            f"{name}: in {cells['transient']} of {cells['cells']} cells peaks are counted although no cycle attracts; "
+            f"in {cells['dormant']} none are counted although one does"
         )
-    counts = Counter(claim["judgement"] for claim in document["claims"])
-    print(", ".join(f"{count} {judgement}" for judgement, count in counts.items()))
     print_written(path for path in files if path.suffix in (".html", ".json"))

@@ -38,7 +38,7 @@ def combined(found: Sequence[Estimate]) -> tuple[list[Estimate], list[str]]:
             one, agrees = _left(key, own)
         answers.append(one)
         if not agrees:
-            said.append(f"{key}: the experiments disagree, the interval allows for that: {_texts(sure or own)}")
+            said.append(f"{key}: the experiments disagree, and the interval allows for it: {_texts(sure or own)}")
         beyond = [each for each in own if shown and not each.shown and (each.low > one.high or each.high < one.low)]
         said += [f"{key}: {_text(one)} is shown, but {_text(each)}" for each in beyond]
     return answers, said
@@ -141,4 +141,4 @@ def _texts(every: Sequence[Estimate]) -> str:
 def _value(each: Estimate) -> str:
     if each.shown:
         return f"{each.value:.4g} ({each.low:.4g} to {each.high:.4g})"
-    return f"{each.low:.4g} to {each.high:.4g} is all that is possible"
+    return f"{each.low:.4g} to {each.high:.4g} is the possible range"

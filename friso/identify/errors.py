@@ -1,4 +1,4 @@
-"""How far a simulated record is from the measured one, and what is left in the difference."""
+"""How far a simulated record is from the measured one, and the residual."""
 
 from __future__ import annotations
 

@@ -203,7 +203,7 @@ def _claims(course: Course) -> str | None:
     """A reference moves; or nothing repeats, the position rests in between, or the force turns seldom and holds few
     frequencies."""
     if course.reference_moves:
-        return "it has a reference that moves"
+        return "its reference moves"
     repetition = course.repetition
     if repetition is None:
         standing = "reference" in course.log
@@ -211,7 +211,7 @@ def _claims(course: Course) -> str | None:
     if repetition.rests > RESTS:
         return f"{course.repeats}, but the position rests in between"
     if repetition.harmonics < FEW and repetition.turns < FEW:
-        return f"{course.repeats}, but turns seldom and holds few frequencies"
+        return f"{course.repeats}, but rarely reverses and contains few frequencies"
     return None
 
 

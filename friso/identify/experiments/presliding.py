@@ -147,9 +147,9 @@ def _nothing(why: str) -> Presliding:
 def _no_bristles(fit: _Fit, between: Between, held: bool) -> str:
     """Why what was found are no bristles; empty where they are."""
     if fit.left > EXPLAINED:
-        return f"{fit.left:.0%} of the friction are not explained: {SLIDES}"
+        return f"{fit.left:.0%} of the friction is not explained: {SLIDES}"
     if fit.ends:
-        return f"the bristles are at their end: {SLIDES}"
+        return f"the bristles yield: {SLIDES}"
     if held and 0 < fit.values[KEYS.index(STIFFNESS)] < SPRING * between.joint:
         return "the stiffness is like that of the joint: is it held?"
     return ""

@@ -66,9 +66,9 @@ FASTEST = 1.5
 NAMES = ("friction.coulomb", "friction.static", "friction.stribeck_velocity")
 UNITS = ("N", "N", "m/s")
 METHOD = "LuGre in the motion of slow sliding"
-BRISTLES = "mass and bristles have to be known: give a log of small motion before sliding too, --as presliding"
-RIGID = "Without [parasitic] in the stage file the structure is taken for rigid."
-DELAY = "the drive's delay has to be known: give it in [drive] of the stage file, --stage"
+BRISTLES = "mass and bristles are needed: add a log of small motion before sliding, --as presliding"
+RIGID = "The structure is assumed rigid, as the stage file has no [parasitic]."
+DELAY = "the drive's delay is needed: give it in [drive] of the stage file, --stage"
 
 
 @dataclass(frozen=True)
@@ -246,9 +246,9 @@ def _judged(found: tuple[Estimate, ...], left: float, velocity: np.ndarray) -> t
     coulomb, static, stribeck = found
     fastest = float(np.abs(velocity).max())
     if left > EXPLAINED:
-        return _unknown(f"{left:.0%} of the friction are not explained by LuGre's bristles")
+        return _unknown(f"{left:.0%} of the friction is not explained by LuGre's bristles")
     if not coulomb.low > 0:
-        return _unknown("the force does not show friction: does the bearing slide?")
+        return _unknown("the force shows no friction: does the bearing slide?")
     if fastest < FASTEST * stribeck.value:
         return _unknown(f"no faster than {fastest:.3g} m/s, the motion does not show where friction ceases to fall")
     if not (static.low > coulomb.value and stribeck.low > 0):

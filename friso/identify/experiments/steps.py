@@ -44,7 +44,7 @@ STARTS = np.linspace(0.1, 0.7, 7)
 """Shares of a plateau after which it may have settled, tried in turn."""
 
 KEY, UNIT = "joint.stiffness", "N/m"
-SOFT = "moving further does not need more force: is the cart fixed?"
+SOFT = "more deflection does not need more force: is the cart fixed?"
 METHOD = "differences of force over differences of deflection between settled position steps"
 
 
@@ -209,7 +209,7 @@ def _hysteresis(windows: tuple[Window, ...]) -> Estimate:
     design = np.stack([np.ones_like(x), (x - x.mean()) / np.ptp(x), way / 2], axis=1)
     solution, rest, rank, _ = np.linalg.lstsq(design, force, rcond=1e-6)
     if rank < 3 or len(x) == 3:
-        return Estimate.unknown(name, unit, method, "deflection and direction of the steps go together")
+        return Estimate.unknown(name, unit, method, "deflection and direction of the steps cannot be separated")
     variance = float(np.sum(rest)) / (len(x) - 3) * np.linalg.inv(design.T @ design)[2, 2]
     return by_t(name, unit, Mean(float(solution[2]), float(variance**0.5), len(x) - 3), method)
 
@@ -218,7 +218,7 @@ def _fixed(log: Log, position: np.ndarray, windows: tuple[Window, ...]) -> tuple
     """Whether the cart stood still between the windows, and what to say of it."""
     moved = cart(log)
     if moved is None:
-        return None, ("The cart is taken as fixed: no channel shows whether it is.",)
+        return None, ("The cart is assumed fixed: no channel shows whether it is.",)
     if len(windows) < 2:
         return None, ()
     marks = [slice(*np.searchsorted(log.time, (w.start, w.end))) for w in windows]
@@ -226,7 +226,7 @@ def _fixed(log: Log, position: np.ndarray, windows: tuple[Window, ...]) -> tuple
     if followed <= FIXED * went:
         return True, ()
     said = f"The cart is not fixed: it moved by {followed:.3g} m while the stage moved by {went:.3g} m"
-    return False, (f"{said}; the deflection is that of the joint all the same.",)
+    return False, (f"{said}; the deflection of the joint was measured all the same.",)
 
 
 def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> StepStiffness:

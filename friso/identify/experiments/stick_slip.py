@@ -262,12 +262,12 @@ def _said(count: int, offset: Estimate) -> tuple[str, ...]:
     """What to know before believing it."""
     said = []
     if count and not offset.shown:
-        said.append("The zero of the force on the cart is taken as measured; slips in one direction cannot check it.")
+        said.append("The zero of the force on the cart is used as measured; slips in one direction cannot verify it.")
     elif count and not offset.holds(0.0):
         size = f"{2 * abs(offset.value):.3g} N"
         said.append(f"The directions differ by {size}: an offset of the sensor, or unequal friction.")
     if 0 < count < 5:
-        said.append(f"Only {count} slips: the range over the rail is not shown.")
+        said.append(f"Only {count} slips: the range along the rail is not shown.")
     return tuple(said)
 
 

@@ -58,10 +58,11 @@ def _reasons(
         if parameter.core and (profiles[name].open_low or profiles[name].open_high):
             unknown[name] = "the log does not bound it"
     if SHARE in unknown:
-        why = f"the log shows the sum of both masses, {found.value(MASS):.4g} kg, not how it is shared"
+        why = f"the log shows the sum of both masses, {found.value(MASS):.4g} kg, not how it is split"
         unknown |= {"masses.cart": why, "masses.stage": why}
     if "friction.coulomb" in parameters and not any(name.startswith("bias.") for name in parameters):
-        why = f"the log moves one way only: with a constant force it makes {found.value('friction.coulomb'):.4g} N"
+        total = f"{found.value('friction.coulomb'):.4g} N"
+        why = f"the log moves in one direction only: its sum with a constant force is {total}"
         unknown |= {"friction.coulomb": why, "friction.static": why}
     return unknown
 

@@ -38,7 +38,7 @@ MOVES, STANDS_OUT, GIVES = 0.02, 3.0, 3.0
 """A joint bends where its deflection reaches this share of the motion, so many times its sensor's noise, and so many
 times what the contact that holds it gives."""
 
-HELD = "The joint is taken as held, with the limiter's stiffness: it is not seen to bend."
+HELD = "The joint is assumed held, with the limiter's stiffness: no bending shows."
 
 
 @dataclass(frozen=True)
@@ -176,7 +176,7 @@ def why_unseen(record: BearingRecord, fewest: int) -> str:
     motion = float(low_pass(record.position, record.interval, cutoff).std())
     noise = robust(np.diff(record.position, 2)) / 6**0.5
     if not motion > max(SEEN * noise, ROUNDING * float(np.abs(record.position).max())):
-        return f"the motion, {motion:.2g} m RMS, does not stand out of the noise"
+        return f"the motion, {motion:.2g} m RMS, does not stand out from the noise"
     return ""
 
 

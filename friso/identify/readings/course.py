@@ -70,7 +70,7 @@ class Course:
         it = self.repetition
         if it is None:
             return "a log whose reference stands still, with nothing periodic in it"
-        between = f"holds about {it.harmonics:.0f} harmonics and turns {it.turns} times in between"
+        between = f"has about {it.harmonics:.0f} harmonics and {it.turns} reversals per period"
         return f"a log in which {self.repeats}, {between}"
 
 

@@ -96,7 +96,7 @@ def friction_position(
     short = len(found) - len(long)
     warnings = [f"{short} passes shorter than a fifth of the longest are left out."] if short else []
     if not mass:
-        warnings.append("No mass is given: what inertia takes of the force is contained in it.")
+        warnings.append("No mass is given: the force contains that of inertia.")
     return FrictionPosition(maps, repeatability, pairs, separated, verdict, tuple(warnings))
 
 
@@ -225,7 +225,7 @@ def _verdict(maps: tuple[PassMap, ...], repeatability: Estimate, crossover: floa
         speeds = ", ".join(sorted({f"{abs(m.velocity) * 1e3:.3g}" for m in rough}))
         reasons.append(f"the motion at {speeds} mm/s is not steady (it hunts, sticks or swings)")
     if not repeatability.shown:
-        reasons.append(f"whether it repeats is not shown ({repeatability.reason})")
+        reasons.append(f"repeatability is not shown ({repeatability.reason})")
     elif repeatability.value < REPEATS:
         reasons.append(
             f"passes over the same places do not repeat it (correlation {repeatability.value:.2f}, 95 % interval "

@@ -80,7 +80,7 @@ def friction_velocity(log: Log, mass: float = 0.0, cutoff: float = CUTOFF) -> Fr
     way = way_of(log, used)
     warnings = []
     if used and way != way_of(log, [each for each in every if each.steady]):
-        warnings.append(f"Read on the way that all passes go, {way[0] * 1e3:.4g} to {way[1] * 1e3:.4g} mm.")
+        warnings.append(f"Read on the stretch common to all passes, {way[0] * 1e3:.4g} to {way[1] * 1e3:.4g} mm.")
     if len(unsteady):
         low, high = np.abs(unsteady).min(), np.abs(unsteady).max()
         warnings.append(f"{len(unsteady)} stretches, {low:.3g} to {high:.3g} m/s, were not steady and are left out.")
@@ -163,7 +163,7 @@ def _direction(speeds: np.ndarray, friction: np.ndarray, errors: np.ndarray, wor
     coulomb, viscous = (_fitted(*name, i, solution, covariance, freedom, method) for i, name in enumerate(names))
     low, high = speeds.min() * 1e3, speeds.max() * 1e3
     if _distinct(speeds) < STRAIGHT:
-        reason = f"two speeds, {low:.3g} and {high:.3g} mm/s, do not show whether friction is still falling at these"
+        reason = f"two speeds, {low:.3g} and {high:.3g} mm/s, do not show whether friction still falls there"
         return _still_falling(coulomb, viscous, reason)
     curved = _stribeck(speeds, friction, errors, solution, freedom)
     if curved is not None:

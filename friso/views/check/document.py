@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
+from friso.views.check.words import answer
 from friso.views.documents import plain_json
 
 if TYPE_CHECKING:
@@ -19,7 +20,7 @@ def check_document(cases: Mapping[str, Case], draws: Draws | None = None) -> dic
     if draws is not None:
         for name, case in document.items():
             case["draws"] = draws_document(draws, name)
-    return plain_json({"stage": cases["given"].stage.name, "cases": document})
+    return plain_json({"conclusion": " ".join(answer(cases)), "stage": cases["given"].stage.name, "cases": document})
 
 
 def _case(case: Case) -> dict[str, Any]:

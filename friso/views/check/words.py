@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from friso.hunting.basin import SHARES
 from friso.hunting.margin import FARTHEST
 from friso.hunting.verdict import LONG
-from friso.views.check.cases import BANDS, ShownCase
+from friso.views.check.cases import BANDS, ShownCase, shown_cases
 from friso.views.drawing.prefixes import listed, plus_minus, with_unit
 
 if TYPE_CHECKING:
@@ -25,6 +25,12 @@ def verdict_sentence(item: ShownCase, cases: Mapping[str, Case]) -> str:
         return f"{case.verdict} (solver: {case.solver.status})."
     after = _remedy(item, cases) if case.verdict in ("hunts", "bistable") else _outlook(case)
     return " ".join([says[case.verdict](case), *after])
+
+
+def answer(cases: Mapping[str, Case]) -> list[str]:
+    """A sentence for each case that is shown, and what follows from both."""
+    says = [f"{item.label}: {verdict_sentence(item, cases)}" for item in shown_cases(cases)]
+    return [*says, *filter(None, [conclusion(cases)])]
 
 
 def conclusion(cases: Mapping[str, Case]) -> str | None:

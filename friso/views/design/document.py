@@ -17,12 +17,14 @@ from friso.design.verification import MachineOutcomes
 from friso.stage.stage import numeric_keys
 from friso.views.design.control import parallel_gains
 from friso.views.design.window import lower, upper
+from friso.views.design.words import need, refusal
 from friso.views.documents import plain_json
 
 
 def design_document(design: Design) -> dict[str, Any]:
     """All but the files."""
     document = {
+        "conclusion": need(design),
         "stage": design.given.name,
         "spec": design.spec.name,
         "feasible": design.meets,
@@ -41,7 +43,8 @@ def design_document(design: Design) -> dict[str, Any]:
 
 def refused_document(stage: str, spec: str, failure: NoDesign) -> dict[str, Any]:
     """What there is to say where no design meets the specification."""
-    document = {"stage": stage, "spec": spec, "feasible": False, "reason": failure.reason}
+    document = {"conclusion": refusal(failure), "stage": stage, "spec": spec, "feasible": False}
+    document["reason"] = failure.reason
     return plain_json(document | {"relax": _relax(failure.relaxed)})
 
 

@@ -7,11 +7,12 @@ from typing import Any
 from friso.flexure.both_models import BothModels
 from friso.flexure.evaluation import Evaluation
 from friso.views.documents import plain_json
+from friso.views.flexure.words import sentences
 
 
 def flexure_document(flexure: BothModels) -> dict[str, Any]:
     """The main results, and those of the closed forms for comparison."""
-    head = {"stage": flexure.stage.name, "failure": flexure.failure or None}
+    head = {"conclusion": sentences(flexure)[0], "stage": flexure.stage.name, "failure": flexure.failure or None}
     return {**head, **_evaluation(flexure.best), "closed_forms": _evaluation(flexure.closed)}
 
 

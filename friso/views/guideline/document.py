@@ -13,6 +13,7 @@ from friso.studies.guideline.worked import WorkedDesign
 from friso.version import VERSION
 from friso.views.documents import plain_json
 from friso.views.guideline.page import group_rows
+from friso.views.guideline.words import accuracy
 
 
 def guideline_document(guideline: Guideline) -> dict[str, Any]:
@@ -20,6 +21,7 @@ def guideline_document(guideline: Guideline) -> dict[str, Any]:
     steps = guideline.worked
     return plain_json(
         {
+            "conclusion": accuracy(guideline)[0],
             "friso": VERSION,
             "samples": guideline.samples,
             "seconds_s": guideline.seconds,

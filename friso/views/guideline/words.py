@@ -71,6 +71,16 @@ def percent(off: float) -> str:
     return f"{100 * math.expm1(off):.0f} %"
 
 
+def accuracy(guideline: Guideline) -> list[str]:
+    """How well each law predicts the edge of hunting of stages that it was not fitted to."""
+    fits = (("locked", guideline.locked.on_test), ("free", guideline.free.on_test))
+    return [
+        f"The law for the {case} joint predicts the edge of hunting of {errors.count} stages that it was not fitted to "
+        f"with an RMS error of {percent(errors.rms)}, {percent(errors.worst)} at worst."
+        for case, errors in fits
+    ]
+
+
 def parasitic_edges(cases: Sequence[RigCase]) -> str:
     """How far the parasitic mode moves the edge of hunting."""
     edges = [case.computed for case in cases if math.isfinite(case.computed)]

@@ -12,7 +12,7 @@ from friso.identify.sources import LogFile
 from friso.views.documents import plain_json
 from friso.views.identify.estimates import key_document
 from friso.views.identify.kind_view import VIEWS
-from friso.views.identify.words import prediction_view
+from friso.views.identify.words import headline, prediction_view
 
 
 def identify_document(
@@ -20,6 +20,7 @@ def identify_document(
 ) -> dict[str, Any]:
     """All but the files written."""
     document = {
+        "conclusion": headline(identification)[0][1],
         "stage": identification.stage.name if identification.stage else None,
         "logs": [_log(file) for file in files],
         "estimates": [key_document(estimate) for estimate in identification.estimates],

@@ -50,14 +50,12 @@ def moves_figures(moves: IdentifiedMoves, name: str) -> list[Figure]:
 def _traces(moves: IdentifiedMoves, name: str) -> Figure:
     """Measured and simulated over time."""
     if moves.loop is not None:
-        caption = (
-            "The identified machine in its own loop, on the reference of the log; the measured motion does not enter."
-        )
+        caption = "The identified machine in closed loop on the logged reference; the measured motion does not enter."
         panels = record_panels(moves.log, moves.part, moves.simulated)
         return Figure(f"{name}_traces", "Measured and simulated", caption, panels)
     time, force = moves.log.time[moves.part], moves.log["force"][moves.part]
     caption = (
-        "The force that the identified machine needs to move as measured, and what of the measured force it leaves."
+        "The force that the identified machine needs to move as measured, and its difference from the measured force."
     )
     panels = (
         Panel("", TIME, Axis("Force", "N"), _both(time, force, force - moves.fit.residual, "needed")),
@@ -67,7 +65,7 @@ def _traces(moves: IdentifiedMoves, name: str) -> Figure:
 
 
 def record_panels(log: Log, part: slice, simulated: Simulated) -> tuple[Panel, ...]:
-    """Position, force and what is left of both, of a record simulated in closed loop."""
+    """Position, force and the residuals of both, of a record simulated in closed loop."""
     time, position, force = log.time[part], log["position"][part], log["force"][part]
     expected = simulated.force + (log["disturbance"][part] if "disturbance" in log else 0.0)
     apart = Series(time, position - simulated.position, "", VERMILLION, width=1.0)
@@ -88,18 +86,18 @@ def _left(time: Array, left: Array) -> Panel:
 
 
 def _residual(moves: IdentifiedMoves, name: str) -> Figure:
-    """What is left of the force, over place and speed."""
+    """The residual force over place and speed."""
     moved = motion(moves.log["position"][moves.part], moves.log.sample_time, SMOOTH * moves.inverse.bandwidth)
-    left, axis = moves.fit.residual, Axis("Force left", "N")
+    left, axis = moves.fit.residual, Axis("Residual force", "N")
     panels = (
         Panel("", Axis("Position", "m"), axis, (Series(moved.position, left, "", VERMILLION, width=0.5),)),
         Panel("", Axis("Velocity", "m/s"), axis, (Series(moved.velocity, left, "", VERMILLION, width=0.5),)),
     )
     caption = (
-        "Measured less simulated force. A pattern over the place comes from the rail or the screw (cogging, pitch), "
-        "one over the velocity from friction that the model does not have."
+        "Measured minus simulated force. A pattern over position comes from the rail or the screw (cogging, pitch), "
+        "one over velocity from friction that the model lacks."
     )
-    return Figure(f"{name}_residual", "What is left of the force", caption, panels, columns=2)
+    return Figure(f"{name}_residual", "Residual force", caption, panels, columns=2)
 
 
 def _friction(moves: IdentifiedMoves, name: str) -> Figure:
@@ -125,10 +123,10 @@ def _friction(moves: IdentifiedMoves, name: str) -> Figure:
     curve = Series(speeds, steady_friction(flat, speeds), "identified", BLUE, width=1.8)
     axes = Axis("Velocity", "m/s", (-1.05 * top, 1.05 * top)), Axis("Friction", "N", (-reach, reach))
     unshown = any(estimate.name == "friction.static" and not estimate.shown for estimate in moves.estimates)
-    caption = "Loops: the measured force less masses times accelerations; they swing where the motion turns."
+    caption = "Loops: measured force less mass times acceleration; they open where the motion reverses."
     if sides:
-        caption += f" Shaded: {range_with_unit(low, high, 'm/s')}, where nothing moves steadily"
-        caption += ", so that a Stribeck effect there would not be seen." if unshown else "."
+        caption += f" Shaded: {range_with_unit(low, high, 'm/s')}, without steady motion"
+        caption += ", where a Stribeck effect would not show." if unshown else "."
     panel = Panel("", *axes, (loops, curve), bands=bands)
     return Figure(f"{name}_friction", "Friction over velocity", caption, (panel,))
 
@@ -154,13 +152,13 @@ def _profiles(moves: IdentifiedMoves, name: str) -> Figure:
     fitted = {moves.fit.problem.parameters[number].name for number in moves.fit.free}
     panels = tuple(_profile(profile, parameters[key], best, key in fitted) for key, profile in moves.profiles.items())
     caption = (
-        "How much worse the best fit gets while one parameter is held at other values and the others follow; 1 ends "
-        f"the 95 % interval (shaded), drawn up to {WORST:g}. A curve that stays below 1 to an end of its range is of a "
-        "parameter that the record does not show."
+        "How much worse the best fit gets with one parameter held and the others refitted; 1 is the end of "
+        f"the 95 % interval (shaded), drawn up to {WORST:g}. Where a curve stays below 1 to the end of its range, the "
+        "record does not determine the parameter."
     )
     if any((profile.cost < best - (profile.limit - best)).any() for profile in moves.profiles.values()):
         caption += (
-            " Below 0 the fit is better than the one chosen, by a parameter whose effect the motion does not cover: it "
+            " Below 0 the fit is better than the one chosen: the parameter has no effect of its own in this motion and "
             "makes up for other errors of the model."
         )
     return Figure(f"{name}_profiles", "Profiles of the fit", caption, panels, columns=2)

@@ -65,7 +65,7 @@ def value_text(estimate: Estimate) -> str:
 
 
 def interval_text(estimate: Estimate) -> str:
-    """The interval, e.g. "94.84 to 95.72 kg"; of what is not shown, what is left possible."""
+    """The interval, e.g. "94.84 to 95.72 kg"; of what the logs do not show, the range that they allow."""
     low, high = math.isfinite(estimate.low), math.isfinite(estimate.high)
     if not (low or high):
         return NOTHING
@@ -82,7 +82,7 @@ def interval_text(estimate: Estimate) -> str:
 def with_interval(estimate: Estimate) -> str:
     """Both in a sentence, e.g. "95.28 kg (94.84 to 95.72)"."""
     if not estimate.shown:
-        return f"not shown ({estimate.reason})"
+        return f"not identified ({estimate.reason})"
     unit = _scale(estimate)[1]
     return f"{value_text(estimate)} ({interval_text(estimate).removesuffix(unit).rstrip()})"
 
@@ -106,7 +106,7 @@ def percent(share: float) -> str:
 
 
 def _scale(estimate: Estimate) -> tuple[float, str]:
-    """Factor and unit with prefix that suit the value, or what is left possible."""
+    """Factor and unit with prefix that suit the value, or else the range that is possible."""
     finite = [estimate.value] if math.isfinite(estimate.value) else [estimate.low, estimate.high]
     unit, size = unit_of(estimate.unit), max((abs(number) for number in finite if math.isfinite(number)), default=0.0)
     if unit.startswith("N") and FORCES[0] < size < FORCES[1]:

@@ -50,7 +50,7 @@ def _bode(bench: Bench, name: str) -> Figure:
     if bench.lines:
         caption += f" Mass line: {' and '.join(with_interval(line.value) for line in bench.lines)}."
     if bench.departs is not None and bench.departs.frequency.shown:
-        caption += " Below their band the response leaves the linear model."
+        caption += " Below their band the response departs from the linear model."
     return Figure(f"{name}_bode", "Frequency response", caption, panels, columns=len(outputs))
 
 
@@ -161,7 +161,7 @@ def _departure(bench: Bench, name: str) -> Figure:
     text = with_interval(departs.frequency)
     caption = f"The driven mass's response over that of the two-mass model; departure: {text}."
     if departs.differ:
-        caption += " Below, realisations differ by more than noise: what acts there is not linear."
+        caption += " Below, realisations differ by more than noise: the machine is nonlinear there."
     return Figure(f"{name}_departure", "Departure from the linear model", caption, (panel,))
 
 

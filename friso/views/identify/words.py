@@ -1,4 +1,4 @@
-"""What an identification found, in words that the terminal and the page share."""
+"""An identification in words that the terminal and the page share."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ if TYPE_CHECKING:
     from friso.identify.method import Experiment, Identification, Prediction
     from friso.identify.sources import LogFile
 
-COLUMNS = ("Quantity", "Value", "95 % interval", "How, or why there is no value")
+COLUMNS = ("Quantity", "Value", "95 % interval", "Method, or why there is no value")
 """Of the table of estimates."""
 
-LEFT = "not shown"
+LEFT = "not identified"
 """Stands for the value of what the logs do not show."""
 
 NO_STAGE = (
-    "No stage file is written: without moves, friso cannot make one up around the logs. One that is given (--stage) "
-    "takes over what they show."
+    "No stage file is written: logs without moves do not describe a whole machine. Give the rest with --stage; the "
+    "identified values replace those in it."
 )
 
 POOR = 0.5
@@ -53,31 +53,27 @@ class EstimateRow:
 
 
 def headline(identification: Identification) -> list[tuple[str, str]]:
-    """What is shown, what is not and why, and how well other logs are predicted; each with its colour."""
+    """What is identified, and what is not and why; each sentence with its colour."""
     estimates = ordered(identification.estimates)
     visible = [estimate for estimate in estimates if estimate.shown]
     headlines = [VIEWS[experiment.kind].headline(experiment.result) for experiment in identification.experiments]
     headlines = [sentence for sentence in headlines if sentence]
     lines = []
     if visible:
-        lines.append(
-            (
-                GREEN,
-                f"Shown: {'; '.join(f'{within(estimate.name)} {with_interval(estimate)}' for estimate in visible)}.",
-            )
-        )
+        values = "; ".join(f"{within(estimate.name)} {with_interval(estimate)}" for estimate in visible)
+        lines.append((GREEN, f"Identified: {values}."))
     elif not headlines:
-        lines.append((VERMILLION, "No key of the stage file is shown by these logs."))
+        lines.append((VERMILLION, "These logs determine no key of the stage file."))
     lines += [(GREEN, sentence) for sentence in headlines]
     if identification.stage is None:
         lines.append((ORANGE, NO_STAGE))
     if len(visible) < len(estimates):
-        lines.append((ORANGE, f"Not shown: {missing(estimates)}."))
+        lines.append((ORANGE, f"Not identified: {missing(estimates)}."))
     return lines
 
 
 def missing(estimates: Sequence[Estimate]) -> str:
-    """What is not shown, together with its reason, which several may share."""
+    """What is not identified, with its reason, which several may share."""
     names: dict[str, list[str]] = {}
     for estimate in estimates:
         if not estimate.shown:
@@ -96,7 +92,7 @@ def prediction_line(prediction: Prediction) -> tuple[str, str]:
     """How well another log is predicted, with its colour."""
     view = prediction_view(prediction)
     colour = GREEN if view.worst(prediction.result) < POOR else VERMILLION
-    return colour, f"{prediction.log.name}, predicted: {view.sentence(prediction.result)}"
+    return colour, f"Prediction of {prediction.log.name}: {view.sentence(prediction.result)}"
 
 
 def estimate_rows(identification: Identification) -> list[EstimateRow]:
@@ -172,20 +168,19 @@ def _warned(file: LogFile) -> tuple[str, ...]:
 
 
 def answer(identification: Identification, files: Sequence[LogFile], predictions: Sequence[Prediction]) -> list[str]:
-    """The lines of the terminal: what was read, what was found, and what to know about it."""
-    lines = []
-    for title, read, warned in read_rows(files):
-        lines += [title, *(f"  {text}" for text in read), *(f"  note: {text}" for text in warned)]
+    """The lines of the terminal: the answer, the estimates, the experiments behind them, and what was read."""
+    rows = estimate_rows(identification)
+    lines = [sentence for _, sentence in headline(identification)]
+    lines += [prediction_line(prediction)[1] for prediction in predictions]
+    lines += [f"note: {warning}" for warning in identification.warnings]
+    lines += ["", *_aligned(rows)] if rows else []
     for part in summaries(identification):
         lines += ["", part.title, *(f"  {sentence}" for sentence in part.sentences)]
-        lines += [
-            *(f"  {name}: {text}" for name, text in part.facts),
-            *(f"  note: {warning}" for warning in part.warnings),
-        ]
-    rows = estimate_rows(identification)
-    lines += [*(["", *_aligned(rows)] if rows else []), "", *(sentence for _, sentence in headline(identification))]
-    lines += [prediction_line(prediction)[1] for prediction in predictions]
-    return lines + [f"note: {warning}" for warning in identification.warnings]
+        lines += [f"  {name}: {text}" for name, text in part.facts]
+        lines += [f"  note: {warning}" for warning in part.warnings]
+    for title, read, warned in read_rows(files):
+        lines += ["", title, *(f"  {text}" for text in read), *(f"  note: {text}" for text in warned)]
+    return lines
 
 
 def _aligned(rows: Sequence[EstimateRow]) -> list[str]:

@@ -2,14 +2,37 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import TYPE_CHECKING, Any
 
 from friso.studies.thesis import CONVENTIONS, thesis_rig
 from friso.version import VERSION
 from friso.views.documents import plain_json
+from friso.views.drawing.prefixes import listed
 
 if TYPE_CHECKING:
     from friso.studies.thesis import Reproduction, Verdict
+    from friso.studies.thesis.claims import Judgement
+
+
+def conclusion(reproduction: Reproduction) -> str:
+    """How many claims of the thesis hold."""
+    counts = Counter(verdict.judgement for verdict in reproduction.verdicts)
+    parts = [
+        f"{counts[judgement]} {one if counts[judgement] == 1 else several}"
+        for judgement, one, several in _VERBS
+        if counts[judgement]
+    ]
+    return f"Of {len(reproduction.verdicts)} claims of the thesis {listed(parts, 'and')}."
+
+
+_VERBS: tuple[tuple[Judgement, str, str], ...] = (
+    ("holds", "holds", "hold"),
+    ("holds in part", "holds in part", "hold in part"),
+    ("differs", "does not hold", "do not hold"),
+    ("not yet covered", "is not covered", "are not covered"),
+)
+"""The judgements as said of one claim, and of several."""
 
 
 def claims_document(reproduction: Reproduction) -> dict[str, Any]:
@@ -17,6 +40,7 @@ def claims_document(reproduction: Reproduction) -> dict[str, Any]:
     tolerances = sorted(reproduction.tolerances)
     verdicts, counts = reproduction.changed
     document = {
+        "conclusion": conclusion(reproduction),
         "source": thesis_rig().source,
         "friso": VERSION,
         "points": reproduction.points,

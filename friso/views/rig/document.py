@@ -10,10 +10,17 @@ from friso.views.rig.outcome_view import OUTCOME_VIEWS
 
 
 def rig_document(outcome: Outcome) -> dict[str, Any]:
-    """What was found, and the logs with the seeds of their noise."""
+    """The results of the experiment, and the logs with the seeds of their noise."""
     logs = [
         {"name": log.name, "seed": log.seed, "interval_s": log.interval, "failure": log.failure or None}
         for log in outcome.logs
     ]
-    head = {"experiment": outcome.experiment, "stage": outcome.stage.name, "seed": outcome.seed, "logs": logs}
-    return plain_json({**head, "found": OUTCOME_VIEWS[outcome.experiment].numbers(outcome), "notes": [*outcome.notes]})
+    view = OUTCOME_VIEWS[outcome.experiment]
+    head = {
+        "conclusion": view.sentences(outcome)[0],
+        "experiment": outcome.experiment,
+        "stage": outcome.stage.name,
+        "seed": outcome.seed,
+        "logs": logs,
+    }
+    return plain_json({**head, "found": view.numbers(outcome), "notes": [*outcome.notes]})

@@ -17,7 +17,7 @@ from friso.views.rig.outcome_view import OUTCOME_VIEWS
 
 
 def sentences(outcome: Outcome) -> list[str]:
-    """What was found, for the engineer who has to decide with it."""
+    """The results, the answer first, for the engineer who has to decide with them."""
     return OUTCOME_VIEWS[outcome.experiment].sentences(outcome)
 
 

@@ -62,7 +62,7 @@ def _figures(result: BreakAway, logs: Sequence[Source], name: str) -> list[Figur
         limits,
         bands=bands,
     )
-    caption = f"Each ramp from rest. Static friction, as of the slowest ramps: {with_interval(result.static)}."
+    caption = f"One point per ramp from rest. Static friction from the slowest ramps: {with_interval(result.static)}."
     return [Figure(f"{name}_rates", "Break-away force over force rate", caption, (panel,))]
 
 

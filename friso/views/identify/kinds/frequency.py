@@ -22,7 +22,7 @@ def _sentences(bench: Bench) -> tuple[str, ...]:
     sentences = [f"{text[0].upper()}{text[1:]}." for text in (bench.seen.words[-1:] if bench.seen else ())]
     if bench.departs is not None and bench.departs.frequency.shown:
         below = digits(bench.departs.frequency.value, "Hz")
-        sentences.append(f"Below about {below} the response leaves the linear model.")
+        sentences.append(f"Below about {below} the response departs from the linear model.")
         sentences += [_friction(bench)] if bench.explanation is not None else []
     return tuple(sentences)
 
@@ -33,7 +33,7 @@ def _friction(bench: Bench) -> str:
     share = 1 - bench.explanation.left
     verb = "explains" if share > 0.5 else "does not explain"
     accounted = percent(max(share, 0.0))
-    return f"A simulated mass with Coulomb friction on a spring {verb} it: {accounted} of it is accounted for."
+    return f"A simulated mass with Coulomb friction on a spring {verb} this: it accounts for {accounted}."
 
 
 def _facts(bench: Bench) -> Facts:
@@ -49,7 +49,7 @@ def _facts(bench: Bench) -> Facts:
         for estimate in (bench.two_masses.estimates if bench.two_masses else ())
     ]
     if bench.departs is not None:
-        facts.append(("Leaves the linear model below", with_interval(bench.departs.frequency)))
+        facts.append(("Departs from the linear model below", with_interval(bench.departs.frequency)))
     if bench.drag is not None:
         facts.append(("Coulomb friction, from the departure", with_interval(bench.drag.coulomb)))
         facts.append(("Spring beside it", with_interval(bench.drag.stiffness)))
@@ -71,9 +71,7 @@ def _headline(bench: Bench) -> str:
     modes = f"Frequency response: {'; '.join(sentences)}." if sentences else ""
     if units == ("N", "m"):
         return modes
-    scale = (
-        f"The force stands in {units[0]} and the motion in {units[1]}: only in N and m do masses and stiffness enter "
-    )
+    scale = f"The force is in {units[0]} and the motion in {units[1]}: masses and stiffness need N and m to enter "
     return f"{modes} {scale}the stage file (--scale).".strip()
 
 

@@ -23,43 +23,43 @@ SUFFIXES = {"N": "n", "kg": "kg", "N*s/m": "n_s_per_m"}
 def _sentences(moves: IdentifiedMoves) -> tuple[str, ...]:
     """How it was fitted, and what the motion covers."""
     low, high = moves.covered.gap
-    along = "the machine was simulated along the position of the log: what is compared is the force that it takes."
+    along = "the machine was simulated along the logged position, and the forces were compared."
     if moves.fit.problem.closed:
-        how = "The machine was simulated in its own loop, on the reference of the log."
+        how = "The machine was simulated in closed loop on the logged reference."
     elif moves.loop is not None:
-        how = f"In its own loop the simulated machine gets out of step with the log. For the fit, {along}"
+        how = f"In closed loop the simulated machine gets out of step with the log. For the fit, {along}"
     else:
         how = f"{along[0].upper()}{along[1:]}"
     if not moves.covered.steady.size:
-        return how, "The motion is nowhere steady for long enough to show friction at a speed."
+        return how, "No part of the motion is steady for long enough to show friction at a speed."
     gap = range_with_unit(low, high, "m/s")
     return (
         how,
-        f"The widest range of speeds without steady motion is {gap}: of friction there, the record says nothing.",
+        f"The widest gap in the steady speeds is {gap}: the record does not show friction there.",
     )
 
 
 def _facts(moves: IdentifiedMoves) -> Facts:
-    """Both fits of the inverse model, the errors of the output-error fit, and what is left."""
-    left = moves.residual
-    alike = (
-        "neighbouring samples do not resemble each other"
-        if left.white
-        else (f"alike over {digits(left.correlation_time, 's')}")
+    """Both fits of the inverse model, the errors of the output-error fit, and the residual."""
+    residual = moves.residual
+    correlation = (
+        "uncorrelated from sample to sample"
+        if residual.white
+        else f"correlated over {digits(residual.correlation_time, 's')}"
     )
     return (
         ("Inverse model", _inverse_text(moves.inverse)),
         ("Inverse model, per direction", _inverse_text(moves.by_direction)),
         ("Bandwidth of the motion", digits(moves.inverse.bandwidth, "Hz")),
         ("Relative errors of the simulation", _errors(moves)),
-        ("Force left unexplained", f"{digits(left.rms, 'N')} (root mean square), {alike}"),
-        ("Of its power, the mean explains", f"{percent(left.by_position)} over places along the rail, "
-         f"{percent(left.by_velocity)} over speeds"),
+        ("Residual force", f"{digits(residual.rms, 'N')} RMS, {correlation}"),
+        ("Share of its power explained", f"{percent(residual.by_position)} by position along the rail, "
+         f"{percent(residual.by_velocity)} by speed"),
     )  # fmt: skip
 
 
 def _errors(moves: IdentifiedMoves) -> str:
-    """The relative errors of the simulated record; along the log's position, that of the force alone says anything."""
+    """The relative errors of the simulated record; along the logged position, that of the force alone is meaningful."""
     errors = moves.errors
     if moves.loop is None:
         return f"force {percent(errors.force)}"
@@ -109,14 +109,14 @@ def _inverse_numbers(model: InverseModel) -> dict[str, Any]:
 
 
 def _residual_numbers(moves: IdentifiedMoves) -> dict[str, Any]:
-    left = moves.residual
+    residual = moves.residual
     return {
-        "rms_n": left.rms,
-        "mean_n": left.mean,
-        "correlation_time_s": left.correlation_time,
-        "white": left.white,
-        "explained_by_position": left.by_position,
-        "explained_by_velocity": left.by_velocity,
+        "rms_n": residual.rms,
+        "mean_n": residual.mean,
+        "correlation_time_s": residual.correlation_time,
+        "white": residual.white,
+        "explained_by_position": residual.by_position,
+        "explained_by_velocity": residual.by_velocity,
     }
 
 
@@ -136,7 +136,7 @@ def _prediction_sentence(simulated: SimulatedLog) -> str:
 def _prediction_figures(log: Log, simulated: SimulatedLog, number: int) -> list[Figure]:
     """The log as measured and as simulated."""
     caption = (
-        f"{log.name}: simulated with what was found in the other logs; relative error of the position "
+        f"{log.name}: simulated with the values identified from the other logs; relative error of the position "
         f"{percent(simulated.errors.position)}, of the force {percent(simulated.errors.force)}."
     )
     panels = record_panels(log, simulated.part, simulated.simulated)

@@ -20,7 +20,7 @@ def _facts(result: Presliding) -> Facts:
         ("Moving mass", with_interval(result.mass)),
     ]
     if len(result.time):
-        facts += [("Friction left unexplained", f"{result.unexplained:.1%} of its standard deviation")]
+        facts += [("Residual friction", f"{result.unexplained:.1%} of its standard deviation")]
     return tuple(facts)
 
 
@@ -44,7 +44,7 @@ def presliding_caption(result: Presliding) -> str:
     """What the bristles are, and how much of the force they explain."""
     return (
         f"The last tenth of the record. Stiffness of the bristles: {with_interval(result.stiffness)}; damping: "
-        f"{with_interval(result.damping)}. {result.unexplained:.1%} of the friction are left unexplained."
+        f"{with_interval(result.damping)}. {result.unexplained:.1%} of the friction remains unexplained."
     )
 
 

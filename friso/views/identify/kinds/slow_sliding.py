@@ -22,7 +22,7 @@ def _facts(result: SlowSliding) -> Facts:
     names = ("Coulomb friction", "Static friction", "Stribeck velocity")
     facts = [(name, with_interval(estimate)) for name, estimate in zip(names, result.estimates, strict=True)]
     if len(result.time):
-        facts += [("Friction left unexplained", f"{result.unexplained:.1%} of its standard deviation")]
+        facts += [("Residual friction", f"{result.unexplained:.1%} of its standard deviation")]
     return tuple(facts)
 
 
@@ -43,9 +43,9 @@ def slow_sliding_caption(result: SlowSliding) -> str:
     """What the friction is, and how much of it the model explains."""
     coulomb, static, stribeck = (with_interval(estimate) for estimate in result.estimates)
     return (
-        "Force less inertia, and the friction of LuGre's bristles in the motion that was measured. Coulomb "
+        "Force less inertia, and the friction of LuGre bristles in the measured motion. Coulomb "
         f"friction: {coulomb}; static friction: {static}; Stribeck velocity: {stribeck}. {result.unexplained:.1%} of "
-        "the friction are left unexplained."
+        "the friction remains unexplained."
     )
 
 

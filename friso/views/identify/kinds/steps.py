@@ -58,7 +58,7 @@ def _figures(result: StepStiffness, logs: Sequence[Source], name: str) -> list[F
         )
         line = Series(result.time, values, quantity.lower() + ("" if unit == "m" else ", low-passed"), INK, width=1.0)
         panels.append(Panel("", TIME, Axis(quantity, unit, (low - room, high + room)), (line,), bands=bands))
-    caption = "Shaded: where both had settled, and their means were taken."
+    caption = "Shaded: settled windows, of which the means are used."
     figures = [Figure(f"{name}_record", "Steps of the position", caption, tuple(panels))]
     if len(result.windows) < 2:
         return figures

@@ -23,7 +23,7 @@ COLOURS = (BLUE, VERMILLION, GREEN, ORANGE, PINK)
 
 
 def sentences(outcome: Outcome) -> list[str]:
-    """What was found."""
+    """Friction along the rail, its truth, and what many speeds and slow sliding show."""
     found: ConstantSpeedResult = outcome.result
     said = [f"Joint {each.name}: {each.place.verdict}" for each in found.cases]
     for case in found.cases:
@@ -37,14 +37,14 @@ def sentences(outcome: Outcome) -> list[str]:
         ],
         "and",
     )
-    return [*said, f"The true dynamic friction along the way is {true} on average.", *_many(found), *_slow(found)]
+    return [*said, f"The true mean dynamic friction along the travel is {true}.", *_many(found), *_slow(found)]
 
 
 def _slow(found: ConstantSpeedResult) -> list[str]:
     """What slow sliding shows."""
     if not found.slow:
         return []
-    head = "In slow sliding, joint locked, at the limit of steady motion, with the true mass and bristles known:"
+    head = "Slow sliding, joint locked, at the edge of steady motion, with the true mass and bristles:"
     return [head, *map(_slow_place, found.slow)]
 
 
@@ -57,7 +57,7 @@ def _slow_place(sliding: Slow) -> str:
         for estimate in sliding.found.estimates
     ]
     told = [
-        f"{name} {text}, truly {with_unit(float(one), unit)}"
+        f"{name} {text} (true: {with_unit(float(one), unit)})"
         for name, text, one, unit in zip(names, shown, true, ("N", "N", "m/s"), strict=True)
     ]
     return f"From {_start(sliding.log)} on: {'; '.join(told)}."
@@ -72,7 +72,7 @@ def _start(log: RigLog) -> str:
 def _many(found: ConstantSpeedResult) -> list[str]:
     """What the many speeds show, at each place."""
     crossover = with_unit(found.many.crossover, "Hz")
-    head = f"At many speeds, joint locked, with the crossover at {crossover}:"
+    head = f"Many speeds, joint locked, crossover {crossover}:"
     return [head, *(_place(number, place) for number, place in enumerate(found.many.places, start=1))]
 
 
@@ -85,7 +85,7 @@ def _place(number: int, place: PlaceOnRail) -> str:
     told = [f"not shown: {listed(words, 'and')} ({reason})" for reason, words in hidden.items() if reason]
     ends = [with_unit(float(end(reached)), "m/s") for end in (np.min, np.max) if len(reached)]
     passed = f"{len(reached)} steady passes{' from ' if ends else ''}{' to '.join(ends)}"
-    head = f"PlaceOnRail {number}, from {_start(place.log)} on, {passed}"
+    head = f"Place {number}, from {_start(place.log)} on, {passed}"
     stopped = [f"the log stopped {place.log.failure}"] if place.log.failure else []
     return f"{head}: {'; '.join([*stopped, *shown, *told])}."
 
@@ -102,7 +102,7 @@ def figures(outcome: Outcome) -> list[Figure]:
         )
         for case in found.cases
     )
-    caption = "Commanded force on the way there, averaged over places; the log also has the way back."
+    caption = "Commanded force of the forward pass, averaged over places; the log also has the return."
     title = "Force at constant speed"
     return [
         Figure("rig_constant_speed", title, caption, panels, columns=1, subject=outcome.stage.name),

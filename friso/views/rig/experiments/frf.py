@@ -42,7 +42,7 @@ def sentences(outcome: Outcome) -> list[str]:
     tuned = listed([f"{with_unit(each.tuned, 'Hz')} at {with_unit(nearest(each), 'Hz')}" for each in measured], "and")
     lost = [f"{loop.tuned:.3g} Hz" for loop in found.loops if not loop.measured]
     unstable = f" Tuned to {listed(lost, 'and')} the closed loop is not stable." if lost else ""
-    above = f"and once more at {with_unit(max(others), 'Hz')}" if others else "and nowhere above"
+    above = f"once more at {with_unit(max(others), 'Hz')}" if others else "nowhere above"
     return [
         f"Joint locked: the mass line shows {_mass(found.locked.mass)} from {with_unit(found.locked.band[0], 'Hz')} to "
         f"{with_unit(found.locked.band[1], 'Hz')}.",
@@ -52,8 +52,8 @@ def sentences(outcome: Outcome) -> list[str]:
         f"{found.apparent[1, 1]:.3g} kg; one that gives {RATIOS[2]:g} times the force makes them "
         f"{found.apparent[0, 2]:.3g} and {found.apparent[1, 2]:.3g} kg: a machine that appears heavier has a motor "
         "weaker than assumed.",
-        f"Locked, the open loops cross 0 dB tuned to {tuned}, {above} at the highest of these settings.{unstable}",
-        f"Free, the loop tuned to {with_unit(found.free_loop.tuned, 'Hz')} crosses at "
+        f"Joint locked, open loops cross 0 dB as follows: tuned to {tuned}; at the highest setting {above}.{unstable}",
+        f"Joint free, the loop tuned to {with_unit(found.free_loop.tuned, 'Hz')} crosses at "
         f"{with_unit(found.free_loop.crossings[-1].value if found.free_loop.crossings else None, 'Hz')}; the highest "
         f"stable setting is {with_unit(found.highest_stable, 'Hz')}"
         + (", the highest tried." if found.stable.all() else "."),

@@ -50,9 +50,9 @@ def sentences(outcome: Outcome) -> list[str]:
     own = moves.shown[0]
     count = len(moves.rails)
     return [
-        f"After a move of {with_unit(moves.distance, 'm')} at {moves.crossovers[own]:.3g} Hz peaks are counted with the "
-        f"joint locked on {share_text(moves.shares('locked')[own], count)}, with it free on "
-        f"{share_text(moves.shares('free')[own], count)} (95 % intervals).",
+        f"After a move of {with_unit(moves.distance, 'm')} at {moves.crossovers[own]:.3g} Hz peaks are counted on "
+        f"{share_text(moves.shares('locked')[own], count)} with the joint locked, and on "
+        f"{share_text(moves.shares('free')[own], count)} with it free (95 % intervals).",
         _swings(moves),
         f"Joint locked: {_limit(moves, 'locked')} Joint free: {_limit(moves, 'free')}",
         *_started(moves),
@@ -68,7 +68,7 @@ def _swings(moves: HuntingResult) -> str:
     swing, period = runs.swing[moves.shown[0]][swings], runs.period[moves.shown[0]][swings]
     return (
         f"With the joint locked the stage still swings at the end of the run on {int(swings.sum())} rails (peaks are "
-        f"counted on {counted}), by {with_unit(float(np.median(swing)), 'm')} from peak to peak with a period "
+        f"counted on {counted}), {with_unit(float(np.median(swing)), 'm')} peak to peak with a period "
         f"of {with_unit(float(np.median(period)), 's')} (medians)."
     )
 
@@ -89,8 +89,8 @@ def _limit(moves: HuntingResult, case: str) -> str:
 def _started(moves: HuntingResult) -> list[str]:
     """What a release starts that the move does not."""
     counts = [
-        f"{int(moves.cases['locked'].counted[row].sum())} and {int(moves.can_start[row].sum())} of {len(moves.rails)} at "
-        f"{moves.crossovers[row]:.3g} Hz"
+        f"{int(moves.cases['locked'].counted[row].sum())} and {int(moves.can_start[row].sum())} of {len(moves.rails)} "
+        f"at {moves.crossovers[row]:.3g} Hz"
         for row in moves.shown
     ]
     listed = ", ".join(with_unit(displacement, "m") for displacement in moves.displacements)
@@ -101,9 +101,9 @@ def _started(moves: HuntingResult) -> list[str]:
     if moves.startable is not None:
         found.append(
             f"At {moves.startable.crossover:.3g} Hz no peaks are counted on rail "
-            f"{moves.rails[moves.startable.rail]:.0f} after the move, and once released from "
-            f"{with_unit(moves.startable.displacement, 'm')} the stage swings to the end: a run that rests does not show "
-            "that the stage cannot hunt."
+            f"{moves.rails[moves.startable.rail]:.0f} after the move, but released from "
+            f"{with_unit(moves.startable.displacement, 'm')} the stage swings to the end: a run that rests does not "
+            "prove that the stage cannot hunt."
         )
     return found
 

@@ -19,7 +19,7 @@ def sentences(outcome: Outcome) -> list[str]:
     found: Bristles = outcome.result
     said = [f"Place {number}: {_place(each)}." for number, each in enumerate(found.found, start=1)]
     stiffness, damping = with_unit(found.stiffness, "N/m", 4), with_unit(found.damping, "N*s/m", 4)
-    return [*said, f"The true values of the bristles are {stiffness} and {damping}."]
+    return [*said, f"True bristles: stiffness {stiffness}, damping {damping}."]
 
 
 def _place(result: Presliding) -> str:

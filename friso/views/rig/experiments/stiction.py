@@ -20,12 +20,14 @@ def sentences(outcome: Outcome) -> list[str]:
     rails = len(found.found)
     truth = range_with_unit(float(found.true.min()), float(found.true.max()), "N")
     if not len(forces):
-        return [f"On {rails} stretches of rail the cart shows no slips; the true static friction there is {truth}."]
+        return [
+            f"The cart does not slip on any of {rails} stretches of rail; the true static friction there is {truth}."
+        ]
     return [
         f"At {with_unit(found.speed, 'm/s')} and {with_unit(SPEEDS[1] * found.speed, 'm/s')} the cart breaks away "
         f"{len(forces)} times on {rails} stretches of rail, at "
         f"{range_with_unit(float(forces.min()), float(forces.max()), 'N')}.",
-        f"The true static friction there is {truth}; its mean where the cart went lies in the 95 % interval on "
+        f"The true static friction there is {truth}; its mean along the travel lies within the 95 % interval on "
         f"{int(shown.sum())} of {rails}.",
     ]
 
@@ -71,7 +73,7 @@ def _rails(found: Stiction, subject: str) -> Figure:
     """Break-away forces by rail, over the true static friction."""
     numbers_ = np.arange(1.0, len(found.found) + 1)
     rows = np.concatenate([np.full(len(each.forces), n) for n, each in zip(numbers_, found.found, strict=True)])
-    truth = Band(numbers_, found.true[:, 0], found.true[:, 1], "true static friction where the cart went", "#cfdfee")
+    truth = Band(numbers_, found.true[:, 0], found.true[:, 1], "true static friction along the travel", "#cfdfee")
     top = 1.1 * max(float(found.true.max()), float(found.forces.max(initial=0.0)))
     panel = Panel(
         "",

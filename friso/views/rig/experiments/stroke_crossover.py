@@ -44,7 +44,8 @@ def _needed(counts: StrokeCrossover) -> list[str]:
     if len(some) and some[-1] + 1 < len(counts.strokes):
         least = float(counts.strokes[some[-1] + 1])
         found.append(
-            f"At {counts.crossovers[counts.own]:.3g} Hz no peaks are counted from a stroke of {with_unit(least, 'm')} on."
+            f"At {counts.crossovers[counts.own]:.3g} Hz no peaks are counted from a stroke of {with_unit(least, 'm')} "
+            "up."
         )
     return found
 
