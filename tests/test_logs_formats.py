@@ -1,5 +1,6 @@
 """Readers of logs: each format gives back what was written, and tells how it read it."""
 
+import itertools
 import sys
 from pathlib import Path
 
@@ -15,6 +16,7 @@ from friso.errors import InputError
 from friso.identify.logs import format as reading
 from friso.identify.logs.channel import Channel, ChannelTable
 from friso.identify.logs.read import file_format, is_frequency_response, read_frequency_response, read_table
+from friso.identify.logs.units import split_heading
 
 M = log_files.motion()
 HEADING = ["time [ms]", "position [mm]", "force [N]"]
@@ -64,6 +66,66 @@ def test_units_in_the_heading(tmp_path: Path, heading: tuple[str, ...]) -> None:
 def test_units_in_a_row_of_their_own(tmp_path: Path, units: tuple[str, ...]) -> None:
     path = log_files.write_text(tmp_path / "a.csv", ["time", "position", "force"], COLUMNS, units=units)
     check_motion(read_table(path))
+
+
+TIMED = "\n".join(
+    f"{1e3 * t:.9g};{x:.9g};{f:.9g}" for t, x, f in zip(M["time"], M["position"], M["force"], strict=True)
+)
+ROWS = "\n".join(f"{x:.9g};{f:.9g}" for x, f in zip(M["position"], M["force"], strict=True))
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        f"t_ms;pos_mm;force;\n{TIMED}",
+        f"t_ms;pos_mm;force\n{TIMED.replace(chr(10), ';' + chr(10), 1)}",
+        f"t_ms;pos_mm;force\n{TIMED.replace(chr(10), ';' + chr(10))};",
+        f"t_ms;pos_mm;force\n{TIMED}\n\x1a",
+        f"t_ms;pos_mm;force\n{TIMED}\x1a\n",
+        f"Sample interval: 1 ms\nUnits;mm;N\npos;force\n{ROWS}",
+        f"# dt = 1e-3 s\n# units: mm, N\npos;force\n{ROWS}",
+        f"Sampling rate [Hz];1000\npos unit;mm\nforce unit;N\n\npos;force\n{ROWS}",
+    ],
+    ids=["heading;", "first;", "every;", "ctrl-z", "glued ctrl-z", "interval", "comment", "rate"],
+)
+def test_texts_as_people_have_them(tmp_path: Path, text: str) -> None:
+    """Delimiters at the ends of some rows, DOS's end of file, and what is told above the table or within names."""
+    path = tmp_path / "a.csv"
+    path.write_bytes(text.encode())
+    position, force = read_table(path).channels[-2:]
+    assert position.unit == "mm"
+    assert position.values == pytest.approx(M["position"], rel=1e-8)
+    assert force.values == pytest.approx(M["force"], rel=1e-8)
+    assert position.time == pytest.approx(M["time"], abs=1e-9)
+    assert force.time == pytest.approx(M["time"], abs=1e-9)
+
+
+@pytest.mark.parametrize("line", ["Sample interval: 1", "Sample interval: 1 ms\nSample rate: 500 Hz", "dt: none"])
+def test_no_interval_is_made_up(tmp_path: Path, line: str) -> None:
+    """Without a unit, where two lines contradict each other, or without a number, there are no instants."""
+    path = tmp_path / "a.csv"
+    path.write_text(f"{line}\npos [mm];force [N]\n{ROWS}", encoding="utf-8")
+    assert all(channel.time is None for channel in read_table(path).channels)
+
+
+@pytest.mark.parametrize(
+    ("name", "unit"),
+    [
+        ("tempo_ms", "ms"),
+        ("angulo_deg", "deg"),
+        ("vel_mm_s", "mm/s"),
+        ("acc_m_s2", "m/s2"),
+        ("torque_Nm", "Nm"),
+        ("enc_counts", "counts"),
+        ("pos_s", ""),
+        ("acc_rms", ""),
+        ("x_ref", ""),
+        ("ms", ""),
+    ],
+)
+def test_units_at_the_end_of_a_name(name: str, unit: str) -> None:
+    """The name stays as it stands in the file."""
+    assert split_heading(name) == (name, unit)
 
 
 def test_a_bracket_that_is_no_unit_stays_in_the_name(tmp_path: Path) -> None:
@@ -141,8 +203,9 @@ def test_any_numbers_come_back(tmp_path: Path, rows: list[tuple[float, ...]], wr
         assert each.values == pytest.approx(expected, rel=1e-15, abs=0)
 
 
-@pytest.mark.parametrize("delimiter", ["\t", ";", ","])
-@pytest.mark.parametrize("full", [True, False])
+@pytest.mark.parametrize(
+    ("delimiter", "full"), [*itertools.product(["\t", ";", ","], [True, False]), (":", True), (" ", True)]
+)
 def test_twincat_groups_end_at_different_rows(tmp_path: Path, delimiter: str, full: bool) -> None:
     slow = np.sin(np.arange(100) * 4e-3)
     groups = [
@@ -161,6 +224,20 @@ def test_twincat_groups_end_at_different_rows(tmp_path: Path, delimiter: str, fu
     if full:
         assert position.unit == "mm"
         assert any("already applied" in line for line in table.read)
+
+
+@pytest.mark.parametrize("delimiter", ["\t", " "])
+def test_twincat_rows_that_have_shifted(tmp_path: Path, delimiter: str, refused: Refused) -> None:
+    """Without the empty cells of a group that has ended, those behind it would be read as its own."""
+    groups = [
+        (4.0, [("ActTorque", "%", np.sin(np.arange(100) * 4e-3))]),
+        (1.0, [("ActPos", "mm", M["position"] * 1e3)]),
+    ]
+    path = log_files.write_twincat(tmp_path / "a.csv", groups, delimiter)
+    lines = path.read_text(encoding="utf-8").split("\n")
+    path.write_text("\n".join(line.lstrip(delimiter) for line in lines), encoding="utf-8")
+    with refused("log"):
+        read_table(path)
 
 
 def test_twincat_absolute_times(tmp_path: Path) -> None:
@@ -218,6 +295,44 @@ def test_uff_time_histories(tmp_path: Path) -> None:
     table = read_table(log_files.write_uff(tmp_path / "a.unv", M["time"], SIGNALS))
     assert channel(table, "position").values == pytest.approx(M["position"] * 1e3, rel=1e-9, abs=1e-12)
     assert channel(table, "position").time == pytest.approx(M["time"], abs=1e-9)
+
+
+def test_units_of_a_universal_file(tmp_path: Path) -> None:
+    """From the label, else from the kind of data and the units of the file; times in the unit of their axis."""
+    path = log_files.write_uff(tmp_path / "a.uff", M["time"], {"position": ("", M["position"])})
+    assert channel(read_table(path), "position").unit == ""
+    pyuff = pytest.importorskip("pyuff")
+    units = {"units_code": 5, "length": 1e3, "force": 1e3, "temp": 1.0, "temp_offset": 0.0}
+    (data,) = [pyuff.UFF(str(path)).read_sets(0)]
+    data |= {"abscissa_axis_units_lab": "ms", "x": M["time"] * 1e3, "abscissa_inc": 1.0}
+    pyuff.UFF(str(path)).write_sets([pyuff.prepare_164(**units), data], "overwrite")
+    position = channel(read_table(path), "position")
+    assert position.unit == "mm"
+    assert position.time == pytest.approx(M["time"], abs=1e-7)
+
+
+def test_units_of_lvm_stand_above_their_columns(tmp_path: Path) -> None:
+    """Also with a column of times per channel, and where a channel has none."""
+    columns = list(zip(M["time"], M["position"], M["time"], M["force"], strict=True))
+    head = [
+        "LabVIEW Measurement\t",
+        "Separator\tTab",
+        "X_Columns\tMulti",
+        "***End_of_Header***\t",
+        "",
+        "Channels\t2\t\t\t",
+    ]
+    head += [
+        "Y_Unit_Label\tmm\t\tN\t",
+        "***End_of_Header***\t\t\t\t",
+        "X_Value\tUntitled\tX_Value\tUntitled 1\tComment",
+    ]
+    rows = ["\t".join(map(repr, map(float, row))) for row in columns]
+    path = tmp_path / "a.lvm"
+    path.write_text("\n".join([*head, *rows]) + "\n", encoding="utf-8")
+    assert [(c.unit, c.values.size) for c in read_table(path).channels] == [("mm", 400), ("N", 400)]
+    path.write_text("\n".join([*head, *rows]).replace("\tmm\t\tN", "\t\t\tN") + "\n", encoding="utf-8")
+    assert [c.unit for c in read_table(path).channels] == ["", "N"]
 
 
 def test_lvm(tmp_path: Path) -> None:

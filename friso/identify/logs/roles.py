@@ -20,11 +20,25 @@ _NOT_MEASURED = frozenset(
 _CART = frozenset(["cart", "carriage", "slider"])
 _RELATIVE = frozenset(["rel", "relative"])
 _KEYS = {
-    "time": frozenset(["t", "time", "timestamp", "zeit", "tout"]),
-    "position": frozenset(["pos", "position", "enc", "encoder", "displacement"]),
-    "velocity": frozenset(["vel", "velo", "velocity", "speed"]),
+    "time": frozenset(["t", "time", "timestamp", "tout", "zeit", "tempo", "temps", "tiempo", "tijd"]),
+    "position": frozenset(
+        [
+            "pos",
+            "position",
+            "enc",
+            "encoder",
+            "displacement",
+            "angle",
+            "winkel",
+            "angulo",
+            "angolo",
+            "posizione",
+            "posicion",
+        ]
+    ),
+    "velocity": frozenset(["vel", "velo", "velocity", "speed", "geschwindigkeit", "vitesse", "velocidad"]),
     "acceleration": frozenset(["acc", "accel", "acceleration"]),
-    "force": frozenset(["force", "torque", "current", "iq"]),
+    "force": frozenset(["force", "torque", "current", "iq", "kraft", "strom", "drehmoment", "forza", "fuerza"]),
     "disturbance": frozenset(["disturbance", "injected", "injection"]),
 }
 """Words in a name that tell what a channel is."""

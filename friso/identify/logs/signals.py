@@ -12,6 +12,7 @@ from friso.identify.logs.channel import Channel, ChannelTable
 from friso.identify.logs.checks import unwrapped
 from friso.identify.logs.log import ROLES
 from friso.identify.logs.mapping import Mapping
+from friso.identify.logs.preamble import RATES, STEPS
 from friso.identify.logs.roles import AssignedRole, find
 from friso.identify.logs.text import with_times
 from friso.identify.logs.units import factor, in_si, read_scale
@@ -19,8 +20,6 @@ from friso.quantities import quoted
 
 LARGEST = 1e30
 """No instrument measures more in any unit; beyond it, squares of squares overflow."""
-_RATES = ("fs", "fsample", "samplerate", "samplingrate", "samplefrequency")
-_STEPS = ("dt", "ts", "tsample", "sampletime", "samplingtime")
 
 
 @dataclass
@@ -149,9 +148,9 @@ def _offers(table: ChannelTable) -> str:
     offers = []
     for name, value in table.scalars.items():
         plain = name.rpartition(".")[2].lower().replace("_", "")
-        if plain in _RATES and value > 0:
+        if plain in RATES and value > 0:
             offers.append(f'--dt "{1e3 / value:.9g} ms", if {name} = {value:g} in the file is the sample rate in Hz')
-        if plain in _STEPS and value > 0:
+        if plain in STEPS and value > 0:
             offers.append(f'--dt "{value:.9g} s", if {name} = {value:g} in the file is the sample time in s')
     return "; ".join(offers)
 

@@ -21,13 +21,16 @@ _CANDIDATES = ((";", "."), (";", ","), ("\t", "."), ("\t", ","), (",", "."), (" 
 """Delimiter and decimal sign; of two that fit equally well the first is taken."""
 _NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?(?:nan|inf(?:inity)?)|true|false", re.IGNORECASE)
 _CLOCK = r"\d{1,2}:\d{2}(?::\d{2}(?:[.,]\d+)?)?"
+DOS_END = "\x1a"
+"""Ctrl-Z, with which programs of DOS end a text."""
 STAMP = re.compile(rf"(?:\d{{4}}-\d{{2}}-\d{{2}}(?:[T ]{_CLOCK}(?:Z|[+-]\d{{2}}:?\d{{2}})?)?|{_CLOCK})")
 """A date and time as in ISO 8601, or a time of day."""
 
 
 @dataclass(frozen=True)
 class TextLayout:
-    """How a text is written. `first` counts the lines before the numbers; `names` and `units` are per column."""
+    """How a text is written. `first` counts the lines before the numbers, `above`; `names` and `units` are per column;
+    `exact`: every delimiter ends a cell, so that several spaces are empty cells."""
 
     encoding: str
     delimiter: str
@@ -36,12 +39,14 @@ class TextLayout:
     columns: int
     names: tuple[str, ...] = ()
     units: tuple[str, ...] = ()
+    above: tuple[str, ...] = ()
     certain: bool = True
+    exact: bool = False
 
     @property
     def told(self) -> str:
         """The layout in words."""
-        names = {"\t": "tab", " ": "spaces", ",": "comma", ";": "semicolon"}
+        names = {"\t": "tab", " ": "spaces", ",": "comma", ";": "semicolon", ":": "colon"}
         return (
             f"delimiter {names[self.delimiter]}, decimal {'comma' if self.decimal == ',' else 'point'}, "
             f"encoding {self.encoding}, {self.first} lines before the numbers"
@@ -64,7 +69,7 @@ def decoded_head(path: Path) -> tuple[str, list[str]]:
             codecs.getincrementaldecoder("utf-8")().decode(head)  # the last character may be cut
         except UnicodeDecodeError:
             encoding = "cp1252"
-    text = codecs.getincrementaldecoder(encoding)("replace").decode(head)
+    text = codecs.getincrementaldecoder(encoding)("replace").decode(head).replace(DOS_END, "")
     odd = sum(not (each.isprintable() or each in "\t\r\n\f") for each in text)
     if odd > 0.02 * len(text):
         raise _no_text(path)
@@ -132,19 +137,22 @@ def _fit(
     names, units = _headings(lines, first, columns, delimiter)
     certain = decimal == "," or any("." in cell for cells in rows[first:] for cell in cells)
     score = sum(is_row[first:]), all(names) and bool(names), columns
-    return score, TextLayout(encoding, delimiter, decimal, first, columns, names, units, certain)
+    return score, TextLayout(encoding, delimiter, decimal, first, columns, names, units, tuple(lines[:first]), certain)
 
 
 def _goes_on(is_row: list[bool], rows: list[list[str]], i: int) -> bool:
     """Whether a row of numbers is followed by one as long (a single number in the lines before is no table)."""
     following = next((j for j in range(i + 1, len(rows)) if any(rows[j])), None)
-    return following is None or (is_row[following] and len(rows[following]) == len(rows[i])) or not any(is_row[i + 1 :])
+    if following is None or not any(is_row[i + 1 :]):
+        return True
+    return is_row[following] and len(_filled(rows[following])) == len(_filled(rows[i]))
 
 
 def _headings(lines: list[str], first: int, columns: int, delimiter: str) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Names and units per column, from the one or two lines above the numbers that are as long; () for none."""
     above = [lines[i].lstrip("#% ") for i in range(first) if lines[i].strip()]
     heads = [_heading_cells(line, columns, delimiter) for line in above[-2:]]
+    heads = [head[:columns] + _filled(head[columns:]) for head in heads]  # a line may end with a delimiter
     heads = [head + [""] * (columns - len(head)) for head in heads if columns >= len(head) >= max(1, columns - 1)]
     if not heads:
         return (), ()
@@ -155,6 +163,11 @@ def _headings(lines: list[str], first: int, columns: int, delimiter: str) -> tup
         return tuple(heads[0]), tuple(bare)
     names, units = zip(*(split_heading(cell) for cell in last), strict=True)
     return tuple(names), tuple(units)
+
+
+def _filled(cells: list[str]) -> list[str]:
+    """The cells up to the last that is not empty."""
+    return cells[: max((i + 1 for i, cell in enumerate(cells) if cell), default=0)]
 
 
 def _heading_cells(line: str, columns: int, delimiter: str) -> list[str]:

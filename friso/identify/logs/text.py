@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import mmap
 import warnings
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
 import numpy as np
 import pandas as pd
 
 from friso.errors import LogError
 from friso.identify.logs.channel import Channel, ChannelTable
+from friso.identify.logs.preamble import preamble
 from friso.identify.logs.roles import role_of
-from friso.identify.logs.sniff import STAMP, TextLayout, layout, split_line
+from friso.identify.logs.sniff import DOS_END, STAMP, TextLayout, layout, split_line
 from friso.identify.logs.units import factor
 from friso.quantities import quoted
 
@@ -26,8 +28,9 @@ def read_text(path: Path) -> ChannelTable:
         form = replace(form, decimal=",")
     frame = read_frame(path, form)
     names = unique(list(form.names) or [f"column {i + 1}" for i in range(form.columns)])
-    units = form.units or ("",) * form.columns
-    notes, columns = [], []
+    told = preamble(form.above, names, form.delimiter)
+    units = [own or told.units.get(name, "") for own, name in zip(form.units or [""] * len(names), names, strict=True)]
+    notes, columns = list(told.read), []
     _no_short_rows(path, form, frame)
     blank = frame.isna().all(axis=1).to_numpy()
     frame, blanks = (frame[~blank], int(blank.sum())) if blank.any() else (frame, 0)
@@ -43,8 +46,10 @@ def read_text(path: Path) -> ChannelTable:
     if blanks:
         notes.append(f"{blanks} empty lines left out")
     channels = with_times(_same_ends(path, form, columns, frame))
+    if told.interval is not None and all(channel.time is None for channel in channels):
+        channels = tuple(replace(c, time=told.interval * np.arange(c.values.size)) for c in channels)
     return ChannelTable(
-        channels, {}, (f"format: text, {form.told}", f"{len(frame)} rows, {len(columns)} columns", *notes)
+        channels, told.scalars, (f"format: text, {form.told}", f"{len(frame)} rows, {len(columns)} columns", *notes)
     )
 
 
@@ -55,18 +60,36 @@ def read_frame(path: Path, form: TextLayout) -> Any:
     """
     options: dict[str, Any] = {
         "header": None, "decimal": form.decimal,
-        "skip_blank_lines": False, "low_memory": False, "names": range(form.columns),
-        "index_col": False, "sep": r"\s+" if form.delimiter == " " else form.delimiter, "skipinitialspace": True,
+        "skip_blank_lines": False, "low_memory": False, "names": range(form.columns + 1),
+        "index_col": False, "sep": form.delimiter, "skipinitialspace": not form.exact,
     }  # fmt: skip
+    if form.delimiter == " " and not form.exact:
+        options["sep"] = r"\s+"
     try:
         with path.open(encoding=form.encoding, errors="replace", newline="") as file:
             for _ in range(form.first):
                 file.readline()
             with warnings.catch_warnings():
                 warnings.simplefilter("error", pd.errors.ParserWarning)  # that cells are dropped
-                return pd.read_csv(file, **options, on_bad_lines="error")
+                frame = pd.read_csv(_WithoutDosEnd(file), **options, on_bad_lines="error")  # pyright: ignore
     except (pd.errors.ParserError, pd.errors.ParserWarning, ValueError) as error:
         raise ragged(path, form, str(error)) from None
+    if frame.iloc[:, -1].notna().any():  # one more than there are columns: a row may end with a delimiter
+        raise ragged(path, form)
+    return frame.iloc[:, :-1]
+
+
+class _WithoutDosEnd:
+    """A text without the mark with which programs of DOS end it."""
+
+    def __init__(self, file: TextIO) -> None:
+        self._file = file
+
+    def read(self, size: int = -1) -> str:
+        return self._file.read(size).replace(DOS_END, "")
+
+    def __iter__(self) -> Iterator[str]:
+        return (line.replace(DOS_END, "") for line in self._file)
 
 
 def ragged(path: Path, form: TextLayout, why: str = "") -> LogError:

@@ -44,6 +44,12 @@ _SPELLINGS = {
 _BRACKETS = re.compile(r"(?P<name>.*?)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round>[^()]*)\))\s*")
 
 
+_GLUED = re.compile(
+    r".*[A-Za-z0-9]_(?:(?P<length>m|mm|um|nm|rad|mrad|deg)_(?:per_)?(?P<time>s|s\^?2)|(?P<unit>[A-Za-zµ°]{2,}))"
+)
+"""Names that may end with a unit."""
+
+
 def spelled(text: str) -> str:
     """A unit text as `friso.quantities` takes it: "m/s2" becomes "m/s^2", "µm" "um", "sec" "s"; "" for none."""
     text = re.sub(r"(?:\s+\([A-Z][\w /]*\)|^\(None\))$", "", text.strip())  # TwinCAT: "V (Voltage)", "(None)"
@@ -88,17 +94,28 @@ _KINDS = (
 
 def split_heading(heading: str) -> tuple[str, str]:
     """Name and unit of a heading: "Position (mm)" is ("Position", "mm"). A text in square brackets is always a unit
-    unless it is an index; one in parentheses only where it is a known unit ("current (filtered)" has none)."""
+    unless it is an index; one in parentheses only where it is a known unit ("current (filtered)" has none). Without
+    brackets a name may end with its unit, and keeps it: "angle_deg"."""
     heading = heading.strip()
     match = _BRACKETS.fullmatch(heading)
     if match is None or not match["name"]:
-        return heading, ""
+        return heading, _last_part(heading)
     square = match["square"]
     if square is not None and not re.fullmatch(r"[\d:, ]*", square):
         return match["name"], square.strip()
     if match["round"] is not None and is_unit(match["round"]):
         return match["name"], match["round"].strip()
     return heading, ""
+
+
+def _last_part(name: str) -> str:
+    """The unit with which a name ends, "" for none: "tempo_ms" is in ms, "vel_mm_s" in mm/s. Single letters are none:
+    they may mean anything."""
+    match = _GLUED.fullmatch(name)
+    if match is None:
+        return ""
+    unit = f"{match['length']}/{match['time'].replace('^', '')}" if match["length"] else match["unit"]
+    return unit if is_unit(unit) else ""
 
 
 def in_si(unit: str, role_unit: str) -> tuple[float, str]:

@@ -28,29 +28,35 @@ def read_lvm(path: Path) -> ChannelTable:
 
 
 def _lvm_segment(segment: dict[str, Any], content: dict[str, Any], source: str) -> list[Channel]:
-    """The channels of a segment: values over an X column in seconds (the first, or one per channel)."""
+    """The channels of a segment: values over an X column in seconds (the first, or one per channel). What the header
+    tells of a channel stands above its column, the first column being that of the keys."""
     names, data = segment["Channel names"], np.asarray(segment["data"], dtype=float)
     each_own, none = content.get("X_Columns") == "Multi", content.get("X_Columns") == "No"
-    units = segment.get("Y_Unit_Label", [])
-    out, time, k = [], None, 0
+    above = 0 if none else -1  # the reader leaves out the empty first column of files without X values
+    out, time = [], None
     for i, name in enumerate(names):
         if name == "Comment" or i >= data.shape[1]:
             continue
         if not none and (i == 0 or (each_own and name == "X_Value")):
             time = data[:, i]
             continue
-        start, step = (segment.get(key, [np.nan])[k : k + 1] for key in ("X0", "Delta_X"))
+        start, step, unit_above = (_above(segment, key, i + above) for key in ("X0", "Delta_X", "Y_Unit_Label"))
         clock = time if time is not None else _even(start, step, len(data))
         heading, unit = split_heading(name)
-        told = units[k] if k < len(units) else ""
         there = ~np.isnan(data[:, i])
-        out.append(Channel(heading, told or unit, data[there, i], None if clock is None else clock[there], source))
-        k += 1
+        times = None if clock is None else clock[there]
+        out.append(Channel(heading, unit_above or unit, data[there, i], times, source))
     return out
 
 
-def _even(start: list[float], step: list[float], n: int) -> np.ndarray | None:
-    return start[0] + step[0] * np.arange(n) if start and step and step[0] > 0 else None
+def _above(segment: dict[str, Any], key: str, column: int) -> Any:
+    """What the header says of a column, None for nothing."""
+    row = segment.get(key, [])
+    return row[column] if 0 <= column < len(row) else None
+
+
+def _even(start: float | None, step: float | None, n: int) -> np.ndarray | None:
+    return start + step * np.arange(n) if start is not None and step is not None and step > 0 else None
 
 
 def _recognise(head: FileHead) -> bool:

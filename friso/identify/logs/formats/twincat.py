@@ -7,6 +7,7 @@ Layout after the exports of Scope 3.4 in github CagtayFabry/pytcs (tests/data) a
 
 from __future__ import annotations
 
+import csv
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ import pandas as pd
 from friso.errors import LogError
 from friso.identify.logs.channel import Channel, ChannelTable
 from friso.identify.logs.format import LogFormat
-from friso.identify.logs.sniff import TextLayout, decoded_head, is_number, split_line
+from friso.identify.logs.sniff import TextLayout, decoded_head, is_number
 from friso.identify.logs.text import as_numbers, read_frame, unique
 from friso.identify.logs.units import spelled
 from friso.quantities import quoted
@@ -24,25 +25,30 @@ from friso.quantities import quoted
 _FILETIME = 1e15
 """Above this a time is a FILETIME: 100 ns since 1601, 1.3e17 in 2022. In ms it would be 30 000 years. As a double
 it is known to 16 steps, 1.6 us, which the fit of an even time base averages out."""
+CERTAIN = ("\t", ";", ",")
+DELIMITERS = (*CERTAIN, ":", " ")
+"""What Scope may write between cells; a first line "Name x" with one of the last two may be that of any text."""
 _MARKS = ("Starttime of export", "StartRecord", "SampleTime[ms]", "SymbolName", "Data-Type")
 
 
 def is_twincat(lines: list[str]) -> bool:
     """Whether the first lines are those of a Scope export."""
     first = lines[0] if lines else ""
-    if first[:4] != "Name" or first[4:5] not in ("\t", ";", ","):
+    if first[:4] != "Name" or not (delimiter := first[4:5]) or delimiter not in DELIMITERS:
         return False
-    head = [line for line in lines[:60] if line.strip(first[4] + " ")]
+    head = [line for line in lines[:60] if line.strip(delimiter + " ")]
+    if any(line.startswith(_MARKS) for line in head):
+        return True
     named = [i for i, line in enumerate(head) if line.startswith(first[:5])]
     below = [head[i + 1] for i in named if i + 1 < len(head)]  # numbers where the export has no other rows of keys
-    return any(line.startswith(_MARKS) for line in head) or any(_is_data(split_line(line, first[4])) for line in below)
+    return delimiter in CERTAIN and any(_is_data(_cells(line, delimiter)) for line in below)
 
 
 def read_twincat(path: Path) -> ChannelTable:
     """Channels with their own times. Raises LogError."""
     encoding, lines = decoded_head(path)
     delimiter = lines[0][4]
-    rows = [split_line(line, delimiter) for line in lines]
+    rows = [_cells(line, delimiter) for line in lines]
     first = next((i for i, cells in enumerate(rows) if i and _is_data(cells)), None)
     names_at = max((i for i, cells in enumerate(rows[:first]) if cells and cells[0] == "Name"), default=None)
     if first is None or names_at is None:
@@ -55,10 +61,15 @@ def read_twincat(path: Path) -> ChannelTable:
     if delimiter != "," and decimal == "." and "." not in sample:
         decimal = ","  # whole numbers only so far: the export's locale writes a comma unless a point shows
     columns = max(len(table["Name"]), max(len(cells) for cells in rows[first : first + 50]))
-    form = TextLayout(encoding, delimiter, decimal, first, columns)
+    form = TextLayout(encoding, delimiter, decimal, first, columns, exact=True)
     frame = _without_end(read_frame(path, form))
     channels, notes = _channels(path, form, table, frame)
     return ChannelTable(channels, {}, (f"format: TwinCAT Scope CSV, {form.told}", f"{len(frame)} rows", *notes))
+
+
+def _cells(line: str, delimiter: str) -> list[str]:
+    """The cells of a line: several spaces between two are empty cells, those of groups that have ended."""
+    return [cell.strip() for cell in next(csv.reader([line], delimiter=delimiter), [])]
 
 
 def _is_data(cells: list[str]) -> bool:
@@ -79,13 +90,15 @@ def _channels(
     labels, notes, out = table["Name"], [], []
     clocks = [i for i, cell in enumerate(labels) if cell == "Name"]
     names = unique(labels)
-    for start, end in zip(clocks, [*clocks[1:], len(labels)], strict=True):
-        time = _floats(path, form, frame, start)
-        rows = np.flatnonzero(~np.isnan(time))
-        if not rows.size:
+    times = [_floats(path, form, frame, start) for start in clocks]
+    times = [
+        time[: int(np.flatnonzero(~np.isnan(time))[-1]) + 1] if not np.isnan(time).all() else time[:0] for time in times
+    ]
+    _no_shifted_rows(path, form, frame, times)
+    for start, end, time in zip(clocks, [*clocks[1:], len(labels)], times, strict=True):
+        if not time.size:
             notes.append(f"left out: {', '.join(labels[start + 1 : end])}, without samples")
             continue
-        time = time[: rows[-1] + 1]
         seconds = (time - time[0]) * 1e-7 if time[0] > _FILETIME else time * 1e-3
         for column in range(start + 1, end):
             if not labels[column]:
@@ -97,6 +110,22 @@ def _channels(
     if not out:
         raise LogError("log", "no channel with samples", "an export with data", "", str(path))
     return tuple(out), notes + _scaled(table)
+
+
+def _no_shifted_rows(path: Path, form: TextLayout, frame: Any, times: list[np.ndarray]) -> None:
+    """Raises LogError where, in the row in which a group ends, the clock of another one jumps: the cells of the first
+    are missing, with their delimiters, and those behind them have moved to the left."""
+    for row in sorted({time.size for time in times} - {0}):
+        for time in times:
+            if 2 < row < time.size:
+                usual, step = np.median(np.diff(time[:row])), time[row] - time[row - 1]
+                if not abs(step - usual) < 0.5 * usual:
+                    line = form.first + 1 + int(frame.index[row])
+                    jump = f"from {time[row - 1]:.12g} to {time[row]:.12g}"
+                    given = f"fewer cells in line {line}, and the times of a group jump there {jump}"
+                    raise LogError(
+                        "log", given, "empty cells, with their delimiters, where a group has ended", "", str(path)
+                    )
 
 
 def _source(column: int, info: dict[str, str]) -> str:

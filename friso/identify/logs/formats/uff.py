@@ -13,9 +13,22 @@ from friso.identify.logs.format import LogFormat
 from friso.identify.logs.libraries import library
 from friso.identify.logs.measured_response import MeasuredResponse, checked, response_unit
 from friso.identify.logs.text import unique
+from friso.identify.logs.units import factor
 
 TIME_RESPONSE, FREQUENCY_RESPONSE, COHERENCE = 1, 4, 6
 """Function types of record 6."""
+_SYSTEMS = {
+    1: ("m", "N"),
+    2: ("ft", "lbf"),
+    3: ("m", "kgf"),
+    5: ("mm", "mN"),
+    6: ("cm", "cN"),
+    7: ("in", "lbf"),
+    8: ("mm", "kgf"),
+}
+"""Units of length and force by the code in dataset 164."""
+_KINDS = {8: "{0}", 11: "{0}/s", 12: "{0}/s^2", 9: "{1}", 13: "{1}"}
+"""Units of the data by their kind in record 9: displacement, velocity, acceleration, reaction and excitation force."""
 
 
 def is_uff(head: bytes) -> bool:
@@ -25,17 +38,19 @@ def is_uff(head: bytes) -> bool:
 
 
 def sets_58(path: Path) -> list[dict[str, Any]]:
-    """The datasets 58 of a universal file. Raises LogError for none."""
+    """The datasets 58 of a universal file, the code of its units (`units_code`) with each. Raises LogError for none."""
     pyuff = library("pyuff", "uff", path)
     try:
         file = pyuff.UFF(str(path))
-        numbers = [i for i, kind in enumerate(file.get_set_types()) if kind == 58]
-        sets = [file.read_sets(i) for i in numbers]
+        kinds = list(file.get_set_types())
+        sets = [file.read_sets(i) for i, kind in enumerate(kinds) if kind == 58]
+        systems = {file.read_sets(i)["units_code"] for i, kind in enumerate(kinds) if kind == 164}
     except Exception as error:  # pyuff lets through whatever a broken file makes it stumble over
         raise LogError("log", f"a UFF file that cannot be read ({error})", "a complete file", "", str(path)) from None
     if not sets:
         raise LogError("log", "a UFF file without a dataset 58", "time histories or responses", "", str(path))
-    return sets
+    code = systems.pop() if len(systems) == 1 else None
+    return [{**data, "units_code": code} for data in sets]
 
 
 def label(data: dict[str, Any], key: str) -> str:
@@ -51,10 +66,22 @@ def read_uff(path: Path) -> ChannelTable:
         raise LogError("log", "a UFF file without time histories", "function type 1 in a dataset 58", "", str(path))
     headings = [label(d, "id1") or f"node {d['rsp_node']} direction {d['rsp_dir']}" for d in times]
     channels = tuple(
-        Channel(name, label(d, "ordinate_axis_units_lab"), np.real(d["data"]).astype(float), _axis(d), "dataset 58")
+        Channel(name, _unit(d), np.real(d["data"]).astype(float), _seconds(d), "dataset 58")
         for name, d in zip(unique(headings), times, strict=True)
     )
     return ChannelTable(channels, {}, ("format: UFF, dataset 58", f"{len(channels)} time histories"))
+
+
+def _unit(data: dict[str, Any]) -> str:
+    """The unit of time histories: that of their label, else by the kind of their data in the units of the file."""
+    system = _SYSTEMS.get(data["units_code"])
+    kind = _KINDS.get(int(data.get("ordinate_spec_data_type") or 0))
+    return label(data, "ordinate_axis_units_lab") or (kind.format(*system) if system and kind else "")
+
+
+def _seconds(data: dict[str, Any]) -> np.ndarray:
+    """The instants; in seconds unless their label tells another unit of time."""
+    return _axis(data) * (factor(label(data, "abscissa_axis_units_lab"), "s") or 1.0)
 
 
 def _axis(data: dict[str, Any]) -> np.ndarray:
