@@ -11,7 +11,7 @@ import json
 import os
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
 from typing import Any
@@ -22,12 +22,16 @@ import numpy as np
 
 from benchmarks.report import Goal, print_goals, print_table
 from benchmarks.truth.attack import attack
+from benchmarks.truth.positions import compared, summary
 
 
 def main() -> None:
     arguments = _arguments()
-    arguments.out.mkdir(parents=True, exist_ok=True)
     numbers = arguments.number or range(arguments.first, arguments.first + arguments.stages)
+    if arguments.simulate:
+        _simulate(arguments.seed, numbers)
+        return
+    arguments.out.mkdir(parents=True, exist_ok=True)
     records: list[dict[str, Any]] = []
     start = time.perf_counter()
     try:
@@ -40,6 +44,21 @@ def main() -> None:
     except KeyboardInterrupt:
         print("interrupted")
     _summary(records, time.perf_counter() - start)
+
+
+def _simulate(seed: int, numbers: Iterable[int]) -> None:
+    """Compare runs with SciPy, stage by stage."""
+    records: list[dict[str, Any]] = []
+    try:
+        for number in numbers:
+            records.append(compared(seed, number))
+            print(
+                f"  {number:5d}  {records[-1]['off']:.1e}  {records[-1]['kind']}, {records[-1]['status']}", flush=True
+            )
+    except KeyboardInterrupt:
+        print("interrupted")
+    if records:
+        summary(records)
 
 
 def _attacked(arguments: argparse.Namespace, numbers: Any) -> Iterator[dict[str, Any]]:
@@ -104,6 +123,7 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--number", type=int, action="append", help="a single stage; may be repeated")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--scipy-share", type=float, default=0.1, help="share of stages that SciPy looks at too")
+    parser.add_argument("--simulate", action="store_true", help="compare runs of the stages with SciPy instead")
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--out", type=Path, default=Path("benchmark_results/truth"), help="folder for refuted stages")
     return parser.parse_args()

@@ -18,6 +18,7 @@ STATES = ("x", "v", "x_cart", "v_cart", "x_part", "v_part", "z", "filtered", "in
 X, V, XC, VC, XP, VP, Z, LOW, INTEGRAL = range(len(STATES))
 
 JOINTS = ("rigid", "locked", "touching", "free")
+WINDUPS = ("none", "clamp", "back_calculation")
 LAWS = ("none", "lugre", "dahl", "stribeck")
 
 NAMES = (
@@ -25,7 +26,7 @@ NAMES = (
     *("k_joint", "d_joint", "stroke", "k_limiter", "d_limiter"),
     *("law", "static", "coulomb", "v_stribeck", "exponent", "sigma0", "sigma1", "viscous"),
     *("asymmetry", "viscous_asymmetry", "v_regular", "tuned", "kp", "ki", "kd", "tau", "on_error", "limit"),
-    *("bias_cart", "bias_stage"),
+    *("windup", "unwinding", "bias_cart", "bias_stage"),
 )
 """What the equations contain, in the order of `_rate`."""
 
@@ -133,8 +134,8 @@ def by_hand(flat: Mapping[str, Any]) -> ByHand:
     law, joint = flat["friction.model"], _joint(flat)
     if law not in LAWS:
         raise NotWritten(law)
-    windup = flat.get("controller.anti_windup", "clamp")
-    if flat["controller.kind"] != "pid" or windup != "clamp":
+    windup = flat.get("controller.anti_windup", "none")
+    if flat["controller.kind"] != "pid" or windup not in WINDUPS:
         raise NotWritten(f"{flat['controller.kind']}, {windup}")
     part = flat.get("parasitic.mass", 0.0) if joint != "rigid" else 0.0
     stage = flat.get("masses.stage", 0.0) - part
@@ -164,6 +165,8 @@ def by_hand(flat: Mapping[str, Any]) -> ByHand:
         "viscous_asymmetry": flat.get("friction.viscous_asymmetry", 0.0),
         "v_regular": flat.get("friction.regularisation_velocity", 1.0),
         "limit": flat.get("controller.force_limit", np.inf),
+        "windup": WINDUPS.index(windup),
+        "unwinding": flat.get("controller.anti_windup_time", 1.0),
         "bias_cart": flat.get("bias.cart", 0.0),
         "bias_stage": flat.get("bias.stage", 0.0),
         **_gains(flat),
@@ -211,7 +214,8 @@ def _pieces(flat: Mapping[str, Any]) -> np.ndarray:
 def _rate(time, y, piece, n):  # type: ignore[no-untyped-def]
     (cart, stage, part, mode_k, mode_d, joint, k_j, d_j, stroke, k_l, d_l) = n[:11]
     (law, static, coulomb, v_s, exponent, sigma0, sigma1, viscous) = n[11:19]
-    (asymmetry, viscous_asymmetry, v_r, tuned, kp, ki, kd, tau, on_error, limit, bias_cart, bias_stage) = n[19:]
+    (asymmetry, viscous_asymmetry, v_r, tuned, kp, ki, kd, tau, on_error, limit) = n[19:29]
+    (windup, unwinding, bias_cart, bias_stage) = n[29:]
     out = np.zeros(9)
     since = time - piece[0]
     r = piece[1] + since * (piece[2] + since * piece[3] / 2)
@@ -233,10 +237,12 @@ def _rate(time, y, piece, n):  # type: ignore[no-untyped-def]
         demand = kp * e + ki * y[8] + (kd * rise if on_error > 0 else -kd * rise)
     share = 1.0
     beyond = abs(demand) - limit
-    if beyond > 0 and demand * integrand > 0:
+    if windup == 1 and beyond > 0 and demand * integrand > 0:
         share = max(0.0, 1 - beyond / (1e-3 * limit))
     out[8] = integrand * share
     force = min(max(demand, -limit), limit)
+    if windup == 2 and ki > 0:
+        out[8] += (force - demand) / (ki * unwinding)
 
     v = y[1] if joint == 0 else y[3]
     sign = 1.0 if v > 0 else -1.0

@@ -25,14 +25,15 @@ SPREAD = 3.0
 @dataclass(frozen=True)
 class Form:
     """What decides on the structure of a stage. `exponent` None: any number; `control`: "rules" of van Dijk, or gains
-    with their derivative "on error", or on the measurement, "filtered" or "plain"; `bias`: the mass it acts on."""
+    with their derivative "on error", or on the measurement, "filtered" or "plain"; `windup`: what the
+    integrator does where the force is limited; `bias`: the mass it acts on."""
 
     joint: str
     friction: str = "lugre"
     exponent: float | None = 2.0
     asymmetry: bool = False
     control: str = "rules"
-    limited: bool = False
+    windup: str = ""
     parasitic: bool = False
     bias: str = ""
 
@@ -52,11 +53,11 @@ _KNOWN = (
     Form("free", control="on error", parasitic=True),
     Form("rigid", exponent=None, asymmetry=True, bias="cart"),
     Form("free", bias="stage"),
-    Form("rigid", control="plain", limited=True),
+    Form("rigid", control="plain", windup="clamp"),
     Form("free", "stribeck", parasitic=True),
-    Form("rigid", limited=True, bias="stage"),
+    Form("rigid", windup="back_calculation", bias="stage"),
     Form("touching", control="filtered"),
-    Form("free", limited=True),
+    Form("free", windup="none"),
     Form("locked", "dahl", bias="cart", parasitic=True),
     Form("free", "dahl", control="plain"),
     Form("rigid", "stribeck", exponent=None, asymmetry=True, control="filtered"),
@@ -175,8 +176,13 @@ class _Draw:
             }
             if self.form.control != "plain":
                 table["tau"] = _text(1 / (natural * self.log(6.0, 100.0)), "s")
-        if self.form.limited:
-            table["force_limit"] = _text(self.static * self.log(3.0, 60.0), "N")
+        if self.form.windup:
+            table |= {
+                "force_limit": _text(self.static * self.log(3.0, 60.0), "N"),
+                "anti_windup": self.form.windup,
+            }
+        if self.form.windup == "back_calculation":
+            table["anti_windup_time"] = _text(self.log(0.1, 10.0) / self.omega, "s")
         return table
 
     def joint(self) -> dict[str, Any]:

@@ -1,0 +1,84 @@
+"""`friso simulate` against SciPy with the equations by hand: positions of drawn stages over their whole motion."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import numpy as np
+
+import friso
+from benchmarks.report import Goal, print_goals, print_table
+from benchmarks.truth.by_hand import ByHand, by_hand
+from benchmarks.truth.draws import draw
+from friso.stage import Stage
+
+WITHIN = 1e-2
+"""Share of the deflection of the loop by the break-away force by which positions may differ."""
+
+DEFAULT, FINE, FINEST = 1e-6, 1e-9, 1e-11
+SAMPLES = 4000
+
+
+@np.errstate(all="ignore")
+def compared(seed: int, number: int) -> dict[str, Any]:
+    """How far the default run of a drawn stage is from SciPy at 1e-9, in units of that deflection; of those that are
+    too far, also how far the two are from themselves at finer tolerances, and from each other there."""
+    stage = draw(seed, number)
+    equations = by_hand(stage.flat())
+    unit = equations.length
+    begin = time.process_time()
+    times, theirs = _scipy(stage, equations, FINE)
+    seconds = time.process_time() - begin
+    status, ours = _friso(stage, DEFAULT, len(times))
+    off = float(np.max(np.abs(ours - theirs)) / unit)
+    record = {"number": number, "kind": stage.motion.kind, "status": status, "off": off, "scipy_cpu": seconds}
+    if not off < WITHIN:
+        fine, finest = _friso(stage, FINE, len(times))[1], _scipy(stage, equations, FINEST)[1]
+        record |= {
+            name: float(np.max(np.abs(a - b)) / unit)
+            for name, a, b in (("friso", ours, fine), ("scipy", theirs, finest), ("fine", fine, finest))
+        }
+        record["first"] = float(times[np.argmax(~(np.abs(ours - theirs) < WITHIN * unit))])
+    return record
+
+
+def _scipy(stage: Stage, equations: ByHand, rtol: float) -> tuple[np.ndarray, np.ndarray]:
+    flat = stage.flat()
+    times = np.arange(SAMPLES + 1) * (flat["motion.duration"] / SAMPLES)
+    displaced = flat["motion.displacement"] if flat["motion.kind"] == "release" else 0.0
+    return times, equations.run(equations.start(displaced), times, rtol)[:, 0]
+
+
+def _friso(stage: Stage, rtol: float, count: int) -> tuple[str, np.ndarray]:
+    response = friso.simulate(stage, rtol, sample_time=stage.flat()["motion.duration"] / SAMPLES)
+    return response.attrs["status"], response["position"].values[:count]
+
+
+def summary(records: list[dict[str, Any]]) -> None:
+    """Print how many are within reach, and those that are not."""
+    far = [record for record in records if not record["off"] < WITHIN]
+    if far:
+        print("\nToo far: largest difference / deflection by the break-away force; first time [s] it is too large")
+        columns = ("off", "friso", "scipy", "fine", "first")
+        head = (
+            "stage",
+            "motion",
+            "1e-6 : 1e-9",
+            "friso 1e-6 : 1e-9",
+            "SciPy 1e-9 : 1e-11",
+            "both fine",
+            "from [s]",
+            "",
+        )
+        rows = [
+            [record["number"], record["kind"], *(f"{record[column]:.2g}" for column in columns), record["status"]]
+            for record in far
+        ]
+        print_table(head, rows)
+    offs = sorted(record["off"] for record in records)
+    median = offs[len(offs) // 2]
+    about = f"{len(records)} simulated stages within {WITHIN:g} of the deflection by the break-away force"
+    print_goals(
+        [Goal(about, "all", f"{len(records) - len(far)}, median {median:.1e}", not far)], "Simulation against SciPy"
+    )
