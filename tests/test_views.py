@@ -115,6 +115,7 @@ class FakeCase:
     settling_time: dict[float, float | None] = field(default_factory=lambda: {1e-6: 0.8234, 1e-5: 0.5123})
     largest_force: float = 179.4
     solver: Any = field(default_factory=lambda: fake_solver("done"))
+    unstable: tuple[str, ...] = ()
 
     @property
     def verdict(self) -> str:
@@ -677,6 +678,12 @@ def test_report_without_traces_has_the_table_and_no_script():
 def sentence(judgement: Judgement, cases: Any = None, locked: bool | None = None, **changes: Any) -> str:
     case = replace(fake_case(stage=fake_stage(locked=locked)), judgement=judgement, **changes)
     return verdict_sentence(ShownCase("given", "As given", "#000000", case), cases or {"given": case})
+
+
+def test_an_unstable_loop_is_named_before_what_friction_makes_of_it():
+    said = sentence(hunts(), unstable=("sticks", "slides"))
+    assert said.startswith("the loop is unstable while the stage sticks and while the stage slides")
+    assert "hunts, ±0.52 mm" in said
 
 
 NEVER = {1e-6: None, 1e-5: None}

@@ -238,7 +238,7 @@ def _rate(time, y, piece, n):  # type: ignore[no-untyped-def]
     share = 1.0
     beyond = abs(demand) - limit
     if windup == 1 and beyond > 0 and demand * integrand > 0:
-        share = max(0.0, 1 - beyond / (1e-3 * limit))
+        share = max(0.0, 1 - beyond / (REST_BAND * limit))
     out[8] = integrand * share
     force = min(max(demand, -limit), limit)
     if windup == 2 and ki > 0:

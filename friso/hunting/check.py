@@ -15,6 +15,7 @@ from friso.engine.tolerance import checked_rtol
 from friso.equations.structure import structure
 from friso.hunting.criteria import Verdict
 from friso.hunting.cycle.hunting import cannot_hunt
+from friso.hunting.loop import LoopState, unstable
 from friso.hunting.measures import BANDS, measure, options
 from friso.hunting.verdict import Judgement, judge
 from friso.stage import Stage
@@ -44,7 +45,8 @@ class Case:
     `judgement` holds the verdict and what it rests on; `peaks` counts the thesis's peaks, at `peak_times` [s] and of
     `peak_heights` [m] above the reference; `peak_to_peak` [m] and `period` [s] (None: no cycle) are of the last
     quarter; `settling_time` maps each band [m] to the time after the last corner of the reference [s] (None: never);
-    `largest_force` [N] is the actuator's. `trace` holds the time response if asked for.
+    `largest_force` [N] is the actuator's; `unstable` tells in which of its states the loop is not stable, whatever the
+    friction does (see `friso.hunting.loop`). `trace` holds the time response if asked for.
     """
 
     stage: Stage
@@ -57,6 +59,7 @@ class Case:
     settling_time: dict[float, float | None]
     largest_force: float
     solver: Solver
+    unstable: tuple[LoopState, ...] = ()
     trace: xr.Dataset | None = None
 
     @property
@@ -103,6 +106,7 @@ def _case(stage: Stage, rtol: float, traces: bool) -> Case:
         settling_time={band: _known(time[0]) for band, time in zip(BANDS, found.settling_time, strict=True)},
         largest_force=float(found.largest_force[0]),
         solver=Solver(status.text, int(found.steps[0]), int(found.rejected[0]), rtol),
+        unstable=unstable(stage),
         trace=simulate(stage, rtol) if traces else None,
     )
 

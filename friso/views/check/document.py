@@ -42,6 +42,7 @@ def _case(case: Case) -> dict[str, Any]:
         "kick": _kick(judgement),
         "moves": {"drawn": judgement.moves.drawn, "hunting": judgement.moves.hunting} if judgement.moves else None,
         "observed": judgement.observed,
+        "loop_unstable_while_it": case.unstable,
         "solver": {
             "status": case.solver.status,
             "steps": case.solver.steps,

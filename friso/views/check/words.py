@@ -20,11 +20,20 @@ _MICRON, _TEN_MICRON = BANDS
 def verdict_sentence(item: ShownCase, cases: Mapping[str, Case]) -> str:
     """What a case does, and what to do about it, for the engineer who decides; `cases` are all of the check."""
     case = item.case
+    loop = _loop(case)
     says = {"hunts": _hunting, "bistable": _bistable, "transient": _transient, "settles": _settling}
     if case.verdict not in says:
-        return f"{case.verdict} (solver: {case.solver.status})."
+        return " ".join([*loop, f"{case.verdict} (solver: {case.solver.status})."])
     after = _remedy(item, cases) if case.verdict in ("hunts", "bistable") else _outlook(case)
-    return " ".join([says[case.verdict](case), *after])
+    return " ".join([*loop, says[case.verdict](case), *after])
+
+
+def _loop(case: Case) -> list[str]:
+    """That the loop is not stable comes before what friction makes of it."""
+    if not case.unstable:
+        return []
+    where = listed([f"while the stage {state}" for state in case.unstable], "and")
+    return [f"the loop is unstable {where}, whatever the friction, a matter of tuning (friso bode). The stage"]
 
 
 def answer(cases: Mapping[str, Case]) -> list[str]:

@@ -1,0 +1,36 @@
+"""Whether a loop is stable, friction aside, against the criterion of Hurwitz."""
+
+import numpy as np
+import pytest
+from variants import VARIANTS
+
+from friso.hunting.loop import unstable
+
+
+@pytest.mark.parametrize("name", ["rigid stage, PI", "rigid, Stribeck 2, PI, limit"])
+@pytest.mark.parametrize(("share", "states"), [(0.98, ()), (1.02, ("slides",))])
+def test_a_pi_controller_is_stable_as_far_as_viscous_friction_damps(
+    name: str, share: float, states: tuple[str, ...]
+) -> None:
+    """m s^3 + sigma_2 s^2 + kp s + ki has its roots on the left where m ki < sigma_2 kp."""
+    chosen = VARIANTS[name]
+    flat = chosen.flat()
+    mass = flat.get("masses.cart", 0.0) + flat.get("masses.stage", 0.0)
+    gain = share * flat["friction.viscous"] * flat["controller.kp"] / mass
+    assert unstable(chosen.replace({"controller.ki": f"{gain!r} N/(m*s)"})) == states
+
+
+@pytest.mark.parametrize("mass", [0.01, 0.1, 0.3, 0.6, 1.7, 200.0])
+def test_van_dijks_rules_tuned_for_another_mass(mass: float) -> None:
+    """The roots of (m s^2 + sigma_2 s) tau_i s (tau_p s + 1) + k_p (tau_z s + 1)(tau_i s + 1) decide (Eq. 7, 8)."""
+    chosen = VARIANTS["rigid"].replace({"controller.tuned_mass": f"{mass} kg"})
+    flat = chosen.flat()
+    omega, root = 2 * np.pi * flat["controller.crossover"], flat["controller.alpha"] ** -0.5
+    gain, tau_z, tau_p = mass * omega**2 / root, root / omega, 1 / (omega * root)
+    tau_i = flat["controller.beta"] * tau_z
+    moving = [flat["masses.cart"] + flat["masses.stage"], flat["friction.viscous"], 0.0]
+    loop = np.polymul(np.polymul(moving, [tau_i, 0.0]), [tau_p, 1.0])
+    control = gain * np.polymul([tau_z, 1.0], [tau_i, 1.0])
+    lost = np.roots(np.polyadd(loop, control)).real.max() > 0
+    assert unstable(chosen) == (("slides",) if lost else ())
+    assert lost == (mass < 0.2)
