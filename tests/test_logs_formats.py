@@ -1,6 +1,7 @@
 """Readers of logs: each format gives back what was written, and tells how it read it."""
 
 import itertools
+import os
 import sys
 from pathlib import Path
 
@@ -470,3 +471,36 @@ def test_a_matrix_is_a_channel_per_column(tmp_path: Path) -> None:
         assert [c.name for c in table.channels] == ["y(:,1)", "y(:,2)"]
         assert table.channels[1].values == pytest.approx(M["force"])
     assert any("image, an array of 90 x 80" in line for line in read_table(tmp_path / "old.mat").read)
+
+
+@pytest.mark.parametrize("way", ["link", "storage", "virtual", "link in a group"])
+def test_values_in_another_file_are_not_read(tmp_path: Path, way: str, refused: Refused) -> None:
+    """A file may name any other one of the system as the place of its values."""
+    import h5py
+
+    other = tmp_path / "other.h5"
+    with h5py.File(other, "w") as file:
+        file["secret"] = M["position"]
+    path = tmp_path / "a.mat"
+    with h5py.File(path, "w") as file:
+        file["time"] = M["time"]
+        if way == "storage":
+            file.create_dataset("x", (50,), "f8", external=[(str(other), 0, 400)])
+        elif way == "virtual":
+            layout = h5py.VirtualLayout((400,), "f8")
+            layout[:] = h5py.VirtualSource(str(other), "secret", (400,))
+            file.create_virtual_dataset("x", layout)
+        else:
+            place = file.create_group("g") if "group" in way else file
+            place["x"] = h5py.ExternalLink(str(other), "secret")
+    with refused("log"):
+        read_table(path)
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes")
+def test_pipes_and_devices_are_refused_at_once(tmp_path: Path, refused: Refused) -> None:
+    """Opening a pipe would wait for a writer, and a device may never end."""
+    os.mkfifo(tmp_path / "a.csv")
+    for path in (tmp_path / "a.csv", Path("/dev/zero")):
+        with refused("log"):
+            read_table(path)

@@ -21,6 +21,8 @@ def file_format(path: Path) -> str:
     try:
         if path.is_dir():
             raise LogError("log", "a folder", "a file", "friso identify log.csv", str(path))
+        if path.exists() and not path.is_file():  # a device or a pipe may never end, or never begin
+            raise LogError("log", "a device, pipe or socket", "a file", "friso identify log.csv", str(path))
         size = path.stat().st_size
         with path.open("rb") as file:
             head = FileHead(path, file.read(520))

@@ -187,7 +187,20 @@ def _read_hdf5(path: Path) -> dict[str, Any]:
     import h5py
 
     with h5py.File(path, "r") as file:
-        return {str(name): _from_hdf5(file[name], file) for name in file if not str(name).startswith("#")}
+        return {str(name): _from_hdf5(_own(file, name), file) for name in file if not str(name).startswith("#")}
+
+
+def _own(group: Any, name: Any) -> Any:
+    """An item of a group. Raises ValueError for one whose values lie in another file, which the log would show as its
+    own: links and data sets may name any file of the system."""
+    import h5py
+
+    if isinstance(group.get(name, getlink=True), h5py.ExternalLink):
+        raise ValueError(f"{name} is a link to another file")
+    item = group[name]
+    if isinstance(item, h5py.Dataset) and (item.external or item.is_virtual):
+        raise ValueError(f"the values of {name} lie in another file")
+    return item
 
 
 def _from_hdf5(item: Any, file: Any) -> Any:
@@ -199,7 +212,7 @@ def _from_hdf5(item: Any, file: Any) -> Any:
     if "MATLAB_object_decode" in item.attrs or kind in ("function_handle", "table", "timeseries"):
         return Opaque(kind or "object")
     if isinstance(item, h5py.Group):
-        children = {str(name): _from_hdf5(item[name], file) for name in item}
+        children = {str(name): _from_hdf5(_own(item, name), file) for name in item}
         return _structures(item, children)
     if item.dtype == h5py.ref_dtype:
         return [_from_hdf5(file[reference], file) for reference in np.ravel(item[()], order="F")]
