@@ -33,3 +33,7 @@ else:
     def usable_cores() -> int:
         """Number of processor cores; neither macOS nor Windows confines a process to some of them by default."""
         return os.cpu_count() or 1
+
+
+LIMITS_MEMORY = sys.platform == "linux"
+"""Whether a process can be held to an amount of memory: Windows has no such limit, and macOS does not keep it."""

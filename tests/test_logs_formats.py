@@ -2,7 +2,9 @@
 
 import itertools
 import os
+import struct
 import sys
+import zlib
 from pathlib import Path
 
 import log_files
@@ -14,10 +16,12 @@ from refusals import Refused
 from scipy.io import savemat
 
 from friso.errors import InputError
+from friso.identify.logs import confined
 from friso.identify.logs import format as reading
 from friso.identify.logs.channel import Channel, ChannelTable
 from friso.identify.logs.read import file_format, is_frequency_response, read_frequency_response, read_table
 from friso.identify.logs.units import split_heading
+from friso.system import LIMITS_MEMORY
 
 M = log_files.motion()
 HEADING = ["time [ms]", "position [mm]", "force [N]"]
@@ -495,6 +499,68 @@ def test_values_in_another_file_are_not_read(tmp_path: Path, way: str, refused: 
             place["x"] = h5py.ExternalLink(str(other), "secret")
     with refused("log"):
         read_table(path)
+
+
+def zeros_as_mat(path: Path, count: int) -> None:
+    """A small MAT file that holds many zeros, compressed."""
+    squeezed, block = zlib.compressobj(1), bytes(1 << 23)
+    parts = [(14, 64 + 8 * count), (6, 8, 6, 0), (5, 8, count, 1), (1, 1, ord("x"), 0), (9, 8 * count)]
+    out = [squeezed.compress(b"".join(struct.pack(f"<{len(part)}i", *part) for part in parts))]
+    out += [squeezed.compress(block[: 8 * count - at]) for at in range(0, 8 * count, len(block))]
+    data = b"".join([*out, squeezed.flush()])
+    head = b"MATLAB 5.0 MAT-file".ljust(116) + bytes(8) + struct.pack("<H", 0x0100) + b"IM"
+    path.write_bytes(head + struct.pack("<ii", 15, len(data)) + data)
+
+
+@pytest.mark.skipif(not LIMITS_MEMORY, reason="this system does not hold a process to an amount of memory")
+def test_a_file_that_swells_is_an_error_of_its_own(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, refused: Refused
+) -> None:
+    monkeypatch.setattr(confined, "MEMORY", 400 << 20)
+    zeros_as_mat(tmp_path / "small.mat", 1000)
+    assert channel(read_table(tmp_path / "small.mat"), "x").values.shape == (1000,)
+    zeros_as_mat(tmp_path / "large.mat", 50_000_000)
+    with refused("log"):
+        read_table(tmp_path / "large.mat")
+
+
+def test_a_file_that_never_ends_is_an_error_of_its_own(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, refused: Refused
+) -> None:
+    """References to references, each level twice as many."""
+    import h5py
+
+    monkeypatch.setattr(confined, "SECONDS", 3.0)
+    with h5py.File(tmp_path / "a.mat", "w") as file:
+        below = file.create_dataset("#0", data=M["position"])
+        for level in range(1, 60):
+            below = file.create_dataset(f"#{level}", data=[below.ref, below.ref], dtype=h5py.ref_dtype)
+        file.create_dataset("x", data=[below.ref], dtype=h5py.ref_dtype)
+    with refused("log"):
+        read_table(tmp_path / "a.mat")
+
+
+def test_a_library_that_crashes_is_an_error_of_the_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, refused: Refused
+) -> None:
+    program = tmp_path / "crash.py"
+    program.write_text("import os\nos.abort()\n", encoding="utf-8")
+    monkeypatch.setattr(confined.binary, "__file__", str(program))
+    zeros_as_mat(tmp_path / "a.mat", 10)
+    with refused("log"):
+        read_table(tmp_path / "a.mat")
+
+
+def test_nothing_but_numbers_and_texts_comes_back(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whoever takes over the reader cannot have the reading process call anything."""
+    program, mark = tmp_path / "taken_over.py", tmp_path / "mark"
+    evil = f"type('E', (), {{'__reduce__': lambda self: (__import__('os').mkdir, ({str(mark)!r},))}})()"
+    program.write_text(f"import pickle, sys\nsys.stdout.buffer.write(pickle.dumps(({evil}, '')))\n", encoding="utf-8")
+    monkeypatch.setattr(confined.binary, "__file__", str(program))
+    zeros_as_mat(tmp_path / "a.mat", 10)
+    with pytest.raises(InputError):
+        read_table(tmp_path / "a.mat")
+    assert not mark.exists()
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes")

@@ -2,27 +2,27 @@
 
 from __future__ import annotations
 
-from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 from friso.errors import LogError
 from friso.identify.logs.channel import Channel, ChannelTable
+from friso.identify.logs.confined import content
 from friso.identify.logs.text import unique
 
 
-def library(module: str, extra: str, path: Path) -> Any:
-    """An optional library. Raises LogError that says how to install it."""
+def content_by(library: str, kind: str, path: Path) -> dict[str, Any]:
+    """What a library reads from a file of a kind. Raises LogError, which says how to install the library if it is not
+    there."""
     try:
-        return import_module(module)
-    except ImportError:
-        given = f"a {extra.upper()} file, and the library {module} is not installed"
-        raise LogError("log", given, "the library", f'pip install "friso[{extra}]"', str(path)) from None
-
-
-def broken(kind: str, error: Exception, path: Path) -> LogError:
-    """The error for a file of a kind at which its library stumbles."""
-    return LogError("log", f"a {kind} file that cannot be read ({error})", f"a complete {kind} file", "", str(path))
+        there = find_spec(library) is not None
+    except ValueError:
+        there = False
+    if not there:
+        given = f"a {kind} file, and the library {library} is not installed"
+        raise LogError("log", given, "the library", f'pip install "friso[{kind.lower()}]"', str(path))
+    return content(kind, path)
 
 
 def named_table(kind: str, channels: list[Channel], notes: list[str], path: Path) -> ChannelTable:

@@ -9,21 +9,15 @@ import numpy as np
 
 from friso.identify.logs.channel import Channel, ChannelTable
 from friso.identify.logs.format import FileHead, LogFormat
-from friso.identify.logs.libraries import broken, library, named_table
+from friso.identify.logs.libraries import content_by, named_table
 from friso.identify.logs.units import split_heading
 
 
 def read_lvm(path: Path) -> ChannelTable:
     """LabVIEW measurement text. Raises LogError."""
-    lvm_read = library("lvm_read", "lvm", path)
-    channels = []
-    try:
-        content = lvm_read.read(str(path), read_from_pickle=False, dump_file=False)
-        for k in range(content["Segments"]):
-            segment = content[k]
-            channels += _lvm_segment(segment, content, f"segment {k + 1}")
-    except Exception as error:  # lvm_read lets through whatever a broken file makes it stumble over
-        raise broken("LVM", error, path) from None
+    file = content_by("lvm_read", "LVM", path)
+    segments = range(int(file["Segments"]))
+    channels = [each for k in segments for each in _lvm_segment(file[str(k)], file, f"segment {k + 1}")]
     return named_table("LVM", channels, [], path)
 
 

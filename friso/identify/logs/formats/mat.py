@@ -9,21 +9,15 @@ from typing import Any
 import numpy as np
 
 from friso.errors import LogError
+from friso.identify.logs.binary import OBJECT, is_hdf5
 from friso.identify.logs.channel import Channel, ChannelTable
+from friso.identify.logs.confined import content
 from friso.identify.logs.format import FileHead, LogFormat
 from friso.identify.logs.text import unique
 from friso.identify.logs.units import split_heading
 
 MOST_COLUMNS = 64
 """A matrix with more columns is no set of channels (an image, a response matrix)."""
-HDF5 = b"\x89HDF\r\n\x1a\n"
-
-
-@dataclass(frozen=True)
-class Opaque:
-    """An object whose content only MATLAB can read (timeseries, Dataset, tf), of this class."""
-
-    kind: str
 
 
 @dataclass
@@ -39,16 +33,9 @@ class _Found:
 def read_mat(path: Path) -> ChannelTable:
     """The channels and single numbers of a MAT file of any version. Raises LogError for a file that holds none."""
     with path.open("rb") as file:
-        head = file.read(520)
-    newer = head.startswith(HDF5) or HDF5 in head[504:]
-    try:
-        tree = _read_hdf5(path) if newer else _read_old(path)
-    except Exception as error:  # scipy and h5py let through whatever a broken file makes them stumble over
-        raise LogError(
-            "log", f"a MAT file that cannot be read ({error})", "a complete MAT file", "", str(path)
-        ) from None
+        newer = is_hdf5(file.read(520))
     found = _Found()
-    for name, node in tree.items():
+    for name, node in content("MAT", path).items():
         _walk(node, name, found)
     if found.objects:
         found.notes.append(f"left out: objects {', '.join(found.objects)}: save them as structure with time")
@@ -68,9 +55,9 @@ def _plainly_named(channels: list[Channel]) -> tuple[Channel, ...]:
 
 
 def _walk(node: Any, name: str, found: _Found) -> None:
-    """Take the channels, numbers and objects of a node of the tree (dict, list, array, str, Opaque)."""
-    if isinstance(node, Opaque):
-        found.objects.append(f"{name} ({node.kind})")
+    """Take the channels, numbers and objects of a node of the tree (dict, list, array, str)."""
+    if isinstance(node, dict) and OBJECT in node:
+        found.objects.append(f"{name} ({node[OBJECT]})")
     elif isinstance(node, dict) and {"X", "Y"} <= set(node) and any("Data" in each for each in _listed(node["Y"])):
         found.channels += _dspace(node, name)
     elif isinstance(node, dict) and {"time", "signals"} <= set(node):
@@ -149,97 +136,10 @@ def _text(node: Any) -> str:
     return node.strip() if isinstance(node, str) else ""
 
 
-def _read_old(path: Path) -> dict[str, Any]:
-    """The tree of a file up to version 7."""
-    from scipy.io import loadmat
-
-    tree: dict[str, Any] = {}
-    for name, value in loadmat(path, squeeze_me=True, struct_as_record=False).items():
-        node = _from_scipy(value)
-        if isinstance(node, Opaque) and str(name) == "None":  # scipy has no name for a variable that is an object
-            name = value[0]["s0"].decode() if isinstance(value[0]["s0"], bytes) else "object"
-        if not str(name).startswith("__"):
-            tree[str(name)] = node
-    return tree
-
-
-def _from_scipy(value: Any) -> Any:
-    """What scipy read, as a tree of dict, list, array, str and Opaque."""
-    from scipy.sparse import issparse
-
-    if hasattr(value, "_fieldnames"):
-        return {key: _from_scipy(getattr(value, key)) for key in value._fieldnames}
-    if type(value).__name__ in ("MatlabOpaque", "MatlabFunction"):
-        named = {*(value.dtype.names or ())} & {"s2", "_Class"}  # of scipy before 1.18, and since
-        kind = value[0][named.pop()] if named else "function"
-        return Opaque(kind.decode() if isinstance(kind, bytes) else str(kind))
-    if isinstance(value, np.ndarray) and value.dtype == object:
-        return [_from_scipy(each) for each in value.ravel()]
-    if isinstance(value, np.ndarray) and value.dtype.kind in "US":
-        return str(value) if value.ndim == 0 else "".join(map(str, value.ravel()))
-    if issparse(value):
-        return value.toarray()  # pyright: ignore[reportAttributeAccessIssue]
-    return value if isinstance(value, str | np.ndarray) else np.asarray(value)
-
-
-def _read_hdf5(path: Path) -> dict[str, Any]:
-    """The tree of a file of version 7.3."""
-    import h5py
-
-    with h5py.File(path, "r") as file:
-        return {str(name): _from_hdf5(_own(file, name), file) for name in file if not str(name).startswith("#")}
-
-
-def _own(group: Any, name: Any) -> Any:
-    """An item of a group. Raises ValueError for one whose values lie in another file, which the log would show as its
-    own: links and data sets may name any file of the system."""
-    import h5py
-
-    if isinstance(group.get(name, getlink=True), h5py.ExternalLink):
-        raise ValueError(f"{name} is a link to another file")
-    item = group[name]
-    if isinstance(item, h5py.Dataset) and (item.external or item.is_virtual):
-        raise ValueError(f"the values of {name} lie in another file")
-    return item
-
-
-def _from_hdf5(item: Any, file: Any) -> Any:
-    """A group or data set as a tree of dict, list, array, str and Opaque. MATLAB's arrays stand transposed."""
-    import h5py
-
-    kind = item.attrs.get("MATLAB_class", b"")
-    kind = kind.decode() if isinstance(kind, bytes) else str(kind)
-    if "MATLAB_object_decode" in item.attrs or kind in ("function_handle", "table", "timeseries"):
-        return Opaque(kind or "object")
-    if isinstance(item, h5py.Group):
-        children = {str(name): _from_hdf5(_own(item, name), file) for name in item}
-        return _structures(item, children)
-    if item.dtype == h5py.ref_dtype:
-        return [_from_hdf5(file[reference], file) for reference in np.ravel(item[()], order="F")]
-    if item.attrs.get("MATLAB_empty", 0):
-        return "" if kind == "char" else np.empty(0)
-    values = np.asarray(item[()])
-    if kind == "char":
-        return "".join(map(chr, values.ravel(order="F")))
-    return np.squeeze(values.T) if values.dtype.kind in "buifc" else Opaque(kind or str(values.dtype))
-
-
-def _structures(item: Any, children: dict[str, Any]) -> Any:
-    """A structure, or the structure array whose fields are lists of references."""
-    import h5py
-
-    references = [isinstance(item[name], h5py.Dataset) and item[name].dtype == h5py.ref_dtype for name in item]
-    classes = [item[name].attrs.get("MATLAB_class") for name in item]
-    if children and all(references) and all(each is None for each in classes):  # a cell array has its class
-        length = min(len(each) for each in children.values())
-        return [{name: each[i] for name, each in children.items()} for i in range(length)]
-    return children
-
-
 def _recognise(head: FileHead) -> bool:
     """By its first bytes, or those behind the block that MATLAB puts before HDF5; or by its name."""
     start = head.start
-    return start.startswith(b"MATLAB ") or HDF5 in (start[:8], start[512:520]) or head.path.suffix.lower() == ".mat"
+    return start.startswith(b"MATLAB ") or is_hdf5(start) or head.path.suffix.lower() == ".mat"
 
 
 FORMAT = LogFormat("MAT", _recognise, read_mat, units=False)

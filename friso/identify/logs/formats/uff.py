@@ -10,7 +10,7 @@ import numpy as np
 from friso.errors import LogError
 from friso.identify.logs.channel import Channel, ChannelTable
 from friso.identify.logs.format import LogFormat
-from friso.identify.logs.libraries import library
+from friso.identify.logs.libraries import content_by
 from friso.identify.logs.measured_response import MeasuredResponse, checked, response_unit
 from friso.identify.logs.text import unique
 from friso.identify.logs.units import factor
@@ -39,14 +39,8 @@ def is_uff(head: bytes) -> bool:
 
 def sets_58(path: Path) -> list[dict[str, Any]]:
     """The datasets 58 of a universal file, the code of its units (`units_code`) with each. Raises LogError for none."""
-    pyuff = library("pyuff", "uff", path)
-    try:
-        file = pyuff.UFF(str(path))
-        kinds = list(file.get_set_types())
-        sets = [file.read_sets(i) for i, kind in enumerate(kinds) if kind == 58]
-        systems = {file.read_sets(i)["units_code"] for i, kind in enumerate(kinds) if kind == 164}
-    except Exception as error:  # pyuff lets through whatever a broken file makes it stumble over
-        raise LogError("log", f"a UFF file that cannot be read ({error})", "a complete file", "", str(path)) from None
+    file = content_by("pyuff", "UFF", path)
+    sets, systems = file["sets"], {*file["units"]}
     if not sets:
         raise LogError("log", "a UFF file without a dataset 58", "time histories or responses", "", str(path))
     code = systems.pop() if len(systems) == 1 else None
