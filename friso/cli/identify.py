@@ -13,7 +13,7 @@ from friso.cli.output import DefaultFolder, OutputFolder, Overwrite, print_docum
 from friso.cli.progress import ProgressBar
 from friso.errors import InputError
 from friso.quantities import Quantity, positive
-from friso.stage import load
+from friso.stage import Stage, load
 
 if TYPE_CHECKING:
     from friso.identify.kind import AnalysisSettings
@@ -69,25 +69,32 @@ def identify(
     Example: friso identify log.csv --stage stage.toml --map position=ActPos --scale force="35.15 N/V" --out identified
     """
     from friso.identify.logs.mapping import from_options
-    from friso.identify.method import identify as found_in
+    from friso.identify.method import identify as identification
     from friso.identify.sources import kept, read_all
 
-    stage_ = None if stage is None else with_overrides(load(stage), overrides)
-    if stage_ is None and overrides:
-        raise InputError("--set", overrides[0], "a stage whose keys to override", "--stage stage.toml")
-    settings = _settings(bandwidth, band, period)
-    options_ = from_options(maps or (), units or (), scales or (), dt, kind)
+    assumed, settings = _stage(stage, overrides), _settings(bandwidth, band, period)
+    mapping = from_options(maps or (), units or (), scales or (), dt, kind)
     target = OutputFolder("identify", out, overwrite, [*logs, *(predict or []), *([stage] if stage else [])])
     target.check([STAGE])
-    inputs = read_all([*logs, *(predict or [])], options_, out)
+    inputs = read_all([*logs, *(predict or [])], mapping, out)
     with ProgressBar() as progress:
-        identified = found_in([(item.source, item.kind) for item in inputs[: len(logs)]], stage_, settings, progress)
+        sources = [(file.source, file.kind) for file in inputs[: len(logs)]]
+        identified = identification(sources, assumed, settings, progress)
         predictions = _predictions(identified, inputs[len(logs) :], settings)
-        inputs = [kept(item, out) for item in inputs]
+        inputs = [kept(file, out) for file in inputs]
         from friso.views.identify.files import identify_files, mappings
 
         files = target.write(identify_files(identified, inputs, predictions), progress, beside=mappings(inputs))
     _answer(identified, inputs, predictions, files, as_json)
+
+
+def _stage(path: Path | None, overrides: list[str] | None) -> Stage | None:
+    """What is known of the machine beforehand. Raises InputError, also for overrides without a stage."""
+    if path is not None:
+        return with_overrides(load(path), overrides)
+    if overrides:
+        raise InputError("--set", overrides[0], "a stage whose keys to override", "--stage stage.toml")
+    return None
 
 
 def _settings(bandwidth: str | None, band: str | None, period: str | None) -> AnalysisSettings:
@@ -126,7 +133,7 @@ def _answer(
     files: list[Path],
     as_json: bool,
 ) -> None:
-    """What was read and found, on standard output."""
+    """The answer on standard output, and what to do next."""
     if as_json:
         from friso.views.identify.document import identify_document
 
@@ -140,7 +147,7 @@ def _answer(
     print(f"\nwrote {', '.join(map(str, named))}, and {len({file.stem for file in files[len(named) :]})} figures")
     if identified.stage is None:
         print(
-            "no stage file: a frequency response or a stiffness alone does not make a machine; describe the rest with "
+            "no stage file: a frequency response or a stiffness alone does not describe a machine; give the rest with "
             "--stage"
         )
     else:

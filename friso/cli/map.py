@@ -19,6 +19,8 @@ from friso.errors import InputError
 if TYPE_CHECKING:
     import xarray as xr
 
+    from friso.cli.map_study import Varied
+    from friso.stage import Stage
     from friso.studies.execute import Crew
     from friso.studies.study import Study
     from friso.views.files import Content
@@ -81,15 +83,7 @@ def map_cells(
     Example: friso map rig.toml --x controller.crossover="1 Hz..16 Hz:41" --y joint.stroke="0 m..1 mm:41"
     A study that was interrupted goes on: friso map thesis_rig_map.zarr
     """
-    from friso.cli.map_study import (
-        Varied,
-        coloured_by,
-        export_files,
-        refuse_overwriting,
-        stored_study,
-        study_for,
-        view_files,
-    )
+    from friso.cli.map_study import Varied, coloured_by, refuse_overwriting, stored_study
     from friso.studies.store import in_memory
     from friso.studies.verify import checked_share
 
@@ -102,20 +96,35 @@ def map_cells(
                 raise InputError(str(source), problem, "the store alone: it contains its study", f"friso map {source}")
             store, study = source, stored_study(source, metric)
         else:
-            stage = read_stage(source, overrides)
             store = out or Path(f"{source.stem}_map.zarr")
-            study = study_for(stage, varied, metric, refine, None if yes else LARGE, crew)
-            study = replace(study, rtol=_chosen_rtol(rtol or "1e-6", study, crew))
+            study = _new_study(read_stage(source, overrides), varied, metric, refine, yes, rtol or "1e-6", crew)
         refuse_overwriting(store, exports, overwrite)
         runs = _run(study, store, crew, share)
+    runs, colouring = in_memory(runs) if study.cells <= LARGE else runs, coloured_by(study, metric)
+    files = _write(runs, study, store, exports, colouring)
+    _report(runs, study, store, colouring, files, as_json)
+
+
+def _new_study(
+    stage: Stage, varied: Varied, metric: str, refine: bool, large_too: bool, rtol: str, crew: Crew
+) -> Study:
+    """The study asked for, at its tolerance. Raises InputError."""
+    from friso.cli.map_study import study_for
+
+    study = study_for(stage, varied, metric, refine, None if large_too else LARGE, crew)
+    return replace(study, rtol=_chosen_rtol(rtol, study, crew))
+
+
+def _write(runs: xr.Dataset, study: Study, store: Path, exports: list[Path], metric: str) -> list[Path]:
+    """Write figure and page, unless there are too many cells for them, and the exports."""
+    from friso.cli.map_study import export_files, view_files
+
     views: dict[Path, Content] = {}
     if study.cells <= LARGE:
-        runs = in_memory(runs)
-        views = view_files(runs, store, coloured_by(study, metric))
+        views = view_files(runs, store, metric)
     else:
         say(f"no figure and no page of {study.cells:.3g} cells")
-    files = write({**views, **export_files(runs, exports)})
-    _report(runs, study, store, coloured_by(study, metric), files, as_json)
+    return write({**views, **export_files(runs, exports)})
 
 
 def _chosen_rtol(text: str, study: Study, crew: Crew) -> float:

@@ -72,10 +72,8 @@ def rig(
         print_document(rig_document(outcome))
     else:
         _print(outcome, files)
-    failed = [log for log in outcome.logs if log.failure]
-    for log in failed:
-        say(f"{log.name} stopped {log.failure}; the log so far is kept")
-    if failed:
+    if failed := [log.name for log in outcome.logs if log.failure]:
+        say(f"{len(failed)} of {len(outcome.logs)} logs end where the run stopped")
         raise typer.Exit(1)
 
 

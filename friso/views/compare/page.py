@@ -10,10 +10,11 @@ from friso.views.compare.figures import figures as compare_figures
 from friso.views.compare.words import (
     COLUMNS,
     PAIRED,
+    answer,
+    details,
     options_rows,
     paired_rows,
     population,
-    sentences,
     table_rows,
 )
 from friso.views.drawing.figure import Figure
@@ -33,7 +34,8 @@ def page(comparison: Comparison, drawn: Sequence[Figure]) -> str:
         "compare.html",
         comparison.stage,
         drawn,
-        sentences=sentences(comparison),
+        answer=answer(comparison),
+        details=details(comparison),
         population=population(comparison),
         notes=comparison.notes,
         options=options_rows(comparison),

@@ -7,6 +7,7 @@ from typing import Any
 from friso.studies.rig.outcome import Outcome
 from friso.views.documents import plain_json
 from friso.views.rig.outcome_view import OUTCOME_VIEWS
+from friso.views.rig.page import sentences
 
 
 def rig_document(outcome: Outcome) -> dict[str, Any]:
@@ -17,7 +18,7 @@ def rig_document(outcome: Outcome) -> dict[str, Any]:
     ]
     view = OUTCOME_VIEWS[outcome.experiment]
     head = {
-        "conclusion": view.sentences(outcome)[0],
+        "conclusion": sentences(outcome)[0],
         "experiment": outcome.experiment,
         "stage": outcome.stage.name,
         "seed": outcome.seed,

@@ -17,8 +17,21 @@ from friso.views.rig.outcome_view import OUTCOME_VIEWS
 
 
 def sentences(outcome: Outcome) -> list[str]:
-    """The results, the answer first, for the engineer who has to decide with them."""
-    return OUTCOME_VIEWS[outcome.experiment].sentences(outcome)
+    """The results, the answer first, for the engineer who has to decide with them; before it, what failed."""
+    return [*_failures(outcome), *OUTCOME_VIEWS[outcome.experiment].sentences(outcome)]
+
+
+def _failures(outcome: Outcome) -> list[str]:
+    """The logs that stopped early, in a sentence for each reason: they end where the run stopped."""
+    by_reason: dict[str, list[str]] = {}
+    for log in outcome.logs:
+        if log.failure:
+            when, _, reason = log.failure.partition(": ")
+            by_reason.setdefault(reason or when, []).append(f"{log.name} {when}" if reason else log.name)
+    return [
+        f"{len(names)} of {len(outcome.logs)} logs stopped early: {reason} ({', '.join(names)})."
+        for reason, names in by_reason.items()
+    ]
 
 
 def figures(outcome: Outcome) -> list[Figure]:
