@@ -12,6 +12,7 @@ from variants import VARIANTS, lugre, stage, there_and_back, van_dijk
 
 import friso
 from friso.equations.bandwidth import faster
+from friso.hunting.attractors import Target
 from friso.hunting.basin import EDGE, MOVES, SHARES, Kick, MoveShare, displacements, ends_in, moves, pushes
 from friso.hunting.cycle.ensemble import Ensemble, done
 from friso.hunting.cycle.hunting import Cycle, hunting
@@ -39,8 +40,16 @@ def cycle() -> Cycle:
 
 
 @cache
+def target() -> Target:
+    """What motions end in there: this cycle."""
+    found = hunting(rigid(8)).target
+    assert found is not None
+    return found
+
+
+@cache
 def windows() -> Kick:
-    return displacements(rigid(8), cycle())
+    return displacements(rigid(8), target())
 
 
 def hunts(chosen: Stage) -> bool:
@@ -88,7 +97,9 @@ def test_edges_of_the_windows_by_single_runs(edge: int) -> None:
 def test_mirrored_releases_start_hunting_as_well() -> None:
     several = np.geomspace(1e-3, 0.1, 32)
     flat = rigid(8).flat()
-    one, other = (ends_in({**flat, "motion.displacement": sign * several}, 32, cycle())[0].tolist() for sign in (1, -1))
+    one, other = (
+        ends_in({**flat, "motion.displacement": sign * several}, 32, target())[0].tolist() for sign in (1, -1)
+    )
     assert one == other
     assert True in one
     assert False in one
@@ -98,7 +109,7 @@ def test_mirrored_releases_start_hunting_as_well() -> None:
 def test_pushes_that_start_hunting() -> None:
     """2 % inside the first window a push hunts, 2 % outside it does not: by runs from states by hand."""
     chosen = rigid(8)
-    found = pushes(chosen, cycle())
+    found = pushes(chosen, target())
     low, high = found.windows[0]
     velocities = np.array([low * 1.02, high / 1.02, low / 1.02, high * 1.02])
     stages = Ensemble.held(chosen.flat(), 4)
@@ -123,7 +134,7 @@ MOVING = stage(there_and_back(), friction=lugre(2), controller=van_dijk("8 Hz"))
 @RIGID
 def test_share_of_moves_is_reproducible() -> None:
     """The same draws each time: the same numbers."""
-    first, second = moves(MOVING, cycle()), moves(MOVING, cycle())
+    first, second = moves(MOVING, target()), moves(MOVING, target())
     assert first is not None
     assert first == second
     assert first.drawn == MOVES
@@ -136,11 +147,11 @@ def test_share_of_moves_is_reproducible() -> None:
 @RIGID
 def test_moves_by_single_runs() -> None:
     """The count is that of single runs of the same draws; eight of them are simulated, hunting and resting ones."""
-    found = moves(MOVING, cycle())
+    found = moves(MOVING, target())
     assert found is not None
     drawn = qmc.scale(qmc.Sobol(2, rng=0).random(MOVES), *zip(found.accelerations, found.times, strict=True))
     own = MOVING.flat() | {"motion.acceleration": drawn[:, 0], "motion.acceleration_time": drawn[:, 1]}
-    each, completed = ends_in(own, MOVES, cycle())
+    each, completed = ends_in(own, MOVES, target())
     assert completed.all()
     assert each.sum() == found.hunting
     assert 0 < found.hunting < MOVES
@@ -155,7 +166,7 @@ def test_moves_by_single_runs() -> None:
 def test_moves_that_overlap_are_not_drawn() -> None:
     """A move takes twice the acceleration time, and the stage returns after it has arrived."""
     soon = MOVING.replace({"motion.return_at": "0.08 s"})
-    found = moves(soon, cycle())
+    found = moves(soon, target())
     assert found is not None
     assert found.times == pytest.approx([SHARES[0] * 0.03, 0.04])
 
@@ -163,8 +174,8 @@ def test_moves_that_overlap_are_not_drawn() -> None:
 @RIGID
 def test_motions_without_acceleration_have_no_share() -> None:
     """A release has none, nor does a move that stays where it is."""
-    assert moves(rigid(8), cycle()) is None
-    assert moves(MOVING.replace({"motion.acceleration": "0 m/s^2"}), cycle()) is None
+    assert moves(rigid(8), target()) is None
+    assert moves(MOVING.replace({"motion.acceleration": "0 m/s^2"}), target()) is None
 
 
 @given(drawn=st.integers(1, 500), data=st.data())

@@ -32,7 +32,7 @@ pytestmark = pytest.mark.xdist_group("rig")
 def judged(stage: Stage, found: Measures) -> str:
     """The verdict of a check; of a stage whose motion ends in its cycle without what a check tells of that besides."""
     known = hunting(stage)
-    if known.attracting and ends_in(stage.flat(), 1, known.attracting[0])[0][0]:
+    if known.target and ends_in(stage.flat(), 1, known.target)[0][0]:
         return "hunts"
     return judge(stage, found, 1e-6).verdict
 

@@ -3,7 +3,7 @@
 from friso.hunting.basin import Kick, MoveShare
 from friso.hunting.check import Case, Solver, check
 from friso.hunting.criteria import COUNTED_ABOVE, COUNTED_AFTER
-from friso.hunting.cycle.hunting import Cycle, Hunting, hunting
+from friso.hunting.cycle.hunting import Cycle, Hunting, Swing, hunting
 from friso.hunting.margin import Margin
 from friso.hunting.measures import BANDS, Measures, measure
 from friso.hunting.verdict import Judgement
@@ -21,6 +21,7 @@ __all__ = [
     "Measures",
     "MoveShare",
     "Solver",
+    "Swing",
     "check",
     "hunting",
     "measure",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from scipy.stats import binomtest, qmc
@@ -14,24 +14,21 @@ from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import kernel
 from friso.equations.motion import last_corner
 from friso.equations.structure import shared_structure
+from friso.hunting.attractors import Target
 from friso.hunting.criteria.run_outcome import lasts
 from friso.hunting.cycle.ensemble import Ensemble, without_motion
-from friso.hunting.cycle.hunting import Cycle
 from friso.hunting.cycle.rest import pushed
 from friso.hunting.measures import swing_of
 from friso.stage import Stage
 
-PERIODS, LAST = (60.0, 600.0), 1.5
-"""Periods of the cycle after which a run is judged, at least and at most, and those at its end by which it is."""
-
-CONSTANTS = 8.0
-"""Time constants of the cycle for which a run is followed, within these limits: near a flip transients last."""
+LAST = 1.5
+"""Periods at the end of a run by which it is judged."""
 
 RTOL = 1e-6
 """Relative tolerance of these runs."""
 
 RANGE, POINTS = (1 / 30, 300.0), 128
-"""Smallest and largest kick in units of the cycle's own, and kicks tried in between."""
+"""Smallest and largest kick in units of the least motion that attracts, and kicks tried in between."""
 
 EDGE = 0.01
 """Share to which the edges of the windows are found."""
@@ -41,18 +38,6 @@ MOVES = 128
 
 SHARES = (0.1, 2.0)
 """Range of the moves drawn, in units of the acceleration and of the acceleration time of the stage file."""
-
-
-class Swing(Protocol):
-    """The size of a cycle, or of many, arrays of shape (count,): its amplitude [m], half of peak to peak, its period
-    [s], and the time constant of deviations from it [s]."""
-
-    @property
-    def amplitude(self) -> Any: ...
-    @property
-    def period(self) -> Any: ...
-    @property
-    def time_constant(self) -> Any: ...
 
 
 @dataclass(frozen=True)
@@ -92,16 +77,21 @@ class MoveShare:
 
 
 def ends_in(
-    flat: Mapping[str, Any], count: int, cycle: Swing, starts: np.ndarray | None = None, rtol: float = RTOL, **how: Any
+    flat: Mapping[str, Any],
+    count: int,
+    target: Target,
+    starts: np.ndarray | None = None,
+    rtol: float = RTOL,
+    **how: Any,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Which runs of stages, given as flat keys to SI numbers or arrays (count,), end in a cycle of the stage: they
-    still swing like it long after their motion, by half its peak to peak or more; and which were completed; both of
-    shape (count,). The cycle is the same for all, or there is one for each: arrays (count,). `how`: `RunOptions`."""
-    periods = np.clip(CONSTANTS * cycle.time_constant / cycle.period, *PERIODS)
-    end = np.broadcast_to(np.max(last_corner(flat)) + periods * cycle.period, (count,))
-    band = np.broadcast_to(cycle.amplitude / 2, (count,))
+    """Which runs of stages, given as flat keys to SI numbers or arrays (count,), end in one of the motions that attract
+    the stage: they still swing long after their motion, by half of the least of these from peak to peak or more; and
+    which were completed; both of shape (count,). The target is the same for all, or there is one for each. `how`:
+    `RunOptions`."""
+    end = np.broadcast_to(np.max(last_corner(flat)) + target.lasting, (count,))
+    band = np.broadcast_to(target.amplitude / 2, (count,))
     long = {**flat, "motion.duration": end}
-    window = float(np.min(1 - LAST * cycle.period / end))
+    window = float(np.min(1 - LAST * target.period / end))
     options = RunOptions(rtol=rtol, window=window, record_from=np.inf, least_swing=np.inf, **how)
     ends, completed = np.zeros(count, bool), np.zeros(count, bool)
     for runs in run_chunks(kernel(shared_structure(flat)), long, count, options, starts):
@@ -110,26 +100,26 @@ def ends_in(
     return ends, completed
 
 
-def displacements(stage: Stage, cycle: Cycle) -> Kick:
+def displacements(stage: Stage, target: Target) -> Kick:
     """The displacements that start hunting."""
     flat = {**without_motion(stage.flat()), "motion.kind": "release"}
 
     def hunts(kicks: np.ndarray) -> np.ndarray:
-        return ends_in({**flat, "motion.displacement": kicks}, len(kicks), cycle)[0]
+        return ends_in({**flat, "motion.displacement": kicks}, len(kicks), target)[0]
 
-    return _kick(hunts, cycle.amplitude)
+    return _kick(hunts, target.amplitude)
 
 
-def pushes(stage: Stage, cycle: Cycle) -> Kick:
+def pushes(stage: Stage, target: Target) -> Kick:
     """The velocities that start hunting."""
     stages = Ensemble.held(stage.flat(), 1)
 
     def hunts(kicks: np.ndarray) -> np.ndarray:
         several = stages.take(np.zeros(len(kicks), np.int64))
         own = {**several.flat, "motion.displacement": float(stages.length[0])}
-        return ends_in(own, len(kicks), cycle, pushed(several, kicks))[0]
+        return ends_in(own, len(kicks), target, pushed(several, kicks))[0]
 
-    return _kick(hunts, cycle.amplitude * float(stages.number("rate")[0]))
+    return _kick(hunts, target.amplitude * float(stages.number("rate")[0]))
 
 
 def _kick(hunts: Callable[[np.ndarray], np.ndarray], unit: float) -> Kick:
@@ -148,7 +138,7 @@ def _kick(hunts: Callable[[np.ndarray], np.ndarray], unit: float) -> Kick:
     return Kick(windows, (float(kicks[0]), float(kicks[-1])))
 
 
-def moves(stage: Stage, cycle: Cycle) -> MoveShare | None:
+def moves(stage: Stage, target: Target) -> MoveShare | None:
     """The share of moves that end in hunting; None for motions that have no acceleration, or if every run fails."""
     flat = stage.flat()
     if flat["motion.kind"] != "there_and_back" or not flat["motion.acceleration"] * flat["motion.acceleration_time"]:
@@ -158,5 +148,5 @@ def moves(stage: Stage, cycle: Cycle) -> MoveShare | None:
     times = (SHARES[0] * time, min(SHARES[1] * time, flat["motion.return_at"] / 2))
     drawn = qmc.scale(qmc.Sobol(2, rng=0).random(MOVES), *zip(accelerations, times, strict=True))
     own = {**flat, "motion.acceleration": drawn[:, 0], "motion.acceleration_time": drawn[:, 1]}
-    hunts, completed = ends_in(own, MOVES, cycle)
+    hunts, completed = ends_in(own, MOVES, target)
     return MoveShare(int(completed.sum()), int(hunts.sum()), accelerations, times) if completed.any() else None

@@ -1,16 +1,18 @@
-"""How far a stage is from the edge of hunting: the crossover at which its hunting cycle stops attracting."""
+"""How far a stage is from the edge of hunting: the crossover up to which something attracts that hunts."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from friso.equations.bandwidth import bandwidth, faster
+from friso.hunting.attractors import Attractors, attractors
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import Cycles, hunting_cycles
+from friso.hunting.cycle.shooting import simplest
 from friso.stage import Stage
 
 FARTHEST = 10.0
@@ -20,21 +22,31 @@ STEPS, AT_ONCE = 41, 10
 """Bandwidths that are tried on the way there, and how many of them together on the way down."""
 
 FINER, ROUNDS = 9, 2
-"""Steps between the two that enclose the edge, and how often they are taken."""
+"""Bandwidths between the two that enclose the edge at which is simulated, and how often."""
 
-ENOUGH = 6
-"""Cycles of these steps that have to be known for a curve to be laid through their multipliers, which are rough where
-a limiter chatters."""
+NEARER = 3
+"""Those between two that enclose a flip at which a cycle is closed, each time."""
+
+CHATTERING, ENOUGH = 9, 6
+"""The same at once where a limiter chatters, and cycles of these that have to be known for a curve to be laid through
+their multipliers, which are rough."""
+
+ABOVE = 1.01
+"""How far above the bandwidth at which a cycle flips nothing else may attract."""
+
+ALONG = 1 + np.array([-0.08, -0.04, -0.02, -0.01, -0.005, 0.0, 0.005, 0.01, 0.02, 0.04, 0.08])
+"""Distances from which a motion is followed from one bandwidth to the next, in units of its own."""
 
 
 @dataclass(frozen=True)
 class Margin:
     """The edge of hunting in bandwidth.
 
-    For a stage whose cycle attracts it is the last one: from there up to ten times the bandwidth no cycle is known to
-    attract. For others it is the nearest below: hunting is possible there. `factor` is the bandwidth at the edge over
-    that of the stage, `crossover` [Hz] the crossover there (None for a controller given by its gains, all of whose
-    poles and zeros the factor scales). It is `certain` unless a cycle next to the edge could not be computed.
+    For a stage that something attracts it is the last one: from there up to ten times the bandwidth nothing is known
+    to attract. For others it is the nearest below: hunting is possible there. `factor` is the bandwidth at the edge
+    over that of the stage, `crossover` [Hz] the crossover there (None for a controller given by its gains, all of whose
+    poles and zeros the factor scales). It is `certain` unless a simulation next to the edge that had to tell what
+    attracts failed, or was given up.
     """
 
     factor: float
@@ -43,75 +55,114 @@ class Margin:
 
 
 def margin(stage: Stage, attracting: bool) -> Margin | None:
-    """The last edge above the bandwidth of a stage whose cycle attracts, or the next one below that of one whose cycle
-    does not; None within a factor of ten."""
+    """The last edge above the bandwidth of a stage that something attracts, or the next one below that of one that
+    nothing does; None within a factor of ten."""
     flat = stage.flat()
     factors = np.geomspace(1.0, FARTHEST if attracting else 1 / FARTHEST, STEPS)
     edge = _last(flat, factors) if attracting else _next(flat, factors)
     if edge is None:
         return None
-    if Ensemble.held(flat, 1).chatters:
-        edge = _smoothed(flat, edge)
-    else:
-        for _ in range(ROUNDS):
-            edge = (_last if attracting else _next)(flat, np.geomspace(edge.low, edge.high, FINER)) or edge
-    factor = edge.low * (edge.high / edge.low) ** edge.share
+    factor = _located(flat, edge)
     own = bandwidth(flat)
-    crossover = None if own is None else own * factor
-    return Margin(factor, crossover, edge.certain)
+    return Margin(factor, None if own is None else own * factor, edge.certain)
 
 
-def _smoothed(flat: Mapping[str, Any], edge: _Edge) -> _Edge:
-    """The edge by a cubic through the multipliers between; as it is where too few are known."""
-    places, share = np.linspace(0, 1, FINER), edge.share
-    cycles = _cycles(flat, edge.low * (edge.high / edge.low) ** places)
-    if np.count_nonzero(cycles.found) >= ENOUGH:
-        off = np.abs(cycles.multiplier[cycles.found]) - 1
-        roots = np.roots(np.polyfit(places[cycles.found], off, 3))
-        inside = roots.real[(np.abs(roots.imag) < 1e-9) & (roots.real >= 0) & (roots.real <= 1)]
-        share = float(inside[np.abs(inside - share).argmin()]) if inside.size else share
-    return replace(edge, share=share)
-
-
-@dataclass(frozen=True)
 class _Edge:
-    """Two factors that enclose the edge, where between them the multiplier passes 1, as a share of the way in their
-    logarithms, and whether both cycles are known."""
+    """Two factors that enclose the edge: something attracts at the lower one, nothing does at the higher one."""
 
-    low: float
-    high: float
-    share: float
-    certain: bool
+    def __init__(self, flat: Mapping[str, Any], factors: np.ndarray, known: Attractors, a: int, b: int) -> None:
+        self.flat = flat
+        self.low, self.high = float(factors[a]), float(factors[b])
+        self.inside, self.outside = known.take(np.array([a])), known.take(np.array([b]))
+        self.certain = bool(known.known[[a, b]].all())
+
+    def narrow(self, factors: np.ndarray) -> None:
+        """Take the last of some factors in between, ascending, at which something attracts, and the next one."""
+        distances = np.outer([motion.distance for motion in self.inside.motions], ALONG).ravel()
+        known = _known(self.flat, factors, np.tile(distances, (len(factors), 1)))
+        attract = np.flatnonzero(known.attracts)
+        last = int(attract[-1]) if attract.size else -1
+        if last >= 0:
+            self.low, self.inside = float(factors[last]), known.take(np.array([last]))
+        if last < len(factors) - 1:
+            self.high, self.outside = float(factors[last + 1]), known.take(np.array([last + 1]))
+        self.certain = bool(self.inside.known[0] and self.outside.known[0])
+
+    def between(self, count: int) -> np.ndarray:
+        """So many factors between the two."""
+        return np.geomspace(self.low, self.high, count + 2)[1:-1]
+
+    @property
+    def may_flip(self) -> bool:
+        """Whether what attracts at the lower factor is a cycle that goes towards a flip."""
+        cycles = [motion.cycles for motion in self.inside.motions]
+        return any(cycle is not None and cycle.swings == simplest(cycle.sign) for cycle in cycles)
 
 
 def _last(flat: Mapping[str, Any], factors: np.ndarray) -> _Edge | None:
-    """The edge behind the last factor at which the cycle attracts; None if that is the last one, or there is none."""
-    cycles = _cycles(flat, factors)
-    attract = np.flatnonzero(cycles.attracting)
+    """The edge behind the last factor at which something attracts; None if that is the last one, or there is none."""
+    known = _known(flat, factors)
+    attract = np.flatnonzero(known.attracts)
     if not attract.size or attract[-1] == len(factors) - 1:
         return None
-    return _edge(factors, cycles, int(attract[-1]), int(attract[-1]) + 1)
+    return _Edge(flat, factors, known, int(attract[-1]), int(attract[-1]) + 1)
 
 
 def _next(flat: Mapping[str, Any], factors: np.ndarray) -> _Edge | None:
-    """The edge before the first factor at which the cycle attracts; None if that is the first one, or there is none."""
+    """The edge before the first factor at which something attracts; None if that is the first one, or there is none."""
     for start in range(0, len(factors), AT_ONCE):
         part = factors[max(start - 1, 0) : start + AT_ONCE]
-        cycles = _cycles(flat, part)
-        attract = np.flatnonzero(cycles.attracting)
+        known = _known(flat, part)
+        attract = np.flatnonzero(known.attracts)
         if attract.size:
-            return _edge(part, cycles, int(attract[0]) - 1, int(attract[0])) if attract[0] else None
+            return _Edge(flat, part, known, int(attract[0]), int(attract[0]) - 1) if attract[0] else None
     return None
 
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
+def _known(flat: Mapping[str, Any], factors: np.ndarray, tried: np.ndarray | None = None) -> Attractors:
+    return attractors(Ensemble.held(faster(flat, factors), len(factors)), tried=tried)
+
+
+@np.errstate(all="ignore")
 def _cycles(flat: Mapping[str, Any], factors: np.ndarray) -> Cycles:
     return hunting_cycles(Ensemble.held(faster(flat, factors), len(factors)))
 
 
-def _edge(factors: np.ndarray, cycles: Cycles, a: int, b: int) -> _Edge:
-    size = np.abs(cycles.multiplier)
-    share = (1 - size[a]) / (size[b] - size[a])
-    share = float(share) if np.isfinite(share) and 0 <= share <= 1 else 0.5  # the middle where one is unknown
-    certain = not cycles.uncertain[[a, b]].any()
-    return _Edge(float(factors[a]), float(factors[b]), share, bool(certain))
+def _located(flat: Mapping[str, Any], edge: _Edge) -> float:
+    """The factor at the edge: where a cycle flips, if nothing else attracts just above; else as far as motions can be
+    followed."""
+    flip = _flip(flat, edge.low, edge.high) if edge.may_flip else None
+    if flip is not None:
+        if flip * ABOVE < edge.high:
+            edge.narrow(np.array([flip * ABOVE]))
+        if edge.low < flip * ABOVE:
+            return flip
+    for _ in range(ROUNDS):
+        edge.narrow(edge.between(FINER))
+    return float(np.sqrt(edge.low * edge.high))
+
+
+def _flip(flat: Mapping[str, Any], low: float, high: float) -> float | None:
+    """The factor between two at which the cycle that attracts at the lower one begins to repel, from the multipliers in
+    between (where a limiter chatters, from a curve through them); None if it does not."""
+    chatters = Ensemble.held(flat, 1).chatters
+    for last in (False, True):
+        factors = np.geomspace(low, high, CHATTERING if chatters else NEARER + 2)
+        cycles = _cycles(flat, factors)
+        there = np.flatnonzero(cycles.found)
+        off, places = np.abs(cycles.multiplier) - 1, np.log(factors / low)
+        attract = there[off[there] < 0]
+        beyond = there[(off[there] >= 0) & (there > attract.max(initial=-1))]
+        if not attract.size or not beyond.size:
+            return None
+        a, b = attract[-1], beyond[0]
+        if chatters and there.size >= ENOUGH:
+            roots = np.roots(np.polyfit(places[there], off[there], 3))
+            real = roots.real[np.abs(roots.imag) < 1e-9]
+            inside = real[(real >= 0) & (real <= places[-1])]
+            return float(low * np.exp(inside.max())) if inside.size else None
+        if last:
+            return float(factors[a] * (factors[b] / factors[a]) ** (-off[a] / (off[b] - off[a])))
+        low, high = float(factors[a]), float(factors[b])
+    return None

@@ -16,14 +16,13 @@ from friso.engine.batch import RunOptions, run_chunks
 from friso.engine.kernel import kernel
 from friso.equations.motion import last_corner
 from friso.equations.structure import shared_structure
-from friso.hunting.attractors import Attractors, attractors
+from friso.hunting.attractors import Attractors, Target, attractors
 from friso.hunting.basin import Kick, MoveShare, displacements, ends_in, moves, pushes
 from friso.hunting.criteria import COUNTED_ABOVE, Verdict, lasts, verdicts
 from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.hunting import Cycle, Hunting, cannot_hunt, hunting, why_not
+from friso.hunting.cycle.hunting import Cycle, Hunting, Swing, cannot_hunt, hunting, why_not
 from friso.hunting.margin import Margin, margin
 from friso.hunting.measures import Measures, measure, options
-from friso.hunting.persistence import Begin, still_swings
 from friso.stage import Stage
 
 LONG = 1000.0
@@ -42,8 +41,8 @@ class Judgement:
 
     `displacement`, `push` and `moves` tell what starts hunting, where there is a cycle that attracts; `margin` the edge
     of hunting nearest in bandwidth; `settled_after` the time [s] after the last corner of the reference from which on
-    this motion stays within 10 um, up to 1000 s. `observed`: no cycle could be found, yet the motion swings on
-    steadily, and so the verdict is that of the motion.
+    this motion stays within 10 um, up to 1000 s. `observed`: what attracts was observed in long simulations, no orbit
+    that attracts could be closed.
     """
 
     verdict: Verdict
@@ -54,6 +53,11 @@ class Judgement:
     margin: Margin | None = None
     settled_after: float | None = None
     observed: bool = False
+
+    @property
+    def swing(self) -> Cycle | Swing | None:
+        """What attracts: a cycle, or else a swing that was observed; None if nothing does."""
+        return next(iter((*self.hunting.attracting, *self.hunting.observed)), None)
 
     @property
     def cycle(self) -> Cycle | None:
@@ -90,29 +94,30 @@ def judge(stage: Stage, ran: Measures, rtol: float) -> Judgement:
     known = Hunting((), MOVING, True, None) if moves_on else hunting(stage)
     if not motions.completed[0]:
         return Judgement("failed", known)
-    if known.attracting:
-        return _with_a_cycle(stage, motions, known, known.attracting[0])
-    rest = _rest(flat, motions, 1, options(rtol), possible=known.returns is not None)
+    if known.target:
+        return _with_a_target(stage, motions, known, known.target)
+    rest = _rest(flat, motions, 1, options(rtol), possible=known.possible)
     observed = bool(rest.steady[0])
     after = float(rest.after[0]) if np.isfinite(rest.after[0]) else None
-    edge = margin(stage, attracting=False) if known.returns is not None and not observed else None
+    edge = margin(stage, attracting=False) if known.possible and not observed else None
     word = verdicts(motions.completed, rest.steady, rest.steady, rest.rests)[0]
     return Judgement(word, known, margin=edge, settled_after=after, observed=observed)
 
 
-def _with_a_cycle(stage: Stage, motions: Motions, known: Hunting, cycle: Cycle) -> Judgement:
-    ends, completed = ends_in(stage.flat(), 1, cycle)
+def _with_a_target(stage: Stage, motions: Motions, known: Hunting, target: Target) -> Judgement:
+    ends, completed = ends_in(stage.flat(), 1, target)
     if not completed[0]:
         return Judgement("failed", known)
     within = float(motions.settling[0])
     return Judgement(
         verdicts(completed, np.ones(1, bool), ends, np.zeros(1, bool))[0],
         known,
-        displacements(stage, cycle),
-        pushes(stage, cycle),
-        moves(stage, cycle),
-        margin(stage, attracting=True) if known.cycles[0].attracts else None,
+        displacements(stage, target),
+        pushes(stage, target),
+        moves(stage, target),
+        margin(stage, attracting=True),
         None if ends[0] or not np.isfinite(within) else within,
+        observed=not known.attracting,
     )
 
 
@@ -130,8 +135,7 @@ def can_hunt(flat: Mapping[str, Any]) -> bool:
 def judge_many(flat: Mapping[str, Any], count: int, rtol: float) -> np.ndarray:
     """The verdicts on stages of one structure, given as flat keys to SI numbers or arrays of shape (count,).
 
-    They are those of `judge`, but where an orbit may be that could not be closed, simulations from many places decide
-    whether something attracts; those that fail leave the verdict "failed".
+    They are those of `judge`, from fewer simulations; those that fail leave the verdict "failed".
     """
     known = attractors(Ensemble.held(flat, count, form=shared_structure(flat))) if can_hunt(flat) else None
     return judge_runs(flat, _motions(flat, count, options(rtol)), known, rtol)
@@ -168,21 +172,8 @@ def judge_runs(
 def _end_in_a_cycle(
     flat: Mapping[str, Any], known: Attractors, threads: int | None, cancel: np.ndarray | None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Which stages' own motions end in the cycle that attracts, and which runs were completed. Where it attracts by
-    simulation alone, a motion that still swings after a long one does."""
-    count = len(known.attracts)
-    ends, completed = np.zeros(count, bool), np.zeros(count, bool)
-    sized = np.isfinite(known.amplitude + known.period + known.time_constant)
-    if (which := np.flatnonzero(sized)).size:
-        ends[which], completed[which] = ends_in(
-            _part(flat, which), which.size, known.take(which), threads=threads, cancel=cancel
-        )
-    if (which := np.flatnonzero(~sized)).size:
-        own = _part(flat, which)
-        motion = {key: value for key, value in own.items() if key.startswith("motion.")}
-        stages = Ensemble.held(own, which.size, form=shared_structure(own), threads=threads, cancel=cancel)
-        ends[which], completed[which] = still_swings(stages, Begin(motion, over=last_corner(own)))
-    return ends, completed
+    """Which stages' own motions end in what attracts, and which runs were completed."""
+    return ends_in(flat, len(known.known), known.target, threads=threads, cancel=cancel)
 
 
 @dataclass(frozen=True)

@@ -105,8 +105,8 @@ def run_cells(
         for flat, cells, shape in _groups(parts, table.ran):
             known = _once(attractors, flat, len(cells), shape, threads, cancel) if can_hunt(flat) else None
             words = judge_runs(flat, table.motions(cells), known, rtol, threads, cancel)
-            table.write_verdicts(cells, words, known)
-    elif any(name in metrics for name in CYCLE_UNITS):
+            table.columns["verdict"][cells] = words
+    if any(name in metrics for name in CYCLE_UNITS):
         for cells, cycles in cell_cycles(stage, links, columns, table.valid, threads, cancel):
             table.write_cycles(cells, cycles)
     return table.columns
@@ -261,12 +261,6 @@ class _Table:
         } | {name: getattr(measures, name) for name in _SAME}
         for name, column in written.items():
             self.columns[name][which[ran]] = column[ran]
-
-    def write_verdicts(self, cells: np.ndarray, words: np.ndarray, known: Attractors | None) -> None:
-        """Write the verdicts on the stages of the cells, and the measures of their cycles."""
-        self.columns["verdict"][cells] = words
-        if known is not None:
-            self.write_cycles(cells, known.cycles)
 
     def write_cycles(self, cells: np.ndarray, cycles: Cycles) -> None:
         """Write those measures of hunting cycles that the table has."""

@@ -13,7 +13,7 @@ from friso.hunting.cycle.guess import UNWINDING, Guess, symmetric_guess, whole_g
 from friso.hunting.cycle.multipliers import multipliers
 from friso.hunting.cycle.rest import stuck, wait
 from friso.hunting.cycle.return_map import ReturnMap, return_map
-from friso.hunting.cycle.shooting import Orbits, close
+from friso.hunting.cycle.shooting import Orbits, close, simplest
 from friso.hunting.cycle.swings import swings
 
 RTOL = 1e-9
@@ -59,14 +59,15 @@ class Cycles:
     """One cycle per stage, or none.
 
     `found` (count,); `reasons` (count,), why there is none; `sign`, -1 for cycles that are their own mirror image after
-    half a period, over which everything is taken then, and 1 for others; `states` (count, states) on the cycle, in the
-    middle of the sticking; `period` [s], `amplitude` [m], half of peak to peak, `middle` [m] between the peaks, `gap`
-    (see `Orbits`), the `local` multipliers (count, states - 1), the largest first, their `direction` (count, states),
-    the macroscopic `slope` and the `multiplier`, that of the two which decides, each of shape (count,); NaN where there
-    is none.
+    half a period, over which everything is taken then, and 1 for others; `swings`, those in that time; `states` (count,
+    states) on the cycle, in the middle of the sticking; `period` [s], `amplitude` [m], half of peak to peak, `middle`
+    [m] between the peaks, `gap` (see `Orbits`), the `local` multipliers (count, states - 1), the largest first, their
+    `direction` (count, states), the macroscopic `slope` and the `multiplier`, that of the two which decides, each of
+    shape (count,); NaN where there is none.
     """
 
     sign: float
+    swings: int
     found: np.ndarray
     reasons: np.ndarray
     states: np.ndarray
@@ -97,16 +98,17 @@ class Cycles:
     @property
     def orbits(self) -> Orbits:
         """The cycles as closed orbits."""
-        return Orbits(self.states, self.period * (0.5 if self.sign < 0 else 1.0), self.sign, self.gap, self.found)
+        times = self.period * (0.5 if self.sign < 0 else 1.0)
+        return Orbits(self.states, times, self.sign, self.gap, self.found, self.swings)
 
     @property
     def arrays(self) -> dict[str, np.ndarray]:
         """What is known of every stage, by name."""
-        return {field.name: getattr(self, field.name) for field in fields(self) if field.name != "sign"}
+        return {field.name: getattr(self, field.name) for field in fields(self) if field.name not in ("sign", "swings")}
 
     def take(self, numbers: np.ndarray) -> Cycles:
         """The cycles with these numbers."""
-        return Cycles(self.sign, **{name: array[numbers] for name, array in self.arrays.items()})
+        return Cycles(self.sign, self.swings, **{name: array[numbers] for name, array in self.arrays.items()})
 
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
@@ -131,7 +133,7 @@ def joined(parts: Sequence[tuple[np.ndarray, Cycles]]) -> Cycles:
         return parts[0][1]
     order = np.argsort(np.concatenate([which for which, _ in parts]))
     columns = zip(*(part.arrays.items() for _, part in parts), strict=True)
-    return Cycles(0.0, **{pair[0][0]: np.concatenate([array for _, array in pair])[order] for pair in columns})
+    return Cycles(0.0, 0, **{pair[0][0]: np.concatenate([array for _, array in pair])[order] for pair in columns})
 
 
 def families(stages: Ensemble, there: ReturnMap, rtol: float = RTOL) -> tuple[Cycles, ...]:
@@ -164,7 +166,12 @@ def _closed(stages: Ensemble, guess: Guess, sign: float, rtol: float) -> Cycles:
     """The cycles near guesses."""
     count, size = stages.count, len(stages.kernel.states)
     orbits = Orbits(
-        np.full((count, size), np.nan), guess.times.copy(), sign, np.full(count, np.inf), np.zeros(count, bool)
+        np.full((count, size), np.nan),
+        guess.times.copy(),
+        sign,
+        np.full(count, np.inf),
+        np.zeros(count, bool),
+        simplest(sign),
     )
     for distance, time in TRIES:
         missing = guess.there[~orbits.closed[guess.there]]
@@ -219,6 +226,7 @@ def described(stages: Ensemble, orbits: Orbits, rtol: float, reasons: np.ndarray
     count, size = stages.count, len(stages.kernel.states)
     cycles = Cycles(
         sign=orbits.sign,
+        swings=orbits.swings,
         found=orbits.closed.copy(),
         reasons=np.where(orbits.closed, "", reasons).astype(object),
         states=orbits.states,

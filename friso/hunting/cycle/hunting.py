@@ -11,10 +11,10 @@ from friso.engine.kernel import Wanted, kernels
 from friso.engine.simulate import output_variables, time_axis
 from friso.engine.tolerance import checked_rtol
 from friso.equations.structure import Structure, structure
+from friso.hunting.attractors import Target, attractors
 from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.find import ROUGH, RTOL, Cycles, families, time_constant
+from friso.hunting.cycle.find import ROUGH, RTOL, Cycles, time_constant
 from friso.hunting.cycle.multipliers import returns_of
-from friso.hunting.cycle.neighbours import pair_beside, partner
 from friso.hunting.cycle.return_map import ReturnMap, return_map
 from friso.stage import Stage
 
@@ -24,6 +24,9 @@ if TYPE_CHECKING:
 AWAY, FOLLOWED, LINEAR = 2e-3, 8, 0.02
 """Where a simulation beside a cycle begins, as share of the distance at which the stage sticks; how many returns it is
 followed for; and up to which share a deviation counts as small."""
+
+UNDECIDED = "simulations that had to tell failed, or swung on when they were given up"
+"""Why it is not certain whether anything attracts a stage."""
 
 SAMPLES = 2000
 """Sampling intervals in a period of the trace."""
@@ -67,20 +70,39 @@ class Cycle:
 
 
 @dataclass(frozen=True)
+class Swing:
+    """A lasting swing that was observed in a long simulation, and of which no orbit could be closed, or none that
+    attracts: half of peak to peak, `amplitude` [m]; its `period` [s], about that if it does not repeat `regularly`."""
+
+    amplitude: float
+    period: float
+    regular: bool
+
+
+@dataclass(frozen=True)
 class Hunting:
-    """What there is to know of a stage's hunting: its `cycles`, or the `reason` why there are none; whether that is
-    `certain` (where the return map has a fixed point, but no orbit could be closed, it is not); and the return map, of
-    a stage that sticks on the positive side (None where a stage cannot hunt at all)."""
+    """What there is to know of a stage's hunting: its `cycles`, those that attract first, or the `reason` why there are
+    none, or why it is not `certain` what attracts (if simulations that had to tell failed or were given up); the
+    return map, of a stage that sticks on the positive side (None where a stage cannot hunt at all); swings that were
+    `observed` and are none of the cycles; and what motions end in that do not come to rest, the `target` (None where
+    nothing attracts)."""
 
     cycles: tuple[Cycle, ...]
     reason: str
     certain: bool
     returns: ReturnMap | None
+    observed: tuple[Swing, ...] = ()
+    target: Target | None = None
 
     @property
     def attracting(self) -> tuple[Cycle, ...]:
         """The cycles that attract."""
         return tuple(cycle for cycle in self.cycles if cycle.attracts)
+
+    @property
+    def possible(self) -> bool:
+        """Whether there is friction to stick to, and integral action that winds up."""
+        return self.returns is not None
 
 
 def cannot_hunt(stage: Stage) -> str:
@@ -99,7 +121,7 @@ def why_not(form: Structure) -> str:
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def hunting(stage: Stage, rtol: float = RTOL) -> Hunting:
-    """The hunting cycles of a stage: the symmetric one and an asymmetric pair, or those of an asymmetric stage.
+    """The hunting cycles of a stage, and whatever else attracts it.
 
     The motion of the stage file plays no part. Raises ValueError for a tolerance that is not usable.
     """
@@ -109,15 +131,18 @@ def hunting(stage: Stage, rtol: float = RTOL) -> Hunting:
     flat = stage.flat()
     kernels([Wanted(structure(flat), variational) for variational in (False, True)])
     stages = Ensemble.held(flat, 1)
-    there = return_map(stages, ROUGH)
-    sought = list(families(stages, there, rtol))
-    if sought[0].found[0] and not any(family.attracting[0] for family in sought):
-        beside = pair_beside if stages.symmetric[0] else partner
-        if other := beside(stages, sought[0], rtol):
-            sought.append(other)
-    cycles = tuple(_cycle(stages, family) for family in sought if family.found[0])
-    first = sought[0]
-    return Hunting(cycles, "" if cycles else first.reasons[0], bool(cycles) or not first.uncertain[0], there)
+    known = attractors(stages, thorough=True, rtol=rtol)
+    closed = [m.cycles.take(np.array([m.number])) for m in known.motions if m.cycles is not None]
+    repelling = [family for family in known.families if family.found[0] and not family.attracting[0]]
+    reason = known.families[0].reasons[0] if known.known[0] else UNDECIDED
+    return Hunting(
+        cycles=tuple(_cycle(stages, cycle) for cycle in (*closed, *repelling)),
+        reason=reason if not known.known[0] or not (closed or repelling) else "",
+        certain=bool(known.known[0]),
+        returns=return_map(stages, ROUGH),
+        observed=tuple(Swing(m.amplitude, m.period, bool(m.time == m.time)) for m in known.motions if not m.cycles),
+        target=known.target.of(0) if known.motions else None,
+    )
 
 
 def _cycle(stages: Ensemble, cycles: Cycles) -> Cycle:

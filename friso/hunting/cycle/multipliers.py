@@ -85,7 +85,7 @@ def returns_of(
     starts = orbits.states[:, None, :] + (away * np.abs(distance)[:, None])[:, :, None] * direction[:, None, :]
     starts = starts.reshape(count * points, -1)
     several = stages.take(np.repeat(np.arange(count), points))
-    half_periods = 1 if orbits.sign < 0 else 2
+    each = orbits.swings
     durations = (returns + 0.5) * np.repeat(orbits.times, points)
-    extrema = swings(several, starts, durations, half_periods * returns, rtol)
-    return np.abs(extrema.values[:, half_periods - 1 :: half_periods]).reshape(count, points, returns)
+    extrema = swings(several, starts, durations, each * returns, rtol)
+    return np.abs(extrema.values[:, each - 1 :: each]).reshape(count, points, returns)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
@@ -47,18 +47,21 @@ class Shot:
 @dataclass(frozen=True)
 class Orbits:
     """Closed orbits: a state of each (count, states), the time after which it comes back, or comes to its mirror
-    image where sign is -1 [s] (count,), the gap that is left, as a share of the states' magnitudes (count,), and
-    whether Newton's method has come that far that they may be called closed (count,)."""
+    image where sign is -1 [s] (count,), the gap that is left, as a share of the states' magnitudes (count,), whether
+    Newton's method has come that far that they may be called closed (count,), and the number of `swings` in that time:
+    one to the other side in half a period of the simplest cycles, two in a whole one."""
 
     states: np.ndarray
     times: np.ndarray
     sign: float
     gaps: np.ndarray
     closed: np.ndarray
+    swings: int
 
     def take(self, numbers: np.ndarray) -> Orbits:
         """The orbits with these numbers."""
-        return Orbits(self.states[numbers], self.times[numbers], self.sign, self.gaps[numbers], self.closed[numbers])
+        arrays = (self.states[numbers], self.times[numbers], self.sign, self.gaps[numbers], self.closed[numbers])
+        return Orbits(*arrays, self.swings)
 
 
 def shoot(stages: Ensemble, states: np.ndarray, times: np.ndarray, sign: float, rtol: float) -> Shot:
@@ -72,15 +75,24 @@ def shoot(stages: Ensemble, states: np.ndarray, times: np.ndarray, sign: float, 
     return Shot(sign * ends[:, 0, :size], flows, np.all(done(results).reshape(count, size), axis=1))
 
 
-def close(stages: Ensemble, states: np.ndarray, times: np.ndarray, sign: float, rtol: float) -> Orbits:
+def simplest(sign: float) -> int:
+    """The swings in half a period (sign -1), or in a whole one, of the simplest cycles."""
+    return 1 if sign < 0 else 2
+
+
+def close(
+    stages: Ensemble, states: np.ndarray, times: np.ndarray, sign: float, rtol: float, swings: int | None = None
+) -> Orbits:
     """Close orbits from guesses: states (count, states) at which the stage sticks, and times [s] (count,).
 
-    `sign` is -1 for half a period of a symmetric cycle, 1 for a whole one. The phase is that at which the integrator's
+    `sign` is -1 for half a period of a symmetric cycle, 1 for a whole one; `swings` are those in that time, if they are
+    not as few as there may be. The phase is that at which the integrator's
     state makes the actuator exert no force on a stage at rest. Where a limiter chatters, the flow's derivative changes
     from one nanometre to the next and points nowhere; the last Jacobian from farther away then serves for as many
     steps as it takes.
     """
-    return _solved(_Shooting(lambda which, places: stages.take(which), states, times, sign, rtol)).orbits
+    orbits = _solved(_Shooting(lambda which, places: stages.take(which), states, times, sign, rtol)).orbits
+    return replace(orbits, swings=swings or orbits.swings)
 
 
 @dataclass(frozen=True)
@@ -140,7 +152,7 @@ class _Shooting:
 
     def advance(self) -> bool:
         """One step of the orbits still on their way; whether any is on its way still."""
-        far = self.gaps > RENEWED
+        far = self.gaps > (RENEWED if self.chatters else FINEST)
         for which in (np.flatnonzero(self.active & far), np.flatnonzero(self.active & ~far)):
             if which.size:
                 self._advance(which, renew=bool(far[which[0]]))
@@ -203,7 +215,8 @@ class _Shooting:
     @property
     def orbits(self) -> Orbits:
         limit = CLOSED_CHATTERING if self.chatters else CLOSED
-        return Orbits(self.best_states, self.best_times, self.sign, self.gaps, self.gaps < limit)
+        closed = self.gaps < limit
+        return Orbits(self.best_states, self.best_times, self.sign, self.gaps, closed, simplest(self.sign))
 
 
 class _Following(_Shooting):

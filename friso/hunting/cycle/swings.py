@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from friso.engine.arrays import Results
 from friso.hunting.cycle.ensemble import Ensemble, done
 
 LEG = 0.5
@@ -34,6 +35,22 @@ def swings(stages: Ensemble, starts: np.ndarray, durations: np.ndarray, most: in
     values = np.hstack([position[:, None], np.where(held, results.turn_values, np.nan)])
     times = np.hstack([np.zeros((runs, 1)), results.turn_times])
     return _zigzag(values, times, legs, np.sign(position), most)
+
+
+def last_swings(results: Results, legs: np.ndarray, most: int) -> tuple[np.ndarray, np.ndarray]:
+    """Where runs turned last [m] and when [s], shape (runs, most), the last swing in the last column, NaN before the
+    first: legs are at least `legs` [m] long, shape (runs,), and the swing that a run ends in does not count."""
+    runs, room = results.turn_values.shape
+    held = (np.arange(room) < results.turn_counts[:, None]) & done(results)[:, None]
+    values = np.where(held, results.turn_values, np.nan)
+    side = np.sign(values[:, 1] - values[:, 0]) if room > 1 else np.ones(runs)
+    extrema = _zigzag(values, results.turn_times, legs, np.where(side == 0, 1.0, side), room)
+    count = np.isfinite(extrema.values).sum(axis=1) - 1
+    which = count[:, None] - most + np.arange(most)
+    inside = which >= 0
+    rows, places = np.arange(runs)[:, None], np.where(inside, which, 0)
+    at, when = (np.where(inside, column[rows, places], np.nan) for column in (extrema.values, extrema.times))
+    return at, when
 
 
 def _zigzag(values: np.ndarray, times: np.ndarray, least: np.ndarray, side: np.ndarray, most: int) -> Swings:

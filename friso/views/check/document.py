@@ -9,7 +9,7 @@ from friso.views.check.words import answer
 from friso.views.documents import plain_json
 
 if TYPE_CHECKING:
-    from friso.hunting import Case, Cycle, Judgement, Margin
+    from friso.hunting import Case, Cycle, Judgement, Margin, Swing
     from friso.studies.draws import Draws
     from friso.studies.shares import Share
 
@@ -43,6 +43,8 @@ def _case(case: Case) -> dict[str, Any]:
         "moves": {"drawn": judgement.moves.drawn, "hunting": judgement.moves.hunting} if judgement.moves else None,
         "observed": judgement.observed,
         "loop_unstable_while_it": case.unstable,
+        "observed_swings": [_swing(swing) for swing in judgement.hunting.observed],
+        "certain": judgement.hunting.certain,
         "solver": {
             "status": case.solver.status,
             "steps": case.solver.steps,
@@ -64,6 +66,10 @@ def _cycle(cycle: Cycle) -> dict[str, Any]:
         "residual": cycle.residual,
         "time_constant_s": cycle.time_constant,
     }
+
+
+def _swing(swing: Swing) -> dict[str, Any]:
+    return {"amplitude_m": swing.amplitude, "period_s": swing.period, "regular": swing.regular}
 
 
 def _kick(judgement: Judgement) -> dict[str, Any] | None:

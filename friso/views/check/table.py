@@ -54,6 +54,13 @@ def _other(cycle: Cycle) -> str:
     return f"{kind}, {plus_minus(cycle.amplitude, 'm', 4)}, {'attracts' if cycle.attracts else 'repels'}"
 
 
+def _observed(case: Case) -> str:
+    swings = case.judgement.hunting.observed
+    return (
+        "; ".join(f"{plus_minus(s.amplitude, 'm', 4)} every {with_unit(s.period, 's', 4)}" for s in swings) or NOTHING
+    )
+
+
 def _edge(case: Case) -> str:
     edge = case.judgement.margin
     if edge is None:
@@ -108,6 +115,7 @@ _COLUMNS: dict[str, Callable[[Case], str]] = {
     "Hunting multiplier": _of_the_cycle(_multiplier),
     "Multiplier taken over": _of_the_cycle(_decided),
     "Other hunting cycles": _others,
+    "Observed in simulations": _observed,
     "Time constant of transients": _of_the_cycle(lambda cycle: with_unit(cycle.time_constant, "s")),
     "Edge of hunting": _edge,
     "Displacements that hunt": lambda case: _kicks(case.judgement.displacement, "m"),

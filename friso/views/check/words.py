@@ -64,7 +64,9 @@ def at_the_end(case: Case) -> str:
 def _hunting(case: Case) -> str:
     if not case.judgement.observed:
         return f"hunts, {_swing(case)}."
-    seen = f"No cycle could be computed ({case.judgement.hunting.reason}); the verdict is that of a long simulation."
+    seen = "This was observed in long simulations: no orbit that attracts could be closed."
+    if case.judgement.swing:
+        return f"hunts, {_swing(case)}. {seen}"
     return f"hunts, {at_the_end(case)} peak to peak{_every(case)}. {seen}"
 
 
@@ -76,12 +78,13 @@ def _bistable(case: Case) -> str:
         starts.append(f"{100 * moves.fraction:.0f} % of the moves tried ({like})")
     if not starts:
         return f"settles after this move, and none of the kicks and moves tried starts hunting ({_swing(case)})."
-    return f"settles after this move, but {listed(starts, 'or')} can start hunting, {_swing(case)}."
+    seen = " (observed in simulations; no orbit that attracts could be closed)" if case.judgement.observed else ""
+    return f"settles after this move, but {listed(starts, 'or')} can start hunting, {_swing(case)}{seen}."
 
 
 def _transient(case: Case) -> str:
     known, end = case.judgement, _end(case)
-    if known.hunting.returns is None:
+    if not known.hunting.possible:
         return f"cannot hunt, because {known.hunting.reason}; but this motion has not settled at its end ({end})."
     says = [f"transient: no cycle attracts, but this motion has not settled at its end ({end})."]
     if known.cycle:
@@ -103,7 +106,7 @@ def _settling(case: Case) -> str:
     else:
         says = f"settles, but not to within {BANDS[_TEN_MICRON]} ({_end(case)})."
     hunting = case.judgement.hunting
-    return says if hunting.returns else f"{says} It cannot hunt, because {hunting.reason}."
+    return says if hunting.possible else f"{says} It cannot hunt, because {hunting.reason}."
 
 
 def _outlook(case: Case) -> list[str]:
@@ -113,7 +116,7 @@ def _outlook(case: Case) -> list[str]:
     if known.margin:
         least = "" if known.margin.certain else "at least "
         says.append(f"Hunting is possible {least}{_below(known.margin)}.")
-    elif known.hunting.returns:
+    elif known.hunting.possible:
         says.append(f"No hunting was found down to 1/{FARTHEST:g} of this bandwidth.")
     return says
 
@@ -130,7 +133,7 @@ def _remedy(item: ShownCase, cases: Mapping[str, Case]) -> list[str]:
     ways = [_faster(item.case, known.margin)] if known.margin else []
     ways += ["free the joint"] if _freeing_helps(item, cases) else []
     says = [f"{ways[0][0].upper()}{listed(ways, 'or')[1:]}."] if ways else []
-    if known.margin or known.observed or not known.hunting.cycles[0].attracts:
+    if known.margin or known.hunting.target is None:
         return says
     return [f"No bandwidth up to {FARTHEST:g} times this one was found to stop it.", *says]
 
@@ -156,9 +159,9 @@ def _freeing_helps(item: ShownCase, cases: Mapping[str, Case]) -> bool:
 
 def _swing(case: Case) -> str:
     """The size of the hunting cycle, e.g. "±0.52 mm every 1.63 s"."""
-    cycle = case.judgement.cycle
-    assert cycle  # one that attracts, or the verdict were another
-    return f"{plus_minus(cycle.amplitude, 'm')} every {with_unit(cycle.period, 's')}"
+    swing = case.judgement.swing
+    assert swing  # it attracts, or the verdict were another
+    return f"{plus_minus(swing.amplitude, 'm')} every {with_unit(swing.period, 's')}"
 
 
 def _end(case: Case) -> str:

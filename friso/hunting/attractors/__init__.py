@@ -1,0 +1,113 @@
+"""Which stages something attracts that swings for ever, and what: cycles of any period, of many stages at once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from friso.hunting.attractors.rounds import typical_period
+from friso.hunting.attractors.starts import Starts
+from friso.hunting.attractors.survey import Survey, Swinging
+from friso.hunting.cycle.ensemble import Ensemble
+from friso.hunting.cycle.find import ROUGH, RTOL, Cycles, asymmetric_cycles, symmetric_cycles, whole_cycles
+from friso.hunting.cycle.return_map import return_map
+
+PERIODS, CONSTANTS = (60.0, 600.0), 8.0
+"""Periods after which a motion has come to what attracts it, at least and at most, and time constants of deviations
+from that: near a flip transients last."""
+
+PATIENT = 3.0
+"""Longest period that these are counted in, in units of a typical one."""
+
+SEEN = 6.0
+"""Periods, however long, that are waited for at least."""
+
+
+@dataclass(frozen=True)
+class Target:
+    """What all motions of stages end in that do not come to rest, arrays of shape (count,) or numbers: they swing by
+    the `amplitude` [m], half of peak to peak, at least; the `period` is not longer than this [s]; and they do so once
+    the time `lasting` has passed [s]."""
+
+    amplitude: Any
+    period: Any
+    lasting: Any
+
+    def of(self, numbers: Any) -> Target:
+        """That of the stages with these numbers, or of one."""
+        return Target(self.amplitude[numbers], self.period[numbers], self.lasting[numbers])
+
+
+@dataclass(frozen=True)
+class Attractors:
+    """Of stages: the motions that attract, of each stage those that were looked for (see `attractors`); whether what
+    attracts is `known`, shape (count,) (not where a simulation that had to decide failed); a `typical` period of
+    hunting [s], shape (count,); and of a thorough survey the cycles that the return map suggests, attracting or not:
+    `families`, the symmetric ones first (of stages that are not symmetric, those of a whole period)."""
+
+    motions: tuple[Swinging, ...]
+    known: np.ndarray
+    typical: np.ndarray
+    families: tuple[Cycles, ...]
+
+    @property
+    def attracts(self) -> np.ndarray:
+        """Which stages something attracts, shape (count,)."""
+        some = np.zeros(len(self.known), bool)
+        some[[motion.stage for motion in self.motions]] = True
+        return some
+
+    @property
+    def target(self) -> Target:
+        """What the stages' motions end in, arrays of shape (count,): NaN where nothing attracts."""
+        amplitude, period, lasting = (np.full(len(self.known), np.nan) for _ in range(3))
+        for motion in self.motions:
+            k, unit = motion.stage, min(motion.period, PATIENT * self.typical[motion.stage])
+            amplitude[k] = np.fmin(amplitude[k], motion.amplitude)
+            period[k] = np.fmax(period[k], motion.period)
+            periods = np.clip(np.nan_to_num(CONSTANTS * motion.time_constant / unit), *PERIODS)
+            lasting[k] = np.fmax(lasting[k], max(periods * unit, SEEN * motion.period))
+        return Target(amplitude, period, lasting)
+
+    def take(self, numbers: np.ndarray) -> Attractors:
+        """Those of the stages with these numbers."""
+        of: dict[int, list[Swinging]] = {}
+        for motion in self.motions:
+            of.setdefault(motion.stage, []).append(motion)
+        motions = (replace(motion, stage=k) for k, n in enumerate(numbers.tolist()) for motion in of.get(n, ()))
+        families = tuple(cycles.take(numbers) for cycles in self.families)
+        return Attractors(tuple(motions), self.known[numbers], self.typical[numbers], families)
+
+
+@np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
+def attractors(
+    stages: Ensemble, thorough: bool = False, rtol: float = RTOL, tried: np.ndarray | None = None
+) -> Attractors:
+    """What attracts: everything that simulations from many starts end in. Of many stages at once one motion that
+    attracts is enough; a `thorough` survey looks for all of them, and for the cycles that the return map suggests.
+    Orbits are closed to the relative tolerance. Motions begin from the distances `tried` [m], (count, n), too, where
+    they are finite."""
+    survey, every = Survey(stages.count, thorough, rtol), np.arange(stages.count)
+    families = _families(stages, rtol) if thorough else ()
+    starts = Starts(stages)
+    starts.spread(thorough)
+    for cycles in families:
+        survey.slow_down(every, cycles)
+        starts.beside(cycles)
+        if (drawn := np.flatnonzero(cycles.attracting)).size:
+            survey.confirm(starts.on(cycles, drawn), drawn, cycles.take(drawn))
+    if tried is not None:
+        starts.stuck_at(tried)
+    survey.follow(*starts.runs())
+    known = survey.attracted | ~survey.unknown
+    return Attractors(tuple(survey.attracting), known, typical_period(stages), families)
+
+
+def _families(stages: Ensemble, rtol: float) -> tuple[Cycles, ...]:
+    """The cycles that the return map suggests."""
+    there = return_map(stages, ROUGH)
+    if stages.symmetric.all():
+        return symmetric_cycles(stages, rtol, there), asymmetric_cycles(stages, there, rtol)
+    return (whole_cycles(stages, rtol, there),)

@@ -1,0 +1,59 @@
+"""Orbits closed from runs that repeat themselves, after any number of swings."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from friso.hunting.attractors.rounds import RTOL, Followed
+from friso.hunting.cycle.find import Cycles, described
+from friso.hunting.cycle.rest import relaxed
+from friso.hunting.cycle.shooting import close
+
+SAMPLES = 400
+"""Samples of the time in which a run repeats itself."""
+
+STILL = 1e-3
+"""Share of peak to peak by which a stage that stands still moves from one sample to the next at most."""
+
+NEAR = 0.2
+"""Share of peak to peak by which that of an orbit may differ from the run that it was closed from."""
+
+
+def closed(
+    runs: Followed, swings: np.ndarray, times: np.ndarray, sizes: np.ndarray, rtol: float
+) -> list[tuple[np.ndarray, Cycles]]:
+    """The cycles beside runs that repeat themselves after numbers of swings and times [s], with sizes from peak to peak
+    [m], each of shape (runs,): in groups of as many swings, the numbers of the runs and their cycles, which are not
+    `found` where no orbit like the run could be closed."""
+    states = _where_they_stick(runs, times)
+    parts = []
+    for n in np.unique(swings):
+        own = np.flatnonzero(swings == n)
+        sign = -1.0 if n % 2 else 1.0
+        stages, starts = runs.stages.take(own), states[own]
+        if sign < 0:
+            starts = starts * np.sign(starts[:, stages.sticking])[:, None]
+        cycles = described(stages, close(stages, starts, times[own], sign, rtol, int(n)), rtol)
+        cycles.found[~(np.abs(2 * cycles.amplitude / sizes[own] - 1) < NEAR)] = False
+        parts.append((own, cycles))
+    return parts
+
+
+def _where_they_stick(some: Followed, times: np.ndarray) -> np.ndarray:
+    """States (runs, states) that runs pass within the next times [s], (runs,), where the integrator is such that the
+    actuator exerts no force on a stage at rest: of several that before which the stage has stood still for longest."""
+    stages, size = some.stages, len(some.stages.kernel.states)
+    every, balance = np.arange(stages.count), relaxed(stages)
+    ahead = np.zeros(stages.count)
+    for k in every:
+        one, step = some.take(every[k : k + 1]), float(times[k]) / SAMPLES
+        path = one.stages.run(one.states, 2 * times[k : k + 1], RTOL, interval=step).samples[0]
+        off = path[:, stages.integral] - balance[k] * path[:, stages.sticking]
+        still = np.abs(np.diff(path[:, stages.sticking])) < STILL * np.ptp(path[:, stages.sticking])
+        moves = np.where(~still, np.arange(len(still)), -1)
+        stood = np.arange(len(still)) - np.maximum.accumulate(moves)
+        crossed = np.flatnonzero((off[:-1] * off[1:] <= 0) & np.isfinite(off[1:]))
+        if crossed.size:
+            j = crossed[stood[crossed].argmax()]
+            ahead[k] = step * (j + off[j] / (off[j] - off[j + 1]))
+    return stages.run(some.states, np.maximum(ahead, 1e-9 * times), RTOL).ends[:, :size]

@@ -1,0 +1,65 @@
+"""Whether swings repeat themselves: after how many of them, and after what time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+MOST = 12
+"""Swings after which a motion has to repeat itself at most."""
+
+SAME = 0.03
+"""Share of the largest swing by which one that repeats another may differ: runs at usual tolerances scatter by half of
+it where a stage swings by far less than it is displaced by the break-away force."""
+
+
+CLOSER = 0.2
+"""Share of the error after fewer swings that there is after more if the motion repeats itself after these."""
+
+
+@dataclass(frozen=True)
+class Recurrence:
+    """Of runs, arrays of shape (runs,): the least number of swings after which each repeats itself, `swings` (0: it
+    does not), and the number after which it does so best, `better`; the times that these take, `time` and
+    `better_time` [s]; peak to peak, `size` [m], the share of that by which it fails to repeat itself, `off`; and the
+    mean size of single swings, `mean` [m]."""
+
+    swings: np.ndarray
+    time: np.ndarray
+    better: np.ndarray
+    better_time: np.ndarray
+    size: np.ndarray
+    off: np.ndarray
+    mean: np.ndarray
+
+    def take(self, numbers: np.ndarray) -> Recurrence:
+        """Those of the runs with these numbers."""
+        return Recurrence(*(getattr(self, field.name)[numbers] for field in fields(self)))
+
+
+@np.errstate(all="ignore")  # swings that a run does not have are NaN
+def recurrence(values: np.ndarray, times: np.ndarray, mirrored: np.ndarray) -> Recurrence:
+    """How the swings of runs end: where they turn [m] and when [s], shape (runs, swings), the last in the last column,
+    NaN before the first. Where `mirrored`, shape (runs,), a motion may repeat as its mirror image, after an odd number
+    of swings; else it cannot."""
+    runs, room = values.shape
+    legs = np.abs(np.diff(values, axis=1))
+    mean = np.nansum(legs, axis=1) / np.maximum(np.isfinite(legs).sum(axis=1), 1)
+    there = np.isfinite(values)
+    size = np.max(values, axis=1, initial=-np.inf, where=there) - np.min(values, axis=1, initial=np.inf, where=there)
+    swings, better = np.zeros(runs, np.int64), np.zeros(runs, np.int64)
+    time, better_time, least = (np.full(runs, np.nan) for _ in range(3))
+    for n in range(1, MOST + 1):
+        seen = max(n, 4)  # and all of these have to repeat what was n swings before
+        if room < seen + n:
+            break
+        last, before = slice(room - seen, room), slice(room - seen - n, room - n)
+        off = np.abs(values[:, last] - (-1) ** n * values[:, before]).max(axis=1) / size
+        takes = (times[:, last] - times[:, before]).mean(axis=1)
+        same = (off <= SAME) & (mirrored | (n % 2 == 0))
+        first = same & (swings == 0)
+        swings[first], time[first] = n, takes[first]
+        closer = first | (same & (off < CLOSER * least))
+        better[closer], better_time[closer], least[closer] = n, takes[closer], off[closer]
+    return Recurrence(swings, time, better, better_time, np.where(size > 0, size, 0.0), least, mean)

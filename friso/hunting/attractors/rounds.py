@@ -1,0 +1,138 @@
+"""What becomes of stages that start from many states: followed in rounds, each longer than the one before, until they
+rest or repeat themselves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from friso.engine.arrays import STATISTICS
+from friso.hunting.attractors.recurrence import Recurrence, recurrence
+from friso.hunting.cycle.ensemble import Ensemble, done
+from friso.hunting.cycle.rest import wait
+from friso.hunting.cycle.return_map import PATIENCE, follow
+from friso.hunting.cycle.swings import last_swings
+
+RTOL = 1e-7
+"""Relative tolerance of these runs."""
+
+PERIODS, LONGER = 24.0, 3.0
+"""Typical periods in the first round, and how many times as long as the last the next round is."""
+
+TYPICAL = 0.3
+"""Distance, in units of the deflection of the loop by the break-away force, whose cycle is typical."""
+
+KEPT = 32
+"""Swings at the end of a round that are looked at."""
+
+LEG = 0.25
+"""Legs of a swing are at least this share of peak to peak."""
+
+RESOLVED = 0.004
+"""Least swing that is looked at, in units of the deflection of the loop by the break-away force."""
+
+CREEPS = np.geomspace(0.001, 1.0, 31)
+"""Distances, in the same units, that are tried for the one from which on a stage breaks away."""
+
+ACROSS = 0.05
+"""How far a stage that breaks away swings across its reference at least, as a share of the distance."""
+
+WOUND = 4.0
+"""For how many waits a stage has to stand still within half of the distance from which it would break away, until it
+surely rests: the integrator has passed from one limit to the other twice by then."""
+
+
+@dataclass(frozen=True)
+class Followed:
+    """Runs on their way, each of a stage of the ensemble `stages`, one for each; their states (runs, kept) now; the
+    durations of their next round [s], the distance from which they break away, `loose` [m], and whether their mirror
+    images are motions too, `mirrored`, each of shape (runs,)."""
+
+    stages: Ensemble
+    states: np.ndarray
+    durations: np.ndarray
+    loose: np.ndarray
+    mirrored: np.ndarray
+
+    def take(self, numbers: np.ndarray) -> Followed:
+        """The runs with these numbers."""
+        arrays = (self.states, self.durations, self.loose, self.mirrored)
+        return Followed(self.stages.take(numbers), *(array[numbers] for array in arrays))
+
+
+@dataclass(frozen=True)
+class Ends:
+    """How a round ended, arrays of shape (runs,): which runs were `completed`, which of them surely `rest`, and how
+    their last swings repeat, with where these turn [m] and when [s], (runs, swings)."""
+
+    completed: np.ndarray
+    rest: np.ndarray
+    repeats: Recurrence
+    values: np.ndarray
+    times: np.ndarray
+
+    def take(self, numbers: np.ndarray) -> Ends:
+        """Those of the runs with these numbers."""
+        arrays = (self.values[numbers], self.times[numbers])
+        return Ends(self.completed[numbers], self.rest[numbers], self.repeats.take(numbers), *arrays)
+
+
+def typical_period(stages: Ensemble) -> np.ndarray:
+    """About the period of a cycle [s], shape (count,)."""
+    return 2 * (wait(stages, TYPICAL * stages.length) + 2 * np.pi / stages.number("rate"))
+
+
+def loose_from(stages: Ensemble) -> np.ndarray:
+    """The distance [m] up to which a stage creeps home, and from which on it breaks away, shape (count,)."""
+    distances = CREEPS * stages.length[:, None]
+    sides = (1.0,) if stages.symmetric.all() else (1.0, -1.0)
+    returns = np.max([follow(stages, distances, RTOL, side).returns for side in sides], axis=0)
+    breaks = returns > ACROSS * distances
+    first = np.where(breaks.any(axis=1), breaks.argmax(axis=1), len(CREEPS) - 1)
+    return distances[np.arange(stages.count), first]
+
+
+def one_round(runs: Followed) -> tuple[Followed, Ends]:
+    """Follow runs for their durations: the runs from where they are then, and how they ended."""
+    stages, count = runs.stages, runs.stages.count
+    ends = np.empty_like(runs.states)
+    completed, still = np.zeros(count, bool), np.zeros(count, bool)
+    values, times = (np.full((count, KEPT), np.nan) for _ in range(2))
+    size = np.round(np.log2(stages.length))  # turning points are kept by one least swing for all runs of a batch
+    for each in np.unique(size):
+        which = np.flatnonzero(size == each)
+        some, length = stages.take(which), stages.length[which]
+        least = RESOLVED * float(length.min())
+        results = some.run(
+            runs.states[which],
+            runs.durations[which],
+            RTOL,
+            with_modes=True,
+            window=0.5,
+            record_from=np.inf,
+            least_swing=least,
+        )
+        ends[which] = results.ends
+        completed[which] = done(results)
+        high, low = (results.statistics[:, STATISTICS.index(name)] for name in ("deviation_max", "deviation_min"))
+        values[which], times[which] = last_swings(results, np.maximum(LEG * (high - low), least), KEPT)
+        still[which] = _stands_still(some, results.ends, high - low, runs.durations[which], runs.loose[which])
+    repeats = recurrence(values, times, runs.mirrored)
+    return replace(runs, states=ends), Ends(completed, completed & still, repeats, values, times)
+
+
+def _stands_still(
+    stages: Ensemble, ends: np.ndarray, swing: np.ndarray, durations: np.ndarray, loose: np.ndarray
+) -> np.ndarray:
+    """Which runs have moved so little, for so long, that they will not break away again."""
+    off = np.abs(ends[:, stages.sticking])
+    home = (swing < loose / 2) & (off < loose / 2) & (durations / 2 > WOUND * wait(stages, loose))
+    aside = (swing < 2 * RESOLVED * stages.length) & (durations / 2 > 2 * PATIENCE * wait(stages, off))
+    return home | aside
+
+
+def lengthened(runs: Followed) -> Followed:
+    """The same, with a longer round before them: long enough for a stage that stands still to show that it rests."""
+    least = 2.1 * WOUND * wait(runs.stages, runs.loose)
+    return replace(runs, durations=np.maximum(LONGER * runs.durations, least))

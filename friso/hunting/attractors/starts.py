@@ -1,0 +1,80 @@
+"""Where motions begin that are to end in everything that attracts a stage."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from friso.hunting.attractors.rounds import PERIODS, Followed, loose_from, typical_period
+from friso.hunting.cycle.ensemble import Ensemble
+from friso.hunting.cycle.find import Cycles
+from friso.hunting.cycle.rest import pushed, stuck
+
+MANY = np.geomspace(0.01, 3.0, 96), np.geomspace(4.0, 300.0, 16)
+"""Distances at which a stage sticks at first, in units of the deflection of the loop by the break-away force: nearer
+than that it creeps home, farther off it does not stick."""
+
+FEW = np.geomspace(0.01, 3.0, 48), np.geomspace(5.0, 300.0, 6)
+"""The same for many stages at once."""
+
+PUSHES = np.geomspace(0.03, 300.0, 12)
+"""Velocities of stages at their reference, in units of what deflects the loop by as much."""
+
+ASIDE = (-0.03, -0.003, 0.003, 0.03)
+"""Shares of the distance by which motions begin beside a cycle."""
+
+
+class Starts:
+    """Runs that begin, of stages of an ensemble: their states (runs, states) and the stages' numbers (runs,)."""
+
+    def __init__(self, stages: Ensemble) -> None:
+        self.stages = stages
+        self.loose, self.period = loose_from(stages), typical_period(stages)
+        self.of: list[np.ndarray] = []
+        self.states: list[np.ndarray] = []
+
+    def spread(self, thorough: bool) -> None:
+        """Stuck at distances on both sides (on one of symmetric stages), and pushed."""
+        near, far = MANY if thorough else FEW
+        units = np.concatenate([near, far])
+        for side in (1.0, -1.0):
+            which = np.arange(self.stages.count) if side > 0 else np.flatnonzero(~self.stages.symmetric)
+            if which.size:
+                of = np.repeat(which, len(units))
+                some = self.stages.take(of)
+                self._add(of, stuck(some, side * np.tile(units, which.size) * some.length))
+                if thorough:
+                    of = np.repeat(which, len(PUSHES))
+                    some = self.stages.take(of)
+                    speeds = np.tile(PUSHES, which.size) * some.length * some.number("rate")
+                    self._add(of, pushed(some, side * speeds))
+
+    def beside(self, cycles: Cycles) -> None:
+        """Beside cycles that repel."""
+        which = np.flatnonzero(cycles.found & ~cycles.attracting & np.isfinite(cycles.direction).all(axis=1))
+        of, away = np.repeat(which, len(ASIDE)), np.tile(ASIDE, which.size)
+        size = np.abs(cycles.states[of, self.stages.sticking])
+        self._add(of, cycles.states[of] + (away * size)[:, None] * cycles.direction[of])
+
+    def stuck_at(self, distances: np.ndarray) -> None:
+        """Stuck at distances [m], (count, n), those that are finite."""
+        of, which = np.nonzero(np.isfinite(distances))
+        if of.size:
+            self._add(of, stuck(self.stages.take(of), distances[of, which]))
+
+    def _add(self, of: np.ndarray, states: np.ndarray) -> None:
+        self.of.append(of)
+        self.states.append(states)
+
+    def runs(self) -> tuple[Followed, np.ndarray]:
+        """The runs before their first round, and the numbers of their stages."""
+        of = np.concatenate(self.of)
+        return self._begun(of, np.concatenate(self.states)), of
+
+    def on(self, cycles: Cycles, which: np.ndarray) -> Followed:
+        """Runs that begin on the cycles of some stages."""
+        return self._begun(which, cycles.states[which])
+
+    def _begun(self, of: np.ndarray, states: np.ndarray) -> Followed:
+        stages, mirrored = self.stages.take(of), self.stages.symmetric[of]
+        kept = stages.kernel.with_modes(states, np.zeros(3), stages.values)
+        return Followed(stages, kept, PERIODS * self.period[of], self.loose[of], mirrored)

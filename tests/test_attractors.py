@@ -1,0 +1,151 @@
+"""Everything that attracts a stage: stages whose symmetric cycle repels, or rests on jumps of the return map, and which
+hunt all the same. What they do is simulated here from the kicks that start it, at two tolerances."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from variants import VARIANTS
+
+import friso
+from friso.hunting.attractors import Attractors, attractors
+from friso.hunting.attractors.recurrence import recurrence
+from friso.hunting.cycle.ensemble import Ensemble
+from friso.hunting.cycle.rest import stuck
+from friso.hunting.margin import margin
+from friso.stage import Stage
+
+LONG_WAIT = VARIANTS["free, parasitic"].replace(
+    {
+        "masses": {"cart": "3.2095 kg", "stage": "1.4139 kg"},
+        "friction": {
+            "model": "lugre",
+            "static": "40.457 N",
+            "coulomb": "10.545 N",
+            "stribeck_velocity": "0.43629 mm/s",
+            "stribeck_exponent": 2,
+            "bristle_stiffness": "651880 N/m",
+            "bristle_damping": "1410.9 N*s/m",
+            "viscous": "5 N*s/m",
+        },
+        "joint": {
+            "locked": False,
+            "stiffness": "8146.7 N/m",
+            "damping": "3.178 N*s/m",
+            "stroke": "60.435 um",
+            "limiter_stiffness": "34836000 N/m",
+            "limiter_damping": "1955 N*s/m",
+        },
+        "parasitic": {"frequency": "581.6 Hz", "mass": "0.8654 kg", "damping_ratio": 0.0042567},
+        "controller": {"kind": "pid", "crossover": "3.531 Hz", "alpha": 0.253, "beta": 3.69},
+    }
+)
+"""Beside a cycle of 7 s that repels, one of 57 s: the stage springs far, and waits nearly at its reference."""
+
+CREEPING = VARIANTS["rigid"].replace(
+    {
+        "masses": {"cart": "2.6276 kg", "stage": "0.07984 kg"},
+        "friction": {
+            "model": "lugre",
+            "static": "28.54 N",
+            "coulomb": "17.928 N",
+            "stribeck_velocity": "9.8268 mm/s",
+            "stribeck_exponent": 2,
+            "bristle_stiffness": "347410 N/m",
+            "bristle_damping": "610.7 N*s/m",
+            "viscous": "1.0802 N*s/m",
+        },
+        "controller": {"kind": "pid", "crossover": "12.3332 Hz", "alpha": 0.186, "beta": 3.62},
+    }
+)
+"""Beyond the flip of its symmetric cycle, but with an asymmetric one that is never left; small distances creep home."""
+
+LIGHT = VARIANTS["rigid"].replace(
+    {"masses": {"cart": "1 g", "stage": "0.5 g"}, "controller.crossover": "34.45 Hz", "controller.tuned_mass": "1.5 g"}
+)
+"""Of a gram and a half, beyond the flip of its symmetric cycle."""
+
+DAMPED = VARIANTS["rigid"].replace({"controller.alpha": 0.4, "controller.crossover": "8 Hz"})
+"""With much phase lead: the symmetric cycle attracts, and creeps through its reversals."""
+
+HUNTING = {  # stage, release that hunts [m], amplitude [m], period [s]
+    "long wait": (LONG_WAIT, 16.6e-3, 22.3e-3, 56.6),
+    "creeping": (CREEPING, 1.1043e-3, 0.876e-3, 2.13),
+    "light": (LIGHT, 0.2, 16.5e-3, 0.786),
+    "damped": (DAMPED, 4e-3, 0.386e-3, 0.476),
+}
+
+
+def held(chosen: Stage) -> Ensemble:
+    return Ensemble.held(chosen.flat(), 1)
+
+
+@cache
+def known(name: str) -> Attractors:
+    return attractors(held(HUNTING[name][0]), thorough=True)
+
+
+@pytest.mark.parametrize("name", HUNTING)
+def test_what_attracts_beside_cycles_that_repel(name: str) -> None:
+    """Amplitudes and periods are those of simulations at two tolerances (see the next test), to 1 %."""
+    _, _, amplitude, period = HUNTING[name]
+    (motion,) = known(name).motions
+    assert motion.amplitude == pytest.approx(amplitude, rel=0.01)
+    assert motion.period == pytest.approx(period, rel=0.01)
+    assert known(name).known.all()
+
+
+@pytest.mark.parametrize("rtol", [1e-7, 1e-9])
+@pytest.mark.parametrize("name", HUNTING)
+def test_releases_swing_on(name: str, rtol: float) -> None:
+    """Released from far off, the stage still swings like that after 60 of these periods."""
+    chosen, release, amplitude, period = HUNTING[name]
+    motion = {"kind": "release", "displacement": f"{release} m", "duration": f"{60 * period} s"}
+    response = friso.simulate(chosen.replace({"motion": motion}), rtol=rtol, sample_time=period / 400)
+    late = response.position.sel(time=slice(57 * period, None))
+    assert np.ptp(late.to_numpy()) / 2 == pytest.approx(amplitude, rel=0.02)
+
+
+@pytest.mark.parametrize("name", HUNTING)
+def test_many_stages_at_once_tell_the_same(name: str) -> None:
+    """The survey of many stages, which begins from fewer states, tells what attracts as well."""
+    chosen, _, amplitude, _ = HUNTING[name]
+    stages = held(chosen)
+    found = attractors(stages.take(np.zeros(2, np.int64)))
+    assert found.attracts.tolist() == [True, True]
+    assert found.target.amplitude == pytest.approx([amplitude, amplitude], rel=0.02)
+
+
+def test_a_stage_that_settles_from_everywhere() -> None:
+    """Above its edge at 9.77 Hz the rigid mass has a cycle that repels; nothing attracts."""
+    above = attractors(held(VARIANTS["rigid"].replace({"controller.crossover": "9.9 Hz"})), thorough=True)
+    assert not above.motions
+    assert above.known.all()
+    assert above.families[0].found.all()
+    assert np.isnan(above.target.amplitude).all()
+
+
+def test_the_edge_is_that_of_the_last_attractor() -> None:
+    """Beyond its flip at 11.97 Hz the creeping stage has an asymmetric cycle up to 13.0 Hz: stuck at 0.78 mm or so it
+    swings on just below, and comes to rest from everywhere 1 % above."""
+    edge = margin(CREEPING, attracting=True)
+    assert edge is not None
+    assert edge.certain
+    assert edge.crossover == pytest.approx(13.01, rel=0.004)
+    starts = np.linspace(0.7e-3, 0.85e-3, 61)
+    for crossover, hunts in ((12.95, True), (13.15, False)):
+        flat = CREEPING.replace({"controller.crossover": f"{crossover} Hz"}).flat()
+        several = Ensemble.held(flat, 1).take(np.zeros(len(starts), np.int64))
+        results = several.run(stuck(several, starts), np.full(len(starts), 200.0), 1e-8, window=0.9)
+        assert bool(np.any(np.ptp(results.statistics[:, 1:3], axis=1) > 1e-3)) == hunts
+
+
+def test_swings_that_repeat_themselves() -> None:
+    """A symmetric swing repeats after one turn, mirrored; a leaning one after two; a long-short one after four."""
+    rows = [[1.0, -1.0] * 16, [1.2, -0.9] * 16, [1.0, -0.5, 0.6, -0.4] * 8]
+    times = np.tile(np.cumsum([1.0] * 32), (3, 1))
+    found = recurrence(np.array(rows), times, np.ones(3, bool))
+    assert found.swings.tolist() == [1, 2, 4]
+    assert found.time.tolist() == [1.0, 2.0, 4.0]
+    noisy = recurrence(np.random.default_rng(1).normal(size=(1, 32)), times[:1], np.ones(1, bool))
+    assert noisy.swings.tolist() == [0]
