@@ -167,6 +167,7 @@ def cycles(multipliers: Sequence[float], sign: float = -1.0) -> Cycles:
     reasons = np.where(np.isinf(multiplier), NOT_CLOSED, "").astype(object)
     return Cycles(
         sign,
+        1 if sign < 0 else 2,
         found,
         reasons,
         states=np.zeros((count, 2)),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from friso.hunting.attractors.rounds import RTOL, Followed
+from friso.hunting.attractors.rounds import RTOL, Pending
 from friso.hunting.cycle.find import Cycles, described
 from friso.hunting.cycle.rest import relaxed
 from friso.hunting.cycle.shooting import close
@@ -20,7 +20,7 @@ NEAR = 0.2
 
 
 def closed(
-    runs: Followed, swings: np.ndarray, times: np.ndarray, sizes: np.ndarray, rtol: float
+    runs: Pending, swings: np.ndarray, times: np.ndarray, sizes: np.ndarray, rtol: float
 ) -> list[tuple[np.ndarray, Cycles]]:
     """The cycles beside runs that repeat themselves after numbers of swings and times [s], with sizes from peak to peak
     [m], each of shape (runs,): in groups of as many swings, the numbers of the runs and their cycles, which are not
@@ -39,7 +39,7 @@ def closed(
     return parts
 
 
-def _where_they_stick(some: Followed, times: np.ndarray) -> np.ndarray:
+def _where_they_stick(some: Pending, times: np.ndarray) -> np.ndarray:
     """States (runs, states) that runs pass within the next times [s], (runs,), where the integrator is such that the
     actuator exerts no force on a stage at rest: of several that before which the stage has stood still for longest."""
     stages, size = some.stages, len(some.stages.kernel.states)

@@ -44,7 +44,7 @@ surely rests: the integrator has passed from one limit to the other twice by the
 
 
 @dataclass(frozen=True)
-class Followed:
+class Pending:
     """Runs on their way, each of a stage of the ensemble `stages`, one for each; their states (runs, kept) now; the
     durations of their next round [s], the distance from which they break away, `loose` [m], and whether their mirror
     images are motions too, `mirrored`, each of shape (runs,)."""
@@ -55,10 +55,10 @@ class Followed:
     loose: np.ndarray
     mirrored: np.ndarray
 
-    def take(self, numbers: np.ndarray) -> Followed:
+    def take(self, numbers: np.ndarray) -> Pending:
         """The runs with these numbers."""
         arrays = (self.states, self.durations, self.loose, self.mirrored)
-        return Followed(self.stages.take(numbers), *(array[numbers] for array in arrays))
+        return Pending(self.stages.take(numbers), *(array[numbers] for array in arrays))
 
 
 @dataclass(frozen=True)
@@ -93,7 +93,7 @@ def loose_from(stages: Ensemble) -> np.ndarray:
     return distances[np.arange(stages.count), first]
 
 
-def one_round(runs: Followed) -> tuple[Followed, Ends]:
+def one_round(runs: Pending) -> tuple[Pending, Ends]:
     """Follow runs for their durations: the runs from where they are then, and how they ended."""
     stages, count = runs.stages, runs.stages.count
     ends = np.empty_like(runs.states)
@@ -132,7 +132,7 @@ def _stands_still(
     return home | aside
 
 
-def lengthened(runs: Followed) -> Followed:
+def lengthened(runs: Pending) -> Pending:
     """The same, with a longer round before them: long enough for a stage that stands still to show that it rests."""
     least = 2.1 * WOUND * wait(runs.stages, runs.loose)
     return replace(runs, durations=np.maximum(LONGER * runs.durations, least))

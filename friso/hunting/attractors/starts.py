@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from friso.hunting.attractors.rounds import PERIODS, Followed, loose_from, typical_period
+from friso.hunting.attractors.rounds import PERIODS, Pending, loose_from, typical_period
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import Cycles
 from friso.hunting.cycle.rest import pushed, stuck
@@ -65,16 +65,16 @@ class Starts:
         self.of.append(of)
         self.states.append(states)
 
-    def runs(self) -> tuple[Followed, np.ndarray]:
+    def runs(self) -> tuple[Pending, np.ndarray]:
         """The runs before their first round, and the numbers of their stages."""
         of = np.concatenate(self.of)
         return self._begun(of, np.concatenate(self.states)), of
 
-    def on(self, cycles: Cycles, which: np.ndarray) -> Followed:
+    def on(self, cycles: Cycles, which: np.ndarray) -> Pending:
         """Runs that begin on the cycles of some stages."""
         return self._begun(which, cycles.states[which])
 
-    def _begun(self, of: np.ndarray, states: np.ndarray) -> Followed:
+    def _begun(self, of: np.ndarray, states: np.ndarray) -> Pending:
         stages, mirrored = self.stages.take(of), self.stages.symmetric[of]
         kept = stages.kernel.with_modes(states, np.zeros(3), stages.values)
-        return Followed(stages, kept, PERIODS * self.period[of], self.loose[of], mirrored)
+        return Pending(stages, kept, PERIODS * self.period[of], self.loose[of], mirrored)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from friso.hunting.attractors.closing import closed
-from friso.hunting.attractors.rounds import Ends, Followed, lengthened, one_round
+from friso.hunting.attractors.rounds import Ends, Pending, lengthened, one_round
 from friso.hunting.cycle.find import Cycles
 
 ROUNDS = 5
@@ -147,7 +147,7 @@ class Survey:
             self._repelling += [(int(numbers[k]), size, time), (int(numbers[k]), size, 2 * time)]
         np.maximum.at(self.slowest, numbers[repel], cycles.time_constant[repel])
 
-    def follow(self, runs: Followed, of: np.ndarray) -> None:
+    def follow(self, runs: Pending, of: np.ndarray) -> None:
         """Follow runs, each of the stage with the number `of`, (runs,), to what attracts them."""
         before = np.full(len(of), np.nan)
         for number in range(ROUNDS):
@@ -172,7 +172,7 @@ class Survey:
                     return
             before, runs, of = ends.repeats.mean[on], lengthened(runs.take(on)), of[on]
 
-    def _on(self, runs: Followed, of: np.ndarray, ends: Ends, early: bool = False) -> np.ndarray:
+    def _on(self, runs: Pending, of: np.ndarray, ends: Ends, early: bool = False) -> np.ndarray:
         """The numbers of the runs that swing on without having come to an attractor, once orbits were closed: `early`
         from those alone that repeat themselves well, and unlike any cycle that is known to repel."""
         self.unknown[of[~ends.completed]] = True
@@ -189,7 +189,7 @@ class Survey:
             return self.attracted[of]
         return _like(self._drawn, of, ends)
 
-    def _close(self, runs: Followed, of: np.ndarray, ends: Ends, which: np.ndarray) -> None:
+    def _close(self, runs: Pending, of: np.ndarray, ends: Ends, which: np.ndarray) -> None:
         """Close orbits from one of each kind of runs, of those with some numbers."""
         most, repeats = CLOSED if self.thorough else 1, ends.repeats
         kinds = which[_kinds(of[which], ends.take(which), most)]
@@ -205,7 +205,7 @@ class Survey:
                     kinds_of += zip(*columns, strict=True)  # the runs are not as exact as their orbits
             kinds = kinds[(repeats.better > repeats.swings)[kinds] & ~self._alike(of, ends)[kinds]]
 
-    def _last(self, runs: Followed, of: np.ndarray, ends: Ends, before: np.ndarray) -> None:
+    def _last(self, runs: Pending, of: np.ndarray, ends: Ends, before: np.ndarray) -> None:
         """Take runs that swing to the end for attracted, if they have not decayed; those that may be about to leave a
         cycle that repels are followed for as long as that takes."""
         kinds = _kinds(of, ends, CLOSED)
@@ -221,7 +221,7 @@ class Survey:
             self._observe(of[slow[on]], last.take(on), before[slow[on]])
         self._observe(of[kinds], ends.take(kinds), before[kinds])
 
-    def confirm(self, runs: Followed, of: np.ndarray, cycles: Cycles) -> None:
+    def confirm(self, runs: Pending, of: np.ndarray, cycles: Cycles) -> None:
         """Add those cycles, of the stages with the numbers `of`, (runs,), that a run which begins on them stays on."""
         _, ends = one_round(runs)
         size = np.abs(ends.repeats.size / (2 * cycles.amplitude) - 1) < ALIKE
