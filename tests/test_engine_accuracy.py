@@ -12,10 +12,9 @@ from scipy.linalg import expm
 from scipy.optimize import brentq
 from variants import HOLD, PARASITIC, TOUCHING, VARIANTS, lugre, stage, step, van_dijk
 
-from friso.engine.arrays import Results, Settings, Status
+from friso.engine.arrays import Results, Settings, Status, new_queue
 from friso.engine.batch import RunOptions, prepare, run_chunks
 from friso.engine.kernel import empty_results, kernel
-from friso.engine.shared_queue import new_queue
 from friso.equations import motion
 from friso.equations.structure import structure
 from friso.stage import Stage
@@ -57,7 +56,7 @@ def fixed_steps(h: float, interval: float, changes: dict[str, Any]) -> tuple[Res
     samples = int(flat["motion.duration"] / interval * (1 + 1e-12)) + 1
     results = empty_results(1, 512, samples, len(shape.states))
     settings = Settings(1e-2, 1e6, 1e-6, 1e-5, 0.0, 0.0, interval, np.zeros(1, np.int64))
-    shape.module.run(new_queue(), batch, settings, results)
+    shape.run(new_queue(), batch, settings, results)
     assert results.statuses[0] == Status.DONE
     assert results.statistics[0, 6] == 0
     times = np.arange(samples) * interval

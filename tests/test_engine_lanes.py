@@ -102,8 +102,8 @@ def test_any_order(eight: Kernel, flat: Flat, reference: Results) -> None:
 def test_four_lanes_or_eight(eight: Kernel, flat: Flat, reference: Results) -> None:
     """One lane alone is computed by other instructions, which round differently."""
     four = kernel(structure(VARIANTS["rigid"].flat()), lanes=4)
-    assert four.module.LANES == 4
-    assert eight.module.LANES == 8
+    assert four.layout.lanes == 4
+    assert eight.layout.lanes == 8
     assert_identical(run(four, flat, BASE), reference)
 
 

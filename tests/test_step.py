@@ -3,16 +3,18 @@
 import zlib
 from collections.abc import Callable
 from pathlib import Path
-from types import ModuleType
+from types import ModuleType, SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 import rosenbrock
 import sympy as sp
+from compiled import aligned, step
 from variants import VARIANTS, plain_module
 
-from friso.engine.kernel import kernel
+from friso.engine.kernel import Kernel, kernel
+from friso.engine.layout import ROW
 from friso.engine.tableaus import TABLEAUS
 from friso.equations import motion
 from friso.equations.component import TIME
@@ -33,7 +35,7 @@ class Lanes:
         rng = np.random.default_rng(zlib.crc32(name.encode()))
         flat = VARIANTS[name].flat()
         flat |= {"motion.size": float(motion.size(flat))}
-        self.module, self.count = module, module.LANES
+        self.module, self.layout, self.count = module, SimpleNamespace(**module.LAYOUT), module.LAYOUT["lanes"]
         self.values = [float(flat[key]) for key in module.PARAMETERS]
         scales = np.array(module.scales(self.values), dtype=float)
         scales[~np.isfinite(scales)] = 1e-3
@@ -49,34 +51,39 @@ class Lanes:
         self.r = pieces[rng.integers(len(pieces), size=self.count), 1:]
         sides = [module.surfaces(x, t, r, self.values) for x, t, r in zip(self.x, self.t, self.r, strict=True)]
         self.modes = (np.array(sides, dtype=float).reshape(self.count, -1) > 0).astype(float)
-        self.buffer = np.zeros(module.ROWS * self.count)
+        self.buffer = aligned(np.zeros(self.layout.rows * self.count))
         self._fill(scales)
 
     def row(self, first: int, rows: int) -> np.ndarray:
         """A block of the buffer as a view, shape (rows, lanes)."""
         return self.buffer[first * self.count : (first + rows) * self.count].reshape(rows, self.count)
 
-    def _fill(self, scales: np.ndarray) -> None:
-        m = self.module
-        constants = np.array(m.constants(self.values), dtype=float)
-        self.row(m.X, m.STATES)[:] = self.x.T
-        self.row(m.TOLERANCE, m.STATES)[:] = RTOL * scales[:, None]
-        self.row(m.CONSTANT, m.CONSTANTS)[:] = constants[:, None]
-        self.row(m.MODE, m.KINKS)[:] = self.modes.T
-        self.row(m.REF, 3)[:] = self.r.T
-        self.row(m.TIME, 1)[:] = self.t
-        self.row(m.STOP, 1)[:] = 1e3
-        self.row(m.TRIAL, 1)[:] = self.h
-        self.row(m.LONGEST, 1)[:] = 1.0
+    def dense(self) -> np.ndarray:
+        """The terms of the dense output, shape (terms, states, lanes)."""
+        terms, states = self.layout.dense_terms, self.layout.states
+        return self.row(self.layout.dense, terms * states).reshape(terms, states, self.count)
 
-    def step(self, compiled: bool) -> None:
+    def _fill(self, scales: np.ndarray) -> None:
+        m = self.layout
+        constants = np.array(self.module.constants(self.values), dtype=float)
+        self.row(m.x, m.states)[:] = self.x.T
+        self.row(m.tolerance, m.states)[:] = RTOL * scales[:, None]
+        self.row(m.constant, m.constants)[:] = constants[:, None]
+        self.row(m.mode, m.kinks)[:] = self.modes.T
+        self.row(m.reference, 3)[:] = self.r.T
+        self.row(ROW.time, 1)[:] = self.t
+        self.row(ROW.stop, 1)[:] = 1e3
+        self.row(ROW.trial, 1)[:] = self.h
+        self.row(ROW.longest, 1)[:] = 1.0
+
+    def step(self, compiled: Kernel | None = None) -> list[bool]:
+        """Take a step; which lanes want attention."""
         numbers = RTOL, 1e-6, 1e-5, 1e6
         if compiled:
-            self.module.step(self.buffer, *numbers)
-            return
+            bits = step(compiled, self.buffer, *numbers)
+            return [bool(bits >> lane & 1) for lane in range(self.count)]
         with np.errstate(all="ignore"):  # the expressions are meant for selects, which compute both of their sides
-            for column in self.row(0, self.module.ROWS).T:
-                self.module.step_of_lane(column, *numbers)
+            return [bool(self.module.step(column, *numbers)) for column in self.row(0, self.layout.rows).T]
 
 
 class Twin:
@@ -118,7 +125,7 @@ def test_step_against_plain_python(name: str, method: str, tmp_path: Path) -> No
     """End of the step and dense output agree to what rounding of the state and of the stages may change in them."""
     module = plain_module(VARIANTS[name], tmp_path, method)
     twin, lanes = Twin(name, method), Lanes(name, module)
-    lanes.step(compiled=False)
+    lanes.step()
     compared = 0
     for lane in range(lanes.count):
         x = lanes.x[lane].astype(Real)
@@ -128,11 +135,11 @@ def test_step_against_plain_python(name: str, method: str, tmp_path: Path) -> No
         except FloatingPointError:
             continue
         sizes, spread = np.abs(expected.k), 4 * np.abs(nudged.k - expected.k)
-        end = lanes.row(module.END, module.STATES)[:, lane]
+        end = lanes.row(lanes.layout.end, lanes.layout.states)[:, lane]
         last = np.abs(np.array([*twin.tableau.a[-1], 1.0]))
         rounding = last @ spread + 1e-14 * (np.abs(x) + last @ sizes)
         assert np.all(np.abs(end - expected.end) <= rounding)
-        dense = lanes.row(module.D0, module.DENSE * module.STATES)[:, lane].reshape(module.DENSE, -1)
+        dense = lanes.dense()[:, :, lane]
         weights = np.abs(np.array([row + (0.0,) * (len(sizes) - len(row)) for row in twin.tableau.dense]))
         rounding = weights @ (spread + 1e-14 * sizes)
         assert np.all(np.abs(dense - expected.dense) <= rounding)
@@ -143,12 +150,12 @@ def test_step_against_plain_python(name: str, method: str, tmp_path: Path) -> No
 @pytest.mark.parametrize("name", COMPILED)
 def test_compiled_step_against_the_same_code_line_by_line(name: str) -> None:
     """Compiling (with fused multiply-adds and selects) changes nothing but rounding, nor which lanes want attention."""
-    module = kernel(structure(VARIANTS[name].flat())).module
-    slow, fast = Lanes(name, module), Lanes(name, module)
-    slow.step(compiled=False)
-    fast.step(compiled=True)
-    rows = fast.row(module.END, module.STATES), slow.row(module.END, module.STATES)
-    k = np.abs(slow.row(module.D0, module.DENSE * module.STATES)).reshape(module.DENSE, module.STATES, -1).sum(axis=0)
+    compiled = kernel(structure(VARIANTS[name].flat()))
+    slow, fast = Lanes(name, compiled.module), Lanes(name, compiled.module)
+    assert fast.step(compiled) == slow.step()
+    layout = slow.layout
+    rows = fast.row(layout.end, layout.states), slow.row(layout.end, layout.states)
+    k = np.abs(slow.dense()).sum(axis=0)
     assert np.all(np.abs(rows[0] - rows[1]) <= 1e-10 * (np.abs(slow.x.T) + k))
-    for row in (module.MODE, module.EVENT):
+    for row in (layout.mode, ROW.event):
         assert np.array_equal(fast.row(row, 1), slow.row(row, 1))

@@ -173,7 +173,7 @@ VARIANTS: dict[str, Stage] = {
 
 
 def plain_module(chosen: Stage, folder: Path, method: str = "Rodas5P") -> ModuleType:
-    """The generated module of a stage, not compiled: `module.step_of_lane` runs it line by line."""
+    """The generated module of a stage, not compiled: `module.step` runs it line by line, for one lane."""
     file = folder / "plain_kernel.py"
     form = structure(chosen.flat())
     file.write_text(write_module(assemble(form), TABLEAUS[method], repr(form)))

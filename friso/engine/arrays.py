@@ -68,6 +68,12 @@ class Results(NamedTuple):
     ends: np.ndarray
 
 
+def new_queue() -> np.ndarray:
+    """A queue from which threads take the numbers of their runs, one by one, so that all of them are busy to the end,
+    shape (1,): next comes run 0."""
+    return np.zeros(1, np.int64)
+
+
 STATISTICS = (
     "force_peak",
     "deviation_max",

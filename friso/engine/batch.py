@@ -9,10 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from friso.engine.arrays import STATISTICS, Batch, Results, Settings, Status
+from friso.engine.arrays import STATISTICS, Batch, Results, Settings, Status, new_queue
 from friso.engine.kernel import Kernel, empty_results
 from friso.engine.layout import LANES
-from friso.engine.shared_queue import new_queue
 from friso.equations import motion
 from friso.equations.roles import Steady
 from friso.system import usable_cores
@@ -107,7 +106,7 @@ def prepare(
     modes = np.ascontiguousarray(kernel.modes(starts.T, 0.0, segments[:, 0, 1:].T, values).T)
     first_steps = np.ascontiguousarray(FIRST_STEP / rates)
     longest = LONGEST_SHARE * segments[:, -1, 0]
-    clocks = columns(kernel.module.clock(values)) if kernel.module.CLOCKED else np.zeros((1, 2))
+    clocks = columns(kernel.module.clock(values)) if kernel.layout.clocked else np.zeros((1, 2))
     return Batch(constants, starts, options.rtol * scales, modes, first_steps, longest, segments, windows, clocks)
 
 
@@ -189,11 +188,11 @@ def run_batch(kernel: Kernel, batch: Batch, settings: Settings, results: Results
     workers = min(threads or usable_cores(), -(-len(batch.starts) // LANES))
     arguments = (new_queue(), batch, settings, results)
     if workers == 1:
-        kernel.module.run(*arguments)
+        kernel.run(*arguments)
         return
     with ThreadPoolExecutor(workers) as pool:
         try:
-            for job in [pool.submit(kernel.module.run, *arguments) for _ in range(workers)]:
+            for job in [pool.submit(kernel.run, *arguments) for _ in range(workers)]:
                 job.result()
         except BaseException:
             settings.cancel[0] = 1

@@ -1,17 +1,17 @@
-"""The program that fills a cache entry: writes a kernel's module, and compiles it so that Numba keeps the machine code.
-
-Run by `friso.engine.cache` as ``python -m friso.engine.build FOLDER``, with the task pickled on standard input; prints
-the name of the entry in the cache's FOLDER.
-"""
+"""Builds kernels, and the loops that run them, in the process that fills the cache (`friso.engine.builder`)."""
 
 from __future__ import annotations
 
+import inspect
 import pickle
-import sys
 from pathlib import Path
+from types import ModuleType
 
+from friso.engine import driver, scalar_code, vector_code
 from friso.engine.cache import keep
-from friso.engine.kernel import Form, compile_driver
+from friso.engine.kernel import Form, driver_kinds
+from friso.engine.layout import FUNCTIONS
+from friso.engine.machine_code import object_code
 from friso.engine.module_source import write_module
 from friso.engine.tableaus import TABLEAUS
 from friso.equations.as_built import AsBuilt, as_built
@@ -21,8 +21,11 @@ from friso.equations.model import Model, assemble
 from friso.equations.variational import variational
 
 
-def main(folder: Path, task: bytes) -> None:
-    """Generates and compiles the kernel that a pickled task asks for into a folder; prints the name of its entry."""
+def build(folder: Path, task: bytes) -> str:
+    """Keep the kernel that a pickled task asks for in a folder of the cache, or without a task the driver; the name of
+    its entry."""
+    if not task:
+        return keep(folder, inspect.getsource(driver), _loops_code)
     plug_ins, pickled = pickle.loads(task)
     for plug_in in plug_ins:
         plug_in.load()
@@ -30,7 +33,18 @@ def main(folder: Path, task: bytes) -> None:
     model = _model(request.structure)
     model = variational(model) if request.variational else model
     source = write_module(model, TABLEAUS[request.method], repr(request), request.lanes)
-    print(keep(folder, source, compile_driver), end="")
+    return keep(folder, source, _code)
+
+
+def _loops_code(module: ModuleType) -> bytes:
+    """The machine code of the driver."""
+    return object_code(scalar_code.written(module.run, driver_kinds()))
+
+
+def _code(module: ModuleType) -> bytes:
+    """The machine code of a kernel's module."""
+    functions = {name: getattr(module, name) for name in FUNCTIONS if hasattr(module, name)}
+    return object_code(vector_code.written(functions, module.LAYOUT["lanes"]))
 
 
 def _model(form: Form) -> Model:
@@ -39,7 +53,3 @@ def _model(form: Form) -> Model:
     if isinstance(form, AsBuilt):
         return as_built(form)
     return driven(form) if isinstance(form, Driven) else assemble(form)
-
-
-if __name__ == "__main__":
-    main(Path(sys.argv[1]), sys.stdin.buffer.read())

@@ -1,12 +1,12 @@
-"""Compiled kernels on disk, private to the user.
+"""Compiled code on disk, private to the user.
 
-An entry is a folder with the generated module, the machine code that Numba puts beside it, and a manifest of
-checksums, written last. Whatever does not match its manifest is built anew; a lock per entry keeps processes that
-build at the same time out of each other's way.
+An entry is a folder with machine code, the module that it was made of, and a manifest of checksums, written last.
+Whatever does not match its manifest is built anew; locks keep processes that build at the same time out of each other's
+way.
 
 An entry is named after what was generated, the compiler and the processor; a request, after what was asked for and
 friso's own sources, names its entry. So a start with friso unchanged generates nothing, and a change of friso that
-leaves the generated code as it was compiles nothing.
+leaves the generated code as it was compiles nothing. What has not been used for long is deleted (`prune`).
 """
 
 from __future__ import annotations
@@ -20,11 +20,11 @@ import logging
 import os
 import re
 import shutil
-import subprocess
 import sys
 import tempfile
-import threading
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
@@ -32,10 +32,8 @@ from types import ModuleType
 
 import llvmlite
 import llvmlite.binding as llvm
-import numba
-import numba.core.config as numba_config
 import numpy as np
-from filelock import FileLock
+from filelock import FileLock, Timeout
 from platformdirs import user_cache_dir
 
 from friso.system import check_private
@@ -45,13 +43,19 @@ logger = logging.getLogger("friso")
 
 FOLDER_VARIABLE = "FRISO_CACHE_DIR"
 
-_numba_folder = threading.Lock()
-_building: set[subprocess.Popen[bytes]] = set()
+MODULE, CODE, MANIFEST = "kernel.py", "code.o", "manifest.json"
+"""Files of an entry."""
+
+DAY = 86_400.0
+"""In seconds; so often it is noted that something is in use."""
+
+KEPT_FOR, KEPT_IN_ALL = 60 * DAY, 200_000_000
+"""How long [s] what is not used is kept, and how much [bytes]; what was used within a day is kept in any case."""
 
 
 @cache
 def cache_folder() -> Path:
-    """The folder of the kernels, mode 0700; a temporary one, with a warning, where that cannot be had."""
+    """The folder of compiled code, mode 0700; a temporary one, with a warning, where that cannot be had."""
     folder = Path(os.environ.get(FOLDER_VARIABLE) or user_cache_dir("friso")) / "kernels"
     try:
         folder.mkdir(parents=True, exist_ok=True, mode=0o700)
@@ -79,88 +83,78 @@ def code_digest(*parts: str) -> str:
 @cache
 def machine() -> str:
     """What decides on the last bits of a run besides friso's code: processor and compiler."""
-    return f"{llvm.get_host_cpu_name()}, numba {numba.__version__}, numpy {np.__version__}"
+    return f"{llvm.get_host_cpu_name()}, llvmlite {llvmlite.__version__}, numpy {np.__version__}"
 
 
 @cache
 def environment() -> str:
-    """What machine code depends on besides its source: the compilers, their settings, and the processor."""
-    versions = (sys.version, np.__version__, numba.__version__, llvmlite.__version__)
+    """What machine code depends on besides its source: the compilers and the processor."""
     processor = (llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten())
-    settings = sorted(
-        (name, value) for name, value in os.environ.items() if name.startswith("NUMBA_") and name != "NUMBA_CACHE_DIR"
-    )
-    return repr((versions, processor, settings))
+    return repr((sys.version, np.__version__, llvmlite.__version__, processor))
 
 
-def load_or_build(name: str, builder: str, task: bytes, load: Callable[[ModuleType], None]) -> ModuleType:
-    """The module called `name` from the cache, built there first if need be, and prepared by `load`.
+@dataclass(frozen=True)
+class Request:
+    """What is to be compiled: its `name` in full, a `title` for people, the module whose `build(folder, task)` keeps it
+    in the cache (`keep`) and returns the name of its entry, and the task that it is given."""
 
-    `builder` is a module that, run as a program with the cache folder as argument and `task` on standard input, keeps
-    the module (`keep`) and prints the name of its entry. It is a process of its own so that what runs is always what
-    is kept: code that is compiled and run in one process may round differently from the same code loaded. Raises
-    RuntimeError with the builder's message if it fails, OSError where the cache folder cannot be written.
-    """
-    asked = (name, VERSION, code_digest("equations", "engine"), version("sympy"), environment())
-    request = cache_folder() / f"{_digest(*asked)}.request"
-    with FileLock(request.with_suffix(".lock"), mode=0o600):
-        entry = _entry(request)
-        if entry is None or not _intact(entry):
-            entry = _build(builder, request, task)
-        module = import_entry(entry)
-        load(module)
-        if module.run.stats.cache_misses:  # Numba did not take the machine code: the files were copied, for one
-            shutil.rmtree(entry, ignore_errors=True)
-            module = import_entry(_build(builder, request, task))
-            load(module)
-        return module
+    name: str
+    title: str
+    builder: str
+    task: bytes = b""
+
+    @property
+    def file(self) -> Path:
+        """The file that names the entry."""
+        asked = (self.name, VERSION, code_digest("equations", "engine"), version("sympy"), environment())
+        return cache_folder() / f"{_digest(*asked)}.request"
+
+    def lock(self) -> FileLock:
+        """Held by who builds what is requested; a request for something else may share it."""
+        return FileLock(cache_folder() / f"{self.file.name[:2]}.request-lock", mode=0o600)
+
+    def entry(self) -> Path | None:
+        """The entry, intact; None where there is none. That it is in use is noted."""
+        try:
+            name = self.file.read_text(encoding="ascii")
+        except (OSError, ValueError):
+            return None
+        if not re.fullmatch("[0-9a-f]{24}", name):
+            return None
+        entry = self.file.parent / name
+        if not _intact(entry):
+            return None
+        _note_use(self.file, entry / MANIFEST)
+        return entry
 
 
 def _digest(*parts: str) -> str:
     return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:24]
 
 
-def _entry(request: Path) -> Path | None:
-    """The entry that a request names; None where it names none."""
-    try:
-        name = request.read_text(encoding="ascii")
-    except (OSError, ValueError):
-        return None
-    return request.parent / name if re.fullmatch("[0-9a-f]{24}", name) else None
+def _note_use(*files: Path) -> None:
+    for file in files:
+        if time.time() - file.stat().st_mtime > DAY:
+            os.utime(file)
 
 
-def _build(builder: str, request: Path, task: bytes) -> Path:
-    logger.warning("compiling; the next run finds it compiled")
-    environ = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
-    command = [sys.executable, "-P", "-m", builder, str(request.parent)]
-    pipe = subprocess.PIPE
-    with subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=pipe, env=environ) as process:
-        _building.add(process)
-        try:
-            name, message = process.communicate(task)
-        except BaseException:
-            process.kill()
-            raise
-        finally:
-            _building.discard(process)
-    if process.returncode:
-        raise RuntimeError(f"the kernel could not be compiled:\n{message.decode(errors='replace')}")
-    request.write_bytes(name)
-    return request.parent / name.decode("ascii")
-
-
-def keep(folder: Path, source: str, compile_module: Callable[[ModuleType], None]) -> str:
-    """Compile a module by `compile_module` and keep it in the cache `folder`, unless the same one is there already;
-    the name of its entry."""
+def keep(folder: Path, source: str, code_of: Callable[[ModuleType], bytes]) -> str:
+    """Keep a module and the machine code that `code_of` makes of it in the cache `folder`, unless the same is there
+    already; the name of its entry."""
     entry = folder / _digest(_without_words(source), _compiled_with(), environment())
-    with FileLock(entry.with_suffix(".lock"), mode=0o600):
+    with _entry_lock(entry):
         if not _intact(entry):
             shutil.rmtree(entry, ignore_errors=True)
             entry.mkdir(mode=0o700)
-            (entry / "kernel.py").write_text(source, encoding="utf-8")
-            compile_module(import_entry(entry))
-            (entry / "manifest.json").write_text(json.dumps(_checksums(entry)), encoding="utf-8")
+            (entry / MODULE).write_text(source, encoding="utf-8")
+            (entry / CODE).write_bytes(code_of(import_entry(entry)))
+            (entry / MANIFEST).write_text(json.dumps(_checksums(entry)), encoding="utf-8")
     return entry.name
+
+
+def _entry_lock(entry: Path) -> FileLock:
+    """Held by who writes or deletes an entry; another one may share it."""
+    return FileLock(entry.parent / f"{entry.name[:2]}.lock", mode=0o600)
 
 
 def _without_words(source: str) -> str:
@@ -173,45 +167,71 @@ def _without_words(source: str) -> str:
 
 
 def _compiled_with() -> str:
-    """What the generated modules take from friso."""
+    """What compiled code takes from friso."""
     files = (Path(__file__).parent / f"{name}.py" for name in _INCLUDED)
     return _digest(*(_without_words(file.read_text(encoding="utf-8")) for file in files))
 
 
-_INCLUDED = ("arrays", "roots", "shared_queue", "simd_math", "vector_code")
-
-
-def stop_building() -> None:
-    """End what other threads are building."""
-    for process in list(_building):
-        process.kill()
+_INCLUDED = ("arrays", "kinds", "layout", "machine_code", "roots", "scalar_code", "simd_math", "vector_code")
 
 
 def _checksums(entry: Path) -> dict[str, str]:
-    files = sorted(entry.rglob("*.py")) + sorted(entry.rglob("*.nb[ci]"))
-    return {str(file.relative_to(entry)): hashlib.sha256(file.read_bytes()).hexdigest() for file in files}
+    files = [entry / MODULE, entry / CODE]
+    return {file.name: hashlib.sha256(file.read_bytes()).hexdigest() for file in files}
 
 
 def _intact(entry: Path) -> bool:
     """Whether the entry is there, whole and unchanged."""
     try:
-        return json.loads((entry / "manifest.json").read_text(encoding="utf-8")) == _checksums(entry)
+        return json.loads((entry / MANIFEST).read_text(encoding="utf-8")) == _checksums(entry)
     except (OSError, ValueError):
         return False
 
 
 def import_entry(entry: Path) -> ModuleType:
-    """The module of an entry; Numba finds its machine code beside it, whatever NUMBA_CACHE_DIR says."""
-    spec = importlib.util.spec_from_file_location(f"friso_kernel_{entry.name}", entry / "kernel.py")
+    """The module of an entry."""
+    spec = importlib.util.spec_from_file_location(f"friso_kernel_{entry.name}", entry / MODULE)
     if spec is None or spec.loader is None:
-        raise ImportError(f"no module can be made of {entry / 'kernel.py'}")
+        raise ImportError(f"no module can be made of {entry / MODULE}")
     module = importlib.util.module_from_spec(spec)
     sys.modules[spec.name] = module
-    with _numba_folder:
-        elsewhere = getattr(numba_config, "CACHE_DIR")  # noqa: B009 (set at import, unknown to type checkers)
-        setattr(numba_config, "CACHE_DIR", "")  # noqa: B010
-        try:
-            spec.loader.exec_module(module)
-        finally:
-            setattr(numba_config, "CACHE_DIR", elsewhere)  # noqa: B010
+    spec.loader.exec_module(module)
     return module
+
+
+def prune(folder: Path) -> None:
+    """Delete what has not been used for long, and then what has not been used for longest as long as there is too much.
+    What another process is writing is left alone."""
+    try:
+        with FileLock(folder / "prune.lock", blocking=False, mode=0o600):
+            size, now = 0, time.time()
+            for used, path, bytes_ in sorted(_used(folder), reverse=True):
+                size += bytes_
+                age = now - used
+                if age > KEPT_FOR or (age > DAY and size > KEPT_IN_ALL):
+                    _delete(path)
+    except (Timeout, OSError) as error:  # another process is at it; it is no reason to stop
+        logger.debug("old kernels are left: %s", error)
+
+
+def _used(folder: Path) -> Iterator[tuple[float, Path, int]]:
+    """When each entry and request was used last [s], and its size [bytes]."""
+    for path in folder.iterdir():
+        if path.is_dir():
+            files = [file for file in path.rglob("*") if file.is_file()]
+            marks = [file for file in files if file.name == MANIFEST] or [path]
+            yield marks[0].stat().st_mtime, path, sum(file.stat().st_size for file in files)
+        elif path.suffix == ".request":
+            yield path.stat().st_mtime, path, 0
+
+
+def _delete(path: Path) -> None:
+    if not path.is_dir():
+        path.unlink()
+        return
+    try:
+        with _entry_lock(path).acquire(blocking=False):
+            (path / MANIFEST).unlink(missing_ok=True)
+            shutil.rmtree(path)
+    except Timeout:
+        return

@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 import pickle
-from collections import defaultdict
 from collections.abc import Iterable
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
+from pathlib import Path
 from threading import Lock
 from types import ModuleType
 from typing import Any
 
-import numba
 import numpy as np
 
-from friso.engine.arrays import STATISTICS, Batch, Results, Settings
-from friso.engine.cache import load_or_build, stop_building
-from friso.engine.layout import LANES
-from friso.engine.shared_queue import new_queue
+from friso.engine.arrays import STATISTICS, Batch, Results, Settings, new_queue
+from friso.engine.building import entries
+from friso.engine.cache import CODE, Request, import_entry
+from friso.engine.kinds import Kind, kind_of
+from friso.engine.layout import FUNCTIONS, LANES, LOOKED_UP, ModelLayout
+from friso.engine.machine_code import Loops, load
 from friso.equations.as_built import AsBuilt
 from friso.equations.driven import Driven
 from friso.equations.imposed import Imposed
@@ -35,9 +35,24 @@ their drive as built."""
 
 @dataclass(frozen=True)
 class Kernel:
-    """A generated module with its names: states, numbers held between samples, parameters and outputs."""
+    """A generated module with its names (states, numbers held between samples, parameters and outputs), its layout with
+    the addresses of its machine code, and the loops that run it."""
 
     module: ModuleType
+    layout: ModelLayout = field(compare=False)
+    loops: Loops = field(compare=False)
+
+    def run(self, queue: np.ndarray, batch: Batch, settings: Settings, results: Results) -> None:
+        """Run the runs of the batch that this thread gets from the queue; write the results."""
+        self.loops(self._buffer(), self.layout, queue, batch, settings, results)
+
+    def _buffer(self) -> np.ndarray:
+        """Room for all rows, on a boundary of 64 bytes: a register that straddles two cache lines takes twice as
+        long."""
+        numbers = self.layout.rows * self.layout.lanes
+        room = np.empty(numbers + 8)
+        first = -room.__array_interface__["data"][0] % 64 // 8
+        return room[first : first + numbers]
 
     @property
     def states(self) -> tuple[str, ...]:
@@ -46,12 +61,12 @@ class Kernel:
     @property
     def position(self) -> int:
         """Which state is the position of the stage, the one that is measured."""
-        return self.module.POSITION
+        return self.layout.position
 
     @property
     def velocity(self) -> int:
         """Which state is the velocity of the stage."""
-        return self.module.VELOCITY
+        return self.layout.velocity
 
     @property
     def cart_position(self) -> int:
@@ -80,7 +95,7 @@ class Kernel:
     @property
     def switches(self) -> tuple[int, ...]:
         """The numbers of the modes that remember, among the kinks."""
-        return getattr(self.module, "SWITCHES", ())
+        return self.module.SWITCHES
 
     @property
     def told(self) -> int:
@@ -148,41 +163,67 @@ class Wanted:
         controller = form.controller if isinstance(form, Structure) else None
         return (friction_law(form.friction), *((controller.law,) if controller else ()))
 
+    @property
+    def title(self) -> str:
+        """The form in a few words."""
+        form = self.structure if isinstance(self.structure, Structure | Imposed) else self.structure.structure
+        words = [f"{form.friction} friction" if form.friction != "none" else "no friction"]
+        if isinstance(form, Structure):
+            words = [f"{form.joint} joint" if form.joint != "rigid" else "rigid stage", *words]
+            words += [form.controller.kind] if form.controller else []
+        if not isinstance(self.structure, Structure):
+            words.append({Imposed: "motion imposed", Driven: "a log followed", AsBuilt: "drive as built"}[type(self.structure)])
+        return ", ".join([*words, *(["variational equations"] if self.variational else [])])
+
 
 def kernel(structure: Form, variational: bool = False, method: str = "Rodas5P", lanes: int = LANES) -> Kernel:
     """The kernel for a form, stepping by the named method in so many lanes.
 
-    A variational one carries a small deviation beside every state (`friso.equations.variational`). Threads that ask
-    for one kernel at the same time get it from the one that is first.
+    A variational one carries a small deviation beside every state (`friso.equations.variational`).
     """
-    return _kernel(Wanted(structure, variational, method, lanes))
-
-
-def _kernel(request: Wanted) -> Kernel:
-    with _loading[request]:
-        return _loaded(request)
-
-
-_loading: defaultdict[Wanted, Lock] = defaultdict(Lock)
-
-
-@cache
-def _loaded(request: Wanted) -> Kernel:
-    """What is wanted is pickled apart from the plug-ins, which the builder loads first: it may hold their classes."""
-    foreign = plug_ins(request.sections)
-    name = " ".join([repr(request), *(plug_in.digest for plug_in in foreign)])
-    task = pickle.dumps((foreign, pickle.dumps(request)))
-    return Kernel(load_or_build(name, "friso.engine.build", task, compile_driver))
+    return kernels([Wanted(structure, variational, method, lanes)])[0]
 
 
 def kernels(requests: Iterable[Wanted]) -> list[Kernel]:
     """Several kernels; what has to be compiled is compiled side by side."""
-    with ThreadPoolExecutor() as pool:
-        try:
-            return list(pool.map(_kernel, requests))
-        except BaseException:
-            stop_building()
-            raise
+    requests = list(requests)
+    missing = [request for request in dict.fromkeys(requests) if request not in _kernels]
+    if missing:
+        missing.sort(key=lambda request: not request.variational)  # these take longest
+        for request, entry in zip(missing, entries([DRIVER, *map(_request, missing)])[1:], strict=True):
+            _load(request, entry)
+    return [_kernels[request] for request in requests]
+
+
+_kernels: dict[Wanted, Kernel] = {}
+_loading = Lock()
+
+DRIVER = Request("driver", "the loops that run any kernel", "friso.engine.build")
+"""What is compiled once for all kernels."""
+
+
+def _request(wanted: Wanted) -> Request:
+    """What is wanted is pickled apart from the plug-ins, which the builder loads first: it may hold their classes."""
+    foreign = plug_ins(wanted.sections)
+    name = " ".join([repr(wanted), *(plug_in.digest for plug_in in foreign)])
+    return Request(name, wanted.title, "friso.engine.build", pickle.dumps((foreign, pickle.dumps(wanted))))
+
+
+def _load(wanted: Wanted, entry: Path) -> None:
+    with _loading:
+        if wanted in _kernels:  # another thread was first
+            return
+        module = import_entry(entry)
+        functions = [name for name in FUNCTIONS if hasattr(module, name)]
+        code = {**dict.fromkeys(FUNCTIONS, 0), **load((entry / CODE).read_bytes(), functions)}
+        arrays = {name: np.array(module.LOOKED_UP[name], np.int64) for name in LOOKED_UP}
+        _kernels[wanted] = Kernel(module, ModelLayout(**module.LAYOUT, **arrays, **code), _loops())
+
+
+@cache
+def _loops() -> Loops:
+    (entry,) = entries([DRIVER])
+    return Loops(load((entry / CODE).read_bytes(), ["run"])["run"], driver_kinds())
 
 
 def empty_results(runs: int, capacity: int, samples: int, outputs: int) -> Results:
@@ -198,11 +239,10 @@ def empty_results(runs: int, capacity: int, samples: int, outputs: int) -> Resul
     )
 
 
-def compile_driver(module: ModuleType) -> None:
-    """Compile (or load from Numba's cache) the driver for the types it is called with, and for no others."""
+def driver_kinds() -> list[Kind]:
+    """The kinds of the driver's arguments."""
     flat, square = np.zeros(1), np.zeros((1, 1))
     batch = Batch(square, square, square, square, flat, flat, np.zeros((1, 1, 4)), np.zeros(1, np.int64), square)
     settings = Settings(1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 1.0, np.zeros(1, np.int64))
-    arguments = (new_queue(), batch, settings, empty_results(1, 1, 1, 1))
-    module.run.compile(tuple(numba.typeof(argument) for argument in arguments))
-    module.run.disable_compile()
+    layout = ModelLayout(*(np.zeros(1, np.int64) if name in LOOKED_UP else 0 for name in ModelLayout._fields))
+    return list(map(kind_of, (flat, layout, new_queue(), batch, settings, empty_results(1, 1, 1, 1))))

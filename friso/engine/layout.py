@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections import namedtuple
 from dataclasses import dataclass
+from itertools import accumulate
 
 LANES = 8
 """Runs side by side: one 512-bit register of float64, or two of 256 bits."""
@@ -35,19 +37,72 @@ corner of the reference, which was at start; trial, longest, taken: step to try 
 fraction: the part of it that was accepted; event: the lane wants attention; turns: number of turning points kept;
 last_kind: of the last one kept, 1 for a maximum, -1 for a minimum."""
 
+DRIVER = ("run", "segment")
+"""Rows of use to the driver alone: the number of the run in the lane, negative where there is none, and of the piece of
+the reference it is in."""
+
 CLOCK = ("period", "tick", "due", "ticked", "noted", "left")
 """Further rows, of use to a model that holds numbers between samples. period: time between them; tick: number of the
 sample to be taken next; due: when what follows from it acts, since the last corner of the reference; ticked: 1 where
 the last step ended there; noted: 1 where that sample is to be written down; left: 1 where a cell of a table has been
 left."""
 
+ROW = namedtuple("ROW", SCALARS + CLOCK + DRIVER)(*range(len(SCALARS + CLOCK + DRIVER)))
+"""Numbers of the rows that are the same for every model: the first of the buffer."""
+
 AXES = ("first", "density", "last")
 """Of the places and of the times of a table: where it begins, its points per unit, and the number of its last point."""
+
+SIZES = (
+    "lanes",
+    "states",
+    "dense_terms",
+    "constants",
+    "kinks",
+    "inputs",
+    "held",
+    "tabled",
+    "places",
+    "clocked",
+    "position",
+    "velocity",
+)
+"""Of a model: lanes side by side, states, terms of the dense output of each, constants, kinks, inputs of the reference,
+behind which numbers are held; the first of all these that comes from tables, and how many tables are over places; 1
+where the drive has a clock; and which states are position and velocity of the stage."""
+
+LOOKED_UP = ("seen_states", "place_states", "walked")
+"""Of a model whose drive has a clock, arrays: the states that it measures, those that tables are looked up over, and
+over which of these, or time after them, each table is."""
+
+FUNCTIONS = ("step", "locate", "update")
+"""What is written for a model and called by the driver."""
+
+BLOCKS = (
+    "x",
+    "old",
+    "end",
+    "dense",
+    "tolerance",
+    "constant",
+    "mode",
+    "reference",
+    "seen",
+    "axis",
+    "piece_before",
+    "cell",
+    "base",
+    "slope",
+)
+"""Blocks of rows whose first row depends on the model; after the last of them the buffer ends."""
+
+ModelLayout = namedtuple("ModelLayout", (*SIZES, *BLOCKS, "rows", *LOOKED_UP, *FUNCTIONS))
+"""What the driver knows of a model: sizes, first rows of blocks, arrays, and addresses of functions."""
 
 
 @dataclass(frozen=True)
 class Layout:
-    """Row numbers of the buffer for a model of the given size; the first row of each block.
+    """The buffer for a model of the given size.
 
     `walks` are what tables are looked up over: states, and time. Each is in a `cell` between two points of its tables,
     in which each of these has a `base` and a `slope`. `piece_before` holds length and inputs of the piece of the
@@ -64,25 +119,9 @@ class Layout:
     walks: int
 
     @property
-    def blocks(self) -> dict[str, int]:
-        sizes = {
-            "x": self.states,
-            "old": self.states,
-            "end": self.states,
-            "dense": self.dense * self.states,
-            "tolerance": self.states,
-            "constant": self.constants,
-            "mode": self.kinks,
-            "reference": self.given,
-            "seen": self.seen,
-            "axis": self.walks and 2 * len(AXES),
-            "piece_before": self.walks and 4,
-            "cell": self.walks,
-            "base": self.tables,
-            "slope": self.tables,
-        } | dict.fromkeys(SCALARS + CLOCK, 1)
-        rows, row = {}, 0
-        for name, size in sizes.items():
-            rows[name] = row
-            row += size
-        return rows | {"rows": row}
+    def first_rows(self) -> dict[str, int]:
+        """The first row of each block, and how many `rows` there are."""
+        axis, before = self.walks and 2 * len(AXES), self.walks and 4
+        sizes = (self.states, self.states, self.states, self.dense * self.states, self.states)
+        sizes += (self.constants, self.kinks, self.given, self.seen, axis, before, self.walks, self.tables, self.tables)
+        return dict(zip((*BLOCKS, "rows"), accumulate(sizes, initial=len(ROW)), strict=True))

@@ -5,14 +5,11 @@ A module needs no SymPy to run, so that a warm start loads neither the equations
 
 from __future__ import annotations
 
-import inspect
-import re
 from collections.abc import Iterable
 
 import sympy as sp
 
-from friso.engine import driver
-from friso.engine.layout import AXES, CLOCK, LANES, SCALARS
+from friso.engine.layout import LANES, LOOKED_UP
 from friso.engine.printing import Rename, print_numpy
 from friso.engine.step_source import StepWriter
 from friso.engine.tableaus.tableau import Tableau
@@ -26,61 +23,54 @@ import functools
 from math import sqrt
 
 import numpy as np
-from numba import njit
 
-from friso.engine.arrays import Status
 from friso.engine.roots import crossing, cubic, first_guess
-from friso.engine.shared_queue import take_next
 from friso.engine.simd_math import exp, gaussian, power, quantised, tanh
-from friso.engine.vector_code import OPTIONS, in_lanes
-
-DONE, BUDGET = int(Status.DONE), int(Status.BUDGET)
-UNDERFLOW, DIVERGED = int(Status.UNDERFLOW), int(Status.DIVERGED)
 '''
 
 
 def write_module(model: Model, tableau: Tableau, title: str, lanes: int = LANES) -> str:
     """The source of the module for `model`, stepping by the method of `tableau`."""
     writer = StepWriter(model, tableau)
-    kernels = (writer.source(), writer.locate_source(), writer.update_source())
+    straight = (writer.source(), writer.locate_source(), writer.update_source())
     parts = [_HEAD.format(title=title, method=tableau.name), _numbers(model, writer, lanes)]
-    parts += [_numpy_functions(model, writer), *kernels, _driver()]
-    return "\n\n".join(parts)
+    return "\n\n".join([*parts, _numpy_functions(model, writer), *straight])
 
 
 def _numbers(model: Model, writer: StepWriter, lanes: int) -> str:
-    """The model's names and sizes, and the row numbers of its buffer."""
-    rows = writer.layout.blocks
-    named = {"X": "x", "OLD": "old", "END": "end", "D0": "dense", "TOLERANCE": "tolerance", "MODE": "mode"}
-    named |= {"CONSTANT": "constant", "REF": "reference", "ROWS": "rows"}
-    named |= {
-        "SEEN": "seen",
-        "AXIS": "axis",
-        "PIECE_BEFORE": "piece_before",
-        "CELL": "cell",
-        "BASE": "base",
-        "SLOPE": "slope",
-    }
-    named |= {name.upper(): name for name in (*SCALARS, *CLOCK)}
-    states = [str(symbol) for symbol in model.symbols]
-    given = [str(symbol) for symbol in model.given]
+    """The model's names, and the layout of its buffer."""
+    places = _places(model, model.stage)
+    layout = _sizes(model, writer) | writer.layout.first_rows
+    layout |= {"lanes": lanes, "position": places[0], "velocity": places[1]}
     lines = [
-        f"LANES = {lanes}",
-        f"STATE_NAMES = {tuple(states)!r}",
+        f"STATE_NAMES = {tuple(map(str, model.symbols))!r}",
         f"ROLES = {tuple(each.role.value for each in (*model.states, *model.held))!r}",
         f"PARAMETERS = {tuple(map(str, model.parameters))!r}",
         f"KINK_NAMES = {tuple(kink.name for kink in model.kinks)!r}",
         f"OUTPUTS = { {name: (each.unit, each.label) for name, each in model.outputs.items()}!r}",
-        f"STATES, KINKS, CONSTANTS = {len(states)}, {len(model.kinks)}, {writer.layout.constants}",
-        f"GIVEN_NAMES = {tuple(given)!r}",
         f"HELD_NAMES = {tuple(map(str, model.kept))!r}",
-        f"INPUTS, HELD, CLOCKED = {len(model.inputs)}, {len(model.kept)}, {model.clock is not None}",
-        *([f"SWITCHES = {switches!r}"] if (switches := writer.switches) else []),
-        *_clock_numbers(model, writer),
-        f"DENSE, POSITION, VELOCITY = {writer.layout.dense}, {', '.join(map(str, _places(model, model.stage)))}",
-        f"CART_POSITION, CART_VELOCITY = {', '.join(map(str, _places(model, model.cart)))}",
+        f"SWITCHES = {writer.switches!r}",
+        f"CART_POSITION, CART_VELOCITY = {_places(model, model.cart)!r}",
+        f"LAYOUT = {layout!r}",
+        f"LOOKED_UP = {_looked_up(model, writer)!r}",
     ]
-    return "\n".join(lines + [f"{name} = {rows[block]}" for name, block in named.items()])
+    return "\n".join(lines)
+
+
+def _sizes(model: Model, writer: StepWriter) -> dict[str, int]:
+    """Sizes of the model, by the names of `friso.engine.layout.SIZES`."""
+    clock, layout = model.clock, writer.layout
+    return {
+        "states": layout.states,
+        "dense_terms": layout.dense,
+        "constants": layout.constants,
+        "kinks": layout.kinks,
+        "inputs": len(model.inputs),
+        "held": len(model.kept),
+        "tabled": model.given.index(clock.tabled[0]) if clock else 0,
+        "places": len(clock.places) if clock else 0,
+        "clocked": int(clock is not None),
+    }
 
 
 def _places(model: Model, body: Body) -> tuple[int, int]:
@@ -88,18 +78,12 @@ def _places(model: Model, body: Body) -> tuple[int, int]:
     return model.symbols.index(body.position), model.symbols.index(body.velocity)
 
 
-def _clock_numbers(model: Model, writer: StepWriter) -> list[str]:
-    """Which states a drive with a clock measures and looks up over, and where it puts what it finds."""
-    clock, states, given = model.clock, list(model.symbols), list(model.given)
+def _looked_up(model: Model, writer: StepWriter) -> dict[str, tuple[int, ...]]:
+    """Which states a drive with a clock measures and looks up over, and over which of these each table is."""
+    clock, states = model.clock, list(model.symbols)
     seen = tuple(states.index(x) for x in clock.seen.values()) if clock else ()
-    walked, places = writer.walked, len(clock.places) if clock else 0
     over = tuple(dict.fromkeys(states.index(x) for x in clock.places.values())) if clock else ()
-    tables = (places, len(walked), given.index(clock.tabled[0]), len(AXES)) if clock else (0, 0, 0, 0)
-    arrays = {"SEEN_STATES": seen, "PLACE_STATES": over, "WALKED": tuple(walked)}
-    return [
-        *(f"{name} = np.array({values!r}, dtype=np.int64)" for name, values in arrays.items()),
-        f"PLACES, TABLES, TABLED, AXIS_ROWS = {tables!r}",
-    ]
+    return dict(zip(LOOKED_UP, (seen, over, tuple(writer.walked)), strict=True))
 
 
 def _numpy_functions(model: Model, writer: StepWriter) -> str:
@@ -128,11 +112,3 @@ def _function(head: str, expressions: Iterable[sp.Expr], rename: Rename) -> str:
     lines = [f"        {print_numpy(sp.sympify(e), rename)}," for e in expressions]
     return "\n".join([f"def {head}:", "    return [", *lines, "    ]"])
 
-
-def _driver() -> str:
-    """The driver's functions, each compiled."""
-    source = inspect.getsource(driver)
-    inner = re.sub(r"^def ", "@njit(**OPTIONS)\ndef ", source[source.index("\ndef ") + 1 :], flags=re.MULTILINE)
-    inner = inner.replace("@njit(**OPTIONS)\ndef run(", "@njit(cache=True, **OPTIONS)\ndef run(")
-    inlined = '@njit(inline="always", **OPTIONS)\ndef take_samples('  # to hand over the batch costs as much as a sample
-    return inner.replace("@njit(**OPTIONS)\ndef take_samples(", inlined)

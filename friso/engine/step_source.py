@@ -12,7 +12,7 @@ from typing import Any
 import sympy as sp
 
 from friso.engine.elimination import eliminate
-from friso.engine.layout import AXES, SCALARS, Layout
+from friso.engine.layout import AXES, ROW, SCALARS, Layout
 from friso.engine.printing import Constants, Rename, print_scalar, reciprocals
 from friso.engine.tableaus.tableau import Tableau
 from friso.equations.component import TICK, TIME
@@ -113,6 +113,7 @@ class StepWriter:
         sizes_of = (self.size, len(tableau.dense), len(self.constants.index), self.kinks, len(self._given))
         looked_up = (len(model.clock.seen), len(model.clock.tabled)) if model.clock else (0, 0)
         self.layout = Layout(*sizes_of, *looked_up, len(self._walks))
+        self._rows = ROW._asdict() | self.layout.first_rows
 
     def _jumping(self, jumps: Mapping[sp.Symbol, sp.Expr]) -> tuple[Block, list[int]]:
         """By how much states jump at a kink, and the numbers of these."""
@@ -152,7 +153,7 @@ class StepWriter:
         return tuple(map(self.model.kinks.index, self.model.switches))
 
     def source(self) -> str:
-        """The function `step(B, rtol, inner, outer, budget)` over the lanes' buffer."""
+        """The function `step(B, rtol, inner, outer, budget)` of a lane: whether the lane wants attention."""
         body = [
             *self._load(),
             *self._choose_step(),
@@ -165,8 +166,9 @@ class StepWriter:
             *self._statistics(),
             *self._seen(),
             *self._store(),
+            "return event > 0.0",
         ]
-        return _over_lanes("step", ", rtol, inner, outer, budget", body)
+        return _function("step", "B, rtol, inner, outer, budget", body)
 
     @property
     def walked(self) -> list[int]:
@@ -175,22 +177,20 @@ class StepWriter:
         return [self._walks.index(x) for x in (*clock.places.values(), *(TICK for _ in clock.times))] if clock else []
 
     def locate_source(self) -> str:
-        """The function `locate(B)`: in which lanes that have `ticked` a cell of a table has been `left`, and whose
-        sample is to be `noted`."""
+        """The function `locate(B)` of a lane: whether it has `ticked` and a cell of a table has been `left`, or the
+        sample is to be `noted`; none without a clock."""
         if not self.model.clock:
-            return _over_lanes("locate", "", ["pass"])
+            return ""
         lines = [*self._clock.code("", self._in_buffer()), *self._offsets(), f"ticked = {self._row('ticked')} > 0.0"]
         outside = (f"(off{w} < 0.0) | (off{w} > 1.0)" for w in range(len(self._walks)))
-        return _over_lanes(
-            "locate",
-            "",
-            [
-                *lines,
-                f"{self._row('left')} = 1.0 if ticked & ({' | '.join(outside)}) else 0.0",
-                f"late_enough = {self._row('tick')} * period_ >= {self._row('next_sample')} * (1.0 - 1e-12)",
-                f"{self._row('noted')} = 1.0 if ticked & late_enough else 0.0",
-            ],
-        )
+        lines += [
+            f"left = ticked & ({' | '.join(outside)})",
+            f"noted = ticked & ({self._row('tick')} * period_ >= {self._row('next_sample')} * (1.0 - 1e-12))",
+            f"{self._row('left')} = 1.0 if left else 0.0",
+            f"{self._row('noted')} = 1.0 if noted else 0.0",
+            "return left | noted",
+        ]
+        return _function("locate", "B", lines)
 
     def _offsets(self) -> list[str]:
         """How far each walk is from the point at which its cell begins, in cells."""
@@ -202,9 +202,9 @@ class StepWriter:
         return lines
 
     def update_source(self) -> str:
-        """The function `update(B)`: tables are looked up, and the numbers that are held become what follows from the
-        sample just taken, in the lanes that have `ticked`; and when they will next. Modes that remember are kept as
-        they are at the beginning of the step."""
+        """The function `update(B)` of a lane: tables are looked up, and the numbers that are held become what follows from the
+        sample just taken, where the lane has `ticked`; and when it will next. Modes that remember are kept as they are
+        at the beginning of the step."""
         clock, name = self.model.clock, self._in_buffer()
         lines = [f"ticked, tick = {self._row('ticked')}, {self._row('tick')}", "instant = 0.0"]
         if clock:
@@ -224,7 +224,7 @@ class StepWriter:
         if clock:
             due = self._row("due")
             lines.append(f"{due} = ((tick + 1.0) * period_ + late_) - {self._row('start')} if ticked > 0.0 else {due}")
-        return _over_lanes("update", "", [*lines, f"{self._row('ticked')} = 0.0"])
+        return _function("update", "B", [*lines, f"{self._row('ticked')} = 0.0"])
 
     def _piece_of_sample(self) -> list[str]:
         """The piece of the reference in which the sample was taken: the one before, where a corner came in between."""
@@ -246,7 +246,7 @@ class StepWriter:
         return names.__getitem__
 
     def _row(self, block: str, i: int = 0) -> str:
-        return f"B[{self.layout.blocks[block] + i}]"
+        return f"B[{self._rows[block] + i}]"
 
     def _load(self) -> list[str]:
         named = {
@@ -490,16 +490,7 @@ class StepWriter:
         return lines
 
 
-def _over_lanes(name: str, numbers: str, lines: list[str]) -> str:
-    """A function `NAME(B, ...)` that does the same in every lane as `NAME_of_lane(B, ...)` on a column of its own."""
+def _function(name: str, arguments: str, lines: list[str]) -> str:
+    """A function, for one lane; B is its column of the buffer."""
     body = "".join(f"    {line}\n" for line in lines)
-    return f"""def {name}_of_lane(B{numbers}):
-{body}
-
-{name}_in_lanes = in_lanes({name}_of_lane, LANES)
-
-
-@njit(**OPTIONS)
-def {name}(B, *numbers):
-    {name}_in_lanes(B, numbers)
-"""
+    return f"def {name}({arguments}):\n{body}"

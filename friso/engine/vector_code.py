@@ -1,8 +1,8 @@
-"""Compiles straight-line Python, written for one lane, into vector instructions for all lanes.
+"""Writes straight-line Python, made for one lane, as vector instructions for all lanes.
 
-The step of a model is a thousand lines without a branch. Numba would infer the type of every variable in them, and LLVM
-would have to find out that the lanes do not depend on each other. Here each operation becomes one instruction on a
-vector with an element per lane, which takes a fraction of the time and leaves nothing to a vectoriser's judgement.
+The step of a model is a thousand lines without a branch. A general compiler would infer the type of every variable in
+them, and find out that the lanes do not depend on each other. Here each operation becomes one instruction on a vector
+with an element per lane, which takes a fraction of the time and leaves nothing to a vectoriser's judgement.
 
 The language: assignments, arithmetic, comparisons, conditional expressions (both sides of which are computed), tuples,
 `for` over a known range, and functions written in it, which are inlined.
@@ -23,37 +23,64 @@ from typing import Any
 
 import numpy as np
 from llvmlite import ir
-from numba import types
-from numba.core import cgutils
-from numba.extending import intrinsic
 
 from friso.engine.simd_math import bits_of, number_of
 
-OPTIONS: dict[str, Any] = {"nogil": True, "error_model": "numpy", "fastmath": {"contract", "nsz", "arcp"}}
-"""How kernels are compiled."""
+FASTMATH = ("arcp", "contract", "nsz")
+"""Liberties that compilers may take with float64 numbers."""
 
 CACHE_LINE = 64
 """Bytes: a register that straddles two of these lines takes twice as long to load."""
 
 
-def in_lanes(function: Callable[..., None], lanes: int) -> Any:
-    """Compiled code `(buffer, numbers)` that does what `function(B, *numbers)` does to a column of numbers B[row], in
-    each of so many lanes of a flat float64 buffer in which those of a row lie side by side; the numbers are the same
-    for all. It becomes part of the compiled function that calls it."""
+def written(functions: Mapping[str, Callable[..., Any]], lanes: int) -> ir.Module:
+    """Functions under these names, as LLVM has it. Each does what its original `(B, *numbers)` does to a column of
+    numbers B[row], in each of so many lanes of a flat float64 buffer in which those of a row lie side by side; the
+    numbers are the same for all.
 
-    def all_lanes(typing_context: Any, buffer: Any, numbers: Any) -> Any:
-        def code(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-            builder.function.attributes.add("noinline")  # which would lose the alignment
-            builder.function.attributes.alignstack = CACHE_LINE
-            column = _Column(builder, context.make_array(buffer)(context, builder, arguments[0]).data, lanes)
-            given = cgutils.unpack_tuple(builder, arguments[1])
-            same = [_Vector(_splat(builder, each, lanes), _FLOAT) for each in given]
-            _Writer(builder, lanes).inlined(function, [column, *same])
-            return context.get_dummy_value()
+    It takes the buffer's address and the numbers, and returns a whole number whose bits tell for which lanes the
+    original returned something true: bit 0 that of lane 0.
+    """
+    module = ir.Module()
+    for name, function in functions.items():
+        _add(module, name, function, lanes)
+    return module
 
-        return types.void(buffer, numbers), code
 
-    return intrinsic(all_lanes)
+def _add(module: ir.Module, name: str, function: Callable[..., Any], lanes: int) -> None:
+    numbers = [_FLOAT.element] * (len(syntax(function).args.args) - 1)
+    signature = ir.FunctionType(_SIGNED.element, [ir.PointerType(_FLOAT.element), *numbers])
+    code = ir.Function(module, signature, name)
+    code.attributes.alignstack = CACHE_LINE
+    builder = _Builder(code.append_basic_block())
+    buffer, *scalars = code.args
+    same = [_Vector(_splat(builder, each, lanes), _FLOAT) for each in scalars]
+    writer = _Writer(builder, lanes)
+    result = writer.inlined(function, [_Column(builder, buffer, lanes), *same])
+    bits = builder.bitcast(writer.truth(result or False).value, ir.IntType(lanes))
+    builder.ret(builder.zext(bits, _SIGNED.element))
+
+
+class _Builder(ir.IRBuilder):
+    """Writes instructions on float64 numbers that may be carried out with some liberty."""
+
+    def fadd(self, lhs: ir.Value, rhs: ir.Value) -> ir.Value:
+        return super().fadd(lhs, rhs, flags=FASTMATH)
+
+    def fsub(self, lhs: ir.Value, rhs: ir.Value) -> ir.Value:
+        return super().fsub(lhs, rhs, flags=FASTMATH)
+
+    def fmul(self, lhs: ir.Value, rhs: ir.Value) -> ir.Value:
+        return super().fmul(lhs, rhs, flags=FASTMATH)
+
+    def fdiv(self, lhs: ir.Value, rhs: ir.Value) -> ir.Value:
+        return super().fdiv(lhs, rhs, flags=FASTMATH)
+
+    def fcmp_ordered(self, sign: str, lhs: ir.Value, rhs: ir.Value) -> ir.Value:
+        return super().fcmp_ordered(sign, lhs, rhs, flags=FASTMATH)
+
+    def fcmp_unordered(self, sign: str, lhs: ir.Value, rhs: ir.Value) -> ir.Value:
+        return super().fcmp_unordered(sign, lhs, rhs, flags=FASTMATH)
 
 
 @dataclass(frozen=True)
@@ -125,7 +152,7 @@ class _Writer:
 
     def inlined(self, function: Callable[..., Any], arguments: list[Any]) -> Any:
         """Write what a function does with its arguments; its result."""
-        tree = _tree(function)
+        tree = syntax(function)
         scope = dict(zip((each.arg for each in tree.args.args), arguments, strict=True))
         frame = _Frame(self, scope, function.__globals__)
         for statement in tree.body:
@@ -320,7 +347,8 @@ class _Frame(ast.NodeVisitor):
 
 
 @cache
-def _tree(function: Callable[..., Any]) -> ast.FunctionDef:
+def syntax(function: Callable[..., Any]) -> ast.FunctionDef:
+    """The syntax of a function."""
     (tree,) = ast.parse(textwrap.dedent(inspect.getsource(function))).body
     assert isinstance(tree, ast.FunctionDef)
     return tree

@@ -1,7 +1,7 @@
 """Counted peaks, periods and swings of runs from their turning points, as plain loops over runs.
 
-A few runs are scanned by this module as it stands. For many, `friso.hunting.turns` has it compiled, all of this file
-with every function in machine code, so it uses numbers and arrays only.
+A few runs are scanned by this module as it stands. For many, `friso.hunting.turns` has it compiled
+(`friso.engine.scalar_code`).
 """
 
 import numpy as np
@@ -23,10 +23,16 @@ WINDOW, HALF = 0.75, 0.5
 """Shares of the run after which its last quarter and its last half begin."""
 
 
+def clear(kinds, count):
+    """Mark all turning points with 0."""
+    for k in range(count):
+        kinds[k] = 0
+
+
 def maxima(values, count, kinds):
     """Mark the local maxima with 1 and all others with 0; of a level stretch the first point stands for all. The ends
     are maxima where they are higher than what is beside them: turning points, as a rule, are."""
-    kinds[:count] = 0
+    clear(kinds, count)
     k = 0
     while k < count:
         last = k
@@ -43,7 +49,7 @@ def maxima(values, count, kinds):
 def zigzag(values, count, least, kinds):
     """Mark the extrema of a zigzag through the turning points `values` whose legs are at least `least`: 1 for its
     maxima, -1 for its minima, 0 for the others. A first and last turning point that end such a leg are among them."""
-    kinds[:count] = 0
+    clear(kinds, count)
     way, high, low = 0, 0, 0
     for k in range(1, count):
         if values[k] > values[high]:
@@ -120,10 +126,9 @@ def last_turn(times, count, kinds):
     return last
 
 
-def run(times, values, counts, swing, ended, peaks, distinct, period, turned, earlier):
+def run(times, values, counts, swing, ended, kinds, peaks, distinct, period, turned, earlier):
     """Fill `peaks` and `distinct`, shape (runs, room), `period`, `turned` and `earlier`, shape (runs,); see
-    `friso.hunting.turns.scan`."""
-    kinds = np.zeros(times.shape[1], np.int64)
+    `friso.hunting.turns.scan`. `kinds`, shape (room,), are for marks in between."""
     for j in range(counts.size):
         count = counts[j]
         period[j], turned[j] = np.nan, -np.inf

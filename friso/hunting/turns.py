@@ -4,15 +4,22 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
-from types import ModuleType
 
 import numpy as np
 
-from friso.engine.cache import code_digest, load_or_build
+from friso.engine.building import entries
+from friso.engine.cache import CODE, Request, code_digest
+from friso.engine.kinds import Array
+from friso.engine.machine_code import Loops, load
 from friso.hunting import turning
 
 MANY = 100
 """Turning points, of all runs together, from which on the compiled loops are loaded; they take as long as so many."""
+
+_FLAT, _SQUARE = Array("float64", 1), Array("float64", 2)
+_WHOLE, _MARKS = Array("int64", 1), Array("bool", 2)
+KINDS = (_SQUARE, _SQUARE, _WHOLE, _FLAT, _FLAT, _WHOLE, _MARKS, _MARKS, _FLAT, _FLAT, _FLAT)
+"""What `friso.hunting.turning.run` is given."""
 
 
 @dataclass(frozen=True)
@@ -37,16 +44,17 @@ def scan(times: np.ndarray, values: np.ndarray, counts: np.ndarray, swing: np.nd
     the period: ringing on top of it does not count. `ended` [s], shape (runs,), is the end of each run.
     """
     runs = len(counts)
+    given = tuple(map(np.ascontiguousarray, (times, values, counts, swing, ended)))
+    kinds = np.zeros(times.shape[1], np.int64)
     peaks, distinct = (np.zeros(times.shape, np.bool_) for _ in range(2))
     period, turned, earlier = (np.empty(runs) for _ in range(3))
-    loops = turning if counts.sum() < MANY else _compiled()
-    loops.run(times, values, counts, swing, ended, peaks, distinct, period, turned, earlier)
+    scan_runs = turning.run if counts.sum() < MANY else _compiled()
+    scan_runs(*given, kinds, peaks, distinct, period, turned, earlier)
     return Turns(peaks, distinct, period, turned, earlier)
 
 
 @cache
-def _compiled() -> ModuleType:
-    from friso.hunting.build import compile_run
-
+def _compiled() -> Loops:
     version = code_digest("hunting/turning.py", "hunting/build.py")
-    return load_or_build(f"turning points {version}", "friso.hunting.build", b"", compile_run)
+    (entry,) = entries([Request(f"turning points {version}", "loops over turning points", "friso.hunting.build")])
+    return Loops(load((entry / CODE).read_bytes(), ["run"])["run"], KINDS)

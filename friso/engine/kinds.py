@@ -1,0 +1,81 @@
+"""Kinds of what compiled loops (`friso.engine.scalar_code`) are given, and how it is handed over: as words of 64 bits."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Number:
+    """A kind of number: "int", "float" or "truth"; the last does not come from outside."""
+
+    name: str
+
+    @property
+    def form(self) -> str:
+        """Its words, as `struct` has it."""
+        return "d" if self.name == "float" else "q"
+
+    def words(self, value: Any) -> list[Any]:
+        """Raises TypeError where the value is of another kind, here and in the others."""
+        if not isinstance(value, float if self.name == "float" else int):
+            raise TypeError(f"{value!r} where a number is expected: {self.name}")
+        return [value]
+
+
+@dataclass(frozen=True)
+class Array:
+    """Arrays of numbers of a type, whose last index runs fastest."""
+
+    dtype: str
+    dimensions: int
+
+    @property
+    def form(self) -> str:
+        return "q" * (1 + self.dimensions)
+
+    def words(self, value: Any) -> list[Any]:
+        """Where it is, and its shape."""
+        if not (value.dtype == self.dtype and value.ndim == self.dimensions and value.flags.c_contiguous):
+            raise TypeError(f"an array of {value.dtype}, strides {value.strides}, where {self} is expected")
+        return [value.__array_interface__["data"][0], *value.shape]
+
+
+@dataclass(frozen=True)
+class Record:
+    """Named tuples with these fields."""
+
+    fields: tuple[tuple[str, Kind], ...]
+
+    @property
+    def form(self) -> str:
+        return "".join(kind.form for _, kind in self.fields)
+
+    def words(self, value: Any) -> list[Any]:
+        return [word for (_, kind), part in zip(self.fields, value, strict=True) for word in kind.words(part)]
+
+
+Kind = Number | Array | Record
+INT, FLOAT, TRUTH = Number("int"), Number("float"), Number("truth")
+
+
+def kind_of(example: Any) -> Kind:
+    """The kind of an argument. Raises TypeError for what compiled loops are not given."""
+    if isinstance(example, np.ndarray) and example.dtype.name in ("int64", "float64", "bool"):
+        return Array(example.dtype.name, example.ndim)
+    if isinstance(example, tuple) and hasattr(example, "_fields"):
+        return Record(tuple((name, kind_of(value)) for name, value in example._asdict().items()))
+    if isinstance(example, float | int) and not isinstance(example, bool):
+        return FLOAT if isinstance(example, float) else INT
+    raise TypeError(f"compiled loops are not given anything like {example!r}")
+
+
+def packed(kinds: Sequence[Kind], arguments: Sequence[Any]) -> bytes:
+    """Arguments of these kinds one after another. Arrays must outlive it."""
+    words = [word for kind, argument in zip(kinds, arguments, strict=True) for word in kind.words(argument)]
+    return struct.pack("".join(kind.form for kind in kinds), *words)

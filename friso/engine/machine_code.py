@@ -1,0 +1,73 @@
+"""Machine code: made by LLVM from its own language, loaded from object files, and called."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Iterable, Mapping, Sequence
+from functools import cache
+from threading import Lock
+from typing import Any
+
+import llvmlite.binding as llvm
+from llvmlite import ir
+
+from friso.engine.kinds import Kind, packed
+
+
+def object_code(module: ir.Module) -> bytes:
+    """The object file of a module, optimised for this processor."""
+    return target_machine().emit_object(optimised(module))
+
+
+def optimised(module: ir.Module) -> llvm.ModuleRef:
+    """A module as LLVM has rewritten it for this processor."""
+    machine = target_machine()
+    parsed = llvm.parse_assembly(str(module))
+    parsed.triple, parsed.data_layout = llvm.get_process_triple(), str(machine.target_data)
+    parsed.verify()
+    options = llvm.create_pipeline_tuning_options(speed_level=2)
+    options.slp_vectorization = options.loop_vectorization = False
+    passes = llvm.create_pass_builder(machine, options)
+    passes.getModulePassManager().run(parsed, passes)
+    return parsed
+
+
+def target_machine() -> llvm.TargetMachine:
+    """What writes code for this processor."""
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+    target = llvm.Target.from_triple(llvm.get_process_triple())
+    features = llvm.get_host_cpu_features().flatten()
+    return target.create_target_machine(llvm.get_host_cpu_name(), features, opt=3, jit=True)
+
+
+def load(code: bytes, functions: Iterable[str]) -> Mapping[str, int]:
+    """Load an object file; the addresses of these functions of it. What is loaded stays to the end of the process.
+    Raises RuntimeError where it cannot be linked."""
+    library = llvm.JITLibraryBuilder().add_object_img(code).add_current_process()
+    for function in functions:
+        library.export_symbol(function)
+    with _linking:
+        loaded = library.link(_linker(), f"library {len(_libraries)}")
+        _libraries.append(loaded)
+    return {function: loaded[function] for function in functions}
+
+
+_linking = Lock()
+_libraries: list[llvm.ResourceTracker] = []
+
+
+@cache
+def _linker() -> llvm.LLJIT:
+    return llvm.create_lljit_compiler(target_machine())
+
+
+class Loops:
+    """Compiled loops (`friso.engine.scalar_code`), called without the interpreter's lock."""
+
+    def __init__(self, address: int, kinds: Sequence[Kind]) -> None:
+        self._call, self._kinds = ctypes.CFUNCTYPE(None, ctypes.c_char_p)(address), tuple(kinds)
+
+    def __call__(self, *arguments: Any) -> None:
+        """Raises TypeError for arguments of other kinds than those the loops were compiled for."""
+        self._call(packed(self._kinds, arguments))

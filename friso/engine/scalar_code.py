@@ -1,0 +1,575 @@
+"""Compiles plain Python loops over numbers and arrays.
+
+What keeps the lanes busy and what scans turning points is loops that branch. They are a few hundred lines, for which a
+general compiler of Python needs seconds: it has to find out types. Here types follow from the arguments of a call.
+
+The language: functions of whole numbers, float64 numbers, truths, arrays and named tuples of these; assignments,
+arithmetic, comparisons, `if`, `while`, `for` over a `range` or a tuple, `return` of a number. What is imported and does
+not change is known beforehand. A variable stays of one kind; arrays are indexed in full, or by their first index, from
+0 on and within their bounds, which is not checked.
+"""
+
+from __future__ import annotations
+
+import ast
+import builtins
+import operator
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from llvmlite import ir
+
+from friso.engine.kinds import FLOAT, INT, TRUTH, Array, Kind, Number, Record, kind_of
+from friso.engine.vector_code import FASTMATH, syntax
+
+_INT64, _DOUBLE, _BIT = ir.IntType(64), ir.DoubleType(), ir.IntType(1)
+_NUMBERS = {INT: _INT64, FLOAT: _DOUBLE, TRUTH: _BIT}
+_ELEMENTS = {"int64": _INT64, "float64": _DOUBLE, "bool": ir.IntType(8)}
+
+
+def _types(kind: Kind) -> list[ir.Type]:
+    """What a value of a kind consists of: a number, an array's address and shape, or a named tuple's address."""
+    if isinstance(kind, Number):
+        return [_NUMBERS[kind]]
+    if isinstance(kind, Record):
+        return [ir.PointerType(_INT64)]
+    return [ir.PointerType(_ELEMENTS[kind.dtype])] + [_INT64] * kind.dimensions
+
+
+def written(function: Callable[..., None], kinds: Sequence[Kind]) -> ir.Module:
+    """A function of arguments of these kinds as LLVM has it, called `run`. It takes the address at which the arguments
+    lie one after another (`friso.engine.kinds.packed`)."""
+    module = ir.Module()
+    entry = ir.Function(module, ir.FunctionType(ir.VoidType(), [ir.PointerType(_INT64)]), "run")
+    builder = ir.IRBuilder(entry.append_basic_block())
+    arguments = _RecordValue(entry.args[0], Record(tuple((str(i), kind) for i, kind in enumerate(kinds))))
+    _Writer(module).call(builder, function, [arguments.field(builder, str(i)) for i in range(len(kinds))])
+    builder.ret_void()
+    return module
+
+
+def take_next(queue: Any) -> Any:
+    """The number at the head of a queue, an array of one number, which no other thread gets too."""
+    queue[0] += 1
+    return queue[0] - 1
+
+
+def call_at(address: Any, buffer: Any, *numbers: Any) -> Any:
+    """Call a function that `friso.engine.vector_code` has written, at its address; the bits of the lanes it tells."""
+    raise NotImplementedError
+
+
+@dataclass(frozen=True)
+class _Value:
+    """A number."""
+
+    value: ir.Value
+    kind: Number
+
+    @property
+    def parts(self) -> list[ir.Value]:
+        return [self.value]
+
+
+@dataclass(frozen=True)
+class _ArrayValue:
+    """An array: where it begins, and its shape."""
+
+    data: ir.Value
+    shape: tuple[ir.Value, ...]
+    kind: Array
+
+    @property
+    def parts(self) -> list[ir.Value]:
+        return [self.data, *self.shape]
+
+
+@dataclass(frozen=True)
+class _RecordValue:
+    """A named tuple: where it lies, which does not change while the code runs."""
+
+    words: ir.Value
+    kind: Record
+
+    @property
+    def parts(self) -> list[ir.Value]:
+        return [self.words]
+
+    def field(self, builder: ir.IRBuilder, name: str) -> Any:
+        place = 0
+        for other, kind in self.kind.fields:
+            if other == name:
+                return self._field(builder, place, kind)
+            place += len(kind.form)
+        raise TypeError(f"not in the language of plain loops: no field {name}")
+
+    def _field(self, builder: ir.IRBuilder, place: int, kind: Kind) -> Any:
+        if isinstance(kind, Record):
+            return _RecordValue(builder.gep(self.words, [ir.Constant(_INT64, place)]), kind)
+        parts = []
+        for i, part in enumerate(_types(kind)):
+            pointer = builder.gep(self.words, [ir.Constant(_INT64, place + i)])
+            loaded = builder.load(builder.bitcast(pointer, ir.PointerType(part)))
+            loaded.set_metadata("invariant.load", builder.module.add_metadata([]))
+            parts.append(loaded)
+        return _value(parts, kind)
+
+
+def _value(parts: Sequence[ir.Value], kind: Kind) -> Any:
+    if isinstance(kind, Array):
+        return _ArrayValue(parts[0], tuple(parts[1:]), kind)
+    return _Value(parts[0], kind) if isinstance(kind, Number) else _RecordValue(parts[0], kind)
+
+
+class _Writer:
+    """Writes functions, each once for the kinds of its arguments."""
+
+    def __init__(self, module: ir.Module) -> None:
+        self.module = module
+        self._written: dict[tuple[Any, ...], tuple[ir.Function, Number | None]] = {}
+
+    def call(self, builder: ir.IRBuilder, function: Callable[..., Any], arguments: list[Any]) -> Any:
+        """Call a function; its result, None without one. All return a word, whatever the kind of their result."""
+        kinds = tuple(argument.kind for argument in arguments)
+        if (function, kinds) not in self._written:
+            self._written[function, kinds] = self._write(function, kinds)
+        code, kind = self._written[function, kinds]
+        word = builder.call(code, [part for argument in arguments for part in argument.parts])
+        if kind is None:
+            return None
+        if kind == FLOAT:
+            return _Value(builder.bitcast(word, _DOUBLE), FLOAT)
+        return _Value(builder.trunc(word, _BIT) if kind == TRUTH else word, kind)
+
+    def _write(self, function: Callable[..., Any], kinds: tuple[Kind, ...]) -> tuple[ir.Function, Number | None]:
+        tree = syntax(function)
+        signature = ir.FunctionType(_INT64, [each for kind in kinds for each in _types(kind)])
+        code = ir.Function(self.module, signature, self.module.get_unique_name(function.__name__))
+        code.linkage = "internal"
+        parts, scope = list(code.args), {}
+        for name, kind in zip((each.arg for each in tree.args.args), kinds, strict=True):
+            scope[name] = _value(parts[: len(_types(kind))], kind)
+            del parts[: len(_types(kind))]
+        frame = _Frame(self, code, scope, function.__globals__)
+        frame.body(tree)
+        return code, frame.result
+
+
+_ARITHMETIC: dict[type[ast.AST], tuple[str, str]] = {
+    ast.Add: ("add", "fadd"),
+    ast.Sub: ("sub", "fsub"),
+    ast.Mult: ("mul", "fmul"),
+}
+_BITWISE: dict[type[ast.AST], str] = {ast.BitAnd: "and_", ast.BitOr: "or_", ast.RShift: "ashr"}
+_PYTHON: dict[type[ast.AST], Callable[..., Any]] = {
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+    ast.Div: operator.truediv,
+    ast.Eq: operator.eq,
+    ast.NotEq: operator.ne,
+}
+"""Operators between numbers that are known beforehand."""
+
+_COMPARISONS: dict[type[ast.AST], str] = {
+    ast.Lt: "<",
+    ast.LtE: "<=",
+    ast.Gt: ">",
+    ast.GtE: ">=",
+    ast.Eq: "==",
+    ast.NotEq: "!=",
+}
+
+
+class _Frame(ast.NodeVisitor):
+    """Writes the statements and expressions of one function for the kinds of its arguments.
+
+    A variable that holds a number is a place in memory, which LLVM turns into registers; one that holds an array or a
+    named tuple is another name for it. What is known beforehand stays a Python object until it meets a number.
+    """
+
+    def __init__(self, writer: _Writer, code: ir.Function, scope: dict[str, Any], outside: dict[str, Any]) -> None:
+        self.result: Number | None = None
+        self._writer, self._code, self._outside = writer, code, outside
+        self._variables = ir.IRBuilder(code.append_basic_block())
+        self._builder = ir.IRBuilder(code.append_basic_block())
+        self._scope: dict[str, Any] = {}
+        self._loops: list[tuple[ir.Block, ir.Block]] = []
+        for name, value in scope.items():
+            self._bind(name, value)
+        self._first = self._code.blocks[1]
+
+    def body(self, tree: ast.FunctionDef) -> None:
+        """Write the whole function."""
+        self._statements(tree.body)
+        if not self._builder.block.is_terminated:
+            self._builder.ret(ir.Constant(_INT64, 0))
+        self._variables.branch(self._first)
+
+    def generic_visit(self, node: ast.AST) -> Any:
+        raise TypeError(f"not in the language of plain loops: {ast.unparse(node)}")
+
+    def _statements(self, statements: Sequence[ast.stmt]) -> None:
+        for statement in statements:
+            if self._builder.block.is_terminated:
+                return
+            self.visit(statement)
+
+    def visit_Expr(self, node: ast.Expr) -> None:
+        if not isinstance(node.value, ast.Constant):
+            self.visit(node.value)
+
+    def visit_Assign(self, node: ast.Assign) -> None:
+        value = self.visit(node.value)
+        for target in node.targets:
+            self._assign(target, value)
+
+    def visit_AugAssign(self, node: ast.AugAssign) -> None:
+        self._assign(node.target, self._operate(node.op, self.visit(node.target), self.visit(node.value)))
+
+    def _assign(self, target: ast.expr, value: Any) -> None:
+        if isinstance(target, ast.Tuple):
+            for part, each in zip(target.elts, value, strict=True):
+                self._assign(part, each)
+        elif isinstance(target, ast.Name):
+            self._bind(target.id, value)
+        elif isinstance(target, ast.Subscript):
+            array = self.visit(target.value)
+            pointer, dtype = self._element(array, target.slice), array.kind.dtype
+            if dtype == "bool":
+                self._builder.store(self._builder.zext(self._truth(value), _ELEMENTS[dtype]), pointer)
+            else:
+                self._builder.store(self._number(value, INT if dtype == "int64" else FLOAT).value, pointer)
+        else:
+            self.generic_visit(target)
+
+    def _bind(self, name: str, value: Any) -> None:
+        """Let a variable be a value; a number is copied into it."""
+        if isinstance(value, _ArrayValue | _RecordValue):
+            self._scope[name] = value
+            return
+        number = self._number(value)
+        if name not in self._scope:
+            room = self._variables.alloca(number.value.type)
+            self._scope[name] = _Variable(room, number.kind)
+        variable = self._scope[name]
+        if not isinstance(variable, _Variable):
+            raise TypeError(f"not in the language of plain loops: {name} is an array here, a number there")
+        self._builder.store(self._number(number, variable.kind).value, variable.room)
+
+    def visit_Return(self, node: ast.Return) -> None:
+        if node.value is None:
+            self._builder.ret(ir.Constant(_INT64, 0))
+            return
+        number = self._number(self.visit(node.value), self.result)
+        self.result, value = number.kind, number.value
+        if number.kind == FLOAT:
+            value = self._builder.bitcast(value, _INT64)
+        elif number.kind == TRUTH:
+            value = self._builder.zext(value, _INT64)
+        self._builder.ret(value)
+
+    def visit_If(self, node: ast.If) -> None:
+        condition = self.visit(node.test)
+        if not isinstance(condition, _Value):
+            self._statements(node.body if condition else node.orelse)
+            return
+        chosen, otherwise, after = self._blocks(3)
+        self._builder.cbranch(self._truth(condition), chosen, otherwise)
+        for block, statements in ((chosen, node.body), (otherwise, node.orelse)):
+            self._builder.position_at_end(block)
+            self._statements(statements)
+            self._go(after)
+        self._builder.position_at_end(after)
+
+    def visit_While(self, node: ast.While) -> None:
+        test, body, after = self._blocks(3)
+        self._go(test)
+        self._builder.position_at_end(test)
+        self._builder.cbranch(self._truth(self.visit(node.test)), body, after)
+        self._loop(node, body, test, after)
+
+    def visit_For(self, node: ast.For) -> None:
+        """Over a range, or as often as a tuple has parts."""
+        if not (isinstance(node.iter, ast.Call) and self.visit(node.iter.func) is range):
+            for part in self.visit(node.iter):
+                self._assign(node.target, part)
+                self._statements(node.body)
+            return
+        if not isinstance(node.target, ast.Name):
+            self.generic_visit(node.target)
+        given = [self.visit(each) for each in node.iter.args]
+        start, stop, step = (0, *given, 1) if len(given) == 1 else (*given, 1)[:3]
+        if isinstance(step, _Value):
+            self.generic_visit(node.iter)
+        end = self._number(stop, INT).value
+        counter = self._variables.alloca(_INT64)
+        self._builder.store(self._number(start, INT).value, counter)
+        test, body, on, after = self._blocks(4)
+        self._go(test)
+        self._builder.position_at_end(test)
+        now = self._builder.load(counter)
+        self._builder.cbranch(self._builder.icmp_signed("<" if step > 0 else ">", now, end), body, after)
+        self._builder.position_at_end(on)
+        following = self._builder.add(self._builder.load(counter), ir.Constant(_INT64, step), flags=["nsw"])
+        self._builder.store(following, counter)
+        self._builder.branch(test)
+        self._builder.position_at_end(body)
+        self._bind(node.target.id, _Value(now, INT))
+        self._loop(node, body, on, after)
+
+    def _loop(self, node: ast.For | ast.While, body: ir.Block, again: ir.Block, after: ir.Block) -> None:
+        if node.orelse:
+            self.generic_visit(node)
+        self._builder.position_at_end(body)
+        self._loops.append((again, after))
+        self._statements(node.body)
+        self._loops.pop()
+        self._go(again)
+        self._builder.position_at_end(after)
+
+    def visit_Break(self, node: ast.Break) -> None:
+        self._builder.branch(self._loops[-1][1])
+
+    def visit_Continue(self, node: ast.Continue) -> None:
+        self._builder.branch(self._loops[-1][0])
+
+    def _blocks(self, count: int) -> list[ir.Block]:
+        return [self._code.append_basic_block() for _ in range(count)]
+
+    def _go(self, block: ir.Block) -> None:
+        if not self._builder.block.is_terminated:
+            self._builder.branch(block)
+
+    def visit_Constant(self, node: ast.Constant) -> Any:
+        return node.value
+
+    def visit_Tuple(self, node: ast.Tuple) -> tuple[Any, ...]:
+        return tuple(map(self.visit, node.elts))
+
+    def visit_Name(self, node: ast.Name) -> Any:
+        if node.id in self._scope:
+            value = self._scope[node.id]
+            if isinstance(value, _Variable):
+                return _Value(self._builder.load(value.room), value.kind)
+            return value
+        return self._outside[node.id] if node.id in self._outside else getattr(builtins, node.id)
+
+    def visit_Attribute(self, node: ast.Attribute) -> Any:
+        value = self.visit(node.value)
+        if isinstance(value, _RecordValue):
+            return value.field(self._builder, node.attr)
+        if isinstance(value, _ArrayValue):
+            lengths = tuple(_Value(length, INT) for length in value.shape)
+            if node.attr == "shape":
+                return lengths
+            if node.attr == "size" and len(lengths) == 1:
+                return lengths[0]
+            self.generic_visit(node)
+        return getattr(value, node.attr)
+
+    def visit_Subscript(self, node: ast.Subscript) -> Any:
+        array = self.visit(node.value)
+        if not isinstance(array, _ArrayValue):
+            return array[self.visit(node.slice)]
+        if array.kind.dimensions > 1 and not isinstance(node.slice, ast.Tuple):
+            kind = Array(array.kind.dtype, array.kind.dimensions - 1)
+            return _ArrayValue(self._element(array, node.slice), array.shape[1:], kind)
+        loaded = self._builder.load(self._element(array, node.slice))
+        if array.kind.dtype == "bool":
+            return _Value(self._builder.trunc(loaded, _BIT), TRUTH)
+        return _Value(loaded, INT if array.kind.dtype == "int64" else FLOAT)
+
+    def _element(self, array: _ArrayValue, node: ast.expr) -> ir.Value:
+        """Where an element is, or where the part with this first index begins."""
+        index = node.elts if isinstance(node, ast.Tuple) else [node]
+        if len(index) not in (1, len(array.shape)):
+            self.generic_visit(node)
+        place = ir.Constant(_INT64, 0)
+        for axis, length in enumerate(array.shape):
+            place = self._builder.mul(place, length, flags=["nsw"])
+            if axis < len(index):
+                place = self._builder.add(place, self._number(self.visit(index[axis]), INT).value, flags=["nsw"])
+        return self._builder.gep(array.data, [place], inbounds=True)
+
+    def visit_UnaryOp(self, node: ast.UnaryOp) -> Any:
+        operand = self.visit(node.operand)
+        if not isinstance(operand, _Value):
+            return -operand if isinstance(node.op, ast.USub) else not operand
+        if isinstance(node.op, ast.Not):
+            return _Value(self._builder.not_(self._truth(operand)), TRUTH)
+        if not isinstance(node.op, ast.USub):
+            self.generic_visit(node)
+        number = self._number(operand)
+        negated = self._builder.fneg(number.value) if number.kind == FLOAT else self._builder.neg(number.value)
+        return _Value(negated, number.kind)
+
+    def visit_BinOp(self, node: ast.BinOp) -> Any:
+        return self._operate(node.op, self.visit(node.left), self.visit(node.right))
+
+    def _operate(self, sign: ast.operator, left: Any, right: Any) -> Any:
+        if not isinstance(left, _Value) and not isinstance(right, _Value):
+            return _PYTHON[type(sign)](left, right)
+        if isinstance(sign, ast.Div):
+            sides = (self._number(left, FLOAT).value, self._number(right, FLOAT).value)
+            return _Value(self._builder.fdiv(*sides, flags=FASTMATH), FLOAT)
+        one, other, kind = self._alike(left, right)
+        if type(sign) in _ARITHMETIC:
+            whole, real = _ARITHMETIC[type(sign)]
+            flags = FASTMATH if kind == FLOAT else ["nsw"]
+            return _Value(getattr(self._builder, real if kind == FLOAT else whole)(one, other, flags=flags), kind)
+        if kind == FLOAT or type(sign) not in _BITWISE:
+            raise TypeError(f"not in the language of plain loops: {type(sign).__name__} of {kind.name}")
+        return _Value(getattr(self._builder, _BITWISE[type(sign)])(one, other), kind)
+
+    def visit_Compare(self, node: ast.Compare) -> Any:
+        if len(node.ops) > 1 or type(node.ops[0]) not in _COMPARISONS:
+            self.generic_visit(node)
+        left, right = self.visit(node.left), self.visit(node.comparators[0])
+        if not isinstance(left, _Value) and not isinstance(right, _Value):
+            return _PYTHON[type(node.ops[0])](left, right)
+        return self._compare(_COMPARISONS[type(node.ops[0])], left, right)
+
+    def _compare(self, sign: str, left: Any, right: Any) -> _Value:
+        one, other, kind = self._alike(left, right)
+        if kind != FLOAT:
+            return _Value(self._builder.icmp_signed(sign, one, other), TRUTH)
+        compare = self._builder.fcmp_unordered if sign == "!=" else self._builder.fcmp_ordered
+        return _Value(compare(sign, one, other, flags=FASTMATH), TRUTH)
+
+    def visit_BoolOp(self, node: ast.BoolOp) -> _Value:
+        """As in Python, what comes later is not looked at where what comes first decides."""
+        after, ends = self._code.append_basic_block(), []
+        decisive = ir.Constant(_BIT, int(isinstance(node.op, ast.Or)))
+        for each in node.values[:-1]:
+            truth, on = self._truth(self.visit(each)), self._code.append_basic_block()
+            ends.append((decisive, self._builder.block))
+            ways = (after, on) if isinstance(node.op, ast.Or) else (on, after)
+            self._builder.cbranch(truth, *ways)
+            self._builder.position_at_end(on)
+        ends.append((self._truth(self.visit(node.values[-1])), self._builder.block))
+        return _Value(self._meet(after, ends, _BIT), TRUTH)
+
+    def visit_IfExp(self, node: ast.IfExp) -> Any:
+        condition = self.visit(node.test)
+        if not isinstance(condition, _Value):
+            return self.visit(node.body if condition else node.orelse)
+        chosen, otherwise, after = self._blocks(3)
+        self._builder.cbranch(self._truth(condition), chosen, otherwise)
+        sides = []
+        for block, side in ((chosen, node.body), (otherwise, node.orelse)):
+            self._builder.position_at_end(block)
+            sides.append((self._number(self.visit(side)), self._builder.block))
+        kind = FLOAT if any(number.kind == FLOAT for number, _ in sides) else sides[0][0].kind
+        ends = []
+        for number, block in sides:
+            self._builder.position_at_end(block)
+            ends.append((self._number(number, kind).value, block))
+        self._builder.position_at_end(ends[0][1])
+        self._builder.branch(after)
+        self._builder.position_at_end(ends[1][1])
+        return _Value(self._meet(after, ends, ends[0][0].type), kind)
+
+    def _meet(self, block: ir.Block, ends: Sequence[tuple[ir.Value, ir.Block]], type_: ir.Type) -> ir.Value:
+        """Go on in a block, to which several ways lead; the value that comes along the way taken."""
+        self._builder.branch(block)
+        self._builder.position_at_end(block)
+        value = self._builder.phi(type_)
+        for each, origin in ends:
+            value.add_incoming(each, origin)
+        return value
+
+    def visit_Call(self, node: ast.Call) -> Any:
+        function, arguments = self.visit(node.func), [self.visit(each) for each in node.args]
+        if node.keywords:
+            self.generic_visit(node)
+        if function in _LIBRARY:
+            return _LIBRARY[function](self, *arguments)
+        if not any(hasattr(each, "parts") for each in arguments):
+            return function(*arguments)
+        whole = [each if hasattr(each, "parts") else self._number(each) for each in arguments]
+        return self._writer.call(self._builder, function, whole)
+
+    def least(self, one: Any, other: Any) -> _Value:
+        return self._choose("<", one, other)
+
+    def greatest(self, one: Any, other: Any) -> _Value:
+        return self._choose(">", one, other)
+
+    def _choose(self, sign: str, one: Any, other: Any) -> _Value:
+        first, second, kind = self._alike(one, other)
+        condition = self._compare(sign, _Value(second, kind), _Value(first, kind)).value
+        return _Value(self._builder.select(condition, second, first), kind)
+
+    def magnitude(self, given: Any) -> _Value:
+        signature = ir.FunctionType(_DOUBLE, [_DOUBLE])
+        called = self._builder.module.declare_intrinsic("llvm.fabs.f64", (), signature)
+        return _Value(self._builder.call(called, [self._number(given, FLOAT).value]), FLOAT)
+
+    def whole(self, given: Any) -> _Value:
+        number = self._number(given)
+        if number.kind != FLOAT:
+            return self._number(number, INT)
+        return _Value(self._builder.fptosi(number.value, _INT64), INT)
+
+    def real(self, given: Any) -> _Value:
+        return self._number(given, FLOAT)
+
+    def take_next(self, queue: _ArrayValue) -> _Value:
+        taken = self._builder.atomic_rmw("add", queue.data, ir.Constant(_INT64, 1), "monotonic")
+        return _Value(taken, INT)
+
+    def call_at(self, address: _Value, buffer: _ArrayValue, *numbers: Any) -> _Value:
+        signature = ir.FunctionType(_INT64, [buffer.data.type] + [_DOUBLE] * len(numbers))
+        code = self._builder.inttoptr(address.value, ir.PointerType(signature))
+        given = [self._number(each, FLOAT).value for each in numbers]
+        return _Value(self._builder.call(code, [buffer.data, *given]), INT)
+
+    def _alike(self, left: Any, right: Any) -> tuple[ir.Value, ir.Value, Number]:
+        """Two numbers of one kind: a float64 number where one of them is."""
+        one, other = self._number(left), self._number(right)
+        kind = FLOAT if FLOAT in (one.kind, other.kind) else INT
+        if one.kind == TRUTH and other.kind == TRUTH:
+            kind = TRUTH
+        return self._number(one, kind).value, self._number(other, kind).value, kind
+
+    def _number(self, given: Any, kind: Number | None = None) -> _Value:
+        """A number as one of a kind; a whole number may become a float64 number, and a truth either."""
+        if not isinstance(given, _Value):
+            own = kind_of(given) if not isinstance(given, bool) else TRUTH
+            if not isinstance(own, Number):
+                raise TypeError(f"not in the language of plain loops: {given!r} where a number is expected")
+            given = _Value(ir.Constant(_types(own)[0], given), own)
+        if kind is None or given.kind == kind:
+            return given
+        if kind == FLOAT and given.kind == INT:
+            return _Value(self._builder.sitofp(given.value, _DOUBLE), FLOAT)
+        if given.kind == TRUTH:
+            return self._number(_Value(self._builder.zext(given.value, _INT64), INT), kind)
+        raise TypeError(f"not in the language of plain loops: {given.kind.name} where {kind.name} is expected")
+
+    def _truth(self, given: Any) -> ir.Value:
+        """Whether a number is not 0."""
+        number = self._number(given)
+        return number.value if number.kind == TRUTH else self._compare("!=", number, 0).value
+
+
+@dataclass(frozen=True)
+class _Variable:
+    """Where a number is kept."""
+
+    room: ir.Value
+    kind: Number
+
+
+_LIBRARY: dict[Any, Callable[..., _Value]] = {
+    min: _Frame.least,
+    max: _Frame.greatest,
+    abs: _Frame.magnitude,
+    int: _Frame.whole,
+    float: _Frame.real,
+    take_next: _Frame.take_next,
+    call_at: _Frame.call_at,
+}
+"""Functions that are instructions."""
