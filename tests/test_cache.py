@@ -21,7 +21,7 @@ BUILDER = """
 import os
 
 from friso.engine.cache import keep
-from friso.engine.kinds import Array
+from friso.engine.kinds import ArrayKind
 from friso.engine.machine_code import object_code
 from friso.engine.scalar_code import written
 
@@ -29,19 +29,19 @@ def build(folder, task):
     assert task == b"task"
     print("a plug-in may say something")
     source = "def run(x):\\n    x[0] = 2.0 * x[0]" + os.environ.get("STAND_IN_ENDS_WITH", "") + "\\n"
-    return keep(folder, source, lambda module: object_code(written(module.run, [Array("float64", 1)])))
+    return keep(folder, source, lambda module: object_code(written(module.run, [ArrayKind("float64", 1)])))
 """
 
 SCRIPT = """
 import sys
 import numpy as np
 from friso.engine.building import entries
-from friso.engine.cache import CODE, Request
-from friso.engine.kinds import Array
+from friso.engine.cache import CODE, CodeRequest
+from friso.engine.kinds import ArrayKind
 from friso.engine.machine_code import Loops, load
 
-(entry,) = entries([Request(sys.argv[1], "a stand-in", "stand_in_builder", b"task")])
-run = Loops(load((entry / CODE).read_bytes(), ["run"])["run"], [Array("float64", 1)])
+(entry,) = entries([CodeRequest(sys.argv[1], "a stand-in", "stand_in_builder", b"task")])
+run = Loops(load((entry / CODE).read_bytes(), ["run"])["run"], [ArrayKind("float64", 1)])
 x = np.array([21.0])
 run(x)
 assert x[0] == 42.0
@@ -236,7 +236,7 @@ def aged(seconds: float, *files: Path) -> None:
 def test_a_builder_that_fails_says_why(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, crash: str) -> None:
     (tmp_path / "failing_builder.py").write_text(f"def build(folder, task):\n    {crash}\n")
     monkeypatch.syspath_prepend(tmp_path)
-    request = cache.Request("failing", "what fails", "failing_builder")
+    request = cache.CodeRequest("failing", "what fails", "failing_builder")
     with pytest.raises(RuntimeError, match="could not be compiled") as raised:
         building.entries([request, request])
     assert ("no such stage" in str(raised.value)) == ("no such stage" in crash)

@@ -17,11 +17,11 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from types import TracebackType
 
-from friso.engine.cache import Request, cache_folder, logger, prune
+from friso.engine.cache import CodeRequest, cache_folder, logger, prune
 from friso.system import usable_cores
 
 
-def entries(requests: Iterable[Request]) -> list[Path]:
+def entries(requests: Iterable[CodeRequest]) -> list[Path]:
     """The entries of what is requested, in the cache; what is missing there is built, and what is said about it logged.
     Raises RuntimeError with the builder's message if that fails, OSError where the cache cannot be written."""
     requests = list(requests)
@@ -39,7 +39,7 @@ def entries(requests: Iterable[Request]) -> list[Path]:
 class _Work:
     """Requests that are still to be met, taken by builders one by one."""
 
-    def __init__(self, requests: list[Request]) -> None:
+    def __init__(self, requests: list[CodeRequest]) -> None:
         self._count, self._waiting = len(requests), deque(enumerate(requests, 1))
         self._builders: list[_Builder] = []
 
@@ -88,7 +88,7 @@ class _Builder:
             self._process.communicate()
         self._messages.close()
 
-    def build(self, request: Request) -> str:
+    def build(self, request: CodeRequest) -> str:
         """Build what is requested; the name of its entry."""
         process = self._process = self._process or self._started()
         assert process.stdin is not None

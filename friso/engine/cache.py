@@ -94,7 +94,7 @@ def environment() -> str:
 
 
 @dataclass(frozen=True)
-class Request:
+class CodeRequest:
     """What is to be compiled: its `name` in full, a `title` for people, the module whose `build(folder, task)` keeps it
     in the cache (`keep`) and returns the name of its entry, and the task that it is given."""
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from friso.engine.arrays import STATISTICS, Batch, Results, Settings, new_queue
 from friso.engine.building import entries
-from friso.engine.cache import CODE, Request, import_entry
+from friso.engine.cache import CODE, CodeRequest, import_entry
 from friso.engine.kinds import Kind, kind_of
 from friso.engine.layout import FUNCTIONS, LANES, LOOKED_UP, ModelLayout
 from friso.engine.machine_code import Loops, load
@@ -198,15 +198,15 @@ def kernels(requests: Iterable[Wanted]) -> list[Kernel]:
 _kernels: dict[Wanted, Kernel] = {}
 _loading = Lock()
 
-DRIVER = Request("driver", "the loops that run any kernel", "friso.engine.build")
+DRIVER = CodeRequest("driver", "the loops that run any kernel", "friso.engine.build")
 """What is compiled once for all kernels."""
 
 
-def _request(wanted: Wanted) -> Request:
+def _request(wanted: Wanted) -> CodeRequest:
     """What is wanted is pickled apart from the plug-ins, which the builder loads first: it may hold their classes."""
     foreign = plug_ins(wanted.sections)
     name = " ".join([repr(wanted), *(plug_in.digest for plug_in in foreign)])
-    return Request(name, wanted.title, "friso.engine.build", pickle.dumps((foreign, pickle.dumps(wanted))))
+    return CodeRequest(name, wanted.title, "friso.engine.build", pickle.dumps((foreign, pickle.dumps(wanted))))
 
 
 def _load(wanted: Wanted, entry: Path) -> None:

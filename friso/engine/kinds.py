@@ -11,7 +11,7 @@ import numpy as np
 
 
 @dataclass(frozen=True)
-class Number:
+class NumberKind:
     """A kind of number: "int", "float" or "truth"; the last does not come from outside."""
 
     name: str
@@ -28,8 +28,11 @@ class Number:
         return [value]
 
 
+_DTYPES = {name: np.dtype(name) for name in ("int64", "float64", "bool")}
+
+
 @dataclass(frozen=True)
-class Array:
+class ArrayKind:
     """Arrays of numbers of a type, whose last index runs fastest."""
 
     dtype: str
@@ -41,13 +44,13 @@ class Array:
 
     def words(self, value: Any) -> list[Any]:
         """Where it is, and its shape."""
-        if not (value.dtype == self.dtype and value.ndim == self.dimensions and value.flags.c_contiguous):
+        if not (value.dtype == _DTYPES[self.dtype] and value.ndim == self.dimensions and value.flags.c_contiguous):
             raise TypeError(f"an array of {value.dtype}, strides {value.strides}, where {self} is expected")
         return [value.__array_interface__["data"][0], *value.shape]
 
 
 @dataclass(frozen=True)
-class Record:
+class RecordKind:
     """Named tuples with these fields."""
 
     fields: tuple[tuple[str, Kind], ...]
@@ -57,19 +60,20 @@ class Record:
         return "".join(kind.form for _, kind in self.fields)
 
     def words(self, value: Any) -> list[Any]:
+        """Those of one field after another."""
         return [word for (_, kind), part in zip(self.fields, value, strict=True) for word in kind.words(part)]
 
 
-Kind = Number | Array | Record
-INT, FLOAT, TRUTH = Number("int"), Number("float"), Number("truth")
+Kind = NumberKind | ArrayKind | RecordKind
+INT, FLOAT, TRUTH = NumberKind("int"), NumberKind("float"), NumberKind("truth")
 
 
 def kind_of(example: Any) -> Kind:
     """The kind of an argument. Raises TypeError for what compiled loops are not given."""
-    if isinstance(example, np.ndarray) and example.dtype.name in ("int64", "float64", "bool"):
-        return Array(example.dtype.name, example.ndim)
+    if isinstance(example, np.ndarray) and example.dtype.name in _DTYPES:
+        return ArrayKind(example.dtype.name, example.ndim)
     if isinstance(example, tuple) and hasattr(example, "_fields"):
-        return Record(tuple((name, kind_of(value)) for name, value in example._asdict().items()))
+        return RecordKind(tuple((name, kind_of(value)) for name, value in example._asdict().items()))
     if isinstance(example, float | int) and not isinstance(example, bool):
         return FLOAT if isinstance(example, float) else INT
     raise TypeError(f"compiled loops are not given anything like {example!r}")

@@ -20,7 +20,7 @@ from typing import Any
 
 from llvmlite import ir
 
-from friso.engine.kinds import FLOAT, INT, TRUTH, Array, Kind, Number, Record, kind_of
+from friso.engine.kinds import FLOAT, INT, TRUTH, ArrayKind, Kind, NumberKind, RecordKind, kind_of
 from friso.engine.vector_code import FASTMATH, syntax
 
 _INT64, _DOUBLE, _BIT = ir.IntType(64), ir.DoubleType(), ir.IntType(1)
@@ -30,9 +30,9 @@ _ELEMENTS = {"int64": _INT64, "float64": _DOUBLE, "bool": ir.IntType(8)}
 
 def _types(kind: Kind) -> list[ir.Type]:
     """What a value of a kind consists of: a number, an array's address and shape, or a named tuple's address."""
-    if isinstance(kind, Number):
+    if isinstance(kind, NumberKind):
         return [_NUMBERS[kind]]
-    if isinstance(kind, Record):
+    if isinstance(kind, RecordKind):
         return [ir.PointerType(_INT64)]
     return [ir.PointerType(_ELEMENTS[kind.dtype])] + [_INT64] * kind.dimensions
 
@@ -43,7 +43,7 @@ def written(function: Callable[..., None], kinds: Sequence[Kind]) -> ir.Module:
     module = ir.Module()
     entry = ir.Function(module, ir.FunctionType(ir.VoidType(), [ir.PointerType(_INT64)]), "run")
     builder = ir.IRBuilder(entry.append_basic_block())
-    arguments = _RecordValue(entry.args[0], Record(tuple((str(i), kind) for i, kind in enumerate(kinds))))
+    arguments = _RecordValue(entry.args[0], RecordKind(tuple((str(i), kind) for i, kind in enumerate(kinds))))
     _Writer(module).call(builder, function, [arguments.field(builder, str(i)) for i in range(len(kinds))])
     builder.ret_void()
     return module
@@ -65,7 +65,7 @@ class _Value:
     """A number."""
 
     value: ir.Value
-    kind: Number
+    kind: NumberKind
 
     @property
     def parts(self) -> list[ir.Value]:
@@ -78,7 +78,7 @@ class _ArrayValue:
 
     data: ir.Value
     shape: tuple[ir.Value, ...]
-    kind: Array
+    kind: ArrayKind
 
     @property
     def parts(self) -> list[ir.Value]:
@@ -90,7 +90,7 @@ class _RecordValue:
     """A named tuple: where it lies, which does not change while the code runs."""
 
     words: ir.Value
-    kind: Record
+    kind: RecordKind
 
     @property
     def parts(self) -> list[ir.Value]:
@@ -105,7 +105,7 @@ class _RecordValue:
         raise TypeError(f"not in the language of plain loops: no field {name}")
 
     def _field(self, builder: ir.IRBuilder, place: int, kind: Kind) -> Any:
-        if isinstance(kind, Record):
+        if isinstance(kind, RecordKind):
             return _RecordValue(builder.gep(self.words, [ir.Constant(_INT64, place)]), kind)
         parts = []
         for i, part in enumerate(_types(kind)):
@@ -117,9 +117,9 @@ class _RecordValue:
 
 
 def _value(parts: Sequence[ir.Value], kind: Kind) -> Any:
-    if isinstance(kind, Array):
+    if isinstance(kind, ArrayKind):
         return _ArrayValue(parts[0], tuple(parts[1:]), kind)
-    return _Value(parts[0], kind) if isinstance(kind, Number) else _RecordValue(parts[0], kind)
+    return _Value(parts[0], kind) if isinstance(kind, NumberKind) else _RecordValue(parts[0], kind)
 
 
 class _Writer:
@@ -127,7 +127,7 @@ class _Writer:
 
     def __init__(self, module: ir.Module) -> None:
         self.module = module
-        self._written: dict[tuple[Any, ...], tuple[ir.Function, Number | None]] = {}
+        self._written: dict[tuple[Any, ...], tuple[ir.Function, NumberKind | None]] = {}
 
     def call(self, builder: ir.IRBuilder, function: Callable[..., Any], arguments: list[Any]) -> Any:
         """Call a function; its result, None without one. All return a word, whatever the kind of their result."""
@@ -142,7 +142,7 @@ class _Writer:
             return _Value(builder.bitcast(word, _DOUBLE), FLOAT)
         return _Value(builder.trunc(word, _BIT) if kind == TRUTH else word, kind)
 
-    def _write(self, function: Callable[..., Any], kinds: tuple[Kind, ...]) -> tuple[ir.Function, Number | None]:
+    def _write(self, function: Callable[..., Any], kinds: tuple[Kind, ...]) -> tuple[ir.Function, NumberKind | None]:
         tree = syntax(function)
         signature = ir.FunctionType(_INT64, [each for kind in kinds for each in _types(kind)])
         code = ir.Function(self.module, signature, self.module.get_unique_name(function.__name__))
@@ -190,7 +190,7 @@ class _Frame(ast.NodeVisitor):
     """
 
     def __init__(self, writer: _Writer, code: ir.Function, scope: dict[str, Any], outside: dict[str, Any]) -> None:
-        self.result: Number | None = None
+        self.result: NumberKind | None = None
         self._writer, self._code, self._outside = writer, code, outside
         self._variables = ir.IRBuilder(code.append_basic_block())
         self._builder = ir.IRBuilder(code.append_basic_block())
@@ -374,7 +374,7 @@ class _Frame(ast.NodeVisitor):
         if not isinstance(array, _ArrayValue):
             return array[self.visit(node.slice)]
         if array.kind.dimensions > 1 and not isinstance(node.slice, ast.Tuple):
-            kind = Array(array.kind.dtype, array.kind.dimensions - 1)
+            kind = ArrayKind(array.kind.dtype, array.kind.dimensions - 1)
             return _ArrayValue(self._element(array, node.slice), array.shape[1:], kind)
         loaded = self._builder.load(self._element(array, node.slice))
         if array.kind.dtype == "bool":
@@ -526,7 +526,7 @@ class _Frame(ast.NodeVisitor):
         given = [self._number(each, FLOAT).value for each in numbers]
         return _Value(self._builder.call(code, [buffer.data, *given]), INT)
 
-    def _alike(self, left: Any, right: Any) -> tuple[ir.Value, ir.Value, Number]:
+    def _alike(self, left: Any, right: Any) -> tuple[ir.Value, ir.Value, NumberKind]:
         """Two numbers of one kind: a float64 number where one of them is."""
         one, other = self._number(left), self._number(right)
         kind = FLOAT if FLOAT in (one.kind, other.kind) else INT
@@ -534,11 +534,11 @@ class _Frame(ast.NodeVisitor):
             kind = TRUTH
         return self._number(one, kind).value, self._number(other, kind).value, kind
 
-    def _number(self, given: Any, kind: Number | None = None) -> _Value:
+    def _number(self, given: Any, kind: NumberKind | None = None) -> _Value:
         """A number as one of a kind; a whole number may become a float64 number, and a truth either."""
         if not isinstance(given, _Value):
             own = kind_of(given) if not isinstance(given, bool) else TRUTH
-            if not isinstance(own, Number):
+            if not isinstance(own, NumberKind):
                 raise TypeError(f"not in the language of plain loops: {given!r} where a number is expected")
             given = _Value(ir.Constant(_types(own)[0], given), own)
         if kind is None or given.kind == kind:
@@ -560,7 +560,7 @@ class _Variable:
     """Where a number is kept."""
 
     room: ir.Value
-    kind: Number
+    kind: NumberKind
 
 
 _LIBRARY: dict[Any, Callable[..., _Value]] = {

@@ -51,6 +51,7 @@ def _add(module: ir.Module, name: str, function: Callable[..., Any], lanes: int)
     numbers = [_FLOAT.element] * (len(syntax(function).args.args) - 1)
     signature = ir.FunctionType(_SIGNED.element, [ir.PointerType(_FLOAT.element), *numbers])
     code = ir.Function(module, signature, name)
+    code.attributes.add("nounwind")  # without another attribute the next one is not written
     code.attributes.alignstack = CACHE_LINE
     builder = _Builder(code.append_basic_block())
     buffer, *scalars = code.args

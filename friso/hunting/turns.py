@@ -8,16 +8,16 @@ from functools import cache
 import numpy as np
 
 from friso.engine.building import entries
-from friso.engine.cache import CODE, Request, code_digest
-from friso.engine.kinds import Array
+from friso.engine.cache import CODE, CodeRequest, code_digest
+from friso.engine.kinds import ArrayKind
 from friso.engine.machine_code import Loops, load
 from friso.hunting import turning
 
 MANY = 100
 """Turning points, of all runs together, from which on the compiled loops are loaded; they take as long as so many."""
 
-_FLAT, _SQUARE = Array("float64", 1), Array("float64", 2)
-_WHOLE, _MARKS = Array("int64", 1), Array("bool", 2)
+_FLAT, _SQUARE = ArrayKind("float64", 1), ArrayKind("float64", 2)
+_WHOLE, _MARKS = ArrayKind("int64", 1), ArrayKind("bool", 2)
 KINDS = (_SQUARE, _SQUARE, _WHOLE, _FLAT, _FLAT, _WHOLE, _MARKS, _MARKS, _FLAT, _FLAT, _FLAT)
 """What `friso.hunting.turning.run` is given."""
 
@@ -56,5 +56,5 @@ def scan(times: np.ndarray, values: np.ndarray, counts: np.ndarray, swing: np.nd
 @cache
 def _compiled() -> Loops:
     version = code_digest("hunting/turning.py", "hunting/build.py")
-    (entry,) = entries([Request(f"turning points {version}", "loops over turning points", "friso.hunting.build")])
+    (entry,) = entries([CodeRequest(f"turning points {version}", "loops over turning points", "friso.hunting.build")])
     return Loops(load((entry / CODE).read_bytes(), ["run"])["run"], KINDS)
