@@ -83,7 +83,7 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    """The numerical functions are imported when first used: Numba and xarray take most of a second."""
+    """The numerical functions are imported when first used: xarray and what runs stages take half a second."""
     if name not in _LAZY:
         raise AttributeError(f"module 'friso' has no attribute {name!r}")
     return getattr(import_module(_LAZY[name]), name)

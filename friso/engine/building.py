@@ -14,6 +14,7 @@ import tempfile
 from collections import deque
 from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from types import TracebackType
 
@@ -66,7 +67,8 @@ class _Work:
                     return
                 with request.lock():
                     if request.entry() is None:  # no other process has built it meanwhile
-                        logger.warning("compiling, once on this machine, %s of %s: %s", number, self._count, request.title)
+                        place = f"{number} of {self._count}"
+                        logger.warning("compiling, once on this machine, %s: %s", place, request.title)
                         request.file.write_text(builder.build(request), encoding="ascii")
 
 
@@ -75,10 +77,10 @@ class _Builder:
 
     def __init__(self) -> None:
         self._process: subprocess.Popen[bytes] | None = None
-        self._messages = tempfile.TemporaryFile()
-        self._killed = False
+        self._open = ExitStack()
 
     def __enter__(self) -> _Builder:
+        self._messages = self._open.enter_context(tempfile.TemporaryFile())
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
@@ -86,18 +88,16 @@ class _Builder:
             if error is not None:
                 self._process.kill()
             self._process.communicate()
-        self._messages.close()
+        self._open.close()
 
     def build(self, request: CodeRequest) -> str:
         """Build what is requested; the name of its entry."""
         process = self._process = self._process or self._started()
         assert process.stdin is not None
         assert process.stdout is not None
-        try:
+        with suppress(BrokenPipeError):  # it says why
             pickle.dump((request.builder, request.task), process.stdin)
             process.stdin.flush()
-        except BrokenPipeError:
-            pass  # it says why
         name = process.stdout.readline().decode("ascii").strip()
         if not name:
             process.wait()

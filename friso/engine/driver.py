@@ -325,7 +325,7 @@ def idle(B, layout, lane):
 
 
 def answer(B, layout, lane, batch, settings, results):
-    """Record what happened in the lane's last step, and go on to the next segment of the reference at the end of one."""
+    """Record what happened in the lane's last step; at the end of a segment of the reference, go on to the next."""
     fraction, j = B[ROW.fraction * layout.lanes + lane], int(B[ROW.run * layout.lanes + lane])
     if fraction == 0.0:
         return

@@ -167,13 +167,16 @@ class Wanted:
     def title(self) -> str:
         """The form in a few words."""
         form = self.structure if isinstance(self.structure, Structure | Imposed) else self.structure.structure
-        words = [f"{form.friction} friction" if form.friction != "none" else "no friction"]
+        words = ["no friction" if form.friction == "none" else f"{form.friction} friction"]
         if isinstance(form, Structure):
-            words = [f"{form.joint} joint" if form.joint != "rigid" else "rigid stage", *words]
+            words.insert(0, "rigid stage" if form.joint == "rigid" else f"{form.joint} joint")
             words += [form.controller.kind] if form.controller else []
-        if not isinstance(self.structure, Structure):
-            words.append({Imposed: "motion imposed", Driven: "a log followed", AsBuilt: "drive as built"}[type(self.structure)])
+        words += [_CIRCUMSTANCES[type(self.structure)]] if type(self.structure) in _CIRCUMSTANCES else []
         return ", ".join([*words, *(["variational equations"] if self.variational else [])])
+
+
+_CIRCUMSTANCES = {Imposed: "imposed motion", Driven: "following a log", AsBuilt: "drive as built"}
+"""What a form is for that is not a stage by itself, for people."""
 
 
 def kernel(structure: Form, variational: bool = False, method: str = "Rodas5P", lanes: int = LANES) -> Kernel:

@@ -1,4 +1,4 @@
-"""Kinds of what compiled loops (`friso.engine.scalar_code`) are given, and how it is handed over: as words of 64 bits."""
+"""Kinds of what compiled loops (`friso.engine.scalar_code`) are given, and how it is handed over: in 64-bit words."""
 
 from __future__ import annotations
 
@@ -72,8 +72,9 @@ def kind_of(example: Any) -> Kind:
     """The kind of an argument. Raises TypeError for what compiled loops are not given."""
     if isinstance(example, np.ndarray) and example.dtype.name in _DTYPES:
         return ArrayKind(example.dtype.name, example.ndim)
-    if isinstance(example, tuple) and hasattr(example, "_fields"):
-        return RecordKind(tuple((name, kind_of(value)) for name, value in example._asdict().items()))
+    names = getattr(example, "_fields", None)
+    if isinstance(example, tuple) and names is not None:
+        return RecordKind(tuple((name, kind_of(value)) for name, value in zip(names, example, strict=True)))
     if isinstance(example, float | int) and not isinstance(example, bool):
         return FLOAT if isinstance(example, float) else INT
     raise TypeError(f"compiled loops are not given anything like {example!r}")

@@ -111,4 +111,3 @@ def _numpy_functions(model: Model, writer: StepWriter) -> str:
 def _function(head: str, expressions: Iterable[sp.Expr], rename: Rename) -> str:
     lines = [f"        {print_numpy(sp.sympify(e), rename)}," for e in expressions]
     return "\n".join([f"def {head}:", "    return [", *lines, "    ]"])
-

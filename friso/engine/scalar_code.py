@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import ast
 import builtins
+import inspect
 import operator
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -28,7 +29,7 @@ _NUMBERS = {INT: _INT64, FLOAT: _DOUBLE, TRUTH: _BIT}
 _ELEMENTS = {"int64": _INT64, "float64": _DOUBLE, "bool": ir.IntType(8)}
 
 
-def _types(kind: Kind) -> list[ir.Type]:
+def _types(kind: Kind) -> Sequence[ir.Type]:
     """What a value of a kind consists of: a number, an array's address and shape, or a named tuple's address."""
     if isinstance(kind, NumberKind):
         return [_NUMBERS[kind]]
@@ -42,7 +43,7 @@ def written(function: Callable[..., None], kinds: Sequence[Kind]) -> ir.Module:
     lie one after another (`friso.engine.kinds.packed`)."""
     module = ir.Module()
     entry = ir.Function(module, ir.FunctionType(ir.VoidType(), [ir.PointerType(_INT64)]), "run")
-    builder = ir.IRBuilder(entry.append_basic_block())
+    builder: Any = ir.IRBuilder(entry.append_basic_block())
     arguments = _RecordValue(entry.args[0], RecordKind(tuple((str(i), kind) for i, kind in enumerate(kinds))))
     _Writer(module).call(builder, function, [arguments.field(builder, str(i)) for i in range(len(kinds))])
     builder.ret_void()
@@ -64,7 +65,7 @@ def call_at(address: Any, buffer: Any, *numbers: Any) -> Any:
 class _Value:
     """A number."""
 
-    value: ir.Value
+    value: Any
     kind: NumberKind
 
     @property
@@ -96,7 +97,7 @@ class _RecordValue:
     def parts(self) -> list[ir.Value]:
         return [self.words]
 
-    def field(self, builder: ir.IRBuilder, name: str) -> Any:
+    def field(self, builder: Any, name: str) -> Any:
         place = 0
         for other, kind in self.kind.fields:
             if other == name:
@@ -104,7 +105,7 @@ class _RecordValue:
             place += len(kind.form)
         raise TypeError(f"not in the language of plain loops: no field {name}")
 
-    def _field(self, builder: ir.IRBuilder, place: int, kind: Kind) -> Any:
+    def _field(self, builder: Any, place: int, kind: Kind) -> Any:
         if isinstance(kind, RecordKind):
             return _RecordValue(builder.gep(self.words, [ir.Constant(_INT64, place)]), kind)
         parts = []
@@ -129,7 +130,7 @@ class _Writer:
         self.module = module
         self._written: dict[tuple[Any, ...], tuple[ir.Function, NumberKind | None]] = {}
 
-    def call(self, builder: ir.IRBuilder, function: Callable[..., Any], arguments: list[Any]) -> Any:
+    def call(self, builder: Any, function: Callable[..., Any], arguments: list[Any]) -> Any:
         """Call a function; its result, None without one. All return a word, whatever the kind of their result."""
         kinds = tuple(argument.kind for argument in arguments)
         if (function, kinds) not in self._written:
@@ -192,8 +193,8 @@ class _Frame(ast.NodeVisitor):
     def __init__(self, writer: _Writer, code: ir.Function, scope: dict[str, Any], outside: dict[str, Any]) -> None:
         self.result: NumberKind | None = None
         self._writer, self._code, self._outside = writer, code, outside
-        self._variables = ir.IRBuilder(code.append_basic_block())
-        self._builder = ir.IRBuilder(code.append_basic_block())
+        self._variables: Any = ir.IRBuilder(code.append_basic_block())
+        self._builder: Any = ir.IRBuilder(code.append_basic_block())
         self._scope: dict[str, Any] = {}
         self._loops: list[tuple[ir.Block, ir.Block]] = []
         for name, value in scope.items():
@@ -297,11 +298,9 @@ class _Frame(ast.NodeVisitor):
                 self._assign(node.target, part)
                 self._statements(node.body)
             return
-        if not isinstance(node.target, ast.Name):
-            self.generic_visit(node.target)
         given = [self.visit(each) for each in node.iter.args]
         start, stop, step = (0, *given, 1) if len(given) == 1 else (*given, 1)[:3]
-        if isinstance(step, _Value):
+        if not isinstance(step, int):
             self.generic_visit(node.iter)
         end = self._number(stop, INT).value
         counter = self._variables.alloca(_INT64)
@@ -316,7 +315,7 @@ class _Frame(ast.NodeVisitor):
         self._builder.store(following, counter)
         self._builder.branch(test)
         self._builder.position_at_end(body)
-        self._bind(node.target.id, _Value(now, INT))
+        self._assign(node.target, _Value(now, INT))
         self._loop(node, body, on, after)
 
     def _loop(self, node: ast.For | ast.While, body: ir.Block, again: ir.Block, after: ir.Block) -> None:
@@ -462,7 +461,7 @@ class _Frame(ast.NodeVisitor):
             self._builder.position_at_end(block)
             sides.append((self._number(self.visit(side)), self._builder.block))
         kind = FLOAT if any(number.kind == FLOAT for number, _ in sides) else sides[0][0].kind
-        ends = []
+        ends: list[tuple[Any, Any]] = []
         for number, block in sides:
             self._builder.position_at_end(block)
             ends.append((self._number(number, kind).value, block))
@@ -488,6 +487,8 @@ class _Frame(ast.NodeVisitor):
             return _LIBRARY[function](self, *arguments)
         if not any(hasattr(each, "parts") for each in arguments):
             return function(*arguments)
+        if not inspect.isfunction(function):
+            self.generic_visit(node)
         whole = [each if hasattr(each, "parts") else self._number(each) for each in arguments]
         return self._writer.call(self._builder, function, whole)
 
@@ -526,7 +527,7 @@ class _Frame(ast.NodeVisitor):
         given = [self._number(each, FLOAT).value for each in numbers]
         return _Value(self._builder.call(code, [buffer.data, *given]), INT)
 
-    def _alike(self, left: Any, right: Any) -> tuple[ir.Value, ir.Value, NumberKind]:
+    def _alike(self, left: Any, right: Any) -> tuple[Any, Any, NumberKind]:
         """Two numbers of one kind: a float64 number where one of them is."""
         one, other = self._number(left), self._number(right)
         kind = FLOAT if FLOAT in (one.kind, other.kind) else INT

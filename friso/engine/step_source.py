@@ -202,9 +202,9 @@ class StepWriter:
         return lines
 
     def update_source(self) -> str:
-        """The function `update(B)` of a lane: tables are looked up, and the numbers that are held become what follows from the
-        sample just taken, where the lane has `ticked`; and when it will next. Modes that remember are kept as they are
-        at the beginning of the step."""
+        """The function `update(B)` of a lane: tables are looked up, and the numbers that are held become what follows
+        from the sample just taken, where the lane has `ticked`; and when it will next. Modes that remember are kept as
+        they are at the beginning of the step."""
         clock, name = self.model.clock, self._in_buffer()
         lines = [f"ticked, tick = {self._row('ticked')}, {self._row('tick')}", "instant = 0.0"]
         if clock:

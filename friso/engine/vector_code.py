@@ -53,35 +53,13 @@ def _add(module: ir.Module, name: str, function: Callable[..., Any], lanes: int)
     code = ir.Function(module, signature, name)
     code.attributes.add("nounwind")  # without another attribute the next one is not written
     code.attributes.alignstack = CACHE_LINE
-    builder = _Builder(code.append_basic_block())
+    builder: Any = ir.IRBuilder(code.append_basic_block())
     buffer, *scalars = code.args
     same = [_Vector(_splat(builder, each, lanes), _FLOAT) for each in scalars]
     writer = _Writer(builder, lanes)
     result = writer.inlined(function, [_Column(builder, buffer, lanes), *same])
     bits = builder.bitcast(writer.truth(result or False).value, ir.IntType(lanes))
     builder.ret(builder.zext(bits, _SIGNED.element))
-
-
-class _Builder(ir.IRBuilder):
-    """Writes instructions on float64 numbers that may be carried out with some liberty."""
-
-    def fadd(self, lhs: ir.Value, rhs: ir.Value) -> ir.Value:
-        return super().fadd(lhs, rhs, flags=FASTMATH)
-
-    def fsub(self, lhs: ir.Value, rhs: ir.Value) -> ir.Value:
-        return super().fsub(lhs, rhs, flags=FASTMATH)
-
-    def fmul(self, lhs: ir.Value, rhs: ir.Value) -> ir.Value:
-        return super().fmul(lhs, rhs, flags=FASTMATH)
-
-    def fdiv(self, lhs: ir.Value, rhs: ir.Value) -> ir.Value:
-        return super().fdiv(lhs, rhs, flags=FASTMATH)
-
-    def fcmp_ordered(self, sign: str, lhs: ir.Value, rhs: ir.Value) -> ir.Value:
-        return super().fcmp_ordered(sign, lhs, rhs, flags=FASTMATH)
-
-    def fcmp_unordered(self, sign: str, lhs: ir.Value, rhs: ir.Value) -> ir.Value:
-        return super().fcmp_unordered(sign, lhs, rhs, flags=FASTMATH)
 
 
 @dataclass(frozen=True)
@@ -185,11 +163,13 @@ class _Writer:
         if not any(isinstance(each, _Vector) for each in given):
             return _PYTHON[type(sign)](*given)
         values, kind = self.together(*given)
-        return _Vector(getattr(self.builder, kind.instructions[type(sign)])(*values), kind)
+        instruction = kind.instructions[type(sign)]
+        liberties = {"flags": FASTMATH} if instruction in _REAL.values() else {}
+        return _Vector(getattr(self.builder, instruction)(*values, **liberties), kind)
 
     def compare(self, sign: str, left: Any, right: Any) -> _Vector:
         values, _ = self.together(left, right)
-        return _Vector(self.builder.fcmp_ordered(sign, *values), _TRUTH)
+        return _Vector(self.builder.fcmp_ordered(sign, *values, flags=FASTMATH), _TRUTH)
 
     def select(self, condition: Any, chosen: Any, otherwise: Any) -> _Vector:
         """One of two, both of which are known: a choice without a branch."""
@@ -200,7 +180,7 @@ class _Writer:
         """Whether a number is not 0, as Python has it."""
         if isinstance(given, _Vector) and given.kind is _FLOAT:
             zero = self.vector(0.0, _FLOAT).value
-            return _Vector(self.builder.fcmp_unordered("!=", given.value, zero), _TRUTH)
+            return _Vector(self.builder.fcmp_unordered("!=", given.value, zero, flags=FASTMATH), _TRUTH)
         return given if isinstance(given, _Vector) else self.vector(bool(given), _TRUTH)
 
     def least(self, left: Any, right: Any) -> _Vector:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 
@@ -48,7 +49,7 @@ def scan(times: np.ndarray, values: np.ndarray, counts: np.ndarray, swing: np.nd
     kinds = np.zeros(times.shape[1], np.int64)
     peaks, distinct = (np.zeros(times.shape, np.bool_) for _ in range(2))
     period, turned, earlier = (np.empty(runs) for _ in range(3))
-    scan_runs = turning.run if counts.sum() < MANY else _compiled()
+    scan_runs: Callable[..., None] = turning.run if counts.sum() < MANY else _compiled()
     scan_runs(*given, kinds, peaks, distinct, period, turned, earlier)
     return Turns(peaks, distinct, period, turned, earlier)
 
