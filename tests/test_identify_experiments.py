@@ -154,7 +154,7 @@ def test_steps_without_noise_are_exact_with_and_without_reference(rig: friso.Sta
         assert found.stiffness.value == pytest.approx(2400, rel=2e-3)
         assert found.up.value == pytest.approx(found.down.value, rel=5e-3)
         assert found.cart_fixed is None
-        assert "taken as fixed" in found.warnings[0]
+        assert "assumed fixed" in found.warnings[0]
 
 
 def test_hysteresis_shows_in_steps(rig: friso.Stage) -> None:

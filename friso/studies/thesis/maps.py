@@ -64,3 +64,8 @@ def free_square(hunts: np.ndarray, valid: np.ndarray) -> float:
 def share(part: np.ndarray, total: np.ndarray) -> float:
     """Share of the cells of `total` that are in `part` too; NaN of an empty whole."""
     return float((part & total).sum() / total.sum()) if total.any() else np.nan
+
+
+def share_text(hunts: np.ndarray, cells: np.ndarray) -> str:
+    """The same share in words."""
+    return f"{share(hunts, cells):.0%}" if cells.any() else "none"

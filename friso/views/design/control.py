@@ -29,7 +29,7 @@ LITTLE = 0.1
 def controller_step(design: Design) -> DesignStep:
     """The crossover, why it is no other, and the gains."""
     controller = design.controller
-    gains = f"Gains of a PID (kp, ki, kd): {_parallel(design)} of {plain(controller.gains.tau_p, 's')}."
+    gains = f"Gains of a PID (kp, ki, kd): {_parallel(design)} {plain(controller.gains.tau_p, 's')}."
     faster = [_faster(design)] if design.damped else []
     sentences = (_not_higher(design), *faster, _not_lower(design), gains, _margin(design), _damping(design))
     figures = ("design_window", "design_damping")
@@ -66,7 +66,8 @@ def _faster(design: Design) -> str:
 def _parallel(design: Design) -> str:
     """The gains of Eq. 6 that act on the error low-passed with tau_p."""
     kp, ki, kd = parallel_gains(design)
-    return f"{plain(kp, 'N/m')}, {plain(ki, 'N/(m*s)')}, {plain(kd, 'N*s/m')}, behind a low-pass of τ_p"
+    gains = f"{plain(kp, 'N/m')}, {plain(ki, 'N/(m*s)')}, {plain(kd, 'N*s/m')}"
+    return f"{gains}, with a low-pass filter of time constant τ_p ="
 
 
 def parallel_gains(design: Design) -> tuple[float, float, float]:
@@ -77,13 +78,13 @@ def parallel_gains(design: Design) -> tuple[float, float, float]:
 
 def _not_higher(design: Design) -> str:
     bounds, crossover = upper(design), design.controller.crossover
-    text = f"Not higher: it is limited by {_listed(bounds)}."
+    text = f"Upper limits: {_listed(bounds)}."
     short = 1 - crossover / bounds[0].value
     if short < ROUNDED:
         return text
     return (
-        f"{text} It stays {percent(short)} below the first of these: sizes rounded to tenths of a millimetre, and "
-        "confirmation by the beam model, cost that much."
+        f"{text} The crossover stays {percent(short)} below the first of these: sizes rounded to tenths of a "
+        "millimetre, and confirmation by the beam model, cost that much."
     )
 
 
@@ -91,7 +92,7 @@ def _not_lower(design: Design) -> str:
     bounds = lower(design)
     if not bounds:
         return "Nothing limits it from below, but a higher crossover settles faster."
-    return f"Not lower: it is limited from below by {_listed(bounds)}; above that, a higher crossover settles faster."
+    return f"Lower limits: {_listed(bounds)}; above these, a higher crossover settles faster."
 
 
 def _listed(bounds: list[CrossoverBound]) -> str:

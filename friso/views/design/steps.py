@@ -23,7 +23,7 @@ def steps(design: Design) -> tuple[DesignStep, ...]:
 def isolator_step(design: Design) -> DesignStep:
     """Whether an isolator is needed."""
     corners, flat = design.without, design.given.flat()
-    sentences = [f"Without isolator the machine {edge(corners)}.", *_worst(corners, design), *_gap(design)]
+    sentences = [f"Without an isolator the machine {edge(corners)}.", *_worst(corners, design), *_gap(design)]
     if not design.needed:
         sentences.append(brings(design))
     facts = [
@@ -45,7 +45,7 @@ def joint_step(design: Design) -> DesignStep:
     allowed = task.friction / safety.breakaway / (1 + safety.stiffness_tolerance)
     stiffness, force = newtons_per(beams.drive[0], "mm"), plain(beams.forces[-1], "N")
     held = (
-        f"At full stroke the joint pushes with {force}. The cart breaks away at no less than "
+        f"At full stroke the joint exerts {force}. The cart breaks away at no less than "
         f"{plain(task.friction, 'N')}; with the safety factor of {safety.breakaway:g} and a stiffness error of "
         f"{safety.stiffness_tolerance:.0%} that allows {allowed:.3g} N, so that it stays stuck inside the stroke."
     )
@@ -83,7 +83,7 @@ def _edge(corners: Corners, factor: float = 1.0) -> str:
 def _stroke(design: Design) -> str:
     stroke, allowed = design.fitted.task.stroke, design.spec.leaves.stroke
     if allowed.low == allowed.high:
-        return f"The stroke of {size(stroke)} mm is the one specified."
+        return f"The stroke of {size(stroke)} mm is as specified."
     if stroke == allowed.high:
         return (
             f"The stroke is the largest specified, {size(stroke)} mm: the larger it is, the less often the limiter is "

@@ -281,7 +281,7 @@ def _shown(stage: Stage, seed: int, slowest: tuple[float, float, float] | None) 
     """Name, stage and seed of the noise of each log."""
     even = on_rail(stage)
     own = even.flat()["rail.seed"]
-    found = [("compare_even_rail", even, seed)]
+    found = [("measured_cycles_even_rail", even, seed)]
     if slowest is not None:
-        found.append(("compare_varied_rail", _machine(even, slowest), seed + int(slowest[2] - own)))
+        found.append(("measured_cycles_varied_rail", _machine(even, slowest), seed + int(slowest[2] - own)))
     return found

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from friso.equations.controllers.van_dijk import CROSSOVER
 from friso.studies.thesis.claims import ABOUT, Evidence, Finding, Part, judges
-from friso.studies.thesis.maps import ends, share, table
+from friso.studies.thesis.maps import ends, share_text, table
 
 _AXES = (CROSSOVER, "joint.stroke")
 
@@ -27,7 +27,7 @@ def isolated_rig_needs_crossover(evidence: Evidence) -> Finding:
                 "one on",
                 bool(hunts[:, long].any(axis=0).all() and not hunts[-1, long].any()),
                 f"mean limit {limits[long].mean():.3g} Hz ({limits[long].min():.3g} to {limits[long].max():.3g} Hz); "
-                f"{share(hunts, below):.0%} of the cells below it hunt",
+                f"{share_text(hunts, below)} of the cells below it hunt",
             ),
             Part(
                 "the mean limits over the third and over the fourth quarter of the strokes differ by at most "

@@ -6,7 +6,7 @@ import numpy as np
 
 from friso.equations.controllers.van_dijk import CROSSOVER
 from friso.studies.thesis.claims import ABOUT, FEW, TREND, Evidence, Finding, Part, judges
-from friso.studies.thesis.maps import ends, free_square, share, table, trend
+from friso.studies.thesis.maps import ends, free_square, share, share_text, table, trend
 from friso.studies.thesis.studies import STUDIES
 
 _ENDS = 20.0
@@ -39,7 +39,7 @@ def path_is_no_cure(evidence: Evidence) -> Finding:
                 "and at least half of the paths that move lie above it",
                 bool(settles.any() and above >= 0.5),
                 f"all hunt above {bound:.2g} m/s, {above:.0%} of the paths; "
-                f"{share(hunts, moved & (speed <= bound)):.0%} hunt below",
+                f"{share_text(hunts, moved & (speed <= bound))} hunt below",
             ),
         )
     )

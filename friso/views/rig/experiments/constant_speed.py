@@ -24,28 +24,28 @@ COLOURS = (BLUE, VERMILLION, GREEN, ORANGE, PINK)
 
 def sentences(outcome: Outcome) -> list[str]:
     """Friction along the rail, its truth, and what many speeds and slow sliding show."""
-    found: ConstantSpeedResult = outcome.result
-    said = [f"Joint {each.name}: {each.place.verdict}" for each in found.cases]
-    for case in found.cases:
+    result: ConstantSpeedResult = outcome.result
+    said = [f"Joint {each.name}: {each.place.verdict}" for each in result.cases]
+    for case in result.cases:
         coulomb = case.velocity.both.coulomb
         told = with_unit(coulomb.value, "N") if coulomb.shown else f"not shown ({coulomb.reason})"
         said.append(f"Joint {case.name}: Coulomb friction {told}.")
     true = listed(
         [
             f"{with_unit(float(force), 'N')} at {with_unit(speed, 'm/s')}"
-            for force, speed in zip(found.cases[0].true, found.speeds, strict=True)
+            for force, speed in zip(result.cases[0].true, result.speeds, strict=True)
         ],
         "and",
     )
-    return [*said, f"The true mean dynamic friction along the travel is {true}.", *_many(found), *_slow(found)]
+    return [*said, f"The true mean dynamic friction along the travel is {true}.", *_many(result), *_slow(result)]
 
 
-def _slow(found: ConstantSpeedResult) -> list[str]:
+def _slow(result: ConstantSpeedResult) -> list[str]:
     """What slow sliding shows."""
-    if not found.slow:
+    if not result.slow:
         return []
     head = "Slow sliding, joint locked, at the edge of steady motion, with the true mass and bristles:"
-    return [head, *map(_slow_place, found.slow)]
+    return [head, *map(_slow_place, result.slow)]
 
 
 def _slow_place(sliding: Slow) -> str:
@@ -69,11 +69,11 @@ def _start(log: RigLog) -> str:
     return with_unit(float(places[0]), "m") if len(places) else "nowhere"
 
 
-def _many(found: ConstantSpeedResult) -> list[str]:
+def _many(result: ConstantSpeedResult) -> list[str]:
     """What the many speeds show, at each place."""
-    crossover = with_unit(found.many.crossover, "Hz")
+    crossover = with_unit(result.many.crossover, "Hz")
     head = f"Many speeds, joint locked, crossover {crossover}:"
-    return [head, *(_place(number, place) for number, place in enumerate(found.many.places, start=1))]
+    return [head, *(_place(number, place) for number, place in enumerate(result.many.places, start=1))]
 
 
 def _place(number: int, place: PlaceOnRail) -> str:
@@ -92,15 +92,15 @@ def _place(number: int, place: PlaceOnRail) -> str:
 
 def figures(outcome: Outcome) -> list[Figure]:
     """Force against position at both speeds, a column for each state of the joint."""
-    found: ConstantSpeedResult = outcome.result
+    result: ConstantSpeedResult = outcome.result
     panels = tuple(
         Panel(
             f"joint {case.name}",
             Axis("Position", "m"),
             Axis("Force", "N"),
-            tuple(_lines(case, found.speeds)),
+            tuple(_lines(case, result.speeds)),
         )
-        for case in found.cases
+        for case in result.cases
     )
     caption = "Commanded force of the forward pass, averaged over places; the log also has the return."
     title = "Force at constant speed"
@@ -113,8 +113,8 @@ def figures(outcome: Outcome) -> list[Figure]:
 
 def _in_slow_sliding(outcome: Outcome) -> list[Figure]:
     """The friction at the first place."""
-    found: ConstantSpeedResult = outcome.result
-    places = [each.found for each in found.slow if len(each.found.model)]
+    result: ConstantSpeedResult = outcome.result
+    places = [each.found for each in result.slow if len(each.found.model)]
     if not places:
         return []
     caption, panels = slow_sliding_caption(places[0]), slow_sliding_panels(places[0])
@@ -151,15 +151,15 @@ def _lines(each: Passes, speeds: tuple[float, ...]) -> list[Series]:
 
 def numbers(outcome: Outcome) -> dict[str, Any]:
     """As JSON."""
-    found: ConstantSpeedResult = outcome.result
-    return {"speeds_m_per_s": [*found.speeds], "cases": {case.name: _numbers(case) for case in found.cases}} | {
-        "many_speeds": _many_numbers(found),
-        "slow_sliding": [_shown(each.found.estimates) for each in found.slow],
+    result: ConstantSpeedResult = outcome.result
+    return {"speeds_m_per_s": [*result.speeds], "cases": {case.name: _numbers(case) for case in result.cases}} | {
+        "many_speeds": _many_numbers(result),
+        "slow_sliding": [_shown(each.found.estimates) for each in result.slow],
     }
 
 
-def _many_numbers(found: ConstantSpeedResult) -> dict[str, Any]:
-    return {"crossover_hz": found.many.crossover, "places": [_place_numbers(place) for place in found.many.places]}
+def _many_numbers(result: ConstantSpeedResult) -> dict[str, Any]:
+    return {"crossover_hz": result.many.crossover, "places": [_place_numbers(place) for place in result.many.places]}
 
 
 def _place_numbers(place: PlaceOnRail) -> dict[str, Any]:

@@ -35,40 +35,40 @@ COLOURS = (BLUE, SKY, GREEN, ORANGE, VERMILLION, PINK)
 
 def sentences(outcome: Outcome) -> list[str]:
     """What was found."""
-    found: Frf = outcome.result
-    measured = [loop for loop in found.loops if loop.measured]
+    result: Frf = outcome.result
+    measured = [loop for loop in result.loops if loop.measured]
     last = measured[-1]
     others = [crossing.value for crossing in last.crossings if crossing.value > 2 * last.tuned]
     tuned = listed([f"{with_unit(each.tuned, 'Hz')} at {with_unit(nearest(each), 'Hz')}" for each in measured], "and")
-    lost = [f"{loop.tuned:.3g} Hz" for loop in found.loops if not loop.measured]
+    lost = [f"{loop.tuned:.3g} Hz" for loop in result.loops if not loop.measured]
     unstable = f" Tuned to {listed(lost, 'and')} the closed loop is not stable." if lost else ""
     above = f"once more at {with_unit(max(others), 'Hz')}" if others else "nowhere above"
     return [
-        f"Joint locked: the mass line shows {_mass(found.locked.mass)} from {with_unit(found.locked.band[0], 'Hz')} to "
-        f"{with_unit(found.locked.band[1], 'Hz')}.",
-        f"Joint free: first mode near {with_unit(found.free.first_mode, 'Hz')}, above it a mass of "
-        f"{_mass(found.free.mass)}.",
-        f"A motor that gives {RATIOS[1]:g} of the assumed force makes these masses {found.apparent[0, 1]:.3g} and "
-        f"{found.apparent[1, 1]:.3g} kg; one that gives {RATIOS[2]:g} times the force makes them "
-        f"{found.apparent[0, 2]:.3g} and {found.apparent[1, 2]:.3g} kg: a machine that appears heavier has a motor "
+        f"Joint locked: the mass line shows {_mass(result.locked.mass)} from "
+        f"{with_unit(result.locked.band[0], 'Hz')} to {with_unit(result.locked.band[1], 'Hz')}.",
+        f"Joint free: first mode near {with_unit(result.free.first_mode, 'Hz')}, above it a mass of "
+        f"{_mass(result.free.mass)}.",
+        f"A motor that gives {RATIOS[1]:g} of the assumed force makes these masses {result.apparent[0, 1]:.3g} and "
+        f"{result.apparent[1, 1]:.3g} kg; one that gives {RATIOS[2]:g} times the force makes them "
+        f"{result.apparent[0, 2]:.3g} and {result.apparent[1, 2]:.3g} kg: a machine that appears heavier has a motor "
         "weaker than assumed.",
         f"Joint locked, open loops cross 0 dB as follows: tuned to {tuned}; at the highest setting {above}.{unstable}",
-        f"Joint free, the loop tuned to {with_unit(found.free_loop.tuned, 'Hz')} crosses at "
-        f"{with_unit(found.free_loop.crossings[-1].value if found.free_loop.crossings else None, 'Hz')}; the highest "
-        f"stable setting is {with_unit(found.highest_stable, 'Hz')}"
-        + (", the highest tried." if found.stable.all() else "."),
+        f"Joint free, the loop tuned to {with_unit(result.free_loop.tuned, 'Hz')} crosses at "
+        f"{with_unit(result.free_loop.crossings[-1].value if result.free_loop.crossings else None, 'Hz')}; the highest "
+        f"stable setting is {with_unit(result.highest_stable, 'Hz')}"
+        + (", the highest tried." if result.stable.all() else "."),
     ]
 
 
 def figures(outcome: Outcome) -> list[Figure]:
     """Fig. 17 and 29, 18, 22 and 23 of the thesis."""
-    found: Frf = outcome.result
+    result: Frf = outcome.result
     subject = outcome.stage.name
     return [
-        _plant("locked", "Plant, joint locked", found.locked, subject),
-        _plant("free", "Plant, joint free", found.free, subject),
-        _loops("loops", "Open loops, joint locked", found.loops, subject),
-        _loops("free_loop", "Open loop, joint free", (found.free_loop,), subject),
+        _plant("locked", "Plant, joint locked", result.locked, subject),
+        _plant("free", "Plant, joint free", result.free, subject),
+        _loops("loops", "Open loops, joint locked", result.loops, subject),
+        _loops("free_loop", "Open loop, joint free", (result.free_loop,), subject),
     ]
 
 
@@ -157,18 +157,18 @@ def _mass(mass: Estimate) -> str:
 
 def numbers(outcome: Outcome) -> dict[str, Any]:
     """As JSON."""
-    found: Frf = outcome.result
-    plants = {"locked": found.locked, "free": found.free}
+    result: Frf = outcome.result
+    plants = {"locked": result.locked, "free": result.free}
     return {
         **{name: _numbers(plant) for name, plant in plants.items()},
         "motor_constant_ratios": [*RATIOS],
-        "apparent_mass_locked_kg": found.apparent[0].tolist(),
-        "apparent_mass_free_kg": found.apparent[1].tolist(),
-        "loops": [_loop_numbers(loop) for loop in found.loops],
-        "free_loop": _loop_numbers(found.free_loop),
-        "settings_hz": found.settings.tolist(),
-        "stable": found.stable.tolist(),
-        "highest_stable_hz": found.highest_stable,
+        "apparent_mass_locked_kg": result.apparent[0].tolist(),
+        "apparent_mass_free_kg": result.apparent[1].tolist(),
+        "loops": [_loop_numbers(loop) for loop in result.loops],
+        "free_loop": _loop_numbers(result.free_loop),
+        "settings_hz": result.settings.tolist(),
+        "stable": result.stable.tolist(),
+        "highest_stable_hz": result.highest_stable,
     }
 
 

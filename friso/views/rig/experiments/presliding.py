@@ -16,9 +16,9 @@ from friso.views.rig.outcome_view import OutcomeView
 
 def sentences(outcome: Outcome) -> list[str]:
     """What was found."""
-    found: Bristles = outcome.result
-    said = [f"Place {number}: {_place(each)}." for number, each in enumerate(found.found, start=1)]
-    stiffness, damping = with_unit(found.stiffness, "N/m", 4), with_unit(found.damping, "N*s/m", 4)
+    result: Bristles = outcome.result
+    said = [f"Place {number}: {_place(each)}." for number, each in enumerate(result.found, start=1)]
+    stiffness, damping = with_unit(result.stiffness, "N/m", 4), with_unit(result.damping, "N*s/m", 4)
     return [*said, f"True bristles: stiffness {stiffness}, damping {damping}."]
 
 

@@ -15,16 +15,16 @@ from friso.views.rig.outcome_view import OutcomeView
 
 def sentences(outcome: Outcome) -> list[str]:
     """What was found."""
-    found: Stiction = outcome.result
-    forces, shown = found.forces, held(found)
-    rails = len(found.found)
-    truth = range_with_unit(float(found.true.min()), float(found.true.max()), "N")
+    result: Stiction = outcome.result
+    forces, shown = result.forces, held(result)
+    rails = len(result.found)
+    truth = range_with_unit(float(result.true.min()), float(result.true.max()), "N")
     if not len(forces):
         return [
             f"The cart does not slip on any of {rails} stretches of rail; the true static friction there is {truth}."
         ]
     return [
-        f"At {with_unit(found.speed, 'm/s')} and {with_unit(SPEEDS[1] * found.speed, 'm/s')} the cart breaks away "
+        f"At {with_unit(result.speed, 'm/s')} and {with_unit(SPEEDS[1] * result.speed, 'm/s')} the cart breaks away "
         f"{len(forces)} times on {rails} stretches of rail, at "
         f"{range_with_unit(float(forces.min()), float(forces.max()), 'N')}.",
         f"The true static friction there is {truth}; its mean along the travel lies within the 95 % interval on "
@@ -32,16 +32,16 @@ def sentences(outcome: Outcome) -> list[str]:
     ]
 
 
-def held(found: Stiction) -> np.ndarray:
+def held(result: Stiction) -> np.ndarray:
     """On which rails the interval holds the middle of the true static friction, shape (rails,)."""
-    middles = found.true.mean(axis=1)
-    return np.array([each.static.holds(middle) for each, middle in zip(found.found, middles, strict=True)])
+    middles = result.true.mean(axis=1)
+    return np.array([each.static.holds(middle) for each, middle in zip(result.found, middles, strict=True)])
 
 
 def figures(outcome: Outcome) -> list[Figure]:
     """Position, relative position and velocity against time on the first rail; break-away forces on all."""
-    found: Stiction = outcome.result
-    log, first = outcome.logs[0], found.found[0]
+    result: Stiction = outcome.result
+    log, first = outcome.logs[0], result.found[0]
     time: Array = np.arange(len(first.pull), dtype=np.float64) * log.interval
     seconds = Axis("Time", "s")
     reference, start = log.logged["reference"], log.logged["reference"][0]
@@ -66,20 +66,20 @@ def figures(outcome: Outcome) -> list[Figure]:
     )
     caption = "The joint deflects while the cart sticks; at each peak the cart breaks away, and its velocity spikes."
     typical = Figure("rig_stiction", "Slow motion with stick-slip", caption, panels, subject=outcome.stage.name)
-    return [typical, _rails(found, outcome.stage.name)]
+    return [typical, _rails(result, outcome.stage.name)]
 
 
-def _rails(found: Stiction, subject: str) -> Figure:
+def _rails(result: Stiction, subject: str) -> Figure:
     """Break-away forces by rail, over the true static friction."""
-    numbers_ = np.arange(1.0, len(found.found) + 1)
-    rows = np.concatenate([np.full(len(each.forces), n) for n, each in zip(numbers_, found.found, strict=True)])
-    truth = Band(numbers_, found.true[:, 0], found.true[:, 1], "true static friction along the travel", "#cfdfee")
-    top = 1.1 * max(float(found.true.max()), float(found.forces.max(initial=0.0)))
+    numbers_ = np.arange(1.0, len(result.found) + 1)
+    rows = np.concatenate([np.full(len(each.forces), n) for n, each in zip(numbers_, result.found, strict=True)])
+    truth = Band(numbers_, result.true[:, 0], result.true[:, 1], "true static friction along the travel", "#cfdfee")
+    top = 1.1 * max(float(result.true.max()), float(result.forces.max(initial=0.0)))
     panel = Panel(
         "",
         Axis("Stretch of rail", "", (0.5, len(numbers_) + 0.5), step=1.0),
         Axis("Break-away force", "N", (0.0, top)),
-        markers=(Markers(rows, found.forces, "read at a slip", INK),),
+        markers=(Markers(rows, result.forces, "read at a slip", INK),),
         bands=(truth,),
     )
     caption = "At a finite force rate the cart breaks away slightly before its static friction is reached."
@@ -88,7 +88,7 @@ def _rails(found: Stiction, subject: str) -> Figure:
 
 def numbers(outcome: Outcome) -> dict[str, Any]:
     """As JSON."""
-    found: Stiction = outcome.result
+    result: Stiction = outcome.result
     rows = [
         {
             "static_n": each.static.value,
@@ -96,9 +96,9 @@ def numbers(outcome: Outcome) -> dict[str, Any]:
             "break_away_n": each.forces.tolist(),
             "true_range_n": true.tolist(),
         }
-        for each, true in zip(found.found, found.true, strict=True)
+        for each, true in zip(result.found, result.true, strict=True)
     ]
-    return {"speed_m_per_s": found.speed, "rails": rows}
+    return {"speed_m_per_s": result.speed, "rails": rows}
 
 
 VIEW = OutcomeView(sentences, figures, numbers)

@@ -13,27 +13,27 @@ from friso.views.rig.outcome_view import OutcomeView
 
 def sentences(outcome: Outcome) -> list[str]:
     """What was found."""
-    found: Stiffness = outcome.result
-    read = found.found.stiffness
+    result: Stiffness = outcome.result
+    read = result.found.stiffness
     if not read.shown:
         return [f"The steps do not show the joint's stiffness: {read.reason}."]
     said = [
         f"The steps show {with_unit(read.value, 'N/m', 4)} ({range_with_unit(read.low, read.high, 'N/m', 4)}) of the "
-        f"joint's {with_unit(found.true, 'N/m', 4)}."
+        f"joint's {with_unit(result.true, 'N/m', 4)}."
     ]
-    if found.motor_constant_ratio != 1:
+    if result.motor_constant_ratio != 1:
         said.append(
-            f"The motor gives {found.motor_constant_ratio:g} of the assumed force, which alone would make it appear as "
-            f"{with_unit(found.apparent, 'N/m', 4)}."
+            f"The motor gives {result.motor_constant_ratio:g} of the assumed force, which alone would make it appear "
+            f"as {with_unit(result.apparent, 'N/m', 4)}."
         )
     return said
 
 
 def figures(outcome: Outcome) -> list[Figure]:
     """Position over force against time."""
-    found: Stiffness = outcome.result
+    result: Stiffness = outcome.result
     (log,) = outcome.logs
-    time, seconds = found.found.time, Axis("Time", "s")
+    time, seconds = result.found.time, Axis("Time", "s")
     panels = (
         Panel(
             "",
@@ -50,7 +50,7 @@ def figures(outcome: Outcome) -> list[Figure]:
             Axis("Force", "N"),
             (
                 Series(time, log.logged["force"], "commanded", LIGHT, width=0.8),
-                Series(time, found.found.force, "low-passed", BLUE),
+                Series(time, result.found.force, "low-passed", BLUE),
             ),
         ),
     )
@@ -60,14 +60,14 @@ def figures(outcome: Outcome) -> list[Figure]:
 
 def numbers(outcome: Outcome) -> dict[str, Any]:
     """As JSON."""
-    found: Stiffness = outcome.result
-    read = found.found.stiffness
+    result: Stiffness = outcome.result
+    read = result.found.stiffness
     return {
         "stiffness_n_per_m": read.value,
         "interval_n_per_m": [read.low, read.high],
-        "true_n_per_m": found.true,
-        "motor_constant_ratio": found.motor_constant_ratio,
-        "apparent_n_per_m": found.apparent,
+        "true_n_per_m": result.true,
+        "motor_constant_ratio": result.motor_constant_ratio,
+        "apparent_n_per_m": result.apparent,
     }
 
 
