@@ -108,7 +108,7 @@ def moved(stage: friso.Stage, **motion: str) -> friso.Stage:
 
 
 @pytest.fixture(scope="module")
-def thesis_rig() -> friso.Stage:
+def rig() -> friso.Stage:
     return friso.load(ROOT / "examples" / "thesis_rig.toml").replace({"joint.stroke": "8 mm"})
 
 
