@@ -47,6 +47,24 @@ motion = {kind = "release", displacement = "1 mm", duration = "1 s"}
     print(run.position.values[-1])
 """
 
+SEVERAL = """
+import friso
+from friso.engine import building
+from friso.engine.kernel import Wanted, kernels
+from friso.equations.structure import structure
+
+if __name__ == "__main__":
+    building.usable_cores = lambda: 1
+    stage = friso.loads('''
+masses.cart = "1 kg"
+friction = {model = "oil", damping = "2 N*s/m"}
+controller = {kind = "pid", kp = "101 N/m"}
+motion = {kind = "release", displacement = "1 mm", duration = "1 s"}
+''')
+    form = structure(stage.flat())
+    print(len(kernels([Wanted(form, variational) for variational in (False, True)])))
+"""
+
 
 def run(folder: Path, source: str, **more: str) -> str:
     (folder / "script.py").write_text(source)
@@ -64,6 +82,11 @@ def test_a_law_of_ones_own(place: str, tmp_path: Path) -> None:
         (tmp_path / "oil_film.py").write_text(LAW)
     text = run(tmp_path, LAW + SCRIPT if place == "script" else "import oil_film\n" + SCRIPT)
     assert float(text) == pytest.approx(-3.286906e-4, rel=1e-5)
+
+
+def test_one_process_builds_several_kernels_of_a_law_of_a_script(tmp_path: Path) -> None:
+    """It registers the law once."""
+    assert run(tmp_path, LAW + SEVERAL).strip() == "2"
 
 
 def test_friso_s_own_laws_are_no_plug_ins() -> None:

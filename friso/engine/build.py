@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import pickle
+from functools import cache
 from pathlib import Path
 from types import ModuleType
 
@@ -19,6 +20,7 @@ from friso.equations.driven import Driven, driven
 from friso.equations.imposed import Imposed, imposed
 from friso.equations.model import Model, assemble
 from friso.equations.variational import variational
+from friso.stage.plug_ins import PlugIn
 
 
 def build(folder: Path, task: bytes) -> str:
@@ -28,12 +30,18 @@ def build(folder: Path, task: bytes) -> str:
         return keep(folder, inspect.getsource(driver), _loops_code)
     plug_ins, pickled = pickle.loads(task)
     for plug_in in plug_ins:
-        plug_in.load()
+        _load(plug_in)
     request = pickle.loads(pickled)
     model = _model(request.structure)
     model = variational(model) if request.variational else model
     source = write_module(model, TABLEAUS[request.method], repr(request), request.lanes)
     return keep(folder, source, _code)
+
+
+@cache
+def _load(plug_in: PlugIn) -> None:
+    """Load a plug-in once, however many tasks need it: it registers names."""
+    plug_in.load()
 
 
 def _loops_code(module: ModuleType) -> bytes:
