@@ -130,7 +130,7 @@ def read_uff(path: Path) -> dict[str, Any]:
     """The datasets 58 of a universal file, and the codes of its units."""
     import pyuff
 
-    file = pyuff.UFF(str(path))
+    file: Any = pyuff.UFF(str(path))
     kinds = list(file.get_set_types())
     sets = [file.read_sets(i) for i, kind in enumerate(kinds) if kind == 58]
     return {"sets": sets, "units": [file.read_sets(i)["units_code"] for i, kind in enumerate(kinds) if kind == 164]}
