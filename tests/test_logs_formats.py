@@ -105,7 +105,7 @@ def test_texts_as_people_have_them(tmp_path: Path, text: str) -> None:
     assert force.time == pytest.approx(M["time"], abs=1e-9)
 
 
-@pytest.mark.parametrize("line", ["Sample interval: 1", "Sample interval: 1 ms\nSample rate: 500 Hz", "dt: none"])
+@pytest.mark.parametrize("line", ["dt: 1", "dt: 1 ms\nfs: 500 Hz", "dt: none", "fs: 10,000 Hz"])
 def test_no_interval_is_made_up(tmp_path: Path, line: str) -> None:
     """Without a unit, where two lines contradict each other, or without a number, there are no instants."""
     path = tmp_path / "a.csv"
@@ -126,6 +126,8 @@ def test_no_interval_is_made_up(tmp_path: Path, line: str) -> None:
         ("acc_rms", ""),
         ("x_ref", ""),
         ("ms", ""),
+        ("pos_in", ""),
+        ("pos_min", ""),
     ],
 )
 def test_units_at_the_end_of_a_name(name: str, unit: str) -> None:
@@ -477,7 +479,7 @@ def test_a_matrix_is_a_channel_per_column(tmp_path: Path) -> None:
     assert any("image, an array of 90 x 80" in line for line in read_table(tmp_path / "old.mat").read)
 
 
-@pytest.mark.parametrize("way", ["link", "storage", "virtual", "link in a group"])
+@pytest.mark.parametrize("way", ["link", "storage", "virtual", "link in a group", "reference"])
 def test_values_in_another_file_are_not_read(tmp_path: Path, way: str, refused: Refused) -> None:
     """A file may name any other one of the system as the place of its values."""
     import h5py
@@ -490,6 +492,9 @@ def test_values_in_another_file_are_not_read(tmp_path: Path, way: str, refused: 
         file["time"] = M["time"]
         if way == "storage":
             file.create_dataset("x", (50,), "f8", external=[(str(other), 0, 400)])
+        elif way == "reference":
+            hidden = file.create_dataset("#refs#/a", (50,), "f8", external=[(str(other), 0, 400)])
+            file.create_dataset("x", data=[hidden.ref], dtype=h5py.ref_dtype)
         elif way == "virtual":
             layout = h5py.VirtualLayout((400,), "f8")
             layout[:] = h5py.VirtualSource(str(other), "secret", (400,))

@@ -180,7 +180,8 @@ class Continuous(Blocks):
                 winding.append(up)
             derivative = each.integrand * share
             if bound and bound.anti_windup == BACK_CALCULATION:  # Astrom and Hagglund, Advanced PID Control, 3.5
-                derivative += bound.cut / (sp.diff(each.output, each.symbol) * unwinding_time())
+                gain = len(self._integrals) * sp.diff(demand.value, each.symbol)
+                derivative += bound.cut / (gain * unwinding_time())
             states.append(State(each.symbol, derivative, "m*s", each.scale, Role.INTEGRAL, steady[each.symbol]))
         return tuple(states), (*far, *winding)
 

@@ -145,7 +145,8 @@ class Sampled(Blocks):
             following = each.symbol + share
             if anti_windup == BACK_CALCULATION:
                 cut = sp.Max(-force_limit(), sp.Min(force_limit(), wanted)) - wanted
-                following += SAMPLE_TIME * cut / (each.gain * unwinding_time())
+                gain = len(self._integrals) * sp.diff(demand.value, each.next)
+                following += SAMPLE_TIME * cut / (gain * unwinding_time())
             updates[each.next] = sp.Piecewise((share, rest.restarts), (each.symbol, rests), (following, True))
         steady: dict[Any, Any] = {**wound_up(demand.settled, [each.symbol for each in self._integrals])}
         known: list[tuple[Any, Any]] = [(each.update, each.settled) for each in self.held]

@@ -81,22 +81,21 @@ def _read_hdf5(path: Path) -> dict[str, Any]:
 
 
 def _own(group: Any, name: Any) -> Any:
-    """An item of a group. Raises ValueError for one whose values lie in another file, which the log would show as its
-    own: links and data sets may name any file of the system."""
+    """An item of a group. Raises ValueError for one that lies in another file, which the log would show as its own: a
+    link may name any file of the system."""
     import h5py
 
     if isinstance(group.get(name, getlink=True), h5py.ExternalLink):
         raise ValueError(f"{name} is a link to another file")
-    item = group[name]
-    if isinstance(item, h5py.Dataset) and (item.external or item.is_virtual):
-        raise ValueError(f"the values of {name} lie in another file")
-    return item
+    return group[name]
 
 
 def _from_hdf5(item: Any, file: Any) -> Any:
     """A group or data set as a tree of dict, list, array and str. MATLAB's arrays stand transposed."""
     import h5py
 
+    if isinstance(item, h5py.Dataset) and (item.external or item.is_virtual):  # references lead to any data set
+        raise ValueError(f"the values of {item.name} lie in another file")
     kind = item.attrs.get("MATLAB_class", b"")
     kind = kind.decode() if isinstance(kind, bytes) else str(kind)
     if "MATLAB_object_decode" in item.attrs or kind in ("function_handle", "table", "timeseries"):

@@ -25,12 +25,12 @@ SECONDS, BYTES_A_SECOND = 10.0, 5e6
 
 def content(kind: str, path: Path) -> dict[str, Any]:
     """What a file of a `kind` of `friso.identify.logs.binary` holds. Raises LogError where it cannot be read within
-    bounds of memory and time."""
+    bounds of time, and of memory where the system keeps such (`LIMITS_MEMORY`)."""
     status = path.stat()
     return _content(kind, path.resolve(), status.st_size, status.st_mtime_ns)
 
 
-@lru_cache(maxsize=2)  # a file is asked for its kind first, and read then
+@lru_cache(maxsize=1)  # a file is asked for its kind first, and read then
 def _content(kind: str, path: Path, size: int, changed: int) -> dict[str, Any]:
     memory = MEMORY + PER_BYTE * size if LIMITS_MEMORY else 0
     command = [sys.executable, "-P", binary.__file__, kind, str(path), str(memory)]
@@ -42,7 +42,7 @@ def _content(kind: str, path: Path, size: int, changed: int) -> dict[str, Any]:
         raise broken(kind, f"reading it takes more than {seconds:.0f} s", path) from None
     try:
         read, message = _PlainUnpickler(io.BytesIO(done.stdout)).load()
-    except (pickle.UnpicklingError, EOFError, ValueError, AttributeError):
+    except Exception:  # whatever is wrong with what came, it is not what the reader writes
         said = done.stderr.decode(errors="replace")
         why = "it needs too much memory" if "MemoryError" in said else "it makes the library crash"
         raise broken(kind, why, path) from None

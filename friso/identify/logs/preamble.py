@@ -19,6 +19,8 @@ STEPS = frozenset(
 """What a sample rate and a sample time are called, in small letters without what stands between them."""
 _PAIR = re.compile(r"[\s#%*/\"]*(?P<key>[^:=;,\t\"]+?)\"?\s*[:=;,\t]\s*(?P<value>\S.*?)[\s;,\"]*")
 _AMOUNT = re.compile(r"(?P<number>[+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?)\s*(?P<unit>\S*)")
+_GROUPED = re.compile(r"[+-]?\d{1,3}(?:[.,]\d{3})*,\d{3}")
+"""Digits in which a comma may group thousands or begin the decimals: 10,000 Hz."""
 _OF_UNIT = re.compile(r"(?:units?|einheit)(?: of)? (?P<after>.+)|(?P<before>.+?)[ _](?:units?|einheit)", re.IGNORECASE)
 
 
@@ -45,6 +47,8 @@ def preamble(lines: Iterable[str], names: Sequence[str], delimiter: str) -> Prea
         key = re.sub(r"[\W\d_]+", "", name.lower())
         amount = _AMOUNT.fullmatch(pair["value"]) if key in RATES | STEPS else None
         if amount is None:
+            continue
+        if _GROUPED.fullmatch(amount["number"]):
             continue
         number = float(amount["number"].replace(",", "."))
         seconds = _seconds(number, amount["unit"].strip("[]()") or unit)

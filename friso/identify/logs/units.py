@@ -45,9 +45,10 @@ _BRACKETS = re.compile(r"(?P<name>.*?)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round
 
 
 _GLUED = re.compile(
-    r".*[A-Za-z0-9]_(?:(?P<length>m|mm|um|nm|rad|mrad|deg)_(?:per_)?(?P<time>s|s\^?2)|(?P<unit>[A-Za-zµ°]{2,}))"
+    r".*[A-Za-z0-9]_(?:(?P<length>m|mm|um|nm|rad|mrad|deg)_(?:per_)?(?P<time>s|s\^?2)"
+    r"|(?P<unit>sec|ms|msec|us|usec|ns|mm|um|µm|nm|deg|rad|mrad|urad|Nm|mNm|kN|mN|mA|mV|Hz|kHz|rpm|counts?|cnts?|incs?|lsb|ticks))"
 )
-"""Names that may end with a unit."""
+"""Names that end with a unit: one that is nothing else (pos_in and pos_min are in no unit)."""
 
 
 def spelled(text: str) -> str:
@@ -114,8 +115,7 @@ def _last_part(name: str) -> str:
     match = _GLUED.fullmatch(name)
     if match is None:
         return ""
-    unit = f"{match['length']}/{match['time'].replace('^', '')}" if match["length"] else match["unit"]
-    return unit if is_unit(unit) else ""
+    return f"{match['length']}/{match['time'].replace('^', '')}" if match["length"] else match["unit"]
 
 
 def in_si(unit: str, role_unit: str) -> tuple[float, str]:

@@ -25,6 +25,7 @@ _SYSTEMS = {
     6: ("cm", "cN"),
     7: ("in", "lbf"),
     8: ("mm", "kgf"),
+    10: ("mm", "N"),
 }
 """Units of length and force by the code in dataset 164."""
 _KINDS = {8: "{0}", 11: "{0}/s", 12: "{0}/s^2", 9: "{1}", 13: "{1}"}
@@ -63,7 +64,9 @@ def read_uff(path: Path) -> ChannelTable:
         Channel(name, _unit(d), np.real(d["data"]).astype(float), _seconds(d), "dataset 58")
         for name, d in zip(unique(headings), times, strict=True)
     )
-    return ChannelTable(channels, {}, ("format: UFF, dataset 58", f"{len(channels)} time histories"))
+    code = times[0]["units_code"]
+    foreign = [f"units of code {code} are unknown"] if code is not None and code not in _SYSTEMS else []
+    return ChannelTable(channels, {}, ("format: UFF, dataset 58", f"{len(channels)} time histories", *foreign))
 
 
 def _unit(data: dict[str, Any]) -> str:
