@@ -8,7 +8,8 @@ import pytest
 from variants import VARIANTS
 
 import friso
-from friso.hunting.attractors import Attractors, attractors
+import friso.hunting.attractors
+from friso.hunting.attractors import Attractors, attractors, starts
 from friso.hunting.attractors.recurrence import recurrence
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.rest import stuck
@@ -138,6 +139,17 @@ def test_the_edge_is_that_of_the_last_attractor() -> None:
         several = Ensemble.held(flat, 1).take(np.zeros(len(starts), np.int64))
         results = several.run(stuck(several, starts), np.full(len(starts), 200.0), 1e-8, window=0.9)
         assert bool(np.any(np.ptp(results.statistics[:, 1:3], axis=1) > 1e-3)) == hunts
+
+
+def test_a_verdict_that_flips_with_the_tolerance_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Simulations at a hundredth of the tolerance decide where no orbit was closed: here they are made to fail to see
+    what the others do, by beginning at rest."""
+    monkeypatch.setattr(starts, "FEW", (np.array([1e-6]), np.array([2e-6])))
+    monkeypatch.setattr(friso.hunting.attractors, "BESIDE", np.array([1e-6]))
+    found = attractors(held(CREEPING), thorough=True)
+    assert found.flips.tolist() == [True]
+    assert found.known.tolist() == [False]
+    assert not found.motions
 
 
 def test_swings_that_repeat_themselves() -> None:

@@ -770,7 +770,7 @@ def row(name: str, judgement: Judgement, **changes: Any) -> str | None:
         ("Other hunting cycles", None),
         ("Time constant of transients", "11.4 s"),
         ("Edge of hunting", "9.75 Hz"),
-        ("Displacements that hunt", "1.72 to 10.8 mm, 22.7 to 43.3 mm, from 59.3 mm on"),
+        ("Displacements that hunt", "1.72 to 10.8 mm, 22.7 to 43.3 mm, from 59.3 mm on (tried: 0.0173 to 156 mm)"),
         ("Pushes that hunt", "23.1 to 73.4 mm/s"),
         ("Moves that end in hunting", "87 % (80 to 92 %) of 128 moves"),
     ],
@@ -797,8 +797,8 @@ def test_rows_of_other_cycles():
     ("windows", "text"),
     [
         ((), "none from 0.0100 to 100 mm"),
-        (((1e-5, 0.1),), "all from 0.0100 to 100 mm"),
-        (((1e-5, 2e-3), (3e-3, 4e-3)), "up to 2.00 mm, 3.00 to 4.00 mm"),
+        (((1e-5, 0.1),), "all that were tried, 0.0100 to 100 mm"),
+        (((1e-5, 2e-3), (3e-3, 4e-3)), "up to 2.00 mm, 3.00 to 4.00 mm (tried: 0.0100 to 100 mm)"),
         ([(i * 1e-3, i * 1e-3 + 5e-4) for i in range(1, 8)], "1.00 to 1.50 mm, 2.00 to 2.50 mm, 3.00 to 3.50 mm, "),
     ],
 )

@@ -19,9 +19,9 @@ FARTHEST = 10.0
 """Factor up to which the bandwidth is changed."""
 
 STEPS, AT_ONCE = 41, 10
-"""Bandwidths that are tried on the way there, and how many of them together on the way down."""
+"""Bandwidths that are tried, from the highest down, and how many of them together."""
 
-FINER, ROUNDS = 9, 2
+FINER, ROUNDS = 4, 2
 """Bandwidths between the two that enclose the edge at which is simulated, and how often."""
 
 NEARER = 3
@@ -57,14 +57,13 @@ class Margin:
 def margin(stage: Stage, attracting: bool) -> Margin | None:
     """The last edge above the bandwidth of a stage that something attracts, or the next one below that of one that
     nothing does; None within a factor of ten."""
-    flat = stage.flat()
-    factors = np.geomspace(1.0, FARTHEST if attracting else 1 / FARTHEST, STEPS)
-    edge = _last(flat, factors) if attracting else _next(flat, factors)
+    flat, own = stage.flat(), bandwidth(stage.flat())
+    factors = np.geomspace(FARTHEST, 1.0, STEPS) if attracting else np.geomspace(1.0, 1 / FARTHEST, STEPS)
+    edge = _nearest(flat, factors, attracting)
     if edge is None:
         return None
-    factor = _located(flat, edge)
-    own = bandwidth(flat)
-    return Margin(factor, None if own is None else own * factor, edge.certain)
+    factor = 1.0 if isinstance(edge, str) else _located(flat, edge)
+    return Margin(factor, None if own is None else own * factor, not isinstance(edge, str) and edge.certain)
 
 
 class _Edge:
@@ -99,24 +98,18 @@ class _Edge:
         return any(cycle is not None and cycle.swings == simplest(cycle.sign) for cycle in cycles)
 
 
-def _last(flat: Mapping[str, Any], factors: np.ndarray) -> _Edge | None:
-    """The edge behind the last factor at which something attracts; None if that is the last one, or there is none."""
-    known = _known(flat, factors)
-    attract = np.flatnonzero(known.attracts)
-    if not attract.size or attract[-1] == len(factors) - 1:
-        return None
-    return _Edge(flat, factors, known, int(attract[-1]), int(attract[-1]) + 1)
-
-
-def _next(flat: Mapping[str, Any], factors: np.ndarray) -> _Edge | None:
-    """The edge before the first factor at which something attracts; None if that is the first one, or there is none."""
+def _nearest(flat: Mapping[str, Any], factors: np.ndarray, attracting: bool) -> _Edge | str | None:
+    """The edge before the first of some factors, descending, at which something attracts; None if that is the first
+    one, or there is none; "missed" if that contradicts what is known of the stage itself, at the factor 1."""
     for start in range(0, len(factors), AT_ONCE):
         part = factors[max(start - 1, 0) : start + AT_ONCE]
         known = _known(flat, part)
         attract = np.flatnonzero(known.attracts)
+        if attract.size and attract[0]:
+            return _Edge(flat, part, known, int(attract[0]), int(attract[0]) - 1)
         if attract.size:
-            return _Edge(flat, part, known, int(attract[0]), int(attract[0]) - 1) if attract[0] else None
-    return None
+            return None if attracting else "missed"
+    return "missed" if attracting else None
 
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from friso.hunting.attractors.rounds import typical_period
+from friso.hunting.attractors.rounds import TIGHT, typical_period
 from friso.hunting.attractors.starts import Starts
 from friso.hunting.attractors.survey import Survey, Swinging
 from friso.hunting.cycle.ensemble import Ensemble
@@ -20,6 +20,9 @@ from that: near a flip transients last."""
 
 PATIENT = 3.0
 """Longest period that these are counted in, in units of a typical one."""
+
+BESIDE = np.array([0.9, 0.97, 0.99, 1.0, 1.01, 1.03, 1.1])
+"""Distances from which a motion that was observed is tried again, in units of its own."""
 
 SEEN = 6.0
 """Periods, however long, that are waited for at least."""
@@ -45,12 +48,14 @@ class Attractors:
     """Of stages: the motions that attract, of each stage those that were looked for (see `attractors`); whether what
     attracts is `known`, shape (count,) (not where a simulation that had to decide failed); a `typical` period of
     hunting [s], shape (count,); and of a thorough survey the cycles that the return map suggests, attracting or not:
-    `families`, the symmetric ones first (of stages that are not symmetric, those of a whole period)."""
+    `families`, the symmetric ones first (of stages that are not symmetric, those of a whole period); and of which
+    stages simulations at different tolerances tell different things, `flips`, shape (count,): the tighter hold."""
 
     motions: tuple[Swinging, ...]
     known: np.ndarray
     typical: np.ndarray
     families: tuple[Cycles, ...]
+    flips: np.ndarray
 
     @property
     def attracts(self) -> np.ndarray:
@@ -78,7 +83,7 @@ class Attractors:
             of.setdefault(motion.stage, []).append(motion)
         motions = (replace(motion, stage=k) for k, n in enumerate(numbers.tolist()) for motion in of.get(n, ()))
         families = tuple(cycles.take(numbers) for cycles in self.families)
-        return Attractors(tuple(motions), self.known[numbers], self.typical[numbers], families)
+        return Attractors(tuple(motions), self.known[numbers], self.typical[numbers], families, self.flips[numbers])
 
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
@@ -86,9 +91,9 @@ def attractors(
     stages: Ensemble, thorough: bool = False, rtol: float = RTOL, tried: np.ndarray | None = None
 ) -> Attractors:
     """What attracts: everything that simulations from many starts end in. Of many stages at once one motion that
-    attracts is enough; a `thorough` survey looks for all of them, and for the cycles that the return map suggests.
-    Orbits are closed to the relative tolerance. Motions begin from the distances `tried` [m], (count, n), too, where
-    they are finite."""
+    attracts is enough; a `thorough` survey looks for all of them and for the cycles that the return map suggests, and
+    where simulations alone tell what it finds, it tries them at a hundredth of the tolerance. Orbits are closed to the
+    relative tolerance. Motions begin from the distances `tried` [m], (count, n), too, where they are finite."""
     survey, every = Survey(stages.count, thorough, rtol), np.arange(stages.count)
     families = _families(stages, rtol) if thorough else ()
     starts = Starts(stages)
@@ -100,9 +105,38 @@ def attractors(
             survey.confirm(starts.on(cycles, drawn), drawn, cycles.take(drawn))
     if tried is not None:
         starts.stuck_at(tried)
-    survey.follow(*starts.runs())
+    for runs, of in starts.waves(thorough):
+        survey.follow(runs, of)
     known = survey.attracted | ~survey.unknown
-    return Attractors(tuple(survey.attracting), known, typical_period(stages), families)
+    first = Attractors(tuple(survey.attracting), known, typical_period(stages), families, np.zeros(stages.count, bool))
+    return _tried_again(stages, first, rtol) if thorough else first
+
+
+def _tried_again(stages: Ensemble, first: Attractors, rtol: float) -> Attractors:
+    """The same, after simulations at a tighter tolerance of the stages of which no orbit that attracts was closed: what
+    these tell holds, and whether it contradicts the others."""
+    proved = {motion.stage for motion in first.motions if motion.cycles is not None}
+    which = np.array([k for k in range(stages.count) if k not in proved], dtype=np.int64)
+    if not which.size:
+        return first
+    survey = Survey(stages.count, False, rtol)
+    survey.attracting += [motion for motion in first.motions if motion.stage in proved]
+    starts = Starts(stages, TIGHT)
+    starts.spread(thorough=False)
+    seen = [motion for motion in first.motions if motion.stage not in proved]
+    for motion in seen:
+        tried = np.full((stages.count, len(BESIDE)), np.nan)
+        tried[motion.stage] = BESIDE * motion.distance
+        starts.stuck_at(tried)
+    for cycles in first.families:
+        survey.slow_down(np.arange(stages.count), cycles)
+    for runs, of in starts.waves(thorough=True):
+        survey.follow(runs, of)
+    flips = first.attracts != survey.attracted
+    again = [motion for motion in survey.attracting if flips[motion.stage] or motion.stage in proved]
+    kept = [motion for motion in seen if not flips[motion.stage]]
+    known = first.known & (survey.attracted | ~survey.unknown) & ~flips
+    return replace(first, motions=(*again, *kept), known=known, flips=flips)
 
 
 def _families(stages: Ensemble, rtol: float) -> tuple[Cycles, ...]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from friso.hunting.attractors.rounds import RTOL, Pending
+from friso.hunting.attractors.rounds import Pending
 from friso.hunting.cycle.find import Cycles, described
 from friso.hunting.cycle.rest import relaxed
 from friso.hunting.cycle.shooting import close
@@ -47,7 +47,7 @@ def _where_they_stick(some: Pending, times: np.ndarray) -> np.ndarray:
     ahead = np.zeros(stages.count)
     for k in every:
         one, step = some.take(every[k : k + 1]), float(times[k]) / SAMPLES
-        path = one.stages.run(one.states, 2 * times[k : k + 1], RTOL, interval=step).samples[0]
+        path = one.stages.run(one.states, 2 * times[k : k + 1], some.rtol, interval=step).samples[0]
         off = path[:, stages.integral] - balance[k] * path[:, stages.sticking]
         still = np.abs(np.diff(path[:, stages.sticking])) < STILL * np.ptp(path[:, stages.sticking])
         moves = np.where(~still, np.arange(len(still)), -1)
@@ -56,4 +56,4 @@ def _where_they_stick(some: Pending, times: np.ndarray) -> np.ndarray:
         if crossed.size:
             j = crossed[stood[crossed].argmax()]
             ahead[k] = step * (j + off[j] / (off[j] - off[j + 1]))
-    return stages.run(some.states, np.maximum(ahead, 1e-9 * times), RTOL).ends[:, :size]
+    return stages.run(some.states, np.maximum(ahead, 1e-9 * times), some.rtol).ends[:, :size]

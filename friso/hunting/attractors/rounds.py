@@ -14,8 +14,8 @@ from friso.hunting.cycle.rest import wait
 from friso.hunting.cycle.return_map import PATIENCE, follow
 from friso.hunting.cycle.swings import last_swings
 
-RTOL = 1e-7
-"""Relative tolerance of these runs."""
+RTOL, TIGHT = 1e-7, 1e-9
+"""Relative tolerance of these runs, and that at which they are tried again where they alone tell."""
 
 PERIODS, LONGER = 24.0, 3.0
 """Typical periods in the first round, and how many times as long as the last the next round is."""
@@ -47,18 +47,19 @@ surely rests: the integrator has passed from one limit to the other twice by the
 class Pending:
     """Runs on their way, each of a stage of the ensemble `stages`, one for each; their states (runs, kept) now; the
     durations of their next round [s], the distance from which they break away, `loose` [m], and whether their mirror
-    images are motions too, `mirrored`, each of shape (runs,)."""
+    images are motions too, `mirrored`, each of shape (runs,); and the relative tolerance."""
 
     stages: Ensemble
     states: np.ndarray
     durations: np.ndarray
     loose: np.ndarray
     mirrored: np.ndarray
+    rtol: float = RTOL
 
     def take(self, numbers: np.ndarray) -> Pending:
         """The runs with these numbers."""
         arrays = (self.states, self.durations, self.loose, self.mirrored)
-        return Pending(self.stages.take(numbers), *(array[numbers] for array in arrays))
+        return Pending(self.stages.take(numbers), *(array[numbers] for array in arrays), self.rtol)
 
 
 @dataclass(frozen=True)
@@ -107,7 +108,7 @@ def one_round(runs: Pending) -> tuple[Pending, Ends]:
         results = some.run(
             runs.states[which],
             runs.durations[which],
-            RTOL,
+            runs.rtol,
             with_modes=True,
             window=0.5,
             record_from=np.inf,

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
-from friso.hunting.attractors.rounds import PERIODS, Pending, loose_from, typical_period
+from friso.hunting.attractors.rounds import PERIODS, RTOL, Pending, loose_from, typical_period
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import Cycles
 from friso.hunting.cycle.rest import pushed, stuck
@@ -19,6 +21,9 @@ FEW = np.geomspace(0.01, 3.0, 48), np.geomspace(5.0, 300.0, 6)
 PUSHES = np.geomspace(0.03, 300.0, 12)
 """Velocities of stages at their reference, in units of what deflects the loop by as much."""
 
+EVERY = 5
+"""One start in so many is tried first."""
+
 ASIDE = (-0.03, -0.003, 0.003, 0.03)
 """Shares of the distance by which motions begin beside a cycle."""
 
@@ -26,8 +31,8 @@ ASIDE = (-0.03, -0.003, 0.003, 0.03)
 class Starts:
     """Runs that begin, of stages of an ensemble: their states (runs, states) and the stages' numbers (runs,)."""
 
-    def __init__(self, stages: Ensemble) -> None:
-        self.stages = stages
+    def __init__(self, stages: Ensemble, rtol: float = RTOL) -> None:
+        self.stages, self.rtol = stages, rtol
         self.loose, self.period = loose_from(stages), typical_period(stages)
         self.of: list[np.ndarray] = []
         self.states: list[np.ndarray] = []
@@ -65,10 +70,17 @@ class Starts:
         self.of.append(of)
         self.states.append(states)
 
-    def runs(self) -> tuple[Pending, np.ndarray]:
-        """The runs before their first round, and the numbers of their stages."""
-        of = np.concatenate(self.of)
-        return self._begun(of, np.concatenate(self.states)), of
+    def waves(self, thorough: bool) -> Iterator[tuple[Pending, np.ndarray]]:
+        """The runs before their first round, and the numbers of their stages: of a `thorough` survey all at once, else
+        one in a few first, from which most stages that hunt do."""
+        of, states = np.concatenate(self.of), np.concatenate(self.states)
+        order = np.argsort(of, kind="stable")
+        rank = np.empty(len(of), np.int64)
+        rank[order] = np.arange(len(of)) - np.searchsorted(of[order], of[order])
+        first = np.ones(len(of), bool) if thorough else rank % EVERY == 0
+        for mask in (first, ~first):
+            if (which := np.flatnonzero(mask)).size:
+                yield self._begun(of[which], states[which]), of[which]
 
     def on(self, cycles: Cycles, which: np.ndarray) -> Pending:
         """Runs that begin on the cycles of some stages."""
@@ -77,4 +89,4 @@ class Starts:
     def _begun(self, of: np.ndarray, states: np.ndarray) -> Pending:
         stages, mirrored = self.stages.take(of), self.stages.symmetric[of]
         kept = stages.kernel.with_modes(states, np.zeros(3), stages.values)
-        return Pending(stages, kept, PERIODS * self.period[of], self.loose[of], mirrored)
+        return Pending(stages, kept, PERIODS * self.period[of], self.loose[of], mirrored, self.rtol)

@@ -8,9 +8,9 @@
 | settles | no | has come to rest |
 | failed | | the run of the motion was not completed, or whether a cycle attracts is unknown |
 
-Just one of them holds. A run alone gives no verdict (see `friso.hunting.criteria.run_outcome` for what a run did), with
-one exception, which is named where it is told ("observed"): no cycle could be closed, and a motion followed for 1000 s
-neither decays nor grows.
+Just one of them holds. A run alone gives no verdict (see `friso.hunting.criteria.run_outcome` for what a run did). What
+attracts is a cycle that was closed as an orbit, or else, and then it is said ("observed"), a swing that long
+simulations do not leave.
 """
 
 from __future__ import annotations

@@ -28,6 +28,9 @@ followed for; and up to which share a deviation counts as small."""
 UNDECIDED = "simulations that had to tell failed, or swung on when they were given up"
 """Why it is not certain whether anything attracts a stage."""
 
+FLIPS = "whether the stage hunts depends on the tolerance of the simulation, a hundredth of which decided"
+"""The same where simulations contradict each other."""
+
 SAMPLES = 2000
 """Sampling intervals in a period of the trace."""
 
@@ -134,7 +137,7 @@ def hunting(stage: Stage, rtol: float = RTOL) -> Hunting:
     known = attractors(stages, thorough=True, rtol=rtol)
     closed = [m.cycles.take(np.array([m.number])) for m in known.motions if m.cycles is not None]
     repelling = [family for family in known.families if family.found[0] and not family.attracting[0]]
-    reason = known.families[0].reasons[0] if known.known[0] else UNDECIDED
+    reason = known.families[0].reasons[0] if known.known[0] else FLIPS if known.flips[0] else UNDECIDED
     return Hunting(
         cycles=tuple(_cycle(stages, cycle) for cycle in (*closed, *repelling)),
         reason=reason if not known.known[0] or not (closed or repelling) else "",

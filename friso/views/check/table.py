@@ -73,9 +73,14 @@ def _kicks(kick: Kick | None, unit: str) -> str:
         return NOTHING
     if not kick.windows:
         return f"none from {range_with_unit(*kick.searched, unit)}"
+    tried = range_with_unit(*kick.searched, unit)
+    if kick.windows == (kick.searched,):
+        return f"all that were tried, {tried}"
     texts = [window_with_unit(*window, kick.searched, unit) for window in kick.windows[:_WINDOWS]]
     more = len(kick.windows) - len(texts)
-    return ", ".join([*texts, *([f"and {more} more ranges"] if more else [])])
+    text = ", ".join([*texts, *([f"and {more} more ranges"] if more else [])])
+    open_ended = kick.windows[0][0] == kick.searched[0] or kick.windows[-1][1] == kick.searched[1]
+    return f"{text} (tried: {tried})" if open_ended else text
 
 
 def _moves(case: Case) -> str:

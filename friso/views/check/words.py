@@ -25,7 +25,7 @@ def verdict_sentence(item: ShownCase, cases: Mapping[str, Case]) -> str:
     if case.verdict not in says:
         return " ".join([*loop, f"{case.verdict} (solver: {case.solver.status})."])
     after = _remedy(item, cases) if case.verdict in ("hunts", "bistable") else _outlook(case)
-    return " ".join([*loop, says[case.verdict](case), *after])
+    return " ".join([*loop, says[case.verdict](case), *_doubts(case), *after])
 
 
 def _loop(case: Case) -> list[str]:
@@ -109,10 +109,18 @@ def _settling(case: Case) -> str:
     return says if hunting.possible else f"{says} It cannot hunt, because {hunting.reason}."
 
 
+def _doubts(case: Case) -> list[str]:
+    """Why the verdict is not certain, if it is not."""
+    known = case.judgement.hunting
+    if known.certain:
+        return []
+    return [f"This is not certain: {known.reason}{'' if known.target else '; other motions may hunt'}."]
+
+
 def _outlook(case: Case) -> list[str]:
-    """Where hunting begins, and whether the verdict is certain, of a case that need not hunt."""
+    """Where hunting begins, of a case that need not hunt."""
     known = case.judgement
-    says = [] if known.hunting.certain else [f"This is not certain: {known.hunting.reason}; other motions may hunt."]
+    says: list[str] = []
     if known.margin:
         least = "" if known.margin.certain else "at least "
         says.append(f"Hunting is possible {least}{_below(known.margin)}.")
