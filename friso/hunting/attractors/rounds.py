@@ -59,7 +59,7 @@ class Pending:
     def take(self, numbers: np.ndarray) -> Pending:
         """The runs with these numbers."""
         arrays = (self.states, self.durations, self.loose, self.mirrored)
-        return Pending(self.stages.take(numbers), *(array[numbers] for array in arrays), self.rtol)
+        return Pending(self.stages.take(numbers), *(array[numbers] for array in arrays), rtol=self.rtol)
 
 
 @dataclass(frozen=True)
