@@ -23,7 +23,7 @@ def made(name: str, hunts: Callable[[np.ndarray, np.ndarray], Any]) -> xr.Datase
     return xr.Dataset(
         {
             name: (tuple(span.key for span in spans), values)
-            for name, values in (("hunting", hunting), ("outcome", words))
+            for name, values in (("keeps_moving", hunting), ("outcome", words))
         },
         coords=dict(zip(dims, (x, y), strict=True)),
     )

@@ -127,7 +127,7 @@ def test_noise_of_the_sensor_does_not_matter_until_motion_is_lost_in_it() -> Non
     assert found.stiffness.holds(STIFFNESS)
     assert found.damping.holds(DAMPING)
     lost = bristles_from_presliding(shaken(noise=2e-7))
-    assert "stand out of the noise" in lost.stiffness.reason
+    assert "stand out from the noise" in lost.stiffness.reason
 
 
 def test_what_a_log_cannot_show_is_told(refused: Refused) -> None:
@@ -141,7 +141,7 @@ def test_what_a_log_cannot_show_is_told(refused: Refused) -> None:
     short = record("short", DT, **{role: values[:500] for role, values in short.signals.items()})
     assert "500 samples" in bristles_from_presliding(short).stiffness.reason
     still = record("still", DT, position=np.full(12000, 0.5), force=np.arange(12000.0))
-    assert "stand out of the noise" in bristles_from_presliding(still).stiffness.reason
+    assert "stand out from the noise" in bristles_from_presliding(still).stiffness.reason
     with refused("force"):
         bristles_from_presliding(record("x", DT, position=np.zeros(10000)))
 

@@ -150,7 +150,7 @@ def test_what_a_log_cannot_show_is_told(refused: Refused) -> None:
     short = record("x", DT, **{role: signal[:1500] for role, signal in sliding().signals.items()})
     assert "1500 samples" in reason(short)
     still = record("x", DT, position=np.full(5000, 0.1), force=np.arange(5000.0))
-    assert "stand out of the noise" in reason(still)
+    assert "stand out from the noise" in reason(still)
     assert "force does not change" in reason(
         replace(sliding(), signals={**sliding().signals, "force": np.zeros(20000)})
     )
