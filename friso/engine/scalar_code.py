@@ -522,7 +522,7 @@ class _Frame(ast.NodeVisitor):
         return _Value(taken, INT)
 
     def call_at(self, address: _Value, buffer: _ArrayValue, *numbers: Any) -> _Value:
-        signature = ir.FunctionType(_INT64, [buffer.data.type] + [_DOUBLE] * len(numbers))
+        signature = ir.FunctionType(_INT64, [*_types(buffer.kind)[:1]] + [_DOUBLE] * len(numbers))
         code = self._builder.inttoptr(address.value, ir.PointerType(signature))
         given = [self._number(each, FLOAT).value for each in numbers]
         return _Value(self._builder.call(code, [buffer.data, *given]), INT)
