@@ -133,7 +133,8 @@ def _stands_still(
     return home | aside
 
 
-def lengthened(runs: Pending) -> Pending:
-    """The same, with a longer round before them: long enough for a stage that stands still to show that it rests."""
-    least = 2.1 * WOUND * wait(runs.stages, runs.loose)
+def lengthened(runs: Pending, swing: np.ndarray) -> Pending:
+    """The same, with a longer round before them: of those that do not `swing`, shape (runs,), long enough to show that
+    they rest."""
+    least = np.where(swing, 0.0, 2.1 * WOUND * wait(runs.stages, runs.loose))
     return replace(runs, durations=np.maximum(LONGER * runs.durations, least))

@@ -170,7 +170,8 @@ class Survey:
                 on = on[~regular]
                 if not on.size:
                     return
-            before, runs, of = ends.repeats.mean[on], lengthened(runs.take(on)), of[on]
+            before, of = ends.repeats.mean[on], of[on]
+            runs = lengthened(runs.take(on), ends.repeats.swings[on] > 0)
 
     def _on(self, runs: Pending, of: np.ndarray, ends: Ends, early: bool = False) -> np.ndarray:
         """The numbers of the runs that swing on without having come to an attractor, once orbits were closed: `early`
