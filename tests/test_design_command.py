@@ -48,7 +48,7 @@ FIGURES = ("design_map", "design_front", "design_modes", "design_window", "desig
 SMALL = {
     front: {"POPULATION": 40, "GENERATIONS": 25},
     choice: {"SHOWN": 3},
-    edges: {"ROUNDS": 1},
+    edges: {"ROUNDS": 1, "PERIODS": 15.0, "TRIED": edges.TRIED[:1]},
     method: {"STEPS": 6},
     population: {"LEVELS": (0.0, 1.0)},
     controller: {"RATIOS": np.array([0.1, 0.7])},

@@ -1,7 +1,7 @@
-"""The edge of hunting over the corners of a specification: below which crossover anything attracts.
+"""The edge of hunting over the corners of a specification: below which crossover a cycle attracts.
 
-Coarser than `friso.hunting.edges`, which distinguishes kinds of edges: a design asks for 1 or 2 % in seconds, and
-simulates all its moves afterwards.
+Coarser than `friso.hunting.edges`, which distinguishes kinds of edges and simulates for minutes where a cycle cannot be
+closed: a design asks for 1 or 2 % in seconds, and simulates all its moves afterwards.
 """
 
 from __future__ import annotations
@@ -14,17 +14,24 @@ import numpy as np
 
 from friso.design.population import Population
 from friso.equations.controllers.van_dijk import CROSSOVER
-from friso.hunting.attractors import attractors
 from friso.hunting.cycle.ensemble import Ensemble
+from friso.hunting.cycle.find import hunting_cycles
+from friso.hunting.persistence import DISTANCES, hunts_somehow
 from friso.progress import Progress, silent
 
 ROUNDS = 4
 """Bisections of the step that holds an edge: to 1 or 2 % of it on the grids here."""
 
+RTOL = 1e-7
+"""Relative tolerance to which cycles are followed: their multipliers are needed to a percent."""
+
+PERIODS, TRIED = 60.0, DISTANCES[::4]
+"""How long, and from where, is simulated where a cycle may be that could not be closed; verification goes further."""
+
 
 @dataclass(frozen=True)
 class Corners:
-    """The corners of a specification with the highest crossover [Hz] at which anything attracts in each, shape (n,): 0
+    """The corners of a specification with the highest crossover [Hz] at which a cycle attracts in each, shape (n,): 0
     where there is none from `searched[0]` on, infinite where it lies above `searched[1]`. In `unknown` of them a run
     that had to decide failed somewhere: there it counts as hunting."""
 
@@ -45,7 +52,7 @@ class Corners:
 
     @property
     def hunts(self) -> bool:
-        """Whether anything attracts anywhere in the range that was searched."""
+        """Whether a cycle attracts anywhere in the range that was searched."""
         return bool(np.any(self.edges > 0))
 
 
@@ -59,7 +66,7 @@ def edges_over(
     what: str = "",
 ) -> Corners:
     """The edges of the stage `flat` in all corners, searched from `low` to `high` [Hz], tuned by van Dijk's rules: on a
-    grid, and between the last point at which anything attracts and the next. `what` names the search to `progress`."""
+    grid, and between the last point at which a cycle attracts and the next. `what` names the search to the progress."""
     ensemble = Ensemble.held(population.over({**flat, CROSSOVER: np.nan}), population.count)
     grid, every = np.log(np.geomspace(low, high, steps)), np.arange(population.count)
     attracts, decided = _attracts(ensemble, np.repeat(every, steps), np.tile(grid, population.count))
@@ -83,12 +90,15 @@ def edges_over(
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def _attracts(ensemble: Ensemble, which: np.ndarray, crossover: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Whether anything attracts, or may for all that is known, in corners at logarithms of crossovers; whether that is
-    known."""
+    """Whether a cycle attracts, or may for all that is known, in corners at logarithms of crossovers; whether it is."""
     some = ensemble.take(which)
     stages = Ensemble.held({**some.flat, CROSSOVER: np.exp(crossover)}, len(which))
-    found = attractors(stages)
-    return found.attracts | ~found.known, found.known
+    cycles = hunting_cycles(stages, RTOL)
+    attracts, decided = cycles.attracting.copy(), np.ones(len(which), bool)
+    unsure = np.flatnonzero(cycles.uncertain)
+    if unsure.size:
+        attracts[unsure], decided[unsure] = hunts_somehow(stages.take(unsure), PERIODS, TRIED)
+    return attracts | ~decided, decided
 
 
 def rigid(flat: Mapping[str, Any]) -> dict[str, Any]:
