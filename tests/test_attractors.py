@@ -131,8 +131,8 @@ def test_the_edge_is_that_of_the_last_attractor() -> None:
     swings on just below, and comes to rest from everywhere 1 % above."""
     edge = margin(CREEPING, attracting=True)
     assert edge is not None
-    assert edge.certain
-    assert edge.crossover == pytest.approx(13.01, rel=0.004)
+    assert not edge.certain  # it was not followed to a flip of its own
+    assert edge.crossover == pytest.approx(13.03, rel=0.005)
     starts = np.linspace(0.7e-3, 0.85e-3, 61)
     for crossover, hunts in ((12.95, True), (13.15, False)):
         flat = CREEPING.replace({"controller.crossover": f"{crossover} Hz"}).flat()

@@ -45,8 +45,8 @@ class Margin:
     For a stage that something attracts it is the last one: from there up to ten times the bandwidth nothing is known
     to attract. For others it is the nearest below: hunting is possible there. `factor` is the bandwidth at the edge
     over that of the stage, `crossover` [Hz] the crossover there (None for a controller given by its gains, all of whose
-    poles and zeros the factor scales). It is `certain` unless a simulation next to the edge that had to tell what
-    attracts failed, or was given up.
+    poles and zeros the factor scales). It is `certain` where a cycle was followed to its flip, nothing else attracts
+    just above, and no simulation beyond that had to tell failed or was given up; else it lies about there.
     """
 
     factor: float
@@ -62,8 +62,8 @@ def margin(stage: Stage, attracting: bool) -> Margin | None:
     edge = _nearest(flat, factors, attracting)
     if edge is None:
         return None
-    factor = 1.0 if isinstance(edge, str) else _located(flat, edge)
-    return Margin(factor, None if own is None else own * factor, not isinstance(edge, str) and edge.certain)
+    factor, certain = (1.0, False) if isinstance(edge, str) else _located(flat, edge)
+    return Margin(factor, None if own is None else own * factor, certain)
 
 
 class _Edge:
@@ -85,7 +85,7 @@ class _Edge:
             self.low, self.inside = float(factors[last]), known.take(np.array([last]))
         if last < len(factors) - 1:
             self.high, self.outside = float(factors[last + 1]), known.take(np.array([last + 1]))
-        self.certain = bool(self.inside.known[0] and self.outside.known[0])
+        self.certain &= bool(known.known[max(last, 0) :].all())
 
     def between(self, count: int) -> np.ndarray:
         """So many factors between the two."""
@@ -101,12 +101,16 @@ class _Edge:
 def _nearest(flat: Mapping[str, Any], factors: np.ndarray, attracting: bool) -> _Edge | str | None:
     """The edge before the first of some factors, descending, at which something attracts; None if that is the first
     one, or there is none; "missed" if that contradicts what is known of the stage itself, at the factor 1."""
+    told = True
     for start in range(0, len(factors), AT_ONCE):
         part = factors[max(start - 1, 0) : start + AT_ONCE]
         known = _known(flat, part)
         attract = np.flatnonzero(known.attracts)
+        told &= bool(known.known[: attract[0] if attract.size else None].all())
         if attract.size and attract[0]:
-            return _Edge(flat, part, known, int(attract[0]), int(attract[0]) - 1)
+            edge = _Edge(flat, part, known, int(attract[0]), int(attract[0]) - 1)
+            edge.certain &= told
+            return edge
         if attract.size:
             return None if attracting else "missed"
     return "missed" if attracting else None
@@ -122,18 +126,18 @@ def _cycles(flat: Mapping[str, Any], factors: np.ndarray) -> Cycles:
     return hunting_cycles(Ensemble.held(faster(flat, factors), len(factors)))
 
 
-def _located(flat: Mapping[str, Any], edge: _Edge) -> float:
-    """The factor at the edge: where a cycle flips, if nothing else attracts just above; else as far as motions can be
-    followed."""
+def _located(flat: Mapping[str, Any], edge: _Edge) -> tuple[float, bool]:
+    """The factor at the edge, and whether it is certain: where a cycle flips, if nothing else attracts just above; else
+    as far as motions were followed, which may end sooner than what attracts does."""
     flip = _flip(flat, edge.low, edge.high) if edge.may_flip else None
     if flip is not None:
         if flip * ABOVE < edge.high:
             edge.narrow(np.array([flip * ABOVE]))
         if edge.low < flip * ABOVE:
-            return flip
+            return flip, edge.certain
     for _ in range(ROUNDS):
         edge.narrow(edge.between(FINER))
-    return float(np.sqrt(edge.low * edge.high))
+    return float(np.sqrt(edge.low * edge.high)), False
 
 
 def _flip(flat: Mapping[str, Any], low: float, high: float) -> float | None:

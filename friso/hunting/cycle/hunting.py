@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -27,6 +28,10 @@ followed for; and up to which share a deviation counts as small."""
 
 UNDECIDED = "simulations that had to tell failed, or swung on when they were given up"
 """Why it is not certain whether anything attracts a stage."""
+
+SMALL_GAP = 0.02
+"""Share of the static friction by which it exceeds Coulomb friction: the smallest for which cycles are of a size that
+is looked for."""
 
 FLIPS = "whether the stage hunts depends on the tolerance of the simulation, a hundredth of which decided"
 """The same where simulations contradict each other."""
@@ -137,15 +142,28 @@ def hunting(stage: Stage, rtol: float = RTOL) -> Hunting:
     known = attractors(stages, thorough=True, rtol=rtol)
     closed = [m.cycles.take(np.array([m.number])) for m in known.motions if m.cycles is not None]
     repelling = [family for family in known.families if family.found[0] and not family.attracting[0]]
-    reason = known.families[0].reasons[0] if known.known[0] else FLIPS if known.flips[0] else UNDECIDED
+    beyond = "" if known.motions else _beyond_the_search(flat)
+    certain = bool(known.known[0]) and not beyond
+    doubt = beyond or (FLIPS if known.flips[0] else UNDECIDED)
+    reason = known.families[0].reasons[0] if certain else doubt
     return Hunting(
         cycles=tuple(_cycle(stages, cycle) for cycle in (*closed, *repelling)),
-        reason=reason if not known.known[0] or not (closed or repelling) else "",
-        certain=bool(known.known[0]),
+        reason=reason if not certain or not (closed or repelling) else "",
+        certain=certain,
         returns=return_map(stages, ROUGH),
         observed=tuple(Swing(m.amplitude, m.period, bool(m.time == m.time)) for m in known.motions if not m.cycles),
         target=known.target.of(0) if known.motions else None,
     )
+
+
+def _beyond_the_search(flat: Mapping[str, Any]) -> str:
+    """Why something may attract a stage that a survey does not reach; "" if there is no such reason."""
+    if "controller.force_limit" in flat and flat.get("controller.anti_windup") == "none":
+        return "with a force limit and no anti-windup, farther kicks than were tried may swing on"
+    static, coulomb = flat.get("friction.static"), flat.get("friction.coulomb")
+    if static is not None and coulomb is not None and 0 < static - coulomb < SMALL_GAP * static:
+        return "static friction is so little above Coulomb friction that cycles may be smaller than is looked for"
+    return ""
 
 
 def _cycle(stages: Ensemble, cycles: Cycles) -> Cycle:

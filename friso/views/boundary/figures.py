@@ -35,7 +35,7 @@ SYMBOLS: dict[str, Symbol] = {"flip": "circle", "fold": "triangle", "torus": "pa
 DASHES: dict[str, Dash] = {"flip": "solid", "fold": "dashed", "torus": "dotted"}
 NODES = {
     ATTRACTS: Kind("hunting is possible", VERMILLION),
-    REPELS: Kind("no hunting", QUIET),
+    REPELS: Kind("no cycle followed attracts", QUIET),
     UNKNOWN: Kind("unknown (orbit not closed)", "#ffffff"),
     INVALID: Kind("invalid stage", LIGHT),
 }

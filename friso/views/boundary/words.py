@@ -25,7 +25,7 @@ from friso.views.drawing.prefixes import listed, plus_minus, pretty, with_unit
 
 VERDICTS = {
     ATTRACTS: "hunting is possible (a cycle attracts)",
-    REPELS: "no hunting (no cycle attracts)",
+    REPELS: "no hunting cycle that was followed attracts (friso check looks for others)",
     UNKNOWN: "unknown (a cycle is expected, but its orbit could not be closed)",
     INVALID: "not a valid stage",
 }
