@@ -158,7 +158,7 @@ def hunting(stage: Stage, rtol: float = RTOL) -> Hunting:
 
 def _beyond_the_search(flat: Mapping[str, Any]) -> str:
     """Why something may attract a stage that a survey does not reach; "" if there is no such reason."""
-    if "controller.force_limit" in flat and flat.get("controller.anti_windup") == "none":
+    if structure(flat).anti_windup == "none":
         return "with a force limit and no anti-windup, farther kicks than were tried may swing on"
     static, coulomb = flat.get("friction.static"), flat.get("friction.coulomb")
     if static is not None and coulomb is not None and 0 < static - coulomb < SMALL_GAP * static:
