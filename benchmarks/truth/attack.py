@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from benchmarks.truth.claims import checked
+from benchmarks.truth.claims import Claim, checked
 from benchmarks.truth.draws import draw
-from benchmarks.truth.refute import refutations
+from benchmarks.truth.refute import Refutation, refutations
+from benchmarks.truth.second_opinion import scipy_refutations
 from friso.stage import Stage
 
 
@@ -23,7 +25,7 @@ def attack(seed: int, number: int, scipy_share: float, folder: Path) -> dict[str
     refuted = [
         {"case": claim.case, "of": each.of, "sure": each.sure, "why": each.why}
         for claim in said.claims
-        for each in refutations(claim, number)
+        for each in _against(claim, number, scipy_share)
     ]
     record = {
         "seed": seed,
@@ -46,6 +48,12 @@ def attack(seed: int, number: int, scipy_share: float, folder: Path) -> dict[str
     if refuted:
         _write(folder / f"seed{seed}-{number}", stage, record)
     return record
+
+
+def _against(claim: Claim, number: int, scipy_share: float) -> Iterator[Refutation]:
+    yield from refutations(claim, number)
+    if np.random.default_rng([number, 5]).random() < scipy_share:
+        yield from scipy_refutations(claim)
 
 
 def _write(name: Path, stage: Stage, record: dict[str, Any]) -> None:

@@ -23,13 +23,16 @@ FEW = (16, 8, 32, 8)
 SECOND = 24
 """Starts of a battery that are followed at the finer tolerance too."""
 
+TRIED, MOST = 3, 0.5
+"""Starts of those that swing on which are looked at closely, and the share of its neighbours that take a swing up."""
+
 ABOVE = (1.01, 1.1, 1.6)
 """Factors above the edge at which nothing may attract."""
 
 BELOW = (0.995, 0.98, 0.95)
 """Factors below it; at one of them at least something must."""
 
-SCIPY_PERIODS, ALIKE = 12.0, 0.02
+SCIPY_PERIODS, ALIKE = 20.0, 0.03
 """Periods for which SciPy follows a swing, and the share by which its amplitude may differ."""
 
 
@@ -74,28 +77,34 @@ def _hunts(bench: Bench, trial: Trial, kicks: tuple[float, ...]) -> bool:
 
 def swinging(bench: Bench, trial: Trial) -> str:
     """From which start, and how, a stage swings on; "" where it does not. What a run at one tolerance shows has to be
-    shown by another, or by SciPy, from where it has come to."""
+    shown at the other, and by its neighbours; SciPy says what it makes of it."""
     rough = bench.follow(trial, ROUGH)
-    for start in rough.swinging[:: max(1, len(rough.swinging) // 3)][:3]:
-        one = trial.take(np.array([start]))
-        fine = bench.follow(one, FINE, ROUNDS[1:])
-        if fine.words[0] == SWINGS:
+    for start in rough.swinging[:: max(1, len(rough.swinging) // TRIED)][:TRIED]:
+        fine = bench.follow(trial.take(np.array([start])), FINE, ROUNDS[1:])
+        if fine.words[0] == SWINGS and attracts(bench, fine.ends[0]):
             return "; ".join(
                 [
-                    f"{one.kinds[0]} {one.sizes[0]:.6g} swings on by {rough.amplitude[start]:.6g} m, "
+                    f"{trial.kinds[start]} {trial.sizes[start]:.6g} swings on by {rough.amplitude[start]:.6g} m, "
                     f"followed for {rough.followed[start]:.4g} s at {ROUGH:g}",
-                    f"by {fine.amplitude[0]:.6g} m for {fine.followed[0]:.4g} s at {FINE:g}",
+                    f"by {fine.amplitude[0]:.6g} m for {fine.followed[0]:.4g} s at {FINE:g}, and so do its neighbours",
                     by_scipy(bench, fine.ends[0], float(fine.amplitude[0])),
                 ]
             )
     second = trial.take(np.unique(np.linspace(0, len(trial.kinds) - 1, SECOND).astype(int)))
     fine = bench.follow(second, FINE)
-    for start in fine.swinging[:1]:
-        about = by_scipy(bench, fine.ends[start], float(fine.amplitude[start]))
-        size, swing = second.sizes[start], fine.amplitude[start]
-        kind, followed = second.kinds[start], fine.followed[start]
-        return f"{kind} {size:.6g} swings on by {swing:.6g} m for {followed:.4g} s at {FINE:g} alone; {about}"
+    for start in fine.swinging[:TRIED]:
+        if attracts(bench, fine.ends[start]):
+            size, swing = second.sizes[start], fine.amplitude[start]
+            kind, followed = second.kinds[start], fine.followed[start]
+            about = by_scipy(bench, fine.ends[start], float(swing))
+            return f"{kind} {size:.6g} swings on by {swing:.6g} m for {followed:.4g} s at {FINE:g} alone; {about}"
     return ""
+
+
+def attracts(bench: Bench, end: np.ndarray) -> bool:
+    """Whether neighbours of a state that a run ended in, which swung for long, swing on too, at both tolerances."""
+    runs = (bench.follow(bench.beside(end), rtol, ROUNDS[1:], any_will_do=False) for rtol in (ROUGH, FINE))
+    return all(np.mean(run.words == SWINGS) >= MOST for run in runs)
 
 
 def by_scipy(bench: Bench, end: np.ndarray, amplitude: float) -> str:
@@ -115,8 +124,7 @@ def by_scipy(bench: Bench, end: np.ndarray, amplitude: float) -> str:
     x = equations.run(y, times)[:, 0]
     if not np.isfinite(x[-1]):
         return "SciPy does not get there"
-    half = x[len(x) // 2 :]
-    swing = float(np.ptp(half) / 2)
+    swing = float(np.ptp(x) / 2)
     word = "confirms" if abs(swing / amplitude - 1) < ALIKE else "CONTRADICTS"
     return f"SciPy {word}: {swing:.6g} m over {times[-1]:.4g} s"
 

@@ -33,6 +33,9 @@ SMALL = 2e-3
 ROUNDS = (150.0, 800.0, 4000.0)
 """Periods for which a run is followed, and followed on where that does not tell."""
 
+NEIGHBOURS = (0.99, 0.997, 1.003, 1.01)
+"""Factors of a state that has swung for long, beside which the swing has to be taken up again."""
+
 FOLLOWED = 6
 """Runs that are followed on."""
 
@@ -156,18 +159,34 @@ class Bench:
             self._settled(np.zeros(len(displacements)), displacements), ("release",) * len(displacements), displacements
         )
 
-    def follow(self, trial: Trial, rtol: float, rounds: tuple[float, ...] = ROUNDS) -> Outcome:
-        """What becomes of starts. Of those that are not clear after a round a few go on."""
-        return self._follow(self.held, trial.states, 0.0, rtol, rounds)
+    def follow(
+        self, trial: Trial, rtol: float, rounds: tuple[float, ...] = ROUNDS, any_will_do: bool = True
+    ) -> Outcome:
+        """What becomes of starts. Of those that are not clear after a round a few go on, unless one that swings on is
+        all that is looked for."""
+        return self._follow(self.held, trial.states, 0.0, rtol, rounds, any_will_do)
+
+    def beside(self, end: np.ndarray) -> Trial:
+        """A state in which a run ended, made larger and smaller by a little: near a cycle that repels but weakly a run
+        lingers, the longer the finer the tolerance, and only its neighbours leave."""
+        states = end * np.array(NEIGHBOURS)[:, None]
+        states[:, len(self.kernel.states) :] = end[len(self.kernel.states) :]
+        return Trial(states, ("beside a swing",) * len(NEIGHBOURS), np.array(NEIGHBOURS))
 
     def follow_own(self, rtol: float, longest: float = 100.0) -> Outcome:
         """What becomes of the stage's own motion, followed as many times its duration, and for `ROUNDS`."""
         periods = max(ROUNDS[0], min(longest * self.flat["motion.duration"] / self.period, ROUNDS[1]))
         corner = float(np.max(last_corner(dict(self.flat))))
-        return self._follow(self.flat, None, corner, rtol, (periods, *ROUNDS[1:]))
+        return self._follow(self.flat, None, corner, rtol, (periods, *ROUNDS[1:]), False)
 
     def _follow(
-        self, flat: Mapping[str, Any], states: np.ndarray | None, corner: float, rtol: float, rounds: tuple[float, ...]
+        self,
+        flat: Mapping[str, Any],
+        states: np.ndarray | None,
+        corner: float,
+        rtol: float,
+        rounds: tuple[float, ...],
+        any_will_do: bool,
     ) -> Outcome:
         count = 1 if states is None else len(states)
         words = np.full(count, UNSURE, dtype=object)
@@ -183,7 +202,7 @@ class Bench:
                 ends[which] = part.results.ends
                 followed[which] += end
             unsure = np.flatnonzero(words == UNSURE)
-            if not unsure.size or SWINGS in words:
+            if not unsure.size or (any_will_do and SWINGS in words):
                 break
             on = unsure[np.unique(np.linspace(0, len(unsure) - 1, FOLLOWED).astype(int))]
             begin, corner = self._resumed(ends[on], flat), 0.0

@@ -1,0 +1,73 @@
+"""Verdicts against SciPy alone, with the equations by hand: the stage's own motion and some releases."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from benchmarks.truth.by_hand import ByHand, NotWritten, by_hand
+from benchmarks.truth.claims import Claim
+from benchmarks.truth.refute import Refutation
+from benchmarks.truth.swings import RESTS, SWINGS, judge, legs
+from benchmarks.truth.trials import SMALL
+
+RELEASES = (0.3, 1.5, 20.0)
+"""Displacements in units of the deflection by the break-away force."""
+
+PERIODS, SAMPLES = 40.0, 8000
+"""Periods for which is followed, and samples in which turning points are sought."""
+
+
+def scipy_refutations(claim: Claim) -> Iterator[Refutation]:
+    """What SciPy has against a verdict: a swing that lasts where nothing is said to attract, or rest where the stage's
+    own motion is said to hunt."""
+    flat = claim.stage.flat()
+    try:
+        equations = by_hand(flat)
+    except NotWritten:
+        return
+    if flat["motion.kind"] == "ramp" or not np.isfinite(equations.wait) or claim.verdict == "failed":
+        return
+    displaced = flat["motion.displacement"] if flat["motion.kind"] == "release" else 0.0
+    own = followed(equations, equations.start(displaced))
+    if claim.verdict == "hunts" and own == RESTS:
+        yield Refutation("own motion", claim.sure, "SciPy: the motion rests in the end")
+    if claim.attracted:
+        return
+    still = equations.held()
+    words = {"its own motion": own}
+    words |= {f"release {d:.6g}": followed(still, still.start(d)) for d in np.array(RELEASES) * equations.length}
+    for name, word in words.items():
+        if word == SWINGS:
+            yield Refutation("verdict", claim.sure, f"SciPy: {name} swings on")
+            return
+
+
+def followed(equations: ByHand, start: np.ndarray) -> str:
+    """What becomes of a stage from a state; a word of `swings`."""
+    corner = float(equations.pieces[-1, 0])
+    period = 2 * (3 * equations.wait + 2 * np.pi / equations.omega)
+    times = corner + np.linspace(0.0, PERIODS * period, SAMPLES)
+    if corner > 0:
+        before = np.linspace(0.0, corner, 100)
+        start = equations.run(start, before)[-1]
+    last = replace(equations, pieces=equations.pieces[-1:])
+    x = last.run(start, times)[:, 0] - equations.pieces[-1, 1]
+    if not np.isfinite(x[-1]):
+        return "unsure"
+    small = SMALL * equations.length
+    places = _turns(x, small)
+    late = x[3 * SAMPLES // 4 :]
+    return judge(legs(times[places] - corner, x[places], PERIODS * period), float(np.ptp(late)), small, False)
+
+
+def _turns(x: np.ndarray, least: float) -> np.ndarray:
+    """Numbers of the turning points of a zigzag whose legs are at least so long."""
+    kept = [0]
+    for k in range(1, len(x) - 1):
+        turns = (x[k] - x[k - 1]) * (x[k + 1] - x[k]) <= 0 and x[k] != x[k - 1]
+        if turns and abs(x[k] - x[kept[-1]]) >= least:
+            kept.append(k)
+    return np.array(kept)
