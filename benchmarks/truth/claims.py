@@ -68,7 +68,7 @@ def checked(stage: Stage) -> Checked:
 
 def _claim(name: str, case: Case) -> Claim:
     said = case.judgement
-    sure = said.hunting.certain and not said.observed and case.verdict != "failed"
+    sure = said.hunting.certain and case.verdict != "failed"
     edge = Edge(said.margin.factor, sure and said.margin.certain) if said.margin else None
     windows = said.displacement.windows if said.displacement else ()
     kicks = tuple((low * high) ** 0.5 for low, high in windows)
