@@ -11,7 +11,7 @@ import numpy as np
 from benchmarks.truth.by_hand import NotWritten, by_hand
 from benchmarks.truth.claims import Claim
 from benchmarks.truth.swings import FAILED, RESTS, SWINGS, UNSURE
-from benchmarks.truth.trials import FINE, ROUGH, ROUNDS, Bench, Trial
+from benchmarks.truth.trials import FINE, LINGERING, ROUGH, ROUNDS, Bench, Trial
 from friso.equations.bandwidth import bandwidth, faster
 
 ALL = (80, 40, 60, 20)
@@ -102,9 +102,9 @@ def swinging(bench: Bench, trial: Trial) -> str:
 
 
 def attracts(bench: Bench, end: np.ndarray) -> bool:
-    """Whether neighbours of a state that a run ended in, which swung for long, swing on too, at both tolerances."""
-    runs = (bench.follow(bench.beside(end), rtol, ROUNDS[1:], any_will_do=False) for rtol in (ROUGH, FINE))
-    return all(np.mean(run.words == SWINGS) >= MOST for run in runs)
+    """Whether neighbours of a state that a run ended in, which swung for long, swing on too, for very long."""
+    words = bench.follow(bench.beside(end), ROUGH, LINGERING).words
+    return bool(np.mean(words == SWINGS) >= MOST)
 
 
 def by_scipy(bench: Bench, end: np.ndarray, amplitude: float) -> str:

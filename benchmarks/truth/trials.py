@@ -36,10 +36,14 @@ ROUNDS = (150.0, 800.0, 4000.0)
 NEIGHBOURS = (0.99, 0.997, 1.003, 1.01)
 """Factors of a state that has swung for long, beside which the swing has to be taken up again."""
 
+LINGERING = (6_000.0,)
+"""Periods for which neighbours of a swing are followed: the solver's errors of 1e-6 push a run off a cycle that repels
+by 0.2 % a swing within 7000 swings."""
+
 FOLLOWED = 6
 """Runs that are followed on."""
 
-BUDGET = 30_000_000
+BUDGET = 100_000_000
 """Steps that a run may take."""
 
 
