@@ -1,0 +1,52 @@
+"""The adversary of benchmarks.truth judges swings by itself, and draws the same stages again."""
+
+import numpy as np
+import pytest
+
+from benchmarks.truth.draws import draw, forms
+from benchmarks.truth.swings import RESTS, SWINGS, UNSURE, judge, legs
+from friso.stage.files import loads
+
+END = 1000.0
+
+
+def word(times: np.ndarray, sizes: np.ndarray, patient: bool = False) -> str:
+    """Of a run that turns at times [s] by so much to either side in turn."""
+    values = sizes * (-1.0) ** np.arange(len(sizes))
+    late = values[times >= 0.75 * END]
+    return judge(legs(times, values, END), float(np.ptp(late)) if late.size else 0.0, 1e-3, patient)
+
+
+def evenly(sizes: np.ndarray) -> str:
+    return word(np.linspace(0.0, END, len(sizes)), sizes)
+
+
+def test_a_cycle_swings_on_whatever_its_period() -> None:
+    long_and_short = np.tile([1.0, 0.4, 0.7], 100)
+    assert evenly(np.ones(300)) == evenly(long_and_short) == SWINGS
+
+
+@pytest.mark.parametrize("share", [0.9999, 1.0001])
+def test_what_grows_or_decays_slowly_is_followed_on(share: float) -> None:
+    assert evenly(share ** np.arange(400)) == UNSURE
+
+
+def test_shrinking_by_a_share_at_every_ever_longer_stop_is_no_cycle() -> None:
+    """A stage waits the longer the nearer it sticks: in time its swings shrink as 1/t."""
+    sizes = 0.97 ** np.arange(200)
+    times = np.cumsum(1 / sizes)
+    times *= END / times[-1]
+    assert word(times, sizes) == UNSURE
+    assert word(times, sizes, patient=True) == RESTS
+
+
+def test_small_swings_are_rest() -> None:
+    assert evenly(np.full(300, 1e-4)) == RESTS
+
+
+@pytest.mark.parametrize("number", range(len(forms())))
+def test_stages_are_drawn_again_by_seed_and_number(number: int) -> None:
+    stage = draw(7, number)
+    assert stage == draw(7, number)
+    assert loads(stage.to_toml()) == stage
+    assert stage.flat() != draw(8, number).flat()
