@@ -158,7 +158,8 @@ def hunting(stage: Stage, rtol: float = RTOL) -> Hunting:
 
 def _beyond_the_search(flat: Mapping[str, Any]) -> str:
     """Why something may attract a stage that a survey does not reach; "" if there is no such reason."""
-    if structure(flat).anti_windup == "none":
+    controller = structure(flat).controller
+    if controller is not None and controller.anti_windup == "none":
         return "with a force limit and no anti-windup, farther kicks than were tried may swing on"
     static, coulomb = flat.get("friction.static"), flat.get("friction.coulomb")
     if static is not None and coulomb is not None and 0 < static - coulomb < SMALL_GAP * static:
