@@ -88,10 +88,11 @@ ROWS = "\n".join(f"{x:.9g};{f:.9g}" for x, f in zip(M["position"], M["force"], s
         f"t_ms;pos_mm;force\n{TIMED}\n\x1a",
         f"t_ms;pos_mm;force\n{TIMED}\x1a\n",
         f"Sample interval: 1 ms\nUnits;mm;N\npos;force\n{ROWS}",
+        f"Sample interval;0.001;s;\nUnits;mm;N\npos;force\n{ROWS}",
         f"# dt = 1e-3 s\n# units: mm, N\npos;force\n{ROWS}",
         f"Sampling rate [Hz];1000\npos unit;mm\nforce unit;N\n\npos;force\n{ROWS}",
     ],
-    ids=["heading;", "first;", "every;", "ctrl-z", "glued ctrl-z", "interval", "comment", "rate"],
+    ids=["heading;", "first;", "every;", "ctrl-z", "glued ctrl-z", "interval", "interval in cells", "comment", "rate"],
 )
 def test_texts_as_people_have_them(tmp_path: Path, text: str) -> None:
     """Delimiters at the ends of some rows, DOS's end of file, and what is told above the table or within names."""
@@ -126,6 +127,8 @@ def test_no_interval_is_made_up(tmp_path: Path, line: str) -> None:
         ("acc_rms", ""),
         ("x_ref", ""),
         ("ms", ""),
+        ("force_N", "N"),
+        ("time_s", "s"),
         ("pos_in", ""),
         ("pos_min", ""),
     ],

@@ -699,7 +699,7 @@ def test_a_stage_that_hunts_gets_a_remedy():
     for known in (hunts(verdict="bistable"), settles(hunting=fake_hunting(certain=False)), settles(verdict="failed")):
         assert "joint" not in sentence(hunts(), {"free": replace(fake_case(), judgement=known)}, locked=True)
     none = sentence(hunts(margin=None), free, locked=True)
-    assert none.endswith("s. No bandwidth up to 10 times this one was found to stop it. Free the joint.")
+    assert none.endswith("s. Hunting is still possible at 10 times this bandwidth. Free the joint.")
 
 
 def test_a_controller_by_its_gains_is_made_faster():

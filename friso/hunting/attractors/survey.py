@@ -238,14 +238,19 @@ class Survey:
 
     def _observe(self, of: np.ndarray, ends: Ends, before: np.ndarray) -> None:
         repeats = ends.repeats
-        steady = repeats.mean >= STEADY * before
+        steady = (repeats.mean > 0) & (repeats.mean >= STEADY * before)
         self.unknown[of[~steady]] = True
         for k in np.flatnonzero(steady):
             if self._alike(of[k : k + 1], ends.take(np.array([k])))[0]:
                 continue
-            period = float(repeats.time[k]) * (2.0 if repeats.swings[k] % 2 else 1.0)
-            twice = float(np.nanmean(ends.times[k, 2:] - ends.times[k, :-2]))
-            period = period if repeats.swings[k] else twice
+            there_and_back = ends.times[k, 2:] - ends.times[k, :-2]
+            if repeats.swings[k]:
+                period = float(repeats.time[k]) * (2.0 if repeats.swings[k] % 2 else 1.0)
+            elif np.isfinite(there_and_back).any():
+                period = float(np.nanmean(there_and_back))
+            else:
+                self.unknown[of[k]] = True
+                continue
             motion = Swinging(
                 int(of[k]), float(repeats.size[k] / 2), float(repeats.time[k]), period, float(ends.values[k, -1])
             )

@@ -18,7 +18,7 @@ STEPS = frozenset(
 )  # fmt: skip
 """What a sample rate and a sample time are called, in small letters without what stands between them."""
 _PAIR = re.compile(r"[\s#%*/\"]*(?P<key>[^:=;,\t\"]+?)\"?\s*[:=;,\t]\s*(?P<value>\S.*?)[\s;,\"]*")
-_AMOUNT = re.compile(r"(?P<number>[+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?)\s*(?P<unit>\S*)")
+_AMOUNT = re.compile(r"(?P<number>[+-]?(?:\d+[.,]?\d*|[.,]\d+)(?:[eE][+-]?\d+)?)[\s;,]*(?P<unit>[^\s;,]*)")
 _GROUPED = re.compile(r"[+-]?\d{1,3}(?:[.,]\d{3})*,\d{3}")
 """Digits in which a comma may group thousands or begin the decimals: 10,000 Hz."""
 _OF_UNIT = re.compile(r"(?:units?|einheit)(?: of)? (?P<after>.+)|(?P<before>.+?)[ _](?:units?|einheit)", re.IGNORECASE)

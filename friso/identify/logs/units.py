@@ -45,10 +45,19 @@ _BRACKETS = re.compile(r"(?P<name>.*?)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round
 
 
 _GLUED = re.compile(
-    r".*[A-Za-z0-9]_(?:(?P<length>m|mm|um|nm|rad|mrad|deg)_(?:per_)?(?P<time>s|s\^?2)"
-    r"|(?P<unit>sec|ms|msec|us|usec|ns|mm|um|µm|nm|deg|rad|mrad|urad|Nm|mNm|kN|mN|mA|mV|Hz|kHz|rpm|counts?|cnts?|incs?|lsb|ticks))"
+    r"(?P<stem>.*[A-Za-z0-9]?)_(?:(?P<letter>[smNAV])|(?P<unit>"
+    r"sec|ms|msec|us|usec|ns|mm|um|µm|nm|deg|rad|mrad|urad|Nm|mNm|kN|mN|mA|mV|Hz|kHz|rpm|counts?|cnts?|incs?|lsb|ticks))"
 )
-"""Names that end with a unit: one that is nothing else (pos_in and pos_min are in no unit)."""
+_RATE = re.compile(r".+_(?P<length>m|mm|um|nm|rad|mrad|deg)_(?:per_)?(?P<time>s|s\^?2)")
+"""Names that end with a unit: one that is nothing else (pos_in and pos_min are in no unit), or a letter."""
+_MEASURED_IN = {
+    "s": {"t", "time", "zeit", "tempo", "temps", "tiempo"},
+    "m": {"pos", "position", "x", "ref", "reference", "displacement"},
+    "N": {"force", "f", "kraft", "friction"},
+    "A": {"current", "iq", "i", "strom"},
+    "V": {"voltage", "u", "command"},
+}
+"""Words in a name that tell what is measured in these letters."""
 
 
 def spelled(text: str) -> str:
@@ -110,12 +119,15 @@ def split_heading(heading: str) -> tuple[str, str]:
 
 
 def _last_part(name: str) -> str:
-    """The unit with which a name ends, "" for none: "tempo_ms" is in ms, "vel_mm_s" in mm/s. Single letters are none:
-    they may mean anything."""
+    """The unit with which a name ends, "" for none: "tempo_ms" is in ms, "vel_mm_s" in mm/s. A single letter is
+    one where the name tells what is measured in it: "force_N", but not "pos_s"."""
+    if rate := _RATE.fullmatch(name):
+        return f"{rate['length']}/{rate['time'].replace('^', '')}"
     match = _GLUED.fullmatch(name)
     if match is None:
         return ""
-    return f"{match['length']}/{match['time'].replace('^', '')}" if match["length"] else match["unit"]
+    words = {*re.split(r"[^a-z]+", match["stem"].lower())}
+    return match["unit"] or (match["letter"] if words & _MEASURED_IN[match["letter"]] else "")
 
 
 def in_si(unit: str, role_unit: str) -> tuple[float, str]:

@@ -143,7 +143,7 @@ def _remedy(item: ShownCase, cases: Mapping[str, Case]) -> list[str]:
     says = [f"{ways[0][0].upper()}{listed(ways, 'or')[1:]}."] if ways else []
     if known.margin or known.hunting.target is None:
         return says
-    return [f"No bandwidth up to {FARTHEST:g} times this one was found to stop it.", *says]
+    return [f"Hunting is still possible at {FARTHEST:g} times this bandwidth.", *says]
 
 
 def _faster(case: Case, edge: Margin) -> str:
