@@ -78,7 +78,7 @@ def balanced(flat: dict, shape: Kernel, start: np.ndarray, member: Members) -> n
     speed = float(member.speed[0])
     touched, stuck = bool(member.touched[0]), not member.speed[0]
     if stuck and touched:  # the bristles bear what just touches the limiter
-        gap = flat["joint.stroke"] * (1 + 1e-2)
+        gap = flat["joint.stroke"] * (1 + 1e-3)
         start = start.copy()
         start[free[0]] = -gap
         force = flat["joint.stiffness"] * gap + flat["joint.limiter_stiffness"] * (gap - flat["joint.stroke"])

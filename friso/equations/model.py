@@ -28,9 +28,6 @@ MOTION_SIZE = key("motion.size")
 SMALLEST_LENGTH = sp.Rational(1, 10**4)
 """Share of the motion below which its length scale does not fall, however little friction there is."""
 
-SMALLEST_MOTION = sp.Rational(1, 10**6)
-"""Share of the deflection by the break-away force below which it does not fall, however short the motion."""
-
 
 @dataclass(frozen=True)
 class Model:
@@ -191,7 +188,7 @@ def _scales(structure: Structure, friction: Friction | None, mass: sp.Expr) -> t
         length, still = MOTION_SIZE, bias / stiffness if bias else sp.S.Zero
     else:
         still = friction.breakaway / stiffness
-        length = sp.Max(sp.Min(MOTION_SIZE, still), SMALLEST_LENGTH * MOTION_SIZE, SMALLEST_MOTION * still)
+        length = sp.Max(sp.Min(MOTION_SIZE, still), SMALLEST_LENGTH * MOTION_SIZE)
     length = sp.Piecewise((length, MOTION_SIZE > 0), (still, True))
     return length, sp.Max(sp.sqrt(stiffness / mass), 1 / key("motion.duration"))
 
