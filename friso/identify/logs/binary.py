@@ -197,7 +197,7 @@ def _plain(node: Any) -> Any:
 
 def main(kind: str, path: Path, memory: int) -> None:
     """Read a file within so much memory [B]."""
-    if memory:
+    if memory and sys.platform != "win32":
         import resource
 
         resource.setrlimit(resource.RLIMIT_AS, (memory, memory))
