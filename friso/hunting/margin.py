@@ -46,7 +46,7 @@ class Margin:
     to attract. For others it is the nearest below: hunting is possible there. `factor` is the bandwidth at the edge
     over that of the stage, `crossover` [Hz] the crossover there (None for a controller given by its gains, all of whose
     poles and zeros the factor scales). It is `certain` where a cycle was followed to its flip, nothing else attracts
-    just above, and no simulation beyond that had to tell failed or was given up; else it lies about there.
+    just above, and no simulation beyond that failed or was stopped undecided; else it lies about there.
     """
 
     factor: float

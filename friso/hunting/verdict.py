@@ -135,7 +135,8 @@ def can_hunt(flat: Mapping[str, Any]) -> bool:
 def judge_many(flat: Mapping[str, Any], count: int, rtol: float) -> np.ndarray:
     """The verdicts on stages of one structure, given as flat keys to SI numbers or arrays of shape (count,).
 
-    They are those of `judge`, from fewer simulations; those that fail leave the verdict "failed".
+    As by `judge`, but from fewer starts, which may miss what attracts from a narrow range of them; simulations that
+    fail leave the verdict "failed".
     """
     known = attractors(Ensemble.held(flat, count, form=shared_structure(flat))) if can_hunt(flat) else None
     return judge_runs(flat, _motions(flat, count, options(rtol)), known, rtol)

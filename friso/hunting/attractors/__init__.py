@@ -11,8 +11,7 @@ from friso.hunting.attractors.rounds import TIGHT, typical_period
 from friso.hunting.attractors.starts import Starts
 from friso.hunting.attractors.survey import Survey, Swinging
 from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.find import ROUGH, RTOL, Cycles, asymmetric_cycles, symmetric_cycles, whole_cycles
-from friso.hunting.cycle.return_map import return_map
+from friso.hunting.cycle.find import RTOL, Cycles, families
 
 PERIODS, CONSTANTS = (60.0, 600.0), 8.0
 """Periods after which a motion has come to what attracts it, at least and at most, and time constants of deviations
@@ -82,8 +81,8 @@ class Attractors:
         for motion in self.motions:
             of.setdefault(motion.stage, []).append(motion)
         motions = (replace(motion, stage=k) for k, n in enumerate(numbers.tolist()) for motion in of.get(n, ()))
-        families = tuple(cycles.take(numbers) for cycles in self.families)
-        return Attractors(tuple(motions), self.known[numbers], self.typical[numbers], families, self.flips[numbers])
+        suggested = tuple(cycles.take(numbers) for cycles in self.families)
+        return Attractors(tuple(motions), self.known[numbers], self.typical[numbers], suggested, self.flips[numbers])
 
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
@@ -95,10 +94,10 @@ def attractors(
     where simulations alone tell what it finds, it tries them at a hundredth of the tolerance. Orbits are closed to the
     relative tolerance. Motions begin from the distances `tried` [m], (count, n), too, where they are finite."""
     survey, every = Survey(stages.count, thorough, rtol), np.arange(stages.count)
-    families = _families(stages, rtol) if thorough else ()
+    suggested = families(stages, rtol) if thorough else ()
     starts = Starts(stages)
     starts.spread(thorough)
-    for cycles in families:
+    for cycles in suggested:
         survey.slow_down(every, cycles)
         starts.beside(cycles)
         if (drawn := np.flatnonzero(cycles.attracting)).size:
@@ -108,7 +107,7 @@ def attractors(
     for runs, of in starts.waves(thorough):
         survey.follow(runs, of)
     known = survey.attracted | ~survey.unknown
-    first = Attractors(tuple(survey.attracting), known, typical_period(stages), families, np.zeros(stages.count, bool))
+    first = Attractors(tuple(survey.attracting), known, typical_period(stages), suggested, np.zeros(stages.count, bool))
     return _tried_again(stages, first, rtol) if thorough else first
 
 
@@ -137,11 +136,3 @@ def _tried_again(stages: Ensemble, first: Attractors, rtol: float) -> Attractors
     kept = [motion for motion in seen if not flips[motion.stage]]
     known = first.known & (survey.attracted | ~survey.unknown) & ~flips
     return replace(first, motions=(*again, *kept), known=known, flips=flips)
-
-
-def _families(stages: Ensemble, rtol: float) -> tuple[Cycles, ...]:
-    """The cycles that the return map suggests."""
-    there = return_map(stages, ROUGH)
-    if stages.symmetric.all():
-        return symmetric_cycles(stages, rtol, there), asymmetric_cycles(stages, there, rtol)
-    return (whole_cycles(stages, rtol, there),)

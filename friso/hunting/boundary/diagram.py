@@ -10,8 +10,7 @@ import numpy as np
 from friso.hunting.boundary.branch import Branch, Point, Tracer
 from friso.hunting.boundary.locate import LocatedPoint, special_points
 from friso.hunting.boundary.space import Space
-from friso.hunting.cycle.find import ROUGH, RTOL, Cycles, families
-from friso.hunting.cycle.return_map import return_map
+from friso.hunting.cycle.find import RTOL, Cycles, families
 
 SEEDS = 33
 """Stages over the range at which cycles are looked for."""
@@ -46,7 +45,7 @@ def diagram(space: Space, rtol: float = RTOL, seeds: int = SEEDS) -> Diagram:
     places = np.linspace(0, 1, seeds)
     places = places[space.allowed(places[:, None])]
     stages = space.stages(places[:, None])
-    sought = families(stages, return_map(stages, ROUGH), rtol)
+    sought = families(stages, rtol)
     branches: list[Branch] = []
     special: list[tuple[LocatedPoint, ...]] = []
     for cycles in sought:

@@ -13,8 +13,7 @@ from friso.hunting.boundary.curve import Curve, CurveTracer, Spot
 from friso.hunting.boundary.locate import changes, located
 from friso.hunting.boundary.space import Space
 from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.find import ROUGH, RTOL, Cycles, families
-from friso.hunting.cycle.return_map import return_map
+from friso.hunting.cycle.find import RTOL, Cycles, families
 
 NODES = 13
 """Stages along either side of the grid from which curves are looked for."""
@@ -67,7 +66,7 @@ def plane(space: Space, rtol: float = RTOL, nodes: int = NODES) -> Plane:
 def _searches(stages: Ensemble, rtol: float) -> tuple[Cycles, list[tuple[Cycles, np.ndarray, np.ndarray]]]:
     """The hunting cycles of stages, and what to look for: cycles, the numbers of the stages on one side of a curve, and
     of those on the other. A stage whose cycle could not be closed is on neither."""
-    hunting, *pairs = families(stages, return_map(stages, ROUGH), rtol)
+    hunting, *pairs = families(stages, rtol)
     outside = ~hunting.attracting & ~hunting.uncertain
     searches = [(hunting, np.flatnonzero(hunting.attracting), np.flatnonzero(outside))]
     for pair in pairs:

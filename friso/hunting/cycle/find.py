@@ -136,9 +136,10 @@ def joined(parts: Sequence[tuple[np.ndarray, Cycles]]) -> Cycles:
     return Cycles(0.0, 0, **{pair[0][0]: np.concatenate([array for _, array in pair])[order] for pair in columns})
 
 
-def families(stages: Ensemble, there: ReturnMap, rtol: float = RTOL) -> tuple[Cycles, ...]:
-    """All cycles that are looked for, from the return maps of stages that stick on the positive side: the symmetric one
-    and one of an asymmetric pair, or the one over a whole period where some of the stages are not symmetric."""
+def families(stages: Ensemble, rtol: float = RTOL) -> tuple[Cycles, ...]:
+    """The cycles that the return maps suggest: the symmetric one and one of an asymmetric pair, or the one over a whole
+    period where some of the stages are not symmetric."""
+    there = return_map(stages, ROUGH)
     if stages.symmetric.all():
         return symmetric_cycles(stages, rtol, there), asymmetric_cycles(stages, there, rtol)
     return (whole_cycles(stages, rtol, there),)

@@ -26,7 +26,7 @@ AWAY, FOLLOWED, LINEAR = 2e-3, 8, 0.02
 """Where a simulation beside a cycle begins, as share of the distance at which the stage sticks; how many returns it is
 followed for; and up to which share a deviation counts as small."""
 
-UNDECIDED = "simulations that had to tell failed, or swung on when they were given up"
+UNDECIDED = "simulations that had to decide failed, or had not settled when they were stopped"
 """Why it is not certain whether anything attracts a stage."""
 
 SMALL_GAP = 0.02
@@ -90,7 +90,7 @@ class Swing:
 @dataclass(frozen=True)
 class Hunting:
     """What there is to know of a stage's hunting: its `cycles`, those that attract first, or the `reason` why there are
-    none, or why it is not `certain` what attracts (if simulations that had to tell failed or were given up); the
+    none, or why it is not `certain` what attracts (if simulations that had to decide failed or were stopped); the
     return map, of a stage that sticks on the positive side (None where a stage cannot hunt at all); swings that were
     `observed` and are none of the cycles; and what motions end in that do not come to rest, the `target` (None where
     nothing attracts)."""
