@@ -3,23 +3,24 @@
 import os
 import stat
 import sys
-from pathlib import Path
 
 if sys.platform == "win32":
 
-    def check_private(folder: Path) -> None:
-        """Nothing to check: folders below a user's profile are the user's own by their access lists, which a mode
-        does not tell."""
+    def foreign_writers(status: os.stat_result) -> str:
+        """Nobody: what is below a user's profile is the user's own by its access lists, which a mode does not tell."""
+        return ""
 
 else:
 
-    def check_private(folder: Path) -> None:
-        """Close a folder to other users. Raises PermissionError where it belongs to one of them."""
-        status = folder.stat()
-        if status.st_uid != os.geteuid():
-            raise PermissionError(f"{folder} belongs to another user")
-        if stat.S_IMODE(status.st_mode) != 0o700:
-            folder.chmod(0o700)
+    def foreign_writers(status: os.stat_result) -> str:
+        """Who else than this user and root may write to a file, or exchange what this user has in a folder, in words;
+        "" for nobody. In a folder with the sticky bit (/tmp) everybody may exchange but what is their own."""
+        if status.st_uid not in (0, os.geteuid()):
+            return "belongs to another user"
+        sticky = stat.S_ISDIR(status.st_mode) and status.st_mode & stat.S_ISVTX
+        if status.st_mode & (stat.S_IWGRP | stat.S_IWOTH) and not sticky:
+            return "can be written by other users"
+        return ""
 
 
 if sys.platform == "linux":

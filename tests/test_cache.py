@@ -14,8 +14,10 @@ from pathlib import Path
 
 import pytest
 
-from friso.engine import building, cache
-from friso.engine.cache import DAY, KEPT_FOR
+from friso.engine import building, cache, private, prune
+from friso.engine.cache import DAY
+from friso.engine.prune import KEPT_FOR
+from friso.engine.seal import LENGTH, SECRET, read_sealed, write_sealed
 
 BUILDER = """
 import os
@@ -36,12 +38,12 @@ SCRIPT = """
 import sys
 import numpy as np
 from friso.engine.building import entries
-from friso.engine.cache import CODE, CodeRequest
+from friso.engine.cache import CodeRequest
 from friso.engine.kinds import ArrayKind
 from friso.engine.machine_code import Loops, load
 
 (entry,) = entries([CodeRequest(sys.argv[1], "a stand-in", "stand_in_builder", b"task")])
-run = Loops(load((entry / CODE).read_bytes(), ["run"])["run"], [ArrayKind("float64", 1)])
+run = Loops(load(entry.code, ["run"])["run"], [ArrayKind("float64", 1)])
 x = np.array([21.0])
 run(x)
 assert x[0] == 42.0
@@ -98,7 +100,7 @@ def mode(path: Path) -> int:
 
 
 def entries(folder: Path) -> list[Path]:
-    return [path for path in (folder / "kernels").iterdir() if path.is_dir()]
+    return [*(folder / "kernels").glob("*.kernel")]
 
 
 def entry(folder: Path) -> Path:
@@ -111,7 +113,7 @@ def test_the_folder_is_private_and_the_second_process_does_not_compile(tmp_path:
     assert first
     assert COMPILING in log
     assert mode(tmp_path / "cache" / "kernels") == 0o700
-    assert mode(entry(tmp_path / "cache")) == 0o700
+    assert {mode(file) for file in (tmp_path / "cache" / "kernels").iterdir()} == {0o600}
     second, log = finished(start(tmp_path / "cache"))
     assert not second
     assert log == ""
@@ -125,9 +127,9 @@ def test_permissions_are_mended(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("damage", ["truncate", "alter", "remove"])
-@pytest.mark.parametrize("pattern", ["kernel.py", "manifest.json", "code.o"])
-def test_a_damaged_entry_is_rebuilt(copied: Path, pattern: str, damage: str) -> None:
-    (file,) = entry(copied).glob(pattern)
+@pytest.mark.parametrize("pattern", ["*.kernel", "*.request", SECRET])
+def test_a_damaged_file_is_made_again(copied: Path, pattern: str, damage: str) -> None:
+    (file,) = (copied / "kernels").glob(pattern)
     content = file.read_bytes()
     middle = len(content) // 2
     if damage == "remove":
@@ -142,12 +144,6 @@ def test_a_damaged_entry_is_rebuilt(copied: Path, pattern: str, damage: str) -> 
 
 def test_a_copied_folder_is_as_good(copied: Path) -> None:
     assert not built(copied)
-
-
-def test_an_interrupted_build_is_built_again(copied: Path) -> None:
-    """Without a manifest, which is written last."""
-    (entry(copied) / "manifest.json").unlink()
-    assert built(copied)
 
 
 def test_processes_at_the_same_time_build_once(tmp_path: Path) -> None:
@@ -167,7 +163,7 @@ def test_a_comment_compiles_nothing(whole: Path, copied: Path) -> None:
     (before,) = entries(copied)
     assert built(copied, "another", STAND_IN_ENDS_WITH="  # in words")
     assert entries(copied) == [before]
-    assert (before / "manifest.json").stat().st_mtime == (entry(whole) / "manifest.json").stat().st_mtime
+    assert before.stat().st_mtime == entry(whole).stat().st_mtime
     assert not built(copied, "another")
 
 
@@ -183,7 +179,7 @@ def test_what_has_not_been_used_for_long_is_deleted(copied: Path) -> None:
     """When something else is built; and requests for it with it."""
     (old,) = entries(copied)
     (request,) = (copied / "kernels").glob("*.request")
-    aged(KEPT_FOR + DAY, old / "manifest.json", request)
+    aged(KEPT_FOR + DAY, old, request)
     assert built(copied, "another", STAND_IN_ENDS_WITH=" + 0.0")
     assert not old.exists()
     assert not request.exists()
@@ -194,7 +190,7 @@ def test_what_has_not_been_used_for_long_is_deleted(copied: Path) -> None:
 def test_what_is_used_is_kept(copied: Path) -> None:
     """Also where it was built long ago: its use is noted."""
     (old,) = entries(copied)
-    aged(KEPT_FOR + DAY, old / "manifest.json", *(copied / "kernels").glob("*.request"))
+    aged(KEPT_FOR + DAY, old, *(copied / "kernels").glob("*.request"))
     assert not built(copied)
     assert built(copied, "another", STAND_IN_ENDS_WITH=" + 0.0")
     assert not built(copied)
@@ -203,25 +199,25 @@ def test_what_is_used_is_kept(copied: Path) -> None:
 def test_there_is_an_end_to_what_is_kept(copied: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """What was used longest ago goes first; what was used today stays."""
     first, folder = entry(copied), copied / "kernels"
-    others = [Path(shutil.copytree(first, first.with_name(f"{i}" * 24))) for i in range(1, 4)]
-    size = sum(file.stat().st_size for file in first.rglob("*") if file.is_file())
+    others = [Path(shutil.copy(first, first.with_name(f"{i}" * 24 + ".kernel"))) for i in range(1, 4)]
+    size = first.stat().st_size
     for i, other in enumerate(others, 1):
-        aged(i * 2 * DAY, other / "manifest.json")
-    monkeypatch.setattr(cache, "KEPT_IN_ALL", 2.5 * size)
-    cache.prune(folder)
+        aged(i * 2 * DAY, other)
+    monkeypatch.setattr(prune, "KEPT_IN_ALL", 2.5 * size)
+    prune.prune(folder)
     assert set(entries(copied)) == {first, others[0]}
-    monkeypatch.setattr(cache, "KEPT_IN_ALL", 0)
-    cache.prune(folder)
+    monkeypatch.setattr(prune, "KEPT_IN_ALL", 0)
+    prune.prune(folder)
     assert entries(copied) == [first]
 
 
 def test_an_entry_that_is_being_written_is_left_alone(copied: Path) -> None:
     old = entry(copied)
-    aged(KEPT_FOR + DAY, old / "manifest.json")
-    with cache._entry_lock(old):
-        cache.prune(copied / "kernels")
+    aged(KEPT_FOR + DAY, old)
+    with cache.entry_lock(old):
+        prune.prune(copied / "kernels")
         assert old.exists()
-    cache.prune(copied / "kernels")
+    prune.prune(copied / "kernels")
     assert not old.exists()
 
 
@@ -242,9 +238,110 @@ def test_a_builder_that_fails_says_why(tmp_path: Path, monkeypatch: pytest.Monke
     assert ("no such stage" in str(raised.value)) == ("no such stage" in crash)
 
 
+def test_what_killed_processes_left_is_deleted(copied: Path) -> None:
+    drafts = [copied / "kernels" / f"{name}.kernel.x{private.DRAFT}" for name in ("old", "new")]
+    for draft in drafts:
+        draft.write_bytes(b"half")
+    aged(2 * DAY, drafts[0])
+    prune.prune(copied / "kernels")
+    assert [draft.exists() for draft in drafts] == [False, True]
+
+
 def test_without_a_folder_kernels_are_compiled_and_not_kept(tmp_path: Path) -> None:
     file = tmp_path / "no folder"
     file.write_text("")
     made, log = finished(start(file))
     assert made
-    assert "temporary folder" in log
+    assert log.count("temporary folder") == 1
+
+
+# nobody else
+
+
+def belongs_to_another(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Give a file away; where this user cannot, be another."""
+    if os.geteuid() == 0:
+        os.chown(path, 12345, -1)
+    else:
+        me = os.geteuid()
+        monkeypatch.setattr(os, "geteuid", lambda: me + 1)
+
+
+def test_folders_that_are_missing_are_made_private(tmp_path: Path) -> None:
+    before = os.umask(0)
+    try:
+        private.make_private(tmp_path / "a" / "b")
+    finally:
+        os.umask(before)
+    assert mode(tmp_path / "a") == mode(tmp_path / "a" / "b") == 0o700
+
+
+@pytest.mark.parametrize("permissions", [0o770, 0o707, 0o777])
+def test_a_folder_on_the_way_that_others_may_write_to_is_left_alone(copied: Path, permissions: int) -> None:
+    """It is not friso's to close: the kernel is compiled elsewhere, and nothing of the folder is loaded."""
+    copied.chmod(permissions)
+    made, log = finished(start(copied))
+    assert made
+    assert log.count(f"{copied} can be written by other users") == 1
+    assert mode(copied) == permissions
+
+
+def test_a_link_is_not_followed(copied: Path, tmp_path: Path) -> None:
+    (tmp_path / "linked").symlink_to(copied)
+    (tmp_path / "below").mkdir()
+    (tmp_path / "below" / "kernels").symlink_to(copied / "kernels")
+    for folder in ("linked", "below"):
+        made, log = finished(start(tmp_path / folder))
+        assert made
+        assert "is a symbolic link" in log
+
+
+def test_the_folder_of_another_user_is_left_alone(copied: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = copied / "kernels"
+    folder.chmod(0o755)
+    belongs_to_another(folder, monkeypatch)
+    with pytest.raises(PermissionError, match="belongs to another user"):
+        private.make_private(folder)
+    assert mode(folder) == 0o755
+
+
+@pytest.mark.parametrize("pattern", ["*.kernel", "*.request", SECRET])
+def test_the_file_of_another_user_is_not_read(copied: Path, pattern: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    (file,) = (copied / "kernels").glob(pattern)
+    belongs_to_another(file, monkeypatch)
+    with pytest.raises(PermissionError, match="belongs to another user"):
+        private.read_private(file)
+    if os.geteuid() == 0:
+        assert built(copied)
+
+
+def test_a_file_that_others_may_write_or_that_is_a_link_is_not_read(tmp_path: Path) -> None:
+    file, link, pipe = tmp_path / "file", tmp_path / "link", tmp_path / "pipe"
+    write_sealed(file, b"content")
+    link.symlink_to(file)
+    os.mkfifo(pipe)
+    assert (read_sealed(file), read_sealed(link), read_sealed(pipe)) == (b"content", None, None)
+    file.chmod(0o620)
+    assert read_sealed(file) is None
+
+
+def test_a_planted_entry_is_not_loaded(copied: Path, tmp_path: Path) -> None:
+    """Whole, of the right name and permissions: sealed with another secret, or with that of another entry."""
+    kernel, other = entry(copied), tmp_path / "elsewhere"
+    other.mkdir(mode=0o700)
+    write_sealed(other / kernel.name, kernel.read_bytes()[LENGTH:])
+    shutil.copy(other / kernel.name, kernel)
+    assert built(copied)
+    write_sealed(kernel.with_name("other.kernel"), b"of the same secret")
+    kernel.with_name("other.kernel").replace(kernel)
+    assert built(copied)
+    assert not built(copied)
+
+
+def test_a_secret_that_others_could_read_is_a_secret_no_more(copied: Path) -> None:
+    secret = copied / "kernels" / SECRET
+    before = secret.read_bytes()
+    secret.chmod(0o644)
+    assert built(copied)
+    assert mode(secret) == 0o600
+    assert secret.read_bytes() != before

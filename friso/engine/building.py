@@ -15,26 +15,25 @@ from collections import deque
 from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, suppress
-from pathlib import Path
 from types import TracebackType
 
-from friso.engine.cache import CodeRequest, cache_folder, logger, prune
+from friso.engine.cache import CodeRequest, Compiled, cache_folder, logger
+from friso.engine.prune import prune
 from friso.system import usable_cores
 
 
-def entries(requests: Iterable[CodeRequest]) -> list[Path]:
-    """The entries of what is requested, in the cache; what is missing there is built, and what is said about it logged.
+def entries(requests: Iterable[CodeRequest]) -> list[Compiled]:
+    """The entries of what is requested; what is missing in the cache is built, and what is said about it logged.
     Raises RuntimeError with the builder's message if that fails, OSError where the cache cannot be written."""
     requests = list(requests)
-    missing = [request for request in requests if request.entry() is None]
-    if missing:
+    there = {request: request.entry() for request in requests}
+    if missing := [request for request, entry in there.items() if entry is None]:
         _Work(missing).finish()
         prune(cache_folder())
-    there = [request.entry() for request in requests]
-    lost = [request.title for request, entry in zip(requests, there, strict=True) if entry is None]
-    if lost:
+        there |= {request: request.entry() for request in missing}
+    if lost := [request.title for request, entry in there.items() if entry is None]:
         raise RuntimeError(f"what was compiled is not in {cache_folder()}: {', '.join(lost)}")
-    return [entry for entry in there if entry is not None]
+    return [entry for request in requests if (entry := there[request]) is not None]
 
 
 class _Work:
@@ -69,7 +68,7 @@ class _Work:
                     if request.entry() is None:  # no other process has built it meanwhile
                         place = f"{number} of {self._count}"
                         logger.warning("compiling, once on this machine, %s: %s", place, request.title)
-                        request.file.write_text(builder.build(request), encoding="ascii")
+                        request.answer(builder.build(request))
 
 
 class _Builder:

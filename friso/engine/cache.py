@@ -1,8 +1,8 @@
 """Compiled code on disk, private to the user.
 
-An entry is a folder with machine code, the module that it was made of, and a manifest of checksums, written last.
-Whatever does not match its manifest is built anew; locks keep processes that build at the same time out of each other's
-way.
+An entry is a file with machine code and the module that it was made of. What is loaded is what this user alone can
+have written (`private.py`) and what bears friso's seal (`seal.py`); anything else is built anew. Locks keep processes
+that build at the same time out of each other's way.
 
 An entry is named after what was generated, the compiler and the processor; a request, after what was asked for and
 friso's own sources, names its entry. So a start with friso unchanged generates nothing, and a change of friso that
@@ -14,56 +14,58 @@ from __future__ import annotations
 import ast
 import atexit
 import hashlib
-import importlib.util
-import json
 import logging
+import marshal
 import os
 import re
 import shutil
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
+from importlib.abc import InspectLoader
 from importlib.metadata import version
+from importlib.util import module_from_spec, spec_from_loader
 from pathlib import Path
-from types import ModuleType
+from types import CodeType, ModuleType
 
 import llvmlite
 import llvmlite.binding as llvm
 import numpy as np
-from filelock import FileLock, Timeout
+from filelock import FileLock
 from platformdirs import user_cache_dir
 
-from friso.system import check_private
+from friso.engine.private import make_private
+from friso.engine.seal import read_sealed, write_sealed
 from friso.version import VERSION
 
 logger = logging.getLogger("friso")
 
 FOLDER_VARIABLE = "FRISO_CACHE_DIR"
 
-MODULE, CODE, MANIFEST = "kernel.py", "code.o", "manifest.json"
-"""Files of an entry."""
+ENTRY, REQUEST = ".kernel", ".request"
+"""How the names of files end that hold code, and that name such a file."""
 
 DAY = 86_400.0
 """In seconds; so often it is noted that something is in use."""
-
-KEPT_FOR, KEPT_IN_ALL = 60 * DAY, 200_000_000
-"""How long [s] what is not used is kept, and how much [bytes]; what was used within a day is kept in any case."""
 
 
 @cache
 def cache_folder() -> Path:
     """The folder of compiled code, mode 0700; a temporary one, with a warning, where that cannot be had."""
-    folder = Path(os.environ.get(FOLDER_VARIABLE) or user_cache_dir("friso")) / "kernels"
+    folder = (Path(os.environ.get(FOLDER_VARIABLE) or user_cache_dir("friso")) / "kernels").absolute()
     try:
-        folder.mkdir(parents=True, exist_ok=True, mode=0o700)
-        check_private(folder)
+        make_private(folder)
         with tempfile.TemporaryFile(dir=folder):
             return folder
     except OSError as error:
-        logger.warning("kernels are compiled into a temporary folder and not kept: %s", error)
+        logger.warning(
+            "kernels are compiled into a temporary folder and not kept: %s; %s names another folder",
+            error,
+            FOLDER_VARIABLE,
+        )
         passing = Path(tempfile.mkdtemp(prefix="friso-kernels-"))
         atexit.register(shutil.rmtree, passing, ignore_errors=True)
         return passing
@@ -94,6 +96,20 @@ def environment() -> str:
 
 
 @dataclass(frozen=True)
+class Compiled:
+    """What is kept of one module: its name in the cache, its source, the same for the interpreter, and machine code."""
+
+    name: str
+    source: str
+    bytecode: bytes
+    code: bytes
+
+    def module(self) -> ModuleType:
+        """The module, run."""
+        return _module(self.name, self.source, marshal.loads(self.bytecode))
+
+
+@dataclass(frozen=True)
 class CodeRequest:
     """What is to be compiled: its `name` in full, a `title` for people, the module whose `build(folder, task)` keeps it
     in the cache (`keep`) and returns the name of its entry, and the task that it is given."""
@@ -107,25 +123,26 @@ class CodeRequest:
     def file(self) -> Path:
         """The file that names the entry."""
         asked = (self.name, VERSION, code_digest("equations", "engine"), version("sympy"), environment())
-        return cache_folder() / f"{_digest(*asked)}.request"
+        return cache_folder() / f"{_digest(*asked)}{REQUEST}"
 
     def lock(self) -> FileLock:
         """Held by who builds what is requested; a request for something else may share it."""
         return FileLock(cache_folder() / f"{self.file.name[:2]}.request-lock", mode=0o600)
 
-    def entry(self) -> Path | None:
+    def answer(self, name: str) -> None:
+        """Keep the name of the entry."""
+        write_sealed(self.file, name.encode("ascii"))
+
+    def entry(self) -> Compiled | None:
         """The entry, intact; None where there is none. That it is in use is noted."""
-        try:
-            name = self.file.read_text(encoding="ascii")
-        except (OSError, ValueError):
-            return None
+        file = self.file
+        name = (read_sealed(file) or b"").decode("ascii")
         if not re.fullmatch("[0-9a-f]{24}", name):
             return None
-        entry = self.file.parent / name
-        if not _intact(entry):
-            return None
-        _note_use(self.file, entry / MANIFEST)
-        return entry
+        stored = _stored(file.parent / f"{name}{ENTRY}")
+        if stored is not None:
+            _note_use(file, file.with_name(f"{name}{ENTRY}"))
+        return stored
 
 
 def _digest(*parts: str) -> str:
@@ -138,23 +155,28 @@ def _note_use(*files: Path) -> None:
             os.utime(file)
 
 
+def _stored(file: Path) -> Compiled | None:
+    """The entry in a file, None where there is none that friso wrote there."""
+    content = read_sealed(file)
+    return None if content is None else Compiled(file.stem, *marshal.loads(content))
+
+
 def keep(folder: Path, source: str, code_of: Callable[[ModuleType], bytes]) -> str:
     """Keep a module and the machine code that `code_of` makes of it in the cache `folder`, unless the same is there
     already; the name of its entry."""
-    entry = folder / _digest(_without_words(source), _compiled_with(), environment())
-    with _entry_lock(entry):
-        if not _intact(entry):
-            shutil.rmtree(entry, ignore_errors=True)
-            entry.mkdir(mode=0o700)
-            (entry / MODULE).write_text(source, encoding="utf-8")
-            (entry / CODE).write_bytes(code_of(import_entry(entry)))
-            (entry / MANIFEST).write_text(json.dumps(_checksums(entry)), encoding="utf-8")
-    return entry.name
+    name = _digest(_without_words(source), _compiled_with(), environment())
+    file = folder / f"{name}{ENTRY}"
+    with entry_lock(file):
+        if _stored(file) is None:
+            compiled = compile(source, _file_name(name), "exec")
+            code = code_of(_module(name, source, compiled))
+            write_sealed(file, marshal.dumps((source, marshal.dumps(compiled), code)))
+    return name
 
 
-def _entry_lock(entry: Path) -> FileLock:
+def entry_lock(file: Path) -> FileLock:
     """Held by who writes or deletes an entry; another one may share it."""
-    return FileLock(entry.parent / f"{entry.name[:2]}.lock", mode=0o600)
+    return FileLock(file.parent / f"{file.name[:2]}.lock", mode=0o600)
 
 
 def _without_words(source: str) -> str:
@@ -175,63 +197,31 @@ def _compiled_with() -> str:
 _INCLUDED = ("arrays", "kinds", "layout", "machine_code", "roots", "scalar_code", "simd_math", "vector_code")
 
 
-def _checksums(entry: Path) -> dict[str, str]:
-    files = [entry / MODULE, entry / CODE]
-    return {file.name: hashlib.sha256(file.read_bytes()).hexdigest() for file in files}
+def _file_name(name: str) -> str:
+    return f"friso_kernel_{name}.py"
 
 
-def _intact(entry: Path) -> bool:
-    """Whether the entry is there, whole and unchanged."""
-    try:
-        return json.loads((entry / MANIFEST).read_text(encoding="utf-8")) == _checksums(entry)
-    except (OSError, ValueError):
-        return False
+class _Loader(InspectLoader):
+    """Loads a module from its code, and tells its source, which is compiled from it."""
+
+    def __init__(self, source: str, compiled: CodeType) -> None:
+        self._source, self._compiled = source, compiled
+
+    def get_source(self, fullname: str) -> str:
+        """The source, for what inspects functions of the module."""
+        return self._source
+
+    def get_code(self, fullname: str) -> CodeType:
+        """The code that is run."""
+        return self._compiled
 
 
-def import_entry(entry: Path) -> ModuleType:
-    """The module of an entry."""
-    spec = importlib.util.spec_from_file_location(f"friso_kernel_{entry.name}", entry / MODULE)
-    if spec is None or spec.loader is None:
-        raise ImportError(f"no module can be made of {entry / MODULE}")
-    module = importlib.util.module_from_spec(spec)
+def _module(name: str, source: str, compiled: CodeType) -> ModuleType:
+    """The module of an entry, run."""
+    loader = _Loader(source, compiled)
+    spec = spec_from_loader(Path(_file_name(name)).stem, loader)
+    assert spec is not None
+    module = module_from_spec(spec)
     sys.modules[spec.name] = module
-    spec.loader.exec_module(module)
+    loader.exec_module(module)
     return module
-
-
-def prune(folder: Path) -> None:
-    """Delete what has not been used for long, and then what has not been used for longest as long as there is too much.
-    What another process is writing is left alone."""
-    try:
-        with FileLock(folder / "prune.lock", blocking=False, mode=0o600):
-            size, now = 0, time.time()
-            for used, path, bytes_ in sorted(_used(folder), reverse=True):
-                size += bytes_
-                age = now - used
-                if age > KEPT_FOR or (age > DAY and size > KEPT_IN_ALL):
-                    _delete(path)
-    except (Timeout, OSError) as error:  # another process is at it; it is no reason to stop
-        logger.debug("old kernels are left: %s", error)
-
-
-def _used(folder: Path) -> Iterator[tuple[float, Path, int]]:
-    """When each entry and request was used last [s], and its size [bytes]."""
-    for path in folder.iterdir():
-        if path.is_dir():
-            files = [file for file in path.rglob("*") if file.is_file()]
-            marks = [file for file in files if file.name == MANIFEST] or [path]
-            yield marks[0].stat().st_mtime, path, sum(file.stat().st_size for file in files)
-        elif path.suffix == ".request":
-            yield path.stat().st_mtime, path, 0
-
-
-def _delete(path: Path) -> None:
-    if not path.is_dir():
-        path.unlink()
-        return
-    try:
-        with _entry_lock(path).acquire(blocking=False):
-            (path / MANIFEST).unlink(missing_ok=True)
-            shutil.rmtree(path)
-    except Timeout:
-        return

@@ -6,7 +6,6 @@ import pickle
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cache
-from pathlib import Path
 from threading import Lock
 from types import ModuleType
 from typing import Any
@@ -15,7 +14,7 @@ import numpy as np
 
 from friso.engine.arrays import STATISTICS, Batch, Results, Settings, new_queue
 from friso.engine.building import entries
-from friso.engine.cache import CODE, CodeRequest, import_entry
+from friso.engine.cache import CodeRequest, Compiled
 from friso.engine.kinds import Kind, kind_of
 from friso.engine.layout import FUNCTIONS, LANES, LOOKED_UP, ModelLayout
 from friso.engine.machine_code import Loops, load
@@ -212,13 +211,13 @@ def _request(wanted: Wanted) -> CodeRequest:
     return CodeRequest(name, wanted.title, "friso.engine.build", pickle.dumps((foreign, pickle.dumps(wanted))))
 
 
-def _load(wanted: Wanted, entry: Path) -> None:
+def _load(wanted: Wanted, entry: Compiled) -> None:
     with _loading:
         if wanted in _kernels:  # another thread was first
             return
-        module = import_entry(entry)
+        module = entry.module()
         functions = [name for name in FUNCTIONS if hasattr(module, name)]
-        code = {**dict.fromkeys(FUNCTIONS, 0), **load((entry / CODE).read_bytes(), functions)}
+        code = {**dict.fromkeys(FUNCTIONS, 0), **load(entry.code, functions)}
         arrays = {name: np.array(module.LOOKED_UP[name], np.int64) for name in LOOKED_UP}
         _kernels[wanted] = Kernel(module, ModelLayout(**module.LAYOUT, **arrays, **code), _loops())
 
@@ -226,7 +225,7 @@ def _load(wanted: Wanted, entry: Path) -> None:
 @cache
 def _loops() -> Loops:
     (entry,) = entries([DRIVER])
-    return Loops(load((entry / CODE).read_bytes(), ["run"])["run"], driver_kinds())
+    return Loops(load(entry.code, ["run"])["run"], driver_kinds())
 
 
 def empty_results(runs: int, capacity: int, samples: int, outputs: int) -> Results:

@@ -9,7 +9,7 @@ from functools import cache
 import numpy as np
 
 from friso.engine.building import entries
-from friso.engine.cache import CODE, CodeRequest, code_digest
+from friso.engine.cache import CodeRequest, code_digest
 from friso.engine.kinds import ArrayKind
 from friso.engine.machine_code import Loops, load
 from friso.hunting import turning
@@ -58,4 +58,4 @@ def scan(times: np.ndarray, values: np.ndarray, counts: np.ndarray, swing: np.nd
 def _compiled() -> Loops:
     version = code_digest("hunting/turning.py", "hunting/build.py")
     (entry,) = entries([CodeRequest(f"turning points {version}", "loops over turning points", "friso.hunting.build")])
-    return Loops(load((entry / CODE).read_bytes(), ["run"])["run"], KINDS)
+    return Loops(load(entry.code, ["run"])["run"], KINDS)

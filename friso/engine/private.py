@@ -1,0 +1,77 @@
+"""Files and folders that nobody but this user and root can have written.
+
+A folder is judged from the root down: once a folder belongs to the user or to root and nobody else may write to it,
+nobody else can exchange what is in it. A file is opened without following links and judged by its descriptor.
+"""
+
+from __future__ import annotations
+
+import os
+import stat
+import tempfile
+from contextlib import suppress
+from pathlib import Path
+
+from friso.system import foreign_writers
+
+
+def make_private(folder: Path) -> None:
+    """Make a folder for this user alone, with those above it that are missing; one of the user's own is closed to
+    others.
+
+    Raises PermissionError where another user could exchange the folder, or one on the way: where it is another user's,
+    others may write to it, or it is a symbolic link. Raises OSError where it cannot be made.
+    """
+    folder = folder.absolute()
+    for path in [*reversed(folder.parents), folder]:
+        with suppress(FileExistsError):
+            path.mkdir(mode=0o700)
+        status = path.lstat()
+        if stat.S_ISLNK(status.st_mode) and path.parent == Path(path.anchor):
+            status = path.stat()  # the system's own, as /var is on macOS
+        if stat.S_ISLNK(status.st_mode):
+            raise PermissionError(f"{path} is a symbolic link")
+        if not stat.S_ISDIR(status.st_mode):
+            raise NotADirectoryError(20, "Not a directory", str(path))
+        if path == folder:
+            status = _closed(path, status)
+        if why := foreign_writers(status):
+            raise PermissionError(f"{path} {why}")
+
+
+def _closed(folder: Path, status: os.stat_result) -> os.stat_result:
+    """The status of the user's own folder once nobody else may look into it; another's is left as it is."""
+    if os.name == "posix" and status.st_uid == os.geteuid() and stat.S_IMODE(status.st_mode) != 0o700:
+        folder.chmod(0o700)
+        return folder.lstat()
+    return status
+
+
+def read_private(path: Path) -> bytes:
+    """What is in a file. Raises PermissionError where another user can have written it, OSError where it cannot be
+    read."""
+    flags = os.O_RDONLY | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
+    with open(os.open(path, flags), "rb") as file:
+        status = os.fstat(file.fileno())
+        if not stat.S_ISREG(status.st_mode):
+            raise PermissionError(f"{path} is no file")
+        if why := foreign_writers(status):
+            raise PermissionError(f"{path} {why}")
+        return file.read()
+
+
+def write_private(path: Path, content: bytes) -> None:
+    """Write a file for this user alone, whole or not at all. Raises OSError."""
+    descriptor, name = tempfile.mkstemp(prefix=f"{path.name}.", suffix=DRAFT, dir=path.parent)
+    draft = Path(name)
+    try:
+        with open(descriptor, "wb") as file:
+            file.write(content)
+        draft.replace(path)
+    except BaseException:
+        draft.unlink(missing_ok=True)
+        raise
+
+
+DRAFT = ".draft"
+"""How the name of a file ends that is being written."""

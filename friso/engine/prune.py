@@ -1,0 +1,47 @@
+"""What has not been used for long is deleted from the folder of compiled code."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+from filelock import FileLock, Timeout
+
+from friso.engine.cache import DAY, ENTRY, REQUEST, entry_lock, logger
+from friso.engine.private import DRAFT
+
+KEPT_FOR, KEPT_IN_ALL = 60 * DAY, 200_000_000
+"""How long [s] what is not used is kept, and how much [bytes]; what was used within a day is kept in any case."""
+
+
+def prune(folder: Path) -> None:
+    """Delete what has not been used for long, then what has not been used for longest as long as there is too much, and
+    what killed processes left. What another process is writing is left alone."""
+    try:
+        with FileLock(folder / "prune.lock", blocking=False, mode=0o600):
+            size, now = 0, time.time()
+            for used, file, length in sorted(_used(folder), reverse=True):
+                size += length
+                age = now - used
+                unfinished = file.suffix == DRAFT and age > DAY
+                if unfinished or age > KEPT_FOR or (age > DAY and size > KEPT_IN_ALL):
+                    _delete(file)
+    except (Timeout, OSError) as error:  # another process is at it; it is no reason to stop
+        logger.debug("old kernels are left: %s", error)
+
+
+def _used(folder: Path) -> Iterator[tuple[float, Path, int]]:
+    """When each entry, request and draft was used last [s], and its size [bytes]."""
+    for file in folder.iterdir():
+        if file.suffix in (ENTRY, REQUEST, DRAFT):
+            status = file.lstat()
+            yield status.st_mtime, file, status.st_size
+
+
+def _delete(file: Path) -> None:
+    try:
+        with entry_lock(file).acquire(blocking=False):
+            file.unlink()
+    except Timeout:
+        return

@@ -1,0 +1,56 @@
+"""What friso keeps for itself is sealed: an authenticator (HMAC-SHA-256, RFC 2104) by a secret of this user tells that
+friso wrote it under just this name, even where others could once write to the folder."""
+
+from __future__ import annotations
+
+import hmac
+import os
+from functools import cache
+from pathlib import Path
+
+from filelock import FileLock
+
+from friso.engine.private import read_private, write_private
+
+SECRET, LENGTH = "secret", 32
+"""The file with the secret, and the length [bytes] of it and of an authenticator."""
+
+
+def write_sealed(path: Path, content: bytes) -> None:
+    """Write a file with its authenticator before it, whole or not at all. Raises OSError."""
+    write_private(path, _authenticator(path, content) + content)
+
+
+def read_sealed(path: Path) -> bytes | None:
+    """What `write_sealed` wrote under this name; None where it is missing, or anything of it is not so."""
+    try:
+        sealed = read_private(path)
+    except OSError:
+        return None
+    authenticator, content = sealed[:LENGTH], sealed[LENGTH:]
+    return content if hmac.compare_digest(authenticator, _authenticator(path, content)) else None
+
+
+def _authenticator(path: Path, content: bytes) -> bytes:
+    return hmac.digest(_secret(path.parent), path.name.encode() + b"\0" + content, "sha256")
+
+
+@cache
+def _secret(folder: Path) -> bytes:
+    """The secret of a folder; a new one where there is none, or one that others can have read or written."""
+    file = folder / SECRET
+    if (secret := _stored(file)) is None:
+        with FileLock(folder / f"{SECRET}.lock", mode=0o600):
+            if (secret := _stored(file)) is None:  # no other process has made one meanwhile
+                secret = os.urandom(LENGTH)
+                write_private(file, secret)
+    return secret
+
+
+def _stored(file: Path) -> bytes | None:
+    try:
+        secret = read_private(file)
+        closed = os.name != "posix" or not file.lstat().st_mode & 0o077
+    except OSError:
+        return None
+    return secret if closed and len(secret) == LENGTH else None
