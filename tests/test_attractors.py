@@ -9,7 +9,7 @@ from variants import VARIANTS
 
 import friso
 import friso.hunting.attractors
-from friso.hunting.attractors import Attractors, attractors, starts
+from friso.hunting.attractors import Attractors, attractors, starts, survey
 from friso.hunting.attractors.recurrence import recurrence
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.rest import stuck
@@ -150,6 +150,15 @@ def test_a_verdict_that_flips_with_the_tolerance_says_so(monkeypatch: pytest.Mon
     assert found.flips.tolist() == [True]
     assert found.known.tolist() == [False]
     assert not found.motions
+
+
+def test_runs_that_are_given_up_leave_it_unknown(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Just above its edge many runs of the rigid mass still swing after two rounds, each in its own way. Of a stage of
+    which one alone is followed on, and that settles, nothing is known."""
+    above = held(VARIANTS["rigid"].replace({"controller.crossover": "9.9 Hz"}))
+    assert attractors(above).known.all()
+    monkeypatch.setattr(survey, "KINDS", 1)
+    assert not attractors(above).known.any()
 
 
 def test_swings_that_repeat_themselves() -> None:

@@ -17,6 +17,7 @@ from friso.engine.kernel import kernel
 from friso.equations.motion import last_corner
 from friso.equations.structure import shared_structure
 from friso.hunting.attractors import Attractors, Target, attractors
+from friso.hunting.attractors.rounds import typical_period
 from friso.hunting.basin import Kick, MoveShare, displacements, ends_in, moves, pushes
 from friso.hunting.criteria import COUNTED_ABOVE, Verdict, lasts, verdicts
 from friso.hunting.cycle.ensemble import Ensemble
@@ -25,8 +26,8 @@ from friso.hunting.margin import Margin, margin
 from friso.hunting.measures import Measures, measure, options
 from friso.stage import Stage
 
-LONG = 1000.0
-"""Time [s] for which a motion that has not settled at its end is followed."""
+LONG, PERIODS = 1000.0, 300.0
+"""Time [s] for which a motion that has not settled at its end is followed at least, and in typical periods."""
 
 MOVING = "the reference never stands still"
 """Why a stage whose reference is a ramp does not hunt: it may stick and slip, but not about a place."""
@@ -41,8 +42,8 @@ class Judgement:
 
     `displacement`, `push` and `moves` tell what starts hunting, where there is a cycle that attracts; `margin` the edge
     of hunting nearest in bandwidth; `settled_after` the time [s] after the last corner of the reference from which on
-    this motion stays within 10 um, up to 1000 s. `observed`: what attracts was observed in long simulations, no orbit
-    that attracts could be closed.
+    this motion stays within 10 um, up to the time for which it was `followed` [s] (None: no longer than its own end).
+    `observed`: what attracts was observed in long simulations, no orbit that attracts could be closed.
     """
 
     verdict: Verdict
@@ -52,6 +53,7 @@ class Judgement:
     moves: MoveShare | None = None
     margin: Margin | None = None
     settled_after: float | None = None
+    followed: float | None = None
     observed: bool = False
 
     @property
@@ -101,7 +103,8 @@ def judge(stage: Stage, ran: Measures, rtol: float) -> Judgement:
     after = float(rest.after[0]) if np.isfinite(rest.after[0]) else None
     edge = margin(stage, attracting=False) if known.possible and not observed else None
     word = verdicts(motions.completed, rest.steady, rest.steady, rest.rests)[0]
-    return Judgement(word, known, margin=edge, settled_after=after, observed=observed)
+    followed = float(rest.followed[0]) if np.isfinite(rest.followed[0]) else None
+    return Judgement(word, known, margin=edge, settled_after=after, followed=followed, observed=observed)
 
 
 def _with_a_target(stage: Stage, motions: Motions, known: Hunting, target: Target) -> Judgement:
@@ -180,30 +183,33 @@ def _end_in_a_cycle(
 @dataclass(frozen=True)
 class _Rest:
     """Of motions of stages without an attracting cycle, arrays of shape (count,): whether they have come to rest at
-    their end; the time [s] after which they have, if they are followed for long (NaN: not then either, or unknown); and
-    whether they swing on `steady`, neither settling nor decaying."""
+    their end; the time [s] after which they have, if they are followed for long (NaN: not then either, or unknown);
+    whether they swing on `steady`, neither settling nor decaying; and for how long they were `followed` [s] (NaN: no
+    longer than their end)."""
 
     rests: np.ndarray
     after: np.ndarray
     steady: np.ndarray
+    followed: np.ndarray
 
 
 def _rest(flat: Mapping[str, Any], motions: Motions, count: int, how: RunOptions, possible: bool) -> _Rest:
     """Where hunting is not `possible`, a stage may rest off its reference; else a motion that has not come to rest at
     its end is followed."""
-    after, steady = motions.settling.copy(), np.zeros(count, bool)
+    after, steady, followed = motions.settling.copy(), np.zeros(count, bool), np.full(count, np.nan)
     rests = np.isfinite(motions.settling)
     if not possible:
         still = (motions.swing <= COUNTED_ABOVE) & (motions.peaks == 0)
-        return _Rest(rests | still, after, steady)
+        return _Rest(rests | still, after, steady, followed)
     if (on := np.flatnonzero(~rests)).size:
         own = _part(flat, on)
-        end = np.maximum(LONG, own["motion.duration"]) + last_corner(own)
-        long = {**own, "motion.duration": end}
+        periods = PERIODS * typical_period(Ensemble.held(own, on.size, form=shared_structure(flat)))
+        followed[on] = np.maximum(np.maximum(LONG, own["motion.duration"]), periods)
+        long = {**own, "motion.duration": followed[on] + last_corner(own)}
         last, half = (_motions(long, on.size, replace(how, window=window)) for window in (0.75, 0.5))
         after[on] = last.settling
         steady[on] = lasts(last.swing, half.swing, COUNTED_ABOVE / 2, 1 / (1 + STEADY))
-    return _Rest(rests, after, steady)
+    return _Rest(rests, after, steady, followed)
 
 
 def _motions(flat: Mapping[str, Any], count: int, how: RunOptions) -> Motions:

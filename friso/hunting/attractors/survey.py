@@ -16,10 +16,13 @@ ROUNDS = 5
 ALIKE = 0.05
 """Share by which the time and the peak to peak of two motions differ at most that are the same."""
 
+CLOSE = 0.01
+"""The same share of the peak to peak of runs that do not repeat themselves."""
+
 SAME = 1e-3
 """The same of two orbits that are the same."""
 
-KINDS = 8
+KINDS = 16
 """Kinds of runs of a stage that are followed after the second round."""
 
 ENOUGH = 3
@@ -161,7 +164,7 @@ class Survey:
             if not on.size:
                 return
             if number > 0:
-                on = on[_kinds(of[on], ends.take(on), KINDS)]
+                on = on[self._kinds(of[on], ends.take(on), KINDS)]
             if number == ROUNDS - 1:
                 return self._last(runs.take(on), of[on], ends.take(on), before[on])
             if number >= REGULAR:
@@ -184,6 +187,13 @@ class Survey:
         self._close(runs, of, ends, np.flatnonzero(ready))
         return np.flatnonzero(on & ~self._alike(of, ends))
 
+    def _kinds(self, of: np.ndarray, ends: Ends, most: int) -> np.ndarray:
+        """The numbers of runs that are followed on for all of their kind; of stages with more kinds than may be it is
+        unknown what the others come to."""
+        kept, left = _kinds(of, ends, most)
+        self.unknown[of[left]] = True
+        return kept
+
     def _alike(self, of: np.ndarray, ends: Ends) -> np.ndarray:
         """Which runs repeat themselves like a motion that is known already to attract their stage."""
         if not self.thorough:
@@ -193,7 +203,7 @@ class Survey:
     def _close(self, runs: Pending, of: np.ndarray, ends: Ends, which: np.ndarray) -> None:
         """Close orbits from one of each kind of runs, of those with some numbers."""
         most, repeats = CLOSED if self.thorough else 1, ends.repeats
-        kinds = which[_kinds(of[which], ends.take(which), most)]
+        kinds = which[_kinds(of[which], ends.take(which), most)[0]]
         for swings, times in ((repeats.swings, repeats.time), (repeats.better, repeats.better_time)):
             if not kinds.size:
                 break
@@ -209,7 +219,7 @@ class Survey:
     def _last(self, runs: Pending, of: np.ndarray, ends: Ends, before: np.ndarray) -> None:
         """Take runs that swing to the end for attracted, if they have not decayed; those that may be about to leave a
         cycle that repels are followed for as long as that takes."""
-        kinds = _kinds(of, ends, CLOSED)
+        kinds = self._kinds(of, ends, CLOSED)
         leave = LEAVES * self.slowest[of]
         slow = kinds[leave[kinds] > runs.durations[kinds]]
         if slow.size:
@@ -257,15 +267,21 @@ class Survey:
             self.add([motion])
 
 
-def _kinds(of: np.ndarray, ends: Ends, most: int) -> np.ndarray:
-    """The numbers of runs that stand for all: no two of a stage that are alike, and not more than `most` of each."""
+def _kinds(of: np.ndarray, ends: Ends, most: int) -> tuple[np.ndarray, np.ndarray]:
+    """The numbers of runs that stand for all, no two of a stage that are alike and not more than `most` of each, and of
+    those that are like none of these. Runs that do not repeat themselves are on their way, and soon apart."""
     kept: dict[int, list[int]] = {}
+    left: list[int] = []
+    repeats = ends.repeats.swings > 0
     sizes, times = ends.repeats.size, np.nan_to_num(ends.repeats.time)
+    near = np.where(repeats, ALIKE, CLOSE)
+
+    def alike(k: int, j: int) -> bool:
+        same = abs(sizes[k] - sizes[j]) <= near[k] * sizes[j] and abs(times[k] - times[j]) <= ALIKE * times[j]
+        return bool(same and repeats[k] == repeats[j])
+
     for k in np.argsort(ends.repeats.swings, kind="stable").tolist():
         own = kept.setdefault(int(of[k]), [])
-        alike = (
-            abs(sizes[k] - sizes[j]) <= ALIKE * sizes[j] and abs(times[k] - times[j]) <= ALIKE * times[j] for j in own
-        )
-        if len(own) < most and not any(alike):
-            own.append(k)
-    return np.array([k for own in kept.values() for k in own], dtype=np.int64)
+        if not any(alike(k, j) for j in own):
+            (own if len(own) < most else left).append(k)
+    return tuple(np.array(some, dtype=np.int64) for some in ([k for own in kept.values() for k in own], left))

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 from friso.hunting.basin import SHARES
 from friso.hunting.margin import FARTHEST
-from friso.hunting.verdict import LONG
 from friso.views.check.cases import BANDS, ShownCase, shown_cases
 from friso.views.drawing.prefixes import listed, plus_minus, with_unit
 
@@ -90,7 +89,7 @@ def _transient(case: Case) -> str:
     if known.cycle:
         says.append(f"Transients change slowly, by a factor of e in {with_unit(known.cycle.time_constant, 's')}.")
     if known.settled_after is None:
-        says.append(f"It does not settle to within {BANDS[_TEN_MICRON]} in {with_unit(LONG, 's')} either.")
+        says.append(f"It does not settle to within {BANDS[_TEN_MICRON]} in {with_unit(known.followed, 's')} either.")
     else:
         says.append(f"It settles to within {BANDS[_TEN_MICRON]} in {with_unit(known.settled_after, 's')}.")
     return " ".join(says)
