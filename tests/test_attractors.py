@@ -161,6 +161,28 @@ def test_runs_that_are_given_up_leave_it_unknown(monkeypatch: pytest.MonkeyPatch
     assert not attractors(above).known.any()
 
 
+def test_a_swing_of_ten_minutes_is_seen() -> None:
+    """With static friction 0.5 % above Coulomb friction of 401 N the stage waits for five minutes at 2 mm, and swings
+    on for ever: a release is followed for many such waits, and the verdict is not certain."""
+    r = 403 / 3
+    gap = VARIANTS["rigid"].replace(
+        {
+            "friction.static": "403 N",
+            "friction.coulomb": "401 N",
+            "friction.bristle_stiffness": f"{1e5 * r} N/m",
+            "friction.bristle_damping": f"{316.23 * r**0.5} N*s/m",
+            "controller.crossover": "4 Hz",
+            "motion": {"kind": "release", "displacement": "2.1 mm", "duration": "60 s"},
+        }
+    )
+    judgement = friso.check(gap)["given"].judgement
+    assert judgement.followed is not None
+    assert judgement.followed > 50 * 572
+    assert judgement.verdict == "hunts"
+    assert judgement.observed
+    assert not judgement.hunting.certain
+
+
 def test_swings_that_repeat_themselves() -> None:
     """A symmetric swing repeats after one turn, mirrored; a leaning one after two; a long-short one after four."""
     rows = [[1.0, -1.0] * 16, [1.2, -0.9] * 16, [1.0, -0.5, 0.6, -0.4] * 8]

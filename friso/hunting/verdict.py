@@ -17,17 +17,19 @@ from friso.engine.kernel import kernel
 from friso.equations.motion import last_corner
 from friso.equations.structure import shared_structure
 from friso.hunting.attractors import Attractors, Target, attractors
-from friso.hunting.attractors.rounds import typical_period
+from friso.hunting.attractors.rounds import loose_from
 from friso.hunting.basin import Kick, MoveShare, displacements, ends_in, moves, pushes
 from friso.hunting.criteria import COUNTED_ABOVE, Verdict, lasts, verdicts
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.hunting import Cycle, Hunting, Swing, cannot_hunt, hunting, why_not
+from friso.hunting.cycle.rest import wait
 from friso.hunting.margin import Margin, margin
 from friso.hunting.measures import Measures, measure, options
 from friso.stage import Stage
 
-LONG, PERIODS = 1000.0, 300.0
-"""Time [s] for which a motion that has not settled at its end is followed at least, and in typical periods."""
+LONG, SWINGS = 1000.0, 120.0
+"""Time [s] for which a motion that has not settled at its end is followed at least, and how many of the longest waits:
+those at the least distance from which the stage breaks away."""
 
 MOVING = "the reference never stands still"
 """Why a stage whose reference is a ramp does not hunt: it may stick and slip, but not about a place."""
@@ -43,7 +45,8 @@ class Judgement:
     `displacement`, `push` and `moves` tell what starts hunting, where there is a cycle that attracts; `margin` the edge
     of hunting nearest in bandwidth; `settled_after` the time [s] after the last corner of the reference from which on
     this motion stays within 10 um, up to the time for which it was `followed` [s] (None: no longer than its own end).
-    `observed`: what attracts was observed in long simulations, no orbit that attracts could be closed.
+    `observed`: what attracts was observed in long simulations, no orbit that attracts could be closed. `lasting` [m],
+    peak to peak, is where this motion alone was seen to swing on, at the end of the time for which it was followed.
     """
 
     verdict: Verdict
@@ -55,6 +58,7 @@ class Judgement:
     settled_after: float | None = None
     followed: float | None = None
     observed: bool = False
+    lasting: float | None = None
 
     @property
     def swing(self) -> Cycle | Swing | None:
@@ -103,8 +107,15 @@ def judge(stage: Stage, ran: Measures, rtol: float) -> Judgement:
     after = float(rest.after[0]) if np.isfinite(rest.after[0]) else None
     edge = margin(stage, attracting=False) if known.possible and not observed else None
     word = verdicts(motions.completed, rest.steady, rest.steady, rest.rests)[0]
-    followed = float(rest.followed[0]) if np.isfinite(rest.followed[0]) else None
-    return Judgement(word, known, margin=edge, settled_after=after, followed=followed, observed=observed)
+    return Judgement(
+        word,
+        known,
+        margin=edge,
+        settled_after=after,
+        followed=float(rest.followed[0]) if np.isfinite(rest.followed[0]) else None,
+        observed=observed,
+        lasting=float(rest.swing[0]) if observed else None,
+    )
 
 
 def _with_a_target(stage: Stage, motions: Motions, known: Hunting, target: Target) -> Judgement:
@@ -184,32 +195,35 @@ def _end_in_a_cycle(
 class _Rest:
     """Of motions of stages without an attracting cycle, arrays of shape (count,): whether they have come to rest at
     their end; the time [s] after which they have, if they are followed for long (NaN: not then either, or unknown);
-    whether they swing on `steady`, neither settling nor decaying; and for how long they were `followed` [s] (NaN: no
-    longer than their end)."""
+    whether they swing on `steady`, neither settling nor decaying; for how long they were `followed` [s] (NaN: no longer
+    than their end); and peak to peak of the last quarter of that, `swing` [m]."""
 
     rests: np.ndarray
     after: np.ndarray
     steady: np.ndarray
     followed: np.ndarray
+    swing: np.ndarray
 
 
 def _rest(flat: Mapping[str, Any], motions: Motions, count: int, how: RunOptions, possible: bool) -> _Rest:
     """Where hunting is not `possible`, a stage may rest off its reference; else a motion that has not come to rest at
     its end is followed."""
     after, steady, followed = motions.settling.copy(), np.zeros(count, bool), np.full(count, np.nan)
+    swing = motions.swing.copy()
     rests = np.isfinite(motions.settling)
     if not possible:
         still = (motions.swing <= COUNTED_ABOVE) & (motions.peaks == 0)
-        return _Rest(rests | still, after, steady, followed)
+        return _Rest(rests | still, after, steady, followed, swing)
     if (on := np.flatnonzero(~rests)).size:
         own = _part(flat, on)
-        periods = PERIODS * typical_period(Ensemble.held(own, on.size, form=shared_structure(flat)))
-        followed[on] = np.maximum(np.maximum(LONG, own["motion.duration"]), periods)
+        stages = Ensemble.held(own, on.size, form=shared_structure(flat))
+        waits = SWINGS * wait(stages, loose_from(stages))
+        followed[on] = np.maximum(np.maximum(LONG, own["motion.duration"]), waits)
         long = {**own, "motion.duration": followed[on] + last_corner(own)}
         last, half = (_motions(long, on.size, replace(how, window=window)) for window in (0.75, 0.5))
-        after[on] = last.settling
+        after[on], swing[on] = last.settling, last.swing
         steady[on] = lasts(last.swing, half.swing, COUNTED_ABOVE / 2, 1 / (1 + STEADY))
-    return _Rest(rests, after, steady, followed)
+    return _Rest(rests, after, steady, followed, swing)
 
 
 def _motions(flat: Mapping[str, Any], count: int, how: RunOptions) -> Motions:

@@ -66,7 +66,8 @@ def _hunting(case: Case) -> str:
     seen = "This was observed in long simulations: no orbit that attracts could be closed."
     if case.judgement.swing:
         return f"hunts, {_swing(case)}. {seen}"
-    return f"hunts, {at_the_end(case)} peak to peak{_every(case)}. {seen}"
+    known = case.judgement
+    return f"hunts, still {with_unit(known.lasting, 'm')} peak to peak after {with_unit(known.followed, 's')}. {seen}"
 
 
 def _bistable(case: Case) -> str:
