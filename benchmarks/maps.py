@@ -22,8 +22,8 @@ from benchmarks.peers import peers, piecewise
 from benchmarks.report import Goal, clock, print_goals, print_table, spread
 from benchmarks.rigs import rig_of
 from friso.stage import Stage
-from friso.studies.distribute import local_cluster
 from friso.studies.execute import Crew, local_crew
+from friso.studies.processes import processes
 from friso.studies.request import Request
 from friso.studies.samples import Samples
 from friso.studies.study import Study
@@ -130,7 +130,7 @@ def run_overhead(blocks: int) -> list[Goal]:
     axes = {"friction.coulomb": f"3.5 N..4 N:{blocks}", "controller.crossover": "1 Hz..16 Hz:1024"}
     study = Request(thesis_rig(), axes).study()
     with tempfile.TemporaryDirectory(prefix="friso-bench-") as folder:
-        for name, crew_of in (("threads of this process", local_crew), ("Dask, 2 processes", lambda: local_cluster(2))):
+        for name, crew_of in (("threads of this process", local_crew), ("2 processes", lambda: processes(2))):
             with crew_of() as crew:
                 run_in_memory([study.at(np.arange(4096))], crew)
                 memory = clock(lambda: run_in_memory([study], crew))

@@ -64,11 +64,14 @@ def map_cells(
     refine: Annotated[
         bool, typer.Option("--refine", help="A grid 4 times finer, run only along its boundaries.")
     ] = False,
-    workers: Annotated[
-        int | None, typer.Option(metavar="N", help="Run in N processes of a local Dask cluster.")
-    ] = None,
+    workers: Annotated[int | None, typer.Option(metavar="N", help="Run in N processes of this machine.")] = None,
     scheduler: Annotated[
-        str | None, typer.Option(metavar="ADDRESS", help="Run on the workers of a Dask scheduler.")
+        str | None,
+        typer.Option(
+            metavar="ADDRESS",
+            help="Run on the workers of a Dask scheduler. Whoever reaches the address can run code there and here, but "
+            "for tls://, with the certificates of Dask's configuration.",
+        ),
     ] = None,
     export: Annotated[list[Path] | None, typer.Option(metavar="FILE", help="Also write a .nc or .csv file.")] = None,
     out: Annotated[
@@ -156,9 +159,9 @@ def _crew(workers: int | None, scheduler: str | None) -> Iterator[Crew]:
         with connected(scheduler) as crew:
             yield crew
     elif workers is not None:
-        from friso.studies.distribute import local_cluster
+        from friso.studies.processes import processes
 
-        with local_cluster(workers) as crew:
+        with processes(workers) as crew:
             yield crew
     else:
         from friso.studies.execute import local_crew

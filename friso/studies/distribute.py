@@ -17,28 +17,19 @@ from friso.studies.cells import Columns, run_cells
 from friso.studies.execute import Crew
 from friso.studies.study import equations_version
 
+logger = logging.getLogger("friso")
+
 PATIENCE = 10.0
 """How long a scheduler may take to answer [s]."""
 
 
 @contextmanager
-def local_cluster(workers: int) -> Iterator[Crew]:
-    """A crew of worker processes on this machine, one thread each."""
-    from distributed import LocalCluster
-
-    cluster: Any = LocalCluster(
-        n_workers=workers, threads_per_worker=1, dashboard_address=":0", silence_logs=logging.CRITICAL
-    )
-    with cluster, connected(cluster.scheduler_address) as crew:
-        yield crew
-
-
-@contextmanager
 def connected(scheduler: str) -> Iterator[Crew]:
-    """A crew made of the workers of the scheduler at an address such as "tcp://10.0.0.1:8786".
+    """A crew made of the workers of the scheduler at an address such as "tls://10.0.0.1:8786".
 
-    Every thread of a worker computes one block at a time, in that thread alone. Raises InputError if the scheduler
-    does not answer, has no workers, or one with another version of friso.
+    Every thread of a worker computes one block at a time, in that thread alone. Certificates are those of Dask's
+    configuration (distributed.comm.tls). Without TLS, whoever reaches the address can run code: that is logged. Raises
+    InputError if the scheduler does not answer, has no workers, or one with another version of friso.
     """
     from distributed import Client, KilledWorker
     from distributed.comm.core import CommClosedError
@@ -46,9 +37,11 @@ def connected(scheduler: str) -> Iterator[Crew]:
     try:
         asyncio.run(_answers(scheduler))
         client: Any = Client(scheduler, timeout=PATIENCE, set_as_default=False)
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, TypeError) as error:  # TypeError: TLS without a certificate
         expected = f"the address of a Dask scheduler that answers ({error})"
-        raise InputError("--scheduler", scheduler, expected, "--scheduler tcp://10.0.0.1:8786") from None
+        raise InputError("--scheduler", scheduler, expected, "--scheduler tls://10.0.0.1:8786") from None
+    if not scheduler.startswith("tls://"):
+        logger.warning("whoever reaches %s can run code on its workers and here; tls:// keeps others out", scheduler)
     with client:
         _refuse_strangers(client)
         threads = sum(client.nthreads().values())
@@ -60,8 +53,9 @@ def connected(scheduler: str) -> Iterator[Crew]:
 async def _answers(scheduler: str) -> None:
     """Raises OSError or ValueError if there is nothing at the address: a client that fails lingers for long."""
     from distributed.comm.core import connect
+    from distributed.security import Security
 
-    comm = await connect(scheduler, timeout=PATIENCE)
+    comm = await connect(scheduler, timeout=PATIENCE, **Security().get_connection_args("client"))
     await comm.close()
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any, Self
 
@@ -71,16 +72,20 @@ class Crew:
 
     def _result(self, future: Future[Columns]) -> Columns:
         """Raises RuntimeError if the executor failed, and whatever the task raised."""
-        try:
+        with self._blamed():
             return future.result()
+
+    @contextmanager
+    def _blamed(self) -> Iterator[None]:
+        try:
+            yield
         except self.failures as error:
-            raise RuntimeError(f"the cluster lost a block: {error or type(error).__name__}") from error
+            raise RuntimeError(f"the workers lost a block: {error or type(error).__name__}") from error
 
     def _submit(self, study: Study, block: Block) -> Future[Columns]:
-        columns = study.block_columns(block)
-        return self.executor.submit(
-            self.task, study.stage, study.links, columns, study.rtol, study.metrics, **self.arguments
-        )
+        arguments = (study.stage, study.links, study.block_columns(block), study.rtol, study.metrics)
+        with self._blamed():
+            return self.executor.submit(self.task, *arguments, **self.arguments)
 
 
 def local_crew(threads: int | None = None) -> Crew:

@@ -1,0 +1,54 @@
+"""Studies in processes of their own on this machine, which are reached over private pipes: no port is opened."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from multiprocessing import get_context, parent_process
+from multiprocessing.connection import wait
+from typing import Any
+
+import numpy as np
+
+from friso.studies.cells import Columns, run_cells
+from friso.studies.execute import Crew
+
+_cancel = np.zeros(1, np.int64)
+"""The flag that has this process end its block early; in a worker, memory that is shared with who started it."""
+
+
+@contextmanager
+def processes(workers: int) -> Iterator[Crew]:
+    """A crew of so many processes on this machine, each of which computes one block at a time, in one thread. They end
+    with this process, however it ends."""
+    context = get_context("spawn")
+    shared: Any = context.RawArray("q", 1)
+    pool = ProcessPoolExecutor(workers, context, _prepare, (shared,))
+    cancel = np.frombuffer(shared, np.int64)
+    with Crew(pool, workers, 4 * workers, run_block, cancel=cancel, failures=(BrokenProcessPool,)) as crew:
+        yield crew
+
+
+def run_block(*arguments: Any) -> Columns:
+    """`run_cells` in a worker, which ends early once the crew is told to."""
+    return run_cells(*arguments, cancel=_cancel)
+
+
+def _prepare(shared: Any) -> None:
+    """Make a process a worker: Ctrl-C is for the process that started it, with which it ends."""
+    global _cancel
+    _cancel = np.frombuffer(shared, np.int64)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+
+
+def _end_with_parent() -> None:
+    parent = parent_process()
+    assert parent is not None
+    wait([parent.sentinel])
+    os._exit(1)

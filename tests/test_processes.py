@@ -1,0 +1,90 @@
+"""Studies in processes of this machine: the same bits, no port that others reach, processes that die."""
+
+import os
+import signal
+import subprocess
+import sys
+import textwrap
+import threading
+from pathlib import Path
+
+import psutil
+import pytest
+import xarray as xr
+
+import friso
+from friso.stage import Stage
+from friso.studies.processes import processes
+from friso.studies.request import Request
+from friso.studies.store import Store
+from friso.studies.study import cells_of
+from friso.studies.sweep import run_in_memory, run_in_store
+
+AXES = {"controller.crossover": "2 Hz..16 Hz:12", "joint.stroke": "0.1 mm..1 mm:16"}
+
+pytestmark = pytest.mark.xdist_group("rig")
+
+
+def test_processes_of_its_own_verify_too_and_open_no_port(rig: Stage) -> None:
+    seen: list[psutil.Process] = []
+
+    def look(done: int, total: int, what: str) -> None:
+        seen[:] = psutil.Process().children(recursive=True)
+        own = [*psutil.Process().net_connections("inet"), *(c for p in seen for c in p.net_connections("inet"))]
+        assert not [connection for connection in own if connection.status == psutil.CONN_LISTEN]
+
+    with processes(2) as crew:
+        (found,) = run_in_memory([Request(rig, AXES).study()], crew, 0.05, look)
+    xr.testing.assert_identical(found, friso.sweep(rig, AXES, verify=0.05))
+    assert seen
+    assert not [process for process in seen if process.is_running() and "spawn_main" in str(process.cmdline())]
+
+
+def test_a_process_that_is_killed_costs_nothing_that_is_done(rig: Stage, tmp_path: Path) -> None:
+    study, path, done_by_then = Request(rig, AXES).study(rtol=1e-9), tmp_path / "a.zarr", []
+
+    def kill(done: int, total: int, what: str) -> None:
+        done_by_then.append(done)
+        if len(done_by_then) == 3:
+            next(iter(crew.executor._processes.values())).kill()  # pyright: ignore[reportAttributeAccessIssue]
+
+    with pytest.raises(RuntimeError, match="lost a block"), processes(2) as crew:
+        run_in_store(study, path, crew, 0.0, kill)
+    with Store.opened(path, study) as store:
+        left = sum(map(cells_of, store.missing()))
+        assert 0 < left <= study.cells - done_by_then[2]
+
+
+PARENT = """
+import time
+from friso.studies.processes import processes
+
+with processes(1) as crew:
+    crew.executor.submit(time.sleep, 0).result()
+    print(*crew.executor._processes, flush=True)
+    time.sleep(60)
+"""
+
+
+def test_workers_end_with_who_started_them(tmp_path: Path) -> None:
+    """However it ends: a killed process cannot stop them."""
+    (tmp_path / "parent.py").write_text(f"if __name__ == '__main__':\n{textwrap.indent(PARENT, '    ')}")
+    with subprocess.Popen([sys.executable, tmp_path / "parent.py"], stdout=subprocess.PIPE) as parent:
+        assert parent.stdout is not None
+        worker = psutil.Process(int(parent.stdout.readline()))
+        parent.kill()
+    worker.wait(30)
+
+
+def test_ctrl_c_ends_the_blocks_in_flight(rig: Stage) -> None:
+    """In the worker too, which would be at it for minutes."""
+    axes = {"controller.crossover": "2 Hz..16 Hz:200", "joint.stroke": "0.1 mm..1 mm:200"}
+    with processes(1) as crew:
+        study = Request(rig, axes).study(rtol=1e-12)
+        jobs = crew.compute([(study, tuple(slice(0, size) for size in study.shape))])
+        timer = threading.Timer(3.0, lambda: os.kill(os.getpid(), signal.SIGINT))
+        timer.start()
+        with pytest.raises(KeyboardInterrupt):
+            next(jobs)
+        jobs.close()
+        assert crew.executor.submit(os.getpid).result(60)
