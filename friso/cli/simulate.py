@@ -68,9 +68,11 @@ def simulate(
 
 def _stage(arguments: list[str], overrides: list[str] | None) -> tuple[Stage, str, float]:
     """The stage of the one file given, a name for it, and the usual tolerance. Raises InputError."""
+    from friso.engine.simulate import RTOL
+
     if len(arguments) != 1:
         raise InputError("STAGE.toml", " ".join(arguments), "one stage file", "friso simulate rig.toml")
-    return read_stage(Path(arguments[0]), overrides), Path(arguments[0]).stem, 1e-6
+    return read_stage(Path(arguments[0]), overrides), Path(arguments[0]).stem, RTOL
 
 
 def _cell(store: Path, arguments: list[str], overrides: list[str] | None) -> tuple[Stage, str, float]:

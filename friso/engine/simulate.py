@@ -22,11 +22,14 @@ if TYPE_CHECKING:
 SAMPLES = 20_000
 """Sampling intervals in a run, where none is asked for."""
 
+RTOL = 1e-9
+"""Usual tolerance: a force limit that winds up, and contacts, multiply errors by up to 1e7, and one run is quick."""
+
 MOST_SAMPLES = 20_000_000
 """Sampling intervals a run may have: states and outputs then take a few gigabytes."""
 
 
-def simulate(stage: Stage, rtol: float = 1e-6, sample_time: float | None = None) -> xr.Dataset:
+def simulate(stage: Stage, rtol: float = RTOL, sample_time: float | None = None) -> xr.Dataset:
     """Time response of a stage to its motion.
 
     Variables over `time` [s], each with `units` and `long_name`: reference, position, velocity, error, force and

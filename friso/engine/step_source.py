@@ -37,6 +37,10 @@ AFTER_KINK = 0.25
 """Share of the proposed step that is tried after a kink, behind which the motion may be much quicker."""
 
 
+WIDE, LATE = 3.0, 0.9
+"""A step that begins so many times farther from a kink than a peak about it is narrow, and crosses it before this share
+of the step, is taken again as far as the kink: within it every stage may lie beyond the peak."""
+
 ROUNDING = 2e-15
 """The hysteresis is no less than this share of the terms of a surface, nine units in their last place."""
 
@@ -97,6 +101,7 @@ class StepWriter:
         drifts = {f"drift{i}_": e for i, e in self._drift.items()}
         sizes = {f"size{k}_": self._size(kink.surface) for k, kink in enumerate(model.kinks)}
         sizes |= {f"terms{k}_": self._rounding(kink.surface) for k, kink in enumerate(model.kinks)}
+        sizes |= {f"narrow{k}_": kink.narrow for k, kink in enumerate(model.kinks) if kink.narrow != 0}
         watched: dict[str, Any] = surfaces if model.clock else surfaces | {"force": force}
         start = rates | entries | drifts | surfaces | {"force": force} | sizes
         self._start = Block(start if model.clock else start | follow, self.constants)
@@ -378,7 +383,8 @@ class StepWriter:
         n = self.size
         lines = [
             "precise = square <= 1.0",
-            "good = precise & (not astray)",
+            *self._passed_over(),
+            "good = precise & (not (astray | passed_over))",
             "cut = fraction < 1.0",
         ]
         for i in range(n):
@@ -404,9 +410,19 @@ class StepWriter:
             "factor = min(factor, 1.0) if rejected_last > 0.0 else factor",
             "proposed = h * factor",
             "proposed = min(proposed, 0.5 * h) if astray else proposed",
+            "proposed = min(proposed, fraction * h) if passed_over else proposed",
             f"proposed = {AFTER_KINK!r} * proposed if good & cut else proposed",
             "trial = max(proposed, trial) if good & (factor >= 1.0) else proposed",
         ]
+
+    def _passed_over(self) -> list[str]:
+        """Whether the step may have `passed_over` a narrow peak about a kink that it crosses."""
+        lines = ["passed_over = False"]
+        for k, kink in enumerate(self.model.kinks):
+            if kink.narrow != 0:
+                far = f"(guess{k} <= earliest) & (near{k} > {WIDE!r} * narrow{k}__s)"
+                lines.append(f"passed_over = passed_over | ({far} & (fraction < {LATE!r}))")
+        return lines
 
     def _jump(self) -> list[str]:
         """Let the states jump that do so at the kinks just crossed."""

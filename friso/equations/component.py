@@ -103,11 +103,13 @@ class Kink:
     """A surface in state space on which a derivative of the right-hand side jumps.
 
     `beyond` is the symbol that is 1 where `surface` > 0 and 0 where it is < 0; the right-hand side contains
-    it instead of an absolute value or a condition, and so is smooth while it is held.
+    it instead of an absolute value or a condition, and so is smooth while it is held. Within about `narrow` of the
+    surface, in its own unit, the right-hand side may have a peak that a long step across the surface would pass over.
     """
 
     name: str
     surface: sp.Expr
+    narrow: sp.Expr = field(default=sp.S.Zero, kw_only=True, compare=False)
 
     @property
     def beyond(self) -> sp.Symbol:
@@ -125,7 +127,8 @@ class Kink:
 
     def with_values(self, values: Mapping[Any, Any]) -> Kink:
         """The same with expressions put in the place of others."""
-        return Kink(self.name, cast(sp.Expr, self.surface.xreplace(values)))
+        surface, narrow = (cast(sp.Expr, expression.xreplace(values)) for expression in (self.surface, self.narrow))
+        return Kink(self.name, surface, narrow=narrow)
 
 
 @dataclass(frozen=True)

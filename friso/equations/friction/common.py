@@ -39,12 +39,12 @@ class Friction:
         self.force, self.breakaway, self.component, self.sliding = force, breakaway, component, sliding
 
 
-def direction(velocity: sp.Symbol) -> Kink:
+def direction(velocity: sp.Symbol, narrow: sp.Expr | None = None) -> Kink:
     """The kink of every law that depends on the direction of the motion, beyond which the velocity [m/s] is positive:
-    others know it, and set it."""
+    others know it, and set it. About it friction may have a peak that is `narrow` [m/s]."""
     from friso.equations.component import Kink
 
-    return Kink("forward", velocity)
+    return Kink("forward", velocity) if narrow is None else Kink("forward", velocity, narrow=narrow)
 
 
 class StribeckCurve(NamedTuple):

@@ -32,7 +32,7 @@ class LuGre(StribeckSection):
         """Friction on a body moving at `velocity` [m/s]."""
         from friso.equations.component import Component, Output, Role, State, key, state
 
-        forward = direction(velocity)
+        forward = direction(velocity, key("friction.stribeck_velocity"))
         deflection, stiffness = state("bristle_deflection"), key("friction.bristle_stiffness")
         level = stribeck_level(velocity, forward.sign, variant)
         rate = velocity - stiffness * forward.sign * velocity / level * deflection

@@ -34,7 +34,7 @@ class Stribeck(StribeckSection):
 
         from friso.equations.component import Component, key
 
-        forward = direction(velocity)
+        forward = direction(velocity, key("friction.stribeck_velocity"))
         level = stribeck_level(velocity, forward.sign, variant)
         force = level * tanh(velocity / key("friction.regularisation_velocity"))
         even = variant.exponent is None or variant.exponent % 2 == 0
