@@ -34,6 +34,7 @@ MISTAKES = {
     "compare": (DRIVE, "--machines", "19"),
     "reproduce": ("masses", "--out", "out"),
     "guideline": ("--samples", "63"),
+    "doctor": ("--full-path",),
 }
 
 RUNS = {

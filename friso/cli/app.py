@@ -18,6 +18,7 @@ from friso.cli.check import check
 from friso.cli.common import INTERRUPTED, say
 from friso.cli.compare import compare
 from friso.cli.design import design
+from friso.cli.doctor import doctor
 from friso.cli.flexure import flexure
 from friso.cli.guideline import guideline
 from friso.cli.identify import identify, listed_kinds
@@ -58,6 +59,7 @@ for name, command in (
     ("compare", compare),
     ("reproduce", reproduce),
     ("guideline", guideline),
+    ("doctor", doctor),
 ):
     app.command(name, cls=LISTS.get(name))(command)
 

@@ -1,0 +1,159 @@
+"""Whether friso works on this machine, and what it runs on: for a bug report, without names of users or folders."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import platform
+import re
+import struct
+import tempfile
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, requires, version
+from importlib.resources import files
+from pathlib import Path
+
+from friso.stage import Stage
+from friso.stage.files import loads
+from friso.system import usable_cores
+from friso.version import VERSION
+
+RUNS = 64
+"""Runs of the stage that are timed, on one core."""
+
+SWING = 1.03e-3
+"""Peak to peak [m] of the hunting of the template's stage with its joint locked (docs/hunting.md)."""
+
+WITHIN = 0.02
+"""Share by which the swing may differ."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What was looked at, what was found, and whether it works; a `remedy` where it does not."""
+
+    subject: str
+    text: str
+    works: bool = True
+    remedy: str = ""
+
+
+def findings(full_paths: bool = False) -> Iterator[Finding]:
+    """All that is looked at, one by one; folders below the user's own begin with ~ unless `full_paths`."""
+    yield Finding("friso", VERSION)
+    yield Finding("Python", f"{platform.python_implementation()} {platform.python_version()}, {_bits()} bit")
+    yield Finding("system", f"{platform.system()} {platform.release()}, {platform.machine()}")
+    yield from _packages()
+    steps: tuple[tuple[str, Callable[[], str], str], ...] = (
+        ("processor", _processor, "reinstall llvmlite: pip install --force-reinstall llvmlite"),
+        ("cores", _cores, ""),
+        ("kept code", lambda: _kept_code(full_paths), "name another folder in FRISO_CACHE_DIR"),
+        ("compiling", _compiling, "reinstall llvmlite: pip install --force-reinstall llvmlite"),
+        ("running", _running, "empty the folder of kept code, then try again; if it stays, report it with this text"),
+    )
+    for subject, look, remedy in steps:
+        try:
+            yield Finding(subject, look())
+        except Exception as error:  # whatever is wrong is what was asked for
+            yield Finding(subject, _without_home(f"{type(error).__name__}: {error}", full_paths), False, remedy)
+
+
+def _bits() -> int:
+    return 8 * struct.calcsize("P")
+
+
+def _packages() -> Iterator[Finding]:
+    """The versions of what friso needs, and of what it reads further formats with."""
+    try:
+        needed = requires("friso") or []
+    except PackageNotFoundError:
+        yield Finding("packages", "friso is run from a folder, not installed")
+        return
+    present: list[str] = []
+    for line in needed:
+        name = re.split(r"[^\w.-]", line)[0]
+        extra = re.search(r"extra == ['\"](\w+)['\"]", line)
+        try:
+            installed = f"{name} {version(name)}"
+        except PackageNotFoundError:
+            if extra is None:
+                yield Finding("packages", f"{name} is missing", False, f"pip install {name}")
+            elif extra[1] not in DEVELOPMENT:
+                yield Finding(f"{extra[1]} files", f'not installed; for them: pip install "friso[{extra[1]}]"')
+            continue
+        if extra is None:
+            present.append(installed)
+        elif extra[1] not in DEVELOPMENT:
+            yield Finding(f"{extra[1]} files", f"read by {installed}")
+    yield Finding("packages", ", ".join(present))
+
+
+DEVELOPMENT = ("test", "bench")
+"""Extras that add nothing for a user."""
+
+
+def _processor() -> str:
+    """The processor as the compiler knows it, and how wide its registers are."""
+    import llvmlite.binding as llvm
+
+    features = llvm.get_host_cpu_features()
+    widths = (("avx512f", 512), ("avx2", 256), ("avx", 256), ("sve", 128), ("neon", 128), ("sse2", 128))
+    name, width = next(((n.upper(), w) for n, w in widths if features.get(n)), ("unknown instructions", 64))
+    return f"{llvm.get_host_cpu_name()}, {name}: registers of {width} bits"
+
+
+def _cores() -> str:
+    return f"{usable_cores()} of {os.cpu_count()} may be used"
+
+
+def _kept_code(full_paths: bool) -> str:
+    """The folder of compiled code: how much is in it."""
+    from friso.engine.cache import ENTRY, cache_folder
+
+    folder = cache_folder()
+    sizes = [file.stat().st_size for file in folder.glob(f"*{ENTRY}")]
+    place = _without_home(str(folder), full_paths)
+    return f"{len(sizes)} kernels, {sum(sizes) / 1e6:.1f} MB, in {place}, closed to other users"
+
+
+def _compiling() -> str:
+    """Compile the kernel of the template's stage into a folder that is deleted."""
+    from friso.engine.build import build
+    from friso.engine.kernel import Wanted
+    from friso.equations.structure import structure
+
+    wanted = Wanted(structure(_stage().flat()))
+    with tempfile.TemporaryDirectory(prefix="friso-doctor-") as folder:
+        begin = time.perf_counter()
+        build(Path(folder), pickle.dumps(((), pickle.dumps(wanted))))
+        return f"a kernel in {time.perf_counter() - begin:.1f} s ({wanted.title})"
+
+
+def _running() -> str:
+    """Run the stage of the template, which hunts with its joint locked. Raises RuntimeError for another result."""
+    from friso.engine.batch import run_chunks
+    from friso.engine.kernel import kernel
+    from friso.equations.structure import structure
+    from friso.hunting.measures import measure, options
+
+    flat = _stage().flat()
+    settings = options(1e-6, threads=1)
+    shape = kernel(structure(flat))
+    begin = time.perf_counter()
+    (runs,) = run_chunks(shape, flat, RUNS, settings)
+    seconds, steps = time.perf_counter() - begin, runs.statistic("attempted").sum()
+    swings = measure(flat, runs).peak_to_peak
+    if not abs(swings / SWING - 1).max() < WITHIN:
+        raise RuntimeError(f"the template's stage swings by {swings.min():g} to {swings.max():g} m, not by {SWING:g} m")
+    return f"{steps / seconds / 1e6:.1f} million steps of the solver per second on one core; the result is right"
+
+
+def _stage() -> Stage:
+    template = files("friso").joinpath("templates/stage.toml").read_text(encoding="utf-8")
+    return loads(template, "the template").replace({"joint.locked": True})
+
+
+def _without_home(text: str, full_paths: bool) -> str:
+    return text if full_paths else text.replace(str(Path.home()), "~")

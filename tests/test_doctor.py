@@ -1,0 +1,44 @@
+"""`friso doctor`: whether friso works on this machine, in a text without names of folders."""
+
+import json
+from pathlib import Path
+
+import pytest
+from inside import friso_inside
+
+from friso.studies import doctor
+
+
+def test_this_machine_works(tmp_path: Path) -> None:
+    done = friso_inside(tmp_path, "doctor", "--json")
+    assert done.returncode == 0
+    document = json.loads(done.stdout)
+    assert document["works"]
+    assert {"friso", "Python", "processor", "kept code", "compiling", "running"} <= {
+        finding["subject"] for finding in document["findings"]
+    }
+
+
+def test_no_folder_of_the_user_is_named_unless_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    from friso.engine.cache import cache_folder
+
+    monkeypatch.setenv("HOME", str(cache_folder().parent))
+    texts = {full: " ".join(finding.text for finding in doctor.findings(full)) for full in (False, True)}
+    assert str(cache_folder()) in texts[True]
+    assert str(cache_folder().parent) not in texts[False]
+
+
+def test_a_wrong_result_and_what_cannot_be_loaded_are_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def no_compiler() -> str:
+        raise ImportError("libstdc++.so.6: cannot open shared object file")
+
+    monkeypatch.setattr(doctor, "SWING", 2e-3)
+    monkeypatch.setattr(doctor, "_processor", no_compiler)
+    broken = {finding.subject: finding for finding in doctor.findings() if not finding.works}
+    assert set(broken) == {"processor", "running"}
+    assert all(finding.remedy for finding in broken.values())
+    done = friso_inside(tmp_path, "doctor")
+    assert done.returncode == 1
+    assert "libstdc++" in done.stdout
