@@ -179,7 +179,7 @@ def identify_without_controller() -> Values:
     for seed in range(MOVES):
         machine = drawn(seed, False)
         for each in identify_moves(moves(machine), machine.guess.flat(), False).estimates:
-            if each.name.startswith("friction.") and each.shown:
+            if each.name.startswith("friction.") and each.determined:
                 shown += 1
                 held += each.holds(machine.flat[each.name])
     return {"machines": MOVES, "shown": shown, "held": held}

@@ -53,7 +53,7 @@ class Count:
     right: int = 0
 
     def add(self, estimate: Estimate, truth: float) -> None:
-        if not estimate.shown:
+        if not estimate.determined:
             self.unshown += 1
             self.right += estimate.holds(truth)
             return
@@ -85,7 +85,7 @@ def of_jointed(machine: Machine) -> Iterator[Answer]:
     flat = machine.flat
     stiffness = stiffness_from_steps(steps(machine)).stiffness
     yield "steps", stiffness, flat["joint.stiffness"]
-    if stiffness.shown:
+    if stiffness.determined:
         slips = static_from_stick_slip(creeping(machine), stiffness, flat["masses.stage"], flat["joint.stroke"])
         yield "stick-slip", slips.static, flat["friction.static"]
 
@@ -110,7 +110,7 @@ def run(first: int, machines: int, fitted: int) -> dict[tuple[str, str], Count]:
                 for method, estimate, truth in task:
                     counts[method, estimate.name].add(estimate, truth)
                     if not estimate.holds(truth):
-                        remark = "" if estimate.shown else " (not shown)"
+                        remark = "" if estimate.determined else " (not shown)"
                         span = f"{estimate.low:.4g} to {estimate.high:.4g}{remark}"
                         print(f"  machine {seed}, {method}: {estimate.name} {span}, true {truth:.4g}")
             except InputError as error:

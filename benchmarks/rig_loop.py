@@ -128,7 +128,7 @@ def run(first: int, machines: int) -> tuple[dict[tuple[str, str], Count], Verdic
             for method, estimate, truth in answers(identified, logs, machine):
                 counts[method, estimate.name].add(estimate, truth)
                 if not estimate.holds(truth):
-                    remark = "" if estimate.shown else " (not shown)"
+                    remark = "" if estimate.determined else " (not shown)"
                     span = f"{estimate.low:.4g} to {estimate.high:.4g}{remark}"
                     print(f"  machine {seed}, {method}: {estimate.name} {span}, true {truth:.4g}")
             if number == 0:

@@ -165,7 +165,7 @@ def _read(entry: Any, of: Quantity | Number) -> tuple[float, Interval]:
             low = high = centre = _number(entry, of)
             form = "value"
     except InputError as error:
-        raise _Refused(f"of which {error.given if error.given != quoted(entry) else error.expected}") from None
+        raise _Refused(f"of which {error.actual if error.actual != quoted(entry) else error.expected}") from None
     if not low <= high:
         raise _Refused("a reversed range")
     return centre, Interval(low, high, str(getattr(entry, "text", entry)), form)

@@ -13,7 +13,7 @@ import friso
 from friso.cli import main
 from friso.hunting.criteria import ATTRACTED, VERDICTS
 from friso.stage import Stage, save
-from friso.stage.correlations import Correlations, Drawn, draw
+from friso.stage.correlations import Correlations, Sample, draw
 from friso.studies.draws import Draws, Fates, different, fates
 from friso.views.check.document import draws_document
 from friso.views.check.draws import draws_figure, draws_rows, draws_sentences
@@ -31,7 +31,7 @@ def locked(rig: Stage, crossover: str) -> Stage:
     return rig.replace({"joint.locked": True, "joint.stiffness": None, CROSSOVER: crossover})
 
 
-def fate(stage: Stage, count: int, seed: int = 0) -> tuple[Fates, Drawn]:
+def fate(stage: Stage, count: int, seed: int = 0) -> tuple[Fates, Sample]:
     drawn = draw(stage, Correlations(), count, seed)
     return fates(stage, drawn, 1e-6)["given"], drawn
 
@@ -127,7 +127,7 @@ def test_the_decisive_key_comes_first() -> None:
 
 def draws(found: Fates) -> Draws:
     count = len(found.verdicts)
-    drawn = Drawn({"friction.coulomb": np.linspace(0.5, 1.5, count)}, count, 2, {"a rule": 3})
+    drawn = Sample({"friction.coulomb": np.linspace(0.5, 1.5, count)}, count, 2, {"a rule": 3})
     stage = friso.load(Path(__file__).parents[1] / "examples" / "lugre_stick_slip.toml")
     return Draws(stage, drawn, 7, {"given": found})
 

@@ -253,9 +253,9 @@ def test_unknown_material(name: str, near: str) -> None:
     error = refused(LEAVES + f'material = "{name}"')
     assert error.key == "flexure.material"
     assert error.origin == "rig.toml"
-    assert "unknown" in error.given
+    assert "unknown" in error.actual
     if near:
-        assert f"did you mean {near}?" in error.given
+        assert f"did you mean {near}?" in error.actual
     assert all(each in error.expected for each in materials())
 
 
@@ -293,7 +293,7 @@ def _changed(key: str, value: str) -> str:
 def test_refused(table: str, key: str, said: str) -> None:
     error = refused(table)
     assert key in error.key
-    assert said in f"{error.given} {error.expected}"
+    assert said in f"{error.actual} {error.expected}"
     assert error.example
 
 

@@ -327,7 +327,7 @@ def test_claims_hold_differ_or_are_unknown() -> None:
     assert [each.judgement for each in differs] == ["holds", "differs", "holds", "holds", "holds", "holds in part"]
     lost = claims(studied(lambda name, flat: np.nan, UNKNOWN))
     assert {each.judgement for each in lost} == {"unknown"}
-    assert all("unknown" in each.found for each in lost)
+    assert all("unknown" in each.result for each in lost)
 
 
 def test_edges_below_the_grid_are_good_ones() -> None:
@@ -340,7 +340,7 @@ def test_edges_below_the_grid_are_good_ones() -> None:
     assert not lost.does
     share = claims(studied(lambda name, flat: np.nan if name == "share" else as_claimed(name, flat), BELOW))[1]
     assert share.judgement == "holds"
-    assert BELOW in share.found
+    assert BELOW in share.result
 
 
 @pytest.mark.parametrize(("static", "low", "high"), [(2.0, 1.0, 1.0), (1.0, 0.85, np.inf), (20.0, 0.0, 2.0)])

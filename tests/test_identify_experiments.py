@@ -208,7 +208,7 @@ def test_steps_that_do_not_settle_are_left_out(rig: friso.Stage) -> None:
     assert "1 of 5 plateaus" in " ".join(found.warnings)
     assert found.stiffness.value == pytest.approx(2400, rel=0.01)
     few = stiffness_from_steps(record("one", DT, **stairs(rig, 2400.0, (1,))))
-    assert not few.stiffness.shown
+    assert not few.stiffness.determined
     assert "2 are needed" in few.stiffness.reason
 
 
@@ -218,7 +218,7 @@ def test_what_needs_no_more_force_to_move_shows_no_stiffness(rig: friso.Stage) -
     noise = 0.05 * np.random.default_rng(3).standard_normal(len(signals["force"]))
     for share, bounded in ((-1.0, False), (0.0, True)):
         found = stiffness_from_steps(record("free", DT, **{**signals, "force": share * signals["force"] + noise}))
-        assert not found.stiffness.shown
+        assert not found.stiffness.determined
         assert "is the cart fixed?" in found.stiffness.reason
         assert found.stiffness.low == 0
         assert np.isfinite(found.stiffness.high) == bounded
@@ -250,7 +250,7 @@ def test_stick_slip_holds_the_static_friction(rig: friso.Stage) -> None:
             "joint.stiffness", "N/m", stiffness * (1 + 0.02 * rng.standard_normal()), 0.02 * stiffness, ""
         )
         found = static_from_stick_slip(log, known, stage_mass=rig.flat()["masses.stage"])
-        assert found.static.shown, found.static
+        assert found.static.determined, found.static
         held += found.static.holds(static)
         stiff += found.stiffness.holds(stiffness)
         assert found.stiffness.half_width < 0.02 * stiffness
@@ -281,7 +281,7 @@ def test_slow_motion_with_the_joint_locked_shows_no_joint(rig: friso.Stage) -> N
     way = np.floor(time) * 1e-3
     log = record("held", DT, position=way + pull / 2e7, relative_position=pull / 2e7, force=pull)
     found = identify([(log, "stick-slip")], rig)
-    assert "joint.stiffness" not in [each.name for each in found.estimates if each.shown]
+    assert "joint.stiffness" not in [each.name for each in found.estimates if each.determined]
 
 
 def test_peaks_come_before_velocity_spikes_and_the_actuator_says_the_same(rig: friso.Stage) -> None:
@@ -294,7 +294,7 @@ def test_peaks_come_before_velocity_spikes_and_the_actuator_says_the_same(rig: f
         assert np.abs(found.cart_velocity[after]).max() == pytest.approx(found.speeds.max(), rel=0.5)
         assert bent == pytest.approx(np.interp(at, log.time, log["relative_position"]), abs=1e-6)
     assert np.all(found.directions == 1)
-    assert not found.backward.shown
+    assert not found.backward.determined
     actuator = static_from_stick_slip(log, stage_mass=0.5)
     assert actuator.break_away_forward.value == pytest.approx(found.break_away_forward.value, rel=0.02)
 
@@ -315,7 +315,7 @@ def test_an_offset_of_the_sensor_drops_out_of_both_directions(rig: friso.Stage) 
 def test_a_touched_limiter_gives_a_lower_bound_only(rig: friso.Stage) -> None:
     log = pulled(rig, 0.5e-3, np.random.default_rng(6), **{"joint.stroke": "1 mm"})
     for known in (static_from_stick_slip(log, 2400.0), static_from_stick_slip(log, 2400.0, stroke=1e-3)):
-        assert not known.static.shown
+        assert not known.static.determined
         assert "limiter" in known.static.reason
         assert 2.3 < known.static.low < 3.0
 
@@ -329,9 +329,9 @@ def test_one_direction_alone_is_a_bound_where_the_other_shows_less(rig: friso.St
     count = len(free.time)
     halves = replace(record("both", DT, **both), segments=(slice(0, count), slice(count, len(both["position"]))))
     found = static_from_stick_slip(halves, 2400.0)
-    assert found.forward.shown
-    assert not found.backward.shown
-    assert not found.static.shown
+    assert found.forward.determined
+    assert not found.backward.determined
+    assert not found.static.determined
     assert "one direction alone" in found.static.reason
     assert found.static.holds(rig.flat()["friction.static"])
 
@@ -341,7 +341,7 @@ def test_motion_hidden_in_noise_widens_the_interval_downwards() -> None:
     machine = drawn(57, True)
     flat = machine.flat
     found = static_from_stick_slip(creeping(machine), flat["joint.stiffness"], flat["masses.stage"])
-    assert found.static.shown
+    assert found.static.determined
     assert found.static.holds(flat["friction.static"])
 
 
@@ -350,7 +350,7 @@ def test_what_shows_no_slips_says_so(refused: Refused) -> None:
     rng = np.random.default_rng(0)
     log = record("slides", DT, position=0.01 * time, force=1 + 0.01 * rng.standard_normal(len(time)))
     found = static_from_stick_slip(log)
-    assert not found.static.shown
+    assert not found.static.determined
     assert "slides all the time" in found.static.reason
     assert "not all measured" in found.stiffness.reason
     assert found.static.low == 0
@@ -420,7 +420,7 @@ def test_break_aways_of_drawn_machines_hold_the_static_friction() -> None:
     for seed in (38, 42, 43, 45, 51, 55, 56, 57, 64, 67):
         machine = drawn(seed, False)
         found = static_from_ramps(break_aways(machine), machine.flat["masses.cart"])
-        held += found.static.shown and found.static.holds(machine.flat["friction.static"])
+        held += found.static.determined and found.static.holds(machine.flat["friction.static"])
     assert held >= 9
 
 
@@ -433,7 +433,7 @@ def test_ramps_hold_the_static_friction() -> None:
         friction = np.array([static, rng.uniform(0.3, 0.7) * static, speed, 1e5, 316.0, 0.4])
         rates = [float(r * static) for r in (1.0, 1.0, 2.0, 2.0, 4.0, 4.0)]
         found = static_from_ramps(ramps(friction, rates, mass, rng), mass)
-        assert found.static.shown, found.static
+        assert found.static.determined, found.static
         held += found.static.holds(static)
         widths.append(found.static.half_width / static)
     assert held >= 27
@@ -443,7 +443,7 @@ def test_ramps_hold_the_static_friction() -> None:
 def test_rates_that_are_too_high_are_told() -> None:
     for rates in ([10.0, 10.0, 10.0, 20.0, 20.0, 20.0], [35.0] * 4):
         found = static_from_ramps(ramps(LUGRE, rates, 1.0, np.random.default_rng(2)), 1.0)
-        assert not found.static.shown
+        assert not found.static.determined
         assert "too fast" in found.static.reason
         assert found.static.holds(1.5)
 
@@ -465,7 +465,7 @@ def test_break_aways_that_do_not_fall_with_the_rate_are_not_extrapolated() -> No
     rates = np.array([50.0, 50.0, 100.0, 100.0, 200.0, 200.0])
     forces = np.array([1.0, 1.01, 1.02, 1.0, 1.01, 1.0])
     found = static_friction("friction.static", forces, rates)
-    assert not found.shown
+    assert not found.determined
     assert "does not fall" in found.reason
     assert found.low == pytest.approx(1.0, abs=0.02)
 
@@ -500,7 +500,7 @@ def test_friction_velocity_map_without_slow_speeds() -> None:
     assert found.both.coulomb.half_width < 0.1
     assert found.directions["forward"].coulomb.value == pytest.approx(1.3, abs=0.03)
     assert found.directions["backward"].coulomb.value == pytest.approx(0.7, abs=0.03)
-    assert not found.both.static.shown
+    assert not found.both.static.determined
     assert "no steady motion below 20 mm/s" in found.both.static.reason
     assert found.both.static.low == found.both.coulomb.low
     assert found.both.stribeck_velocity.high == pytest.approx(0.02, rel=0.01)
@@ -541,7 +541,7 @@ def test_friction_velocity_map_with_slow_speeds_has_the_stribeck_curve() -> None
 def test_one_speed_leaves_a_range() -> None:
     found = friction_velocity(travels([0.05, 0.05, 0.05], FLAT, np.random.default_rng(3)), 1.0)
     for each, truth in ((found.both.coulomb, 1.0), (found.both.viscous, 0.4)):
-        assert not each.shown
+        assert not each.determined
         assert "cannot be told apart" in each.reason
         assert each.low <= truth <= each.high < np.inf
 
@@ -555,8 +555,8 @@ def test_emps_friction_is_that_published() -> None:
     assert found.both.coulomb.value == pytest.approx(20.3935, rel=0.1)
     assert found.both.viscous.holds(203.5034)
     assert found.bias.holds(-3.1648)
-    assert not found.both.static.shown
-    assert not found.both.stribeck_velocity.shown
+    assert not found.both.static.determined
+    assert not found.both.stribeck_velocity.determined
 
 
 # --- friction against position ----------------------------------------------------------------------------------------
@@ -763,10 +763,10 @@ def test_what_is_no_record_is_refused(refused: Refused) -> None:
 @pytest.mark.parametrize("length", [1, 5, 60, 500])
 def test_short_and_still_records_show_nothing(length: int) -> None:
     log = record("short", DT, position=np.zeros(length), force=np.full(length, 0.1))
-    assert not stiffness_from_steps(log).stiffness.shown
-    assert not static_from_stick_slip(log).static.shown
-    assert not static_from_ramps(log).static.shown
-    assert not friction_velocity(log).both.coulomb.shown
+    assert not stiffness_from_steps(log).stiffness.determined
+    assert not static_from_stick_slip(log).static.determined
+    assert not static_from_ramps(log).static.determined
+    assert not friction_velocity(log).both.coulomb.determined
     assert not friction_position(log).separated
 
 
@@ -776,9 +776,9 @@ def test_a_positive_parameter_that_is_hardly_known_is_not_shown(deviation: float
     found = ResponseFit(np.array([2.0]), np.array([[deviation**2]]), 1.0, 10).estimate(
         "mass", "kg", "fit", lambda p: float(p[0]), positive=True
     )
-    assert found.shown == (deviation < 5)
+    assert found.determined == (deviation < 5)
     assert found.low >= 0
-    if found.shown:
+    if found.determined:
         assert np.log(found.high / 2.0) == pytest.approx(1.96 * deviation / 2.0, rel=1e-3)
     else:
         assert "factor of 1000" in found.reason

@@ -148,31 +148,31 @@ ODD = {
 @pytest.mark.parametrize("case", ODD)
 def test_the_stage_is_always_written(case: str, base: Stage) -> None:
     found = fitting(base, ODD[case])
-    stage = identified(base, found.kept, ["log"])
+    stage = identified(base, found.estimates, ["log"])
     flat = stage.flat()
     assert flat[STATIC] >= flat[COULOMB]
-    assert found.said
+    assert found.notes
     if stage.uncertain():
         assert draw(stage, Correlations(), 16, 1).count == 16
 
 
 def test_ranges_begin_above_zero(base: Stage) -> None:
-    (speed,) = fitting(base, ODD["Stribeck velocity from 0"]).kept
+    (speed,) = fitting(base, ODD["Stribeck velocity from 0"]).estimates
     assert (speed.low, speed.high) == pytest.approx((1.5e-5, 0.015))
 
 
 def test_static_friction_moves_along_with_coulomb(base: Stage) -> None:
     found = fitting(base, ODD["Coulomb above the static friction of the stage"])
     assert dict(found.follows) == {STATIC: COULOMB}
-    assert {each.name: each.value for each in found.kept} == {COULOMB: 25.0, STATIC: 25.0}
+    assert {each.name: each.value for each in found.estimates} == {COULOMB: 25.0, STATIC: 25.0}
 
 
 def test_static_friction_is_no_less_than_its_bound(base: Stage) -> None:
-    stage = identified(base, fitting(base, ODD["static at least"]).kept, ["log"])
+    stage = identified(base, fitting(base, ODD["static at least"]).estimates, ["log"])
     assert stage.uncertain()[STATIC].low == 35.0
     known = fitting(base, [unknown(STATIC, "N", "x", "stops", 15.0)])
-    assert known.kept == ()
-    assert "at least 15 N" in known.said[0]
+    assert known.estimates == ()
+    assert "at least 15 N" in known.notes[0]
 
 
 def steady(speeds: list[float], rng: np.random.Generator) -> Log:

@@ -22,10 +22,10 @@ from friso.identify.logs.log import Log
 from friso.identify.output_error import fit as fitting
 from friso.identify.output_error import profile as profiles
 from friso.identify.output_error.fit import everywhere, first_values, fit, nearby
+from friso.identify.output_error.identifiable import BRISTLES, STRIBECK
 from friso.identify.output_error.parameters import RATIO
 from friso.identify.output_error.problem import closed_loop
 from friso.identify.output_error.refine import bounds_of, costs
-from friso.identify.output_error.shown import BRISTLES, STRIBECK
 
 pytestmark = pytest.mark.xdist_group("identify-moves")
 
@@ -59,7 +59,7 @@ def test_intervals_hold_mass_and_friction(quick: tuple[dict[str, Any], Log, Iden
     by_name = {each.name: each for each in found.estimates}
     for name in ("masses.cart", "friction.coulomb", "friction.viscous", "bias.cart"):
         each, true = by_name[name], truth[name]
-        assert each.shown
+        assert each.determined
         assert abs(each.value - true) < 1.5 * each.half_width, name  # half again: 5 intervals at once
         assert each.half_width < 0.15 * abs(true)
     assert by_name["friction.viscous_asymmetry"].value == pytest.approx(0, abs=0.1)
@@ -145,7 +145,7 @@ def test_without_noise_the_fit_ends_at_the_truth() -> None:
     flat = {**machine.flat, "friction.viscous_asymmetry": 0.0}
     given = method._problems(log, log.segments[0], flat, method.inverse_model(log), True)[1]
     assert given is not None
-    exact = replace(given, wanted=closed_loop(flat, log, log.segments[0], ()).record(np.zeros(0)).force)
+    exact = replace(given, target=closed_loop(flat, log, log.segments[0], ()).record(np.zeros(0)).force)
     names = [each.name for each in given.parameters]
     core = tuple(i for i, each in enumerate(given.parameters) if each.core)
     kept = {"static friction ratio": flat["friction.static"] / flat["friction.coulomb"]}
@@ -207,13 +207,13 @@ def test_emps_fits_better_than_the_inverse_model(identified: IdentifiedMoves, em
 def test_emps_shows_mass_and_sliding_friction_alone(identified: IdentifiedMoves) -> None:
     by_name = {each.name: each for each in identified.estimates}
     for name in ("friction.static", "friction.stribeck_velocity", *BRISTLES):
-        assert not by_name[name].shown, name
+        assert not by_name[name].determined, name
         assert by_name[name].low < by_name[name].high
     assert "no steady motion between" in by_name["friction.static"].reason
     assert by_name["friction.static"].low == pytest.approx(by_name["friction.coulomb"].value, rel=1e-3)
     assert {RATIO, *STRIBECK[1:], *BRISTLES} <= {*identified.profiles}
     mass = by_name["masses.cart"]
-    assert mass.shown
+    assert mass.determined
     assert mass.value == pytest.approx(95.1089, rel=5e-3)
     assert by_name["friction.coulomb"].value == pytest.approx(20.3935, rel=0.05)
 

@@ -150,7 +150,7 @@ def test_what_a_log_cannot_show_is_told(refused: Refused) -> None:
 def test_sliding_is_not_taken_for_bristles(size: float) -> None:
     """Most of the force is inertia then, which hides how little of the friction the model explains."""
     found = bristles_from_presliding(shaken(size=size))
-    assert not found.stiffness.shown
+    assert not found.stiffness.determined
     assert "the bearing slides" in found.stiffness.reason
 
 
@@ -159,7 +159,7 @@ def test_a_rig_that_is_shaken_off_its_bristles_shows_none(strength: float) -> No
     stage = locked(friso.load(EXAMPLE))
     log = rig_log(excite(stage, 0.02, 1, kind=replace(GENTLE, strength=strength)), 0, "x", None, stage, 1).log
     found = bristles_from_presliding(log, between(stage.flat()))
-    assert not any(each.shown for each in (found.mass, found.damping, found.stiffness))
+    assert not any(each.determined for each in (found.mass, found.damping, found.stiffness))
 
 
 def test_a_slow_current_loop_is_taken_off() -> None:

@@ -465,12 +465,12 @@ def test_departure_from_the_mass_line() -> None:
     rng, frequency = np.random.default_rng(28), np.arange(0.2, 20, 0.2)
     response = exact(dragged, frequency, 0.05, rng)
     found = departure(response, lambda f: -1 / (1.7 * (2 * np.pi * f) ** 2))
-    assert found.frequency.shown
+    assert found.frequency.determined
     assert 1.0 < found.frequency.value < 8.0  # damping is a tenth of the inertia force at 7.5 Hz
     assert found.differ is None
     straight = exact(lambda f: -1 / (1.7 * (2 * np.pi * f) ** 2), frequency, 0.05, rng)
     none = departure(straight, lambda f: -1 / (1.7 * (2 * np.pi * f) ** 2))
-    assert not none.frequency.shown
+    assert not none.frequency.determined
     assert "down to its lowest line" in none.frequency.reason
 
 

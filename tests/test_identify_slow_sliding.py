@@ -140,7 +140,7 @@ def test_a_contact_is_taken_off() -> None:
 
 def reason(log: Log, known: MassOnBristles | None = KNOWN) -> str:
     found = stribeck_from_slow_sliding(log, THERE, known)
-    assert not found.estimates[2].shown
+    assert not found.estimates[2].determined
     return found.estimates[2].reason
 
 
@@ -169,7 +169,7 @@ def test_level_friction_shows_its_level_alone() -> None:
     coulomb, static, stribeck = found.estimates
     assert coulomb.value == pytest.approx(STATIC, rel=0.02)
     assert "no rise" in static.reason
-    assert not stribeck.shown
+    assert not stribeck.determined
 
 
 def test_friction_without_a_falling_curve_is_not_slid_on_the_rig() -> None:
@@ -192,11 +192,11 @@ def test_a_machine_on_which_no_slow_pass_is_steady_shows_its_friction_on_the_rig
     machine = built(93)
     stage, flat = locked(machine.truth), machine.flat
     passes = many_speeds.many_speeds(stage, 1)
-    assert not passes.places[0].velocity.both.stribeck_velocity.shown
+    assert not passes.places[0].velocity.both.stribeck_velocity.determined
     for each in slow_sliding.slow_sliding(stage, [place.log for place in passes.places], 1):
         places = each.log.true["cart_position"]
         there = friction_factors(flat, np.linspace(places.min(), places.max(), 500)).mean(axis=1)
-        coulomb, static, stribeck = each.found.estimates
+        coulomb, static, stribeck = each.result.estimates
         assert coulomb.value == pytest.approx(flat["friction.coulomb"] * there[1], rel=0.02)
         assert static.value == pytest.approx(flat["friction.static"] * there[0], rel=0.02)
         assert stribeck.value == pytest.approx(flat["friction.stribeck_velocity"], rel=0.03)

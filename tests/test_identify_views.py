@@ -328,7 +328,7 @@ def test_every_key_has_a_row_with_its_value_or_the_reason(case: tuple) -> None:
     rows = {row.texts[0]: row for row in estimate_rows(case[0])}
     assert list(rows) == ["Cart mass", "Coulomb friction", "Static friction", "Stribeck velocity"]
     assert rows["Cart mass"].texts == ("Cart mass", "10.000 kg", "9.961 to 10.039 kg", "output error")
-    assert not rows["Static friction"].shown
+    assert not rows["Static friction"].determined
     assert rows["Static friction"].texts[1:] == (LEFT, "8 to 32 N", WHY)
 
 

@@ -35,14 +35,14 @@ def test_sizes_on_the_thesis_rig_are_the_thesis_s(built: Stage) -> None:
 def test_steps_show_the_joint_on_its_cables(built: Stage) -> None:
     found = stiffness.run_experiment(built, 1, silent).result
     on_cables = found.true + built.flat()["cable.stiffness"]
-    assert found.found.stiffness.holds(on_cables)
-    assert found.found.stiffness.value == pytest.approx(on_cables, rel=1e-3)
+    assert found.steps.stiffness.holds(on_cables)
+    assert found.steps.stiffness.value == pytest.approx(on_cables, rel=1e-3)
 
 
 def test_a_weaker_motor_makes_the_joint_look_stiffer(built: Stage) -> None:
     weak = built.replace({"drive.motor_constant_ratio": 0.68})
     found = stiffness.run_experiment(weak, 1, silent).result
-    assert found.found.stiffness.value == pytest.approx(found.apparent, rel=5e-3)
+    assert found.steps.stiffness.value == pytest.approx(found.apparent, rel=5e-3)
     assert found.apparent > found.true
 
 
@@ -67,8 +67,8 @@ def test_uneven_friction_at_constant_speed_is_not_read_as_coulomb_friction(
     found = constant_speed.run_experiment(built, 1, silent).result
     free, (place,) = found.cases[0], found.many.places
     assert not free.place.separated
-    assert not free.velocity.both.coulomb.shown
-    assert place.velocity.both.coulomb.shown
+    assert not free.velocity.both.coulomb.determined
+    assert place.velocity.both.coulomb.determined
     assert len(place.friction) > 12
     true = np.interp(np.abs(place.velocity.velocities), place.speeds, place.true)
     assert place.friction == pytest.approx(true, rel=0.1)

@@ -63,7 +63,7 @@ def test_two_speeds_bound_friction_and_do_not_show_it() -> None:
     both = friction_velocity(record("two", sample_time, reference=position, position=position, force=force)).both
     assert "two speeds" in both.coulomb.reason
     for found, truth in ((both.coulomb, coulomb), (both.viscous, viscous), (both.static, coulomb + rise)):
-        assert not found.shown
+        assert not found.determined
         assert found.holds(truth)
     assert both.coulomb.high < 2.5
     assert both.stribeck_velocity.holds(stribeck)

@@ -77,7 +77,7 @@ def _read_frequencies(text: str, stage: Stage) -> tuple[float, float]:
     try:
         low, high = float(FREQUENCY.read(first)), float(FREQUENCY.read(last))
     except InputError as error:
-        raise InputError("--frequencies", error.given, error.expected, EXAMPLE) from None
+        raise InputError("--frequencies", error.actual, error.expected, EXAMPLE) from None
     if not low < high:
         order = "empty" if low == high else "reversed"
         raise InputError("--frequencies", quoted(text, f"{order} range"), "an increasing range", EXAMPLE)

@@ -15,7 +15,7 @@ from friso.stage import Stage, load
 
 if TYPE_CHECKING:
     from friso.hunting import Case
-    from friso.stage.correlations import Drawn
+    from friso.stage.correlations import Sample
     from friso.studies.draws import Draws
 
 Count = Annotated[
@@ -70,7 +70,7 @@ def check(
     leave(all(case.solver.done for case in cases.values()))
 
 
-def _sample(stage: Stage, path: Path, count: int, seed: int) -> Drawn:
+def _sample(stage: Stage, path: Path, count: int, seed: int) -> Sample:
     """Stages drawn, correlated as a file beside the stage file says. Raises InputError."""
     from friso.stage.correlations import Correlations, beside, draw, read_correlations
     from friso.studies.draws import MOST
@@ -85,7 +85,7 @@ def _sample(stage: Stage, path: Path, count: int, seed: int) -> Drawn:
         raise error if error.origin else error.found_in("--draws") from None
 
 
-def _draws(stage: Stage, sample: Drawn, seed: int, tolerance: float) -> Draws:
+def _draws(stage: Stage, sample: Sample, seed: int, tolerance: float) -> Draws:
     """What becomes of the stages drawn."""
     from friso.studies.draws import Draws, fates
 
@@ -98,7 +98,7 @@ def _print_draws(draws: Draws) -> None:
     from friso.views.check.cases import case_labels
     from friso.views.check.draws import draws_rows, draws_sentences
 
-    title = f"{draws.drawn.count} stages drawn from the uncertain keys, seed {draws.seed}"
+    title = f"{draws.sample.count} stages drawn from the uncertain keys, seed {draws.seed}"
     print_answer(draws_sentences(draws), title, [*case_labels(draws.stage).values()], draws_rows(draws))
 
 
@@ -108,5 +108,5 @@ def _print_cases(stage: Stage, cases: dict[str, Case]) -> None:
     from friso.views.check.table import rows
     from friso.views.check.words import answer
 
-    shown = shown_cases(cases)
-    print_answer(answer(cases), stage.name, [item.label for item in shown], rows(shown))
+    cases_in_order = shown_cases(cases)
+    print_answer(answer(cases), stage.name, [item.label for item in cases_in_order], rows(cases_in_order))

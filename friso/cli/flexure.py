@@ -87,7 +87,7 @@ def _stroke(text: str | None, stage: Stage, mechanism: Mechanism) -> float:
         try:
             stroke = STROKE.read(text)
         except InputError as error:
-            raise InputError(key, error.given, error.expected, example) from None
+            raise InputError(key, error.actual, error.expected, example) from None
     if stroke > mechanism.length / 2:
         expected = f"at most half the length of the leaves, {1e3 * mechanism.length / 2:g} mm"
         raise InputError(key, quoted(getattr(stroke, "text", stroke)), expected, example)

@@ -70,7 +70,7 @@ def identify(
     """
     from friso.identify.logs.mapping import from_options
     from friso.identify.method import identify as identification
-    from friso.identify.sources import kept, read_all
+    from friso.identify.sources import read_all, with_mapping_file
 
     assumed, settings = _stage(stage, overrides), _settings(bandwidth, band, period)
     mapping = from_options(maps or (), units or (), scales or (), dt, kind)
@@ -81,7 +81,7 @@ def identify(
         sources = [(file.source, file.kind) for file in inputs[: len(logs)]]
         identified = identification(sources, assumed, settings, progress)
         predictions = _predictions(identified, inputs[len(logs) :], settings)
-        inputs = [kept(file, out) for file in inputs]
+        inputs = [with_mapping_file(file, out) for file in inputs]
         from friso.views.identify.files import identify_files, mappings
 
         files = target.write(identify_files(identified, inputs, predictions), progress, beside=mappings(inputs))

@@ -174,19 +174,19 @@ def _run(study: Study, store: Path, crew: Crew, share: float) -> xr.Dataset:
     """Run what the store lacks. Whatever ends it early, the message says where the rest is."""
     from friso.studies.sweep import run_in_store
 
-    kept = 0
+    stored = 0
     with ProgressBar(store.name) as bar:
 
         def progress(done: int, total: int, what: str) -> None:
-            nonlocal kept
-            kept = done
+            nonlocal stored
+            stored = done
             bar(done, total, store.name)
 
         try:
             return run_in_store(study, store, crew, share, progress)
         except (KeyboardInterrupt, OSError, RuntimeError):
             if store.exists():
-                say(f"{kept} of {study.cells} cells are kept; to resume: friso map {store}")
+                say(f"{stored} of {study.cells} cells are stored; to resume: friso map {store}")
             raise
 
 

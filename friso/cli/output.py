@@ -64,11 +64,11 @@ class OutputFolder:
             if not path.exists():
                 continue
             if any(file.exists() and path.samefile(file) for file in self.inputs):
-                given = f"{self.folder}, where {name} is read"
-                raise InputError("--out", given, "another folder", f"--out {self.folder}-2")
+                actual = f"{self.folder}, where {name} is read"
+                raise InputError("--out", actual, "another folder", f"--out {self.folder}-2")
             if name not in self.files and not self.overwrite:
-                given = f"{self.folder}, with a {name} that friso {self.command} has not written"
-                raise InputError("--out", given, "another folder, or --overwrite", f"--out {self.folder}-2")
+                actual = f"{self.folder}, with a {name} that friso {self.command} has not written"
+                raise InputError("--out", actual, "another folder, or --overwrite", f"--out {self.folder}-2")
 
     def write(
         self, files: Files, progress: Progress = silent, beside: Mapping[Path, Content] | None = None
@@ -109,8 +109,8 @@ def write(files: Mapping[Path, Content], progress: Progress = silent) -> list[Pa
 
 def print_document(document: Mapping[str, Any], files: Iterable[Path] | None = None) -> None:
     """The JSON document of a command, with the files that it has written if it tells them."""
-    told = {} if files is None else {"files": [str(file) for file in files]}
-    print(json.dumps({**document, **told}, allow_nan=False))
+    written = {} if files is None else {"files": [str(file) for file in files]}
+    print(json.dumps({**document, **written}, allow_nan=False))
 
 
 def print_written(files: Iterable[Path]) -> None:

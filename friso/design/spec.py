@@ -58,7 +58,7 @@ class OneOrMany:
             try:
                 return self.of.read(value)
             except InputError as error:
-                raise SpecError("", error.given, self.expected, self.example) from None
+                raise SpecError("", error.actual, self.expected, self.example) from None
         if not isinstance(value, str) or value not in materials():
             raise unknown_material(value if isinstance(value, str) else str(value))
         return value

@@ -81,8 +81,8 @@ def as_built(form: AsBuilt) -> Model:
     places = dict(zip(map(state, PLACES), (cart, cart, position), strict=True))
     clock = Clock(SAMPLE_TIME, key("drive.late"), {state("seen"): position}, places, tuple(map(state, TIMES)))
     varied = {key(f"friction.{name}"): key(f"friction.{name}") * state(f"{name}_factor") for name in LEVELS}
-    states = tuple(replace(each, derivative=_shaken(each).xreplace(varied)) for each in model.states)
-    outputs = {n: replace(each, expression=each.expression.xreplace(varied)) for n, each in model.outputs.items()}
+    states = tuple(replace(part, derivative=_shaken(part).xreplace(varied)) for part in model.states)
+    outputs = {n: replace(output, expression=output.expression.xreplace(varied)) for n, output in model.outputs.items()}
     kinks = tuple(kink.with_values(varied) for kink in model.kinks)
     return replace(model, states=states, outputs=outputs, kinks=kinks, jumps=resets(kinks), clock=clock)
 
@@ -91,11 +91,11 @@ LEVELS = ("static", "coulomb")
 """Names of the keys of friction that vary along a rail."""
 
 
-def _shaken(each: Any) -> sp.Expr:
+def _shaken(part: Any) -> sp.Expr:
     """The derivative of a state in a frame that moves with the floor."""
     from friso.equations.component import Role, state
 
-    return each.derivative - (state(FLOOR) if each.role == Role.VELOCITY else 0)
+    return part.derivative - (state(FLOOR) if part.role == Role.VELOCITY else 0)
 
 
 def _cable(position: sp.Symbol, velocity: sp.Symbol) -> sp.Expr:
@@ -114,9 +114,9 @@ def _drive(form: AsBuilt) -> Control:
     from friso.equations.model import loop_stiffness
 
     def control(loop: Loop, length: sp.Expr, rate: sp.Expr) -> Controller:
-        reading, command, kept = _command(form, loop)
+        reading, command, sampled = _command(form, loop)
         commanded, waiting = state(COMMANDED), [state(f"waiting_{n + 1}") for n in range(form.delay_samples)]
-        held = [Held(state(READING), reading, STEADY.position), *kept, Held(commanded, command)]
+        held = [Held(state(READING), reading, STEADY.position), *sampled, Held(commanded, command)]
         held += [Held(new, old) for new, old in zip(waiting, [commanded, *waiting], strict=False)]
         acting = waiting[-1] if waiting else commanded
         force = key("drive.motor_constant_ratio") * state(MOTOR_FACTOR) * acting
@@ -153,8 +153,8 @@ def _command(form: AsBuilt, loop: Any) -> tuple[sp.Expr, sp.Expr, tuple[Any, ...
         rests=sp.Abs(error) < drive["integrator_deadband"],
         restarts=sp.And(drive["integrator_reset"] > 0, error * before < 0),
     )
-    known = Loop(error, reading, loop.velocity, speed, acceleration)
+    measured = Loop(error, reading, loop.velocity, speed, acceleration)
     extra = ahead + state(INJECTED)
-    command, held = sampled_controller(form.structure.controller, known, form.velocity_samples, extra, rest)
+    command, held = sampled_controller(form.structure.controller, measured, form.velocity_samples, extra, rest)
     last = sp.Piecewise((error, error**2 > 0), (before, True))  # a reading in whole digits may find none
     return reading, command, (*held, Held(before, last, STEADY.error))

@@ -162,9 +162,12 @@ class Switch(Kink):
 
     def with_values(self, values: Mapping[Any, Any]) -> Switch:
         """The same with expressions put in the place of others."""
-        enter, leave, begins = (cast(sp.Expr, each.xreplace(values)) for each in (self.enter, self.leave, self.begins))
+        enter, leave, begins = (
+            cast(sp.Expr, expression.xreplace(values)) for expression in (self.enter, self.leave, self.begins)
+        )
         entered, left = (
-            {x: cast(sp.Expr, e.xreplace(values)) for x, e in each.items()} for each in (self.entered, self.left)
+            {x: cast(sp.Expr, e.xreplace(values)) for x, e in assignments.items()}
+            for assignments in (self.entered, self.left)
         )
         return Switch(self.name, enter, leave, begins, entered, left)
 

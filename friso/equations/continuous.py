@@ -109,7 +109,7 @@ class Continuous(Blocks):
     @property
     def integrands(self) -> dict[sp.Symbol, sp.Expr]:
         """What the integrators integrate in a steady motion."""
-        return {each.symbol: each.settled for each in self._integrals}
+        return {integral.symbol: integral.settled for integral in self._integrals}
 
     def low_pass(self, signal: Signal, tau: sp.Expr, name: str) -> Signal:
         """By a state, the filtered signal; `tau` [s]."""
@@ -160,29 +160,31 @@ class Continuous(Blocks):
     def finished(self, demand: Signal, bound: ForceLimit | None) -> tuple[tuple[State, ...], tuple[Kink, ...]]:
         """All states, the integrators doing as they are to where the demand is beyond its bound, and resting where
         their output is beyond a limit of its own; and the kinks of that."""
-        steady = wound_up(demand.settled, [each.symbol for each in self._integrals])
-        states = [replace(each, settled=each.settled.xreplace(steady)) for each in self.states]
+        steady = wound_up(demand.settled, [integral.symbol for integral in self._integrals])
+        states = [replace(part, settled=part.settled.xreplace(steady)) for part in self.states]
         clamp = bound if bound and bound.anti_windup == "clamp" else None
         far: list[Kink] = list(_far(clamp.kinks, clamp.limit, "rest")) if self._integrals and clamp else []
         winding: list[Kink] = []
-        for each in self._integrals:
+        for integral in self._integrals:
             share = sp.S.One
-            beside = "" if str(each.symbol) == "integral" else f"_{each.symbol}"
-            up = Kink(f"winding_up{beside}", each.integrand)
+            beside = "" if str(integral.symbol) == "integral" else f"_{integral.symbol}"
+            up = Kink(f"winding_up{beside}", integral.integrand)
             if clamp:
                 share *= 1 - _resting(clamp.kinks, tuple(far[:2]), up, clamp.limit)
-            if each.limit is not None:
-                _, ends = _clamped(each.output, each.limit, str(each.symbol))
-                beyond = _far(ends, each.limit, f"rest_{each.symbol}")
-                share *= 1 - _resting(ends, beyond, up, each.limit)
+            if integral.limit is not None:
+                _, ends = _clamped(integral.output, integral.limit, str(integral.symbol))
+                beyond = _far(ends, integral.limit, f"rest_{integral.symbol}")
+                share *= 1 - _resting(ends, beyond, up, integral.limit)
                 far += [*ends, *beyond]
             if share != 1:
                 winding.append(up)
-            derivative = each.integrand * share
+            derivative = integral.integrand * share
             if bound and bound.anti_windup == BACK_CALCULATION:  # Astrom and Hagglund, Advanced PID Control, 3.5
-                gain = len(self._integrals) * sp.diff(demand.value, each.symbol)
+                gain = len(self._integrals) * sp.diff(demand.value, integral.symbol)
                 derivative += bound.cut / (gain * unwinding_time())
-            states.append(State(each.symbol, derivative, "m*s", each.scale, Role.INTEGRAL, steady[each.symbol]))
+            states.append(
+                State(integral.symbol, derivative, "m*s", integral.scale, Role.INTEGRAL, steady[integral.symbol])
+            )
         return tuple(states), (*far, *winding)
 
 

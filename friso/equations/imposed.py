@@ -61,7 +61,7 @@ def imposed(form: Imposed) -> Model:
     states = (
         State(position, velocity * period, "m", MOTION_SIZE, Role.POSITION),
         State(velocity, -(omega**2) * position * period, "m/s", MOTION_SIZE * omega, Role.VELOCITY),
-        *(_per_period(each, period) for each in friction.component.states),
+        *(_per_period(part, period) for part in friction.component.states),
         *(State(state(name), share, "N", size, Role.SUM) for name, share in zip(HARMONIC, shares, strict=True)),
     )
     return Model(

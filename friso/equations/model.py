@@ -62,16 +62,16 @@ class Model:
 
     @property
     def symbols(self) -> tuple[sp.Symbol, ...]:
-        return tuple(each.symbol for each in self.states)
+        return tuple(part.symbol for part in self.states)
 
     @property
     def rhs(self) -> tuple[sp.Expr, ...]:
-        return tuple(each.derivative for each in self.states)
+        return tuple(part.derivative for part in self.states)
 
     @property
     def settled(self) -> tuple[sp.Expr, ...]:
         """States, then the numbers held, in a steady motion that has lasted, in terms of `STEADY`."""
-        return tuple(each.settled for each in (*self.states, *self.held))
+        return tuple(part.settled for part in (*self.states, *self.held))
 
     @property
     def switches(self) -> tuple[Switch, ...]:
@@ -81,7 +81,7 @@ class Model:
     @property
     def kept(self) -> tuple[sp.Symbol, ...]:
         """What a run has besides its states: numbers held, and the modes that remember."""
-        return (*(each.symbol for each in self.held), *(switch.beyond for switch in self.switches))
+        return (*(held.symbol for held in self.held), *(switch.beyond for switch in self.switches))
 
     @property
     def given(self) -> tuple[sp.Symbol, ...]:
@@ -92,7 +92,7 @@ class Model:
     def parameters(self) -> tuple[sp.Symbol, ...]:
         """The stage-file keys (and the length of the motion) that the equations contain, sorted by name."""
         expressions = [*self.rhs, *(k.surface for k in self.kinks), *(o.expression for o in self.outputs.values())]
-        expressions += [*(each.scale for each in self.states), *(each.update for each in self.held), *self.settled]
+        expressions += [*(part.scale for part in self.states), *(part.update for part in self.held), *self.settled]
         expressions += [*(k.at_start for k in self.kinks), *(e for jump in self.jumps.values() for e in jump.values())]
         others = {*self.symbols, *(k.beyond for k in self.kinks), *self.given, TIME, TICK, *STEADY}
         if self.clock:
@@ -145,7 +145,7 @@ def assemble(structure: Structure, external: External | None = None, control: Co
         outputs |= part.outputs
     kinks = tuple(kink for part in parts for kink in part.kinks)
     return Model(
-        states=(*bodies, *(each for part in parts for each in part.states)),
+        states=(*bodies, *(part_state for part in parts for part_state in part.states)),
         stage=stage,
         cart=cart,
         kinks=kinks,

@@ -63,7 +63,7 @@ class Sampled(Blocks):
         self.held: list[Held] = []
         self._integrals: list[_Integral] = []
 
-    def _kept(self, name: str, value: sp.Expr, settled: sp.Expr) -> sp.Symbol:
+    def _previous(self, name: str, value: sp.Expr, settled: sp.Expr) -> sp.Symbol:
         """The number that a value was at the sample before."""
         symbol = state(name)
         self.held.append(Held(symbol, value, settled))
@@ -84,7 +84,7 @@ class Sampled(Blocks):
             return Signal(slope, scale, signal.settled_rate, sp.S.Zero)
         count, past = self.velocity_samples, signal.value
         for n in range(1, count + 1):
-            past = self._kept(f"{name}_before_{n}", past, signal.settled - n * SAMPLE_TIME * signal.settled_rate)
+            past = self._previous(f"{name}_before_{n}", past, signal.settled - n * SAMPLE_TIME * signal.settled_rate)
         return Signal((signal.value - past) / (count * SAMPLE_TIME), scale, signal.settled_rate, sp.S.Zero)
 
     def integral(
@@ -101,7 +101,7 @@ class Sampled(Blocks):
         if rule == "bilinear":
             before = signal.before
             if before is None:
-                before = self._kept(f"{name}_signal_before", signal.value, signal.settled)
+                before = self._previous(f"{name}_signal_before", signal.value, signal.settled)
             share = SAMPLE_TIME / 2 * (signal.value + before)
         self._integrals.append(_Integral(symbol, following, share, gain, limit))
         return Signal(gain * following, gain * signal.scale * SAMPLE_TIME, gain * symbol, sp.S.Zero)
@@ -130,31 +130,31 @@ class Sampled(Blocks):
         """The force before it is limited, and all that is held, the integrators doing as they are to where the force
         would be beyond its limit, and resting where their output would be beyond a limit of its own."""
         new: dict[Any, Any] = {}
-        for each in self._integrals:
-            new[each.next] = each.symbol + each.share.xreplace(new)
-        wanted = demand.value.xreplace(new)
+        for integral in self._integrals:
+            new[integral.next] = integral.symbol + integral.share.xreplace(new)
+        unlimited = demand.value.xreplace(new)
         updates: dict[Any, Any] = {}
-        for each in self._integrals:
-            share: Any = each.share.xreplace(updates)
+        for integral in self._integrals:
+            share: Any = integral.share.xreplace(updates)
             rests = rest.rests
             clamp = force_limit() if anti_windup == "clamp" else None
-            for value, end in ((wanted, clamp), (each.gain * new[each.next], each.limit)):
+            for value, end in ((unlimited, clamp), (integral.gain * new[integral.next], integral.limit)):
                 if end is not None:
                     winding = sp.Or(sp.And(value > end, share > 0), sp.And(value < -end, share < 0))
                     rests = sp.Or(rests, winding)
-            following = each.symbol + share
+            following = integral.symbol + share
             if anti_windup == BACK_CALCULATION:
-                cut = sp.Max(-force_limit(), sp.Min(force_limit(), wanted)) - wanted
-                gain = len(self._integrals) * sp.diff(demand.value, each.next)
+                cut = sp.Max(-force_limit(), sp.Min(force_limit(), unlimited)) - unlimited
+                gain = len(self._integrals) * sp.diff(demand.value, integral.next)
                 following += SAMPLE_TIME * cut / (gain * unwinding_time())
-            updates[each.next] = sp.Piecewise((share, rest.restarts), (each.symbol, rests), (following, True))
-        steady: dict[Any, Any] = {**wound_up(demand.settled, [each.symbol for each in self._integrals])}
-        known: list[tuple[Any, Any]] = [(each.update, each.settled) for each in self.held]
+            updates[integral.next] = sp.Piecewise((share, rest.restarts), (integral.symbol, rests), (following, True))
+        steady: dict[Any, Any] = {**wound_up(demand.settled, [integral.symbol for integral in self._integrals])}
+        updated: list[tuple[Any, Any]] = [(held.update, held.settled) for held in self.held]
         held = [
-            replace(each, update=update.xreplace(updates), settled=settled.xreplace(steady))
-            for each, (update, settled) in zip(self.held, known, strict=True)
+            replace(number, update=update.xreplace(updates), settled=settled.xreplace(steady))
+            for number, (update, settled) in zip(self.held, updated, strict=True)
         ]
-        held += [Held(e.symbol, updates[e.next], steady[e.symbol], Role.INTEGRAL) for e in self._integrals]
+        held += [Held(i.symbol, updates[i.next], steady[i.symbol], Role.INTEGRAL) for i in self._integrals]
         force: Any = demand.value
         return force.xreplace(updates), tuple(held)
 

@@ -79,8 +79,8 @@ def shared_structure(flat: Mapping[str, Any]) -> Structure:
 def decisive_keys(flat: Mapping[str, Any]) -> tuple[str, ...]:
     """The numeric keys on which the structure depends, by being zero or a whole number, for instance."""
     law, control = friction_law(flat["friction.model"]), controller_of(flat)
-    own = ("joint.stroke", "bias.cart", "bias.stage")
-    return (*own, *map(control.key, control.decisive), *law.decisive)
+    of_stage = ("joint.stroke", "bias.cart", "bias.stage")
+    return (*of_stage, *map(control.key, control.decisive), *law.decisive)
 
 
 def _joint_form(flat: Mapping[str, Any]) -> JointForm:

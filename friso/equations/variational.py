@@ -22,12 +22,12 @@ PREFIX = "small_"
 
 def variational(model: Model) -> Model:
     """The model with a deviation beside each state, the states first; it takes no part in the control of the step."""
-    small = {each.symbol: state(f"{PREFIX}{each.symbol}") for each in model.states}
+    small = {part.symbol: state(f"{PREFIX}{part.symbol}") for part in model.states}
     deviations = tuple(
         State(
-            small[each.symbol], _along(each.derivative, small), each.unit, each.scale, Role.DEVIATION, controlled=False
+            small[part.symbol], _along(part.derivative, small), part.unit, part.scale, Role.DEVIATION, controlled=False
         )
-        for each in model.states
+        for part in model.states
     )
     jumps = {kink: {**model.jumps.get(kink, {}), **_saltation(model, kink, small)} for kink in model.kinks}
     return replace(
@@ -47,14 +47,14 @@ def _along(expression: sp.Expr, small: Small) -> sp.Expr:
 def _saltation(model: Model, kink: Kink, small: Small) -> dict[sp.Symbol, sp.Expr]:
     """By how much the deviations jump at a kink: (f+ - f-) times their share across it over the speed of crossing."""
     speed = sp.diff(kink.surface, TIME)
-    speed += sum((sp.diff(kink.surface, each.symbol) * each.derivative for each in model.states), start=sp.S.Zero)
+    speed += sum((sp.diff(kink.surface, part.symbol) * part.derivative for part in model.states), start=sp.S.Zero)
     share = _along(kink.surface, small) / speed
     if isinstance(kink, Switch):
         return _saltation_with_reset(model, kink, small, share)
     across = {
-        each.symbol: gap * (1 - 2 * kink.beyond)
-        for each in model.states
-        if not _vanishes(gap := each.derivative.subs(kink.beyond, 1) - each.derivative.subs(kink.beyond, 0), kink)
+        part.symbol: gap * (1 - 2 * kink.beyond)
+        for part in model.states
+        if not _vanishes(gap := part.derivative.subs(kink.beyond, 1) - part.derivative.subs(kink.beyond, 0), kink)
     }
     return {small[x]: gap * share for x, gap in across.items()}
 
@@ -63,7 +63,7 @@ def _saltation_with_reset(model: Model, switch: Switch, small: Small, share: sp.
     """The same where states become R(x): the deviations become DR small + (f+ - DR f-) share, f+ taken at R(x)."""
     becomes = switch.becomes
     behind = {**becomes, switch.beyond: 1 - switch.beyond}
-    before = {each.symbol: each.derivative for each in model.states}
+    before = {part.symbol: part.derivative for part in model.states}
     jumps: dict[sp.Symbol, sp.Expr] = {}
     for x, rate in before.items():
         if x not in becomes and not rate.free_symbols & {switch.beyond, *becomes}:

@@ -116,8 +116,8 @@ def settled_members(flat: Mapping[str, Any]) -> Members:
 
 def _own(flat: Mapping[str, Any]) -> float:
     """The crossover of a stage [Hz]; 1 where its controller tells none."""
-    own = bandwidth(flat)
-    return 1.0 if own is None else own
+    named = bandwidth(flat)
+    return 1.0 if named is None else named
 
 
 def _at(flat: Mapping[str, Any], crossover: np.ndarray) -> dict[str, Any]:

@@ -19,59 +19,69 @@ Correlated = tuple[Sequence[Estimate], np.ndarray]
 """What one experiment shows, each with an interval, and its correlation matrix, shape (estimates, estimates)."""
 
 
-def combined(found: Sequence[Estimate]) -> tuple[list[Estimate], list[str]]:
+def combined(estimates: Sequence[Estimate]) -> tuple[list[Estimate], list[str]]:
     """One estimate per key from all those found, weighted by their intervals; and a sentence where they disagree.
 
     Where some disagree, the interval allows for that. What one experiment shows counts, whatever another cannot show;
     where none does, what all of them leave possible is left.
     """
-    answers, said = [], []
-    for key in dict.fromkeys(each.name for each in found):
-        own = [each for each in found if each.name == key]
-        shown = [each for each in own if each.shown]
+    answers, sentences = [], []
+    for key in dict.fromkeys(estimate.name for estimate in estimates):
+        estimates_of_key = [estimate for estimate in estimates if estimate.name == key]
+        shown = [estimate for estimate in estimates_of_key if estimate.determined]
         sure = _weighty(shown)
         if len(sure) > 1:
             one, agrees = _mean(key, sure)
         elif shown:
             one, agrees = (sure or shown)[0], True
         else:
-            one, agrees = _left(key, own)
+            one, agrees = _left(key, estimates_of_key)
         answers.append(one)
         if not agrees:
-            said.append(f"{key}: the experiments disagree, and the interval allows for it: {_texts(sure or own)}")
-        beyond = [each for each in own if shown and not each.shown and (each.low > one.high or each.high < one.low)]
-        said += [f"{key}: {_text(one)} is shown, but {_text(each)}" for each in beyond]
-    return answers, said
+            sentences.append(
+                f"{key}: the experiments disagree, and the interval allows for it: {_texts(sure or estimates_of_key)}"
+            )
+        beyond = [
+            estimate
+            for estimate in estimates_of_key
+            if shown and not estimate.determined and (estimate.low > one.high or estimate.high < one.low)
+        ]
+        sentences += [f"{key}: {_text(one)} is shown, but {_text(estimate)}" for estimate in beyond]
+    return answers, sentences
 
 
-def correlations(found: Sequence[Estimate], groups: Sequence[Correlated]) -> tuple[tuple[str, ...], np.ndarray]:
+def correlations(estimates: Sequence[Estimate], groups: Sequence[Correlated]) -> tuple[tuple[str, ...], np.ndarray]:
     """The keys of the groups and their correlations once combined, shape (keys, keys).
 
-    `found` are the estimates of all experiments. A combined value is a mean of single ones with weights a_i, and the
+    `estimates` are those of all experiments. A combined value is a mean of single ones with weights a_i, and the
     experiments are independent: its covariance is the sum of A_i C_i A_i, with C_i the covariance within one.
     """
-    keys = tuple(dict.fromkeys(each.name for group, _ in groups for each in group))
-    precision = {key: sum(_weight(each) for each in _weighty(found) if each.name == key) for key in keys}
+    keys = tuple(dict.fromkeys(estimate.name for group, _ in groups for estimate in group))
+    precision = {
+        key: sum(_weight(estimate) for estimate in _weighty(estimates) if estimate.name == key) for key in keys
+    }
     covariance = np.diag([1 / precision[key] for key in keys])
     for group, matrix in groups:
-        shares = np.array([_weight(each) ** 0.5 / precision[each.name] for each in group])  # a_i times the deviation
-        places = [keys.index(each.name) for each in group]
+        shares = np.array(
+            [_weight(estimate) ** 0.5 / precision[estimate.name] for estimate in group]
+        )  # a_i times the deviation
+        places = [keys.index(estimate.name) for estimate in group]
         covariance[np.ix_(places, places)] += (matrix - np.eye(len(group))) * np.outer(shares, shares)
     size = np.sqrt(np.diag(covariance))
     joint = covariance / np.outer(size, size)
     return keys, (joint + joint.T) / 2
 
 
-def _weighty(found: Sequence[Estimate]) -> list[Estimate]:
+def _weighty(estimates: Sequence[Estimate]) -> list[Estimate]:
     """Those that can be weighted: shown, with an interval."""
-    return [each for each in found if each.shown and each.half_width > 0]
+    return [estimate for estimate in estimates if estimate.determined and estimate.half_width > 0]
 
 
-def _weight(each: Estimate) -> float:
-    return (COVERAGE / each.half_width) ** 2
+def _weight(estimate: Estimate) -> float:
+    return (COVERAGE / estimate.half_width) ** 2
 
 
-def _mean(key: str, shown: Sequence[Estimate]) -> tuple[Estimate, bool]:
+def _mean(key: str, estimates: Sequence[Estimate]) -> tuple[Estimate, bool]:
     """The weighted mean where a chi-square test allows that all are of one value, and whether it does.
 
     Its interval is wider by the Birge ratio (Birge 1932, doi:10.1103/PhysRev.40.207), by Student's t of three and more,
@@ -80,23 +90,24 @@ def _mean(key: str, shown: Sequence[Estimate]) -> tuple[Estimate, bool]:
     its own (`_between`); of two, which hardly show a scatter, the interval spans both.
     """
     values, weights = (
-        np.array(column) for column in zip(*((each.value, _weight(each)) for each in shown), strict=True)
+        np.array(column)
+        for column in zip(*((estimate.value, _weight(estimate)) for estimate in estimates), strict=True)
     )
     mean, freedom = float(np.average(values, weights=weights)), len(values) - 1
-    shared = float(np.average([each.systematic for each in shown], weights=weights))
+    shared = float(np.average([estimate.systematic for estimate in estimates], weights=weights))
     squares = float(np.sum(weights * (values - mean) ** 2))
-    method = ", ".join(dict.fromkeys(each.method for each in shown))
+    method = ", ".join(dict.fromkeys(estimate.method for estimate in estimates))
     if chi2.sf(squares, freedom) > CHANCE:
-        own = np.array([(each.half_width - each.systematic) / COVERAGE for each in shown])
-        error = float(np.linalg.norm(weights * own)) / float(weights.sum())
+        errors = np.array([(estimate.half_width - estimate.systematic) / COVERAGE for estimate in estimates])
+        error = float(np.linalg.norm(weights * errors)) / float(weights.sum())
         ratio = (squares / freedom) ** 0.5
         wider = ratio * t_value(freedom) if ratio > 1 and freedom > 1 else COVERAGE * max(ratio, 1.0)
         half = wider * error + shared
-        return Estimate(key, shown[0].unit, mean, mean - half, mean + half, method, systematic=shared), True
+        return Estimate(key, estimates[0].unit, mean, mean - half, mean + half, method, systematic=shared), True
     if freedom == 1:
-        low, high = min(each.low for each in shown), max(each.high for each in shown)
-        return Estimate(key, shown[0].unit, (low + high) / 2, low, high, method), False
-    return by_t(key, shown[0].unit, _between(values, 1 / weights), method, shared, shared), False
+        low, high = min(estimate.low for estimate in estimates), max(estimate.high for estimate in estimates)
+        return Estimate(key, estimates[0].unit, (low + high) / 2, low, high, method), False
+    return by_t(key, estimates[0].unit, _between(values, 1 / weights), method, shared, shared), False
 
 
 def _between(values: np.ndarray, variances: np.ndarray) -> Mean:
@@ -113,32 +124,37 @@ def _between(values: np.ndarray, variances: np.ndarray) -> Mean:
     return Mean(float(np.average(values, weights=weights)), float(weights.sum() ** -0.5), max(float(equal) - 1, 1.0))
 
 
-def _left(key: str, own: Sequence[Estimate]) -> tuple[Estimate, bool]:
+def _left(key: str, estimates: Sequence[Estimate]) -> tuple[Estimate, bool]:
     """What several that do not show it leave possible: what they have in common, or the hull where that is nothing."""
-    bounding = [each for each in own if np.isfinite(each.low) or np.isfinite(each.high)] or own[:1]
-    low, high = max(each.low for each in bounding), min(each.high for each in bounding)
+    bounding = [
+        estimate for estimate in estimates if np.isfinite(estimate.low) or np.isfinite(estimate.high)
+    ] or estimates[:1]
+    low, high = max(estimate.low for estimate in bounding), min(estimate.high for estimate in bounding)
     agrees = low <= high
     if not agrees:
-        low, high = min(each.low for each in bounding), max(each.high for each in bounding)
+        low, high = min(estimate.low for estimate in bounding), max(estimate.high for estimate in bounding)
     method, reason = (
         joint.join(dict.fromkeys(texts))
-        for joint, texts in ((", ", [each.method for each in bounding]), ("; ", [each.reason for each in bounding]))
+        for joint, texts in (
+            (", ", [estimate.method for estimate in bounding]),
+            ("; ", [estimate.reason for estimate in bounding]),
+        )
     )
-    return Estimate.unknown(key, own[0].unit, method, reason, low, high), agrees
+    return Estimate.unknown(key, estimates[0].unit, method, reason, low, high), agrees
 
 
-def _text(each: Estimate) -> str:
-    return f"{_value(each)} by {each.method}"
+def _text(estimate: Estimate) -> str:
+    return f"{_value(estimate)} by {estimate.method}"
 
 
 def _texts(every: Sequence[Estimate]) -> str:
     """The values by method."""
-    methods = dict.fromkeys(each.method for each in every)
-    own = ([_value(each) for each in every if each.method == method] for method in methods)
-    return "; ".join(f"{', '.join(values)} by {method}" for method, values in zip(methods, own, strict=True))
+    methods = dict.fromkeys(estimate.method for estimate in every)
+    values_of = ([_value(estimate) for estimate in every if estimate.method == method] for method in methods)
+    return "; ".join(f"{', '.join(values)} by {method}" for method, values in zip(methods, values_of, strict=True))
 
 
-def _value(each: Estimate) -> str:
-    if each.shown:
-        return f"{each.value:.4g} ({each.low:.4g} to {each.high:.4g})"
-    return f"{each.low:.4g} to {each.high:.4g} is the possible range"
+def _value(estimate: Estimate) -> str:
+    if estimate.determined:
+        return f"{estimate.value:.4g} ({estimate.low:.4g} to {estimate.high:.4g})"
+    return f"{estimate.low:.4g} to {estimate.high:.4g} is the possible range"

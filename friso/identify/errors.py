@@ -47,12 +47,12 @@ class Residual:
 def errors_of(log: Log, part: slice, simulated: Simulated, bandwidth: float) -> SimulationErrors:
     """The errors of a simulated record of some samples of a log; `bandwidth` [Hz] is that of the motion."""
     measured = motion(log["position"][part], log.sample_time, SMOOTH * bandwidth)
-    found = motion(simulated.position, log.sample_time, SMOOTH * bandwidth)
+    modelled = motion(simulated.position, log.sample_time, SMOOTH * bandwidth)
     disturbance = log["disturbance"][part] if "disturbance" in log else 0.0
     return SimulationErrors(
         _relative(log["position"][part], simulated.position),
-        _relative(measured.velocity, found.velocity),
-        _relative(measured.acceleration, found.acceleration),
+        _relative(measured.velocity, modelled.velocity),
+        _relative(measured.acceleration, modelled.acceleration),
         _relative(log["force"][part], simulated.force + disturbance),
     )
 

@@ -38,12 +38,12 @@ class Estimate:
     def unknown(
         cls, name: str, unit: str, method: str, reason: str, low: float = -np.inf, high: float = np.inf
     ) -> Estimate:
-        """Not shown by the data, for this reason; at most bounded."""
+        """Not determined by the data, for this reason; at most bounded."""
         return cls(name, unit, np.nan, float(low), float(high), method, reason)
 
     @property
-    def shown(self) -> bool:
-        """Whether the data show the value."""
+    def determined(self) -> bool:
+        """Whether the data determine the value."""
         return not self.reason
 
     @property

@@ -126,16 +126,16 @@ def inverse_model(
     band = bandwidth or bandwidth_of(log["position"], log.sample_time)
     longest = max(part.stop - part.start for part in log.segments) * log.sample_time
     if band * longest < 1:
-        given, expected = f"{band:.3g} Hz for {longest:.3g} s", "at least one period of it in the log"
-        raise InputError("--bandwidth", given, expected, '--bandwidth "20 Hz"', log.name)
+        actual, expected = f"{band:.3g} Hz for {longest:.3g} s", "at least one period of it in the log"
+        raise InputError("--bandwidth", actual, expected, '--bandwidth "20 Hz"', log.name)
     parts = [_rows(log, part, band, by_direction, cart_share) for part in log.segments]
     time, columns, force = (np.concatenate([part[i] for part in parts]) for i in range(3))
     speed = np.abs(columns[:, 1] + columns[:, 3]) if by_direction else np.abs(columns[:, 1])
     slides = ~_rests(speed <= SLIDING * speed.max(initial=0.0), time)
     time, columns, force = time[slides], columns[slides], force[slides]
     if len(force) < LEAST:
-        given = f"{len(log.time)} samples, {len(force)} of them in motion after decimation to {5 * band:.3g} Hz"
-        raise InputError("position", given, f"at least {LEAST} in motion after decimation", "a longer log")
+        actual = f"{len(log.time)} samples, {len(force)} of them in motion after decimation to {5 * band:.3g} Hz"
+        raise InputError("position", actual, f"at least {LEAST} in motion after decimation", "a longer log")
     both = all(directions(log["position"]))
     if not both and not by_direction:
         columns[:, 3] = 0.0  # with Coulomb friction in one direction, which it is added to
@@ -200,8 +200,8 @@ def _rows(
     else:
         columns = np.stack([a, v, sign, np.ones_like(v)], axis=1)
     every = max(1, round(PASS / (2 * DECIMATE * band * log.sample_time)))
-    kept = [each[EDGE:] for each in (log.time[part], columns, log["force"][part])]
-    return kept[0][_first(len(kept[0]), every) :: every], _decimated(kept[1], every), _decimated(kept[2], every)
+    arrays = [array[EDGE:] for array in (log.time[part], columns, log["force"][part])]
+    return arrays[0][_first(len(arrays[0]), every) :: every], _decimated(arrays[1], every), _decimated(arrays[2], every)
 
 
 def _decimated(columns: np.ndarray, every: int) -> np.ndarray:

@@ -37,12 +37,12 @@ NOTHING_CHOSEN = AnalysisSettings()
 
 @dataclass(frozen=True)
 class Prior:
-    """What is known of the machine before an experiment is analysed: the stage (None where there is none), whether the
-    user gave it, so that its controller is the machine's, and what the experiments analysed before show, by key."""
+    """What is known of the machine before an experiment is analysed: the stage (None where there is none), whether it
+    is the user's, so that its controller is the machine's, and the estimates of experiments analysed before, by key."""
 
     stage: Stage | None = None
-    given: bool = False
-    shown: Mapping[str, Estimate] = field(default_factory=dict)
+    from_user: bool = False
+    estimates: Mapping[str, Estimate] = field(default_factory=dict)
 
     def flat(self, log: Log) -> dict[str, Any]:
         """The flat keys of the stage as it was set up for a log; none without a stage. Raises InputError."""
@@ -50,7 +50,7 @@ class Prior:
 
     def believed(self, log: Log) -> dict[str, Any]:
         """The same, with the values that other experiments show. Raises InputError."""
-        return {**self.flat(log), **{key: estimate.value for key, estimate in self.shown.items()}}
+        return {**self.flat(log), **{key: estimate.value for key, estimate in self.estimates.items()}}
 
     def masses(self, log: Log) -> tuple[float, float]:
         """Mass [kg] of the cart and of the stage as believed, 0 for what is not known. Raises InputError."""
@@ -70,13 +70,13 @@ def as_set_up(stage: Stage, log: Log) -> dict[str, Any]:
 
 def independent(result: Any, estimates: Sequence[Estimate]) -> Correlated:
     """Estimates none of which tells anything of another one."""
-    shown = with_interval(estimates)
-    return shown, np.eye(len(shown))
+    certain = with_interval(estimates)
+    return certain, np.eye(len(certain))
 
 
 def with_interval(estimates: Sequence[Estimate]) -> list[Estimate]:
     """Those that are shown, with an interval."""
-    return [estimate for estimate in estimates if estimate.shown and estimate.half_width > 0]
+    return [estimate for estimate in estimates if estimate.determined and estimate.half_width > 0]
 
 
 @dataclass(frozen=True)
@@ -117,7 +117,7 @@ class ExperimentKind(Generic[Result]):
 
     def needed(self, mapped: Mapping[str, Any]) -> tuple[str, ...]:
         """The roles that a log needs, where these are mapped."""
-        choices = [each.split("|") for each in self.roles]
+        choices = [channels.split("|") for channels in self.roles]
         return tuple(next((role for role in roles if role in mapped), roles[-1]) for roles in choices)
 
     def groups(self, sources: Sequence[Source]) -> list[tuple[Source, ...]]:

@@ -16,7 +16,7 @@ KINDS: Registry[ExperimentKind[Any]] = Registry("friso.identify.experiments", "K
 
 def in_order() -> list[str]:
     """The names of all kinds, those first whose results others use; by name where none uses the other's."""
-    sorter = TopologicalSorter({name: [each for each in KINDS[name].after if each in KINDS] for name in KINDS})
+    sorter = TopologicalSorter({name: [kind for kind in KINDS[name].after if kind in KINDS] for name in KINDS})
     sorter.prepare()
     names: list[str] = []
     while sorter.is_active():

@@ -70,7 +70,7 @@ def identify(
     for number, (kind, group) in enumerate(groups):
         progress(number, len(groups), f"{kind}: {', '.join(log.name for log in group)}")
         best = combined(_every_estimate(experiments))[0]
-        prior = Prior(stage, base is not None, {estimate.name: estimate for estimate in best if estimate.shown})
+        prior = Prior(stage, base is not None, {estimate.name: estimate for estimate in best if estimate.determined})
         result = KINDS[kind].analyse(group, prior, settings)
         experiments.append(Experiment(kind, group, result, KINDS[kind].estimates(result, stage)))
     estimates, warnings = combined(_every_estimate(experiments))
@@ -78,13 +78,13 @@ def identify(
         return Identification(None, Correlations(), tuple(experiments), tuple(estimates), tuple(warnings))
     warnings += _notes(experiments, base)
     fits = fitting(stage, estimates)
-    whole = identified(stage, fits.kept, [log.name for log, _ in logs])
+    whole = identified(stage, fits.estimates, [log.name for log, _ in logs])
     return Identification(
         whole,
         _correlations(experiments, estimates, fits, whole),
         tuple(experiments),
         tuple(estimates),
-        (*warnings, *fits.said),
+        (*warnings, *fits.notes),
     )
 
 
@@ -141,9 +141,11 @@ def _correlations(
         [KINDS[experiment.kind].correlated(experiment.result, experiment.estimates) for experiment in experiments],
     )
     uncertain = stage.uncertain()
-    leads = {one.name: one.name for one in fits.kept if one.name in keys and one in estimates} | {**fits.follows}
-    kept = [key for key, lead in leads.items() if key in uncertain and lead in keys]
-    places = [keys.index(leads[key]) for key in kept]
+    leads = {one.name: one.name for one in fits.estimates if one.name in keys and one in estimates} | {**fits.follows}
+    leading = [key for key, lead in leads.items() if key in uncertain and lead in keys]
+    places = [keys.index(leads[key]) for key in leading]
     part = matrix[np.ix_(places, places)]
-    alone = np.abs(part - np.eye(len(kept))).max(axis=1, initial=0.0) == 0
-    return Correlations(tuple(kept), part).among([key for key, single in zip(kept, alone, strict=True) if not single])
+    alone = np.abs(part - np.eye(len(leading))).max(axis=1, initial=0.0) == 0
+    return Correlations(tuple(leading), part).among(
+        [key for key, single in zip(leading, alone, strict=True) if not single]
+    )

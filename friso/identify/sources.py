@@ -27,7 +27,7 @@ class LogFile:
     kind: str
     reason: str
     mapping: Mapping = Mapping()  # noqa: RUF009 (frozen)
-    kept: Path | None = None
+    mapping_file: Path | None = None
 
 
 def read_all(paths: Sequence[Path], options: Mapping, folder: Path) -> list[LogFile]:
@@ -67,24 +67,24 @@ def _read(path: Path, options: Mapping, folder: Path) -> LogFile:
     if is_frequency_response(path):
         kind = next(name for name in KINDS if KINDS[name].responses)
         return LogFile(path, read_frequency_response(path), kind, "the file holds a frequency response")
-    kept = load(path, folder) or Mapping()
-    mapping = options.over(kept)
+    stored = load(path, folder) or Mapping()
+    mapping = options.over(stored)
     if mapping.experiment is not None:
         KINDS.checked(mapping.experiment, "--as", "--as {}")
         log = _log(path, mapping, mapping.experiment)
-        before = "" if kept.experiment in (None, mapping.experiment) else f", in place of {kept.experiment} as kept"
+        before = "" if stored.experiment in (None, mapping.experiment) else f", in place of {stored.experiment} as kept"
         return LogFile(path, log, mapping.experiment, f"as told{before}", mapping)
     log = read_log(path, mapping, strict=False, needed=("position", "force"))
     kind, reason = recognised(log, path)
     return LogFile(path, _log(path, mapping, kind) if KINDS[kind].si else log, kind, reason, mapping)
 
 
-def kept(file: LogFile, folder: Path) -> LogFile:
+def with_mapping_file(file: LogFile, folder: Path) -> LogFile:
     """The file with the place where its mapping is kept for the next time, if there is anything to keep: beside it, or
     in `folder`."""
     if file.mapping == Mapping():
         return file
-    return replace(file, kept=place_for(file.path, folder))
+    return replace(file, mapping_file=place_for(file.path, folder))
 
 
 def _log(path: Path, mapping: Mapping, kind: str) -> Log:

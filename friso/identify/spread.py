@@ -35,20 +35,20 @@ def spread_of(jacobian: np.ndarray, residual: np.ndarray) -> np.ndarray:
     """
     count, size = jacobian.shape
     scale = np.linalg.norm(jacobian, axis=0)
-    known = scale > 0
-    columns = jacobian[:, known] / scale[known]
+    positive = scale > 0
+    columns = jacobian[:, positive] / scale[positive]
     inverse, alike = _inverse(columns.T @ columns)
     scores = columns * residual[:, None]
-    window = max(correlation_length(each) for each in (residual, *scores.T))
+    window = max(correlation_length(series) for series in (residual, *scores.T))
     window = min(max(window, 1), max(2, int(LONGEST * count)))
     middle = scores.T @ scores
     for lag in range(1, window):
         shifted = scores[lag:].T @ scores[:-lag]
         middle += (1 - lag / window) * (shifted + shifted.T)
-    found = inverse @ middle @ inverse * count / max(count - size, 1)
+    sandwich = inverse @ middle @ inverse * count / max(count - size, 1)
     covariance = np.full((size, size), np.inf)
-    found[alike], found[:, alike] = np.inf, np.inf
-    covariance[np.ix_(known, known)] = found / np.outer(scale[known], scale[known])
+    sandwich[alike], sandwich[:, alike] = np.inf, np.inf
+    covariance[np.ix_(positive, positive)] = sandwich / np.outer(scale[positive], scale[positive])
     return covariance
 
 
@@ -56,6 +56,6 @@ def _inverse(square: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The inverse of columns of length 1 times themselves, and which of these cannot be told from others."""
     sizes, directions = np.linalg.eigh(square)
     lost = sizes < COLLINEAR * sizes[-1]
-    kept = directions[:, ~lost]
+    resolved = directions[:, ~lost]
     alike = (np.abs(directions[:, lost]) > np.sqrt(COLLINEAR)).any(axis=1)
-    return kept / sizes[~lost] @ kept.T, alike
+    return resolved / sizes[~lost] @ resolved.T, alike

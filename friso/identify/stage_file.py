@@ -23,12 +23,12 @@ DIGITS = 2
 OUR_CHOICE = "controller, motion, bristles and Stribeck velocity are our choice"
 
 
-def made_up(log: Log, found: InverseModel) -> Stage:
+def made_up(log: Log, inverse: InverseModel) -> Stage:
     """A stage around a log without any: one rigid mass, LuGre friction without Stribeck effect, a controller of our
     choice, and a move as fast as the log's fastest."""
-    mass, coulomb = (max(found.value(name), 1e-6) for name in ("mass", "coulomb"))
-    viscous, stiffness = max(found.value("viscous"), 0.0), coulomb / BENDING
-    parts = [motion(log["position"][part], log.sample_time, SMOOTH * found.bandwidth) for part in log.segments]
+    mass, coulomb = (max(inverse.value(name), 1e-6) for name in ("mass", "coulomb"))
+    viscous, stiffness = max(inverse.value("viscous"), 0.0), coulomb / BENDING
+    parts = [motion(log["position"][part], log.sample_time, SMOOTH * inverse.bandwidth) for part in log.segments]
     top = max(float(np.abs(part.velocity).max()) for part in parts)
     brisk = max(float(np.abs(part.acceleration).max()) for part in parts)
     time = max(top / brisk, log.sample_time)
@@ -73,13 +73,13 @@ def identified(stage: Stage, estimates: Iterable[Estimate], logs: Iterable[str])
     return stage.replace({**changes, "source": f"{source}; {stage.source}" if stage.source else source})
 
 
-def written(found: Estimate) -> str:
+def written(estimate: Estimate) -> str:
     """The text of an estimate in a stage file: "20.4 N +/- 0.1 N", or "1 N .. 2.5 N" for what is not shown."""
-    unit = f" {found.unit}" if found.unit else ""
-    if not found.shown:
-        return f"{found.low:.3g}{unit} .. {found.high:.3g}{unit}"
-    half, digits = rounded(found.half_width)
-    value = f"{found.value:.{digits}f}" if digits > 0 else f"{round(found.value, digits):.0f}"
+    unit = f" {estimate.unit}" if estimate.unit else ""
+    if not estimate.determined:
+        return f"{estimate.low:.3g}{unit} .. {estimate.high:.3g}{unit}"
+    half, digits = rounded(estimate.half_width)
+    value = f"{estimate.value:.{digits}f}" if digits > 0 else f"{round(estimate.value, digits):.0f}"
     return f"{value}{unit} +/- {half}{unit}"
 
 

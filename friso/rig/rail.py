@@ -72,8 +72,8 @@ def _white(first: int, count: int, seed: int, length: float) -> np.ndarray:
     """Independent standard normal numbers of cells from number `first`, each a function of its number alone."""
     if count > MOST_CELLS:
         least = length * count / MOST_CELLS
-        given, expected = f"{length:.3g} m", f"at least {least:.3g} m for places that far apart"
-        raise InputError("rail.correlation_length", given, expected, 'correlation_length = "5 mm"')
+        actual, expected = f"{length:.3g} m", f"at least {least:.3g} m for places that far apart"
+        raise InputError("rail.correlation_length", actual, expected, 'correlation_length = "5 mm"')
     block, skipped = divmod(first, BLOCK)
     words = np.random.Philox(key=[seed, FIELD], counter=block % 2**256).random_raw(skipped + count)[skipped:]
     return ndtri(((words >> np.uint64(11)) + 0.5) * 2.0**-53)

@@ -103,11 +103,11 @@ def _check(flat: Mapping[str, Any], interval: float) -> None:
         and flat["friction.model"] != "none"
         and not any(f"friction.{level}" in flat for level in LEVELS)
     ):
-        given = f'a [rail], but friction "{flat["friction.model"]}" without a static or Coulomb level to vary along it'
-        raise InputError("rail", given, "no [rail], or a law with such a level", 'model = "lugre"')
+        actual = f'a [rail], but friction "{flat["friction.model"]}" without a static or Coulomb level to vary along it'
+        raise InputError("rail", actual, "no [rail], or a law with such a level", 'model = "lugre"')
     if whole_samples(flat) > MOST_SAMPLES:
-        given = f"{flat['drive.delay']:g} s, {whole_samples(flat)} samples of {flat['drive.sample_time']:g} s"
-        raise InputError("drive.delay", given, f"at most {MOST_SAMPLES} samples", 'delay = "100 us"')
+        actual = f"{flat['drive.delay']:g} s, {whole_samples(flat)} samples of {flat['drive.sample_time']:g} s"
+        raise InputError("drive.delay", actual, f"at most {MOST_SAMPLES} samples", 'delay = "100 us"')
     samples = interval / flat["drive.sample_time"]
     if samples < 1 - 1e-9 or abs(samples - round(samples)) > 1e-6:
         expected = f"a whole number of samples of the drive, {flat['drive.sample_time']:g} s each"

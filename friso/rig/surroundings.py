@@ -71,12 +71,12 @@ def _over_time(floor: Floor | None, task: MoveTask, seeds: Sequence[int]) -> tup
     fine += [1 / (PER_PERIOD * floor.frequency[-1])] if floor else []
     interval = min(fine)
     count = int(np.ceil(task.duration / interval)) + 2
-    found = np.zeros((len(seeds) if floor else 1, 2, count))
+    inputs = np.zeros((len(seeds) if floor else 1, 2, count))
     if injected:
-        given = np.arange(len(task.injected)) * task.injected_each
-        found[:, 0] = np.interp(np.arange(count) * interval, given, task.injected, right=0.0)
+        times = np.arange(len(task.injected)) * task.injected_each
+        inputs[:, 0] = np.interp(np.arange(count) * interval, times, task.injected, right=0.0)
     if floor:
         for run, seed in enumerate(seeds):
             shaken = floor_acceleration(floor, count * interval, interval, seed)
-            found[run, 1] = shaken[:count]
-    return found, 1 / interval
+            inputs[run, 1] = shaken[:count]
+    return inputs, 1 / interval

@@ -66,9 +66,9 @@ class ControllerSection(UncertainSection):
             expected = "the time in which the integrator unwinds as well"
             raise StageError("anti_windup", f'"{BACK_CALCULATION}"', expected, 'anti_windup_time = "50 ms"')
         if self.anti_windup_time is not None and not by_time:
-            given = f'anti_windup = "{self.anti_windup}"' if self.anti_windup else "no anti_windup"
+            actual = f'anti_windup = "{self.anti_windup}"' if self.anti_windup else "no anti_windup"
             expected = "the anti-windup to which this time belongs"
-            raise StageError("anti_windup_time", given, expected, f'anti_windup = "{BACK_CALCULATION}"')
+            raise StageError("anti_windup_time", actual, expected, f'anti_windup = "{BACK_CALCULATION}"')
         return self
 
     @classmethod

@@ -133,7 +133,7 @@ def _belongs(correlations: Correlations, stage: Stage) -> None:
 
 
 @dataclass(frozen=True)
-class Drawn:
+class Sample:
     """Stages drawn: dotted keys to SI arrays, shape (count,). Draws in which a key was `beyond` its bound, or that
     broke a rule between keys (`broken`: what was expected, to how many), were left out and others drawn instead."""
 
@@ -148,7 +148,7 @@ class Drawn:
         return self.beyond + sum(self.broken.values())
 
 
-def draw(stage: Stage, correlations: Correlations, count: int, seed: int) -> Drawn:
+def draw(stage: Stage, correlations: Correlations, count: int, seed: int) -> Sample:
     """Draw stages from what is uncertain of one: a scrambled Sobol sequence (Owen 1998), in which the same seed gives
     the same stages. Raises StageError where no key is uncertain, or hardly any draw is allowed."""
     from scipy.stats import qmc
@@ -172,7 +172,7 @@ def draw(stage: Stage, correlations: Correlations, count: int, seed: int) -> Dra
         accepted += int(within[seen].sum())
         if accepted == count:
             joined = {key: np.concatenate([part[key] for part in parts]) for key in intervals}
-            return Drawn(joined, count, beyond, broken)
+            return Sample(joined, count, beyond, broken)
     most = broken.most_common(1)
     text = f"ranges of which {100 * accepted / (MOST * size):.2g} % are allowed"
     raise StageError("", text, most[0][0] if most else "ranges within the bounds of their keys")

@@ -12,7 +12,10 @@ def foreign() -> list[str]:
         "friction law": FRICTION.classes.items(),
     }
     return [
-        f"{what} {name} ({cls.__module__})" for what, known in kinds.items() for name, cls in known if plug_in_of(cls)
+        f"{what} {name} ({cls.__module__})"
+        for what, classes in kinds.items()
+        for name, cls in classes
+        if plug_in_of(cls)
     ]
 
 

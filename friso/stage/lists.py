@@ -47,15 +47,15 @@ class Several:
         quote = '"' if isinstance(self.of, Quantity) else ""
         return f"[{', '.join(f'{quote}{example}{quote}' for example in self.examples)}]"
 
-    def read(self, given: Any, read_one: Callable[[Any], Any] | None = None) -> Values:
+    def read(self, raw: Any, read_one: Callable[[Any], Any] | None = None) -> Values:
         """The values of an array, each read by `read_one` or as the key's kind is. Raises InputError, under the number
         of the element that is wrong."""
-        size = len(given) if isinstance(given, list | tuple) else None
+        size = len(raw) if isinstance(raw, list | tuple) else None
         if size is None or size < self.least or size > (self.most or size):
             hint = "not an array" if size is None else f"of {size}"
-            raise InputError("", quoted(given if size is None else [*given], hint), self.expected, self.written_example)
+            raise InputError("", quoted(raw if size is None else [*raw], hint), self.expected, self.written_example)
         read, values = read_one or self.of.read, []
-        for number, item in enumerate(given, start=1):
+        for number, item in enumerate(raw, start=1):
             try:
                 values.append(read(item))
             except InputError as error:

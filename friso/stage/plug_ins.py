@@ -80,5 +80,5 @@ def load_installed(group: str) -> None:
         except InputError as error:
             raise error.under(f"{group}: {point.name}") from None
         except Exception as error:
-            given = f"{point.value}, which cannot be imported: {error}"
-            raise InputError(f"{group}: {point.name}", given, "a module that registers its class") from error
+            actual = f"{point.value}, which cannot be imported: {error}"
+            raise InputError(f"{group}: {point.name}", actual, "a module that registers its class") from error

@@ -147,7 +147,7 @@ class Density(Quantity):
         try:
             return Value(super().read(amplitude), text)
         except InputError as error:
-            why = error.given.replace(quoted(amplitude), quoted(text))
+            why = error.actual.replace(quoted(amplitude), quoted(text))
             raise StageError("", why, self.expected, self.written_example) from None
 
 

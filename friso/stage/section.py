@@ -131,9 +131,9 @@ class Variants:
         name = self.name_of(cls)
         taken = self.classes.get(name, cls)
         if (taken.__module__, taken.__qualname__) != (cls.__module__, cls.__qualname__):
-            given = f"{as_toml(name)}, which {cls.__module__}.{cls.__qualname__} registers"
+            actual = f"{as_toml(name)}, which {cls.__module__}.{cls.__qualname__} registers"
             expected = f"a name that is not taken: {taken.__module__}.{taken.__qualname__} has it"
-            raise InputError(self.tag, given, expected, f'{self.tag}: Literal["my_{name}"]')
+            raise InputError(self.tag, actual, expected, f'{self.tag}: Literal["my_{name}"]')
         self.classes[name] = cls
         return cls
 
@@ -196,7 +196,7 @@ def _complete(error: InputError, key: str) -> InputError:
     """The error seen from the table: below `key`, which also goes before an example that is a mere value."""
     is_value = not error.key and error.example and "=" not in error.example
     example = f"{key} = {error.example}" if is_value else error.example
-    return InputError(error.key, error.given, error.expected, example).under(key)
+    return InputError(error.key, error.actual, error.expected, example).under(key)
 
 
 def _described(cls: type[Section], key: str) -> tuple[str, str]:

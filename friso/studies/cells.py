@@ -103,8 +103,8 @@ def run_cells(
             table.write(cells[runs.numbers], measure(runs.part(flat), runs), runs)
     if "verdict" in metrics:
         for flat, cells, shape in _groups(parts, table.ran):
-            known = _once(attractors, flat, len(cells), shape, threads, cancel) if can_hunt(flat) else None
-            words = judge_runs(flat, table.motions(cells), known, rtol, threads, cancel)
+            attracting = _once(attractors, flat, len(cells), shape, threads, cancel) if can_hunt(flat) else None
+            words = judge_runs(flat, table.motions(cells), attracting, rtol, threads, cancel)
             table.columns["verdict"][cells] = words
     if any(name in metrics for name in CYCLE_UNITS):
         for cells, cycles in cell_cycles(stage, links, columns, table.valid, threads, cancel):
@@ -144,8 +144,8 @@ def _once(
     varied = [np.zeros(count)]
     varied += [value for key, value in flat.items() if np.ndim(value) and not key.startswith("motion.")]
     _, first, again = np.unique(np.stack(varied), axis=1, return_index=True, return_inverse=True)
-    own = {key: value[first] if np.ndim(value) else value for key, value in flat.items()}
-    stages = Ensemble.held(own, len(first), form=shape, threads=threads, cancel=cancel)
+    of_structure = {key: value[first] if np.ndim(value) else value for key, value in flat.items()}
+    stages = Ensemble.held(of_structure, len(first), form=shape, threads=threads, cancel=cancel)
     return find(stages).take(again.ravel())
 
 
@@ -172,8 +172,8 @@ def _groups(
     """The cells that are chosen, shape (cells,), by the equations they need: their flat SI form, numbers, structure."""
     for flat, cells in parts:
         for shape, members in _by_structure(flat, chosen[cells], len(cells)):
-            own = {key: value[members] if np.ndim(value) else value for key, value in flat.items()}
-            yield own, cells[members], shape
+            of_group = {key: value[members] if np.ndim(value) else value for key, value in flat.items()}
+            yield of_group, cells[members], shape
 
 
 def _by_words(

@@ -15,7 +15,7 @@ from friso.hunting.cycle.hunting import why_not
 from friso.hunting.verdict import judge_many
 from friso.progress import Progress, Tally, silent
 from friso.stage import Stage, numeric_keys
-from friso.stage.correlations import Drawn, laid_over
+from friso.stage.correlations import Sample, laid_over
 from friso.studies.shares import Share, share
 
 CHUNK = 256
@@ -51,22 +51,22 @@ class Fates:
         if not (attracted.any() and others.any()):
             return {}
         pairs = int(attracted.sum()) * int(others.sum())
-        found = {
+        separation = {
             key: 2 * float(mannwhitneyu(values[attracted], values[others]).statistic) / pairs - 1
             for key, values in keys.items()
         }
-        return dict(sorted(found.items(), key=lambda item: -abs(item[1])))
+        return dict(sorted(separation.items(), key=lambda item: -abs(item[1])))
 
 
-def fates(stage: Stage, drawn: Drawn, rtol: float, progress: Progress = silent) -> dict[str, Fates]:
+def fates(stage: Stage, sample: Sample, rtol: float, progress: Progress = silent) -> dict[str, Fates]:
     """The fates of the drawn stages as given and, with a joint, locked and free."""
     variants = different(stage)
-    wanted = [shared_structure(laid_over(variant, drawn.keys)) for variant in variants.values()]
-    kernels([Wanted(form, variational) for form in wanted for variational in (False, not why_not(form))])
-    tally = Tally(progress, drawn.count * len(variants))
-    found = {name: _fates(variant, drawn, rtol, tally) for name, variant in variants.items()}
+    structures = [shared_structure(laid_over(variant, sample.keys)) for variant in variants.values()]
+    kernels([Wanted(form, variational) for form in structures for variational in (False, not why_not(form))])
+    tally = Tally(progress, sample.count * len(variants))
+    by_variant = {name: _fates(variant, sample, rtol, tally) for name, variant in variants.items()}
     return {
-        name: found[next(other for other, known in variants.items() if known == variant)]
+        name: by_variant[next(other for other, same in variants.items() if same == variant)]
         for name, variant in stage.variants().items()
     }
 
@@ -76,7 +76,7 @@ class Draws:
     """Stages drawn from an uncertain one with a seed, and their fates case by case."""
 
     stage: Stage
-    drawn: Drawn
+    sample: Sample
     seed: int
     fates: Mapping[str, Fates]
 
@@ -87,18 +87,18 @@ class Draws:
 
 def different(stage: Stage) -> dict[str, Stage]:
     """The variants of a stage, each once."""
-    kept: dict[str, Stage] = {}
+    variants: dict[str, Stage] = {}
     for name, variant in stage.variants().items():
-        if variant not in kept.values():
-            kept[name] = variant
-    return kept
+        if variant not in variants.values():
+            variants[name] = variant
+    return variants
 
 
-def _fates(stage: Stage, drawn: Drawn, rtol: float, tally: Tally) -> Fates:
-    words = np.full(drawn.count, "failed", dtype=object)
-    for first in range(0, drawn.count, CHUNK):
-        some = slice(first, min(first + CHUNK, drawn.count))
-        keys = {key: values[some] for key, values in drawn.keys.items()}
+def _fates(stage: Stage, sample: Sample, rtol: float, tally: Tally) -> Fates:
+    words = np.full(sample.count, "failed", dtype=object)
+    for first in range(0, sample.count, CHUNK):
+        some = slice(first, min(first + CHUNK, sample.count))
+        keys = {key: values[some] for key, values in sample.keys.items()}
         words[some] = judge_many(laid_over(stage, keys), some.stop - first, rtol)
         tally.add(some.stop - first, "draws")
     return Fates(words)

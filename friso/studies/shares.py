@@ -18,11 +18,11 @@ class Share:
     high: float
 
 
-def share(flags: np.ndarray, known: np.ndarray) -> Share:
-    """The share of runs of which something holds, `flags`, among those of which it is `known`, both of any one shape;
+def share(flags: np.ndarray, decided: np.ndarray) -> Share:
+    """The share of runs of which something holds, `flags`, among those where it is `decided`, both of any one shape;
     the others count either way in the interval."""
-    count, unknown = np.size(flags), int(np.count_nonzero(~known))
-    hits = int(np.count_nonzero(flags & known))
+    count, unknown = np.size(flags), int(np.count_nonzero(~decided))
+    hits = int(np.count_nonzero(flags & decided))
     if not count:
         return Share(np.nan, 0.0, 1.0)
     low = binomtest(hits, count).proportion_ci(0.95, method="exact").low

@@ -229,11 +229,11 @@ def _refuse_foreign(path: Path) -> None:
     except (OSError, ValueError, KeyError):
         old = False
     if old:
-        given = "a store of an earlier friso, whose verdicts are by the peak count of the runs"
+        actual = "a store of an earlier friso, whose verdicts are by the peak count of the runs"
         expected = "a store that tells what the runs did (outcome): run the study again under a new name"
-        raise StoreError("", given, expected, "friso map STAGE.toml ... --out study.zarr", str(path))
-    given = "a folder with other things in it" if path.is_dir() else "a file"
-    raise StoreError("", f"{given}; nothing was overwritten", expected, "--out study.zarr", str(path))
+        raise StoreError("", actual, expected, "friso map STAGE.toml ... --out study.zarr", str(path))
+    actual = "a folder with other things in it" if path.is_dir() else "a file"
+    raise StoreError("", f"{actual}; nothing was overwritten", expected, "--out study.zarr", str(path))
 
 
 def _refuse_other(path: Path, study: Study) -> None:

@@ -56,8 +56,10 @@ class Report:
         """The page: it opens offline, prints, and is the same bytes on every run."""
         figures = [(figure, Markup(plotly_renderer.fragment(figure)), print_image(figure)) for figure in self.figures]
         scripts = Markup(plotly_renderer.script()) if figures or self.scripted else None
-        own = {name: getattr(self, name) for name in ("name", "stage_file", "source", "version")}
-        return environment().get_template(self.template).render(figures=figures, plotly=scripts, **own, **self.values)
+        common = {name: getattr(self, name) for name in ("name", "stage_file", "source", "version")}
+        return (
+            environment().get_template(self.template).render(figures=figures, plotly=scripts, **common, **self.values)
+        )
 
 
 def environment() -> Environment:

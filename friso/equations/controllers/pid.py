@@ -29,12 +29,14 @@ class Pid(ControllerSection):
     def pick(cls, forms: Sequence[type[ControllerSection]], table: Mapping[str, Any]) -> type[Pid]:
         """By rules or by gains. Raises StageError for both or neither."""
         by_keys = sorted(cast(Sequence[type[Pid]], forms), key=lambda form: not form.told_by)
-        own = {form: [key for key in form.model_fields if key in {*table} - {*cls.model_fields}] for form in by_keys}
-        used = [form for form, keys in own.items() if keys]
+        keys_of = {
+            form: [key for key in form.model_fields if key in {*table} - {*cls.model_fields}] for form in by_keys
+        }
+        used = [form for form, keys in keys_of.items() if keys]
         if len(used) > 1:
-            given = " together with ".join(f"{', '.join(own[form])} ({form.written})" for form in used)
-            raise StageError("", given, "one form, not both", EITHER_FORM)
+            actual = " together with ".join(f"{', '.join(keys_of[form])} ({form.written})" for form in used)
+            raise StageError("", actual, "one form, not both", EITHER_FORM)
         if not used or not {*used[0].needed} & {*table}:
-            given = f"neither {' nor '.join(form.asked for form in by_keys)}"
-            raise StageError("", given, "one of the two forms", EITHER_FORM)
+            actual = f"neither {' nor '.join(form.asked for form in by_keys)}"
+            raise StageError("", actual, "one of the two forms", EITHER_FORM)
         return used[0]

@@ -58,8 +58,8 @@ def _compiled(form: Imposed) -> tuple[Callable[..., list[Any]], tuple[str, ...],
     friction = friction_law(form.friction).declare(velocity, form.friction_variant)
     inner = friction.component.states
     if any(isinstance(kink, Switch) for kink in friction.component.kinks):
-        given = f'"{form.friction}", with modes that remember'
-        raise InputError("friction.model", given, "a law that is smooth but for the direction", 'model = "lugre"')
+        actual = f'"{form.friction}", with modes that remember'
+        raise InputError("friction.model", actual, "a law that is smooth but for the direction", 'model = "lugre"')
     if len(inner) > 1:
         law = f'"{form.friction}", with {len(inner)} states of its own'
         raise InputError("friction.model", law, "a law with at most one", 'model = "lugre"')

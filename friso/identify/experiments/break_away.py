@@ -69,10 +69,10 @@ def static_from_ramps(
     for part in log.segments:
         if part.stop - part.start < LEAST:
             continue
-        found = slips(body[part], log.sample_time, cutoff)
-        threshold = max(threshold, found.threshold)
+        breaks = slips(body[part], log.sample_time, cutoff)
+        threshold = max(threshold, breaks.threshold)
         pushed = low_pass(force[part], log.sample_time, cutoff)
-        marks = zip(found.onsets, found.starts, found.rests, found.directions, strict=True)
+        marks = zip(breaks.onsets, breaks.starts, breaks.rests, breaks.directions, strict=True)
         for onset, start, rest, way in marks:
             begin = rest + _half(way * force[part][rest : start + 1])
             if start - begin < max(SMEARED / (cutoff * log.sample_time), SAMPLES):
@@ -87,12 +87,12 @@ def static_from_ramps(
             first = part.start + at
             rows.append((float(log.time[first]), float(body[first]), float(way), level, float(rising), unsure))
     table = np.array([row for row in rows if row[3] > 0 and row[4] > 0]).reshape(-1, 6).T
-    said = []
+    notes = []
     if quick:
-        said.append(f"{quick} ramps rise too fast for a low-pass at {cutoff:g} Hz (or the sampling) and are left out.")
+        notes.append(f"{quick} ramps rise too fast for a low-pass at {cutoff:g} Hz (or the sampling) and are left out.")
     if len(rows) > table.shape[1]:
-        said.append(f"{len(rows) - table.shape[1]} motions did not begin under a rising force and are left out.")
-    return _answer(table, bristle_rate, threshold, said)
+        notes.append(f"{len(rows) - table.shape[1]} motions did not begin under a rising force and are left out.")
+    return _answer(table, bristle_rate, threshold, notes)
 
 
 def _half(push: np.ndarray) -> int:
@@ -101,21 +101,25 @@ def _half(push: np.ndarray) -> int:
     return int(np.flatnonzero(seen <= (seen[0] + seen[-1]) / 2)[-1])
 
 
-def _answer(table: np.ndarray, bristle_rate: float, threshold: float, said: list[str]) -> BreakAway:
+def _answer(table: np.ndarray, bristle_rate: float, threshold: float, notes: list[str]) -> BreakAway:
     times, places, directions, forces, rates, unsure = table
 
     def static(chosen: np.ndarray) -> Estimate:
-        found = static_friction("friction.static", forces[chosen], rates[chosen], bristle_rate)
+        estimate = static_friction("friction.static", forces[chosen], rates[chosen], bristle_rate)
         off = float(unsure[chosen].mean()) if chosen.any() else 0.0
-        ends = {"low": max(found.low - off, 0.0), "high": found.high + off}
-        found = replace(found, **ends, systematic=found.systematic + off)
-        return found if found.shown else replace(found, reason=" ".join([f"{found.reason}.", *said]).rstrip("."))
+        ends = {"low": max(estimate.low - off, 0.0), "high": estimate.high + off}
+        estimate = replace(estimate, **ends, systematic=estimate.systematic + off)
+        return (
+            estimate
+            if estimate.determined
+            else replace(estimate, reason=" ".join([f"{estimate.reason}.", *notes]).rstrip("."))
+        )
 
     one, other = (static(mask) for _, mask in ways(directions))
     every = static(np.ones(len(forces), dtype=bool))
-    if one.shown and other.shown and (one.low > other.high or other.low > one.high):
-        said.append(f"The directions differ: {one.value:.3g} N forward, {other.value:.3g} N backward.")
-    return BreakAway(every, one, other, times, places, directions, forces, rates, unsure, threshold, tuple(said))
+    if one.determined and other.determined and (one.low > other.high or other.low > one.high):
+        notes.append(f"The directions differ: {one.value:.3g} N forward, {other.value:.3g} N backward.")
+    return BreakAway(every, one, other, times, places, directions, forces, rates, unsure, threshold, tuple(notes))
 
 
 def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> BreakAway:

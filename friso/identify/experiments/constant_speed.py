@@ -46,7 +46,7 @@ def _correlated(result: FrictionAtSpeeds, estimates: Sequence[Estimate]) -> Corr
     if not covariance.size:
         return independent(result, estimates)
     fitted = enumerate(estimates[: len(covariance)])
-    rows = [row for row, estimate in fitted if estimate.shown and estimate.half_width > 0]
+    rows = [row for row, estimate in fitted if estimate.determined and estimate.half_width > 0]
     size = np.sqrt(np.diag(covariance))
     return [estimates[row] for row in rows], (covariance / np.outer(size, size))[np.ix_(rows, rows)]
 

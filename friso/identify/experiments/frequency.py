@@ -87,16 +87,16 @@ def _parasitic(model: TwoMass, stage: Stage) -> float | None:
         return None
     masses = (flat["masses.cart"], flat["masses.stage"])
     joint = np.sqrt(flat["joint.stiffness"] * sum(masses) / np.prod(masses)) / (2 * np.pi)
-    found = model["resonance frequency"].value
-    away = [abs(np.log(found / each)) for each in (joint, flat["parasitic.frequency"])]
-    return found if away[1] < away[0] else None
+    resonance = model["resonance frequency"].value
+    away = [abs(np.log(resonance / frequency)) for frequency in (joint, flat["parasitic.frequency"])]
+    return resonance if away[1] < away[0] else None
 
 
 def _correlated(result: Bench, estimates: Sequence[Estimate]) -> Correlated:
     """Masses that are shared out of one move together."""
-    shown = with_interval(estimates)
+    certain = with_interval(estimates)
     if all(estimate.name.startswith("masses.") for estimate in estimates):
-        return shown, np.ones((len(shown), len(shown)))
+        return certain, np.ones((len(certain), len(certain)))
     return independent(result, estimates)
 
 

@@ -21,10 +21,10 @@ from friso.identify.logs.log import Log
 from friso.identify.output_error.answers import estimates_of
 from friso.identify.output_error.coverage import Coverage, coverage
 from friso.identify.output_error.fit import OutputErrorFit
+from friso.identify.output_error.identifiable import fit_identifiable
 from friso.identify.output_error.parameters import MASS, keys_of, parameters_of
 from friso.identify.output_error.problem import Problem, Simulated, closed_loop, tracking, why_continuous
 from friso.identify.output_error.profile import Profile
-from friso.identify.output_error.shown import fit_shown
 from friso.identify.readings.course import Course
 from friso.identify.stage_file import made_up
 from friso.stage import Stage
@@ -56,7 +56,7 @@ class IdentifiedMoves:
     @property
     def correlated(self) -> tuple[Estimate, ...]:
         """The estimates that the rows of `correlation` stand for."""
-        return tuple(estimate for estimate in self.estimates if estimate.shown and estimate.half_width > 0)
+        return tuple(estimate for estimate in self.estimates if estimate.determined and estimate.half_width > 0)
 
     @property
     def flat(self) -> dict[str, Any]:
@@ -64,13 +64,13 @@ class IdentifiedMoves:
         return fitted_flat(self.fit)
 
 
-def fitted_flat(found: OutputErrorFit) -> dict[str, Any]:
+def fitted_flat(fit: OutputErrorFit) -> dict[str, Any]:
     """The stage of a fit as flat keys."""
     values = {
         parameter.name: parameter.outer(inner)
-        for parameter, inner in zip(found.problem.parameters, found.inner, strict=True)
+        for parameter, inner in zip(fit.problem.parameters, fit.inner, strict=True)
     }
-    return {**found.problem.flat, **keys_of(found.problem.flat, values)}
+    return {**fit.problem.flat, **keys_of(fit.problem.flat, values)}
 
 
 def identify_moves(
@@ -91,13 +91,13 @@ def identify_moves(
     starts = {parameter.name: parameter.start for parameter in follows.parameters}
     mass, coulomb = starts[MASS], starts.get("friction.coulomb", np.inf)
     covered = coverage(log["position"][part], moved, mass, coulomb, log.sample_time)
-    found, profiles, shown = fit_shown(follows, loop, covered, inverse.bandwidth)
-    estimates, correlation = estimates_of(found, profiles, shown, covered)
-    simulated = (loop or follows).record(found.inner)
+    fit, profiles, identifiable = fit_identifiable(follows, loop, covered, inverse.bandwidth)
+    estimates, correlation = estimates_of(fit, profiles, identifiable, covered)
+    simulated = (loop or follows).record(fit.inner)
     return IdentifiedMoves(
-        log, part, inverse, by_direction, found, profiles, estimates, correlation, covered, simulated,
+        log, part, inverse, by_direction, fit, profiles, estimates, correlation, covered, simulated,
         errors_of(log, part, simulated, inverse.bandwidth) if loop else unexplained(log, part, simulated),
-        residual_of(found.residual, moved, log.sample_time), loop,
+        residual_of(fit.residual, moved, log.sample_time), loop,
     )  # fmt: skip
 
 
@@ -110,18 +110,18 @@ class SimulatedLog:
     errors: SimulationErrors
 
 
-def simulated_log(found: IdentifiedMoves, log: Log) -> SimulatedLog:
+def simulated_log(moves: IdentifiedMoves, log: Log) -> SimulatedLog:
     """Another log of the same axis simulated with what was found.
 
     Raises InputError where the machine's own loop is not known.
     """
-    if found.loop is None:
+    if moves.loop is None:
         expected = "the machine's own controller, with which another record can be simulated"
         raise InputError("--predict", "no stage file", expected, "--stage examples/emps_axis.toml", log.name)
     part = log.longest
-    problem = _same_kind(found.loop, log, part)
-    simulated = problem.record(found.fit.inner)
-    return SimulatedLog(part, simulated, errors_of(log, part, simulated, found.inverse.bandwidth))
+    problem = _same_kind(moves.loop, log, part)
+    simulated = problem.record(moves.fit.inner)
+    return SimulatedLog(part, simulated, errors_of(log, part, simulated, moves.inverse.bandwidth))
 
 
 def _same_kind(problem: Problem, log: Log, part: slice) -> Problem:
@@ -133,8 +133,8 @@ def _same_kind(problem: Problem, log: Log, part: slice) -> Problem:
 def _has(log: Log, roles: Sequence[str]) -> None:
     for role in roles:
         if role not in log:
-            given = f"a log with {', '.join(log.signals) or 'no signals'}"
-            raise InputError(role, given, f"its {role}", f'--map {role}="NAME OF THE CHANNEL"', log.name)
+            actual = f"a log with {', '.join(log.signals) or 'no signals'}"
+            raise InputError(role, actual, f"its {role}", f'--map {role}="NAME OF THE CHANNEL"', log.name)
         if role in log.units:
             example = f'--scale {role}="35 {"N" if role == "force" else "mm"}/{log.unit(role)}"'
             raise InputError(role, f"a channel in {log.unit(role)}", "what one of these is in SI", example, log.name)
@@ -191,10 +191,10 @@ RESTS = 0.1
 
 def _without_controller() -> str:
     """Why the machine's own controller is needed."""
-    held, shown = (evidence.value("identify.without-controller", name) for name in ("held", "shown"))
+    covered, reported = (evidence.value("identify.without-controller", name) for name in ("held", "shown"))
     return (
         "without the machine's own controller the intervals of friction are too narrow: on randomly drawn machines "
-        f"only {held:.0f} of {shown:.0f} contained the true value (python -m benchmarks.identify); specify the "
+        f"only {covered:.0f} of {reported:.0f} contained the true value (python -m benchmarks.identify); specify the "
         "controller with --stage"
     )
 
@@ -220,16 +220,19 @@ def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -
     (log,) = logs
     assert isinstance(log, Log)
     flat = prior.flat(log)
-    start = {**flat, **{key: estimate.value for key, estimate in prior.shown.items() if key in flat}}
-    return identify_moves(log, start, prior.given and "reference" in log, settings.bandwidth)
+    start = {**flat, **{key: estimate.value for key, estimate in prior.estimates.items() if key in flat}}
+    return identify_moves(log, start, prior.from_user and "reference" in log, settings.bandwidth)
 
 
 def _notes(results: Sequence[IdentifiedMoves], stage: Stage | None) -> list[str]:
     """Where the drive that was given is not the one simulated, and where no controller was."""
     loops = [result for result in results if result.loop] if stage is not None else []
-    told = [why_continuous(stage.flat(), result.log.sample_time) for result in loops if stage is not None]
+    reasons = [why_continuous(stage.flat(), result.log.sample_time) for result in loops if stage is not None]
     followed = any(result.loop is None for result in results)
-    return [*(sentence for sentence in dict.fromkeys(told) if sentence), *([_without_controller()] if followed else [])]
+    return [
+        *(sentence for sentence in dict.fromkeys(reasons) if sentence),
+        *([_without_controller()] if followed else []),
+    ]
 
 
 def _predict(result: IdentifiedMoves, log: Log, settings: AnalysisSettings) -> SimulatedLog | None:

@@ -128,9 +128,9 @@ def bristles_from_presliding(log: Log, between: Between = DIRECT) -> Presliding:
         for key, *numbers in zip(KEYS, best.values, np.diag(best.covariance) ** 0.5, systematic, strict=True)
     )
     correlation = correlation_of(best.covariance, changes, even)
-    said = (HELD,) if record.bent is None and between.joint else ()
-    shown = (best.time, best.position, best.force, best.model)
-    return Presliding(mass, damping, stiffness, correlation, *shown, best.left, said)
+    notes = (HELD,) if record.bent is None and between.joint else ()
+    curves = (best.time, best.position, best.force, best.model)
+    return Presliding(mass, damping, stiffness, correlation, *curves, best.left, notes)
 
 
 def _seen(record: BearingRecord, cutoff: float) -> BearingRecord:
@@ -156,11 +156,11 @@ def _no_bristles(fit: _Fit, between: Between, held: bool) -> str:
 
 
 def _estimate(key: str, value: float, error: float, systematic: float) -> Estimate:
-    found = by_t(key, UNITS[key], Mean(value, error, BLOCKS - 1), METHOD, systematic, systematic)
-    if found.low > 0:
-        return found
+    estimate = by_t(key, UNITS[key], Mean(value, error, BLOCKS - 1), METHOD, systematic, systematic)
+    if estimate.low > 0:
+        return estimate
     why = "the motion is too slow to show it" if key != STIFFNESS else "no force holds the bearing: does it stick?"
-    return Estimate.unknown(key, UNITS[key], METHOD, why, 0.0, max(found.high, 0.0) or np.inf)
+    return Estimate.unknown(key, UNITS[key], METHOD, why, 0.0, max(estimate.high, 0.0) or np.inf)
 
 
 def _settled(record: BearingRecord, between: Between, cutoff: float, late: bool) -> _Fit:
@@ -189,8 +189,8 @@ def _fit(record: BearingRecord, between: Between, cutoff: float, mass: float, la
     covariance = jackknife(np.column_stack([x, bends]), target)[:3, :3]
     left = float((target - x @ solution).std() / (target - x[:, 0] * solution[0]).std())
     ends, more = bending * span > 0.99 * BENDING[1], float(solution[-1]) if late else 0.0
-    shown = (record.time[equation.low_pass.inside], equation.low_pass(equation.body), target, x @ solution)
-    return _Fit(solution[:3], covariance, more, ends, left, *shown)
+    curves = (record.time[equation.low_pass.inside], equation.low_pass(equation.body), target, x @ solution)
+    return _Fit(solution[:3], covariance, more, ends, left, *curves)
 
 
 @dataclass(frozen=True)
@@ -232,15 +232,15 @@ def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -
 
 def _estimates(result: Presliding, stage: Stage | None) -> tuple[Estimate, ...]:
     """The bristles, and the whole mass where there is a stage whose masses share it."""
-    masses = shared_masses(result.mass, stage) if stage is not None and result.mass.shown else ()
+    masses = shared_masses(result.mass, stage) if stage is not None and result.mass.determined else ()
     return (result.stiffness, result.damping, *masses)
 
 
 def _correlated(result: Presliding, estimates: Sequence[Estimate]) -> Correlated:
     """As the fit has it; masses are shares of one."""
-    shown = with_interval(estimates)
-    rows = [result.order(estimate.name) for estimate in shown]
-    return shown, result.correlation[np.ix_(rows, rows)]
+    certain = with_interval(estimates)
+    rows = [result.order(estimate.name) for estimate in certain]
+    return certain, result.correlation[np.ix_(rows, rows)]
 
 
 KIND = ExperimentKind[Presliding](_analyse, _estimates, _correlated, after=("constant-speed", "frequency", "moves"))

@@ -112,16 +112,16 @@ class _Equation:
     velocity: np.ndarray
     friction: np.ndarray
     late: np.ndarray
-    known: MassOnBristles
+    contact: MassOnBristles
     sizes: np.ndarray
 
     def model(self, p: np.ndarray) -> np.ndarray:
         """Friction [N] at the low-pass, shape (m,), of the logarithms of the first three over their `sizes`, and of the
         other two over theirs."""
         coulomb, more, stribeck, constant, start = np.append(np.exp(p[:3]), p[3:]) * self.sizes
-        stiffness, damping = self.known.stiffness[0], self.known.damping[0]
+        stiffness, damping = self.contact.stiffness[0], self.contact.damping[0]
         speed = np.abs(self.velocity)
-        ends = (coulomb + more * np.exp(-((speed / stribeck) ** self.known.exponent))) / stiffness
+        ends = (coulomb + more * np.exp(-((speed / stribeck) ** self.contact.exponent))) / stiffness
         z = deflections(self.moves, (ends[1:] + ends[:-1]) / 2, start / stiffness)
         return self.low_pass(stiffness * z + damping * (self.velocity - speed * z / ends)) + constant
 
@@ -134,7 +134,7 @@ class _Equation:
         return np.stack([(self.model(p + step) - here) / STEP for step in STEP * np.eye(len(p))], axis=1)
 
 
-def stribeck_from_slow_sliding(log: Log, between: Between, known: MassOnBristles | None) -> SlowSliding:
+def stribeck_from_slow_sliding(log: Log, between: Between, contact: MassOnBristles | None) -> SlowSliding:
     """Static and Coulomb friction and Stribeck velocity from a log of position and force in which the bearing slides
     slowly, there and back. Of a log with gaps the longest stretch is used, and of that no more than `MOST` samples.
 
@@ -145,33 +145,33 @@ def stribeck_from_slow_sliding(log: Log, between: Between, known: MassOnBristles
     """
     record = record_of(log, slice(log.longest.start, min(log.longest.stop, log.longest.start + MOST)), between)
     why = why_unseen(record, FEWEST) or (DELAY if between.delay is None else "")
-    if why or known is None:
+    if why or contact is None:
         return _nothing(why or BRISTLES)
     cutoff = cutoff_of(record)
     cutoff = min(cutoff, BELOW_MODE * between.mode.frequency) if between.mode else cutoff
     sizes = _sizes(record, cutoff)
-    equation = _equation(record, between, known, cutoff, sizes)
+    equation = _equation(record, between, contact, cutoff, sizes)
     best = _fitted(equation, [np.log([1.0, 0.5, share]) for share in STARTS])
     jacobian, residual = equation.derivatives(best), equation.residual(best)
-    lower = _fitted(_equation(record, between, known, CHECKED * cutoff, sizes), [best])
+    lower = _fitted(_equation(record, between, contact, CHECKED * cutoff, sizes), [best])
     shifts = [lower - best, _moved(np.column_stack([jacobian, equation.late]), residual)[:5]]
-    for other in _off(between, known):
+    for other in _off(between, contact):
         shifts.append(_moved(jacobian, _equation(record, *other, cutoff, sizes).residual(best) - residual))
     left = float(residual.std() / equation.friction.std())
     covariance = jackknife(jacobian, -residual)[:3, :3]
-    found, correlation = _estimates(best[:3] + np.log(sizes[:3]), covariance, np.array(shifts)[:, :3], left)
+    estimates, correlation = _estimates(best[:3] + np.log(sizes[:3]), covariance, np.array(shifts)[:, :3], left)
     inside = equation.low_pass.inside
-    shown = (record.time[inside], equation.low_pass(equation.velocity), equation.friction, equation.model(best), left)
+    curves = (record.time[inside], equation.low_pass(equation.velocity), equation.friction, equation.model(best), left)
     held = [HELD] if record.bent is None and between.joint else []
-    said = (*held, *([] if between.mode else [RIGID]))
-    return SlowSliding(_judged(found, left, shown[1]), correlation, *shown, known.exponent, said)
+    notes = (*held, *([] if between.mode else [RIGID]))
+    return SlowSliding(_judged(estimates, left, curves[1]), correlation, *curves, contact.exponent, notes)
 
 
-def _off(between: Between, known: MassOnBristles) -> list[tuple[Between, MassOnBristles]]:
+def _off(between: Between, contact: MassOnBristles) -> list[tuple[Between, MassOnBristles]]:
     """What is known, with each in turn at the end of its interval."""
-    doubted = {key: getattr(known, key) for key in ("mass", "stiffness", "damping")}
-    others = [(between, replace(known, **{key: (sum(value), value[1])})) for key, value in doubted.items()]
-    return [*others, (replace(between, viscous=(sum(between.viscous), between.viscous[1])), known)]
+    doubted = {key: getattr(contact, key) for key in ("mass", "stiffness", "damping")}
+    others = [(between, replace(contact, **{key: (sum(value), value[1])})) for key, value in doubted.items()]
+    return [*others, (replace(between, viscous=(sum(between.viscous), between.viscous[1])), contact)]
 
 
 def _moved(jacobian: np.ndarray, residual: np.ndarray) -> np.ndarray:
@@ -185,7 +185,7 @@ def _nothing(why: str) -> SlowSliding:
 
 
 def _unknown(why: str) -> tuple[Estimate, ...]:
-    return tuple(Estimate.unknown(*each, METHOD, why) for each in zip(NAMES, UNITS, strict=True))
+    return tuple(Estimate.unknown(*key, METHOD, why) for key in zip(NAMES, UNITS, strict=True))
 
 
 def _sizes(record: BearingRecord, cutoff: float) -> np.ndarray:
@@ -195,15 +195,15 @@ def _sizes(record: BearingRecord, cutoff: float) -> np.ndarray:
 
 
 def _equation(
-    record: BearingRecord, between: Between, known: MassOnBristles, cutoff: float, sizes: np.ndarray
+    record: BearingRecord, between: Between, contact: MassOnBristles, cutoff: float, sizes: np.ndarray
 ) -> _Equation:
     """The equation of a record at a low-pass [Hz]."""
     seen, low_pass = record.seen(MOTION * cutoff), LowPass(record.time, cutoff)
-    body, force, inertia = at_bearing(seen, between, known.mass[0])
+    body, force, inertia = at_bearing(seen, between, contact.mass[0])
     velocity = rate_of(record.time, body)
-    friction = force - known.mass[0] * inertia - between.viscous[0] * velocity
+    friction = force - contact.mass[0] * inertia - between.viscous[0] * velocity
     late = low_pass(rate_of(record.time, force))
-    return _Equation(low_pass, np.diff(body), velocity, low_pass(friction), late, known, sizes)
+    return _Equation(low_pass, np.diff(body), velocity, low_pass(friction), late, contact, sizes)
 
 
 def _fitted(equation: _Equation, starts: list[np.ndarray]) -> np.ndarray:
@@ -233,17 +233,17 @@ def _estimates(
     values = (coulomb, coulomb + more, stribeck)
     turned = np.array([[coulomb, 0, 0], [coulomb, more, 0], [0, 0, stribeck]])  # derivatives by the logarithms
     covariance, shifts = turned @ covariance @ turned.T, shifts @ turned.T
-    even, found = (left + LINEARITY) * np.array(values), []
+    even, estimates = (left + LINEARITY) * np.array(values), []
     for i, (name, unit) in enumerate(zip(NAMES, UNITS, strict=True)):
         mean = Mean(float(values[i]), float(covariance[i, i] ** 0.5), BLOCKS - 1)
         systematic = float(np.abs(shifts[:, i]).sum() + even[i])
-        found.append(by_t(name, unit, mean, METHOD, systematic, systematic))
-    return tuple(found), correlation_of(covariance, shifts, even)
+        estimates.append(by_t(name, unit, mean, METHOD, systematic, systematic))
+    return tuple(estimates), correlation_of(covariance, shifts, even)
 
 
-def _judged(found: tuple[Estimate, ...], left: float, velocity: np.ndarray) -> tuple[Estimate, ...]:
+def _judged(estimates: tuple[Estimate, ...], left: float, velocity: np.ndarray) -> tuple[Estimate, ...]:
     """What was found as far as the motion shows it, whose model leaves a share of the friction unexplained."""
-    coulomb, static, stribeck = found
+    coulomb, static, stribeck = estimates
     fastest = float(np.abs(velocity).max())
     if left > EXPLAINED:
         return _unknown(f"{left:.0%} of the friction is not explained by LuGre's bristles")
@@ -253,8 +253,10 @@ def _judged(found: tuple[Estimate, ...], left: float, velocity: np.ndarray) -> t
         return _unknown(f"no faster than {fastest:.3g} m/s, the motion does not show where friction ceases to fall")
     if not (static.low > coulomb.value and stribeck.low > 0):
         why = "no rise of friction towards rest shows"
-        return coulomb, *(Estimate.unknown(each.name, each.unit, METHOD, why) for each in (static, stribeck))
-    return found
+        return coulomb, *(
+            Estimate.unknown(estimate.name, estimate.unit, METHOD, why) for estimate in (static, stribeck)
+        )
+    return estimates
 
 
 def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> SlowSliding:
@@ -268,21 +270,21 @@ def _bristles(prior: Prior, log: Log) -> MassOnBristles | None:
     flat = prior.flat(log)
     masses = [key for key in flat if key.startswith("masses.")]
     bristles = ["friction.bristle_stiffness", "friction.bristle_damping"]
-    if not masses or not all(key in prior.shown for key in (*masses, *bristles)):
+    if not masses or not all(key in prior.estimates for key in (*masses, *bristles)):
         return None
     mass = (
-        sum(prior.shown[key].value for key in masses),
-        sum(prior.shown[key].half_width for key in masses),
+        sum(prior.estimates[key].value for key in masses),
+        sum(prior.estimates[key].half_width for key in masses),
     )
-    stiffness, damping = ((prior.shown[key].value, prior.shown[key].half_width) for key in bristles)
+    stiffness, damping = ((prior.estimates[key].value, prior.estimates[key].half_width) for key in bristles)
     return MassOnBristles(mass, stiffness, damping, flat.get("friction.stribeck_exponent", 2.0))
 
 
 def _correlated(result: SlowSliding, estimates: Sequence[Estimate]) -> Correlated:
     """As the fit has it."""
-    shown = with_interval(estimates)
-    rows = [result.estimates.index(estimate) for estimate in shown]
-    return shown, result.correlation[np.ix_(rows, rows)]
+    certain = with_interval(estimates)
+    rows = [result.estimates.index(estimate) for estimate in certain]
+    return certain, result.correlation[np.ix_(rows, rows)]
 
 
 KIND = ExperimentKind[SlowSliding](

@@ -94,8 +94,8 @@ def stiffness_from_steps(log: Log, cutoff: float = CUTOFF) -> StepStiffness:
     scale, secant = _scale(position, spans), _secant(smooth[1], smooth[0], spans)
     settled = [_settled(log, span, smooth[0], smooth[1], scale, secant) for span in spans]
     windows = tuple(w for w in settled if w is not None)
-    fixed, said = _fixed(log, position, windows)
-    warnings = list(said)
+    fixed, notes = _fixed(log, position, windows)
+    warnings = list(notes)
     if len(windows) < len(spans):
         warnings.append(f"{len(spans) - len(windows)} of {len(spans)} plateaus had not settled and are left out.")
     steps = np.diff([[w.position, w.force] for w in windows], axis=0).reshape(-1, 2)
@@ -105,8 +105,8 @@ def stiffness_from_steps(log: Log, cutoff: float = CUTOFF) -> StepStiffness:
         _slope(steps, noise, large & chosen, words, len(spans))
         for chosen, words in ((steps[:, 0] != 0, ""), (steps[:, 0] > 0, ", upwards"), (steps[:, 0] < 0, ", downwards"))
     )
-    shown = (log.time, deflected, smooth[0])
-    return StepStiffness(every, up, down, _hysteresis(windows), windows, *shown, fixed, tuple(warnings))
+    curves = (log.time, deflected, smooth[0])
+    return StepStiffness(every, up, down, _hysteresis(windows), windows, *curves, fixed, tuple(warnings))
 
 
 def _plateaus(log: Log, part: slice, cutoff: float) -> list[slice]:
@@ -124,8 +124,8 @@ def _plateaus(log: Log, part: slice, cutoff: float) -> list[slice]:
         moved = np.abs(np.roll(level, -half) - np.roll(level, half))
         moved[:half] = moved[-half:] = 0.0
         steady = moved <= 0.02 * np.ptp(level)
-    found = [slice(part.start + s.start, part.start + s.stop) for s in runs(steady)]
-    return [s for s in found if s.stop - s.start >= least]
+    spans = [slice(part.start + s.start, part.start + s.stop) for s in runs(steady)]
+    return [s for s in spans if s.stop - s.start >= least]
 
 
 def _scale(position: np.ndarray, spans: list[slice]) -> float:
@@ -193,10 +193,10 @@ def _slope(steps: np.ndarray, noise: np.ndarray, chosen: np.ndarray, words: str,
     within = float(np.sum((x * noise) ** 2) / (x @ x) ** 2)
     variance = max(max(1.0, shared) * spread / float(x @ x), within)
     linear = LINEARITY * abs(slope)
-    found = by_t(KEY, UNIT, Mean(slope, variance**0.5, count - 1), method, linear, linear)
-    if found.low > 0:
-        return found
-    return Estimate.unknown(KEY, UNIT, method, SOFT, 0.0, found.high if found.high > 0 else np.inf)
+    estimate = by_t(KEY, UNIT, Mean(slope, variance**0.5, count - 1), method, linear, linear)
+    if estimate.low > 0:
+        return estimate
+    return Estimate.unknown(KEY, UNIT, method, SOFT, 0.0, estimate.high if estimate.high > 0 else np.inf)
 
 
 def _hysteresis(windows: tuple[Window, ...]) -> Estimate:
@@ -225,8 +225,8 @@ def _fixed(log: Log, position: np.ndarray, windows: tuple[Window, ...]) -> tuple
     followed, went = (np.ptp([x[m].mean() for m in marks]) for x in (moved, position))
     if followed <= FIXED * went:
         return True, ()
-    said = f"The cart is not fixed: it moved by {followed:.3g} m while the stage moved by {went:.3g} m"
-    return False, (f"{said}; the deflection of the joint was measured all the same.",)
+    finding = f"The cart is not fixed: it moved by {followed:.3g} m while the stage moved by {went:.3g} m"
+    return False, (f"{finding}; the deflection of the joint was measured all the same.",)
 
 
 def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> StepStiffness:

@@ -105,25 +105,25 @@ def static_from_stick_slip(
     rows: list[tuple[float, ...]] = []
     shares, loads = [], []
     for part in log.segments:
-        found = slips(body[part], log.sample_time, cutoff)
-        cart_velocity[part] = found.speed
-        shares.append(found.share)
-        marks = zip(found.onsets, found.starts, found.rests, found.fastest, found.directions, strict=True)
+        breaks = slips(body[part], log.sample_time, cutoff)
+        cart_velocity[part] = breaks.speed
+        shares.append(breaks.share)
+        marks = zip(breaks.onsets, breaks.starts, breaks.rests, breaks.fastest, breaks.directions, strict=True)
         for onset, start, rest, top, way in marks:
             at, force, before, rising, held = _peak(
                 way * pull[part], log.sample_time, cutoff, (rest, onset, start, top)
             )
             at += part.start
             bent = np.nan if deflected is None else float(way * deflected[at])
-            unseen = _unseen(way * found.speed[onset + 1 : top + 1]) * log.sample_time
+            unseen = _unseen(way * breaks.speed[onset + 1 : top + 1]) * log.sample_time
             late = max(force - before, 0.0) + abs(rising) * (unseen + 1 / cutoff)
             place = (float(log.time[at]), float(body[at]), float(way))
             held = held or abs(bent) > (1 - AT_STOP) * stroke
             loads += [] if held else [slice(part.start + rest, part.start + onset)]
-            rows.append((*place, bent, force, rising, float(abs(found.speed[top])), held, late))
+            rows.append((*place, bent, force, rising, float(abs(breaks.speed[top])), held, late))
     table = np.array([row for row in rows if row[5] > 0 or row[7]]).reshape(-1, 9).T
-    shown = _stiffness(log, deflected, loads, cutoff)
-    return _answer(table, pull, cart_velocity, (relative_error, bristle_rate), shown, _why(shares))
+    joint_stiffness = _stiffness(log, deflected, loads, cutoff)
+    return _answer(table, pull, cart_velocity, (relative_error, bristle_rate), joint_stiffness, _why(shares))
 
 
 def _smooth(log: Log, values: np.ndarray, cutoff: float) -> np.ndarray:
@@ -214,12 +214,12 @@ def _answer(
     table: np.ndarray,
     pull: np.ndarray,
     velocity: np.ndarray,
-    known: tuple[float, float],
+    uncertainty: tuple[float, float],
     stiffness: Estimate,
     why: str,
 ) -> StickSlip:
     times, places, directions, bent, forces, rates, speeds, held, late = table
-    relative_error, bristle_rate = known
+    relative_error, bristle_rate = uncertainty
 
     def static(chosen: np.ndarray, words: str) -> Estimate:
         if not chosen.any():
@@ -233,7 +233,7 @@ def _answer(
     masks = dict(ways(directions))
     means = {name: _mean(f"break-away force, {name}", forces[m], relative_error, why) for name, m in masks.items()}
     one, other = (static(mask, f" {words}") for words, mask in masks.items())
-    every = _both(one, other) if one.shown or other.shown else static(np.ones(len(forces), dtype=bool), "")
+    every = _both(one, other) if one.determined or other.determined else static(np.ones(len(forces), dtype=bool), "")
     low, high = np.percentile(forces, [5, 95]) if len(forces) else (np.nan, np.nan)
     offset = _offset(means["forward"], means["backward"])
     return StickSlip(
@@ -254,21 +254,21 @@ def _answer(
         speeds,
         pull,
         velocity,
-        _said(len(forces), offset),
+        _notes(len(forces), offset),
     )
 
 
-def _said(count: int, offset: Estimate) -> tuple[str, ...]:
+def _notes(count: int, offset: Estimate) -> tuple[str, ...]:
     """What to know before believing it."""
-    said = []
-    if count and not offset.shown:
-        said.append("The zero of the force on the cart is used as measured; slips in one direction cannot verify it.")
+    notes = []
+    if count and not offset.determined:
+        notes.append("The zero of the force on the cart is used as measured; slips in one direction cannot verify it.")
     elif count and not offset.holds(0.0):
         size = f"{2 * abs(offset.value):.3g} N"
-        said.append(f"The directions differ by {size}: an offset of the sensor, or unequal friction.")
+        notes.append(f"The directions differ by {size}: an offset of the sensor, or unequal friction.")
     if 0 < count < 5:
-        said.append(f"Only {count} slips: the range along the rail is not shown.")
-    return tuple(said)
+        notes.append(f"Only {count} slips: the range along the rail is not shown.")
+    return tuple(notes)
 
 
 def _mean(name: str, forces: np.ndarray, relative_error: float, why: str) -> Estimate:
@@ -284,8 +284,8 @@ def _mean(name: str, forces: np.ndarray, relative_error: float, why: str) -> Est
 def _both(one: Estimate, other: Estimate) -> Estimate:
     """The mean of both directions, in which a common offset drops out; that of the only one in which the cart slips.
     What one direction shows and the other bounds is a bound: the offset is not known."""
-    if not (one.shown and other.shown):
-        seen, unseen = (one, other) if one.shown else (other, one)
+    if not (one.determined and other.determined):
+        seen, unseen = (one, other) if one.determined else (other, one)
         if not unseen.low > 0:  # no slips at all
             return seen
         low = (one.low + other.low) / 2
@@ -302,7 +302,7 @@ def _offset(one: Estimate, other: Estimate) -> Estimate:
         "offset of the force on the cart",
         "half the difference of the break-away forces forward and backward",
     )
-    if not (one.shown and other.shown):
+    if not (one.determined and other.determined):
         return Estimate.unknown(name, "N", method, "slips in one direction only")
     half = float(np.hypot(one.half_width, other.half_width)) / 2
     middle = (one.value - other.value) / 2
@@ -314,9 +314,9 @@ def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -
     (log,) = logs
     assert isinstance(log, Log)
     flat, (_, mass) = prior.flat(log), prior.masses(log)
-    stroke, stiffness = flat.get("joint.stroke", np.inf), prior.shown.get("joint.stiffness")
+    stroke, stiffness = flat.get("joint.stroke", np.inf), prior.estimates.get("joint.stiffness")
     result = static_from_stick_slip(log, stiffness or flat.get("joint.stiffness"), mass, stroke)
-    if stiffness is None and result.stiffness.shown:
+    if stiffness is None and result.stiffness.determined:
         return static_from_stick_slip(log, result.stiffness, mass, stroke)
     return result
 
@@ -328,7 +328,7 @@ def _estimates(result: StickSlip, stage: Stage | None) -> tuple[Estimate, ...]:
 
 def _of_joint(stiffness: Estimate, stage: Stage | None) -> bool:
     """Whether a stiffness is that of the stage's joint, and not of the limiter that holds it."""
-    if stage is None or stage.joint is None or not stiffness.shown:
+    if stage is None or stage.joint is None or not stiffness.determined:
         return False
     return bool(stiffness.value < FAR_BELOW * stage.flat()["joint.limiter_stiffness"])
 

@@ -14,7 +14,7 @@ from friso.identify.logs.log import ROLES, Log
 from friso.identify.logs.mapping import Mapping
 from friso.identify.logs.read import file_format
 from friso.identify.logs.roles import AssignedRole, choose, role_of
-from friso.identify.logs.signals import Reading, Told, instants, no_time, signal, unused, with_told_units
+from friso.identify.logs.signals import Notes, Reading, instants, no_time, signal, unused, with_user_units
 from friso.identify.logs.time_base import Track, together, track
 from friso.quantities import quoted
 
@@ -32,51 +32,51 @@ def read_log(
     """
     path, mapping = Path(path), mapping or Mapping()
     form = FORMATS[file_format(path)]
-    table = with_told_units(form.read(path), mapping, form.times, str(path))
+    table = with_user_units(form.read(path), mapping, form.times, str(path))
     reading = Reading(table, mapping, strict, not form.units, str(path))
     chosen = choose(table, mapping.roles, needed, str(path))
     unused(mapping, chosen, str(path))
-    told = Told(list(table.read))
+    notes = Notes(list(table.read))
     try:
-        tracks = _tracks(chosen, reading, told, needed)
+        tracks = _tracks(chosen, reading, notes, needed)
         base, signals = together(tracks)
-        told.read += base.read
-        told.warnings += base.warnings
+        notes.read += base.read
+        notes.warnings += base.warnings
         _check(base, signals, needed)
     except InputError as error:
         raise error.found_in(str(path)) from None
-    told.warnings += _doubts(base, signals, told)
-    told.read.append(_spans(base))
+    notes.warnings += _doubts(base, signals, notes)
+    notes.read.append(_spans(base))
     return Log(
-        path.stem, base.time, base.period, signals, tuple(base.segments), told.units, dict(table.scalars),
-        tuple(told.read), tuple(told.warnings), dict(mapping.setup),
+        path.stem, base.time, base.period, signals, tuple(base.segments), notes.units, dict(table.scalars),
+        tuple(notes.read), tuple(notes.warnings), dict(mapping.setup),
     )  # fmt: skip
 
 
-def _tracks(chosen: dict[str, AssignedRole], reading: Reading, told: Told, needed: Sequence[str]) -> dict[str, Track]:
+def _tracks(chosen: dict[str, AssignedRole], reading: Reading, notes: Notes, needed: Sequence[str]) -> dict[str, Track]:
     """Each role's channel on even instants in the unit of the role. A channel that was only proposed and that nobody
     needs is left out, which is told, where it has no instants or no unit; others raise LogError."""
     clock = chosen.get("time")
     tracks: dict[str, Track] = {}
-    sizes = [choice.channel.values.size for role, choice in chosen.items() if role in needed or choice.told]
+    sizes = [choice.channel.values.size for role, choice in chosen.items() if role in needed or choice.by_user]
     for role in [role for role in ROLES if role in chosen]:
         choice = chosen[role]
-        optional = not choice.told and role not in needed
-        time = instants(choice, clock, reading, told)
+        optional = not choice.by_user and role not in needed
+        time = instants(choice, clock, reading, notes)
         foreign = reading.mapping.sample_time is not None and choice.channel.values.size not in sizes
         if optional and (time is None or foreign):
-            told.warnings.append(
+            notes.warnings.append(
                 f"{role}: {choice.channel.name} left out: its length differs, or it has no time stamps"
             )
             continue
         if time is None:
             raise no_time(choice.channel, reading)
         try:
-            values = signal(choice, reading, told)
+            values = signal(choice, reading, notes)
         except InputError as error:
             if not optional or role == "force":
                 raise
-            told.warnings.append(f"{role}: {error.given} left out; to use it: {error.example}")
+            notes.warnings.append(f"{role}: {error.actual} left out; to use it: {error.example}")
             continue
         if time.size != values.size:
             raise LogError(
@@ -86,8 +86,8 @@ def _tracks(chosen: dict[str, AssignedRole], reading: Reading, told: Told, neede
                 "",
                 reading.origin,
             )
-        tracks[role] = _track(role, choice, time, values, told)
-    told.read += _clocks(clock, reading)
+        tracks[role] = _track(role, choice, time, values, notes)
+    notes.read += _clocks(clock, reading)
     return tracks
 
 
@@ -104,17 +104,17 @@ def _clocks(clock: AssignedRole | None, reading: Reading) -> list[str]:
     return [f"time: {c.name} ({c.source}), in {c.unit}" for c in columns] or ["time: as stored with the signals"]
 
 
-def _track(role: str, choice: AssignedRole, time: np.ndarray, values: np.ndarray, told: Told) -> Track:
+def _track(role: str, choice: AssignedRole, time: np.ndarray, values: np.ndarray, notes: Notes) -> Track:
     """One track, its lines told."""
-    each = track(role, time, values)
-    told.read += each.read
-    told.warnings += each.warnings
+    channel_track = track(role, time, values)
+    notes.read += channel_track.read
+    notes.warnings += channel_track.warnings
     n = checks.held(values)
     if n > 1:
-        told.warnings.append(
+        notes.warnings.append(
             f"{role}: {choice.channel.name} holds each value for {n} samples: it is sampled {n} times slower"
         )
-    return each
+    return channel_track
 
 
 def _check(base: Track, signals: dict[str, np.ndarray], needed: Sequence[str]) -> None:
@@ -129,7 +129,7 @@ def _check(base: Track, signals: dict[str, np.ndarray], needed: Sequence[str]) -
             )
 
 
-def _doubts(base: Track, signals: dict[str, np.ndarray], told: Told) -> list[str]:
+def _doubts(base: Track, signals: dict[str, np.ndarray], notes: Notes) -> list[str]:
     """What the engineer should know of the signals before believing them."""
     lines, parts, period = [], base.segments, base.period
     for role, values in signals.items():
@@ -139,7 +139,7 @@ def _doubts(base: Track, signals: dict[str, np.ndarray], told: Told) -> list[str
         if share > checks.CLIPPED:
             lines.append(f"{role}: {share:.2%} of the samples lie on flat tops at its extremes: saturated or clipped")
     position, velocity, force = (signals.get(role) for role in ("position", "velocity", "force"))
-    same_kind = ("position" in told.units) == ("velocity" in told.units)
+    same_kind = ("position" in notes.units) == ("velocity" in notes.units)
     if position is not None and velocity is not None and same_kind:
         lines.append(checks.velocity_warning(position, velocity, period, parts))
         lines.append(delays.velocity_line(position, velocity, period, parts))
@@ -151,6 +151,6 @@ def _doubts(base: Track, signals: dict[str, np.ndarray], told: Told) -> list[str
 def _spans(base: Track) -> str:
     """The segments in words."""
     parts = base.segments
-    shown = ", ".join(f"{base.time[p.start]:.6g} s to {base.time[p.stop - 1]:.6g} s" for p in parts[:6])
+    listed = ", ".join(f"{base.time[p.start]:.6g} s to {base.time[p.stop - 1]:.6g} s" for p in parts[:6])
     more = f" and {len(parts) - 6} more" if len(parts) > 6 else ""
-    return f"{base.time.size} samples at {1 / base.period:.6g} Hz in {len(parts)} segments: {shown}{more}"
+    return f"{base.time.size} samples at {1 / base.period:.6g} Hz in {len(parts)} segments: {listed}{more}"

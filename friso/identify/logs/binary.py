@@ -64,7 +64,7 @@ def _from_scipy(value: Any) -> Any:
         kind = value[0][named.pop()] if named else "function"
         return _object(kind.decode() if isinstance(kind, bytes) else str(kind))
     if isinstance(value, np.ndarray) and value.dtype == object:
-        return [_from_scipy(each) for each in value.ravel()]
+        return [_from_scipy(item) for item in value.ravel()]
     if isinstance(value, np.ndarray) and value.dtype.kind in "US":
         return str(value) if value.ndim == 0 else "".join(map(str, value.ravel()))
     if issparse(value):
@@ -119,9 +119,11 @@ def _structures(item: Any, children: dict[str, Any]) -> Any:
 
     references = [isinstance(item[name], h5py.Dataset) and item[name].dtype == h5py.ref_dtype for name in item]
     classes = [item[name].attrs.get("MATLAB_class") for name in item]
-    if children and all(references) and all(each is None for each in classes):  # a cell array has its class
-        length = min(len(each) for each in children.values())
-        return [{name: each[i] for name, each in children.items()} for i in range(length)]
+    if (
+        children and all(references) and all(array_class is None for array_class in classes)
+    ):  # a cell array has its class
+        length = min(len(array) for array in children.values())
+        return [{name: array[i] for name, array in children.items()} for i in range(length)]
     return children
 
 

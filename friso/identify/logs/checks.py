@@ -19,17 +19,17 @@ def repeated_stamps(name: str, time: np.ndarray, values: np.ndarray) -> tuple[np
     back = np.flatnonzero(steps < 0)
     if back.size:
         i = int(back[0])
-        given = f"time that decreases, from {time[i]:.9g} s to {time[i + 1]:.9g} s at sample {i + 2}"
-        raise LogError(name, given, "time that increases", "")
+        actual = f"time that decreases, from {time[i]:.9g} s to {time[i + 1]:.9g} s at sample {i + 2}"
+        raise LogError(name, actual, "time that increases", "")
     again = np.flatnonzero(steps == 0)
     if again.size == 0:
         return time, values, 0
     other = again[values[again] != values[again + 1]]
     if other.size:
         i = int(other[0])
-        given = f"two values at {time[i]:.9g} s ({values[i]:.6g} and {values[i + 1]:.6g}), at {other.size} instants"
+        actual = f"two values at {time[i]:.9g} s ({values[i]:.6g} and {values[i + 1]:.6g}), at {other.size} instants"
         raise LogError(
-            name, given, "one value per time stamp; if the stamps are rounded too coarsely, use --dt", '--dt "1 ms"'
+            name, actual, "one value per time stamp; if the stamps are rounded too coarsely, use --dt", '--dt "1 ms"'
         )
     keep = np.r_[True, steps > 0]
     if keep.sum() < 2:

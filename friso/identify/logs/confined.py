@@ -43,8 +43,8 @@ def _content(kind: str, path: Path, size: int, changed: int) -> dict[str, Any]:
     try:
         read, message = _PlainUnpickler(io.BytesIO(done.stdout)).load()
     except Exception:  # whatever is wrong with what came, it is not what the reader writes
-        said = done.stderr.decode(errors="replace")
-        why = "it needs too much memory" if "MemoryError" in said else "it makes the library crash"
+        errors = done.stderr.decode(errors="replace")
+        why = "it needs too much memory" if "MemoryError" in errors else "it makes the library crash"
         raise broken(kind, why, path) from None
     if read is None:
         raise broken(kind, message, path)

@@ -19,7 +19,7 @@ WINDOW = 11
 def velocity_line(position: np.ndarray, velocity: np.ndarray, period: float, parts: list[slice]) -> str:
     """A line that offers the delay of the velocity [m/s] behind the derivative of position [m], "" for none; both are
     sampled every `period` [s]."""
-    part = max(parts, key=lambda each: each.stop - each.start)
+    part = max(parts, key=lambda span: span.stop - span.start)
     slope, speed = _smoothed(position[part], 1, period), _smoothed(velocity[part], 0, period)
     return _line(
         "velocity",
@@ -36,7 +36,7 @@ def force_line(position: np.ndarray, force: np.ndarray, period: float, parts: li
     For each lag the force is fitted by acceleration, velocity, its sign, position and a constant: against acceleration
     alone friction would look like a delay, and so would a spring. The lag with the least residual counts.
     """
-    part = max(parts, key=lambda each: each.stop - each.start)
+    part = max(parts, key=lambda span: span.stop - span.start)
     place, velocity, acceleration = (_smoothed(position[part], order, period) for order in (0, 1, 2))
     push = _smoothed(force[part], 0, period)
     sign = np.sign(velocity) * (np.abs(velocity) > 0.01 * np.abs(velocity).max())
@@ -83,15 +83,15 @@ def in_blocks(estimate: Callable[[int, int], float], size: int) -> tuple[float, 
     half of them show one."""
     from scipy.stats import t as student
 
-    each = size // BLOCKS
-    if each < 10 * MOST:
+    length = size // BLOCKS
+    if length < 10 * MOST:
         return np.nan, np.nan
-    found = np.array([estimate(k * each, (k + 1) * each) for k in range(BLOCKS)])
-    found = found[np.isfinite(found)]
-    if found.size < BLOCKS / 2:
+    delays = np.array([estimate(k * length, (k + 1) * length) for k in range(BLOCKS)])
+    delays = delays[np.isfinite(delays)]
+    if delays.size < BLOCKS / 2:
         return np.nan, np.nan
-    half = student.ppf(0.975, found.size - 1) * np.std(found, ddof=1) / np.sqrt(found.size)
-    return float(found.mean()), float(half)
+    half = student.ppf(0.975, delays.size - 1) * np.std(delays, ddof=1) / np.sqrt(delays.size)
+    return float(delays.mean()), float(half)
 
 
 def _line(late: str, early: str, estimate: tuple[float, float], period: float) -> str:

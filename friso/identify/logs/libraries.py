@@ -20,8 +20,8 @@ def content_by(library: str, kind: str, path: Path) -> dict[str, Any]:
     except ValueError:
         there = False
     if not there:
-        given = f"a {kind} file, and the library {library} is not installed"
-        raise LogError("log", given, "the library", f'pip install "friso[{kind.lower()}]"', str(path))
+        actual = f"a {kind} file, and the library {library} is not installed"
+        raise LogError("log", actual, "the library", f'pip install "friso[{kind.lower()}]"', str(path))
     return content(kind, path)
 
 

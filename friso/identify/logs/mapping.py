@@ -123,9 +123,9 @@ def _parsed(place: Path) -> Mapping:
         raise LogError(
             "", str(error), "a mapping kept by friso; delete the file to map again", "", str(place)
         ) from None
-    known = {each.name for each in fields(Mapping)}
+    names = {entry.name for entry in fields(Mapping)}
     for key, value in document.items():
-        if key not in known or (key in TABLES) != isinstance(value, dict):
+        if key not in names or (key in TABLES) != isinstance(value, dict):
             raise LogError(key, quoted(value), f"tables {', '.join(TABLES)}; sample_time", "", str(place))
     texts = {key: _texts(document.get(key, {}), key, place) for key in TABLES}
     try:

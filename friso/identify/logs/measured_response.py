@@ -47,17 +47,17 @@ def kind_of(name: str) -> str | None:
 
 def is_response(names: Iterable[str]) -> bool:
     """Whether headings hold a frequency with magnitude and phase, or with real and imaginary part."""
-    found = {kind_of(name) for name in names}
-    return "frequency" in found and ({"magnitude", "phase"} <= found or {"real", "imaginary"} <= found)
+    kinds = {kind_of(name) for name in names}
+    return "frequency" in kinds and ({"magnitude", "phase"} <= kinds or {"real", "imaginary"} <= kinds)
 
 
 def response_of(table: ChannelTable, path: Path) -> MeasuredResponse:
     """The response in the columns of a table. Raises LogError."""
-    found: dict[str, list[Channel]] = {}
+    by_kind: dict[str, list[Channel]] = {}
     for channel in table.channels:
         if kind_of(channel.name) is not None:
-            found.setdefault(str(kind_of(channel.name)), []).append(channel)
-    for kind, channels in found.items():
+            by_kind.setdefault(str(kind_of(channel.name)), []).append(channel)
+    for kind, channels in by_kind.items():
         if len(channels) > 1:
             names = ", ".join(channel.name for channel in channels)
             raise LogError(kind, f"{len(channels)} columns: {names}", "one column", "", str(path))
@@ -65,16 +65,16 @@ def response_of(table: ChannelTable, path: Path) -> MeasuredResponse:
         names = ", ".join(channel.name for channel in table.channels)
         expected = "frequency, and magnitude and phase or real and imaginary part"
         raise LogError("log", names, expected, "f [Hz];magnitude [dB];phase [deg]", str(path))
-    columns = {kind: channels[0] for kind, channels in found.items()}
+    columns = {kind: channels[0] for kind, channels in by_kind.items()}
     frequency = _frequency(columns["frequency"], path)
     if {"real", "imaginary"} <= set(columns):
         response = columns["real"].values + 1j * columns["imaginary"].values
-        scale, unit, told = response_unit(columns["real"].unit)
-        told = f"real and imaginary part {told}"
+        scale, unit, quantities = response_unit(columns["real"].unit)
+        quantities = f"real and imaginary part {quantities}"
     else:
-        response, scale, unit, told = _polar(columns["magnitude"], columns["phase"], path)
+        response, scale, unit, quantities = _polar(columns["magnitude"], columns["phase"], path)
     coherence = columns["coherence"].values if "coherence" in columns else None
-    read = (*table.read, told, f"{frequency.size} frequencies, {frequency.min():g} Hz to {frequency.max():g} Hz")
+    read = (*table.read, quantities, f"{frequency.size} frequencies, {frequency.min():g} Hz to {frequency.max():g} Hz")
     return checked(MeasuredResponse(frequency, response * scale, coherence, path.stem, read, unit), path)
 
 
@@ -82,8 +82,8 @@ def _frequency(column: Channel, path: Path) -> np.ndarray:
     """Frequencies in Hz. Raises LogError for a column without a unit."""
     value = factor(column.unit, "Hz") if column.unit else None
     if value is None:
-        given = f"{column.name} in {column.unit}" if column.unit else f"{column.name} without a unit"
-        raise LogError("frequency", given, "Hz or rad/s in the heading", "f [Hz]", str(path))
+        actual = f"{column.name} in {column.unit}" if column.unit else f"{column.name} without a unit"
+        raise LogError("frequency", actual, "Hz or rad/s in the heading", "f [Hz]", str(path))
     return column.values * value
 
 
@@ -97,8 +97,8 @@ def _polar(magnitude: Channel, phase: Channel, path: Path) -> tuple[np.ndarray, 
     if unit.lower().startswith("db") or "db" in words(magnitude.name):
         with np.errstate(over="ignore"):
             return 10 ** (magnitude.values / 20) * angle, 1.0, "", f"magnitude in dB, phase in {phase.unit}"
-    scale, si, told = response_unit(magnitude.unit)
-    return magnitude.values * angle, scale, si, f"magnitude {told}, phase in {phase.unit}"
+    scale, si, unit_in_words = response_unit(magnitude.unit)
+    return magnitude.values * angle, scale, si, f"magnitude {unit_in_words}, phase in {phase.unit}"
 
 
 def response_unit(text: str) -> tuple[float, str, str]:
@@ -115,9 +115,9 @@ def checked(measured: MeasuredResponse, path: Path) -> MeasuredResponse:
     """The response without its line at 0 Hz, checked. Raises LogError for too few or falling frequencies and NaN."""
     positive = measured.frequency > 0
     if not positive.all():
-        kept = [a if a is None else a[positive] for a in (measured.frequency, measured.response, measured.coherence)]
+        arrays = [a if a is None else a[positive] for a in (measured.frequency, measured.response, measured.coherence)]
         read = (*measured.read, f"left out: {np.count_nonzero(~positive)} lines at 0 Hz or below")
-        measured = replace(measured, frequency=kept[0], response=kept[1], coherence=kept[2], read=read)
+        measured = replace(measured, frequency=arrays[0], response=arrays[1], coherence=arrays[2], read=read)
     frequency = measured.frequency
     if frequency.size < 3:
         raise LogError("log", f"{frequency.size} frequencies", "at least 3", "", str(path))
@@ -127,6 +127,6 @@ def checked(measured: MeasuredResponse, path: Path) -> MeasuredResponse:
             raise LogError(name, f"no number in row {row}", "finite numbers in every row", "", str(path))
     falling = np.flatnonzero(np.diff(frequency) <= 0)
     if falling.size:
-        given = f"{frequency[falling[0] + 1]:g} Hz after {frequency[falling[0]]:g} Hz"
-        raise LogError("frequency", given, "rising frequencies", "", str(path))
+        actual = f"{frequency[falling[0] + 1]:g} Hz after {frequency[falling[0]]:g} Hz"
+        raise LogError("frequency", actual, "rising frequencies", "", str(path))
     return measured

@@ -78,8 +78,8 @@ def _row_of_units(lines: Sequence[str], names: Sequence[str], delimiter: str) ->
         cells = re.split(r"[;,\t]|\s+", pair["value"]) if pair and listed else line.lstrip("#% ").split(delimiter)
         cells = [cell for cell in cells if cell] if listed and len(cells) != len(names) else cells
         units = [cell.strip(' []()"') for cell in cells]
-        told = [unit for unit in units if unit and unit != "-"]
-        if len(units) == len(names) and told and all(is_unit(unit) for unit in told):
+        stated = [unit for unit in units if unit and unit != "-"]
+        if len(units) == len(names) and stated and all(is_unit(unit) for unit in stated):
             return {name: unit for name, unit in zip(names, units, strict=True) if unit and unit != "-"}
     return {}
 

@@ -46,12 +46,12 @@ _KEYS = {
 
 @dataclass(frozen=True)
 class AssignedRole:
-    """A channel for a role and why; `told` where the user said so."""
+    """A channel for a role and why; `by_user` where the user assigned it."""
 
     role: str
     channel: Channel
     reason: str
-    told: bool
+    by_user: bool
 
 
 def words(name: str) -> list[str]:
@@ -64,65 +64,71 @@ def words(name: str) -> list[str]:
 def role_of(name: str) -> tuple[str, str] | None:
     """Role that a name tells, and the word that tells it; None for a name that tells none."""
     parts = words(name)
-    found = set(parts)
-    if found & _NOT_MEASURED:
+    name_words = set(parts)
+    if name_words & _NOT_MEASURED:
         return None
     key = {role: next((part for part in parts if part in keys), "") for role, keys in _KEYS.items()}
     if key["time"] and len(parts) <= 2 and not any(key[role] for role in _KEYS if role != "time"):
         return "time", key["time"]
-    if found & _SET or "setpos" in found:
+    if name_words & _SET or "setpos" in name_words:
         others = key["velocity"] or key["acceleration"] or key["force"] or key["disturbance"]
         return None if others else ("reference", next(part for part in parts if part in _SET or part == "setpos"))
-    if key["position"] or "actpos" in found:
+    if key["position"] or "actpos" in name_words:
         word = key["position"] or "actpos"
-        kind = "relative_position" if found & _RELATIVE else "cart_position" if found & _CART else "position"
+        kind = "relative_position" if name_words & _RELATIVE else "cart_position" if name_words & _CART else "position"
         return kind, word
     return next(((role, key[role]) for role in ("velocity", "acceleration", "disturbance", "force") if key[role]), None)
 
 
-def find(table: ChannelTable, wanted: str, role: str, origin: str = "") -> Channel:
+def find(table: ChannelTable, name: str, role: str, origin: str = "") -> Channel:
     """The channel of this name, with or without its unit in brackets. Raises LogError that lists the channels."""
-    plain = split_heading(wanted)[0]
-    for matches in ([c for c in table.channels if c.name == wanted], [c for c in table.channels if c.name == plain]):
+    plain = split_heading(name)[0]
+    for matches in ([c for c in table.channels if c.name == name], [c for c in table.channels if c.name == plain]):
         if len(matches) == 1:
             return matches[0]
     names = [channel.name for channel in table.channels]
-    near = difflib.get_close_matches(wanted, names, 1, 0.6)
+    near = difflib.get_close_matches(name, names, 1, 0.6)
     example = f'--map {role}="{near[0] if near else names[0]}"'
-    raise LogError(role, f"{quoted(wanted)}, which the log does not contain", listing(table), example, origin)
+    raise LogError(role, f"{quoted(name)}, which the log does not contain", listing(table), example, origin)
 
 
 def listing(table: ChannelTable) -> str:
     """The channels there are, for a message; and what was left out as objects."""
-    shown = [c.name + (f" [{c.unit}]" if c.unit else "") for c in table.channels]
-    text = ", ".join(shown[:40]) + (f" and {len(shown) - 40} more" if len(shown) > 40 else "")
+    labels = [c.name + (f" [{c.unit}]" if c.unit else "") for c in table.channels]
+    text = ", ".join(labels[:40]) + (f" and {len(labels) - 40} more" if len(labels) > 40 else "")
     objects = "".join(f"; {line}" for line in table.read if "structure with time" in line)
     return f"one of the channels {text}{objects}"
 
 
 def choose(
-    table: ChannelTable, told: Names[str, str], needed: Sequence[str], origin: str = ""
+    table: ChannelTable, assigned: Names[str, str], needed: Sequence[str], origin: str = ""
 ) -> dict[str, AssignedRole]:
     """Roles with their channels: first what the user told, then what the names tell.
 
     Raises LogError for a name that is not there, for two candidates, and for a role that is needed and not found.
     """
-    chosen = {role: AssignedRole(role, find(table, name, role, origin), "as told", True) for role, name in told.items()}
+    chosen = {
+        role: AssignedRole(role, find(table, name, role, origin), "as told", True) for role, name in assigned.items()
+    }
     taken = {id(choice.channel) for choice in chosen.values()}
     candidates: dict[str, list[tuple[Channel, str]]] = {}
     for channel in table.channels:
         role = role_of(channel.name)
-        if role is not None and role[0] not in told and id(channel) not in taken:
+        if role is not None and role[0] not in assigned and id(channel) not in taken:
             candidates.setdefault(role[0], []).append((channel, role[1]))
-    for role, found in candidates.items():
+    for role, matches in candidates.items():
         if role == "time" and _own_times(table):
             continue
-        if len(found) > 1:
-            names = " and ".join(quoted(channel.name) for channel, _ in found)
+        if len(matches) > 1:
+            names = " and ".join(quoted(channel.name) for channel, _ in matches)
             raise LogError(
-                role, f"{len(found)} candidates: {names}", "one channel", f'--map {role}="{found[0][0].name}"', origin
+                role,
+                f"{len(matches)} candidates: {names}",
+                "one channel",
+                f'--map {role}="{matches[0][0].name}"',
+                origin,
             )
-        channel, word = found[0]
+        channel, word = matches[0]
         chosen[role] = AssignedRole(role, channel, f'the name says "{word}"', False)
     for role in needed:
         if role not in chosen:

@@ -23,7 +23,7 @@ LARGEST = 1e30
 
 
 @dataclass
-class Told:
+class Notes:
     """Lines gathered on the way to a log, and the units that are not those of the roles."""
 
     read: list[str] = field(default_factory=list)
@@ -43,34 +43,34 @@ class Reading:
     origin: str
 
 
-def with_told_units(table: ChannelTable, mapping: Mapping, times: bool, origin: str) -> ChannelTable:
-    """The table with the units that the user said, and with the times that follow from them, where the format has no
-    `times` of its own. Raises LogError."""
+def with_user_units(table: ChannelTable, mapping: Mapping, times: bool, origin: str) -> ChannelTable:
+    """The table with the user's units, and with the times that follow from them where the format has no `times` of its
+    own. Raises LogError."""
     if not mapping.units:
         return table
-    told = {id(find(table, name, "unit", origin)): unit for name, unit in mapping.units.items()}
-    channels = [replace(channel, unit=told.get(id(channel), channel.unit)) for channel in table.channels]
+    units = {id(find(table, name, "unit", origin)): unit for name, unit in mapping.units.items()}
+    channels = [replace(channel, unit=units.get(id(channel), channel.unit)) for channel in table.channels]
     if not times:  # they come from its columns
         channels = [replace(channel, time=None) for channel in channels]
     timed = zip(channels, with_times(channels), strict=True)
-    kept = tuple(new if old.time is None else old for old, new in timed)
-    return replace(table, channels=kept)
+    timed_channels = tuple(new if old.time is None else old for old, new in timed)
+    return replace(table, channels=timed_channels)
 
 
-def signal(choice: AssignedRole, reading: Reading, told: Told) -> np.ndarray:
+def signal(choice: AssignedRole, reading: Reading, notes: Notes) -> np.ndarray:
     """Values of a channel in the unit of its role, with what was done to them told. Raises LogError."""
     channel, role = choice.channel, choice.role
     values, bits = unwrapped(channel.values) if ROLES[role] == "m" else (channel.values, 0)  # encoders overflow
     if bits:
-        told.warnings.append(f"{role}: {channel.name} treated as a {bits}-bit counter that overflows: unwrapped")
+        notes.warnings.append(f"{role}: {channel.name} treated as a {bits}-bit counter that overflows: unwrapped")
     scale = reading.mapping.scales.get(role)
     unit = channel.unit
     if scale is not None:
         value, taken = _scaled(role, scale, unit, reading.origin)
         line = f"{scale}" + ("" if unit else f", its values taken to be in {taken} as the scale implies")
-    elif not unit and reading.strict and choice.told and reading.bare:
+    elif not unit and reading.strict and choice.by_user and reading.bare:
         value, line = 1.0, f"no unit in the file: assumed to be in {ROLES[role]}"
-        told.warnings.append(
+        notes.warnings.append(
             f"{role}: {channel.name} has no unit (this format has none): assumed to be in {ROLES[role]}"
         )
     else:
@@ -79,14 +79,14 @@ def signal(choice: AssignedRole, reading: Reading, told: Told) -> np.ndarray:
         if si != ROLES[role]:
             if reading.strict:
                 raise _wrong_unit(choice, unit, si, reading)
-            told.units[role] = si
-    told.read.append(f"{role}: {channel.name} ({channel.source}), {choice.reason}; {line}")
+            notes.units[role] = si
+    notes.read.append(f"{role}: {channel.name} ({channel.source}), {choice.reason}; {line}")
     with np.errstate(all="ignore"):  # what is no number stays so, and is the business of the time base
         values = values * value
         most = np.abs(values[np.isfinite(values)]).max(initial=0.0)
     if most > LARGEST:
-        given = f"values up to {most:.3g} {told.units.get(role, ROLES[role])}"
-        raise LogError(role, given, "values that an instrument can measure; is the file damaged?", "", reading.origin)
+        actual = f"values up to {most:.3g} {notes.units.get(role, ROLES[role])}"
+        raise LogError(role, actual, "values that an instrument can measure; is the file damaged?", "", reading.origin)
     return values
 
 
@@ -102,36 +102,42 @@ def _wrong_unit(choice: AssignedRole, unit: str, si: str, reading: Reading) -> L
     role, name = choice.role, choice.channel.name
     if not unit:
         usual = {"m": "mm", "m/s": "mm/s", "N": "N"}.get(ROLES[role], ROLES[role])
-        given = f"{quoted(name)}, which has no unit"
-        return LogError(role, given, f"a unit convertible to {ROLES[role]}", f'--unit "{name}={usual}"', reading.origin)
+        actual = f"{quoted(name)}, which has no unit"
+        return LogError(
+            role, actual, f"a unit convertible to {ROLES[role]}", f'--unit "{name}={usual}"', reading.origin
+        )
     number = "35.1507" if role in ("force", "disturbance") else "1.5"
     example = f'--scale {role}="{number} {ROLES[role]}/{si}"'
     return LogError(role, f"{quoted(name)} in {unit}", f"a scale to {ROLES[role]}", example, reading.origin)
 
 
-def instants(choice: AssignedRole, clock: AssignedRole | None, reading: Reading, told: Told) -> np.ndarray | None:
+def instants(choice: AssignedRole, clock: AssignedRole | None, reading: Reading, notes: Notes) -> np.ndarray | None:
     """Instants of a channel [s]: from the sample time that the user said, the time channel, or the file; None where
     there are none. Raises LogError."""
     channel = choice.channel
     if reading.mapping.sample_time is not None:
         return reading.mapping.sample_time * np.arange(channel.values.size)
-    if clock is not None and (clock.told or channel.time is None) and clock.channel.values.size == channel.values.size:
-        return clock.channel.values * _seconds(clock, reading, told)
+    if (
+        clock is not None
+        and (clock.by_user or channel.time is None)
+        and clock.channel.values.size == channel.values.size
+    ):
+        return clock.channel.values * _seconds(clock, reading, notes)
     return channel.time
 
 
-def _seconds(clock: AssignedRole, reading: Reading, told: Told) -> float:
+def _seconds(clock: AssignedRole, reading: Reading, notes: Notes) -> float:
     """Seconds in the unit of the time channel. Raises LogError for none."""
     name, unit = clock.channel.name, clock.channel.unit
-    if not unit and clock.told and reading.bare:
+    if not unit and clock.by_user and reading.bare:
         line = f"time: {name} has no unit (this format has none): assumed to be in s"
-        told.warnings += [line] if line not in told.warnings else []
+        notes.warnings += [line] if line not in notes.warnings else []
         return 1.0
     value = factor(unit, "s") if unit else None
     if value is None:
-        given = f"{quoted(name)} in {unit}" if unit else f"{quoted(name)}, which has no unit"
-        example = "; or ".join(each for each in (f'--unit "{name}=ms"', _offers(reading.table)) if each)
-        raise LogError("time", given, "a unit convertible to s", example, reading.origin)
+        actual = f"{quoted(name)} in {unit}" if unit else f"{quoted(name)}, which has no unit"
+        example = "; or ".join(option for option in (f'--unit "{name}=ms"', _offers(reading.table)) if option)
+        raise LogError("time", actual, "a unit convertible to s", example, reading.origin)
     return value
 
 

@@ -44,7 +44,7 @@ class TextLayout:
     exact: bool = False
 
     @property
-    def told(self) -> str:
+    def in_words(self) -> str:
         """The layout in words."""
         names = {"\t": "tab", " ": "spaces", ",": "comma", ";": "semicolon", ":": "colon"}
         return (
@@ -70,7 +70,7 @@ def decoded_head(path: Path) -> tuple[str, list[str]]:
         except UnicodeDecodeError:
             encoding = "cp1252"
     text = codecs.getincrementaldecoder(encoding)("replace").decode(head).replace(DOS_END, "")
-    odd = sum(not (each.isprintable() or each in "\t\r\n\f") for each in text)
+    odd = sum(not (character.isprintable() or character in "\t\r\n\f") for character in text)
     if odd > 0.02 * len(text):
         raise _no_text(path)
     lines = re.split(r"\r\n|\n|\r", text)
@@ -115,12 +115,12 @@ def layout(path: Path) -> TextLayout:
     encoding, lines = decoded_head(path)
     lines = lines[:HEAD_LINES]
     for words in (False, True):
-        found = [_fit(lines, encoding, *candidate, words) for candidate in _CANDIDATES]
-        fits = [each for each in found if each is not None]
+        layouts = [_fit(lines, encoding, *candidate, words) for candidate in _CANDIDATES]
+        fits = [fit for fit in layouts if fit is not None]
         if fits:
             return max(fits, key=lambda fit: fit[0])[1]
-    given = "no row of numbers" + (f" after the heading {lines[0][:60]!r}" if lines else "")
-    raise LogError("log", given, "a heading and rows of numbers", "time [s];position [mm];force [N]", str(path))
+    actual = "no row of numbers" + (f" after the heading {lines[0][:60]!r}" if lines else "")
+    raise LogError("log", actual, "a heading and rows of numbers", "time [s];position [mm];force [N]", str(path))
 
 
 def _fit(
@@ -158,8 +158,8 @@ def _headings(lines: list[str], first: int, columns: int, delimiter: str) -> tup
         return (), ()
     last = heads[-1]
     bare = [cell.strip("[]()") for cell in last]
-    told = [cell for cell in bare if cell and cell != "-"]
-    if len(heads) == 2 and told and sum(is_unit(cell) for cell in told) >= 0.5 * len(told):
+    cells = [cell for cell in bare if cell and cell != "-"]
+    if len(heads) == 2 and cells and sum(is_unit(cell) for cell in cells) >= 0.5 * len(cells):
         return tuple(heads[0]), tuple(bare)
     names, units = zip(*(split_heading(cell) for cell in last), strict=True)
     return tuple(names), tuple(units)
@@ -175,5 +175,5 @@ def _heading_cells(line: str, columns: int, delimiter: str) -> list[str]:
     cells = split_line(line, delimiter)
     if delimiter == " " and len(cells) != columns:
         named = re.findall(r"[^\[\]()]+[\[(][^\])]*[\])]", line)
-        return [each.strip() for each in named] if len(named) == columns else cells
+        return [name.strip() for name in named] if len(named) == columns else cells
     return cells

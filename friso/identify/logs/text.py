@@ -28,9 +28,11 @@ def read_text(path: Path) -> ChannelTable:
         form = replace(form, decimal=",")
     frame = read_frame(path, form)
     names = unique(list(form.names) or [f"column {i + 1}" for i in range(form.columns)])
-    told = preamble(form.above, names, form.delimiter)
-    units = [own or told.units.get(name, "") for own, name in zip(form.units or [""] * len(names), names, strict=True)]
-    notes, columns = list(told.read), []
+    heading = preamble(form.above, names, form.delimiter)
+    units = [
+        unit or heading.units.get(name, "") for unit, name in zip(form.units or [""] * len(names), names, strict=True)
+    ]
+    notes, columns = list(heading.read), []
     _no_short_rows(path, form, frame)
     blank = frame.isna().all(axis=1).to_numpy()
     frame, blanks = (frame[~blank], int(blank.sum())) if blank.any() else (frame, 0)
@@ -46,10 +48,12 @@ def read_text(path: Path) -> ChannelTable:
     if blanks:
         notes.append(f"{blanks} empty lines left out")
     channels = with_times(_same_ends(path, form, columns, frame))
-    if told.interval is not None and all(channel.time is None for channel in channels):
-        channels = tuple(replace(c, time=told.interval * np.arange(c.values.size)) for c in channels)
+    if heading.interval is not None and all(channel.time is None for channel in channels):
+        channels = tuple(replace(c, time=heading.interval * np.arange(c.values.size)) for c in channels)
     return ChannelTable(
-        channels, told.scalars, (f"format: text, {form.told}", f"{len(frame)} rows, {len(columns)} columns", *notes)
+        channels,
+        heading.scalars,
+        (f"format: text, {form.in_words}", f"{len(frame)} rows, {len(columns)} columns", *notes),
     )
 
 
@@ -98,8 +102,8 @@ def ragged(path: Path, form: TextLayout, why: str = "") -> LogError:
         for number, line in enumerate(file, 1):
             cells = split_line(line.rstrip("\r\n"), form.delimiter) if number > form.first else []
             if len(cells) > form.columns and any(cells[form.columns :]):
-                given = f"{len(cells)} cells in line {number}"
-                return LogError("log", given, f"{form.columns} cells in every row", "", str(path))
+                actual = f"{len(cells)} cells in line {number}"
+                return LogError("log", actual, f"{form.columns} cells in every row", "", str(path))
     return LogError("log", why.strip(), f"rows of {form.columns} numbers", "", str(path))
 
 
@@ -114,8 +118,8 @@ def _no_short_rows(path: Path, form: TextLayout, frame: Any) -> None:
         for number, line in enumerate(file, 1):
             cells = split_line(line.rstrip("\r\n"), form.delimiter) if number in suspects and line.strip() else []
             if 0 < len(cells) < form.columns:
-                given = f"{len(cells)} cells in line {number}"
-                raise LogError("log", given, f"{form.columns} cells in every row", "", str(path))
+                actual = f"{len(cells)} cells in line {number}"
+                raise LogError("log", actual, f"{form.columns} cells in every row", "", str(path))
 
 
 def _has_comma(path: Path, form: TextLayout) -> bool:
@@ -156,8 +160,8 @@ def _numbers(path: Path, form: TextLayout, cells: Any, name: str) -> tuple[np.nd
     if wrong.any():
         row = int(np.flatnonzero(wrong)[0])
         line = form.first + 1 + int(cells.index[row])
-        given = f"{quoted(str(texts.iloc[row]))} in line {line}, column {name or 'without a name'}"
-        raise LogError("log", given, "numbers in every row", "", str(path))
+        actual = f"{quoted(str(texts.iloc[row]))} in line {line}, column {name or 'without a name'}"
+        raise LogError("log", actual, "numbers in every row", "", str(path))
     return values, ""
 
 
@@ -199,8 +203,8 @@ def _same_ends(path: Path, form: TextLayout, columns: list[Channel], frame: Any)
         missing = len(frame) - len(shortest.values)
         if missing <= 2 and missing < 0.01 * len(frame):
             line = form.first + 1 + int(frame.index[len(shortest.values)])
-            given = f"a row in line {line} that ends before {shortest.name}"
-            raise LogError("log", given, f"{form.columns} cells in every row", "", str(path))
+            actual = f"a row in line {line} that ends before {shortest.name}"
+            raise LogError("log", actual, f"{form.columns} cells in every row", "", str(path))
     return out
 
 
@@ -211,9 +215,9 @@ def with_times(columns: list[Channel]) -> tuple[Channel, ...]:
     clocks = [(i, c, factor(c.unit, "s")) for i, c in clocks if c.unit]
     out = []
     for i, column in enumerate(columns):
-        fitting = [each for each in clocks if each[2] is not None and len(each[1].values) == len(column.values)]
-        left = [each for each in fitting if each[0] < i] or (fitting if len(fitting) == 1 else [])
-        is_clock = any(i == each[0] for each in clocks)
+        fitting = [clock for clock in clocks if clock[2] is not None and len(clock[1].values) == len(column.values)]
+        left = [clock for clock in fitting if clock[0] < i] or (fitting if len(fitting) == 1 else [])
+        is_clock = any(i == clock[0] for clock in clocks)
         if left and not is_clock:
             _, clock, seconds = left[-1]
             out.append(replace(column, time=clock.values * (seconds or 1.0)))

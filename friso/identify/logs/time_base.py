@@ -50,8 +50,8 @@ def track(name: str, time: np.ndarray, values: np.ndarray) -> Track:
     steps = np.diff(time)
     gaps = steps > GAP * np.median(steps)
     if gaps.mean() > MOST_GAPS:
-        given = f"time stamps with {gaps.mean():.0%} of the steps over {GAP} times the usual {np.median(steps):.4g} s"
-        raise LogError(name, given, "uniform sampling, or the true sample time", '--dt "1 ms"')
+        actual = f"time stamps with {gaps.mean():.0%} of the steps over {GAP} times the usual {np.median(steps):.4g} s"
+        raise LogError(name, actual, "uniform sampling, or the true sample time", '--dt "1 ms"')
     period = float(steps[~gaps].mean())
     edges = [0, *(np.flatnonzero(gaps) + 1).tolist(), time.size]
     segments = [slice(a, b) for a, b in pairwise(edges)]
@@ -62,8 +62,8 @@ def _numbers_only(name: str, time: np.ndarray, values: np.ndarray) -> tuple[np.n
     """The samples that are numbers, and how many are not between the first and the last. Raises LogError."""
     there = np.isfinite(time) & np.isfinite(values)
     if there.sum() < max(2, 0.5 * there.size):
-        given = f"{there.size - there.sum()} of {there.size} samples that are not numbers (NaN)"
-        raise LogError(name, given, "at least half of the samples", "")
+        actual = f"{there.size - there.sum()} of {there.size} samples that are not numbers (NaN)"
+        raise LogError(name, actual, "at least half of the samples", "")
     inside = np.flatnonzero(there)
     return time[there], values[there], int(np.count_nonzero(~there[inside[0] : inside[-1]]))
 
@@ -105,19 +105,19 @@ def together(tracks: Mapping[str, Track]) -> tuple[Track, dict[str, np.ndarray]]
     base_name = max(tracks, key=lambda name: round(np.log(tracks[name].period), 4))
     base = tracks[base_name]
     read, warnings, values = [], [], {}
-    for name, each in tracks.items():
-        if _same_instants(each, base):
-            values[name] = each.values
+    for name, single in tracks.items():
+        if _same_instants(single, base):
+            values[name] = single.values
             continue
-        values[name] = _at(base, each)
-        if not _coincident(base, each):
+        values[name] = _at(base, single)
+        if not _coincident(base, single):
             read.append(
-                f"{name}: interpolated linearly from {1 / each.period:.6g} Hz onto the {1 / base.period:.6g} Hz "
+                f"{name}: interpolated linearly from {1 / single.period:.6g} Hz onto the {1 / base.period:.6g} Hz "
                 f"instants of {base_name}"
             )
-        if each.period < base.period / GAP:
+        if single.period < base.period / GAP:
             warnings.append(
-                f"{name}: sampled at {1 / each.period:.6g} Hz and read at {1 / base.period:.6g} Hz without an "
+                f"{name}: sampled at {1 / single.period:.6g} Hz and read at {1 / base.period:.6g} Hz without an "
                 "anti-aliasing filter"
             )
     covered = np.all([np.isfinite(value) for value in values.values()], axis=0)
@@ -125,18 +125,18 @@ def together(tracks: Mapping[str, Track]) -> tuple[Track, dict[str, np.ndarray]]
     short = [run for run in segments if run.stop - run.start < SHORTEST]
     segments = [run for run in segments if run.stop - run.start >= SHORTEST]
     if not segments:
-        spans = ", ".join(f"{name} {each.time[0]:.6g} s to {each.time[-1]:.6g} s" for name, each in tracks.items())
+        spans = ", ".join(f"{name} {trace.time[0]:.6g} s to {trace.time[-1]:.6g} s" for name, trace in tracks.items())
         raise LogError(
             "log", f"no {SHORTEST} consecutive samples that all channels share: {spans}", "a common span", ""
         )
     if short:
         read.append(f"{len(short)} segments shorter than {SHORTEST} samples left out")
-    kept, start = [], 0
+    parts, start = [], 0
     for run in segments:
-        kept.append(slice(start, start + run.stop - run.start))
-        start = kept[-1].stop
+        parts.append(slice(start, start + run.stop - run.start))
+        start = parts[-1].stop
     pick = np.concatenate([np.arange(run.start, run.stop) for run in segments])
-    whole = Track(base.time[pick], base.values[pick], base.period, kept, read, warnings)
+    whole = Track(base.time[pick], base.values[pick], base.period, parts, read, warnings)
     return whole, {name: value[pick] for name, value in values.items()}
 
 

@@ -154,13 +154,13 @@ def read_scale(role: str, text: str, channel_unit: str) -> tuple[float, str]:
     if below.lower() in COUNTS and unit.lower() in COUNTS:
         return above, "count"
     for kind in ("m", "rad", "A", "V", "N*m", "N", "m/s", "rad/s", "m/s^2"):
-        own, of_scale = factor(unit, kind), factor(below, kind)
-        if own is not None and of_scale is not None:
-            return above * own / of_scale, unit
+        of_unit, of_scale = factor(unit, kind), factor(below, kind)
+        if of_unit is not None and of_scale is not None:
+            return above * of_unit / of_scale, unit
     if unit == below:
         return above, unit
-    given = f"{quoted(text)}, and the channel is in {unit}"
-    raise LogError("scale", given, f"a scale from {unit} to {role_unit}", f'--scale {role}="1.5 {role_unit}/{unit}"')
+    actual = f"{quoted(text)}, and the channel is in {unit}"
+    raise LogError("scale", actual, f"a scale from {unit} to {role_unit}", f'--scale {role}="1.5 {role_unit}/{unit}"')
 
 
 def _scale_part(text: str, role_unit: str, whole: str, example: str) -> float:

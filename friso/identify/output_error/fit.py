@@ -71,8 +71,8 @@ def fit(problem: Problem, free: Sequence[int], starts: np.ndarray) -> OutputErro
     which are refined; the others stay as in the first of them."""
     mask = np.zeros(starts.shape[1], bool)
     mask[list(free)] = True
-    kept = _screened(problem, starts)
-    refined = refine(problem, kept, np.tile(mask, (len(kept), 1)), ROUGH)
+    screened = _screened(problem, starts)
+    refined = refine(problem, screened, np.tile(mask, (len(screened), 1)), ROUGH)
     best = refined.inner[np.argmin(refined.cost)]
     return _polished(problem, tuple(free), best)
 
@@ -91,20 +91,20 @@ def everywhere(problem: Problem, free: Sequence[int], first: np.ndarray) -> np.n
     return np.vstack([first, starts])
 
 
-def nearby(found: OutputErrorFit) -> np.ndarray:
+def nearby(fit: OutputErrorFit) -> np.ndarray:
     """Starts that another problem's fit allows, shape (starts, parameters), itself the first: drawn from its covariance
     `FAR` times as wide."""
-    low, high = (end[list(found.free)] for end in bounds_of(found.problem))
-    deviation = np.sqrt(np.diag(found.covariance))
-    known = np.isfinite(deviation) & (deviation > 0)
-    correlation = np.eye(len(found.free))
-    part = found.covariance[np.ix_(known, known)]
-    correlation[np.ix_(known, known)] = part / np.outer(deviation[known], deviation[known])
-    spread = np.minimum(FAR * np.where(known, deviation, np.inf), (high - low) / 4)
+    low, high = (end[list(fit.free)] for end in bounds_of(fit.problem))
+    deviation = np.sqrt(np.diag(fit.covariance))
+    usable = np.isfinite(deviation) & (deviation > 0)
+    correlation = np.eye(len(fit.free))
+    part = fit.covariance[np.ix_(usable, usable)]
+    correlation[np.ix_(usable, usable)] = part / np.outer(deviation[usable], deviation[usable])
+    spread = np.minimum(FAR * np.where(usable, deviation, np.inf), (high - low) / 4)
     rows = np.random.default_rng(SEED).multivariate_normal(np.zeros(len(spread)), correlation, NEARBY, method="eigh")
-    starts = np.tile(found.inner, (NEARBY + 1, 1))
-    starts[1:, list(found.free)] += rows * spread
-    starts[:, list(found.free)] = np.clip(starts[:, list(found.free)], low, high)
+    starts = np.tile(fit.inner, (NEARBY + 1, 1))
+    starts[1:, list(fit.free)] += rows * spread
+    starts[:, list(fit.free)] = np.clip(starts[:, list(fit.free)], low, high)
     return starts
 
 
@@ -112,8 +112,8 @@ def _screened(problem: Problem, starts: np.ndarray) -> np.ndarray:
     """The best starts, shape (kept, parameters), the first one always among them."""
     if len(starts) <= KEPT:
         return starts
-    found = costs(problem.beginning(min(len(problem.wanted), int(SCREENED / len(starts)))), starts[1:])
-    return np.vstack([starts[0], starts[1:][np.argsort(found)[: KEPT - 1]]])
+    screened = costs(problem.beginning(min(len(problem.target), int(SCREENED / len(starts)))), starts[1:])
+    return np.vstack([starts[0], starts[1:][np.argsort(screened)[: KEPT - 1]]])
 
 
 def _polished(problem: Problem, free: tuple[int, ...], inner: np.ndarray) -> OutputErrorFit:
@@ -121,22 +121,22 @@ def _polished(problem: Problem, free: tuple[int, ...], inner: np.ndarray) -> Out
     low, high = bounds_of(problem)
     mask = np.isin(np.arange(len(inner)), free)
     names = [f"p{i}" for i in free]
-    given = lmfit.Parameters()
+    parameters = lmfit.Parameters()
     for name, i in zip(names, free, strict=True):
-        given.add(name, value=inner[i], min=low[i], max=high[i])
+        parameters.add(name, value=inner[i], min=low[i], max=high[i])
 
-    def numbers(found: lmfit.Parameters) -> np.ndarray:
+    def numbers(parameters: lmfit.Parameters) -> np.ndarray:
         full = inner.copy()
-        full[list(free)] = [found[name].value for name in names]
+        full[list(free)] = [parameters[name].value for name in names]
         return full
 
-    def residual(found: lmfit.Parameters) -> np.ndarray:
-        return problem.residuals(numbers(found)[None])[0]
+    def residual(parameters: lmfit.Parameters) -> np.ndarray:
+        return problem.residuals(numbers(parameters)[None])[0]
 
-    def jacobian(found: lmfit.Parameters) -> np.ndarray:
-        return problem.jacobians(numbers(found)[None], mask[None])[0][1]
+    def jacobian(parameters: lmfit.Parameters) -> np.ndarray:
+        return problem.jacobians(numbers(parameters)[None], mask[None])[0][1]
 
-    result: Any = lmfit.minimize(residual, given, Dfun=jacobian, max_nfev=FINE * len(free), ftol=1e-6, xtol=1e-6)
+    result: Any = lmfit.minimize(residual, parameters, Dfun=jacobian, max_nfev=FINE * len(free), ftol=1e-6, xtol=1e-6)
     best = numbers(result.params)
     ((rest, slopes),) = problem.jacobians(best[None], mask[None])
     return OutputErrorFit(problem, best, free, spread_of(slopes, rest), rest)

@@ -58,49 +58,49 @@ def parameters_of(
     InputError for a friction law that is not among those that can be fitted.
     """
     mass = levels["mass"]
-    found = [FitParameter(MASS, "kg", mass, mass / 5, mass * 5)]
+    parameters = [FitParameter(MASS, "kg", mass, mass / 5, mass * 5)]
     if flat["friction.model"] in FITTED:
-        found += _friction(flat, levels, speed, travel, both_ways)
+        parameters += _friction(flat, levels, speed, travel, both_ways)
     elif flat["friction.model"] != "none":
-        given = f'"{flat["friction.model"]}", of which it is not known what a log shows'
-        raise InputError("friction.model", given, f"one of {', '.join(FITTED)}, or none", 'model = "lugre"')
+        actual = f'"{flat["friction.model"]}", of which it is not known what a log shows'
+        raise InputError("friction.model", actual, f"one of {', '.join(FITTED)}, or none", 'model = "lugre"')
     bias = "bias.cart" if "masses.cart" in flat else "bias.stage"
     reach = 5 * max(levels["coulomb"], abs(levels["offset"]))
     if both_ways:
-        found.append(FitParameter(bias, "N", -levels["offset"] or 1e-9, -reach, reach, logarithmic=False))
+        parameters.append(FitParameter(bias, "N", -levels["offset"] or 1e-9, -reach, reach, logarithmic=False))
     if "joint.stiffness" in flat and not flat["joint.locked"]:
         k, d = flat["joint.stiffness"], max(flat["joint.damping"], 1e-3)
         share = flat["masses.cart"] / (flat["masses.cart"] + flat["masses.stage"])
-        found += [
+        parameters += [
             FitParameter(SHARE, "", share, share / 20, 1 - (1 - share) / 20, logarithmic=False, core=False),
             FitParameter("joint.stiffness", "N/m", k, k / 10, k * 10, core=False),
             FitParameter("joint.damping", "N*s/m", d, d / 100, d * 100, core=False),
         ]
-    return found
+    return parameters
 
 
 def _friction(
     flat: Mapping[str, Any], levels: Mapping[str, float], speed: float, travel: float, both_ways: bool
 ) -> list[FitParameter]:
     coulomb, viscous = levels["coulomb"], levels["viscous"]
-    found = [
+    parameters = [
         FitParameter("friction.coulomb", "N", coulomb, coulomb / 20, coulomb * 5),
         FitParameter("friction.viscous", "N*s/m", viscous, viscous / 1e3, viscous * 20),
     ]
     if "friction.stribeck_velocity" in flat:
         if both_ways:
-            found.append(FitParameter("friction.viscous_asymmetry", "", 1e-6, -0.9, 0.9, logarithmic=False))
-        found += [
+            parameters.append(FitParameter("friction.viscous_asymmetry", "", 1e-6, -0.9, 0.9, logarithmic=False))
+        parameters += [
             FitParameter(RATIO, "", 1.0, 1.0, HIGHEST_RATIO, logarithmic=False, core=False),
             _slow("friction.stribeck_velocity", "m/s", flat, speed / 3e3, speed),
         ]
     if "friction.bristle_stiffness" in flat:
         softest, stiffest = coulomb / min(LONGEST, travel / 10), coulomb / SHORTEST
-        found.append(_slow("friction.bristle_stiffness", "N/m", flat, softest, stiffest))
+        parameters.append(_slow("friction.bristle_stiffness", "N/m", flat, softest, stiffest))
     if "friction.bristle_damping" in flat:
         critical = 2 * np.sqrt(flat["friction.bristle_stiffness"] * levels["mass"])
-        found.append(_slow("friction.bristle_damping", "N*s/m", flat, critical / 50, 10 * critical))
-    return found
+        parameters.append(_slow("friction.bristle_damping", "N*s/m", flat, critical / 50, 10 * critical))
+    return parameters
 
 
 def _slow(name: str, unit: str, flat: Mapping[str, Any], low: float, high: float) -> FitParameter:

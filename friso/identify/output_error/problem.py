@@ -51,18 +51,18 @@ class Simulated:
 
 @dataclass(frozen=True)
 class Problem:
-    """A stage as flat keys that follows a log, the parameters, and the force [N] that is `wanted` of the controller.
+    """A stage as flat keys that follows a log, the parameters, and the force [N] expected of the controller, `target`.
 
-    In a `closed` loop the stage has the controller of its machine and follows the log's reference; what is wanted is
+    In a `closed` loop the stage has the controller of its machine and follows the log's reference; the target is
     the log's force. Otherwise it follows the log's position under the log's force, held to it by a controller of our
-    own, of whose force nothing is wanted: what it has to add is what the model does not explain. `start` holds position
+    own whose target is zero: what it has to add is what the model does not explain. `start` holds position
     [m] and velocity [m/s] at the beginning.
     """
 
     flat: Mapping[str, Any]
     form: Driven
     inputs: Inputs
-    wanted: np.ndarray
+    target: np.ndarray
     parameters: tuple[FitParameter, ...]
     closed: bool
     start: tuple[float, float]
@@ -73,9 +73,9 @@ class Problem:
 
     def beginning(self, count: int) -> Problem:
         """The same with the first so many samples alone."""
-        given = self.inputs
-        inputs = replace(given, reference=given.reference[:count], force=given.force[:count])
-        return replace(self, inputs=inputs, wanted=self.wanted[:count])
+        whole = self.inputs
+        inputs = replace(whole, reference=whole.reference[:count], force=whole.force[:count])
+        return replace(self, inputs=inputs, target=self.target[:count])
 
     def simulated(self, inner: np.ndarray) -> Iterator[tuple[np.ndarray, Simulated]]:
         """Numbers of the runs and their records, a chunk at a time, for fitted numbers of shape (runs, parameters)."""
@@ -91,10 +91,10 @@ class Problem:
 
     def residuals(self, inner: np.ndarray) -> np.ndarray:
         """Wanted minus simulated force [N], shape (runs, n); infinite for runs that failed."""
-        found = np.empty((len(inner), len(self.wanted)))
+        residuals = np.empty((len(inner), len(self.target)))
         for numbers, record in self.simulated(inner):
-            found[numbers] = self.wanted - record.force
-        return np.where(np.isfinite(found), found, np.inf)
+            residuals[numbers] = self.target - record.force
+        return np.where(np.isfinite(residuals), residuals, np.inf)
 
     def jacobians(self, inner: np.ndarray, free: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
         """For each row of fitted numbers, shape (rows, parameters), the residual, shape (n,), and its derivatives to
@@ -103,26 +103,26 @@ class Problem:
         steps = np.array([self._step(inner[row], int(i)) for row, i in zip(owner, number, strict=True)])
         moved = inner[owner].copy()
         moved[np.arange(len(owner)), number] += steps
-        found = self.residuals(np.vstack([inner, moved]))
-        at, off = found[: len(inner)], found[len(inner) :]
+        residuals = self.residuals(np.vstack([inner, moved]))
+        at, off = residuals[: len(inner)], residuals[len(inner) :]
         slopes = (off - at[owner]) / steps[:, None]
         return [(at[row], slopes[owner == row].T) for row in range(len(inner))]
 
     def _step(self, inner: np.ndarray, i: int) -> float:
         """The step of a number, away from the nearer end of its range."""
-        each = self.parameters[i]
-        size = STEP * (1.0 if each.logarithmic else 0.01 * (each.high - each.low))
-        return size if inner[i] < (each.inner(each.low) + each.inner(each.high)) / 2 else -size
+        parameter = self.parameters[i]
+        size = STEP * (1.0 if parameter.logarithmic else 0.01 * (parameter.high - parameter.low))
+        return size if inner[i] < (parameter.inner(parameter.low) + parameter.inner(parameter.high)) / 2 else -size
 
     def _starts(self, flat: Mapping[str, Any], runs: int) -> np.ndarray:
         """Where the log begins and as fast, the bristles bent as far as the first force bends them."""
         position, velocity = self.start
         speed = np.gradient(self.inputs.reference[:3], self.inputs.sample_time)[0]
-        beginning = Steady(self.inputs.reference[0] - position, position, velocity, speed, self.wanted[0])
+        beginning = Steady(self.inputs.reference[0] - position, position, velocity, speed, self.target[0])
         whole = {**flat, "motion.size": np.nan, "motion.duration": np.inf}
         starts = self.kernel.settled(whole, beginning, runs)
         if bristles := self.kernel.having(Role.BRISTLE):
-            pull = self.wanted[0] + self.inputs.force[0] + flat.get("bias.cart", 0.0) + flat.get("bias.stage", 0.0)
+            pull = self.target[0] + self.inputs.force[0] + flat.get("bias.cart", 0.0) + flat.get("bias.stage", 0.0)
             held = flat.get("friction.static", flat["friction.coulomb"])
             bent = np.clip(pull, -held, held) / flat["friction.bristle_stiffness"]
             starts[:, bristles] = np.reshape(bent, (-1, 1))
@@ -133,18 +133,18 @@ class Problem:
         held = self.kernel.held
         force = runs.held[:, :, held.index("held_force")] if "held_force" in held else self._force(flat, runs)
         failed = runs.statuses != Status.DONE
-        return Simulated(*(np.where(failed[:, None], np.nan, each) for each in (position, velocity, force)))
+        return Simulated(*(np.where(failed[:, None], np.nan, channel) for channel in (position, velocity, force)))
 
     def _force(self, flat: Mapping[str, Any], runs: Followed) -> np.ndarray:
         """The force of a controller in continuous time, from the states at the samples."""
         count = runs.states.shape[1]
         part = {key: value[runs.numbers] if np.ndim(value) else value for key, value in flat.items()}
         part |= {"motion.size": np.nan, "motion.duration": np.nan}
-        values = [np.asarray(each)[:, None] for each in self.kernel.values(part, len(runs.numbers))]
-        given = self.inputs.segments[0, :count, 1:].T[:, None, :]
+        values = [np.asarray(value)[:, None] for value in self.kernel.values(part, len(runs.numbers))]
+        reference = self.inputs.segments[0, :count, 1:].T[:, None, :]
         states = np.moveaxis(runs.states, 2, 0)
-        modes = self.kernel.modes(states, 0.0, given, values)
-        outputs = self.kernel.module.outputs(states, modes, 0.0, given, values)
+        modes = self.kernel.modes(states, 0.0, reference, values)
+        outputs = self.kernel.module.outputs(states, modes, 0.0, reference, values)
         return np.broadcast_to(outputs[list(self.kernel.outputs).index("force")], runs.states.shape[:2])
 
 

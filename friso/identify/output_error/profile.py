@@ -52,14 +52,14 @@ def profile(fit: OutputErrorFit, number: int, others: tuple[int, ...], best: flo
     or over the whole range.
     """
     low, high = (float(end[number]) for end in bounds_of(fit.problem))
-    own = fit.inner[number]
+    centre = fit.inner[number]
     spread = fit.covariance[fit.free.index(number), fit.free.index(number)] if number in fit.free else np.inf
     limit = best * (1 + WORSE / fit.independent)
     parameter = fit.problem.parameters[number]
     half = WIDE * np.sqrt(spread) if spread > 0 else np.inf
     while True:
-        near, far = max(low, own - half), min(high, own + half)
-        values = np.unique([*np.linspace(near, far, POINTS), own])
+        near, far = max(low, centre - half), min(high, centre + half)
+        values = np.unique([*np.linspace(near, far, POINTS), centre])
         cost = _costs(fit, number, others, values)
         left, right, open_left, open_right = _ends(values, cost, limit)
         if not ((open_left and near > low) or (open_right and far < high)):

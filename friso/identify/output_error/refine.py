@@ -35,10 +35,10 @@ def bounds_of(problem: Problem) -> tuple[np.ndarray, np.ndarray]:
 
 def costs(problem: Problem, inner: np.ndarray) -> np.ndarray:
     """Mean squares of the residuals [N^2], shape (runs,), of fitted numbers of shape (runs, parameters)."""
-    found = np.empty(len(inner))
+    costs = np.empty(len(inner))
     for numbers, record in problem.simulated(inner):
-        found[numbers] = np.mean((problem.wanted - record.force) ** 2, axis=1)
-    return np.where(np.isfinite(found), found, np.inf)
+        costs[numbers] = np.mean((problem.target - record.force) ** 2, axis=1)
+    return np.where(np.isfinite(costs), costs, np.inf)
 
 
 def refine(problem: Problem, starts: np.ndarray, free: np.ndarray, iterations: int) -> Refined:
@@ -56,11 +56,11 @@ def refine(problem: Problem, starts: np.ndarray, free: np.ndarray, iterations: i
         trial = inner.copy()
         trial[busy] = _stepped(problem, inner[busy], free[busy], damping[busy])
         trial = np.clip(trial, low + margin, high - margin)
-        found = np.full(len(inner), np.inf)
-        found[busy] = costs(problem, trial[busy])
-        better = found < cost
-        done = better & (found > cost * (1 - ENOUGH))
-        inner, cost = np.where(better[:, None], trial, inner), np.where(better, found, cost)
+        trial_cost = np.full(len(inner), np.inf)
+        trial_cost[busy] = costs(problem, trial[busy])
+        better = trial_cost < cost
+        done = better & (trial_cost > cost * (1 - ENOUGH))
+        inner, cost = np.where(better[:, None], trial, inner), np.where(better, trial_cost, cost)
         damping = np.where(better, damping * LESS, damping * MORE)
         busy &= ~done & (damping < 1e3)
     return Refined(inner, cost)

@@ -103,7 +103,7 @@ def believed_between(prior: Prior, log: Log) -> Between:
     """What lies between force and bearing, as other experiments show it or else the stage file has it, which tells no
     viscous friction better than to its whole size. Raises InputError."""
     believed = between(prior.believed(log))
-    viscous = prior.shown.get("friction.viscous")
+    viscous = prior.estimates.get("friction.viscous")
     return replace(believed, viscous=(believed.viscous[0], viscous.half_width if viscous else believed.viscous[0]))
 
 
@@ -170,8 +170,8 @@ def why_unseen(record: BearingRecord, fewest: int) -> str:
     highest = motion_bandwidth(record.body, record.interval)
     if highest * record.interval > SAMPLED:
         needed = SAMPLED / highest
-        each = f"one sample in {record.interval:.3g} s"
-        return f"{each}, and the motion goes up to {highest:.3g} Hz: one in {needed:.3g} s or less is needed"
+        sampled = f"one sample in {record.interval:.3g} s"
+        return f"{sampled}, and the motion goes up to {highest:.3g} Hz: one in {needed:.3g} s or less is needed"
     cutoff = max(highest, LEAST / (len(record.time) * record.interval))
     motion = float(low_pass(record.position, record.interval, cutoff).std())
     noise = robust(np.diff(record.position, 2)) / 6**0.5
@@ -229,8 +229,8 @@ def _arrived(time: np.ndarray, command: np.ndarray, between: Between) -> np.ndar
 
 def _followed(time: np.ndarray, acceleration: np.ndarray, mode: StructureMode) -> np.ndarray:
     """Acceleration of the mass of a mode whose base moves with an acceleration [m/s^2], shape (n,)."""
-    omega, each = 2 * np.pi * mode.frequency, float(time[1] - time[0]) / FINER
+    omega, step = 2 * np.pi * mode.frequency, float(time[1] - time[0]) / FINER
     fine = CubicSpline(time, acceleration)(np.linspace(time[0], time[-1], (len(time) - 1) * FINER + 1))
     damping = 2 * mode.damping_ratio * omega
-    b, a = bilinear([damping, omega**2], [1.0, damping, omega**2], 1 / each)
+    b, a = bilinear([damping, omega**2], [1.0, damping, omega**2], 1 / step)
     return lfilter(b, a, fine, zi=lfilter_zi(b, a) * fine[0])[0][::FINER]

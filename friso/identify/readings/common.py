@@ -49,15 +49,15 @@ def record(name: str, sample_time: float, **signals: Any) -> Log:
 def channel(log: Log, role: str) -> np.ndarray:
     """The values of a role, in its SI unit and finite, shape (n,). Raises InputError otherwise."""
     if role not in log:
-        given = f"channels for {', '.join(log.signals) or 'nothing'}"
-        raise InputError(role, given, f"a channel for the {role.replace('_', ' ')}", f'--map {role}="NAME"', log.name)
+        actual = f"channels for {', '.join(log.signals) or 'nothing'}"
+        raise InputError(role, actual, f"a channel for the {role.replace('_', ' ')}", f'--map {role}="NAME"', log.name)
     if log.unit(role) != ROLES[role]:
         example = _EXAMPLES.get(role, f'--unit {role}="mm"')
         raise InputError(role, f"a channel in {log.unit(role)}", f"one in {ROLES[role]}", example, log.name)
     values = log[role]
     if not np.isfinite(values).all():
-        given = f"{int((~np.isfinite(values)).sum())} of {len(values)} values are no finite numbers"
-        raise InputError(role, given, "finite values, gaps being told in the segments", "", log.name)
+        actual = f"{int((~np.isfinite(values)).sum())} of {len(values)} values are no finite numbers"
+        raise InputError(role, actual, "finite values, gaps being told in the segments", "", log.name)
     return values
 
 
@@ -200,8 +200,8 @@ def correlation_of(covariance: np.ndarray, shifts: np.ndarray, even: np.ndarray)
 def deflections(moves: np.ndarray, ends: np.ndarray, start: float = 0.0) -> np.ndarray:
     """Deflection [m] of bristles, shape (n,), under a body that makes these moves [m], at whose velocities the bristles
     come to rest at `ends` [m], both of shape (n - 1,), from a deflection at the `start` [m] on; exact in each move."""
-    kept = np.exp(-np.abs(moves) / ends)
-    steps = zip((np.sign(moves) * ends).tolist(), kept.tolist(), strict=True)
+    remaining = np.exp(-np.abs(moves) / ends)
+    steps = zip((np.sign(moves) * ends).tolist(), remaining.tolist(), strict=True)
     return np.array([*accumulate(steps, lambda z, step: step[0] + (z - step[0]) * step[1], initial=start)])
 
 

@@ -61,16 +61,16 @@ class Course:
     @property
     def repeats(self) -> str:
         """What repeats, in words; "" for nothing."""
-        it = self.repetition
-        return f"the {self.signal} repeats every {it.samples} samples" if it else ""
+        repetition = self.repetition
+        return f"the {self.signal} repeats every {repetition.samples} samples" if repetition else ""
 
     @property
     def words(self) -> str:
         """The whole of it in words."""
-        it = self.repetition
-        if it is None:
+        repetition = self.repetition
+        if repetition is None:
             return "a log whose reference stands still, with nothing periodic in it"
-        between = f"has about {it.harmonics:.0f} harmonics and {it.turns} reversals per period"
+        between = f"has about {repetition.harmonics:.0f} harmonics and {repetition.turns} reversals per period"
         return f"a log in which {self.repeats}, {between}"
 
 

@@ -79,21 +79,21 @@ def friction_position(
     With the loop's `crossover` [Hz] the verdict also asks whether it is quick enough for the oscillations seen. Raises
     InputError for missing channels.
     """
-    found = passes(log, cutoff)
+    stretches = passes(log, cutoff)
     position, force = on_bearing(log), channel(log, "force")
-    if not found:
+    if not stretches:
         unknown = _no_repeatability("no stretch of constant velocity")
         verdict = "Dynamic friction cannot be read off: the log has no stretch of constant velocity."
         return FrictionPosition((), unknown, (), False, verdict, ())
-    travel = [np.ptp(position[p.span]) for p in found]
-    long = [p for p, way in zip(found, travel, strict=True) if way >= 0.2 * max(travel)]
+    travel = [np.ptp(position[p.span]) for p in stretches]
+    long = [p for p, way in zip(stretches, travel, strict=True) if way >= 0.2 * max(travel)]
     ends = [position[p.span] for p in long]
     places = np.linspace(min(x.min() for x in ends), max(x.max() for x in ends), POINTS)
-    maps = tuple(_map(each, places, position, force, log.sample_time, (mass, cutoff)) for each in long)
+    maps = tuple(_map(stretch, places, position, force, log.sample_time, (mass, cutoff)) for stretch in long)
     pairs = _pairs(maps)
     repeatability = _repeatability(maps, pairs)
     separated, verdict = _verdict(maps, repeatability, crossover)
-    short = len(found) - len(long)
+    short = len(stretches) - len(long)
     warnings = [f"{short} passes shorter than a fifth of the longest are left out."] if short else []
     if not mass:
         warnings.append("No mass is given: the force contains that of inertia.")
@@ -101,16 +101,16 @@ def friction_position(
 
 
 def _map(
-    each: Pass,
+    stretch: Pass,
     places: np.ndarray,
     position: np.ndarray,
     force: np.ndarray,
     sample_time: float,
-    known: tuple[float, float],
+    settings: tuple[float, float],
 ) -> PassMap:
     """Mean force by place; places are met once, or several times where the motion goes back a little."""
-    mass, cutoff = known
-    x, f = position[each.span], force[each.span]
+    mass, cutoff = settings
+    x, f = position[stretch.span], force[stretch.span]
     smooth = low_pass(x, sample_time, cutoff)
     f = f - mass * np.gradient(np.gradient(smooth, sample_time), sample_time)
     step = places[1] - places[0]
@@ -125,14 +125,14 @@ def _map(
     mean = by_t("friction force along the rail", "N", block_mean(row), "mean over the place by blocks")
     flat = row - np.polyval(np.polyfit(inside, row, 1), inside)
     return PassMap(
-        each.velocity,
+        stretch.velocity,
         places,
         mapped,
         mean,
         float(row.std()),
         _correlation_length(flat, step),
-        _harmonics(flat, step, abs(each.velocity)),
-        each.steady,
+        _harmonics(flat, step, abs(stretch.velocity)),
+        stretch.steady,
     )
 
 
@@ -155,18 +155,18 @@ def _correlation_length(flat: np.ndarray, step: float) -> Estimate:
     name, unit, method = "correlation length", "m", "autocorrelation of the force over the place falls to 1/e"
     if not np.ptp(flat) > 0:
         return Estimate.unknown(name, unit, method, "the force does not vary with the place")
-    found = float(_length(flat[None])[0])
+    length = float(_length(flat[None])[0])
     count = len(flat)
-    if not found * LEAST_LENGTHS <= count:
+    if not length * LEAST_LENGTHS <= count:
         reason = f"the pass holds fewer than {LEAST_LENGTHS:g} correlation lengths"
         return Estimate.unknown(name, unit, method, reason, low=count / LEAST_LENGTHS * step)
-    share = np.exp(-1 / max(found, 0.5))
-    noise = np.random.default_rng(0).standard_normal((DRAWS, count + int(5 * found) + 1))
+    share = np.exp(-1 / max(length, 0.5))
+    noise = np.random.default_rng(0).standard_normal((DRAWS, count + int(5 * length) + 1))
     fields = np.asarray(lfilter([1.0], [1.0, -share], noise, axis=1))[:, -count:]
     trend = np.stack([np.ones(count), np.linspace(-1, 1, count)])
     fields -= fields @ np.linalg.pinv(trend) @ trend
-    low, middle, high = np.nanpercentile(_length(fields) / max(found, 0.5), [2.5, 50, 97.5])
-    value, least, most = (float(found / ratio * step) for ratio in (middle, high, low))
+    low, middle, high = np.nanpercentile(_length(fields) / max(length, 0.5), [2.5, 50, 97.5])
+    value, least, most = (float(length / ratio * step) for ratio in (middle, high, low))
     return Estimate(name, unit, value, least, most, method)
 
 
@@ -181,7 +181,7 @@ def _harmonics(flat: np.ndarray, step: float, speed: float) -> tuple[Harmonic, .
 def _pairs(maps: tuple[PassMap, ...]) -> tuple[tuple[int, int, float], ...]:
     """Correlation of the maps, detrended, of all pairs that share at least half of the shorter one's places; passes in
     opposite directions by the friction against the motion."""
-    found = []
+    pairs = []
     for (i, one), (j, other) in combinations(enumerate(maps), 2):
         common = np.isfinite(one.force) & np.isfinite(other.force)
         shorter = min(np.isfinite(one.force).sum(), np.isfinite(other.force).sum())
@@ -190,8 +190,8 @@ def _pairs(maps: tuple[PassMap, ...]) -> tuple[tuple[int, int, float], ...]:
             rows = [np.sign(m.velocity) * m.force[common] for m in (one, other)]
             rows = [r - np.polyval(np.polyfit(x, r, 1), x) for r in rows]
             sizes = float(np.sqrt(np.sum(rows[0] ** 2) * np.sum(rows[1] ** 2)))
-            found.append((i, j, float(rows[0] @ rows[1]) / sizes if sizes > 0 else 0.0))
-    return tuple(found)
+            pairs.append((i, j, float(rows[0] @ rows[1]) / sizes if sizes > 0 else 0.0))
+    return tuple(pairs)
 
 
 def _no_repeatability(reason: str) -> Estimate:
@@ -206,11 +206,11 @@ def _repeatability(maps: tuple[PassMap, ...], pairs: tuple[tuple[int, int, float
         return _no_repeatability("no two passes over the same places")
     z = np.arctanh(np.clip([r for _, _, r in pairs], -0.999999, 0.999999))
     lengths = [m.correlation_length for m in maps]
-    shown = [length.value for length in lengths if length.shown]
-    if not shown:
+    lengths_shown = [length.value for length in lengths if length.determined]
+    if not lengths_shown:
         return _no_repeatability("the passes are too short against the correlation length of the force")
     travel = min(np.isfinite(m.force).sum() * (m.places[1] - m.places[0]) for m in maps)
-    independent = max(travel / (2 * float(np.median(shown))), 4.0)
+    independent = max(travel / (2 * float(np.median(lengths_shown))), 4.0)
     error = max((independent - 3) ** -0.5, float(z.std(ddof=1)) / len(z) ** 0.5 if len(z) > 1 else 0.0)
     value, low, high = np.tanh(z.mean() + COVERAGE * error * np.array([0, -1, 1]))
     method = f"mean correlation of the force over the place between {len(pairs)} pairs of passes"
@@ -224,7 +224,7 @@ def _verdict(maps: tuple[PassMap, ...], repeatability: Estimate, crossover: floa
     if rough:
         speeds = ", ".join(sorted({f"{abs(m.velocity) * 1e3:.3g}" for m in rough}))
         reasons.append(f"the motion at {speeds} mm/s is not steady (it hunts, sticks or swings)")
-    if not repeatability.shown:
+    if not repeatability.determined:
         reasons.append(f"repeatability is not shown ({repeatability.reason})")
     elif repeatability.value < REPEATS:
         reasons.append(

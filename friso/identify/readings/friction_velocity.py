@@ -69,9 +69,9 @@ def friction_velocity(log: Log, mass: float = 0.0, cutoff: float = CUTOFF) -> Fr
     the reason. Raises InputError for missing channels.
     """
     every = passes(log, cutoff)
-    used = on_common_way(log, [each for each in every if each.steady], cutoff)
-    velocities, forces, errors = np.array([_row(each, mass) for each in used]).reshape(-1, 3).T
-    unsteady = np.array([each.velocity for each in every if not each.steady])
+    used = on_common_way(log, [stretch for stretch in every if stretch.steady], cutoff)
+    velocities, forces, errors = np.array([_row(stretch, mass) for stretch in used]).reshape(-1, 3).T
+    unsteady = np.array([stretch.velocity for stretch in every if not stretch.steady])
     sides = {
         words: _direction(np.abs(velocities[m]), np.sign(velocities[m]) * forces[m], errors[m], words)
         for words, m in ways(velocities)
@@ -79,7 +79,7 @@ def friction_velocity(log: Log, mass: float = 0.0, cutoff: float = CUTOFF) -> Fr
     bias, both = _together(velocities, forces, errors)
     way = way_of(log, used)
     warnings = []
-    if used and way != way_of(log, [each for each in every if each.steady]):
+    if used and way != way_of(log, [stretch for stretch in every if stretch.steady]):
         warnings.append(f"Read on the stretch common to all passes, {way[0] * 1e3:.4g} to {way[1] * 1e3:.4g} mm.")
     if len(unsteady):
         low, high = np.abs(unsteady).min(), np.abs(unsteady).max()
@@ -87,8 +87,12 @@ def friction_velocity(log: Log, mass: float = 0.0, cutoff: float = CUTOFF) -> Fr
     return FrictionVelocity(sides, both, bias, velocities, forces, errors, unsteady, way, tuple(warnings))
 
 
-def _row(each: Pass, mass: float) -> tuple[float, float, float]:
-    return each.velocity, each.force.value - mass * each.acceleration, t_value(each.force.freedom) * each.force.error
+def _row(stretch: Pass, mass: float) -> tuple[float, float, float]:
+    return (
+        stretch.velocity,
+        stretch.force.value - mass * stretch.acceleration,
+        t_value(stretch.force.freedom) * stretch.force.error,
+    )
 
 
 def _together(velocities: np.ndarray, forces: np.ndarray, errors: np.ndarray) -> tuple[Estimate, Direction]:

@@ -33,8 +33,12 @@ def stiffness_of_loading(
     without = np.array([_spring(products.sum(axis=0) - product) for product in products])
     error = float(np.sqrt((count - 1) / count * np.sum((without - without.mean()) ** 2)))
     value = _spring(products.sum(axis=0))
-    found = by_t(KEY, UNIT, Mean(value, error, count - 1), METHOD, LINEARITY * abs(value), LINEARITY * abs(value))
-    return found if found.low > 0 else Estimate.unknown(KEY, UNIT, METHOD, SOFT, 0.0, max(found.high, 0.0) or np.inf)
+    estimate = by_t(KEY, UNIT, Mean(value, error, count - 1), METHOD, LINEARITY * abs(value), LINEARITY * abs(value))
+    return (
+        estimate
+        if estimate.low > 0
+        else Estimate.unknown(KEY, UNIT, METHOD, SOFT, 0.0, max(estimate.high, 0.0) or np.inf)
+    )
 
 
 def _spring(products: np.ndarray) -> float:

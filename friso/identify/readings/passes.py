@@ -62,7 +62,7 @@ def passes(log: Log, cutoff: float = CUTOFF) -> tuple[Pass, ...]:
     """
     position, velocity = on_bearing(log), _velocity(log, cutoff)
     channel(log, "force")
-    found = []
+    stretches = []
     for part in log.segments:
         if part.stop - part.start < LEAST_SAMPLES:
             continue
@@ -70,33 +70,33 @@ def passes(log: Log, cutoff: float = CUTOFF) -> tuple[Pass, ...]:
             spans = _of_reference(log, part, cutoff)
         else:
             spans = _of_motion(velocity[part], log.sample_time, cutoff)
-        for each in spans:
-            span = slice(part.start + each.start, part.start + each.stop)
+        for steady in spans:
+            span = slice(part.start + steady.start, part.start + steady.stop)
             if np.ptp(position[span]) > 0 and velocity[span].mean() != 0:
-                found.append(_pass(log, span, velocity, cutoff))
-    return tuple(found)
+                stretches.append(_pass(log, span, velocity, cutoff))
+    return tuple(stretches)
 
 
-def on_common_way(log: Log, found: Sequence[Pass], cutoff: float = CUTOFF) -> tuple[Pass, ...]:
+def on_common_way(log: Log, stretches: Sequence[Pass], cutoff: float = CUTOFF) -> tuple[Pass, ...]:
     """Passes of a log, each cut to the way that all of them go, where friction is that of the same places; as they are
     where that is too little. `cutoff` [Hz] is that of the velocity."""
     position, velocity = on_bearing(log), _velocity(log, cutoff)
-    ways = [(float(position[each.span].min()), float(position[each.span].max())) for each in found]
+    ways = [(float(position[single.span].min()), float(position[single.span].max())) for single in stretches]
     low, high = max((way[0] for way in ways), default=0.0), min((way[1] for way in ways), default=0.0)
     if high - low < COMMON * min((way[1] - way[0] for way in ways), default=np.inf):
-        return tuple(found)
+        return tuple(stretches)
     cut = []
-    for each in found:
-        inside = each.span.start + np.flatnonzero((position[each.span] >= low) & (position[each.span] <= high))
+    for stretch in stretches:
+        inside = stretch.span.start + np.flatnonzero((position[stretch.span] >= low) & (position[stretch.span] <= high))
         if len(inside) < LEAST_COMMON:
-            return tuple(found)
+            return tuple(stretches)
         cut.append(_pass(log, slice(int(inside[0]), int(inside[-1]) + 1), velocity, cutoff))
     return tuple(cut)
 
 
-def way_of(log: Log, found: Sequence[Pass]) -> tuple[float, float]:
+def way_of(log: Log, stretches: Sequence[Pass]) -> tuple[float, float]:
     """The lowest and highest position [m] in passes of a log; NaN without any."""
-    places = [on_bearing(log)[each.span] for each in found]
+    places = [on_bearing(log)[stretch.span] for stretch in stretches]
     return (min(place.min() for place in places), max(place.max() for place in places)) if places else (np.nan, np.nan)
 
 
@@ -132,12 +132,12 @@ def _of_motion(velocity: np.ndarray, sample_time: float, cutoff: float) -> list[
 def _trimmed(mask: np.ndarray, sample_time: float, cutoff: float, share: float) -> list[slice]:
     """The stretches of a mask without their ends: what the filter smears, and a share of the start to settle."""
     edge, least = int(1 / (cutoff * sample_time)), max(int(LEAST / sample_time), LEAST_SAMPLES)
-    found = []
+    stretches = []
     for run in runs(mask):
         begin, end = run.start + edge + int(share * (run.stop - run.start)), run.stop - edge
         if end - begin >= least:
-            found.append(slice(begin, end))
-    return found
+            stretches.append(slice(begin, end))
+    return stretches
 
 
 def _pass(log: Log, span: slice, velocity: np.ndarray, cutoff: float) -> Pass:

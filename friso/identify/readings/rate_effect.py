@@ -71,10 +71,10 @@ def static_friction(
         return Estimate.unknown(name, "N", "break-away forces", f"{len(forces)} break-aways: 3 are needed", low)
     low, high = np.percentile(rates, [10, 90])
     if high >= SPREAD * low > 0:
-        found = _extrapolated(name, forces, rates, bristle_rate, relative_error)
+        estimate = _extrapolated(name, forces, rates, bristle_rate, relative_error)
     else:
-        found = _bounded(name, forces, rates, bristle_rate, relative_error)
-    return replace(found, low=max(float(found.low - late), 0.0), systematic=found.systematic + late / 2)
+        estimate = _bounded(name, forces, rates, bristle_rate, relative_error)
+    return replace(estimate, low=max(float(estimate.low - late), 0.0), systematic=estimate.systematic + late / 2)
 
 
 def _bounded(name: str, forces: np.ndarray, rates: np.ndarray, bristle_rate: float, relative_error: float) -> Estimate:

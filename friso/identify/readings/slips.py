@@ -50,7 +50,7 @@ def slips(position: np.ndarray, sample_time: float, cutoff: float) -> Slips:
     above = size > threshold
     least = max(int(REST / sample_time), SHOWS)
     edge = int(1 / (cutoff * sample_time))
-    found: list[tuple[int, ...]] = []
+    spans: list[tuple[int, ...]] = []
     rested = 0
     for run in runs(above):
         if run.start - rested >= least and run.start > edge and threshold > 0:
@@ -59,9 +59,9 @@ def slips(position: np.ndarray, sample_time: float, cutoff: float) -> Slips:
             quiet = np.flatnonzero(size[rested : run.start] <= level)
             onset = rested + int(quiet[-1]) if len(quiet) else rested
             if onset - rested >= SHOWS:
-                found.append((onset, run.start - 1, rested, top, int(np.sign(speed[top]))))
+                spans.append((onset, run.start - 1, rested, top, int(np.sign(speed[top]))))
         rested = run.stop
-    columns = np.array(found, dtype=int).reshape(-1, 5).T
+    columns = np.array(spans, dtype=int).reshape(-1, 5).T
     return Slips(
         columns[0],
         columns[1],

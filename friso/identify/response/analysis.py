@@ -124,7 +124,7 @@ def _attempt(warnings: list[str], what: str, function, *arguments):
     try:
         return function(*arguments)
     except InputError as error:
-        warnings.append(f"no {what}: {error.given}; expected {error.expected}")
+        warnings.append(f"no {what}: {error.actual}; expected {error.expected}")
         return None
 
 
@@ -157,7 +157,7 @@ def _clear(responses: Sequence[FrequencyResponse]) -> tuple[FrequencyResponse, F
 
 def _above(driven: FrequencyResponse, departs: Departure | None) -> Range:
     """The band above the departure by friction."""
-    low = departs.frequency.high if departs is not None and departs.frequency.shown else 0.0
+    low = departs.frequency.high if departs is not None and departs.frequency.determined else 0.0
     return max(float(driven.frequency[0]), low), _top(driven)
 
 
@@ -196,7 +196,7 @@ def _friction(
     period: float | None,
 ) -> tuple[Drag | None, Explanation | None]:
     """The friction level that explains the departure, and whether a simulation with it does."""
-    if not records or departs is None or model is None or not departs.frequency.shown:
+    if not records or departs is None or model is None or not departs.frequency.determined:
         return None, None
     step = records[0].sample_time
     rigid = RIGID * model["antiresonance frequency"].value
@@ -204,7 +204,7 @@ def _friction(
     smooth = butter(4, min(2 * float(driven.frequency[-1]), 0.45 / step), fs=1 / step, output="sos")
     speeds = [sosfiltfilt(smooth, np.gradient(record.output, step)) for record in records]
     drag = _attempt(warnings, "friction level", friction_from_departure, driven, speeds, limits, model.signs[0])
-    if drag is None or not drag.coulomb.shown or not np.isfinite(drag.coulomb.value):
+    if drag is None or not drag.coulomb.determined or not np.isfinite(drag.coulomb.value):
         return drag, None
     once = _attempt(warnings, "explanation", lambda: [_last_period(record, period) for record in records])
     if once is None:

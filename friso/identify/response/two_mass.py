@@ -112,7 +112,7 @@ def widened(fitted: TwoMass, apart: Sequence[TwoMass]) -> TwoMass:
 
 def _scaled(estimate: Estimate, others: Sequence[Estimate]) -> Estimate:
     """An estimate with its interval scaled by the ratio of external to internal scatter of the others, if above 1."""
-    if not estimate.shown or not all(another.shown and another.half_width > 0 for another in others):
+    if not estimate.determined or not all(another.determined and another.half_width > 0 for another in others):
         return estimate
     values, weights = (
         np.array([another.value for another in others]),

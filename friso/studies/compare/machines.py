@@ -14,7 +14,7 @@ from friso.errors import InputError
 from friso.rig.run import SAMPLE_TIME
 from friso.stage import Stage, numeric_keys
 from friso.stage.controllers import CONTROLLER, as_tuned
-from friso.stage.correlations import Correlations, Drawn, draw
+from friso.stage.correlations import Correlations, Sample, draw
 
 LEAST, MOST = 20, 100_000
 """Machines at least, for an interval to tell anything, and at most, which take hours."""
@@ -66,7 +66,7 @@ class Machines:
     keys: Mapping[str, np.ndarray]
     seeds: np.ndarray
     signs: np.ndarray
-    drawn: Drawn
+    sample: Sample
     from_file: tuple[str, ...]
     spreads: Mapping[str, float]
     notes: tuple[str, ...]
@@ -96,22 +96,22 @@ def draw_machines(stage: Stage, correlations: Correlations, count: int, seed: in
             raise InputError(option, str(value), f"a whole number from {least} to {most}", example)
     clocked, notes = _with_clock(stage)
     spreads = _spreads(clocked)
-    drawn = draw(_spread(clocked, spreads), _joined(correlations, spreads), count, seed)
+    sample = draw(_spread(clocked, spreads), _joined(correlations, spreads), count, seed)
     held = [key for key in stage.uncertain() if key.startswith(HELD)]
     if held:
         notes += [f"not drawn, being set alike on all machines: {', '.join(held)}"]
-    if drawn.left_out:
-        notes += [f"{drawn.left_out} draws that no stage may have were left out and others drawn"]
+    if sample.left_out:
+        notes += [f"{sample.left_out} draws that no stage may have were left out and others drawn"]
     numbers = np.arange(count)
-    keys = {key: values for key, values in drawn.keys.items() if not key.startswith(HELD)}
+    keys = {key: values for key, values in sample.keys.items() if not key.startswith(HELD)}
     if clocked.rail:
         keys["rail.seed"] = clocked.rail.seed + numbers
     else:
         notes += ["friction is the same all along the rail: the stage file has no [rail]"]
     uniform = np.random.Generator(np.random.Philox(key=[seed, SIGNS])).random(count)
     signs = np.where(uniform < 0.5, -1.0, 1.0)
-    known = tuple(key for key in stage.uncertain() if key in keys)
-    return Machines(clocked, keys, seed + numbers, signs, drawn, known, spreads, tuple(notes))
+    uncertain = tuple(key for key in stage.uncertain() if key in keys)
+    return Machines(clocked, keys, seed + numbers, signs, sample, uncertain, spreads, tuple(notes))
 
 
 def _with_clock(stage: Stage) -> tuple[Stage, list[str]]:
@@ -124,26 +124,28 @@ def _with_clock(stage: Stage) -> tuple[Stage, list[str]]:
 
 def _spreads(stage: Stage) -> dict[str, float]:
     """Default spreads [%] of keys that the stage has, not 0, and calls certain."""
-    flat, given = stage.flat(), stage.uncertain()
+    flat, uncertain = stage.flat(), stage.uncertain()
     follow = FROM_LEAVES if stage.flexure else ()
     return {
         key: spread
         for key, spread in SPREADS.items()
-        if flat.get(key) and key not in given and not key.startswith(follow)
+        if flat.get(key) and key not in uncertain and not key.startswith(follow)
     }
 
 
 def _spread(stage: Stage, spreads: Mapping[str, float]) -> Stage:
     """The stage with these spreads [%] written into it."""
     flat = stage.flat()
-    known = numeric_keys(flat)
-    return stage.replace({key: f"{flat[key]!r} {known[key].unit} +/- {part} %" for key, part in spreads.items()})
+    fields_of_keys = numeric_keys(flat)
+    return stage.replace(
+        {key: f"{flat[key]!r} {fields_of_keys[key].unit} +/- {part} %" for key, part in spreads.items()}
+    )
 
 
 def _joined(correlations: Correlations, spreads: Mapping[str, float]) -> Correlations:
     """Those given, and those of the keys with default spreads."""
     if not all(key in spreads for key in TOGETHER):
         return correlations
-    own = np.array([[1.0, TOGETHER_BY], [TOGETHER_BY, 1.0]])
-    matrix = np.asarray(block_diag(correlations.matrix, own)) if correlations.keys else own
+    lengths = np.array([[1.0, TOGETHER_BY], [TOGETHER_BY, 1.0]])
+    matrix = np.asarray(block_diag(correlations.matrix, lengths)) if correlations.keys else lengths
     return Correlations((*correlations.keys, *TOGETHER), matrix)

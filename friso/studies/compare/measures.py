@@ -54,7 +54,7 @@ Measures = TypeVar("Measures", "MachineMeasures", "Later")
 
 def joined(parts: Sequence[Measures]) -> Measures:
     """Chunks of runs, one after the other."""
-    names = [each.name for each in fields(parts[0])]
+    names = [field.name for field in fields(parts[0])]
     return type(parts[0])(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
 
 
@@ -121,11 +121,11 @@ def linear_loops(stage: Stage, flat: Mapping[str, Any], count: int) -> LoopRobus
     drive, stable, margin = DriveTiming.of(flat), np.ones(count, bool), np.full(count, np.inf)
     for one in limit_cases(stage.flat()).values():
         machines = one.repeated(count)
-        known, looked = poles(flat, machines, drive), stability_by_poles(flat, machines)
-        size = np.abs(known.continuous)
+        loop_poles, looked = poles(flat, machines, drive), stability_by_poles(flat, machines)
+        size = np.abs(loop_poles.continuous)
         low, high = SLOWEST * float(np.median(size.min(axis=1))), drive.highest
         omega = np.geomspace(low, high, int(DENSITY * np.log10(high / low)) + 2)
-        shared = known.distance(np.broadcast_to(omega, (count, len(omega)))).min(axis=1)
+        shared = loop_poles.distance(np.broadcast_to(omega, (count, len(omega)))).min(axis=1)
         stable &= looked.abscissa < 0
         margin = np.minimum(margin, np.minimum(shared, looked.resonant))
     return LoopRobustness(stable, np.where(stable, margin, 0.0))

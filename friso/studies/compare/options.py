@@ -70,10 +70,10 @@ class CompareOptions:
 def linear_flat(stage: Stage, flat: Mapping[str, Any]) -> dict[str, Any]:
     """Keys for the linear loop: the lag of the current loop counts as a delay, as it acts well below its bandwidth, and
     the motor's constant over the one believed is part of the controller's gains. The cable is left out."""
-    own = stage.flat()
-    late = own.get("drive.delay", 0.0)
-    if "drive.current_bandwidth" in own:
-        late += 1 / (2 * np.pi * own["drive.current_bandwidth"])
+    machine = stage.flat()
+    late = machine.get("drive.delay", 0.0)
+    if "drive.current_bandwidth" in machine:
+        late += 1 / (2 * np.pi * machine["drive.current_bandwidth"])
     ratio, law = flat.get("drive.motor_constant_ratio", 1.0), controller_of(flat)
     return {**flat, **{key: ratio * flat[key] for key in map(law.key, law.loop_gain)}, "drive.delay": late}
 
@@ -85,22 +85,22 @@ def options(machines: Machines, within: float) -> CompareOptions:
     locked, free = variants.get("locked", stage), variants.get("free")
     left_out: dict[str, str] = {} if free else dict.fromkeys(JOINT, "the stage file has no joint with a stiffness")
     deadband = DEADBAND * within
-    found = [Option("a", locked), *_faster("b", locked, left_out)]
+    listed = [Option("a", locked), *_faster("b", locked, left_out)]
     if free:
-        found.append(Option("c", free))
+        listed.append(Option("c", free))
     if _integrates(stage):
         waiting = locked.with_numbers({"drive.integrator_deadband": deadband})
-        found += [Option("d", waiting), Option("e", locked.replace({"drive.integrator_reset": True}))]
+        listed += [Option("d", waiting), Option("e", locked.replace({"drive.integrator_reset": True}))]
     else:
         left_out |= dict.fromkeys("de", "the controller does not integrate")
     ahead = _feedforward(machines)
     if any(np.any(force) for force in ahead.values()):
-        found.append(Option("f", locked, ahead))
+        listed.append(Option("f", locked, ahead))
     else:
         left_out["f"] = "the stage file has neither Coulomb nor viscous friction"
     if free:
-        found += _faster("g", free, left_out)
-    return CompareOptions(tuple(found), dict(sorted(left_out.items())), deadband)
+        listed += _faster("g", free, left_out)
+    return CompareOptions(tuple(listed), dict(sorted(left_out.items())), deadband)
 
 
 def _faster(letter: str, stage: Stage, left_out: dict[str, str]) -> list[Option]:
@@ -108,14 +108,14 @@ def _faster(letter: str, stage: Stage, left_out: dict[str, str]) -> list[Option]
     machine, and all others get its settings. Nothing, and why not, where it is that fast already."""
     flat = stage.flat()
     highest = limits(linear_flat(stage, flat)).highest_comfortable
-    told = bandwidth(flat)
-    own = 1.0 if told is None else told
-    if told is not None and highest is not None:
+    tuned = bandwidth(flat)
+    present = 1.0 if tuned is None else tuned
+    if tuned is not None and highest is not None:
         highest = min(highest, 1 / (PER_PERIOD * flat["drive.sample_time"]))
-    if highest is None or highest <= own:
+    if highest is None or highest <= present:
         left_out[letter] = f"no higher bandwidth keeps a modulus margin of {WANTED:g}"
         return []
-    factor = float(highest / own)
+    factor = float(highest / present)
     changes = {key: value for key, value in sped_up(flat, factor).items() if value != flat[key]}
     return [Option(letter, stage.with_numbers(changes), factor=factor)]
 

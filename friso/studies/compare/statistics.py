@@ -22,12 +22,12 @@ class EstimatedValue:
 def median(values: np.ndarray) -> EstimatedValue:
     """The median, with the interval of order statistics (David, Nagaraja 2003, Order Statistics, Sec. 7.1), which holds
     for any distribution; infinite values are allowed, NaN are left out."""
-    known = np.sort(values[~np.isnan(values)])
-    if not known.size:
+    ranked = np.sort(values[~np.isnan(values)])
+    if not ranked.size:
         return EstimatedValue(np.nan, np.nan, np.nan)
-    rank = int(binom.ppf(0.025, known.size, 0.5))
-    low, high = (known[rank - 1], known[-rank]) if rank else (-np.inf, np.inf)
-    return EstimatedValue(_middle(known), float(low), float(high))
+    rank = int(binom.ppf(0.025, ranked.size, 0.5))
+    low, high = (ranked[rank - 1], ranked[-rank]) if rank else (-np.inf, np.inf)
+    return EstimatedValue(_middle(ranked), float(low), float(high))
 
 
 def _middle(ordered: np.ndarray) -> float:

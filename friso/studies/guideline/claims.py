@@ -30,7 +30,7 @@ class GuidelineClaim:
 
     where: str
     text: str
-    found: str
+    result: str
     rule: str
     judgement: str
 

@@ -57,15 +57,15 @@ RATIOS = (0.0, 0.05, 0.3, 3.0, 20.0, np.inf)
 @dataclass(frozen=True)
 class Fit:
     """A law and what it rests on: the samples it was fitted to, those it was tested on, and its errors on both. With a
-    free joint the locked edge is that computed in `on_fit`, that of the locked law in `on_test`, where `given` has the
-    errors with the computed one. `checked` holds simulations of samples of the test."""
+    free joint the locked edge is that computed in `on_fit`, that of the locked law in `on_test`, where
+    `on_computed_edge` has the errors with the computed one. `checked` holds simulations of samples of the test."""
 
     law: FittedLaw
     fit: Sweep
     test: Sweep
     on_fit: Errors
     on_test: Errors
-    given: Errors
+    on_computed_edge: Errors
     checked: Checked
 
     @property

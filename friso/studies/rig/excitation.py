@@ -52,12 +52,12 @@ def excite(
     kind: Excitation = SLIDING,
 ) -> Recorded:
     """Runs at a standstill at a place [m] with the multisine of a seed; `changes` are arrays of shape (runs,)."""
-    each, wanted = as_built_keys(stage)["drive.sample_time"], interval(stage, 1 / (kind.samples * pace(stage)))
-    period = round(PERIOD / pace(stage) / wanted) * wanted
-    lines = np.geomspace(1, min(kind.top * PERIOD, FINEST * period / wanted), kind.lines)
-    force = kind.strength * friction(stage) * sines(round(period / each), np.unique(np.rint(lines).astype(int)), seed)
-    task = replace(standing(place, PERIODS * period), injected=np.tile(force, PERIODS), injected_each=each)
-    (recorded,) = run(stage, task, [seed] * runs, wanted, changes)
+    step, slow = as_built_keys(stage)["drive.sample_time"], interval(stage, 1 / (kind.samples * pace(stage)))
+    period = round(PERIOD / pace(stage) / slow) * slow
+    lines = np.geomspace(1, min(kind.top * PERIOD, FINEST * period / slow), kind.lines)
+    force = kind.strength * friction(stage) * sines(round(period / step), np.unique(np.rint(lines).astype(int)), seed)
+    task = replace(standing(place, PERIODS * period), injected=np.tile(force, PERIODS), injected_each=step)
+    (recorded,) = run(stage, task, [seed] * runs, slow, changes)
     return recorded
 
 
@@ -77,7 +77,7 @@ def plant(logs: Sequence[RigLog]) -> FrequencyResponse:
     for log in logs:
         if log.failure:
             raise stopped(log)
-    return multisine([from_log(each.log, "force", "position", "disturbance")[0] for each in logs])
+    return multisine([from_log(log.log, "force", "position", "disturbance")[0] for log in logs])
 
 
 def loop(log: RigLog) -> FrequencyResponse:

@@ -43,11 +43,11 @@ ROUND = (1.0, 2.0, 5.0, 10.0)
 def distance(stage: Stage) -> float:
     """Of the move [m]: that of the stage's own motion, rounded to 1, 2 or 5 times a power of ten: 100 mm for the 90 mm
     of the thesis's rig (Sec. 4.3.2). Raises InputError for a motion that goes nowhere."""
-    own = float(motion.size(stage.flat()))
-    if not own:
+    exact = float(motion.size(stage.flat()))
+    if not exact:
         raise InputError("motion.kind", repr(stage.flat()["motion.kind"]), "a motion that moves the stage", '"step"')
-    power = 10.0 ** np.floor(np.log10(own))
-    return float(power * min(ROUND, key=lambda digit: abs(np.log(digit * power / own))))
+    power = 10.0 ** np.floor(np.log10(exact))
+    return float(power * min(ROUND, key=lambda digit: abs(np.log(digit * power / exact))))
 
 
 def duration(stage: Stage) -> float:
@@ -84,8 +84,8 @@ def crossover_key(stage: Stage) -> str:
     """The key that tells it. Raises InputError for a controller that is given by its gains."""
     key = stage.controller.bandwidth_key
     if key is None:
-        given, expected = "gains", "a controller tuned by its crossover, which the experiment varies"
-        raise InputError(CONTROLLER, given, expected, 'crossover = "8 Hz"')
+        actual, expected = "gains", "a controller tuned by its crossover, which the experiment varies"
+        raise InputError(CONTROLLER, actual, expected, 'crossover = "8 Hz"')
     return key
 
 
@@ -148,7 +148,7 @@ class Hunted:
 
     def shaped(self, *shape: int) -> Hunted:
         """With arrays of another shape."""
-        return Hunted(**{each.name: getattr(self, each.name).reshape(shape) for each in fields(self)})
+        return Hunted(**{entry.name: getattr(self, entry.name).reshape(shape) for entry in fields(self)})
 
     def share(self, which: Any = ...) -> Share:
         """The share of some runs that have a peak that counts, with its 95 % interval."""
@@ -164,7 +164,7 @@ def once(stage: Stage, task: MoveTask, seeds: Sequence[int], changes: Mapping[st
 def joined(parts: list[Hunted]) -> Hunted:
     """What became of several lots of runs, one after the other."""
     return Hunted(
-        **{each.name: np.concatenate([getattr(part, each.name) for part in parts]) for each in fields(Hunted)}
+        **{entry.name: np.concatenate([getattr(part, entry.name) for part in parts]) for entry in fields(Hunted)}
     )
 
 
@@ -191,20 +191,20 @@ def hunted(recorded: Recorded) -> Hunted:
     deviation = recorded.logged["position"] - recorded.logged["reference"]
     deviation[failed] = 0.0
     turns = [turning_points(time, row) for row in deviation]
-    counts = np.array([len(each) for each, _ in turns])
+    counts = np.array([len(run_turns) for run_turns, _ in turns])
     times, values = np.zeros((2, len(turns), max(1, counts.max(initial=0))))
     for row, (at, value) in enumerate(turns):
         times[row, : len(at)], values[row, : len(at)] = at, value
     swing, earlier = (np.ptp(deviation[:, time >= part * time[-1]], axis=1) for part in (WINDOW, HALF))
     ended = np.full(len(turns), time[-1])
-    found = scan(times, values, counts, swing, ended)
-    end = End(~failed, swing, earlier, found.period, found.turned, last_outside(time, deviation, BAND), ended)
+    ending = scan(times, values, counts, swing, ended)
+    end = End(~failed, swing, earlier, ending.period, ending.turned, last_outside(time, deviation, BAND), ended)
     shapes = [cycle_shape(*turn, size, time[-1]) for turn, size in zip(turns, swing, strict=True)]
-    known = np.where(failed, np.nan, 1.0)
-    above, below, rising, periods, heights = np.array(shapes).T * known
+    valid = np.where(failed, np.nan, 1.0)
+    above, below, rising, periods, heights = np.array(shapes).T * valid
     counted = np.where(failed, 0, peaks_in_traces(time, deviation))
     words = outcomes(end, BAND)
-    return Hunted(counted, words, swing * known, found.period * known, above, below, rising, periods, heights)
+    return Hunted(counted, words, swing * valid, ending.period * valid, above, below, rising, periods, heights)
 
 
 def turning_points(time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -62,7 +62,7 @@ class PlaceOnRail:
     def friction(self) -> np.ndarray:
         """Friction [N] of the steady passes, shape (passes,), less what does not turn with the motion, as the pull of a
         cable."""
-        bias = self.velocity.bias.value if self.velocity.bias.shown else 0.0
+        bias = self.velocity.bias.value if self.velocity.bias.determined else 0.0
         return np.abs(self.velocity.forces - bias)
 
 
@@ -99,7 +99,7 @@ def many_speeds_logs(stage: Stage, seed: int) -> tuple[RigLog, ...]:
         if steady > MOST * len(logs) * 2 * SPEEDS:
             return logs
         tried.append((steady, logs))
-    return max(tried, key=lambda each: each[0])[1]
+    return max(tried, key=lambda candidate: candidate[0])[1]
 
 
 def mean_friction(stage: Stage, speeds: np.ndarray, places: np.ndarray) -> np.ndarray:

@@ -63,7 +63,7 @@ def rig_log(recorded: Recorded, row: int, name: str, kind: str | None, stage: St
     why = "" if status == Status.DONE else Status(status).text
     if not why and (end := _swings_between_limits(recorded.logged["force"][row], stage)):
         count, why = end, "the command swings between its limits to the end: the sampled loop is unstable"
-    logged, true = ({role: values[:count] for role, values in each.items()} for each in (logged, true))
+    logged, true = ({role: values[:count] for role, values in channels.items()} for channels in (logged, true))
     why = why and f"after {count * recorded.interval:.3g} s: {why}"
     return RigLog(name, kind, recorded.interval, logged, true, stage, seed, why)
 

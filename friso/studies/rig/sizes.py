@@ -52,9 +52,9 @@ def locked(stage: Stage) -> Stage:
 def pace(stage: Stage) -> float:
     """The controller's crossover [Hz]; for plain gains, that of a van Dijk controller of the same proportional gain."""
     flat = stage.flat()
-    own = bandwidth(flat)
-    if own is not None:
-        return float(own)
+    named = bandwidth(flat)
+    if named is not None:
+        return float(named)
     return float(np.sqrt(proportional_stiffness(flat) / (moving_mass(stage) * np.sqrt(ALPHA)))) / (2 * np.pi)
 
 
@@ -87,7 +87,7 @@ def quicker(stage: Stage, factors: Any) -> dict[str, Any]:
     return sped_up(stage.flat(), factors)
 
 
-def interval(stage: Stage, wanted: float) -> float:
-    """Time between the samples of a log [s]: at most `wanted`, a whole number of the drive's samples."""
-    each = as_built_keys(stage)["drive.sample_time"]
-    return max(1, int(wanted / each * (1 + 1e-9))) * each
+def interval(stage: Stage, length: float) -> float:
+    """Time between the samples of a log [s]: at most `length`, a whole number of the drive's samples."""
+    step = as_built_keys(stage)["drive.sample_time"]
+    return max(1, int(length / step * (1 + 1e-9))) * step

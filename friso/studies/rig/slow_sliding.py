@@ -43,20 +43,20 @@ class Slow:
     as they truly are on average over its way, shape (2,)."""
 
     log: RigLog
-    found: SlowSliding
+    result: SlowSliding
     true: np.ndarray
 
 
 def slow_sliding(stage: Stage, passed: Sequence[RigLog], seed: int) -> tuple[Slow, ...]:
     """Slow sliding of a stage whose joint is locked, or which has none, after the logs of its passes at many speeds."""
-    return tuple(Slow(log, _found(log), _true(log)) for log in slow_sliding_logs(stage, passed, seed))
+    return tuple(Slow(log, _analysed(log), _true(log)) for log in slow_sliding_logs(stage, passed, seed))
 
 
 def slow_sliding_logs(stage: Stage, passed: Sequence[RigLog], seed: int) -> tuple[RigLog, ...]:
     """The logs, one for each place; none where the friction has no bristles and Stribeck curve, or no loop was
     stable."""
     speeds, quick = _edge(passed), passed[0].stage
-    if not _has_falling_bristles(quick) or all(each.failure for each in passed):
+    if not _has_falling_bristles(quick) or all(run_passes.failure for run_passes in passed):
         return ()
     period = 1 / pace(stage)
     parts = [(0.0, STANDS * period), *((float(way * speed), LASTS * period) for speed in speeds for way in (1, -1))]
@@ -87,7 +87,7 @@ def _edge(passed: Sequence[RigLog]) -> np.ndarray:
     return speeds[max(fastest + 1 - UNSTEADY, 0) : fastest + 1 + STEADY]
 
 
-def _found(log: RigLog) -> SlowSliding:
+def _analysed(log: RigLog) -> SlowSliding:
     flat = as_built_keys(log.stage)
     stiffness, damping = flat["friction.bristle_stiffness"], flat.get("friction.bristle_damping", 0.0)
     mass, exponent = moving_mass(log.stage), flat["friction.stribeck_exponent"]

@@ -82,7 +82,7 @@ class JointSteps:
     """Fig. 19: the record, what is found in it, and the joint's stiffness [N/m] that it was simulated with."""
 
     log: Log
-    found: StepStiffness
+    result: StepStiffness
     stiffness: float
 
 
@@ -92,7 +92,7 @@ class SlowMotion:
 
     speed: float
     log: Log
-    found: StickSlip
+    result: StickSlip
     static: float
 
 
@@ -102,7 +102,7 @@ class ConstantSpeed:
 
     speeds: tuple[float, ...]
     log: Log
-    found: FrictionPosition
+    result: FrictionPosition
 
 
 @dataclass(frozen=True)

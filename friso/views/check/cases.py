@@ -39,9 +39,9 @@ def case_labels(stage: Stage) -> dict[str, str]:
     return _labels([*stage.variants()], stage)
 
 
-def _labels(names: Collection[str], given: Stage | None) -> dict[str, str]:
-    joint = given.joint if given else None
-    own = "locked" if joint and joint.locked else "free"
-    twin = own if joint and own in names else None
-    shown = [name for name in COLOURS if name in names and not (name == "given" and twin)]
-    return {name: LABELS[name] + (" (as given)" if name == twin else "") for name in shown}
+def _labels(names: Collection[str], stage: Stage | None) -> dict[str, str]:
+    joint = stage.joint if stage else None
+    variant = "locked" if joint and joint.locked else "free"
+    twin = variant if joint and variant in names else None
+    listed = [name for name in COLOURS if name in names and not (name == "given" and twin)]
+    return {name: LABELS[name] + (" (as given)" if name == twin else "") for name in listed}

@@ -20,14 +20,14 @@ _DASHES: dict[bool, Dash] = {True: "solid", False: "dashed"}
 _WORDS = {True: "attracts", False: "repels"}
 
 
-def cycle_figures(shown: list[ShownCase]) -> tuple[Figure, Figure]:
+def cycle_figures(cases: list[ShownCase]) -> tuple[Figure, Figure]:
     """The return maps and the cycles of cases with time responses; without panels where there are none."""
-    return _return_maps(shown), _cycles(shown)
+    return _return_maps(cases), _cycles(cases)
 
 
-def _return_maps(shown: list[ShownCase]) -> Figure:
+def _return_maps(cases: list[ShownCase]) -> Figure:
     """How far each swing reaches against the one before: the map, and this motion's own swings."""
-    panels = tuple(panel for item in shown for panel in _return_map(item))
+    panels = tuple(panel for item in cases for panel in _return_map(item))
     caption = (
         "Each swing of the stage past its target (curve: from the positive side), given by its turning point, against "
         "the previous one. Where the curve crosses the dashed diagonal, every swing reaches as far as the last: a "
@@ -35,13 +35,13 @@ def _return_maps(shown: list[ShownCase]) -> Figure:
         "swings die out. The thin line is this motion after its last move. Beyond the ends of the curve the stage "
         "does not swing past its target."
     )
-    if any((joint := item.case.stage.joint) and not joint.locked for item in shown):
+    if any((joint := item.case.stage.joint) and not joint.locked for item in cases):
         caption += (
             " A stage on a free joint turns farther out than the point where its cart sticks, slightly off the curve."
         )
-    known = [(item.label, item.case.judgement.hunting) for item in shown]
-    caption += "".join(f" {label}: no cycle, as {each.reason}." for label, each in known if each.reason)
-    return Figure("return-map", "Does the next swing reach as far?", caption, panels, 2, subject(shown))
+    hunting = [(item.label, item.case.judgement.hunting) for item in cases]
+    caption += "".join(f" {label}: no cycle, as {search.reason}." for label, search in hunting if search.reason)
+    return Figure("return-map", "Does the next swing reach as far?", caption, panels, 2, subject(cases))
 
 
 def _return_map(item: ShownCase) -> list[Panel]:
@@ -78,7 +78,7 @@ def _fixed_points(cycles: tuple[Cycle, ...]) -> tuple[Markers, ...]:
     markers = []
     for attracts, label in _WORDS.items():
         position = [samples(cycle.trace, "position") for cycle in cycles if cycle.attracts == attracts]
-        x, y = (np.array([np.max(side * each) for each in position]) for side in (1, -1))
+        x, y = (np.array([np.max(side * array) for array in position]) for side in (1, -1))
         if mirrored:
             x, y = np.concatenate((x, y)), np.concatenate((y, x))
         if x.size:
@@ -86,15 +86,15 @@ def _fixed_points(cycles: tuple[Cycle, ...]) -> tuple[Markers, ...]:
     return tuple(markers)
 
 
-def _cycles(shown: list[ShownCase]) -> Figure:
+def _cycles(cases: list[ShownCase]) -> Figure:
     """One period of every cycle in time, and as a loop of velocity over position."""
-    panels = tuple(panel for item in shown if item.case.judgement.hunting.cycles for panel in _cycle_panels(item))
+    panels = tuple(panel for item in cases if item.case.judgement.hunting.cycles for panel in _cycle_panels(item))
     caption = (
         "One period: the stage sticks off its target while the integral action winds up the actuator force, breaks "
         "away, overshoots and sticks on the other side. Motions near a solid cycle end in it; motions near a dashed "
         "one leave it."
     )
-    return Figure("cycle", "The hunting cycle", caption, panels, 3, subject(shown))
+    return Figure("cycle", "The hunting cycle", caption, panels, 3, subject(cases))
 
 
 def _cycle_panels(item: ShownCase) -> list[Panel]:

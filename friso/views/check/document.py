@@ -89,14 +89,14 @@ def draws_document(draws: Draws, case: str) -> dict[str, Any]:
 
     fates = draws.fates[case]
     return {
-        "count": draws.drawn.count,
+        "count": draws.sample.count,
         "seed": draws.seed,
-        "left_out": draws.drawn.left_out,
+        "left_out": draws.sample.left_out,
         "hunts": _share(fates.share(("hunts",))),
         "attracting_cycle": _share(fates.share(ATTRACTED)),
         "criterion": CRITERION,
         "verdicts": fates.counts,
-        "separation": fates.separations(draws.drawn.keys),
+        "separation": fates.separations(draws.sample.keys),
     }
 
 

@@ -22,35 +22,41 @@ TOLD = 4
 
 def draws_rows(draws: Draws) -> list[tuple[str, list[str]]]:
     """The rows of the table of draws, one text per case."""
-    found = [draws.fates[name] for name in case_labels(draws.stage)]
+    fates = [draws.fates[name] for name in case_labels(draws.stage)]
     rows = [
-        ("Hunts after this move", [_percent(each.share(("hunts",))) for each in found]),
-        ("A cycle attracts", [_percent(each.share(ATTRACTED)) for each in found]),
-        *((f"Verdict {word}", [str(each.counts[word]) for each in found]) for word in VERDICTS),
+        ("Hunts after this move", [_percent(fate.share(("hunts",))) for fate in fates]),
+        ("A cycle attracts", [_percent(fate.share(ATTRACTED)) for fate in fates]),
+        *((f"Verdict {word}", [str(fate.counts[word]) for fate in fates]) for word in VERDICTS),
     ]
-    known = [each.separations(draws.drawn.keys) for each in found]
-    strength = {key: max((abs(each[key]) for each in known if each), default=0.0) for key in draws.drawn.keys}
-    told = sorted(strength, key=lambda key: -strength[key])[:TOLD]
-    rows += [(f"Decided by {key}", [f"{each[key]:+.2f}" if each else NOTHING for each in known]) for key in told]
+    separations = [fate.separations(draws.sample.keys) for fate in fates]
+    strength = {
+        key: max((abs(separation[key]) for separation in separations if separation), default=0.0)
+        for key in draws.sample.keys
+    }
+    strongest = sorted(strength, key=lambda key: -strength[key])[:TOLD]
+    rows += [
+        (f"Decided by {key}", [f"{separation[key]:+.2f}" if separation else NOTHING for separation in separations])
+        for key in strongest
+    ]
     return rows
 
 
 def draws_sentences(draws: Draws) -> list[str]:
     """What the draws say, a sentence per case, and what was left out."""
-    drawn = draws.drawn
+    sample = draws.sample
     says = [f"{label}: {_sentence(draws.fates[name], draws)}" for name, label in case_labels(draws.stage).items()]
-    if drawn.left_out:
-        reasons = [f"{count}: {why}" for why, count in drawn.broken.items()]
-        beyond = [f"{drawn.beyond}: a key beyond its bounds"] if drawn.beyond else []
-        says.append(f"{drawn.left_out} invalid draws were left out ({'; '.join([*beyond, *reasons])}).")
+    if sample.left_out:
+        reasons = [f"{count}: {why}" for why, count in sample.broken.items()]
+        beyond = [f"{sample.beyond}: a key beyond its bounds"] if sample.beyond else []
+        says.append(f"{sample.left_out} invalid draws were left out ({'; '.join([*beyond, *reasons])}).")
     return says
 
 
-def _sentence(found: Fates, draws: Draws) -> str:
-    failed, keys = found.counts["failed"], found.separations(draws.drawn.keys)
+def _sentence(fates: Fates, draws: Draws) -> str:
+    failed, keys = fates.counts["failed"], fates.separations(draws.sample.keys)
     says = [
-        f"of {draws.drawn.count} draws, hunts with a probability of {_percent(found.share(('hunts',)))}, "
-        f"has a cycle that attracts with {_percent(found.share(ATTRACTED))}."
+        f"of {draws.sample.count} draws, hunts with a probability of {_percent(fates.share(('hunts',)))}, "
+        f"has a cycle that attracts with {_percent(fates.share(ATTRACTED))}."
     ]
     if failed:
         says.append(f"{failed} draws failed; the intervals cover both outcomes for them.")
@@ -70,19 +76,19 @@ def draws_figure(draws: Draws) -> Figure:
     """The verdicts over the key that decides most, case by case, as bars on top of each other."""
     panels = [_panel(label, draws.fates[name], draws) for name, label in case_labels(draws.stage).items()]
     caption = (
-        f"{draws.drawn.count} stages drawn from the uncertain keys (seed {draws.seed}), by the key that best "
+        f"{draws.sample.count} stages drawn from the uncertain keys (seed {draws.seed}), by the key that best "
         "separates those with an attracting cycle from the others; all other uncertain keys vary too."
     )
     return Figure("draws", "What if the parameters are wrong?", caption, tuple(panels), min(2, len(panels)))
 
 
-def _panel(label: str, found: Fates, draws: Draws) -> Panel:
-    keys = draws.drawn.keys
-    key = next(iter(found.separations(keys) or keys))
+def _panel(label: str, fates: Fates, draws: Draws) -> Panel:
+    keys = draws.sample.keys
+    key = next(iter(fates.separations(keys) or keys))
     edges = np.histogram_bin_edges(keys[key], BINS)
     x, bands, below = np.repeat(edges, 2)[1:-1], [], np.zeros(2 * BINS)
     for word in VERDICTS:
-        counts = np.repeat(np.histogram(keys[key][found.verdicts == word], edges)[0], 2).astype(float)
+        counts = np.repeat(np.histogram(keys[key][fates.verdicts == word], edges)[0], 2).astype(float)
         if counts.any():
             bands.append(Band(x, below, below + counts, word, COLOURS[word]))
             below = below + counts

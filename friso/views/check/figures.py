@@ -42,11 +42,11 @@ _PERIODS = 4  # hunting periods shown of the force shares
 
 def check_figures(cases: Mapping[str, Case]) -> tuple[Figure, ...]:
     """Every figure that the cases have data for, the most telling first; none for cases without traces."""
-    shown = [item for item in shown_cases(cases) if item.case.trace is not None]
-    if not shown:
+    with_trace = [item for item in shown_cases(cases) if item.case.trace is not None]
+    if not with_trace:
         return ()
-    motion = (_overview(shown), _shares(shown), _joint(shown), _friction(shown))
-    figures = (_settled(shown), *cycle_figures(shown), *motion)
+    motion = (_overview(with_trace), _shares(with_trace), _joint(with_trace), _friction(with_trace))
+    figures = (_settled(with_trace), *cycle_figures(with_trace), *motion)
     return tuple(figure for figure in figures if figure.panels)
 
 
@@ -71,11 +71,11 @@ def response_figure(trace: xr.Dataset) -> Figure:
 _TIME = Axis("Time", "s")
 
 
-def _settled(shown: list[ShownCase]) -> Figure:
+def _settled(cases: list[ShownCase]) -> Figure:
     """Deviation after the move with the counted peaks (thesis, Fig. 5), and how each case settles."""
-    start, end = _window(shown)
+    start, end = _window(cases)
     lines, peaks = [], []
-    for item in shown:
+    for item in cases:
         time, deviation = _cut(item, _deviation(item), start, end)
         lines.append(Series(time, deviation, item.label, item.colour))
         if len(item.case.peak_times):
@@ -98,13 +98,13 @@ def _settled(shown: list[ShownCase]) -> Figure:
         "deviation over the whole run, on a logarithmic scale that ends at 1 nm; a stage that hunts never stays under "
         "the lines."
     )
-    return Figure("settled", "Does it hunt?", caption, (zoom, _settling(shown)), subject=subject(shown))
+    return Figure("settled", "Does it hunt?", caption, (zoom, _settling(cases)), subject=subject(cases))
 
 
-def _settling(shown: list[ShownCase]) -> Panel:
+def _settling(cases: list[ShownCase]) -> Panel:
     """Size of the deviation over the whole run on a logarithmic scale, with the settling bands."""
     lines = []
-    for item in shown:
+    for item in cases:
         size = np.maximum(np.abs(_deviation(item)), _FLOOR)
         lines.append(Series(samples(trace_of(item), "time"), size, item.label, item.colour))
     largest = max((float(np.max(line.y[np.isfinite(line.y)], initial=_FLOOR)) for line in lines), default=_FLOOR)
@@ -114,45 +114,45 @@ def _settling(shown: list[ShownCase]) -> Panel:
     return Panel("Whole run: size of the deviation", _TIME, axis, tuple(lines), limits=bands)
 
 
-def _overview(shown: list[ShownCase]) -> Figure:
+def _overview(cases: list[ShownCase]) -> Figure:
     """Reference and position, and the actuator force, over the whole run, the cases side by side."""
-    view = common_range([samples(trace_of(item), "position") for item in shown], least=2 * min(BANDS))
+    view = common_range([samples(trace_of(item), "position") for item in cases], least=2 * min(BANDS))
     panels = []
-    for item in shown:
+    for item in cases:
         time = samples(trace_of(item), "time")
         series = (
             Series(time, samples(trace_of(item), "reference"), "reference", LIGHT, width=4.0),
             Series(time, samples(trace_of(item), "position"), "position", item.colour),
         )
         panels.append(Panel(f"{item.label}: reference and position", _TIME, Axis("Position", "m", view), series))
-    bounds = _force_limit(shown)
-    arrays = [samples(trace_of(item), "force") for item in shown]
+    bounds = _force_limit(cases)
+    arrays = [samples(trace_of(item), "force") for item in cases]
     view = common_range([*arrays, *(np.array(bound.values) for bound in bounds)])
-    for item, force in zip(shown, arrays, strict=True):
+    for item, force in zip(cases, arrays, strict=True):
         series = (Series(samples(trace_of(item), "time"), force, "force", item.colour),)
         title = f"{item.label}: actuator force"
         panels.append(Panel(title, _TIME, Axis("Force", "N", view), series, limits=bounds))
     caption = "The whole run. On this scale cases that differ by millimetres may look the same."
-    return Figure("overview", "The motion", caption, tuple(panels), len(shown), subject(shown))
+    return Figure("overview", "The motion", caption, tuple(panels), len(cases), subject(cases))
 
 
-def _force_limit(shown: list[ShownCase]) -> tuple[Limit, ...]:
+def _force_limit(cases: list[ShownCase]) -> tuple[Limit, ...]:
     """The force limit of the controller, where a case comes near it: a distant one would flatten all."""
-    bound = shown[0].case.stage.controller.force_limit
-    forces = np.abs(np.concatenate([samples(trace_of(item), "force") for item in shown]))
+    bound = cases[0].case.stage.controller.force_limit
+    forces = np.abs(np.concatenate([samples(trace_of(item), "force") for item in cases]))
     if bound is None or not np.any(forces[np.isfinite(forces)] > bound / 2):
         return ()
     return (Limit((-float(bound), float(bound)), "force limit"),)
 
 
-def _shares(shown: list[ShownCase]) -> Figure:
+def _shares(cases: list[ShownCase]) -> Figure:
     """P, I and D shares of the actuator force after the move (thesis, Fig. 13), one scale for all cases."""
-    start, end = _window(shown)
-    periods = [item.case.period for item in shown if item.case.period and np.isfinite(item.case.period)]
+    start, end = _window(cases)
+    periods = [item.case.period for item in cases if item.case.period and np.isfinite(item.case.period)]
     if periods:
         start = max(start, end - _PERIODS * max(periods))
     panels = []
-    for item in shown:
+    for item in cases:
         named = [(name, *SHARES[name]) for name in SHARES if name in trace_of(item) and _any(trace_of(item), name)]
         lines = [(*share, 1.8) for share in named] + ([("force", "total", INK, 0.9)] if named else [])
         series = tuple(
@@ -167,14 +167,14 @@ def _shares(shown: list[ShownCase]) -> Figure:
         "While the stage sticks, the integral share grows until the friction breaks away; the others follow "
         "the error. A share that is zero throughout is left out."
     )
-    return Figure("shares", "What the controller does", caption, tuple(panels), subject=subject(shown))
+    return Figure("shares", "What the controller does", caption, tuple(panels), subject=subject(cases))
 
 
-def _joint(shown: list[ShownCase]) -> Figure:
+def _joint(cases: list[ShownCase]) -> Figure:
     """Joint deflection with its limits, over the whole run and its settled part, where the joint is free."""
-    start, end = _window(shown)
+    start, end = _window(cases)
     panels = []
-    for item in shown:
+    for item in cases:
         joint = item.case.stage.joint
         if joint is None or joint.stroke is None or joint.locked or "joint_deflection" not in trace_of(item):
             continue
@@ -189,14 +189,14 @@ def _joint(shown: list[ShownCase]) -> Figure:
             Panel(f"From {start:g} s on", Axis("Time", "s", (start, end)), axis, (after,), limits=limits),
         ]
     caption = "Deflection of the stage against the cart. Beyond the dashed lines the stroke limiter carries load."
-    return Figure("joint", "The joint", caption, tuple(panels), columns=2, subject=subject(shown))
+    return Figure("joint", "The joint", caption, tuple(panels), columns=2, subject=subject(cases))
 
 
-def _friction(shown: list[ShownCase]) -> Figure:
+def _friction(with_trace: list[ShownCase]) -> Figure:
     """Friction against velocity and displacement of the cart: while a case hunts, else the whole run."""
-    cases = [item for item in shown if "friction_force" in trace_of(item)]
+    cases = [item for item in with_trace if "friction_force" in trace_of(item)]
     hunting = any(item.case.peaks for item in cases)
-    start, end = _window(shown) if hunting else (-np.inf, np.inf)
+    start, end = _window(with_trace) if hunting else (-np.inf, np.inf)
     part = f"From {start:g} s on." if hunting else "The whole run."
     caption = f"{part} The friction force opposes the velocity of the cart. A case at rest is a single point."
     along = "Cart position from the target" if hunting else "Cart position"
@@ -214,7 +214,7 @@ def _friction(shown: list[ShownCase]) -> Figure:
             lines.append(Series(_cut(item, values, start, end)[1], force, item.label, item.colour, width=1.2))
         if lines:
             panels.append(_loops(title, Axis(quantity, unit), Axis("Friction force", "N"), lines))
-    return Figure("friction", "The friction", caption, tuple(panels), columns=2, subject=subject(shown))
+    return Figure("friction", "The friction", caption, tuple(panels), columns=2, subject=subject(with_trace))
 
 
 def _loops(title: str, x: Axis, y: Axis, lines: list[Series]) -> Panel:
@@ -230,9 +230,9 @@ def _loops(title: str, x: Axis, y: Axis, lines: list[Series]) -> Panel:
     return Panel(title, x, y, tuple(moving), tuple(points))
 
 
-def _window(shown: list[ShownCase]) -> tuple[float, float]:
+def _window(cases: list[ShownCase]) -> tuple[float, float]:
     """Begin and end [s] of the settled part: from where peaks count, or the later half of a shorter run."""
-    end = max(float(samples(trace_of(item), "time")[-1]) for item in shown)
+    end = max(float(samples(trace_of(item), "time")[-1]) for item in cases)
     return (COUNTED_AFTER if end > COUNTED_AFTER else end / 2), end
 
 

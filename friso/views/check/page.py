@@ -20,16 +20,16 @@ if TYPE_CHECKING:
 def report_html(cases: Mapping[str, Case], draws: Draws | None = None) -> str:
     """The whole page for the cases "given" and, with a joint, "locked" and "free"; traces may be missing. `draws`
     adds what stages drawn from an uncertain one do."""
-    shown = shown_cases(cases)
-    stage = shown[0].case.stage if "given" not in cases else cases["given"].stage
+    in_order = shown_cases(cases)
+    stage = in_order[0].case.stage if "given" not in cases else cases["given"].stage
     return Report.of_stage(
         "check.html",
         stage,
         (*check_figures(cases), *([draws_figure(draws)] if draws else [])),
-        shown=shown,
-        sentences=[(item, verdict_sentence(item, cases)) for item in shown],
+        shown=in_order,
+        sentences=[(item, verdict_sentence(item, cases)) for item in in_order],
         conclusion=conclusion(cases),
-        rows=rows(shown),
+        rows=rows(in_order),
         draws=draws_sentences(draws) if draws else [],
-        rtol=", ".join(sorted({f"{item.case.solver.rtol:g}" for item in shown})),
+        rtol=", ".join(sorted({f"{item.case.solver.rtol:g}" for item in in_order})),
     ).html()

@@ -16,9 +16,9 @@ if TYPE_CHECKING:
 _WINDOWS = 4  # windows of kicks that are listed, at most
 
 
-def rows(shown: tuple[ShownCase, ...]) -> list[tuple[str, list[str]]]:
+def rows(cases: tuple[ShownCase, ...]) -> list[tuple[str, list[str]]]:
     """The rows of which some case has something to say."""
-    texts = [(name, [text(item.case) for item in shown]) for name, text in _COLUMNS.items()]
+    texts = [(name, [text(item.case) for item in cases]) for name, text in _COLUMNS.items()]
     return [(name, row) for name, row in texts if set(row) != {NOTHING}]
 
 
@@ -45,8 +45,8 @@ def _decided(cycle: Cycle) -> str:
 
 
 def _others(case: Case) -> str:
-    known = case.judgement
-    return "; ".join(_other(cycle) for cycle in known.hunting.cycles if cycle is not known.cycle) or NOTHING
+    judgement = case.judgement
+    return "; ".join(_other(cycle) for cycle in judgement.hunting.cycles if cycle is not judgement.cycle) or NOTHING
 
 
 def _other(cycle: Cycle) -> str:

@@ -36,6 +36,6 @@ def common_range(arrays: Sequence[Array], least: float = 0.0) -> tuple[float, fl
     return low - margin, high + margin
 
 
-def subject(shown: Sequence[ShownCase]) -> str:
+def subject(cases: Sequence[ShownCase]) -> str:
     """The stage that the cases are of, as figures name it."""
-    return str(shown[0].case.stage.name)
+    return str(cases[0].case.stage.name)

@@ -83,16 +83,16 @@ def _bistable(case: Case) -> str:
 
 
 def _transient(case: Case) -> str:
-    known, end = case.judgement, _end(case)
-    if not known.hunting.possible:
-        return f"cannot hunt, because {known.hunting.reason}; but this motion has not settled at its end ({end})."
+    judgement, end = case.judgement, _end(case)
+    if not judgement.hunting.possible:
+        return f"cannot hunt, because {judgement.hunting.reason}; but this motion has not settled at its end ({end})."
     says = [f"transient: no cycle attracts, but this motion has not settled at its end ({end})."]
-    if known.cycle:
-        says.append(f"Transients change slowly, by a factor of e in {with_unit(known.cycle.time_constant, 's')}.")
-    if known.settled_after is None:
-        says.append(f"It does not settle to within {BANDS[_TEN_MICRON]} in {with_unit(known.followed, 's')} either.")
+    if judgement.cycle:
+        says.append(f"Transients change slowly, by a factor of e in {with_unit(judgement.cycle.time_constant, 's')}.")
+    if judgement.settled_after is None:
+        says.append(f"It does not settle to within {BANDS[_TEN_MICRON]} in {with_unit(judgement.followed, 's')} either.")
     else:
-        says.append(f"It settles to within {BANDS[_TEN_MICRON]} in {with_unit(known.settled_after, 's')}.")
+        says.append(f"It settles to within {BANDS[_TEN_MICRON]} in {with_unit(judgement.settled_after, 's')}.")
     return " ".join(says)
 
 
@@ -111,20 +111,20 @@ def _settling(case: Case) -> str:
 
 def _doubts(case: Case) -> list[str]:
     """Why the verdict is not certain, if it is not."""
-    known = case.judgement.hunting
-    if known.certain:
+    hunting = case.judgement.hunting
+    if hunting.certain:
         return []
-    return [f"This is not certain: {known.reason}{'' if known.target else '; other motions may hunt'}."]
+    return [f"This is not certain: {hunting.reason}{'' if hunting.target else '; other motions may hunt'}."]
 
 
 def _outlook(case: Case) -> list[str]:
     """Where hunting begins, of a case that need not hunt."""
-    known = case.judgement
+    judgement = case.judgement
     says: list[str] = []
-    if known.margin:
-        least = "" if known.margin.certain else "at least "
-        says.append(f"Hunting is possible {least}{_below(known.margin)}.")
-    elif known.hunting.possible:
+    if judgement.margin:
+        least = "" if judgement.margin.certain else "at least "
+        says.append(f"Hunting is possible {least}{_below(judgement.margin)}.")
+    elif judgement.hunting.possible:
         says.append(f"No hunting was found down to 1/{FARTHEST:g} of this bandwidth.")
     return says
 
@@ -137,11 +137,11 @@ def _below(edge: Margin) -> str:
 
 def _remedy(item: ShownCase, cases: Mapping[str, Case]) -> list[str]:
     """What keeps a case from hunting."""
-    known = item.case.judgement
-    ways = [_faster(item.case, known.margin)] if known.margin else []
+    judgement = item.case.judgement
+    ways = [_faster(item.case, judgement.margin)] if judgement.margin else []
     ways += ["free the joint"] if _freeing_helps(item, cases) else []
     says = [f"{ways[0][0].upper()}{listed(ways, 'or')[1:]}."] if ways else []
-    if known.margin or known.hunting.target is None:
+    if judgement.margin or judgement.hunting.target is None:
         return says
     return [f"Hunting is still possible at {FARTHEST:g} times this bandwidth.", *says]
 

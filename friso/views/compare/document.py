@@ -30,7 +30,7 @@ def compare_document(comparison: Comparison) -> dict[str, Any]:
             "sample_time_s": comparison.stage.flat()["drive.sample_time"],
             "from_file": [*machines.from_file],
             "spreads_percent": dict(machines.spreads),
-            "left_out_draws": machines.drawn.left_out,
+            "left_out_draws": machines.sample.left_out,
             "options": {result.letter: _option(comparison, result) for result in comparison.results},
             "left_out": dict(comparison.options.left_out),
             "standstill_compared": comparison.shaken,

@@ -28,12 +28,12 @@ def compare_files(comparison: Comparison) -> dict[str, Content]:
     return {"compare.html": page(comparison, figures), **pictures(figures)}
 
 
-def page(comparison: Comparison, drawn: Sequence[Figure]) -> str:
+def page(comparison: Comparison, figures: Sequence[Figure]) -> str:
     """The page with its figures."""
     return Report.of_stage(
         "compare.html",
         comparison.stage,
-        drawn,
+        figures,
         answer=answer(comparison),
         details=details(comparison),
         population=population(comparison),

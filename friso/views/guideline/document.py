@@ -65,7 +65,11 @@ def _law(fit: Fit) -> dict[str, Any]:
     return {
         "rates": _rates(fit.law),
         "validation": list(fit.law.path),
-        "errors": {"fit": asdict(fit.on_fit), "held_out": asdict(fit.on_test), "locked_given": asdict(fit.given)},
+        "errors": {
+            "fit": asdict(fit.on_fit),
+            "held_out": asdict(fit.on_test),
+            "locked_given": asdict(fit.on_computed_edge),
+        },
         "samples": dict(fit.kinds),
         "attracting_again": fit.again,
         "simulated": asdict(fit.checked),

@@ -47,15 +47,15 @@ FINER = 10
 """Places per step between two computed edges at which a law is drawn."""
 
 
-def guideline_figures(found: Guideline) -> tuple[Figure, ...]:
+def guideline_figures(guideline: Guideline) -> tuple[Figure, ...]:
     """All charts, in the order of the page."""
-    return _locked(found), _free(found), _stroke(found), _against(found), _rig(found)
+    return _locked(guideline), _free(guideline), _stroke(guideline), _against(guideline), _rig(guideline)
 
 
-def _locked(found: Guideline) -> Figure:
+def _locked(guideline: Guideline) -> Figure:
     """The edge of rigid masses over the ratio of their two rates."""
-    sweep = found.locked.test.usable
-    slip, drop = np.exp(found.locked.law.log_rates(sweep.values))
+    sweep = guideline.locked.test.usable
+    slip, drop = np.exp(guideline.locked.law.log_rates(sweep.values))
     mean = np.sqrt(slip * drop)
     ratio = np.geomspace(*_ends(slip / drop), 200)
     law = Series(ratio, 1 / (np.sqrt(ratio) + 1 / np.sqrt(ratio)), "the law", INK)
@@ -73,10 +73,10 @@ def _locked(found: Guideline) -> Figure:
     return Figure("guideline_locked", "Where hunting ends, joint locked", caption, (panel,))
 
 
-def _free(found: Guideline) -> Figure:
+def _free(guideline: Guideline) -> Figure:
     """The edge with a free joint of ample stroke over the rate of the joint, both over the locked edge."""
-    sweep = _both(found.free, lambda values: values["stroke"] > FULL)
-    joint = np.exp(found.free.law.log_rates(sweep.values)[0])
+    sweep = _both(guideline.free, lambda values: values["stroke"] > FULL)
+    joint = np.exp(guideline.free.law.log_rates(sweep.values)[0])
     x, y = joint / sweep.locked, sweep.edge / sweep.locked
     line = np.geomspace(*_ends(x), 200)
     panel = Panel(
@@ -93,22 +93,22 @@ def _free(found: Guideline) -> Figure:
     return Figure("guideline_free", "Where hunting ends, joint free", caption, (panel,))
 
 
-def _stroke(found: Guideline) -> Figure:
+def _stroke(guideline: Guideline) -> Figure:
     """The share of a joint's effect that is left with its stroke."""
-    sweep = _both(found.free, lambda values: values["stroke"] > 0)
-    joint, stroke = np.exp(found.free.law.log_rates(sweep.values))
+    sweep = _both(guideline.free, lambda values: values["stroke"] > 0)
+    joint, stroke = np.exp(guideline.free.law.log_rates(sweep.values))
     effect = (sweep.edge**-2 - sweep.locked**-2) * joint**2
     felt = joint < sweep.locked  # else the effect is small, and its share a small difference
     x = (joint / stroke) ** 2
     line = np.geomspace(*_ends(x[felt]), 200)
     y = effect[felt]
-    shown = (float(min(0.0, *(1.05 * y))), float(max(1.6, *(1.05 * y))))
-    shown = max(shown[0], -SHARES), min(shown[1], SHARES)
-    out = int(np.count_nonzero((y < shown[0]) | (y > shown[1])))
+    visible = (float(min(0.0, *(1.05 * y))), float(max(1.6, *(1.05 * y))))
+    visible = max(visible[0], -SHARES), min(visible[1], SHARES)
+    out = int(np.count_nonzero((y < visible[0]) | (y > visible[1])))
     panel = Panel(
         "Joints slower than the locked edge",
         _log("(omega_joint / omega_stroke)^2, about k_j S_j / F_s", x[felt]),
-        Axis("share of the joint's effect", "", shown),
+        Axis("share of the joint's effect", "", visible),
         (Series(line, np.minimum(1.0, line), "the law", INK),),
         clouds=(_by_end(x[felt], y, sweep.take(felt)),),
     )
@@ -117,11 +117,13 @@ def _stroke(found: Guideline) -> Figure:
     return Figure("guideline_stroke", "How much stroke the joint needs", caption, (panel,))
 
 
-def _against(found: Guideline) -> Figure:
+def _against(guideline: Guideline) -> Figure:
     """Edges by the laws against computed ones, samples of the fit and samples held out."""
-    locked, free = found.locked, found.free
-    whole = [free.law.edge(each.values, locked.law.edge(each.values)) for each in (free.fit.usable, free.test.usable)]
-    rigid = [locked.law.edge(each.values) for each in (locked.fit.usable, locked.test.usable)]
+    locked, free = guideline.locked, guideline.free
+    whole = [
+        free.law.edge(sweep.values, locked.law.edge(sweep.values)) for sweep in (free.fit.usable, free.test.usable)
+    ]
+    rigid = [locked.law.edge(sweep.values) for sweep in (locked.fit.usable, locked.test.usable)]
     panels = (
         _scatter("Joint locked", rigid, [locked.fit.usable.edge, locked.test.usable.edge]),
         _scatter("Joint free, locked edge by its law", whole, [free.fit.usable.edge, free.test.usable.edge]),
@@ -132,7 +134,7 @@ def _against(found: Guideline) -> Figure:
 
 def _scatter(title: str, law: Sequence[Array], computed: Sequence[Array]) -> Panel:
     x, y = np.concatenate(list(law)), np.concatenate(list(computed))
-    codes = np.repeat([0.0, 1.0], [len(each) for each in law])
+    codes = np.repeat([0.0, 1.0], [len(values) for values in law])
     line = np.array(_ends(np.concatenate([x, y])))
     off = [Series(line, factor * line, "20 % off" if factor > 1 else "", GREY, "dotted") for factor in (1 / 1.2, 1.2)]
     return Panel(
@@ -144,10 +146,10 @@ def _scatter(title: str, law: Sequence[Array], computed: Sequence[Array]) -> Pan
     )
 
 
-def _rig(found: Guideline) -> Figure:
+def _rig(guideline: Guideline) -> Figure:
     """The thesis rig with one thing changed at a time."""
-    laws = Laws(found.locked.law, found.free.law)
-    panels = tuple(_studied(title, x, found.worked.studies[name], laws) for name, (title, x) in PANELS.items())
+    laws = Laws(guideline.locked.law, guideline.free.law)
+    panels = tuple(_studied(title, x, guideline.worked.studies[name], laws) for name, (title, x) in PANELS.items())
     caption = "Lines: the laws. Points: computed edges. The rig has 1.7 kg, 2.4 N/mm, 1 mm."
     return Figure("guideline_rig", "The thesis rig", caption, panels, 2)
 
@@ -161,7 +163,7 @@ PANELS: Mapping[str, tuple[str, Axis]] = {
 
 
 def _studied(title: str, x: Axis, cases: Sequence[RigCase], laws: Laws) -> Panel:
-    name = next(name for name, (known, _) in PANELS.items() if known == title)
+    name = next(name for name, (heading, _) in PANELS.items() if heading == title)
     at, computed = np.array([(STUDIED[name](case.changes), case.computed) for case in cases]).T
     places = np.linspace(0, len(cases) - 1, FINER * (len(cases) - 1) + 1)
     changes = {

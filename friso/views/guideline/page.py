@@ -104,7 +104,7 @@ def _errors(guideline: Guideline) -> list[tuple[str, Errors]]:
         ),
         ("joint free, all by law", guideline.free.on_test),
         (f"of these {ONE_WINDOW}", guideline.held_out(True, _one_window)),
-        ("joint free, locked edge as computed", guideline.free.given),
+        ("joint free, locked edge as computed", guideline.free.on_computed_edge),
     ]
     return [(name, errors) for name, errors in rows if errors is not None]
 

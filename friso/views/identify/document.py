@@ -36,7 +36,7 @@ def _log(file: LogFile) -> dict[str, Any]:
         "file": str(file.path),
         "kind": file.kind,
         "reason": file.reason,
-        "mapping_file": None if file.kept is None else str(file.kept),
+        "mapping_file": None if file.mapping_file is None else str(file.mapping_file),
         **_content(file.source),
         "read": list(file.source.read),
     }

@@ -18,7 +18,7 @@ def estimate_document(estimate: Estimate) -> dict[str, Any]:
     about = {
         "unit": estimate.unit,
         **ends_document(estimate),
-        "shown": estimate.shown,
+        "shown": estimate.determined,
         "method": estimate.method,
         "reason": estimate.reason or None,
     }

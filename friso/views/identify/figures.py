@@ -50,10 +50,10 @@ def _intervals(identification: Identification) -> list[Figure]:
     bounded = bounded[::-1]  # the first on top
     half = np.array([estimate.half_width for estimate in bounded])
     middle = np.array(
-        [abs(estimate.value) if estimate.shown else (estimate.low + estimate.high) / 2 for estimate in bounded]
+        [abs(estimate.value) if estimate.determined else (estimate.low + estimate.high) / 2 for estimate in bounded]
     )
     share = 100 * half / np.maximum(np.abs(middle), 1e-3 * half)
-    visible = np.array([estimate.shown for estimate in bounded])
+    visible = np.array([estimate.determined for estimate in bounded])
     places = np.arange(len(bounded), dtype=float)
     left = 0.5 * float(share.min())
     stems = [

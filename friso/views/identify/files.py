@@ -17,21 +17,21 @@ STAGE = "identified.toml"
 
 
 def identify_files(
-    found: Identification, given: Sequence[LogFile], predictions: Sequence[Prediction]
+    identification: Identification, logs: Sequence[LogFile], predictions: Sequence[Prediction]
 ) -> dict[str, Content]:
     """All files; a stage file and correlations of an earlier run go where there are none now."""
-    stage, correlations = found.stage, None
-    if stage is not None and found.correlations.keys:
-        correlations = correlations_text(found.correlations, stage)
-    figures = identify_figures(found, predictions)
+    stage, correlations = identification.stage, None
+    if stage is not None and identification.correlations.keys:
+        correlations = correlations_text(identification.correlations, stage)
+    figures = identify_figures(identification, predictions)
     return {
         STAGE: None if stage is None else stage.to_toml(),
         beside(Path(STAGE)).name: correlations,
-        "identify.html": identify_html(found, given, predictions, figures),
+        "identify.html": identify_html(identification, logs, predictions, figures),
         **pictures(figures),
     }
 
 
-def mappings(given: Sequence[LogFile]) -> dict[Path, Content]:
+def mappings(logs: Sequence[LogFile]) -> dict[Path, Content]:
     """How the logs were read, each where it is kept for the next time."""
-    return {each.kept: mapping_text(each.mapping) for each in given if each.kept is not None}
+    return {log.mapping_file: mapping_text(log.mapping) for log in logs if log.mapping_file is not None}

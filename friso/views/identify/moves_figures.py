@@ -122,7 +122,7 @@ def _friction(moves: IdentifiedMoves, name: str) -> Figure:
     speeds = np.concatenate([-np.geomspace(top, top / 1e4, 200), [np.nan], np.geomspace(top / 1e4, top, 200)])
     curve = Series(speeds, steady_friction(flat, speeds), "identified", BLUE, width=1.8)
     axes = Axis("Velocity", "m/s", (-1.05 * top, 1.05 * top)), Axis("Friction", "N", (-reach, reach))
-    unshown = any(estimate.name == "friction.static" and not estimate.shown for estimate in moves.estimates)
+    unshown = any(estimate.name == "friction.static" and not estimate.determined for estimate in moves.estimates)
     caption = "Loops: measured force less mass times acceleration; they open where the motion reverses."
     if sides:
         caption += f" Shaded: {range_with_unit(low, high, 'm/s')}, without steady motion"

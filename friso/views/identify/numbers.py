@@ -81,7 +81,7 @@ def interval_text(estimate: Estimate) -> str:
 
 def with_interval(estimate: Estimate) -> str:
     """Both in a sentence, e.g. "95.28 kg (94.84 to 95.72)"."""
-    if not estimate.shown:
+    if not estimate.determined:
         return f"not identified ({estimate.reason})"
     unit = _scale(estimate)[1]
     return f"{value_text(estimate)} ({interval_text(estimate).removesuffix(unit).rstrip()})"

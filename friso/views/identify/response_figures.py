@@ -49,7 +49,7 @@ def _bode(bench: Bench, name: str) -> Figure:
     caption = "Measured with its 95 % band; fits drawn over the band in which they were fitted."
     if bench.lines:
         caption += f" Mass line: {' and '.join(with_interval(line.value) for line in bench.lines)}."
-    if bench.departs is not None and bench.departs.frequency.shown:
+    if bench.departs is not None and bench.departs.frequency.determined:
         caption += " Below their band the response departs from the linear model."
     return Figure(f"{name}_bode", "Frequency response", caption, panels, columns=len(outputs))
 
@@ -153,7 +153,7 @@ def _departure(bench: Bench, name: str) -> Figure:
     assert departs is not None
     limits = _around(departs.excess)
     line, bands = Series(departs.lines, departs.excess, "", GREY), ()
-    if departs.frequency.shown:
+    if departs.frequency.determined:
         ends = np.array([departs.frequency.low, departs.frequency.high])
         bands = (Band(ends, np.full(2, limits[0]), np.full(2, limits[1]), "", AREA),)
     ratio = Axis("|G / G model|", "", limits, log=True)

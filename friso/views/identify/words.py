@@ -48,14 +48,14 @@ class ExperimentSummary:
 class EstimateRow:
     """A line of the table of estimates: whether the value is shown, and the texts of `COLUMNS`."""
 
-    shown: bool
+    determined: bool
     texts: tuple[str, ...]
 
 
 def headline(identification: Identification) -> list[tuple[str, str]]:
     """What is identified, and what is not and why; each sentence with its colour."""
     estimates = ordered(identification.estimates)
-    visible = [estimate for estimate in estimates if estimate.shown]
+    visible = [estimate for estimate in estimates if estimate.determined]
     headlines = [VIEWS[experiment.kind].headline(experiment.result) for experiment in identification.experiments]
     headlines = [sentence for sentence in headlines if sentence]
     lines = []
@@ -76,7 +76,7 @@ def missing(estimates: Sequence[Estimate]) -> str:
     """What is not identified, with its reason, which several may share."""
     names: dict[str, list[str]] = {}
     for estimate in estimates:
-        if not estimate.shown:
+        if not estimate.determined:
             names.setdefault(estimate.reason, []).append(within(estimate.name))
     return "; ".join(f"{', '.join(group)} ({reason})" for reason, group in names.items())
 
@@ -108,9 +108,10 @@ def ordered(estimates: Sequence[Estimate]) -> list[Estimate]:
 
 
 def _row(estimate: Estimate) -> EstimateRow:
-    value = value_text(estimate) if estimate.shown else LEFT
+    value = value_text(estimate) if estimate.determined else LEFT
     return EstimateRow(
-        estimate.shown, (name_of(estimate.name), value, interval_text(estimate), estimate.reason or estimate.method)
+        estimate.determined,
+        (name_of(estimate.name), value, interval_text(estimate), estimate.reason or estimate.method),
     )
 
 
@@ -160,7 +161,7 @@ def _counts_as(file: LogFile) -> str:
 
 
 def _mapping_kept(file: LogFile) -> tuple[str, ...]:
-    return () if file.kept is None else (f"mapping kept in {file.kept.name}",)
+    return () if file.mapping_file is None else (f"mapping kept in {file.mapping_file.name}",)
 
 
 def _warned(file: LogFile) -> tuple[str, ...]:

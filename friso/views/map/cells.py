@@ -102,9 +102,9 @@ class Look:
 def axes_of(runs: xr.Dataset) -> tuple[CellAxis, ...]:
     """The swept axes in the order of the runs; of sampled runs the sampled keys. ValueError where there are none."""
     if SAMPLE in runs.dims:
-        given = json.loads(runs.attrs.get("axes", "[]"))  # a store forgets the order of its coordinates
+        order = json.loads(runs.attrs.get("axes", "[]"))  # a store forgets the order of its coordinates
         keys = [key for key in runs.coords if runs[key].dims == (SAMPLE,) and key != SAMPLE]
-        keys.sort(key=lambda key: given.index(key) if key in given else len(given))
+        keys.sort(key=lambda key: order.index(key) if key in order else len(order))
         return tuple(_sampled(runs, key) for key in keys)
     dims = _dims(runs)
     if not dims:
@@ -176,13 +176,13 @@ def look(runs: xr.Dataset, metric: str) -> Look:
         codes, words = words_of(runs, metric)
         template = runs[metric]
         numbers = template.copy(data=np.full(template.shape, np.nan))
-        own = [word_kind(metric, word) for word in words]
-        kinds = in_order(own)
-        table = np.array([kinds.index(kind) for kind in own], dtype=float)
+        word_kinds = [word_kind(metric, word) for word in words]
+        kinds = in_order(word_kinds)
+        table = np.array([kinds.index(kind) for kind in word_kinds], dtype=float)
         return Look(variable(metric), "", None, False, (), kinds, numbers, template.copy(data=table[codes]))
-    given = np.asarray(runs[metric].values, dtype=float)
-    kinds, codes = _without_number(runs, metric, given)
-    numbers = np.where(np.isnan(codes), given, np.nan)
+    values = np.asarray(runs[metric].values, dtype=float)
+    kinds, codes = _without_number(runs, metric, values)
+    numbers = np.where(np.isnan(codes), values, np.nan)
     limits, log, colours = _range(metric, numbers)
     arrays = (runs[metric].copy(data=numbers), runs[metric].copy(data=codes))
     return Look(variable(metric), unit_of(runs[metric]), limits, log, colours, kinds, *arrays)
@@ -214,7 +214,7 @@ def _range(metric: str, numbers: np.ndarray) -> tuple[tuple[float, float] | None
     return (low, high), False, ()
 
 
-def _without_number(runs: xr.Dataset, metric: str, given: np.ndarray) -> tuple[tuple[Kind, ...], np.ndarray]:
+def _without_number(runs: xr.Dataset, metric: str, values: np.ndarray) -> tuple[tuple[Kind, ...], np.ndarray]:
     """The kinds of the cells that have no number to show, and their codes; NaN where a number counts."""
     shape, dims = runs[metric].shape, runs[metric].dims
     outcome = _texts(runs, "outcome", dims)
@@ -224,7 +224,7 @@ def _without_number(runs: xr.Dataset, metric: str, given: np.ndarray) -> tuple[t
     kinds = in_order(kind for kind in (*pairs, none) if kind is not None)
     table = np.array([np.nan if kind is None else kinds.index(kind) for kind in pairs], dtype=float)
     codes = np.broadcast_to(table[outcome[0] * len(status[1]) + status[0]], shape).copy()
-    codes[np.isnan(codes) & ~np.isfinite(given)] = kinds.index(none)
+    codes[np.isnan(codes) & ~np.isfinite(values)] = kinds.index(none)
     return kinds, codes
 
 
@@ -252,7 +252,9 @@ def _state(outcome: str | None, status: str | None) -> Kind | None:
 def pick(sizes: Sequence[int], most: int) -> tuple[np.ndarray, ...]:
     """Evenly spread indices along dimensions of these sizes, of at most `most` combinations; the longest dimension
     gives way first."""
-    kept = list(sizes)
-    while math.prod(kept) > most and max(kept) > 1:
-        kept[kept.index(max(kept))] -= 1
-    return tuple(np.linspace(0, size - 1, number).round().astype(int) for size, number in zip(sizes, kept, strict=True))
+    counts = list(sizes)
+    while math.prod(counts) > most and max(counts) > 1:
+        counts[counts.index(max(counts))] -= 1
+    return tuple(
+        np.linspace(0, size - 1, number).round().astype(int) for size, number in zip(sizes, counts, strict=True)
+    )

@@ -86,29 +86,33 @@ def _axis(axis: CellAxis, positions: np.ndarray) -> dict[str, Any]:
 
 def _coloured(runs: xr.Dataset, name: str, cells: _Cells) -> dict[str, Any]:
     """A variable that the page can colour: its numbers, its kinds, and its scale."""
-    shown = look(runs, name)
-    numbers = shown.numbers.values.ravel().astype(float)
+    colouring = look(runs, name)
+    numbers = colouring.numbers.values.ravel().astype(float)
     none = np.zeros(numbers.size)
-    field = Cloud(none, none, numbers, shown.quantity, shown.unit, shown.limits, shown.log, shown.colours)
+    field = Cloud(
+        none, none, numbers, colouring.quantity, colouring.unit, colouring.limits, colouring.log, colouring.colours
+    )
     factor, unit = colour_prefix(field)
-    limits = None if shown.limits is None else (shown.limits[0] * factor, shown.limits[1] * factor)
-    drawn = scale(Cloud(none, none, numbers * factor, shown.quantity, unit, limits, shown.log, shown.colours))
-    codes = cells.take(shown.codes)
-    own = shown.numbers if name in KINDS else runs[name]
-    kinds = [_kind(kind) for kind in shown.kinds]
+    limits = None if colouring.limits is None else (colouring.limits[0] * factor, colouring.limits[1] * factor)
+    scaled = scale(
+        Cloud(none, none, numbers * factor, colouring.quantity, unit, limits, colouring.log, colouring.colours)
+    )
+    codes = cells.take(colouring.codes)
+    stored = colouring.numbers if name in KINDS else runs[name]
+    kinds = [_kind(kind) for kind in colouring.kinds]
     return {
         "name": name,
-        "label": shown.quantity,
+        "label": colouring.quantity,
         "unit": unit,
-        "log": shown.log,
-        "low": drawn.low,
-        "high": drawn.high,
-        "stops": [[_rounded(place), colour] for place, colour in drawn.stops],
-        "ticks": list(drawn.ticks),
-        "texts": list(drawn.texts),
+        "log": colouring.log,
+        "low": scaled.low,
+        "high": scaled.high,
+        "stops": [[_rounded(place), colour] for place, colour in scaled.stops],
+        "ticks": list(scaled.ticks),
+        "texts": list(scaled.texts),
         "kinds": kinds,
         "codes": _base64(np.where(np.isnan(codes), NONE, codes).astype(np.uint8)),
-        "numbers": _base64(_short(cells.take(own).astype(float) * factor)),
+        "numbers": _base64(_short(cells.take(stored).astype(float) * factor)),
     }
 
 

@@ -72,15 +72,23 @@ def map_panel(
     return _cells(axes[0], axes[1], look(runs, metric), marker, title)
 
 
-def _cells(x: CellAxis, y: CellAxis, shown: Look, marker: Mapping[str, float] | None, title: str) -> Panel:
+def _cells(x: CellAxis, y: CellAxis, colouring: Look, marker: Mapping[str, float] | None, title: str) -> Panel:
     """A map panel of arrays that have just the dimensions of x and y."""
     z, codes = (
         np.asarray(array.transpose(y.key, x.key).values)[np.ix_(y.places, x.places)]
-        for array in (shown.numbers, shown.codes)
+        for array in (colouring.numbers, colouring.codes)
     )
     points = _marked(marker, x, y)
-    edges = _edges(x, y, np.where(np.isnan(codes), z, np.nan)) if shown.quantity == variable("multiplier") else ()
-    coloured = (shown.quantity, shown.unit, shown.limits, shown.log, shown.colours, shown.kinds, codes)
+    edges = _edges(x, y, np.where(np.isnan(codes), z, np.nan)) if colouring.quantity == variable("multiplier") else ()
+    coloured = (
+        colouring.quantity,
+        colouring.unit,
+        colouring.limits,
+        colouring.log,
+        colouring.colours,
+        colouring.kinds,
+        codes,
+    )
     return Panel(
         title,
         x.axis(_limits(x, [point.x for point in points])),
@@ -121,7 +129,7 @@ def _marked(marker: Mapping[str, float] | None, x: CellAxis, y: CellAxis) -> tup
     return (Markers(right, up, "evaluation point", RED, "target"),)
 
 
-def _slices(axes: tuple[CellAxis, ...], shown: Look, marker: Mapping[str, float] | None) -> tuple[list[Panel], str]:
+def _slices(axes: tuple[CellAxis, ...], colouring: Look, marker: Mapping[str, float] | None) -> tuple[list[Panel], str]:
     """Panels over the first two axes of numbers with more than one value, for values of the further ones; and which
     of these values are left out."""
     x, y, *further = plane_first(axes)
@@ -130,19 +138,19 @@ def _slices(axes: tuple[CellAxis, ...], shown: Look, marker: Mapping[str, float]
     for positions in product(*picked):
         where = list(zip(further, positions, strict=True))
         cut = {axis.key: int(axis.places[i]) for axis, i in where}
-        sliced = replace(shown, numbers=shown.numbers.isel(cut), codes=shown.codes.isel(cut))
+        sliced = replace(colouring, numbers=colouring.numbers.isel(cut), codes=colouring.codes.isel(cut))
         elsewhere = marker and any(
             axis.key in marker and axis.position(marker[axis.key]) != axis.positions[i] for axis, i in where
         )
         title = ", ".join(axis.text(i) for axis, i in where)
         panels.append(_cells(x, y, sliced, None if elsewhere else marker, title))
-    left_out = [_left_out(axis, kept) for axis, kept in zip(further, picked, strict=True)]
+    left_out = [_left_out(axis, indices) for axis, indices in zip(further, picked, strict=True)]
     return panels, " ".join(text for text in left_out if text)
 
 
-def _left_out(axis: CellAxis, kept: np.ndarray) -> str:
+def _left_out(axis: CellAxis, indices: np.ndarray) -> str:
     """Which values of an axis have no panel."""
-    missing = [i for i in range(len(axis.places)) if i not in kept]
+    missing = [i for i in range(len(axis.places)) if i not in indices]
     if not missing:
         return ""
     texts = [axis.text(i).removeprefix(f"{axis.quantity} ") for i in missing]
@@ -150,47 +158,63 @@ def _left_out(axis: CellAxis, kept: np.ndarray) -> str:
     return f"Not shown: {axis.quantity} {listed}."
 
 
-def _line(x: CellAxis, shown: Look, marker: Mapping[str, float] | None) -> Panel:
+def _line(x: CellAxis, colouring: Look, marker: Mapping[str, float] | None) -> Panel:
     """One variable over a single axis: a line with its points, and patches under it where there is no number."""
-    numbers, codes = (np.asarray(array.values)[x.places] for array in (shown.numbers, shown.codes))
-    occurring = [i for i in range(len(shown.kinds)) if np.any(codes == i)]
+    numbers, codes = (np.asarray(array.values)[x.places] for array in (colouring.numbers, colouring.codes))
+    occurring = [i for i in range(len(colouring.kinds)) if np.any(codes == i)]
     if not np.isfinite(numbers).any():
-        return _rows(x, shown, codes, occurring)
+        return _rows(x, colouring, codes, occurring)
     low, high = float(np.nanmin(numbers)), float(np.nanmax(numbers))
     span = (high - low) or abs(high) or 1.0
     markers = [Markers(x.positions, numbers, "", BLUE)]
     for i in occurring:
         where = x.positions[codes == i]
-        below = low * (low / high) ** 0.06 if shown.log else low - 0.08 * span
-        markers.append(Markers(where, np.full(len(where), below), shown.kinds[i].label, shown.kinds[i].colour, "patch"))
+        below = low * (low / high) ** 0.06 if colouring.log else low - 0.08 * span
+        markers.append(
+            Markers(where, np.full(len(where), below), colouring.kinds[i].label, colouring.kinds[i].colour, "patch")
+        )
     return Panel(
         "",
         x.axis(None),
-        Axis(shown.quantity, shown.unit, log=shown.log),
-        (Series(x.positions, numbers, shown.quantity, BLUE),),
+        Axis(colouring.quantity, colouring.unit, log=colouring.log),
+        (Series(x.positions, numbers, colouring.quantity, BLUE),),
         tuple(markers),
     )
 
 
-def _rows(x: CellAxis, shown: Look, codes: np.ndarray, occurring: list[int]) -> Panel:
+def _rows(x: CellAxis, colouring: Look, codes: np.ndarray, occurring: list[int]) -> Panel:
     """Words over a single axis: a row of points for each word."""
-    names = tuple(shown.kinds[i].label for i in occurring)
+    names = tuple(colouring.kinds[i].label for i in occurring)
     markers = tuple(
         Markers(
-            x.positions[codes == i], np.full(int(np.sum(codes == i)), float(row)), "", shown.kinds[i].colour, "patch"
+            x.positions[codes == i],
+            np.full(int(np.sum(codes == i)), float(row)),
+            "",
+            colouring.kinds[i].colour,
+            "patch",
         )
         for row, i in enumerate(occurring)
     )
-    return Panel("", x.axis(None), Axis(shown.quantity, "", (-0.5, len(names) - 0.5), words=names), markers=markers)
+    return Panel("", x.axis(None), Axis(colouring.quantity, "", (-0.5, len(names) - 0.5), words=names), markers=markers)
 
 
-def _samples(axes: tuple[CellAxis, ...], shown: Look, marker: Mapping[str, float] | None) -> tuple[list[Panel], str]:
+def _samples(
+    axes: tuple[CellAxis, ...], colouring: Look, marker: Mapping[str, float] | None
+) -> tuple[list[Panel], str]:
     """Samples over the first two of their keys; and what else was sampled."""
     if len(axes) < 2:
         raise ValueError(f"map: got samples of {len(axes)} key, expected at least two")
     x, y, *further = axes
-    coloured = (shown.quantity, shown.unit, shown.limits, shown.log, shown.colours, shown.kinds, shown.codes.values)
-    cloud = Cloud(x.positions, y.positions, shown.numbers.values, *coloured)
+    coloured = (
+        colouring.quantity,
+        colouring.unit,
+        colouring.limits,
+        colouring.log,
+        colouring.colours,
+        colouring.kinds,
+        colouring.codes.values,
+    )
+    cloud = Cloud(x.positions, y.positions, colouring.numbers.values, *coloured)
     panel = Panel("", x.axis(None), y.axis(None), markers=_marked(marker, x, y), clouds=(cloud,))
     also = ", ".join(axis.quantity for axis in further)
     return [panel], f"Sampled as well: {also}." if also else ""

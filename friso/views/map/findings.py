@@ -182,9 +182,9 @@ def meanings(runs: xr.Dataset) -> list[tuple[str, str]]:
     """What the words mean that stand in a map."""
     return [
         (word, text)
-        for name, known in MEANINGS.items()
+        for name, texts in MEANINGS.items()
         for word in word_counts(runs, name)
-        if (text := (known | _NO_RESULT).get(word))
+        if (text := (texts | _NO_RESULT).get(word))
     ]
 
 

@@ -87,9 +87,11 @@ def _thinned(runs: xr.Dataset) -> str:
     sizes = [runs.sizes[SAMPLE]] if SAMPLE in runs.dims else [len(axis.places) for axis in axes_of(runs)]
     names = ["samples"] if SAMPLE in runs.dims else [axis.quantity for axis in axes_of(runs)]
     parts = [
-        f"{len(kept)} of the {size} values of {name}" if name != "samples" else f"{len(kept)} of the {size} samples"
-        for name, size, kept in zip(names, sizes, picked(runs), strict=True)
-        if len(kept) < size
+        f"{len(indices)} of the {size} values of {name}"
+        if name != "samples"
+        else f"{len(indices)} of the {size} samples"
+        for name, size, indices in zip(names, sizes, picked(runs), strict=True)
+        if len(indices) < size
     ]
     return (
         f"In this page: {' and '.join(parts)}, evenly picked; the files of the map hold all of them." if parts else ""

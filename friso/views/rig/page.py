@@ -42,13 +42,13 @@ def figures(outcome: Outcome) -> list[Figure]:
 def rig_files(outcome: Outcome) -> dict[str, Content]:
     """The page, the logs with how they are to be read, the truth in a folder of its own, and every figure in all
     formats."""
-    drawn = figures(outcome)
+    images = figures(outcome)
     logs = {name: content for log in outcome.logs for name, content in _log_files(log, outcome.stage).items()}
     return {
-        "rig.html": page(outcome, drawn),
+        "rig.html": page(outcome, images),
         **logs,
         "truth/stage.toml": _stage_text(outcome.stage, outcome.seed),
-        **pictures(drawn),
+        **pictures(images),
     }
 
 
@@ -64,9 +64,9 @@ def _log_files(log: RigLog, stage: Stage) -> dict[str, Content]:
     return files
 
 
-def _setup(own: Stage, stage: Stage) -> dict[str, str]:
+def _setup(machine: Stage, stage: Stage) -> dict[str, str]:
     """What of joint and controller was set otherwise for a log than in the stage file, as texts with units."""
-    was, now = stage.given(), own.given()
+    was, now = stage.given(), machine.given()
     return {
         f"{table}.{key}": text
         for table in ("joint", "controller")
@@ -79,12 +79,12 @@ def _stage_text(stage: Stage, seed: int) -> str:
     return f"# friso rig, seed {seed}\n{stage.to_toml()}"
 
 
-def page(outcome: Outcome, drawn: Sequence[Figure]) -> str:
+def page(outcome: Outcome, figures: Sequence[Figure]) -> str:
     """The page with its figures."""
     return Report.of_stage(
         "rig.html",
         outcome.stage,
-        drawn,
+        figures,
         experiment=outcome.experiment,
         seed=outcome.seed,
         sentences=sentences(outcome),

@@ -17,7 +17,7 @@ def read_lvm(path: Path) -> ChannelTable:
     """LabVIEW measurement text. Raises LogError."""
     file = content_by("lvm_read", "LVM", path)
     segments = range(int(file["Segments"]))
-    channels = [each for k in segments for each in _lvm_segment(file[str(k)], file, f"segment {k + 1}")]
+    channels = [channel for k in segments for channel in _lvm_segment(file[str(k)], file, f"segment {k + 1}")]
     return named_table("LVM", channels, [], path)
 
 

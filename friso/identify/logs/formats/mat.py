@@ -21,7 +21,7 @@ MOST_COLUMNS = 64
 
 
 @dataclass
-class _Found:
+class _Contents:
     """What was found on the walk through a file."""
 
     channels: list[Channel] = field(default_factory=list)
@@ -34,17 +34,17 @@ def read_mat(path: Path) -> ChannelTable:
     """The channels and single numbers of a MAT file of any version. Raises LogError for a file that holds none."""
     with path.open("rb") as file:
         newer = is_hdf5(file.read(520))
-    found = _Found()
+    walk = _Contents()
     for name, node in content("MAT", path).items():
-        _walk(node, name, found)
-    if found.objects:
-        found.notes.append(f"left out: objects {', '.join(found.objects)}: save them as structure with time")
-    if not found.channels:
-        given = f"no arrays, but objects: {', '.join(found.objects)}" if found.objects else "no arrays of numbers"
-        raise LogError("log", given, "signals: save as structure with time", "", str(path))
+        _walk(node, name, walk)
+    if walk.objects:
+        walk.notes.append(f"left out: objects {', '.join(walk.objects)}: save them as structure with time")
+    if not walk.channels:
+        actual = f"no arrays, but objects: {', '.join(walk.objects)}" if walk.objects else "no arrays of numbers"
+        raise LogError("log", actual, "signals: save as structure with time", "", str(path))
     name = "MATLAB 7.3 (HDF5)" if newer else "MATLAB up to 7"
-    channels = _plainly_named(found.channels)
-    return ChannelTable(channels, found.scalars, (f"format: {name}", f"{len(channels)} channels", *found.notes))
+    channels = _plainly_named(walk.channels)
+    return ChannelTable(channels, walk.scalars, (f"format: {name}", f"{len(channels)} channels", *walk.notes))
 
 
 def _plainly_named(channels: list[Channel]) -> tuple[Channel, ...]:
@@ -54,75 +54,75 @@ def _plainly_named(channels: list[Channel]) -> tuple[Channel, ...]:
     return tuple(replace(channel, name=name) for channel, name in zip(channels, unique(names), strict=True))
 
 
-def _walk(node: Any, name: str, found: _Found) -> None:
+def _walk(node: Any, name: str, walk: _Contents) -> None:
     """Take the channels, numbers and objects of a node of the tree (dict, list, array, str)."""
     if isinstance(node, dict) and OBJECT in node:
-        found.objects.append(f"{name} ({node[OBJECT]})")
-    elif isinstance(node, dict) and {"X", "Y"} <= set(node) and any("Data" in each for each in _listed(node["Y"])):
-        found.channels += _dspace(node, name)
+        walk.objects.append(f"{name} ({node[OBJECT]})")
+    elif isinstance(node, dict) and {"X", "Y"} <= set(node) and any("Data" in curve for curve in _listed(node["Y"])):
+        walk.channels += _dspace(node, name)
     elif isinstance(node, dict) and {"time", "signals"} <= set(node):
-        found.channels += _with_time(node, name, found)
+        walk.channels += _with_time(node, name, walk)
     elif isinstance(node, dict):
         for key, child in node.items():
-            _walk(child, f"{name}.{key}", found)
+            _walk(child, f"{name}.{key}", walk)
     elif isinstance(node, list):
         for i, child in enumerate(node):
-            _walk(child, f"{name}({i + 1})", found)
+            _walk(child, f"{name}({i + 1})", walk)
     elif isinstance(node, np.ndarray) and node.dtype.kind in "buif":
-        _array(node, name, found)
+        _array(node, name, walk)
     elif isinstance(node, np.ndarray) and node.dtype.kind == "c":
-        found.notes.append(f"left out: {name}, complex numbers")
+        walk.notes.append(f"left out: {name}, complex numbers")
 
 
-def _array(values: np.ndarray, name: str, found: _Found) -> None:
+def _array(values: np.ndarray, name: str, walk: _Contents) -> None:
     """An array as one number, one channel, or one channel per column."""
     values = np.squeeze(values)
     if values.ndim == 0:
-        found.scalars[name] = float(values)
+        walk.scalars[name] = float(values)
     elif values.ndim == 1 and values.size > 1:
-        found.channels.append(Channel(name, "", values.astype(float), None, name))
+        walk.channels.append(Channel(name, "", values.astype(float), None, name))
     elif values.ndim == 2 and min(values.shape) <= MOST_COLUMNS:
         for i, column in enumerate(values.T if values.shape[0] >= values.shape[1] else values):
             label = f"{name}(:,{i + 1})" if values.shape[0] >= values.shape[1] else f"{name}({i + 1},:)"
-            found.channels.append(Channel(label, "", column.astype(float), None, label))
+            walk.channels.append(Channel(label, "", column.astype(float), None, label))
     elif values.size:
-        found.notes.append(f"left out: {name}, an array of {' x '.join(map(str, values.shape))}")
+        walk.notes.append(f"left out: {name}, an array of {' x '.join(map(str, values.shape))}")
 
 
 def _listed(node: Any) -> list[dict[str, Any]]:
     """A structure array as a list of structures, one alone too."""
-    return [each for each in (node if isinstance(node, list) else [node]) if isinstance(each, dict)]
+    return [item for item in (node if isinstance(node, list) else [node]) if isinstance(item, dict)]
 
 
 def _dspace(node: dict[str, Any], name: str) -> list[Channel]:
     """The channels of a dSPACE recording: `Y(i).Data` over `X(XIndex).Data` in seconds."""
     axes = _listed(node["X"])
     out = []
-    for i, each in enumerate(_listed(node["Y"])):
-        values = np.atleast_1d(np.squeeze(np.asarray(each["Data"], dtype=float)))
-        index = int(np.asarray(each.get("XIndex", 1)).ravel()[0]) - 1 if np.size(each.get("XIndex", 1)) else 0
+    for i, curve in enumerate(_listed(node["Y"])):
+        values = np.atleast_1d(np.squeeze(np.asarray(curve["Data"], dtype=float)))
+        index = int(np.asarray(curve.get("XIndex", 1)).ravel()[0]) - 1 if np.size(curve.get("XIndex", 1)) else 0
         axis = axes[index].get("Data") if 0 <= index < len(axes) else None
         time = None if axis is None else np.atleast_1d(np.squeeze(np.asarray(axis, dtype=float)))
         if time is not None and time.shape != values.shape:
             time = None
-        heading, unit = split_heading(_text(each.get("Name")) or f"Y({i + 1})")
-        out.append(Channel(f"{name}/{heading}", unit or _text(each.get("Unit")), values, time, f"{name}.Y({i + 1})"))
+        heading, unit = split_heading(_text(curve.get("Name")) or f"Y({i + 1})")
+        out.append(Channel(f"{name}/{heading}", unit or _text(curve.get("Unit")), values, time, f"{name}.Y({i + 1})"))
     return out
 
 
-def _with_time(node: dict[str, Any], name: str, found: _Found) -> list[Channel]:
+def _with_time(node: dict[str, Any], name: str, walk: _Contents) -> list[Channel]:
     """The channels of Simulink's structure with time: `signals(i).values` over `time` in seconds."""
     time = np.squeeze(np.asarray(node["time"], dtype=float))
     out = []
-    for i, each in enumerate(_listed(node["signals"])):
+    for i, curve in enumerate(_listed(node["signals"])):
         source = f"{name}.signals({i + 1})"
-        values = np.squeeze(np.asarray(each.get("values", []), dtype=float))
+        values = np.squeeze(np.asarray(curve.get("values", []), dtype=float))
         values = values.T if values.ndim == 2 and values.shape[0] != time.size else values
         if time.ndim != 1 or values.ndim not in (1, 2) or values.shape[0] != time.size:
-            found.notes.append(f"left out: {source}, {values.shape} values for {time.size} time stamps")
+            walk.notes.append(f"left out: {source}, {values.shape} values for {time.size} time stamps")
             continue
         heading, unit = split_heading(
-            _text(each.get("label")) or _text(each.get("blockName")).rpartition("/")[2] or source
+            _text(curve.get("label")) or _text(curve.get("blockName")).rpartition("/")[2] or source
         )
         columns = values.reshape(time.size, -1).T
         for k, column in enumerate(columns):

@@ -64,7 +64,7 @@ def read_twincat(path: Path) -> ChannelTable:
     form = TextLayout(encoding, delimiter, decimal, first, columns, exact=True)
     frame = _without_end(read_frame(path, form))
     channels, notes = _channels(path, form, table, frame)
-    return ChannelTable(channels, {}, (f"format: TwinCAT Scope CSV, {form.told}", f"{len(frame)} rows", *notes))
+    return ChannelTable(channels, {}, (f"format: TwinCAT Scope CSV, {form.in_words}", f"{len(frame)} rows", *notes))
 
 
 def _cells(line: str, delimiter: str) -> list[str]:
@@ -122,15 +122,15 @@ def _no_shifted_rows(path: Path, form: TextLayout, frame: Any, times: list[np.nd
                 if not abs(step - usual) < 0.5 * usual:
                     line = form.first + 1 + int(frame.index[row])
                     jump = f"from {time[row - 1]:.12g} to {time[row]:.12g}"
-                    given = f"fewer cells in line {line}, and the times of a group jump there {jump}"
+                    actual = f"fewer cells in line {line}, and the times of a group jump there {jump}"
                     raise LogError(
-                        "log", given, "empty cells, with their delimiters, where a group has ended", "", str(path)
+                        "log", actual, "empty cells, with their delimiters, where a group has ended", "", str(path)
                     )
 
 
 def _source(column: int, info: dict[str, str]) -> str:
-    told = [info[key] for key in ("SymbolName", "Data-Type") if info.get(key)]
-    return ", ".join([f"column {column + 1}", *told])
+    texts = [info[key] for key in ("SymbolName", "Data-Type") if info.get(key)]
+    return ", ".join([f"column {column + 1}", *texts])
 
 
 def _scaled(table: dict[str, list[str]]) -> list[str]:
@@ -154,8 +154,8 @@ def _floats(path: Path, form: TextLayout, frame: Any, column: int) -> np.ndarray
     wrong = np.flatnonzero(np.isnan(values) & there)
     if wrong.size:
         line = form.first + 1 + int(cells.index[wrong[0]])
-        given = f"{quoted(str(cells.iloc[wrong[0]]))} in line {line}, column {column + 1}"
-        raise LogError("log", given, "numbers in every row", "", str(path))
+        actual = f"{quoted(str(cells.iloc[wrong[0]]))} in line {line}, column {column + 1}"
+        raise LogError("log", actual, "numbers in every row", "", str(path))
     return values
 
 

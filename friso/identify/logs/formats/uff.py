@@ -95,8 +95,8 @@ def frequency_sets(path: Path) -> tuple[dict[str, Any], np.ndarray, np.ndarray |
     sets = sets_58(path)
     responses = [data for data in sets if data["func_type"] == FREQUENCY_RESPONSE]
     if len(responses) != 1:
-        given = f"{len(responses)} frequency responses: {', '.join(label(d, 'id1') for d in responses)}".rstrip(": ")
-        raise LogError("log", given, "a file with one frequency response", "", str(path))
+        actual = f"{len(responses)} frequency responses: {', '.join(label(d, 'id1') for d in responses)}".rstrip(": ")
+        raise LogError("log", actual, "a file with one frequency response", "", str(path))
     axis = _axis(responses[0])
     fitting = [d for d in sets if d["func_type"] == COHERENCE and np.size(d["data"]) == axis.size]
     coherence = np.real(fitting[0]["data"]).astype(float) if len(fitting) == 1 else None
@@ -107,8 +107,8 @@ def read_response_uff(path: Path) -> MeasuredResponse:
     """The response in a universal file. Raises LogError."""
     data, frequency, coherence = frequency_sets(path)
     above, below = label(data, "ordinate_axis_units_lab"), label(data, "orddenom_axis_units_lab")
-    scale, unit, told = response_unit(f"{above}/({below})" if above and below else above)
-    read = ("format: UFF, dataset 58", f"frequency response {told}", f"{frequency.size} frequencies")
+    scale, unit, unit_in_words = response_unit(f"{above}/({below})" if above and below else above)
+    read = ("format: UFF, dataset 58", f"frequency response {unit_in_words}", f"{frequency.size} frequencies")
     response = np.asarray(data["data"], dtype=complex) * scale
     name = label(data, "id1") or path.stem
     return checked(MeasuredResponse(frequency, response, coherence, name, read, unit), path)

@@ -51,15 +51,15 @@ def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
     """Passes at two speeds there and back, the joint free and locked; at many, and slow sliding, with it locked. Raises
     InputError for a stage without joint."""
     cases = []
-    for number, (name, each) in enumerate((("free", freed(stage)), ("locked", locked(stage)))):
+    for number, (name, machine) in enumerate((("free", freed(stage)), ("locked", locked(stage)))):
         progress(number, 4, f"constant speed, joint {name}")
-        cases.append(_passes(name, each, seed))
+        cases.append(_passes(name, machine, seed))
     progress(2, 4, "many speeds, joint locked, faster controller")
     many = many_speeds(locked(stage), seed)
     progress(3, 4, "slow sliding, joint locked")
     slow = slow_sliding(locked(stage), [place.log for place in many.places], seed)
     progress(4, 4, "")
-    logs = tuple(each.log for each in (*cases, *many.places, *slow))
+    logs = tuple(recorded.log for recorded in (*cases, *many.places, *slow))
     return Outcome("constant-speed", stage, seed, logs, ConstantSpeedResult(speeds(stage), tuple(cases), many, slow))
 
 

@@ -110,13 +110,13 @@ def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
     progress(2, 4, "open loops")
     logs, loops = open_loops(fixed, places[0], seed, SETTINGS[1:])
     loops = (measured_loop(held[0], pace(stage)), *loops)
-    apparent = np.array([apparent_masses(each, places[0], seed) for each in (fixed, free)])
+    apparent = np.array([apparent_masses(machine, places[0], seed) for machine in (fixed, free)])
     progress(3, 4, "highest stable setting, joint free")
     settings, stable = stable_settings(free, places[0], seed)
     progress(4, 4, "")
     free_loop = measured_loop(loose[0], pace(stage))
-    found = Frf(locked_plant(held), free_plant(loose), loops, free_loop, apparent, settings, stable)
-    return Outcome("frf", stage, seed, (*held, *loose, *logs), found, NOTES)
+    result = Frf(locked_plant(held), free_plant(loose), loops, free_loop, apparent, settings, stable)
+    return Outcome("frf", stage, seed, (*held, *loose, *logs), result, NOTES)
 
 
 NOTES = (
@@ -139,11 +139,11 @@ def open_loops(
     recorded = excite(stage, place, seed, len(factors), quicker(stage, factors))
     rows = []
     for row, factor in enumerate(settings):
-        own = stage.with_numbers(quicker(stage, factor))
+        quick = stage.with_numbers(quicker(stage, factor))
         name = f"loop_{factor * pace(stage):.3g}_Hz".replace(".", "_")
-        rows.append(rig_log(recorded, row, name, "frequency", own, seed))
-    found = (measured_loop(log, factor * pace(stage)) for log, factor in zip(rows, settings, strict=True))
-    return tuple(rows), tuple(found)
+        rows.append(rig_log(recorded, row, name, "frequency", quick, seed))
+    loops = (measured_loop(log, factor * pace(stage)) for log, factor in zip(rows, settings, strict=True))
+    return tuple(rows), tuple(loops)
 
 
 def measured_loop(log: RigLog, tuned: float) -> MeasuredLoop:

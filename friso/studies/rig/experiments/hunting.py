@@ -81,7 +81,7 @@ class HuntingResult:
     cases: Mapping[str, Hunted]
     displacements: np.ndarray
     started: Hunted
-    shown: tuple[int, ...]
+    plotted: tuple[int, ...]
     rail: int
     traces: Mapping[tuple[str, int], Trace]
     startable: Startable | None
@@ -93,8 +93,8 @@ class HuntingResult:
     def limit(self, case: str, rail: int | None = None) -> float:
         """The highest crossover [Hz] at which peaks are counted on one rail (None: any); NaN for none."""
         counted = self.cases[case].counted if rail is None else self.cases[case].counted[:, [rail]]
-        found = np.flatnonzero(counted.any(axis=1))
-        return float(self.crossovers[found[-1]]) if len(found) else np.nan
+        rows = np.flatnonzero(counted.any(axis=1))
+        return float(self.crossovers[rows[-1]]) if len(rows) else np.nan
 
     @property
     def can_start(self) -> np.ndarray:
@@ -108,20 +108,22 @@ def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
     stages = {case: with_joint(stage, locked) for case, locked in CASES.items()}
     frequencies, seeds = crossover(stage) * CROSSOVERS, rails(stage)
     changes = on_rails(stage, {crossover_key(stage): frequencies}, seeds)
-    found = {}
-    for case, each in stages.items():
+    moves = {}
+    for case, variant in stages.items():
         numbers = numbers_of(seed, len(frequencies), len(seeds))
-        runs = follow(each, move(stage), numbers, changes, progress, f"moves, joint {case}")
-        found[case] = runs.shaped(len(frequencies), len(seeds))
+        runs = follow(variant, move(stage), numbers, changes, progress, f"moves, joint {case}")
+        moves[case] = runs.shaped(len(frequencies), len(seeds))
     started = _releases(stages["locked"], seed, frequencies, seeds, progress)
-    rail = int(np.argmax(found["locked"].counted[SHOWN[0]]))
+    rail = int(np.argmax(moves["locked"].counted[SHOWN[0]]))
     machine = on_rails(stage, {crossover_key(stage): frequencies}, seeds[[rail]])
-    again = {case: once(each, move(stage), [seed + rail] * len(frequencies), machine) for case, each in stages.items()}
+    again = {
+        case: once(variant, move(stage), [seed + rail] * len(frequencies), machine) for case, variant in stages.items()
+    }
     traces = {(case, row): _trace(again[case], row) for case in CASES for row in range(len(frequencies))}
-    startable = _startable(stages["locked"], seed, frequencies, seeds, found["locked"], started)
+    startable = _startable(stages["locked"], seed, frequencies, seeds, moves["locked"], started)
     displacements = distance(stage) * np.array(DISPLACEMENTS)
     result = HuntingResult(
-        distance(stage), frequencies, seeds, found, displacements, started, SHOWN, rail, traces, startable
+        distance(stage), frequencies, seeds, moves, displacements, started, SHOWN, rail, traces, startable
     )  # fmt: skip
     logs = []
     for case, row in product(CASES, SHOWN):
@@ -172,9 +174,9 @@ def _notes(stage: Stage, result: HuntingResult) -> tuple[str, ...]:
     if stage.rail is None:
         notes.append("the stage file has no [rail], so friction is uniform and there is only one machine")
     elif result.rail:
-        own, shown = result.rails[0], result.rails[result.rail]
-        notes.append(f"figure and logs show rail {shown:g}: the stage's own, {own:g}, has no counted peaks locked")
-    failed = sum(int(each.failed.sum()) for each in (*result.cases.values(), result.started))
+        first, chosen = result.rails[0], result.rails[result.rail]
+        notes.append(f"figure and logs show rail {chosen:g}: the stage's own, {first:g}, has no counted peaks locked")
+    failed = sum(int(runs_of_case.failed.sum()) for runs_of_case in (*result.cases.values(), result.started))
     if failed:
         notes.append(f"{failed} runs failed: whether they have counted peaks is unknown")
     notes.append(

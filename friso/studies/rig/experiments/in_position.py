@@ -77,7 +77,7 @@ class InPosition:
     runs: Mapping[tuple[str, str], Standstill]
     after_move: Mapping[str, Standstill]
     damping: np.ndarray
-    own: float
+    own_damping: float
     damped: Standstill
     traces: Mapping[str, tuple[np.ndarray, np.ndarray]]
 
@@ -94,9 +94,10 @@ class InPosition:
 
 def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
     """All standstills. Raises InputError without a joint or a crossover."""
-    result, kept = in_position(stage, seed, progress)
+    result, recordings = in_position(stage, seed, progress)
     logs = tuple(
-        rig_log(recorded, 0, f"in_position_{case}", None, machine, seed) for case, (recorded, machine) in kept.items()
+        rig_log(recorded, 0, f"in_position_{case}", None, machine, seed)
+        for case, (recorded, machine) in recordings.items()
     )
     notes = ("the logs are of a standstill, from which friso identify cannot identify anything",)
     return Outcome("in-position", stage, seed, logs, result, notes)
@@ -109,35 +110,35 @@ def in_position(stage: Stage, seed: int, progress: Progress) -> tuple[InPosition
     quiet = fast.replace({"floor": None}) if stage.floor is not None else fast
     force = amplifier_noise(stage)
     still = standing(0.0, SETTLING + WATCHED)
-    each = as_built_keys(stage)["drive.sample_time"]
-    noisy = with_noise(still, force, seed, each)
+    step = as_built_keys(stage)["drive.sample_time"]
+    noisy = with_noise(still, force, seed, step)
     plans = {"encoder": (quiet, still), "amplifier": (quiet, noisy), "floor": (shaken, still), "all": (shaken, noisy)}
-    runs, kept, after, done, total = {}, {}, {}, 0, len(CASES) * (len(plans) + 1) + 1
+    runs, recordings, after, done, total = {}, {}, {}, 0, len(CASES) * (len(plans) + 1) + 1
     for case, locked in CASES.items():
         for source, (machine, task) in plans.items():
             progress(done, total, f"joint {case}, {source}")
             done += 1
-            own = machine.replace({"joint.locked": locked})
-            recorded = _recorded(own, task, seed, _silenced(own, source))
+            fixed = machine.replace({"joint.locked": locked})
+            recorded = _recorded(fixed, task, seed, _silenced(fixed, source))
             runs[case, source] = _standstill(recorded, SETTLING)
             if source == "all":
-                kept[case] = (recorded, own)
+                recordings[case] = (recorded, fixed)
         progress(done, total, f"joint {case}, after a move")
         done += 1
-        task = with_noise(replace(move(stage), duration=SETTLING + WATCHED), force, seed, each)
+        task = with_noise(replace(move(stage), duration=SETTLING + WATCHED), force, seed, step)
         after[case] = _standstill(_recorded(shaken.replace({"joint.locked": locked}), task, seed), SETTLING)
     progress(done, total, "joint free, more and less damping")
     flat = stage.flat()
     damping = 2 * np.sqrt(flat["joint.stiffness"] * flat["masses.stage"]) * np.array(DAMPING_RATIOS)
     damped = _standstill(_recorded(shaken, noisy, seed, {"joint.damping": damping}, len(damping)), SETTLING)
     progress(total, total, "done")
-    traces = {case: _watched(recorded, SETTLING) for case, (recorded, _) in kept.items()}
+    traces = {case: _watched(recorded, SETTLING) for case, (recorded, _) in recordings.items()}
     logged_each = interval(stage, INTERVAL)
     frequencies = np.fft.rfftfreq(segment(logged_each), logged_each)
     return InPosition(
         FASTER * crossover(stage), force, stage.floor is not None, frequencies, runs, after, damping,
         float(flat["joint.damping"]), damped, traces,
-    ), kept  # fmt: skip
+    ), recordings  # fmt: skip
 
 
 def amplifier_noise(stage: Stage) -> float:
@@ -147,10 +148,10 @@ def amplifier_noise(stage: Stage) -> float:
     return float(2 * limit / 2**BITS / np.sqrt(12))
 
 
-def with_noise(task: MoveTask, force: float, seed: int, each: float) -> MoveTask:
-    """The task with a force of an RMS [N], unknown to the drive, that is another at every sample of it, `each` [s]."""
-    noise = np.random.default_rng(seed).standard_normal(int(np.ceil(task.duration / each)) + 1)
-    return replace(task, injected=force * noise, injected_each=each, unknown=True)
+def with_noise(task: MoveTask, force: float, seed: int, step: float) -> MoveTask:
+    """The task with a force of an RMS [N], unknown to the drive, that is another at every sample of it, `step` [s]."""
+    noise = np.random.default_rng(seed).standard_normal(int(np.ceil(task.duration / step)) + 1)
+    return replace(task, injected=force * noise, injected_each=step, unknown=True)
 
 
 def _silenced(stage: Stage, source: str) -> dict[str, Any]:
@@ -183,9 +184,9 @@ def _standstill(recorded: Recorded, since: float) -> Standstill:
     return Standstill(_rms_and_peak(true), _rms_and_peak(read), mean, np.sqrt(spectrum))
 
 
-def segment(each: float) -> int:
+def segment(step: float) -> int:
     """Samples in a segment of the spectrum, for so much time between them [s]; segments overlap by half."""
-    return 2 * int(WATCHED / each / (SEGMENTS + 1))
+    return 2 * int(WATCHED / step / (SEGMENTS + 1))
 
 
 def _rms_and_peak(deviation: np.ndarray) -> np.ndarray:

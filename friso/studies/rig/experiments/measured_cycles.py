@@ -133,9 +133,9 @@ def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
     logs, notes = [], ()
     if result.slowest is None:
         notes = ("no varied rail has a slower cycle of a similar swing",)
-    for name, machine, own in _shown(locked, seed, result.slowest):
-        recorded = once(machine, _longer(move(machine)), [own])
-        logs.append(rig_log(recorded, 0, name, "moves", machine, own))
+    for name, machine, number in _shown(locked, seed, result.slowest):
+        recorded = once(machine, _longer(move(machine)), [number])
+        logs.append(rig_log(recorded, 0, name, "moves", machine, number))
     return Outcome("measured-cycles", stage, seed, tuple(logs), result, notes)
 
 
@@ -150,11 +150,11 @@ def compare_cycles(
 ) -> CycleComparison:
     """The cycles of a stage with its joint locked, on so many rails of each kind."""
     even = on_rail(stage)
-    own = started(even, seed, {}, 1, progress, "an even rail")
-    swing = float(own.swing[0]) if own.swings[0] else 0.01 * distance(stage)
+    plain = started(even, seed, {}, 1, progress, "an even rail")
+    swing = float(plain.swing[0]) if plain.swings[0] else 0.01 * distance(stage)
     long = swing * np.array(lengths)
     seeds = even.flat()["rail.seed"] + np.arange(float(machines))
-    first, second = (each.ravel() for each in np.meshgrid(deviations, long, indexing="ij"))
+    first, second = (axis.ravel() for axis in np.meshgrid(deviations, long, indexing="ij"))
     cases = {"rail.static_deviation": first, "rail.coulomb_deviation": first, "rail.correlation_length": second}
     field, asymmetry = varied(even, seed, cases, seeds, swing, progress, "rails with a random field")
     shape = (len(deviations), len(long), machines)
@@ -163,7 +163,7 @@ def compare_cycles(
     waves = {"rail.first_harmonic": np.array(harmonics)}
     rolled, rolled_asymmetry = varied(rolling, seed, waves, seeds, swing, progress, "rails with rolling elements")
     result = CycleComparison(
-        own, np.array(deviations), long, field.shaped(*shape), asymmetry.reshape(shape), np.array(harmonics), pitch,
+        plain, np.array(deviations), long, field.shaped(*shape), asymmetry.reshape(shape), np.array(harmonics), pitch,
         rolled.shaped(len(harmonics), machines), rolled_asymmetry.reshape(len(harmonics), machines),
         levels(even, seed, progress), others(even, seed, progress), (_trace(even, seed), None), None,
     )  # fmt: skip
@@ -188,7 +188,7 @@ def started(stage: Stage, seed: int, changes: Mapping[str, Any], count: int, pro
     runs = [follow(stage, _longer(task), [seed] * count, changes, progress, what) for task in tasks]
     every = joined(runs).shaped(len(tasks), count)
     first = np.argmax(every.swings, axis=0)
-    return Hunted(**{each.name: getattr(every, each.name)[first, np.arange(count)] for each in fields(Hunted)})
+    return Hunted(**{entry.name: getattr(every, entry.name)[first, np.arange(count)] for entry in fields(Hunted)})
 
 
 def varied(
@@ -204,23 +204,23 @@ def varied(
     count = len(next(iter(cases.values())))
     changes = {key: np.repeat(values, len(seeds)) for key, values in cases.items()}
     changes["rail.seed"] = np.tile(seeds, count)
-    found = follow(stage, _longer(move(stage)), numbers_of(seed, count, len(seeds)), changes, progress, what)
+    followed = follow(stage, _longer(move(stage)), numbers_of(seed, count, len(seeds)), changes, progress, what)
     sides = distance(stage) + np.array([-swing / 2, swing / 2])
     flat, runs = stage.flat(), range(count * len(seeds))
     at = [friction_factors(flat | {key: values[run] for key, values in changes.items()}, sides)[0] for run in runs]
-    return found, np.diff(np.log(at), axis=1)[:, 0]
+    return followed, np.diff(np.log(at), axis=1)[:, 0]
 
 
 def levels(stage: Stage, seed: int, progress: Progress) -> Hunted:
     """Cycles with other motors and friction levels, shape (motors, static, coulomb); static friction is at least as
     large as Coulomb friction."""
     flat = stage.flat()
-    motor, first, second = (each.ravel() for each in np.meshgrid(MOTORS, STATIC, COULOMB, indexing="ij"))
+    motor, first, second = (axis.ravel() for axis in np.meshgrid(MOTORS, STATIC, COULOMB, indexing="ij"))
     coulomb = second * flat["friction.coulomb"]
     changes = {"friction.static": np.maximum(first * flat["friction.static"], coulomb), "friction.coulomb": coulomb}
     changes["drive.motor_constant_ratio"] = motor * flat.get("drive.motor_constant_ratio", 1.0)
-    found = started(stage, seed, changes, len(first), progress, "other friction levels")
-    return found.shaped(len(MOTORS), len(STATIC), len(COULOMB))
+    cycles = started(stage, seed, changes, len(first), progress, "other friction levels")
+    return cycles.shaped(len(MOTORS), len(STATIC), len(COULOMB))
 
 
 def others(stage: Stage, seed: int, progress: Progress) -> dict[str, Hunted]:
@@ -242,14 +242,14 @@ def others(stage: Stage, seed: int, progress: Progress) -> dict[str, Hunted]:
             key: flat[key] / 100 for key in ("drive.current_bandwidth",) if key in flat
         },
     }
-    wanted = {name: changes for name, changes in named.items() if changes}
-    keys = {key for changes in wanted.values() for key in changes}
+    changed = {name: changes for name, changes in named.items() if changes}
+    keys = {key for changes in changed.values() for key in changes}
     ideal = {"drive.motor_constant_ratio": 1.0, **flat}
-    lanes = {key: np.array([changes.get(key, ideal[key]) for changes in wanted.values()]) for key in keys}
-    found = started(stage, seed, lanes, len(wanted), progress, "other drives")
+    lanes = {key: np.array([changes.get(key, ideal[key]) for changes in changed.values()]) for key in keys}
+    cycles = started(stage, seed, lanes, len(changed), progress, "other drives")
     return {
-        name: Hunted(**{each.name: getattr(found, each.name)[[row]] for each in fields(Hunted)})
-        for row, name in enumerate(wanted)
+        name: Hunted(**{entry.name: getattr(cycles, entry.name)[[row]] for entry in fields(Hunted)})
+        for row, name in enumerate(changed)
     }
 
 
@@ -280,8 +280,8 @@ def _trace(stage: Stage, seed: int) -> Trace:
 def _shown(stage: Stage, seed: int, slowest: tuple[float, float, float] | None) -> list[tuple[str, Stage, int]]:
     """Name, stage and seed of the noise of each log."""
     even = on_rail(stage)
-    own = even.flat()["rail.seed"]
-    found = [("measured_cycles_even_rail", even, seed)]
+    first = even.flat()["rail.seed"]
+    machines = [("measured_cycles_even_rail", even, seed)]
     if slowest is not None:
-        found.append(("measured_cycles_varied_rail", _machine(even, slowest), seed + int(slowest[2] - own)))
-    return found
+        machines.append(("measured_cycles_varied_rail", _machine(even, slowest), seed + int(slowest[2] - first)))
+    return machines

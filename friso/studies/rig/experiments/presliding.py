@@ -32,7 +32,7 @@ sample to sample on slower ones."""
 class Bristles:
     """What the log of each place shows, and the bristles' true stiffness [N/m] and damping [N s/m]."""
 
-    found: tuple[Presliding, ...]
+    by_place: tuple[Presliding, ...]
     stiffness: float
     damping: float
 
@@ -41,8 +41,8 @@ def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
     """A small multisine at each place. Raises InputError for a stage whose friction has no bristles."""
     flat = stage.flat()
     if "friction.bristle_stiffness" not in flat:
-        given = f"model = {flat.get('friction.model', 'none')!r}"
-        raise InputError("friction.model", given, "friction with bristles", 'model = "lugre"')
+        actual = f"model = {flat.get('friction.model', 'none')!r}"
+        raise InputError("friction.model", actual, "friction with bristles", 'model = "lugre"')
     held = locked(stage) if stage.joint else stage
     places = np.linspace(*travel(stage), PLACES)
     logs = []
@@ -50,10 +50,10 @@ def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
         progress(number, PLACES, f"place {number + 1} of {PLACES}")
         logs.append(presliding_log(held, f"presliding_{number + 1}", place, seed + number))
     progress(PLACES, PLACES, "")
-    known = between(as_built_keys(stage))
-    found = tuple(bristles_from_presliding(log.log, known) for log in logs)
+    contact = between(as_built_keys(stage))
+    results = tuple(bristles_from_presliding(log.log, contact) for log in logs)
     true = (flat["friction.bristle_stiffness"], flat.get("friction.bristle_damping", 0.0))
-    return Outcome("presliding", stage, seed, tuple(logs), Bristles(found, *map(float, true)), _notes(stage))
+    return Outcome("presliding", stage, seed, tuple(logs), Bristles(results, *map(float, true)), _notes(stage))
 
 
 def _notes(stage: Stage) -> tuple[str, ...]:

@@ -40,32 +40,32 @@ class Stiction:
     """What each log shows, read with the joint's true stiffness; per rail the least and greatest true static friction
     [N] where the cart went, shape (rails, 2); and the slow velocity [m/s]."""
 
-    found: tuple[StickSlip, ...]
+    by_rail: tuple[StickSlip, ...]
     true: np.ndarray
     speed: float
 
     @property
     def forces(self) -> np.ndarray:
         """Break-away forces [N] of all slips, shape (slips,)."""
-        return np.concatenate([each.forces for each in self.found])
+        return np.concatenate([slips.forces for slips in self.by_rail])
 
 
 def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
     """Slow motion there and back on several rails. Raises InputError for a stage without a joint, or static
     friction."""
     if "friction.static" not in stage.flat():
-        given = f"model = {stage.flat().get('friction.model', 'none')!r}"
-        raise InputError("friction.model", given, "friction with a static level", 'model = "lugre"')
+        actual = f"model = {stage.flat().get('friction.model', 'none')!r}"
+        raise InputError("friction.model", actual, "friction with a static level", 'model = "lugre"')
     progress(0, 1, f"slow motion on {RAILS} rails")
     logs = slow_motion(stage, seed)
     progress(1, 1, "")
     flat = freed(stage).flat()
-    found = tuple(
+    results = tuple(
         static_from_stick_slip(log.log, flat["joint.stiffness"], flat["masses.stage"], flat["joint.stroke"])
         for log in logs
     )
     true = np.array([true_range(log) for log in logs])
-    return Outcome("stiction", stage, seed, logs, Stiction(found, true, slow_speed(stage)), (_note(flat),))
+    return Outcome("stiction", stage, seed, logs, Stiction(results, true, slow_speed(stage)), (_note(flat),))
 
 
 def _note(flat: Mapping[str, Any]) -> str:
@@ -86,17 +86,19 @@ def slow_motion(stage: Stage, seed: int, rails: int = RAILS) -> tuple[RigLog, ..
     for factor in SPEEDS:
         parts += [(factor * slow, SLIPS * LOADS * period / abs(factor)), (0.0, STANDS * period)]
     task = legs(travel(stage)[0], parts)
-    drawn = {"rail.seed": stage.flat()["rail.seed"] + np.arange(rails)} if stage.rail else {}
+    rails_of_runs = {"rail.seed": stage.flat()["rail.seed"] + np.arange(rails)} if stage.rail else {}
     logs: list[RigLog] = []
-    for chunk in run(free, task, [seed + number for number in range(rails)], interval(stage, period / SAMPLES), drawn):
+    for chunk in run(
+        free, task, [seed + number for number in range(rails)], interval(stage, period / SAMPLES), rails_of_runs
+    ):
         logs += [_log(free, chunk, row, int(number), seed) for row, number in enumerate(chunk.numbers)]
     return tuple(logs)
 
 
 def _log(free: Stage, chunk: Recorded, row: int, number: int, seed: int) -> RigLog:
     """One rail's log, with the stage that has this rail."""
-    own = free.with_numbers({"rail.seed": free.flat()["rail.seed"] + number}) if free.rail else free
-    return rig_log(chunk, row, f"rail_{number + 1:02d}", "stick-slip", own, seed + number)
+    on_rail = free.with_numbers({"rail.seed": free.flat()["rail.seed"] + number}) if free.rail else free
+    return rig_log(chunk, row, f"rail_{number + 1:02d}", "stick-slip", on_rail, seed + number)
 
 
 def true_range(log: RigLog) -> tuple[float, float]:

@@ -33,7 +33,7 @@ class Stiffness:
     """What the log shows, the joint's true stiffness [N/m], and the motor's true constant over the believed one: the
     drive's newtons are so many times smaller than true ones."""
 
-    found: StepStiffness
+    steps: StepStiffness
     true: float
     motor_constant_ratio: float
 
@@ -49,10 +49,10 @@ def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
     log = steps(stage, seed)
     progress(1, 1, "")
     flat = stage.flat()
-    found = Stiffness(
+    result = Stiffness(
         stiffness_from_steps(log.log), float(flat["joint.stiffness"]), float(flat.get("drive.motor_constant_ratio", 1))
     )
-    return Outcome("stiffness", stage, seed, (log,), found, _notes(stage))
+    return Outcome("stiffness", stage, seed, (log,), result, _notes(stage))
 
 
 def steps(stage: Stage, seed: int) -> RigLog:
@@ -77,7 +77,7 @@ def pulling_time(stage: Stage) -> float:
 
 def _notes(stage: Stage) -> tuple[str, ...]:
     """What to know of the result."""
-    said = ["the cart is fixed and the limiters are far away, as an engineer would set them up; the joint is free"]
+    notes = ["the cart is fixed and the limiters are far away, as an engineer would set them up; the joint is free"]
     if stage.flat().get("cable.stiffness", 0.0) > 0:
-        said.append("the cables move with the stage: their stiffness is included in the result")
-    return tuple(said)
+        notes.append("the cables move with the stage: their stiffness is included in the result")
+    return tuple(notes)

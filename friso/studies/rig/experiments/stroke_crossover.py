@@ -52,7 +52,7 @@ class StrokeCrossover:
         return np.divide(counted, count, out=np.full(count.shape, np.nan), where=count > 0)
 
     @property
-    def own(self) -> int:
+    def nearest(self) -> int:
         """Number of the crossover that is the stage's, or the next to it."""
         return int(np.argmin(abs(self.crossovers - self.frequency)))
 
@@ -60,12 +60,12 @@ class StrokeCrossover:
     def limits(self) -> np.ndarray:
         """By stroke the crossover [Hz] halfway from the last at which any rail has counted peaks to the next, shape
         (strokes,): 0 where none has, infinite where some have at the highest."""
-        found = np.zeros(len(self.strokes))
+        limits = np.zeros(len(self.strokes))
         for row, counted in enumerate(self.share > 0):
             if counted.any():
                 last = int(np.flatnonzero(counted)[-1])
-                found[row] = np.inf if last + 1 == len(counted) else self.crossovers[last : last + 2].mean()
-        return found
+                limits[row] = np.inf if last + 1 == len(counted) else self.crossovers[last : last + 2].mean()
+        return limits
 
 
 def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:

@@ -37,7 +37,7 @@ def stiffness_from_position_steps(evidence: Evidence) -> Finding:
 
 def judged_steps(steps: JointSteps) -> Finding:
     """The finding from the simulated steps."""
-    read, apparent = steps.found.stiffness, (2 * np.pi * FIRST) ** 2 * MEASURED[1]
+    read, apparent = steps.result.stiffness, (2 * np.pi * FIRST) ** 2 * MEASURED[1]
     larger = steps.stiffness * float(np.mean(CONSTANTS))
     return Finding(
         (
@@ -46,7 +46,7 @@ def judged_steps(steps: JointSteps) -> Finding:
                 f"within {CLOSE:.0%} of it",
                 bool(read.holds(steps.stiffness) and read.half_width <= CLOSE * steps.stiffness),
                 f"{read.value / 1e3:.4g} N/mm ({read.low / 1e3:.4g} to {read.high / 1e3:.4g}) of "
-                f"{steps.stiffness / 1e3:.4g}, {len(steps.found.windows)} settled windows. Assumed: steps back and "
+                f"{steps.stiffness / 1e3:.4g}, {len(steps.result.windows)} settled windows. Assumed: steps back and "
                 "forth, "
                 f"{STANDS:g} s each; no noise",
                 why=read.reason or "method: the interval misses it, or is wide",
@@ -73,23 +73,23 @@ def static_friction_from_stick_slip(evidence: Evidence) -> Finding:
 
 def judged_slips(runs: tuple[SlowMotion, ...]) -> Finding:
     """The finding from simulated slow motion."""
-    slips = sum(len(run.found.forces) for run in runs)
-    forces, rates = (np.concatenate([getattr(run.found, name) for run in runs]) for name in ("forces", "rates"))
+    slips = sum(len(run.result.forces) for run in runs)
+    forces, rates = (np.concatenate([getattr(run.result, name) for run in runs]) for name in ("forces", "rates"))
     read = static_friction("friction.static", forces, rates)
     truth = runs[0].static
-    counts = ", ".join(f"{len(run.found.forces)} slips at {run.speed * 1e3:g} mm/s" for run in runs)
+    counts = ", ".join(f"{len(run.result.forces)} slips at {run.speed * 1e3:g} mm/s" for run in runs)
     range_read = f"{forces.min():.3g} to {forces.max():.3g} N" if slips else "none"
     return Finding(
         (
             Part(
                 f"at every speed the cart sticks and slips, and a spike of its velocity follows every peak of the "
                 f"relative position within {_SPIKE:g} s",
-                all(len(run.found.forces) > 1 and _spikes(run) for run in runs),
+                all(len(run.result.forces) > 1 and _spikes(run) for run in runs),
                 f"{counts}. Assumed: these speeds, {SLOW_TIME:g} s each (the thesis states neither); {_UNIFORM}",
             ),
             Part(
                 "read from the peaks at all speeds, the 95 % interval holds the static friction of the rig",
-                bool(read.shown and read.holds(truth)),
+                bool(read.determined and read.holds(truth)),
                 f"{read.value:.3g} N ({read.low:.3g} to {read.high:.3g}) of {truth:.3g}: {read.method}",
                 why=read.reason or "method: the interval misses it",
             ),
@@ -108,7 +108,7 @@ def judged_slips(runs: tuple[SlowMotion, ...]) -> Finding:
 
 def _spikes(run: SlowMotion) -> bool:
     """Whether the velocity of the cart spikes after every peak, to more than half of the usual."""
-    slips, time = run.found, run.log.time
+    slips, time = run.result, run.log.time
     after = [(time >= at) & (time <= at + _SPIKE) for at in slips.times]
     return all(np.abs(slips.cart_velocity[window]).max() > np.median(slips.speeds) / 2 for window in after)
 
@@ -121,7 +121,7 @@ def force_at_constant_speed(evidence: Evidence) -> Finding:
 
 def judged_speeds(free: ConstantSpeed, locked: ConstantSpeed) -> Finding:
     """The finding from the simulated runs."""
-    named = {"free": free.found, "locked": locked.found}
+    named = {"free": free.result, "locked": locked.result}
     swings = {
         name: [passage.spread / abs(passage.mean.value) for passage in friction.passes]
         for name, friction in named.items()
@@ -139,7 +139,9 @@ def judged_speeds(free: ConstantSpeed, locked: ConstantSpeed) -> Finding:
             ),
             Part(
                 "the oscillation depends on the place: passes over the same places repeat it",
-                all(friction.repeatability.shown and friction.repeatability.low > 0 for friction in named.values()),
+                all(
+                    friction.repeatability.determined and friction.repeatability.low > 0 for friction in named.values()
+                ),
                 f"correlation of the two speeds: {repeats}",
                 why="not in the model: its friction is uniform along the rail, and it is the loop that oscillates, by "
                 "sticking and slipping. Simulation alone cannot tell",
@@ -147,7 +149,7 @@ def judged_speeds(free: ConstantSpeed, locked: ConstantSpeed) -> Finding:
             Part(
                 "dynamic friction cannot be determined, joint free or locked",
                 not any(friction.separated for friction in named.values()),
-                f"free: {free.found.verdict} Locked: {locked.found.verdict}",
+                f"free: {free.result.verdict} Locked: {locked.result.verdict}",
             ),
         )
     )

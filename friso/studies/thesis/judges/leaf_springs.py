@@ -105,8 +105,8 @@ def _parasitic(evaluations: tuple[Evaluation, ...]) -> Part:
 
 def _as_beams(young: float) -> float:
     """Drive stiffness [N/m] of leaves that curl freely across their width: n 12 E I/L^3."""
-    it = _mechanism(young, _SPACINGS[0], _HEIGHTS[0])
-    return it.leaves * 12 * it.young * it.bending / it.length**3
+    mechanism = _mechanism(young, _SPACINGS[0], _HEIGHTS[0])
+    return mechanism.leaves * 12 * mechanism.young * mechanism.bending / mechanism.length**3
 
 
 def _met(ratio: np.ndarray) -> bool:

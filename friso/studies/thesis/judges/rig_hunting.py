@@ -200,7 +200,7 @@ def judged_standstill(standstill: InPosition) -> Finding:
     peaks = [float(standstill.runs[case, "all"].true[0, 1]) for case in ("locked", "free")]
     ratio = standstill.ratio("all")
     expected = _DEVIATIONS[1] / _DEVIATIONS[0]
-    tenfold = float(np.interp(np.log(10 * standstill.own), np.log(standstill.damping), standstill.recovered))
+    tenfold = float(np.interp(np.log(10 * standstill.own_damping), np.log(standstill.damping), standstill.recovered))
     assumed = (
         f"Assumed: {standstill.amplifier * 1e3:.2g} mN RMS of noise of the drive's force (rounding to {BITS} bits), a "
         "quiet laboratory's floor"
@@ -222,7 +222,8 @@ def judged_standstill(standstill: InPosition) -> Finding:
             Part(
                 f"the joint lacks damping: ten times as much removes at least {_RECOVERED:.0%} of the difference",
                 tenfold >= _RECOVERED,
-                f"{tenfold:.0%} at {10 * standstill.own:g} N s/m, {standstill.recovered.max():.0%} at the most tried",
+                f"{tenfold:.0%} at {10 * standstill.own_damping:g} N s/m, "
+                f"{standstill.recovered.max():.0%} at the most tried",
                 why="stiffness: the sticking bearing holds the locked stage with its bristles, the free one is held "
                 "only by the joint and the controller",
             ),

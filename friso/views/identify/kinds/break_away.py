@@ -51,7 +51,7 @@ def _figures(result: BreakAway, logs: Sequence[Source], name: str) -> list[Figur
         bands = (
             Band(ends, np.full(2, result.static.low), np.full(2, result.static.high), "static friction, 95 %", AREA),
         )
-    if result.static.shown:
+    if result.static.determined:
         limits = (Limit((result.static.value,), "", INK),)
     panel = Panel(
         "",

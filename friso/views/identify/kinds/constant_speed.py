@@ -49,9 +49,9 @@ def _facts(result: FrictionAtSpeeds) -> Facts:
 
 def _direction_text(direction: Direction) -> str:
     several = (direction.coulomb, direction.viscous, direction.static, direction.stribeck_velocity)
-    visible = [estimate for estimate in several if estimate.shown]
-    reasons = {estimate.reason: None for estimate in several if not estimate.shown}
-    names = [within(estimate.name) for estimate in several if not estimate.shown]
+    visible = [estimate for estimate in several if estimate.determined]
+    reasons = {estimate.reason: None for estimate in several if not estimate.determined}
+    names = [within(estimate.name) for estimate in several if not estimate.determined]
     lost = f"not shown: {', '.join(names)} ({'; '.join(reasons)})" if names else ""
     return "; ".join(text for text in (listed(visible), lost) if text)
 
@@ -110,11 +110,11 @@ def _velocity(friction: FrictionVelocity, name: str) -> list[Figure]:
 
 def _fit(direction: Direction, velocities: Array, word: str) -> list[Series]:
     """The curve fitted to one direction, over the velocities it was fitted to."""
-    if not (direction.coulomb.shown and direction.viscous.shown):
+    if not (direction.coulomb.determined and direction.viscous.determined):
         return []
     size = np.geomspace(np.abs(velocities).min(), np.abs(velocities).max(), 200)
     friction = direction.coulomb.value + direction.viscous.value * size
-    if direction.static.shown and direction.stribeck_velocity.shown:
+    if direction.static.determined and direction.stribeck_velocity.determined:
         rise = direction.static.value - direction.coulomb.value
         friction = friction + rise * np.exp(-((size / direction.stribeck_velocity.value) ** 2))
     sign = 1.0 if word == "forward" else -1.0

@@ -20,7 +20,7 @@ from friso.views.identify.response_figures import response_figures
 def _sentences(bench: Bench) -> tuple[str, ...]:
     """What the response shows, and whether friction explains its lower end."""
     sentences = [f"{text[0].upper()}{text[1:]}." for text in (bench.seen.words[-1:] if bench.seen else ())]
-    if bench.departs is not None and bench.departs.frequency.shown:
+    if bench.departs is not None and bench.departs.frequency.determined:
         below = digits(bench.departs.frequency.value, "Hz")
         sentences.append(f"Below about {below} the response departs from the linear model.")
         sentences += [_friction(bench)] if bench.explanation is not None else []

@@ -93,7 +93,7 @@ def _numbers(moves: IdentifiedMoves) -> dict[str, Any]:
             "profiles": {name: _profile_numbers(profile) for name, profile in moves.profiles.items()},
         },
         "not_shown": [
-            {"key": estimate.name, "reason": estimate.reason} for estimate in moves.estimates if not estimate.shown
+            {"key": estimate.name, "reason": estimate.reason} for estimate in moves.estimates if not estimate.determined
         ],
         "no_steady_motion_m_per_s": [low, high],
         "samples_used": moves.part.stop - moves.part.start,

@@ -67,7 +67,7 @@ def slow_sliding_panels(result: SlowSliding) -> tuple[Panel, ...]:
 def _steady_friction(result: SlowSliding) -> tuple[Series, ...]:
     """The friction at steady velocities without the viscous, either way."""
     coulomb, static, stribeck = (estimate.value for estimate in result.estimates)
-    if not all(estimate.shown for estimate in result.estimates):
+    if not all(estimate.determined for estimate in result.estimates):
         return ()
     speeds = np.linspace(0, float(np.abs(result.velocity).max()), CURVE)
     level = coulomb + (static - coulomb) * np.exp(-((speeds / stribeck) ** result.exponent))

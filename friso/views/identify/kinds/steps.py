@@ -64,7 +64,7 @@ def _figures(result: StepStiffness, logs: Sequence[Source], name: str) -> list[F
         return figures
     x, y = np.array([[w.position, w.force] for w in result.windows]).T
     lines = ()
-    if result.stiffness.shown:
+    if result.stiffness.determined:
         ends = np.array([x.min(), x.max()])
         line = y.mean() + result.stiffness.value * (ends - x.mean())
         lines = (Series(ends, line, f"stiffness {with_interval(result.stiffness)}", BLUE),)

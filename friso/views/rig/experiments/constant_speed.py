@@ -25,11 +25,11 @@ COLOURS = (BLUE, VERMILLION, GREEN, ORANGE, PINK)
 def sentences(outcome: Outcome) -> list[str]:
     """Friction along the rail, its truth, and what many speeds and slow sliding show."""
     result: ConstantSpeedResult = outcome.result
-    said = [f"Joint {each.name}: {each.place.verdict}" for each in result.cases]
+    lines = [f"Joint {case.name}: {case.place.verdict}" for case in result.cases]
     for case in result.cases:
         coulomb = case.velocity.both.coulomb
-        told = with_unit(coulomb.value, "N") if coulomb.shown else f"not shown ({coulomb.reason})"
-        said.append(f"Joint {case.name}: Coulomb friction {told}.")
+        level = with_unit(coulomb.value, "N") if coulomb.determined else f"not shown ({coulomb.reason})"
+        lines.append(f"Joint {case.name}: Coulomb friction {level}.")
     true = listed(
         [
             f"{with_unit(float(force), 'N')} at {with_unit(speed, 'm/s')}"
@@ -37,7 +37,7 @@ def sentences(outcome: Outcome) -> list[str]:
         ],
         "and",
     )
-    return [*said, f"The true mean dynamic friction along the travel is {true}.", *_many(result), *_slow(result)]
+    return [*lines, f"The true mean dynamic friction along the travel is {true}.", *_many(result), *_slow(result)]
 
 
 def _slow(result: ConstantSpeedResult) -> list[str]:
@@ -52,15 +52,15 @@ def _slow_place(sliding: Slow) -> str:
     names = ("Coulomb friction", "static friction", "the Stribeck velocity")
     flat = sliding.log.stage.flat()
     true = [*sliding.true, flat["friction.stribeck_velocity"]]
-    shown = [
-        with_interval(estimate) if estimate.shown else f"not shown ({estimate.reason})"
-        for estimate in sliding.found.estimates
+    estimates = [
+        with_interval(estimate) if estimate.determined else f"not shown ({estimate.reason})"
+        for estimate in sliding.result.estimates
     ]
-    told = [
+    texts = [
         f"{name} {text} (true: {with_unit(float(one), unit)})"
-        for name, text, one, unit in zip(names, shown, true, ("N", "N", "m/s"), strict=True)
+        for name, text, one, unit in zip(names, estimates, true, ("N", "N", "m/s"), strict=True)
     ]
-    return f"From {_start(sliding.log)} on: {'; '.join(told)}."
+    return f"From {_start(sliding.log)} on: {'; '.join(texts)}."
 
 
 def _start(log: RigLog) -> str:
@@ -80,14 +80,16 @@ def _place(number: int, place: PlaceOnRail) -> str:
     both, reached = place.velocity.both, np.abs(place.velocity.velocities)
     named = (("Coulomb friction", both.coulomb), ("viscous friction", both.viscous))
     named += (("static friction", both.static), ("the Stribeck velocity", both.stribeck_velocity))
-    shown = [f"{words} {with_interval(each)}" for words, each in named if each.shown]
-    hidden = {each.reason: [words for words, one in named if one.reason == each.reason] for _, each in named}
-    told = [f"not shown: {listed(words, 'and')} ({reason})" for reason, words in hidden.items() if reason]
+    certain = [f"{words} {with_interval(estimate)}" for words, estimate in named if estimate.determined]
+    hidden = {
+        estimate.reason: [words for words, one in named if one.reason == estimate.reason] for _, estimate in named
+    }
+    unknown = [f"not shown: {listed(words, 'and')} ({reason})" for reason, words in hidden.items() if reason]
     ends = [with_unit(float(end(reached)), "m/s") for end in (np.min, np.max) if len(reached)]
     passed = f"{len(reached)} steady passes{' from ' if ends else ''}{' to '.join(ends)}"
     head = f"Place {number}, from {_start(place.log)} on, {passed}"
     stopped = [f"the log stopped {place.log.failure}"] if place.log.failure else []
-    return f"{head}: {'; '.join([*stopped, *shown, *told])}."
+    return f"{head}: {'; '.join([*stopped, *certain, *unknown])}."
 
 
 def figures(outcome: Outcome) -> list[Figure]:
@@ -114,7 +116,7 @@ def figures(outcome: Outcome) -> list[Figure]:
 def _in_slow_sliding(outcome: Outcome) -> list[Figure]:
     """The friction at the first place."""
     result: ConstantSpeedResult = outcome.result
-    places = [each.found for each in result.slow if len(each.found.model)]
+    places = [sliding.result for sliding in result.slow if len(sliding.result.model)]
     if not places:
         return []
     caption, panels = slow_sliding_caption(places[0]), slow_sliding_panels(places[0])
@@ -140,9 +142,9 @@ def _over_velocity(outcome: Outcome) -> Figure:
     )
 
 
-def _lines(each: Passes, speeds: tuple[float, ...]) -> list[Series]:
+def _lines(passes: Passes, speeds: tuple[float, ...]) -> list[Series]:
     """The forward passes."""
-    forward = [one for one in each.place.passes if one.velocity > 0]
+    forward = [one for one in passes.place.passes if one.velocity > 0]
     return [
         Series(one.places, one.force, with_unit(speed, "m/s"), colour)
         for one, speed, colour in zip(forward, speeds, (BLUE, VERMILLION), strict=False)
@@ -154,7 +156,7 @@ def numbers(outcome: Outcome) -> dict[str, Any]:
     result: ConstantSpeedResult = outcome.result
     return {"speeds_m_per_s": [*result.speeds], "cases": {case.name: _numbers(case) for case in result.cases}} | {
         "many_speeds": _many_numbers(result),
-        "slow_sliding": [_shown(each.found.estimates) for each in result.slow],
+        "slow_sliding": [_shown(sliding.result.estimates) for sliding in result.slow],
     }
 
 
@@ -177,24 +179,26 @@ def _place_numbers(place: PlaceOnRail) -> dict[str, Any]:
 
 def _shown(every: Sequence[Estimate]) -> dict[str, Any]:
     return {
-        "shown": {e.name: {"value": e.value, "low": e.low, "high": e.high, "unit": e.unit} for e in every if e.shown},
-        "not_shown": {each.name: each.reason for each in every if not each.shown},
+        "shown": {
+            e.name: {"value": e.value, "low": e.low, "high": e.high, "unit": e.unit} for e in every if e.determined
+        },
+        "not_shown": {estimate.name: estimate.reason for estimate in every if not estimate.determined},
     }
 
 
-def _numbers(each: Passes) -> dict[str, Any]:
-    coulomb = each.velocity.both.coulomb
+def _numbers(passes: Passes) -> dict[str, Any]:
+    coulomb = passes.velocity.both.coulomb
     return {
-        "separated": each.place.separated,
-        "verdict": each.place.verdict,
-        "repeatability": each.place.repeatability.value,
+        "separated": passes.place.separated,
+        "verdict": passes.place.verdict,
+        "repeatability": passes.place.repeatability.value,
         "passes": [
             {"velocity_m_per_s": one.velocity, "mean_force_n": one.mean.value, "deviation_n": one.spread}
-            for one in each.place.passes
+            for one in passes.place.passes
         ],
         "coulomb_n": coulomb.value,
         "coulomb_reason": coulomb.reason,
-        "true_dynamic_friction_n": np.asarray(each.true).tolist(),
+        "true_dynamic_friction_n": np.asarray(passes.true).tolist(),
     }
 
 

@@ -39,7 +39,7 @@ def sentences(outcome: Outcome) -> list[str]:
     measured = [loop for loop in result.loops if loop.measured]
     last = measured[-1]
     others = [crossing.value for crossing in last.crossings if crossing.value > 2 * last.tuned]
-    tuned = listed([f"{with_unit(each.tuned, 'Hz')} at {with_unit(nearest(each), 'Hz')}" for each in measured], "and")
+    tuned = listed([f"{with_unit(loop.tuned, 'Hz')} at {with_unit(nearest(loop), 'Hz')}" for loop in measured], "and")
     lost = [f"{loop.tuned:.3g} Hz" for loop in result.loops if not loop.measured]
     unstable = f" Tuned to {listed(lost, 'and')} the closed loop is not stable." if lost else ""
     above = f"once more at {with_unit(max(others), 'Hz')}" if others else "nowhere above"
@@ -75,14 +75,14 @@ def figures(outcome: Outcome) -> list[Figure]:
 def _plant(name: str, title: str, plant: Plant, subject: str) -> Figure:
     """All identifications, their average and the mass line, as magnitude over phase."""
     hertz, average = plant.averaged.frequency, plant.averaged.response
-    singles = [each.response for each in plant.single]
+    singles = [single.response for single in plant.single]
     angles = [_turned(single, average) for single in singles]
     lines = [
         Series(each.frequency, np.abs(each.response), "single identifications" * (n == 0), LIGHT, width=0.8)
         for n, each in enumerate(plant.single)
     ]
     lines.append(Series(hertz, np.abs(average), f"average of {len(singles)}", BLUE))
-    if plant.mass.shown:
+    if plant.mass.determined:
         reach = np.array([max(plant.band[0] / 2, hertz[0]), min(plant.band[1] * 2, hertz[-1])])
         lines.append(
             Series(
@@ -94,7 +94,8 @@ def _plant(name: str, title: str, plant: Plant, subject: str) -> Figure:
             )
         )
     below = [
-        Series(each.frequency, angle, "", LIGHT, width=0.8) for each, angle in zip(plant.single, angles, strict=True)
+        Series(single.frequency, angle, "", LIGHT, width=0.8)
+        for single, angle in zip(plant.single, angles, strict=True)
     ]
     below.append(Series(hertz, phases([average])[0], "", BLUE))
     gain = Axis("Magnitude", "m/N", log=True, prefixed=False)
@@ -119,9 +120,9 @@ def _loops(name: str, title: str, loops: tuple[MeasuredLoop, ...], subject: str)
         Series(each.response.frequency, np.abs(each.response.response), f"tuned to {each.tuned:.3g} Hz", colour)
         for each, colour in named
     )
-    turned = phases([each.response.response for each, _ in named])
+    turned = phases([loop.response.response for loop, _ in named])
     angles = tuple(
-        Series(each.response.frequency, angle, "", colour) for (each, colour), angle in zip(named, turned, strict=True)
+        Series(loop.response.frequency, angle, "", colour) for (loop, colour), angle in zip(named, turned, strict=True)
     )
     hertz = named[0][0].response.frequency
     panels = (
@@ -134,8 +135,8 @@ def _loops(name: str, title: str, loops: tuple[MeasuredLoop, ...], subject: str)
         ),
         Panel("", _frequency(hertz), Axis("Phase", "°", step=90.0), angles, limits=(Limit((-180.0,), "", INK),)),
     )
-    told = "; ".join(f"{loop.tuned:.3g} Hz: {_crossings(loop)}" for loop in loops)
-    return Figure(f"rig_frf_{name}", title, f"Tuned to, and crossing 0 dB at: {told}.", panels, subject=subject)
+    crossings = "; ".join(f"{loop.tuned:.3g} Hz: {_crossings(loop)}" for loop in loops)
+    return Figure(f"rig_frf_{name}", title, f"Tuned to, and crossing 0 dB at: {crossings}.", panels, subject=subject)
 
 
 def _crossings(loop: MeasuredLoop) -> str:
@@ -152,7 +153,7 @@ def _frequency(hertz: Array) -> Axis:
 
 
 def _mass(mass: Estimate) -> str:
-    return f"{mass.value:.3g} kg ({mass.low:.3g} to {mass.high:.3g})" if mass.shown else f"nothing ({mass.reason})"
+    return f"{mass.value:.3g} kg ({mass.low:.3g} to {mass.high:.3g})" if mass.determined else f"nothing ({mass.reason})"
 
 
 def numbers(outcome: Outcome) -> dict[str, Any]:

@@ -47,12 +47,12 @@ def share_text(share: Share, count: int) -> str:
 def sentences(outcome: Outcome) -> list[str]:
     """Where peaks are counted and what swings on, by crossover, on the stage's own rail and on repeated ones."""
     moves: HuntingResult = outcome.result
-    own = moves.shown[0]
+    first = moves.plotted[0]
     count = len(moves.rails)
     return [
-        f"After a move of {with_unit(moves.distance, 'm')} at {moves.crossovers[own]:.3g} Hz peaks are counted on "
-        f"{share_text(moves.shares('locked')[own], count)} with the joint locked, and on "
-        f"{share_text(moves.shares('free')[own], count)} with it free (95 % intervals).",
+        f"After a move of {with_unit(moves.distance, 'm')} at {moves.crossovers[first]:.3g} Hz peaks are counted on "
+        f"{share_text(moves.shares('locked')[first], count)} with the joint locked, and on "
+        f"{share_text(moves.shares('free')[first], count)} with it free (95 % intervals).",
         _swings(moves),
         f"Joint locked: {_limit(moves, 'locked')} Joint free: {_limit(moves, 'free')}",
         *_started(moves),
@@ -62,10 +62,10 @@ def sentences(outcome: Outcome) -> list[str]:
 def _swings(moves: HuntingResult) -> str:
     """The swings at the stage's own crossover with the joint locked."""
     runs = moves.cases["locked"]
-    swings, counted = runs.swings[moves.shown[0]], int(runs.counted[moves.shown[0]].sum())
+    swings, counted = runs.swings[moves.plotted[0]], int(runs.counted[moves.plotted[0]].sum())
     if not swings.any():
         return "With the joint locked the stage swings on no rail when the run ends."
-    swing, period = runs.swing[moves.shown[0]][swings], runs.period[moves.shown[0]][swings]
+    swing, period = runs.swing[moves.plotted[0]][swings], runs.period[moves.plotted[0]][swings]
     return (
         f"With the joint locked the stage still swings at the end of the run on {int(swings.sum())} rails (peaks are "
         f"counted on {counted}), {with_unit(float(np.median(swing)), 'm')} peak to peak with a period "
@@ -75,15 +75,15 @@ def _swings(moves: HuntingResult) -> str:
 
 def _limit(moves: HuntingResult, case: str) -> str:
     """Up to where peaks are counted, on any rail and on the one shown."""
-    last, shown = moves.limit(case), moves.limit(case, moves.rail)
+    last, on_rail = moves.limit(case), moves.limit(case, moves.rail)
     if np.isnan(last):
         return f"no peaks are counted from {moves.crossovers[0]:.3g} to {moves.crossovers[-1]:.3g} Hz."
     above = moves.crossovers[moves.crossovers > last]
     bound = moves.shares(case)[-1].high
     beyond = f"none from {above[0]:.3g} Hz on (at most {bound:.0%} of all rails)" if len(above) else "none tried above"
     name = f"rail {moves.rails[moves.rail]:.0f}" if len(moves.rails) > 1 else "it"
-    own = f"on {name} up to {shown:.3g} Hz" if np.isfinite(shown) else f"none on {name}"
-    return f"peaks are counted on some rails up to {last:.3g} Hz, {beyond}; {own}."
+    there = f"on {name} up to {on_rail:.3g} Hz" if np.isfinite(on_rail) else f"none on {name}"
+    return f"peaks are counted on some rails up to {last:.3g} Hz, {beyond}; {there}."
 
 
 def _started(moves: HuntingResult) -> list[str]:
@@ -91,21 +91,21 @@ def _started(moves: HuntingResult) -> list[str]:
     counts = [
         f"{int(moves.cases['locked'].counted[row].sum())} and {int(moves.can_start[row].sum())} of {len(moves.rails)} "
         f"at {moves.crossovers[row]:.3g} Hz"
-        for row in moves.shown
+        for row in moves.plotted
     ]
     listed = ", ".join(with_unit(displacement, "m") for displacement in moves.displacements)
-    found = [
+    texts = [
         f"Rails with counted peaks, joint locked, after the move, and after it or a release from {listed}: "
         f"{'; '.join(counts)}."
     ]
     if moves.startable is not None:
-        found.append(
+        texts.append(
             f"At {moves.startable.crossover:.3g} Hz no peaks are counted on rail "
             f"{moves.rails[moves.startable.rail]:.0f} after the move, but released from "
             f"{with_unit(moves.startable.displacement, 'm')} the stage swings to the end: a run that rests does not "
             "prove that the stage cannot hunt."
         )
-    return found
+    return texts
 
 
 def figures(outcome: Outcome) -> list[Figure]:
@@ -116,7 +116,7 @@ def figures(outcome: Outcome) -> list[Figure]:
 
 
 def _locked_and_free(moves: HuntingResult) -> Figure:
-    row = moves.shown[0]
+    row = moves.plotted[0]
     lines = tuple(
         Series(t.time, t.deviation + moves.distance, f"joint {case}", COLOURS[case])
         for case, t in ((case, moves.traces[case, row]) for case in COLOURS)
@@ -152,11 +152,11 @@ def _reach(traces: list[Trace]) -> float:
 def _crossovers(moves: HuntingResult) -> Figure:
     """One panel for each case, a line for each crossover of the thesis and the one beyond which none hunts."""
     panels = []
-    reach = _reach([moves.traces["locked", row] for row in moves.shown])
+    reach = _reach([moves.traces["locked", row] for row in moves.plotted])
     for case in COLOURS:
         lines = tuple(
             Series(t.time, t.deviation, f"{moves.crossovers[row]:.3g} Hz", LINES[number + 1])
-            for number, row in enumerate(moves.shown)
+            for number, row in enumerate(moves.plotted)
             for t in (moves.traces[case, row],)
         )
         axis = Axis("Position minus reference", "m", (-reach, reach))
@@ -173,9 +173,9 @@ def _crossovers(moves: HuntingResult) -> Figure:
 def _shares(moves: HuntingResult) -> Figure:
     bands, lines = [], []
     for case, colour in COLOURS.items():
-        found = moves.shares(case)
-        low, high = (np.array([getattr(each, end) for each in found]) for end in ("low", "high"))
-        share = np.array([each.probability for each in found])
+        shares = moves.shares(case)
+        low, high = (np.array([getattr(share_of_case, end) for share_of_case in shares]) for end in ("low", "high"))
+        share = np.array([share_of_case.probability for share_of_case in shares])
         bands.append(Band(moves.crossovers, low, high, f"95 % interval, {case}", AREAS[case]))
         lines.append(Series(moves.crossovers, share, f"joint {case}", colour))
     swings = moves.cases["locked"].swings.mean(axis=1)
@@ -191,17 +191,17 @@ def _shares(moves: HuntingResult) -> Figure:
 
 
 def _startable(moves: HuntingResult) -> Figure:
-    found = moves.startable
-    assert found is not None
+    startable = moves.startable
+    assert startable is not None
     both = (
-        (found.after_move, "after the move", BLUE),
-        (found.after_release, f"released from {with_unit(found.displacement, 'm')}", VERMILLION),
+        (startable.after_move, "after the move", BLUE),
+        (startable.after_release, f"released from {with_unit(startable.displacement, 'm')}", VERMILLION),
     )
     lines = tuple(Series(t.time, t.deviation, label, colour) for t, label, colour in both)
-    reach = _reach([found.after_move, found.after_release])
+    reach = _reach([startable.after_move, startable.after_release])
     return Figure(
         "hunting_started",
-        f"{found.crossover:.3g} Hz, joint locked, rail {moves.rails[found.rail]:.0f}: swinging once started",
+        f"{startable.crossover:.3g} Hz, joint locked, rail {moves.rails[startable.rail]:.0f}: swinging once started",
         "The same machine twice.",
         (Panel("", TIME, Axis("Position minus reference", "m", (-reach, reach)), lines),),
     )

@@ -42,18 +42,19 @@ def _source(result: InPosition, source: str) -> str:
 def _damping(result: InPosition) -> str:
     recovered = result.recovered
     best = int(np.argmax(recovered))
-    factor = result.damping / result.own
+    factor = result.damping / result.own_damping
     ten = int(np.argmin(abs(np.log(factor / 10))))
     if recovered[best] < 0.01:
         return "More damping in the joint recovers none of the difference."
     return (
         f"Damping in the joint recovers little of the difference: {recovered[ten]:.0%} at {factor[ten]:.3g} times its "
-        f"own {with_unit(result.own, 'N*s/m')}, and at most {recovered[best]:.0%}, at "
+        f"own {with_unit(result.own_damping, 'N*s/m')}, and at most {recovered[best]:.0%}, at "
         f"{with_unit(result.damping[best], 'N*s/m')}. The rest is due to stiffness: the locked stage is held by the "
         "sticking bearing, the free one only by the joint and the controller."
         if recovered[ten] < 0.5
         else f"Damping in the joint recovers {recovered[ten]:.0%} of the difference at {factor[ten]:.3g} times its own "
-        f"{with_unit(result.own, 'N*s/m')}, and {recovered[best]:.0%} at {with_unit(result.damping[best], 'N*s/m')}."
+        f"{with_unit(result.own_damping, 'N*s/m')}, and {recovered[best]:.0%} at "
+        f"{with_unit(result.damping[best], 'N*s/m')}."
     )
 
 
@@ -104,7 +105,7 @@ def _over_damping(result: InPosition) -> Figure:
         Limit((float(result.runs["locked", "all"].true[0, 0]),), "joint locked", VERMILLION),
         Limit(
             (float(result.runs["free", "all"].true[0, 0]),),
-            f"joint free, its own {with_unit(result.own, 'N*s/m')}",
+            f"joint free, its own {with_unit(result.own_damping, 'N*s/m')}",
             GREY,
         ),
     )

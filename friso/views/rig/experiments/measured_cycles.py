@@ -49,11 +49,11 @@ def sentences(outcome: Outcome) -> list[str]:
 
 
 def _field(result: CycleComparison) -> str:
-    found, done = result.as_measured(result.field), int((~result.field.failed).sum())
+    as_slow, done = result.as_measured(result.field), int((~result.field.failed).sum())
     swings = int(result.field.swings.sum())
     slowest = np.nanmax(result.slower(result.field)) if swings else np.nan
     return (
-        f"On rails with a random field {swings} of {done} runs still swing at their end; {int(found.sum())} of them "
+        f"On rails with a random field {swings} of {done} runs still swing at their end; {int(as_slow.sum())} of them "
         f"have at least {AS_SLOW:g} times that period at a similar swing (within a factor of {SIMILAR:g}); the slowest "
         f"has {slowest:.3g} times."
     )
@@ -92,7 +92,9 @@ def _irregular(result: CycleComparison) -> str:
         return "No cycle on a varied rail lasts long enough to show how regular it is."
     above, below = result.field.above[swings], result.field.below[swings]
     sides = np.median(np.maximum(above, below) / np.minimum(above, below))
-    scatter, heights = (np.median(each[swings]) for each in (result.field.period_scatter, result.field.height_scatter))
+    scatter, heights = (
+        np.median(values[swings]) for values in (result.field.period_scatter, result.field.height_scatter)
+    )
     return (
         f"Such cycles are lopsided: one side is {sides:.2g} times as high as the other (median). From cycle to "
         f"cycle they repeat: the period scatters by {scatter:.1%}, the heights by {heights:.1%} of the swing. "
@@ -104,18 +106,18 @@ def _irregular(result: CycleComparison) -> str:
 def _levels(result: CycleComparison) -> str:
     """Whether other friction levels make the cycle as slow."""
     slow, swing = result.slower(result.levels), result.larger(result.levels)
-    found = np.argwhere(result.as_measured(result.levels))
-    if not len(found):
+    matches = np.argwhere(result.as_measured(result.levels))
+    if not len(matches):
         best = np.unravel_index(np.nanargmax(slow), slow.shape)
         return (
             f"On an even rail none of the friction levels tried makes the cycle that slow; the slowest has "
             f"{slow[best]:.3g} times the period at "
             f"{swing[best]:.3g} times the swing ({_level(*best)})."
         )
-    closest = sorted(map(tuple, found), key=lambda cell: abs(np.log(swing[cell])) + abs(np.log(slow[cell] / 2)))
+    closest = sorted(map(tuple, matches), key=lambda cell: abs(np.log(swing[cell])) + abs(np.log(slow[cell] / 2)))
     named = [f"{_level(*cell)} ({slow[cell]:.3g} and {swing[cell]:.3g})" for cell in closest[:3]]
     return (
-        f"On an even rail {len(found)} of {slow.size} other motors and friction levels make it that slow; closest to "
+        f"On an even rail {len(matches)} of {slow.size} other motors and friction levels make it that slow; closest to "
         "twice the period at the same swing (period and swing over those of the file): "
         f"{'; '.join(named)}."
     )
@@ -186,8 +188,8 @@ def _maps(result: CycleComparison) -> Figure:
 
 def _medians(values: np.ndarray) -> np.ndarray:
     """Medians over the last axis of what is known, NaN of nothing."""
-    known = np.asarray(np.isfinite(values).any(axis=-1))
-    return np.where(known, np.nanmedian(np.where(known[..., None], values, 0.0), axis=-1), np.nan)
+    defined = np.asarray(np.isfinite(values).any(axis=-1))
+    return np.where(defined, np.nanmedian(np.where(defined[..., None], values, 0.0), axis=-1), np.nan)
 
 
 def _by_asymmetry(result: CycleComparison) -> Figure:
@@ -195,13 +197,13 @@ def _by_asymmetry(result: CycleComparison) -> Figure:
     alive = np.isfinite(slow)
     largest = float(size.max())
     points = Markers(size[alive], slow[alive], "rails that keep swinging", BLUE)
-    known = [
+    rows = [
         (low, min(high, largest), row[0]) for low, high, row in zip(BINS, BINS[1:], result.by_asymmetry, strict=False)
     ]
-    known = [row for row in known if np.isfinite(row[2].probability)]
-    middle = np.array([(low + high) / 2 for low, high, _ in known])
+    rows = [row for row in rows if np.isfinite(row[2].probability)]
+    middle = np.array([(low + high) / 2 for low, high, _ in rows])
     ends = ("probability", "low", "high")
-    share, low, high = (np.array([getattr(each, name) for *_, each in known]) for name in ends)
+    share, low, high = (np.array([getattr(estimate, name) for *_, estimate in rows]) for name in ends)
     axis = Axis(ASYMMETRY, "")
     shares = Panel(
         "share that keeps swinging", axis, Axis("Share of rails", "", (-0.03, 1.03)),

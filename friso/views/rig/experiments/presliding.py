@@ -17,23 +17,23 @@ from friso.views.rig.outcome_view import OutcomeView
 def sentences(outcome: Outcome) -> list[str]:
     """What was found."""
     result: Bristles = outcome.result
-    said = [f"Place {number}: {_place(each)}." for number, each in enumerate(result.found, start=1)]
+    lines = [f"Place {number}: {_place(place)}." for number, place in enumerate(result.by_place, start=1)]
     stiffness, damping = with_unit(result.stiffness, "N/m", 4), with_unit(result.damping, "N*s/m", 4)
-    return [*said, f"True bristles: stiffness {stiffness}, damping {damping}."]
+    return [*lines, f"True bristles: stiffness {stiffness}, damping {damping}."]
 
 
 def _place(result: Presliding) -> str:
-    shown = {"stiffness": result.stiffness, "damping": result.damping, "moving mass": result.mass}
+    estimates = {"stiffness": result.stiffness, "damping": result.damping, "moving mass": result.mass}
     return "; ".join(
-        f"{words} {with_interval(each)}" if each.shown else f"{words} not shown ({each.reason})"
-        for words, each in shown.items()
+        f"{words} {with_interval(estimate)}" if estimate.determined else f"{words} not shown ({estimate.reason})"
+        for words, estimate in estimates.items()
     )
 
 
 def figures(outcome: Outcome) -> list[Figure]:
     """Force and model at the first place that shows the bristles."""
-    found: Bristles = outcome.result
-    result = next((each for each in found.found if len(each.model)), None)
+    bristles: Bristles = outcome.result
+    result = next((place for place in bristles.by_place if len(place.model)), None)
     if result is None:
         return []
     title = "Small motion before sliding"
@@ -46,7 +46,7 @@ def figures(outcome: Outcome) -> list[Figure]:
 
 def numbers(outcome: Outcome) -> dict[str, Any]:
     """As JSON."""
-    found: Bristles = outcome.result
+    bristles: Bristles = outcome.result
     places = [
         {
             "stiffness_n_per_m": [result.stiffness.value, result.stiffness.low, result.stiffness.high],
@@ -54,9 +54,9 @@ def numbers(outcome: Outcome) -> dict[str, Any]:
             "mass_kg": [result.mass.value, result.mass.low, result.mass.high],
             "unexplained": result.unexplained,
         }
-        for result in found.found
+        for result in bristles.by_place
     ]
-    return {"places": places, "true_stiffness_n_per_m": found.stiffness, "true_damping_n_s_per_m": found.damping}
+    return {"places": places, "true_stiffness_n_per_m": bristles.stiffness, "true_damping_n_s_per_m": bristles.damping}
 
 
 VIEW = OutcomeView(sentences, figures, numbers)

@@ -16,8 +16,8 @@ from friso.views.rig.outcome_view import OutcomeView
 def sentences(outcome: Outcome) -> list[str]:
     """What was found."""
     result: Stiction = outcome.result
-    forces, shown = result.forces, held(result)
-    rails = len(result.found)
+    forces, within = result.forces, held(result)
+    rails = len(result.by_rail)
     truth = range_with_unit(float(result.true.min()), float(result.true.max()), "N")
     if not len(forces):
         return [
@@ -28,20 +28,20 @@ def sentences(outcome: Outcome) -> list[str]:
         f"{len(forces)} times on {rails} stretches of rail, at "
         f"{range_with_unit(float(forces.min()), float(forces.max()), 'N')}.",
         f"The true static friction there is {truth}; its mean along the travel lies within the 95 % interval on "
-        f"{int(shown.sum())} of {rails}.",
+        f"{int(within.sum())} of {rails}.",
     ]
 
 
 def held(result: Stiction) -> np.ndarray:
     """On which rails the interval holds the middle of the true static friction, shape (rails,)."""
     middles = result.true.mean(axis=1)
-    return np.array([each.static.holds(middle) for each, middle in zip(result.found, middles, strict=True)])
+    return np.array([slips.static.holds(middle) for slips, middle in zip(result.by_rail, middles, strict=True)])
 
 
 def figures(outcome: Outcome) -> list[Figure]:
     """Position, relative position and velocity against time on the first rail; break-away forces on all."""
     result: Stiction = outcome.result
-    log, first = outcome.logs[0], result.found[0]
+    log, first = outcome.logs[0], result.by_rail[0]
     time: Array = np.arange(len(first.pull), dtype=np.float64) * log.interval
     seconds = Axis("Time", "s")
     reference, start = log.logged["reference"], log.logged["reference"][0]
@@ -71,8 +71,8 @@ def figures(outcome: Outcome) -> list[Figure]:
 
 def _rails(result: Stiction, subject: str) -> Figure:
     """Break-away forces by rail, over the true static friction."""
-    numbers_ = np.arange(1.0, len(result.found) + 1)
-    rows = np.concatenate([np.full(len(each.forces), n) for n, each in zip(numbers_, result.found, strict=True)])
+    numbers_ = np.arange(1.0, len(result.by_rail) + 1)
+    rows = np.concatenate([np.full(len(slips.forces), n) for n, slips in zip(numbers_, result.by_rail, strict=True)])
     truth = Band(numbers_, result.true[:, 0], result.true[:, 1], "true static friction along the travel", "#cfdfee")
     top = 1.1 * max(float(result.true.max()), float(result.forces.max(initial=0.0)))
     panel = Panel(
@@ -96,7 +96,7 @@ def numbers(outcome: Outcome) -> dict[str, Any]:
             "break_away_n": each.forces.tolist(),
             "true_range_n": true.tolist(),
         }
-        for each, true in zip(result.found, result.true, strict=True)
+        for each, true in zip(result.by_rail, result.true, strict=True)
     ]
     return {"speed_m_per_s": result.speed, "rails": rows}
 

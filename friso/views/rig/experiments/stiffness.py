@@ -14,26 +14,26 @@ from friso.views.rig.outcome_view import OutcomeView
 def sentences(outcome: Outcome) -> list[str]:
     """What was found."""
     result: Stiffness = outcome.result
-    read = result.found.stiffness
-    if not read.shown:
+    read = result.steps.stiffness
+    if not read.determined:
         return [f"The steps do not show the joint's stiffness: {read.reason}."]
-    said = [
+    lines = [
         f"The steps show {with_unit(read.value, 'N/m', 4)} ({range_with_unit(read.low, read.high, 'N/m', 4)}) of the "
         f"joint's {with_unit(result.true, 'N/m', 4)}."
     ]
     if result.motor_constant_ratio != 1:
-        said.append(
+        lines.append(
             f"The motor gives {result.motor_constant_ratio:g} of the assumed force, which alone would make it appear "
             f"as {with_unit(result.apparent, 'N/m', 4)}."
         )
-    return said
+    return lines
 
 
 def figures(outcome: Outcome) -> list[Figure]:
     """Position over force against time."""
     result: Stiffness = outcome.result
     (log,) = outcome.logs
-    time, seconds = result.found.time, Axis("Time", "s")
+    time, seconds = result.steps.time, Axis("Time", "s")
     panels = (
         Panel(
             "",
@@ -50,7 +50,7 @@ def figures(outcome: Outcome) -> list[Figure]:
             Axis("Force", "N"),
             (
                 Series(time, log.logged["force"], "commanded", LIGHT, width=0.8),
-                Series(time, result.found.force, "low-passed", BLUE),
+                Series(time, result.steps.force, "low-passed", BLUE),
             ),
         ),
     )
@@ -61,7 +61,7 @@ def figures(outcome: Outcome) -> list[Figure]:
 def numbers(outcome: Outcome) -> dict[str, Any]:
     """As JSON."""
     result: Stiffness = outcome.result
-    read = result.found.stiffness
+    read = result.steps.stiffness
     return {
         "stiffness_n_per_m": read.value,
         "interval_n_per_m": [read.low, read.high],

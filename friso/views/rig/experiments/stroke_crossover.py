@@ -39,15 +39,15 @@ def _limit(counts: StrokeCrossover, row: int) -> str:
 def _needed(counts: StrokeCrossover) -> list[str]:
     """The crossover limits by stroke, and from which stroke on none are counted at the stage's own crossover."""
     named = [f"{with_unit(float(stroke), 'm')} {_limit(counts, row)}" for row, stroke in enumerate(counts.strokes)]
-    found = [f"Counted peaks by stroke: {'; '.join(named)}."]
-    some = np.flatnonzero(counts.share[:, counts.own] > 0)
+    lines = [f"Counted peaks by stroke: {'; '.join(named)}."]
+    some = np.flatnonzero(counts.share[:, counts.nearest] > 0)
     if len(some) and some[-1] + 1 < len(counts.strokes):
         least = float(counts.strokes[some[-1] + 1])
-        found.append(
-            f"At {counts.crossovers[counts.own]:.3g} Hz no peaks are counted from a stroke of {with_unit(least, 'm')} "
-            "up."
+        lines.append(
+            f"At {counts.crossovers[counts.nearest]:.3g} Hz no peaks are counted from a stroke of "
+            f"{with_unit(least, 'm')} up."
         )
-    return found
+    return lines
 
 
 def figures(outcome: Outcome) -> list[Figure]:

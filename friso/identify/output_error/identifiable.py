@@ -27,7 +27,7 @@ SHARP = 3.0
 """Factor between the ends of a profile interval within which a parameter counts as shown."""
 
 
-def fit_shown(
+def fit_identifiable(
     follows: Problem, loop: Problem | None, covered: Coverage, bandwidth: float
 ) -> tuple[OutputErrorFit, dict[str, Profile], set[str]]:
     """The fit, the profile of every parameter, and which of those that not every motion shows it does show; `bandwidth`
@@ -43,24 +43,24 @@ def fit_shown(
     asked = {*names} - core
     plain = fit(follows, _numbers(names, core), first_values(parameters)[None])
     hopeful = {name for name in asked if _may_show(name, covered, follows)}
-    shown: set[str] = set()
-    found = plain
+    identifiable: set[str] = set()
+    best = plain
     if hopeful:
         every = _numbers(names, core | hopeful)
         whole = fit(follows, every, everywhere(follows, every, plain.inner))
-        shown = _complete({name for name in hopeful if _shows(whole, names.index(name), covered)}, asked)
-        kept = hopeful if _pays(whole, plain) else shown
-        free = _numbers(names, core | kept)
+        identifiable = _complete({name for name in hopeful if _shows(whole, names.index(name), covered)}, asked)
+        fitted = hopeful if _pays(whole, plain) else identifiable
+        free = _numbers(names, core | fitted)
         neutral = np.where(np.isin(np.arange(len(names)), free), whole.inner, plain.inner)
-        found = whole if kept == hopeful else fit(follows, free, neutral[None]) if shown else plain
+        best = whole if fitted == hopeful else fit(follows, free, neutral[None]) if identifiable else plain
     if loop is not None:
-        starts = nearby(found)
-        if set(found.free) - set(_numbers(names, core)):
-            starts = np.vstack([starts, everywhere(loop, found.free, plain.inner)])
-        looped = fit(loop, found.free, starts)
-        found = looped if _in_step(looped, found, bandwidth) else found
-    profiles = {name: profile(found, i, _others(names, i, found.free), found.cost) for i, name in enumerate(names)}
-    return found, profiles, shown
+        starts = nearby(best)
+        if set(best.free) - set(_numbers(names, core)):
+            starts = np.vstack([starts, everywhere(loop, best.free, plain.inner)])
+        looped = fit(loop, best.free, starts)
+        best = looped if _in_step(looped, best, bandwidth) else best
+    profiles = {name: profile(best, i, _others(names, i, best.free), best.cost) for i, name in enumerate(names)}
+    return best, profiles, identifiable
 
 
 def _pays(whole: OutputErrorFit, plain: OutputErrorFit) -> bool:
@@ -69,22 +69,22 @@ def _pays(whole: OutputErrorFit, plain: OutputErrorFit) -> bool:
     return bool(plain.cost > whole.cost * (1 + chi2.ppf(SURE, more) / whole.independent))
 
 
-def _in_step(looped: OutputErrorFit, found: OutputErrorFit, bandwidth: float) -> bool:
+def _in_step(looped: OutputErrorFit, direct: OutputErrorFit, bandwidth: float) -> bool:
     """Whether a closed loop follows: its residual is no larger than that of the stage that follows the log, both within
     the motion's bandwidth [Hz], since the latter knows no noise above it."""
     step = looped.problem.inputs.sample_time
-    rms = [np.std(low_pass(each.residual, step, bandwidth)) for each in (looped, found)]
+    rms = [np.std(low_pass(fit.residual, step, bandwidth)) for fit in (looped, direct)]
     return bool(rms[0] < STEP_OUT * rms[1])
 
 
-def _numbers(names: Sequence[str], wanted: set[str]) -> tuple[int, ...]:
-    return tuple(i for i, name in enumerate(names) if name in wanted)
+def _numbers(names: Sequence[str], chosen: set[str]) -> tuple[int, ...]:
+    return tuple(i for i, name in enumerate(names) if name in chosen)
 
 
-def _complete(shown: set[str], asked: set[str]) -> set[str]:
+def _complete(identifiable: set[str], asked: set[str]) -> set[str]:
     """Without either of the Stribeck effect's parameters, the other one means nothing."""
     effect = set(STRIBECK) & asked
-    return shown if effect <= shown else shown - effect
+    return identifiable if effect <= identifiable else identifiable - effect
 
 
 def _others(names: Sequence[str], number: int, free: Sequence[int]) -> tuple[int, ...]:
@@ -95,7 +95,7 @@ def _others(names: Sequence[str], number: int, free: Sequence[int]) -> tuple[int
 
 def _may_show(name: str, covered: Coverage, problem: Problem) -> bool:
     """Whether the motion covers anything that the parameter could show itself in."""
-    parameter = next(each for each in problem.parameters if each.name == name)
+    parameter = next(candidate for candidate in problem.parameters if candidate.name == name)
     if name in STRIBECK:
         return bool(covered.steady.size) and covered.steady[0] < covered.steady[-1] / 10
     if name in BRISTLES:
