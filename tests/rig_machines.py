@@ -19,9 +19,9 @@ from friso.identify.kind import Source
 from friso.identify.logs.mapping import Mapping, mapping_text, sidecar
 from friso.identify.readings.friction_velocity import friction_velocity
 from friso.identify.sources import LogFile, read_all
-from friso.rig.log_files import write_csv
 from friso.rig.rail import friction_factors
 from friso.studies.rig.outcome import RigLog
+from friso.views.rig.log_files import write_csv
 
 EXAMPLE = Path(__file__).parent.parent / "examples" / "thesis_drive.toml"
 

@@ -19,7 +19,7 @@ from friso.identify.logs.channel import Channel, ChannelTable
 from friso.identify.logs.format import FORMATS, LogFormat
 from friso.identify.logs.log import Log
 from friso.identify.logs.read import file_format, read_table
-from friso.studies.rig.registry import RIG_EXPERIMENTS
+from friso.studies.rig.experiments import RIG_EXPERIMENTS
 from friso.views.drawing.figure import Axis, Figure, Panel, Series
 from friso.views.identify.kind_view import VIEWS, KindView
 from friso.views.rig.outcome_view import OUTCOME_VIEWS

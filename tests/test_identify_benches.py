@@ -14,8 +14,7 @@ from friso.identify.response.limit_cases import visible
 from friso.identify.response.mass_line import mass_lines
 from friso.identify.response.modes import fit_modes
 from friso.identify.response.periodic import multisine
-from friso.identify.response.prediction import relative_error
-from friso.identify.response.records import ResponseRecord
+from friso.identify.response.records import ResponseRecord, relative_error
 from friso.identify.response.response import Channels, FrequencyResponse
 from friso.identify.response.simulated import explained
 from friso.identify.response.two_mass import TwoMass, fit_two_mass, widened

@@ -17,8 +17,7 @@ from friso.identify.response.mass_line import mass_lines, straight_lines
 from friso.identify.response.modes import fit_modes
 from friso.identify.response.period import find_periods
 from friso.identify.response.periodic import multisine
-from friso.identify.response.prediction import relative_error
-from friso.identify.response.records import ResponseRecord, drift, from_log
+from friso.identify.response.records import ResponseRecord, drift, from_log, relative_error
 from friso.identify.response.response import FrequencyResponse
 from friso.identify.response.simulated import explained, slid
 from friso.identify.response.two_mass import fit_two_mass, two_masses, widened

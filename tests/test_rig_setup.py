@@ -10,10 +10,10 @@ from friso.identify.kind import as_set_up
 from friso.identify.logs.mapping import Mapping, load, mapping_text, sidecar
 from friso.identify.sources import read_all
 from friso.progress import silent
-from friso.rig.log_files import write_csv
 from friso.stage import Stage
 from friso.studies.rig.experiments import constant_speed, presliding, stiction
 from friso.studies.rig.experiments.stiffness import steps
+from friso.views.rig.log_files import write_csv
 from friso.views.rig.page import sentences
 
 

@@ -8,9 +8,11 @@ from __future__ import annotations
 import io
 import logging
 import sys
-from typing import Annotated, NoReturn
+from collections.abc import Callable, Iterable
+from typing import Annotated, Any, NoReturn
 
 import typer
+from typer.core import TyperCommand
 
 from friso.cli.bode import bode
 from friso.cli.boundary import boundary
@@ -23,7 +25,6 @@ from friso.cli.flexure import flexure
 from friso.cli.guideline import guideline
 from friso.cli.identify import identify, listed_kinds
 from friso.cli.init import init
-from friso.cli.listing import ending_with
 from friso.cli.map import map_cells
 from friso.cli.reproduce import reproduce
 from friso.cli.rig import listed_experiments, rig
@@ -38,6 +39,19 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
+
+
+def ending_with(title: str, rows: Callable[[], Iterable[tuple[str, str]]]) -> type[TyperCommand]:
+    """A class of commands whose help ends with a list, read only when the help is asked for: names, and what each is
+    in one line."""
+
+    class ListingCommand(TyperCommand):
+        def format_epilog(self, ctx: Any, formatter: Any) -> None:
+            with formatter.section(title):
+                formatter.write_dl([*rows()])
+
+    return ListingCommand
+
 
 LISTS = {
     "identify": ending_with("Kinds of experiment (--as)", listed_kinds),

@@ -95,8 +95,7 @@ def map_cells(
     with _crew(workers, scheduler) as crew:
         if source.is_dir():
             if varied != Varied() or overrides or rtol or refine or out:
-                problem = "a store together with options that would make it another study"
-                raise InputError(str(source), problem, "the store alone: it contains its study", f"friso map {source}")
+                raise _another_study(source)
             store, study = source, stored_study(source, metric)
         else:
             store = out or Path(f"{source.stem}_map.zarr")
@@ -106,6 +105,11 @@ def map_cells(
     runs, colouring = in_memory(runs) if study.cells <= LARGE else runs, coloured_by(study, metric)
     files = _write(runs, study, store, exports, colouring)
     _report(runs, study, store, colouring, files, as_json)
+
+
+def _another_study(store: Path) -> InputError:
+    problem = "a store together with options that would make it another study"
+    return InputError(str(store), problem, "the store alone: it contains its study", f"friso map {store}")
 
 
 def _new_study(

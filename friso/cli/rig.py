@@ -49,7 +49,7 @@ def rig(
 
     Example: friso rig stiffness examples/thesis_drive.toml --out rig
     """
-    from friso.studies.rig.registry import RIG_EXPERIMENTS
+    from friso.studies.rig.experiments import RIG_EXPERIMENTS
 
     run = RIG_EXPERIMENTS[RIG_EXPERIMENTS.checked(experiment, "EXPERIMENT", "friso rig {} rig.toml")]
     stage = with_overrides(load(stage_file), overrides)
@@ -104,6 +104,6 @@ def _print(outcome: Outcome, files: Sequence[Path]) -> None:
 
 def listed_experiments() -> list[tuple[str, str]]:
     """The experiments of the rig, each in one line."""
-    from friso.studies.rig.registry import RIG_EXPERIMENTS
+    from friso.studies.rig.experiments import RIG_EXPERIMENTS
 
     return [(name, RIG_EXPERIMENTS.one_line(name)) for name in RIG_EXPERIMENTS]

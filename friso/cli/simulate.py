@@ -47,7 +47,7 @@ def simulate(
     stage, name, usual_rtol = _stage(arguments, overrides) if cell is None else _cell(cell, arguments, overrides)
     target = OutputFolder("simulate", out, overwrite, [] if cell else [Path(arguments[0])])
     from friso.engine.simulate import simulate as simulate_stage
-    from friso.studies.response import measured_run
+    from friso.hunting.measures import measured_run
     from friso.views.simulate.document import simulate_document, simulate_files
     from friso.views.simulate.words import conclusion
 

@@ -9,11 +9,14 @@ from typing import Any
 import numpy as np
 
 from friso.engine.arrays import Status
-from friso.engine.batch import RunOptions, Runs
+from friso.engine.batch import RunOptions, Runs, run_chunks
+from friso.engine.kernel import kernel
 from friso.equations.motion import last_corner
+from friso.equations.structure import structure
 from friso.hunting.criteria.run_outcome import BAND, End, outcomes
 from friso.hunting.turning import COUNTED_AFTER, DISTINCT, WINDOW
 from friso.hunting.turns import Turns, scan
+from friso.stage import Stage
 
 BANDS = (1e-6, BAND)
 """Bands about the reference into which a stage settles [m]."""
@@ -109,3 +112,11 @@ def measure(flat: Mapping[str, Any], runs: Runs) -> Measures:
         rejected=runs.statistic("rejected").astype(np.int64),
         turns=turns.peaks,
     )
+
+
+def measured_run(stage: Stage, rtol: float = 1e-6) -> Measures:
+    """What the run of a stage's motion does, arrays of shape (1,); whatever the sampling interval of a time response,
+    the turning points of the run itself decide. Raises ValueError for a tolerance that is not usable."""
+    flat = stage.flat()
+    (runs,) = run_chunks(kernel(structure(flat)), flat, 1, options(rtol))
+    return measure(flat, runs)

@@ -20,8 +20,7 @@ from friso.identify.response.mass_line import StraightLine, mass_lines
 from friso.identify.response.modes import Modes, fit_modes
 from friso.identify.response.period import find_periods
 from friso.identify.response.periodic import multisine
-from friso.identify.response.prediction import relative_error
-from friso.identify.response.records import ResponseRecord, from_log
+from friso.identify.response.records import ResponseRecord, from_log, relative_error
 from friso.identify.response.response import Channels, FrequencyResponse
 from friso.identify.response.simulated import Explanation, explained
 from friso.identify.response.two_mass import TwoMass, fit_two_mass, widened

@@ -98,6 +98,11 @@ class Look:
     numbers: xr.DataArray
     codes: xr.DataArray
 
+    @property
+    def scale(self) -> tuple[str, str, tuple[float, float] | None, bool, tuple[str, ...], tuple[Kind, ...]]:
+        """What a map or a cloud of these cells is coloured by."""
+        return self.quantity, self.unit, self.limits, self.log, self.colours, self.kinds
+
 
 def axes_of(runs: xr.Dataset) -> tuple[CellAxis, ...]:
     """The swept axes in the order of the runs; of sampled runs the sampled keys. ValueError where there are none."""

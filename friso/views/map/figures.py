@@ -80,22 +80,13 @@ def _cells(x: CellAxis, y: CellAxis, colouring: Look, marker: Mapping[str, float
     )
     points = _marked(marker, x, y)
     edges = _edges(x, y, np.where(np.isnan(codes), z, np.nan)) if colouring.quantity == variable("multiplier") else ()
-    coloured = (
-        colouring.quantity,
-        colouring.unit,
-        colouring.limits,
-        colouring.log,
-        colouring.colours,
-        colouring.kinds,
-        codes,
-    )
     return Panel(
         title,
         x.axis(_limits(x, [point.x for point in points])),
         y.axis(_limits(y, [point.y for point in points])),
         edges,
         points,
-        maps=(Map(x.positions, y.positions, z, *coloured),),
+        maps=(Map(x.positions, y.positions, z, *colouring.scale, codes),),
     )
 
 
@@ -205,16 +196,7 @@ def _samples(
     if len(axes) < 2:
         raise ValueError(f"map: got samples of {len(axes)} key, expected at least two")
     x, y, *further = axes
-    coloured = (
-        colouring.quantity,
-        colouring.unit,
-        colouring.limits,
-        colouring.log,
-        colouring.colours,
-        colouring.kinds,
-        colouring.codes.values,
-    )
-    cloud = Cloud(x.positions, y.positions, colouring.numbers.values, *coloured)
+    cloud = Cloud(x.positions, y.positions, colouring.numbers.values, *colouring.scale, colouring.codes.values)
     panel = Panel("", x.axis(None), y.axis(None), markers=_marked(marker, x, y), clouds=(cloud,))
     also = ", ".join(axis.quantity for axis in further)
     return [panel], f"Sampled as well: {also}." if also else ""

@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial
-from pathlib import Path
 
-from friso.identify.logs.mapping import Mapping, mapping_text, sidecar
-from friso.rig.log_files import write_csv
-from friso.stage import Stage
-from friso.studies.rig.outcome import Outcome, RigLog
+from friso.studies.rig.outcome import Outcome
 from friso.views.drawing.figure import Figure
 from friso.views.files import Content, pictures
 from friso.views.pages import Report
+from friso.views.rig.log_files import log_files, stage_text
 from friso.views.rig.outcome_view import OUTCOME_VIEWS
 
 
@@ -43,40 +39,13 @@ def rig_files(outcome: Outcome) -> dict[str, Content]:
     """The page, the logs with how they are to be read, the truth in a folder of its own, and every figure in all
     formats."""
     images = figures(outcome)
-    logs = {name: content for log in outcome.logs for name, content in _log_files(log, outcome.stage).items()}
+    logs = {name: content for log in outcome.logs for name, content in log_files(log, outcome.stage).items()}
     return {
         "rig.html": page(outcome, images),
         **logs,
-        "truth/stage.toml": _stage_text(outcome.stage, outcome.seed),
+        "truth/stage.toml": stage_text(outcome.stage, outcome.seed),
         **pictures(images),
     }
-
-
-def _log_files(log: RigLog, stage: Stage) -> dict[str, Content]:
-    """The log as the drive writes it, how to read it beside it, and the truth behind it in a folder of its own."""
-    heading, name = f"friso rig, seed {log.seed}", f"{log.name}.csv"
-    csv = partial(write_csv, interval=log.interval)
-    files: dict[str, Content] = {name: partial(csv, signals=log.logged, heading=heading)}
-    if log.kind is not None:
-        files[sidecar(Path(name)).name] = mapping_text(Mapping(experiment=log.kind, setup=_setup(log.stage, stage)))
-    files[f"truth/{name}"] = partial(csv, signals=log.true, heading=f"{heading}: the truth behind {name}")
-    files[f"truth/{log.name}.toml"] = _stage_text(log.stage, log.seed)
-    return files
-
-
-def _setup(machine: Stage, stage: Stage) -> dict[str, str]:
-    """What of joint and controller was set otherwise for a log than in the stage file, as texts with units."""
-    was, now = stage.given(), machine.given()
-    return {
-        f"{table}.{key}": text
-        for table in ("joint", "controller")
-        for key, text in now.get(table, {}).items()
-        if isinstance(text, str) and text != was.get(table, {}).get(key)
-    }
-
-
-def _stage_text(stage: Stage, seed: int) -> str:
-    return f"# friso rig, seed {seed}\n{stage.to_toml()}"
 
 
 def page(outcome: Outcome, figures: Sequence[Figure]) -> str:

@@ -1,1 +1,18 @@
-"""Experiments of the rig, one file each: each declares how it is run, `run_experiment`."""
+"""Experiments of the rig by name, as `friso rig` takes them: one file each, which declares how it is run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from friso.registry import Registry
+
+if TYPE_CHECKING:  # the names are asked for by --help
+    from friso.progress import Progress
+    from friso.stage import Stage
+    from friso.studies.rig.outcome import Outcome
+
+RIG_EXPERIMENTS: Registry[Callable[[Stage, int, Progress], Outcome]] = Registry(
+    "friso.studies.rig.experiments", "run_experiment"
+)
+"""Every module of this folder declares one: the function that runs it on a stage, with a seed."""
