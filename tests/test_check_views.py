@@ -1,0 +1,414 @@
+"""What a check looks like: its figures, its sentences and table, and its page, on cases made up here."""
+
+from __future__ import annotations
+
+import base64
+import re
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from made_up import (
+    NO_RETURN,
+    both_joints,
+    cannot_hunt,
+    fake_case,
+    fake_cycle,
+    fake_hunting,
+    fake_solver,
+    fake_stage,
+    fake_trace,
+    hunts,
+    mpl_arrays,
+    plotly_arrays,
+    same,
+    settles,
+)
+from pages import Page
+from snapshots import Snapshots
+
+from friso.hunting import Judgement, Kick, Margin
+from friso.version import VERSION
+from friso.views.check.cases import COLOURS, ShownCase, shown_cases
+from friso.views.check.figures import check_figures, response_figure
+from friso.views.check.page import conclusion, report_html, verdict_sentence
+from friso.views.check.table import rows
+from friso.views.drawing import matplotlib_renderer, plotly_renderer
+from friso.views.drawing.drawable import drawable
+from friso.views.drawing.figure import Figure
+from friso.views.pages import made_with
+
+# ---------------------------------------------------------------- figures of a check
+
+
+def figure_of(name: str, cases: dict[str, Any]) -> Figure:
+    return next(figure for figure in check_figures(cases) if figure.name == name)
+
+
+def test_figures_of_a_stage_with_a_joint():
+    figures = {figure.name: figure for figure in check_figures(both_joints())}
+    assert list(figures) == ["settled", "return-map", "cycle", "overview", "shares", "joint", "friction"]
+    zoom, settling = figures["settled"].panels
+    assert zoom.x.limits == (10.0, 20.0)
+    assert [line.label for line in zoom.series] == ["Locked", "Free (as given)"]
+    assert zoom.markers[0].label == "counted peaks, locked: 6"
+    assert np.array_equal(zoom.markers[0].x, both_joints()["locked"].peak_times)
+    assert settling.y.log
+    assert [limit.values for limit in settling.limits] == [(1e-6,), (1e-5,)]
+    assert [line.label for line in figures["shares"].panels[0].series] == ["P", "I", "D", "total"]
+    assert figures["shares"].panels[0].y.limits == figures["shares"].panels[1].y.limits
+    assert figures["joint"].panels[0].limits[0].values == (-1e-3, 1e-3)
+    assert all(panel.title for figure in figures.values() for panel in figure.panels)
+
+
+def test_a_case_has_one_colour_everywhere():
+    for figure in check_figures(both_joints()):
+        for panel in figure.panels:
+            for drawn in (*panel.series, *panel.markers):
+                if drawn.label.startswith("Locked") or "locked" in drawn.label:
+                    assert drawn.colour == COLOURS["locked"]
+                if drawn.label.startswith("Free"):
+                    assert drawn.colour == COLOURS["free"]
+
+
+def test_given_is_shown_once_beside_its_twin():
+    assert [(item.key, item.label) for item in shown_cases(both_joints())] == [
+        ("locked", "Locked"),
+        ("free", "Free (as given)"),
+    ]
+    assert [item.label for item in shown_cases({"given": fake_case()})] == ["As given"]
+
+
+@pytest.mark.parametrize("kind", ["there_and_back", "step", "ramp", "release", "hold"])
+@pytest.mark.parametrize("hunting", [False, True])
+def test_every_motion_gives_figures_that_can_be_drawn(kind, hunting):
+    case = fake_case(hunting, kind=kind, drop=["joint_deflection"])
+    figures = check_figures({"given": case})
+    cycle = ["cycle"] if hunting else []
+    assert [figure.name for figure in figures] == ["settled", "return-map", *cycle, "overview", "shares", "friction"]
+    for figure in figures:
+        assert matplotlib_renderer.image(figure, "png").startswith(b"\x89PNG")
+        assert same(mpl_arrays(figure), plotly_arrays(figure))
+
+
+def test_what_a_stage_lacks_has_no_panel():
+    bare = ["friction_force", "force_p", "force_i", "force_d", "joint_deflection"]
+    case = replace(fake_case(drop=bare), judgement=cannot_hunt())
+    assert [figure.name for figure in check_figures({"given": case})] == ["settled", "overview"]
+    assert "The friction" not in report_html({"given": case})
+
+
+def test_a_share_that_is_always_zero_is_left_out():
+    case = fake_case(hunting=True)
+    assert case.trace is not None
+    case.trace["force_i"][:] = 0.0
+    assert [line.label for line in figure_of("shares", {"given": case}).panels[0].series] == ["P", "D", "total"]
+
+
+def test_a_force_limit_is_drawn_where_it_is_near():
+    near, far = (fake_case(hunting=True, stage=fake_stage(force_limit=bound)) for bound in (6.0, 200.0))
+    panel = figure_of("overview", {"given": near}).panels[1]
+    assert panel.limits[0].values == (-6.0, 6.0)
+    assert panel.y.limits is not None
+    assert panel.y.limits[1] > 6.0
+    assert figure_of("overview", {"given": far}).panels[1].limits == ()
+
+
+def test_a_cart_that_rests_is_a_point():
+    panel = check_figures(both_joints())[-1].panels[0]
+    assert [line.label for line in panel.series] == ["Locked", "Free (as given)"]
+    cases = both_joints() | {"free": fake_case(stage=fake_stage(locked=False), kind="hold")}
+    panel = check_figures(cases)[-1].panels[0]
+    assert [marker.label for marker in panel.markers] == ["Free (as given): at rest"]
+    panel = check_figures({"given": fake_case(kind="hold")})[-1].panels[0]
+    assert (len(panel.series), len(panel.markers)) == (0, 1)
+
+
+def test_a_short_run_shows_its_later_half():
+    case = replace(fake_case(), trace=fake_trace("hold", duration=4.0, samples=401))
+    assert check_figures({"given": case})[0].panels[0].x.limits == (2.0, 4.0)
+
+
+def test_solver_noise_does_not_fill_the_panel():
+    panel = drawable(check_figures({"given": fake_case(kind="hold")})[0]).panels[0]
+    assert panel.y.limits == pytest.approx((-1.0, 1.0))
+    assert panel.y.unit == "µm"
+
+
+@pytest.mark.parametrize("start", [0, 1000, 2400, 4000])
+def test_nan_of_a_failed_run_breaks_nothing(start):
+    case = fake_case(hunting=True, stage=fake_stage(locked=True))
+    assert case.trace is not None
+    for name in case.trace.data_vars:
+        case.trace[name][start:] = np.nan if name != "force" else np.inf
+    solver = fake_solver("step size underflow: use a looser rtol")
+    numbers = {"peak_to_peak": float("nan"), "period": float("nan")}
+    failed = replace(case, judgement=hunts(verdict="failed"), solver=solver, **numbers)
+    cases = {"given": failed, "locked": failed, "free": fake_case(stage=fake_stage(locked=False))}
+    for figure in check_figures(cases):
+        assert same(mpl_arrays(figure), plotly_arrays(figure))
+    page = report_html(cases)
+    assert "step size underflow: use a looser rtol" in page
+    assert "NaN" not in re.sub(r"<script.*?</script>", "", page, flags=re.DOTALL)
+
+
+def test_return_map_with_the_swings_of_this_motion():
+    locked, free = figure_of("return-map", both_joints()).panels
+    assert locked.x.limits == locked.y.limits == pytest.approx((0.0, 2.2 * 5.2e-4))
+    diagonal, curve, motion = locked.series
+    assert np.array_equal(diagonal.x, diagonal.y)
+    assert np.isnan(curve.y[curve.x < 2e-4]).all()
+    assert np.isfinite(curve.y[(curve.x > 2e-4) & (curve.x < 1e-3)]).all()
+    assert motion.x[:4] == pytest.approx(5.2e-4 * 0.9 ** np.array([0, 1, 1, 2]))
+    assert motion.y[:4] == pytest.approx(5.2e-4 * 0.9 ** np.array([1, 1, 2, 2]))
+    (cycle,) = locked.markers
+    assert (cycle.label, *cycle.x, *cycle.y) == ("attracts", *[pytest.approx(5.2e-4)] * 4)
+    assert free.markers == ()
+    assert f"Free (as given): no cycle, as {NO_RETURN}." in figure_of("return-map", both_joints()).caption
+
+
+def test_ringing_does_not_count_as_a_swing():
+    case = fake_case(hunting=True)
+    assert case.trace is not None
+    ringing = np.array([4e-4, 4.2e-4, -1e-4, -3e-4, -2e-4, 1e-4])
+    turns = {"turning_time": ("turning_point", np.arange(6.0) + 1), "turning_deviation": ("turning_point", ringing)}
+    case = replace(case, trace=case.trace.drop_vars(list(turns)).assign(turns))
+    motion = figure_of("return-map", {"given": case}).panels[0].series[2]
+    assert motion.x == pytest.approx([4.2e-4, 3e-4, 3e-4, 1e-4])
+    assert motion.y == pytest.approx([3e-4, 3e-4, 1e-4, 1e-4])
+
+
+def test_cycles_that_attract_are_solid_and_others_dashed():
+    both = fake_hunting(fake_cycle(), fake_cycle(symmetric=False, multiplier=1.02, apart=1e-4))
+    cases = {"given": replace(fake_case(hunting=True), judgement=hunts(hunting=both))}
+    attracts, repels = figure_of("return-map", cases).panels[0].markers
+    assert (attracts.label, attracts.symbol, repels.label, repels.symbol) == ("attracts", "target", "repels", "cross")
+    assert sorted(repels.x) == pytest.approx([4.7e-4, 5.7e-4])
+    position, force, loop = figure_of("cycle", cases).panels
+    assert [line.label for line in position.series] == ["attracts", "cart", "repels", "cart"]
+    assert [line.dash for line in position.series] == ["solid", "solid", "dashed", "dashed"]
+    assert [line.dash for line in force.series] == [line.dash for line in loop.series] == ["solid", "dashed"]
+    for name in ("return-map", "cycle"):
+        assert same(mpl_arrays(figure_of(name, cases)), plotly_arrays(figure_of(name, cases)))
+
+
+def test_response_of_one_run():
+    figure = response_figure(fake_trace())
+    assert [panel.title for panel in figure.panels] == [
+        "Position",
+        "Error",
+        "Actuator force",
+        "Joint deflection",
+    ]
+    assert figure.subject == "Thesis rig"
+    assert same(mpl_arrays(figure), plotly_arrays(figure))
+
+
+# ---------------------------------------------------------------- report
+
+
+@pytest.fixture(scope="module")
+def page() -> str:
+    return report_html(both_joints())
+
+
+def test_report_says_the_verdict_first(page):
+    text = " ".join(" ".join(Page(page).words).split())
+    locked, free = text.index("±0.52 mm every 1.63 s"), text.index("1 µm in 823 ms")
+    assert locked < free < text.index("Counted peaks") < text.index('name = "Thesis rig"')
+    assert conclusion(both_joints()) in text
+    assert made_with().startswith(VERSION)  # then what other tests have registered
+    assert made_with() in text
+    assert "1e-06" in text
+
+
+def test_report_opens_offline_and_holds_plotly_once(page):
+    parsed = Page(page)
+    assert all(address.startswith("data:image/svg+xml;base64,") for address in parsed.loads)
+    assert page.count(plotly_renderer.script()) == 1
+    assert page.count("Plotly.newPlot(") - plotly_renderer.script().count("Plotly.newPlot(") == 7
+    assert "default-src 'none'" in page
+    own = page.replace(plotly_renderer.script(), "")
+    assert not re.findall(r"https?://[^\"'<> ]*", own)
+    assert "sendChartToCloud" not in own
+
+
+def test_report_holds_a_print_of_every_figure(page):
+    prints = [address for address in Page(page).loads if address.startswith("data:image/svg+xml")]
+    assert len(prints) == 7
+    for address in prints:
+        assert b"<svg" in base64.b64decode(address.split(",", 1)[1])
+
+
+def test_names_and_files_cannot_inject_markup():
+    evil = '</script><script>alert("x")</script><img src=x onerror=alert(1)>'
+    plain = report_html(both_joints())
+    page = report_html(both_joints(evil))
+    assert sorted(Page(page).tags) == sorted(Page(plain).tags)
+    assert evil in " ".join(Page(page).words)
+    assert "&lt;script&gt;alert(" in page
+
+
+def test_report_without_traces_has_the_table_and_no_script():
+    cases = {key: replace(case, trace=None) for key, case in both_joints().items()}
+    page = report_html(cases)
+    assert "<script" not in page
+    assert "±0.52 mm" in page
+
+
+def sentence(judgement: Judgement, cases: Any = None, locked: bool | None = None, **changes: Any) -> str:
+    case = replace(fake_case(stage=fake_stage(locked=locked)), judgement=judgement, **changes)
+    return verdict_sentence(ShownCase("given", "As given", "#000000", case), cases or {"given": case})
+
+
+def said_by_name() -> dict[str, str]:
+    """What is said of stages that differ in one respect."""
+    free = {"free": replace(fake_case(), judgement=settles())}
+    none = Kick((), (1e-5, 0.1))
+    repels = fake_hunting(fake_cycle(multiplier=-1.0112))
+    uncertain = fake_hunting(reason="no orbit could be closed", certain=False)
+    faster, slower = Margin(1.22, None, True), Margin(0.5, None, True)
+    transient = settles(verdict="transient", hunting=repels, settled_after=190.2, margin=Margin(0.975, 9.7496, True))
+    seen = hunts(hunting=fake_hunting(reason=NO_RETURN), margin=None, observed=True)
+    return {
+        "hunts": sentence(hunts()),
+        "hunts, unstable": sentence(hunts(), unstable=("sticks", "slides")),
+        "hunts, free joint settles": sentence(hunts(), free, locked=True),
+        "hunts, no margin": sentence(hunts(margin=None), free, locked=True),
+        "hunts, gains": sentence(hunts(margin=faster)),
+        "hunts, observed": sentence(seen, peak_to_peak=1.04e-3, period=1.63),
+        "bistable": sentence(hunts(verdict="bistable")),
+        "bistable, no kick starts it": sentence(hunts(verdict="bistable", displacement=none, push=none, moves=None)),
+        "transient": sentence(transient, peak_to_peak=6.9e-4, period=1.33),
+        "transient, at rest": sentence(settles(verdict="transient", settled_after=None), peak_to_peak=1e-7),
+        "transient, cannot hunt": sentence(cannot_hunt("transient"), peak_to_peak=0.383, period=6.36),
+        "settles": sentence(settles()),
+        "settles, no margin": sentence(settles(margin=None)),
+        "settles, gains": sentence(settles(margin=slower)),
+        "settles, cannot hunt": sentence(cannot_hunt()),
+        "settles, coarsely": sentence(settles(), settling_time={1e-6: None, 1e-5: 1.5}),
+        "settles, band not reached": sentence(settles(), settling_time={1e-6: None, 1e-5: None}, peak_to_peak=7e-5),
+        "settles, uncertain": sentence(settles(hunting=uncertain)),
+        "failed": sentence(settles(verdict="failed")),
+    }
+
+
+def test_sentences(snapshots: Snapshots) -> None:
+    said = said_by_name()
+    assert len({*said.values()}) == len(said)
+    snapshots.check("check", "sentences", "\n".join(f"{name}: {text}" for name, text in said.items()))
+
+
+@pytest.mark.parametrize(
+    ("name", "facts"),
+    [
+        ("hunts", ["±0.52 mm", "1.63 s", "1.75 Hz", "9.75 Hz"]),
+        ("hunts, gains", ["1.22 times", "kp × 1.49", "ki × 1.82", "kd × 1.22"]),
+        ("bistable", ["1.72 mm", "23.1 mm/s", "87 %", "±0.52 mm", "1.75 Hz"]),
+        ("transient", ["690 µm", "1.33 s", "73.1 s", "190 s", "9.75 Hz"]),
+        ("settles", ["1 µm in 823 ms", "below 5.60 Hz"]),
+        ("settles, coarsely", ["10 µm in 1.50 s"]),
+    ],
+)
+def test_numbers_in_sentences(name: str, facts: list[str]) -> None:
+    said = said_by_name()[name]
+    assert [fact for fact in facts if fact not in said] == []
+
+
+def test_an_unstable_loop_is_named_before_what_friction_makes_of_it():
+    said = said_by_name()["hunts, unstable"]
+    assert said.index("unstable") < said.index("±0.52 mm")
+
+
+def test_freeing_the_joint_is_advised_only_where_the_free_joint_certainly_settles():
+    free = {"free": replace(fake_case(), judgement=settles())}
+    assert "joint" in sentence(hunts(), free, locked=True)
+    assert "joint" not in sentence(hunts(), free, locked=False)
+    for other in (hunts(verdict="bistable"), settles(hunting=fake_hunting(certain=False)), settles(verdict="failed")):
+        assert "joint" not in sentence(hunts(), {"free": replace(fake_case(), judgement=other)}, locked=True)
+
+
+def row(name: str, judgement: Judgement, **changes: Any) -> str | None:
+    item = ShownCase("given", "As given", "#000000", replace(fake_case(), judgement=judgement, **changes))
+    return dict(rows((item,))).get(name, [None])[0]
+
+
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("Hunting cycle, amplitude", "±0.52 mm"),
+        ("Hunting cycle, period", "1.628 s"),
+        ("Hunting multiplier", "-0.9312 (simulated: -0.9311)"),
+        ("Multiplier taken over", "half a period (Floquet)"),
+        ("Other hunting cycles", None),
+        ("Time constant of transients", "11.4 s"),
+        ("Edge of hunting", "9.75 Hz"),
+        ("Displacements that hunt", "1.72 to 10.8 mm, 22.7 to 43.3 mm, from 59.3 mm on (tried: 0.0173 to 156 mm)"),
+        ("Pushes that hunt", "23.1 to 73.4 mm/s"),
+        ("Moves that end in hunting", "87 % (80 to 92 %) of 128 moves"),
+    ],
+)
+def test_rows_of_a_stage_that_hunts(name, text):
+    assert row(name, hunts()) == text
+    assert row(name, cannot_hunt()) is None
+
+
+def test_rows_of_other_cycles():
+    pair = fake_cycle(symmetric=False, multiplier=1.0105)
+    repels = fake_cycle(multiplier=-1.01)
+    assert row("Other hunting cycles", hunts(hunting=fake_hunting(fake_cycle(), pair))) == (
+        "asymmetric, ±0.52 mm, repels"
+    )
+    assert row("Hunting cycle, amplitude", settles(hunting=fake_hunting(repels))) == "±0.52 mm (repels)"
+    whole = hunts(hunting=fake_hunting(replace(pair, multiplier=-0.93, growth=np.nan)))
+    assert row("Multiplier taken over", whole) == "a whole period (slope of the returns)"
+    assert row("Hunting multiplier", whole) == "-0.9300"
+    assert row("Edge of hunting", hunts(margin=Margin(1.22, None, True))) == "1.22 × as fast"
+
+
+@pytest.mark.parametrize(
+    ("windows", "text"),
+    [
+        ((), "none from 0.0100 to 100 mm"),
+        (((1e-5, 0.1),), "all that were tried, 0.0100 to 100 mm"),
+        (((1e-5, 2e-3), (3e-3, 4e-3)), "up to 2.00 mm, 3.00 to 4.00 mm (tried: 0.0100 to 100 mm)"),
+        ([(i * 1e-3, i * 1e-3 + 5e-4) for i in range(1, 8)], "1.00 to 1.50 mm, 2.00 to 2.50 mm, 3.00 to 3.50 mm, "),
+    ],
+)
+def test_windows_of_kicks(windows, text):
+    found = row("Displacements that hunt", hunts(displacement=Kick(tuple(windows), (1e-5, 0.1))))
+    assert found is not None
+    assert found.startswith(text)
+    assert found.endswith("and 3 more ranges") == (len(windows) == 7)
+
+
+@pytest.mark.parametrize(
+    ("judgement", "peaks", "text"),
+    [
+        (hunts(), 6, "6"),
+        (hunts(), 0, "0 (only those after 10 s, above 100 µm, count)"),
+        (hunts(verdict="bistable"), 0, "0 (another motion hunts)"),
+        (settles(verdict="transient"), 8, "8 (a long transient)"),
+        (settles(), 0, "0"),
+    ],
+)
+def test_a_peak_count_that_contradicts_the_verdict_is_explained(judgement, peaks, text):
+    assert row("Counted peaks", judgement, peaks=peaks) == text
+
+
+def test_conclusion_names_what_the_joint_does(snapshots):
+    cases = both_joints()
+    hunting, settled = cases["locked"], cases["free"]
+    bistable, failed = (replace(settled, judgement=hunts(verdict=word)) for word in ("bistable", "failed"))
+    named = {
+        "stops": conclusion({"locked": hunting, "free": settled}),
+        "does not stop": conclusion({"locked": hunting, "free": hunting}),
+        "bistable": conclusion({"locked": hunting, "free": bistable}),
+        "only free": conclusion({"locked": settled, "free": bistable}),
+    }
+    assert len({*named.values()}) == len(named)
+    snapshots.check("check", "conclusions", "\n".join(f"{name}: {text}" for name, text in named.items()))
+    assert conclusion({"locked": settled, "free": settled}) is None
+    assert conclusion({"given": hunting}) is None
+    assert conclusion({"locked": hunting, "free": failed}) is None

@@ -1,0 +1,245 @@
+"""Figures as data and their two renderers."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import subprocess
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from made_up import (
+    both_joints,
+    mpl_arrays,
+    plotly_arrays,
+    same,
+    small_figure,
+)
+
+from friso.views.check.figures import check_figures
+from friso.views.drawing import matplotlib_renderer, plotly_renderer
+from friso.views.drawing.drawable import drawable
+from friso.views.drawing.figure import Axis, Figure, Map, Panel, Series
+from friso.views.drawing.prefixes import choose, plus_minus, pretty, range_with_unit, with_unit
+from friso.views.drawing.thinning import BUCKETS, KEPT, thin
+
+# ---------------------------------------------------------------- plain data
+
+
+def test_arrays_of_different_length_are_refused():
+    with pytest.raises(ValueError, match=r"wave: x has the shape \(3,\), y \(2,\); expected one length"):
+        Series(np.zeros(3), np.zeros(2), "wave", "#000000")
+    with pytest.raises(ValueError, match=r"z has the shape \(2, 3\), expected \(len\(y\), len\(x\)\) = \(3, 2\)"):
+        Map(np.zeros(2), np.zeros(3), np.zeros((2, 3)), "peaks", "")
+
+
+@pytest.mark.parametrize(
+    ("values", "unit", "factor", "text"),
+    [
+        ([0.0, 0.52e-3], "m", 1e6, "µm"),
+        ([-1.04e-3], "m", 1e3, "mm"),
+        ([0.09, -0.02], "m", 1e3, "mm"),
+        ([0.001], "m", 1e3, "mm"),
+        ([1000.0], "m", 1.0, "m"),
+        ([2e-13], "m", 1e9, "nm"),
+        ([20.0], "s", 1.0, "s"),
+        ([3600.0], "s", 1.0, "s"),
+        ([0.015], "m/s", 1e3, "mm/s"),
+        ([2400.0], "N/m", 1e-3, "kN/m"),
+        ([316.0], "N*s/m", 1.0, "N·s/m"),
+        ([0.5], "kg", 1.0, "kg"),
+        ([1e-6], "m^2", 1.0, "m²"),
+        ([0.0, np.nan, np.inf], "m", 1.0, "m"),
+        ([], "N", 1.0, "N"),
+        ([7.0], "", 1.0, ""),
+    ],
+)
+def test_prefix(values, unit, factor, text):
+    assert choose(np.array(values), unit) == (pytest.approx(factor), text)
+
+
+def test_prefix_of_a_logarithmic_axis_suits_its_middle():
+    assert choose(np.array([1e-9, 0.1]), "m", log=True) == (pytest.approx(1e6), "µm")
+
+
+@given(st.floats(1e-9, 999.0))
+def test_prefixed_lengths_read_between_one_and_a_thousand(value):
+    factor, _ = choose(np.array([value]), "m")
+    assert 1 - 1e-8 <= value * factor < 1000 * (1 + 1e-8)
+
+
+def test_values_in_sentences():
+    assert with_unit(1.04e-3, "m") == "1.04 mm"
+    assert with_unit(0.9996e-3, "m") in ("1000 µm", "1.00 mm")
+    assert with_unit(0.0, "m") == "0 m"
+    assert with_unit(None, "s") == "–"
+    assert with_unit(float("nan"), "s") == "–"
+    assert with_unit(1234.5, "s") == "1234 s"
+    assert with_unit(1e-15, "m") == "1.00e-06 nm"
+    assert pretty("m/s**2") == "m/s²"
+    assert with_unit(0.0496, "Hz") == "0.0496 Hz"
+    assert plus_minus(0.52e-3, "m") == "±0.52 mm"
+    assert plus_minus(0.345e-3, "m") == "±345 µm"
+    assert range_with_unit(0.233e-3, 2.07e-3, "m") == "0.233 to 2.07 mm"
+
+
+# ---------------------------------------------------------------- thinning
+
+values = st.one_of(st.floats(-1e6, 1e6), st.just(np.nan))
+
+
+@settings(deadline=None)
+@given(arrays(float, st.integers(1, 900), elements=values), st.integers(1, 12), st.booleans())
+def test_thinning_keeps_order_ends_extremes_and_gaps(y, buckets, loop):
+    x = np.cos(np.arange(len(y))) if loop else np.arange(len(y), dtype=float)
+    label = np.arange(len(y), dtype=float) * 1e-9  # tells samples of equal value apart
+    kept_x, kept_y = thin(x + label, y, buckets)
+    places = np.array([int(np.flatnonzero(x + label == value)[0]) for value in kept_x])
+    assert np.all(np.diff(places) > 0)
+    assert np.array_equal(kept_y, y[places], equal_nan=True)
+    assert places[0] == 0
+    assert places[-1] == len(y) - 1
+    assert np.isnan(kept_y).any() == np.isnan(y).any()
+    if not np.isnan(y).all():
+        assert np.nanmin(kept_y) == np.nanmin(y)
+        assert np.nanmax(kept_y) == np.nanmax(y)
+    assert kept_x.min() == (x + label).min()
+    assert kept_x.max() == (x + label).max()
+    if len(y) > KEPT * buckets:
+        assert len(kept_y) <= (KEPT + 1) * buckets + 2
+
+
+@settings(deadline=None, max_examples=30)
+@given(st.integers(0, 199_999), st.floats(1.1, 1e6), st.sampled_from([-1, 1]))
+def test_a_spike_of_one_sample_survives_where_it_is(place, height, sign):
+    y = np.sin(np.linspace(0, 50, 200_000))
+    y[place] = sign * height
+    x, kept = thin(np.arange(200_000.0), y)
+    assert len(kept) <= (KEPT + 1) * BUCKETS
+    assert kept[x == place] == pytest.approx(sign * height)
+
+
+def test_every_stretch_keeps_its_own_extremes():
+    y = np.random.default_rng(1).normal(size=100_000)
+    x, kept = thin(np.arange(100_000.0), y, 100)
+    for start in range(0, 100_000, 1000):
+        inside = (x >= start) & (x < start + 1000)
+        assert kept[inside].min() == y[start : start + 1000].min()
+        assert kept[inside].max() == y[start : start + 1000].max()
+
+
+def test_a_loop_that_rests_keeps_its_shape():
+    angle = np.concatenate([np.zeros(90_000), np.linspace(0, 2 * np.pi, 10_000)])
+    x, y = thin(np.cos(angle), np.sin(angle), 200)
+    assert np.max(np.hypot(np.diff(x), np.diff(y))) < 0.1
+
+
+# ---------------------------------------------------------------- renderers
+
+
+@pytest.mark.parametrize("figure", [small_figure(), *check_figures(both_joints(samples=20001))], ids=lambda f: f.name)
+def test_both_renderers_draw_the_same_arrays(figure):
+    on_paper, on_page = mpl_arrays(figure), plotly_arrays(figure)
+    assert sum(len(panel) for panel in on_paper) > 0
+    assert same(on_paper, on_page)
+
+
+def test_both_renderers_write_the_same_labels_and_ranges():
+    for figure in (small_figure(), *check_figures(both_joints())):
+        axes = [a for a in matplotlib_renderer.render(figure).axes if a.get_label() != "<colorbar>"]
+        layout = plotly_renderer.render(figure).layout
+        for number, (panel, paper) in enumerate(zip(drawable(figure).panels, axes, strict=True)):
+            suffix = number + 1 if number else ""
+            for declared, label, page in (
+                (panel.x, paper.get_xlabel(), layout[f"xaxis{suffix}"]),
+                (panel.y, paper.get_ylabel(), layout[f"yaxis{suffix}"]),
+            ):
+                assert label == page.title.text == declared.label
+            if panel.x.limits:
+                assert paper.get_xlim() == pytest.approx(layout[f"xaxis{suffix}"].range)
+
+
+def test_no_axis_of_any_figure_has_an_offset_text():
+    far = np.linspace(0, 1, 50)
+    narrow = Panel("Far", Axis("Time", "s"), Axis("Position", "m"), (Series(far, 100 + 1e-7 * far, "y", "#000000"),))
+    for figure in (Figure("far", "Far", "", (narrow,)), *check_figures(both_joints())):
+        canvas = matplotlib_renderer.render(figure)
+        canvas.draw_without_rendering()
+        for axes in canvas.axes:
+            assert axes.xaxis.get_offset_text().get_text() == axes.yaxis.get_offset_text().get_text() == ""
+
+
+def test_colour_bar_and_units_of_a_map():
+    panel = drawable(small_figure()).panels[1]
+    assert panel.x.label == "Stiffness [kN/m]"
+    assert panel.y.label == "Stroke [mm]"
+    assert panel.maps[0].x[-1] == pytest.approx(4.0)
+
+
+def test_drawing_twice_changes_nothing():
+    once = drawable(small_figure())
+    assert [p.x for p in drawable(once).panels] == [p.x for p in once.panels]
+
+
+def test_unknown_format_is_refused(tmp_path):
+    with pytest.raises(ValueError, match=r"got 'gif', expected one of png, svg, pdf"):
+        matplotlib_renderer.save(small_figure(), tmp_path / "figure.gif")
+
+
+def test_dollars_and_markup_in_names_are_text():
+    figure = replace(small_figure(), subject=r"$\frac{1}$ <b>&", title="_x$")
+    panel = replace(figure.panels[0], title="<script>$", series=(replace(figure.panels[0].series[0], label="_$a"),))
+    figure = replace(figure, panels=(panel,))
+    assert matplotlib_renderer.image(figure, "png").startswith(b"\x89PNG")
+    legend = matplotlib_renderer.render(figure).axes[0].get_legend()
+    assert [text.get_text() for text in legend.get_texts()] == ["_$a", "band", "peak"]
+    assert "<script>$" not in plotly_renderer.fragment(figure)
+
+
+SCRIPT = """
+import hashlib, sys
+sys.path.insert(0, {tests!r})
+import made_up
+from friso.views.check.figures import check_figures
+from friso.views.check.page import report_html
+from friso.views.drawing import matplotlib_renderer as m
+for figure in (made_up.small_figure(), check_figures(made_up.both_joints())[-1]):
+    for form in m.FORMATS:
+        print(hashlib.sha256(m.image(figure, form)).hexdigest())
+print(hashlib.sha256(report_html(made_up.both_joints()).encode()).hexdigest())
+"""
+
+
+def test_files_are_the_same_bytes_in_every_process(request, tmp_path):
+    code = SCRIPT.format(tests=str(request.path.parent))
+    runs = []
+    for seed in ("1", "2"):
+        (tmp_path / seed).mkdir()
+        (tmp_path / seed / "matplotlibrc").write_text("font.size: 30\n" if seed == "2" else "")
+        environment = {"PYTHONHASHSEED": seed, "MATPLOTLIBRC": str(tmp_path / seed), "HOME": str(tmp_path)}
+        environment |= {"PYTHONPATH": str(request.config.rootpath), "PATH": "/usr/bin:/bin"}
+        environment |= {"MPLCONFIGDIR": str(tmp_path / "cache")}
+        done = subprocess.run(
+            [sys.executable, "-c", code],
+            env=environment,
+            capture_output=True,
+            text=True,
+            check=True,
+            timeout=300,
+        )
+        runs.append(done.stdout)
+    here = hashlib.sha256(matplotlib_renderer.image(small_figure(), "png")).hexdigest()
+    assert runs[0] == runs[1]
+    assert runs[0].split()[0] == here
+
+
+def test_a_figure_file_opens_as_an_image(tmp_path):
+    import matplotlib.image
+
+    matplotlib_renderer.save(small_figure(), tmp_path / "small.PNG")
+    assert matplotlib.image.imread(io.BytesIO((tmp_path / "small.PNG").read_bytes()), format="png").ndim == 3
