@@ -13,6 +13,7 @@ import pytest
 from inside import friso_inside
 from pages import Page
 from refusals import Refused
+from snapshots import Snapshots
 
 import friso
 from friso.cli.bode import bode as command
@@ -189,7 +190,7 @@ def test_a_rigid_stage_without_friction_has_the_one_case_given(rigid: Bode) -> N
     assert document["limits"].keys() == {"given"}
     assert [item.label for item in shown_states(rigid)] == ["As given"]
     (said,) = stability(rigid)
-    assert said.startswith("The loop is stable, modulus margin 0.73")
+    assert "0.73" in said
 
 
 def test_an_unstable_loop_is_a_plain_statement(unstable: Bode) -> None:
@@ -224,43 +225,36 @@ def test_friction_that_rises_is_not_blamed(found: Bode) -> None:
     assert any("Stribeck" in sentence for sentence in stability(found))
 
 
-def test_unstable_limit_cases_are_a_matter_of_tuning(unstable: Bode) -> None:
+def test_unstable_limit_cases_are_a_matter_of_tuning(unstable: Bode, snapshots: Snapshots) -> None:
     settled, where, why = stability(unstable)
-    assert settled.startswith("At 8.00 Hz, this controller is not stable in all settled states")
-    assert "grows e-fold in 64.4 ms, swinging at 9.26 Hz" in settled
-    assert "Unstable: stuck, limiter free; stuck under a bias force of 2." in where
-    assert "sliding, all from 1.60 µm/s to 1.60 m/s, limiter free" in where
-    assert why.startswith("This is a matter of tuning")
+    for text, facts in ((settled, ("8.00 Hz", "64.4 ms", "9.26 Hz")), (where, ("stuck", "1.60 µm/s", "1.60 m/s"))):
+        assert [fact for fact in facts if fact not in text] == []
     assert "Stribeck" not in why
-    assert crossovers(unstable)["free"].startswith("Free (as given): stable: none from 0.100 Hz to 10.0 kHz")
     assert caveats(unstable) == []
+    snapshots.check("bode", "unstable", "\n".join([settled, where, why, crossovers(unstable)["free"]]))
 
 
 def test_the_state_that_is_lost_first_is_named(rig: Stage) -> None:
     """Tuned for too light a mass, the loop of a sliding cart is too slow for its integral action."""
     said = crossovers(bode(rig.replace({"controller.tuned_mass": "0.2 kg"})))
-    assert "stable: up to 8.41 Hz (above 8.41 Hz, lost first: sliding at 1.6" in said["locked"]
-    assert "5.92 Hz (above 5.92 Hz, lost first: sliding at 1.60 m/s, limiter free)" in said["free"]
+    for joint, highest in (("locked", "8.41 Hz"), ("free", "5.92 Hz")):
+        assert said[joint].count(highest) == 2
+        assert "sliding at 1.6" in said[joint].partition(highest)[2]
 
 
-def test_what_the_stage_file_lacks_is_named(found: Bode, rig: Stage) -> None:
-    (said,) = caveats(found)
-    assert "sampling (drive.sample_time), delay (drive.delay) and modes that the stage file does not contain" in said
-    assert said.startswith("The loop is still stable at 10.0 kHz, where")
-    sampled = replace(found, stage=rig.replace({"drive.sample_time": "50 us", "drive.delay": "0 s"}))
-    (said,) = caveats(sampled)
-    assert "half the sampling frequency" in said
-    assert "the real machine modes that" in said
-    assert "drive." not in said
+def test_what_the_stage_file_lacks_is_named(found: Bode, rig: Stage, snapshots: Snapshots) -> None:
+    (bare,) = caveats(found)
+    assert [key for key in ("10.0 kHz", "drive.sample_time", "drive.delay") if key not in bare] == []
+    (sampled,) = caveats(replace(found, stage=rig.replace({"drive.sample_time": "50 us", "drive.delay": "0 s"})))
+    assert "drive." not in sampled
+    snapshots.check("bode", "caveats", f"{bare}\n{sampled}")
 
 
-def test_words_of_a_controller_by_gains(emps: Bode) -> None:
-    said = " ".join(sentences(emps))
-    assert "As given, this controller is stable in all settled states" in said
-    assert "It is stable in every state: stuck under bias forces of up to 20.4 N" in said
-    assert "in multiples of its bandwidth" in said
-    assert "stable: all from 0.0100 to 1000 times this bandwidth" in said
-    assert "crossover" not in said
+def test_words_of_a_controller_by_gains(emps: Bode, snapshots: Snapshots) -> None:
+    said = sentences(emps)
+    assert "20.4 N" in " ".join(said)
+    assert "crossover" not in " ".join(said)
+    snapshots.check("bode", "gains", "\n".join(said))
 
 
 def test_no_texts_but_json_on_standard_output(capsys: pytest.CaptureFixture) -> None:

@@ -16,6 +16,7 @@ import pytest
 import typer
 from pages import Page
 from refusals import Refused
+from snapshots import Snapshots
 
 import friso
 from friso.cli.flexure import EXAMPLE
@@ -192,11 +193,11 @@ def test_a_failure_of_the_beams_leaves_the_closed_forms(
     document = _strict(shown.out)
     assert document["model"] == "closed forms"
     assert "reduce the stroke" in document["failure"]
-    assert "the beam model found no solution" in shown.err
+    assert document["failure"] in " ".join(shown.err.split())
     with pytest.raises(typer.Exit):
         command(path)
     said = " ".join(capsys.readouterr().out.split())
-    assert "The beam model found no solution: The beams find no equilibrium" in said
+    assert document["failure"] in said
     assert (BEAMS in said, CLOSED in said) == (False, True)
 
 
@@ -219,16 +220,16 @@ def test_a_sound_joint_has_no_warnings_and_a_largest_stroke(stage: Stage) -> Non
     found = evaluated(of_material(stage, "stainless 1.4310"))
     assert warnings(found) == []
     largest = found.best.fatigue_margin  # of a stroke of 1 mm
-    assert f"fatigue allows a stroke of about {largest:.2f} mm" in " ".join(findings(found))
+    assert f"{largest:.2f} mm" in " ".join(findings(found))
 
 
 @pytest.mark.parametrize(
     ("changes", "stroke", "warning"),
     [
-        ({"flexure.thickness": "1 mm"}, 8e-3, "The leaves yield: "),
-        ({"flexure.fatigue": "60 MPa"}, 1e-3, "The leaves fail by fatigue: "),
-        ({"flexure.thickness": "0.05 mm", "masses.stage": "5 kg"}, 1e-4, "would buckle them: it weighs 49.0 N"),
-        ({"friction.static": "2 N"}, 1e-3, "The cart breaks away inside the stroke: the leaves push with 2.54 N"),
+        ({"flexure.thickness": "1 mm"}, 8e-3, "yield"),
+        ({"flexure.fatigue": "60 MPa"}, 1e-3, "fatigue"),
+        ({"flexure.thickness": "0.05 mm", "masses.stage": "5 kg"}, 1e-4, "49.0 N"),
+        ({"friction.static": "2 N"}, 1e-3, "2.54 N"),
     ],
 )
 def test_what_the_leaves_do_not_bear_is_a_warning(
@@ -242,7 +243,8 @@ def test_models_that_differ_are_a_warning(found: BothModels) -> None:
     assert found.beams is not None
     other = replace(found, beams=replace(found.beams, stress=found.beams.stress * 0.8, drive=found.beams.drive * 2))
     (said,) = (said for said in warnings(other) if "differ" in said)
-    assert "drive stiffness by -50 % and stress by +2" in said
+    assert "-50 %" in said
+    assert "+2" in said
 
 
 def test_actuator_and_sensor_that_move_against_each_other_are_a_warning(stage: Stage) -> None:
@@ -256,10 +258,9 @@ def test_actuator_and_sensor_that_move_against_each_other_are_a_warning(stage: S
     modes = [mode for mode in against.best.modes[1:] if mode.interferes and mode.actuator * mode.sensor < 0]
     assert "stage about x" in [mode.name for mode in modes]
     named = " and ".join(f"{mode.name} ({mode.frequency / 1e3:.2f} kHz)" for mode in modes)
-    assert said.startswith(f"In {named} actuator and sensor move in opposite directions.")
-    assert "cannot damp that by phase" in said
-    assert "[parasitic], which describes only the size of a mode, makes the loop look better than it is" in said
-    assert "actuation along x at the centre of mass of the stage" in " ".join(assumptions(against.stage))
+    assert named in said
+    assert "[parasitic]" in said
+    assert "centre of mass" in " ".join(assumptions(against.stage))
 
 
 def test_only_what_is_left_out_is_assumed(stage: Stage) -> None:
@@ -267,16 +268,16 @@ def test_only_what_is_left_out_is_assumed(stage: Stage) -> None:
     inertia = {f"flexure.inertia_{axis}": "2e-4 kg*m^2" for axis in "xyz"}
     assert assumptions(stage.replace({**given, **inertia})) == []
     (said,) = assumptions(stage.replace(given))
-    assert said.startswith("Assumed, since [flexure] does not say: moments of inertia")
-    assert said.endswith("cube of 0.5 kg.")
+    assert "moments of inertia" in said
+    assert "0.5 kg" in said
 
 
-def test_without_a_mode_that_interferes_there_is_no_limit(found: BothModels) -> None:
+def test_without_a_mode_that_interferes_there_is_no_limit(found: BothModels, snapshots: Snapshots) -> None:
     quiet = tuple(replace(mode, peak=0.0) for mode in found.closed.modes)
-    alone = BothModels(found.stage, replace(found.closed, modes=quiet), None, "told")
-    assert any("the leaves set no limit to the crossover" in said for said in sentences(alone))
+    alone = BothModels(found.stage, replace(found.closed, modes=quiet), None, "singular at step 7")
     assert flexure_document(alone)["first_interfering_hz"] is None
-    assert "The beam model found no solution: told" in Page(flexure_html(alone, ())).text
+    assert "singular at step 7" in Page(flexure_html(alone, ())).text
+    snapshots.check("flexure", "closed forms alone", "\n".join(sentences(alone)))
 
 
 # ---------------------------------------------------------------- figures and page
