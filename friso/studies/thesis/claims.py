@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -89,6 +90,11 @@ class Finding:
         """ "holds" if all parts are met, "differs" if none is, else "holds in part"."""
         met = sum(part.holds for part in self.parts)
         return "holds" if met == len(self.parts) else "holds in part" if met else "differs"
+
+
+def number_text(value: float, form: str = ".3g", unit: str = "") -> str:
+    """A number with its unit, or that there is none (NaN)."""
+    return f"{value:{form}} {unit}".rstrip() if math.isfinite(value) else "none"
 
 
 @dataclass(frozen=True)

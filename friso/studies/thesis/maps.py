@@ -50,6 +50,11 @@ def trend(x: np.ndarray, y: np.ndarray) -> float:
     return float(np.corrcoef(*ranks)[0, 1])
 
 
+def trend_text(correlation: float) -> str:
+    """A rank correlation in words: where `trend` has none, that it is undefined."""
+    return f"{correlation:.2f}" if np.isfinite(correlation) else "undefined (too few cells, or all alike)"
+
+
 def free_square(hunts: np.ndarray, valid: np.ndarray) -> float:
     """Share of the valid cells that the largest square of valid cells without hunting covers."""
     free = valid & ~hunts

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from friso.evidence import value
-from friso.hunting.edges import KINDS, STEP
+from friso.frequency.crossover import WANTED
+from friso.hunting.edges import KINDS, ROUNDS, STEP
 from friso.hunting.persistence import DISTANCES
 from friso.studies.guideline import Guideline
 from friso.studies.guideline.checks import ABOVE, BELOW, MOVES, PERIODS
@@ -30,6 +31,12 @@ from friso.views.pages import environment
 PAGE, TABLE = "guideline.md", "guideline_edges.csv"
 
 
+FAR = 1.5
+"""Factor from which an edge counts as far off the law."""
+
+RESOLVED = max(float(grid[1] / grid[0]) ** 0.5**ROUNDS - 1 for grid in (LOCKED_GRID, FREE_GRID))
+"""Width of the last step of a bisection, over the edge in it."""
+
 CONSTANTS: Mapping[str, Any] = {
     "below": BELOW,
     "above": ABOVE,
@@ -44,8 +51,13 @@ CONSTANTS: Mapping[str, Any] = {
     "margin": MARGIN,
     "at": CLAIMED_AT,
     "step": f"{100 * (STEP - 1):.0f} %",
+    "apart": f"{100 * (DISTANCES[1] / DISTANCES[0] - 1):.0f} %",
+    "resolved": f"{100 * RESOLVED:.1g} %",
+    "largest_gap": LOCKED_BOX["gap"][1],
+    "far": FAR,
+    "comfortable": WANTED,
 }
-"""Settings of the computation that the page tells."""
+"""Settings of the computation that the page states."""
 
 
 def guideline_files(guideline: Guideline) -> dict[str, Content]:
@@ -88,9 +100,6 @@ def guideline_page(guideline: Guideline) -> str:
 
 ONE_WINDOW = "with one window (a diagnosis)"
 """Name of the rows of samples in which a cycle attracts up to the edge without a break."""
-
-FAR = 1.5
-"""Factor from which an edge is told of as far off the law."""
 
 
 def _errors(guideline: Guideline) -> list[tuple[str, Errors]]:

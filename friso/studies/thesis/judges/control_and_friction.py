@@ -6,7 +6,7 @@ import numpy as np
 
 from friso.equations.controllers.van_dijk import ALPHA, BETA
 from friso.studies.thesis.claims import ABOUT, FEW, TREND, Evidence, Finding, Part, judges
-from friso.studies.thesis.maps import counts, free_square, share, table, trend
+from friso.studies.thesis.maps import counts, free_square, share, table, trend, trend_text
 
 _GAP = 1.0
 """Gap between static and Coulomb friction from which hunting was seen [N] (claim F12A)."""
@@ -35,12 +35,13 @@ def gap_makes_hunting(evidence: Evidence) -> Finding:
                 f"the smallest gap F_s - F_c that hunts is about {_GAP:g} N (from {_GAP / ABOUT:.2g} to "
                 f"{_GAP * ABOUT:.2g} N)",
                 bool(_GAP / ABOUT <= smallest <= _GAP * ABOUT),
-                f"smallest gap {smallest:.2g} N",
+                f"smallest gap {smallest:.2g} N" if hunts.any() else "nothing hunts",
             ),
             Part(
                 f"over the cells that hunt, the count rises with the gap (rank correlation at least {TREND:g})",
                 rises >= TREND,
-                f"rank correlation {rises:.2f}; at fixed F_s {at_static:.2f}, at fixed F_c {at_coulomb:.2f}",
+                f"rank correlation {trend_text(rises)}; at fixed F_s {trend_text(at_static)}, at fixed F_c "
+                f"{trend_text(at_coulomb)}",
                 why=f"the count has no rising trend with the gap at fixed {flat}" if flat else "",
             ),
         )
@@ -64,13 +65,13 @@ def control_is_no_cure(evidence: Evidence) -> Finding:
                 "at fixed alpha the count of the cells that hunt falls with beta (mean rank correlation at most "
                 f"{-TREND:g})",
                 with_beta <= -TREND,
-                f"mean rank correlation with beta {with_beta:.2f}",
+                f"mean rank correlation with beta {trend_text(with_beta)}",
             ),
             Part(
                 "at fixed beta the count of the cells that hunt rises with alpha (mean rank correlation at least "
                 f"{TREND:g})",
                 with_alpha >= TREND,
-                f"with alpha {with_alpha:.2f}",
+                f"with alpha {trend_text(with_alpha)}",
             ),
             Part(
                 "every alpha and every beta hunts somewhere, and the largest square without hunting covers few cells "

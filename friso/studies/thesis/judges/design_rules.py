@@ -9,7 +9,7 @@ import numpy as np
 from friso.equations.controllers.van_dijk import CROSSOVER
 from friso.frequency.crossover import WANTED, settled_margin
 from friso.hunting.margin import margin
-from friso.studies.thesis.claims import ABOUT, Evidence, Finding, Part, about, judges
+from friso.studies.thesis.claims import ABOUT, Evidence, Finding, Part, about, judges, number_text
 from friso.studies.thesis.maps import begins, ends, table
 from friso.studies.thesis.studies import thesis_rig
 
@@ -83,7 +83,7 @@ def _far() -> Part:
         f"the parasitic mode must be about {_RATIO:g} times the crossover (within a factor of {ABOUT:g}) for a "
         f"modulus margin of {WANTED:g} in all settled states, the joint free, 8 Hz",
         about(ratio, _RATIO),
-        f"{ratio:.3g} times",
+        f"{ratio:.3g} times" if np.isfinite(ratio) else f"more than {_RATIOS[-1]:g} times, the highest tried",
         why="the mass and the damping ratio of the mode, which the thesis leaves open, determine how far away it must "
         "be",
     )
@@ -110,7 +110,7 @@ def _gap(evidence: Evidence) -> Part:
     return Part(
         f"the smallest gap F_s - F_c that hunts at 8 Hz is about {_GAP:g} N (within a factor of {ABOUT:g})",
         about(smallest, _GAP),
-        f"{smallest:.2g} N",
+        number_text(smallest, ".2g", "N") if hunts.any() else "nothing hunts",
     )
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from friso.identify.readings.rate_effect import static_friction
-from friso.studies.thesis.claims import Evidence, Finding, Part, judges
+from friso.studies.thesis.claims import Evidence, Finding, Part, judges, number_text
 from friso.studies.thesis.experiments import (
     RANGE,
     SLIPS,
@@ -45,7 +45,7 @@ def judged_steps(steps: JointSteps) -> Finding:
                 f"read as in Sec. 4.2.2 the steps give the joint's stiffness: the 95 % interval holds it, and is "
                 f"within {CLOSE:.0%} of it",
                 bool(read.holds(steps.stiffness) and read.half_width <= CLOSE * steps.stiffness),
-                f"{read.value / 1e3:.4g} N/mm ({read.low / 1e3:.4g} to {read.high / 1e3:.4g}) of "
+                f"{number_text(read.value / 1e3, '.4g', 'N/mm')} ({read.low / 1e3:.4g} to {read.high / 1e3:.4g}) of "
                 f"{steps.stiffness / 1e3:.4g}, {len(steps.result.windows)} settled windows. Assumed: steps back and "
                 "forth, "
                 f"{STANDS:g} s each; no noise",
@@ -54,7 +54,7 @@ def judged_steps(steps: JointSteps) -> Finding:
             Part(
                 f"it is {_STIFFNESS / 1e3:g} N/mm (within {CLOSE:.0%})",
                 bool(abs(read.value / _STIFFNESS - 1) <= CLOSE),
-                f"{read.value / 1e3:.3g} N/mm, as entered by Sec. 3.5",
+                f"{number_text(read.value / 1e3, unit='N/mm')}, as entered by Sec. 3.5",
                 why="not in the model: cables, misalignment, the motor constant (Sec. 4.2.2). The latter alone, "
                 f"wrong by as much as the masses of Fig. 17 and 18 require, would make it {larger / 1e3:.3g} N/mm, "
                 f"and {FIRST:g} Hz "
@@ -90,7 +90,8 @@ def judged_slips(runs: tuple[SlowMotion, ...]) -> Finding:
             Part(
                 "read from the peaks at all speeds, the 95 % interval holds the static friction of the rig",
                 bool(read.determined and read.holds(truth)),
-                f"{read.value:.3g} N ({read.low:.3g} to {read.high:.3g}) of {truth:.3g}: {read.method}",
+                f"{number_text(read.value, unit='N')} ({read.low:.3g} to {read.high:.3g}) of {truth:.3g} N: "
+                f"{read.method}",
                 why=read.reason or "method: the interval misses it",
             ),
             Part(

@@ -7,7 +7,7 @@ import numpy as np
 from friso.frequency.crossover import WANTED
 from friso.frequency.margins import Margins
 from friso.frequency.ranges import Range
-from friso.studies.thesis.claims import ABOUT, ORDER, Evidence, Finding, Part, about, judges
+from friso.studies.thesis.claims import ABOUT, ORDER, Evidence, Finding, Part, about, judges, number_text
 from friso.studies.thesis.experiments import BUILT
 from friso.studies.thesis.judges.rig_loops import measured_free, measured_locked, on_the_rig
 from friso.studies.thesis.linear import FREE, FURTHER, LOCKED_LOOP, Contact, CrossoverLoops, Linear, Speeds
@@ -145,6 +145,7 @@ def free_loop_crosses_above(evidence: Evidence) -> Finding:
     analysis = evidence.analysis
     cases = analysis.free.margins[min(analysis.free.margins)]
     crossing = {name: nearest(cases[name], _CROSSES) for name in ("stuck", "sliding")}
+    crossed = ", ".join(f"{name} {number_text(f, unit='Hz')}" for name, f in crossing.items())
     highest = analysis.free.unsampled
     return Finding(
         (
@@ -152,8 +153,8 @@ def free_loop_crosses_above(evidence: Evidence) -> Finding:
                 f"tuned to 8 Hz for the whole mass, the free joint's loop crosses 0 dB about {_CROSSES:g} Hz (from "
                 f"{_CROSSES / ABOUT:.3g} to {_CROSSES * ABOUT:.3g} Hz), stuck and sliding",
                 all(about(f, _CROSSES) for f in crossing.values()),
-                f"{', '.join(f'{name} {f:.3g} Hz' for name, f in crossing.items())}; with the masses identified "
-                f"(0.75 kg, tuned for 2.5 kg) {nearest(analysis.identified, _CROSSES):.3g} Hz",
+                f"{crossed}; with the masses identified (0.75 kg, tuned for 2.5 kg) "
+                f"{nearest(analysis.identified, _CROSSES):.3g} Hz",
             ),
             Part(
                 f"the setting up to which all limit cases are stable is about {_MEASURED:g} Hz (from "

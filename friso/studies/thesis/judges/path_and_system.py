@@ -6,7 +6,7 @@ import numpy as np
 
 from friso.equations.controllers.van_dijk import CROSSOVER
 from friso.studies.thesis.claims import ABOUT, FEW, TREND, Evidence, Finding, Part, judges
-from friso.studies.thesis.maps import ends, free_square, share, share_text, table, trend
+from friso.studies.thesis.maps import ends, free_square, share, share_text, table, trend, trend_text
 from friso.studies.thesis.studies import STUDIES
 
 _ENDS = 20.0
@@ -65,8 +65,8 @@ def crossover_and_mass_end_hunting(evidence: Evidence) -> Finding:
                 "some crossovers that hunt with the marker's mass settle with the heaviest, and the limit falls with "
                 f"the mass (rank correlation at most {-TREND:g})",
                 bool(ended.any() and falls <= -TREND),
-                f"{ended.sum()} of {marker.sum()} crossovers; rank correlation {falls:.2f}: limit {by_mass[0]:.3g} Hz "
-                f"at {mass[0]:g} kg, {by_mass[-1]:.3g} Hz at {mass[-1]:g} kg",
+                f"{ended.sum()} of {marker.sum()} crossovers; rank correlation {trend_text(falls)}: limit "
+                f"{by_mass[0]:.3g} Hz at {mass[0]:g} kg, {by_mass[-1]:.3g} Hz at {mass[-1]:g} kg",
             ),
         )
     )

@@ -10,8 +10,8 @@ from friso.studies.rig.experiments.in_position import BITS, InPosition
 from friso.studies.rig.experiments.measured_cycles import AS_SLOW, MOTORS, SIMILAR
 from friso.studies.rig.experiments.stroke_crossover import StrokeCrossover
 from friso.studies.rig.hunted import Hunted
-from friso.studies.thesis.as_built import AS_BUILT, COULOMB_LEVEL, CyclesOnRails, MovesOnRails
-from friso.studies.thesis.claims import ORDER, Evidence, Finding, Part, about, judges
+from friso.studies.thesis.as_built import AS_BUILT, COULOMB_LEVEL, DISPLACEMENTS, CyclesOnRails, MovesOnRails
+from friso.studies.thesis.claims import ORDER, Evidence, Finding, Part, about, judges, number_text
 from friso.studies.thesis.experiments import GRID, MOVES, ON_RAILS, STANDSTILL
 
 _ASSUMED = (
@@ -82,7 +82,7 @@ def judged_crossovers(moves: MovesOnRails) -> Finding:
             Part(
                 f"at {moves.crossovers[1]:g} Hz a rail without peaks after the move keeps swinging after a release",
                 started > 0,
-                f"{started} of {int(settle.sum())} do, released 5 mm to either side",
+                f"{started} of {int(settle.sum())} do, released {max(DISPLACEMENTS):.0%} of the move to either side",
                 why="here the place on the rail decides, not the start; friso rig hunting finds such rails at other "
                 "crossovers",
             ),
@@ -158,13 +158,15 @@ def judged_cycles(cycles: CyclesOnRails) -> Finding:
             Part(
                 "there its two sides differ (by more than a tenth, on at least half of those that swing on)",
                 bool(len(lopsided) and np.median(lopsided) > np.log(1.1)),
-                f"larger side over the other, median {np.exp(np.median(lopsided)) if len(lopsided) else np.nan:.3g}",
+                f"larger side over the other, median {np.exp(np.median(lopsided)):.3g}"
+                if len(lopsided)
+                else "nothing swings on",
                 why="too few keep swinging",
             ),
             Part(
                 "there it is less regular from cycle to cycle (period scatters by more than a twentieth)",
                 scatter > 0.05,
-                f"median scatter of the period {scatter:.2%}",
+                f"median scatter of the period {number_text(scatter, '.2%')}",
                 why="friction at a given place is the same in each cycle: what changes from cycle to cycle is not in "
                 "the model",
             ),
@@ -217,7 +219,7 @@ def judged_standstill(standstill: InPosition) -> Finding:
             Part(
                 f"free it is of the order of {expected:g} times as large as locked",
                 about(ratio, expected, ORDER),
-                f"{ratio:.2g} times (RMS)",
+                f"ratio of RMS values: {number_text(ratio, '.2g')}",
             ),
             Part(
                 f"the joint lacks damping: ten times as much removes at least {_RECOVERED:.0%} of the difference",

@@ -6,9 +6,10 @@ from collections.abc import Callable
 
 import numpy as np
 
+from friso.studies.rig.excitation import SLIDING
 from friso.studies.rig.experiments.frf import RATIOS, MeasuredLoop, highest_stable, nearest
-from friso.studies.thesis.as_built import RigLoops
-from friso.studies.thesis.claims import ABOUT, Evidence, Part, about
+from friso.studies.thesis.as_built import AS_BUILT, RigLoops
+from friso.studies.thesis.claims import ABOUT, Evidence, Part, about, number_text
 
 _HIGHEST, _OTHER, _FREE = 48.0, 600.0, 20.0
 """Highest setting, crossing that threatens stability (Fig. 22), and the crossing of the free joint (Fig. 23) [Hz]."""
@@ -17,8 +18,9 @@ BEYOND = 3.0
 """Times the crossover from which a peak of the open loop is one of a mode."""
 
 ASSUMED = (
-    "Assumed: sample time, encoder and peak force of Sec. 3.5; one sample of delay, a current loop of 2 kHz, a rail "
-    "that varies by 20 %, a multisine of twice the static friction"
+    f"Assumed: sample time, encoder and peak force of Sec. 3.5; a delay of {AS_BUILT['drive.delay']}, a current loop "
+    f"of {AS_BUILT['drive.current_bandwidth']}, a rail that varies by {AS_BUILT['rail.static_deviation']:.0%}, a "
+    f"multisine of {SLIDING.strength:g} times the static friction"
 )
 
 
@@ -37,7 +39,8 @@ def _crossings(loops: RigLoops) -> Part:
     return Part(
         f"measured on the rig as built, every open loop crosses 0 dB about where it is tuned (within {ABOUT:g})",
         all(about(crossed, tuned) for tuned, crossed in read.items()),
-        ", ".join(f"{crossed:.3g} Hz tuned to {tuned:.3g}" for tuned, crossed in read.items()) + f". {ASSUMED}",
+        ", ".join(f"{number_text(crossed, unit='Hz')} tuned to {tuned:.3g} Hz" for tuned, crossed in read.items())
+        + f". {ASSUMED}",
         why="not in the model: friction bends the response at low frequency, or another",
     )
 
@@ -51,9 +54,11 @@ def _further(loops: RigLoops) -> Part:
         f"measured on the rig as built, that tuned to {last.tuned:g} Hz crosses 0 dB again about {_OTHER:g} Hz",
         any(about(f, _OTHER) for f in above),
         f"above the first crossing: {', '.join(f'{f:.3g} Hz' for f in above) or 'none'}; its peak there is "
-        f"{gain:.2g} at {near:.3g} Hz",
+        f"{number_text(gain, '.2g')} at {number_text(near, unit='Hz')}",
         why=f"not in the model: its only parasitic mode, that of Fig. 18, is at {near:.3g} Hz with the joint locked. "
-        "Simulation alone cannot tell",
+        "Simulation alone cannot tell"
+        if np.isfinite(near)
+        else "",
     )
 
 
@@ -73,13 +78,14 @@ def measured_free(loops: RigLoops) -> tuple[Part, Part]:
         Part(
             f"measured on the rig as built, tuned to {loops.free.tuned:g} Hz, it crosses 0 dB about {_FREE:g} Hz",
             about(crossed, _FREE),
-            f"last at {crossed:.3g} Hz. {ASSUMED}",
+            f"last crossing: {number_text(crossed, unit='Hz')}. {ASSUMED}",
             why="not in the model: with the masses identified instead of weighed it crosses lower",
         ),
         Part(
             f"the highest setting at which the rig as built comes to rest is about {_HIGHEST:g} Hz",
             about(highest, _HIGHEST),
-            f"{highest:.3g} Hz, of settings 10 % apart, released away from its reference, the limiters not touched",
+            f"{number_text(highest, unit='Hz')}, of settings 10 % apart, released away from its reference, the "
+            "limiters not touched",
             why="not in the model: the thesis found “resonances in the compliant joint”, of which the model has one, "
             "and its delays are our choice",
         ),

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from friso.studies.thesis.claims import ABOUT, ORDER, TREND, Evidence, Finding, Part, Response, judges
-from friso.studies.thesis.maps import begins, ends, table, trend
+from friso.studies.thesis.maps import begins, ends, table, trend, trend_text
+from friso.studies.thesis.studies import thesis_rig
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -30,9 +31,11 @@ def stiffness_has_a_limit(evidence: Evidence) -> Finding:
     shortest = stroke[works][0] * 1e3 if works.any() else np.nan
     span = f"{limits[works][0]:.3g} N/m at {shortest:.2g} mm, {limits[-1]:.3g} N/m at {stroke[-1] * 1e3:.2g} mm"
     force = limits[works] * stroke[works]
+    static = thesis_rig().flat()["friction.static"]
     why = (
         f"idealisation: below {shortest:.2g} mm even the softest joint of the range hunts, and at the limit the joint "
-        f"carries {force.min():.2g} to {force.max():.2g} N at its stroke, with a static friction of 3 N: the force at "
+        f"carries {force.min():.2g} to {force.max():.2g} N at its stroke, with a static friction of "
+        f"{static:g} N: the force at "
         "full stroke, on which the thesis bases its argument, does not set the limit"
         if works.any()
         else ""
@@ -48,7 +51,7 @@ def stiffness_has_a_limit(evidence: Evidence) -> Finding:
                 "the limit rises as the stroke gets smaller, over the strokes at which the softest joint settles "
                 f"(rank correlation with the stroke at most {-TREND:g})",
                 rises <= -TREND,
-                f"rank correlation {rises:.2f}: {span}" if works.any() else "the softest joint settles nowhere",
+                f"rank correlation {trend_text(rises)}: {span}" if works.any() else "the softest joint settles nowhere",
                 why if rises >= TREND else "",
             ),
             _locked_at_no_stroke(runs, evidence.responses["locked"]),
