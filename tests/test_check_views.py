@@ -270,18 +270,19 @@ def said_by_name() -> dict[str, str]:
     uncertain = fake_hunting(reason="no orbit could be closed", certain=False)
     faster, slower = Margin(1.22, None, True), Margin(0.5, None, True)
     transient = settles(verdict="transient", hunting=repels, settled_after=190.2, margin=Margin(0.975, 9.7496, True))
-    seen = hunts(hunting=fake_hunting(reason=NO_RETURN), margin=None, observed=True)
+    still = settles(verdict="transient", settled_after=None, followed=1e3)
+    seen = hunts(hunting=fake_hunting(reason=NO_RETURN), margin=None, observed=True, lasting=1.04e-3, followed=1e3)
     return {
         "hunts": sentence(hunts()),
         "hunts, unstable": sentence(hunts(), unstable=("sticks", "slides")),
         "hunts, free joint settles": sentence(hunts(), free, locked=True),
         "hunts, no margin": sentence(hunts(margin=None), free, locked=True),
         "hunts, gains": sentence(hunts(margin=faster)),
-        "hunts, observed": sentence(seen, peak_to_peak=1.04e-3, period=1.63),
+        "hunts, observed": sentence(seen),
         "bistable": sentence(hunts(verdict="bistable")),
         "bistable, no kick starts it": sentence(hunts(verdict="bistable", displacement=none, push=none, moves=None)),
         "transient": sentence(transient, peak_to_peak=6.9e-4, period=1.33),
-        "transient, at rest": sentence(settles(verdict="transient", settled_after=None), peak_to_peak=1e-7),
+        "transient, at rest": sentence(still, peak_to_peak=1e-7),
         "transient, cannot hunt": sentence(cannot_hunt("transient"), peak_to_peak=0.383, period=6.36),
         "settles": sentence(settles()),
         "settles, no margin": sentence(settles(margin=None)),

@@ -90,7 +90,8 @@ def _transient(case: Case) -> str:
     if judgement.cycle:
         says.append(f"Transients change slowly, by a factor of e in {with_unit(judgement.cycle.time_constant, 's')}.")
     if judgement.settled_after is None:
-        says.append(f"It does not settle to within {BANDS[_TEN_MICRON]} in {with_unit(judgement.followed, 's')} either.")
+        followed = with_unit(judgement.followed, "s")
+        says.append(f"It does not settle to within {BANDS[_TEN_MICRON]} in {followed} either.")
     else:
         says.append(f"It settles to within {BANDS[_TEN_MICRON]} in {with_unit(judgement.settled_after, 's')}.")
     return " ".join(says)
