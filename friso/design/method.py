@@ -28,7 +28,7 @@ from friso.stage import Stage
 STROKES = 4
 """Strokes that are tried where the specification leaves a range, the largest first."""
 
-FIRST, BEYOND, STEPS = 1 / 40, 3.0, 12
+FIRST, BEYOND, STEPS = 1 / 40, 3.0, 24
 """Where edges are searched, in units of the machine's limit: from there to there, in so many steps."""
 
 ABOVE = 2.0

@@ -89,9 +89,9 @@ class Attractors:
 def attractors(
     stages: Ensemble, thorough: bool = False, rtol: float = RTOL, tried: np.ndarray | None = None
 ) -> Attractors:
-    """What attracts: everything that simulations from many starts end in. Of many stages at once one motion that
-    attracts is enough; a `thorough` survey looks for all of them and for the cycles that the return map suggests, and
-    where simulations alone tell what it finds, it tries them at a hundredth of the tolerance. Orbits are closed to the
+    """What attracts: everything that simulations from many starts end in, and the cycles that the return map suggests.
+    Of many stages at once one motion that attracts is enough; a `thorough` survey looks for all of them, and where
+    simulations alone tell what it finds, it tries them at a hundredth of the tolerance. Orbits are closed to the
     relative tolerance. Motions begin from the distances `tried` [m], (count, n), too, where they are finite."""
     survey, every = Survey(stages.count, thorough, rtol), np.arange(stages.count)
     suggested = families(stages, rtol) if thorough else ()
@@ -106,9 +106,28 @@ def attractors(
         starts.stuck_at(tried)
     for runs, of in starts.waves(thorough):
         survey.follow(runs, of)
+    if not thorough:
+        _try_cycles(stages, survey, rtol)
     known = survey.attracted | ~survey.unknown
     first = Attractors(tuple(survey.attracting), known, typical_period(stages), suggested, np.zeros(stages.count, bool))
     return _tried_again(stages, first, rtol) if thorough else first
+
+
+def _try_cycles(stages: Ensemble, survey: Survey, rtol: float) -> None:
+    """Follow stages that nothing attracts so far from the cycles that the return map suggests: near a fold these
+    attract from less far than starts are apart."""
+    left = np.flatnonzero(~survey.attracted)
+    if not left.size:
+        return
+    some = stages.take(left)
+    starts = Starts(some)
+    for cycles in families(some, rtol):
+        survey.slow_down(left, cycles)
+        starts.beside(cycles)
+        if (drawn := np.flatnonzero(cycles.attracting)).size:
+            survey.confirm(starts.on(cycles, drawn), left[drawn], cycles.take(drawn))
+    for runs, of in starts.waves(thorough=True):
+        survey.follow(runs, left[of])
 
 
 def _tried_again(stages: Ensemble, first: Attractors, rtol: float) -> Attractors:

@@ -96,14 +96,15 @@ def _stroke(design: Design) -> str:
 
 
 def _worst(corners: Corners, design: Design) -> list[str]:
-    """The corner that decides, and those of which nothing is known."""
+    """The corner that decides, and how many have an edge that is not certain."""
     sentences = []
     if corners.hunts:
         count = corners.population.count
         sentences.append(f"Worst of {count} corners: {corner(corners, design.stage.flat())}.")
     if corners.unknown:
         sentences.append(
-            f"In {corners.unknown} corners a decisive run failed at some crossover; there the corner counts as hunting."
+            f"In {corners.unknown} of {corners.population.count} corners the edge is not certain: simulations below it "
+            "failed or had not settled when they were stopped, which counts as hunting."
         )
     return sentences
 
