@@ -3,6 +3,7 @@
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
+import friso.interrupts  # isort: skip  (first: what follows takes a while)
 import friso.equations.controllers  # registers the controllers with the stage file
 import friso.equations.friction  # and the friction laws
 import friso.flexure.joint  # noqa: F401 (and what follows from leaf springs)

@@ -5,6 +5,7 @@ import os
 import struct
 import sys
 import zlib
+from contextlib import suppress
 from pathlib import Path
 
 import log_files
@@ -578,3 +579,15 @@ def test_pipes_and_devices_are_refused_at_once(tmp_path: Path, refused: Refused)
     for path in (tmp_path / "a.csv", Path("/dev/zero")):
         with refused("log"):
             read_table(path)
+
+
+@pytest.mark.parametrize("column", [0, 2])
+def test_a_cell_of_forty_thousand_digits_is_no_trouble(tmp_path: Path, column: int) -> None:
+    """Which once took a time that grew with the square of their number."""
+    rows = [[f"{k}", f"{k % 7}", f"{k % 5}"] for k in range(300)]
+    for row in rows:
+        row[column] = "1" * 40_000
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join(["time [s],position [mm],force [N]", *map(",".join, rows)]))
+    with suppress(InputError):
+        read_table(path)

@@ -14,6 +14,7 @@ from typing import Annotated, Any, NoReturn
 import typer
 from typer.core import TyperCommand
 
+from friso import interrupts
 from friso.cli.bode import bode
 from friso.cli.boundary import boundary
 from friso.cli.check import check
@@ -29,6 +30,7 @@ from friso.cli.map import map_cells
 from friso.cli.reproduce import reproduce
 from friso.cli.rig import listed_experiments, rig
 from friso.cli.simulate import simulate
+from friso.cli.terminal import escaping
 from friso.errors import InputError
 from friso.stage.foreign import installed
 from friso.version import VERSION
@@ -85,36 +87,58 @@ def main() -> NoReturn:
             stream.reconfigure(errors="replace")  # a terminal that knows no dash still gets its answer
     if len(sys.argv) == 1:
         sys.argv.append("--help")
+    with escaping():
+        sys.exit(_status())
+
+
+def _status() -> int:
+    """Run the command; the status with which the process ends."""
+    signal = 0
+    try:
+        with interrupts.raising():
+            try:
+                status = _run()
+            finally:
+                signal = interrupts.came()
+    except BaseException as error:
+        signal = signal or interrupts.came() or (2 if isinstance(error, KeyboardInterrupt | typer.Abort) else 0)
+        if not signal:
+            return _failed(error)
+        status = INTERRUPTED
+    if status == INTERRUPTED:  # typer's word for Ctrl-C too
+        say("interrupted" if signal in (0, 2) else "terminated")
+        return 128 + signal if signal else INTERRUPTED
+    return status
+
+
+def _run() -> int:
+    """Run the command; its status."""
     messages = logging.StreamHandler(sys.stderr)
     messages.setFormatter(logging.Formatter("friso: %(message)s"))
     logging.getLogger("friso").addHandler(messages)
-    try:
-        if {"-h", "--help"} & {*sys.argv[1:2]}:
-            app.info.epilog = _plug_ins()
-        status = app(standalone_mode=False) or 0
-        if status == INTERRUPTED:  # typer's word for Ctrl-C
-            say("interrupted")
-        sys.exit(status)
-    except typer.Exit as leave:
-        sys.exit(leave.exit_code)
-    except (typer.Abort, KeyboardInterrupt):
-        say("interrupted")
-        sys.exit(INTERRUPTED)
-    except BrokenPipeError:
+    if {"-h", "--help"} & {*sys.argv[1:2]}:
+        app.info.epilog = _plug_ins()
+    return app(standalone_mode=False) or 0
+
+
+def _failed(error: BaseException) -> int:
+    """Say what went wrong; the status with which the process ends. Raises what nobody should meet."""
+    if isinstance(error, typer.Exit):
+        return error.exit_code
+    if isinstance(error, BrokenPipeError):
         sys.stderr.close()
-        sys.exit(1)
-    except InputError as error:
+        return 1
+    if isinstance(error, InputError):
         say(str(error))
-        sys.exit(2)
-    except Exception as error:
-        usage = getattr(error, "format_message", None)
-        if usage is not None:
-            say(f"{usage()}\n  try: friso --help")
-            sys.exit(2)
-        if isinstance(error, RuntimeError | OSError | MemoryError):
-            say(f"the computation could not be completed: {error}")
-            sys.exit(1)
-        raise
+        return 2
+    usage = getattr(error, "format_message", None)
+    if usage is not None:
+        say(f"{usage()}\n  try: friso --help")
+        return 2
+    if isinstance(error, RuntimeError | OSError | MemoryError):
+        say(f"the computation could not be completed: {error}")
+        return 1
+    raise error
 
 
 def _plug_ins() -> str:

@@ -11,7 +11,9 @@ from typing import Annotated
 
 import typer
 
+from friso.cli.terminal import console
 from friso.errors import InputError
+from friso.escapes import one_line
 from friso.quantities import Quantity, positive
 from friso.stage import Stage, load, parse_set
 
@@ -47,22 +49,22 @@ def print_answer(
 
 def print_table(title: str, columns: Sequence[str], rows: Sequence[tuple[str, list[str]]]) -> None:
     """A table whose rows have names; columns that do not fit beside each other go into further tables below."""
-    from rich.console import Console
     from rich.table import Table
 
-    console = Console(highlight=False, markup=False)
-    texts = [["", *(label for label, _ in rows)], *zip(columns, *(row for _, row in rows), strict=True)]
+    screen = console(sys.stdout, highlight=False, markup=False)
+    lines = [["", *(label for label, _ in rows)], *zip(columns, *(row for _, row in rows), strict=True)]
+    texts, title = [[*map(one_line, column)] for column in lines], one_line(title)
     narrow = [_narrow(column) for column in texts]
-    for part in _side_by_side(narrow, console.width - 1):
+    for part in _side_by_side(narrow, screen.width - 1):
         table = Table(title=title or None, title_justify="left")
-        spare = max(0, console.width - 1 - sum(narrow[k] + _BORDER for k in part))
+        spare = max(0, screen.width - 1 - sum(narrow[k] + _BORDER for k in part))
         for k in part:
             width = min(max(map(len, texts[k])), narrow[k] + spare)
             spare -= width - narrow[k]
             table.add_column(texts[k][0], width=width)
         for row in zip(*(texts[k][1:] for k in part), strict=True):
             table.add_row(*row)
-        console.print(table)
+        screen.print(table)
         title = ""
 
 

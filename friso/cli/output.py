@@ -17,6 +17,7 @@ import typer
 
 from friso.cli.drafts import DRAFTS, Drafts, made
 from friso.errors import InputError
+from friso.escapes import one_line
 from friso.progress import Progress, silent
 from friso.quantities import as_toml
 from friso.version import VERSION
@@ -116,7 +117,7 @@ def print_document(document: Mapping[str, Any], files: Iterable[Path] | None = N
 def print_written(files: Iterable[Path]) -> None:
     """Every file on a line of its own."""
     for file in files:
-        print(f"wrote {file}")
+        print(f"wrote {one_line(str(file))}")
 
 
 def _marked(folder: Path) -> tuple[str, tuple[str, ...]]:

@@ -6,6 +6,9 @@ import sys
 from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING, Self
 
+from friso.cli.terminal import console
+from friso.escapes import one_line
+
 if TYPE_CHECKING:
     from rich.progress import Progress as Display
     from rich.progress import TaskID
@@ -25,7 +28,7 @@ class ProgressBar(AbstractContextManager["ProgressBar"]):
     def __enter__(self) -> Self:
         if sys.stderr.isatty():
             self.display = _display()
-            self.task = self.display.add_task(self.what, total=None)
+            self.task = self.display.add_task(one_line(self.what), total=None)
             self.display.start()
         return self
 
@@ -36,11 +39,10 @@ class ProgressBar(AbstractContextManager["ProgressBar"]):
 
     def __call__(self, done: int, total: int, what: str, /) -> None:
         if self.display is not None and self.task is not None:
-            self.display.update(self.task, completed=done, total=total or None, description=what)
+            self.display.update(self.task, completed=done, total=total or None, description=one_line(what))
 
 
 def _display() -> Display:
-    from rich.console import Console
     from rich.progress import (
         BarColumn,
         MofNCompleteColumn,
@@ -58,5 +60,11 @@ def _display() -> Display:
         def render(self, task: Task) -> Text:
             return Text(f"{task.speed:,.0f}/s" if task.speed and task.speed >= 1 else "")
 
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), Rate(), TimeRemainingColumn())
-    return Progress(*columns, console=Console(stderr=True), transient=True)
+    columns = (
+        TextColumn("{task.description}", markup=False),
+        BarColumn(),
+        MofNCompleteColumn(),
+        Rate(),
+        TimeRemainingColumn(),
+    )
+    return Progress(*columns, console=console(sys.stderr), transient=True)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from friso.escapes import table_cell
 from friso.studies.cells import WORDS
 
 if TYPE_CHECKING:
@@ -49,7 +50,9 @@ def _write_csv(runs: xr.Dataset, path: Path) -> None:
         for first in range(0, shape[0], rows):
             part = runs.isel({dims[0]: slice(first, first + rows)})
             frame: pd.DataFrame = part.to_dataframe(dim_order=dims).reset_index()
-            named = {name: _with_unit(runs, str(name)) for name in frame.columns}
+            named = {name: table_cell(_with_unit(runs, str(name))) for name in frame.columns}
+            for name in frame.columns[[kind.kind not in "biuf" for kind in frame.dtypes]]:
+                frame[name] = frame[name].astype(str).map(table_cell)
             frame.rename(columns=named).to_csv(file, index=False, header=first == 0)
 
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup
 
+from friso.escapes import escaped
 from friso.stage.foreign import foreign
 from friso.version import VERSION
 from friso.views.drawing import matplotlib_renderer, plotly_renderer
@@ -65,10 +66,19 @@ class Report:
 def environment() -> Environment:
     """The templates of friso/views/templates; texts are escaped, a name without a value is an error."""
     templates = Environment(
-        loader=PackageLoader("friso.views"), autoescape=True, undefined=StrictUndefined, trim_blocks=True
+        loader=PackageLoader("friso.views"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        finalize=_shown,
     )
     templates.tests["starting"] = str.startswith
     return templates
+
+
+def _shown(value: Any) -> Any:
+    """What a template puts into a page: texts escaped, markup of friso's own as it is."""
+    return value if isinstance(value, Markup) or not isinstance(value, str) else escaped(value)
 
 
 def print_image(figure: Figure) -> str:

@@ -19,7 +19,8 @@ HEAD_LINES = 1000
 _BYTE_ORDER_MARKS = ((codecs.BOM_UTF8, "utf-8-sig"), (codecs.BOM_UTF16_LE, "utf-16"), (codecs.BOM_UTF16_BE, "utf-16"))
 _CANDIDATES = ((";", "."), (";", ","), ("\t", "."), ("\t", ","), (",", "."), (" ", "."), (" ", ","), (",", ","))
 """Delimiter and decimal sign; of two that fit equally well the first is taken."""
-_NUMBER = re.compile(r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?|[+-]?(?:nan|inf(?:inity)?)|true|false", re.IGNORECASE)
+_DIGITS = r"(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d+)?"  # one way to read a run of digits: thousands take no time
+_NUMBER = re.compile(rf"[+-]?{_DIGITS}|[+-]?(?:nan|inf(?:inity)?)|true|false", re.IGNORECASE)
 _CLOCK = r"\d{1,2}:\d{2}(?::\d{2}(?:[.,]\d+)?)?"
 DOS_END = "\x1a"
 """Ctrl-Z, with which programs of DOS end a text."""

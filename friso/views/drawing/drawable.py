@@ -6,11 +6,12 @@ Both renderers start here, so that they draw the same arrays.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import replace
-from typing import TypeVar
+from dataclasses import fields, is_dataclass, replace
+from typing import Any, TypeVar
 
 import numpy as np
 
+from friso.escapes import escaped
 from friso.views.drawing.figure import Array, Axis, Coloured, Figure, Kind, Limit, Markers, Panel, Series
 from friso.views.drawing.prefixes import choose, pretty
 from friso.views.drawing.thinning import thin
@@ -20,7 +21,18 @@ Field = TypeVar("Field", bound=Coloured)
 
 def drawable(figure: Figure) -> Figure:
     """The figure with prefixed units, thinned series, limits as series, and markers that can be drawn."""
-    return replace(figure, panels=tuple(_panel(panel) for panel in figure.panels))
+    return _shown(replace(figure, panels=tuple(_panel(panel) for panel in figure.panels)))
+
+
+def _shown(part: Any) -> Any:
+    """A part of a figure whose texts are escaped: they may come from a file."""
+    if isinstance(part, str):
+        return escaped(part)
+    if isinstance(part, tuple):
+        return tuple(map(_shown, part))
+    if is_dataclass(part) and not isinstance(part, type):
+        return replace(part, **{field.name: _shown(getattr(part, field.name)) for field in fields(part)})
+    return part
 
 
 def cell_edges(centres: Array, *, log: bool = False) -> Array:

@@ -1,0 +1,90 @@
+"""Ctrl-C, a termination and a closed terminal end the command line in one line, whenever they come.
+
+Importing friso and its libraries takes up to a second, in which an exception is lost, or ends in a traceback out of a
+library that is half there. So a signal raises KeyboardInterrupt only where no import is under way, and before the
+command begins it is noted. Nothing is installed where friso is used as a library.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
+from typing import Any
+
+_SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
+
+_AGAIN = 0.02
+"""After how long [s] it is looked again whether an import has ended."""
+
+_came: list[int] = []
+_raising = False
+
+
+def came() -> int:
+    """The signal that came first, 0 for none."""
+    return _came[0] if _came else 0
+
+
+@contextmanager
+def raising() -> Iterator[None]:
+    """Signals raise KeyboardInterrupt within, one that came before at once. In another thread than the main one they
+    are as they were."""
+    global _raising
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = _install()
+    _raising = True
+    try:
+        if came():
+            raise KeyboardInterrupt
+        yield
+    finally:
+        _raising = False
+        if not _IS_COMMAND:  # which ends now, and is not to be interrupted in that
+            _came.clear()
+            for number, handler in before.items():
+                signal.signal(number, handler)
+
+
+def _install() -> dict[int, Any]:
+    """Take the signals, but those that are ignored (nohup); what was done with them before."""
+    before = {number: signal.getsignal(number) for number in _SIGNALS}
+    for number in (number for number, handler in before.items() if handler is not signal.SIG_IGN):
+        signal.signal(number, _arrived)
+    return {number: handler for number, handler in before.items() if handler is not None}
+
+
+def _arrived(number: int, frame: FrameType | None) -> None:
+    if number in _SIGNALS:
+        _came.append(number)
+    if not _raising:
+        return
+    if _imports(frame) and hasattr(signal, "setitimer"):
+        signal.signal(signal.SIGALRM, _arrived)
+        signal.setitimer(signal.ITIMER_REAL, _AGAIN)
+        return
+    raise KeyboardInterrupt
+
+
+def _imports(frame: FrameType | None) -> bool:
+    """Whether an import is under way."""
+    while frame is not None:
+        if frame.f_code.co_filename == "<frozen importlib._bootstrap>":
+            return True
+        frame = frame.f_back
+    return False
+
+
+_IS_COMMAND = ("-m", "friso.cli") in zip(sys.orig_argv, sys.orig_argv[1:], strict=False) or (
+    os.path.splitext(os.path.basename(sys.argv[0]))[0] == "friso"
+)
+"""Whether this process was started as friso, or as python -m friso.cli."""
+
+if _IS_COMMAND:
+    _install()

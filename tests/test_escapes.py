@@ -1,0 +1,104 @@
+r"""Texts of files that are shown: nothing of theirs steers a terminal, a reader or a spreadsheet."""
+
+import io
+import re
+import sys
+import unicodedata
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from hypothesis import given
+from hypothesis import strategies as st
+from inside import friso_inside
+
+from friso.cli.terminal import Escaping, console
+from friso.escapes import escaped, one_line, table_cell
+from friso.studies.export import export
+from friso.views.drawing import matplotlib_renderer, plotly_renderer
+from friso.views.drawing.figure import Axis, Figure, Panel, Series
+
+EXAMPLES = Path(__file__).parent.parent / "examples"
+HOSTILE = "\x1b[2J\x1b]0;owned\x07 \u202egnp.exe \x9b31m \u2066x\r"
+
+
+def steers(text: str) -> list[str]:
+    """The characters of a text that are no letters, signs or ends of lines."""
+    return [c for c in text if unicodedata.category(c) in ("Cc", "Cf", "Cs", "Zl", "Zp") and c not in "\n\t"]
+
+
+@given(st.text(st.characters()))
+def test_no_text_steers(text: str) -> None:
+    for character in steers(escaped(text)):
+        assert unicodedata.category(character) == "Cf"  # a sign of a script, which joins numbers or letters
+        assert unicodedata.bidirectional(character) in ("AN", "ON", "L", "BN", "NSM")
+    assert "\n" not in one_line(text)
+    assert table_cell(text)[:1] not in ("=", "+", "-", "@", "\t")
+
+
+@pytest.mark.parametrize("text", ["Ångström µm²", "שלום", "ruler −5 °C", "a\tb\nc", "日本"])
+def test_a_harmless_text_stays(text: str) -> None:
+    assert escaped(text) == text
+
+
+def test_what_is_written_out_can_be_read() -> None:
+    assert escaped("\x1b[2J\u202ex") == r"\x1b[2J\u202ex"
+
+
+def hostile_stage(folder: Path) -> Path:
+    stage = (EXAMPLES / "thesis_rig.toml").read_text(encoding="utf-8")
+    written = HOSTILE.encode("unicode_escape").decode().replace("\\x", "\\u00")
+    stage = re.sub("^(name|source) = .*$", lambda match: f'{match[1]} = "{written}"', stage, flags=re.MULTILINE)
+    path = folder / "hostile.toml"
+    path.write_text(stage, encoding="utf-8")
+    return path
+
+
+def test_a_stage_file_steers_neither_terminal_nor_page(tmp_path: Path) -> None:
+    done = friso_inside(tmp_path, "bode", hostile_stage(tmp_path), "--out", "out")
+    assert done.returncode == 0
+    assert not steers(done.stdout + done.stderr)
+    (page,) = (tmp_path / "out").glob("*.html")
+    assert r"\x1b[2J" in page.read_text(encoding="utf-8")
+    text = re.sub(r"<script.*?</script>", "", page.read_text(encoding="utf-8"), flags=re.DOTALL)
+    assert not steers(text)
+
+
+def test_a_path_steers_nothing(tmp_path: Path) -> None:
+    done = friso_inside(tmp_path, "check", f"{HOSTILE}.toml")
+    assert done.returncode == 2
+    assert not steers(done.stderr)
+
+
+def test_a_picture_shows_what_a_text_is() -> None:
+    line = Series(np.arange(3.0), np.arange(3.0), HOSTILE, "#000000")
+    figure = Figure("name", HOSTILE, HOSTILE, (Panel(HOSTILE, Axis(HOSTILE, "m"), Axis("y", "m"), (line,)),))
+    ET.fromstring(matplotlib_renderer.image(figure, "svg"))  # what a control character would break
+    assert not steers(plotly_renderer.fragment(figure))
+
+
+def test_a_table_for_a_spreadsheet_has_no_formulas(tmp_path: Path) -> None:
+    words = np.array(["=cmd()", "@x", HOSTILE], dtype=object)
+    runs = xr.Dataset({"outcome": ("=key", words), "peaks": ("=key", [-1.0, 2.0, 3.0])}, {"=key": words})
+    export(runs, tmp_path / "map.csv")
+    text = (tmp_path / "map.csv").read_text(encoding="utf-8")
+    assert not steers(text)
+    assert [line.split(",")[0][:2] for line in text.splitlines()] == ["'=", "'=", "'@", r"\x"]
+    assert ",-1.0" in text
+
+
+def test_friso_draws_on_the_terminal_itself() -> None:
+    class Screen(io.StringIO):
+        def isatty(self) -> bool:
+            return True
+
+    screen = Screen()
+    out = Escaping(screen)
+    print("\x1b[2J", file=out)  # pyright: ignore[reportArgumentType]
+    console(out, force_terminal=True, color_system="standard").print("[bold]x[/]")  # pyright: ignore[reportArgumentType]
+    assert screen.getvalue().startswith("\\x1b[2J\n")
+    assert "\x1b[1m" in screen.getvalue()
+    assert out.isatty()
+    assert sys.stdout is not out

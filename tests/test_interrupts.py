@@ -1,0 +1,70 @@
+"""Ctrl-C and a termination at any moment: one line, and the status that shells know."""
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import pytest
+from inside import friso_inside
+
+from friso import interrupts
+
+RIG = Path(__file__).parent.parent / "examples" / "thesis_rig.toml"
+COMMAND = [sys.executable, "-X", "importtime", "-m", "friso.cli", "bode", str(RIG)]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_signal_while_friso_starts_is_one_line(tmp_path: Path, seed: int) -> None:
+    """After a random one of the modules that are imported."""
+    number = [signal.SIGINT, signal.SIGTERM][seed % 2]
+    wanted = random.Random(seed).randrange(10, 400)
+    with subprocess.Popen(COMMAND, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stderr is not None
+        imported = 0
+        for line in process.stderr:
+            imported += imported > 0 or "friso.interrupts" in line
+            if imported == wanted:
+                process.send_signal(number)
+        assert process.wait() == 128 + number
+    assert line == f"friso: {'interrupted' if number == signal.SIGINT else 'terminated'}\n"
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize("becomes", [None, ImportError("a library that is half there"), SystemExit(0)])
+def test_a_signal_that_a_library_turns_into_something_else(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: signal.Signals, becomes: BaseException | None
+) -> None:
+    def interrupted(*_: Any, **__: Any) -> None:
+        try:
+            os.kill(os.getpid(), number)
+            time.sleep(10)
+        except KeyboardInterrupt:
+            if becomes is not None:
+                raise becomes from None
+            raise
+
+    monkeypatch.setattr("friso.cli.bode.read_stage", interrupted)
+    before = signal.getsignal(number)
+    done = friso_inside(tmp_path, "bode", RIG)
+    assert done.returncode == 128 + number
+    assert done.stderr == f"friso: {'interrupted' if number == signal.SIGINT else 'terminated'}\n"
+    assert signal.getsignal(number) is before
+
+
+def test_an_import_that_is_under_way_ends_first(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "half_there.py").write_text("import os, signal\nos.kill(os.getpid(), signal.SIGINT)\nwhole = True\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(KeyboardInterrupt), interrupts.raising():
+        _import_and_wait()
+    assert sys.modules["half_there"].whole
+
+
+def _import_and_wait() -> None:
+    import_module("half_there")
+    time.sleep(10)
