@@ -192,6 +192,17 @@ def test_amplitudes_over_many_decades_are_logarithmic_and_end_above_the_noise():
     assert not only_map(map_figure(plain(), "peak_to_peak")).log
 
 
+def test_cells_without_a_measure_of_what_attracts_say_why():
+    runs = plain()
+    words = np.full(runs["peaks"].shape, "cycle", dtype=object)
+    words[0, :3] = "nothing", "unknown", "swing"
+    runs["attractor"] = (runs["peaks"].dims, words)
+    runs["multiplier"] = (runs["peaks"].dims, np.where(words == "cycle", -0.5, np.nan))
+    shown = kinds_shown(only_map(map_figure(runs, "multiplier")))
+    labels = {kind.label for row in shown for kind in row if kind}
+    assert labels == {"nothing attracts", "not certain what attracts", "attracts, but not closed as an orbit"}
+
+
 def test_variables_may_be_missing():
     runs = plain()[["peak_to_peak"]]
     runs["peak_to_peak"][1, 1] = np.nan

@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
+from beyond_flip import CREEPING
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from refusals import Refused
@@ -249,12 +250,13 @@ def test_an_unknown_metric_is_refused(rig: Stage, refused: Refused) -> None:
         friso.sweep(rig, {"controller.crossover": ["8 Hz"]}, metrics=["loudness"])
 
 
-def test_measures_of_the_hunting_cycle_are_those_of_the_stage_alone(rig: Stage) -> None:
-    """Asked for by name; the motion plays no part, and a cell without a cycle has no number."""
+def test_measures_of_what_attracts_are_those_of_the_stage_alone(rig: Stage) -> None:
+    """Asked for by name; the motion plays no part, and a cell that nothing attracts has no number."""
     locked = rig.replace({"joint.locked": True})
     axes = {"controller.crossover": ["4 Hz", "8 Hz", "30 Hz"], "motion.acceleration": ["1 m/s^2", "100 m/s^2"]}
     runs = friso.sweep(locked, axes, metrics=["multiplier", "amplitude", "cycle_period", "peaks"])
-    assert set(runs.data_vars) == {"peaks", "multiplier", "amplitude", "cycle_period", "outcome", "status"}
+    assert set(runs.data_vars) == {"peaks", "multiplier", "amplitude", "cycle_period", "outcome", "attractor", "status"}
+    assert runs.attractor.values[:, 0].tolist() == ["cycle", "cycle", "nothing"]
     for name in ("multiplier", "amplitude", "cycle_period"):
         assert np.array_equal(runs[name].values[:, 0], runs[name].values[:, 1], equal_nan=True)
         assert np.isnan(runs[name].values[2]).all()
@@ -265,3 +267,17 @@ def test_measures_of_the_hunting_cycle_are_those_of_the_stage_alone(rig: Stage) 
     assert found == pytest.approx(alone, rel=1e-9)
     assert runs.multiplier.attrs["units"] == "1"
     assert "multiplier" not in friso.sweep(locked, {"controller.crossover": ["8 Hz"]})
+
+
+def test_measures_are_those_of_an_asymmetric_cycle_where_that_attracts() -> None:
+    """The symmetric cycle repels at both crossovers; the other one is 0.876 mm large at the lower, by simulations at
+    1e-7 and 1e-9, and gone at the higher."""
+    metrics = ["multiplier", "amplitude", "verdict"]
+    runs = friso.sweep(CREEPING, {"controller.crossover": ["12.3332 Hz", "13.3 Hz"]}, metrics=metrics)
+    assert runs.attractor.values[0] in ("cycle", "swing")
+    assert runs.attractor.values[1] == "nothing"
+    assert runs.verdict.values[0] in ("hunts", "bistable")
+    assert runs.verdict.values[1] in ("settles", "transient")
+    assert runs.amplitude.values[0] == pytest.approx(0.876e-3, rel=0.01)
+    assert not abs(runs.multiplier.values[0]) >= 1
+    assert np.isnan([runs.amplitude.values[1], runs.multiplier.values[1]]).all()

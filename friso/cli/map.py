@@ -53,7 +53,7 @@ def map_cells(
         typer.Option(
             metavar="NAME",
             help="Quantity that colours the map; of runs: outcome (what they do at their end), peaks, ...; "
-            "of the cycles of the stage: verdict, multiplier, amplitude, period.",
+            "of what attracts the stage: verdict, multiplier, amplitude, period.",
         ),
     ] = "outcome",
     rtol: Annotated[

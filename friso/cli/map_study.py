@@ -14,7 +14,7 @@ import numpy as np
 from friso.cli.common import key_values
 from friso.errors import InputError
 from friso.stage import Stage
-from friso.studies.cells import BY_CYCLES, CYCLE_UNITS, METRICS, USUAL
+from friso.studies.cells import BY_ATTRACTORS, CYCLE_UNITS, METRICS, USUAL
 from friso.studies.execute import Crew
 from friso.studies.refine import FINER, SHARE, finer
 from friso.studies.request import Request
@@ -73,7 +73,7 @@ def study_for(stage: Stage, varied: Varied, metric: str, refine: bool, most: int
     runs = int(request.size() * (SHARE * FINER ** len(axes) if refine else 1))
     if most is not None and runs > most:
         raise _too_large(runs, request.trial(), crew)
-    metrics = (*USUAL, *CYCLE_UNITS) if metric in (*BY_CYCLES, "period") else USUAL
+    metrics = (*USUAL, *CYCLE_UNITS) if metric in (*BY_ATTRACTORS, "period") else USUAL
     metrics = (*metrics, "verdict") if metric == "verdict" else metrics
     study = request.study(metrics)
     return finer(study) if refine else study

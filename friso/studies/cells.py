@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from typing import Any, TypeVar
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -14,8 +14,6 @@ from friso.equations.structure import Structure, decisive_keys, structure
 from friso.hunting.attractors import Attractors, attractors
 from friso.hunting.criteria import peak_count, run_outcome, stage_verdict
 from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.find import Cycles, hunting_cycles
-from friso.hunting.cycle.hunting import why_not
 from friso.hunting.measures import BANDS, Measures, measure, options
 from friso.hunting.verdict import Motions, can_hunt, judge_runs
 from friso.stage import Stage, numeric_keys, violations
@@ -38,29 +36,40 @@ RUN_UNITS = {
 """The numeric measures of a cell's run and their units."""
 
 CYCLE_UNITS = {"multiplier": "1", "amplitude": "m", "cycle_period": "s"}
-"""Those of its hunting cycle, which are computed if asked for: NaN where there is none, or none could be closed."""
+"""Those of what attracts its stage, which are computed if asked for: of the largest swing where several are found; NaN
+where nothing attracts, the multiplier also where no orbit could be closed."""
 
 UNITS = RUN_UNITS | CYCLE_UNITS
 """All numeric measures and their units."""
 
-WORDS = {"outcome": "<U9", "verdict": "<U9", "status": "<U160"}
+CYCLE, SWING, NOTHING, UNKNOWN = "cycle", "swing", "nothing", "unknown"
+"""What attracts a stage: a cycle that was closed as an orbit; a swing that simulations do not leave, of which no orbit
+could be closed; nothing; or it is not certain, because simulations failed or had not settled when they were stopped."""
+
+WORDS = {"outcome": "<U9", "verdict": "<U9", "attractor": "<U9", "status": "<U160"}
 """The measures that are words, and how they are stored; a status longer than that is cut."""
 
 ALWAYS = ("outcome", "status")
-"""The words of every cell; the verdict, which needs the cycles, is found if asked for."""
+"""The words of every cell; the verdict and what attracts are found if asked for."""
 
 USUAL = (*RUN_UNITS, *ALWAYS)
 """What is known of every cell."""
 
-BY_CYCLES = (*CYCLE_UNITS, "verdict")
-"""What needs the hunting cycles, and is computed if asked for."""
+BY_ATTRACTORS = (*CYCLE_UNITS, "attractor", "verdict")
+"""What needs a survey of what attracts, and is computed if asked for."""
 
 METRICS = (*RUN_UNITS, *CYCLE_UNITS, *WORDS)
 """Everything that may be known of a cell."""
 
+OF_ATTRACTORS = (
+    "what attracts the stage, by a survey of simulations from many starts: of several swings that attract the largest "
+    "that was found"
+)
+
 CRITERIA = {
     "outcome": run_outcome.CRITERION,
     "verdict": stage_verdict.CRITERION,
+    **dict.fromkeys(("attractor", *CYCLE_UNITS), OF_ATTRACTORS),
     "peaks": peak_count.CRITERION,
     "distinct_peaks": peak_count.DISTINCT_CRITERION,
 }
@@ -89,70 +98,59 @@ def run_cells(
 ) -> Columns:
     """Run one stage per entry of the columns: axis names to SI values, words or booleans, each of shape (cells,).
 
-    The result holds `USUAL`, and of `BY_CYCLES` what is among the metrics, each of shape (cells,). A cell that no stage
-    may have has the outcome (and the verdict) "invalid" and the reason in its status; one that a run did not complete
-    for has "failed". Setting cancel[0] from another thread ends the work early: cells not run by then keep the outcome
-    "".
+    The result holds `USUAL`, and of `BY_ATTRACTORS` what is among the metrics, each of shape (cells,). A cell that no
+    stage may have has the outcome (and the verdict) "invalid" and the reason in its status; one that a run did not
+    complete for has "failed". Setting cancel[0] from another thread ends the work early: cells not run by then keep the
+    outcome "".
     """
-    table = _Table(len(next(iter(columns.values()))), (*USUAL, *(name for name in BY_CYCLES if name in metrics)))
-    parts = list(_by_words(stage, links, columns))
+    table = _Table(len(next(iter(columns.values()))), (*USUAL, *(name for name in BY_ATTRACTORS if name in metrics)))
+    parts = list(by_words(stage, links, columns))
     for flat, cells in parts:
         table.invalidate(cells, flat)
     for flat, cells, shape in _groups(parts, table.valid):
         for runs in run_chunks(kernel(shape), flat, len(cells), options(rtol, threads, cancel)):
             table.write(cells[runs.numbers], measure(runs.part(flat), runs), runs)
-    if "verdict" in metrics:
-        for flat, cells, shape in _groups(parts, table.ran):
-            attracting = _once(attractors, flat, len(cells), shape, threads, cancel) if can_hunt(flat) else None
-            words = judge_runs(flat, table.motions(cells), attracting, rtol, threads, cancel)
-            table.columns["verdict"][cells] = words
-    if any(name in metrics for name in CYCLE_UNITS):
-        for cells, cycles in cell_cycles(stage, links, columns, table.valid, threads, cancel):
-            table.write_cycles(cells, cycles)
+    if any(name in metrics for name in BY_ATTRACTORS):
+        for flat, cells, survey in cell_attractors(parts, table.ran, threads, cancel):
+            table.write_attractors(cells, survey)
+            if "verdict" in metrics:
+                words = judge_runs(flat, table.motions(cells), survey, rtol, threads, cancel)
+                table.columns["verdict"][cells] = words
     return table.columns
 
 
-def cell_cycles(
-    stage: Stage,
-    links: Mapping[str, str],
-    columns: Mapping[str, np.ndarray],
-    valid: np.ndarray,
-    threads: int | None = None,
-    cancel: np.ndarray | None = None,
-) -> Iterator[tuple[np.ndarray, Cycles]]:
-    """The hunting cycles of the cells that are valid, shape (cells,), and may hunt: numbers of cells, and their cycles.
+Parts = Iterable[tuple[dict[str, Any], np.ndarray]]
+"""The flat SI form and the numbers of cells, by their words and booleans."""
 
-    The motion plays no part: of cells that differ in it alone one is computed.
+
+def cell_attractors(
+    parts: Parts, chosen: np.ndarray, threads: int | None = None, cancel: np.ndarray | None = None
+) -> Iterator[tuple[dict[str, Any], np.ndarray, Attractors | None]]:
+    """What attracts the stages of the cells that are chosen, shape (cells,), by the equations they need: their flat SI
+    form, their numbers, and the survey; None where they cannot hunt.
+
+    The motion plays no part: of cells that differ in it alone one is surveyed.
     """
-    for flat, cells, shape in _groups(_by_words(stage, links, columns), valid):
-        if not why_not(shape):
-            yield cells, _once(hunting_cycles, flat, len(cells), shape, threads, cancel)
-
-
-_Found = TypeVar("_Found", Cycles, Attractors)
+    for flat, cells, shape in _groups(parts, chosen):
+        yield flat, cells, _once(flat, len(cells), shape, threads, cancel) if can_hunt(flat) else None
 
 
 def _once(
-    find: Callable[[Ensemble], _Found],
-    flat: Mapping[str, Any],
-    count: int,
-    shape: Structure,
-    threads: int | None,
-    cancel: np.ndarray | None,
-) -> _Found:
-    """What is found of stages of one structure, looked for once for all that differ in their motion alone."""
+    flat: Mapping[str, Any], count: int, shape: Structure, threads: int | None, cancel: np.ndarray | None
+) -> Attractors:
+    """What attracts stages of one structure, looked for once for all that differ in their motion alone."""
     varied = [np.zeros(count)]
     varied += [value for key, value in flat.items() if np.ndim(value) and not key.startswith("motion.")]
     _, first, again = np.unique(np.stack(varied), axis=1, return_index=True, return_inverse=True)
     of_structure = {key: value[first] if np.ndim(value) else value for key, value in flat.items()}
     stages = Ensemble.held(of_structure, len(first), form=shape, threads=threads, cancel=cancel)
-    return find(stages).take(again.ravel())
+    return attractors(stages).take(again.ravel())
 
 
 def allowed(stage: Stage, links: Mapping[str, str], columns: Mapping[str, np.ndarray]) -> np.ndarray:
     """Which cells a stage may have, shape (cells,)."""
     table = _Table(len(next(iter(columns.values()))), ALWAYS)
-    for flat, cells in _by_words(stage, links, columns):
+    for flat, cells in by_words(stage, links, columns):
         table.invalidate(cells, flat)
     return table.valid
 
@@ -166,9 +164,7 @@ def flat_cells(stage: Stage, links: Mapping[str, str], columns: Mapping[str, np.
     return stage.flat(keys | linked(links, stage.flat(keys) | dict(columns)))
 
 
-def _groups(
-    parts: Iterable[tuple[dict[str, Any], np.ndarray]], chosen: np.ndarray
-) -> Iterator[tuple[dict[str, Any], np.ndarray, Structure]]:
+def _groups(parts: Parts, chosen: np.ndarray) -> Iterator[tuple[dict[str, Any], np.ndarray, Structure]]:
     """The cells that are chosen, shape (cells,), by the equations they need: their flat SI form, numbers, structure."""
     for flat, cells in parts:
         for shape, members in _by_structure(flat, chosen[cells], len(cells)):
@@ -176,7 +172,7 @@ def _groups(
             yield of_group, cells[members], shape
 
 
-def _by_words(
+def by_words(
     stage: Stage, links: Mapping[str, str], columns: Mapping[str, np.ndarray]
 ) -> Iterator[tuple[dict[str, Any], np.ndarray]]:
     """For each combination of words and booleans among the columns: the flat SI form and the numbers of its cells."""
@@ -262,8 +258,19 @@ class _Table:
         for name, column in written.items():
             self.columns[name][which[ran]] = column[ran]
 
-    def write_cycles(self, cells: np.ndarray, cycles: Cycles) -> None:
-        """Write those measures of hunting cycles that the table has."""
-        for name, column in zip(CYCLE_UNITS, (cycles.multiplier, cycles.amplitude, cycles.period), strict=True):
+    def write_attractors(self, cells: np.ndarray, survey: Attractors | None) -> None:
+        """Write those measures of what attracts the cells' stages that the table has: of the largest swing of each."""
+        count = len(cells)
+        word = np.full(count, NOTHING, dtype=object)
+        measures = {name: np.full(count, np.nan) for name in CYCLE_UNITS}
+        if survey is not None:
+            word[~survey.known] = UNKNOWN
+            for motion in sorted(survey.motions, key=lambda motion: motion.amplitude):  # the largest last
+                k, orbit = motion.stage, motion.cycles
+                word[k] = SWING if orbit is None else CYCLE
+                multiplier = np.nan if orbit is None else orbit.multiplier[motion.number]
+                for name, value in zip(CYCLE_UNITS, (multiplier, motion.amplitude, motion.period), strict=True):
+                    measures[name][k] = value
+        for name, column in {"attractor": word, **measures}.items():
             if name in self.columns:
                 self.columns[name][cells] = column

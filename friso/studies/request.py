@@ -13,7 +13,7 @@ from friso.errors import InputError
 from friso.stage import Stage
 from friso.studies import links as linking
 from friso.studies.axes import SweptAxis, SweptRange, Values, read_axes
-from friso.studies.cells import ALWAYS, METRICS, USUAL
+from friso.studies.cells import ALWAYS, CYCLE_UNITS, METRICS, USUAL
 from friso.studies.samples import SAMPLE, Samples, sampled
 from friso.studies.study import Dimension, Study
 
@@ -89,9 +89,11 @@ def _gridded(axis: SweptAxis | SweptRange) -> SweptAxis:
 
 
 def _checked_metrics(metrics: Sequence[str] | None) -> tuple[str, ...]:
-    """The metrics asked for, with outcome and status, in their usual order."""
+    """The metrics asked for, with outcome and status, in their usual order; with measures of what attracts comes what
+    that is."""
     for name in metrics or ():
         if name not in METRICS:
             raise InputError("metrics", name, f"some of {', '.join(METRICS)}", '["peaks", "period"]')
-    requested = metrics or USUAL
+    requested = [*(metrics or USUAL)]
+    requested += ["attractor"] if any(name in CYCLE_UNITS for name in requested) else []
     return tuple(name for name in METRICS if name in requested or name in ALWAYS)

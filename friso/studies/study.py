@@ -15,7 +15,7 @@ import numpy as np
 from friso.engine.cache import code_digest, machine
 from friso.stage import Stage, loads
 from friso.studies.axes import SweptAxis
-from friso.studies.cells import BY_CYCLES, METRICS, flat_cells
+from friso.studies.cells import BY_ATTRACTORS, METRICS, flat_cells
 from friso.studies.samples import SAMPLE
 from friso.version import VERSION
 
@@ -58,8 +58,8 @@ class Study:
 
     @property
     def cycles(self) -> bool:
-        """Whether anything is wanted that needs the hunting cycles."""
-        return any(name in self.metrics for name in BY_CYCLES)
+        """Whether anything is wanted that needs a survey of what attracts."""
+        return any(name in self.metrics for name in BY_ATTRACTORS)
 
     @property
     def names(self) -> tuple[str, ...]:

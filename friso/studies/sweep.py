@@ -54,10 +54,11 @@ def sweep(
     (what the run did at its end: "swings", "creeps", "rests" or "failed"), peaks (the thesis's count), distinct_peaks,
     peak_to_peak [m], period [s], settling_time [s] into 1 um, settling_time_10um [s], largest_force [N], steps,
     rejected and status; a cell that no stage may have is "invalid", with the reason in its status. Asked for by name,
-    `metrics` are also those of the hunting cycle itself, which are smooth, whatever the motion does: multiplier (the
-    cycle attracts where its modulus is below 1), amplitude [m] and cycle_period [s]; and the verdict on the stage by
-    its cycles ("hunts", "bistable", "transient", "settles" or "failed"). The attribute `criterion` of a variable says
-    by what it tells of hunting (`friso.hunting.criteria`).
+    `metrics` are also those of what attracts the stage, whatever the motion does: amplitude [m], cycle_period [s] and
+    multiplier, of the largest swing that was found (NaN where nothing attracts; the multiplier also where no orbit
+    could be closed), with the attractor ("cycle", "swing" where no orbit could be closed, "nothing", "unknown" where
+    it is not certain); and the verdict on the stage ("hunts", "bistable", "transient", "settles" or "failed"). The
+    attribute `criterion` of a variable says by what it tells of hunting (`friso.hunting.criteria`).
 
     An outcome is as good as its tolerance: with `verify` that share of the cells is run again at rtol/100, and the
     attributes verified_cells, verified_surviving and verified_rtol count the outcomes that survived. With `refine` the

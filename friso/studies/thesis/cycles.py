@@ -1,4 +1,5 @@
-"""The hunting cycles behind the thesis's maps: the edge of hunting, and the agreement of the peak count with it."""
+"""What attracts the stages of the thesis's maps: the curves on which cycles stop attracting, and the agreement of the
+peak count with what attracts."""
 
 from __future__ import annotations
 
@@ -8,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from friso.hunting.boundary import KeyRange, Kind, Space, plane
-from friso.studies.cells import cell_cycles, flat_cells
+from friso.studies.cells import by_words, cell_attractors, flat_cells
 from friso.studies.study import study_of
 from friso.studies.thesis.studies import ThesisStudy
 
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 EVERY = 2
-"""Of every so many values of each axis the cycle is looked for, to compare it with the peak count."""
+"""Of every so many values of each axis the stage is surveyed, to compare what attracts it with the peak count."""
 
 NODES = 9
 """Stages along either axis from which curves are looked for."""
@@ -38,9 +39,9 @@ class Edge:
 
 @dataclass(frozen=True)
 class PeaksAgainstCycles:
-    """What the peak count and the cycle say of the cells compared: peaks counted where a cycle attracts (`agreed`) or
-    neither (`quiet`), peaks counted although no cycle attracts (`transient`), a cycle that attracts although no peaks
-    are counted (`dormant`: another move would start it), and cells of which the cycle could not be computed."""
+    """What the peak count and the survey say of the cells compared: peaks counted where something attracts (`agreed`)
+    or neither (`quiet`), peaks counted although nothing attracts (`transient`), something that attracts although no
+    peaks are counted (`dormant`: another move would start it), and cells of which it is not certain."""
 
     cells: int
     agreed: int
@@ -68,8 +69,9 @@ def _comparison(runs: xr.Dataset) -> PeaksAgainstCycles:
     study = study_of(coarse)
     valid = (coarse["outcome"].values != "invalid").ravel()
     attracts, decided = np.zeros(study.cells, bool), np.zeros(study.cells, bool)
-    for which, cycles in cell_cycles(study.stage, study.links, study.columns(np.arange(study.cells)), valid):
-        attracts[which], decided[which] = cycles.attracting, ~cycles.uncertain
+    parts = by_words(study.stage, study.links, study.columns(np.arange(study.cells)))
+    for _, cells, survey in cell_attractors(parts, valid):
+        attracts[cells], decided[cells] = (False, True) if survey is None else (survey.attracts, survey.known)
     peaks = coarse["keeps_moving"].values.ravel()
     decided &= valid
     return PeaksAgainstCycles(

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from friso.studies.cells import CYCLE_UNITS
 from friso.views.drawing.colours import ramp
 from friso.views.drawing.figure import Array, Axis, Kind
 from friso.views.drawing.prefixes import choose
@@ -210,7 +211,7 @@ def _range(metric: str, numbers: np.ndarray) -> tuple[tuple[float, float] | None
         return None, False, ()
     low, high = float(finite.min()), float(finite.max())
     if metric == "multiplier":
-        return (-2.0, 0.0), False, ()
+        return (-1.0, 1.0), False, ()
     if metric in ("peaks", "distinct_peaks"):
         return None, False, (QUIET, *ramp(max(1, int(high))))
     positive = finite[finite > 0]
@@ -225,12 +226,13 @@ def _without_number(runs: xr.Dataset, metric: str, values: np.ndarray) -> tuple[
     outcome = _texts(runs, "outcome", dims)
     status = _texts(runs, "status", dims)
     pairs = [_state(word, reason) for word in outcome[1] for reason in status[1]]
-    none = no_number(metric)
-    kinds = in_order(kind for kind in (*pairs, none) if kind is not None)
+    attractor = _texts(runs, "attractor", dims) if metric in CYCLE_UNITS else (np.zeros((), dtype=int), [None])
+    none = [no_number(metric, word) for word in attractor[1]]
+    kinds = in_order(kind for kind in (*pairs, *none) if kind is not None)
     table = np.array([np.nan if kind is None else kinds.index(kind) for kind in pairs], dtype=float)
-    codes = np.broadcast_to(table[outcome[0] * len(status[1]) + status[0]], shape).copy()
-    codes[np.isnan(codes) & ~np.isfinite(values)] = kinds.index(none)
-    return kinds, codes
+    codes = np.broadcast_to(table[outcome[0] * len(status[1]) + status[0]], shape)
+    reasons = np.array([kinds.index(kind) for kind in none], dtype=float)[attractor[0]]
+    return kinds, np.where(np.isnan(codes) & ~np.isfinite(values), reasons, codes)
 
 
 def _texts(runs: xr.Dataset, name: str, dims: tuple[Hashable, ...]) -> tuple[np.ndarray, Sequence[str | None]]:

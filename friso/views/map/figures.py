@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from friso.views.drawing.drawable import cell_edges
-from friso.views.drawing.figure import BLUE, INK, Axis, Cloud, Figure, Map, Markers, Panel, Series
+from friso.views.drawing.figure import BLUE, Axis, Cloud, Figure, Map, Markers, Panel, Series
 from friso.views.map.cells import SAMPLE, CellAxis, Look, axes_of, cuts, look, pick, plane_first
 from friso.views.map.findings import statement
 from friso.views.map.words import variable
@@ -79,27 +79,14 @@ def _cells(x: CellAxis, y: CellAxis, colouring: Look, marker: Mapping[str, float
         for array in (colouring.numbers, colouring.codes)
     )
     points = _marked(marker, x, y)
-    edges = _edges(x, y, np.where(np.isnan(codes), z, np.nan)) if colouring.quantity == variable("multiplier") else ()
     return Panel(
         title,
         x.axis(_limits(x, [point.x for point in points])),
         y.axis(_limits(y, [point.y for point in points])),
-        edges,
+        (),
         points,
         maps=(Map(x.positions, y.positions, z, *colouring.scale, codes),),
     )
-
-
-def _edges(x: CellAxis, y: CellAxis, multiplier: np.ndarray) -> tuple[Series, ...]:
-    """The lines on which the cycle stops attracting, between the cells that know their multiplier."""
-    if min(multiplier.shape) < 2:
-        return ()
-    from contourpy import contour_generator
-
-    lines = contour_generator(x.positions, y.positions, np.ma.masked_invalid(np.abs(multiplier))).lines(1.0)
-    label = "edge of hunting: multiplier of modulus 1"
-    corners = [np.asarray(line, dtype=float) for line in lines]
-    return tuple(Series(corner[:, 0], corner[:, 1], label, INK, width=2.0) for corner in corners)
 
 
 def _limits(axis: CellAxis, points: Sequence[np.ndarray]) -> tuple[float, float]:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from friso.stage.controllers import CONTROLLER, CONTROLLERS, FORCE_LIMIT
+from friso.studies.cells import NOTHING, SWING, UNKNOWN
 from friso.views.drawing.figure import GREY, INK, ORANGE, PINK, VERMILLION, Kind
 
 if TYPE_CHECKING:
@@ -45,9 +46,10 @@ _VARIABLES = {
     "settling_time": "Settling time into 1 µm",
     "settling_time_10um": "Settling time into 10 µm",
     "largest_force": "Largest actuator force",
-    "multiplier": "Hunting multiplier",
-    "amplitude": "Amplitude of the hunting cycle",
-    "cycle_period": "Period of the hunting cycle",
+    "attractor": "What attracts the stage",
+    "multiplier": "Multiplier of the cycle that attracts",
+    "amplitude": "Amplitude of what attracts",
+    "cycle_period": "Period of what attracts",
     "steps": "Solver steps",
     "rejected": "Rejected solver steps",
 }
@@ -80,6 +82,12 @@ INFERRED = {
     "rests": Kind("rests (inferred)", "#e4efe0"),
 }
 _NO_NUMBER = "#e8dcc6"
+_OF_ATTRACTORS = {
+    NOTHING: Kind("nothing attracts", QUIET),
+    UNKNOWN: Kind("not certain what attracts", "#8c6d8f"),
+    SWING: Kind("attracts, but not closed as an orbit", PINK),
+}
+"""Why a cell has no measure of what attracts its stage, by the word for that."""
 
 
 def quantity(key: Hashable) -> str:
@@ -108,13 +116,13 @@ def word_kind(name: str, word: str) -> Kind:
     return KINDS[name].get(word) or Kind(word, GREY)
 
 
-def no_number(name: str) -> Kind:
-    """What it means that a run that was completed has no such number."""
+def no_number(name: str, attractor: str | None = None) -> Kind:
+    """What it means that a run that was completed has no such number; `attractor`: the word for what attracts."""
     if name.startswith("settling_time"):
         band = variable(name).removeprefix("Settling time into ")
         return Kind(f"does not stay within {band}", _NO_NUMBER)
-    if name in ("multiplier", "amplitude", "cycle_period"):
-        return Kind("no cycle found", _NO_NUMBER)
+    if attractor in _OF_ATTRACTORS:
+        return _OF_ATTRACTORS[attractor]
     return Kind("no period" if name == "period" else "no value", _NO_NUMBER)
 
 
