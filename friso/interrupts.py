@@ -16,7 +16,8 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import Any
 
-_SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
+SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
+"""The signals that end a command."""
 
 _AGAIN = 0.02
 """After how long [s] it is looked again whether an import has ended."""
@@ -54,14 +55,14 @@ def raising() -> Iterator[None]:
 
 def _install() -> dict[int, Any]:
     """Take the signals, but those that are ignored (nohup); what was done with them before."""
-    before = {number: signal.getsignal(number) for number in _SIGNALS}
+    before = {number: signal.getsignal(number) for number in SIGNALS}
     for number in (number for number, handler in before.items() if handler is not signal.SIG_IGN):
         signal.signal(number, _arrived)
     return {number: handler for number, handler in before.items() if handler is not None}
 
 
 def _arrived(number: int, frame: FrameType | None) -> None:
-    if number in _SIGNALS:
+    if number in SIGNALS:
         _came.append(number)
     if not _raising:
         return

@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 import typer
+from filelock import FileLock
 from inside import friso_inside
 from refusals import Refused
 
@@ -183,6 +184,17 @@ def test_an_error_while_files_get_their_names_is_undone(
     assert not [name for name in tree(folder) if DRAFTS in name]
     if after <= steps - (method == "rename"):
         assert tree(folder) == before
+
+
+def test_drafts_that_a_killed_process_left_are_removed(folder: Path) -> None:
+    """Those of one that is alive stay."""
+    left, alive = (folder / f"{DRAFTS}{name}" for name in ("left", "alive"))
+    for draft in (left, alive):
+        draft.mkdir()
+        (draft / "0.txt").write_text("half")
+    with FileLock(alive / "lock"):
+        write(contents(folder))
+    assert (left.exists(), alive.exists()) == (False, True)
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])

@@ -1,17 +1,21 @@
 """Studies on disk: killed and resumed they are what an uninterrupted one is, bit for bit; nothing else is touched."""
 
 import errno
+import json
 import os
 import random
+import shutil
 import signal
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
 import pytest
 import xarray as xr
+from filelock import FileLock
 from refusals import Refused
 
 import friso
@@ -20,6 +24,7 @@ from friso.stage import Stage
 from friso.studies import refine
 from friso.studies import store as storing
 from friso.studies.execute import local_crew
+from friso.studies.metadata import LOCK
 from friso.studies.request import Request
 from friso.studies.samples import Samples
 from friso.studies.store import Store, read_store
@@ -252,6 +257,7 @@ HOLD = """
 import sys, time
 from pathlib import Path
 import friso
+from friso.studies.metadata import LOCK
 from friso.studies.request import Request
 from friso.studies.store import Store
 
@@ -318,9 +324,123 @@ def test_export(rig: Stage, whole: xr.Dataset, tmp_path: Path) -> None:
         export(whole, tmp_path / "map.xls")
 
 
-def test_a_store_whose_verdicts_are_by_the_peak_count_is_refused(tmp_path: Path) -> None:
-    """Written before outcomes: it says why, and what to do."""
+def test_a_store_without_checksums_is_refused(tmp_path: Path) -> None:
     old = xr.Dataset({"verdict": ("x", ["hunts"])}, attrs={"equations": "0.1.0"})
     old.to_zarr(tmp_path / "old.zarr", zarr_format=2)
-    with pytest.raises(StoreError, match=r"earlier friso, whose verdicts are by the peak count[\s\S]*under a new name"):
+    with pytest.raises(StoreError, match=r"earlier friso[\s\S]*under a new name"):
         read_store(tmp_path / "old.zarr")
+
+
+# damage
+
+
+@pytest.fixture(scope="module")
+def finished(rig: Stage, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A store of the study, which is done."""
+    path = tmp_path_factory.mktemp("finished") / "a.zarr"
+    friso.sweep(rig, AXES, store=path, verify=0.3)
+    return path
+
+
+@pytest.fixture
+def stored(finished: Path, tmp_path: Path) -> Path:
+    """A copy of the finished store."""
+    return Path(shutil.copytree(finished, tmp_path / "a.zarr"))
+
+
+def flip(file: Path, place: float) -> None:
+    """Change one bit of a file, at a share of its length."""
+    content = bytearray(file.read_bytes())
+    content[int(place * len(content))] ^= 0x10
+    file.write_bytes(content)
+
+
+def test_a_store_says_whether_it_is_whole(stored: Path, rig: Stage) -> None:
+    with Store.opened(stored, Request(rig, AXES).study()) as store:
+        assert store.damaged() == []
+        flip(stored / "period" / "1.0", 0.6)
+        assert store.damaged() == ["1.0"]
+
+
+@pytest.mark.parametrize("name", ["peaks", "period", "status", "outcome"])
+@pytest.mark.parametrize("place", [0.2, 0.6, 0.99])
+def test_a_damaged_block_is_run_again(
+    stored: Path, finished: Path, rig: Stage, name: str, place: float, caplog: pytest.LogCaptureFixture
+) -> None:
+    """What a flipped bit changes is never believed."""
+    flip(stored / name / "1.0", place)
+    with Store.opened(stored, Request(rig, AXES).study()) as store:
+        missing = list(store.missing())
+    if not missing:  # a bit that says nothing
+        xr.testing.assert_identical(read_store(stored).load(), read_store(finished).load())
+        return
+    assert len(missing) == 1
+    assert "block 1.0 is damaged and is run again" in caplog.text
+    friso.sweep(rig, AXES, store=stored, verify=0.3)
+    xr.testing.assert_identical(read_store(stored).load(), read_store(finished).load())
+
+
+@pytest.mark.parametrize("place", np.linspace(0.01, 0.99, 25))
+def test_damaged_metadata_are_refused(stored: Path, place: float) -> None:
+    before = read_store(stored).attrs
+    flip(stored / ".zmetadata", place)
+    with suppress(StoreError):
+        assert read_store(stored).attrs == before  # blank space
+
+
+@pytest.mark.parametrize("content", [b"", b"{}", b"[1]", b"null", b'{"metadata": 3}', b"\xff\x00", b"[" * 100_000])
+def test_metadata_of_any_content_are_refused(stored: Path, content: bytes, refused: Refused) -> None:
+    (stored / ".zmetadata").write_bytes(content)
+    with refused(kind=StoreError):
+        read_store(stored)
+
+
+def test_missing_metadata_and_damaged_axes_are_refused(stored: Path, refused: Refused) -> None:
+    flip(stored / "joint.stroke" / "0", 0.8)
+    with refused(kind=StoreError):
+        read_store(stored)
+    (stored / ".zmetadata").unlink()
+    with refused(kind=StoreError):
+        read_store(stored)
+
+
+def test_a_store_of_a_newer_friso_says_so(stored: Path, refused: Refused) -> None:
+    document = json.loads((stored / ".zmetadata").read_text())
+    document["friso"]["format"] += 1
+    document["metadata"][".zattrs"]["friso"] = "9.9.9"
+    (stored / ".zmetadata").write_text(json.dumps(document))
+    with refused(kind=StoreError) as error:
+        read_store(stored)
+    assert "newer friso (9.9.9)" in str(error.value)
+
+
+@pytest.mark.parametrize("damage", ["", ".zmetadata"])
+def test_a_store_of_another_study_or_a_damaged_one_is_replaced_when_told(stored: Path, rig: Stage, damage: str) -> None:
+    other = Request(rig, {"controller.crossover": "2 Hz..3 Hz:2"}).study()
+    if damage:
+        flip(stored / damage, 0.5)
+    with pytest.raises(StoreError), Store.opened(stored, other):
+        pass
+    with Store.opened(stored, other, overwrite=True) as store:
+        assert store.read()["outcome"].shape == (2,)
+    with Store.opened(stored, other, overwrite=True) as store:  # the same goes on
+        assert list(stored.parent.iterdir()) == [stored]
+
+
+def test_what_is_no_store_is_not_replaced_even_when_told(rig: Stage, tmp_path: Path) -> None:
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "thesis.txt").write_text("precious")
+    with pytest.raises(StoreError), Store.opened(tmp_path / "mine", Request(rig, AXES).study(), overwrite=True):
+        pass
+    assert (tmp_path / "mine" / "thesis.txt").read_text() == "precious"
+
+
+def test_leftovers_of_a_killed_run_are_removed(rig: Stage, tmp_path: Path) -> None:
+    left, being_made = (tmp_path / f".a.zarr.{digit * 32}" for digit in "ab")
+    for draft in (left, being_made):
+        draft.mkdir()
+        (draft / ".zgroup").write_text("{}")
+    study = Request(rig, AXES).study()
+    with FileLock(being_made / LOCK), Store.opened(tmp_path / "a.zarr", study):
+        assert not left.exists()
+        assert being_made.exists()

@@ -8,18 +8,24 @@ import signal
 import tempfile
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from functools import partial
 from itertools import count
 from pathlib import Path
 from types import TracebackType
 from typing import TYPE_CHECKING
 
+from filelock import FileLock, Timeout
+
+from friso.interrupts import SIGNALS
+
 if TYPE_CHECKING:
     from friso.views.files import Content
 
 DRAFTS = ".friso-draft-"
-"""How the folder of drafts begins; one that a killed process left behind may be deleted."""
+"""How the folder of drafts begins; one that a killed process left behind is deleted by the next."""
+
+_LOCK = "lock"
 
 
 class Drafts:
@@ -27,6 +33,7 @@ class Drafts:
 
     def __init__(self) -> None:
         self.folders: dict[Path, Path] = {}
+        self.locks = ExitStack()
         self.drafts: list[tuple[Path | None, Path]] = []
         self.numbers = count()
 
@@ -34,6 +41,7 @@ class Drafts:
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        self.locks.close()
         for folder in self.folders.values():
             shutil.rmtree(folder, ignore_errors=True)
 
@@ -74,8 +82,20 @@ class Drafts:
         """A path that is free, on the disk of `path`, with its suffix."""
         root = next(folder for folder in path.absolute().parents if folder.exists())
         if root not in self.folders:
-            self.folders[root] = Path(tempfile.mkdtemp(prefix=DRAFTS, dir=root))
+            _remove_leftovers(root)
+            folder = self.folders[root] = Path(tempfile.mkdtemp(prefix=DRAFTS, dir=root))
+            self.locks.enter_context(FileLock(folder / _LOCK))  # locked, it is no leftover
         return self.folders[root] / f"{next(self.numbers)}{path.suffix}"
+
+
+def _remove_leftovers(root: Path) -> None:
+    """Remove what killed processes left of their drafts: nobody holds their lock."""
+    for folder in root.glob(f"{DRAFTS}*"):
+        try:
+            with FileLock(folder / _LOCK, blocking=False):
+                shutil.rmtree(folder, ignore_errors=True)
+        except (OSError, Timeout):  # it is written to, or nobody may delete it
+            continue
 
 
 def made(folder: Path) -> list[Path]:
@@ -103,10 +123,7 @@ def _signals_held() -> Iterator[None]:
         yield
         return
     came: list[int] = []
-    before = {
-        number: signal.signal(number, lambda number, frame: came.append(number))
-        for number in (signal.SIGINT, signal.SIGTERM)
-    }
+    before = {number: signal.signal(number, lambda number, frame: came.append(number)) for number in SIGNALS}
     try:
         yield
     finally:

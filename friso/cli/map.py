@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from friso.cli.common import AsJson, Overrides, read_stage, read_tolerance, say
-from friso.cli.output import Overwrite, print_document, print_written, write
+from friso.cli.output import print_document, print_written, write
 from friso.cli.progress import ProgressBar
 from friso.errors import InputError
 
@@ -77,7 +77,11 @@ def map_cells(
     out: Annotated[
         Path | None, typer.Option(metavar="STORE", help="Folder of the results, resumed if it exists.")
     ] = None,
-    overwrite: Overwrite = False,
+    overwrite: Annotated[
+        bool,
+        typer.Option("--overwrite", help="Replace a store of another study, and figures and tables of the same names."),
+    ] = False,
+    check: Annotated[bool, typer.Option("--check", help="Run nothing, but tell whether a STORE is whole.")] = False,
     yes: Annotated[bool, typer.Option("--yes", help="Confirm a study of more than ten million cells.")] = False,
     as_json: AsJson = False,
 ) -> None:
@@ -86,12 +90,14 @@ def map_cells(
     Example: friso map rig.toml --x controller.crossover="1 Hz..16 Hz:41" --y joint.stroke="0 m..1 mm:41"
     A study that was interrupted goes on: friso map thesis_rig_map.zarr
     """
-    from friso.cli.map_study import Varied, coloured_by, refuse_overwriting, stored_study
+    from friso.cli.map_study import Varied, claim_views, coloured_by, refuse_overwriting, stored_study
     from friso.studies.store import in_memory
     from friso.studies.verify import checked_share
 
     exports, share = _checked_exports(export), checked_share(verify)
     varied = Varied(x, y, tuple(axis or ()), tuple(link or ()), samples, latin, log)
+    if check:
+        return _check(source, as_json)
     with _crew(workers, scheduler) as crew:
         if source.is_dir():
             if varied != Varied() or overrides or rtol or refine or out:
@@ -101,7 +107,8 @@ def map_cells(
             store = out or Path(f"{source.stem}_map.zarr")
             study = _new_study(read_stage(source, overrides), varied, metric, refine, yes, rtol or "1e-6", crew)
         refuse_overwriting(store, exports, overwrite)
-        runs = _run(study, store, crew, share)
+        runs = _run(study, store, crew, share, overwrite)
+    claim_views(store)
     runs, colouring = in_memory(runs) if study.cells <= LARGE else runs, coloured_by(study, metric)
     files = _write(runs, study, store, exports, colouring)
     _report(runs, study, store, colouring, files, as_json)
@@ -174,7 +181,22 @@ def _crew(workers: int | None, scheduler: str | None) -> Iterator[Crew]:
             yield crew
 
 
-def _run(study: Study, store: Path, crew: Crew, share: float) -> xr.Dataset:
+def _check(store: Path, as_json: bool) -> None:
+    """Tell whether a store is whole; status 1 where it is not. Raises StoreError where it cannot be read at all."""
+    from friso.studies.store import check_store
+
+    state = check_store(store)
+    if as_json:
+        print_document({"store": str(store), "blocks": state.blocks, "done": state.done, "damaged": state.damaged})
+    else:
+        whole = f"{state.done} of {state.blocks} blocks are done"
+        damage = f"damaged: {', '.join(state.damaged)}; friso map {store} runs them again"
+        print(f"{store}: {whole}, {damage if state.damaged else 'all of them as they were written'}")
+    if state.damaged:
+        raise typer.Exit(1)
+
+
+def _run(study: Study, store: Path, crew: Crew, share: float, overwrite: bool) -> xr.Dataset:
     """Run what the store lacks. Whatever ends it early, the message says where the rest is."""
     from friso.studies.sweep import run_in_store
 
@@ -187,7 +209,7 @@ def _run(study: Study, store: Path, crew: Crew, share: float) -> xr.Dataset:
             bar(done, total, store.name)
 
         try:
-            return run_in_store(study, store, crew, share, progress)
+            return run_in_store(study, store, crew, share, progress, overwrite)
         except (KeyboardInterrupt, OSError, RuntimeError):
             if store.exists():
                 say(f"{stored} of {study.cells} cells are stored; to resume: friso map {store}")

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from friso.cli.common import key_values
+from friso.cli.output import MARKER, marked, marker, write
 from friso.errors import InputError
 from friso.stage import Stage
 from friso.studies.cells import BY_ATTRACTORS, CYCLE_UNITS, METRICS, USUAL
@@ -133,11 +134,19 @@ def refuse_overwriting(store: Path, exports: list[Path], overwrite: bool) -> Non
     """Refuse to write over files that are no earlier result of this study. Raises InputError."""
     from friso.views.map.page import FORMS
 
-    views = [] if store.exists() else [_beside(store, form) for form in FORMS]
+    mine = marked(store)[1]
+    views = [path for form in FORMS if (path := _beside(store, form)).name not in mine]
     for path in [*views, *exports]:
         if path == store or (path.exists() and not overwrite):
             expected = "another name, or --overwrite; nothing was overwritten"
             raise InputError("--out", f"{path} already exists", expected, "--out new.zarr")
+
+
+def claim_views(store: Path) -> None:
+    """Note in the store that figure and page beside it are its own, which the next run may replace."""
+    from friso.views.map.page import FORMS
+
+    write({store / MARKER: marker("map", [_beside(store, form).name for form in FORMS])})
 
 
 def _beside(store: Path, form: str) -> Path:

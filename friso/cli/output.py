@@ -45,7 +45,7 @@ class OutputFolder:
         """Raises InputError where the command must not write there, or cannot."""
         self.command, self.folder, self.overwrite, self.inputs = command, folder, overwrite, tuple(inputs)
         _check_writable(folder)
-        maker, self.files = _marked(folder)
+        maker, self.files = marked(folder)
         self.is_own = maker == command or not _entries(folder)
         if not (self.is_own or overwrite):
             holds = f"made by friso {maker}" if maker else f"with {_entries(folder)[0]} in it"
@@ -86,9 +86,8 @@ class OutputFolder:
 
     def _marker(self, files: Files) -> str:
         gone = {name for name, content in files.items() if content is None}
-        names = [as_toml(name) for name in dict.fromkeys([*self.files, *files]) if name not in gone]
-        lines = [f'command = "{self.command}"', f'version = "{VERSION}"', "files = [", *(f"  {n}," for n in names), "]"]
-        return "\n".join(["# Made by friso, which replaces these files when the command is run again.", *lines, ""])
+        names = [name for name in dict.fromkeys([*self.files, *files]) if name not in gone]
+        return marker(self.command, names)
 
 
 def output_folder(
@@ -120,7 +119,13 @@ def print_written(files: Iterable[Path]) -> None:
         print(f"wrote {one_line(str(file))}")
 
 
-def _marked(folder: Path) -> tuple[str, tuple[str, ...]]:
+def marker(command: str, names: Iterable[str]) -> str:
+    """What the marker says of a command and the files that are its own."""
+    lines = [f'command = "{command}"', f'version = "{VERSION}"', "files = [", *(f"  {as_toml(n)}," for n in names), "]"]
+    return "\n".join(["# Made by friso, which replaces these files when the command is run again.", *lines, ""])
+
+
+def marked(folder: Path) -> tuple[str, tuple[str, ...]]:
     """The command that made a folder and the files that it wrote there; empty where no command of friso did."""
     try:
         document = tomllib.loads((folder / MARKER).read_text(encoding="utf-8"))

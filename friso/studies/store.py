@@ -2,7 +2,7 @@
 
 The store is made whole, without results, under another name and then moved into place; a block's outcomes are
 written after its other variables, and Zarr moves each file into place. So a block whose outcomes are there is done,
-whenever the process was killed.
+whenever the process was killed. Every chunk holds a checksum: blocks that are damaged are run again.
 """
 
 from __future__ import annotations
@@ -12,10 +12,9 @@ import os
 import shutil
 import uuid
 import warnings
-import zipfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from itertools import count
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,8 +23,9 @@ from filelock import FileLock, Timeout
 
 from friso.engine.cache import machine
 from friso.errors import StoreError
-from friso.studies.cells import UNITS, WORDS, Columns, attributes_of
-from friso.studies.refine import Ask
+from friso.studies.answers import PARTIAL, Answers
+from friso.studies.cells import UNITS, WORDS, attributes_of
+from friso.studies.metadata import LOCK, checked_metadata, is_store, seal_metadata
 from friso.studies.study import Block, Study, study_of
 
 if TYPE_CHECKING:
@@ -37,8 +37,6 @@ more from `BLOCKS` blocks on, so that writing does not hold up the workers, and 
 the same blocks on every machine."""
 
 logger = logging.getLogger("friso")
-
-_ANSWERS = ".answers"
 
 _FORMAT = 2
 """Version of the Zarr format: the one that every reader knows, and in which fixed-length texts are specified."""
@@ -54,25 +52,39 @@ class Store:
 
     @classmethod
     @contextmanager
-    def opened(cls, path: Path, study: Study) -> Iterator[Store]:
-        """The store of a study, made if it is not there.
+    def opened(cls, path: Path, study: Study, overwrite: bool = False) -> Iterator[Store]:
+        """The store of a study, made if it is not there; with `overwrite` in place of that of another study, or of a
+        damaged one.
 
         Raises StoreError if the folder holds anything else, another study, or is in use by another process.
         """
         store = cls(path, study)
+        if overwrite and path.is_dir() and is_store(path):
+            store._replace()
         if not path.exists() or (path.is_dir() and not any(path.iterdir())):
             store._make()
-        _refuse_foreign(path)
+        checked_metadata(path)
         with _locked(path):
             _refuse_other(path, study)
             _warn_of_another_machine(path)
-            for leftover in path.rglob("*.partial"):  # of a file that was being written when its process was killed
+            for leftover in path.rglob(f"*{PARTIAL}"):  # of a file that was being written when its process was killed
                 leftover.unlink(missing_ok=True)
             yield store
+
+    def _replace(self) -> None:
+        """Delete the store that is there, unless it is that of this study."""
+        with _locked(self.path):
+            try:
+                _refuse_other(self.path, self.study)
+            except StoreError:
+                gone = _beside(self.path)
+                self.path.rename(gone)
+                shutil.rmtree(gone, ignore_errors=True)
 
     def _make(self) -> None:
         import dask.array as da
         import xarray as xr
+        from numcodecs import CRC32
 
         study = self.study
         kinds = {name: WORDS.get(name, "f8") for name in study.metrics}
@@ -82,14 +94,22 @@ class Store:
             for name, kind in kinds.items()
         }
         variables = {name: (study.names, array, attributes_of(name)) for name, array in empty.items()}
-        encoding: dict[str, dict[str, Any]] = {name: {"chunks": self.blocks} for name in study.metrics}
+        checked = {"filters": [CRC32()]}
+        encoding: dict[str, dict[str, Any]] = {name: {"chunks": self.blocks, **checked} for name in study.metrics}
+        coordinates = study.coordinates()
+        encoding |= dict.fromkeys(coordinates, checked)
         for name in UNITS:
             if name in encoding:
                 encoding[name]["_FillValue"] = np.nan
-        template = xr.Dataset(variables, coords=study.coordinates(), attrs=study.attributes())
-        draft = self.path.with_name(f".{self.path.name}.{uuid.uuid4().hex}")
+        template = xr.Dataset(variables, coords=coordinates, attrs=study.attributes())
+        _remove_leftovers(self.path)
+        draft = _beside(self.path)
         try:
-            template.to_zarr(draft, compute=False, encoding=encoding, zarr_format=_FORMAT, consolidated=True)
+            draft.mkdir(parents=True)
+            with FileLock(draft / LOCK), warnings.catch_warnings():  # locked, it is no leftover
+                warnings.filterwarnings("ignore", "Object at", UserWarning)  # the lock is no part of the hierarchy
+                template.to_zarr(draft, "a", compute=False, encoding=encoding, zarr_format=_FORMAT, consolidated=True)
+                seal_metadata(draft)
             draft.rename(self.path)
         except OSError as error:
             if self.path.exists():
@@ -100,72 +120,60 @@ class Store:
             shutil.rmtree(draft, ignore_errors=True)
 
     def missing(self) -> Iterator[Block]:
-        """The blocks not yet done."""
-        outcomes = self.read()["outcome"]
+        """The blocks not yet done, and those that are damaged, which is logged."""
+        runs = self.read()
         for block in self.study.blocks(self.blocks):
-            if not self._is_done(block, outcomes):
+            if not self.is_there(block):
+                yield block
+            elif not self._is_whole(block, runs):
+                logger.warning("%s: block %s is damaged and is run again", self.path, self._number(block))
                 yield block
 
-    def _is_done(self, block: Block, outcomes: xr.DataArray) -> bool:
-        """Whether all files of a block are there and its outcomes can be read; a power cut may take either."""
-        number = ".".join(str(part.start // size) for part, size in zip(block, self.blocks, strict=True))
+    def damaged(self) -> list[str]:
+        """The numbers of the blocks that are there, but are not what was written."""
+        runs = self.read()
+        there = [block for block in self.study.blocks(self.blocks) if self.is_there(block)]
+        return [self._number(block) for block in there if not self._is_whole(block, runs)]
+
+    def _number(self, block: Block) -> str:
+        """The name of the files of a block."""
+        return ".".join(str(part.start // size) for part, size in zip(block, self.blocks, strict=True))
+
+    def is_there(self, block: Block) -> bool:
+        """Whether the outcomes of a block were written, which are the last of it."""
+        return (self.path / "outcome" / self._number(block)).exists()
+
+    def _is_whole(self, block: Block, runs: xr.Dataset) -> bool:
+        """Whether all of a block agrees with its checksums; a missing file would be read as empty cells."""
+        number = self._number(block)
         if not all((self.path / name / number).exists() for name in self.study.metrics):
             return False
         try:
-            return not np.any(outcomes[block].values == "")
-        except (OSError, RuntimeError, ValueError):
+            columns = {name: runs[name][block].values for name in self.study.metrics}
+        except Exception:  # whatever a codec makes of what it cannot read
             return False
+        return not np.any(columns["outcome"] == "")
 
     def write(self, block: Block, columns: Mapping[str, np.ndarray]) -> None:
         """Write the measures of a block, its outcomes last. Raises OSError where the disk is full."""
+        import zarr
+
         shape = tuple(part.stop - part.start for part in block)
-        region = dict(zip(self.study.names, block, strict=True))
-        self._write([name for name in self.study.metrics if name != "outcome"], columns, shape, region)
-        self._write(["outcome"], columns, shape, region)
-
-    def _write(
-        self, names: list[str], columns: Mapping[str, np.ndarray], shape: tuple[int, ...], region: dict[str, slice]
-    ) -> None:
-        import xarray as xr
-
-        arrays = {name: columns[name].astype(WORDS.get(name, "f8")).reshape(shape) for name in names}
-        part = xr.Dataset({name: (self.study.names, array) for name, array in arrays.items()})
+        names = [*(name for name in self.study.metrics if name != "outcome"), "outcome"]
         # an empty chunk is written too: its presence marks the block as done
-        part.to_zarr(self.path, region=region, zarr_format=_FORMAT, consolidated=True, write_empty_chunks=True)
+        with zarr.config.set({"array.write_empty_chunks": True}):
+            group: Any = zarr.open_group(self.path, mode="r+", zarr_format=_FORMAT, use_consolidated=True)
+            for name in names:
+                group[name][block] = columns[name].astype(WORDS.get(name, "f8")).reshape(shape)
 
-    def keeping(self, ask: Ask) -> Ask:
-        """`ask` with its answers kept in the store: asked the same questions again, they need no runs."""
-        folder = self.path / _ANSWERS
-        folder.mkdir(exist_ok=True)
-        number = count()
-
-        def answer(cells: np.ndarray) -> Columns:
-            file = folder / f"{next(number)}.npz"
-            if (stored := _answer(file, cells)) is not None:
-                return stored
-            columns = ask(cells)
-            draft = file.with_suffix(".partial")
-            with draft.open("wb") as stream:
-                arrays: dict[str, Any] = {name: columns[name].astype(WORDS.get(name, "f8")) for name in columns}
-                np.savez_compressed(stream, cells=cells, **arrays)
-            draft.rename(file)
-            return columns
-
-        return answer
-
-    def forget_answers(self) -> None:
-        """Remove what `keeping` kept: the blocks hold it by now."""
-        shutil.rmtree(self.path / _ANSWERS, ignore_errors=True)
+    @property
+    def answers(self) -> Answers:
+        """What a refined study keeps until it is done."""
+        return Answers(self.path / ".answers")
 
     def annotate(self, attributes: Mapping[str, Any]) -> None:
         """Add attributes to the store."""
-        import zarr
-
-        group = zarr.open_group(self.path, mode="r+", zarr_format=_FORMAT)
-        group.attrs.update(dict(attributes))
-        with warnings.catch_warnings():  # about the lock, which is no part of the Zarr hierarchy
-            warnings.filterwarnings("ignore", "Object at", UserWarning)
-            zarr.consolidate_metadata(group.store, zarr_format=_FORMAT)
+        seal_metadata(self.path, attributes)
 
     def read(self) -> xr.Dataset:
         """The store as a dataset whose values are read when they are looked at."""
@@ -175,12 +183,37 @@ class Store:
 def read_store(path: str | os.PathLike[str]) -> xr.Dataset:
     """The study in the store at `path`, finished or not, as a dataset whose values are read when they are looked at.
 
-    Raises StoreError if there is none.
+    Raises StoreError if there is none, or its metadata or axes are damaged; RuntimeError where a damaged value is
+    looked at.
     """
     import xarray as xr
 
-    _refuse_foreign(Path(path))
-    return xr.open_zarr(path, chunks=None, zarr_format=_FORMAT)
+    checked_metadata(Path(path))
+    try:
+        runs = xr.open_zarr(path, chunks=None, zarr_format=_FORMAT)
+        return runs.assign_coords({name: axis.load() for name, axis in runs.coords.items()})
+    except Exception:  # whatever a codec makes of what it cannot read
+        expected = "a copy of the store, or the study run again under a new name, or with --overwrite"
+        actual = "a store whose axes are damaged"
+        raise StoreError("", actual, expected, "friso map STAGE.toml ... --out study.zarr", str(path)) from None
+
+
+@dataclass(frozen=True)
+class StoreState:
+    """How many blocks a study has, how many of them are done, and the numbers of those that are damaged."""
+
+    blocks: int
+    done: int
+    damaged: list[str]
+
+
+def check_store(path: Path) -> StoreState:
+    """Read all of the store at `path` and compare it with its checksums. Raises StoreError where its metadata or axes
+    are damaged, or there is none."""
+    study = study_of(read_store(path))
+    store = Store(path, study)
+    blocks = list(study.blocks(store.blocks))
+    return StoreState(len(blocks), sum(map(store.is_there, blocks)), store.damaged())
 
 
 def in_memory(runs: xr.Dataset) -> xr.Dataset:
@@ -204,36 +237,19 @@ def _shared(texts: xr.DataArray) -> np.ndarray:
     return decoded
 
 
-def _answer(file: Path, cells: np.ndarray) -> Columns | None:
-    """What was kept about just these cells, None if nothing."""
-    try:
-        with np.load(file) as stored:
-            answer = dict(stored)
-    except (OSError, ValueError, zipfile.BadZipFile):
-        return None
-    return answer if np.array_equal(answer.pop("cells"), cells) else None
+def _beside(path: Path) -> Path:
+    """A name that is free, for a store that is not there yet, or no more."""
+    return path.with_name(f".{path.name}.{uuid.uuid4().hex}")
 
 
-def _refuse_foreign(path: Path) -> None:
-    """Raises StoreError for anything but a store that friso has made."""
-    import xarray as xr
-
-    expected = "a store made by friso map, or a new name"
-    if not path.exists():
-        raise StoreError("", "nothing there", expected, "friso map STAGE.toml ... --out study.zarr", str(path))
-    try:
-        with xr.open_zarr(path, chunks=None, zarr_format=_FORMAT) as dataset:
-            if "equations" in dataset.attrs and "outcome" in dataset:
-                return
-            old = "equations" in dataset.attrs and "verdict" in dataset
-    except (OSError, ValueError, KeyError):
-        old = False
-    if old:
-        actual = "a store of an earlier friso, whose verdicts are by the peak count of the runs"
-        expected = "a store that tells what the runs did (outcome): run the study again under a new name"
-        raise StoreError("", actual, expected, "friso map STAGE.toml ... --out study.zarr", str(path))
-    actual = "a folder with other things in it" if path.is_dir() else "a file"
-    raise StoreError("", f"{actual}; nothing was overwritten", expected, "--out study.zarr", str(path))
+def _remove_leftovers(path: Path) -> None:
+    """Remove drafts of this store that killed processes left: nobody holds their lock."""
+    for draft in path.parent.glob(f".{path.name}.{'[0-9a-f]' * 32}"):
+        try:
+            with FileLock(draft / LOCK, blocking=False):
+                shutil.rmtree(draft, ignore_errors=True)
+        except (OSError, Timeout):  # it is being made
+            continue
 
 
 def _refuse_other(path: Path, study: Study) -> None:
@@ -256,7 +272,7 @@ def _warn_of_another_machine(path: Path) -> None:
 @contextmanager
 def _locked(path: Path) -> Iterator[None]:
     """Keep other processes out. Raises StoreError if one is in."""
-    lock = FileLock(path / ".friso.lock")
+    lock = FileLock(path / LOCK)
     try:
         lock.acquire(timeout=0)
     except Timeout:

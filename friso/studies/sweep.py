@@ -102,17 +102,25 @@ def _room(study: Study) -> Columns:
     }
 
 
-def run_in_store(study: Study, path: Path, crew: Crew, verify: float = 0.0, progress: Progress = silent) -> xr.Dataset:
-    """Run what a store lacks of its study, block by block, and verify a share; the opened store. Raises InputError."""
-    with Store.opened(path, study) as store:
+def run_in_store(
+    study: Study,
+    path: Path,
+    crew: Crew,
+    verify: float = 0.0,
+    progress: Progress = silent,
+    overwrite: bool = False,
+) -> xr.Dataset:
+    """Run what a store lacks of its study, block by block, and verify a share; the opened store. With `overwrite` the
+    store of another study is replaced. Raises InputError."""
+    with Store.opened(path, study, overwrite) as store:
         missing = list(store.missing())
         tally = Tally(progress, study.cells)
         tally.add(study.cells - sum(map(cells_of, missing)), CELLS)
         if missing and study.refined:
-            columns = _refined(study, crew, tally, store.keeping)
+            columns = _refined(study, crew, tally, store.answers.keeping)
             for block in missing:
                 store.write(block, {name: columns[name][block] for name in study.metrics})
-            store.forget_answers()
+            store.answers.forget()
             missing = []
         for _, block, measures in crew.compute((study, block) for block in missing):
             store.write(block, measures)

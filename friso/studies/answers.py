@@ -1,0 +1,58 @@
+"""What a refined study was told of its cells, kept until it is done: asked the same again, it needs no runs."""
+
+from __future__ import annotations
+
+import shutil
+import zipfile
+import zlib
+from itertools import count
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from friso.studies.cells import WORDS, Columns
+from friso.studies.refine import Ask
+
+PARTIAL = ".partial"
+"""How the names of files end that are being written, Zarr's and these."""
+
+
+class Answers:
+    """Answers kept in a folder; what is damaged there is asked for again: the files are archives with checksums."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+
+    def keeping(self, ask: Ask) -> Ask:
+        """`ask` with its answers kept."""
+        self.folder.mkdir(exist_ok=True)
+        number = count()
+
+        def answer(cells: np.ndarray) -> Columns:
+            file = self.folder / f"{next(number)}.npz"
+            if (stored := _answer(file, cells)) is not None:
+                return stored
+            columns = ask(cells)
+            draft = file.with_suffix(PARTIAL)
+            with draft.open("wb") as stream:
+                arrays: dict[str, Any] = {name: columns[name].astype(WORDS.get(name, "f8")) for name in columns}
+                np.savez_compressed(stream, cells=cells, **arrays)
+            draft.replace(file)
+            return columns
+
+        return answer
+
+    def forget(self) -> None:
+        """Remove what was kept: the blocks of the study hold it by now."""
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+
+def _answer(file: Path, cells: np.ndarray) -> Columns | None:
+    """What was kept about just these cells, None if nothing."""
+    try:
+        with np.load(file) as stored:
+            answer = dict(stored)
+    except (OSError, ValueError, EOFError, KeyError, NotImplementedError, zipfile.BadZipFile, zlib.error):
+        return None
+    return answer if np.array_equal(answer.pop("cells", None), cells) else None
