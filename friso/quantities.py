@@ -18,6 +18,9 @@ from pydantic_core import CoreSchema, core_schema
 
 from friso.errors import InputError
 
+LARGEST_INTEGER = 10**60
+"""Whole numbers from here on are kept and written as floats."""
+
 
 def as_toml(value: Any) -> str:
     """How a scalar is written in TOML; anything else is named, not written out."""
@@ -28,7 +31,7 @@ def as_toml(value: Any) -> str:
     if isinstance(value, float):
         return repr(float(value))  # float(): numpy's own repr is no TOML
     if isinstance(value, int):
-        return str(value) if abs(value) < 10**60 else "a huge integer"
+        return str(value) if abs(value) < LARGEST_INTEGER else "a huge integer"
     names = {dict: "a table", list: "an array", type(None): "nothing"}
     return names.get(type(value), f"{value} (a {type(value).__name__})")
 
@@ -142,7 +145,7 @@ class Number:
         is_number = isinstance(entry, int | float) and not isinstance(entry, bool)
         if not is_number or not self.bound.holds(entry):
             raise InputError("", quoted(entry), self.expected, self.written_example)
-        return entry
+        return float(entry) if abs(entry) >= LARGEST_INTEGER else entry
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         return core_schema.no_info_plain_validator_function(self.read)
@@ -227,8 +230,39 @@ def _root(unit: str) -> tuple[float, dict[str, float], list[str]]:
         units = _registry().parse_units(unit)
         factor, root = _registry().get_root_units(units)
     except Exception as error:  # pint lets through whatever Python's tokenizer and its own arithmetic raise
-        raise _Refused(f"{quoted(unit)} is not a known unit") from error
+        raise _Refused(f"{quoted(unit)} is not a known unit{_meant(unit)}") from error
     return float(factor), dict(root._units), [*units._units]
+
+
+_USUAL = [
+    "Hz",
+    "kHz",
+    "N",
+    "kN",
+    "m",
+    "mm",
+    "um",
+    "nm",
+    "s",
+    "ms",
+    "us",
+    "kg",
+    "g",
+    "Pa",
+    "GPa",
+    "rad",
+    "deg",
+    "rpm",
+    "A",
+]
+_SPELLED = {name.lower(): name for name in _USUAL}
+"""How units are spelled that are often written with other capitals."""
+
+
+def _meant(unit: str) -> str:
+    """The unit in the usual capitals, as a question; "" where it stands in them."""
+    spelled = re.sub(r"[^\W\d_]+", lambda name: _SPELLED.get(name[0].lower(), name[0]), unit)
+    return f"; {spelled}?" if spelled != unit else ""
 
 
 @lru_cache(maxsize=1024)

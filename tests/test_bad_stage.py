@@ -49,7 +49,7 @@ STIFFNESS = 'stiffness = "2.4 N/mm"'
         ('"2.4 N/m/rad"', '"2.4 N/m/rad" (N/m/rad is not convertible to N/m)'),
         ('"2.4 flurbs/mm"', '"2.4 flurbs/mm" ("flurbs/mm" is not a known unit)'),
         ('"2.4 Ns/m"', '"2.4 Ns/m" ("Ns/m" is not a known unit)'),
-        ('"2.4 n/MM"', '"2.4 n/MM" ("n/MM" is not a known unit)'),
+        ('"2.4 n/MM"', '"2.4 n/MM" ("n/MM" is not a known unit; N/mm?)'),
         ('"-2.4 N/mm"', '"-2.4 N/mm"'),
         ('"0 N/mm"', '"0 N/mm"'),
         ('"nan N/mm"', '"nan N/mm" (not a finite number)'),

@@ -3,6 +3,7 @@
 import json
 import os
 import pty
+import shutil
 import signal
 import subprocess
 import sys
@@ -13,6 +14,8 @@ import pytest
 import xarray as xr
 from inside import friso_inside
 from refusals import Refused
+
+from friso.cli.output import MARKER
 
 RIG = Path(__file__).parent.parent / "examples" / "thesis_rig.toml"
 SMALL = ("--x", "controller.crossover=4 Hz..12 Hz:5", "--y", "joint.stroke=0 m..1 mm:4")
@@ -196,3 +199,36 @@ def test_samples_links_and_a_local_cluster(tmp_path: Path) -> None:
         assert found.outcome.shape == (16,)
     again = friso_inside(tmp_path, "map", RIG, *options, *links, "--out", "b.zarr", "--json")
     assert json.loads(again.stdout)["outcomes"] == json.loads(done.stdout)["outcomes"]
+
+
+def test_a_store_is_checked(mapped: tuple[Path, dict], tmp_path: Path) -> None:
+    shutil.copytree(mapped[0] / "a.zarr", tmp_path / "a.zarr")
+    done = friso_inside(tmp_path, "map", "a.zarr", "--check")
+    assert done.returncode == 0
+    (chunk, *_) = (tmp_path / "a.zarr" / "peaks").glob("[0-9]*")
+    content = chunk.read_bytes()
+    chunk.write_bytes(content[:-1] + bytes([content[-1] ^ 1]))
+    done = friso_inside(tmp_path, "map", "a.zarr", "--check", "--json")
+    assert done.returncode == 1
+    assert json.loads(done.stdout)["damaged"] == [chunk.name]
+
+
+def test_a_figure_beside_a_store_that_it_has_not_made_stays(mapped: tuple[Path, dict], tmp_path: Path) -> None:
+    shutil.copytree(mapped[0] / "a.zarr", tmp_path / "a.zarr")
+    (tmp_path / "a.zarr" / MARKER).unlink()
+    (tmp_path / "a.png").write_text("precious")
+    done = friso_inside(tmp_path, "map", "a.zarr")
+    assert done.returncode == 2
+    assert "--overwrite" in done.stderr
+    assert (tmp_path / "a.png").read_text() == "precious"
+    assert friso_inside(tmp_path, "map", "a.zarr", "--overwrite").returncode == 0
+    assert friso_inside(tmp_path, "map", "a.zarr").returncode == 0  # they are its own from then on
+
+
+def test_a_store_of_another_study_is_replaced_when_told(mapped: tuple[Path, dict], tmp_path: Path) -> None:
+    shutil.copytree(mapped[0] / "a.zarr", tmp_path / "a.zarr")
+    other = ("map", RIG, "--x", "controller.crossover=4 Hz, 5 Hz", "--out", "a.zarr", "--verify", "0")
+    assert friso_inside(tmp_path, *other).returncode == 2
+    assert friso_inside(tmp_path, *other, "--overwrite").returncode == 0
+    with xr.open_zarr(tmp_path / "a.zarr") as found:
+        assert found.outcome.shape == (2,)

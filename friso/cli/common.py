@@ -16,6 +16,7 @@ from friso.errors import InputError
 from friso.escapes import one_line
 from friso.quantities import Quantity, positive
 from friso.stage import Stage, load, parse_set
+from friso.stage.plausible import doubts
 
 INTERRUPTED = 130
 
@@ -108,6 +109,8 @@ def read_stage(
     """The stage of the file with the overrides; tables that the command leaves out are mentioned, and that the centres
     of uncertain keys are used, unless these are wanted too (`uncertain_too`). Raises InputError."""
     stage = with_overrides(load(path), overrides)
+    for doubt in doubts(stage):
+        say(doubt)
     keys = [] if uncertain_too else [*stage.uncertain()]
     if keys:
         several = f"{len(keys)} keys are" if len(keys) > 1 else "1 key is"

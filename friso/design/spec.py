@@ -272,6 +272,9 @@ EXPECTED = "a specification; examples/specs/thesis.toml is one"
 def load_spec(path: str | os.PathLike[str]) -> Spec:
     """The specification in a TOML file. Raises SpecError."""
     try:
-        return Spec(**parsed(text_of(Path(path), EXPECTED, EXAMPLE), EXPECTED, EXAMPLE))
+        tables = parsed(text_of(Path(path), EXPECTED, EXAMPLE), EXPECTED, EXAMPLE)
+        if "machine" not in tables and {"controller", "motion"} <= tables.keys():
+            raise SpecError("", "a stage file", EXPECTED, "friso design STAGE.toml SPECIFICATION.toml")
+        return Spec(**tables)
     except InputError as error:
         raise SpecError.of(error).found_in(str(path)) from None

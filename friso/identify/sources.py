@@ -11,7 +11,7 @@ from friso.identify.kind import Source
 from friso.identify.kinds import KINDS
 from friso.identify.logs.assemble import read_log
 from friso.identify.logs.log import Log
-from friso.identify.logs.mapping import Mapping, load, place_for
+from friso.identify.logs.mapping import SUFFIX, Mapping, load, place_for
 from friso.identify.logs.read import is_frequency_response, read_frequency_response, read_table
 from friso.identify.logs.roles import find
 from friso.identify.readings.course import Course
@@ -68,6 +68,8 @@ def _read(path: Path, options: Mapping, folder: Path) -> LogFile:
         kind = next(name for name in KINDS if KINDS[name].responses)
         return LogFile(path, read_frequency_response(path), kind, "the file holds a frequency response")
     stored = load(path, folder) or Mapping()
+    if stored.experiment is not None:
+        KINDS.checked(stored.experiment, f"{path}{SUFFIX}: experiment", 'experiment = "{}"')
     mapping = options.over(stored)
     if mapping.experiment is not None:
         KINDS.checked(mapping.experiment, "--as", "--as {}")

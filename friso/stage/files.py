@@ -1,11 +1,14 @@
 """Stage files: reading, writing, and the KEY=VALUE of the command line."""
 
 import os
+import re
 import tomllib
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from friso.errors import InputError, StageError
+from friso.escapes import one_line
 from friso.quantities import quoted
 from friso.stage.stage import Stage
 
@@ -24,9 +27,18 @@ def load(path: str | os.PathLike[str]) -> Stage:
 def loads(text: str, origin: str = "stage file") -> Stage:
     """The stage of a TOML text; `origin` names it in errors. Raises StageError."""
     try:
-        return Stage(**parsed(text, _EXPECTED))
+        tables = parsed(text, _EXPECTED)
+        if "masses" not in tables or "controller" not in tables:
+            _refuse_specification(tables)
+        return Stage(**tables)
     except InputError as error:
         raise StageError.of(error).found_in(origin) from None
+
+
+def _refuse_specification(tables: Mapping[str, Any]) -> None:
+    """Raises StageError for what describes a design instead of a stage."""
+    if len({"machine", "moves", "leaves", "position", "safety"} & tables.keys()) > 1:
+        raise StageError("", "a specification of a design", _EXPECTED, "friso design STAGE.toml SPECIFICATION.toml")
 
 
 def save(stage: Stage, path: str | os.PathLike[str], overwrite: bool = False) -> None:
@@ -89,9 +101,59 @@ def parsed(text: str, expected: str, example: str = _EXAMPLE) -> dict[str, Any]:
     """The tables of a TOML text that is to be what is `expected`. Raises InputError."""
     if not text.strip():
         raise InputError("", "an empty file", expected, example)
+    if key := _MANY_PARTS.search(text):
+        line = text.count("\n", 0, key.end()) + 1
+        raise InputError("", f"a key of more than {_PARTS} parts in line {line}", expected, example)
     try:
         return tomllib.loads(text)
     except RecursionError:
         raise InputError("", "tables nested too deeply", expected, example) from None
-    except ValueError as error:  # TOMLDecodeError, and Python's own for integers of thousands of digits
-        raise InputError("", f"not TOML: {error}", "tables in brackets, then key = value", example) from None
+    except tomllib.TOMLDecodeError as error:
+        actual = f"not TOML: {_shown(text, str(error))}"
+        raise InputError("", actual, "tables in brackets, then key = value", example) from None
+    except ValueError:  # Python's own
+        raise InputError("", "not TOML: a whole number of thousands of digits", expected, example) from None
+
+
+_PARTS = 32
+_PART = r"""(?:[\w-]+|"[^"\n]*"|'[^'\n]*')"""
+_MANY_PARTS = re.compile(rf"(?:^|[\[{{,])[ \t]*(?:{_PART}[ \t]*\.[ \t]*){{{_PARTS}}}", re.MULTILINE)
+"""Keys of more parts than any table has; the time that thousands of them take grows with the square of their number."""
+
+_PLACE = re.compile(r" \(at line (\d+), column (\d+)\)$")
+
+_WIDTH = 100
+"""How much of a line is shown, at most."""
+
+
+def _shown(text: str, message: str) -> str:
+    """What is wrong with a TOML text, and the line with a caret below the place."""
+    place = _PLACE.search(message)
+    if place is None:
+        return message
+    number, column = int(place[1]), int(place[2])
+    line = text.split("\n")[number - 1].rstrip("\r")
+    why = message[: place.start()]
+    if (opened := _open_quote(line)) is not None:
+        column, why = opened + 1, "a quote that is not closed"
+    start = max(0, column - _WIDTH // 2) if column > _WIDTH else 0
+    before, line = one_line(line[start : column - 1]), one_line(line[start : start + _WIDTH])
+    place_in_words = f"(at line {number}, column {column})"
+    return f"{why} {place_in_words}\n{_INDENT}{line}\n{_INDENT}{' ' * len(before)}^"
+
+
+_INDENT = " " * 12
+"""Below what an InputError says was given."""
+
+
+def _open_quote(line: str) -> int | None:
+    """Where the quote stands that is not closed in a line, None for none."""
+    opened: int | None = None
+    for place, sign in enumerate(line):
+        if opened is not None:
+            opened = None if sign == line[opened] and (sign == "'" or line[place - 1] != "\\") else opened
+        elif sign == "#":
+            return None
+        elif sign in "\"'":
+            opened = place
+    return opened

@@ -188,8 +188,11 @@ def _first_problem(cls: type[Section], error: ValidationError) -> InputError:
     if problem["type"] == "extra_forbidden":
         near = nearest(key, cls.model_fields) or next(iter(cls.model_fields))
         return unknown_key(key, cls.model_fields, _described(cls, near)[1])
-    text = "nothing" if problem["type"] == "missing" else quoted(problem["input"])
-    return InputError(key, text, *_described(cls, key))
+    if problem["type"] != "missing":
+        return InputError(key, quoted(problem["input"]), *_described(cls, key))
+    missing = [".".join(map(str, other["loc"])) for other in problems if other["type"] == "missing"]
+    others = f"nothing; nor {', '.join(missing[1:])}" if len(missing) > 1 else "nothing"
+    return InputError(key, others, *_described(cls, key))
 
 
 def _complete(error: InputError, key: str) -> InputError:

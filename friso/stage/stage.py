@@ -121,7 +121,10 @@ class Stage(Section):
 
     def _has_computable_leaves(self) -> None:
         """Leaf springs of absurd sizes have neither stiffness nor modes."""
-        flat = self.flat() if self.flexure else {}
+        try:
+            flat = self.flat() if self.flexure else {}
+        except (ArithmeticError, ValueError, np.linalg.LinAlgError):  # numbers beyond what floats hold
+            flat = {"joint.stiffness": np.nan}
         followed = (key for key in flat if key.startswith(("parasitic.", "joint.")))
         lost = [key for key in followed if not isinstance(flat[key], bool) and not np.isfinite(flat[key])]
         if lost:

@@ -28,6 +28,8 @@ def seal_metadata(path: Path, attributes: Mapping[str, Any] | None = None) -> No
     document = json.loads((path / _FILE).read_bytes())
     metadata = document["metadata"]
     metadata[_ATTRIBUTES] |= dict(attributes or {})
+    if attributes:  # also for other readers; first, so that a kill in between has it all done again
+        write_private(path / _ATTRIBUTES, json.dumps(metadata[_ATTRIBUTES], indent=1).encode())
     sealed = {**document, _OWN: {"format": FORMAT, "sha256": _digest(metadata)}}
     write_private(path / _FILE, json.dumps(sealed, indent=1, sort_keys=True).encode())
 

@@ -188,9 +188,10 @@ def read_store(path: str | os.PathLike[str]) -> xr.Dataset:
     """
     import xarray as xr
 
-    checked_metadata(Path(path))
+    attributes = checked_metadata(Path(path))
     try:
         runs = xr.open_zarr(path, chunks=None, zarr_format=_FORMAT)
+        runs.attrs = attributes
         return runs.assign_coords({name: axis.load() for name, axis in runs.coords.items()})
     except Exception:  # whatever a codec makes of what it cannot read
         expected = "a copy of the store, or the study run again under a new name, or with --overwrite"

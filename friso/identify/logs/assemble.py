@@ -121,6 +121,9 @@ def _check(base: Track, signals: dict[str, np.ndarray], needed: Sequence[str]) -
     """Raises LogError for a log that is too short and for a signal that does not change and should."""
     if base.time.size < LEAST_SAMPLES:
         raise LogError("log", f"{base.time.size} samples", f"at least {LEAST_SAMPLES} samples", "")
+    if not 1e-9 <= base.period <= 3600:
+        expected = "1 ns to 1 h between samples: is the time in another unit?"
+        raise LogError("time", f"{base.period:g} s between samples", expected, '--unit TIME="ms"')
     for role in {*needed, "position", "force"} & set(signals):
         if checks.constant(role, signals[role]):
             value = quoted(float(signals[role][0]))
@@ -151,6 +154,12 @@ def _doubts(base: Track, signals: dict[str, np.ndarray], notes: Notes) -> list[s
 def _spans(base: Track) -> str:
     """The segments in words."""
     parts = base.segments
-    listed = ", ".join(f"{base.time[p.start]:.6g} s to {base.time[p.stop - 1]:.6g} s" for p in parts[:6])
+    listed = ", ".join(f"{_instant(base, p.start)} to {_instant(base, p.stop - 1)}" for p in parts[:6])
     more = f" and {len(parts) - 6} more" if len(parts) > 6 else ""
     return f"{base.time.size} samples at {1 / base.period:.6g} Hz in {len(parts)} segments: {listed}{more}"
+
+
+def _instant(base: Track, number: int) -> str:
+    """The instant of a sample; what rounding leaves of the beginning is 0."""
+    time = float(base.time[number])
+    return f"{0.0 if abs(time) < 1e-6 * base.period else time:.6g} s"

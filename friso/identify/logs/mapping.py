@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import stat
-import tomllib
 from collections.abc import Iterable
 from collections.abc import Mapping as Table
 from dataclasses import dataclass, field, fields, replace
@@ -13,13 +12,15 @@ from typing import Any
 
 from friso.errors import InputError, LogError
 from friso.identify.logs.log import ROLES
-from friso.quantities import Quantity, as_toml, positive, quoted
+from friso.quantities import Bound, Quantity, as_toml, quoted
+from friso.stage.files import parsed, text_of
 
 SUFFIX = ".friso.toml"
 MAPPABLE = ("time", *ROLES)
 """What a channel can be mapped to."""
 TABLES = ("roles", "units", "scales", "setup")
-_SAMPLE_TIME = Quantity("s", positive, "1 ms")
+_INTERVALS = Bound("1 ns to 1 h", lambda value: (value >= 1e-9) & (value <= 3600))
+_SAMPLE_TIME = Quantity("s", _INTERVALS, "1 ms")
 
 
 @dataclass(frozen=True)
@@ -115,21 +116,25 @@ def load(log: Path, folder: Path | None = None) -> Mapping | None:
     return None
 
 
+_KEPT = "a mapping kept by friso; delete the file to map again"
+
+
 def _parsed(place: Path) -> Mapping:
     """The mapping in a file. Raises LogError."""
     try:
-        document = tomllib.loads(place.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError) as error:
-        raise LogError(
-            "", str(error), "a mapping kept by friso; delete the file to map again", "", str(place)
-        ) from None
+        document = parsed(text_of(place, _KEPT), _KEPT)
+    except InputError as error:
+        raise LogError("", error.actual, _KEPT, "", str(place)) from None
+    experiment = document.get("experiment")
+    if not isinstance(experiment, str | None):
+        raise LogError("experiment", quoted(experiment), "the name of a kind of experiment", "", str(place))
     names = {entry.name for entry in fields(Mapping)}
     for key, value in document.items():
         if key not in names or (key in TABLES) != isinstance(value, dict):
             raise LogError(key, quoted(value), f"tables {', '.join(TABLES)}; sample_time", "", str(place))
     texts = {key: _texts(document.get(key, {}), key, place) for key in TABLES}
     try:
-        options = from_options(dt=document.get("sample_time"), experiment=document.get("experiment"))
+        options = from_options(dt=document.get("sample_time"), experiment=experiment)
         for group, allowed in (("roles", MAPPABLE), ("scales", tuple(ROLES))):
             for key in texts[group]:
                 if key not in allowed:

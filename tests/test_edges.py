@@ -1,0 +1,177 @@
+"""Inputs at the edges of what a float, a file or a person does: one message that says what is wrong, and at once."""
+
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from inside import friso_inside
+from refusals import Refused
+
+import friso
+from friso.errors import InputError
+from friso.identify.logs import mapping
+from friso.stage import Stage, loads, numeric_keys
+from friso.stage.plausible import doubts
+
+EXAMPLES = Path(__file__).parent.parent / "examples"
+RIG = (EXAMPLES / "thesis_rig.toml").read_text(encoding="utf-8")
+LEAVES = friso.load(EXAMPLES / "thesis_leaves.toml")
+SPECIFICATION = EXAMPLES / "specs" / "thesis.toml"
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        {"flexure.spacing": "1e200 m"},
+        {"flexure.length": "1e-200 m"},
+        {"flexure.thickness": "1e-300 m"},
+        {"flexure.width": "1e300 m"},
+    ],
+)
+def test_sizes_that_no_float_holds(changes: dict[str, str], refused: Refused) -> None:
+    with refused("flexure"):
+        LEAVES.replace(changes)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        RIG.replace("stribeck_exponent = 2", f"stribeck_exponent = {'1' * 5000}"),
+        f"{RIG}\n[more]\na = {'1' * 40_000}",
+        RIG.replace('"1.2 kg"', f'"{"1" * 40_000} kg"'),
+        f"a = {'[' * 3000}{']' * 3000}",
+        f"a = {'{b = ' * 3000}1{'}' * 3000}",
+        f"{RIG}\n{'.'.join(['a'] * 10_000)} = 1",
+        f"{RIG}\n[{' . '.join(['a'] * 10_000)}]",
+        f'{RIG}\n"a"{".a" * 10_000} = 1',
+    ],
+)
+def test_what_is_too_long_or_too_deep(text: str, refused: Refused) -> None:
+    with refused():
+        loads(text)
+
+
+@pytest.mark.parametrize(("unit", "meant"), [("hz", "Hz"), ("KHZ", "kHz"), ("RPM", "rpm")])
+def test_a_unit_in_other_capitals_is_recognised(unit: str, meant: str) -> None:
+    with pytest.raises(InputError, match=f"not a known unit; {meant}"):
+        loads(RIG.replace('"8 Hz"', f'"25{unit}"'))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "below"),
+    [
+        ('"8 Hz"', '"8 Hz', '"'),
+        ('"8 Hz"', '8 Hz"', '"'),
+        ("[masses]", "[masses", ""),
+        ("alpha = 0.1", "alpha 0.1", "0"),
+    ],
+)
+def test_the_line_is_shown_with_a_caret(old: str, new: str, below: str, refused: Refused) -> None:
+    with refused() as error:
+        loads(RIG.replace(old, new))
+    lines = str(error.value).splitlines()
+    (caret,) = (k for k, line in enumerate(lines) if line.strip() == "^")
+    assert new in lines[caret - 1]
+    assert lines[caret - 1][lines[caret].index("^") :].startswith(below)
+
+
+def test_a_specification_given_as_a_stage_is_recognised_and_the_reverse(tmp_path: Path) -> None:
+    rig = EXAMPLES / "thesis_rig.toml"
+    done = friso_inside(tmp_path, "check", SPECIFICATION)
+    assert done.returncode == 2
+    assert "a specification of a design" in done.stderr
+    done = friso_inside(tmp_path, "design", rig, rig)
+    assert done.returncode == 2
+    assert "a stage file" in done.stderr
+
+
+def test_missing_keys_of_a_table_are_named_together() -> None:
+    text = RIG.replace('static = "3 N"\n', "").replace('coulomb = "1 N"\n', "").replace('viscous = "0.5 N*s/m"\n', "")
+    with pytest.raises(InputError, match=r"static[\s\S]*nor coulomb"):
+        loads(text)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        'sample_time = "1e300 s"',
+        'sample_time = "1e-300 s"',
+        "sample_time = 3",
+        f"sample_time = {'1' * 5000}",
+        "experiment = 3",
+        f"a = {'[' * 3000}{']' * 3000}",
+        '[roles]\nvolume = "a"',
+        "[units]\nposition = 3",
+        "roles = 3",
+        "\xff",
+    ],
+)
+def test_a_mapping_that_is_kept_is_checked_like_an_option(tmp_path: Path, text: str, refused: Refused) -> None:
+    log = tmp_path / "log.csv"
+    mapping.sidecar(log).write_text(text, encoding="utf-8")
+    with refused():
+        mapping.load(log)
+
+
+@pytest.mark.parametrize("time", ["1e300 s", "1e-300 s", "2 h"])
+def test_a_sample_time_beyond_all_measure_is_refused(time: str) -> None:
+    with pytest.raises(InputError, match="--dt"):
+        mapping.from_options(dt=time)
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "meant"),
+    [
+        ("masses.cart", "3000 kg", "g"),
+        ("friction.static", "52 kN", "N"),
+        ("joint.stroke", "1000 m", "mm"),
+        ("friction.stribeck_velocity", "1600 m/s", "mm/s"),
+    ],
+)
+def test_a_value_that_is_hardly_meant_is_questioned(key: str, value: str, meant: str) -> None:
+    (doubt,) = doubts(loads(RIG).replace({key: value}))
+    assert key in doubt
+    assert value in doubt
+    assert doubt.endswith(f"was {meant} meant?")
+
+
+def test_a_doubt_is_said_before_the_answer(tmp_path: Path) -> None:
+    done = friso_inside(tmp_path, "bode", EXAMPLES / "thesis_rig.toml", "--set", "friction.static=52 kN")
+    assert "friso: friction.static = 52 kN" in done.stderr
+
+
+@pytest.mark.parametrize("path", [*EXAMPLES.glob("*.toml"), EXAMPLES.parent / "friso" / "templates" / "stage.toml"])
+def test_usual_stages_raise_no_doubts(path: Path) -> None:
+    assert not [*doubts(friso.load(path))]
+
+
+NUMBERS = st.one_of(
+    st.integers(0, 10**80), st.floats(allow_nan=True), st.sampled_from([10**60, 10**70, 10**308, 10**400, True])
+)
+
+
+KEYS = sorted(numeric_keys(loads(RIG).flat()))
+
+
+@given(key=st.sampled_from(KEYS), number=NUMBERS, unit=st.sampled_from(["", "m", "N"]))
+@settings(deadline=None, max_examples=200)
+def test_what_is_a_stage_can_be_saved_and_read_again(key: str, number: float, unit: str) -> None:
+    field = numeric_keys(loads(RIG).flat())[key]
+    try:
+        stage = loads(RIG).replace({key: f"{number!r} {unit or field.unit}" if field.unit else number})
+    except InputError:
+        return
+    again = loads(stage.to_toml())
+    assert again == stage
+    assert again.flat() == stage.flat()
+
+
+@given(text=st.text(st.characters(), max_size=20))
+@settings(deadline=None)
+def test_any_text_can_be_saved_and_read_again(text: str) -> None:
+    try:
+        stage: Stage = loads(RIG).replace({"name": text, "source": text})
+    except InputError:
+        return
+    assert loads(stage.to_toml()) == stage
