@@ -234,27 +234,7 @@ def _root(unit: str) -> tuple[float, dict[str, float], list[str]]:
     return float(factor), dict(root._units), [*units._units]
 
 
-_USUAL = [
-    "Hz",
-    "kHz",
-    "N",
-    "kN",
-    "m",
-    "mm",
-    "um",
-    "nm",
-    "s",
-    "ms",
-    "us",
-    "kg",
-    "g",
-    "Pa",
-    "GPa",
-    "rad",
-    "deg",
-    "rpm",
-    "A",
-]
+_USUAL = ("Hz", "kHz", "N", "kN", "m", "mm", "um", "nm", "s", "ms", "us", "kg", "g", "Pa", "GPa", "rad", "deg", "rpm")
 _SPELLED = {name.lower(): name for name in _USUAL}
 """How units are spelled that are often written with other capitals."""
 
