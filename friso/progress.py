@@ -1,4 +1,4 @@
-"""How long work tells how far it has come: one signature, for studies and analyses alike."""
+"""How long work reports its progress: one signature, for studies and analyses."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def silent(done: int, total: int, what: str) -> None:
 
 
 class Tally:
-    """Counts the steps of work that is done in pieces, and tells a progress of each."""
+    """Counts the steps of work that is done in pieces, and reports each to a progress."""
 
     def __init__(self, progress: Progress, total: int) -> None:
         self.progress, self.total, self.done = progress, total, 0

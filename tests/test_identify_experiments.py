@@ -542,7 +542,7 @@ def test_one_speed_leaves_a_range() -> None:
     found = friction_velocity(travels([0.05, 0.05, 0.05], FLAT, np.random.default_rng(3)), 1.0)
     for each, truth in ((found.both.coulomb, 1.0), (found.both.viscous, 0.4)):
         assert not each.determined
-        assert "cannot be told apart" in each.reason
+        assert "cannot be distinguished" in each.reason
         assert each.low <= truth <= each.high < np.inf
 
 

@@ -226,7 +226,9 @@ def everything() -> tuple[Identification, list[LogFile], list[Prediction]]:
     estimates = tuple(combined(list(moved.estimates))[0])
     stage = identified(made_up(log, moved.inverse), estimates, ["axis"])
     found = Identification(stage, Correlations(), experiments, estimates, ("something <to> know",))
-    files = [LogFile(Path(f"{each.name}.csv"), each, kind, "as told", None) for kind, _, logs in rows for each in logs]
+    files = [
+        LogFile(Path(f"{each.name}.csv"), each, kind, "as specified", None) for kind, _, logs in rows for each in logs
+    ]
     predictions = [
         Prediction(log, "moves", SimulatedLog(moved.part, moved.simulated, moved.errors)),
         Prediction(exps[0], "frequency", (0.1, 0.7)),

@@ -1,6 +1,6 @@
 """Where the answers of all commands go: files, all of them or none, and one JSON document.
 
-A command writes into a folder that is new, empty, or its own from an earlier run, which a small file in it tells;
+A command writes into a folder that is new, empty, or its own from an earlier run, which a small file in it marks;
 else it refuses and names --overwrite. Never does it replace a file that it reads.
 """
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from friso.views.files import Content, Files
 
 MARKER = ".friso-output"
-"""The file that tells which command made a folder, and which files there are friso's."""
+"""The file that records which command made a folder, and which files there are friso's."""
 
 UNFINISHED = ".friso-unfinished"
 """The folder in which a long command keeps what is done until all is."""
@@ -108,7 +108,7 @@ def write(files: Mapping[Path, Content], progress: Progress = silent) -> list[Pa
 
 
 def print_document(document: Mapping[str, Any], files: Iterable[Path] | None = None) -> None:
-    """The JSON document of a command, with the files that it has written if it tells them."""
+    """The JSON document of a command, with the files that it has written, if it lists them."""
     written = {} if files is None else {"files": [str(file) for file in files]}
     print(json.dumps({**document, **written}, allow_nan=False))
 

@@ -57,7 +57,7 @@ def take_next(queue: Any) -> Any:
 
 
 def call_at(address: Any, buffer: Any, *numbers: Any) -> Any:
-    """Call a function that `friso.engine.vector_code` has written, at its address; the bits of the lanes it tells."""
+    """Call a function that `friso.engine.vector_code` has written, at its address; the bits of the lanes it returns."""
     raise NotImplementedError
 
 

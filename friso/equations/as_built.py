@@ -45,7 +45,7 @@ class AsBuilt:
 
 
 def whole_samples(flat: Mapping[str, Any]) -> int:
-    """The delay of a drive in whole samples, what is left of it being `drive.late`."""
+    """The delay of a drive in whole samples, the remainder being `drive.late`."""
     return int(flat.get("drive.delay", 0.0) / flat["drive.sample_time"] * (1 + 1e-9) + 1e-9)
 
 

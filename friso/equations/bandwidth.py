@@ -18,7 +18,7 @@ def bandwidth(flat: Mapping[str, Any]) -> Any:
 
 def at_bandwidth(flat: Mapping[str, Any], bandwidth: Any) -> dict[str, Any]:
     """Stages with their controllers at bandwidths [Hz], faster or slower as a whole; at factors of it where no key
-    tells a bandwidth."""
+    states a bandwidth."""
     key = controller_of(flat).bandwidth_key
     return faster(flat, bandwidth) if key is None else {**faster(flat, bandwidth / flat[key]), key: bandwidth}
 

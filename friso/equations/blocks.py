@@ -112,7 +112,7 @@ def measured(loop: Loop, length: sp.Expr, rate: sp.Expr) -> Measured:
 
 
 class Blocks(ABC):
-    """The blocks, which keep what they need beside them. `name` tells a block from others of its kind."""
+    """The blocks, which keep what they need beside them. `name` distinguishes a block from others of its kind."""
 
     nothing = Signal(sp.S.Zero, sp.S.Zero, sp.S.Zero, sp.S.Zero, sp.S.Zero, sp.S.Zero)
     """A signal that is always 0."""
@@ -139,8 +139,8 @@ class Blocks(ABC):
         limit: sp.Expr | None = None,
     ) -> Signal:
         """gain/s; the gain is positive, and the controller's force rises with the output. Where that force is at its
-        limit, the integrator does as the anti-windup tells; where its own output is at a `limit`, it rests. A drive
-        integrates by trapezoids (`bilinear`) or sums up."""
+        limit, the integrator does what the anti-windup prescribes; where its own output is at a `limit`, it rests. A
+        drive integrates by trapezoids (`bilinear`) or sums up."""
 
     @abstractmethod
     def biquad(self, signal: Signal, upper: Polynomial, lower: Polynomial, name: str) -> Signal:

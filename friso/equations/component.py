@@ -71,7 +71,7 @@ class Clock:
     a period; then the numbers that are held change.
 
     `seen` are the states that are measured at the sample itself, under names of their own. `places` are looked up in
-    tables over the position that a state tells, `times` in tables over the time of the sample; they are held too.
+    tables over the position that a state holds, `times` in tables over the time of the sample; they are held too.
     """
 
     period: sp.Expr
@@ -136,9 +136,9 @@ class Switch(Kink):
     """A mode that remembers, such as the slip of an element: which side it is on depends on how the motion came there.
 
     It is entered where `enter` rises through 0 and left where `leave` does; `beyond` is 1 in it. `begins` is positive
-    in the states in which a run begins in the mode where nothing else tells; it contains no mode. `entered` and `left`
-    are what states become on entering and on leaving, in terms of what they were; the other states go on as they were.
-    """
+    in the states in which a run begins in the mode where nothing else decides; it contains no mode. `entered` and
+    `left` are what states become on entering and on leaving, in terms of what they were; the other states go on as they
+    were."""
 
     surface: sp.Expr = field(init=False, compare=False)
     enter: sp.Expr

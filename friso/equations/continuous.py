@@ -133,7 +133,7 @@ class Continuous(Blocks):
         rule: Literal["bilinear", "sum"] = "bilinear",
         limit: sp.Expr | None = None,
     ) -> Signal:
-        """By a state, which rests as the base class tells; `gain` in N per unit of the state."""
+        """By a state, which rests as the base class describes; `gain` in N per unit of the state."""
         symbol = state(name)
         output = gain * symbol
         self._integrals.append(_Integral(symbol, signal.value, signal.settled, signal.scale / self.rate, output, limit))

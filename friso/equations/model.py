@@ -37,7 +37,7 @@ class Model:
     The right-hand side is smooth while the kinks' `beyond` symbols are held; `TIME` counts from the last corner
     of the reference. `deviation` [m] is position minus reference, `length` [m] and `rate` [1/s] the scales of
     the motion from which the solver takes its absolute tolerances, `breakaway` [N] the largest friction force at rest
-    and `stiffness` [N/m] the proportional one of the loop. `jumps` tells by how much states jump where a
+    and `stiffness` [N/m] the proportional one of the loop. `jumps` gives by how much states jump where a
     kink is crossed, in terms of what holds just before: kinks to states to expressions.
 
     `inputs` are what a run is given anew at every corner of the reference, in this order. Between corners, or between

@@ -33,9 +33,8 @@ def sampled_controller(
     """The force [N] commanded at a sample, an `extra` one added before it is limited, and what is kept for the next.
 
     `loop` holds what is known at the sample. A derivative without a filter is a difference over `velocity_samples`. An
-    integrator does at the limit of the force as its anti-windup tells: clamped, it rests for the sample in which it
-    would drive the force further beyond.
-    """
+    integrator does at the limit of the force what its anti-windup prescribes: clamped, it rests for the sample in which
+    it would drive the force further beyond."""
     blocks = Sampled(velocity_samples)
     shares = form.law.declare(measured(loop, sp.S.One, sp.S.One), blocks, form.variant)
     demand = sum(shares.values(), start=Blocks.nothing)

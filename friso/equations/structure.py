@@ -72,7 +72,7 @@ def structure(flat: Mapping[str, Any]) -> Structure:
 
 
 def shared_structure(flat: Mapping[str, Any]) -> Structure:
-    """The structure of stages that all have the same, told by the first of them."""
+    """The structure of stages that all have the same, read off the first of them."""
     return structure({key: value[0] if np.ndim(value) else value for key, value in flat.items()})
 
 

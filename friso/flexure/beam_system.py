@@ -113,7 +113,7 @@ class Configuration:
 class Condensed:
     """Coordinates of the leaves' nodes, eliminated: the inner nodes `follow` the stage (leaves, inner coordinates, 3)
     and `settle` (leaves, inner coordinates) under forces that are out of balance; `force` (3,) and `stiffness` (3, 3)
-    are what is left at the stage."""
+    are the remainder at the stage."""
 
     follow: np.ndarray
     settle: np.ndarray
@@ -125,7 +125,7 @@ class Condensed:
         cls, stiffness: np.ndarray, forces: np.ndarray, which: int, ends: np.ndarray, bend: tuple[int, float]
     ) -> Condensed:
         """Of the stiffness of the leaves and forces on their nodes, the coordinates which, which + 2 and which + 4 of
-        each node; `ends` (leaves, 3, 3) tells how those of the leaf ends follow the stage, `bend` at which coordinate
+        each node; `ends` (leaves, 3, 3) says how those of the leaf ends follow the stage, `bend` at which coordinate
         their path is curved, and what the forces do there [N m]."""
         matrices = stiffness[:, COORDINATES + which :: 2, COORDINATES + which :: 2]
         out = forces[:, 1:, which::2].reshape(len(forces), -1)

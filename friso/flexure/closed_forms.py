@@ -230,9 +230,9 @@ def _symmetric(mechanism: Mechanism, entries: dict[tuple[int, int], Any]) -> np.
 
 def modes(mechanism: Mechanism) -> tuple[np.ndarray, np.ndarray]:
     """Frequencies, shape (..., 7), ascending, and shapes, (..., 7, 7), one per column at unit modal mass, of the stage
-    (six coordinates) and the leaves that bend all alike in their first mode (the seventh, at its unit modal mass), the
-    leaves following the stage statically besides (Craig & Bampton 1968, doi:10.2514/3.4741); NaN where the numbers make
-    no mechanism."""
+    (six coordinates) and the leaves that all bend in phase in their first mode (the seventh, at its unit modal mass),
+    the leaves following the stage statically besides (Craig & Bampton 1968, doi:10.2514/3.4741); NaN where the numbers
+    make no mechanism."""
     mass, stiffness = stage_mass(mechanism), stage_stiffness(mechanism)
     mass, stiffness = (np.pad(matrix, [(0, 0)] * (matrix.ndim - 2) + [(0, 1), (0, 1)]) for matrix in (mass, stiffness))
     together = np.sqrt(mechanism.leaves * mechanism.leaf_mass)

@@ -26,7 +26,7 @@ def mode_name(
     `stage` (6,) is the motion of the stage at its reference point, the middle of the leaf ends: translations, then
     rotations; `mass` [kg] and `inertia` [kg m^2] (3,) are its own, about the centre of mass, which is `arm` [m] (3,)
     away from the reference point. `leaves` (leaves, points, 3) are displacements of their middle lines at even places
-    from cart to stage, `leaf_mass` [kg] that of one. What of the energy is found nowhere else is torsion of the leaves.
+    from cart to stage, `leaf_mass` [kg] that of one. The energy that is nowhere else is torsion of the leaves.
     """
     speed = stage[:3] + np.cross(stage[3:], arm)
     energies = np.concatenate([mass * speed**2, np.asarray(inertia, dtype=float) * stage[3:] ** 2])

@@ -115,7 +115,7 @@ def settled_members(flat: Mapping[str, Any]) -> Members:
 
 
 def _own(flat: Mapping[str, Any]) -> float:
-    """The crossover of a stage [Hz]; 1 where its controller tells none."""
+    """The crossover of a stage [Hz]; 1 where its controller states none."""
     named = bandwidth(flat)
     return 1.0 if named is None else named
 

@@ -33,7 +33,7 @@ SLOW, FAST = 0.1, 1e5
 """Rates [1/s] at which bristles give way at the least and the greatest speed, of a law that names no speed."""
 
 BRISTLES = 1e-6
-"""Length [m] for that of the bristles of a law that has none: its force is alike at all speeds."""
+"""Length [m] for that of the bristles of a law that has none: its force is the same at all speeds."""
 
 
 @dataclass(frozen=True)

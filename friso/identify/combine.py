@@ -113,7 +113,7 @@ def _mean(key: str, estimates: Sequence[Estimate]) -> tuple[Estimate, bool]:
 def _between(values: np.ndarray, variances: np.ndarray) -> Mean:
     """The mean of values, shape (n,), that scatter by more than their variances: a variance from one to the next is
     added with which they scatter as they do (Paule, Mandel 1982, doi:10.6028/jres.087.022). The degrees of freedom are
-    those of as many values as count equally: one that is hardly known tells little of the scatter."""
+    those of as many values as count equally: one that is hardly known says little about the scatter."""
 
     def excess(added: float) -> float:
         weights = 1 / (variances + added)

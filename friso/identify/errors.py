@@ -29,8 +29,8 @@ class SimulationErrors:
 
 @dataclass(frozen=True)
 class Residual:
-    """What is left of the force [N]: root mean square and mean, the time [s] over which it stays alike, and the shares
-    of its power that its mean over places along the rail, and over speeds, explains."""
+    """What is left of the force [N]: root mean square and mean, the time [s] over which it stays correlated, and the
+    shares of its power that its mean over places along the rail, and over speeds, explains."""
 
     rms: float
     mean: float

@@ -1,4 +1,5 @@
-"""Least squares on the inverse model: force = M a + F_v v + F_c sign(v) + offset, filtered and decimated alike.
+"""Least squares on the inverse model: force = M a + F_v v + F_c sign(v) + offset, filtered and decimated in the same
+way.
 
 The filtering is that of Janot, Gautier, Brunot (EMPS benchmark, nonlinearbenchmark.org, 2019) and, for the method,
 Gautier, Janot, Vandanjon 2013, doi:10.1109/TCST.2012.2185697: position through a Butterworth filter of order 4 forward
@@ -36,7 +37,7 @@ ENERGY, ABOVE_NOISE, PIECES = 0.95, 4.0, 8
 stands above its noise where it counts, and into how many pieces a record is cut for it (Welch's method)."""
 
 ONE_WAY = 0.02
-"""Share of the way that a log goes in one direction at least, for the two directions to be told apart."""
+"""Share of the way that a log goes in one direction at least, for the two directions to be distinguished."""
 
 SLIDING, REST = 0.01, 0.1
 """Share of the highest speed below which a stage rests, and time [s] from which on a rest is left out of the fit: the
@@ -118,11 +119,10 @@ def inverse_model(
 ) -> InverseModel:
     """Mass, viscous and Coulomb friction and offset of a log with position and force.
 
-    With `by_direction`, both frictions have a value for each direction, and there is no offset, which could not be told
-    from a difference of the Coulomb frictions. `bandwidth` [Hz] is that of the motion, told from the log unless given.
-    Of a stage on a joint, `cart_share` is the share of the mass that moves with the measured cart, as does friction.
-    Raises InputError for a log too short.
-    """
+    With `by_direction`, both frictions have a value for each direction, and there is no offset, which could not be
+    distinguished from a difference of the Coulomb frictions. `bandwidth` [Hz] is that of the motion, read off the log
+    by default. Of a stage on a joint, `cart_share` is the share of the mass that moves with the measured cart, as does
+    friction. Raises InputError for a log too short."""
     band = bandwidth or bandwidth_of(log["position"], log.sample_time)
     longest = max(part.stop - part.start for part in log.segments) * log.sample_time
     if band * longest < 1:

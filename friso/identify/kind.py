@@ -69,7 +69,7 @@ def as_set_up(stage: Stage, log: Log) -> dict[str, Any]:
 
 
 def independent(result: Any, estimates: Sequence[Estimate]) -> Correlated:
-    """Estimates none of which tells anything of another one."""
+    """Estimates that are independent of one another."""
     certain = with_interval(estimates)
     return certain, np.eye(len(certain))
 
@@ -92,15 +92,14 @@ class Predictor(Generic[Result]):
 class ExperimentKind(Generic[Result]):
     """A kind of experiment. Its name, the word of the command line, is that of its module; see `kinds`.
 
-    `analyse` gives the result of a group of logs, whose class is the kind's own affair; `estimates` what this tells of
-    keys of the stage file, and `correlated` how these hang together. `after` names the kinds whose results it uses.
-    `roles` are the channels that a log needs; of several that are told apart by | the first one that is mapped, or the
+    `analyse` gives the result of a group of logs, whose class is the kind's own affair; `estimates` what this says
+    about keys of the stage file, and `correlated` how these hang together. `after` names the kinds whose results it
+    uses. `roles` are the channels that a log needs; of several separated by | the first one that is mapped, or the
     last. `si`: they have to be in SI units. `together`: all its logs are realisations of one experiment; `responses`:
-    it takes frequency responses as somebody measured them, too. `claims` answers why a log of which nobody said what
-    it is may be of this kind, or None; `around` makes up a stage around a log where none is given. `notes` are what
-    the engineer should know of all its results, the stage being given or not. Functions raise InputError for logs that
-    cannot be used.
-    """
+    it takes frequency responses as somebody measured them, too. `claims` answers why a log of which nobody said what it
+    is may be of this kind, or None; `around` makes up a stage around a log where none is given. `notes` are what the
+    engineer should know of all its results, the stage being given or not. Functions raise InputError for logs that
+    cannot be used."""
 
     analyse: Callable[[Sequence[Source], Prior, AnalysisSettings], Result]
     estimates: Callable[[Result, Stage | None], tuple[Estimate, ...]]

@@ -112,7 +112,7 @@ def _groups(logs: Sequence[tuple[Source, str]]) -> list[tuple[str, tuple[Source,
 
 
 def _around(logs: Sequence[tuple[Source, str]]) -> Stage | None:
-    """A stage around the first log that tells enough of a machine; None without one."""
+    """A stage around the first log that shows enough of a machine; None without one."""
     for log, kind in logs:
         around = KINDS[kind].around
         if around is not None and isinstance(log, Log):
@@ -135,7 +135,7 @@ def _notes(experiments: Sequence[Experiment], base: Stage | None) -> list[str]:
 def _correlations(
     experiments: Sequence[Experiment], estimates: Sequence[Estimate], fits: Fitting, stage: Stage
 ) -> Correlations:
-    """Those of the keys that the stage file has as they were found, and of what moves along with one of these."""
+    """Those of the keys that the stage file has as they were estimated, and of what moves along with one of these."""
     keys, matrix = correlations(
         _every_estimate(experiments),
         [KINDS[experiment.kind].correlated(experiment.result, experiment.estimates) for experiment in experiments],

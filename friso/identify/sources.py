@@ -75,7 +75,7 @@ def _read(path: Path, options: Mapping, folder: Path) -> LogFile:
         KINDS.checked(mapping.experiment, "--as", "--as {}")
         log = _log(path, mapping, mapping.experiment)
         before = "" if stored.experiment in (None, mapping.experiment) else f", in place of {stored.experiment} as kept"
-        return LogFile(path, log, mapping.experiment, f"as told{before}", mapping)
+        return LogFile(path, log, mapping.experiment, f"as specified{before}", mapping)
     log = read_log(path, mapping, strict=False, needed=("position", "force"))
     kind, reason = recognised(log, path)
     return LogFile(path, _log(path, mapping, kind) if KINDS[kind].si else log, kind, reason, mapping)
@@ -103,5 +103,5 @@ def recognised(log: Log, path: Path) -> tuple[str, str]:
     if len(reasons) == 1:
         return next(iter(reasons.items()))
     names = list(reasons or asked)
-    expected = f"to be told which kind of experiment it is: {', '.join(names)}"
+    expected = f"the kind of experiment: {', '.join(names)}"
     raise InputError("--as", course.words, expected, ", or ".join(f"--as {name}" for name in names), str(path))

@@ -1,4 +1,4 @@
-"""How uncertain a least-squares fit is whose residuals are not independent: neighbouring errors are alike."""
+"""How uncertain a least-squares fit is whose residuals are not independent: neighbouring errors are correlated."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ COLLINEAR = 1e-6
 
 
 def correlation_length(residual: np.ndarray) -> int:
-    """Rows after which residuals, shape (n,), are no longer alike: the integrated autocorrelation up to its first zero,
-    to both sides; 1 of white noise."""
+    """Rows after which residuals, shape (n,), are no longer correlated: the integrated autocorrelation up to its first
+    zero, to both sides; 1 of white noise."""
     centred = residual - residual.mean()
     count = len(centred)
     spectrum = np.abs(np.fft.rfft(centred, 2 * count)) ** 2
@@ -30,7 +30,7 @@ def spread_of(jacobian: np.ndarray, residual: np.ndarray) -> np.ndarray:
     """Covariance of the parameters of a fit, shape (p, p), from its Jacobian, shape (n, p), and residual, shape (n,).
 
     Neither equal nor independent errors are assumed: Newey, West 1987, doi:10.2307/1913610, with the window as long as
-    the residuals, or their products with a column, stay alike. Directions in which the fit does not depend on the
+    the residuals, or their products with a column, stay correlated. Directions in which the fit does not depend on the
     parameters have an infinite variance.
     """
     count, size = jacobian.shape
@@ -53,7 +53,7 @@ def spread_of(jacobian: np.ndarray, residual: np.ndarray) -> np.ndarray:
 
 
 def _inverse(square: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The inverse of columns of length 1 times themselves, and which of these cannot be told from others."""
+    """The inverse of columns of length 1 times themselves, and which of these cannot be distinguished from others."""
     sizes, directions = np.linalg.eigh(square)
     lost = sizes < COLLINEAR * sizes[-1]
     resolved = directions[:, ~lost]

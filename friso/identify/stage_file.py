@@ -1,4 +1,4 @@
-"""The stage file that identification writes: the stage given (or one made up around a log), with what was found."""
+"""The stage file that identification writes: the stage given (or one made up around a log), with the estimates."""
 
 from __future__ import annotations
 

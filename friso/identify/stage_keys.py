@@ -29,7 +29,7 @@ ADDED = ("bias.cart", "bias.stage", "friction.viscous_asymmetry")
 @dataclass(frozen=True)
 class Fitting:
     """Estimates that can all stand in the stage file, keys that move along with another (full correlation), and a
-    sentence for each that cannot stand there as it was found."""
+    sentence for each that cannot stand there as it was estimated."""
 
     estimates: tuple[Estimate, ...]
     follows: Mapping[str, str]
@@ -83,7 +83,7 @@ def _bounded(estimate: Estimate, stage: Stage, estimates: Sequence[Estimate]) ->
     coulomb = next((one for one in estimates if one.name == COULOMB and one.determined), None)
     value, high = (coulomb.value, coulomb.high) if coulomb else (flat[COULOMB], flat[COULOMB])
     top = HIGHEST_RATIO * value
-    # a bound that is Coulomb friction itself tells nothing: static friction then moves along with that
+    # a bound that is Coulomb friction itself adds nothing: static friction then moves along with that
     return replace(estimate, high=top) if max(flat[STATIC], high) < estimate.low < top else estimate
 
 

@@ -31,7 +31,7 @@ class ControllerSection(UncertainSection):
     """Base of the controllers, each of which declares its keys, `kind: Literal["name"]`, its blocks, and what the house
     asks of any controller: nobody else asks for its keys.
 
-    Several forms of one kind, told apart by their keys, derive from the class that declares the kind.
+    Several forms of one kind, distinguished by their keys, derive from the class that declares the kind.
     """
 
     kind: Any
@@ -40,9 +40,9 @@ class ControllerSection(UncertainSection):
     anti_windup_time: Annotated[Value | None, Quantity("s", positive, "50 ms")] = None
 
     bandwidth_key: ClassVar[str | None] = None
-    """The numeric key [Hz] that tells the bandwidth, where the controller has one."""
+    """The numeric key [Hz] that states the bandwidth, where the controller has one."""
     bandwidth_name: ClassVar[str] = "crossover"
-    """What that key tells, in a sentence."""
+    """What that key is, in a sentence."""
     speeds_up: ClassVar[Mapping[str, int]] = MappingProxyType({})
     """Names of the keys to the powers of the factor by which they change in a controller that is so many times faster,
     all its poles and zeros being scaled."""
@@ -51,7 +51,7 @@ class ControllerSection(UncertainSection):
     decisive: ClassVar[tuple[str, ...]] = ()
     """Names of the numeric keys on which `variant` and `integrates` depend, by being zero, for instance."""
     told_by: ClassVar[tuple[str, ...]] = ()
-    """Names of the keys, any of which tells this form from others of its kind; of these one has none."""
+    """Names of the keys, any of which distinguishes this form from others of its kind; of these one has none."""
     shares: ClassVar[Mapping[str, str]] = MappingProxyType({})
     """The shares of the force and what they are called in plots."""
     words: ClassVar[Mapping[str, str]] = MappingProxyType({})
@@ -109,7 +109,7 @@ class ControllerSection(UncertainSection):
 
 
 class Controllers(Variants):
-    """The registered controllers: kinds, each of one form or of several that are told apart by their keys."""
+    """The registered controllers: kinds, each of one form or of several that are distinguished by their keys."""
 
     def __init__(self) -> None:
         super().__init__("kind", "friso.controllers")

@@ -28,7 +28,7 @@ class Values(tuple[Any, ...]):
 
 @dataclass(frozen=True)
 class Several:
-    """A key that takes an array of at least `least` and, if told, at most `most` values; the examples are theirs."""
+    """A key that takes an array of at least `least` and, if stated, at most `most` values; the examples are theirs."""
 
     of: Quantity | Number
     examples: tuple[str, ...]

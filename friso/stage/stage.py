@@ -238,7 +238,7 @@ def _tables(flat: Mapping[str, Any]) -> dict[str, type[Section]]:
     classes = {
         "masses": Masses,
         "friction": friction_law(flat["friction.model"]),
-        "flexure": Flexure,  # before what follows from it: the first mistake is the one to be told
+        "flexure": Flexure,  # before what follows from it: the first mistake is the one reported
         "joint": Joint,
         "parasitic": Parasitic,
         "bias": Bias,

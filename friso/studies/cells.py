@@ -73,7 +73,7 @@ CRITERIA = {
     "peaks": peak_count.CRITERION,
     "distinct_peaks": peak_count.DISTINCT_CRITERION,
 }
-"""By which criterion (`friso.hunting.criteria`) a measure tells of hunting."""
+"""By which criterion (`friso.hunting.criteria`) a measure says what hunts."""
 
 INFERRED = "inferred"
 """How the status of a cell begins that was not run, but lies among cells that agree."""

@@ -19,7 +19,7 @@ from friso.stage.correlations import Sample, laid_over
 from friso.studies.shares import Share, share
 
 CHUNK = 256
-"""Stages whose verdicts are found at once: between chunks progress is told."""
+"""Stages whose verdicts are found at once: between chunks progress is reported."""
 
 MOST = 100_000
 """Draws at most: at the edge of hunting one takes some 50 ms."""
@@ -33,7 +33,7 @@ class Fates:
 
     @property
     def counts(self) -> dict[str, int]:
-        """How often each verdict was found."""
+        """How often each verdict occurs."""
         return {word: int(np.count_nonzero(self.verdicts == word)) for word in VERDICTS}
 
     def share(self, words: tuple[str, ...]) -> Share:
@@ -41,10 +41,10 @@ class Fates:
         return share(np.isin(self.verdicts, words), self.verdicts != "failed")
 
     def separations(self, keys: Mapping[str, np.ndarray]) -> dict[str, float]:
-        """How far each key tells stages with an attracting cycle from those without, the most decisive first.
+        """How well each key separates stages with an attracting cycle from those without, the most decisive first.
 
         It is the rank-biserial correlation (Kerby 2014, doi 10.2466/11.IT.3.1): 1 where all that hunt have the larger
-        values, -1 where all have the smaller ones, 0 where the key tells nothing. Empty where all share one fate.
+        values, -1 where all have the smaller ones, 0 where the key separates nothing. Empty where all share one fate.
         """
         attracted = np.isin(self.verdicts, ATTRACTED)
         others = ~attracted & (self.verdicts != "failed")

@@ -35,7 +35,7 @@ def processes(workers: int) -> Iterator[Crew]:
 
 
 def run_block(*arguments: Any) -> Columns:
-    """`run_cells` in a worker, which ends early once the crew is told to."""
+    """`run_cells` in a worker, which ends early once the crew says so."""
     return run_cells(*arguments, cancel=_cancel)
 
 

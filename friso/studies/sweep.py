@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 CELLS = "cells"
-"""What a sweep tells its progress that it is doing."""
+"""What a sweep reports to its progress."""
 
 
 def sweep(
@@ -58,7 +58,7 @@ def sweep(
     multiplier, of the largest swing that was found (NaN where nothing attracts; the multiplier also where no orbit
     could be closed), with the attractor ("cycle", "swing" where no orbit could be closed, "nothing", "unknown" where
     it is not certain); and the verdict on the stage ("hunts", "bistable", "transient", "settles" or "failed"). The
-    attribute `criterion` of a variable says by what it tells of hunting (`friso.hunting.criteria`).
+    attribute `criterion` of a variable names its criterion of hunting (`friso.hunting.criteria`).
 
     An outcome is as good as its tolerance: with `verify` that share of the cells is run again at rtol/100, and the
     attributes verified_cells, verified_surviving and verified_rtol count the outcomes that survived. With `refine` the

@@ -45,7 +45,7 @@ def verified(study: Study, runs: xr.Dataset, crew: Crew, share: float) -> dict[s
 
     The same cells for the same study. Of a refined map cells that were inferred are run too, and counted apart
     (inferred_checked, inferred_confirmed). Invalid and failed cells have no outcome that could survive; nothing is
-    told where there are no others, or no share was asked for.
+    stated where there are no others, or no share was asked for.
     """
     if not share or study.rtol < 10 * TIGHTEST:  # there is no tolerance to check it with
         return {}

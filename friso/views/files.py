@@ -13,7 +13,7 @@ Content = str | bytes | Callable[[Path], object] | None
 """A text, bytes, or what writes the file to the path that it is called with; None: one of an earlier run is deleted."""
 
 Files = Mapping[str, Content]
-"""Names, relative to the folder of the command, to contents; in the order in which they are told."""
+"""Names, relative to the folder of the command, to contents; in the order in which they are listed."""
 
 
 def pictures(figures: Iterable[Figure], forms: Iterable[str] | None = None) -> dict[str, Content]:

@@ -1,4 +1,4 @@
-"""What the two forms of the PID controller share: their kind, and how their tables are told apart."""
+"""What the two forms of the PID controller share: their kind, and how their tables are distinguished."""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ COULOMB_BELOW_STATIC = Rule(
 class Friction:
     """A declared friction law: force [N] that opposes the velocity, its component and its scales.
 
-    `breakaway` [N] is the largest force at rest, from which the solver takes its length scale. `sliding` tells the
+    `breakaway` [N] is the largest force at rest, from which the solver takes its length scale. `sliding` gives the
     law's own states, and its modes that remember, in a steady motion at the velocity; without it they are those at
     which the states do not change. At rest all modes that remember have been left.
     """

@@ -79,7 +79,7 @@ def identify_moves(
     """Mass, friction and what else the moves of a log show of a stage given as flat keys.
 
     With `own_loop` the stage's controller is the machine's, and the closed loop is simulated on the log's reference;
-    else the model follows the log's position. `bandwidth` [Hz] is the motion's, told from the force unless given.
+    else the model follows the log's position. `bandwidth` [Hz] is the motion's, read off the force by default.
     Raises InputError for a log without position or force.
     """
     _has(log, ("position", "force", *(("reference",) if own_loop else ())))
@@ -111,7 +111,7 @@ class SimulatedLog:
 
 
 def simulated_log(moves: IdentifiedMoves, log: Log) -> SimulatedLog:
-    """Another log of the same axis simulated with what was found.
+    """Another log of the same axis simulated with the estimates.
 
     Raises InputError where the machine's own loop is not known.
     """

@@ -145,7 +145,7 @@ def _nothing(why: str) -> Presliding:
 
 
 def _no_bristles(fit: _Fit, between: Between, held: bool) -> str:
-    """Why what was found are no bristles; empty where they are."""
+    """Why the fit is not one of bristles; empty where it is."""
     if fit.left > EXPLAINED:
         return f"{fit.left:.0%} of the friction is not explained: {SLIDES}"
     if fit.ends:

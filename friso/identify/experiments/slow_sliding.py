@@ -242,7 +242,7 @@ def _estimates(
 
 
 def _judged(estimates: tuple[Estimate, ...], left: float, velocity: np.ndarray) -> tuple[Estimate, ...]:
-    """What was found as far as the motion shows it, whose model leaves a share of the friction unexplained."""
+    """The estimates as far as the motion determines them, whose model leaves a share of the friction unexplained."""
     coulomb, static, stribeck = estimates
     fastest = float(np.abs(velocity).max())
     if left > EXPLAINED:

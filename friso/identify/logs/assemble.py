@@ -25,7 +25,7 @@ LEAST_SAMPLES = 50
 def read_log(
     path: Path | str, mapping: Mapping | None = None, strict: bool = True, needed: Sequence[str] = ("position",)
 ) -> Log:
-    """The log in a file: signals by role, SI, on one time base; what was read and what is doubtful told line by line.
+    """The log in a file: signals by role, SI, on one time base; with what was read and what is doubtful, line by line.
 
     With `strict`, every signal must be in the SI unit of its role; without, others are kept and listed in `Log.units`.
     `needed` are the roles that must be there. Raises LogError (one message) for what cannot be read or used.
@@ -55,7 +55,7 @@ def read_log(
 
 def _tracks(chosen: dict[str, AssignedRole], reading: Reading, notes: Notes, needed: Sequence[str]) -> dict[str, Track]:
     """Each role's channel on even instants in the unit of the role. A channel that was only proposed and that nobody
-    needs is left out, which is told, where it has no instants or no unit; others raise LogError."""
+    needs is left out, with a warning, where it has no instants or no unit; others raise LogError."""
     clock = chosen.get("time")
     tracks: dict[str, Track] = {}
     sizes = [choice.channel.values.size for role, choice in chosen.items() if role in needed or choice.by_user]
@@ -105,7 +105,7 @@ def _clocks(clock: AssignedRole | None, reading: Reading) -> list[str]:
 
 
 def _track(role: str, choice: AssignedRole, time: np.ndarray, values: np.ndarray, notes: Notes) -> Track:
-    """One track, its lines told."""
+    """One track, with its lines added to the notes."""
     channel_track = track(role, time, values)
     notes.read += channel_track.read
     notes.warnings += channel_track.warnings

@@ -10,9 +10,9 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Channel:
-    """Values of shape (n,) as they stand in the file, with the unit that it tells ("" for none).
+    """Values of shape (n,) as they stand in the file, with the unit that it states ("" for none).
 
-    `time` holds the instants in seconds, shape (n,), or None where the file tells no time; `source` says where in the
+    `time` holds the instants in seconds, shape (n,), or None where the file has no time; `source` says where in the
     file the channel stands ("column 3", "exp1.Y(2)").
     """
 

@@ -123,7 +123,8 @@ _FACTORS = {
 
 
 def velocity_warning(position: np.ndarray, velocity: np.ndarray, period: float, parts: list[slice]) -> str:
-    """What is wrong between position [m] and velocity [m/s], "" for nothing; a factor tells wrong units or counts."""
+    """What is wrong between position [m] and velocity [m/s], "" for nothing; a factor points to wrong units or
+    counts."""
     ratio, correlation = velocity_factor(position, velocity, period, parts)
     if abs(correlation) < 0.8:
         return (

@@ -11,7 +11,7 @@ BLOCKS = 8
 MOST = 20
 """Longest delay looked for, in samples."""
 LEAST = 0.25
-"""Shortest delay told, in samples: derivatives are smoothed more than what they are compared with."""
+"""Shortest delay reported, in samples: derivatives are smoothed more than what they are compared with."""
 WINDOW = 11
 """Samples over which derivatives are smoothed (Savitzky-Golay, no delay of its own)."""
 

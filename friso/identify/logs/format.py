@@ -34,10 +34,10 @@ class FileHead:
 class LogFormat:
     """A format of logs: its `title`, whether a file is one, and the reader of its channels, which raises LogError.
 
-    Formats are asked by rank: 0 for those told by their first bytes, 1 for those told by their first lines, 2 for any
-    text. `units`: it can hold units; `times`: its channels come with their instants, which no column of it has to tell.
-    A file that `holds_response` holds a frequency response instead of signals over time, which `read_response` reads.
-    """
+    Formats are asked by rank: 0 for those recognised by their first bytes, 1 for those recognised by their first lines,
+    2 for any text. `units`: it can hold units; `times`: its channels come with their instants, which no column of it
+    has to tell. A file that `holds_response` holds a frequency response instead of signals over time, which
+    `read_response` reads."""
 
     title: str
     recognise: Callable[[FileHead], bool]

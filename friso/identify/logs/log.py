@@ -30,7 +30,7 @@ class Log:
     Samples are `sample_time` [s] apart within each of the `segments`; between these there are gaps. `units` holds, for
     a role whose channel could not be turned into the SI unit of the role (a force in volts without a scale, an angle
     instead of a length), the unit in which it stands. `scalars` are single numbers that stood in the file, by name.
-    `read` tells line by line what was read and how, `warnings` what the engineer should know before believing it.
+    `read` lists line by line what was read and how, `warnings` what the engineer should know before believing it.
     `setup` are keys of the stage file that were otherwise while this log was taken ({"joint.stroke": "8 mm"}).
     """
 

@@ -26,8 +26,8 @@ _SAMPLE_TIME = Quantity("s", _INTERVALS, "1 ms")
 @dataclass(frozen=True)
 class Mapping:
     """Roles ({role: channel name}), units ({channel name: unit}), scales ({role: "35.1507 N/V"}), the sample time [s]
-    where the file tells none, and the kind of experiment where the user named it; and how the stage was set up for this
-    log, otherwise than in its file ({dotted key: "8 mm"})."""
+    where the file states none, and the kind of experiment where the user named it; and how the stage was set up for
+    this log, otherwise than in its file ({dotted key: "8 mm"})."""
 
     roles: Table[str, str] = field(default_factory=dict)
     units: Table[str, str] = field(default_factory=dict)

@@ -28,7 +28,7 @@ _KEYS = {
 @dataclass(frozen=True)
 class MeasuredResponse:
     """A response at rising frequencies [Hz]: complex values, and coherence or None, all of shape (n,). `unit` is what
-    the values are in, SI where the file tells a unit, "" where it tells none."""
+    the values are in, SI where the file states a unit, "" where it states none."""
 
     frequency: np.ndarray
     response: np.ndarray

@@ -26,7 +26,7 @@ _OF_UNIT = re.compile(r"(?:units?|einheit)(?: of)? (?P<after>.+)|(?P<before>.+?)
 
 @dataclass(frozen=True)
 class Preamble:
-    """The sampling `interval` [s], where a line tells it with its unit; numbers without a unit by name; units by the
+    """The sampling `interval` [s], where a line states it with its unit; numbers without a unit by name; units by the
     name of the column; and what was read, a line each."""
 
     interval: float | None = None

@@ -62,7 +62,7 @@ def words(name: str) -> list[str]:
 
 
 def role_of(name: str) -> tuple[str, str] | None:
-    """Role that a name tells, and the word that tells it; None for a name that tells none."""
+    """Role that a name stands for, and the word that shows it; None for a name that shows none."""
     parts = words(name)
     name_words = set(parts)
     if name_words & _NOT_MEASURED:
@@ -103,12 +103,13 @@ def listing(table: ChannelTable) -> str:
 def choose(
     table: ChannelTable, assigned: Names[str, str], needed: Sequence[str], origin: str = ""
 ) -> dict[str, AssignedRole]:
-    """Roles with their channels: first what the user told, then what the names tell.
+    """Roles with their channels: first what the user assigned, then what the names show.
 
     Raises LogError for a name that is not there, for two candidates, and for a role that is needed and not found.
     """
     chosen = {
-        role: AssignedRole(role, find(table, name, role, origin), "as told", True) for role, name in assigned.items()
+        role: AssignedRole(role, find(table, name, role, origin), "as specified", True)
+        for role, name in assigned.items()
     }
     taken = {id(choice.channel) for choice in chosen.values()}
     candidates: dict[str, list[tuple[Channel, str]]] = {}

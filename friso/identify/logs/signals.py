@@ -58,7 +58,7 @@ def with_user_units(table: ChannelTable, mapping: Mapping, times: bool, origin: 
 
 
 def signal(choice: AssignedRole, reading: Reading, notes: Notes) -> np.ndarray:
-    """Values of a channel in the unit of its role, with what was done to them told. Raises LogError."""
+    """Values of a channel in the unit of its role, with notes on what was done to them. Raises LogError."""
     channel, role = choice.channel, choice.role
     values, bits = unwrapped(channel.values) if ROLES[role] == "m" else (channel.values, 0)  # encoders overflow
     if bits:

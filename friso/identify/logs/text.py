@@ -132,7 +132,7 @@ def _has_comma(path: Path, form: TextLayout) -> bool:
 
 
 def unique(names: list[str]) -> list[str]:
-    """Names told apart by a number where they are the same."""
+    """Names, with a number where they are the same."""
     seen: dict[str, int] = {}
     out = []
     for name in names:

@@ -69,7 +69,7 @@ def _numbers_only(name: str, time: np.ndarray, values: np.ndarray) -> tuple[np.n
 
 
 def _evened(name: str, raw: Track) -> Track:
-    """The track on even instants: its own where the stamps scatter little, else interpolated, which is told."""
+    """The track on even instants: its own where the stamps scatter little, else interpolated, which the notes say."""
     time, scatter = np.empty_like(raw.time), 0.0
     for part in raw.segments:
         steps = raw.period * np.arange(part.stop - part.start)

@@ -120,7 +120,7 @@ def split_heading(heading: str) -> tuple[str, str]:
 
 def _last_part(name: str) -> str:
     """The unit with which a name ends, "" for none: "tempo_ms" is in ms, "vel_mm_s" in mm/s. A single letter is
-    one where the name tells what is measured in it: "force_N", but not "pos_s"."""
+    one where the name says what is measured in it: "force_N", but not "pos_s"."""
     if rate := _RATE.fullmatch(name):
         return f"{rate['length']}/{rate['time'].replace('^', '')}"
     match = _GLUED.fullmatch(name)

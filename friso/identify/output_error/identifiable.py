@@ -33,10 +33,9 @@ def fit_identifiable(
     """The fit, the profile of every parameter, and which of those that not every motion shows it does show; `bandwidth`
     [Hz] is that of the motion.
 
-    Which they are is told by the stage that follows the log, since a closed loop that hunts soon gets out of step; the
-    loop then has the last word, unless it cannot follow. Where the fit is clearly better with those that are not shown
-    it keeps them: their effect is there, and without it friction and mass would have to explain it.
-    """
+    Which they are is decided by the stage that follows the log, since a closed loop that hunts soon gets out of step;
+    the loop then has the last word, unless it cannot follow. Where the fit is clearly better with those that are not
+    shown it keeps them: their effect is there, and without it friction and mass would have to explain it."""
     parameters = follows.parameters
     names = [parameter.name for parameter in parameters]
     core = {parameter.name for parameter in parameters if parameter.core}

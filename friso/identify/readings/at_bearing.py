@@ -100,7 +100,7 @@ def between(flat: Mapping[str, Any]) -> Between:
 
 
 def believed_between(prior: Prior, log: Log) -> Between:
-    """What lies between force and bearing, as other experiments show it or else the stage file has it, which tells no
+    """What lies between force and bearing, as other experiments show it or else the stage file has it, which states no
     viscous friction better than to its whole size. Raises InputError."""
     believed = between(prior.believed(log))
     viscous = prior.estimates.get("friction.viscous")

@@ -57,7 +57,7 @@ def channel(log: Log, role: str) -> np.ndarray:
     values = log[role]
     if not np.isfinite(values).all():
         actual = f"{int((~np.isfinite(values)).sum())} of {len(values)} values are no finite numbers"
-        raise InputError(role, actual, "finite values, gaps being told in the segments", "", log.name)
+        raise InputError(role, actual, "finite values, with gaps between segments", "", log.name)
     return values
 
 

@@ -31,7 +31,7 @@ LEAST_LENGTHS = 5.0
 """Correlation lengths that a pass must hold for its correlation length to be shown."""
 
 HARMONICS = 3
-"""Harmonics told of each pass."""
+"""Harmonics reported of each pass."""
 
 
 @dataclass(frozen=True)
@@ -151,7 +151,7 @@ def _length(fields: np.ndarray) -> np.ndarray:
 
 def _correlation_length(flat: np.ndarray, step: float) -> Estimate:
     """Where the autocorrelation of the field is 1/e; its interval by the ratio of found to true length of
-    random fields with exponential correlation, detrended alike."""
+    random fields with exponential correlation, detrended in the same way."""
     name, unit, method = "correlation length", "m", "autocorrelation of the force over the place falls to 1/e"
     if not np.ptp(flat) > 0:
         return Estimate.unknown(name, unit, method, "the force does not vary with the place")

@@ -16,7 +16,7 @@ from friso.identify.readings.passes import CUTOFF, Pass, on_common_way, passes, 
 from friso.intervals import COVERAGE
 
 SPAN = 1.5
-"""Ratio of the greatest to the least speed from which Coulomb and viscous friction can be told apart."""
+"""Ratio of the greatest to the least speed from which Coulomb and viscous friction can be distinguished."""
 
 SPEEDS, DISTINCT = 5, 1.1
 """Speeds, each so many times the last, from which a curve of four parameters may be fitted."""
@@ -124,7 +124,7 @@ def _deviations(forces: np.ndarray, errors: np.ndarray) -> np.ndarray:
 def _linear(design: np.ndarray, forces: np.ndarray, errors: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
     """Weighted least squares with Coulomb friction in the first column: solution, covariance, degrees of freedom.
 
-    Friction varies from place to place, and all stretches lie on the same way: what one of them tells of Coulomb
+    Friction varies from place to place, and all stretches lie on the same way: what one of them shows of Coulomb
     friction is not averaged out over the others.
     """
     deviations = _deviations(forces, errors)
@@ -185,7 +185,7 @@ def _one_speed(speeds: np.ndarray, friction: np.ndarray, method: str, spent: int
     count = len(friction)
     half = t_value(count - 1 - spent) * float(friction.std(ddof=1)) / count**0.5
     top = float(friction.mean()) + half
-    reason = f"all speeds about {speeds.mean() * 1e3:.3g} mm/s: Coulomb and viscous friction cannot be told apart"
+    reason = f"all speeds about {speeds.mean() * 1e3:.3g} mm/s: Coulomb and viscous friction cannot be distinguished"
     nothing = _nothing(reason)
     return Direction(
         Estimate.unknown("friction.coulomb", "N", method, reason, 0.0, top),

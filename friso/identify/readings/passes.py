@@ -57,7 +57,7 @@ class Pass:
 def passes(log: Log, cutoff: float = CUTOFF) -> tuple[Pass, ...]:
     """All stretches over which the reference, or the body itself where there is none, goes at constant velocity.
 
-    With a reference the motion may be unsteady, which each tells; `cutoff` [Hz] is that of the velocity. Raises
+    With a reference the motion may be unsteady, which each states; `cutoff` [Hz] is that of the velocity. Raises
     InputError for missing position or force.
     """
     position, velocity = on_bearing(log), _velocity(log, cutoff)

@@ -97,13 +97,13 @@ def _outputs(logs: Sequence[Log]) -> list[str]:
 
 
 def as_measured(measured: MeasuredResponse) -> FrequencyResponse:
-    """A response that somebody else measured: how far it can be believed is told by its scatter alone."""
+    """A response that somebody else measured: how far it can be believed follows from its scatter alone."""
     output, _, unit = measured.unit.partition("/")
     unknown, lines = np.full(len(measured.frequency), np.nan), len(measured.frequency)
     return FrequencyResponse(
         measured.frequency, measured.response, np.zeros(lines), unknown, unknown, np.full(lines, 2.0), "measured",
         Channels("force", unit or "1", "position", output or "1"), measured.coherence,
-        ("the file tells no deviations: the scatter between neighbouring lines stands for them",),
+        ("the file gives no deviations: the scatter between neighbouring lines stands for them",),
     )  # fmt: skip
 
 

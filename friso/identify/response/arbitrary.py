@@ -108,7 +108,7 @@ def _response(
     coherence: np.ndarray | None,
 ) -> FrequencyResponse:
     unknown = np.full(len(frequency), np.nan)
-    warnings = ("noise and nonlinear distortion cannot be told apart: the deviation covers both",)
+    warnings = ("noise and nonlinear distortion cannot be distinguished: the deviation covers both",)
     return FrequencyResponse(
         frequency, response, deviation, unknown, unknown, degrees, kind, channels or Channels(), coherence, warnings
     )

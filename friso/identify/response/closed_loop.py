@@ -38,7 +38,7 @@ def feedback(record: ResponseRecord, direct: bool = False) -> tuple[str, ...]:
     doi:10.2307/1912791; for feedback: Caines, Chan 1975, doi:10.1109/TAC.1975.1101008). An input that repeats is
     taken without its periodic part; one that repeats exactly cannot hold any reaction. Slow or weak loops stay unseen.
     The present sample of the output counts as past, since a position cannot react to a force within the same sample;
-    `direct` tells that this output can (an acceleration).
+    `direct` says that this output can (an acceleration).
     """
     record = record.checked(LEAST)
     driven, answer = _surprising(record)

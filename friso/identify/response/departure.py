@@ -29,7 +29,7 @@ Vander Velde 1968, table E.2: random-input describing function of the ideal rela
 class Departure:
     """Below `frequency` a response differs from the model; `excess` (lines,) is |G/G_model|, on lines `lines` [Hz].
 
-    `differ` tells whether realisations differ there by more than noise (chance below 1 %), None where there is one
+    `differ` says whether realisations differ there by more than noise (chance below 1 %), None where there is one
     only; `ratio` is their scatter over the noise.
     """
 

@@ -19,7 +19,7 @@ CLOSE = 1e-6
 
 
 LOOSE = 1e3
-"""Factor to either side from which an interval to first order tells nothing of a positive quantity."""
+"""Factor to either side from which an interval to first order says nothing about a positive quantity."""
 
 
 @dataclass(frozen=True)

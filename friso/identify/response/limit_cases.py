@@ -1,8 +1,8 @@
 """The limit cases of a stage (thesis, Table 1 and Fig. 7) in a measured response, in the words of `friso.frequency`.
 
-A cart that is "stuck" makes friction a spring: a stiffness line at low frequency, and with a free joint the mode of
-the stage on it. A cart that is "sliding" shows the mass line of cart and stage, and with a free joint an antiresonance
-and a resonance, above which the mass line of the stage alone follows. A touched limiter is told by its frequencies.
+A cart that is "stuck" makes friction a spring: a stiffness line at low frequency, and with a free joint the mode of the
+stage on it. A cart that is "sliding" shows the mass line of cart and stage, and with a free joint an antiresonance and
+a resonance, above which the mass line of the stage alone follows. A touched limiter is recognised by its frequencies.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from friso.identify.response.response import FrequencyResponse
 @dataclass(frozen=True)
 class Visible:
     """What a response shows: straight lines by frequency, modes (None: too few lines, or none fits), the `case` of the
-    cart ("stuck", "sliding", or "" where it cannot be told), and all of it in words."""
+    cart ("stuck", "sliding", or "" where it cannot be decided), and all of it in words."""
 
     case: str
     lines: tuple[StraightLine, ...]

@@ -26,7 +26,7 @@ LEAST = 0.01
 class Modes:
     """The fit over `band` [Hz], its resonances and antiresonances by frequency: ("resonance 1 frequency", ...).
 
-    `order` tells how the number of modes was chosen; `low_level` and `high_level` are the acceleration per input below
+    `order` says how the number of modes was chosen; `low_level` and `high_level` are the acceleration per input below
     and above all modes (the mass lines), unknown without a rigid body.
     """
 
@@ -53,7 +53,7 @@ def fit_modes(
 ) -> Modes:
     """Modes of a force-to-position response in a `band` [Hz] (default: all lines).
 
-    `rigid` tells whether the mass moves freely (default: what fits better). Raises InputError for fewer than 12 lines.
+    `rigid` says whether the mass moves freely (default: what fits better). Raises InputError for fewer than 12 lines.
     """
     part = response if band is None else response.between(*band)
     part = part.at(part.frequency > 0)

@@ -174,7 +174,7 @@ def _excited(driving: np.ndarray) -> np.ndarray:
 def _settled(reaction: np.ndarray) -> int:
     """The number of leading periods that are transient, given the output (periods, lines); at least three stay.
 
-    Each period is compared with the later half of the others, which tells what is usual. Without a transient
+    Each period is compared with the later half of the others, which show what is usual. Without a transient
     they are exchangeable: one of them lies furthest off at the front by chance only, and `FAR` makes that rarer.
     """
     count = len(reaction)

@@ -110,7 +110,7 @@ class FrequencyResponse:
     def usable(self, ratio: float = 3.0, coherence: float = 0.5) -> FrequencyResponse:
         """The lines whose response is at least `ratio` deviations large and whose coherence, if known, suffices.
 
-        The lines left out are told in the warnings. Raises InputError where none is left: excitation too weak.
+        The warnings list the lines left out. Raises InputError where none is left: excitation too weak.
         """
         enough = np.abs(self.response) >= ratio * self.deviation
         if self.coherence is not None:

@@ -44,10 +44,10 @@ it differs between bearings of one type and preload, masses as weighed, bristles
 they are identified."""
 
 TOGETHER, TOGETHER_BY = ("friction.static", "friction.coulomb"), 0.8
-"""Keys that follow the preload alike, and their correlation, where neither is uncertain in the file: our choice."""
+"""Keys that follow the preload together, and their correlation, where neither is uncertain in the file: our choice."""
 
 HELD = (f"{CONTROLLER}.", "motion.", "drive.sample_time", "drive.delay", "drive.velocity_samples")
-"""What is set and not found: alike on all machines, even where the file calls it uncertain."""
+"""What is set, not identified: the same on all machines, even where the file calls it uncertain."""
 
 SIGNS = int.from_bytes(b"signs")
 """Which of a seed's random numbers: Philox takes them as the second half of its key."""
@@ -58,7 +58,7 @@ FROM_LEAVES = ("joint.stiffness", "parasitic.")
 
 @dataclass(frozen=True)
 class Machines:
-    """The stage whose drive tells a sample time; keys to SI arrays of shape (count,) that differ between the machines;
+    """The stage whose drive states a sample time; keys to SI arrays of shape (count,) that differ between the machines;
     the seeds of their noise; the sign, 1 or -1, with which the model of each is wrong; how they were `drawn`, from
     which keys of the file and from which default `spreads` [%]; and what to know of that."""
 
@@ -99,7 +99,7 @@ def draw_machines(stage: Stage, correlations: Correlations, count: int, seed: in
     sample = draw(_spread(clocked, spreads), _joined(correlations, spreads), count, seed)
     held = [key for key in stage.uncertain() if key.startswith(HELD)]
     if held:
-        notes += [f"not drawn, being set alike on all machines: {', '.join(held)}"]
+        notes += [f"not drawn, as they are the same on all machines: {', '.join(held)}"]
     if sample.left_out:
         notes += [f"{sample.left_out} draws that no stage may have were left out and others drawn"]
     numbers = np.arange(count)

@@ -144,7 +144,7 @@ class Comparison:
 
     @property
     def shaken(self) -> bool:
-        """Whether a floor shakes the machines: without, their standstill tells whether they rest, and not how still."""
+        """Whether a floor shakes the machines: without, their standstill shows whether they rest, and not how still."""
         return self.stage.floor is not None
 
     def paired(self, result: Result) -> Paired:
@@ -210,7 +210,7 @@ def _corner(stage: Stage) -> float:
 @dataclass(frozen=True)
 class _Work:
     """What all options share: the machines, their task, from when on its reference stands [s], the tolerance [m], who
-    is told of the progress, and how many options there are."""
+    to which progress is reported, and how many options there are."""
 
     machines: Machines
     task: MoveTask

@@ -68,7 +68,7 @@ PARAMETERS: Mapping[str, Parameter] = {
 @dataclass(frozen=True)
 class Group:
     """A dimensionless group: `factor` times the parameters to their `powers`; what it means; and of which part of the
-    stage it tells ("stage", "joint" or "parasitic")."""
+    stage it belongs to ("stage", "joint" or "parasitic")."""
 
     written: str
     meaning: str

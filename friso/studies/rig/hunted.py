@@ -31,7 +31,7 @@ DURATION = 20.0
 """Of a run at least [s], as in the thesis (Sec. 3.2.2), whose peaks count after 10 s."""
 
 INTERVAL = 1e-3
-"""Between the samples of a log, at most [s]: the thesis tells none."""
+"""Between the samples of a log, at most [s]: the thesis states none."""
 
 BAND = COUNTED_ABOVE
 """Band about the reference [m] within which a run rests: the height from which the thesis counts peaks."""
@@ -56,7 +56,7 @@ def duration(stage: Stage) -> float:
 
 
 def move(stage: Stage) -> MoveTask:
-    """The move from 0 with the acceleration of the stage's motion, after which it stands; of a motion that tells none,
+    """The move from 0 with the acceleration of the stage's motion, after which it stands; of a motion that states none,
     with one that the loop can just follow (a move then takes two of its time constants)."""
     flat, way = stage.flat(), distance(stage)
     rate = 2 * np.pi * (bandwidth(flat) or 1.0)
@@ -81,7 +81,7 @@ def crossover(stage: Stage) -> float:
 
 
 def crossover_key(stage: Stage) -> str:
-    """The key that tells it. Raises InputError for a controller that is given by its gains."""
+    """The key that states it. Raises InputError for a controller that is given by its gains."""
     key = stage.controller.bandwidth_key
     if key is None:
         actual, expected = "gains", "a controller tuned by its crossover, which the experiment varies"

@@ -1,4 +1,4 @@
-"""What an experiment of the rig gives: logs, the truth behind each, and what was found in them."""
+"""What an experiment of the rig gives: logs, the truth behind each, and their analysis."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from friso.stage.controllers import FORCE_LIMIT
 
 @dataclass(frozen=True)
 class RigLog:
-    """A log as the drive writes it: its name, the kind of experiment for `friso identify` (None: it tells that itself),
-    the sample time [s], what was logged and what is true, SI arrays of shape (n,) by role; the stage that ran, the seed
-    of its noise, and why the run ended early (empty: it did not)."""
+    """A log as the drive writes it: its name, the kind of experiment for `friso identify` (None: it is recognised
+    without), the sample time [s], what was logged and what is true, SI arrays of shape (n,) by role; the stage that
+    ran, the seed of its noise, and why the run ended early (empty: it did not)."""
 
     name: str
     kind: str | None

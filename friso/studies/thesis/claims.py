@@ -1,4 +1,4 @@
-"""The claims of the thesis and what is found of them: parts that hold or not, by a criterion stated in words."""
+"""The claims of the thesis and how they were judged: parts that hold or not, by a criterion stated in words."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ class Part:
 
 @dataclass(frozen=True)
 class Finding:
-    """What was found of a claim."""
+    """How a claim was judged."""
 
     parts: tuple[Part, ...]
 

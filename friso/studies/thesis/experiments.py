@@ -79,7 +79,7 @@ class LockedLine:
 
 @dataclass(frozen=True)
 class JointSteps:
-    """Fig. 19: the record, what is found in it, and the joint's stiffness [N/m] that it was simulated with."""
+    """Fig. 19: the record, the analysis of it, and the joint's stiffness [N/m] that it was simulated with."""
 
     log: Log
     result: StepStiffness
@@ -88,7 +88,7 @@ class JointSteps:
 
 @dataclass(frozen=True)
 class SlowMotion:
-    """Fig. 20: speed [m/s], the record, what is found in it, and the static friction [N] it was simulated with."""
+    """Fig. 20: speed [m/s], the record, the analysis of it, and the static friction [N] it was simulated with."""
 
     speed: float
     log: Log
@@ -98,7 +98,7 @@ class SlowMotion:
 
 @dataclass(frozen=True)
 class ConstantSpeed:
-    """Fig. 21: the speeds [m/s], a record with one segment for each, and what is found in it."""
+    """Fig. 21: the speeds [m/s], a record with one segment for each, and the analysis of it."""
 
     speeds: tuple[float, ...]
     log: Log

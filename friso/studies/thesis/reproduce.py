@@ -52,7 +52,7 @@ _PARTS = {**NEEDS, **EXPERIMENTS}
 
 @dataclass(frozen=True)
 class Reproduction:
-    """All that was found.
+    """All results.
 
     Maps by study name and responses by name; the linear analysis of the rig, and in `bode` its curves over the
     frequency; the map of Fig. 14B by relative tolerance and the shares of its cells in which peaks are counted at one

@@ -1,4 +1,5 @@
-"""What a linear analysis found, in sentences: where the controller is stable, why not elsewhere, how fast it may be."""
+"""The results of a linear analysis in sentences: where the controller is stable, why not elsewhere, how fast it may
+be."""
 
 from __future__ import annotations
 
@@ -93,7 +94,7 @@ def caveats(bode: Bode) -> list[str]:
 
 
 def _crossing(bode: Bode) -> bool:
-    """Whether a key of the controller tells its bandwidth."""
+    """Whether a key of the controller states its bandwidth."""
     return bode.stage.controller.bandwidth_key is not None
 
 

@@ -51,7 +51,7 @@ MARGIN = 0.02
 
 
 def boundary_figure(traced: Diagram | Plane, keys: tuple[ShownKey, ...], subject: str = "") -> Figure:
-    """What was found over one key, or in the plane of two; special points are named in the units shown."""
+    """The branches over one key, or the curves in the plane of two; special points are named in the units shown."""
     figure = _diagram(traced, keys[0]) if isinstance(traced, Diagram) else _plane(traced)
     return replace(figure, subject=subject)
 

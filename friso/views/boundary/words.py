@@ -196,5 +196,5 @@ def _no_boundary(space: Space, keys: tuple[ShownKey, ...]) -> str:
 
 
 def _ends(line: Line) -> str:
-    """How a line ends; once where both ends are alike."""
+    """How a line ends; once where both ends are the same."""
     return "; ".join(dict.fromkeys(line.ends))

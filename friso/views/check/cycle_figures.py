@@ -1,4 +1,4 @@
-"""The figures of a hunting cycle: the return map that tells whether there is one, and the cycle itself."""
+"""The figures of a hunting cycle: the return map that shows whether there is one, and the cycle itself."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ BINS = 24
 """Bars of the figure."""
 
 TOLD = 4
-"""Keys of which the table tells how far they decide, at most."""
+"""Most keys whose influence on the verdict the table lists."""
 
 
 def draws_rows(draws: Draws) -> list[tuple[str, list[str]]]:

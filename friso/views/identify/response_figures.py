@@ -120,7 +120,7 @@ def _around(*several: Array) -> tuple[float, float]:
 
 
 def _levels(bench: Bench, name: str) -> list[Figure]:
-    """Response, noise and distortion, where the record tells these."""
+    """Response, noise and distortion, where the record shows these."""
     outputs = [response for response in (bench.driven, bench.other) if response is not None]
     panels = tuple(_level_panel(response) for response in outputs)
     if min(len(panel.series) for panel in panels) < 2:

@@ -22,7 +22,7 @@ MOST_COLUMNS = 64
 
 @dataclass
 class _Contents:
-    """What was found on the walk through a file."""
+    """What a file contains, gathered in a walk through it."""
 
     channels: list[Channel] = field(default_factory=list)
     scalars: dict[str, float] = field(default_factory=dict)
@@ -48,7 +48,7 @@ def read_mat(path: Path) -> ChannelTable:
 
 
 def _plainly_named(channels: list[Channel]) -> tuple[Channel, ...]:
-    """The channels without the name of the variable they stand in, where they are told apart without it."""
+    """The channels without the name of the variable they stand in, where they differ without it."""
     short = [channel.name.rpartition("/")[2] for channel in channels]
     names = [s if short.count(s) == 1 else c.name.replace("/", ".") for s, c in zip(short, channels, strict=True)]
     return tuple(replace(channel, name=name) for channel, name in zip(channels, unique(names), strict=True))

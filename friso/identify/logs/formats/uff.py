@@ -77,7 +77,7 @@ def _unit(data: dict[str, Any]) -> str:
 
 
 def _seconds(data: dict[str, Any]) -> np.ndarray:
-    """The instants; in seconds unless their label tells another unit of time."""
+    """The instants; in seconds unless their label states another unit of time."""
     return _axis(data) * (factor(label(data, "abscissa_axis_units_lab"), "s") or 1.0)
 
 

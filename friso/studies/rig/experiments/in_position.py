@@ -34,10 +34,10 @@ BITS = 14
 """Of the drive's force between its limits: our choice. The rounding of uniform steps is the noise of its amplifier."""
 
 LIMIT_FACTOR = 60.0
-"""Largest force over the static friction, for a drive that tells none: that of the thesis's rig, rounded."""
+"""Largest force over the static friction, for a drive that states none: that of the thesis's rig, rounded."""
 
 FLOOR = {"frequency": ["1 Hz", "10 Hz", "100 Hz"], "acceleration": [f"{a} m/s^2/Hz^0.5" for a in (1e-5, 1e-4, 1e-4)]}
-"""Of a quiet laboratory, where the stage tells none: our choice. In thirds of an octave its velocity stays below
+"""Of a quiet laboratory, where the stage states none: our choice. In thirds of an octave its velocity stays below
 2.4 um/s RMS, and so below VC-E (3.1 um/s) of the usual vibration criteria."""
 
 DAMPING_RATIOS = (0.001, 0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 3.0)
@@ -66,7 +66,7 @@ class InPosition:
     """Standstills at `crossover` [Hz], by case (locked, free) and source of the disturbance, each of one run, and the
     spectra's `frequencies` [Hz]. `damped`: free with all disturbances, by `damping` [N s/m]; `own` is the joint's.
 
-    `amplifier` is the RMS [N] of the force noise; `own_floor` tells whether the floor is the stage's. `after_move`: by
+    `amplifier` is the RMS [N] of the force noise; `own_floor` says whether the floor is the stage's. `after_move`: by
     case, with all disturbances, as soon after the move as others after their start.
     """
 

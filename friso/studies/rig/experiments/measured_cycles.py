@@ -38,7 +38,7 @@ from friso.studies.rig.outcome import Outcome, rig_log
 from friso.studies.shares import Share, share
 
 DEVIATIONS = (0.02, 0.05, 0.1, 0.2, 0.3)
-"""Of static and Coulomb friction alike, over their means: our choice."""
+"""Of static and of Coulomb friction, over their means: our choice."""
 
 LENGTHS = (2.0, 5.0, 10.0, 20.0)
 """Correlation lengths over the swing of the cycle on an even rail: our choice."""
@@ -47,7 +47,7 @@ HARMONICS = (0.01, 0.02, 0.05, 0.1)
 """Of the rolling elements, over the mean: our choice."""
 
 PITCH = 4.0
-"""Of the rolling elements over that swing, for a stage that tells none."""
+"""Of the rolling elements over that swing, for a stage that states none."""
 
 STATIC, COULOMB = (0.75, 1.0, 1.25, 1.5, 2.0), (0.5, 0.75, 1.0, 1.25, 1.5, 1.75, 2.0)
 """Friction levels over those of the stage, on an even rail: our choice."""

@@ -25,7 +25,7 @@ STEP, WAYS = 0.3, (1, 1, -1, -1, 1, -1)
 STANDS, LONGEST, SETTLED, SAMPLES = 16.0, 64.0, 5.0, 125.0
 """Periods of the crossover for which each step stands (2 s on the thesis's rig) and at most may; so many time constants
 of the integrator against the joint, if it is not longer; samples of the log per period (1 ms): our choice, the thesis
-tells neither."""
+states neither."""
 
 
 @dataclass(frozen=True)

@@ -32,7 +32,7 @@ class Speeds:
 
     `unstable` are the ranges of speed in which it is not, the limiter free and `unstable_touched`; `undeflected` the
     same with bristles that the motion has not deflected yet (z = 0), which is where a linearisation about an initial
-    speed begins; `incurable` tells whether in its middle no faster controller up to 10 kHz is stable; `slow` and
+    speed begins; `incurable` says whether in its middle no faster controller up to 10 kHz is stable; `slow` and
     `fast` are the ratios of the greatest to the least magnitude of the loop over the prescribed speeds, at a tenth and
     at ten times the crossover.
     """

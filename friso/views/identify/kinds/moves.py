@@ -17,7 +17,7 @@ from friso.views.identify.moves_figures import moves_figures, record_panels
 from friso.views.identify.numbers import digits, listed, percent
 
 SUFFIXES = {"N": "n", "kg": "kg", "N*s/m": "n_s_per_m"}
-"""Of keys, by unit, of what the inverse model tells."""
+"""Of keys, by unit, of what the inverse model shows."""
 
 
 def _sentences(moves: IdentifiedMoves) -> tuple[str, ...]:

@@ -34,7 +34,7 @@ COLOURS = (BLUE, SKY, GREEN, ORANGE, VERMILLION, PINK)
 
 
 def sentences(outcome: Outcome) -> list[str]:
-    """What was found."""
+    """The results in sentences."""
     result: Frf = outcome.result
     measured = [loop for loop in result.loops if loop.measured]
     last = measured[-1]

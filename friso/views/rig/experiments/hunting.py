@@ -226,7 +226,7 @@ def share_document(share: Share) -> dict[str, float]:
 
 
 def numbers(outcome: Outcome) -> dict[str, Any]:
-    """All that was found."""
+    """All results."""
     moves: HuntingResult = outcome.result
     cases = {
         case: {**runs_document(runs), "counted": [share_document(share) for share in moves.shares(case)]}

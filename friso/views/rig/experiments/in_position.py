@@ -115,7 +115,7 @@ def _over_damping(result: InPosition) -> Figure:
 
 
 def numbers(outcome: Outcome) -> dict[str, Any]:
-    """All that was found."""
+    """All results."""
     result: InPosition = outcome.result
     return {
         "crossover_hz": result.crossover,

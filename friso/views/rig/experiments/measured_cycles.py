@@ -246,7 +246,7 @@ def _motor(share: float) -> str:
 
 
 def numbers(outcome: Outcome) -> dict[str, Any]:
-    """All that was found; arrays of runs have the shapes of `CycleComparison`."""
+    """All results; arrays of runs have the shapes of `CycleComparison`."""
     result: CycleComparison = outcome.result
     classes = [
         {"from": low, "to": high, **share_document(share), "period_over_even": slow}

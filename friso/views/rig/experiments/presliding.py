@@ -15,7 +15,7 @@ from friso.views.rig.outcome_view import OutcomeView
 
 
 def sentences(outcome: Outcome) -> list[str]:
-    """What was found."""
+    """The results in sentences."""
     result: Bristles = outcome.result
     lines = [f"Place {number}: {_place(place)}." for number, place in enumerate(result.by_place, start=1)]
     stiffness, damping = with_unit(result.stiffness, "N/m", 4), with_unit(result.damping, "N*s/m", 4)

@@ -14,7 +14,7 @@ from friso.views.rig.outcome_view import OutcomeView
 
 
 def sentences(outcome: Outcome) -> list[str]:
-    """What was found."""
+    """The results in sentences."""
     result: Stiction = outcome.result
     forces, within = result.forces, held(result)
     rails = len(result.by_rail)

@@ -12,7 +12,7 @@ from friso.views.rig.outcome_view import OutcomeView
 
 
 def sentences(outcome: Outcome) -> list[str]:
-    """What was found."""
+    """The results in sentences."""
     result: Stiffness = outcome.result
     read = result.steps.stiffness
     if not read.determined:

@@ -64,7 +64,7 @@ def figures(outcome: Outcome) -> list[Figure]:
 
 
 def numbers(outcome: Outcome) -> dict[str, Any]:
-    """All that was found; arrays have the shape (strokes, crossovers, rails), shares (strokes, crossovers)."""
+    """All results; arrays have the shape (strokes, crossovers, rails), shares (strokes, crossovers)."""
     counts: StrokeCrossover = outcome.result
     shares = [
         [share_document(counts.runs.share((row, column))) for column in range(len(counts.crossovers))]
