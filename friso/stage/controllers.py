@@ -50,7 +50,7 @@ class ControllerSection(UncertainSection):
     """Names of the keys in proportion to all of which the gain of the loop goes."""
     decisive: ClassVar[tuple[str, ...]] = ()
     """Names of the numeric keys on which `variant` and `integrates` depend, by being zero, for instance."""
-    told_by: ClassVar[tuple[str, ...]] = ()
+    recognised_by: ClassVar[tuple[str, ...]] = ()
     """Names of the keys, any of which distinguishes this form from others of its kind; of these one has none."""
     shares: ClassVar[Mapping[str, str]] = MappingProxyType({})
     """The shares of the force and what they are called in plots."""
@@ -131,8 +131,8 @@ class Controllers(Variants):
     def of(self, flat: Mapping[str, Any]) -> type[ControllerSection]:
         """The class of the controller of a stage given as flat keys."""
         forms = self._forms_of(flat[KIND])
-        recognised = (form for form in forms if any(form.key(name) in flat for name in form.told_by))
-        return next(recognised, None) or next(form for form in forms if not form.told_by)
+        recognised = (form for form in forms if any(form.key(name) in flat for name in form.recognised_by))
+        return next(recognised, None) or next(form for form in forms if not form.recognised_by)
 
     @property
     def words(self) -> dict[str, str]:

@@ -28,7 +28,7 @@ class Pid(ControllerSection):
     @classmethod
     def pick(cls, forms: Sequence[type[ControllerSection]], table: Mapping[str, Any]) -> type[Pid]:
         """By rules or by gains. Raises StageError for both or neither."""
-        by_keys = sorted(cast(Sequence[type[Pid]], forms), key=lambda form: not form.told_by)
+        by_keys = sorted(cast(Sequence[type[Pid]], forms), key=lambda form: not form.recognised_by)
         keys_of = {
             form: [key for key in form.model_fields if key in {*table} - {*cls.model_fields}] for form in by_keys
         }

@@ -33,7 +33,7 @@ class VanDijk(Pid):
     written = "van Dijk's rules"
     needed = ("crossover", "alpha", "beta", "tuned_mass")
     asked = "crossover"
-    told_by = ("crossover",)
+    recognised_by = ("crossover",)
     bandwidth_key = CROSSOVER
     speeds_up: ClassVar[Mapping[str, int]] = MappingProxyType({"crossover": 1})
     loop_gain = ("tuned_mass",)

@@ -54,8 +54,8 @@ def parameters_of(
 
     `levels` holds first values, of mass, Coulomb and viscous friction and offset, from the inverse model; `speed` [m/s]
     is the highest of the log, `travel` [m] how far it goes: no Stribeck velocity and no bristle can be beyond them.
-    Where it does not go `both_ways`, a constant force and an asymmetry cannot be distinguished from friction, and are left
-    out. Raises InputError for a friction law that is not among those that can be fitted."""
+    Where it does not go `both_ways`, a constant force and an asymmetry cannot be distinguished from friction, and are
+    left out. Raises InputError for a friction law that is not among those that can be fitted."""
     mass = levels["mass"]
     parameters = [FitParameter(MASS, "kg", mass, mass / 5, mass * 5)]
     if flat["friction.model"] in FITTED:
