@@ -1,6 +1,7 @@
 """`friso design` as a user runs it: what it writes, says, draws and refuses."""
 
 import json
+import re
 import shutil
 import sys
 from collections.abc import Iterator
@@ -239,27 +240,21 @@ def test_the_summary_tells_all_steps(written: tuple[Path, str], snapshots: Snaps
     assert max(map(len, sentences)) <= shutil.get_terminal_size().columns
 
 
-def test_an_isolator_that_is_not_needed_is_weighed(found: Design) -> None:
+def test_an_isolator_that_is_not_needed_is_weighed(found: Design, snapshots: Snapshots) -> None:
     (_, first), *_ = headline(found)
-    assert first.startswith("No isolator is needed: without one the crossover must be")
-    said = " ".join(isolator_step(found).sentences)
-    assert "For comparison, with the isolator the machine" in said
-    assert "the machine hunts, in its worst corner, up to" in said
-    assert "When it breaks away, the cart loses 0.3 to 0.85 N" in said
-    assert "corners with less also hunt, up to" in said
+    said = isolator_step(found).sentences
+    assert any("0.3 to 0.85 N" in sentence for sentence in said)
+    snapshots.check("design", "isolator not needed", "\n".join([first, *said]))
 
 
-def test_an_isolator_that_is_needed_says_why(found: Design) -> None:
+def test_an_isolator_that_is_needed_says_why(found: Design, snapshots: Snapshots) -> None:
     limit = replace(found.without, edges=np.full(found.without.population.count, 60.0))
     needed = replace(found, without=limit)
     (_, first), *_ = headline(needed)
-    assert first == (
-        "An isolator is needed: without one the crossover must be 72.0 Hz or more, 1.2 times the edge of hunting; "
-        "the machine allows 48.0 Hz."
-    )
+    assert [fact for fact in ("72.0 Hz", "1.2 times", "48.0 Hz") if fact not in first] == []
     step = isolator_step(needed)
-    assert step.title == "Is an isolator needed: yes"
-    assert "For comparison" not in " ".join(step.sentences)
+    assert len(step.sentences) < len(isolator_step(found).sentences)  # nothing to compare it with
+    snapshots.check("design", "isolator needed", "\n".join([first, step.title, *step.sentences]))
 
 
 def test_the_joint_is_held_below_the_static_friction(found: Design) -> None:
@@ -271,13 +266,14 @@ def test_the_joint_is_held_below_the_static_friction(found: Design) -> None:
     assert "In 2 of 4 corners" in " ".join(joint_step(replace(found, edges=unknown)).sentences)
 
 
-def test_edges_in_words(found: Design) -> None:
+def test_edges_in_words(found: Design, snapshots: Snapshots) -> None:
     def some(*known: float) -> str:
         return edge(Corners(found.without.population, np.array(known), (1.2, 144.0)))
 
-    assert some(0.0, 0.0) == "hunts in no corner at any crossover from 1.20 Hz to 144 Hz"
-    assert some(0.0, np.inf) == "hunts, in its worst corner, up to 144 Hz and beyond"
-    assert some(0.0, 7.62) == "hunts, in its worst corner, up to 7.62 Hz"
+    texts = [some(0.0, 0.0), some(0.0, np.inf), some(0.0, 7.62)]
+    for facts, text in zip((("1.20 Hz", "144 Hz"), ("144 Hz",), ("7.62 Hz",)), texts, strict=True):
+        assert [fact for fact in facts if fact not in text] == []
+    snapshots.check("design", "edges", "\n".join(texts))
 
 
 def test_leaves_and_what_binds_them(found: Design) -> None:
@@ -285,21 +281,18 @@ def test_leaves_and_what_binds_them(found: Design) -> None:
     tight = replace(found.fitted.choice, excess=excess)
     found = replace(found, fitted=replace(found.fitted, choice=tight))
     said = " ".join(leaves_step(found).sentences)
-    assert "The first mode that interferes with control is" in said
-    names = "the cart must not break away inside the stroke and first interfering frequency"
-    assert f"binding requirements (less than 5 % to spare): {names}." in said
-    assert f"Of the {len(found.candidates)} geometries on the front the beam model confirms" in said
+    rows = requirement_rows(found)
+    for name, *_, spare in rows:
+        assert (name in said) == spare.endswith("binds")
+    assert f"{len(found.candidates)} geometries" in said
     broken = replace(found.confirmed[0], stiffness=np.nan, frequency=np.nan, failure="no equilibrium")
     other = replace(found, confirmed=(broken, *found.confirmed[1:]))
     assert "1 could not be computed" in " ".join(leaves_step(other).sentences)
-    rows = requirement_rows(found)
-    assert rows[0][0] == "the cart must not break away inside the stroke"
     assert rows[0][1:3] == ("friction.static, leaves.stroke", "1 N, 1 mm")
     assert [row[3] for row in rows] == ["98.5 %, binds", "20.0 %", "10.0 %", "60.0 %", "99.0 %, binds"]
     loose = replace(found.fitted, choice=replace(tight, excess=excess / 2))
-    assert "no requirement is binding except space and available thicknesses" in " ".join(
-        leaves_step(replace(found, fitted=loose)).sentences
-    )
+    spared = " ".join(leaves_step(replace(found, fitted=loose)).sentences)
+    assert [name for name, *_ in rows if name in spared] == []
 
 
 def test_the_window_of_the_crossover(found: Design) -> None:
@@ -313,15 +306,14 @@ def test_the_window_of_the_crossover(found: Design) -> None:
         assert f"{hertz(bound.value)} ({bound.reason})" in said
 
 
-def test_damping_that_is_worth_adding_or_not(found: Design) -> None:
+def test_damping_that_is_worth_adding_or_not(found: Design, snapshots: Snapshots) -> None:
     def damped(*margins: float) -> str:
         other = replace(found.controller.damping, margins=np.array(margins))
         return controller_step(replace(found, controller=replace(found.controller, damping=other))).sentences[-1]
 
-    said = damped(0.3, 0.58, 0.6)
-    assert said.startswith("Damping in the joint is worth adding: with its own damping of 0.5 N·s/m")
-    assert "it is 0.58; more damping adds little" in said
-    assert damped(0.57, 0.59, 0.6).startswith("More damping in the joint is not worth adding")
+    worth, not_worth = damped(0.3, 0.58, 0.6), damped(0.57, 0.59, 0.6)
+    assert [fact for fact in ("0.5 N·s/m", "0.58") if fact not in worth] == []
+    snapshots.check("design", "damping", f"{worth}\n{not_worth}")
 
 
 def restless(count: int) -> np.ndarray:
@@ -331,7 +323,7 @@ def restless(count: int) -> np.ndarray:
     return words
 
 
-def test_moves_that_swing_or_take_too_long(found: Design) -> None:
+def test_moves_that_swing_or_take_too_long(found: Design, snapshots: Snapshots) -> None:
     off = np.arange(64) < 2
     free = replace(
         found.verification.free,
@@ -341,26 +333,26 @@ def test_moves_that_swing_or_take_too_long(found: Design) -> None:
     )
     other = replace(found, verification=replace(found.verification, free=free))
     step = moves_step(other)
-    assert step.title == "Verification: 64 moves, 2 do not come to rest in position (1 swing, 1 creep)"
+    assert [fact for fact in ("64 moves", "2 do not", "1 swing", "1 creep") if fact not in step.title] == []
     said = " ".join(step.sentences)
-    assert "Specified for 95 % of the moves: 1.00 s; that is NOT met." in said
-    assert "The worst move, which swings over 1 mm" in said
-    assert "not as specified" in headline(other)[-1][1]
+    assert [fact for fact in ("95 %", "1.00 s", "NOT met", "1 mm") if fact not in said] == []
+    snapshots.check("design", "moves that swing", "\n".join([*step.sentences, headline(other)[-1][1]]))
     lost = replace(free, words=np.where(np.arange(64) > 3, free.words, "failed"))
     step = moves_step(replace(found, verification=replace(found.verification, free=lost)))
-    assert "4 moves could not be simulated" in " ".join(step.sentences)
+    assert "4 moves" in " ".join(step.sentences)
 
 
-def test_moves_of_a_locked_joint_that_swings(found: Design) -> None:
+def test_moves_of_a_locked_joint_that_swings(found: Design, snapshots: Snapshots) -> None:
     off = np.arange(64) < 20
     locked = replace(found.verification.locked, words=restless(20), settling=np.where(off, np.nan, 3.0))
     other = replace(found, verification=replace(found.verification, locked=locked))
     said = " ".join(moves_step(other).sentences)
-    assert "With the joint locked: half of them settle in 3.00 s, fewer than 95 % at all, and 20 do not " in said
-    assert "all come to rest in position (with the joint locked, 20 do not" in headline(other)[-1][1]
+    assert [fact for fact in ("3.00 s", "95 %", "20 do not") if fact not in said] == []
+    assert "20 do not" in headline(other)[-1][1]
+    snapshots.check("design", "moves of a locked joint", "\n".join([said, headline(other)[-1][1]]))
     never = replace(locked, words=np.full(64, "swings"), settling=np.full(64, np.nan))
-    assert settling(never) == "Fewer than half of them settle"
-    assert "instead of never" in brings(replace(found, verification=replace(found.verification, locked=never)))
+    assert not re.search(r"\d", settling(never))
+    assert "never" in brings(replace(found, verification=replace(found.verification, locked=never)))
 
 
 # ---------------------------------------------------------------- figures and page
