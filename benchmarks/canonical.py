@@ -97,7 +97,7 @@ def _followed(model: Model, flat: Flat) -> dict[str, list[float]]:
     numbers = [float(values[name]) for name in names]
     flags = [kink.beyond for kink in model.kinks]
     seen = model.clock.seen if model.clock else {}
-    arguments = [*model.symbols, *flags, *model.given, *seen, TIME, TICK, *model.parameters]
+    arguments = [*model.symbols, *flags, *model.fixed, *seen, TIME, TICK, *model.parameters]
     known = {"quantised": _quantised, "gaussian": lambda seed, tick: 0.0}
 
     def compiled(expressions: Any) -> Any:

@@ -92,7 +92,7 @@ class Machine:
         found = problem.record(np.zeros(0))
         signals = {"reference": reference, "position": found.position, "force": found.force}
         if self.jointed:
-            starts = np.zeros((1, len(problem.kernel.kept)))
+            starts = np.zeros((1, len(problem.kernel.full_state)))
             (runs,) = follow(problem.kernel, flat, 1, problem.inputs, starts, RTOL)
             signals["cart_position"] = runs.states[0, :, problem.kernel.states.index("cart_position")]
         return self.measured(record(name, self.sample_time, **{k: v[::FINE] for k, v in signals.items()}), bare)

@@ -86,7 +86,7 @@ def mean_level(logs: Iterable[RigLog], key: str) -> float:
     for log in logs:
         flat = log.stage.flat()
         places = log.true.get("cart_position", log.true["position"])
-        way = friction_velocity(log.log).way if log.kind == "constant-speed" else (places.min(), places.max())
+        way = friction_velocity(log.log).places if log.kind == "constant-speed" else (places.min(), places.max())
         if np.isnan(way[0]):
             continue  # nothing was steady
         means.append(flat[key] * float(friction_factors(flat, np.linspace(*way, 1000))[row].mean()))

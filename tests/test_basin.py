@@ -137,7 +137,7 @@ def test_share_of_moves_is_reproducible() -> None:
     first, second = moves(MOVING, target()), moves(MOVING, target())
     assert first is not None
     assert first == second
-    assert first.drawn == MOVES
+    assert first.count == MOVES
     assert first.accelerations == pytest.approx([10, 200])
     assert first.times == pytest.approx([0.003, 0.06])
     low, high = first.interval

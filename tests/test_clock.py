@@ -73,7 +73,7 @@ def run(
     chosen = RunOptions(**{"rtol": 1e-11, "interval": every * TIME, **options})
     batch = prepare(shape, flat, runs, chosen)._replace(tables=tables)
     assert chosen.interval is not None
-    results = empty_results(runs, 1, round(0.4 / chosen.interval) + 1, len(shape.kept))
+    results = empty_results(runs, 1, round(0.4 / chosen.interval) + 1, len(shape.full_state))
     run_batch(shape, batch, settings_of(chosen), results, threads)
     return shape, results
 
@@ -194,10 +194,10 @@ def test_drive_is_that_of_plain_python(delay: float, ramp: str) -> None:
     shape, results = run(keys(stage, delay, **digital), tables=tables)
     assert results.statuses[0] == Status.DONE
     states, commands = Twin(stage, delay).run(tables, 400)
-    simulated = results.samples[0, :400, [shape.kept.index(n) for n in ("position", "velocity", "motor_force")]].T
+    simulated = results.samples[0, :400, [shape.full_state.index(n) for n in ("position", "velocity", "motor_force")]].T
     assert np.abs(commands).max() == LIMIT  # the limit is met, and left again
     assert np.mean(np.abs(commands) == LIMIT) < 0.4
-    assert results.samples[0, :400, shape.kept.index("commanded")] == pytest.approx(commands[:400], abs=1e-6)
+    assert results.samples[0, :400, shape.full_state.index("commanded")] == pytest.approx(commands[:400], abs=1e-6)
     assert simulated == pytest.approx(states, abs=1e-7, rel=1e-7)
 
 
@@ -206,7 +206,7 @@ def test_delays_act_in_turn() -> None:
     first = []
     for delay in DELAYS:
         shape, results = run(keys(axis(), delay))
-        moving = np.abs(results.samples[0, :, shape.kept.index("motor_force")]) > 1e-9
+        moving = np.abs(results.samples[0, :, shape.full_state.index("motor_force")]) > 1e-9
         first.append(int(np.argmax(moving)))
     assert first == [2 + int(delay) for delay in DELAYS]
 
@@ -219,7 +219,7 @@ def test_the_continuous_loop_is_approached_in_the_first_order() -> None:
     for time in times:
         flat = keys(stage, sample_time=time, current_bandwidth=0.5 / time)
         shape, results = run(flat, every=round(0.01 / TIME), rtol=1e-9)
-        positions = results.samples[0, :40, shape.kept.index("position")]
+        positions = results.samples[0, :40, shape.full_state.index("position")]
         errors.append(float(np.abs(positions - exact.position.values[:40]).max()))
     slope = np.polyfit(np.log(times[1:]), np.log(errors[1:]), 1)[0]
     assert slope == pytest.approx(1, abs=0.1)
@@ -244,7 +244,7 @@ def test_tables_between_their_points() -> None:
         tables = FLAT_TABLES._replace(times=line, per_second=np.array([(count - 1) / 0.4]))
         still = {"controller.kp": 1e-9, "controller.ki": 1e-9, "controller.kd": 1e-9}
         shape, results = run(keys(axis()) | still, tables=tables)
-        commanded.append(results.samples[0, :400, shape.kept.index("commanded")])
+        commanded.append(results.samples[0, :400, shape.full_state.index("commanded")])
     expected = -4.0 + 10.0 * np.arange(400) * TIME / 0.4
     for force in commanded:
         assert force == pytest.approx(expected, abs=1e-9)
@@ -294,7 +294,7 @@ def test_what_is_not_watched_is_not_a_number() -> None:
     statistics = results.statistics[0]
     assert np.isnan(statistics[1:5]).all()
     assert statistics[7] == pytest.approx(0.4)
-    force = np.abs(results.samples[0, :, shape.kept.index("motor_force")])
+    force = np.abs(results.samples[0, :, shape.full_state.index("motor_force")])
     assert statistics[0] == pytest.approx(np.nanmax(force), rel=1e-3)
 
 

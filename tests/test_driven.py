@@ -22,7 +22,7 @@ def axis(**changes: str) -> Stage:
 def run(stage: Stage, inputs: Inputs, samples: int, rtol: float = 1e-9):
     flat = stage.flat()
     shape = kernel(Driven(structure(flat), samples))
-    starts = np.zeros((1, len(shape.kept)))
+    starts = np.zeros((1, len(shape.full_state)))
     (runs,) = follow(shape, flat, 1, inputs, starts, rtol)
     assert runs.statuses[0] == 1
     return shape, runs

@@ -737,7 +737,7 @@ def test_passes_that_hardly_overlap_are_read_whole() -> None:
     log = ramps_there_and_back((3e-3, 9e-3, 29e-3), 0.02, 1e-3)
     shift = np.where(log.time > log.time[-1] / 2, 0.017, 0.0)
     signals = {**log.signals, "position": log["position"] + shift, "reference": log["reference"] + shift}
-    low, high = friction_velocity(record("apart", log.sample_time, **signals)).way
+    low, high = friction_velocity(record("apart", log.sample_time, **signals)).places
     assert high - low > 0.02
 
 

@@ -281,6 +281,6 @@ def test_the_side_at_the_start_may_be_told() -> None:
     states = np.zeros((1, len(shape.states)))
     names = [*shape.states]
     states[0, names.index("velocity")], states[0, names.index("deflection_2")] = 1e-3, LIMIT[1]
-    assert shape.with_modes(states, np.zeros((3, 1)), values)[0, shape.told :].tolist() == [0.0, 1.0, 0.0]
+    assert shape.with_modes(states, np.zeros((3, 1)), values)[0, shape.initial_size :].tolist() == [0.0, 1.0, 0.0]
     other = np.hstack([states, [[1.0, 0.0, 0.0]]])
     assert shape.modes(other.T, 0.0, np.zeros((3, 1)), values)[list(shape.switches), 0].tolist() == [1.0, 0.0, 0.0]

@@ -26,7 +26,7 @@ def built() -> Stage:
 def test_sizes_on_the_thesis_rig_are_the_thesis_s(built: Stage) -> None:
     low, high = sizes.travel(built)
     assert high - low == pytest.approx(0.09)
-    assert sizes.longest_way(built) == pytest.approx(0.15)
+    assert sizes.longest_travel(built) == pytest.approx(0.15)
     assert constant_speed.speeds(built) == pytest.approx((2.5e-3, 10e-3))
     assert sizes.freed(built).flat()["joint.stroke"] == pytest.approx(8e-3)
     assert np.array(frf.SETTINGS) * sizes.pace(built) == pytest.approx([8, 12, 16, 24, 32, 48])

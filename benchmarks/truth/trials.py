@@ -195,7 +195,7 @@ class Bench:
         count = 1 if states is None else len(states)
         words = np.full(count, UNSURE, dtype=object)
         amplitude, followed = np.zeros(count), np.zeros(count)
-        ends = np.full((count, len(self.kernel.kept)), np.nan)
+        ends = np.full((count, len(self.kernel.full_state)), np.nan)
         on, begin = np.arange(count), states
         for number, periods in enumerate(rounds):
             end = corner + periods * self.period

@@ -74,7 +74,7 @@ class Design:
     """
 
     spec: Spec
-    given: Stage
+    original: Stage
     without: Corners
     candidates: tuple[Candidate, ...]
     confirmed: tuple[Confirmed, ...]

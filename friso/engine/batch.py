@@ -151,7 +151,7 @@ def _run_with_room(
     samples = 0
     if options.interval is not None:
         samples = int(np.max(part["motion.duration"]) / options.interval * (1 + 1e-12)) + 1
-    results = empty_results(len(numbers), room, samples, len(kernel.kept))
+    results = empty_results(len(numbers), room, samples, len(kernel.full_state))
     run_batch(kernel, batch, settings_of(options), results, options.threads)
     crowded = results.turn_counts > room
     if room >= MOST_TURNS:

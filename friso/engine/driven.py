@@ -70,7 +70,7 @@ def follow(
         batch = prepare(kernel, _as_motion(flat, numbers, inputs, size), len(numbers), options, starts[numbers])
         every = np.full(len(numbers), inputs.sample_time)
         batch = batch._replace(segments=segments, first_steps=every, longest=every, windows=np.full(len(numbers), -1))
-        results = empty_results(len(numbers), 1, count + 1, len(kernel.kept))
+        results = empty_results(len(numbers), 1, count + 1, len(kernel.full_state))
         run_batch(kernel, batch, settings, results, options.threads)
         states, held = np.split(results.samples, [len(kernel.states)], axis=2)
         yield Followed(numbers, states[:, :-1], held[:, 1:], results.statuses)

@@ -87,7 +87,7 @@ class Kernel:
         return self.module.HELD_NAMES
 
     @property
-    def kept(self) -> tuple[str, ...]:
+    def full_state(self) -> tuple[str, ...]:
         """All that a run has at an instant: states, then the numbers held."""
         return self.states + self.held
 
@@ -97,9 +97,9 @@ class Kernel:
         return self.module.SWITCHES
 
     @property
-    def told(self) -> int:
-        """How much of `kept` a run has to be told at its start: the modes that remember follow from it if need be."""
-        return len(self.kept) - len(self.switches)
+    def initial_size(self) -> int:
+        """How many numbers of `full_state` a run starts from: the modes that remember follow from these if need be."""
+        return len(self.full_state) - len(self.switches)
 
     @property
     def parameters(self) -> tuple[str, ...]:
@@ -115,28 +115,28 @@ class Kernel:
         return self.module.OUTPUTS
 
     def settled(self, flat: dict[str, Any], steady: Steady, runs: int) -> np.ndarray:
-        """States and numbers held in a steady motion that has lasted, shape (runs, told); `flat` and the numbers of the
-        motion may be arrays of shape (runs,)."""
-        full = np.zeros((runs, self.told))
+        """States and numbers held in a steady motion that has lasted, shape (runs, initial_size); `flat` and the
+        numbers of the motion may be arrays of shape (runs,)."""
+        full = np.zeros((runs, self.initial_size))
         for i, row in enumerate(self.module.settled(steady, self.values(flat, runs))):
             full[:, i] = row
         return full
 
-    def modes(self, kept: np.ndarray, time: Any, reference: Any, values: list[Any]) -> np.ndarray:
-        """On which side of each kink runs are, 1 beyond and 0 before it, shape (kinks, ...), from what is `kept`
-        (states or all of it, ...): modes that remember are as they are kept, and where they are not, those in which a
+    def modes(self, full: np.ndarray, time: Any, reference: Any, values: list[Any]) -> np.ndarray:
+        """On which side of each kink runs are, 1 beyond and 0 before it, shape (kinks, ...), from the `full` state
+        (or the states alone, ...): modes that remember are as they are kept, and where they are not, those in which a
         run begins there."""
-        sides = self.module.surfaces(kept[: len(self.states)], time, reference, values)
-        modes = np.zeros((len(self.kinks), *kept.shape[1:]))
+        sides = self.module.surfaces(full[: len(self.states)], time, reference, values)
+        modes = np.zeros((len(self.kinks), *full.shape[1:]))
         for k, side in enumerate(sides):
             modes[k] = np.asarray(side) > 0
-        if len(kept) == len(self.kept):
-            modes[list(self.switches)] = kept[self.told :]
+        if len(full) == len(self.full_state):
+            modes[list(self.switches)] = full[self.initial_size :]
         return modes
 
     def with_modes(self, starts: np.ndarray, reference: Any, values: list[Any]) -> np.ndarray:
-        """Starts, shape (runs, told or kept), with the modes that remember in which a run begins there."""
-        if starts.shape[1] == len(self.kept):
+        """Starts, shape (runs, initial_size or all), with the modes that remember in which a run begins there."""
+        if starts.shape[1] == len(self.full_state):
             return starts
         modes = self.modes(starts.T, 0.0, reference, values)[list(self.switches)]
         return np.hstack([starts, modes.T])
@@ -204,22 +204,22 @@ DRIVER = CodeRequest("driver", "the loops that run any kernel", "friso.engine.bu
 """What is compiled once for all kernels."""
 
 
-def _request(wanted: Wanted) -> CodeRequest:
+def _request(request: Wanted) -> CodeRequest:
     """What is wanted is pickled apart from the plug-ins, which the builder loads first: it may hold their classes."""
-    foreign = plug_ins(wanted.sections)
-    name = " ".join([repr(wanted), *(plug_in.digest for plug_in in foreign)])
-    return CodeRequest(name, wanted.title, "friso.engine.build", pickle.dumps((foreign, pickle.dumps(wanted))))
+    foreign = plug_ins(request.sections)
+    name = " ".join([repr(request), *(plug_in.digest for plug_in in foreign)])
+    return CodeRequest(name, request.title, "friso.engine.build", pickle.dumps((foreign, pickle.dumps(request))))
 
 
-def _load(wanted: Wanted, entry: Compiled) -> None:
+def _load(request: Wanted, entry: Compiled) -> None:
     with _loading:
-        if wanted in _kernels:  # another thread was first
+        if request in _kernels:  # another thread was first
             return
         module = entry.module()
         functions = [name for name in FUNCTIONS if hasattr(module, name)]
         code = {**dict.fromkeys(FUNCTIONS, 0), **load(entry.code, functions)}
         arrays = {name: np.array(module.LOOKED_UP[name], np.int64) for name in LOOKED_UP}
-        _kernels[wanted] = Kernel(module, ModelLayout(**module.LAYOUT, **arrays, **code), _loops())
+        _kernels[request] = Kernel(module, ModelLayout(**module.LAYOUT, **arrays, **code), _loops())
 
 
 @cache

@@ -113,7 +113,7 @@ class Layout:
     dense: int
     constants: int
     kinks: int
-    given: int
+    fixed: int
     seen: int
     tables: int
     walks: int
@@ -123,5 +123,5 @@ class Layout:
         """The first row of each block, and how many `rows` there are."""
         axis, before = self.walks and 2 * len(AXES), self.walks and 4
         sizes = (self.states, self.states, self.states, self.dense * self.states, self.states)
-        sizes += (self.constants, self.kinks, self.given, self.seen, axis, before, self.walks, self.tables, self.tables)
+        sizes += (self.constants, self.kinks, self.fixed, self.seen, axis, before, self.walks, self.tables, self.tables)
         return dict(zip((*BLOCKS, "rows"), accumulate(sizes, initial=len(ROW)), strict=True))

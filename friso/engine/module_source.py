@@ -44,11 +44,11 @@ def _numbers(model: Model, writer: StepWriter, lanes: int) -> str:
     layout |= {"lanes": lanes, "position": places[0], "velocity": places[1]}
     lines = [
         f"STATE_NAMES = {tuple(map(str, model.symbols))!r}",
-        f"ROLES = {tuple(each.role.value for each in (*model.states, *model.held))!r}",
+        f"ROLES = {tuple(state.role.value for state in (*model.states, *model.held))!r}",
         f"PARAMETERS = {tuple(map(str, model.parameters))!r}",
         f"KINK_NAMES = {tuple(kink.name for kink in model.kinks)!r}",
-        f"OUTPUTS = { {name: (each.unit, each.label) for name, each in model.outputs.items()}!r}",
-        f"HELD_NAMES = {tuple(map(str, model.kept))!r}",
+        f"OUTPUTS = { {name: (output.unit, output.label) for name, output in model.outputs.items()}!r}",
+        f"HELD_NAMES = {tuple(map(str, model.discrete))!r}",
         f"SWITCHES = {writer.switches!r}",
         f"CART_POSITION, CART_VELOCITY = {_places(model, model.cart)!r}",
         f"LAYOUT = {layout!r}",
@@ -66,8 +66,8 @@ def _sizes(model: Model, writer: StepWriter) -> dict[str, int]:
         "constants": layout.constants,
         "kinks": layout.kinks,
         "inputs": len(model.inputs),
-        "held": len(model.kept),
-        "tabled": model.given.index(clock.tabled[0]) if clock else 0,
+        "held": len(model.discrete),
+        "tabled": model.fixed.index(clock.tabled[0]) if clock else 0,
         "places": len(clock.places) if clock else 0,
         "clocked": int(clock is not None),
     }
@@ -89,13 +89,13 @@ def _looked_up(model: Model, writer: StepWriter) -> dict[str, tuple[int, ...]]:
 def _numpy_functions(model: Model, writer: StepWriter) -> str:
     names: dict[sp.Symbol, str] = {p: f"p[{i}]" for i, p in enumerate(model.parameters)}
     names |= {s: f"x[{i}]" for i, s in enumerate(model.symbols)}
-    names |= {r: f"r[{i}]" for i, r in enumerate(model.given)} | {TIME: "t"}
+    names |= {r: f"r[{i}]" for i, r in enumerate(model.fixed)} | {TIME: "t"}
     names |= {s: f"s[{i}]" for i, s in enumerate(STEADY)}
     names |= {kink.beyond: f"m[{k}]" for k, kink in enumerate(model.kinks)}
     rename: Rename = names.__getitem__
     functions = {
         "constants(p)": writer.constants.expressions,
-        "scales(p)": [each.scale for each in model.states],
+        "scales(p)": [state.scale for state in model.states],
         "rate(p)": [model.rate],
         "clock(p)": [model.clock.period, model.clock.late] if model.clock else [],
         "breakaway(p)": [model.breakaway],
@@ -103,7 +103,7 @@ def _numpy_functions(model: Model, writer: StepWriter) -> str:
         "settled(s, p)": model.settled,
         "surfaces(x, t, r, p)": [kink.at_start for kink in model.kinks],
         "right_hand_side(x, m, t, r, p)": model.rhs,
-        "outputs(x, m, t, r, p)": [each.expression for each in model.outputs.values()],
+        "outputs(x, m, t, r, p)": [output.expression for output in model.outputs.values()],
     }
     return "\n\n".join(_function(head, body, rename) for head, body in functions.items())
 

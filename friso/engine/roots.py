@@ -59,5 +59,5 @@ def crossing(p0, p1, p2, p3, guess):
         high = high if value > 0.0 else theta
         newton = theta - value / slope
         theta = newton if (newton >= low) & (newton <= high) else 0.5 * (low + high)
-    found = p0 + theta * (c1 + theta * (c2 + theta * c3)) <= 0.01 * p0
-    return theta if found else high
+    crosses = p0 + theta * (c1 + theta * (c2 + theta * c3)) <= 0.01 * p0
+    return theta if crosses else high

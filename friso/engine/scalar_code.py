@@ -145,11 +145,11 @@ class _Writer:
 
     def _write(self, function: Callable[..., Any], kinds: tuple[Kind, ...]) -> tuple[ir.Function, NumberKind | None]:
         tree = syntax(function)
-        signature = ir.FunctionType(_INT64, [each for kind in kinds for each in _types(kind)])
+        signature = ir.FunctionType(_INT64, [part for kind in kinds for part in _types(kind)])
         code = ir.Function(self.module, signature, self.module.get_unique_name(function.__name__))
         code.linkage = "internal"
         parts, scope = list(code.args), {}
-        for name, kind in zip((each.arg for each in tree.args.args), kinds, strict=True):
+        for name, kind in zip((argument.arg for argument in tree.args.args), kinds, strict=True):
             scope[name] = _value(parts[: len(_types(kind))], kind)
             del parts[: len(_types(kind))]
         frame = _Frame(self, code, scope, function.__globals__)
@@ -231,8 +231,8 @@ class _Frame(ast.NodeVisitor):
 
     def _assign(self, target: ast.expr, value: Any) -> None:
         if isinstance(target, ast.Tuple):
-            for part, each in zip(target.elts, value, strict=True):
-                self._assign(part, each)
+            for part, element in zip(target.elts, value, strict=True):
+                self._assign(part, element)
         elif isinstance(target, ast.Name):
             self._bind(target.id, value)
         elif isinstance(target, ast.Subscript):
@@ -298,8 +298,8 @@ class _Frame(ast.NodeVisitor):
                 self._assign(node.target, part)
                 self._statements(node.body)
             return
-        given = [self.visit(each) for each in node.iter.args]
-        start, stop, step = (0, *given, 1) if len(given) == 1 else (*given, 1)[:3]
+        bounds = [self.visit(argument) for argument in node.iter.args]
+        start, stop, step = (0, *bounds, 1) if len(bounds) == 1 else (*bounds, 1)[:3]
         if not isinstance(step, int):
             self.generic_visit(node.iter)
         end = self._number(stop, INT).value
@@ -441,8 +441,8 @@ class _Frame(ast.NodeVisitor):
         """As in Python, what comes later is not looked at where what comes first decides."""
         after, ends = self._code.append_basic_block(), []
         decisive = ir.Constant(_BIT, int(isinstance(node.op, ast.Or)))
-        for each in node.values[:-1]:
-            truth, on = self._truth(self.visit(each)), self._code.append_basic_block()
+        for operand in node.values[:-1]:
+            truth, on = self._truth(self.visit(operand)), self._code.append_basic_block()
             ends.append((decisive, self._builder.block))
             ways = (after, on) if isinstance(node.op, ast.Or) else (on, after)
             self._builder.cbranch(truth, *ways)
@@ -475,21 +475,21 @@ class _Frame(ast.NodeVisitor):
         self._builder.branch(block)
         self._builder.position_at_end(block)
         value = self._builder.phi(type_)
-        for each, origin in ends:
-            value.add_incoming(each, origin)
+        for incoming, origin in ends:
+            value.add_incoming(incoming, origin)
         return value
 
     def visit_Call(self, node: ast.Call) -> Any:
-        function, arguments = self.visit(node.func), [self.visit(each) for each in node.args]
+        function, arguments = self.visit(node.func), [self.visit(argument) for argument in node.args]
         if node.keywords:
             self.generic_visit(node)
         if function in _LIBRARY:
             return _LIBRARY[function](self, *arguments)
-        if not any(hasattr(each, "parts") for each in arguments):
+        if not any(hasattr(argument, "parts") for argument in arguments):
             return function(*arguments)
         if not inspect.isfunction(function):
             self.generic_visit(node)
-        whole = [each if hasattr(each, "parts") else self._number(each) for each in arguments]
+        whole = [argument if hasattr(argument, "parts") else self._number(argument) for argument in arguments]
         return self._writer.call(self._builder, function, whole)
 
     def least(self, one: Any, other: Any) -> _Value:
@@ -503,19 +503,19 @@ class _Frame(ast.NodeVisitor):
         condition = self._compare(sign, _Value(second, kind), _Value(first, kind)).value
         return _Value(self._builder.select(condition, second, first), kind)
 
-    def magnitude(self, given: Any) -> _Value:
+    def magnitude(self, value: Any) -> _Value:
         signature = ir.FunctionType(_DOUBLE, [_DOUBLE])
         called = self._builder.module.declare_intrinsic("llvm.fabs.f64", (), signature)
-        return _Value(self._builder.call(called, [self._number(given, FLOAT).value]), FLOAT)
+        return _Value(self._builder.call(called, [self._number(value, FLOAT).value]), FLOAT)
 
-    def whole(self, given: Any) -> _Value:
-        number = self._number(given)
+    def whole(self, value: Any) -> _Value:
+        number = self._number(value)
         if number.kind != FLOAT:
             return self._number(number, INT)
         return _Value(self._builder.fptosi(number.value, _INT64), INT)
 
-    def real(self, given: Any) -> _Value:
-        return self._number(given, FLOAT)
+    def real(self, value: Any) -> _Value:
+        return self._number(value, FLOAT)
 
     def take_next(self, queue: _ArrayValue) -> _Value:
         taken = self._builder.atomic_rmw("add", queue.data, ir.Constant(_INT64, 1), "monotonic")
@@ -524,8 +524,8 @@ class _Frame(ast.NodeVisitor):
     def call_at(self, address: _Value, buffer: _ArrayValue, *numbers: Any) -> _Value:
         signature = ir.FunctionType(_INT64, [*_types(buffer.kind)[:1]] + [_DOUBLE] * len(numbers))
         code = self._builder.inttoptr(address.value, ir.PointerType(signature))
-        given = [self._number(each, FLOAT).value for each in numbers]
-        return _Value(self._builder.call(code, [buffer.data, *given]), INT)
+        operands = [self._number(number, FLOAT).value for number in numbers]
+        return _Value(self._builder.call(code, [buffer.data, *operands]), INT)
 
     def _alike(self, left: Any, right: Any) -> tuple[Any, Any, NumberKind]:
         """Two numbers of one kind: a float64 number where one of them is."""
@@ -535,24 +535,24 @@ class _Frame(ast.NodeVisitor):
             kind = TRUTH
         return self._number(one, kind).value, self._number(other, kind).value, kind
 
-    def _number(self, given: Any, kind: NumberKind | None = None) -> _Value:
+    def _number(self, value: Any, kind: NumberKind | None = None) -> _Value:
         """A number as one of a kind; a whole number may become a float64 number, and a truth either."""
-        if not isinstance(given, _Value):
-            own = kind_of(given) if not isinstance(given, bool) else TRUTH
-            if not isinstance(own, NumberKind):
-                raise TypeError(f"not in the language of plain loops: {given!r} where a number is expected")
-            given = _Value(ir.Constant(_types(own)[0], given), own)
-        if kind is None or given.kind == kind:
-            return given
-        if kind == FLOAT and given.kind == INT:
-            return _Value(self._builder.sitofp(given.value, _DOUBLE), FLOAT)
-        if given.kind == TRUTH:
-            return self._number(_Value(self._builder.zext(given.value, _INT64), INT), kind)
-        raise TypeError(f"not in the language of plain loops: {given.kind.name} where {kind.name} is expected")
+        if not isinstance(value, _Value):
+            own_kind = kind_of(value) if not isinstance(value, bool) else TRUTH
+            if not isinstance(own_kind, NumberKind):
+                raise TypeError(f"not in the language of plain loops: {value!r} where a number is expected")
+            value = _Value(ir.Constant(_types(own_kind)[0], value), own_kind)
+        if kind is None or value.kind == kind:
+            return value
+        if kind == FLOAT and value.kind == INT:
+            return _Value(self._builder.sitofp(value.value, _DOUBLE), FLOAT)
+        if value.kind == TRUTH:
+            return self._number(_Value(self._builder.zext(value.value, _INT64), INT), kind)
+        raise TypeError(f"not in the language of plain loops: {value.kind.name} where {kind.name} is expected")
 
-    def _truth(self, given: Any) -> ir.Value:
+    def _truth(self, value: Any) -> ir.Value:
         """Whether a number is not 0."""
-        number = self._number(given)
+        number = self._number(value)
         return number.value if number.kind == TRUTH else self._compare("!=", number, 0).value
 
 

@@ -88,8 +88,8 @@ class StepWriter:
         self.constants = Constants(model.parameters)
         self._index = {symbol: i for i, symbol in enumerate(model.symbols)}
         self._position, self._velocity = self._index[model.stage.position], self._index[model.stage.velocity]
-        self._given = [f"given{i}" for i in range(len(model.given))]
-        self._fixed = dict(zip(model.given, self._given, strict=True))
+        self._fixed_names = [f"given{i}" for i in range(len(model.fixed))]
+        self._fixed = dict(zip(model.fixed, self._fixed_names, strict=True))
         self._fixed |= {kink.beyond: f"mode{k}" for k, kink in enumerate(model.kinks)}
         self._jacobian = self._nonzero_jacobian()
         self._drift = {i: d for i, f in enumerate(model.rhs) if (d := sp.diff(f, TIME)) != 0}
@@ -111,11 +111,11 @@ class StepWriter:
         self._jumps = [self._jumping(model.jumps.get(kink, {})) for kink in model.kinks]
         free: set[Any] = set().union(*(sp.sympify(e).free_symbols for e in watched.values()))
         self._watched_states = sorted(self._index[s] for s in free & set(self._index))
-        self._updates = Block({f"held{i}_": each.update for i, each in enumerate(model.held)}, self.constants)
+        self._updates = Block({f"held{i}_": held.update for i, held in enumerate(model.held)}, self.constants)
         clock = {"period_": model.clock.period, "late_": model.clock.late} if model.clock else {}
         self._clock = Block(clock, self.constants)
         self._walks = [*dict.fromkeys(model.clock.places.values()), TICK] if model.clock else []
-        sizes_of = (self.size, len(tableau.dense), len(self.constants.index), self.kinks, len(self._given))
+        sizes_of = (self.size, len(tableau.dense), len(self.constants.index), self.kinks, len(self._fixed_names))
         looked_up = (len(model.clock.seen), len(model.clock.tabled)) if model.clock else (0, 0)
         self.layout = Layout(*sizes_of, *looked_up, len(self._walks))
         self._rows = ROW._asdict() | self.layout.first_rows
@@ -218,13 +218,13 @@ class StepWriter:
         for i, w in enumerate(self.walked):
             lines.append(f"table{i} = {self._row('base', i)} + off{w} * {self._row('slope', i)}")
         lines += self._updates.code("", name)
-        held = {each.symbol: f"held{i}_" for i, each in enumerate(self.model.held)}
+        held = {number.symbol: f"held{i}_" for i, number in enumerate(self.model.held)}
         held |= {x: f"table{i}" for i, x in enumerate(clock.tabled if clock else ())}
         for symbol, value in held.items():
-            row = self._row("reference", self.model.given.index(symbol))
+            row = self._row("reference", self.model.fixed.index(symbol))
             lines.append(f"{row} = {value} if ticked > 0.0 else {row}")
         for k, switch in zip(self.switches, self.model.switches, strict=True):
-            lines.append(f"{self._row('reference', self.model.given.index(switch.beyond))} = {self._row('mode', k)}")
+            lines.append(f"{self._row('reference', self.model.fixed.index(switch.beyond))} = {self._row('mode', k)}")
         lines.append(f"{self._row('tick')} = tick + ticked")
         if clock:
             due = self._row("due")
@@ -242,7 +242,7 @@ class StepWriter:
         """Names for what a sample is computed from, most of which is in the buffer."""
         clock = self.model.clock
         names = {x: self._row("x", i) for x, i in self._index.items()}
-        names |= {x: self._row("reference", i) for i, x in enumerate(self.model.given)}
+        names |= {x: self._row("reference", i) for i, x in enumerate(self.model.fixed)}
         names |= {x: f"input{i}" for i, x in enumerate(self.model.inputs if clock else ())}
         names |= {c: self._row("constant", i) for c, i in self.constants.index.items()}
         names |= {x: self._row("seen", i) for i, x in enumerate(clock.seen if clock else ())}
@@ -259,7 +259,7 @@ class StepWriter:
             "tolerance": [f"tol{i}" for i in range(self.size)],
             "constant": [str(c) for c in self.constants.index],
             "mode": [f"mode{k}" for k in range(self.kinks)],
-            "reference": self._given,
+            "reference": self._fixed_names,
             "seen": [f"seen{i}" for i in range(self.layout.seen)],
         }
         lines = [f"{name} = {self._row(b, i)}" for b, names in named.items() for i, name in enumerate(names)]
@@ -289,11 +289,11 @@ class StepWriter:
         method = self.tableau
         lines = [f"diagonal, inverse = {1 / method.gamma!r} * per_h, {method.gamma!r} * h"]
         for i in range(self.size):
-            own = f" - j_{i}_{i}__s" if (i, i) in self._jacobian else ""
-            lines.append(f"A_{i}_{i} = diagonal{own}")
+            own_term = f" - j_{i}_{i}__s" if (i, i) in self._jacobian else ""
+            lines.append(f"A_{i}_{i} = diagonal{own_term}")
         lines += [f"A_{i}_{j} = -j_{i}_{j}__s" for i, j in self._jacobian if i != j]
-        own = {i for i, j in self._jacobian if i == j}
-        elimination = eliminate(self.size, set(self._jacobian), own, method.stages)
+        diagonals = {i for i, j in self._jacobian if i == j}
+        elimination = eliminate(self.size, set(self._jacobian), diagonals, method.stages)
         lines += elimination.code
         for stage in range(method.stages):
             lines += self._stage_rates(stage)
@@ -375,8 +375,8 @@ class StepWriter:
             lines += [
                 f"first_{point} = {point}{k} if guess{k} <= earliest else first_{point}" for k in range(1, self.kinks)
             ]
-        found = f"crossing({', '.join(f'first_{point}' for point in POINTS)}, earliest)"
-        return [*lines, f"fraction = {found}", "fraction = fraction if earliest < 1.0 else 1.0"]
+        call = f"crossing({', '.join(f'first_{point}' for point in POINTS)}, earliest)"
+        return [*lines, f"fraction = {call}", "fraction = fraction if earliest < 1.0 else 1.0"]
 
     def _accept(self) -> list[str]:
         """Accept or reject, the new state and modes, and the next step."""
@@ -494,8 +494,8 @@ class StepWriter:
         lines += [f"{self._row('x', i)} = n{i}" for i in range(self.size)]
         lines += [f"{self._row('mode', k)} = mode{k}" for k in range(self.kinks)]
         lines += ["time, old_time, taken = t_n, t, h"]
-        kept = UNCHANGED + UNWATCHED if self.model.clock else UNCHANGED
-        return lines + [f"{self._row(name)} = {name}" for name in SCALARS if name not in kept]
+        unwritten = UNCHANGED + UNWATCHED if self.model.clock else UNCHANGED
+        return lines + [f"{self._row(name)} = {name}" for name in SCALARS if name not in unwritten]
 
     def _store_step(self) -> list[str]:
         """What the states inside the step follow from."""

@@ -55,7 +55,7 @@ def _add(module: ir.Module, name: str, function: Callable[..., Any], lanes: int)
     code.attributes.alignstack = CACHE_LINE
     builder: Any = ir.IRBuilder(code.append_basic_block())
     buffer, *scalars = code.args
-    same = [_Vector(_splat(builder, each, lanes), _FLOAT) for each in scalars]
+    same = [_Vector(_splat(builder, scalar_value, lanes), _FLOAT) for scalar_value in scalars]
     writer = _Writer(builder, lanes)
     result = writer.inlined(function, [_Column(builder, buffer, lanes), *same])
     bits = builder.bitcast(writer.truth(result or False).value, ir.IntType(lanes))
@@ -113,8 +113,8 @@ class _Column:
     def load(self, row: int) -> _Vector:
         return _Vector(self.builder.load(self._pointer(row), align=8), _FLOAT)
 
-    def store(self, row: int, given: _Vector) -> None:
-        self.builder.store(given.value, self._pointer(row), align=8)
+    def store(self, row: int, vector: _Vector) -> None:
+        self.builder.store(vector.value, self._pointer(row), align=8)
 
     def _pointer(self, row: int) -> ir.Value:
         if row < 0:
@@ -132,7 +132,7 @@ class _Writer:
     def inlined(self, function: Callable[..., Any], arguments: list[Any]) -> Any:
         """Write what a function does with its arguments; its result."""
         tree = syntax(function)
-        scope = dict(zip((each.arg for each in tree.args.args), arguments, strict=True))
+        scope = dict(zip((argument.arg for argument in tree.args.args), arguments, strict=True))
         frame = _Frame(self, scope, function.__globals__)
         for statement in tree.body:
             if isinstance(statement, ast.Return) and statement.value is not None:
@@ -140,29 +140,29 @@ class _Writer:
             frame.visit(statement)
         return None
 
-    def vector(self, given: Any, kind: _Kind) -> _Vector:
+    def vector(self, value: Any, kind: _Kind) -> _Vector:
         """What is given, the same in all lanes if it is a number."""
-        if isinstance(given, _Vector):
-            if given.kind is not kind:
-                raise TypeError(f"{given.kind} where {kind} is expected")
-            return given
-        known = float(given) if kind is _FLOAT else int(given)
-        if known != given:
-            raise TypeError(f"not in the language of straight-line code: {given} where a whole number is expected")
-        return _Vector(ir.Constant(self._type(kind), [ir.Constant(kind.element, known)] * self.lanes), kind)
+        if isinstance(value, _Vector):
+            if value.kind is not kind:
+                raise TypeError(f"{value.kind} where {kind} is expected")
+            return value
+        constant = float(value) if kind is _FLOAT else int(value)
+        if constant != value:
+            raise TypeError(f"not in the language of straight-line code: {value} where a whole number is expected")
+        return _Vector(ir.Constant(self._type(kind), [ir.Constant(kind.element, constant)] * self.lanes), kind)
 
-    def together(self, *given: Any) -> tuple[list[ir.Value], _Kind]:
+    def together(self, *operands: Any) -> tuple[list[ir.Value], _Kind]:
         """The values of vectors and numbers, which become of the kind of the vectors; and the kind."""
-        kinds = [each.kind for each in given if isinstance(each, _Vector)]
-        truths = all(isinstance(each, bool) for each in given)
+        kinds = [operand.kind for operand in operands if isinstance(operand, _Vector)]
+        truths = all(isinstance(operand, bool) for operand in operands)
         kind = kinds[0] if kinds else (_TRUTH if truths else _FLOAT)
-        return [self.vector(each, kind).value for each in given], kind
+        return [self.vector(operand, kind).value for operand in operands], kind
 
-    def operate(self, sign: ast.AST, *given: Any) -> Any:
+    def operate(self, sign: ast.AST, *operands: Any) -> Any:
         """The result of an operator."""
-        if not any(isinstance(each, _Vector) for each in given):
-            return _PYTHON[type(sign)](*given)
-        values, kind = self.together(*given)
+        if not any(isinstance(operand, _Vector) for operand in operands):
+            return _PYTHON[type(sign)](*operands)
+        values, kind = self.together(*operands)
         instruction = kind.instructions[type(sign)]
         liberties = {"flags": FASTMATH} if instruction in _REAL.values() else {}
         return _Vector(getattr(self.builder, instruction)(*values, **liberties), kind)
@@ -176,12 +176,12 @@ class _Writer:
         values, kind = self.together(chosen, otherwise)
         return _Vector(self.builder.select(self.truth(condition).value, *values), kind)
 
-    def truth(self, given: Any) -> _Vector:
+    def truth(self, value: Any) -> _Vector:
         """Whether a number is not 0, as Python has it."""
-        if isinstance(given, _Vector) and given.kind is _FLOAT:
+        if isinstance(value, _Vector) and value.kind is _FLOAT:
             zero = self.vector(0.0, _FLOAT).value
-            return _Vector(self.builder.fcmp_unordered("!=", given.value, zero, flags=FASTMATH), _TRUTH)
-        return given if isinstance(given, _Vector) else self.vector(bool(given), _TRUTH)
+            return _Vector(self.builder.fcmp_unordered("!=", value.value, zero, flags=FASTMATH), _TRUTH)
+        return value if isinstance(value, _Vector) else self.vector(bool(value), _TRUTH)
 
     def least(self, left: Any, right: Any) -> _Vector:
         return self.select(self.compare("<", right, left), right, left)
@@ -189,35 +189,35 @@ class _Writer:
     def greatest(self, left: Any, right: Any) -> _Vector:
         return self.select(self.compare(">", right, left), right, left)
 
-    def magnitude(self, given: Any) -> _Vector:
-        return self._library("fabs", given)
+    def magnitude(self, value: Any) -> _Vector:
+        return self._library("fabs", value)
 
-    def root(self, given: Any) -> _Vector:
-        return self._library("sqrt", given)
+    def root(self, value: Any) -> _Vector:
+        return self._library("sqrt", value)
 
-    def _library(self, name: str, given: Any) -> _Vector:
+    def _library(self, name: str, value: Any) -> _Vector:
         """One of LLVM's own functions of a number."""
         whole = self._type(_FLOAT)
         signature = ir.FunctionType(whole, [whole])
         called = self.builder.module.declare_intrinsic(f"llvm.{name}.v{self.lanes}f64", (), signature)
-        return _Vector(self.builder.call(called, [self.vector(given, _FLOAT).value]), _FLOAT)
+        return _Vector(self.builder.call(called, [self.vector(value, _FLOAT).value]), _FLOAT)
 
-    def bits_of(self, given: Any) -> _Vector:
-        return _Vector(self.builder.bitcast(given.value, self._type(_SIGNED)), _SIGNED)
+    def bits_of(self, vector: Any) -> _Vector:
+        return _Vector(self.builder.bitcast(vector.value, self._type(_SIGNED)), _SIGNED)
 
-    def number_of(self, given: Any) -> _Vector:
-        return _Vector(self.builder.bitcast(given.value, self._type(_FLOAT)), _FLOAT)
+    def number_of(self, vector: Any) -> _Vector:
+        return _Vector(self.builder.bitcast(vector.value, self._type(_FLOAT)), _FLOAT)
 
-    def signed(self, given: Any) -> _Vector:
-        return self._same_bits(given, _SIGNED)
+    def signed(self, vector: Any) -> _Vector:
+        return self._same_bits(vector, _SIGNED)
 
-    def unsigned(self, given: Any) -> _Vector:
-        return self._same_bits(given, _UNSIGNED)
+    def unsigned(self, vector: Any) -> _Vector:
+        return self._same_bits(vector, _UNSIGNED)
 
-    def _same_bits(self, given: _Vector, kind: _Kind) -> _Vector:
-        if given.kind.element != kind.element:
-            raise TypeError(f"not in the language of straight-line code: a {given.kind.element} as a whole number")
-        return _Vector(given.value, kind)
+    def _same_bits(self, vector: _Vector, kind: _Kind) -> _Vector:
+        if vector.kind.element != kind.element:
+            raise TypeError(f"not in the language of straight-line code: a {vector.kind.element} as a whole number")
+        return _Vector(vector.value, kind)
 
     def _type(self, kind: _Kind) -> ir.VectorType:
         return ir.VectorType(kind.element, self.lanes)
@@ -261,15 +261,15 @@ class _Frame(ast.NodeVisitor):
     def visit_For(self, node: ast.For) -> None:
         if node.orelse:
             self.generic_visit(node)
-        for each in self.visit(node.iter):
-            self._assign(node.target, each)
+        for item in self.visit(node.iter):
+            self._assign(node.target, item)
             for statement in node.body:
                 self.visit(statement)
 
     def _assign(self, target: ast.expr, value: Any) -> None:
         if isinstance(target, ast.Tuple):
-            for part, each in zip(target.elts, value, strict=True):
-                self._assign(part, each)
+            for part, element in zip(target.elts, value, strict=True):
+                self._assign(part, element)
         elif isinstance(target, ast.Subscript):
             self.visit(target.value).store(self.visit(target.slice), self._writer.vector(value, _FLOAT))
         elif isinstance(target, ast.Name):
@@ -299,12 +299,12 @@ class _Frame(ast.NodeVisitor):
 
     def visit_UnaryOp(self, node: ast.UnaryOp) -> Any:
         operand = self.visit(node.operand)
-        known = not isinstance(operand, _Vector) or not isinstance(node.op, ast.Not)
-        return self._writer.operate(node.op, operand if known else self._writer.truth(operand))
+        usable = not isinstance(operand, _Vector) or not isinstance(node.op, ast.Not)
+        return self._writer.operate(node.op, operand if usable else self._writer.truth(operand))
 
     def visit_BoolOp(self, node: ast.BoolOp) -> Any:
         sign = ast.BitAnd() if isinstance(node.op, ast.And) else ast.BitOr()
-        truths = (self._writer.truth(self.visit(each)) for each in node.values)
+        truths = (self._writer.truth(self.visit(operand)) for operand in node.values)
         return reduce(lambda left, right: self._writer.operate(sign, left, right), truths)
 
     def visit_Compare(self, node: ast.Compare) -> _Vector:
@@ -314,11 +314,11 @@ class _Frame(ast.NodeVisitor):
         return self._writer.compare(_COMPARISONS[type(node.ops[0])], left, right)
 
     def visit_IfExp(self, node: ast.IfExp) -> _Vector:
-        return self._writer.select(*(self.visit(each) for each in (node.test, node.body, node.orelse)))
+        return self._writer.select(*(self.visit(part) for part in (node.test, node.body, node.orelse)))
 
     def visit_Call(self, node: ast.Call) -> Any:
-        function, arguments = self.visit(node.func), [self.visit(each) for each in node.args]
-        if not any(isinstance(each, _Vector) for each in arguments):
+        function, arguments = self.visit(node.func), [self.visit(argument) for argument in node.args]
+        if not any(isinstance(argument, _Vector) for argument in arguments):
             return function(*arguments)
         if function in _LIBRARY and not node.keywords:
             return _LIBRARY[function](self._writer, *arguments)

@@ -79,14 +79,14 @@ class Model:
         return tuple(kink for kink in self.kinks if isinstance(kink, Switch))
 
     @property
-    def kept(self) -> tuple[sp.Symbol, ...]:
+    def discrete(self) -> tuple[sp.Symbol, ...]:
         """What a run has besides its states: numbers held, and the modes that remember."""
         return (*(held.symbol for held in self.held), *(switch.beyond for switch in self.switches))
 
     @property
-    def given(self) -> tuple[sp.Symbol, ...]:
-        """What the right-hand side finds as it is during a step: inputs, what is kept, and what is looked up."""
-        return (*self.inputs, *self.kept, *(self.clock.tabled if self.clock else ()))
+    def fixed(self) -> tuple[sp.Symbol, ...]:
+        """What the right-hand side finds as it is during a step: inputs, discrete states, and what is looked up."""
+        return (*self.inputs, *self.discrete, *(self.clock.tabled if self.clock else ()))
 
     @property
     def parameters(self) -> tuple[sp.Symbol, ...]:
@@ -94,7 +94,7 @@ class Model:
         expressions = [*self.rhs, *(k.surface for k in self.kinks), *(o.expression for o in self.outputs.values())]
         expressions += [*(part.scale for part in self.states), *(part.update for part in self.held), *self.settled]
         expressions += [*(k.at_start for k in self.kinks), *(e for jump in self.jumps.values() for e in jump.values())]
-        others = {*self.symbols, *(k.beyond for k in self.kinks), *self.given, TIME, TICK, *STEADY}
+        others = {*self.symbols, *(k.beyond for k in self.kinks), *self.fixed, TIME, TICK, *STEADY}
         if self.clock:
             expressions += [self.clock.period, self.clock.late]
             others |= {*self.clock.seen}

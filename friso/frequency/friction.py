@@ -94,7 +94,7 @@ def _stuck(states: Sequence[sp.Symbol], rates: Sequence[sp.Expr], force: sp.Expr
     if not ways:
         return {}
     (far,) = solved([force.subs(VELOCITY, 0).subs(ways) - BIAS], [pulled])
-    return {x: way.subs(pulled, far) for x, way in ways.items()}
+    return {x: limit.subs(pulled, far) for x, limit in ways.items()}
 
 
 def _compiled(expressions: list[sp.Expr]) -> Callable[[Mapping[str, Any]], list[Any]]:

@@ -60,20 +60,20 @@ class MoveShare:
     """Share of moves that end in the cycle, of a Sobol sample over acceleration [m/s^2] and acceleration time [s]: how
     many were drawn (and run to their end), how many hunt, and the ranges they were drawn from."""
 
-    drawn: int
+    count: int
     hunting: int
     accelerations: tuple[float, float]
     times: tuple[float, float]
 
     @property
     def fraction(self) -> float:
-        return self.hunting / self.drawn
+        return self.hunting / self.count
 
     @property
     def interval(self) -> tuple[float, float]:
         """The range that holds the true share with a probability of 95 % (Wilson)."""
-        found = binomtest(self.hunting, self.drawn).proportion_ci(0.95, method="wilson")
-        return float(found.low), float(found.high)
+        ends = binomtest(self.hunting, self.count).proportion_ci(0.95, method="wilson")
+        return float(ends.low), float(ends.high)
 
 
 def ends_in(
@@ -116,8 +116,8 @@ def pushes(stage: Stage, target: Target) -> Kick:
 
     def hunts(kicks: np.ndarray) -> np.ndarray:
         several = stages.take(np.zeros(len(kicks), np.int64))
-        own = {**several.flat, "motion.displacement": float(stages.length[0])}
-        return ends_in(own, len(kicks), target, pushed(several, kicks))[0]
+        released = {**several.flat, "motion.displacement": float(stages.length[0])}
+        return ends_in(released, len(kicks), target, pushed(several, kicks))[0]
 
     return _kick(hunts, target.amplitude * float(stages.number("rate")[0]))
 
@@ -125,15 +125,15 @@ def pushes(stage: Stage, target: Target) -> Kick:
 def _kick(hunts: Callable[[np.ndarray], np.ndarray], unit: float) -> Kick:
     """The windows of kicks that hunt, searched on a grid about `unit`, their edges by bisection."""
     kicks = np.geomspace(RANGE[0] * unit, RANGE[1] * unit, POINTS)
-    found = hunts(kicks)
-    edges = np.flatnonzero(found[1:] != found[:-1])
+    hunting = hunts(kicks)
+    edges = np.flatnonzero(hunting[1:] != hunting[:-1])
     low, high = kicks[edges], kicks[edges + 1]
     while edges.size and np.any(high > (1 + EDGE) * low):
         middle = np.sqrt(low * high)
-        like_low = hunts(middle) == found[edges]
+        like_low = hunts(middle) == hunting[edges]
         low, high = np.where(like_low, middle, low), np.where(like_low, high, middle)
-    places = np.where(found[edges], low, high)  # the side that hunts
-    ends = [*([kicks[0]] if found[0] else []), *places, *([kicks[-1]] if found[-1] else [])]
+    places = np.where(hunting[edges], low, high)  # the side that hunts
+    ends = [*([kicks[0]] if hunting[0] else []), *places, *([kicks[-1]] if hunting[-1] else [])]
     windows = tuple((float(a), float(b)) for a, b in zip(ends[::2], ends[1::2], strict=True))
     return Kick(windows, (float(kicks[0]), float(kicks[-1])))
 
@@ -146,7 +146,7 @@ def moves(stage: Stage, target: Target) -> MoveShare | None:
     acceleration, time = flat["motion.acceleration"], flat["motion.acceleration_time"]
     accelerations = (SHARES[0] * acceleration, SHARES[1] * acceleration)
     times = (SHARES[0] * time, min(SHARES[1] * time, flat["motion.return_at"] / 2))
-    drawn = qmc.scale(qmc.Sobol(2, rng=0).random(MOVES), *zip(accelerations, times, strict=True))
-    own = {**flat, "motion.acceleration": drawn[:, 0], "motion.acceleration_time": drawn[:, 1]}
-    hunts, completed = ends_in(own, MOVES, target)
+    sample = qmc.scale(qmc.Sobol(2, rng=0).random(MOVES), *zip(accelerations, times, strict=True))
+    moved = {**flat, "motion.acceleration": sample[:, 0], "motion.acceleration_time": sample[:, 1]}
+    hunts, completed = ends_in(moved, MOVES, target)
     return MoveShare(int(completed.sum()), int(hunts.sum()), accelerations, times) if completed.any() else None

@@ -92,24 +92,24 @@ def _needed(stage: Stage) -> set[Wanted]:
 def _case(stage: Stage, rtol: float, traces: bool) -> Case:
     flat = stage.flat()
     (runs,) = run_chunks(kernel(structure(flat)), flat, 1, options(rtol))
-    found = measure(flat, runs)
-    room = found.turns.shape[1]
-    status = Status(int(found.status[0]))
+    measures = measure(flat, runs)
+    room = measures.turns.shape[1]
+    status = Status(int(measures.status[0]))
     return Case(
         stage=stage,
-        judgement=judge(stage, found, rtol),
-        peaks=int(found.peaks[0]),
-        peak_times=runs.results.turn_times[0, :room][found.turns[0]],
-        peak_heights=runs.results.turn_values[0, :room][found.turns[0]],
-        peak_to_peak=float(found.peak_to_peak[0]),
-        period=_known(found.period[0]),
-        settling_time={band: _known(time[0]) for band, time in zip(BANDS, found.settling_time, strict=True)},
-        largest_force=float(found.largest_force[0]),
-        solver=Solver(status.text, int(found.steps[0]), int(found.rejected[0]), rtol),
+        judgement=judge(stage, measures, rtol),
+        peaks=int(measures.peaks[0]),
+        peak_times=runs.results.turn_times[0, :room][measures.turns[0]],
+        peak_heights=runs.results.turn_values[0, :room][measures.turns[0]],
+        peak_to_peak=float(measures.peak_to_peak[0]),
+        period=_finite(measures.period[0]),
+        settling_time={band: _finite(time[0]) for band, time in zip(BANDS, measures.settling_time, strict=True)},
+        largest_force=float(measures.largest_force[0]),
+        solver=Solver(status.text, int(measures.steps[0]), int(measures.rejected[0]), rtol),
         unstable=unstable(stage),
         trace=simulate(stage, rtol) if traces else None,
     )
 
 
-def _known(value: float) -> float | None:
+def _finite(value: float) -> float | None:
     return float(value) if np.isfinite(value) else None

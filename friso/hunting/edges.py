@@ -66,11 +66,11 @@ class Edges:
 
 def joined(parts: list[Edges]) -> Edges:
     """The edges of all stages."""
-    return Edges(*(np.concatenate([getattr(part, each.name) for part in parts]) for each in fields(Edges)))
+    return Edges(*(np.concatenate([getattr(part, column.name) for part in parts]) for column in fields(Edges)))
 
 
 @dataclass(frozen=True)
-class _Known:
+class _AtCrossovers:
     """What is known at crossovers: whether something attracts, the multiplier (NaN: no cycle), whether there may be a
     cycle that could not be closed, and whether simulation, which had to decide then, failed."""
 
@@ -79,20 +79,20 @@ class _Known:
     uncertain: np.ndarray
     failed: np.ndarray
 
-    def reshaped(self, *shape: int) -> _Known:
-        return _Known(*(getattr(self, each.name).reshape(shape) for each in fields(_Known)))
+    def reshaped(self, *shape: int) -> _AtCrossovers:
+        return _AtCrossovers(*(getattr(self, column.name).reshape(shape) for column in fields(_AtCrossovers)))
 
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
-def _known(stages: Stages, which: np.ndarray, crossover: np.ndarray) -> _Known:
+def _at_crossovers(stages: Stages, which: np.ndarray, crossover: np.ndarray) -> _AtCrossovers:
     """Where an orbit may be but could not be closed, a long simulation tells whether anything hunts on."""
     some = stages(which, crossover)
     cycles = hunting_cycles(some)
     attracts, failed, unsure = cycles.attracting, np.zeros(some.count, bool), np.flatnonzero(cycles.uncertain)
     if unsure.size:
-        attracts[unsure], known = hunts_somehow(some.take(unsure))
-        failed[unsure] = ~known
-    return _Known(attracts, cycles.multiplier, cycles.uncertain, failed)
+        attracts[unsure], decided = hunts_somehow(some.take(unsure))
+        failed[unsure] = ~decided
+    return _AtCrossovers(attracts, cycles.multiplier, cycles.uncertain, failed)
 
 
 def find_edges(stages: Stages, grid: np.ndarray, rounds: int = ROUNDS) -> Edges:
@@ -104,7 +104,7 @@ def find_edges(stages: Stages, grid: np.ndarray, rounds: int = ROUNDS) -> Edges:
     else the middle of that is taken (of the logarithm).
     """
     count, points = grid.shape
-    seen = _known(stages, np.repeat(np.arange(count), points), grid.ravel()).reshaped(count, points)
+    seen = _at_crossovers(stages, np.repeat(np.arange(count), points), grid.ravel()).reshaped(count, points)
     last = points - 1 - seen.attracts[:, ::-1].argmax(axis=1)
     some = seen.attracts.any(axis=1)
     which = np.flatnonzero(some & (last < points - 1))
@@ -117,8 +117,8 @@ def find_edges(stages: Stages, grid: np.ndarray, rounds: int = ROUNDS) -> Edges:
         for _ in range(rounds):
             search.halve()
         search.follow()
-        for name, found in search.found().items():
-            getattr(edges, name)[which] = found
+        for name, column in search.columns().items():
+            getattr(edges, name)[which] = column
     return edges
 
 
@@ -131,7 +131,9 @@ class _Search:
     whether a simulation above failed.
     """
 
-    def __init__(self, stages: Stages, which: np.ndarray, grid: np.ndarray, seen: _Known, last: np.ndarray) -> None:
+    def __init__(
+        self, stages: Stages, which: np.ndarray, grid: np.ndarray, seen: _AtCrossovers, last: np.ndarray
+    ) -> None:
         at = which, last[which]
         above = which, last[which] + 1
         self.stages, self.which = stages, which
@@ -146,7 +148,7 @@ class _Search:
 
     def halve(self) -> None:
         middle = (self.low + self.high) / 2
-        seen = _known(self.stages, self.which, np.exp(middle))
+        seen = _at_crossovers(self.stages, self.which, np.exp(middle))
         inside, flips = seen.attracts, ~seen.attracts & np.isfinite(seen.multiplier)
         self.low, self.inside = np.where(inside, middle, self.low), np.where(inside, seen.multiplier, self.inside)
         self.high, self.outside = np.where(inside, self.high, middle), np.where(inside, self.outside, seen.multiplier)
@@ -166,15 +168,15 @@ class _Search:
         for _ in range(STEPS):
             if not on.size:
                 return
-            hunts, known = hunts_somehow(self.stages(self.which[on], np.exp(self.high[on])), LONG)
-            self.failed[on] |= ~known
+            hunts, decided = hunts_somehow(self.stages(self.which[on], np.exp(self.high[on])), LONG)
+            self.failed[on] |= ~decided
             on = on[hunts]
             self.low[on] = self.high[on]
             self.high[on] += np.log(STEP)
         self.failed[on] = True
 
-    def found(self) -> dict[str, np.ndarray]:
-        """What the steps tell of the edges, by the names of `Edges`."""
+    def columns(self) -> dict[str, np.ndarray]:
+        """The edges by the steps, under the names of `Edges`."""
         off = np.abs(self.inside) - 1, np.abs(self.flipped) - 1
         crossed = self.low - off[0] * (self.flip - self.low) / (off[1] - off[0])
         within = (self.low <= crossed) & (crossed <= self.high)

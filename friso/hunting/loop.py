@@ -57,8 +57,8 @@ def _sliding(stages: Ensemble, stuck: np.ndarray) -> np.ndarray:
     for k, step in enumerate(_moved(stages)):
         matrix[cart, k] += (_friction(stages, step) - _friction(stages, -step)) / (2 * STEP * mass * unit)
     matrix[cart, cart] -= _viscous(stages, FAST * unit) / mass
-    own = kernel.having(Role.BRISTLE)
-    return np.delete(np.delete(matrix, own, 0), own, 1)
+    bristles = kernel.having(Role.BRISTLE)
+    return np.delete(np.delete(matrix, bristles, 0), bristles, 1)
 
 
 def _viscous(stages: Ensemble, speed: float) -> float:
@@ -70,14 +70,14 @@ def _viscous(stages: Ensemble, speed: float) -> float:
 def _slid(stages: Ensemble, speed: float) -> np.ndarray:
     """States of a stage that has slid for long at a speed [m/s]: those of the friction law do not change any more."""
     states = stages.settled(Steady(0.0, 0.0, speed))
-    own = stages.kernel.having(Role.BRISTLE)
-    begun = stages.rates(states)[0, own]
-    changes = np.empty((len(own), len(own)))
-    for column, k in enumerate(own):
+    bristles = stages.kernel.having(Role.BRISTLE)
+    begun = stages.rates(states)[0, bristles]
+    changes = np.empty((len(bristles), len(bristles)))
+    for column, k in enumerate(bristles):
         moved = states.copy()
         moved[0, k] += stages.scales[0, k]
-        changes[:, column] = (stages.rates(moved)[0, own] - begun) / stages.scales[0, k]
-    states[0, own] -= np.linalg.lstsq(changes, begun, rcond=None)[0]
+        changes[:, column] = (stages.rates(moved)[0, bristles] - begun) / stages.scales[0, k]
+    states[0, bristles] -= np.linalg.lstsq(changes, begun, rcond=None)[0]
     return states
 
 

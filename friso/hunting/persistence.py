@@ -80,6 +80,6 @@ def hunts_somehow(
     stage of which a run failed, while no other swings on, may hunt or not."""
     several = stages.take(np.repeat(np.arange(stages.count), len(distances)))
     runs = still_swings(several, from_rest(several, np.tile(distances, stages.count)), periods)
-    swings, completed = (each.reshape(stages.count, -1) for each in runs)
+    swings, completed = (runs_of_stages.reshape(stages.count, -1) for runs_of_stages in runs)
     some = np.any(swings, axis=1)
     return np.asarray(some), np.asarray(some | np.all(completed, axis=1))

@@ -45,12 +45,12 @@ def scan(times: np.ndarray, values: np.ndarray, counts: np.ndarray, swing: np.nd
     the period: ringing on top of it does not count. `ended` [s], shape (runs,), is the end of each run.
     """
     runs = len(counts)
-    given = tuple(map(np.ascontiguousarray, (times, values, counts, swing, ended)))
+    arrays = tuple(map(np.ascontiguousarray, (times, values, counts, swing, ended)))
     kinds = np.zeros(times.shape[1], np.int64)
     peaks, distinct = (np.zeros(times.shape, np.bool_) for _ in range(2))
     period, turned, earlier = (np.empty(runs) for _ in range(3))
     scan_runs: Callable[..., None] = turning.run if counts.sum() < MANY else _compiled()
-    scan_runs(*given, kinds, peaks, distinct, period, turned, earlier)
+    scan_runs(*arrays, kinds, peaks, distinct, period, turned, earlier)
     return Turns(peaks, distinct, period, turned, earlier)
 
 

@@ -28,12 +28,12 @@ def combined(estimates: Sequence[Estimate]) -> tuple[list[Estimate], list[str]]:
     answers, sentences = [], []
     for key in dict.fromkeys(estimate.name for estimate in estimates):
         estimates_of_key = [estimate for estimate in estimates if estimate.name == key]
-        shown = [estimate for estimate in estimates_of_key if estimate.determined]
-        sure = _weighty(shown)
+        certain = [estimate for estimate in estimates_of_key if estimate.determined]
+        sure = _weighty(certain)
         if len(sure) > 1:
             one, agrees = _mean(key, sure)
-        elif shown:
-            one, agrees = (sure or shown)[0], True
+        elif certain:
+            one, agrees = (sure or certain)[0], True
         else:
             one, agrees = _left(key, estimates_of_key)
         answers.append(one)
@@ -44,7 +44,7 @@ def combined(estimates: Sequence[Estimate]) -> tuple[list[Estimate], list[str]]:
         beyond = [
             estimate
             for estimate in estimates_of_key
-            if shown and not estimate.determined and (estimate.low > one.high or estimate.high < one.low)
+            if certain and not estimate.determined and (estimate.low > one.high or estimate.high < one.low)
         ]
         sentences += [f"{key}: {_text(one)} is shown, but {_text(estimate)}" for estimate in beyond]
     return answers, sentences

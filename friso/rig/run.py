@@ -88,7 +88,7 @@ def run(
     first_run = {key: value[0] if np.ndim(value) else value for key, value in flat.items()}
     shape = kernel(AsBuilt.of(first_run), method=METHOD)
     count = int(np.ceil(task.duration / interval * (1 - 1e-12)))
-    chunk = max(8, int(MEMORY / (8 * count * len(shape.kept))))
+    chunk = max(8, int(MEMORY / (8 * count * len(shape.full_state))))
     for first in range(0, len(seeds), chunk):
         numbers = np.arange(first, min(first + chunk, len(seeds)))
         part = {key: value[numbers] if np.ndim(value) else value for key, value in flat.items()}
@@ -143,7 +143,7 @@ def _recorded(
         windows=np.full(len(seeds), -1),
         tables=tables(flat, stage.floor, task, [int(seed) for seed in seeds]),
     )
-    results = empty_results(len(seeds), 1, count, len(shape.kept))
+    results = empty_results(len(seeds), 1, count, len(shape.full_state))
     run_batch(shape, batch, settings_of(options), results, threads)
     return Recorded(numbers, interval, *_signals(shape, results.samples, flat, task, seeds, interval), results.statuses)
 
@@ -154,7 +154,7 @@ def _signals(
     """What the drive logs, and what is true."""
     time = np.arange(samples.shape[1]) * interval
     position, reading, commanded = (
-        samples[:, :, i] for i in (shape.position, shape.kept.index(READING), shape.kept.index(COMMANDED))
+        samples[:, :, i] for i in (shape.position, shape.full_state.index(READING), shape.full_state.index(COMMANDED))
     )
     logged = {
         "reference": np.broadcast_to(reference(task, time), position.shape),
@@ -173,7 +173,7 @@ def _signals(
         gap = position - cart
         noise = np.array([_sensor(int(seed)).standard_normal(len(time)) for seed in seeds])
         logged["relative_position"] = gap + np.reshape(flat.get("drive.relative_noise", 0.0), (-1, 1)) * noise
-    true |= {shape.kept[i]: samples[:, :, i] for i in shape.having(Role.BRISTLE)}
+    true |= {shape.full_state[i]: samples[:, :, i] for i in shape.having(Role.BRISTLE)}
     return logged, true
 
 

@@ -72,10 +72,10 @@ def point_to_point(places: Sequence[float], acceleration: float, top_speed: floa
     reference stands for a time [s]."""
     rows, now = [[0.0, places[0], 0.0, 0.0]], stands
     for start, end in pairwise(places):
-        way, sign = abs(end - start), np.sign(end - start)
-        ramp = min(top_speed / acceleration, np.sqrt(way / acceleration))
+        travel, sign = abs(end - start), np.sign(end - start)
+        ramp = min(top_speed / acceleration, np.sqrt(travel / acceleration))
         speed = acceleration * ramp
-        cruise = way / speed - ramp
+        cruise = travel / speed - ramp
         at = start + sign * speed * ramp / 2
         rows += [[now, start, 0.0, sign * acceleration], [now + ramp, at, sign * speed, 0.0]]
         rows += [[now + ramp + cruise, end - sign * speed * ramp / 2, sign * speed, -sign * acceleration]]

@@ -124,11 +124,11 @@ def _compiling() -> str:
     from friso.engine.kernel import Wanted
     from friso.equations.structure import structure
 
-    wanted = Wanted(structure(_stage().flat()))
+    request = Wanted(structure(_stage().flat()))
     with tempfile.TemporaryDirectory(prefix="friso-doctor-") as folder:
         begin = time.perf_counter()
-        build(Path(folder), pickle.dumps(((), pickle.dumps(wanted))))
-        return f"a kernel in {time.perf_counter() - begin:.1f} s ({wanted.title})"
+        build(Path(folder), pickle.dumps(((), pickle.dumps(request))))
+        return f"a kernel in {time.perf_counter() - begin:.1f} s ({request.title})"
 
 
 def _running() -> str:

@@ -30,10 +30,10 @@ ATTRACTED: tuple[Verdict, ...] = ("hunts", "bistable")
 CRITERION = "verdict on the stage, by its attracting cycles and where its own motion ends"
 
 
-def verdicts(known: np.ndarray, attracts: np.ndarray, ends_in_cycle: np.ndarray, rests: np.ndarray) -> np.ndarray:
-    """The word of `VERDICTS` for every stage, all arrays of shape (count,): whether what follows is `known`; whether a
-    cycle `attracts`; and of the stage's own motion whether it `ends_in_cycle` (asked where one attracts) and `rests`
+def verdicts(decided: np.ndarray, attracts: np.ndarray, ends_in_cycle: np.ndarray, rests: np.ndarray) -> np.ndarray:
+    """The word of `VERDICTS` for every stage, all arrays of shape (count,): whether what follows is `decided`; whether
+    a cycle `attracts`; and of the stage's own motion whether it `ends_in_cycle` (asked where one attracts) and `rests`
     in the end (asked where none does)."""
-    drawn = np.where(ends_in_cycle, "hunts", "bistable")
+    hunting = np.where(ends_in_cycle, "hunts", "bistable")
     free = np.where(rests, "settles", "transient")
-    return np.where(known, np.where(attracts, drawn, free), "failed").astype(object)
+    return np.where(decided, np.where(attracts, hunting, free), "failed").astype(object)

@@ -132,7 +132,7 @@ class Ensemble:
     def same_modes(self, states: np.ndarray, ends: np.ndarray) -> np.ndarray:
         """Whether runs end, `ends` (count, kept), in the modes that remember in which they began in `states`, shape
         (count,)."""
-        begun, ended = (self.kernel.modes(kept.T, 0.0, np.zeros(3), self.values) for kept in (states, ends))
+        begun, ended = (self.kernel.modes(state.T, 0.0, np.zeros(3), self.values) for state in (states, ends))
         switches = list(self.kernel.switches)
         return np.all(begun[switches] == ended[switches], axis=0)
 

@@ -73,19 +73,19 @@ def static_from_ramps(
         threshold = max(threshold, breaks.threshold)
         pushed = low_pass(force[part], log.sample_time, cutoff)
         marks = zip(breaks.onsets, breaks.starts, breaks.rests, breaks.directions, strict=True)
-        for onset, start, rest, way in marks:
-            begin = rest + _half(way * force[part][rest : start + 1])
+        for onset, start, rest, direction in marks:
+            begin = rest + _half(direction * force[part][rest : start + 1])
             if start - begin < max(SMEARED / (cutoff * log.sample_time), SAMPLES):
                 quick += 1
                 continue
-            rising = way * np.polyfit(np.arange(begin, start) * log.sample_time, pushed[begin:start], 1)[0]
-            at, level, unsure = onset, float(way * pushed[onset]), 0.0
+            rising = direction * np.polyfit(np.arange(begin, start) * log.sample_time, pushed[begin:start], 1)[0]
+            at, level, unsure = onset, float(direction * pushed[onset]), 0.0
             if mass and rising > 0:
-                signals = way * force[part], way * body[part]
+                signals = direction * force[part], direction * body[part]
                 top = peak(*signals, mass, log.sample_time, rising, (begin, start), cutoff)
                 at, level, unsure = top.at, top.level, top.unsure
             first = part.start + at
-            rows.append((float(log.time[first]), float(body[first]), float(way), level, float(rising), unsure))
+            rows.append((float(log.time[first]), float(body[first]), float(direction), level, float(rising), unsure))
     table = np.array([row for row in rows if row[3] > 0 and row[4] > 0]).reshape(-1, 6).T
     notes = []
     if quick:

@@ -203,10 +203,10 @@ def _hysteresis(windows: tuple[Window, ...]) -> Estimate:
     """Force = offset + stiffness * deflection + half the hysteresis * direction of the step before."""
     name, unit, method = "hysteresis", "N", "force at a deflection reached from below minus from above"
     x, force = np.array([[w.position, w.force] for w in windows]).reshape(-1, 2).T
-    if len(x) < 5 or len(set(way := np.sign(np.diff(x)))) < 2:
+    if len(x) < 5 or len(set(direction := np.sign(np.diff(x)))) < 2:
         return Estimate.unknown(name, unit, method, "no deflections reached from both sides, over 5 windows or more")
     x, force = x[1:], force[1:]
-    design = np.stack([np.ones_like(x), (x - x.mean()) / np.ptp(x), way / 2], axis=1)
+    design = np.stack([np.ones_like(x), (x - x.mean()) / np.ptp(x), direction / 2], axis=1)
     solution, rest, rank, _ = np.linalg.lstsq(design, force, rcond=1e-6)
     if rank < 3 or len(x) == 3:
         return Estimate.unknown(name, unit, method, "deflection and direction of the steps cannot be separated")

@@ -109,15 +109,15 @@ def static_from_stick_slip(
         cart_velocity[part] = breaks.speed
         shares.append(breaks.share)
         marks = zip(breaks.onsets, breaks.starts, breaks.rests, breaks.fastest, breaks.directions, strict=True)
-        for onset, start, rest, top, way in marks:
+        for onset, start, rest, top, direction in marks:
             at, force, before, rising, held = _peak(
-                way * pull[part], log.sample_time, cutoff, (rest, onset, start, top)
+                direction * pull[part], log.sample_time, cutoff, (rest, onset, start, top)
             )
             at += part.start
-            bent = np.nan if deflected is None else float(way * deflected[at])
-            unseen = _unseen(way * breaks.speed[onset + 1 : top + 1]) * log.sample_time
+            bent = np.nan if deflected is None else float(direction * deflected[at])
+            unseen = _unseen(direction * breaks.speed[onset + 1 : top + 1]) * log.sample_time
             late = max(force - before, 0.0) + abs(rising) * (unseen + 1 / cutoff)
-            place = (float(log.time[at]), float(body[at]), float(way))
+            place = (float(log.time[at]), float(body[at]), float(direction))
             held = held or abs(bent) > (1 - AT_STOP) * stroke
             loads += [] if held else [slice(part.start + rest, part.start + onset)]
             rows.append((*place, bent, force, rising, float(abs(breaks.speed[top])), held, late))

@@ -51,7 +51,7 @@ class Coverage:
 
     def shows_length(self, length: float) -> bool:
         """Whether bristles are seen bending by a length [m], again and again."""
-        seen = [np.sum((way > RESOLVED * self.resolution) & (way < length)) for way in self.starts]
+        seen = [np.sum((distance > RESOLVED * self.resolution) & (distance < length)) for distance in self.starts]
         return bool(sum(count >= SAMPLES for count in seen) >= EPISODES)
 
 

@@ -101,10 +101,10 @@ def _rest(position: np.ndarray, samples: int) -> float:
 
 def _turns(period: np.ndarray) -> int:
     """How often a signal over one period, shape (samples,), turns back by more than `BACK` of its range."""
-    least, turns, way, last = BACK * np.ptp(period), 0, 1.0, period[0]
+    least, turns, direction, last = BACK * np.ptp(period), 0, 1.0, period[0]
     for value in period:
-        if (value - last) * way > 0:
+        if (value - last) * direction > 0:
             last = value
-        elif (last - value) * way > least:
-            way, last, turns = -way, value, turns + 1
+        elif (last - value) * direction > least:
+            direction, last, turns = -direction, value, turns + 1
     return turns

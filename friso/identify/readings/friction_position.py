@@ -86,7 +86,7 @@ def friction_position(
         verdict = "Dynamic friction cannot be read off: the log has no stretch of constant velocity."
         return FrictionPosition((), unknown, (), False, verdict, ())
     travel = [np.ptp(position[p.span]) for p in stretches]
-    long = [p for p, way in zip(stretches, travel, strict=True) if way >= 0.2 * max(travel)]
+    long = [p for p, length in zip(stretches, travel, strict=True) if length >= 0.2 * max(travel)]
     ends = [position[p.span] for p in long]
     places = np.linspace(min(x.min() for x in ends), max(x.max() for x in ends), POINTS)
     maps = tuple(_map(stretch, places, position, force, log.sample_time, (mass, cutoff)) for stretch in long)

@@ -12,7 +12,7 @@ from scipy.stats import f as fisher
 from friso.identify.estimate import Estimate
 from friso.identify.logs.log import Log
 from friso.identify.readings.common import Mean, by_t, t_value, ways
-from friso.identify.readings.passes import CUTOFF, Pass, on_common_way, passes, way_of
+from friso.identify.readings.passes import CUTOFF, Pass, on_common_places, passes, places_of
 from friso.intervals import COVERAGE
 
 SPAN = 1.5
@@ -50,7 +50,7 @@ class FrictionVelocity:
     """The directions "forward" and "backward", each with what constant force there is in its Coulomb friction, both
     together with that taken out, and the `bias` [N] itself, on top of equal friction. Per steady stretch, shape (n,):
     velocity [m/s], mean force [N] less inertia, half-width of its 95 % interval [N]; velocities of those that were not
-    steady, shape (m,); and the `way` [m] from end to end over which the steady ones were read."""
+    steady, shape (m,); and the `places` [m] from end to end over which the steady ones were read."""
 
     directions: Mapping[str, Direction]
     both: Direction
@@ -59,17 +59,16 @@ class FrictionVelocity:
     forces: np.ndarray
     half_widths: np.ndarray
     unsteady: np.ndarray
-    way: tuple[float, float]
+    places: tuple[float, float]
     warnings: tuple[str, ...]
 
 
 def friction_velocity(log: Log, mass: float = 0.0, cutoff: float = CUTOFF) -> FrictionVelocity:
-    """Friction-velocity map from the stretches of constant velocity, on the way that all of them share if they share
-    one, `mass` [kg] times what is left of acceleration taken off. What the speeds present cannot show is unknown, with
-    the reason. Raises InputError for missing channels.
-    """
+    """Friction-velocity map from the stretches of constant velocity, over the places that all of them share if they
+    share one, `mass` [kg] times what is left of acceleration taken off. What the speeds present cannot show is unknown,
+    with the reason. Raises InputError for missing channels. """
     every = passes(log, cutoff)
-    used = on_common_way(log, [stretch for stretch in every if stretch.steady], cutoff)
+    used = on_common_places(log, [stretch for stretch in every if stretch.steady], cutoff)
     velocities, forces, errors = np.array([_row(stretch, mass) for stretch in used]).reshape(-1, 3).T
     unsteady = np.array([stretch.velocity for stretch in every if not stretch.steady])
     sides = {
@@ -77,14 +76,14 @@ def friction_velocity(log: Log, mass: float = 0.0, cutoff: float = CUTOFF) -> Fr
         for words, m in ways(velocities)
     }
     bias, both = _together(velocities, forces, errors)
-    way = way_of(log, used)
+    places = places_of(log, used)
     warnings = []
-    if used and way != way_of(log, [stretch for stretch in every if stretch.steady]):
-        warnings.append(f"Read on the stretch common to all passes, {way[0] * 1e3:.4g} to {way[1] * 1e3:.4g} mm.")
+    if used and places != places_of(log, [stretch for stretch in every if stretch.steady]):
+        warnings.append(f"Read on the stretch common to all passes, {places[0] * 1e3:.4g} to {places[1] * 1e3:.4g} mm.")
     if len(unsteady):
         low, high = np.abs(unsteady).min(), np.abs(unsteady).max()
         warnings.append(f"{len(unsteady)} stretches, {low:.3g} to {high:.3g} m/s, were not steady and are left out.")
-    return FrictionVelocity(sides, both, bias, velocities, forces, errors, unsteady, way, tuple(warnings))
+    return FrictionVelocity(sides, both, bias, velocities, forces, errors, unsteady, places, tuple(warnings))
 
 
 def _row(stretch: Pass, mass: float) -> tuple[float, float, float]:
@@ -124,7 +123,7 @@ def _deviations(forces: np.ndarray, errors: np.ndarray) -> np.ndarray:
 def _linear(design: np.ndarray, forces: np.ndarray, errors: np.ndarray) -> tuple[np.ndarray, np.ndarray, int]:
     """Weighted least squares with Coulomb friction in the first column: solution, covariance, degrees of freedom.
 
-    Friction varies from place to place, and all stretches lie on the same way: what one of them shows of Coulomb
+    Friction varies from place to place, and all stretches lie over the same places: what one of them shows of Coulomb
     friction is not averaged out over the others.
     """
     deviations = _deviations(forces, errors)

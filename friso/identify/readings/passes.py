@@ -77,13 +77,13 @@ def passes(log: Log, cutoff: float = CUTOFF) -> tuple[Pass, ...]:
     return tuple(stretches)
 
 
-def on_common_way(log: Log, stretches: Sequence[Pass], cutoff: float = CUTOFF) -> tuple[Pass, ...]:
+def on_common_places(log: Log, stretches: Sequence[Pass], cutoff: float = CUTOFF) -> tuple[Pass, ...]:
     """Passes of a log, each cut to the way that all of them go, where friction is that of the same places; as they are
     where that is too little. `cutoff` [Hz] is that of the velocity."""
     position, velocity = on_bearing(log), _velocity(log, cutoff)
-    ways = [(float(position[single.span].min()), float(position[single.span].max())) for single in stretches]
-    low, high = max((way[0] for way in ways), default=0.0), min((way[1] for way in ways), default=0.0)
-    if high - low < COMMON * min((way[1] - way[0] for way in ways), default=np.inf):
+    covered = [(float(position[single.span].min()), float(position[single.span].max())) for single in stretches]
+    low, high = max((span[0] for span in covered), default=0.0), min((span[1] for span in covered), default=0.0)
+    if high - low < COMMON * min((span[1] - span[0] for span in covered), default=np.inf):
         return tuple(stretches)
     cut = []
     for stretch in stretches:
@@ -94,7 +94,7 @@ def on_common_way(log: Log, stretches: Sequence[Pass], cutoff: float = CUTOFF) -
     return tuple(cut)
 
 
-def way_of(log: Log, stretches: Sequence[Pass]) -> tuple[float, float]:
+def places_of(log: Log, stretches: Sequence[Pass]) -> tuple[float, float]:
     """The lowest and highest position [m] in passes of a log; NaN without any."""
     places = [on_bearing(log)[stretch.span] for stretch in stretches]
     return (min(place.min() for place in places), max(place.max() for place in places)) if places else (np.nan, np.nan)

@@ -105,7 +105,7 @@ def _extrapolated(
     (level, slope), rest, _, _ = np.linalg.lstsq(design, forces[near], rcond=None)
     freedom = int(near.sum()) - 2
     inverse = np.linalg.inv(design.T @ design) * float(np.sum(rest)) / freedom
-    error, way = float(np.hypot(inverse[0, 0] ** 0.5, relative_error * level)), -slope * float(power.min())
+    error, offset = float(np.hypot(inverse[0, 0] ** 0.5, relative_error * level)), -slope * float(power.min())
     method = f"break-away forces at {rates[near].min():.3g} to {rates[near].max():.3g} N/s, extrapolated to 0"
     least = float(np.mean(forces[rates <= 1.5 * rates.min()]))
     if slope + t_value(freedom) * inverse[1, 1] ** 0.5 >= 0:
@@ -113,7 +113,7 @@ def _extrapolated(
             return _bounded(name, forces[near], np.full(int(near.sum()), rates.min()), bristle_rate, relative_error)
         reason = "break-away does not fall with the force rate: the rates may be too high to show static friction"
         return Estimate.unknown(name, "N", method, reason, least)
-    if way > FAR * level:
+    if offset > FAR * level:
         reason = f"the lowest force rate, {rates.min():.3g} N/s, is too high: the forces still rise towards rate 0"
         return Estimate.unknown(name, "N", method, reason, least)
-    return by_t(name, "N", Mean(float(level), error, freedom), method, way / 2, way / 2)
+    return by_t(name, "N", Mean(float(level), error, freedom), method, offset / 2, offset / 2)

@@ -58,10 +58,10 @@ def duration(stage: Stage) -> float:
 def move(stage: Stage) -> MoveTask:
     """The move from 0 with the acceleration of the stage's motion, after which it stands; of a motion that states none,
     with one that the loop can just follow (a move then takes two of its time constants)."""
-    flat, way = stage.flat(), distance(stage)
+    flat, travel = stage.flat(), distance(stage)
     rate = 2 * np.pi * (bandwidth(flat) or 1.0)
-    acceleration = flat.get("motion.acceleration", way * rate**2)
-    rows = point_to_point([0.0, way], acceleration, np.inf, 0.0).pieces
+    acceleration = flat.get("motion.acceleration", travel * rate**2)
+    rows = point_to_point([0.0, travel], acceleration, np.inf, 0.0).pieces
     return MoveTask(rows[1:], duration(stage))
 
 

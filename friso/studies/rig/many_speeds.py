@@ -22,7 +22,7 @@ from friso.rig.run import run
 from friso.rig.task import legs
 from friso.stage import Stage
 from friso.studies.rig.outcome import RigLog, rig_log
-from friso.studies.rig.sizes import interval, longest_way, moving_mass, pace, quicker, travel
+from friso.studies.rig.sizes import interval, longest_travel, moving_mass, pace, quicker, travel
 
 FASTER = (4.0, 3.0, 2.0, 1.5, 1.0)
 """Crossovers over the stage's own that are tried, one after the other: our choice."""
@@ -81,9 +81,9 @@ def many_speeds(stage: Stage, seed: int) -> ManySpeeds:
         velocity = friction_velocity(log.log, moving_mass(stage))
         low, *_, high = speeds_of(log.stage)
         speeds = np.geomspace(low, high, CURVE)
-        way = velocity.way if len(velocity.velocities) else (begin, begin + SHARED * longest_way(stage))
+        ends = velocity.places if len(velocity.velocities) else (begin, begin + SHARED * longest_travel(stage))
         drag = log.stage.flat().get("cable.drag", 0.0)
-        true = mean_friction(log.stage, speeds, np.linspace(*way, 1000)) + drag * speeds
+        true = mean_friction(log.stage, speeds, np.linspace(*ends, 1000)) + drag * speeds
         places.append(PlaceOnRail(log, velocity, speeds, true))
     return ManySpeeds(pace(logs[0].stage), tuple(places))
 
@@ -113,23 +113,23 @@ def mean_friction(stage: Stage, speeds: np.ndarray, places: np.ndarray) -> np.nd
 def _begins(stage: Stage) -> np.ndarray:
     """Where the stretches begin [m]."""
     low, high = travel(stage)
-    return np.linspace(low, high - SHARED * longest_way(stage), PLACES)
+    return np.linspace(low, high - SHARED * longest_travel(stage), PLACES)
 
 
 def speeds_of(stage: Stage) -> np.ndarray:
     """The speeds [m/s], shape (`SPEEDS`,), of a stage with its controller made faster."""
-    top = longest_way(stage) * pace(stage) / SHORTEST
+    top = longest_travel(stage) * pace(stage) / SHORTEST
     return np.geomspace(top / RATIO, top, SPEEDS)
 
 
 def _log(stage: Stage, own_pace: float, number: int, low: float, seed: int) -> RigLog:
     """The passes over the stretch that begins at a place [m], ever faster."""
-    period, shared = 1 / pace(stage), SHARED * longest_way(stage)
+    period, shared = 1 / pace(stage), SHARED * longest_travel(stage)
     parts, before = [(0.0, STANDS * period)], 0.0
     for speed in speeds_of(stage):
         run_up = max(0.0, speed * SHORTEST * period - shared) / 2
-        for way in (shared + run_up + before, -(shared + 2 * run_up)):
-            parts += [(float(np.sign(way) * speed), abs(way) / speed), (0.0, STANDS * period)]
+        for span in (shared + run_up + before, -(shared + 2 * run_up)):
+            parts += [(float(np.sign(span) * speed), abs(span) / speed), (0.0, STANDS * period)]
         before = run_up
     (recorded,) = run(stage, legs(low, parts), [seed], interval(stage, 1 / (SAMPLES * own_pace)))
     return rig_log(recorded, 0, f"many_speeds_{number + 1}", "constant-speed", stage, seed)

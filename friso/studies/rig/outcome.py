@@ -84,7 +84,7 @@ def _swings_between_limits(force: np.ndarray, stage: Stage) -> int:
     limit = stage.flat().get(FORCE_LIMIT, np.inf)
     parts = np.array_split(force, WINDOWS)
     ways = [(np.mean(part >= 0.999 * limit), np.mean(part <= -0.999 * limit)) for part in parts]
-    swings = np.array([min(way) > 0 and sum(way) > SATURATED for way in ways])
+    swings = np.array([min(sides) > 0 and sum(sides) > SATURATED for sides in ways])
     if not swings[-1]:
         return 0
     rests = np.flatnonzero(~swings)

@@ -76,7 +76,7 @@ def travel(stage: Stage) -> tuple[float, float]:
     return low - reach, high + reach
 
 
-def longest_way(stage: Stage) -> float:
+def longest_travel(stage: Stage) -> float:
     """The way at constant speed [m]."""
     low, high = travel(stage)
     return WAY * (high - low)

@@ -59,7 +59,7 @@ def slow_sliding_logs(stage: Stage, passed: Sequence[RigLog], seed: int) -> tupl
     if not _has_falling_bristles(quick) or all(run_passes.failure for run_passes in passed):
         return ()
     period = 1 / pace(stage)
-    parts = [(0.0, STANDS * period), *((float(way * speed), LASTS * period) for speed in speeds for way in (1, -1))]
+    parts = [(0.0, STANDS * period), *((float(sign * speed), LASTS * period) for speed in speeds for sign in (1, -1))]
     logs = []
     for number, low in enumerate(np.linspace(*travel(stage), PLACES)):
         (recorded,) = run(quick, legs(low, parts), [seed + number], interval(quick, period / SAMPLES))
@@ -97,6 +97,6 @@ def _analysed(log: RigLog) -> SlowSliding:
 
 def _true(log: RigLog) -> np.ndarray:
     places = log.true.get("cart_position", log.true["position"])
-    way = np.linspace(places.min(), places.max(), POINTS) if len(places) else np.full(1, np.nan)
+    places_between = np.linspace(places.min(), places.max(), POINTS) if len(places) else np.full(1, np.nan)
     levels = [log.stage.flat()[key] for key in ("friction.coulomb", "friction.static")]
-    return levels * friction_factors(log.stage.flat(), way).mean(axis=1)[::-1]
+    return levels * friction_factors(log.stage.flat(), places_between).mean(axis=1)[::-1]

@@ -40,7 +40,7 @@ def _case(case: Case) -> dict[str, Any]:
         "settled_after_s": judgement.settled_after,
         "margin": _margin(judgement.margin) if judgement.margin else None,
         "kick": _kick(judgement),
-        "moves": {"drawn": judgement.moves.drawn, "hunting": judgement.moves.hunting} if judgement.moves else None,
+        "moves": {"drawn": judgement.moves.count, "hunting": judgement.moves.hunting} if judgement.moves else None,
         "observed": judgement.observed,
         "loop_unstable_while_it": case.unstable,
         "observed_swings": [_swing(swing) for swing in judgement.hunting.observed],

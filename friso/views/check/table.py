@@ -88,7 +88,7 @@ def _moves(case: Case) -> str:
     if moves is None:
         return NOTHING
     low, high = moves.interval
-    return f"{100 * moves.fraction:.0f} % ({100 * low:.0f} to {100 * high:.0f} %) of {moves.drawn} moves"
+    return f"{100 * moves.fraction:.0f} % ({100 * low:.0f} to {100 * high:.0f} %) of {moves.count} moves"
 
 
 def _peaks(case: Case) -> str:

@@ -25,7 +25,7 @@ def design_document(design: Design) -> dict[str, Any]:
     """All but the files."""
     document = {
         "conclusion": need(design),
-        "stage": design.given.name,
+        "stage": design.original.name,
         "spec": design.spec.name,
         "feasible": design.meets,
         "relax": _relax(design.unmet),

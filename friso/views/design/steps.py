@@ -22,7 +22,7 @@ def steps(design: Design) -> tuple[DesignStep, ...]:
 
 def isolator_step(design: Design) -> DesignStep:
     """Whether an isolator is needed."""
-    corners, flat = design.without, design.given.flat()
+    corners, flat = design.without, design.original.flat()
     sentences = [f"Without an isolator the machine {edge(corners)}.", *_worst(corners, design), *_gap(design)]
     if not design.needed:
         sentences.append(brings(design))
@@ -111,7 +111,7 @@ def _worst(corners: Corners, design: Design) -> list[str]:
 
 def _gap(design: Design) -> list[str]:
     """The friction that is lost in sliding, against what the thesis says of it."""
-    losses = gaps(design.without, design.given.flat())
+    losses = gaps(design.without, design.original.flat())
     if losses is None:
         return []
     small = design.without.edges[losses < GAP]

@@ -17,7 +17,7 @@ from friso.rig.task import legs
 from friso.stage import Stage
 from friso.studies.rig.many_speeds import SAMPLES, STANDS, ManySpeeds, many_speeds, mean_friction
 from friso.studies.rig.outcome import Outcome, RigLog, rig_log, stopped
-from friso.studies.rig.sizes import freed, interval, locked, longest_way, moving_mass, pace, travel
+from friso.studies.rig.sizes import freed, interval, locked, longest_travel, moving_mass, pace, travel
 from friso.studies.rig.slow_sliding import Slow, slow_sliding
 
 DURATIONS = (480.0, 120.0)
@@ -65,7 +65,7 @@ def run_experiment(stage: Stage, seed: int, progress: Progress) -> Outcome:
 
 def speeds(stage: Stage) -> tuple[float, ...]:
     """The speeds [m/s], the slow one first."""
-    return tuple(longest_way(stage) * pace(stage) / periods for periods in DURATIONS)
+    return tuple(longest_travel(stage) * pace(stage) / periods for periods in DURATIONS)
 
 
 def _passes(name: str, stage: Stage, seed: int) -> Passes:

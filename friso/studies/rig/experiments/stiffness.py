@@ -60,7 +60,7 @@ def steps(stage: Stage, seed: int) -> RigLog:
     free, period = freed(stage), 1 / pace(stage)
     step = STEP * stage.flat()["joint.stroke"]
     stands = np.clip(SETTLED * pulling_time(free), STANDS * period, LONGEST * period)
-    task = staircase([way * step for way in WAYS], float(stands))
+    task = staircase([sign * step for sign in WAYS], float(stands))
     held = {"masses.cart": np.array([FIXED])}
     held |= {key: np.array([value]) for key, value in as_tuned(stage.flat()).items()}
     (recorded,) = run(free, task, [seed], interval(stage, period / SAMPLES), held)

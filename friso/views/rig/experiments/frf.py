@@ -78,8 +78,8 @@ def _plant(name: str, title: str, plant: Plant, subject: str) -> Figure:
     singles = [single.response for single in plant.single]
     angles = [_turned(single, average) for single in singles]
     lines = [
-        Series(each.frequency, np.abs(each.response), "single identifications" * (n == 0), LIGHT, width=0.8)
-        for n, each in enumerate(plant.single)
+        Series(run.frequency, np.abs(run.response), "single identifications" * (n == 0), LIGHT, width=0.8)
+        for n, run in enumerate(plant.single)
     ]
     lines.append(Series(hertz, np.abs(average), f"average of {len(singles)}", BLUE))
     if plant.mass.determined:
@@ -117,8 +117,8 @@ def _loops(name: str, title: str, loops: tuple[MeasuredLoop, ...], subject: str)
     """Open loops, magnitude over phase."""
     named = [(loop, colour) for loop, colour in zip(loops, COLOURS, strict=False) if loop.measured]
     gains = tuple(
-        Series(each.response.frequency, np.abs(each.response.response), f"tuned to {each.tuned:.3g} Hz", colour)
-        for each, colour in named
+        Series(loop.response.frequency, np.abs(loop.response.response), f"tuned to {loop.tuned:.3g} Hz", colour)
+        for loop, colour in named
     )
     turned = phases([loop.response.response for loop, _ in named])
     angles = tuple(

@@ -91,12 +91,12 @@ def numbers(outcome: Outcome) -> dict[str, Any]:
     result: Stiction = outcome.result
     rows = [
         {
-            "static_n": each.static.value,
-            "interval_n": [each.static.low, each.static.high],
-            "break_away_n": each.forces.tolist(),
+            "static_n": slips.static.value,
+            "interval_n": [slips.static.low, slips.static.high],
+            "break_away_n": slips.forces.tolist(),
             "true_range_n": true.tolist(),
         }
-        for each, true in zip(result.by_rail, result.true, strict=True)
+        for slips, true in zip(result.by_rail, result.true, strict=True)
     ]
     return {"speed_m_per_s": result.speed, "rails": rows}
 
