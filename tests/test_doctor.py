@@ -23,7 +23,7 @@ def test_no_folder_of_the_user_is_named_unless_asked_for(monkeypatch: pytest.Mon
     from friso.engine.cache import cache_folder
 
     monkeypatch.setenv("HOME", str(cache_folder().parent))
-    texts = {full: " ".join(finding.text for finding in doctor.findings(full)) for full in (False, True)}
+    texts = {full: " ".join(finding.text for finding in doctor.checks(full)) for full in (False, True)}
     assert str(cache_folder()) in texts[True]
     assert str(cache_folder().parent) not in texts[False]
 
@@ -36,7 +36,7 @@ def test_a_wrong_result_and_what_cannot_be_loaded_are_told(
 
     monkeypatch.setattr(doctor, "SWING", 2e-3)
     monkeypatch.setattr(doctor, "_processor", no_compiler)
-    broken = {finding.subject: finding for finding in doctor.findings() if not finding.works}
+    broken = {finding.subject: finding for finding in doctor.checks() if not finding.works}
     assert set(broken) == {"processor", "running"}
     assert all(finding.remedy for finding in broken.values())
     done = friso_inside(tmp_path, "doctor")

@@ -20,17 +20,17 @@ def doctor(
 
     Example: friso doctor
     """
-    from friso.studies.doctor import findings
-    from friso.views.doctor import conclusion, doctor_document
+    from friso.studies.doctor import checks
+    from friso.views.doctor.document import conclusion, doctor_document
 
-    looked_at = [*findings(full_paths)]
+    looked_at = [*checks(full_paths)]
     if as_json:
         print_document(doctor_document(looked_at))
     else:
         print_wrapped(conclusion(looked_at))
-        for finding in looked_at:
-            print(f"{finding.subject}: {finding.text}")
-            if finding.remedy and not finding.works:
-                print(f"  to mend it: {finding.remedy}")
-    if not all(finding.works for finding in looked_at):
+        for check in looked_at:
+            print(f"{check.subject}: {check.text}")
+            if check.remedy and not check.works:
+                print(f"  to mend it: {check.remedy}")
+    if not all(check.works for check in looked_at):
         raise typer.Exit(1)

@@ -31,8 +31,8 @@ WITHIN = 0.02
 
 
 @dataclass(frozen=True)
-class Finding:
-    """What was looked at, what was found, and whether it works; a `remedy` where it does not."""
+class DoctorCheck:
+    """What was looked at, the result in words, and whether it works; a `remedy` where it does not."""
 
     subject: str
     text: str
@@ -40,11 +40,11 @@ class Finding:
     remedy: str = ""
 
 
-def findings(full_paths: bool = False) -> Iterator[Finding]:
+def checks(full_paths: bool = False) -> Iterator[DoctorCheck]:
     """All that is looked at, one by one; folders below the user's own begin with ~ unless `full_paths`."""
-    yield Finding("friso", VERSION)
-    yield Finding("Python", f"{platform.python_implementation()} {platform.python_version()}, {_bits()} bit")
-    yield Finding("system", f"{platform.system()} {platform.release()}, {platform.machine()}")
+    yield DoctorCheck("friso", VERSION)
+    yield DoctorCheck("Python", f"{platform.python_implementation()} {platform.python_version()}, {_bits()} bit")
+    yield DoctorCheck("system", f"{platform.system()} {platform.release()}, {platform.machine()}")
     yield from _packages()
     steps: tuple[tuple[str, Callable[[], str], str], ...] = (
         ("processor", _processor, "reinstall llvmlite: pip install --force-reinstall llvmlite"),
@@ -55,21 +55,21 @@ def findings(full_paths: bool = False) -> Iterator[Finding]:
     )
     for subject, look, remedy in steps:
         try:
-            yield Finding(subject, look())
+            yield DoctorCheck(subject, look())
         except Exception as error:  # whatever is wrong is what was asked for
-            yield Finding(subject, _without_home(f"{type(error).__name__}: {error}", full_paths), False, remedy)
+            yield DoctorCheck(subject, _without_home(f"{type(error).__name__}: {error}", full_paths), False, remedy)
 
 
 def _bits() -> int:
     return 8 * struct.calcsize("P")
 
 
-def _packages() -> Iterator[Finding]:
+def _packages() -> Iterator[DoctorCheck]:
     """The versions of what friso needs, and of what it reads further formats with."""
     try:
         needed = requires("friso") or []
     except PackageNotFoundError:
-        yield Finding("packages", "friso is run from a folder, not installed")
+        yield DoctorCheck("packages", "friso is run from a folder, not installed")
         return
     present: list[str] = []
     for line in needed:
@@ -79,15 +79,15 @@ def _packages() -> Iterator[Finding]:
             installed = f"{name} {version(name)}"
         except PackageNotFoundError:
             if extra is None:
-                yield Finding("packages", f"{name} is missing", False, f"pip install {name}")
+                yield DoctorCheck("packages", f"{name} is missing", False, f"pip install {name}")
             elif extra[1] not in DEVELOPMENT:
-                yield Finding(f"{extra[1]} files", f'not installed; for them: pip install "friso[{extra[1]}]"')
+                yield DoctorCheck(f"{extra[1]} files", f'not installed; for them: pip install "friso[{extra[1]}]"')
             continue
         if extra is None:
             present.append(installed)
         elif extra[1] not in DEVELOPMENT:
-            yield Finding(f"{extra[1]} files", f"read by {installed}")
-    yield Finding("packages", ", ".join(present))
+            yield DoctorCheck(f"{extra[1]} files", f"read by {installed}")
+    yield DoctorCheck("packages", ", ".join(present))
 
 
 DEVELOPMENT = ("test", "bench")

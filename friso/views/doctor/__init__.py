@@ -1,0 +1,1 @@
+"""What `friso doctor` shows."""
