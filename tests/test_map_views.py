@@ -358,7 +358,7 @@ def test_samples_are_points_over_the_first_two_keys():
     assert (panel.x.label, panel.y.label) == ("Mass [kg]", "Joint stroke [mm]")
     cloud = panel.clouds[0]
     assert cloud.x.tolist() == sampled().mass.values.tolist()
-    assert kinds_shown(cloud)[0][3] is INVALID
+    assert kinds_shown(cloud)[0][3] == INVALID
     assert figure.caption == "Sampled as well: X."
     assert len(panel.markers) == 1
     assert [axis.key for axis in axes_of(sampled())] == ["mass", STROKE, "x"]
