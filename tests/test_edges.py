@@ -11,6 +11,7 @@ from refusals import Refused
 import friso
 from friso.errors import InputError
 from friso.identify.logs import mapping
+from friso.identify.logs.read import read_frequency_response
 from friso.stage import Stage, loads, numeric_keys
 from friso.stage.plausible import doubts
 
@@ -144,6 +145,14 @@ def test_a_doubt_is_said_before_the_answer(tmp_path: Path) -> None:
 @pytest.mark.parametrize("path", [*EXAMPLES.glob("*.toml"), EXAMPLES.parent / "friso" / "templates" / "stage.toml"])
 def test_usual_stages_raise_no_doubts(path: Path) -> None:
     assert not [*doubts(friso.load(path))]
+
+
+@pytest.mark.parametrize("empty", [(3,), (9,), (7, 8, 9), (0, 4)])
+def test_empty_cells_of_a_frequency_response_are_refused(tmp_path: Path, empty: tuple[int, ...]) -> None:
+    rows = [f"{k + 1};-20;{'' if k in empty else -90}" for k in range(10)]
+    (tmp_path / "frf.csv").write_text("\n".join(["f [Hz];magnitude [dB];phase [deg]", *rows]))
+    with pytest.raises(InputError):
+        read_frequency_response(tmp_path / "frf.csv")
 
 
 NUMBERS = st.one_of(

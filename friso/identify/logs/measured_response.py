@@ -66,6 +66,9 @@ def response_of(table: ChannelTable, path: Path) -> MeasuredResponse:
         expected = "frequency, and magnitude and phase or real and imaginary part"
         raise LogError("log", names, expected, "f [Hz];magnitude [dB];phase [deg]", str(path))
     columns = {kind: channels[0] for kind, channels in by_kind.items()}
+    if len({channel.values.size for channel in columns.values()}) > 1:
+        actual = ", ".join(f"{channel.values.size} of {channel.name}" for channel in columns.values())
+        raise LogError("log", f"columns of different lengths: {actual}", "a value in every cell", "", str(path))
     frequency = _frequency(columns["frequency"], path)
     if {"real", "imaginary"} <= set(columns):
         response = columns["real"].values + 1j * columns["imaginary"].values

@@ -1,0 +1,67 @@
+"""Damage to files: what disks, editors and hostile people make of them, drawn at random."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable
+
+_TOKENS = (
+    b"\x00", b"\xff\xfe", b"\x1b[2J", b"\xe2\x80\xae", b"\r", b"\n", b'"', b"'", b"[", b"]", b"{", b"}", b"=", b"#",
+    b",", b"nan", b"inf", b"-1", b"0", b"1e308", b"1e-308", b"1e400", b"-0.0", b"true", b"kg", b"m/s^9", b"hz",
+    b"..", b"+/-", b"9" * 400, b"9" * 5000, b"[" * 500, b"a." * 400,
+    b"\xed\xa0\x80", b"=1+1", b":log", b":0", b":1000000000",
+)  # fmt: skip
+
+
+def damaged(content: bytes, rng: random.Random) -> bytes:
+    """The content after one to four changes."""
+    for _ in range(rng.choice((1, 1, 1, 2, 4))):
+        content = rng.choice(_CHANGES)(content, rng)
+    return content
+
+
+def _bit(content: bytes, rng: random.Random) -> bytes:
+    if not content:
+        return content
+    place = rng.randrange(len(content))
+    return content[:place] + bytes([content[place] ^ 1 << rng.randrange(8)]) + content[place + 1 :]
+
+
+def _cut(content: bytes, rng: random.Random) -> bytes:
+    return content[: rng.randrange(len(content) + 1)]
+
+
+def _gap(content: bytes, rng: random.Random) -> bytes:
+    first = rng.randrange(len(content) + 1)
+    return content[:first] + content[first + rng.randrange(1, 40) :]
+
+
+def _insert(content: bytes, rng: random.Random) -> bytes:
+    place = rng.randrange(len(content) + 1)
+    return content[:place] + rng.choice(_TOKENS) + content[place:]
+
+
+def _repeat(content: bytes, rng: random.Random) -> bytes:
+    first = rng.randrange(len(content) + 1)
+    part = content[first : first + rng.randrange(1, 80)]
+    return content[:first] + part * rng.choice((2, 2, 50)) + content[first:]
+
+
+def _number(content: bytes, rng: random.Random) -> bytes:
+    """Another number in place of one."""
+    places = [k for k, sign in enumerate(content) if 48 <= sign <= 57]
+    if not places:
+        return content
+    place = rng.choice(places)
+    return content[:place] + rng.choice(_TOKENS) + content[place + 1 :]
+
+
+def _lines(content: bytes, rng: random.Random) -> bytes:
+    """Two lines exchanged, or one of them lost."""
+    lines = content.split(b"\n")
+    a, b = rng.randrange(len(lines)), rng.randrange(len(lines))
+    lines[a], lines[b] = lines[b], lines[a]
+    return b"\n".join(lines[: rng.choice((len(lines), len(lines) - 1))])
+
+
+_CHANGES: tuple[Callable[[bytes, random.Random], bytes], ...] = (_bit, _cut, _gap, _insert, _repeat, _number, _lines)
