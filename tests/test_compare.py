@@ -418,7 +418,7 @@ def test_standstill_is_compared_on_a_floor_only(made_up: Comparison) -> None:
     settled = [replace(each, measures=replace(each.measures, settling=np.ones(COUNT))) for each in made_up.results]
     quiet = replace(made_up, results=tuple(settled))
     shaken = _shaken(quiet)
-    assert "RMS" not in " ".join(sentences(quiet))
+    assert "nm RMS" not in " ".join(sentences(quiet))
     assert "[floor]" in sentences(quiet)[-1]
     assert "1.00 nm RMS" in " ".join(sentences(shaken))
     assert "[floor]" not in " ".join(sentences(shaken))
