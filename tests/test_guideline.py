@@ -444,6 +444,7 @@ def test_page_renders_with_its_charts(quick: compute.Guideline, tmp_path: Path, 
     assert len(table) == 1 + sum(len(each.whole.edge) for each in (quick.locked, quick.free))
     document = json.loads(json.dumps(guideline_document(quick), allow_nan=False))
     assert document["laws"]["locked"]["rates"]["slip"]["factor"] == pytest.approx(1.5, rel=1e-3)
+    assert document["laws"]["free"]["edges_of"].startswith("the symmetric cycle")
 
 
 def test_interrupted_sweep_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

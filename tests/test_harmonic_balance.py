@@ -198,6 +198,8 @@ def test_hunting_by_harmonic_balance() -> None:
     assert float(found["period"]) == pytest.approx(1.62757, abs=1e-4)
     assert float(found["amplitude"]) == pytest.approx(0.5202e-3, rel=1e-3)
     assert int(found["solutions"]) == 0
+    assert found["multiplier"].attrs["of"].startswith("the symmetric cycle")
+    assert "approximation" in found["period_error"].attrs["of"]
     assert float(found["least_residual"]) > 0.25
     assert set(found["status"].values[:3]) <= {REST, OPEN}
     assert set(found["status"].values[3:]) == {DONE}

@@ -21,6 +21,9 @@ from friso.progress import Progress, silent
 ROUNDS = 3
 """Bisections of the step that holds an edge: to 1 or 2 % of it on the grids here."""
 
+RTOL = 1e-7
+"""Relative tolerance to which orbits are closed: their multipliers are needed to a percent."""
+
 
 @dataclass(frozen=True)
 class Corners:
@@ -87,7 +90,7 @@ def _attract(ensemble: Ensemble, which: np.ndarray, crossover: np.ndarray) -> tu
     """Whether anything attracts, or may for all that simulations show, in corners at logarithms of crossovers; and
     whether they decided that."""
     some = ensemble.take(which)
-    survey = attractors(Ensemble.held({**some.flat, CROSSOVER: np.exp(crossover)}, len(which)))
+    survey = attractors(Ensemble.held({**some.flat, CROSSOVER: np.exp(crossover)}, len(which)), rtol=RTOL)
     return survey.attracts | ~survey.known, survey.known
 
 

@@ -1,4 +1,8 @@
-"""The edge of hunting of many stages at once: the lowest crossover at and above which no cycle is known to attract."""
+"""The edge of the symmetric cycle of many stages: the lowest crossover at and above which it is not known to attract.
+
+What else may attract beyond, such as an asymmetric cycle, is looked for after a jump and where no orbit could be
+closed, and nowhere else; `friso.hunting.margin` and `friso.design.edges` rest on a survey of everything that attracts.
+"""
 
 from __future__ import annotations
 
@@ -10,6 +14,12 @@ import numpy as np
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import hunting_cycles
 from friso.hunting.persistence import hunts_somehow
+
+OF = (
+    "the symmetric cycle (of stages that are not symmetric, that over a whole period); others may attract beyond, and "
+    "friso check looks for them"
+)
+"""What these edges are of."""
 
 ROUNDS = 6
 """Bisections of the step of the grid that holds the edge."""

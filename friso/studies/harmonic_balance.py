@@ -22,6 +22,11 @@ if TYPE_CHECKING:
 SAMPLES = 16_384
 """Samples per period of the simulated cycle from which multi-harmonic balance starts."""
 
+CYCLE = "the symmetric cycle, closed as an orbit: it attracts where the multiplier is below 1 in size, else it repels"
+APPROXIMATION = "harmonic balance, an approximation"
+PREDICTED = ("solutions", "least_residual")
+"""What the variables are of, by their attribute `of`, and those that single-harmonic balance predicts."""
+
 HARMONICS = (1, 5, 25, 51, 75, 101, 151, 201, 301, 401)
 """Default orders of the highest harmonic."""
 
@@ -32,9 +37,10 @@ def harmonic_balance(
     harmonics: Sequence[int] = HARMONICS,
     rtol: float = RTOL,
 ) -> xr.Dataset:
-    """The hunting cycle of a stage at crossovers [Hz], by simulation and by harmonic balance.
+    """The symmetric hunting cycle of a stage at crossovers [Hz], by simulation and by harmonic balance.
 
-    Over "crossover": `period` [s], `amplitude` [m] and `multiplier` of the cycle, found by shooting; `solutions`, the
+    Over "crossover": `period` [s], `amplitude` [m] and `multiplier` of that cycle, attracting or not, found by shooting
+    (what attracts the stage is another question: see `friso.check`); `solutions`, the
     number of cycles that single-harmonic balance predicts, and `least_residual`, the least residual of that balance
     (see `friso.frequency.describing.balance`). Over ("crossover", "highest"), `highest` being the highest harmonic
     of a multi-harmonic balance (each of `harmonics`) that starts from the simulated cycle: `period_error` and
@@ -61,10 +67,16 @@ def harmonic_balance(
         "solutions": (np.array([len(single.amplitudes) for single in singles]), "1"),
         "least_residual": (np.array([single.least for single in singles]), "1"),
     }
-    variables: dict[str, Any] = {name: ("crossover", value, {"units": unit}) for name, (value, unit) in columns.items()}
+    variables: dict[str, Any] = {
+        name: ("crossover", value, {"units": unit, "of": APPROXIMATION if name in PREDICTED else CYCLE})
+        for name, (value, unit) in columns.items()
+    }
     names, plane = ("period_error", "amplitude_error", "status"), ("crossover", "highest")
     rows = [_errors(stages, cycles, number, harmonics, rtol) for number in range(len(rates))]
-    variables |= {name: (plane, [[cell[k] for cell in row] for row in rows]) for k, name in enumerate(names)}
+    variables |= {
+        name: (plane, [[cell[k] for cell in row] for row in rows], {"of": APPROXIMATION})
+        for k, name in enumerate(names)
+    }
     coords = {"crossover": ("crossover", rates, {"units": "Hz"}), "highest": list(harmonics)}
     return xr.Dataset(variables, coords, {"stage": stage.to_toml(), "rtol": rtol})
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Any
 
+from friso.hunting.edges import OF
 from friso.studies.guideline import Fit, Guideline
 from friso.studies.guideline.claims import claims
 from friso.studies.guideline.laws import FittedLaw
@@ -70,6 +71,7 @@ def _law(fit: Fit) -> dict[str, Any]:
             "held_out": asdict(fit.on_test),
             "locked_given": asdict(fit.on_computed_edge),
         },
+        "edges_of": OF,
         "samples": dict(fit.kinds),
         "attracting_again": fit.again,
         "simulated": asdict(fit.checked),
