@@ -247,6 +247,14 @@ def test_what_killed_processes_left_is_deleted(copied: Path) -> None:
     assert [draft.exists() for draft in drafts] == [False, True]
 
 
+def test_a_full_disk_is_said_in_a_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "full_builder.py").write_text("def build(folder, task):\n    raise OSError(28, 'No space left')\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    with pytest.raises(RuntimeError, match="No space left") as raised:
+        building.entries([cache.CodeRequest("full", "what needs room", "full_builder")])
+    assert "Traceback" not in str(raised.value)
+
+
 def test_without_a_folder_kernels_are_compiled_and_not_kept(tmp_path: Path) -> None:
     file = tmp_path / "no folder"
     file.write_text("")

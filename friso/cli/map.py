@@ -189,9 +189,8 @@ def _check(store: Path, as_json: bool) -> None:
     if as_json:
         print_document({"store": str(store), "blocks": state.blocks, "done": state.done, "damaged": state.damaged})
     else:
-        whole = f"{state.done} of {state.blocks} blocks are done"
-        damage = f"damaged: {', '.join(state.damaged)}; friso map {store} runs them again"
-        print(f"{store}: {whole}, {damage if state.damaged else 'all of them as they were written'}")
+        damage = f"damaged: {', '.join(state.damaged)} (friso map {store} runs what is damaged again)"
+        print(f"{store}: blocks done: {state.done} of {state.blocks}; {damage if state.damaged else 'none is damaged'}")
     if state.damaged:
         raise typer.Exit(1)
 

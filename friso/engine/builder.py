@@ -20,7 +20,10 @@ def main(folder: Path) -> None:
             builder, task = pickle.load(sys.stdin.buffer)
         except EOFError:
             return
-        print(import_module(builder).build(folder, task), file=answers, flush=True)
+        try:
+            print(import_module(builder).build(folder, task), file=answers, flush=True)
+        except OSError as error:  # the disk is full: no fault of what is built, whose traceback would help
+            sys.exit(f"{folder}: {error.strerror or error}")
 
 
 if __name__ == "__main__":
