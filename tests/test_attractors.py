@@ -149,6 +149,15 @@ def test_runs_that_are_given_up_leave_it_unknown(monkeypatch: pytest.MonkeyPatch
     assert not attractors(above).known.any()
 
 
+@pytest.mark.parametrize("thorough", [False, True])
+def test_a_survey_out_of_steps_knows_nothing(monkeypatch: pytest.MonkeyPatch, thorough: bool) -> None:
+    """Just above its edge the rigid mass settles from everywhere, and takes more steps than these to show it."""
+    above = held(VARIANTS["rigid"].replace({"controller.crossover": "9.9 Hz"}))
+    monkeypatch.setattr(survey, "STEPS", 20_000)
+    monkeypatch.setattr(survey, "FEWER", 20_000)
+    assert not attractors(above, thorough=thorough).known.any()
+
+
 def test_a_swing_of_ten_minutes_is_seen() -> None:
     """With static friction 0.5 % above Coulomb friction of 401 N the stage waits for five minutes at 2 mm, and swings
     on for ever: a release is followed for many such waits, and the verdict is not certain."""

@@ -25,8 +25,9 @@ class Batch(NamedTuple):
     """Runs of one model: constants (n, constants), start states, absolute tolerances (n, states), modes (n, kinks),
     first and longest steps [s] (n,), pieces of the reference (n, pieces + 1, 1 + inputs), of which the last one only
     ends the run (in the first dimension also 1: shared by all runs), the number of the piece that begins the window
-    in which extremes are taken (n,), the period and the lateness of the drive's clock [s] (n, 2), and what is looked
-    up. Start states go on with the numbers that are held."""
+    in which extremes are taken (n,), the period and the lateness of the drive's clock [s] (n, 2), the least swing [m]
+    between two turning points that are kept (n,), and what is looked up. Start states go on with the numbers that are
+    held."""
 
     constants: np.ndarray
     starts: np.ndarray
@@ -37,20 +38,20 @@ class Batch(NamedTuple):
     segments: np.ndarray
     windows: np.ndarray
     clocks: np.ndarray
+    least_swings: np.ndarray
     tables: Tables = NO_TABLES
 
 
 class Settings(NamedTuple):
     """What all runs share: relative tolerance, step budget, the two bands of settling [m], the time [s] from which
-    turning points are kept, the least swing [m] between two of them, the sampling interval [s], and a flag, shape
-    (1,), that is set to have no further run begun."""
+    turning points are kept, the sampling interval [s], and a flag, shape (1,), that is set to have no further run
+    begun."""
 
     rtol: float
     budget: float
     inner: float
     outer: float
     record_from: float
-    least_swing: float
     interval: float
     cancel: np.ndarray
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -32,15 +32,17 @@ MOST_TURNS = 1 << 20
 @dataclass(frozen=True)
 class RunOptions:
     """How to run: relative tolerance, bands of settling [m], start of the window for extremes as a share of the run,
-    time [s] from which turning points are kept (at most half of the run), the least swing [m] between two of them
-    (the smaller ones of a zigzag are passed over), sampling interval [s] (None: no samples), step budget, threads,
+    time [s] from which turning points are kept (at most half of the run), the least swing [m] between two of them, a
+    number or one for each run (the smaller ones of a zigzag are passed over), how many there is room for at first,
+    sampling interval [s] (None: no samples), step budget, threads,
     and a flag, shape (1,): once it is set from another thread, no further run begins."""
 
     rtol: float = 1e-6
     bands: tuple[float, float] = (1e-6, 1e-5)
     window: float = 0.75
     record_from: float = 0.0
-    least_swing: float = 0.0
+    least_swing: float | np.ndarray = 0.0
+    room: int = CAPACITY
     interval: float | None = None
     budget: int = 2_000_000
     threads: int | None = None
@@ -80,7 +82,7 @@ def run_chunks(
     """
     for first in range(0, runs, options.chunk):
         numbers = np.arange(first, min(first + options.chunk, runs))
-        yield from _run_with_room(kernel, flat, numbers, CAPACITY, options, starts)
+        yield from _run_with_room(kernel, flat, numbers, options.room, options, starts)
 
 
 def prepare(
@@ -107,7 +109,9 @@ def prepare(
     first_steps = np.ascontiguousarray(FIRST_STEP / rates)
     longest = LONGEST_SHARE * segments[:, -1, 0]
     clocks = columns(kernel.module.clock(values)) if kernel.layout.clocked else np.zeros((1, 2))
-    return Batch(constants, starts, options.rtol * scales, modes, first_steps, longest, segments, windows, clocks)
+    least = np.full(runs, options.least_swing, dtype=float)
+    tolerances = options.rtol * scales
+    return Batch(constants, starts, tolerances, modes, first_steps, longest, segments, windows, clocks, least)
 
 
 def _starts(kernel: Kernel, flat: Mapping[str, Any], runs: int) -> np.ndarray:
@@ -147,7 +151,9 @@ def _run_with_room(
     """Run the runs with these numbers; those with more turning points than there is room for again, fewer at a time
     with more room each."""
     part = _part(flat, numbers)
-    batch = prepare(kernel, part, len(numbers), options, None if starts is None else starts[numbers])
+    least = options.least_swing
+    own = replace(options, least_swing=least[numbers]) if isinstance(least, np.ndarray) else options
+    batch = prepare(kernel, part, len(numbers), own, None if starts is None else starts[numbers])
     samples = 0
     if options.interval is not None:
         samples = int(np.max(part["motion.duration"]) / options.interval * (1 + 1e-12)) + 1
@@ -177,7 +183,6 @@ def settings_of(options: RunOptions) -> Settings:
         inner=float(options.bands[0]),
         outer=float(options.bands[1]),
         record_from=float(options.record_from),
-        least_swing=float(options.least_swing),
         interval=float(options.interval or np.inf),
         cancel=np.zeros(1, np.int64) if options.cancel is None else options.cancel,
     )

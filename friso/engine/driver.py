@@ -87,7 +87,7 @@ def note_entry(B, layout, lane, row, fraction, start, end, band):
         B[row * layout.lanes + lane] = moment(B, layout, lane, theta)
 
 
-def note_turn(B, layout, lane, fraction, settings, results):
+def note_turn(B, layout, lane, fraction, batch, settings, results):
     """Look at the turning point of the deviation inside the step, if there is one."""
     before, after = deviation_rate(B, layout, lane, 0.0), deviation_rate(B, layout, lane, fraction)
     if not ((before > 0.0 and after <= 0.0) or (before < 0.0 and after >= 0.0)):
@@ -96,8 +96,8 @@ def note_turn(B, layout, lane, fraction, settings, results):
     theta = find_turn(B, layout, lane, fraction)
     value = deviation(B, layout, lane, theta)
     time = moment(B, layout, lane, theta)
-    most, least = ROW.deviation_max * layout.lanes + lane, ROW.deviation_min * layout.lanes + lane
-    B[most], B[least] = max(B[most], value), min(B[least], value)
+    most, lowest = ROW.deviation_max * layout.lanes + lane, ROW.deviation_min * layout.lanes + lane
+    B[most], B[lowest] = max(B[most], value), min(B[lowest], value)
     if abs(value) > settings.inner:
         inner = ROW.inner_exit * layout.lanes + lane
         B[inner] = max(B[inner], time)
@@ -105,7 +105,8 @@ def note_turn(B, layout, lane, fraction, settings, results):
         outer = ROW.outer_exit * layout.lanes + lane
         B[outer] = max(B[outer], time)
     if time >= B[ROW.record_from * layout.lanes + lane]:
-        keep_turn(B, layout, lane, kind, time, value, settings.least_swing, results)
+        least = batch.least_swings[int(B[ROW.run * layout.lanes + lane])]
+        keep_turn(B, layout, lane, kind, time, value, least, results)
 
 
 def keep_turn(B, layout, lane, kind, time, value, least, results):
@@ -331,19 +332,19 @@ def answer(B, layout, lane, batch, settings, results):
         return
     at_stop = B[ROW.time * layout.lanes + lane] >= B[ROW.stop * layout.lanes + lane]
     if not layout.clocked:
-        look_inside(B, layout, lane, fraction, settings, results)
+        look_inside(B, layout, lane, fraction, batch, settings, results)
         if at_stop or moment(B, layout, lane, fraction) >= B[ROW.next_sample * layout.lanes + lane]:
             note_samples(B, layout, lane, fraction, settings.interval, results.samples[j])
     if at_stop:
         enter_segment(B, layout, lane, j, int(B[ROW.segment * layout.lanes + lane]) + 1, batch)
 
 
-def look_inside(B, layout, lane, fraction, settings, results):
+def look_inside(B, layout, lane, fraction, batch, settings, results):
     """Record entries into the bands and turning points in the lane's last step."""
     start, end = deviation(B, layout, lane, 0.0), deviation(B, layout, lane, fraction)
     note_entry(B, layout, lane, ROW.inner_exit, fraction, start, end, settings.inner)
     note_entry(B, layout, lane, ROW.outer_exit, fraction, start, end, settings.outer)
-    note_turn(B, layout, lane, fraction, settings, results)
+    note_turn(B, layout, lane, fraction, batch, settings, results)
 
 
 def outcome(B, layout, lane, batch, settings):

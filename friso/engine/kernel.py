@@ -143,7 +143,12 @@ class Kernel:
 
     def values(self, flat: dict[str, Any], runs: int) -> list[np.ndarray]:
         """The parameters of each run [SI], each of shape (runs,), from flat keys to numbers or arrays."""
-        return [np.broadcast_to(np.asarray(flat[name], dtype=float), (runs,)) for name in self.parameters]
+        return [
+            np.broadcast_to(np.asarray(value, dtype=float), (runs,))
+            if np.ndim(value)
+            else np.full(runs, value, dtype=float)
+            for value in (flat[name] for name in self.parameters)
+        ]
 
 
 @dataclass(frozen=True)
@@ -244,7 +249,7 @@ def empty_results(runs: int, capacity: int, samples: int, outputs: int) -> Resul
 def driver_kinds() -> list[Kind]:
     """The kinds of the driver's arguments."""
     flat, square = np.zeros(1), np.zeros((1, 1))
-    batch = Batch(square, square, square, square, flat, flat, np.zeros((1, 1, 4)), np.zeros(1, np.int64), square)
-    settings = Settings(1.0, 1.0, 1.0, 1.0, 0.0, 0.0, 1.0, np.zeros(1, np.int64))
+    batch = Batch(square, square, square, square, flat, flat, np.zeros((1, 1, 4)), np.zeros(1, np.int64), square, flat)
+    settings = Settings(1.0, 1.0, 1.0, 1.0, 0.0, 1.0, np.zeros(1, np.int64))
     layout = ModelLayout(*(np.zeros(1, np.int64) if name in LOOKED_UP else 0 for name in ModelLayout._fields))
     return list(map(kind_of, (flat, layout, new_queue(), batch, settings, empty_results(1, 1, 1, 1))))

@@ -107,21 +107,21 @@ def attractors(
     for runs, of in starts.waves(thorough):
         survey.follow(runs, of)
     if not thorough:
-        _try_cycles(stages, survey, rtol)
+        _try_cycles(starts, survey, rtol)
     known = survey.attracted | ~survey.unknown
-    first = Attractors(tuple(survey.attracting), known, typical_period(stages), suggested, np.zeros(stages.count, bool))
-    return _tried_again(stages, first, rtol) if thorough else first
+    nothing, typical = np.zeros(stages.count, bool), typical_period(stages)
+    surveyed = Attractors(tuple(survey.attracting), known, typical, suggested, nothing)
+    return _tried_again(stages, surveyed, rtol) if thorough else surveyed
 
 
-def _try_cycles(stages: Ensemble, survey: Survey, rtol: float) -> None:
+def _try_cycles(begun: Starts, survey: Survey, rtol: float) -> None:
     """Follow stages that nothing attracts so far from the cycles that the return map suggests: near a fold these
     attract from less far than starts are apart."""
     left = np.flatnonzero(~survey.attracted)
     if not left.size:
         return
-    some = stages.take(left)
-    starts = Starts(some)
-    for cycles in families(some, rtol):
+    starts = begun.take(left)
+    for cycles in families(starts.stages, rtol):
         survey.slow_down(left, cycles)
         starts.beside(cycles)
         if (drawn := np.flatnonzero(cycles.attracting)).size:

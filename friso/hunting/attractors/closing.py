@@ -45,15 +45,26 @@ def _where_they_stick(some: Pending, times: np.ndarray) -> np.ndarray:
     stages, size = some.stages, len(some.stages.kernel.states)
     every, balance = np.arange(stages.count), relaxed(stages)
     ahead = np.zeros(stages.count)
-    for k in every:
-        one, step = some.take(every[k : k + 1]), float(times[k]) / SAMPLES
-        path = one.stages.run(one.states, 2 * times[k : k + 1], some.rtol, interval=step).samples[0]
-        off = path[:, stages.integral] - balance[k] * path[:, stages.sticking]
-        still = np.abs(np.diff(path[:, stages.sticking])) < STILL * np.ptp(path[:, stages.sticking])
-        moves = np.where(~still, np.arange(len(still)), -1)
-        stood = np.arange(len(still)) - np.maximum.accumulate(moves)
-        crossed = np.flatnonzero((off[:-1] * off[1:] <= 0) & np.isfinite(off[1:]))
-        if crossed.size:
-            j = crossed[stood[crossed].argmax()]
-            ahead[k] = step * (j + off[j] / (off[j] - off[j + 1]))
+    octave = np.round(np.log2(times))  # runs of about the same length are sampled together
+    for own in (every[octave == n] for n in np.unique(octave)):
+        runs, step = some.take(own), float(times[own].min()) / SAMPLES
+        paths = runs.stages.run(runs.states, 2 * times[own], some.rtol, interval=step, least_swing=np.inf).samples
+        for k, path in zip(own, paths, strict=True):
+            crossed = _balanced(
+                path[:, stages.integral] - balance[k] * path[:, stages.sticking], path[:, stages.sticking]
+            )
+            ahead[k] = step * crossed
     return stages.run(some.states, np.maximum(ahead, 1e-9 * times), some.rtol).ends[:, :size]
+
+
+def _balanced(off: np.ndarray, place: np.ndarray) -> float:
+    """The sample, and what share of the step to the next, at which the integrator is no longer `off` the state that
+    exerts no force, where the stage has stood still in its place [m] for longest before; both of shape (samples,)."""
+    still = np.abs(np.diff(place)) < STILL * np.nanmax(place) - STILL * np.nanmin(place)
+    moves = np.where(~still, np.arange(len(still)), -1)
+    stood = np.arange(len(still)) - np.maximum.accumulate(moves)
+    crossed = np.flatnonzero((off[:-1] * off[1:] <= 0) & np.isfinite(off[1:]))
+    if not crossed.size:
+        return 0.0
+    j = crossed[stood[crossed].argmax()]
+    return float(j + off[j] / (off[j] - off[j + 1]))

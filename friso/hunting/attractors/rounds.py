@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from friso.engine.arrays import STATISTICS
+from friso.engine.batch import CAPACITY
 from friso.hunting.attractors.recurrence import Recurrence, recurrence
 from friso.hunting.cycle.ensemble import Ensemble, done
 from friso.hunting.cycle.rest import wait
@@ -25,6 +26,12 @@ TYPICAL = 0.3
 
 KEPT = 32
 """Swings at the end of a round that are looked at."""
+
+ROOM, MOST_SWINGS = 1 << 20, 1 << 14
+"""Room for turning points of all runs of a round together, and of one: runs that need more are run again."""
+
+BUDGET = 2_000_000
+"""Steps that a run takes in a round at most."""
 
 LEG = 0.25
 """Legs of a swing are at least this share of peak to peak."""
@@ -64,11 +71,12 @@ class Pending:
 
 @dataclass(frozen=True)
 class Ends:
-    """How a round ended, arrays of shape (runs,): which runs were `completed`, which of them surely `rest`, and how
-    their last swings repeat, with where these turn [m] and when [s], (runs, swings)."""
+    """How a round ended, arrays of shape (runs,): which runs were `completed`, which of them surely `rest`, the `steps`
+    that they took, and how their last swings repeat, with where these turn [m] and when [s], (runs, swings)."""
 
     completed: np.ndarray
     rest: np.ndarray
+    steps: np.ndarray
     repeats: Recurrence
     values: np.ndarray
     times: np.ndarray
@@ -76,7 +84,8 @@ class Ends:
     def take(self, numbers: np.ndarray) -> Ends:
         """Those of the runs with these numbers."""
         arrays = (self.values[numbers], self.times[numbers])
-        return Ends(self.completed[numbers], self.rest[numbers], self.repeats.take(numbers), *arrays)
+        told = (self.completed[numbers], self.rest[numbers], self.steps[numbers])
+        return Ends(*told, self.repeats.take(numbers), *arrays)
 
 
 def typical_period(stages: Ensemble) -> np.ndarray:
@@ -94,33 +103,30 @@ def loose_from(stages: Ensemble) -> np.ndarray:
     return distances[np.arange(stages.count), first]
 
 
-def one_round(runs: Pending) -> tuple[Pending, Ends]:
-    """Follow runs for their durations: the runs from where they are then, and how they ended."""
+def one_round(runs: Pending, budget: float = BUDGET) -> tuple[Pending, Ends]:
+    """Follow runs for their durations, in so many steps each at most: the runs from where they are then, and how they
+    ended."""
     stages, count = runs.stages, runs.stages.count
-    ends = np.empty_like(runs.states)
-    completed, still = np.zeros(count, bool), np.zeros(count, bool)
-    values, times = (np.full((count, KEPT), np.nan) for _ in range(2))
-    size = np.round(np.log2(stages.length))  # turning points are kept by one least swing for all runs of a batch
-    for each in np.unique(size):
-        which = np.flatnonzero(size == each)
-        some, length = stages.take(which), stages.length[which]
-        least = RESOLVED * float(length.min())
-        results = some.run(
-            runs.states[which],
-            runs.durations[which],
-            runs.rtol,
-            with_modes=True,
-            window=0.5,
-            record_from=np.inf,
-            least_swing=least,
-        )
-        ends[which] = results.ends
-        completed[which] = done(results)
-        high, low = (results.statistics[:, STATISTICS.index(name)] for name in ("deviation_max", "deviation_min"))
-        values[which], times[which] = last_swings(results, np.maximum(LEG * (high - low), least), KEPT)
-        still[which] = _stands_still(some, results.ends, high - low, runs.durations[which], runs.loose[which])
+    least = RESOLVED * stages.length
+    results = stages.run(
+        runs.states,
+        runs.durations,
+        runs.rtol,
+        with_modes=True,
+        window=0.5,
+        record_from=np.inf,
+        least_swing=least,
+        room=max(CAPACITY, min(MOST_SWINGS, ROOM // count)),
+        budget=int(min(budget, BUDGET)),
+    )
+    completed = done(results)
+    high, low, steps = (
+        results.statistics[:, STATISTICS.index(name)] for name in ("deviation_max", "deviation_min", "attempted")
+    )
+    values, times = last_swings(results, np.maximum(LEG * (high - low), least), KEPT)
+    still = _stands_still(stages, results.ends, high - low, runs.durations, runs.loose)
     repeats = recurrence(values, times, runs.mirrored)
-    return replace(runs, states=ends), Ends(completed, completed & still, repeats, values, times)
+    return replace(runs, states=results.ends), Ends(completed, completed & still, steps, repeats, values, times)
 
 
 def _stands_still(

@@ -21,8 +21,8 @@ FEW = np.geomspace(0.01, 3.0, 48), np.geomspace(5.0, 300.0, 6)
 PUSHES = np.geomspace(0.03, 300.0, 12)
 """Velocities of stages at their reference, in units of what deflects the loop by as much."""
 
-EVERY = 5
-"""One start in so many is tried first."""
+EVERY = 16, 4, 1
+"""One start in so many is tried first, then one in so many of the others, and so on."""
 
 ASIDE = (-0.03, -0.003, 0.003, 0.03)
 """Shares of the distance by which motions begin beside a cycle."""
@@ -31,11 +31,16 @@ ASIDE = (-0.03, -0.003, 0.003, 0.03)
 class Starts:
     """Runs that begin, of stages of an ensemble: their states (runs, states) and the stages' numbers (runs,)."""
 
-    def __init__(self, stages: Ensemble, rtol: float = RTOL) -> None:
+    def __init__(self, stages: Ensemble, rtol: float = RTOL, loose: np.ndarray | None = None) -> None:
         self.stages, self.rtol = stages, rtol
-        self.loose, self.period = loose_from(stages), typical_period(stages)
+        self.loose = loose_from(stages) if loose is None else loose
+        self.period = typical_period(stages)
         self.of: list[np.ndarray] = []
         self.states: list[np.ndarray] = []
+
+    def take(self, numbers: np.ndarray) -> Starts:
+        """Those of the stages with these numbers, none of them begun."""
+        return Starts(self.stages.take(numbers), self.rtol, self.loose[numbers])
 
     def spread(self, thorough: bool) -> None:
         """Stuck at distances on both sides (on one of symmetric stages), and pushed."""
@@ -72,15 +77,18 @@ class Starts:
 
     def waves(self, thorough: bool) -> Iterator[tuple[Pending, np.ndarray]]:
         """The runs before their first round, and the numbers of their stages: of a `thorough` survey all at once, else
-        one in a few first, from which most stages that hunt do."""
+        a few first, from which most stages that hunt do."""
+        if not self.of:
+            return
         of, states = np.concatenate(self.of), np.concatenate(self.states)
         order = np.argsort(of, kind="stable")
         rank = np.empty(len(of), np.int64)
         rank[order] = np.arange(len(of)) - np.searchsorted(of[order], of[order])
-        first = np.ones(len(of), bool) if thorough else rank % EVERY == 0
-        for mask in (first, ~first):
-            if (which := np.flatnonzero(mask)).size:
+        left = np.ones(len(of), bool)
+        for every in EVERY[-1:] if thorough else EVERY:
+            if (which := np.flatnonzero(left & (rank % every == every // 2))).size:
                 yield self._begun(of[which], states[which]), of[which]
+            left[which] = False
 
     def on(self, cycles: Cycles, which: np.ndarray) -> Pending:
         """Runs that begin on the cycles of some stages."""

@@ -13,6 +13,9 @@ from friso.hunting.cycle.find import Cycles
 ROUNDS = 5
 """Rounds at most: the last takes two thousand typical periods."""
 
+STEPS, FEWER = 10_000_000, 6_000_000
+"""Steps that all runs of a stage take together at most until they are given up, in a thorough survey and in others."""
+
 ALIKE = 0.05
 """Share by which the time and the peak to peak of two motions differ at most that are the same."""
 
@@ -35,6 +38,10 @@ which on one is tried to be closed from all others."""
 REGULAR, UNCHANGED = 2, 2e-3
 """The round from which on a motion is taken for attracted, although no orbit could be closed, if it repeats itself, and
 the share by which its mean swing may change over that round, of two hundred typical periods and more."""
+
+EXACT = 1e-7
+"""Share of peak to peak up to which a motion repeats itself that is taken for attracted at once: so near a cycle that
+repels no run comes by chance."""
 
 CLOSED = 3
 """Orbits that are tried to be closed for a stage after one round of a thorough survey, of others one."""
@@ -113,8 +120,8 @@ def of_cycles(numbers: np.ndarray, cycles: Cycles, sticking: int) -> list[Swingi
 @dataclass
 class Survey:
     """What has been learned of stages so far: the motions that attract; and of which stages that is `unknown`, because
-    a run failed or had to be given up, and the time constant of the cycle that repels most slowly, `slowest` [s] (0:
-    none), both of shape (count,)."""
+    a run failed or had to be given up, the time constant of the cycle that repels most slowly, `slowest` [s] (0: none),
+    and the steps that its runs may take still, `left`, all of shape (count,)."""
 
     count: int
     thorough: bool
@@ -122,11 +129,14 @@ class Survey:
     attracting: list[Swinging] = field(default_factory=list)
     unknown: np.ndarray = field(init=False)
     slowest: np.ndarray = field(init=False)
+    left: np.ndarray = field(init=False)
     _drawn: list[_Kind] = field(default_factory=list)
-    _repelling: list[_Kind] = field(default_factory=list)
+    _closed: list[_Kind] = field(default_factory=list)
+    _others: list[_Kind] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self.unknown, self.slowest = np.zeros(self.count, bool), np.zeros(self.count)
+        self.left = np.full(self.count, float(STEPS if self.thorough else FEWER))
 
     @property
     def attracted(self) -> np.ndarray:
@@ -147,7 +157,7 @@ class Survey:
         repel = np.flatnonzero(cycles.found & ~cycles.attracting)
         for k in repel:
             size, time = 2 * float(cycles.amplitude[k]), float(cycles.orbits.times[k])
-            self._repelling += [(int(numbers[k]), size, time), (int(numbers[k]), size, 2 * time)]
+            self._closed += [(int(numbers[k]), size, time), (int(numbers[k]), size, 2 * time)]
         np.maximum.at(self.slowest, numbers[repel], cycles.time_constant[repel])
 
     def follow(self, runs: Pending, of: np.ndarray) -> None:
@@ -159,20 +169,22 @@ class Survey:
             if not keep.size:
                 return
             of, before = of[keep], before[keep]
-            runs, ends = one_round(runs.take(keep))
+            runs, ends = one_round(runs.take(keep), self.left[of].max())
             on = self._on(runs, of, ends, early=number < PATIENCE)
+            on = self._within_budget(on, of, ends)
             if not on.size:
                 return
             if number > 0:
                 on = on[self._kinds(of[on], ends.take(on), KINDS)]
             if number == ROUNDS - 1:
                 return self._last(runs.take(on), of[on], ends.take(on), before[on])
+            regular = self._exact(of[on], ends.take(on))
             if number >= REGULAR:
-                regular = self._regular(of[on], ends.take(on), before[on])
-                self._observe(of[on[regular]], ends.take(on[regular]), before[on[regular]])
-                on = on[~regular]
-                if not on.size:
-                    return
+                regular |= self._regular(of[on], ends.take(on), before[on])
+            self._observe(of[on[regular]], ends.take(on[regular]), before[on[regular]])
+            on = on[~regular]
+            if not on.size:
+                return
             before, of = ends.repeats.mean[on], of[on]
             runs = lengthened(runs.take(on), ends.repeats.swings[on] > 0)
 
@@ -183,9 +195,16 @@ class Survey:
         on = ends.completed & ~ends.rest & ~self._alike(of, ends)
         ready = on & (ends.repeats.swings > 0)
         if early:
-            ready &= (ends.repeats.off < SETTLED) & ~_like(self._repelling, of, ends)
+            ready &= (ends.repeats.off < SETTLED) & ~self._repels(of, ends)
         self._close(runs, of, ends, np.flatnonzero(ready))
         return np.flatnonzero(on & ~self._alike(of, ends))
+
+    def _within_budget(self, on: np.ndarray, of: np.ndarray, ends: Ends) -> np.ndarray:
+        """Those of the runs with the numbers `on` whose stages have steps left after a round."""
+        np.subtract.at(self.left, of, ends.steps)
+        spent = self.left[of[on]] <= 0
+        self.unknown[of[on[spent]]] = True
+        return on[~spent]
 
     def _kinds(self, of: np.ndarray, ends: Ends, most: int) -> np.ndarray:
         """The numbers of runs that are followed on for all of their kind; of stages with more kinds than may be it is
@@ -193,6 +212,11 @@ class Survey:
         kept, left = _kinds(of, ends, most)
         self.unknown[of[left]] = True
         return kept
+
+    def _repels(self, of: np.ndarray, ends: Ends) -> np.ndarray:
+        """Which runs repeat themselves like a cycle that repels, or like what no orbit that attracts could be closed
+        from."""
+        return _like(self._closed, of, ends) | _like(self._others, of, ends)
 
     def _alike(self, of: np.ndarray, ends: Ends) -> np.ndarray:
         """Which runs repeat themselves like a motion that is known already to attract their stage."""
@@ -211,7 +235,7 @@ class Survey:
                 numbers = kinds[own]
                 self.add(of_cycles(of[numbers], cycles, runs.stages.sticking))
                 self.slow_down(of[numbers], cycles)
-                for kinds_of, which in ((self._drawn, cycles.attracting), (self._repelling, ~cycles.attracting)):
+                for kinds_of, which in ((self._drawn, cycles.attracting), (self._others, ~cycles.attracting)):
                     columns = (column[numbers[which]].tolist() for column in (of, repeats.size, repeats.time))
                     kinds_of += zip(*columns, strict=True)  # the runs are not as exact as their orbits
             kinds = kinds[(repeats.better > repeats.swings)[kinds] & ~self._alike(of, ends)[kinds]]
@@ -244,11 +268,16 @@ class Survey:
         """Which runs repeat themselves so well, and have changed so little in the last round, that they will not leave
         where they are: unless that is beside a cycle that repels."""
         same = np.abs(ends.repeats.mean / before - 1) < UNCHANGED
-        return same & (ends.repeats.off < SETTLED) & ~_like(self._repelling, of, ends)
+        return same & (ends.repeats.off < SETTLED) & ~self._repels(of, ends)
+
+    def _exact(self, of: np.ndarray, ends: Ends) -> np.ndarray:
+        """Which runs repeat themselves as exactly as they do on what attracts alone, and unlike any closed cycle that
+        repels."""
+        return (ends.repeats.off < EXACT) & (ends.repeats.swings > 0) & ~_like(self._closed, of, ends)
 
     def _observe(self, of: np.ndarray, ends: Ends, before: np.ndarray) -> None:
         repeats = ends.repeats
-        steady = (repeats.mean > 0) & (repeats.mean >= STEADY * before)
+        steady = (repeats.mean > 0) & ~(repeats.mean < STEADY * before)  # there is nothing before the first round
         self.unknown[of[~steady]] = True
         for k in np.flatnonzero(steady):
             if self._alike(of[k : k + 1], ends.take(np.array([k])))[0]:
@@ -284,4 +313,5 @@ def _kinds(of: np.ndarray, ends: Ends, most: int) -> tuple[np.ndarray, np.ndarra
         own = kept.setdefault(int(of[k]), [])
         if not any(alike(k, j) for j in own):
             (own if len(own) < most else left).append(k)
-    return tuple(np.array(some, dtype=np.int64) for some in ([k for own in kept.values() for k in own], left))
+    stand = [k for own in kept.values() for k in own]
+    return np.array(stand, dtype=np.int64), np.array(left, dtype=np.int64)

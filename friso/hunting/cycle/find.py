@@ -62,8 +62,8 @@ class Cycles:
     half a period, over which everything is taken then, and 1 for others; `swings`, those in that time; `states` (count,
     states) on the cycle, in the middle of the sticking; `period` [s], `amplitude` [m], half of peak to peak, `middle`
     [m] between the peaks, `gap` (see `Orbits`), the `local` multipliers (count, states - 1), the largest first, their
-    `direction` (count, states), the macroscopic `slope` and the `multiplier`, that of the two which decides, each of
-    shape (count,); NaN where there is none.
+    `direction` (count, states), the macroscopic `slope` (where a limiter may chatter) and the `multiplier`, that of the
+    two which decides, each of shape (count,); NaN where there is none.
     """
 
     sign: float

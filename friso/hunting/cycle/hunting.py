@@ -15,7 +15,7 @@ from friso.equations.structure import Structure, structure
 from friso.hunting.attractors import Target, attractors
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import ROUGH, RTOL, Cycles, time_constant
-from friso.hunting.cycle.multipliers import returns_of
+from friso.hunting.cycle.multipliers import returns_of, slopes
 from friso.hunting.cycle.return_map import ReturnMap, return_map
 from friso.stage import Stage
 
@@ -147,7 +147,7 @@ def hunting(stage: Stage, rtol: float = RTOL) -> Hunting:
     doubt = beyond or (FLIPS if known.flips[0] else UNDECIDED)
     reason = known.families[0].reasons[0] if certain else doubt
     return Hunting(
-        cycles=tuple(_cycle(stages, cycle) for cycle in (*closed, *repelling)),
+        cycles=tuple(_cycle(stages, cycle, rtol) for cycle in (*closed, *repelling)),
         reason=reason if not certain or not (closed or repelling) else "",
         certain=certain,
         returns=return_map(stages, ROUGH),
@@ -167,7 +167,8 @@ def _beyond_the_search(flat: Mapping[str, Any]) -> str:
     return ""
 
 
-def _cycle(stages: Ensemble, cycles: Cycles) -> Cycle:
+def _cycle(stages: Ensemble, cycles: Cycles, rtol: float) -> Cycle:
+    slope = cycles.slope if stages.chatters else slopes(stages, cycles.orbits, cycles.direction, rtol)
     return Cycle(
         symmetric=cycles.sign < 0,
         amplitude=float(cycles.amplitude[0]),
@@ -175,7 +176,7 @@ def _cycle(stages: Ensemble, cycles: Cycles) -> Cycle:
         period=float(cycles.period[0]),
         multiplier=float(cycles.multiplier[0]),
         multipliers=cycles.local[0],
-        slope=float(cycles.slope[0]),
+        slope=float(slope[0]),
         growth=_growth(stages, cycles),
         residual=float(cycles.gap[0]),
         trace=_trace(stages, cycles),

@@ -24,7 +24,7 @@ NEAR = 0.25
 class Multipliers:
     """Of each orbit: its Floquet multipliers but the one that every cycle has along itself, the largest first
     (count, states - 1), the direction that belongs to the first, with a position of 1 (count, states), and the
-    macroscopic slope of the return map along it (count,)."""
+    macroscopic slope of the return map along it (count,), NaN where no limiter chatters: it decides nothing there."""
 
     local: np.ndarray
     direction: np.ndarray
@@ -36,7 +36,8 @@ def multipliers(stages: Ensemble, orbits: Orbits, rtol: float) -> Multipliers:
     shot = shoot(stages, orbits.states, orbits.times, orbits.sign, rtol)
     flows = np.where(shot.done[:, None, None], shot.flows, np.nan)
     local, direction = _floquet(stages, flows, stages.rates(shot.ends))
-    return Multipliers(local, direction, _slope(stages, orbits, direction, rtol))
+    nothing = np.full(stages.count, np.nan)
+    return Multipliers(local, direction, slopes(stages, orbits, direction, rtol) if stages.chatters else nothing)
 
 
 def _floquet(stages: Ensemble, flows: np.ndarray, rates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -55,8 +56,9 @@ def _floquet(stages: Ensemble, flows: np.ndarray, rates: np.ndarray) -> tuple[np
         return values, np.real(first / first[:, stages.sticking, None])
 
 
-def _slope(stages: Ensemble, orbits: Orbits, direction: np.ndarray, rtol: float) -> np.ndarray:
-    """Slope of the straight line through the returns from a small range about the orbits."""
+def slopes(stages: Ensemble, orbits: Orbits, direction: np.ndarray, rtol: float) -> np.ndarray:
+    """Slope of the straight line through the returns from a small range about the orbits along a direction (count,
+    states), shape (count,)."""
     away = np.linspace(-RANGE / 2, RANGE / 2, POINTS)[None, :]
     heights = returns_of(stages, orbits, direction, away, 2, rtol)
     return np.array([_straight(pairs[np.isfinite(pairs).all(axis=1)]) for pairs in heights])

@@ -29,7 +29,7 @@ def swings(stages: Ensemble, starts: np.ndarray, durations: np.ndarray, most: in
     """
     position = starts[:, stages.kernel.position]
     legs = LEG * np.abs(position)
-    results = stages.run(starts, durations, rtol, least_swing=0.1 * float(legs.min()))
+    results = stages.run(starts, durations, rtol, least_swing=0.1 * legs)
     runs, room = results.turn_values.shape
     held = (np.arange(room) < results.turn_counts[:, None]) & done(results)[:, None]
     values = np.hstack([position[:, None], np.where(held, results.turn_values, np.nan)])
