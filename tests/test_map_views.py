@@ -201,6 +201,9 @@ def test_cells_without_a_measure_of_what_attracts_say_why():
     shown = kinds_shown(only_map(map_figure(runs, "multiplier")))
     labels = {kind.label for row in shown for kind in row if kind}
     assert labels == {"nothing attracts", "not certain what attracts", "attracts, but not closed as an orbit"}
+    said = statement(runs, "multiplier")
+    assert said.startswith(f"Something attracts the stage that swings in {round(100 * 18 / 19)} % of the map")
+    assert "In 1 of the cells it is not certain" in said
 
 
 def test_variables_may_be_missing():

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from friso.hunting.criteria.run_outcome import CREEPS, RESTS, SWINGS
+from friso.studies.cells import CYCLE, CYCLE_UNITS, SWING, UNKNOWN
 from friso.views.drawing.prefixes import listed
 from friso.views.map.cells import SAMPLE, CellAxis, axes_of
 from friso.views.map.words import (
@@ -67,15 +68,21 @@ class Question:
 
 _HUNTS = Question("verdict", "The stage hunts", ("hunts",))
 _BISTABLE = Question("verdict", "It is bistable (a kick or another move can start hunting)", ("bistable",))
+_ATTRACTS = Question("attractor", "Something attracts the stage that swings", (CYCLE, SWING))
 _SWINGS = Question("outcome", "The run swings at its end", (SWINGS,))
 
 
 def headline(runs: xr.Dataset, metric: str) -> str:
-    """What share of the map swings (of a map of verdicts: hunts, or is bistable; of counts: has counted peaks), and
-    where: the ranges of the axes outside of which no cell does. Empty where the runs do not tell."""
+    """What share of the map swings (of a map of verdicts: hunts, or is bistable; of counts: has counted peaks; of
+    measures of what attracts: has a swing that attracts), and where: the ranges of the axes outside of which no cell
+    does. Empty where the runs do not say."""
     if metric == "verdict" and metric in runs:
         bistable = [_BISTABLE] if counts(runs, "verdict").get("bistable") else []
         return " ".join(_answer(runs, question) for question in [_HUNTS, *bistable])
+    if metric in CYCLE_UNITS and "attractor" in runs:
+        unknown = counts(runs, "attractor").get(UNKNOWN, 0)
+        doubt = f"In {grouped(unknown)} of the cells it is not certain what attracts." if unknown else ""
+        return " ".join(filter(None, (_answer(runs, _ATTRACTS), doubt)))
     if metric in PEAKS and metric in runs:
         return _answer(runs, Question(metric, "Peaks are counted"))
     return _answer(runs, _SWINGS) if "outcome" in runs else ""
@@ -113,7 +120,9 @@ def _flags(runs: xr.Dataset, question: Question) -> tuple[np.ndarray, np.ndarray
     rows = max(1, AT_ONCE // max(1, int(np.prod(values.shape[1:]))))
     for first in range(0, len(values), rows):
         part = np.asarray(values[first : first + rows].values)
-        ran = np.isfinite(part) if question.variable in PEAKS else ~np.isin(part.astype(str), ["", *_NO_RESULT])
+        ran = (
+            np.isfinite(part) if question.variable in PEAKS else ~np.isin(part.astype(str), ["", *_NO_RESULT, UNKNOWN])
+        )
         completed[first : first + rows] = ran
         holds[first : first + rows] = ran & question.holds(part)
     return holds, completed
