@@ -14,7 +14,7 @@ from friso.hunting.attractors import Attractors, attractors, starts, survey
 from friso.hunting.attractors.recurrence import recurrence
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.rest import stuck
-from friso.hunting.margin import margin
+from friso.hunting.margin import margin, searched
 from friso.stage import Stage
 
 LONG_WAIT = VARIANTS["free, parasitic"].replace(
@@ -114,18 +114,64 @@ def test_a_stage_that_settles_from_everywhere() -> None:
     assert np.isnan(above.target.amplitude).all()
 
 
-def test_the_edge_is_that_of_the_last_attractor() -> None:
-    """Beyond its flip at 11.97 Hz the creeping stage has an asymmetric cycle up to 13.0 Hz: stuck at 0.78 mm or so it
-    swings on just below, and comes to rest from everywhere 1 % above."""
-    edge = margin(CREEPING, attracting=True)
+@pytest.mark.parametrize("crossover", [12.3332, 12.9, 13.1])
+def test_the_edge_is_that_of_the_last_attractor(crossover: float) -> None:
+    """Beyond its flip at 11.97 Hz the creeping stage has asymmetric cycles, of one period and of many, up to 12.95 Hz,
+    where the symmetric one attracts again, until it folds: by brute force between 13.026 and 13.029 Hz."""
+    edge = margin(CREEPING.replace({"controller.crossover": f"{crossover} Hz"}), attracting=crossover < 13)
     assert edge is not None
-    assert not edge.certain  # it was not followed to a flip of its own
-    assert edge.crossover == pytest.approx(13.03, rel=0.005)
-    starts = np.linspace(0.7e-3, 0.85e-3, 61)
-    for crossover, hunts in ((12.95, True), (13.15, False)):
+    assert edge.crossover is not None
+    assert edge.certain
+    assert 13.026 < edge.crossover < 13.029
+
+
+@pytest.mark.parametrize("rtol", [1e-7, 1e-9])
+def test_the_creeping_stage_just_below_and_above_its_edge(rtol: float) -> None:
+    """Stuck at 0.77 mm or so it swings on at 13.026 Hz, and comes to rest at 13.029 Hz."""
+    starts = 0.7703e-3 * np.linspace(0.9975, 1.0025, 11)
+    for crossover, hunts in ((13.026, True), (13.029, False)):
         flat = CREEPING.replace({"controller.crossover": f"{crossover} Hz"}).flat()
         several = Ensemble.held(flat, 1).take(np.zeros(len(starts), np.int64))
-        results = several.run(stuck(several, starts), np.full(len(starts), 200.0), 1e-8, window=0.9)
+        results = several.run(stuck(several, starts), np.full(len(starts), 2000.0), rtol, window=0.95)
+        assert bool(np.any(np.ptp(results.statistics[:, 1:3], axis=1) > 1e-3)) == hunts
+
+
+UNWOUND = VARIANTS["rigid, limit, back-calculation"].replace(
+    {
+        "controller.force_limit": "12 N",
+        "controller.anti_windup_time": "50 ms",
+        "motion": {"kind": "release", "displacement": "2 mm", "duration": "20 s"},
+    }
+)
+"""Hunts below 9.77 Hz, and again from some 39 Hz on, where back-calculation drives it to and fro at the force limit."""
+
+
+def test_every_window_in_which_a_stage_hunts_is_searched() -> None:
+    """From both windows, and from the gap between them."""
+    for crossover, attracting in ((8.0, True), (20.0, False), (60.0, True)):
+        sought = searched(UNWOUND.replace({"controller.crossover": f"{crossover} Hz"}), attracting)
+        factors = [end for window in sought.windows for end in (window.low, window.high) if end is not None]
+        ends = [crossover * factor for factor in factors]
+        if crossover < 60:
+            assert sought.margin is not None
+            assert sought.margin.crossover == pytest.approx(9.77, abs=0.005)
+            assert ends == [pytest.approx(37, abs=2.5)]
+            assert sought.windows[0].high is None
+        else:
+            assert sought.lower is not None
+            assert crossover * sought.lower == pytest.approx(37, abs=2.5)
+            assert ends == [pytest.approx(10.4, abs=1)]
+            assert sought.windows[0].low is None
+
+
+@pytest.mark.parametrize("rtol", [1e-7, 1e-9])
+def test_what_back_calculation_does_at_38_and_at_40_hz(rtol: float) -> None:
+    """Released from 0.1 mm to 1 m it rests after 200 s at 38 Hz; at 40 Hz some of these swing on."""
+    starts = np.geomspace(1e-4, 1.0, 41)
+    for crossover, hunts in ((38.0, False), (40.0, True)):
+        flat = UNWOUND.replace({"controller.crossover": f"{crossover} Hz"}).flat()
+        several = Ensemble.held(flat, 1).take(np.zeros(len(starts), np.int64))
+        results = several.run(stuck(several, starts), np.full(len(starts), 200.0), rtol, window=0.9)
         assert bool(np.any(np.ptp(results.statistics[:, 1:3], axis=1) > 1e-3)) == hunts
 
 

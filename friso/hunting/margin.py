@@ -2,164 +2,147 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from friso.equations.bandwidth import bandwidth, faster
+from friso.equations.bandwidth import bandwidth
 from friso.hunting.attractors import Attractors, attractors
+from friso.hunting.attractors.survey import Swinging
 from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.find import Cycles, hunting_cycles
-from friso.hunting.cycle.shooting import simplest
+from friso.hunting.outward import Beyond, End, Outward
 from friso.stage import Stage
 
 FARTHEST = 10.0
 """Factor up to which the bandwidth is changed."""
 
-STEPS, AT_ONCE = 41, 10
-"""Bandwidths that are tried, from the highest down, and how many of them together."""
-
-FINER, ROUNDS = 4, 2
-"""Bandwidths between the two that enclose the edge at which is simulated, and how often."""
-
-NEARER = 3
-"""Those between two that enclose a flip at which a cycle is closed, each time."""
-
-CHATTERING, ENOUGH = 9, 6
-"""The same at once where a limiter chatters, and cycles of these that have to be known for a curve to be laid through
-their multipliers, which are rough."""
-
-ABOVE = 1.01
-"""How far above the bandwidth at which a cycle flips nothing else may attract."""
-
-ALONG = 1 + np.array([-0.08, -0.04, -0.02, -0.01, -0.005, 0.0, 0.005, 0.01, 0.02, 0.04, 0.08])
-"""Distances from which a motion is followed from one bandwidth to the next, in units of its own."""
+STEPS, COARSE = 40, 20
+"""Steps to a factor of ten in bandwidth where an edge is looked for, and beyond, where something may attract again:
+windows narrower than a step may be missed."""
 
 
 @dataclass(frozen=True)
 class Margin:
-    """The edge of hunting in bandwidth.
+    """The edge of hunting in bandwidth: the highest one, over the range searched, below which something attracts and
+    above which nothing does. Of a stage that nothing attracts it is the nearest below.
 
-    For a stage that something attracts it is the last one: from there up to ten times the bandwidth nothing is known
-    to attract. For others it is the nearest below: hunting is possible there. `factor` is the bandwidth at the edge
-    over that of the stage, `crossover` [Hz] the crossover there (None for a controller given by its gains, all of whose
-    poles and zeros the factor scales). It is `certain` where a cycle was followed to its flip, nothing else attracts
-    just above, and no simulation beyond that failed or was stopped undecided; else it lies about there.
+    `factor` is the bandwidth at the edge over that of the stage, `crossover` [Hz] the crossover there (None for a
+    controller given by its gains, all of whose poles and zeros the factor scales). At `quiet`, a factor just above,
+    simulations settle from everywhere that was tried. The edge is `certain` where a closed orbit was followed to its
+    end there, and all simulations beyond it that had to decide were completed; else it lies between the two.
     """
 
     factor: float
     crossover: float | None
     certain: bool
+    quiet: float
+
+
+@dataclass(frozen=True)
+class Window:
+    """Bandwidths, as factors of that of a stage, outside of which nothing attracts next to them: something does at some
+    in between. None: as far as the search goes."""
+
+    low: float | None
+    high: float | None
+
+
+@dataclass(frozen=True)
+class Searched:
+    """What a search through the bandwidths showed: the `margin` (None: no such edge); the other `windows` in which
+    something attracts, to the step of the search; of a stage that something attracts the next factor below at which
+    nothing does, `lower` (None: there is none); and whether the search `contradicts` that nothing attracts the stage
+    itself, to which an orbit was followed."""
+
+    margin: Margin | None
+    windows: tuple[Window, ...]
+    lower: float | None = None
+    contradicts: bool = False
+
+
+NOT_SOUGHT = Searched(None, ())
+"""What is told of a stage that cannot hunt at any bandwidth."""
 
 
 def margin(stage: Stage, attracting: bool) -> Margin | None:
     """The last edge above the bandwidth of a stage that something attracts, or the next one below that of one that
     nothing does; None within a factor of ten."""
+    return searched(stage, attracting).margin
+
+
+def searched(stage: Stage, attracting: bool, known: Attractors | None = None) -> Searched:
+    """Where something attracts, over bandwidths from a tenth to ten times that of a stage; `known` is what attracts the
+    stage itself, if that was surveyed."""
     flat, own = stage.flat(), bandwidth(stage.flat())
-    factors = np.geomspace(FARTHEST, 1.0, STEPS) if attracting else np.geomspace(1.0, 1 / FARTHEST, STEPS)
-    edge = _nearest(flat, factors, attracting)
+    here, above = (COARSE, STEPS) if attracting else (STEPS, COARSE)
+    below = np.geomspace(1 / FARTHEST, 1.0, here, endpoint=False)
+    factors = np.concatenate([below, np.geomspace(1.0, FARTHEST, above + 1)])
+    grid = _Grid(Outward(flat, FARTHEST), factors)
+    grid.know(here, known or attractors(Ensemble.held(flat, 1), thorough=True))
+    edge = grid.last_edge(here, attracting)
+    contradicts = bool(grid.attracts[here]) and not attracting
+    own_window = next((window for window in grid.windows() if _holds(window, 1.0)), Window(None, None))
+    lower = own_window.low if attracting else None
     if edge is None:
-        return None
-    factor, certain = (1.0, False) if isinstance(edge, str) else _located(flat, edge)
-    return Margin(factor, None if own is None else own * factor, certain)
+        others = tuple(window for window in grid.windows() if window != own_window)
+        return Searched(None, others, lower, contradicts)
+    at, end, certain = edge
+    sure = certain and not contradicts
+    found = Margin(end.inside, None if own is None else own * end.inside, sure, end.outside)
+    others = tuple(window for window in grid.windows() if not _holds(window, factors[at]))
+    return Searched(found, others, lower, contradicts)
 
 
-class _Edge:
-    """Two factors that enclose the edge: something attracts at the lower one, nothing does at the higher one."""
+class _Grid:
+    """Factors, ascending, at which it is known whether something attracts."""
 
-    def __init__(self, flat: Mapping[str, Any], factors: np.ndarray, known: Attractors, a: int, b: int) -> None:
-        self.flat = flat
-        self.low, self.high = float(factors[a]), float(factors[b])
-        self.inside, self.outside = known.take(np.array([a])), known.take(np.array([b]))
-        self.certain = bool(known.known[[a, b]].all())
+    def __init__(self, outward: Outward, factors: np.ndarray) -> None:
+        self.outward, self.factors = outward, factors
+        seen = outward.surveyed(factors)
+        self.attracts, self.known = seen.attracts, seen.known
+        self.motions: list[list[Swinging]] = [[] for _ in factors]
+        for motion in seen.motions:
+            self.motions[motion.stage].append(motion)
 
-    def narrow(self, factors: np.ndarray) -> None:
-        """Take the last of some factors in between, ascending, at which something attracts, and the next one."""
-        distances = np.outer([motion.distance for motion in self.inside.motions], ALONG).ravel()
-        known = _known(self.flat, factors, np.tile(distances, (len(factors), 1)))
-        attract = np.flatnonzero(known.attracts)
-        last = int(attract[-1]) if attract.size else -1
-        if last >= 0:
-            self.low, self.inside = float(factors[last]), known.take(np.array([last]))
-        if last < len(factors) - 1:
-            self.high, self.outside = float(factors[last + 1]), known.take(np.array([last + 1]))
-        self.certain &= bool(known.known[max(last, 0) :].all())
+    def know(self, here: int, seen: Attractors) -> None:
+        """Take over what a thorough survey of one of the stages shows."""
+        self.attracts[here], self.known[here] = seen.attracts[0], seen.known[0]
+        self.motions[here] = list(seen.motions)
 
-    def between(self, count: int) -> np.ndarray:
-        """So many factors between the two."""
-        return np.geomspace(self.low, self.high, count + 2)[1:-1]
+    def last_edge(self, here: int, above: bool) -> tuple[int, End, bool] | None:
+        """The last factor, by number, at which something attracts while nothing does at the next one, of those from a
+        number on if the edge is looked for `above`, else of those below it; the end of what attracts; and whether that
+        is certain. None if there is no such factor."""
+        while True:
+            falls = np.flatnonzero(self.attracts[:-1] & ~self.attracts[1:])
+            falls = falls[falls >= here] if above else falls[falls < here]
+            if not falls.size:
+                return None
+            at = int(falls[-1])
+            try:
+                end = self.outward.end(float(self.factors[at]), tuple(self.motions[at]), float(self.factors[at + 1]))
+            except Beyond:
+                self.attracts[at + 1 :] = True
+                continue
+            passed = (self.factors > self.factors[at]) & (self.factors <= end.inside)
+            self.attracts |= passed
+            quiet = np.flatnonzero(self.factors > end.inside)
+            hunts = quiet[self.attracts[quiet]]
+            upper = quiet[quiet < hunts[0]] if hunts.size else quiet
+            return at, end, bool(end.certain and self.known[upper].all())
 
-    @property
-    def may_flip(self) -> bool:
-        """Whether what attracts at the lower factor is a cycle that goes towards a flip."""
-        cycles = [motion.cycles for motion in self.inside.motions]
-        return any(cycle is not None and cycle.swings == simplest(cycle.sign) for cycle in cycles)
-
-
-def _nearest(flat: Mapping[str, Any], factors: np.ndarray, attracting: bool) -> _Edge | str | None:
-    """The edge before the first of some factors, descending, at which something attracts; None if that is the first
-    one, or there is none; "missed" if that contradicts what is known of the stage itself, at the factor 1."""
-    told = True
-    for start in range(0, len(factors), AT_ONCE):
-        part = factors[max(start - 1, 0) : start + AT_ONCE]
-        known = _known(flat, part)
-        attract = np.flatnonzero(known.attracts)
-        told &= bool(known.known[: attract[0] if attract.size else None].all())
-        if attract.size and attract[0]:
-            edge = _Edge(flat, part, known, int(attract[0]), int(attract[0]) - 1)
-            edge.certain &= told
-            return edge
-        if attract.size:
-            return None if attracting else "missed"
-    return "missed" if attracting else None
-
-
-@np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
-def _known(flat: Mapping[str, Any], factors: np.ndarray, tried: np.ndarray | None = None) -> Attractors:
-    return attractors(Ensemble.held(faster(flat, factors), len(factors)), tried=tried)
+    def windows(self) -> list[Window]:
+        """All windows of factors in which something attracts."""
+        ends = np.flatnonzero(np.diff(self.attracts.astype(int), prepend=0, append=0))
+        last = len(self.factors) - 1
+        return [
+            Window(
+                None if first == 0 else float(self.factors[first - 1]),
+                None if after > last else float(self.factors[after]),
+            )
+            for first, after in zip(ends[::2], ends[1::2], strict=True)
+        ]
 
 
-@np.errstate(all="ignore")
-def _cycles(flat: Mapping[str, Any], factors: np.ndarray) -> Cycles:
-    return hunting_cycles(Ensemble.held(faster(flat, factors), len(factors)))
-
-
-def _located(flat: Mapping[str, Any], edge: _Edge) -> tuple[float, bool]:
-    """The factor at the edge, and whether it is certain: where a cycle flips, if nothing else attracts just above; else
-    as far as motions were followed, which may end sooner than what attracts does."""
-    flip = _flip(flat, edge.low, edge.high) if edge.may_flip else None
-    if flip is not None:
-        if flip * ABOVE < edge.high:
-            edge.narrow(np.array([flip * ABOVE]))
-        if edge.low < flip * ABOVE:
-            return flip, edge.certain
-    for _ in range(ROUNDS):
-        edge.narrow(edge.between(FINER))
-    return float(np.sqrt(edge.low * edge.high)), False
-
-
-def _flip(flat: Mapping[str, Any], low: float, high: float) -> float | None:
-    """The factor between two at which the cycle that attracts at the lower one begins to repel, from the multipliers in
-    between (where a limiter chatters, from a curve through them); None if it does not."""
-    chatters = Ensemble.held(flat, 1).chatters
-    for last in (False, True):
-        factors = np.geomspace(low, high, CHATTERING if chatters else NEARER + 2)
-        cycles = _cycles(flat, factors)
-        there = np.flatnonzero(cycles.found)
-        off, places = np.abs(cycles.multiplier) - 1, np.log(factors / low)
-        attract = there[off[there] < 0]
-        beyond = there[(off[there] >= 0) & (there > attract.max(initial=-1))]
-        if not attract.size or not beyond.size:
-            return None
-        a, b = attract[-1], beyond[0]
-        if chatters and there.size >= ENOUGH:
-            roots = np.roots(np.polyfit(places[there], off[there], 3))
-            real = roots.real[np.abs(roots.imag) < 1e-9]
-            inside = real[(real >= 0) & (real <= places[-1])]
-            return float(low * np.exp(inside.max())) if inside.size else None
-        if last:
-            return float(factors[a] * (factors[b] / factors[a]) ** (-off[a] / (off[b] - off[a])))
-        low, high = float(factors[a]), float(factors[b])
-    return None
+def _holds(window: Window, factor: float) -> bool:
+    return (window.low or 0.0) < factor < (window.high or np.inf)

@@ -21,9 +21,9 @@ from friso.hunting.attractors.rounds import loose_from
 from friso.hunting.basin import Kick, MoveShare, displacements, ends_in, moves, pushes
 from friso.hunting.criteria import COUNTED_ABOVE, Verdict, lasts, verdicts
 from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.cycle.hunting import Cycle, Hunting, Swing, cannot_hunt, hunting, why_not
+from friso.hunting.cycle.hunting import REACHED, Cycle, Hunting, Swing, cannot_hunt, hunting, why_not
 from friso.hunting.cycle.rest import wait
-from friso.hunting.margin import Margin, margin
+from friso.hunting.margin import NOT_SOUGHT, Margin, Window, searched
 from friso.hunting.measures import Measures, measure, options
 from friso.stage import Stage
 
@@ -43,10 +43,12 @@ class Judgement:
     """The verdict (see `friso.hunting.criteria.stage_verdict`) and what it rests on.
 
     `displacement`, `push` and `moves` tell what starts hunting, where there is a cycle that attracts; `margin` the edge
-    of hunting nearest in bandwidth; `settled_after` the time [s] after the last corner of the reference from which on
-    this motion stays within 10 um, up to the time for which it was `followed` [s] (None: no longer than its own end).
-    `observed`: what attracts was observed in long simulations, no orbit that attracts could be closed. `lasting` [m],
-    peak to peak, is where this motion alone was seen to swing on, at the end of the time for which it was followed.
+    of hunting in bandwidth, `windows` where else something attracts, and `lower` the next factor of the bandwidth below
+    1 at which nothing attracts a stage that hunts (None: none was found); `settled_after` the time [s] after the last
+    corner of the reference from which on this motion stays within 10 um, up to the time for which it was `followed` [s]
+    (None: no longer than its own end). `observed`: what attracts was observed in long simulations, no orbit that
+    attracts could be closed. `lasting` [m], peak to peak, is where this motion alone was seen to swing on, at the end
+    of the time for which it was followed.
     """
 
     verdict: Verdict
@@ -55,6 +57,8 @@ class Judgement:
     push: Kick | None = None
     moves: MoveShare | None = None
     margin: Margin | None = None
+    windows: tuple[Window, ...] = ()
+    lower: float | None = None
     settled_after: float | None = None
     followed: float | None = None
     observed: bool = False
@@ -104,13 +108,16 @@ def judge(stage: Stage, ran: Measures, rtol: float) -> Judgement:
         return _with_a_target(stage, motions, known, known.target)
     rest = _rest(flat, motions, 1, options(rtol), possible=known.possible)
     observed = bool(rest.steady[0])
+    sought = searched(stage, False, known.surveyed) if known.possible and not observed else NOT_SOUGHT
+    if sought.contradicts:
+        known = replace(known, certain=False, reason=REACHED)
     after = float(rest.after[0]) if np.isfinite(rest.after[0]) else None
-    edge = margin(stage, attracting=False) if known.possible and not observed else None
     word = verdicts(motions.completed, rest.steady, rest.steady, rest.rests)[0]
     return Judgement(
         word,
         known,
-        margin=edge,
+        margin=_as_sure(sought.margin, known),
+        windows=sought.windows,
         settled_after=after,
         followed=float(rest.followed[0]) if np.isfinite(rest.followed[0]) else None,
         observed=observed,
@@ -122,17 +129,24 @@ def _with_a_target(stage: Stage, motions: Motions, known: Hunting, target: Targe
     ends, completed = ends_in(stage.flat(), 1, target)
     if not completed[0]:
         return Judgement("failed", known)
-    within = float(motions.settling[0])
+    within, sought = float(motions.settling[0]), searched(stage, True, known.surveyed)
     return Judgement(
         verdicts(completed, np.ones(1, bool), ends, np.zeros(1, bool))[0],
         known,
         displacements(stage, target),
         pushes(stage, target),
         moves(stage, target),
-        margin(stage, attracting=True),
+        _as_sure(sought.margin, known),
+        sought.windows,
+        sought.lower,
         None if ends[0] or not np.isfinite(within) else within,
         observed=not known.attracting,
     )
+
+
+def _as_sure(edge: Margin | None, known: Hunting) -> Margin | None:
+    """An edge is not more certain than the verdict."""
+    return edge and replace(edge, certain=edge.certain and known.certain)
 
 
 def _keeps_moving(flat: Mapping[str, Any]) -> bool:

@@ -18,6 +18,10 @@ than that it creeps home, farther off it does not stick."""
 FEW = np.geomspace(0.01, 3.0, 48), np.geomspace(5.0, 300.0, 6)
 """The same for many stages at once."""
 
+LIMITED = np.geomspace(500.0, 30000.0, 8)
+"""Distances beyond these, in the same units, for stages with a force limit: cycles that it drives are as large as the
+limit moves the masses in the time in which the integrator unwinds."""
+
 PUSHES = np.geomspace(0.03, 300.0, 12)
 """Velocities of stages at their reference, in units of what deflects the loop by as much."""
 
@@ -45,7 +49,8 @@ class Starts:
     def spread(self, thorough: bool) -> None:
         """Stuck at distances on both sides (on one of symmetric stages), and pushed."""
         near, far = MANY if thorough else FEW
-        units = np.concatenate([near, far])
+        limited = (controller := self.stages.structure.controller) is not None and controller.anti_windup is not None
+        units = np.concatenate([near, far, *([LIMITED] if limited else [])])
         for side in (1.0, -1.0):
             which = np.arange(self.stages.count) if side > 0 else np.flatnonzero(~self.stages.symmetric)
             if which.size:

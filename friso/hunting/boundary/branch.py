@@ -6,6 +6,7 @@ chapter 10. The line is measured by a place (0 to 1) and the cycle by the distan
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,6 +34,9 @@ SMOOTH, STEEP = 0.25, 3.0
 
 END_OF_RANGE = "end of the range"
 """How a branch ends that has been followed to the end."""
+
+REACHED = "it was followed as far as was asked"
+"""How one ends that was followed until something happened."""
 
 TURN = 0.3
 """Largest change of direction [rad] from one step to the next."""
@@ -73,10 +77,13 @@ class Branch:
 
 
 class Tracer:
-    """Follows one cycle along a line of stages (a family of one), from place 0 to the farthest."""
+    """Follows one cycle along a line of stages (a family of one), from place 0 to the farthest; `sign` and `swings` are
+    those of the cycle (the latter only if they are not as few as there may be)."""
 
-    def __init__(self, family: Family, sign: float, rtol: float = RTOL, farthest: float = 1.0) -> None:
-        self.family, self.sign, self.rtol, self.farthest = family, sign, rtol, farthest
+    def __init__(
+        self, family: Family, sign: float, rtol: float = RTOL, farthest: float = 1.0, swings: int | None = None
+    ) -> None:
+        self.family, self.sign, self.rtol, self.farthest, self.swings = family, sign, rtol, farthest, swings
 
     def solve(self, near: Point, target: np.ndarray, normal: np.ndarray) -> Point | None:
         """The cycle on the plane through a target (place, log distance, log time) with this normal, found from a cycle
@@ -84,7 +91,7 @@ class Tracer:
         border = Border(normal[None, :], np.array([normal @ target]))
         states = near.cycle.states * np.exp(target[1] - near.distance)
         times = near.cycle.orbits.times * np.exp(target[2] - near.time)
-        orbits, places = close_along(self.family, states, times, target[:1], border, self.sign, self.rtol)
+        orbits, places = close_along(self.family, states, times, target[:1], border, self.sign, self.rtol, self.swings)
         if not orbits.closed[0]:
             return None
         stages = self.family(np.zeros(1, np.int64), places)
@@ -93,8 +100,9 @@ class Tracer:
             return None
         return Point.of(stages, float(places[0]), cycle)
 
-    def walk(self, start: Point, ahead: float) -> tuple[list[Point], str]:
-        """The points that follow the start on one side, and how they end; `ahead` is 1 or -1."""
+    def walk(self, start: Point, ahead: float, until: Callable[[Point], bool] | None = None) -> tuple[list[Point], str]:
+        """The points that follow the start on one side, and how they end; `ahead` is 1 or -1. The first point of which
+        `until` holds is the last, and asymmetric cycles are then followed on where they meet the symmetric one."""
         points, direction, step = [start], np.array([ahead, 0.0, 0.0]), FIRST
         while len(points) <= MOST:
             last = points[-1]
@@ -116,9 +124,11 @@ class Tracer:
                 continue
             if not 0 <= point.place <= self.farthest:
                 return [*points[1:], *self._at_the_end(last, point)], END_OF_RANGE
-            if self._is_mirrored(start, point):
+            if until is None and self._is_mirrored(start, point):
                 return points[1:], "it meets the symmetric cycle"
             points.append(point)
+            if until is not None and until(point):
+                return points[1:], REACHED
             step = min(1.5 * step, LONGEST)
             if reason := self._stop(point):
                 return points[1:], reason

@@ -56,10 +56,31 @@ def _complex(point: Point) -> bool:
 
 
 def located(tracer: Tracer, first: Point, second: Point, kind: Kind) -> LocatedPoint | None:
-    """The point between two neighbours on a branch at which it happens; None if it cannot be reached."""
+    """The point between two neighbours on a branch at which it happens, with its error; None if it is not reached."""
+    direction = _towards(first, second)
+    met = _enclosed(tracer, first, second, kind, PRECISE)
+    if met is None:
+        return None
+    along = min(met, key=lambda place: abs(distance_to(kind, met[place])))
+    return _special_point(tracer, kind, met[along], direction, _slope(kind, met))
+
+
+def last_inside(tracer: Tracer, first: Point, second: Point, kind: Kind, precise: float) -> Point:
+    """Of the points between two neighbours on a branch that still attract, the one nearest to where it happens, to so
+    much along the branch; the first where no other can be reached."""
+    met = _enclosed(tracer, first, second, kind, precise) or {0.0: first}
+    return met[max(place for place, point in met.items() if abs(point.multiplier) < 1)]
+
+
+def _towards(first: Point, second: Point) -> np.ndarray:
     direction = second.vector - first.vector
-    length = float(np.linalg.norm(direction))
-    direction = direction / length
+    return direction / np.linalg.norm(direction)
+
+
+def _enclosed(tracer: Tracer, first: Point, second: Point, kind: Kind, precise: float) -> dict[float, Point] | None:
+    """The points between two neighbours that the search for where it happens has met, by their places along the branch;
+    None if one of them cannot be reached."""
+    direction, length = _towards(first, second), float(np.linalg.norm(second.vector - first.vector))
     met: dict[float, Point] = {0.0: first, length: second}
 
     def off(along: float) -> float:
@@ -72,11 +93,11 @@ def located(tracer: Tracer, first: Point, second: Point, kind: Kind) -> LocatedP
         return distance_to(kind, met[along])
 
     try:
-        along = float(brentq(off, 0.0, length, xtol=PRECISE, maxiter=TRIES))  # type: ignore[arg-type]
+        along = float(brentq(off, 0.0, length, xtol=precise, maxiter=TRIES))  # type: ignore[arg-type]
         off(along)
     except (Unreached, RuntimeError):
         return None
-    return _special_point(tracer, kind, met[along], direction, _slope(kind, met))
+    return met
 
 
 class Unreached(Exception):

@@ -12,7 +12,7 @@ from friso.engine.kernel import Wanted, kernels
 from friso.engine.simulate import output_variables, time_axis
 from friso.engine.tolerance import checked_rtol
 from friso.equations.structure import Structure, structure
-from friso.hunting.attractors import Target, attractors
+from friso.hunting.attractors import Attractors, Target, attractors
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import ROUGH, RTOL, Cycles, time_constant
 from friso.hunting.cycle.multipliers import returns_of, slopes
@@ -35,6 +35,9 @@ is looked for."""
 
 FLIPS = "whether the stage hunts depends on the tolerance of the simulation, a hundredth of which decided"
 """The same where simulations contradict each other."""
+
+REACHED = "a cycle that attracts at another bandwidth could be followed to this one, but was not found here"
+"""The same where the search through the bandwidths contradicts the survey of the stage itself."""
 
 SAMPLES = 2000
 """Sampling intervals in a period of the trace."""
@@ -92,8 +95,8 @@ class Hunting:
     """What there is to know of a stage's hunting: its `cycles`, those that attract first, or the `reason` why there are
     none, or why it is not `certain` what attracts (if simulations that had to decide failed or were stopped); the
     return map, of a stage that sticks on the positive side (None where a stage cannot hunt at all); swings that were
-    `observed` and are none of the cycles; and what motions end in that do not come to rest, the `target` (None where
-    nothing attracts)."""
+    `observed` and are none of the cycles; what motions end in that do not come to rest, the `target` (None where
+    nothing attracts); and all of this as it was `surveyed`."""
 
     cycles: tuple[Cycle, ...]
     reason: str
@@ -101,6 +104,7 @@ class Hunting:
     returns: ReturnMap | None
     observed: tuple[Swing, ...] = ()
     target: Target | None = None
+    surveyed: Attractors | None = None
 
     @property
     def attracting(self) -> tuple[Cycle, ...]:
@@ -153,6 +157,7 @@ def hunting(stage: Stage, rtol: float = RTOL) -> Hunting:
         returns=return_map(stages, ROUGH),
         observed=tuple(Swing(m.amplitude, m.period, bool(m.time == m.time)) for m in known.motions if not m.cycles),
         target=known.target.of(0) if known.motions else None,
+        surveyed=known,
     )
 
 

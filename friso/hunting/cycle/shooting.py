@@ -116,13 +116,15 @@ def close_along(
     border: Border,
     sign: float,
     rtol: float,
+    swings: int | None = None,
 ) -> tuple[Orbits, np.ndarray]:
     """Close orbits as `close` does, from states and times [s], their stages being free to change their places so that
     each comes to lie on its border; orbits and places. Goes round folds, at which there is no orbit at a place beyond.
     """
     following = _Following(family, states, times, sign, rtol, places)
     following.border = border
-    return _solved(following).orbits, following.best_places
+    orbits = _solved(following).orbits
+    return replace(orbits, swings=swings or orbits.swings), following.best_places
 
 
 _S = TypeVar("_S", bound="_Shooting")

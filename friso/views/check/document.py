@@ -39,6 +39,8 @@ def _case(case: Case) -> dict[str, Any]:
         "reason": judgement.hunting.reason or None,
         "settled_after_s": judgement.settled_after,
         "margin": _margin(judgement.margin) if judgement.margin else None,
+        "windows": [{"low_factor": window.low, "high_factor": window.high} for window in judgement.windows],
+        "settles_below_factor": judgement.lower,
         "kick": _kick(judgement),
         "moves": {"drawn": judgement.moves.count, "hunting": judgement.moves.hunting} if judgement.moves else None,
         "observed": judgement.observed,
@@ -79,7 +81,8 @@ def _kick(judgement: Judgement) -> dict[str, Any] | None:
 
 
 def _margin(edge: Margin) -> dict[str, Any]:
-    return {"factor": edge.factor, "crossover_hz": edge.crossover, "certain": edge.certain}
+    crossover = {"factor": edge.factor, "crossover_hz": edge.crossover, "certain": edge.certain}
+    return {**crossover, "settles_at_factor": edge.quiet}
 
 
 def draws_document(draws: Draws, case: str) -> dict[str, Any]:

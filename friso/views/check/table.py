@@ -61,11 +61,18 @@ def _observed(case: Case) -> str:
     )
 
 
+def _verdict(case: Case) -> str:
+    return case.verdict if case.judgement.hunting.certain else f"{case.verdict} (not certain)"
+
+
 def _edge(case: Case) -> str:
     edge = case.judgement.margin
     if edge is None:
         return NOTHING
-    return f"{edge.factor:.3g} × as fast" if edge.crossover is None else with_unit(edge.crossover, "Hz")
+    own = edge.crossover / edge.factor if edge.crossover else None
+    ends = [edge.factor] if edge.certain else [edge.factor, edge.quiet]
+    texts = [f"{end:.3g} × as fast" if own is None else with_unit(own * end, "Hz", 4) for end in ends]
+    return texts[0] if edge.certain else f"between {' and '.join(texts)} (not certain)"
 
 
 def _kicks(kick: Kick | None, unit: str) -> str:
@@ -114,7 +121,7 @@ def _settled_within(band: float) -> Callable[[Case], str]:
 
 
 _COLUMNS: dict[str, Callable[[Case], str]] = {
-    "Verdict": lambda case: case.verdict,
+    "Verdict": _verdict,
     "Hunting cycle, amplitude": _of_the_cycle(_amplitude),
     "Hunting cycle, period": _of_the_cycle(lambda cycle: with_unit(cycle.period, "s", 4)),
     "Hunting multiplier": _of_the_cycle(_multiplier),

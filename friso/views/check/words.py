@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
+from friso.equations.bandwidth import bandwidth
 from friso.hunting.basin import SHARES
-from friso.hunting.margin import FARTHEST
+from friso.hunting.margin import FARTHEST, STEPS
 from friso.views.check.cases import BANDS, ShownCase, shown_cases
-from friso.views.drawing.prefixes import listed, plus_minus, with_unit
+from friso.views.drawing.prefixes import listed, plus_minus, rounded_down, rounded_up, with_unit
 
 if TYPE_CHECKING:
-    from friso.hunting import Case, Margin
+    from friso.hunting import Case, Kick, Margin
 
 _MICRON, _TEN_MICRON = BANDS
 
@@ -66,13 +67,13 @@ def _hunting(case: Case) -> str:
     seen = "This was observed in long simulations: no orbit that attracts could be closed."
     if case.judgement.swing:
         return f"hunts, {_swing(case)}. {seen}"
-    known = case.judgement
-    return f"hunts, still {with_unit(known.lasting, 'm')} peak to peak after {with_unit(known.followed, 's')}. {seen}"
+    judgement = case.judgement
+    return f"hunts, still {with_unit(judgement.lasting, 'm')} peak to peak after {with_unit(judgement.followed, 's')}. {seen}"
 
 
 def _bistable(case: Case) -> str:
     kicks = (("displacement", case.judgement.displacement, "m"), ("push", case.judgement.push, "m/s"))
-    starts = [f"a {name} of {with_unit(kick.smallest, unit)}" for name, kick, unit in kicks if kick and kick.smallest]
+    starts = [_kick(name, kick, unit) for name, kick, unit in kicks if kick and kick.windows]
     if (moves := case.judgement.moves) and moves.hunting:
         like = f"like this one, {SHARES[0]:g} to {SHARES[1]:g} times its acceleration and time"
         starts.append(f"{100 * moves.fraction:.0f} % of the moves tried ({like})")
@@ -82,16 +83,24 @@ def _bistable(case: Case) -> str:
     return f"settles after this move, but {listed(starts, 'or')} can start hunting, {_swing(case)}{seen}."
 
 
+def _kick(name: str, kick: Kick, unit: str) -> str:
+    """The smallest kick that starts hunting, or that was tried."""
+    least = kick.windows[0][0]
+    return f"a {name} of {with_unit(least, unit)}{', the smallest tried,' if least == kick.searched[0] else ''}"
+
+
 def _transient(case: Case) -> str:
     judgement, end = case.judgement, _end(case)
     if not judgement.hunting.possible:
         return f"cannot hunt, because {judgement.hunting.reason}; but this motion has not settled at its end ({end})."
-    says = [f"transient: no cycle attracts, but this motion has not settled at its end ({end})."]
+    attracts = "no cycle attracts" if judgement.hunting.certain else "no cycle was found that attracts"
+    says = [f"transient: {attracts}, but this motion has not settled at its end ({end})."]
     if judgement.cycle:
         says.append(f"Transients change slowly, by a factor of e in {with_unit(judgement.cycle.time_constant, 's')}.")
     if judgement.settled_after is None:
-        followed = with_unit(judgement.followed, "s")
-        says.append(f"It does not settle to within {BANDS[_TEN_MICRON]} in {followed} either.")
+        says.append(
+            f"It does not settle to within {BANDS[_TEN_MICRON]} in {with_unit(judgement.followed, 's')} either."
+        )
     else:
         says.append(f"It settles to within {BANDS[_TEN_MICRON]} in {with_unit(judgement.settled_after, 's')}.")
     return " ".join(says)
@@ -123,40 +132,70 @@ def _outlook(case: Case) -> list[str]:
     judgement = case.judgement
     says: list[str] = []
     if judgement.margin:
-        least = "" if judgement.margin.certain else "at least "
-        says.append(f"Hunting is possible {least}{_below(judgement.margin)}.")
+        says.append(f"Hunting is possible {_below(case, judgement.margin)}.")
     elif judgement.hunting.possible:
         says.append(f"No hunting was found down to 1/{FARTHEST:g} of this bandwidth.")
-    return says
+    return [*says, *_windows(case)]
 
 
-def _below(edge: Margin) -> str:
-    if edge.crossover is None:
-        return f"with a controller more than {1 / edge.factor:.3g} times slower"
-    return f"below {with_unit(edge.crossover, 'Hz')}"
+def _below(case: Case, edge: Margin) -> str:
+    """Up to where hunting is possible, rounded upward."""
+    inside, quiet = _bandwidth(case, edge.factor), _bandwidth(case, edge.quiet)
+    if edge.certain:
+        return f"below {inside}"
+    return f"up to somewhere between {_bandwidth(case, edge.factor, up=False)}, where it was found, and {quiet}"
+
+
+def _bandwidth(case: Case, factor: float, up: bool = True) -> str:
+    """A bandwidth that is a factor of that of the case."""
+    own = bandwidth(case.stage.flat())
+    value = (rounded_up if up else rounded_down)(factor * (own or 1.0))
+    return f"{value:.3g} times this bandwidth" if own is None else with_unit(value, "Hz")
+
+
+def _windows(case: Case) -> list[str]:
+    """Where else in bandwidth something attracts."""
+    places = []
+    for window in case.judgement.windows:
+        low = None if window.low is None else _bandwidth(case, window.low, up=False)
+        high = None if window.high is None else _bandwidth(case, window.high)
+        if low and high:
+            places.append(f"between {low} and {high}")
+        elif low or high:
+            places.append(f"above {low}" if low else f"below {high}")
+    if not places:
+        return []
+    step = 100 * (FARTHEST ** (1 / STEPS) - 1)
+    return [f"Hunting is possible again {listed(places, 'and')} (tried in steps of {step:.0f} % and more)."]
 
 
 def _remedy(item: ShownCase, cases: Mapping[str, Case]) -> list[str]:
     """What keeps a case from hunting."""
     judgement = item.case.judgement
     ways = [_faster(item.case, judgement.margin)] if judgement.margin else []
+    ways += [f"lower the bandwidth to {_bandwidth(item.case, judgement.lower, up=False)}"] if judgement.lower else []
     ways += ["free the joint"] if _freeing_helps(item, cases) else []
     says = [f"{ways[0][0].upper()}{listed(ways, 'or')[1:]}."] if ways else []
-    if judgement.margin or judgement.hunting.target is None:
+    if judgement.margin:
+        return [*says, *_windows(item.case)]
+    if judgement.hunting.target is None:
         return says
     return [f"Hunting is still possible at {FARTHEST:g} times this bandwidth.", *says]
 
 
 def _faster(case: Case, edge: Margin) -> str:
+    """What to do to the controller so that the stage settles: to a bandwidth at which it was found to."""
     controller = case.stage.controller
+    doubt = "" if edge.certain else f" (not certain: hunting was found up to {_bandwidth(case, edge.factor, up=False)})"
     if edge.crossover is not None:
-        more = edge.crossover * (1 - 1 / edge.factor)
-        about = "" if edge.certain else "about "
-        by, to = with_unit(more, "Hz"), with_unit(edge.crossover, "Hz")
-        return f"raise the {controller.bandwidth_name} by {about}{by} (to {to})"
+        own = edge.crossover / edge.factor
+        to = rounded_up(own * edge.quiet)
+        by = rounded_up(to - own)
+        return f"raise the {controller.bandwidth_name} by {with_unit(by, 'Hz')} (to {with_unit(to, 'Hz')}){doubt}"
+    factor = rounded_up(edge.quiet)
     powers = controller.speeds_up.items()
-    gains = [f"{name} × {edge.factor**power:.3g}" for name, power in powers if getattr(controller, name)]
-    return f"make the controller {edge.factor:.3g} times faster ({', '.join(gains)})"
+    gains = [f"{name} × {factor**power:.3g}" for name, power in powers if getattr(controller, name)]
+    return f"make the controller {factor:.3g} times faster ({', '.join(gains)}){doubt}"
 
 
 def _freeing_helps(item: ShownCase, cases: Mapping[str, Case]) -> bool:

@@ -59,6 +59,18 @@ def with_unit(value: float | None, unit: str, digits: int = 3) -> str:
     return f"{number:.{digits - 1}e} {text}"
 
 
+def rounded_up(value: float, digits: int = 3) -> float:
+    """A positive value rounded to so many significant digits, never downward."""
+    unit = 10.0 ** (math.floor(math.log10(value) + 1e-12) - digits + 1)
+    return math.ceil(value / unit - 1e-9) * unit
+
+
+def rounded_down(value: float, digits: int = 3) -> float:
+    """A positive value rounded to so many significant digits, never upward."""
+    unit = 10.0 ** (math.floor(math.log10(value) + 1e-12) - digits + 1)
+    return math.floor(value / unit + 1e-9) * unit
+
+
 def range_with_unit(low: float, high: float, unit: str, digits: int = 3) -> str:
     """A range [unit] for a table or a sentence, e.g. "1.72 to 10.8 mm"; a wide one has two prefixes."""
     factor, text = choose(np.array([low, high]), unit)

@@ -1,0 +1,176 @@
+"""Where attraction ends: closed orbits followed through the bandwidth to their own ends, one after the other, until
+nothing attracts just beyond."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from friso.equations.bandwidth import faster
+from friso.hunting.attractors import Attractors, attractors
+from friso.hunting.attractors.survey import Swinging
+from friso.hunting.boundary.branch import REACHED, Point, Tracer
+from friso.hunting.boundary.locate import Kind, changes, last_inside
+from friso.hunting.cycle.ensemble import Ensemble
+from friso.hunting.cycle.find import hunting_cycles
+from friso.hunting.cycle.shooting import simplest
+
+SCALE = 0.06
+"""Change of the logarithm of the bandwidth that counts as much as one of the logarithms of distance and time."""
+
+PRECISE = 1e-5
+"""Step along a branch that ends the search for its end."""
+
+BEYOND, CHATTERING = 1.005, 1.01
+"""How far beyond the end of an orbit nothing may attract, as a factor; the same where a limiter chatters, which makes
+multipliers rough."""
+
+SPREAD, ENOUGH = 9, 6
+"""Cycles of a stage whose limiter chatters through whose multipliers a curve is laid, and how many of these have to be
+known."""
+
+HOPS = 8
+"""Orbits that are followed one after the other at most: beyond the end of one another may attract."""
+
+ALONG = 1 + np.array([-0.08, -0.04, -0.02, -0.01, -0.005, -0.0025, 0.0, 0.0025, 0.005, 0.01, 0.02, 0.04, 0.08])
+"""Distances from which a motion is followed from one bandwidth to the next, in units of its own."""
+
+FINER = 4
+"""Bandwidths between the two that enclose the end at which is simulated where no orbit can be followed."""
+
+
+@dataclass(frozen=True)
+class End:
+    """Two factors of the bandwidth: something attracts at `inside`, nothing does at `outside`. It is `certain` where an
+    orbit was followed to its end at `inside`, and simulations at `outside` all settled."""
+
+    inside: float
+    outside: float
+    certain: bool
+
+
+class Beyond(Exception):
+    """What attracts was followed to the end of the range of bandwidths."""
+
+
+@dataclass(frozen=True)
+class Outward:
+    """The search for the end of what attracts a stage, given as flat keys, from a bandwidth towards the `farthest` one
+    (factors)."""
+
+    flat: Mapping[str, Any]
+    farthest: float
+
+    def end(self, at: float, motions: tuple[Swinging, ...], outside: float) -> End:
+        """The end of what attracts: these motions do at a factor, nothing does at the one `outside`. Raises Beyond
+        where orbits attract as far as the search goes."""
+        chatters = Ensemble.held(self.flat, 1).chatters
+        beyond = CHATTERING if chatters else BEYOND
+        for _ in range(HOPS):
+            orbit = next((motion for motion in motions if motion.cycles is not None), None)
+            if orbit is None:
+                at, motions, outside = self._simulated(at, motions, outside)
+                if outside / at < beyond and at / outside < beyond:
+                    break
+                continue
+            flip = self._flip(at, outside) if chatters and _is_simple(orbit) else None
+            at, distance = (flip, orbit.distance) if flip else self._followed(at, orbit)
+            next_to = at * beyond ** self._ahead(at)
+            seen = self.surveyed(np.array([next_to]), ALONG * distance)
+            if not seen.attracts[0]:
+                return End(at, next_to, bool(seen.known[0]))
+            at, motions = next_to, seen.motions
+        return End(at, outside, False)
+
+    @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
+    def surveyed(self, factors: np.ndarray, distances: np.ndarray | None = None) -> Attractors:
+        """What attracts at some factors, tried from distances [m] as well."""
+        tried = None if distances is None else np.tile(distances, (len(factors), 1))
+        return attractors(self._stages(factors), tried=tried)
+
+    def _stages(self, factors: np.ndarray) -> Ensemble:
+        return Ensemble.held(faster(self.flat, factors), len(factors))
+
+    def _ahead(self, at: float) -> float:
+        return 1.0 if self.farthest >= at else -1.0
+
+    @np.errstate(all="ignore")
+    def _followed(self, at: float, orbit: Swinging) -> tuple[float, float]:
+        """The last factor at which a closed orbit attracts, and the distance [m] at which the stage sticks there."""
+        ahead, cycles = self._ahead(at), orbit.cycles
+        assert cycles is not None
+
+        def family(_: np.ndarray, places: np.ndarray) -> Ensemble:
+            return self._stages(at * np.exp(ahead * SCALE * places))
+
+        length = abs(float(np.log(self.farthest / at))) / SCALE
+        tracer = Tracer(family, cycles.sign, farthest=length, swings=cycles.swings)
+        start = Point.of(family(np.zeros(1), np.zeros(1)), 0.0, cycles.take(np.array([orbit.number])))
+        farthest = start
+
+        def over(point: Point) -> bool:
+            nonlocal farthest
+            ended = not abs(point.multiplier) < 1 or point.place <= farthest.place
+            farthest = farthest if ended else point
+            return ended
+
+        points, reason = tracer.walk(start, 1.0, over)
+        if reason == REACHED:
+            first, second = ([start, *points])[-2:]
+            if not abs(second.multiplier) < 1:
+                last = last_inside(tracer, first, second, _kind(first, second), PRECISE)
+                farthest = max(farthest, last, key=lambda point: point.place)
+        elif points and farthest.place >= length * (1 - 1e-9):
+            raise Beyond
+        return float(at * np.exp(ahead * SCALE * farthest.place)), orbit_distance(farthest, orbit)
+
+    @np.errstate(all="ignore")
+    def _flip(self, at: float, outside: float) -> float | None:
+        """The factor between two at which the simplest cycle begins to repel, from a curve through its multipliers in
+        between: each of them is rough where a limiter chatters. None if it does not, or too few are known."""
+        factors = np.geomspace(at, outside, SPREAD)
+        cycles = hunting_cycles(self._stages(factors))
+        there = np.flatnonzero(cycles.found)
+        if there.size < ENOUGH or not np.ptp(np.sign(np.abs(cycles.multiplier[there]) - 1)):
+            return None
+        places, off = np.linspace(0, 1, SPREAD)[there], np.abs(cycles.multiplier[there]) - 1
+        roots = np.roots(np.polyfit(places, off, 3))
+        real = roots.real[np.abs(roots.imag) < 1e-9]
+        inside = real[(real >= 0) & (real <= places[-1])]
+        return float(at * (outside / at) ** inside.max()) if inside.size else None
+
+    def _simulated(
+        self, at: float, motions: tuple[Swinging, ...], outside: float
+    ) -> tuple[float, tuple[Swinging, ...], float]:
+        """The last of some factors at which something attracts that simulations follow from motions at one, `at`, with
+        what it is, and the next one, at which nothing does. They may lose it before it ceases to attract."""
+        ahead = self._ahead(at)
+        farther = outside if ahead * (outside - at) > 0 else at * np.exp(ahead * SCALE)
+        factors = np.geomspace(at, farther, FINER + 2)[1:]
+        seen = self.surveyed(factors, np.outer([motion.distance for motion in motions], ALONG).ravel())
+        attract = np.flatnonzero(seen.attracts)
+        if not attract.size:
+            return at, motions, float(factors[0])
+        last = int(attract[-1])
+        beyond = float(factors[last + 1]) if last + 1 < len(factors) else farther * np.exp(ahead * SCALE)
+        if ahead * (beyond - self.farthest) > 0:
+            raise Beyond
+        return float(factors[last]), seen.take(attract[-1:]).motions, beyond
+
+
+def _is_simple(orbit: Swinging) -> bool:
+    return orbit.cycles is not None and orbit.cycles.swings == simplest(orbit.cycles.sign)
+
+
+def orbit_distance(point: Point, orbit: Swinging) -> float:
+    """The distance [m] at which a stage sticks on an orbit, on the side on which it was followed."""
+    return float(np.copysign(np.exp(point.distance), orbit.distance))
+
+
+def _kind(first: Point, second: Point) -> Kind:
+    """How the orbit ceases to attract from one point to the next, beyond which it repels."""
+    kinds = changes(first, second)
+    return kinds[0] if kinds else "torus"
