@@ -209,6 +209,8 @@ def round_a_fold() -> Diagram:
         (special,),
         np.linspace(0, 1, 3),
         cycles([-0.5, np.nan, np.inf]),
+        attracts=np.array([True, False, False]),
+        known=np.array([True, True, False]),
     )
 
 
@@ -249,8 +251,8 @@ def crossing() -> Plane:
     across = np.array([1.0, 0.0])
     spots = tuple(Spot(np.array([0.5, y]), found("flip", 0.0, -1), across) for y in (0.0, 0.5, 1.0))
     curve = Curve("flip", -1.0, spots, ("end of the range", "end of the range"))
-    known = cycles([-0.5, np.inf, -2])
-    return Plane(Space((STROKE, GAIN), dict), (curve,), 2, np.array([0, 1, 3]), known, (np.array([0.5, 0.25]),))
+    known = cycles([-0.5, np.inf, -2]), np.array([True, False, False]), np.array([True, False, True])
+    return Plane(Space((STROKE, GAIN), dict), (curve,), 2, np.array([0, 1, 3]), *known, (np.array([0.5, 0.25]),))
 
 
 def test_sentences_of_two_keys(crossing: Plane, snapshots: Snapshots) -> None:

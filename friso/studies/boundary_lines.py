@@ -15,7 +15,8 @@ Shape = Literal["symmetric", "asymmetric", "whole"]
 """A cycle that is its own mirror image; one that is not, of a stage that is; one of a stage that is not."""
 
 ATTRACTS, REPELS, UNKNOWN, INVALID = "attracting cycle", "no attracting cycle", "unknown", "invalid"
-"""The verdicts of a boundary: the last two where an orbit could not be closed, and where no stage may be."""
+"""The verdicts of a boundary, by everything that simulations from many starts end in: the last two where some of these
+failed or did not settle, and where no stage may be."""
 
 
 @dataclass(frozen=True)
@@ -114,14 +115,59 @@ def _values(space: Space, at: np.ndarray) -> np.ndarray:
     return np.stack(list(space.values(at).values()), axis=1)
 
 
+def place_verdicts(result: Diagram) -> list[str]:
+    """The verdicts at the stages evenly over the range, by simulations and by all branches that reach them."""
+    verdicts = _verdicts(result)
+    return [
+        ATTRACTS if _attracts_at(result, place) else verdict
+        for place, verdict in zip(result.places.tolist(), verdicts, strict=True)
+    ]
+
+
 def end_verdicts(result: Diagram) -> tuple[str, str]:
-    """The verdicts at both ends of the range, by all branches that reach them."""
-    verdict_at = dict(zip(result.places.tolist(), _verdicts(result.cycles), strict=True))
-    low, high = (
-        ATTRACTS if place in verdict_at and _attracts_at(result, place) else verdict_at.get(place, INVALID)
-        for place in (0.0, 1.0)
+    """The verdicts at both ends of the range."""
+    verdict_at = dict(zip(result.places.tolist(), place_verdicts(result), strict=True))
+    return verdict_at.get(0.0, INVALID), verdict_at.get(1.0, INVALID)
+
+
+class Change(NamedTuple):
+    """A change from stages that something attracts to such that nothing does, or back: whether hunting `begins` there
+    as the key rises, and the values [SI] between which it does; one value twice where a cycle that was followed ceases
+    to attract there, or begins to."""
+
+    begins: bool
+    low: float
+    high: float
+
+
+def changes_of(result: Diagram) -> list[Change]:
+    """Where hunting begins and ends over the range, in order."""
+    values = _values(result.space, result.places[:, None])[:, 0]
+    sure = [(value, word) for value, word in zip(values.tolist(), place_verdicts(result), strict=True)]
+    sure = [(value, word == ATTRACTS) for value, word in sure if word in (ATTRACTS, REPELS)]
+    turns = sorted(
+        (float(line.at[k, 0]), begins)
+        for line in lines(result)
+        for k in line.special
+        if (begins := begins_at(line, k)) is not None
     )
-    return low, high
+    changes = []
+    for (low, before), (high, after) in pairwise(sure):
+        if before != after:
+            inside = [value for value, begins in turns if begins == after and low <= value <= high]
+            at = (min(inside) if after else max(inside)) if inside else None
+            changes.append(Change(after, low if at is None else at, high if at is None else at))
+    return changes
+
+
+def begins_at(line: Line, k: int) -> bool | None:
+    """Whether a cycle begins to attract at a special point as the key rises; None if it attracts on both sides of the
+    point along its branch, or on neither."""
+    beside = [bool(0 <= j < len(line.attracts) and line.attracts[j]) for j in (k - 1, k)]
+    if beside[0] == beside[1]:
+        return None
+    other = k - 1 if beside[0] else k + 1
+    return bool(line.at[other, 0] > line.at[k, 0]) if 0 <= other < len(line.at) else None
 
 
 def _attracts_at(result: Diagram, place: float) -> bool:
@@ -134,7 +180,7 @@ def _attracts_at(result: Diagram, place: float) -> bool:
 def node_verdicts(result: Plane) -> list[tuple[float, float, str]]:
     """The values [SI] of both keys at every node of the grid, the first key the slowest, and the verdict there."""
     verdicts = np.full(result.nodes**2, INVALID, object)
-    verdicts[result.allowed] = _verdicts(result.cycles)
+    verdicts[result.allowed] = _verdicts(result)
     values = _values(result.space, result.space.grid(result.nodes)).tolist()
     return [(x, y, verdict) for (x, y), verdict in zip(values, verdicts.tolist(), strict=True)]
 
@@ -150,6 +196,6 @@ def lost_places(result: Plane) -> np.ndarray:
     return _values(result.space, np.reshape(result.lost, (-1, 2)))
 
 
-def _verdicts(cycles: Cycles) -> list[str]:
-    """The verdicts of stages by their hunting cycles."""
-    return np.select([cycles.attracting, cycles.uncertain], [ATTRACTS, UNKNOWN], REPELS).tolist()
+def _verdicts(result: Diagram | Plane) -> list[str]:
+    """The verdicts of stages by what simulations of them end in."""
+    return np.select([result.attracts, ~result.known], [ATTRACTS, UNKNOWN], REPELS).tolist()

@@ -7,6 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from friso.hunting.attractors import attractors
 from friso.hunting.boundary.branch import Branch, Point, Tracer
 from friso.hunting.boundary.locate import LocatedPoint, special_points
 from friso.hunting.boundary.space import Space
@@ -15,20 +16,26 @@ from friso.hunting.cycle.find import RTOL, Cycles, families
 SEEDS = 33
 """Stages over the range at which cycles are looked for."""
 
+OTHERS = 6
+"""Branches at most of cycles that simulations end in, beside those that the return maps suggest: where periods double
+again and again there is no end of them."""
+
 SAME = 0.02
 """Difference in the logarithm of distance up to which two cycles of one stage are the same."""
 
 
 @dataclass(frozen=True)
 class Diagram:
-    """Branches of cycles over the range of one key, the special points of each, and the hunting cycles found at stages
-    evenly over the range (their places)."""
+    """Branches of cycles over the range of one key, the special points of each, and, of stages evenly over the range
+    (their places), the hunting cycles, whether anything attracts, and whether that is known, shape (places,)."""
 
     space: Space
     branches: tuple[Branch, ...]
     special: tuple[tuple[LocatedPoint, ...], ...]
     places: np.ndarray
     cycles: Cycles
+    attracts: np.ndarray
+    known: np.ndarray
 
     def value(self, place: float) -> float:
         """The value of the key [SI] at a place."""
@@ -41,27 +48,41 @@ class Diagram:
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def diagram(space: Space, rtol: float = RTOL, seeds: int = SEEDS) -> Diagram:
-    """Follow every cycle that is found at stages evenly over the range: the symmetric one and asymmetric ones."""
+    """Follow every cycle that is found at stages evenly over the range: those that the return map suggests, the
+    symmetric one and asymmetric ones, and those that simulations end in, of any number of swings."""
     places = np.linspace(0, 1, seeds)
     places = places[space.allowed(places[:, None])]
     stages = space.stages(places[:, None])
-    sought = families(stages, rtol)
+    sought, surveyed = families(stages, rtol), attractors(stages, rtol=rtol)
     branches: list[Branch] = []
     special: list[tuple[LocatedPoint, ...]] = []
+
+    def follow(number: int, cycle: Cycles) -> bool:
+        start = Point.of(stages.take(np.array([number])), float(places[number]), cycle)
+        if any(_passes(branch, start) for branch in branches):
+            return False
+        line = space.lines(np.zeros((1, 1)), np.ones((1, 1)))
+        tracer = Tracer(line, cycle.sign, rtol, swings=cycle.swings)
+        branches.append(tracer.branch(start))
+        special.append(tuple(special_points(tracer, branches[-1])))
+        return True
+
     for cycles in sought:
-        tracer = Tracer(space.lines(np.zeros((1, 1)), np.ones((1, 1))), cycles.sign, rtol)
-        for k in np.flatnonzero(cycles.found)[:, None]:
-            start = Point.of(stages.take(k), float(places[k[0]]), cycles.take(k))
-            if not any(_passes(branch, start) for branch in branches):
-                branch = tracer.branch(start)
-                branches.append(branch)
-                special.append(tuple(special_points(tracer, branch)))
-    return Diagram(space, tuple(branches), tuple(special), places, sought[0])
+        for k in np.flatnonzero(cycles.found).tolist():
+            follow(k, cycles.take(np.array([k])))
+    others = 0
+    for motion in surveyed.motions:
+        if motion.cycles is not None and others < OTHERS:
+            others += follow(motion.stage, motion.cycles.take(np.array([motion.number])))
+    attracts = surveyed.attracts | sought[0].attracting
+    return Diagram(
+        space, tuple(branches), tuple(special), places, sought[0], attracts, surveyed.known | sought[0].attracting
+    )
 
 
 def _passes(branch: Branch, point: Point) -> bool:
     """Whether a branch passes through a cycle, or through its mirror image."""
-    if branch.sign != point.cycle.sign:
+    if (branch.sign, branch.points[0].cycle.swings) != (point.cycle.sign, point.cycle.swings):
         return False
     path = np.array([passed.vector for passed in branch.points])
     for first, second in pairwise(path):

@@ -8,6 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from friso.hunting.attractors import attractors
 from friso.hunting.boundary.branch import END_OF_RANGE, Point, Tracer
 from friso.hunting.boundary.curve import Curve, CurveTracer, Spot
 from friso.hunting.boundary.locate import changes, located
@@ -25,14 +26,16 @@ SAME = 0.2
 @dataclass(frozen=True)
 class Plane:
     """What was found in the box of two keys: the curves; the hunting cycles on those nodes of a grid, numbered in C
-    order with the first key along the first side, that are `allowed`; and where a change was seen that no curve could
-    be begun at, each shape (2,)."""
+    order with the first key along the first side, that are `allowed`; whether anything attracts the stages on these,
+    and whether that is known; and where a change was seen that no curve could be begun at, each shape (2,)."""
 
     space: Space
     curves: tuple[Curve, ...]
     nodes: int
     allowed: np.ndarray
     cycles: Cycles
+    attracts: np.ndarray
+    known: np.ndarray
     lost: tuple[np.ndarray, ...]
 
 
@@ -44,7 +47,9 @@ def plane(space: Space, rtol: float = RTOL, nodes: int = NODES) -> Plane:
     allowed = np.flatnonzero(space.allowed(points))
     curves: list[Curve] = []
     lost: list[np.ndarray] = []
-    hunting, searches = _searches(space.stages(points[allowed]), rtol)
+    stages = space.stages(points[allowed])
+    surveyed = attractors(stages, rtol=rtol)
+    hunting, searches = _searches(stages, rtol)
     for cycles, inside, outside in searches:
         new_curves: list[Curve] = []
         for a, b in _changes(_on_grid(allowed[inside], nodes), _on_grid(allowed[outside], nodes)):
@@ -60,7 +65,14 @@ def plane(space: Space, rtol: float = RTOL, nodes: int = NODES) -> Plane:
             else:
                 lost.append((points[a] + points[b]) / 2)
         curves += new_curves
-    return Plane(space, tuple(curves), nodes, allowed, hunting, tuple(lost))
+    attracts, known = surveyed.attracts | hunting.attracting, surveyed.known | hunting.attracting
+    sides = (_on_grid(allowed[known & which], nodes) for which in (attracts, ~attracts))
+    for a, b in _changes(*sides):  # of what attracts, whatever it is
+        middle = (points[a] + points[b]) / 2
+        known_lost = any(np.array_equal(middle, at) for at in lost)
+        if not known_lost and not any(_crossed(curve, points[a], points[b]) for curve in curves):
+            lost.append(middle)
+    return Plane(space, tuple(curves), nodes, allowed, hunting, attracts, known, tuple(lost))
 
 
 def _searches(stages: Ensemble, rtol: float) -> tuple[Cycles, list[tuple[Cycles, np.ndarray, np.ndarray]]]:

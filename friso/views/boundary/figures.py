@@ -8,7 +8,17 @@ from dataclasses import replace
 import numpy as np
 
 from friso.hunting.boundary import Diagram, KeyRange, Plane
-from friso.studies.boundary_lines import ATTRACTS, INVALID, REPELS, UNKNOWN, Line, Shape, lines, node_verdicts
+from friso.studies.boundary_lines import (
+    ATTRACTS,
+    INVALID,
+    REPELS,
+    UNKNOWN,
+    Line,
+    Shape,
+    lines,
+    lost_places,
+    node_verdicts,
+)
 from friso.views.boundary.words import BASIN, CYCLES, MEANINGS, ShownKey, end_sentence
 from friso.views.drawing.figure import (
     BLUE,
@@ -35,10 +45,13 @@ SYMBOLS: dict[str, Symbol] = {"flip": "circle", "fold": "triangle", "torus": "pa
 DASHES: dict[str, Dash] = {"flip": "solid", "fold": "dashed", "torus": "dotted"}
 NODES = {
     ATTRACTS: Kind("hunting is possible", VERMILLION),
-    REPELS: Kind("no cycle followed attracts", QUIET),
-    UNKNOWN: Kind("unknown (orbit not closed)", "#ffffff"),
+    REPELS: Kind("no hunting was found", QUIET),
+    UNKNOWN: Kind("unknown", "#ffffff"),
     INVALID: Kind("invalid stage", LIGHT),
 }
+
+LOST = "a change, no curve begun"
+"""What is said of places between stages that differ, where no curve could be begun."""
 
 REACH = 2.5
 """Multipliers up to which they are shown."""
@@ -123,7 +136,9 @@ def _plane(traced: Plane) -> Figure:
     kinds = dict.fromkeys(line.kinds[0] for line in curves)
     meanings = [f"Beyond a {kind} of a cycle, {MEANINGS[kind]}." for kind in kinds]
     note = " ".join([*meanings, BASIN] if any(line.shape == "asymmetric" for line in curves) else meanings)
-    return Figure("boundary", "Edge of hunting", note, (Panel("", x, y, series, clouds=(nodes,)),), note=note)
+    lost = lost_places(traced)
+    markers = (Markers(lost[:, 0], lost[:, 1], LOST, GREY, "cross"),) if len(lost) else ()
+    return Figure("boundary", "Edge of hunting", note, (Panel("", x, y, series, markers, clouds=(nodes,)),), note=note)
 
 
 def _axis(swept: KeyRange, margin: float = 0.0) -> Axis:

@@ -13,20 +13,23 @@ from friso.studies.boundary_lines import (
     INVALID,
     REPELS,
     UNKNOWN,
+    Change,
     Line,
     Shape,
+    changes_of,
     corner_verdicts,
     end_verdicts,
     lines,
     lost_places,
+    place_verdicts,
 )
 from friso.views.drawing.figure import Array
 from friso.views.drawing.prefixes import listed, plus_minus, pretty, with_unit
 
 VERDICTS = {
-    ATTRACTS: "hunting is possible (a cycle attracts)",
-    REPELS: "no hunting cycle that was followed attracts (friso check looks for others)",
-    UNKNOWN: "unknown (a cycle is expected, but its orbit could not be closed)",
+    ATTRACTS: "hunting is possible",
+    REPELS: "no hunting was found",
+    UNKNOWN: "unknown (some simulations failed, or had not settled when they were stopped)",
     INVALID: "not a valid stage",
 }
 CYCLES: dict[Shape, str] = {
@@ -89,26 +92,28 @@ def conclusion(traced: Diagram | Plane, keys: tuple[ShownKey, ...]) -> str:
     possible = f"Hunting is possible at {verdicts.count(ATTRACTS)} of the 4 corners of the plane{unknown}."
     kinds = Counter(f"{line.kinds[0]} of {CYCLES[line.shape]}" for line in lines(traced))
     curves = listed([f"{kind}{f' ({number} curves)' if number > 1 else ''}" for kind, number in kinds.items()], "and")
-    return f"{possible} Boundaries: {curves}." if kinds else f"{possible} {_no_boundary(traced.space, keys)}"
+    if kinds:
+        return f"{possible} Boundaries: {curves}."
+    if traced.lost or UNKNOWN in verdicts:
+        return f"{possible} No curve could be followed."
+    return f"{possible} {_no_boundary(traced.space, keys)}"
 
 
 def _edges(traced: Diagram, key: ShownKey) -> str:
-    """Where cycles begin or stop to attract, and so where hunting begins or ends if that is at one place."""
-    values = sorted(
-        {float(line.at[k, 0]) for line in lines(traced) for k in line.special if len({*_beside(line, k)}) == 2}
-    )
-    if not values:
-        return _no_boundary(traced.space, (key,))
-    verb = {(ATTRACTS, REPELS): "ends", (REPELS, ATTRACTS): "begins"}.get(end_verdicts(traced))
-    places = f"{key.key} = {listed([key.text(value) for value in values], 'and')}"
-    if len(values) == 1 and verb:
-        return f"Hunting {verb} at {places}."
-    return f"Cycles begin or stop attracting at {places}."
+    """Where hunting begins and ends over the range, and how finely that was looked for."""
+    changes, verdicts = changes_of(traced), place_verdicts(traced)
+    tried = f"{len(verdicts)} values were tried"
+    unknown = f", of which {verdicts.count(UNKNOWN)} are unknown" if UNKNOWN in verdicts else ""
+    if changes:
+        places = [f"{'begins' if each.begins else 'ends'} {_between(each, key)}" for each in changes]
+        return f"Hunting {listed(places, 'and')} ({tried}{unknown})."
+    return f"{_no_boundary(traced.space, (key,))[:-1]} ({tried}{unknown})."
 
 
-def _beside(line: Line, k: int) -> list[bool]:
-    """Whether the cycle attracts on either side of a special point; beyond the end of a line there is none."""
-    return [0 <= j < len(line.attracts) and bool(line.attracts[j]) for j in (k - 1, k)]
+def _between(change: Change, key: ShownKey) -> str:
+    if change.low == change.high:
+        return f"at {key.key} = {key.text(change.low)}"
+    return f"between {key.key} = {key.text(change.low)} and {key.text(change.high)}, where no cycle could be followed"
 
 
 def _of_diagram(traced: Diagram, key: ShownKey) -> list[str]:
@@ -192,7 +197,7 @@ def _no_boundary(space: Space, keys: tuple[ShownKey, ...]) -> str:
         f"{key.key} {key.text(swept.low)} to {key.text(swept.high)}"
         for key, swept in zip(keys, space.ranges, strict=True)
     )
-    return f"Hunting neither begins nor ends over {', '.join(between)}."
+    return f"No place was found at which hunting begins or ends over {', '.join(between)}."
 
 
 def _ends(line: Line) -> str:

@@ -67,8 +67,8 @@ def _hunting(case: Case) -> str:
     seen = "This was observed in long simulations: no orbit that attracts could be closed."
     if case.judgement.swing:
         return f"hunts, {_swing(case)}. {seen}"
-    judgement = case.judgement
-    return f"hunts, still {with_unit(judgement.lasting, 'm')} peak to peak after {with_unit(judgement.followed, 's')}. {seen}"
+    size, after = with_unit(case.judgement.lasting, "m"), with_unit(case.judgement.followed, "s")
+    return f"hunts, still {size} peak to peak after {after}. {seen}"
 
 
 def _bistable(case: Case) -> str:
