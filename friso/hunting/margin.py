@@ -16,7 +16,7 @@ from friso.stage import Stage
 FARTHEST = 10.0
 """Factor up to which the bandwidth is changed."""
 
-STEPS, COARSE = 40, 20
+STEPS, COARSE = 40, 10
 """Steps to a factor of ten in bandwidth where an edge is looked for, and beyond, where something may attract again:
 windows narrower than a step may be missed."""
 

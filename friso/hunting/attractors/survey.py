@@ -60,14 +60,15 @@ class Swinging:
     """A motion that a stage does not leave: the number of the `stage`; half of peak to peak, `amplitude` [m]; the
     `time` in which it repeats itself [s] (NaN: it does not) and its `period` [s], twice that if it is its mirror image
     by then (of one that does not repeat itself, about the time from one swing to the next but one); a `distance` [m] at
-    which it sticks; and the cycle, closed as an orbit, with its number among `cycles` (None: it was observed, in a
-    simulation)."""
+    which it sticks; the number of `swings`, to one side or the other, in a period; and the cycle, closed as an orbit,
+    with its number among `cycles` (None: it was observed, in a simulation)."""
 
     stage: int
     amplitude: float
     time: float
     period: float
     distance: float
+    swings: int
     cycles: Cycles | None = None
     number: int = 0
 
@@ -110,6 +111,7 @@ def of_cycles(numbers: np.ndarray, cycles: Cycles, sticking: int) -> list[Swingi
             float(cycles.orbits.times[k]),
             float(cycles.period[k]),
             float(cycles.states[k, sticking]),
+            cycles.swings * (2 if cycles.sign < 0 else 1),
             cycles,
             int(k),
         )
@@ -283,16 +285,16 @@ class Survey:
             if self._alike(of[k : k + 1], ends.take(np.array([k])))[0]:
                 continue
             there_and_back = ends.times[k, 2:] - ends.times[k, :-2]
-            if repeats.swings[k]:
-                period = float(repeats.time[k]) * (2.0 if repeats.swings[k] % 2 else 1.0)
+            swings, time = int(repeats.swings[k]), float(repeats.time[k])
+            if swings:
+                twice = 2 if swings % 2 else 1  # it is its mirror image by then
+                period, swings = twice * time, twice * swings
             elif np.isfinite(there_and_back).any():
-                period = float(np.nanmean(there_and_back))
+                period, swings = float(np.nanmean(there_and_back)), 2
             else:
                 self.unknown[of[k]] = True
                 continue
-            motion = Swinging(
-                int(of[k]), float(repeats.size[k] / 2), float(repeats.time[k]), period, float(ends.values[k, -1])
-            )
+            motion = Swinging(int(of[k]), float(repeats.size[k] / 2), time, period, float(ends.values[k, -1]), swings)
             self.add([motion])
 
 

@@ -47,7 +47,8 @@ SAMPLES = 2000
 class Cycle:
     """A hunting cycle.
 
-    `amplitude` [m], half of peak to peak, `middle` [m] between the peaks, and `period` [s]. A `symmetric` cycle is its
+    `amplitude` [m], half of peak to peak, `middle` [m] between the peaks, `period` [s], after which it repeats itself,
+    and the number of `swings` to one side or the other in it. A `symmetric` cycle is its
     own mirror image after half a period, and its multipliers are those of half a period; those of others are of a whole
     one. `multipliers`, shape (states - 1,), are the Floquet multipliers, the largest first, without the one that every
     cycle has along itself; `slope` is that of the return map over 1 % of the amplitude (NaN where stages so near do not
@@ -67,6 +68,7 @@ class Cycle:
     growth: float
     residual: float
     trace: xr.Dataset
+    swings: int = 2
 
     @property
     def attracts(self) -> bool:
@@ -83,11 +85,13 @@ class Cycle:
 @dataclass(frozen=True)
 class Swing:
     """A lasting swing that was observed in a long simulation, and of which no orbit could be closed, or none that
-    attracts: half of peak to peak, `amplitude` [m]; its `period` [s], about that if it does not repeat `regularly`."""
+    attracts: half of peak to peak, `amplitude` [m]; its `period` [s], about that if it is not `regular`; and the number
+    of `swings` to one side or the other in it."""
 
     amplitude: float
     period: float
     regular: bool
+    swings: int
 
 
 @dataclass(frozen=True)
@@ -155,7 +159,9 @@ def hunting(stage: Stage, rtol: float = RTOL) -> Hunting:
         reason=reason if not certain or not (closed or repelling) else "",
         certain=certain,
         returns=return_map(stages, ROUGH),
-        observed=tuple(Swing(m.amplitude, m.period, bool(m.time == m.time)) for m in known.motions if not m.cycles),
+        observed=tuple(
+            Swing(m.amplitude, m.period, bool(m.time == m.time), m.swings) for m in known.motions if not m.cycles
+        ),
         target=known.target.of(0) if known.motions else None,
         surveyed=known,
     )
@@ -185,6 +191,7 @@ def _cycle(stages: Ensemble, cycles: Cycles, rtol: float) -> Cycle:
         growth=_growth(stages, cycles),
         residual=float(cycles.gap[0]),
         trace=_trace(stages, cycles),
+        swings=cycles.swings * (2 if cycles.sign < 0 else 1),
     )
 
 

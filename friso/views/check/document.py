@@ -60,6 +60,7 @@ def _cycle(cycle: Cycle) -> dict[str, Any]:
     return {
         "amplitude_m": cycle.amplitude,
         "period_s": cycle.period,
+        "swings_per_period": cycle.swings,
         "multiplier": cycle.multiplier,
         "symmetric": cycle.symmetric,
         "attracts": cycle.attracts,
@@ -71,7 +72,12 @@ def _cycle(cycle: Cycle) -> dict[str, Any]:
 
 
 def _swing(swing: Swing) -> dict[str, Any]:
-    return {"amplitude_m": swing.amplitude, "period_s": swing.period, "regular": swing.regular}
+    return {
+        "amplitude_m": swing.amplitude,
+        "period_s": swing.period,
+        "regular": swing.regular,
+        "swings_per_period": swing.swings,
+    }
 
 
 def _kick(judgement: Judgement) -> dict[str, Any] | None:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from friso.equations.bandwidth import bandwidth
 from friso.hunting.basin import SHARES
-from friso.hunting.margin import FARTHEST, STEPS
+from friso.hunting.margin import COARSE, FARTHEST, STEPS
 from friso.views.check.cases import BANDS, ShownCase, shown_cases
 from friso.views.drawing.prefixes import listed, plus_minus, rounded_down, rounded_up, with_unit
 
@@ -165,8 +165,9 @@ def _windows(case: Case) -> list[str]:
             places.append(f"above {low}" if low else f"below {high}")
     if not places:
         return []
-    step = 100 * (FARTHEST ** (1 / STEPS) - 1)
-    return [f"Hunting is possible again {listed(places, 'and')} (tried in steps of {step:.0f} % and more)."]
+    finest, coarsest = (100 * (FARTHEST ** (1 / steps) - 1) for steps in (STEPS, COARSE))
+    steps = f"tried in steps of {finest:.0f} %, on the other side of this bandwidth of {coarsest:.0f} %"
+    return [f"Hunting is possible again {listed(places, 'and')} ({steps})."]
 
 
 def _remedy(item: ShownCase, cases: Mapping[str, Case]) -> list[str]:
@@ -209,7 +210,11 @@ def _swing(case: Case) -> str:
     """The size of the hunting cycle, e.g. "±0.52 mm every 1.63 s"."""
     swing = case.judgement.swing
     assert swing  # it attracts, or the verdict were another
-    return f"{plus_minus(swing.amplitude, 'm')} every {with_unit(swing.period, 's')}"
+    size, turns = plus_minus(swing.amplitude, "m"), swing.swings / 2
+    often = f"{size} every {with_unit(swing.period / turns, 's')}"
+    if turns == 1:
+        return often
+    return f"up to {often}, each swing unlike the next (it repeats itself after {with_unit(swing.period, 's')})"
 
 
 def _end(case: Case) -> str:
