@@ -66,14 +66,14 @@ def hunts(**changes: Any) -> Judgement:
         Kick(((1.72e-3, 10.8e-3), (22.7e-3, 43.3e-3), (59.3e-3, 0.156)), (1.73e-5, 0.156)),
         Kick(((0.0231, 0.0734),), (5e-4, 4.4)),
         MoveShare(128, 111, (10.0, 200.0), (0.003, 0.06)),
-        Margin(1.2187, 9.7496, True),
+        Margin(1.2187, 9.7496, True, 1.2248),
     )
     return replace(found, **changes)
 
 
 def settles(**changes: Any) -> Judgement:
     """What is known of it, free."""
-    edge = Margin(0.6998, 5.598, True)
+    edge = Margin(0.6998, 5.598, True, 0.7068)
     found = Judgement("settles", fake_hunting(reason=NO_RETURN), margin=edge, settled_after=0.5123)
     return replace(found, **changes)
 

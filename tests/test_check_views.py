@@ -29,6 +29,7 @@ from pages import Page
 from snapshots import Snapshots
 
 from friso.hunting import Judgement, Kick, Margin
+from friso.hunting.margin import BandwidthWindow
 from friso.version import VERSION
 from friso.views.check.cases import COLOURS, ShownCase, shown_cases
 from friso.views.check.figures import check_figures, response_figure
@@ -268,8 +269,10 @@ def said_by_name() -> dict[str, str]:
     none = Kick((), (1e-5, 0.1))
     repels = fake_hunting(fake_cycle(multiplier=-1.0112))
     uncertain = fake_hunting(reason="no orbit could be closed", certain=False)
-    faster, slower = Margin(1.22, None, True), Margin(0.5, None, True)
-    transient = settles(verdict="transient", hunting=repels, settled_after=190.2, margin=Margin(0.975, 9.7496, True))
+    faster, slower = Margin(1.22, None, True, 1.227), Margin(0.5, None, True, 0.5025)
+    transient = settles(
+        verdict="transient", hunting=repels, settled_after=190.2, margin=Margin(0.975, 9.7496, True, 0.98)
+    )
     still = settles(verdict="transient", settled_after=None, followed=1e3)
     seen = hunts(hunting=fake_hunting(reason=NO_RETURN), margin=None, observed=True, lasting=1.04e-3, followed=1e3)
     return {
@@ -304,9 +307,9 @@ def test_sentences(snapshots: Snapshots) -> None:
 @pytest.mark.parametrize(
     ("name", "facts"),
     [
-        ("hunts", ["±0.52 mm", "1.63 s", "1.75 Hz", "9.75 Hz"]),
-        ("hunts, gains", ["1.22 times", "kp × 1.49", "ki × 1.82", "kd × 1.22"]),
-        ("bistable", ["1.72 mm", "23.1 mm/s", "87 %", "±0.52 mm", "1.75 Hz"]),
+        ("hunts", ["±0.52 mm", "1.63 s", "1.80 Hz", "9.80 Hz"]),
+        ("hunts, gains", ["1.23 times", "kp × 1.51", "ki × 1.86", "kd × 1.23"]),
+        ("bistable", ["1.72 mm", "23.1 mm/s", "87 %", "±0.52 mm", "1.80 Hz"]),
         ("transient", ["690 µm", "1.33 s", "73.1 s", "190 s", "9.75 Hz"]),
         ("settles", ["1 µm in 823 ms", "below 5.60 Hz"]),
         ("settles, coarsely", ["10 µm in 1.50 s"]),
@@ -344,7 +347,7 @@ def row(name: str, judgement: Judgement, **changes: Any) -> str | None:
         ("Multiplier taken over", "half a period (Floquet)"),
         ("Other hunting cycles", None),
         ("Time constant of transients", "11.4 s"),
-        ("Edge of hunting", "9.75 Hz"),
+        ("Edge of hunting", "9.750 Hz"),
         ("Displacements that hunt", "1.72 to 10.8 mm, 22.7 to 43.3 mm, from 59.3 mm on (tried: 0.0173 to 156 mm)"),
         ("Pushes that hunt", "23.1 to 73.4 mm/s"),
         ("Moves that end in hunting", "87 % (80 to 92 %) of 128 moves"),
@@ -365,7 +368,7 @@ def test_rows_of_other_cycles():
     whole = hunts(hunting=fake_hunting(replace(pair, multiplier=-0.93, growth=np.nan)))
     assert row("Multiplier taken over", whole) == "a whole period (slope of the returns)"
     assert row("Hunting multiplier", whole) == "-0.9300"
-    assert row("Edge of hunting", hunts(margin=Margin(1.22, None, True))) == "1.22 × as fast"
+    assert row("Edge of hunting", hunts(margin=Margin(1.22, None, True, 1.227))) == "1.22 × as fast"
 
 
 @pytest.mark.parametrize(
@@ -413,3 +416,30 @@ def test_conclusion_names_what_the_joint_does(snapshots):
     assert conclusion({"locked": settled, "free": settled}) is None
     assert conclusion({"given": hunting}) is None
     assert conclusion({"locked": hunting, "free": failed}) is None
+
+
+def test_an_uncertain_edge_is_told_as_an_interval_and_advice_lies_beyond_it() -> None:
+    """8 Hz: something attracts at 9.7496 Hz, nothing at 9.7984 Hz, which is rounded upward."""
+    sure, unsure = (Margin(1.2187, 9.7496, certain, 1.2248) for certain in (True, False))
+    for edge in (sure, unsure):
+        assert "(to 9.80 Hz)" in sentence(hunts(margin=edge))
+    assert "not certain" in sentence(hunts(margin=unsure))
+    assert row("Edge of hunting", hunts(margin=unsure)) == "between 9.750 Hz and 9.798 Hz (not certain)"
+    below = sentence(settles(margin=replace(unsure, factor=0.91234, crossover=7.29872, quiet=0.92)))
+    assert "7.29 Hz" in below
+    assert "7.36 Hz" in below
+    near = sentence(hunts(margin=Margin(1.00001, 8.00008, True, 1.00002)))
+    assert "0.00016 Hz" not in near
+    assert "by 0 Hz" not in near
+
+
+def test_windows_are_told_beside_the_edge() -> None:
+    """From 8 Hz: again above 40 Hz, rounded downward."""
+    assert "above 40.0 Hz" in sentence(hunts(windows=(BandwidthWindow(5.0049, None),)))
+    assert "lower the bandwidth to 4.00 Hz" in sentence(hunts(lower=0.5004))
+
+
+def test_an_uncertain_verdict_is_not_tabled_as_sure() -> None:
+    uncertain = fake_hunting(reason="no orbit could be closed", certain=False)
+    assert row("Verdict", settles(hunting=uncertain)) == "settles (not certain)"
+    assert "no cycle attracts" not in sentence(settles(verdict="transient", hunting=uncertain))

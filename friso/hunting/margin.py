@@ -10,7 +10,7 @@ from friso.equations.bandwidth import bandwidth
 from friso.hunting.attractors import Attractors, attractors
 from friso.hunting.attractors.survey import Swinging
 from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.outward import Beyond, End, Outward
+from friso.hunting.outward import AttractionEnd, Beyond, Outward
 from friso.stage import Stage
 
 FARTHEST = 10.0
@@ -39,7 +39,7 @@ class Margin:
 
 
 @dataclass(frozen=True)
-class Window:
+class BandwidthWindow:
     """Bandwidths, as factors of that of a stage, outside of which nothing attracts next to them: something does at some
     in between. None: as far as the search goes."""
 
@@ -55,7 +55,7 @@ class Searched:
     itself, to which an orbit was followed."""
 
     margin: Margin | None
-    windows: tuple[Window, ...]
+    windows: tuple[BandwidthWindow, ...]
     lower: float | None = None
     contradicts: bool = False
 
@@ -81,7 +81,7 @@ def searched(stage: Stage, attracting: bool, known: Attractors | None = None) ->
     grid.know(here, known or attractors(Ensemble.held(flat, 1), thorough=True))
     edge = grid.last_edge(here, attracting)
     contradicts = bool(grid.attracts[here]) and not attracting
-    own_window = next((window for window in grid.windows() if _holds(window, 1.0)), Window(None, None))
+    own_window = next((window for window in grid.windows() if _holds(window, 1.0)), BandwidthWindow(None, None))
     lower = own_window.low if attracting else None
     if edge is None:
         others = tuple(window for window in grid.windows() if window != own_window)
@@ -109,7 +109,7 @@ class _Grid:
         self.attracts[here], self.known[here] = seen.attracts[0], seen.known[0]
         self.motions[here] = list(seen.motions)
 
-    def last_edge(self, here: int, above: bool) -> tuple[int, End, bool] | None:
+    def last_edge(self, here: int, above: bool) -> tuple[int, AttractionEnd, bool] | None:
         """The last factor, by number, at which something attracts while nothing does at the next one, of those from a
         number on if the edge is looked for `above`, else of those below it; the end of what attracts; and whether that
         is certain. None if there is no such factor."""
@@ -131,12 +131,12 @@ class _Grid:
             upper = quiet[quiet < hunts[0]] if hunts.size else quiet
             return at, end, bool(end.certain and self.known[upper].all())
 
-    def windows(self) -> list[Window]:
+    def windows(self) -> list[BandwidthWindow]:
         """All windows of factors in which something attracts."""
         ends = np.flatnonzero(np.diff(self.attracts.astype(int), prepend=0, append=0))
         last = len(self.factors) - 1
         return [
-            Window(
+            BandwidthWindow(
                 None if first == 0 else float(self.factors[first - 1]),
                 None if after > last else float(self.factors[after]),
             )
@@ -144,5 +144,5 @@ class _Grid:
         ]
 
 
-def _holds(window: Window, factor: float) -> bool:
+def _holds(window: BandwidthWindow, factor: float) -> bool:
     return (window.low or 0.0) < factor < (window.high or np.inf)

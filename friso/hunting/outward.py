@@ -43,7 +43,7 @@ FINER = 4
 
 
 @dataclass(frozen=True)
-class End:
+class AttractionEnd:
     """Two factors of the bandwidth: something attracts at `inside`, nothing does at `outside`. It is `certain` where an
     orbit was followed to its end at `inside`, and simulations at `outside` all settled."""
 
@@ -64,7 +64,7 @@ class Outward:
     flat: Mapping[str, Any]
     farthest: float
 
-    def end(self, at: float, motions: tuple[Swinging, ...], outside: float) -> End:
+    def end(self, at: float, motions: tuple[Swinging, ...], outside: float) -> AttractionEnd:
         """The end of what attracts: these motions do at a factor, nothing does at the one `outside`. Raises Beyond
         where orbits attract as far as the search goes."""
         chatters = Ensemble.held(self.flat, 1).chatters
@@ -81,9 +81,9 @@ class Outward:
             next_to = at * beyond ** self._ahead(at)
             seen = self.surveyed(np.array([next_to]), ALONG * distance)
             if not seen.attracts[0]:
-                return End(at, next_to, bool(seen.known[0]))
+                return AttractionEnd(at, next_to, bool(seen.known[0]))
             at, motions = next_to, seen.motions
-        return End(at, outside, False)
+        return AttractionEnd(at, outside, False)
 
     @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
     def surveyed(self, factors: np.ndarray, distances: np.ndarray | None = None) -> Attractors:

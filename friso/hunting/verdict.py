@@ -23,7 +23,7 @@ from friso.hunting.criteria import COUNTED_ABOVE, Verdict, lasts, verdicts
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.hunting import REACHED, Cycle, Hunting, Swing, cannot_hunt, hunting, why_not
 from friso.hunting.cycle.rest import wait
-from friso.hunting.margin import NOT_SOUGHT, Margin, Window, searched
+from friso.hunting.margin import NOT_SOUGHT, BandwidthWindow, Margin, searched
 from friso.hunting.measures import Measures, measure, options
 from friso.stage import Stage
 
@@ -57,7 +57,7 @@ class Judgement:
     push: Kick | None = None
     moves: MoveShare | None = None
     margin: Margin | None = None
-    windows: tuple[Window, ...] = ()
+    windows: tuple[BandwidthWindow, ...] = ()
     lower: float | None = None
     settled_after: float | None = None
     followed: float | None = None

@@ -103,7 +103,7 @@ def _edges(traced: Diagram, key: ShownKey) -> str:
     """Where hunting begins and ends over the range, and how finely that was looked for."""
     changes, verdicts = changes_of(traced), place_verdicts(traced)
     tried = f"{len(verdicts)} values were tried"
-    unknown = f", of which {verdicts.count(UNKNOWN)} are unknown" if UNKNOWN in verdicts else ""
+    unknown = f"; unknown at {verdicts.count(UNKNOWN)} of them" if UNKNOWN in verdicts else ""
     if changes:
         places = [f"{'begins' if each.begins else 'ends'} {_between(each, key)}" for each in changes]
         return f"Hunting {listed(places, 'and')} ({tried}{unknown})."

@@ -148,7 +148,8 @@ def _below(case: Case, edge: Margin) -> str:
 
 def _bandwidth(case: Case, factor: float, up: bool = True) -> str:
     """A bandwidth that is a factor of that of the case."""
-    own = bandwidth(case.stage.flat())
+    edge = case.judgement.margin
+    own = edge.crossover / edge.factor if edge and edge.crossover else bandwidth(case.stage.flat())
     value = (rounded_up if up else rounded_down)(factor * (own or 1.0))
     return f"{value:.3g} times this bandwidth" if own is None else with_unit(value, "Hz")
 
