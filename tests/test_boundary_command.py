@@ -18,7 +18,7 @@ from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import NOT_CLOSED, Cycles, symmetric_cycles
 from friso.stage import Stage
 from friso.studies.boundary_lines import corner_verdicts, end_verdicts, lines
-from friso.views.boundary.figures import NODES, boundary_figure
+from friso.views.boundary.figures import LOST, NODES, boundary_figure
 from friso.views.boundary.words import VERDICTS, ShownKey, conclusion, sentences
 from friso.views.drawing import matplotlib_renderer, plotly_renderer
 
@@ -277,6 +277,7 @@ def test_the_figure_of_two_keys_shows_nodes_and_curves_in_one_legend(crossing: P
     texts = [text.get_text() for text in canvas.legends[0].get_texts()]
     assert texts == [
         *(kind.label for kind in NODES.values()),
+        LOST,
         "flip of the hunting cycle",
     ]
     names = [trace.name for trace in plotly_renderer.render(figure).data if trace.mode == "lines"]

@@ -145,12 +145,7 @@ def changes_of(result: Diagram) -> list[Change]:
     values = _values(result.space, result.places[:, None])[:, 0]
     sure = [(value, word) for value, word in zip(values.tolist(), place_verdicts(result), strict=True)]
     sure = [(value, word == ATTRACTS) for value, word in sure if word in (ATTRACTS, REPELS)]
-    turns = sorted(
-        (float(line.at[k, 0]), begins)
-        for line in lines(result)
-        for k in line.special
-        if (begins := begins_at(line, k)) is not None
-    )
+    turns = turns_of(result)
     changes = []
     for (low, before), (high, after) in pairwise(sure):
         if before != after:
@@ -158,6 +153,16 @@ def changes_of(result: Diagram) -> list[Change]:
             at = (min(inside) if after else max(inside)) if inside else None
             changes.append(Change(after, low if at is None else at, high if at is None else at))
     return changes
+
+
+def turns_of(result: Diagram) -> list[tuple[float, bool]]:
+    """The values [SI] at which a cycle that was followed begins to attract (true), or ceases to, as the key rises."""
+    return sorted(
+        (float(line.at[k, 0]), begins)
+        for line in lines(result)
+        for k in line.special
+        if (begins := begins_at(line, k)) is not None
+    )
 
 
 def begins_at(line: Line, k: int) -> bool | None:

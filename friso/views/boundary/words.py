@@ -22,6 +22,7 @@ from friso.studies.boundary_lines import (
     lines,
     lost_places,
     place_verdicts,
+    turns_of,
 )
 from friso.views.drawing.figure import Array
 from friso.views.drawing.prefixes import listed, plus_minus, pretty, with_unit
@@ -104,10 +105,14 @@ def _edges(traced: Diagram, key: ShownKey) -> str:
     changes, verdicts = changes_of(traced), place_verdicts(traced)
     tried = f"{len(verdicts)} values were tried"
     unknown = f"; unknown at {verdicts.count(UNKNOWN)} of them" if UNKNOWN in verdicts else ""
+    at = {change.low for change in changes}
+    others = sorted({value for value, _ in turns_of(traced)} - at)
+    also = [f"Cycles also begin or stop attracting at {listed([key.text(value) for value in others], 'and')}."]
+    answer = f"{_no_boundary(traced.space, (key,))[:-1]} ({tried}{unknown})."
     if changes:
-        places = [f"{'begins' if each.begins else 'ends'} {_between(each, key)}" for each in changes]
-        return f"Hunting {listed(places, 'and')} ({tried}{unknown})."
-    return f"{_no_boundary(traced.space, (key,))[:-1]} ({tried}{unknown})."
+        places = [f"{'begins' if change.begins else 'ends'} {_between(change, key)}" for change in changes]
+        answer = f"Hunting {listed(places, 'and')} ({tried}{unknown})."
+    return " ".join([answer, *(also if others else [])])
 
 
 def _between(change: Change, key: ShownKey) -> str:
