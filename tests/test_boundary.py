@@ -14,6 +14,7 @@ from friso.hunting.boundary.branch import Point, Tracer
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import symmetric_cycles
 from friso.stage import Stage
+from friso.studies.boundary_lines import changes_of
 
 pytestmark = pytest.mark.xdist_group("rigid")
 
@@ -173,6 +174,23 @@ def test_a_range_without_a_boundary_has_no_points() -> None:
     found = diagram(Space.of(RIGID, [KeyRange("controller.crossover", 4.0, 6.0)]), seeds=5)
     assert found.cycles.attracting.all()
     assert not any(found.special)
+
+
+def test_cycles_at_the_force_limit_are_followed_to_their_fold() -> None:
+    """With back-calculation: released from up to 1 m it rests at 38 Hz and swings on at 40 Hz (test_attractors.py). No
+    cycle of the return map attracts there."""
+    unwound = VARIANTS["rigid, limit, back-calculation"].replace(
+        {"controller.force_limit": "12 N", "controller.anti_windup_time": "50 ms"}
+    )
+    found = diagram(Space.of(unwound, [KeyRange("controller.crossover", 36.0, 44.0)]), seeds=5)
+    assert found.known.all()
+    assert found.attracts.tolist() == [False, False, True, True, True]
+    assert not found.cycles.attracting.any()
+    (fold,) = special(found, symmetric=True)["fold"]
+    assert fold[0] == pytest.approx(39.599, abs=0.001)
+    (change,) = changes_of(found)
+    assert change.begins
+    assert change.low == change.high == pytest.approx(39.599, abs=0.001)
 
 
 def test_a_logarithmic_range_finds_the_same_flip() -> None:
