@@ -48,7 +48,6 @@ def plane(space: Space, rtol: float = RTOL, nodes: int = NODES) -> Plane:
     curves: list[Curve] = []
     lost: list[np.ndarray] = []
     stages = space.stages(points[allowed])
-    surveyed = attractors(stages, rtol=rtol)
     hunting, searches = _searches(stages, rtol)
     for cycles, inside, outside in searches:
         new_curves: list[Curve] = []
@@ -65,7 +64,11 @@ def plane(space: Space, rtol: float = RTOL, nodes: int = NODES) -> Plane:
             else:
                 lost.append((points[a] + points[b]) / 2)
         curves += new_curves
-    attracts, known = surveyed.attracts | hunting.attracting, surveyed.known | hunting.attracting
+    attracts, known = hunting.attracting.copy(), hunting.attracting.copy()
+    others = np.flatnonzero(~attracts)  # beside a cycle that attracts there is no need of simulations
+    if others.size:
+        surveyed = attractors(stages.take(others), rtol=rtol)
+        attracts[others], known[others] = surveyed.attracts, surveyed.known
     sides = (_on_grid(allowed[known & which], nodes) for which in (attracts, ~attracts))
     for a, b in _changes(*sides):  # of what attracts, whatever it is
         middle = (points[a] + points[b]) / 2
