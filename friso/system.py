@@ -1,16 +1,33 @@
 """What differs between operating systems: Linux, macOS and Windows."""
 
 import os
+import signal
 import stat
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 if sys.platform == "win32":
+
+    @contextmanager
+    def interrupts_held() -> Iterator[None]:
+        """Nothing: a process does not pass on that Ctrl-C is held back."""
+        yield
 
     def foreign_writers(status: os.stat_result) -> str:
         """Nobody: what is below a user's profile is the user's own by its access lists, which a mode does not tell."""
         return ""
 
 else:
+
+    @contextmanager
+    def interrupts_held() -> Iterator[None]:
+        """Ctrl-C waits; processes started meanwhile never see it."""
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        try:
+            yield
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
     def foreign_writers(status: os.stat_result) -> str:
         """Who else than this user and root may write to a file, or exchange what this user has in a folder, in words;

@@ -7,6 +7,7 @@ import control
 import numpy as np
 import pytest
 from beyond_flip import CREEPING
+from friso.studies.response import measured_run
 
 import friso
 from friso.design import front as front_module
@@ -23,7 +24,7 @@ from friso.design.prepare import prepared, with_leaves
 from friso.design.relax import relaxations
 from friso.design.requirements import PARASITIC, RESERVE, LeafTask, requirements
 from friso.design.spec import Spec, load_spec
-from friso.design.verification import MachineOutcomes, tried, verification
+from friso.design.verification import RTOL, MachineOutcomes, tried, verification
 from friso.flexure import beams as beams_module
 from friso.flexure import closed_forms
 from friso.flexure.beams import BeamFailure
@@ -300,16 +301,17 @@ def test_without_a_comfortable_crossover_there_is_no_design(
 # --- verification -----------------------------------------------------------------------------------------------------
 
 
-def test_tried_moves_agree_with_check(base: Stage) -> None:
-    """At 8 Hz the locked rig hunts and the free one settles, as `friso check` says, in the time it says."""
+def test_tried_moves_agree_with_runs_of_their_own(base: Stage) -> None:
+    """At 8 Hz the locked rig hunts and the free one settles, in the time that a run at the same tolerance takes: the
+    limiter scatters it by some per cent from one tolerance to the next."""
     rig = friso.load(EXAMPLES / "thesis_rig.toml")
     flat = rig.flat()
     for held, hunts in ((True, True), (False, False)):
         found = tried({**flat, "joint.locked": held}, 1, 1e-6)
         assert found.tried == 1
         assert (found.words[0] == "swings") == hunts
-    case = friso.check(rig)["free"]
-    assert found.settling[0] == pytest.approx(case.settling_time[1e-6], rel=1e-2)
+    within, _ = measured_run(rig.replace({"joint.locked": False}), RTOL).settling_time
+    assert found.settling[0] == pytest.approx(within[0], rel=1e-4)
 
 
 def test_verification_counts_and_its_worst_is_reproduced(base: Stage, monkeypatch: pytest.MonkeyPatch) -> None:

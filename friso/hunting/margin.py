@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from friso.stage import Stage
 FARTHEST = 10.0
 """Factor up to which the bandwidth is changed."""
 
-STEPS, COARSE = 40, 10
+STEPS, COARSE = 20, 10
 """Steps to a factor of ten in bandwidth where an edge is looked for, and beyond, where something may attract again:
 windows narrower than a step may be missed."""
 
@@ -82,7 +82,7 @@ def searched(stage: Stage, attracting: bool, known: Attractors | None = None) ->
     edge = grid.last_edge(here, attracting)
     contradicts = bool(grid.attracts[here]) and not attracting
     own_window = next((window for window in grid.windows() if _holds(window, 1.0)), BandwidthWindow(None, None))
-    lower = own_window.low if attracting else None
+    lower = grid.quiet_below(here) if attracting else None
     if edge is None:
         others = tuple(window for window in grid.windows() if window != own_window)
         return Searched(None, others, lower, contradicts)
@@ -98,7 +98,7 @@ class _Grid:
 
     def __init__(self, outward: Outward, factors: np.ndarray) -> None:
         self.outward, self.factors = outward, factors
-        seen = outward.surveyed(factors)
+        seen = outward.glanced(factors)
         self.attracts, self.known = seen.attracts, seen.known
         self.motions: list[list[Swinging]] = [[] for _ in factors]
         for motion in seen.motions:
@@ -127,9 +127,23 @@ class _Grid:
             passed = (self.factors > self.factors[at]) & (self.factors <= end.inside)
             self.attracts |= passed
             quiet = np.flatnonzero(self.factors > end.inside)
+            if end.outside <= end.inside:  # the search was given up beyond it
+                settled = quiet[~self.attracts[quiet]]
+                if not settled.size:
+                    return None
+                end = replace(end, outside=float(self.factors[settled[0]]))
             hunts = quiet[self.attracts[quiet]]
             upper = quiet[quiet < hunts[0]] if hunts.size else quiet
             return at, end, bool(end.certain and self.known[upper].all())
+
+    def quiet_below(self, here: int) -> float | None:
+        """The next factor below a number at which nothing attracts, nor at the one below that, if both are known."""
+        quiet = np.flatnonzero(~self.attracts[:here])
+        if not quiet.size:
+            return None
+        both = slice(max(int(quiet[-1]) - 1, 0), int(quiet[-1]) + 1)
+        sure = not self.attracts[both].any() and bool(self.known[both].all())
+        return float(self.factors[quiet[-1]]) if sure else None
 
     def windows(self) -> list[BandwidthWindow]:
         """All windows of factors in which something attracts."""

@@ -12,7 +12,7 @@ import numpy as np
 from friso.equations.bandwidth import faster
 from friso.hunting.attractors import Attractors, attractors
 from friso.hunting.attractors.survey import Swinging
-from friso.hunting.boundary.branch import REACHED, Point, Tracer
+from friso.hunting.boundary.branch import END_OF_RANGE, REACHED, Point, Tracer
 from friso.hunting.boundary.locate import Kind, changes, last_inside
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import hunting_cycles
@@ -24,7 +24,7 @@ SCALE = 0.06
 PRECISE = 1e-5
 """Step along a branch that ends the search for its end."""
 
-BEYOND, CHATTERING = 1.005, 1.01
+BEYOND, CHATTERING = 1.01, 1.01
 """How far beyond the end of an orbit nothing may attract, as a factor; the same where a limiter chatters, which makes
 multipliers rough."""
 
@@ -79,6 +79,8 @@ class Outward:
             flip = self._flip(at, outside) if chatters and _is_simple(orbit) else None
             at, distance = (flip, orbit.distance) if flip else self._followed(at, orbit)
             next_to = at * beyond ** self._ahead(at)
+            if self._ahead(at) * (next_to - self.farthest) > 0:
+                raise Beyond
             seen = self.surveyed(np.array([next_to]), ALONG * distance)
             if not seen.attracts[0]:
                 return AttractionEnd(at, next_to, bool(seen.known[0]))
@@ -90,6 +92,12 @@ class Outward:
         """What attracts at some factors, tried from distances [m] as well."""
         tried = None if distances is None else np.tile(distances, (len(factors), 1))
         return attractors(self._stages(factors), tried=tried)
+
+    @np.errstate(all="ignore")
+    def glanced(self, factors: np.ndarray) -> Attractors:
+        """What attracts at some factors, from simulations alone: orbits that attract from a narrow range show where
+        they are followed from wider ones."""
+        return attractors(self._stages(factors), cycles=False)
 
     def _stages(self, factors: np.ndarray) -> Ensemble:
         return Ensemble.held(faster(self.flat, factors), len(factors))
@@ -118,13 +126,13 @@ class Outward:
             return ended
 
         points, reason = tracer.walk(start, 1.0, over)
-        if reason == REACHED:
-            first, second = ([start, *points])[-2:]
+        if reason in (REACHED, END_OF_RANGE):
+            first, second = ([start, start, *points])[-2:]
             if not abs(second.multiplier) < 1:
                 last = last_inside(tracer, first, second, _kind(first, second), PRECISE)
                 farthest = max(farthest, last, key=lambda point: point.place)
-        elif points and farthest.place >= length * (1 - 1e-9):
-            raise Beyond
+            elif reason == END_OF_RANGE:
+                raise Beyond
         return float(at * np.exp(ahead * SCALE * farthest.place)), orbit_distance(farthest, orbit)
 
     @np.errstate(all="ignore")

@@ -45,7 +45,7 @@ def checked_metadata(path: Path) -> dict[str, Any]:
     try:
         document = json.loads((path / _FILE).read_bytes())
         own, metadata = document.get(_OWN), document["metadata"]
-        attributes = metadata[_ATTRIBUTES]
+        attributes = dict(metadata[_ATTRIBUTES])
         whole = isinstance(own, dict) and own.get("sha256") == _digest(metadata)
     except FileNotFoundError:
         if is_store(path):

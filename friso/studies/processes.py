@@ -17,6 +17,7 @@ import numpy as np
 
 from friso.studies.cells import Columns, run_cells
 from friso.studies.execute import Crew
+from friso.system import interrupts_held
 
 _cancel = np.zeros(1, np.int64)
 """The flag that has this process end its block early; in a worker, memory that is shared with who started it."""
@@ -29,6 +30,8 @@ def processes(workers: int) -> Iterator[Crew]:
     context = get_context("spawn")
     shared: Any = context.RawArray("q", 1)
     pool = ProcessPoolExecutor(workers, context, _prepare, (shared,))
+    with interrupts_held():
+        pool.submit(os.getpid)  # starts all of them
     cancel = np.frombuffer(shared, np.int64)
     with Crew(pool, workers, 4 * workers, run_block, cancel=cancel, failures=(BrokenProcessPool,)) as crew:
         yield crew

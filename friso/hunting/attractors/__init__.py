@@ -87,26 +87,27 @@ class Attractors:
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def attractors(
-    stages: Ensemble, thorough: bool = False, rtol: float = RTOL, tried: np.ndarray | None = None
+    stages: Ensemble, thorough: bool = False, rtol: float = RTOL, tried: np.ndarray | None = None, cycles: bool = True
 ) -> Attractors:
     """What attracts: everything that simulations from many starts end in, and the cycles that the return map suggests.
     Of many stages at once one motion that attracts is enough; a `thorough` survey looks for all of them, and where
     simulations alone tell what it finds, it tries them at a hundredth of the tolerance. Orbits are closed to the
-    relative tolerance. Motions begin from the distances `tried` [m], (count, n), too, where they are finite."""
+    relative tolerance. Motions begin from the distances `tried` [m], (count, n), too, where they are finite. Without
+    `cycles` many stages are surveyed by simulations alone."""
     survey, every = Survey(stages.count, thorough, rtol), np.arange(stages.count)
     suggested = families(stages, rtol) if thorough else ()
     starts = Starts(stages)
     starts.spread(thorough)
-    for cycles in suggested:
-        survey.slow_down(every, cycles)
-        starts.beside(cycles)
-        if (drawn := np.flatnonzero(cycles.attracting)).size:
-            survey.confirm(starts.on(cycles, drawn), drawn, cycles.take(drawn))
+    for family in suggested:
+        survey.slow_down(every, family)
+        starts.beside(family)
+        if (drawn := np.flatnonzero(family.attracting)).size:
+            survey.confirm(starts.on(family, drawn), drawn, family.take(drawn))
     if tried is not None:
         starts.stuck_at(tried)
     for runs, of in starts.waves(thorough):
         survey.follow(runs, of)
-    if not thorough:
+    if cycles and not thorough:
         _try_cycles(starts, survey, rtol)
     known = survey.attracted | ~survey.unknown
     nothing, typical = np.zeros(stages.count, bool), typical_period(stages)

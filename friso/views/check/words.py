@@ -86,7 +86,7 @@ def _bistable(case: Case) -> str:
 def _kick(name: str, kick: Kick, unit: str) -> str:
     """The smallest kick that starts hunting, or that was tried."""
     least = kick.windows[0][0]
-    return f"a {name} of {with_unit(least, unit)}{', the smallest tried,' if least == kick.searched[0] else ''}"
+    return f"a {name} of {with_unit(least, unit)}{' (the smallest tried)' if least == kick.searched[0] else ''}"
 
 
 def _transient(case: Case) -> str:
