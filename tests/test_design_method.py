@@ -7,7 +7,6 @@ import control
 import numpy as np
 import pytest
 from beyond_flip import CREEPING
-from friso.studies.response import measured_run
 
 import friso
 from friso.design import front as front_module
@@ -34,6 +33,7 @@ from friso.flexure.mechanism import Mechanism
 from friso.frequency.crossover import limits, settled_margin
 from friso.frequency.tuning import Tuning
 from friso.hunting.margin import margin
+from friso.hunting.measures import measured_run
 from friso.stage import Stage
 
 EXAMPLES = Path(__file__).parent.parent / "examples"

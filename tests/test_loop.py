@@ -5,6 +5,7 @@ import pytest
 from variants import VARIANTS
 
 from friso.hunting.loop import unstable
+from friso.stage import Stage
 
 
 @pytest.mark.parametrize("name", ["rigid stage, PI", "rigid, Stribeck 2, PI, limit"])
@@ -34,3 +35,11 @@ def test_van_dijks_rules_tuned_for_another_mass(mass: float) -> None:
     lost = np.roots(np.polyadd(loop, control)).real.max() > 0
     assert unstable(chosen) == (("slides",) if lost else ())
     assert lost == (mass < 0.2)
+
+
+def test_a_stage_without_friction_is_judged_too() -> None:
+    """No friction deflects its loop, from which magnitudes follow elsewhere; a PI controller alone never damps it."""
+    assert unstable(VARIANTS["rigid, no friction section"]) == ()
+    pushed = VARIANTS["rigid stage, PI"].given()
+    smooth = Stage(**{name: table for name, table in pushed.items() if name != "friction"})
+    assert unstable(smooth) == ("sticks", "slides")

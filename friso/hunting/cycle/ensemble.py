@@ -15,6 +15,9 @@ from friso.engine.kernel import Kernel, kernel
 from friso.equations.roles import Role, Steady
 from friso.equations.structure import Structure, shared_structure
 
+WITHOUT_FRICTION = 1e-6
+"""Size of the motion [m] from which magnitudes follow where no friction deflects the loop: such a stage is linear."""
+
 
 @dataclass(frozen=True)
 class Ensemble:
@@ -80,7 +83,8 @@ class Ensemble:
     @cached_property
     def scales(self) -> np.ndarray:
         """Magnitudes of the states, shape (count, states)."""
-        values = self.kernel.values({**self.flat, "motion.size": self.length, "motion.duration": np.inf}, self.count)
+        size = np.where(self.length > 0, self.length, WITHOUT_FRICTION)
+        values = self.kernel.values({**self.flat, "motion.size": size, "motion.duration": np.inf}, self.count)
         return np.stack([np.broadcast_to(row, (self.count,)) for row in self.kernel.module.scales(values)], axis=1)
 
     @property
