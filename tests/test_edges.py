@@ -22,6 +22,21 @@ SPECIFICATION = EXAMPLES / "specs" / "thesis.toml"
 
 
 @pytest.mark.parametrize(
+    ("key", "value", "expected"),
+    [
+        ("controller.anti_windup", "backcalculation", '"back_calculation"'),
+        ("name", 5, "a text"),
+        ("joint.locked", "maybe", "true or false"),
+    ],
+)
+def test_keys_that_may_be_left_out_say_what_they_take(key: str, value: object, expected: str) -> None:
+    with pytest.raises(InputError) as error:
+        loads(RIG).replace({key: value})
+    assert expected in error.value.expected
+    assert "class" not in error.value.expected + error.value.example
+
+
+@pytest.mark.parametrize(
     "changes",
     [
         {"flexure.spacing": "1e200 m"},

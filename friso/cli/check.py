@@ -50,7 +50,8 @@ def check(
     target = output_folder("check", out, overwrite, [stage_file])
     from friso.hunting import check as check_stage
 
-    cases = check_stage(stage, rtol=tolerance, traces=target is not None)
+    with ProgressBar("what attracts the stage") as progress:
+        cases = check_stage(stage, rtol=tolerance, traces=target is not None, progress=progress)
     draws = None if sample is None else _draws(stage, sample, seed, tolerance)
     files = []
     if target is not None:

@@ -17,7 +17,8 @@ from friso.hunting.criteria import Verdict
 from friso.hunting.cycle.hunting import cannot_hunt
 from friso.hunting.loop import LoopState, unstable
 from friso.hunting.measures import BANDS, measure, options
-from friso.hunting.verdict import Judgement, judge
+from friso.hunting.verdict import WORK, Judgement, judge
+from friso.progress import Progress, Tally, silent
 from friso.stage import Stage
 
 if TYPE_CHECKING:
@@ -68,7 +69,7 @@ class Case:
         return self.judgement.verdict
 
 
-def check(stage: Stage, rtol: float = 1e-6, traces: bool = False) -> dict[str, Case]:
+def check(stage: Stage, rtol: float = 1e-6, traces: bool = False, progress: Progress = silent) -> dict[str, Case]:
     """The cases "given" and, for a stage with a joint, "locked" and "free" (if the file tells its stiffness).
 
     With `traces`, each case has its time response. Raises ValueError for an `rtol` that is not usable.
@@ -76,11 +77,11 @@ def check(stage: Stage, rtol: float = 1e-6, traces: bool = False) -> dict[str, C
     checked_rtol(rtol)
     variants = stage.variants()
     kernels(set().union(*map(_needed, variants.values())))
-    cases: dict[str, Case] = {}
-    for name, variant in variants.items():
-        same = next((case for case in cases.values() if case.stage == variant), None)
-        cases[name] = same or _case(variant, rtol, traces)
-    return cases
+    different: list[Stage] = []
+    different += (variant for variant in variants.values() if variant not in different)
+    work = Tally(progress, len(different) * len(WORK))
+    judged = [_case(variant, rtol, traces, work) for variant in different]
+    return {name: judged[different.index(variant)] for name, variant in variants.items()}
 
 
 def _needed(stage: Stage) -> set[Wanted]:
@@ -89,15 +90,18 @@ def _needed(stage: Stage) -> set[Wanted]:
     return {Wanted(shape)} if cannot_hunt(stage) else {Wanted(shape), Wanted(shape, variational=True)}
 
 
-def _case(stage: Stage, rtol: float, traces: bool) -> Case:
+def _case(stage: Stage, rtol: float, traces: bool, work: Tally) -> Case:
     flat = stage.flat()
+    begun = work.done
     (runs,) = run_chunks(kernel(structure(flat)), flat, 1, options(rtol))
     measures = measure(flat, runs)
     room = measures.turns.shape[1]
     status = Status(int(measures.status[0]))
+    judgement = judge(stage, measures, rtol, lambda what: work.add(int(what != WORK[0]), what))
+    work.add(begun + len(WORK) - work.done, WORK[-1])  # the last, too, where nothing attracts
     return Case(
         stage=stage,
-        judgement=judge(stage, measures, rtol),
+        judgement=judgement,
         peaks=int(measures.peaks[0]),
         peak_times=runs.results.turn_times[0, :room][measures.turns[0]],
         peak_heights=runs.results.turn_values[0, :room][measures.turns[0]],

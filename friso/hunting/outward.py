@@ -77,13 +77,13 @@ class Outward:
                     break
                 continue
             flip = self._flip(at, outside) if chatters and _is_simple(orbit) else None
-            at, distance = (flip, orbit.distance) if flip else self._followed(at, orbit)
+            at, distance, ended = (flip, orbit.distance, True) if flip else self._followed(at, orbit)
             next_to = at * beyond ** self._ahead(at)
             if self._ahead(at) * (next_to - self.farthest) > 0:
                 raise Beyond
             seen = self.surveyed(np.array([next_to]), ALONG * distance)
             if not seen.attracts[0]:
-                return AttractionEnd(at, next_to, bool(seen.known[0]))
+                return AttractionEnd(at, next_to, ended and bool(seen.known[0]))
             at, motions = next_to, seen.motions
         return AttractionEnd(at, outside, False)
 
@@ -106,8 +106,9 @@ class Outward:
         return 1.0 if self.farthest >= at else -1.0
 
     @np.errstate(all="ignore")
-    def _followed(self, at: float, orbit: Swinging) -> tuple[float, float]:
-        """The last factor at which a closed orbit attracts, and the distance [m] at which the stage sticks there."""
+    def _followed(self, at: float, orbit: Swinging) -> tuple[float, float, bool]:
+        """The last factor at which a closed orbit attracts, the distance [m] at which the stage sticks there, and
+        whether it was followed to its end: a flip, a fold or a torus, and not lost on the way."""
         ahead, cycles = self._ahead(at), orbit.cycles
         assert cycles is not None
 
@@ -126,14 +127,16 @@ class Outward:
             return ended
 
         points, reason = tracer.walk(start, 1.0, over)
+        ended = reason == REACHED
         if reason in (REACHED, END_OF_RANGE):
             first, second = ([start, start, *points])[-2:]
             if not abs(second.multiplier) < 1:
                 last = last_inside(tracer, first, second, _kind(first, second), PRECISE)
-                farthest = max(farthest, last, key=lambda point: point.place)
+                ended = last is not None
+                farthest = max(farthest, last or first, key=lambda point: point.place)
             elif reason == END_OF_RANGE:
                 raise Beyond
-        return float(at * np.exp(ahead * SCALE * farthest.place)), orbit_distance(farthest, orbit)
+        return float(at * np.exp(ahead * SCALE * farthest.place)), orbit_distance(farthest, orbit), ended
 
     @np.errstate(all="ignore")
     def _flip(self, at: float, outside: float) -> float | None:

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -97,15 +97,22 @@ class Motions:
         return Motions(*(array[numbers] for array in (self.completed, self.peaks, self.swing, self.settling)))
 
 
-def judge(stage: Stage, ran: Measures, rtol: float) -> Judgement:
-    """The verdict on a stage whose motion was run and measured at a relative tolerance."""
+WORK = ("what attracts the stage", "other bandwidths", "kicks and moves")
+"""What is computed for a verdict, in this order; without a cycle that attracts the last is left out."""
+
+
+def judge(stage: Stage, ran: Measures, rtol: float, begin: Callable[[str], None] = lambda what: None) -> Judgement:
+    """The verdict on a stage whose motion was run and measured at a relative tolerance; `begin` is told what work is
+    begun (see `WORK`)."""
     flat, motions = stage.flat(), Motions.of(ran)
+    begin(WORK[0])
     moves_on = _keeps_moving(flat) and not cannot_hunt(stage)
     known = Hunting((), MOVING, True, None) if moves_on else hunting(stage)
     if not motions.completed[0]:
         return Judgement("failed", known)
     if known.target:
-        return _with_a_target(stage, motions, known, known.target)
+        return _with_a_target(stage, motions, known, known.target, begin)
+    begin(WORK[1])
     rest = _rest(flat, motions, 1, options(rtol), possible=known.possible)
     observed = bool(rest.steady[0])
     sought = searched(stage, False, known.surveyed) if known.possible and not observed else NOT_SOUGHT
@@ -125,11 +132,15 @@ def judge(stage: Stage, ran: Measures, rtol: float) -> Judgement:
     )
 
 
-def _with_a_target(stage: Stage, motions: Motions, known: Hunting, target: Target) -> Judgement:
+def _with_a_target(
+    stage: Stage, motions: Motions, known: Hunting, target: Target, begin: Callable[[str], None]
+) -> Judgement:
+    begin(WORK[1])
     ends, completed = ends_in(stage.flat(), 1, target)
     if not completed[0]:
         return Judgement("failed", known)
     within, sought = float(motions.settling[0]), searched(stage, True, known.surveyed)
+    begin(WORK[2])
     return Judgement(
         verdicts(completed, np.ones(1, bool), ends, np.zeros(1, bool))[0],
         known,

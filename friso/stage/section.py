@@ -3,6 +3,7 @@
 import difflib
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
+from types import NoneType
 from typing import Any, ClassVar, TypeVar, get_args
 
 from pydantic import (
@@ -210,9 +211,11 @@ def _described(cls: type[Section], key: str) -> tuple[str, str]:
             return f"a table [{key}]", item.example
         if hasattr(item, "written_example"):
             return item.expected, f"{key} = {item.written_example}"
-    if field.annotation is bool:
+    kind = next((part for part in get_args(field.annotation) if part is not NoneType and get_args(part)), None)
+    kind = kind or next((part for part in get_args(field.annotation) if part in (bool, str)), field.annotation)
+    if kind is bool:
         return "true or false", f"{key} = true"
-    if field.annotation is str:
+    if kind is str:
         return "a text in quotes", f'{key} = "Thesis rig"'
-    choices = [as_toml(choice) for choice in get_args(field.annotation) if choice]
+    choices = [as_toml(choice) for choice in get_args(kind) if choice]
     return f"one of {', '.join(choices)}", f"{key} = {choices[0]}"

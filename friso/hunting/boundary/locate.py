@@ -65,10 +65,12 @@ def located(tracer: Tracer, first: Point, second: Point, kind: Kind) -> LocatedP
     return _special_point(tracer, kind, met[along], direction, _slope(kind, met))
 
 
-def last_inside(tracer: Tracer, first: Point, second: Point, kind: Kind, precise: float) -> Point:
+def last_inside(tracer: Tracer, first: Point, second: Point, kind: Kind, precise: float) -> Point | None:
     """Of the points between two neighbours on a branch that still attract, the one nearest to where it happens, to so
-    much along the branch; the first where no other can be reached."""
-    met = _enclosed(tracer, first, second, kind, precise) or {0.0: first}
+    much along the branch; None if one of them cannot be reached."""
+    met = _enclosed(tracer, first, second, kind, precise)
+    if met is None:
+        return None
     return met[max(place for place, point in met.items() if abs(point.multiplier) < 1)]
 
 

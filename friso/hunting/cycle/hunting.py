@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -32,6 +31,11 @@ UNDECIDED = "simulations that had to decide failed, or had not settled when they
 SMALL_GAP = 0.02
 """Share of the static friction by which it exceeds Coulomb friction: the smallest for which cycles are of a size that
 is looked for."""
+
+SMALL_SWING, FED = 0.01, (2.0, 6.0)
+"""The smallest amplitude that is looked for with certainty, as a share of the deflection by the break-away force; and
+how much larger than the amplitude of a cycle the fall of friction over its speeds is, as a share of the static one, at
+least and at most."""
 
 FLIPS = "whether the stage hunts depends on the tolerance of the simulation, a hundredth of which decided"
 """The same where simulations contradict each other."""
@@ -150,7 +154,7 @@ def hunting(stage: Stage, rtol: float = RTOL) -> Hunting:
     known = attractors(stages, thorough=True, rtol=rtol)
     closed = [m.cycles.take(np.array([m.number])) for m in known.motions if m.cycles is not None]
     repelling = [family for family in known.families if family.found[0] and not family.attracting[0]]
-    beyond = "" if known.motions else _beyond_the_search(flat)
+    beyond = "" if known.motions else _beyond_the_search(stages)
     certain = bool(known.known[0]) and not beyond
     doubt = beyond or (FLIPS if known.flips[0] else UNDECIDED)
     reason = known.families[0].reasons[0] if certain else doubt
@@ -167,15 +171,30 @@ def hunting(stage: Stage, rtol: float = RTOL) -> Hunting:
     )
 
 
-def _beyond_the_search(flat: Mapping[str, Any]) -> str:
+def _beyond_the_search(stages: Ensemble) -> str:
     """Why something may attract a stage that a survey does not reach; "" if there is no such reason."""
-    controller = structure(flat).controller
+    controller = stages.structure.controller
     if controller is not None and controller.anti_windup == "none":
         return "with a force limit and no anti-windup, farther kicks than were tried may swing on"
-    static, coulomb = flat.get("friction.static"), flat.get("friction.coulomb")
-    if static is not None and coulomb is not None and 0 < static - coulomb < SMALL_GAP * static:
-        return "static friction is so little above Coulomb friction that cycles may be smaller than is looked for"
+    if _may_swing_a_little(stages):
+        return "friction falls so little over the speeds of small swings that cycles may be smaller than is looked for"
     return ""
+
+
+def _may_swing_a_little(stages: Ensemble) -> bool:
+    """Whether cycles may be smaller than is looked for: those that the fall of friction feeds are a certain share of
+    it (`FED`), and they attract where it falls off with less than their size."""
+    flat = stages.flat
+    if "friction.stribeck_velocity" not in flat:
+        return False
+    static, coulomb = flat["friction.static"], flat["friction.coulomb"]
+    if 0 < static - coulomb < SMALL_GAP * static:
+        return True
+    sizes = np.geomspace(1e-3 * SMALL_SWING, SMALL_SWING, 60)
+    speeds = sizes * float(stages.length[0] * stages.number("rate")[0])
+    part = 1 - np.exp(-((speeds / flat["friction.stribeck_velocity"]) ** flat["friction.stribeck_exponent"]))
+    fed = (static - coulomb) / static * part / sizes
+    return bool(fed[-1] < FED[1] and fed.max() > max(FED[0], 1.2 * fed[-1]))
 
 
 def _cycle(stages: Ensemble, cycles: Cycles, rtol: float) -> Cycle:
