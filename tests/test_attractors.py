@@ -15,6 +15,7 @@ from friso.hunting.attractors.recurrence import recurrence
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.rest import stuck
 from friso.hunting.margin import margin, searched
+from friso.hunting.outward import Beyond, Outward
 from friso.stage import Stage
 
 LONG_WAIT = VARIANTS["free, parasitic"].replace(
@@ -120,6 +121,18 @@ def test_the_period_of_a_doubled_orbit_is_told_by_its_swings() -> None:
     assert {motion.swings for motion in found.motions} == {4}
     for motion in found.motions:
         assert motion.period == pytest.approx(4.144, rel=0.01)
+
+
+def test_an_orbit_that_attracts_to_the_end_of_the_range_has_no_end_in_it() -> None:
+    """The rigid mass hunts to 1.63 times 6 Hz; a search to 1.2 times has to say so, one to 10 times ends beyond it."""
+    flat = VARIANTS["rigid"].replace({"controller.crossover": "6 Hz"}).flat()
+    motions = attractors(Ensemble.held(flat, 1)).motions
+    with pytest.raises(Beyond):
+        Outward(flat, 1.2).end(1.0, motions, 1.06)
+    end = Outward(flat, 10.0).end(1.0, motions, 1.06)  # something attracts at 1.06, other than is said
+    assert end.inside == pytest.approx(9.77 / 6, rel=1e-3)
+    assert end.outside > end.inside
+    assert end.certain
 
 
 @pytest.mark.parametrize("crossover", [12.3332, 12.9, 13.1])

@@ -38,6 +38,9 @@ HOPS = 8
 ALONG = 1 + np.array([-0.08, -0.04, -0.02, -0.01, -0.005, -0.0025, 0.0, 0.0025, 0.005, 0.01, 0.02, 0.04, 0.08])
 """Distances from which a motion is followed from one bandwidth to the next, in units of its own."""
 
+AHEAD = np.array([0.04, 0.1, 0.2, 0.4, 0.7, 1.0, 2.0, 4.0])
+"""Where it is looked for the end of what could not be followed to it, in units of the scale."""
+
 FINER = 4
 """Bandwidths between the two that enclose the end at which is simulated where no orbit can be followed."""
 
@@ -85,7 +88,18 @@ class Outward:
             if not seen.attracts[0]:
                 return AttractionEnd(at, next_to, ended and bool(seen.known[0]))
             at, motions = next_to, seen.motions
-        return AttractionEnd(at, outside, False)
+        return self._quiet_from(at, motions)
+
+    def _quiet_from(self, at: float, motions: tuple[Swinging, ...]) -> AttractionEnd:
+        """The first factor ahead of one at which motions attract from which on nothing was found to, of a few."""
+        factors = at * np.exp(self._ahead(at) * SCALE * AHEAD)
+        factors = factors[self._ahead(at) * (self.farthest - factors) >= 0]
+        distances = np.outer([motion.distance for motion in motions], ALONG).ravel()
+        attracts = self.surveyed(factors, distances).attracts if factors.size else np.ones(0, bool)
+        last = int(np.flatnonzero(attracts)[-1]) if attracts.any() else -1
+        if last + 1 >= len(factors):
+            raise Beyond
+        return AttractionEnd(at if last < 0 else float(factors[last]), float(factors[last + 1]), False)
 
     @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
     def surveyed(self, factors: np.ndarray, distances: np.ndarray | None = None) -> Attractors:
@@ -128,14 +142,13 @@ class Outward:
 
         points, reason = tracer.walk(start, 1.0, over)
         ended = reason == REACHED
-        if reason in (REACHED, END_OF_RANGE):
-            first, second = ([start, start, *points])[-2:]
-            if not abs(second.multiplier) < 1:
-                last = last_inside(tracer, first, second, _kind(first, second), PRECISE)
-                ended = last is not None
-                farthest = max(farthest, last or first, key=lambda point: point.place)
-            elif reason == END_OF_RANGE:
-                raise Beyond
+        first, second = ([start, *points])[-2:] if points else (start, start)
+        if points and not abs(second.multiplier) < 1 and reason in (REACHED, END_OF_RANGE):
+            last = last_inside(tracer, first, second, _kind(first, second), PRECISE)
+            ended = last is not None
+            farthest = max(farthest, last or first, key=lambda point: point.place)
+        elif reason == END_OF_RANGE and second.place > length * (1 - 1e-6):
+            raise Beyond
         return float(at * np.exp(ahead * SCALE * farthest.place)), orbit_distance(farthest, orbit), ended
 
     @np.errstate(all="ignore")
