@@ -19,6 +19,9 @@ LARGEST_BLOCK = 2048
 CYCLES_BLOCK = 256
 """Cells of a block where cycles are wanted, for each of which a hundred runs are needed."""
 
+PATIENCE = 10.0
+"""How long [s] blocks in flight are waited for that have been told to end."""
+
 
 @dataclass
 class Crew:
@@ -61,7 +64,7 @@ class Crew:
                 future.cancel()
             if flying:
                 self.cancel[0] = 1
-                wait(flying)
+                wait(flying, timeout=PATIENCE)  # what a broken pool was given may never end
 
     def jobs(self, studies: Sequence[Study]) -> Iterator[tuple[Study, Block]]:
         """The blocks of studies, as large as memory allows, but enough of them for the whole crew."""

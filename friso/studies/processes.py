@@ -31,7 +31,8 @@ def processes(workers: int) -> Iterator[Crew]:
     shared: Any = context.RawArray("q", 1)
     pool = ProcessPoolExecutor(workers, context, _prepare, (shared,))
     with interrupts_held():
-        pool.submit(os.getpid)  # starts all of them
+        for _ in range(workers):  # each starts one
+            pool.submit(os.getpid)
     cancel = np.frombuffer(shared, np.int64)
     with Crew(pool, workers, 4 * workers, run_block, cancel=cancel, failures=(BrokenProcessPool,)) as crew:
         yield crew
