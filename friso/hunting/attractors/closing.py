@@ -60,6 +60,8 @@ def _where_they_stick(some: Pending, times: np.ndarray) -> np.ndarray:
 def _balanced(off: np.ndarray, place: np.ndarray) -> float:
     """The sample, and what share of the step to the next, at which the integrator is no longer `off` the state that
     exerts no force, where the stage has stood still in its place [m] for longest before; both of shape (samples,)."""
+    if not np.isfinite(place).any():  # the run failed
+        return 0.0
     still = np.abs(np.diff(place)) < STILL * np.nanmax(place) - STILL * np.nanmin(place)
     moves = np.where(~still, np.arange(len(still)), -1)
     stood = np.arange(len(still)) - np.maximum.accumulate(moves)
