@@ -3,6 +3,7 @@ core to itself, so that its BLAS takes no more."""
 
 import os
 import shutil
+import signal
 import sys
 import tempfile
 from pathlib import Path
@@ -28,6 +29,10 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 def pytest_configure(config: pytest.Config) -> None:
     """Before the workers start, so that they inherit the variables; a folder already chosen is kept and left."""
     os.environ.setdefault(BLAS, "1")
+    if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # a shell starts what runs in its background deaf to Ctrl-C
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+    if hasattr(signal, "SIGHUP") and signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:  # nohup
+        signal.signal(signal.SIGHUP, signal.SIG_DFL)
     if FOLDER not in os.environ:
         os.environ[FOLDER] = os.environ[MADE] = tempfile.mkdtemp(prefix="friso-tests-")
 

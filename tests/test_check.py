@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 import friso
+from friso.hunting.measures import measured_run
+from friso.hunting.verdict import judge
 from friso.stage import Stage
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
@@ -108,8 +110,9 @@ def test_a_stage_stuck_off_its_reference_does_not_hunt(rtol: float, displacement
 
 def test_a_run_too_short_for_the_peak_count_hunts_all_the_same(rig: Stage) -> None:
     """The cycle attracts, and the move ends in it, however short the run."""
-    case = friso.check(rig.replace({"motion.duration": "9.9 s"}))["locked"]
-    assert (case.verdict, case.peaks) == ("hunts", 0)
+    short = rig.replace({"motion.duration": "9.9 s", "joint.locked": True})
+    ran = measured_run(short)
+    assert (judge(short, ran, 1e-6).verdict, ran.peaks[0]) == ("hunts", 0)
 
 
 def test_the_edge_of_hunting_of_the_thesis_rig(rig: Stage) -> None:
@@ -134,10 +137,11 @@ def test_the_edge_of_hunting_of_the_thesis_rig(rig: Stage) -> None:
 )
 def test_verdicts_by_the_cycle(rig: Stage, crossover: str, joint: str, verdict: str, attracts: bool) -> None:
     """Just above the edge a move still swings for minutes; below that of the free rig it takes a kick to hunt."""
-    case = friso.check(rig.replace({"controller.crossover": crossover}))[joint]
-    assert case.verdict == verdict
-    assert case.judgement.cycle is not None
-    assert case.judgement.cycle.attracts == attracts
+    stage = rig.replace({"controller.crossover": crossover, "joint.locked": joint == "locked"})
+    judgement = judge(stage, measured_run(stage), 1e-6)
+    assert judgement.verdict == verdict
+    assert judgement.cycle is not None
+    assert judgement.cycle.attracts == attracts
 
 
 def test_without_integral_action_there_is_a_reason() -> None:
@@ -163,6 +167,6 @@ def test_a_short_touch_of_the_limiter_is_not_missed(rig: Stage, share: float, rt
 
 def test_a_sweep_over_the_duration_leaves_its_cells_alone(rig: Stage) -> None:
     runs = friso.sweep(rig, {"motion.duration": ["10.5 s", "20 s", "60 s"]}, rtol=1e-6)
-    alone = friso.check(rig)["given"]
-    assert runs.settling_time.values[1] == alone.settling_time[1e-6]
-    assert runs.steps.values[1] == alone.solver.steps
+    alone = measured_run(rig, 1e-6)
+    assert runs.settling_time.values[1] == alone.settling_time[0][0]
+    assert runs.steps.values[1] == alone.steps[0]

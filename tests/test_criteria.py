@@ -33,9 +33,9 @@ from friso.hunting.criteria import (
     verdicts,
 )
 from friso.hunting.criteria.peak_count import DISTINCT
-from friso.hunting.measures import measure, options
+from friso.hunting.measures import measure, measured_run, options
 from friso.hunting.turns import scan
-from friso.hunting.verdict import judge_many
+from friso.hunting.verdict import judge, judge_many
 from friso.stage import Stage
 from friso.studies.rig.hunted import turning_points
 
@@ -81,7 +81,8 @@ def test_check_is_the_batch_of_one(rig: Stage) -> None:
     crossovers = np.array([8.0, 10.0, 12.0, 4.0])
     locked = rig.replace({"joint.locked": True})
     flat = locked.flat({"controller.crossover": crossovers})
-    alone = [friso.check(locked.replace({"controller.crossover": f"{f} Hz"}))["locked"].verdict for f in crossovers]
+    stages = [locked.replace({"controller.crossover": f"{f} Hz"}) for f in crossovers]
+    alone = [judge(stage, measured_run(stage), 1e-6).verdict for stage in stages]
     assert judge_many(flat, 4, 1e-6).tolist() == alone
     assert judge_many(locked.flat({"controller.crossover": crossovers[:1]}), 1, 1e-6).tolist() == alone[:1]
     assert set(alone) == {"hunts", "transient", "settles"}

@@ -72,7 +72,8 @@ class Case:
 def check(stage: Stage, rtol: float = 1e-6, traces: bool = False, progress: Progress = silent) -> dict[str, Case]:
     """The cases "given" and, for a stage with a joint, "locked" and "free" (if the file tells its stiffness).
 
-    With `traces`, each case has its time response. Raises ValueError for an `rtol` that is not usable.
+    With `traces`, each case has its time response; `progress` is called as work is done. Raises ValueError for an
+    `rtol` that is not usable.
     """
     checked_rtol(rtol)
     variants = stage.variants()

@@ -123,6 +123,8 @@ class Stage(Section):
         """Leaf springs of absurd sizes have neither stiffness nor modes."""
         try:
             flat = self.flat() if self.flexure else {}
+        except InputError:  # leaves that buckle, for one: it says why
+            raise
         except (ArithmeticError, ValueError, np.linalg.LinAlgError):  # numbers beyond what floats hold
             flat = {"joint.stiffness": np.nan}
         followed = (key for key in flat if key.startswith(("parasitic.", "joint.")))
