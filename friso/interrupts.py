@@ -66,7 +66,7 @@ def _arrived(number: int, frame: FrameType | None) -> None:
         _came.append(number)
     if not _raising:
         return
-    if _imports(frame) and hasattr(signal, "setitimer"):
+    if sys.platform != "win32" and _imports(frame):
         signal.signal(signal.SIGALRM, _arrived)
         signal.setitimer(signal.ITIMER_REAL, _AGAIN)
         return

@@ -32,6 +32,9 @@ SPREAD, ENOUGH = 9, 6
 """Cycles of a stage whose limiter chatters through whose multipliers a curve is laid, and how many of these have to be
 known."""
 
+NEAR = 1.03
+"""The range of factors about the flip over which that curve is laid again."""
+
 HOPS = 8
 """Orbits that are followed one after the other at most: beyond the end of one another may attract."""
 
@@ -155,16 +158,22 @@ class Outward:
     def _flip(self, at: float, outside: float) -> float | None:
         """The factor between two at which the simplest cycle begins to repel, from a curve through its multipliers in
         between: each of them is rough where a limiter chatters. None if it does not, or too few are known."""
-        factors = np.geomspace(at, outside, SPREAD)
-        cycles = hunting_cycles(self._stages(factors))
-        there = np.flatnonzero(cycles.found)
-        if there.size < ENOUGH or not np.ptp(np.sign(np.abs(cycles.multiplier[there]) - 1)):
-            return None
-        places, off = np.linspace(0, 1, SPREAD)[there], np.abs(cycles.multiplier[there]) - 1
-        roots = np.roots(np.polyfit(places, off, 3))
-        real = roots.real[np.abs(roots.imag) < 1e-9]
-        inside = real[(real >= 0) & (real <= places[-1])]
-        return float(at * (outside / at) ** inside.max()) if inside.size else None
+        flip: float | None = None
+        for _ in range(2):
+            factors = np.geomspace(at, outside, SPREAD)
+            cycles = hunting_cycles(self._stages(factors))
+            there = np.flatnonzero(cycles.found)
+            if there.size < ENOUGH or not np.ptp(np.sign(np.abs(cycles.multiplier[there]) - 1)):
+                break
+            places, off = np.linspace(0, 1, SPREAD)[there], np.abs(cycles.multiplier[there]) - 1
+            roots = np.roots(np.polyfit(places, off, 3))
+            real = roots.real[np.abs(roots.imag) < 1e-9]
+            inside = real[(real >= 0) & (real <= places[-1])]
+            if not inside.size:
+                break
+            flip = float(at * (outside / at) ** inside.max())
+            at, outside = flip / NEAR, flip * NEAR  # a curve over less is closer
+        return flip
 
     def _simulated(
         self, at: float, motions: tuple[Swinging, ...], outside: float
