@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import shlex
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -161,6 +162,24 @@ def test_a_second_run_needs_no_options_again(
 
 def _stopped(*arguments: Any, **named: Any) -> None:
     raise KeyboardInterrupt
+
+
+def test_one_message_holds_the_command_that_tells_all(
+    log: Log, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It is copied, and the log is read; what was said before is kept, and need not be said again."""
+    bare = pd.DataFrame({"t": log.time[:COUNT], "x": log["position"][:COUNT] * 1e3, "u": log["force"][:COUNT]})
+    bare.to_csv(tmp_path / "bare.csv", index=False)
+    monkeypatch.setattr(method, "identify", _stopped)
+    first = ("bare.csv", "--unit", "u=N", "--out", "out")
+    monkeypatch.chdir(tmp_path)
+    status, _, said = run(capsys, *first)
+    assert status == 2
+    assert '"u" = "N"' in (tmp_path / "bare.csv.friso.toml").read_text()
+    assert not (tmp_path / "out").exists()
+    command = next(line for line in said.splitlines() if "friso identify" in line).partition("friso identify")[2]
+    assert run(capsys, *shlex.split(command))[0] == 130
+    assert run(capsys, "bare.csv", "--out", "out")[0] == 130
 
 
 def test_ctrl_c_leaves_nothing(

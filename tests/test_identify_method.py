@@ -233,7 +233,7 @@ def test_a_repeated_move_is_none(acceleration: float, rest: int) -> None:
         kind = recognised(log, Path("log.csv"))[0]
     except InputError as error:
         kind = error.example
-    assert kind in (["moves"] if rest == 400 or acceleration < 5 else ["moves", "--as frequency, or --as moves"])
+    assert kind in (["moves"] if rest == 400 or acceleration < 5 else ["moves", "--as moves"])
 
 
 # what moves a loop from outside

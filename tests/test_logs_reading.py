@@ -15,6 +15,7 @@ from friso.identify.logs import mapping as mappings
 from friso.identify.logs.assemble import read_log
 from friso.identify.logs.checks import clipped_share, held, unwrapped
 from friso.identify.logs.delays import fitted_lag, in_blocks, lag
+from friso.identify.logs.gaps import GapsError
 from friso.identify.logs.log import ROLES, Log
 from friso.identify.logs.mapping import Mapping, from_options
 from friso.identify.logs.roles import role_of
@@ -77,7 +78,57 @@ def test_roles_by_name(name: str, role: str | None) -> None:
 def test_two_candidates_are_listed(tmp_path: Path) -> None:
     text = message(tmp_path, ["time [s]", "enc1 [mm]", "enc2 [mm]", "force [N]"], columns())
     assert '2 candidates: "enc1" and "enc2"' in text
-    assert '--map position="enc1"' in text
+    assert "--map position=enc1" in text
+
+
+@pytest.mark.parametrize(
+    ("first", "others"),
+    [("force", ["force_p", "force_i", "friction_force"]), ("Force", ["Force_d"]), ("iq", ["iq filtered"])],
+)
+def test_an_exact_name_wins(first: str, others: list[str], tmp_path: Path) -> None:
+    names = [*NAMES[:3], *(f"{name} [N]" for name in (*others, first))]
+    values = [*columns()[:3], *(2 * M["force"] for _ in others), M["force"]]
+    log = log_of(tmp_path, names, values)
+    assert log["force"] == pytest.approx(M["force"])
+    assert told(log.read, f'the name is "{first}"')
+
+
+def test_two_names_that_are_alike_are_still_asked_for(tmp_path: Path) -> None:
+    assert '2 candidates: "force a" and "force b"' in message(
+        tmp_path, [*NAMES[:3], "force a [N]", "force b [N]"], [*columns(), M["force"]]
+    )
+
+
+def test_velocities_of_which_none_is_needed_are_left_out(tmp_path: Path) -> None:
+    names = ["time [s]", "position [mm]", "vel a [mm/s]", "vel b [mm/s]", "force [N]"]
+    log = log_of(tmp_path, names, [*columns()[:3], M["velocity"], M["force"]])
+    assert "velocity" not in log
+    assert told(log.warnings, '--map velocity="vel a"')
+
+
+def test_everything_that_is_open_is_told_at_once(tmp_path: Path) -> None:
+    """The options of one message are all that it takes."""
+    path = log_files.write_text(
+        tmp_path / "a.csv", ["t", "ref", "x", "F"], [M["time"], columns()[1], columns()[1], M["force"]]
+    )
+    with pytest.raises(GapsError) as caught:
+        read_log(path, needed=("position", "force"))
+    options = caught.value.options
+    assert {*options} == {
+        "--map position=x", "--map force=F", "--unit t=s", "--unit x=mm", "--unit ref=mm", "--unit F=N"
+    }  # fmt: skip
+    pairs = [option.split(" ", 1) for option in options]
+    maps, units = ([text for name, text in pairs if name == kind] for kind in ("--map", "--unit"))
+    log = read_log(path, from_options(maps, units), needed=("position", "force"))
+    assert log["position"] == pytest.approx(M["position"])
+    assert log["force"] == pytest.approx(M["force"])
+
+
+def test_time_is_never_proposed_for_another_role(tmp_path: Path) -> None:
+    path = log_files.write_text(tmp_path / "a.csv", ["t [s]", "pos [mm]"], columns()[:2])
+    with pytest.raises(GapsError) as caught:
+        read_log(path, needed=("position", "force"))
+    assert caught.value.options == ()
 
 
 def test_no_candidate_lists_the_channels(tmp_path: Path) -> None:
@@ -94,7 +145,7 @@ def test_a_mapped_name_that_is_not_there(tmp_path: Path) -> None:
 def test_no_units(tmp_path: Path) -> None:
     text = message(tmp_path, ["time [s]", "position", "velocity [m/s]", "force [N]"], columns())
     assert '"position", which has no unit' in text
-    assert '--unit "position=mm"' in text
+    assert "--unit position=mm" in text
     log = log_of(
         tmp_path,
         ["time [s]", "position", "velocity [mm/s]", "force [N]"],
@@ -103,7 +154,7 @@ def test_no_units(tmp_path: Path) -> None:
     )
     assert log["position"] == pytest.approx(M["position"])
     text = message(tmp_path, ["time", "position [mm]", "velocity [mm/s]", "force [N]"], columns())
-    assert '--unit "time=ms"' in text
+    assert "--unit time=s" in text
 
 
 def test_current_needs_a_scale(tmp_path: Path) -> None:

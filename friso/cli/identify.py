@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import shlex
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -9,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from friso.cli.common import AsJson, Overrides, print_wrapped, with_overrides
-from friso.cli.output import DefaultFolder, OutputFolder, Overwrite, print_document
+from friso.cli.output import DefaultFolder, OutputFolder, Overwrite, print_document, write
 from friso.cli.progress import ProgressBar
 from friso.errors import InputError
 from friso.quantities import Quantity, positive
@@ -17,8 +19,10 @@ from friso.stage import Stage, load
 
 if TYPE_CHECKING:
     from friso.identify.kind import AnalysisSettings
+    from friso.identify.logs.mapping import Mapping
     from friso.identify.method import Identification, Prediction
     from friso.identify.sources import LogFile
+    from friso.views.files import Content
 
 STAGE = "identified.toml"
 
@@ -70,22 +74,56 @@ def identify(
     """
     from friso.identify.logs.mapping import from_options
     from friso.identify.method import identify as identification
-    from friso.identify.sources import read_all, with_mapping_file
 
     assumed, settings = _stage(stage, overrides), _settings(bandwidth, band, period)
     mapping = from_options(maps or (), units or (), scales or (), dt, kind)
     target = OutputFolder("identify", out, overwrite, [*logs, *(predict or []), *([stage] if stage else [])])
     target.check([STAGE])
-    inputs = read_all([*logs, *(predict or [])], mapping, out)
+    inputs = _read([*logs, *(predict or [])], mapping, target)
     with ProgressBar() as progress:
         sources = [(file.source, file.kind) for file in inputs[: len(logs)]]
         identified = identification(sources, assumed, settings, progress)
         predictions = _predictions(identified, inputs[len(logs) :], settings)
-        inputs = [with_mapping_file(file, out) for file in inputs]
-        from friso.views.identify.files import identify_files, mappings
+        from friso.views.identify.files import identify_files
 
-        files = target.write(identify_files(identified, inputs, predictions), progress, beside=mappings(inputs))
+        files = target.write(identify_files(identified, inputs, predictions), progress)
     _answer(identified, inputs, predictions, files, as_json)
+
+
+def _read(paths: list[Path], options: Mapping, target: OutputFolder) -> list[LogFile]:
+    """The logs; what was said of them is kept, also where more has to be said. Raises InputError, for all that is
+    open with the command that tells it."""
+    from friso.identify.sources import OpenQuestions, read_all
+
+    try:
+        files = read_all(paths, options, target.folder)
+    except OpenQuestions as error:
+        _keep(error.mappings, target)
+        raise InputError(error.key, error.actual, error.expected, _command(error.options), error.origin) from None
+    _keep({file.path: file.mapping for file in files}, target)
+    return files
+
+
+def _keep(mappings: dict[Path, Mapping], target: OutputFolder) -> None:
+    """Keep what was said of logs, by file, for the next time, where it is not kept so already."""
+    from friso.identify.logs.mapping import load, mapping_text
+    from friso.identify.sources import kept_at
+
+    folder = target.folder
+    new = {path: said for path, said in mappings.items() if said != load(path, folder)}
+    texts: dict[Path, Content] = {
+        place: mapping_text(said) for path, said in new.items() if (place := kept_at(path, said, folder)) is not None
+    }
+    if any(place.parent == folder for place in texts):
+        target.write({}, beside=texts)  # so that the folder is known for its own next time
+    else:
+        write(texts)
+
+
+def _command(options: Sequence[str]) -> str:
+    """The command as it was called, with more options: to be copied."""
+    said = (argument if argument.isalnum() else shlex.quote(argument) for argument in sys.argv[1:])
+    return " ".join(["friso", *said, *options])
 
 
 def _stage(path: Path | None, overrides: list[str] | None) -> Stage | None:

@@ -6,15 +6,19 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from friso.errors import InputError
+from friso.errors import InputError, LogError
 from friso.identify.kind import Source
 from friso.identify.kinds import KINDS
 from friso.identify.logs.assemble import read_log
+from friso.identify.logs.gaps import GapsError
 from friso.identify.logs.log import Log
 from friso.identify.logs.mapping import SUFFIX, Mapping, load, place_for
 from friso.identify.logs.read import is_frequency_response, read_frequency_response, read_table
 from friso.identify.logs.roles import find
 from friso.identify.readings.course import Course
+
+MOVED = ("position", "force")
+"""Roles by which the kind of an experiment is recognised."""
 
 
 @dataclass(frozen=True)
@@ -30,34 +34,59 @@ class LogFile:
     mapping_file: Path | None = None
 
 
+class OpenQuestions(GapsError):
+    """What several logs do not tell; `mappings` are what was said of them, by file, kept beside or not."""
+
+    def __init__(self, gaps: Sequence[LogError], mappings: dict[Path, Mapping]) -> None:
+        super().__init__(gaps)
+        self.mappings = mappings
+
+
 def read_all(paths: Sequence[Path], options: Mapping, folder: Path) -> list[LogFile]:
     """The files, mapped as the options say, or as kept from an earlier time beside them or in `folder`. Raises
-    InputError.
+    OpenQuestions for all that they do not tell, InputError for what cannot be read.
 
     Of several files, each takes what the options say about channels that it has.
     """
     if options.experiment is not None:
         KINDS.checked(options.experiment, "--as", "--as {}")
-    return [_read(path, _applicable(options, path, paths), folder) for path in paths]
+    files: list[LogFile] = []
+    gaps: list[LogError] = []
+    mappings: dict[Path, Mapping] = {}
+    for path in paths:
+        said = _applicable(options, path, paths)
+        try:
+            file = _read(path, said, folder)
+            files.append(replace(file, mapping_file=kept_at(path, file.mapping, folder)))
+            mappings[path] = file.mapping
+        except GapsError as error:
+            gaps += error.gaps
+            mappings[path] = said.over(load(path, folder) or Mapping())
+    if gaps:
+        raise OpenQuestions(gaps, mappings)
+    return files
 
 
 def _applicable(options: Mapping, path: Path, paths: Sequence[Path]) -> Mapping:
     """Of the options what this file can use; what no file can use stays, to be answered where it is read."""
-    if len(paths) < 2 or not options.roles or is_frequency_response(path):
+    if len(paths) < 2 or is_frequency_response(path):
         return options
-    holders = {role: [_has(other, name, role) for other in paths] for role, name in options.roles.items()}
+    names = {*options.roles.values(), *options.units}
+    holders = {name: [_has(other, name) for other in paths] for name in names}
     place = paths.index(path)
-    lacking = {role for role, held in holders.items() if any(held) and not held[place]}
-    roles, scales = ({k: v for k, v in table.items() if k not in lacking} for table in (options.roles, options.scales))
-    return replace(options, roles=roles, scales=scales)
+    lacking = {name for name, held in holders.items() if any(held) and not held[place]}
+    roles = {role: name for role, name in options.roles.items() if name not in lacking}
+    units = {name: unit for name, unit in options.units.items() if name not in lacking}
+    scales = {k: v for k, v in options.scales.items() if k in roles or k not in options.roles}
+    return replace(options, roles=roles, units=units, scales=scales)
 
 
-def _has(path: Path, name: str, role: str) -> bool:
+def _has(path: Path, name: str) -> bool:
     """Whether a file has a channel of this name."""
     if is_frequency_response(path):
         return False
     try:
-        find(read_table(path), name, role)
+        find(read_table(path), name, "")
     except InputError:
         return False
     return True
@@ -76,17 +105,46 @@ def _read(path: Path, options: Mapping, folder: Path) -> LogFile:
         log = _log(path, mapping, mapping.experiment)
         before = "" if stored.experiment in (None, mapping.experiment) else f", in place of {stored.experiment} as kept"
         return LogFile(path, log, mapping.experiment, f"as specified{before}", mapping)
-    log = read_log(path, mapping, strict=False, needed=("position", "force"))
-    kind, reason = recognised(log, path)
-    return LogFile(path, _log(path, mapping, kind) if KINDS[kind].si else log, kind, reason, mapping)
+    log, kind, reason = _unnamed(path, mapping)
+    return LogFile(path, log, kind, reason, mapping)
 
 
-def with_mapping_file(file: LogFile, folder: Path) -> LogFile:
-    """The file with the place where its mapping is kept for the next time, if there is anything to keep: beside it, or
-    in `folder`."""
-    if file.mapping == Mapping():
-        return file
-    return replace(file, mapping_file=place_for(file.path, folder))
+def _unnamed(path: Path, mapping: Mapping) -> tuple[Log, str, str]:
+    """A log of which nobody said what it is, its kind of experiment, and why. Raises GapsError for all that is open,
+    the units included that most kinds need."""
+    gaps: list[LogError] = []
+    kind = reason = ""
+    try:
+        log = read_log(path, mapping, strict=False, needed=MOVED)
+    except GapsError as error:
+        gaps += error.gaps
+        log = _without_clock(path, mapping)
+    try:
+        kind, reason = recognised(log, path) if log is not None else ("", "")
+    except LogError as error:
+        gaps.append(error)
+    if kind and not gaps and not KINDS[kind].si and log is not None:
+        return log, kind, reason
+    try:
+        log = _log(path, mapping, kind) if kind else read_log(path, mapping, needed=MOVED)
+    except GapsError as error:
+        gaps += [gap for gap in error.gaps if gap.example not in [other.example for other in gaps]]
+    if gaps or log is None:
+        raise GapsError(gaps)
+    return log, kind, reason
+
+
+def _without_clock(path: Path, mapping: Mapping) -> Log | None:
+    """A log whose instants are not told, sample by sample: how it goes can be seen without. None where it cannot."""
+    try:
+        return read_log(path, replace(mapping, sample_time=1.0), strict=False, needed=MOVED)
+    except LogError:
+        return None
+
+
+def kept_at(path: Path, mapping: Mapping, folder: Path) -> Path | None:
+    """Where the mapping of a log is kept for the next time: beside it, or in `folder`; None for nothing to keep."""
+    return None if mapping == Mapping() else place_for(path, folder)
 
 
 def _log(path: Path, mapping: Mapping, kind: str) -> Log:
@@ -102,6 +160,6 @@ def recognised(log: Log, path: Path) -> tuple[str, str]:
     reasons = {name: reason for name, claims in asked.items() if (reason := claims(course)) is not None}
     if len(reasons) == 1:
         return next(iter(reasons.items()))
-    names = list(reasons or asked)
+    names = sorted(reasons or KINDS, key=lambda name: name != "moves")
     expected = f"the kind of experiment: {', '.join(names)}"
-    raise InputError("--as", course.words, expected, ", or ".join(f"--as {name}" for name in names), str(path))
+    raise LogError("--as", course.words, expected, f"--as {names[0]}", str(path))

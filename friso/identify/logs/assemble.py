@@ -10,10 +10,11 @@ import numpy as np
 from friso.errors import InputError, LogError
 from friso.identify.logs import checks, delays
 from friso.identify.logs.format import FORMATS
+from friso.identify.logs.gaps import GapsError, gaps_of
 from friso.identify.logs.log import ROLES, Log
-from friso.identify.logs.mapping import Mapping
+from friso.identify.logs.mapping import Mapping, option
 from friso.identify.logs.read import file_format
-from friso.identify.logs.roles import AssignedRole, choose, role_of
+from friso.identify.logs.roles import AssignedRole, Proposal, propose, role_of
 from friso.identify.logs.signals import Notes, Reading, instants, no_time, signal, unused, with_user_units
 from friso.identify.logs.time_base import Track, together, track
 from friso.quantities import quoted
@@ -34,9 +35,13 @@ def read_log(
     form = FORMATS[file_format(path)]
     table = with_user_units(form.read(path), mapping, form.times, str(path))
     reading = Reading(table, mapping, strict, not form.units, str(path))
-    chosen = choose(table, mapping.roles, needed, str(path))
+    proposal = propose(table, mapping.roles, str(path))
+    gaps = gaps_of(reading, proposal, needed)
+    if gaps:
+        raise GapsError(gaps)
+    chosen = proposal.chosen
     unused(mapping, chosen, str(path))
-    notes = Notes(list(table.read))
+    notes = Notes(list(table.read), _undecided(proposal))
     try:
         tracks = _tracks(chosen, reading, notes, needed)
         base, signals = together(tracks)
@@ -51,6 +56,15 @@ def read_log(
         path.stem, base.time, base.period, signals, tuple(base.segments), notes.units, dict(table.scalars),
         tuple(notes.read), tuple(notes.warnings), dict(mapping.setup),
     )  # fmt: skip
+
+
+def _undecided(proposal: Proposal) -> list[str]:
+    """A line for each role that no channel has since several could."""
+    return [
+        f"{role}: left out, since {' and '.join(channel.name for channel in channels)} could be it; to use one: "
+        f"{option('--map', role, channels[0].name)}"
+        for role, channels in proposal.rivals.items()
+    ]
 
 
 def _tracks(chosen: dict[str, AssignedRole], reading: Reading, notes: Notes, needed: Sequence[str]) -> dict[str, Track]:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import re
+import shlex
 import stat
 from collections.abc import Iterable
 from collections.abc import Mapping as Table
@@ -78,6 +80,16 @@ def _pair(
     if left is not None and first not in left:
         raise LogError(option, quoted(first), f"one of {', '.join(left)}", f"{option} {example}")
     return first, second
+
+
+def option(name: str, left: str, right: str) -> str:
+    """An option LEFT=RIGHT as a shell takes it."""
+    text = f"{left}={right}"
+    if re.fullmatch(r"[\w.,:/=@%+-]+", text):
+        return f"{name} {text}"
+    if set('"$`\\!') & set(text):
+        return f"{name} {shlex.quote(text)}"
+    return f'{name} {left}="{right}"' if re.fullmatch(r"\w+", left) else f'{name} "{text}"'
 
 
 def sidecar(log: Path, folder: Path | None = None) -> Path:

@@ -100,13 +100,17 @@ def listing(table: ChannelTable) -> str:
     return f"one of the channels {text}{objects}"
 
 
-def choose(
-    table: ChannelTable, assigned: Names[str, str], needed: Sequence[str], origin: str = ""
-) -> dict[str, AssignedRole]:
-    """Roles with their channels: first what the user assigned, then what the names show.
+@dataclass(frozen=True)
+class Proposal:
+    """Roles with their channels, and the `rivals` for those of which several channels could be one."""
 
-    Raises LogError for a name that is not there, for two candidates, and for a role that is needed and not found.
-    """
+    chosen: dict[str, AssignedRole]
+    rivals: dict[str, tuple[Channel, ...]]
+
+
+def propose(table: ChannelTable, assigned: Names[str, str], origin: str = "") -> Proposal:
+    """Roles with their channels: first what the user assigned, then what the names show. Of several channels whose
+    names show a role, the one whose name is nothing else has it. Raises LogError for a name that is not there."""
     chosen = {
         role: AssignedRole(role, find(table, name, role, origin), "as specified", True)
         for role, name in assigned.items()
@@ -117,25 +121,32 @@ def choose(
         role = role_of(channel.name)
         if role is not None and role[0] not in assigned and id(channel) not in taken:
             candidates.setdefault(role[0], []).append((channel, role[1]))
+    rivals = {}
     for role, matches in candidates.items():
         if role == "time" and _own_times(table):
             continue
-        if len(matches) > 1:
-            names = " and ".join(quoted(channel.name) for channel, _ in matches)
-            raise LogError(
-                role,
-                f"{len(matches)} candidates: {names}",
-                "one channel",
-                f'--map {role}="{matches[0][0].name}"',
-                origin,
-            )
-        channel, word = matches[0]
-        chosen[role] = AssignedRole(role, channel, f'the name says "{word}"', False)
-    for role in needed:
-        if role not in chosen:
-            example = f'--map {role}="{table.channels[0].name}"'
-            raise LogError(role, "no channel whose name suggests it", listing(table), example, origin)
-    return chosen
+        exact = _exact(role, matches)
+        if exact is not None:
+            chosen[role] = AssignedRole(role, exact[0], f'the name is "{exact[0].name}"', False)
+        elif len(matches) > 1:
+            rivals[role] = tuple(channel for channel, _ in matches)
+        else:
+            channel, word = matches[0]
+            chosen[role] = AssignedRole(role, channel, f'the name says "{word}"', False)
+    return Proposal(chosen, rivals)
+
+
+def _exact(role: str, matches: Sequence[tuple[Channel, str]]) -> tuple[Channel, str] | None:
+    """Of several candidates the only one whose name is that of the role, or else the word alone that shows it."""
+    if len(matches) < 2:
+        return None
+    for alone in (
+        [match for match in matches if match[0].name.strip().lower().replace(" ", "_") == role],
+        [match for match in matches if match[0].name.strip().lower() == match[1]],
+    ):
+        if len(alone) == 1:
+            return alone[0]
+    return None
 
 
 def _own_times(table: ChannelTable) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping as Roles
 from dataclasses import dataclass, field, replace
 
@@ -11,11 +12,11 @@ from friso.errors import InputError, LogError
 from friso.identify.logs.channel import Channel, ChannelTable
 from friso.identify.logs.checks import unwrapped
 from friso.identify.logs.log import ROLES
-from friso.identify.logs.mapping import Mapping
+from friso.identify.logs.mapping import Mapping, option
 from friso.identify.logs.preamble import RATES, STEPS
 from friso.identify.logs.roles import AssignedRole, find
 from friso.identify.logs.text import with_times
-from friso.identify.logs.units import factor, in_si, read_scale
+from friso.identify.logs.units import factor, in_si, is_unit, read_scale
 from friso.quantities import quoted
 
 LARGEST = 1e30
@@ -49,6 +50,11 @@ def with_user_units(table: ChannelTable, mapping: Mapping, times: bool, origin: 
     if not mapping.units:
         return table
     units = {id(find(table, name, "unit", origin)): unit for name, unit in mapping.units.items()}
+    for name, unit in mapping.units.items():
+        if not is_unit(unit):
+            raise LogError(
+                "unit", quoted(unit), "a unit such as mm, um, rad, V, A or counts", option("--unit", name, "mm"), origin
+            )
     channels = [replace(channel, unit=units.get(id(channel), channel.unit)) for channel in table.channels]
     if not times:  # they come from its columns
         channels = [replace(channel, time=None) for channel in channels]
@@ -68,7 +74,7 @@ def signal(choice: AssignedRole, reading: Reading, notes: Notes) -> np.ndarray:
     if scale is not None:
         value, taken = _scaled(role, scale, unit, reading.origin)
         line = f"{scale}" + ("" if unit else f", its values taken to be in {taken} as the scale implies")
-    elif not unit and reading.strict and choice.by_user and reading.bare:
+    elif _taken_as_si(choice, reading):
         value, line = 1.0, f"no unit in the file: assumed to be in {ROLES[role]}"
         notes.warnings.append(
             f"{role}: {channel.name} has no unit (this format has none): assumed to be in {ROLES[role]}"
@@ -97,18 +103,49 @@ def _scaled(role: str, scale: str, unit: str, origin: str) -> tuple[float, str]:
         raise error.found_in(origin) from None
 
 
+def unit_gap(choice: AssignedRole, reading: Reading) -> LogError | None:
+    """What has to be told of the unit of a channel before it has that of its role; None for nothing. Raises LogError
+    for a scale that does not fit."""
+    si = in_si(choice.channel.unit, ROLES[choice.role])[1]
+    scale = reading.mapping.scales.get(choice.role)
+    if scale is not None:
+        _scaled(choice.role, scale, choice.channel.unit, reading.origin)
+    if not reading.strict or scale is not None or _taken_as_si(choice, reading):
+        return None
+    return None if si == ROLES[choice.role] else _wrong_unit(choice, choice.channel.unit, si, reading)
+
+
+def _taken_as_si(choice: AssignedRole, reading: Reading) -> bool:
+    """Whether a channel without a unit counts as one in SI: the user assigned it, and the format holds no units."""
+    return not choice.channel.unit and reading.strict and choice.by_user and reading.bare
+
+
 def _wrong_unit(choice: AssignedRole, unit: str, si: str, reading: Reading) -> LogError:
     """The error for a channel whose unit is none of the role's kind, or that has none."""
     role, name = choice.role, choice.channel.name
     if not unit:
-        usual = {"m": "mm", "m/s": "mm/s", "N": "N"}.get(ROLES[role], ROLES[role])
-        actual = f"{quoted(name)}, which has no unit"
-        return LogError(
-            role, actual, f"a unit convertible to {ROLES[role]}", f'--unit "{name}={usual}"', reading.origin
-        )
+        usual = _likely_length(choice.channel) if ROLES[role] == "m" else ROLES[role]
+        actual = f"{quoted(name)}, which has no unit{_span(choice.channel.values)}"
+        expected = f"a unit convertible to {ROLES[role]}"
+        if role == "force":
+            expected += f", or a scale such as {option('--scale', role, '35 N/V')}"
+        return LogError(role, actual, expected, option("--unit", name, usual), reading.origin)
     number = "35.1507" if role in ("force", "disturbance") else "1.5"
     example = f'--scale {role}="{number} {ROLES[role]}/{si}"'
     return LogError(role, f"{quoted(name)} in {unit}", f"a scale to {ROLES[role]}", example, reading.origin)
+
+
+def _likely_length(place: Channel) -> str:
+    """The unit of length in which the travel of a position is between 0.5 mm and 0.5 m, or nearest to that."""
+    finite = place.values[np.isfinite(place.values)]
+    travel = float(np.ptp(finite)) if finite.size else 0.0
+    return "m" if travel <= 0.5 else "mm" if travel <= 500 else "um"
+
+
+def _span(values: np.ndarray) -> str:
+    """Between which values a channel runs, in words."""
+    finite = values[np.isfinite(values)]
+    return f" and runs from {finite.min():.4g} to {finite.max():.4g}" if finite.size else ""
 
 
 def instants(choice: AssignedRole, clock: AssignedRole | None, reading: Reading, notes: Notes) -> np.ndarray | None:
@@ -136,17 +173,27 @@ def _seconds(clock: AssignedRole, reading: Reading, notes: Notes) -> float:
     value = factor(unit, "s") if unit else None
     if value is None:
         actual = f"{quoted(name)} in {unit}" if unit else f"{quoted(name)}, which has no unit"
-        example = "; or ".join(option for option in (f'--unit "{name}=ms"', _offers(reading.table)) if option)
-        raise LogError("time", actual, "a unit convertible to s", example, reading.origin)
+        expected = "; or ".join(text for text in ("a unit convertible to s", _offers(reading.table)) if text)
+        raise LogError("time", actual, expected, option("--unit", name, _likely_unit(clock.channel)), reading.origin)
     return value
+
+
+def _likely_unit(clock: Channel) -> str:
+    """The unit in which the steps of a time are like those of a log, between 0.1 ms and 100 ms."""
+    steps = np.diff(clock.values)
+    step = float(np.median(steps[steps > 0])) if (steps > 0).any() else 1.0
+    return "s" if step <= 0.1 else "ms" if step <= 100 else "us"
 
 
 def no_time(channel: Channel, reading: Reading) -> LogError:
     """The error for a channel without instants."""
-    example = _offers(reading.table) or '--map time="CHANNEL", or --dt "1 ms"'
+    offers = _offers(reading.table)
+    expected = "; or ".join(text for text in ("a time channel or a sample time", offers) if text)
+    example = re.match(r'--dt "[^"]*"', offers)
     return LogError(
-        "time", f"no time stamps for {quoted(channel.name)}", "a time channel or a sample time", example, reading.origin
-    )
+        "time", f"no time stamps for {quoted(channel.name)}", expected, example[0] if example else '--dt "1 ms"',
+        reading.origin,
+    )  # fmt: skip
 
 
 def _offers(table: ChannelTable) -> str:

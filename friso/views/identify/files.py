@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from friso.identify.logs.mapping import mapping_text
 from friso.identify.method import Identification, Prediction
 from friso.identify.sources import LogFile
 from friso.stage.correlations import beside, correlations_text
@@ -30,8 +29,3 @@ def identify_files(
         "identify.html": identify_html(identification, logs, predictions, figures),
         **pictures(figures),
     }
-
-
-def mappings(logs: Sequence[LogFile]) -> dict[Path, Content]:
-    """How the logs were read, each where it is kept for the next time."""
-    return {log.mapping_file: mapping_text(log.mapping) for log in logs if log.mapping_file is not None}
