@@ -114,7 +114,7 @@ def run_accuracy() -> list[Goal]:
     for name, changes in {**CASES, "locked, 4 Hz": {**LOCKED, "controller.crossover": "4 Hz"}}.items():
         stages = Ensemble.held(stage_of(changes).flat(), 1)
         plain, tight = (symmetric_cycles(stages, rtol) for rtol in (1e-9, 1e-11))
-        if not plain.found[0]:
+        if not plain.closed[0]:
             continue
         off = [
             abs(getattr(plain, what)[0] / getattr(tight, what)[0] - 1) for what in ("period", "amplitude", "multiplier")

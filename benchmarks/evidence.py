@@ -48,7 +48,7 @@ def friso(*arguments: str) -> dict[str, Any]:
 
 def rig(experiment: str) -> dict[str, Any]:
     """What an experiment of the virtual rig found on the thesis's rig."""
-    return friso("rig", experiment, DRIVE)["found"]
+    return friso("rig", experiment, DRIVE)["results"]
 
 
 def rig_in_position() -> Values:

@@ -164,7 +164,7 @@ def _masses(flat: dict) -> list[float]:
 
 def moved(stage: friso.Stage, **motion: str) -> friso.Stage:
     """The stage with another kind of motion."""
-    return friso.Stage(**{**stage.given(), "motion": motion})
+    return friso.Stage(**{**stage.as_written(), "motion": motion})
 
 
 def moves(machine: Machine, bare: bool = False) -> Log:
@@ -229,7 +229,7 @@ def break_aways(machine: Machine, bare: bool = False) -> Log:
     again, at force rates that span more than a decade."""
     flat = machine.flat
     gains = {"kind": "pid", "kp": f"{flat['friction.static'] / 2e-3} N/m", "kd": "0 N*s/m", "ki": "0 N/(m*s)"}
-    stage = friso.Stage(**{**machine.truth.given(), "controller": gains})
+    stage = friso.Stage(**{**machine.truth.as_written(), "controller": gains})
     logs = [ramps(machine, stage, (speed, -speed), 0.012, bare) for speed in PULLS]
     return joined(logs)
 

@@ -45,9 +45,9 @@ def built(seed: int) -> Machine:
     rng = np.random.default_rng((seed, len("rail")))
     flat = machine.flat
     mass, static = flat["masses.cart"] + flat["masses.stage"], flat["friction.static"]
-    tables = machine.truth.given()
-    tables["drive"] = example.given()["drive"]
-    tables["parasitic"] = {**example.given()["parasitic"], "mass": f"{flat['masses.stage'] / 2} kg"}
+    tables = machine.truth.as_written()
+    tables["drive"] = example.as_written()["drive"]
+    tables["parasitic"] = {**example.as_written()["parasitic"], "mass": f"{flat['masses.stage'] / 2} kg"}
     tables |= {"rail": {**RAIL, "seed": seed}, "controller": {**tables["controller"], "anti_windup": "clamp"}}
     numbers = {
         "joint.stroke": rng.uniform(*STROKE) * static / flat["joint.stiffness"],

@@ -72,7 +72,7 @@ def test_what_attracts_beside_cycles_that_repel(name: str) -> None:
     (motion,) = known(name).motions
     assert motion.amplitude == pytest.approx(amplitude, rel=0.01)
     assert motion.period == pytest.approx(period, rel=0.01)
-    assert known(name).known.all()
+    assert known(name).decided.all()
 
 
 @pytest.mark.parametrize("rtol", [1e-7, 1e-9])
@@ -103,15 +103,15 @@ def test_a_basin_narrower_than_starts_are_apart(crossover: str, hunts: bool) -> 
     friction = {"friction.static": "1 N", "friction.coulomb": "0.15 N", "masses.cart": "1.26 kg"}
     stage = VARIANTS["rigid"].replace({**friction, "masses.stage": "0.525 kg", "controller.crossover": crossover})
     survey = attractors(held(stage))
-    assert (survey.attracts.tolist(), survey.known.tolist()) == ([hunts], [True])
+    assert (survey.attracts.tolist(), survey.decided.tolist()) == ([hunts], [True])
 
 
 def test_a_stage_that_settles_from_everywhere() -> None:
     """Above its edge at 9.77 Hz the rigid mass has a cycle that repels; nothing attracts."""
     above = attractors(held(VARIANTS["rigid"].replace({"controller.crossover": "9.9 Hz"})), thorough=True)
     assert not above.motions
-    assert above.known.all()
-    assert above.families[0].found.all()
+    assert above.decided.all()
+    assert above.families[0].closed.all()
     assert np.isnan(above.target.amplitude).all()
 
 
@@ -203,7 +203,7 @@ def test_a_verdict_that_flips_with_the_tolerance_says_so(monkeypatch: pytest.Mon
     monkeypatch.setattr(friso.hunting.attractors, "BESIDE", np.array([1e-6]))
     found = attractors(held(CREEPING), thorough=True)
     assert found.flips.tolist() == [True]
-    assert found.known.tolist() == [False]
+    assert found.decided.tolist() == [False]
     assert not found.motions
 
 
@@ -211,9 +211,9 @@ def test_runs_that_are_given_up_leave_it_unknown(monkeypatch: pytest.MonkeyPatch
     """Just above its edge many runs of the rigid mass still swing after two rounds, each in its own way. Of a stage of
     which one alone is followed on, and that settles, nothing is known."""
     above = held(VARIANTS["rigid"].replace({"controller.crossover": "9.9 Hz"}))
-    assert attractors(above).known.all()
+    assert attractors(above).decided.all()
     monkeypatch.setattr(survey, "KINDS", 1)
-    assert not attractors(above).known.any()
+    assert not attractors(above).decided.any()
 
 
 @pytest.mark.parametrize("thorough", [False, True])
@@ -222,7 +222,7 @@ def test_a_survey_out_of_steps_knows_nothing(monkeypatch: pytest.MonkeyPatch, th
     above = held(VARIANTS["rigid"].replace({"controller.crossover": "9.9 Hz"}))
     monkeypatch.setattr(survey, "STEPS", 20_000)
     monkeypatch.setattr(survey, "FEWER", 20_000)
-    assert not attractors(above, thorough=thorough).known.any()
+    assert not attractors(above, thorough=thorough).decided.any()
 
 
 def test_a_swing_of_ten_minutes_is_seen() -> None:

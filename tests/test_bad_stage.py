@@ -479,6 +479,6 @@ def test_wrong_sections_from_python(refused: Refused) -> None:
     with refused("cart"):
         Masses(cart="3 m")  # pyright: ignore[reportArgumentType]
     masses = Masses(cart="3 kg")  # pyright: ignore[reportArgumentType]
-    tables = loads(RIG).given()
+    tables = loads(RIG).as_written()
     with refused("motion"):
         Stage(**{**tables, "motion": masses})

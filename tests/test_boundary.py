@@ -78,7 +78,7 @@ def test_the_branch_is_what_is_found_at_single_stages(over_crossover: Diagram) -
     some = [point for point in symmetric.points if 0 < point.place < 0.35][::6]
     stages = over_crossover.space.stages(np.array([[point.place] for point in some]))
     alone = symmetric_cycles(stages)
-    assert alone.found.all()
+    assert alone.closed.all()
     assert alone.amplitude == pytest.approx([point.cycle.amplitude[0] for point in some], rel=1e-6)
     assert alone.multiplier == pytest.approx([point.multiplier for point in some], rel=1e-3)
 
@@ -111,7 +111,7 @@ def test_every_curve_lies_where_the_multiplier_says(over_friction: Plane) -> Non
         for spot in curve.spots[2:-2:5]:
             sides = np.clip(np.stack([spot.at - 0.01 * spot.across, spot.at + 0.01 * spot.across]), 0, 1)
             cycles = symmetric_cycles(over_friction.space.stages(sides))
-            if cycles.found.all():
+            if cycles.closed.all():
                 assert sorted(np.abs(cycles.multiplier) < 1) == [False, True]
 
 
@@ -183,7 +183,7 @@ def test_cycles_at_the_force_limit_are_followed_to_their_fold() -> None:
         {"controller.force_limit": "12 N", "controller.anti_windup_time": "50 ms"}
     )
     found = diagram(Space.of(unwound, [KeyRange("controller.crossover", 36.0, 44.0)]), seeds=5)
-    assert found.known.all()
+    assert found.decided.all()
     assert found.attracts.tolist() == [False, False, True, True, True]
     assert not found.cycles.attracting.any()
     (fold,) = special(found, symmetric=True)["fold"]

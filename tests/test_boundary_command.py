@@ -210,7 +210,7 @@ def round_a_fold() -> Diagram:
         np.linspace(0, 1, 3),
         cycles([-0.5, np.nan, np.inf]),
         attracts=np.array([True, False, False]),
-        known=np.array([True, True, False]),
+        decided=np.array([True, True, False]),
     )
 
 

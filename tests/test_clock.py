@@ -16,7 +16,7 @@ from scipy.linalg import expm
 from friso.engine import simd_math
 from friso.engine.arrays import Results, Status, Tables
 from friso.engine.batch import RunOptions, prepare, run_batch, settings_of
-from friso.engine.kernel import Kernel, Wanted, empty_results, kernel, kernels
+from friso.engine.kernel import Kernel, KernelRequest, empty_results, kernel, kernels
 from friso.engine.simulate import simulate
 from friso.equations.as_built import NEUTRAL, AsBuilt, _command
 from friso.equations.blocks import Loop
@@ -62,7 +62,7 @@ def surroundings() -> Tables:
 @pytest.fixture(scope="module", autouse=True)
 def compiled() -> None:
     """All that is needed is compiled side by side."""
-    kernels([Wanted(AsBuilt.of(keys(axis(), delay))) for delay in (0.0, 2.0)])
+    kernels([KernelRequest(AsBuilt.of(keys(axis(), delay))) for delay in (0.0, 2.0)])
 
 
 def run(

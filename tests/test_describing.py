@@ -14,7 +14,7 @@ from scipy.integrate import solve_ivp
 from scipy.special import dawsn
 from variants import DAHL, HOLD, NO_FRICTION, free, lugre, maxwell, stage, stribeck, van_dijk
 
-from friso.engine.kernel import Wanted, kernels
+from friso.engine.kernel import KernelRequest, kernels
 from friso.equations.imposed import imposed_form
 from friso.frequency.describing.function import describing, dynamic_stiffness
 from friso.frequency.describing.loop import TOUCHES
@@ -36,7 +36,7 @@ def rigid(friction: str) -> Stage:
 
 @pytest.fixture(scope="module", autouse=True)
 def compiled() -> None:
-    kernels([Wanted(imposed_form(rigid(law).flat())) for law in LAWS.values()])
+    kernels([KernelRequest(imposed_form(rigid(law).flat())) for law in LAWS.values()])
 
 
 def test_every_law_with_a_force_is_tried() -> None:

@@ -59,7 +59,7 @@ def candidates(task: LeafTask) -> list[Candidate]:
 def loaded(**force: str) -> Spec:
     """The example with another load."""
     return Spec(
-        **{**SPEC.given(), "load": force, **tables("machine", "friction", "masses", "moves", "position", "leaves")}
+        **{**SPEC.as_written(), "load": force, **tables("machine", "friction", "masses", "moves", "position", "leaves")}
     )
 
 

@@ -389,7 +389,7 @@ def test_every_kind_of_stage_with_every_drive(name: str, drive: dict) -> None:
 
 def by_gains(rig: Stage, **gains: str) -> Stage:
     """The rig with a controller by these gains."""
-    tables = rig.given() | {"controller": {"kind": "pid", "derivative_on": "measurement", **gains}}
+    tables = rig.as_written() | {"controller": {"kind": "pid", "derivative_on": "measurement", **gains}}
     return Stage(**tables)
 
 

@@ -155,7 +155,7 @@ def test_edge_of_the_rigid_mass() -> None:
     assert -1.01 < found.outside[0] < -1
     assert edge_of(rigid(), 3, 8, 3).kind[0] == ABOVE
     assert edge_of(rigid(), 18, 30, 3).kind[0] == BELOW
-    assert not edge_of(rigid(), 18, 30, 3).known[0]
+    assert not edge_of(rigid(), 18, 30, 3).located[0]
 
 
 @FREE_RIG
@@ -219,7 +219,7 @@ def test_failed_simulation_is_not_one_that_settles(monkeypatch: pytest.MonkeyPat
     assert [each.tolist() for each in hunts_somehow(at(JUMPS, 0.1))] == [[False], [False]]
     found = swept(FAR_FLIP)
     assert found.kind[0] == UNKNOWN
-    assert not found.known[0]
+    assert not found.located[0]
 
 
 @RIGID
@@ -406,7 +406,7 @@ def shown(laws: Any, safe_locked: float, safe_free: float) -> worked.Worked:
 
 
 def test_guideline_counts_what_it_leaves_out(quick: compute.Guideline) -> None:
-    assert quick.locked.kinds[BELOW] == quick.locked.whole.edge.size - quick.locked.whole.usable.edge.size > 0
+    assert quick.locked.kinds[BELOW] == quick.locked.sweep.edge.size - quick.locked.sweep.usable.edge.size > 0
     assert quick.locked.on_test.count == quick.locked.test.usable.edge.size
     assert quick.locked.on_test.worst < 1e-3  # the invented edges are the law's own
     assert not set(map(tuple, np.stack(list(quick.locked.fit.values.values()), 1))) & set(
@@ -441,7 +441,7 @@ def test_page_renders_with_its_charts(quick: compute.Guideline, tmp_path: Path, 
     table = files["guideline_edges.csv"].read_text().splitlines()
     assert table[0].endswith("locked edge,edge,law,kind,multiplier inside,outside,windows")
     assert {line.count(",") for line in table} == {table[0].count(",")}
-    assert len(table) == 1 + sum(len(each.whole.edge) for each in (quick.locked, quick.free))
+    assert len(table) == 1 + sum(len(each.sweep.edge) for each in (quick.locked, quick.free))
     document = json.loads(json.dumps(guideline_document(quick), allow_nan=False))
     assert document["laws"]["locked"]["rates"]["slip"]["factor"] == pytest.approx(1.5, rel=1e-3)
     assert document["laws"]["free"]["edges_of"].startswith("the symmetric cycle")

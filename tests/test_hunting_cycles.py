@@ -196,7 +196,7 @@ def test_no_asymmetric_pair_elsewhere(crossover: float) -> None:
     assert [cycle.symmetric for cycle in known(rigid(crossover)).cycles] == [True]
     stages = Ensemble.held(rigid(crossover).flat(), 1)
     beside = asymmetric_cycles(stages, return_map(stages, 1e-6))
-    assert not beside.found[0]
+    assert not beside.closed[0]
     assert beside.reasons[0] in (NO_PAIR, NO_RETURN)
 
 
@@ -516,14 +516,14 @@ def test_newton_does_not_slide_onto_the_rest_line() -> None:
     crossovers = np.linspace(2, 30, 57)
     flat = rigid(4).flat() | {"controller.crossover": crossovers}
     cycles = hunting_cycles(Ensemble.held(flat, crossovers.size))
-    assert np.array_equal(cycles.found, crossovers < crossovers[np.argmin(cycles.found)])
-    assert 15 < crossovers[cycles.found].max() < 17
-    assert np.all(cycles.amplitude[cycles.found] > 4 * BRISTLES)
-    assert np.all(np.diff(cycles.amplitude[cycles.found]) < 0)
-    assert np.all(cycles.gap[cycles.found] < 1e-8)
-    assert np.all(np.isnan(cycles.amplitude[~cycles.found]))
-    assert {*cycles.reasons[~cycles.found]} == {NO_RETURN}
-    assert {*cycles.reasons[cycles.found]} == {""}
+    assert np.array_equal(cycles.closed, crossovers < crossovers[np.argmin(cycles.closed)])
+    assert 15 < crossovers[cycles.closed].max() < 17
+    assert np.all(cycles.amplitude[cycles.closed] > 4 * BRISTLES)
+    assert np.all(np.diff(cycles.amplitude[cycles.closed]) < 0)
+    assert np.all(cycles.gap[cycles.closed] < 1e-8)
+    assert np.all(np.isnan(cycles.amplitude[~cycles.closed]))
+    assert {*cycles.reasons[~cycles.closed]} == {NO_RETURN}
+    assert {*cycles.reasons[cycles.closed]} == {""}
 
 
 @RIGID
@@ -540,8 +540,8 @@ def test_cycles_of_many_stages_are_those_of_each() -> None:
     crossovers = np.array([4.0, 8.0, 18.0, 12.0])
     flat = rigid(4).flat() | {"controller.crossover": crossovers}
     together = hunting_cycles(Ensemble.held(flat, crossovers.size))
-    assert together.found.tolist() == [True, True, False, True]
-    for k in np.flatnonzero(together.found):
+    assert together.closed.tolist() == [True, True, False, True]
+    for k in np.flatnonzero(together.closed):
         alone = only_symmetric(known(rigid(float(crossovers[k]))))
         assert together.period[k] == pytest.approx(alone.period, rel=1e-9)
         assert together.multiplier[k] == pytest.approx(alone.multiplier, rel=1e-6)

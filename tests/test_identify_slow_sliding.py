@@ -174,7 +174,7 @@ def test_level_friction_shows_its_level_alone() -> None:
 
 def test_friction_without_a_falling_curve_is_not_slid_on_the_rig() -> None:
     dahl = {"model": "dahl", "coulomb": "1 N", "bristle_stiffness": "1e5 N/m", "viscous": "0.5 N*s/m"}
-    tables = {key: table for key, table in friso.load(EXAMPLE).given().items() if key != "rail"}
+    tables = {key: table for key, table in friso.load(EXAMPLE).as_written().items() if key != "rail"}
     stage = friso.Stage(**{**tables, "friction": dahl})
     still = {"position": np.zeros(200), "force": np.zeros(200)}
     assert slow_sliding.slow_sliding_logs(stage, [RigLog("x", None, DT, still, {}, stage, 1)], 1) == ()

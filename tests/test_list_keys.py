@@ -8,7 +8,7 @@ import pytest
 from variants import gains, release, stage
 
 import friso
-from friso.engine.kernel import Wanted
+from friso.engine.kernel import KernelRequest
 from friso.equations.structure import structure
 from friso.errors import InputError, StageError
 from friso.stage import Stage, numeric_keys, parse_set, violations
@@ -46,7 +46,7 @@ def test_saved_and_loaded_it_is_the_same(three: Stage) -> None:
     again = friso.loads(three.to_toml())
     assert again == three
     assert again.flat() == three.flat()
-    assert again.given()["friction"]["element_stiffness"] == ["40 N/um", "30 N/um", "30 kN/mm"]
+    assert again.as_written()["friction"]["element_stiffness"] == ["40 N/um", "30 N/um", "30 kN/mm"]
     assert pickle.loads(pickle.dumps(three)) == three
 
 
@@ -134,6 +134,6 @@ def test_the_number_of_elements_is_part_of_the_structure(three: Stage) -> None:
 
 
 def test_the_law_is_a_plug_in(three: Stage) -> None:
-    (plug_in,) = plug_ins(Wanted(structure(three.flat())).sections)
+    (plug_in,) = plug_ins(KernelRequest(structure(three.flat())).sections)
     assert plug_in.module == "maxwell_slip"
     assert plug_in.file == maxwell_slip.__file__

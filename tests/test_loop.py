@@ -40,6 +40,6 @@ def test_van_dijks_rules_tuned_for_another_mass(mass: float) -> None:
 def test_a_stage_without_friction_is_judged_too() -> None:
     """No friction deflects its loop, from which magnitudes follow elsewhere; a PI controller alone never damps it."""
     assert unstable(VARIANTS["rigid, no friction section"]) == ()
-    pushed = VARIANTS["rigid stage, PI"].given()
+    pushed = VARIANTS["rigid stage, PI"].as_written()
     smooth = Stage(**{name: table for name, table in pushed.items() if name != "friction"})
     assert unstable(smooth) == ("sticks", "slides")

@@ -9,7 +9,7 @@ from slip_reference import Loop, imposed, virgin
 from variants import FULL, gains, maxwell, release, stage, van_dijk
 
 import friso
-from friso.engine.kernel import Wanted, kernels
+from friso.engine.kernel import KernelRequest, kernels
 from friso.equations.as_built import AsBuilt
 from friso.equations.component import Kink, Switch, state
 from friso.equations.imposed import imposed_form
@@ -55,8 +55,16 @@ DROPS = stage(release("1 mm", "1 s"), friction=maxwell(0.4), controller=van_dijk
 @pytest.fixture(scope="module", autouse=True)
 def compiled() -> None:
     drops, moves = structure(DROPS.flat()), structure(MOVES.flat())
-    built = Wanted(AsBuilt.of(as_built_keys(MOVES)), method="Rodas4")
-    kernels([Wanted(moves), Wanted(drops), Wanted(drops, True), Wanted(imposed_form(MOVES.flat())), built])
+    built = KernelRequest(AsBuilt.of(as_built_keys(MOVES)), method="Rodas4")
+    kernels(
+        [
+            KernelRequest(moves),
+            KernelRequest(drops),
+            KernelRequest(drops, True),
+            KernelRequest(imposed_form(MOVES.flat())),
+            built,
+        ]
+    )
 
 
 # simulate
@@ -139,7 +147,7 @@ def test_a_loop_against_scipy_with_events() -> None:
 def cycle() -> tuple[Ensemble, Cycles]:
     stages = Ensemble.held(DROPS.flat(), 1)
     cycles = hunting_cycles(stages)
-    assert cycles.found[0], cycles.reasons[0]
+    assert cycles.closed[0], cycles.reasons[0]
     return stages, cycles
 
 
@@ -278,7 +286,7 @@ def test_a_switch_is_a_kink_whose_surface_depends_on_its_side() -> None:
 
 def test_the_side_at_the_start_may_be_told() -> None:
     """Behind the states; else it follows from them."""
-    (shape,) = kernels([Wanted(structure(MOVES.flat()))])
+    (shape,) = kernels([KernelRequest(structure(MOVES.flat()))])
     values = shape.values({**MOVES.flat(), "motion.size": 1e-3}, 1)
     states = np.zeros((1, len(shape.states)))
     names = [*shape.states]

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from friso.engine.kernel import Wanted
+from friso.engine.kernel import KernelRequest
 from friso.equations.imposed import Imposed
 from friso.stage.plug_ins import PlugIn, plug_in_of, plug_ins
 from friso.stage.tables import friction_law
@@ -50,7 +50,7 @@ motion = {kind = "release", displacement = "1 mm", duration = "1 s"}
 SEVERAL = """
 import friso
 from friso.engine import building
-from friso.engine.kernel import Wanted, kernels
+from friso.engine.kernel import KernelRequest, kernels
 from friso.equations.structure import structure
 
 if __name__ == "__main__":
@@ -62,7 +62,7 @@ controller = {kind = "pid", kp = "101 N/m"}
 motion = {kind = "release", displacement = "1 mm", duration = "1 s"}
 ''')
     form = structure(stage.flat())
-    print(len(kernels([Wanted(form, variational) for variational in (False, True)])))
+    print(len(kernels([KernelRequest(form, variational) for variational in (False, True)])))
 """
 
 
@@ -90,7 +90,7 @@ def test_one_process_builds_several_kernels_of_a_law_of_a_script(tmp_path: Path)
 
 
 def test_friso_s_own_laws_are_no_plug_ins() -> None:
-    assert plug_ins(Wanted(Imposed("lugre", None)).sections) == ()
+    assert plug_ins(KernelRequest(Imposed("lugre", None)).sections) == ()
     assert plug_in_of(friction_law("dahl")) is None
 
 

@@ -152,7 +152,7 @@ def test_free_joint_does_not_hunt_and_its_stroke_matters() -> None:
     for outcome in (told, grid):
         assert all(sentences(outcome))
         assert figures(outcome)
-        assert rig_document(outcome)["found"]
+        assert rig_document(outcome)["results"]
 
 
 def test_an_even_rail_has_a_symmetric_cycle_and_an_uneven_one_has_not() -> None:

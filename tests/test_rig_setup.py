@@ -41,7 +41,7 @@ def test_how_the_stage_was_set_up_goes_with_the_log(built: Stage, tmp_path: Path
 
 
 def test_friction_without_what_is_looked_for_is_refused(built: Stage, refused: Refused) -> None:
-    bare = {f"friction.{key}": None for key in built.given()["friction"]}
+    bare = {f"friction.{key}": None for key in built.as_written()["friction"]}
     bare |= {"rail": None}
     none = built.replace({**bare, "friction.model": "none"})
     with refused("friction.model"):

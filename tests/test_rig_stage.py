@@ -99,7 +99,7 @@ def test_what_is_left_out_does_nothing(built: Stage) -> None:
 def test_round_trip(built: Stage) -> None:
     again = loads(built.to_toml())
     assert again == built
-    assert again.given() == built.given()
+    assert again.as_written() == built.as_written()
     assert tomllib.loads(built.to_toml())["floor"] == FLOOR
     assert again.floor
     assert built.floor
@@ -124,7 +124,7 @@ def spectra(draw: st.DrawFn) -> dict[str, list[str]]:
 def test_floors_come_through(floor: dict[str, list[str]]) -> None:
     found = loads(load(EXAMPLE).replace({"floor": floor}).to_toml()).floor
     assert found
-    assert found.given() == floor
+    assert found.as_written() == floor
     assert [*found.acceleration] == [float(text.split()[0]) for text in floor["acceleration"]]
     assert all(low < high for low, high in pairwise(found.frequency))
 

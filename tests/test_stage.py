@@ -150,7 +150,7 @@ def test_round_trip(path: Path, tmp_path: Path) -> None:
     again = load(tmp_path / "again.toml")
     assert again == stage
     assert again.flat() == stage.flat()
-    assert again.given() == stage.given()
+    assert again.as_written() == stage.as_written()
     assert again.to_toml() == stage.to_toml()
     assert stage.source
 

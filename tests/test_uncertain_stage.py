@@ -55,7 +55,7 @@ def test_a_plain_stage_is_not_uncertain(rig: Stage) -> None:
 
 def test_every_numeric_key_may_be_uncertain(rig: Stage) -> None:
     """All keys that the rig gives, dimensionless ones as a text."""
-    given, known = rig.given(), numeric_keys(rig.flat())
+    given, known = rig.as_written(), numeric_keys(rig.flat())
     keys = [key for key in known if key.split(".")[1] in given.get(key.split(".")[0], {})]
     assert len(keys) == sum(isinstance(value, float) for value in rig.flat().values())
     texts = {key: f"{given[key.split('.')[0]][key.split('.')[1]]} +/- 1 %" for key in keys}
@@ -77,7 +77,7 @@ def test_save_and_load(low: float, width: float, percent: float, tmp_path_factor
     save(stage, path)
     again = load(path)
     assert again == stage
-    assert again.given() == stage.given()
+    assert again.as_written() == stage.as_written()
     assert again.uncertain() == stage.uncertain()
     assert again.to_toml() == path.read_text(encoding="utf-8")
 

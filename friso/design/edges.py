@@ -91,7 +91,7 @@ def _attract(ensemble: Ensemble, which: np.ndarray, crossover: np.ndarray) -> tu
     whether they decided that."""
     some = ensemble.take(which)
     survey = attractors(Ensemble.held({**some.flat, CROSSOVER: np.exp(crossover)}, len(which)), rtol=RTOL)
-    return survey.attracts | ~survey.known, survey.known
+    return survey.attracts | ~survey.decided, survey.decided
 
 
 def rigid(flat: Mapping[str, Any]) -> dict[str, Any]:

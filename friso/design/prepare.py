@@ -23,7 +23,7 @@ def prepared(stage: Stage, spec: Spec) -> Stage:
         for name in ("cart", "stage")
         if (mass := getattr(spec.masses, name)) is not None
     }
-    if masses and "tuned_mass" in stage.controller.given():
+    if masses and "tuned_mass" in stage.controller.as_written():
         masses[TUNED_MASS] = None  # it follows the masses
     sizes = {f"flexure.{name}": f"{section.space(name)[1]!r} m" for name in ("length", "width", "spacing")}
     leaves = {
@@ -38,7 +38,7 @@ def prepared(stage: Stage, spec: Spec) -> Stage:
     removed = {"joint.stiffness": None} if joint and joint.stiffness is not None else {}
     removed |= {"parasitic": None} if stage.parasitic else {}
     numbers = ("young", "poisson", "density", "yield", "fatigue")
-    section = stage.flexure.given() if stage.flexure else {}
+    section = stage.flexure.as_written() if stage.flexure else {}
     removed |= {f"flexure.{key}": None for key in (*numbers, "load") if key in section}
     base = stage.replace(removed | masses | sizes | leaves)
     return base.with_numbers(moved_along(stage.flat(), base.flat()["flexure.length"])) if section else base

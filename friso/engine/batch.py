@@ -152,8 +152,8 @@ def _run_with_room(
     with more room each."""
     part = _part(flat, numbers)
     least = options.least_swing
-    own = replace(options, least_swing=least[numbers]) if isinstance(least, np.ndarray) else options
-    batch = prepare(kernel, part, len(numbers), own, None if starts is None else starts[numbers])
+    part_options = replace(options, least_swing=least[numbers]) if isinstance(least, np.ndarray) else options
+    batch = prepare(kernel, part, len(numbers), part_options, None if starts is None else starts[numbers])
     samples = 0
     if options.interval is not None:
         samples = int(np.max(part["motion.duration"]) / options.interval * (1 + 1e-12)) + 1

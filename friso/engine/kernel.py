@@ -152,7 +152,7 @@ class Kernel:
 
 
 @dataclass(frozen=True)
-class Wanted:
+class KernelRequest:
     """Which kernel: for what, with variational equations or without, by the named method, in so many lanes."""
 
     structure: Form
@@ -188,10 +188,10 @@ def kernel(structure: Form, variational: bool = False, method: str = "Rodas5P", 
 
     A variational one carries a small deviation beside every state (`friso.equations.variational`).
     """
-    return kernels([Wanted(structure, variational, method, lanes)])[0]
+    return kernels([KernelRequest(structure, variational, method, lanes)])[0]
 
 
-def kernels(requests: Iterable[Wanted]) -> list[Kernel]:
+def kernels(requests: Iterable[KernelRequest]) -> list[Kernel]:
     """Several kernels; what has to be compiled is compiled side by side."""
     requests = list(requests)
     missing = [request for request in dict.fromkeys(requests) if request not in _kernels]
@@ -202,21 +202,21 @@ def kernels(requests: Iterable[Wanted]) -> list[Kernel]:
     return [_kernels[request] for request in requests]
 
 
-_kernels: dict[Wanted, Kernel] = {}
+_kernels: dict[KernelRequest, Kernel] = {}
 _loading = Lock()
 
 DRIVER = CodeRequest("driver", "the loops that run any kernel", "friso.engine.build")
 """What is compiled once for all kernels."""
 
 
-def _request(request: Wanted) -> CodeRequest:
+def _request(request: KernelRequest) -> CodeRequest:
     """What is wanted is pickled apart from the plug-ins, which the builder loads first: it may hold their classes."""
     foreign = plug_ins(request.sections)
     name = " ".join([repr(request), *(plug_in.digest for plug_in in foreign)])
     return CodeRequest(name, request.title, "friso.engine.build", pickle.dumps((foreign, pickle.dumps(request))))
 
 
-def _load(request: Wanted, entry: Compiled) -> None:
+def _load(request: KernelRequest, entry: Compiled) -> None:
     with _loading:
         if request in _kernels:  # another thread was first
             return

@@ -413,14 +413,14 @@ class _Frame(ast.NodeVisitor):
         if isinstance(sign, ast.Div):
             sides = (self._number(left, FLOAT).value, self._number(right, FLOAT).value)
             return _Value(self._builder.fdiv(*sides, flags=FASTMATH), FLOAT)
-        one, other, kind = self._alike(left, right)
+        first, second, kind = self._alike(left, right)
         if type(sign) in _ARITHMETIC:
-            whole, real = _ARITHMETIC[type(sign)]
+            integer, real = _ARITHMETIC[type(sign)]
             flags = FASTMATH if kind == FLOAT else ["nsw"]
-            return _Value(getattr(self._builder, real if kind == FLOAT else whole)(one, other, flags=flags), kind)
+            return _Value(getattr(self._builder, real if kind == FLOAT else integer)(first, second, flags=flags), kind)
         if kind == FLOAT or type(sign) not in _BITWISE:
             raise TypeError(f"not in the language of plain loops: {type(sign).__name__} of {kind.name}")
-        return _Value(getattr(self._builder, _BITWISE[type(sign)])(one, other), kind)
+        return _Value(getattr(self._builder, _BITWISE[type(sign)])(first, second), kind)
 
     def visit_Compare(self, node: ast.Compare) -> Any:
         if len(node.ops) > 1 or type(node.ops[0]) not in _COMPARISONS:
@@ -431,11 +431,11 @@ class _Frame(ast.NodeVisitor):
         return self._compare(_COMPARISONS[type(node.ops[0])], left, right)
 
     def _compare(self, sign: str, left: Any, right: Any) -> _Value:
-        one, other, kind = self._alike(left, right)
+        first, second, kind = self._alike(left, right)
         if kind != FLOAT:
-            return _Value(self._builder.icmp_signed(sign, one, other), TRUTH)
+            return _Value(self._builder.icmp_signed(sign, first, second), TRUTH)
         compare = self._builder.fcmp_unordered if sign == "!=" else self._builder.fcmp_ordered
-        return _Value(compare(sign, one, other, flags=FASTMATH), TRUTH)
+        return _Value(compare(sign, first, second, flags=FASTMATH), TRUTH)
 
     def visit_BoolOp(self, node: ast.BoolOp) -> _Value:
         """As in Python, what comes later is not looked at where what comes first decides."""
@@ -489,17 +489,17 @@ class _Frame(ast.NodeVisitor):
             return function(*arguments)
         if not inspect.isfunction(function):
             self.generic_visit(node)
-        whole = [argument if hasattr(argument, "parts") else self._number(argument) for argument in arguments]
-        return self._writer.call(self._builder, function, whole)
+        operands = [argument if hasattr(argument, "parts") else self._number(argument) for argument in arguments]
+        return self._writer.call(self._builder, function, operands)
 
-    def least(self, one: Any, other: Any) -> _Value:
-        return self._choose("<", one, other)
+    def least(self, first: Any, second: Any) -> _Value:
+        return self._choose("<", first, second)
 
-    def greatest(self, one: Any, other: Any) -> _Value:
-        return self._choose(">", one, other)
+    def greatest(self, first: Any, second: Any) -> _Value:
+        return self._choose(">", first, second)
 
-    def _choose(self, sign: str, one: Any, other: Any) -> _Value:
-        first, second, kind = self._alike(one, other)
+    def _choose(self, sign: str, left: Any, right: Any) -> _Value:
+        first, second, kind = self._alike(left, right)
         condition = self._compare(sign, _Value(second, kind), _Value(first, kind)).value
         return _Value(self._builder.select(condition, second, first), kind)
 
@@ -508,7 +508,7 @@ class _Frame(ast.NodeVisitor):
         called = self._builder.module.declare_intrinsic("llvm.fabs.f64", (), signature)
         return _Value(self._builder.call(called, [self._number(value, FLOAT).value]), FLOAT)
 
-    def whole(self, value: Any) -> _Value:
+    def integer(self, value: Any) -> _Value:
         number = self._number(value)
         if number.kind != FLOAT:
             return self._number(number, INT)
@@ -518,8 +518,8 @@ class _Frame(ast.NodeVisitor):
         return self._number(value, FLOAT)
 
     def take_next(self, queue: _ArrayValue) -> _Value:
-        taken = self._builder.atomic_rmw("add", queue.data, ir.Constant(_INT64, 1), "monotonic")
-        return _Value(taken, INT)
+        ticket = self._builder.atomic_rmw("add", queue.data, ir.Constant(_INT64, 1), "monotonic")
+        return _Value(ticket, INT)
 
     def call_at(self, address: _Value, buffer: _ArrayValue, *numbers: Any) -> _Value:
         signature = ir.FunctionType(_INT64, [*_types(buffer.kind)[:1]] + [_DOUBLE] * len(numbers))
@@ -529,11 +529,11 @@ class _Frame(ast.NodeVisitor):
 
     def _alike(self, left: Any, right: Any) -> tuple[Any, Any, NumberKind]:
         """Two numbers of one kind: a float64 number where one of them is."""
-        one, other = self._number(left), self._number(right)
-        kind = FLOAT if FLOAT in (one.kind, other.kind) else INT
-        if one.kind == TRUTH and other.kind == TRUTH:
+        first, second = self._number(left), self._number(right)
+        kind = FLOAT if FLOAT in (first.kind, second.kind) else INT
+        if first.kind == TRUTH and second.kind == TRUTH:
             kind = TRUTH
-        return self._number(one, kind).value, self._number(other, kind).value, kind
+        return self._number(first, kind).value, self._number(second, kind).value, kind
 
     def _number(self, value: Any, kind: NumberKind | None = None) -> _Value:
         """A number as one of a kind; a whole number may become a float64 number, and a truth either."""
@@ -568,7 +568,7 @@ _LIBRARY: dict[Any, Callable[..., _Value]] = {
     min: _Frame.least,
     max: _Frame.greatest,
     abs: _Frame.magnitude,
-    int: _Frame.whole,
+    int: _Frame.integer,
     float: _Frame.real,
     take_next: _Frame.take_next,
     call_at: _Frame.call_at,

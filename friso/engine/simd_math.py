@@ -33,8 +33,8 @@ def exp(x):
     """e^x for any x; below -300 as at -300 (1e-130: products with it stay normal numbers), above 700 as at 700."""
     x = min(max(x, -300.0), 700.0)
     shifted = x * _LOG2_E + _ROUNDER
-    whole = shifted - _ROUNDER
-    r = (x - whole * _LN2_HIGH) - whole * _LN2_LOW
+    rounded = shifted - _ROUNDER
+    r = (x - rounded * _LN2_HIGH) - rounded * _LN2_LOW
     r2 = r * r
     r4 = r2 * r2
     p0 = (1.0 + r) + r2 * (1.0 / 2 + r * (1.0 / 6))  # the series in groups that do not wait for each other

@@ -71,13 +71,13 @@ class _Kind:
 
 
 _BITWISE: dict[type[ast.AST], str] = {ast.BitAnd: "and_", ast.BitOr: "or_", ast.BitXor: "xor"}
-_WHOLE = {ast.Add: "add", ast.Sub: "sub", ast.Mult: "mul", ast.LShift: "shl", **_BITWISE}
+_INTEGER = {ast.Add: "add", ast.Sub: "sub", ast.Mult: "mul", ast.LShift: "shl", **_BITWISE}
 _REAL: dict[type[ast.AST], str] = {ast.Add: "fadd", ast.Sub: "fsub", ast.Mult: "fmul", ast.Div: "fdiv"}
 
 _FLOAT = _Kind(ir.DoubleType(), {**_REAL, ast.USub: "fneg"})
 _TRUTH = _Kind(ir.IntType(1), {**_BITWISE, ast.Not: "not_"})
-_SIGNED = _Kind(ir.IntType(64), {**_WHOLE, ast.RShift: "ashr"})
-_UNSIGNED = _Kind(ir.IntType(64), {**_WHOLE, ast.RShift: "lshr"})
+_SIGNED = _Kind(ir.IntType(64), {**_INTEGER, ast.RShift: "ashr"})
+_UNSIGNED = _Kind(ir.IntType(64), {**_INTEGER, ast.RShift: "lshr"})
 
 _PYTHON: dict[type[ast.AST], Callable[..., Any]] = {
     ast.Add: operator.add,
@@ -197,8 +197,8 @@ class _Writer:
 
     def _library(self, name: str, value: Any) -> _Vector:
         """One of LLVM's own functions of a number."""
-        whole = self._type(_FLOAT)
-        signature = ir.FunctionType(whole, [whole])
+        vector = self._type(_FLOAT)
+        signature = ir.FunctionType(vector, [vector])
         called = self.builder.module.declare_intrinsic(f"llvm.{name}.v{self.lanes}f64", (), signature)
         return _Vector(self.builder.call(called, [self.vector(value, _FLOAT).value]), _FLOAT)
 
@@ -337,7 +337,7 @@ def syntax(function: Callable[..., Any]) -> ast.FunctionDef:
 
 def _splat(builder: Any, scalar: Any, lanes: int) -> ir.Value:
     """A register with one value in all lanes."""
-    whole = ir.VectorType(scalar.type, lanes)
-    first = builder.insert_element(ir.Constant(whole, ir.Undefined), scalar, ir.Constant(ir.IntType(32), 0))
+    vector = ir.VectorType(scalar.type, lanes)
+    first = builder.insert_element(ir.Constant(vector, ir.Undefined), scalar, ir.Constant(ir.IntType(32), 0))
     same = ir.Constant(ir.VectorType(ir.IntType(32), lanes), [0] * lanes)
     return builder.shuffle_vector(first, first, same)

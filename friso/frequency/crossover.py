@@ -63,7 +63,7 @@ class Limits:
 def limits(flat: Mapping[str, Any]) -> Limits:
     """The crossovers at which a stage is stable, and comfortably so."""
     ends, members = searched(flat), settled_members(flat)
-    crossover = _own(flat)
+    crossover = _stated(flat)
     stable = stable_crossovers(flat, members)
     close = ranges_below(np.geomspace(*ends, STEPS), lambda f: WANTED - _distance(flat, members, f).min(axis=1))
     comfortable = shared(close, stable)
@@ -103,8 +103,8 @@ def searched(flat: Mapping[str, Any]) -> Range:
 
 def settled_margin(flat: Mapping[str, Any]) -> float:
     """The least modulus margin of the settled states of a stage; 0 if one of them is not stable."""
-    seen = scan(flat, settled_members(flat))
-    return float(seen.distance.min()) if seen.stable.all() else 0.0
+    loops = scan(flat, settled_members(flat))
+    return float(loops.distance.min()) if loops.stable.all() else 0.0
 
 
 def settled_members(flat: Mapping[str, Any]) -> Members:
@@ -114,14 +114,14 @@ def settled_members(flat: Mapping[str, Any]) -> Members:
     return joined([*limit_cases(flat).values(), every[every.stuck]])
 
 
-def _own(flat: Mapping[str, Any]) -> float:
+def _stated(flat: Mapping[str, Any]) -> float:
     """The crossover of a stage [Hz]; 1 where its controller states none."""
     named = bandwidth(flat)
     return 1.0 if named is None else named
 
 
 def _at(flat: Mapping[str, Any], crossover: np.ndarray) -> dict[str, Any]:
-    return faster(flat, crossover / _own(flat))
+    return faster(flat, crossover / _stated(flat))
 
 
 def _abscissa(flat: Mapping[str, Any], members: Members, crossover: np.ndarray) -> np.ndarray:

@@ -9,7 +9,7 @@ import numpy as np
 
 from friso.engine.arrays import Status
 from friso.engine.batch import run_chunks
-from friso.engine.kernel import Wanted, kernel, kernels
+from friso.engine.kernel import KernelRequest, kernel, kernels
 from friso.engine.simulate import simulate
 from friso.engine.tolerance import checked_rtol
 from friso.equations.structure import structure
@@ -85,10 +85,12 @@ def check(stage: Stage, rtol: float = 1e-6, traces: bool = False, progress: Prog
     return {name: judged[different.index(variant)] for name, variant in variants.items()}
 
 
-def _needed(stage: Stage) -> set[Wanted]:
+def _needed(stage: Stage) -> set[KernelRequest]:
     """The kernels for a case."""
     shape = structure(stage.flat())
-    return {Wanted(shape)} if cannot_hunt(stage) else {Wanted(shape), Wanted(shape, variational=True)}
+    return (
+        {KernelRequest(shape)} if cannot_hunt(stage) else {KernelRequest(shape), KernelRequest(shape, variational=True)}
+    )
 
 
 def _case(stage: Stage, rtol: float, traces: bool, work: Tally) -> Case:

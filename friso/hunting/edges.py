@@ -69,7 +69,7 @@ class Edges:
     windows: np.ndarray
 
     @property
-    def known(self) -> np.ndarray:
+    def located(self) -> np.ndarray:
         """Which stages have an edge in the range, shape (count,)."""
         return np.isfinite(self.crossover)
 
@@ -114,16 +114,16 @@ def find_edges(stages: Stages, grid: np.ndarray, rounds: int = ROUNDS) -> Edges:
     else the middle of that is taken (of the logarithm).
     """
     count, points = grid.shape
-    seen = _at_crossovers(stages, np.repeat(np.arange(count), points), grid.ravel()).reshaped(count, points)
-    last = points - 1 - seen.attracts[:, ::-1].argmax(axis=1)
-    some = seen.attracts.any(axis=1)
+    at_crossovers = _at_crossovers(stages, np.repeat(np.arange(count), points), grid.ravel()).reshaped(count, points)
+    last = points - 1 - at_crossovers.attracts[:, ::-1].argmax(axis=1)
+    some = at_crossovers.attracts.any(axis=1)
     which = np.flatnonzero(some & (last < points - 1))
     nothing = [np.full(count, np.nan) for _ in range(3)]
-    windows = (np.diff(seen.attracts, axis=1, prepend=False) & seen.attracts).sum(axis=1)
-    kind = np.where(some, ABOVE, np.where(seen.failed.any(axis=1), UNKNOWN, BELOW)).astype(object)
+    windows = (np.diff(at_crossovers.attracts, axis=1, prepend=False) & at_crossovers.attracts).sum(axis=1)
+    kind = np.where(some, ABOVE, np.where(at_crossovers.failed.any(axis=1), UNKNOWN, BELOW)).astype(object)
     edges = Edges(nothing[0], kind, nothing[1], nothing[2], windows)
     if which.size:
-        search = _Search(stages, which, grid, seen, last)
+        search = _Search(stages, which, grid, at_crossovers, last)
         for _ in range(rounds):
             search.halve()
         search.follow()
@@ -142,29 +142,42 @@ class _Search:
     """
 
     def __init__(
-        self, stages: Stages, which: np.ndarray, grid: np.ndarray, seen: _AtCrossovers, last: np.ndarray
+        self, stages: Stages, which: np.ndarray, grid: np.ndarray, at_crossovers: _AtCrossovers, last: np.ndarray
     ) -> None:
         at = which, last[which]
         above = which, last[which] + 1
         self.stages, self.which = stages, which
-        self.low, self.inside = np.log(grid[at]), seen.multiplier[at]
-        self.high, self.outside, self.unsure = np.log(grid[above]), seen.multiplier[above], seen.uncertain[above]
+        self.low, self.inside = np.log(grid[at]), at_crossovers.multiplier[at]
+        self.high, self.outside, self.unsure = (
+            np.log(grid[above]),
+            at_crossovers.multiplier[above],
+            at_crossovers.uncertain[above],
+        )
         beyond = np.arange(grid.shape[1]) > last[which, None]
-        flips = beyond & np.isfinite(seen.multiplier[which])
+        flips = beyond & np.isfinite(at_crossovers.multiplier[which])
         first = flips.argmax(axis=1)
         self.flip = np.where(flips.any(axis=1), np.log(grid[which, first]), np.inf)
-        self.flipped = seen.multiplier[which, first]
-        self.failed = (beyond & seen.failed[which]).any(axis=1)
+        self.flipped = at_crossovers.multiplier[which, first]
+        self.failed = (beyond & at_crossovers.failed[which]).any(axis=1)
 
     def halve(self) -> None:
         middle = (self.low + self.high) / 2
-        seen = _at_crossovers(self.stages, self.which, np.exp(middle))
-        inside, flips = seen.attracts, ~seen.attracts & np.isfinite(seen.multiplier)
-        self.low, self.inside = np.where(inside, middle, self.low), np.where(inside, seen.multiplier, self.inside)
-        self.high, self.outside = np.where(inside, self.high, middle), np.where(inside, self.outside, seen.multiplier)
-        self.unsure = np.where(inside, self.unsure, seen.uncertain)
-        self.flip, self.flipped = np.where(flips, middle, self.flip), np.where(flips, seen.multiplier, self.flipped)
-        self.failed |= seen.failed
+        at_crossovers = _at_crossovers(self.stages, self.which, np.exp(middle))
+        inside, flips = at_crossovers.attracts, ~at_crossovers.attracts & np.isfinite(at_crossovers.multiplier)
+        self.low, self.inside = (
+            np.where(inside, middle, self.low),
+            np.where(inside, at_crossovers.multiplier, self.inside),
+        )
+        self.high, self.outside = (
+            np.where(inside, self.high, middle),
+            np.where(inside, self.outside, at_crossovers.multiplier),
+        )
+        self.unsure = np.where(inside, self.unsure, at_crossovers.uncertain)
+        self.flip, self.flipped = (
+            np.where(flips, middle, self.flip),
+            np.where(flips, at_crossovers.multiplier, self.flipped),
+        )
+        self.failed |= at_crossovers.failed
 
     @property
     def jumps(self) -> np.ndarray:

@@ -70,15 +70,15 @@ def margin(stage: Stage, attracting: bool) -> Margin | None:
     return searched(stage, attracting).margin
 
 
-def searched(stage: Stage, attracting: bool, known: Attractors | None = None) -> Searched:
-    """Where something attracts, over bandwidths from a tenth to ten times that of a stage; `known` is what attracts the
-    stage itself, if that was surveyed."""
-    flat, own = stage.flat(), bandwidth(stage.flat())
+def searched(stage: Stage, attracting: bool, survey: Attractors | None = None) -> Searched:
+    """Where something attracts, over bandwidths from a tenth to ten times that of a stage; `survey` is what
+    attracts the stage itself, if that was surveyed."""
+    flat, crossover = stage.flat(), bandwidth(stage.flat())
     here, above = (COARSE, STEPS) if attracting else (STEPS, COARSE)
     below = np.geomspace(1 / FARTHEST, 1.0, here, endpoint=False)
     factors = np.concatenate([below, np.geomspace(1.0, FARTHEST, above + 1)])
     grid = _Grid(Outward(flat, FARTHEST), factors)
-    grid.know(here, known or attractors(Ensemble.held(flat, 1), thorough=True))
+    grid.know(here, survey or attractors(Ensemble.held(flat, 1), thorough=True))
     edge = grid.last_edge(here, attracting)
     contradicts = bool(grid.attracts[here]) and not attracting
     own_window = next((window for window in grid.windows() if _holds(window, 1.0)), BandwidthWindow(None, None))
@@ -88,9 +88,9 @@ def searched(stage: Stage, attracting: bool, known: Attractors | None = None) ->
         return Searched(None, others, lower, contradicts)
     at, end, certain = edge
     sure = certain and not contradicts
-    found = Margin(end.inside, None if own is None else own * end.inside, sure, end.outside)
+    outermost = Margin(end.inside, None if crossover is None else crossover * end.inside, sure, end.outside)
     others = tuple(window for window in grid.windows() if not _holds(window, factors[at]))
-    return Searched(found, others, lower, contradicts)
+    return Searched(outermost, others, lower, contradicts)
 
 
 class _Grid:
@@ -98,16 +98,16 @@ class _Grid:
 
     def __init__(self, outward: Outward, factors: np.ndarray) -> None:
         self.outward, self.factors = outward, factors
-        seen = outward.glanced(factors)
-        self.attracts, self.known = seen.attracts, seen.known
+        survey = outward.surveyed(factors, cycles=False)
+        self.attracts, self.decided = survey.attracts, survey.decided
         self.motions: list[list[Swinging]] = [[] for _ in factors]
-        for motion in seen.motions:
+        for motion in survey.motions:
             self.motions[motion.stage].append(motion)
 
-    def know(self, here: int, seen: Attractors) -> None:
+    def know(self, here: int, survey: Attractors) -> None:
         """Take over what a thorough survey of one of the stages shows."""
-        self.attracts[here], self.known[here] = seen.attracts[0], seen.known[0]
-        self.motions[here] = list(seen.motions)
+        self.attracts[here], self.decided[here] = survey.attracts[0], survey.decided[0]
+        self.motions[here] = list(survey.motions)
 
     def last_edge(self, here: int, above: bool) -> tuple[int, AttractionEnd, bool] | None:
         """The last factor, by number, at which something attracts while nothing does at the next one, of those from a
@@ -134,7 +134,7 @@ class _Grid:
                 end = replace(end, outside=float(self.factors[settled[0]]))
             hunts = quiet[self.attracts[quiet]]
             upper = quiet[quiet < hunts[0]] if hunts.size else quiet
-            return at, end, bool(end.certain and self.known[upper].all())
+            return at, end, bool(end.certain and self.decided[upper].all())
 
     def quiet_below(self, here: int) -> float | None:
         """The next factor below a number at which nothing attracts, nor at the one below that, if both are known."""
@@ -142,7 +142,7 @@ class _Grid:
         if not quiet.size:
             return None
         both = slice(max(int(quiet[-1]) - 1, 0), int(quiet[-1]) + 1)
-        sure = not self.attracts[both].any() and bool(self.known[both].all())
+        sure = not self.attracts[both].any() and bool(self.decided[both].all())
         return float(self.factors[quiet[-1]]) if sure else None
 
     def windows(self) -> list[BandwidthWindow]:

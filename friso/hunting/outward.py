@@ -87,10 +87,10 @@ class Outward:
             next_to = at * beyond ** self._ahead(at)
             if self._ahead(at) * (next_to - self.farthest) > 0:
                 raise Beyond
-            seen = self.surveyed(np.array([next_to]), ALONG * distance)
-            if not seen.attracts[0]:
-                return AttractionEnd(at, next_to, ended and bool(seen.known[0]))
-            at, motions = next_to, seen.motions
+            survey = self.surveyed(np.array([next_to]), ALONG * distance)
+            if not survey.attracts[0]:
+                return AttractionEnd(at, next_to, ended and bool(survey.decided[0]))
+            at, motions = next_to, survey.motions
         return self._quiet_from(at, motions)
 
     def _quiet_from(self, at: float, motions: tuple[Swinging, ...]) -> AttractionEnd:
@@ -105,16 +105,11 @@ class Outward:
         return AttractionEnd(at if last < 0 else float(factors[last]), float(factors[last + 1]), False)
 
     @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
-    def surveyed(self, factors: np.ndarray, distances: np.ndarray | None = None) -> Attractors:
-        """What attracts at some factors, tried from distances [m] as well."""
+    def surveyed(self, factors: np.ndarray, distances: np.ndarray | None = None, cycles: bool = True) -> Attractors:
+        """What attracts at some factors, tried from distances [m] as well. Without `cycles` simulations alone tell:
+        orbits that attract from a narrow range show where they are followed from wider ones."""
         tried = None if distances is None else np.tile(distances, (len(factors), 1))
-        return attractors(self._stages(factors), tried=tried)
-
-    @np.errstate(all="ignore")
-    def glanced(self, factors: np.ndarray) -> Attractors:
-        """What attracts at some factors, from simulations alone: orbits that attract from a narrow range show where
-        they are followed from wider ones."""
-        return attractors(self._stages(factors), cycles=False)
+        return attractors(self._stages(factors), tried=tried, cycles=cycles)
 
     def _stages(self, factors: np.ndarray) -> Ensemble:
         return Ensemble.held(faster(self.flat, factors), len(factors))
@@ -162,10 +157,10 @@ class Outward:
         for _ in range(2):
             factors = np.geomspace(at, outside, SPREAD)
             cycles = hunting_cycles(self._stages(factors))
-            there = np.flatnonzero(cycles.found)
-            if there.size < ENOUGH or not np.ptp(np.sign(np.abs(cycles.multiplier[there]) - 1)):
+            closed = np.flatnonzero(cycles.closed)
+            if closed.size < ENOUGH or not np.ptp(np.sign(np.abs(cycles.multiplier[closed]) - 1)):
                 break
-            places, off = np.linspace(0, 1, SPREAD)[there], np.abs(cycles.multiplier[there]) - 1
+            places, off = np.linspace(0, 1, SPREAD)[closed], np.abs(cycles.multiplier[closed]) - 1
             roots = np.roots(np.polyfit(places, off, 3))
             real = roots.real[np.abs(roots.imag) < 1e-9]
             inside = real[(real >= 0) & (real <= places[-1])]
@@ -183,15 +178,15 @@ class Outward:
         ahead = self._ahead(at)
         farther = outside if ahead * (outside - at) > 0 else at * np.exp(ahead * SCALE)
         factors = np.geomspace(at, farther, FINER + 2)[1:]
-        seen = self.surveyed(factors, np.outer([motion.distance for motion in motions], ALONG).ravel())
-        attract = np.flatnonzero(seen.attracts)
+        survey = self.surveyed(factors, np.outer([motion.distance for motion in motions], ALONG).ravel())
+        attract = np.flatnonzero(survey.attracts)
         if not attract.size:
             return at, motions, float(factors[0])
         last = int(attract[-1])
         beyond = float(factors[last + 1]) if last + 1 < len(factors) else farther * np.exp(ahead * SCALE)
         if ahead * (beyond - self.farthest) > 0:
             raise Beyond
-        return float(factors[last]), seen.take(attract[-1:]).motions, beyond
+        return float(factors[last]), survey.take(attract[-1:]).motions, beyond
 
 
 def _is_simple(orbit: Swinging) -> bool:

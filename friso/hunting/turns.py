@@ -18,8 +18,8 @@ MANY = 100
 """Turning points, of all runs together, from which on the compiled loops are loaded; they take as long as so many."""
 
 _FLAT, _SQUARE = ArrayKind("float64", 1), ArrayKind("float64", 2)
-_WHOLE, _MARKS = ArrayKind("int64", 1), ArrayKind("bool", 2)
-KINDS = (_SQUARE, _SQUARE, _WHOLE, _FLAT, _FLAT, _WHOLE, _MARKS, _MARKS, _FLAT, _FLAT, _FLAT)
+_COUNTS, _MARKS = ArrayKind("int64", 1), ArrayKind("bool", 2)
+KINDS = (_SQUARE, _SQUARE, _COUNTS, _FLAT, _FLAT, _COUNTS, _MARKS, _MARKS, _FLAT, _FLAT, _FLAT)
 """What `friso.hunting.turning.run` is given."""
 
 

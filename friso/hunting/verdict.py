@@ -107,23 +107,23 @@ def judge(stage: Stage, ran: Measures, rtol: float, begin: Callable[[str], None]
     flat, motions = stage.flat(), Motions.of(ran)
     begin(WORK[0])
     moves_on = _keeps_moving(flat) and not cannot_hunt(stage)
-    known = Hunting((), MOVING, True, None) if moves_on else hunting(stage)
+    attraction = Hunting((), MOVING, True, None) if moves_on else hunting(stage)
     if not motions.completed[0]:
-        return Judgement("failed", known)
-    if known.target:
-        return _with_a_target(stage, motions, known, known.target, begin)
+        return Judgement("failed", attraction)
+    if attraction.target:
+        return _with_a_target(stage, motions, attraction, attraction.target, begin)
     begin(WORK[1])
-    rest = _rest(flat, motions, 1, options(rtol), possible=known.possible)
+    rest = _rest(flat, motions, 1, options(rtol), possible=attraction.possible)
     observed = bool(rest.steady[0])
-    sought = searched(stage, False, known.surveyed) if known.possible and not observed else NOT_SOUGHT
+    sought = searched(stage, False, attraction.surveyed) if attraction.possible and not observed else NOT_SOUGHT
     if sought.contradicts:
-        known = replace(known, certain=False, reason=REACHED)
+        attraction = replace(attraction, certain=False, reason=REACHED)
     after = float(rest.after[0]) if np.isfinite(rest.after[0]) else None
     word = verdicts(motions.completed, rest.steady, rest.steady, rest.rests)[0]
     return Judgement(
         word,
-        known,
-        margin=_as_sure(sought.margin, known),
+        attraction,
+        margin=_as_sure(sought.margin, attraction),
         windows=sought.windows,
         settled_after=after,
         followed=float(rest.followed[0]) if np.isfinite(rest.followed[0]) else None,
@@ -133,31 +133,31 @@ def judge(stage: Stage, ran: Measures, rtol: float, begin: Callable[[str], None]
 
 
 def _with_a_target(
-    stage: Stage, motions: Motions, known: Hunting, target: Target, begin: Callable[[str], None]
+    stage: Stage, motions: Motions, attraction: Hunting, target: Target, begin: Callable[[str], None]
 ) -> Judgement:
     begin(WORK[1])
     ends, completed = ends_in(stage.flat(), 1, target)
     if not completed[0]:
-        return Judgement("failed", known)
-    within, sought = float(motions.settling[0]), searched(stage, True, known.surveyed)
+        return Judgement("failed", attraction)
+    within, sought = float(motions.settling[0]), searched(stage, True, attraction.surveyed)
     begin(WORK[2])
     return Judgement(
         verdicts(completed, np.ones(1, bool), ends, np.zeros(1, bool))[0],
-        known,
+        attraction,
         displacements(stage, target),
         pushes(stage, target),
         moves(stage, target),
-        _as_sure(sought.margin, known),
+        _as_sure(sought.margin, attraction),
         sought.windows,
         sought.lower,
         None if ends[0] or not np.isfinite(within) else within,
-        observed=not known.attracting,
+        observed=not attraction.attracting,
     )
 
 
-def _as_sure(edge: Margin | None, known: Hunting) -> Margin | None:
+def _as_sure(edge: Margin | None, attraction: Hunting) -> Margin | None:
     """An edge is not more certain than the verdict."""
-    return edge and replace(edge, certain=edge.certain and known.certain)
+    return edge and replace(edge, certain=edge.certain and attraction.certain)
 
 
 def _keeps_moving(flat: Mapping[str, Any]) -> bool:
@@ -177,15 +177,15 @@ def judge_many(flat: Mapping[str, Any], count: int, rtol: float) -> np.ndarray:
     As by `judge`, but from fewer starts, which may miss what attracts from a narrow range of them; simulations that
     fail leave the verdict "failed".
     """
-    known = attractors(Ensemble.held(flat, count, form=shared_structure(flat))) if can_hunt(flat) else None
-    return judge_runs(flat, _motions(flat, count, options(rtol)), known, rtol)
+    survey = attractors(Ensemble.held(flat, count, form=shared_structure(flat))) if can_hunt(flat) else None
+    return judge_runs(flat, _motions(flat, count, options(rtol)), survey, rtol)
 
 
 @np.errstate(all="ignore")
 def judge_runs(
     flat: Mapping[str, Any],
     motions: Motions,
-    known: Attractors | None,
+    survey: Attractors | None,
     rtol: float,
     threads: int | None = None,
     cancel: np.ndarray | None = None,
@@ -194,26 +194,28 @@ def judge_runs(
     `threads` and `cancel` as in `RunOptions`."""
     count = len(motions.completed)
     sure, attracts = motions.completed.copy(), np.zeros(count, bool)
-    if known is not None:
-        sure &= known.known
-        attracts = known.attracts.copy()
+    if survey is not None:
+        sure &= survey.decided
+        attracts = survey.attracts.copy()
     in_cycle, rests = np.zeros(count, bool), np.zeros(count, bool)
-    drawn = np.flatnonzero(sure & attracts)
-    if known is not None and drawn.size:
-        in_cycle[drawn], sure[drawn] = _end_in_a_cycle(_part(flat, drawn), known.take(drawn), threads, cancel)
+    attracted = np.flatnonzero(sure & attracts)
+    if survey is not None and attracted.size:
+        in_cycle[attracted], sure[attracted] = _end_in_a_cycle(
+            _part(flat, attracted), survey.take(attracted), threads, cancel
+        )
     free = np.flatnonzero(sure & ~attracts)
     if free.size:
         how = options(rtol, threads, cancel)
-        rest = _rest(_part(flat, free), motions.take(free), free.size, how, possible=known is not None)
+        rest = _rest(_part(flat, free), motions.take(free), free.size, how, possible=survey is not None)
         rests[free], attracts[free], in_cycle[free] = rest.rests, rest.steady, rest.steady
     return verdicts(sure, attracts, in_cycle, rests)
 
 
 def _end_in_a_cycle(
-    flat: Mapping[str, Any], known: Attractors, threads: int | None, cancel: np.ndarray | None
+    flat: Mapping[str, Any], survey: Attractors, threads: int | None, cancel: np.ndarray | None
 ) -> tuple[np.ndarray, np.ndarray]:
     """Which stages' own motions end in what attracts, and which runs were completed."""
-    return ends_in(flat, len(known.known), known.target, threads=threads, cancel=cancel)
+    return ends_in(flat, len(survey.decided), survey.target, threads=threads, cancel=cancel)
 
 
 @dataclass(frozen=True)
@@ -240,11 +242,11 @@ def _rest(flat: Mapping[str, Any], motions: Motions, count: int, how: RunOptions
         still = (motions.swing <= COUNTED_ABOVE) & (motions.peaks == 0)
         return _Rest(rests | still, after, steady, followed, swing)
     if (on := np.flatnonzero(~rests)).size:
-        own = _part(flat, on)
-        stages = Ensemble.held(own, on.size, form=shared_structure(flat))
+        part = _part(flat, on)
+        stages = Ensemble.held(part, on.size, form=shared_structure(flat))
         waits = SWINGS * wait(stages, loose_from(stages))
-        followed[on] = np.maximum(np.maximum(LONG, own["motion.duration"]), waits)
-        long = {**own, "motion.duration": followed[on] + last_corner(own)}
+        followed[on] = np.maximum(np.maximum(LONG, part["motion.duration"]), waits)
+        long = {**part, "motion.duration": followed[on] + last_corner(part)}
         last, half = (_motions(long, on.size, replace(how, window=window)) for window in (0.75, 0.5))
         after[on], swing[on] = last.settling, last.swing
         steady[on] = lasts(last.swing, half.swing, COUNTED_ABOVE / 2, 1 / (1 + STEADY))

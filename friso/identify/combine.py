@@ -31,12 +31,12 @@ def combined(estimates: Sequence[Estimate]) -> tuple[list[Estimate], list[str]]:
         certain = [estimate for estimate in estimates_of_key if estimate.determined]
         sure = _weighty(certain)
         if len(sure) > 1:
-            one, agrees = _mean(key, sure)
+            answer, agrees = _mean(key, sure)
         elif certain:
-            one, agrees = (sure or certain)[0], True
+            answer, agrees = (sure or certain)[0], True
         else:
-            one, agrees = _left(key, estimates_of_key)
-        answers.append(one)
+            answer, agrees = _left(key, estimates_of_key)
+        answers.append(answer)
         if not agrees:
             sentences.append(
                 f"{key}: the experiments disagree, and the interval allows for it: {_texts(sure or estimates_of_key)}"
@@ -44,9 +44,9 @@ def combined(estimates: Sequence[Estimate]) -> tuple[list[Estimate], list[str]]:
         beyond = [
             estimate
             for estimate in estimates_of_key
-            if certain and not estimate.determined and (estimate.low > one.high or estimate.high < one.low)
+            if certain and not estimate.determined and (estimate.low > answer.high or estimate.high < answer.low)
         ]
-        sentences += [f"{key}: {_text(one)} is shown, but {_text(estimate)}" for estimate in beyond]
+        sentences += [f"{key}: {_text(answer)} is shown, but {_text(estimate)}" for estimate in beyond]
     return answers, sentences
 
 

@@ -78,10 +78,10 @@ def identify(
         return Identification(None, Correlations(), tuple(experiments), tuple(estimates), tuple(warnings))
     warnings += _notes(experiments, base)
     fits = fitting(stage, estimates)
-    whole = identified(stage, fits.estimates, [log.name for log, _ in logs])
+    fitted = identified(stage, fits.estimates, [log.name for log, _ in logs])
     return Identification(
-        whole,
-        _correlations(experiments, estimates, fits, whole),
+        fitted,
+        _correlations(experiments, estimates, fits, fitted),
         tuple(experiments),
         tuple(estimates),
         (*warnings, *fits.notes),
@@ -141,7 +141,9 @@ def _correlations(
         [KINDS[experiment.kind].correlated(experiment.result, experiment.estimates) for experiment in experiments],
     )
     uncertain = stage.uncertain()
-    leads = {one.name: one.name for one in fits.estimates if one.name in keys and one in estimates} | {**fits.follows}
+    leads = {
+        estimate.name: estimate.name for estimate in fits.estimates if estimate.name in keys and estimate in estimates
+    } | {**fits.follows}
     leading = [key for key, lead in leads.items() if key in uncertain and lead in keys]
     places = [keys.index(leads[key]) for key in leading]
     part = matrix[np.ix_(places, places)]

@@ -47,12 +47,12 @@ def fitting(stage: Stage, estimates: Sequence[Estimate]) -> Fitting:
             notes += [f"{estimate.name}: the stage has no such key, it is left out"] if estimate.determined else []
             continue
         bounded = _bounded(estimate, stage, estimates)
-        one, why = _within(bounded, field)
+        accepted_estimate, why = _within(bounded, field)
         if not why and bounded.high < estimate.high:
             why = f"the upper end {bounded.high:.4g} {estimate.unit} is from what was known beforehand"
         notes += [f"{estimate.name}: {why}"] if why else []
-        if one is not None:
-            accepted[estimate.name] = one
+        if accepted_estimate is not None:
+            accepted[estimate.name] = accepted_estimate
     follows = _static_above(stage, fields, accepted, notes)
     return Fitting(_together(stage, accepted, notes), {k: v for k, v in follows.items() if k in accepted}, tuple(notes))
 
@@ -80,7 +80,7 @@ def _bounded(estimate: Estimate, stage: Stage, estimates: Sequence[Estimate]) ->
     if estimate.name != STATIC or not np.isfinite(estimate.low) or np.isfinite(estimate.high):
         return estimate
     flat = stage.flat()
-    coulomb = next((one for one in estimates if one.name == COULOMB and one.determined), None)
+    coulomb = next((candidate for candidate in estimates if candidate.name == COULOMB and candidate.determined), None)
     value, high = (coulomb.value, coulomb.high) if coulomb else (flat[COULOMB], flat[COULOMB])
     top = HIGHEST_RATIO * value
     # a bound that is Coulomb friction itself adds nothing: static friction then moves along with that

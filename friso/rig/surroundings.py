@@ -32,12 +32,12 @@ def tables(flat: Mapping[str, Any], floor: Floor | None, task: MoveTask, seeds: 
     """
     places, grid = _places(flat, task)
     varied = [key for key, value in flat.items() if key.startswith(("rail.", "drive.ripple")) and np.ndim(value)]
-    over = [_over_places(_one(flat, run), places) for run in (range(len(seeds)) if varied else range(1))]
+    over = [_over_places(_of_run(flat, run), places) for run in (range(len(seeds)) if varied else range(1))]
     times, per_second = _over_time(floor, task, seeds)
     return Tables(np.array(over), grid, times, np.array([per_second]))
 
 
-def _one(flat: Mapping[str, Any], run: int) -> dict[str, Any]:
+def _of_run(flat: Mapping[str, Any], run: int) -> dict[str, Any]:
     return {key: value[run] if np.ndim(value) else value for key, value in flat.items()}
 
 

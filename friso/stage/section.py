@@ -49,7 +49,7 @@ class Section(BaseModel):
         except ValidationError as error:
             raise self.refusal.of(_first_problem(type(self), error)) from None
 
-    def given(self) -> dict[str, Any]:
+    def as_written(self) -> dict[str, Any]:
         """The keys that the user gave, with the values as written."""
         values = {key: getattr(self, key) for key in type(self).model_fields if key in self.model_fields_set}
         return {key: getattr(value, "text", value) for key, value in values.items()}
@@ -130,10 +130,10 @@ class Variants:
     def register(self, cls: SectionClass) -> SectionClass:
         """Class decorator: add a variant. Raises InputError where its name is taken."""
         name = self.name_of(cls)
-        taken = self.classes.get(name, cls)
-        if (taken.__module__, taken.__qualname__) != (cls.__module__, cls.__qualname__):
+        holder = self.classes.get(name, cls)
+        if (holder.__module__, holder.__qualname__) != (cls.__module__, cls.__qualname__):
             actual = f"{as_toml(name)}, which {cls.__module__}.{cls.__qualname__} registers"
-            expected = f"a name that is not taken: {taken.__module__}.{taken.__qualname__} has it"
+            expected = f"a name that is not taken: {holder.__module__}.{holder.__qualname__} has it"
             raise InputError(self.tag, actual, expected, f'{self.tag}: Literal["my_{name}"]')
         self.classes[name] = cls
         return cls

@@ -139,10 +139,10 @@ class Stage(Section):
         values = [(name, getattr(getattr(self, table), name)) for table, name in pairs if getattr(self, table)]
         return ", ".join(f"{name} = {_written(getattr(value, 'text', value))}" for name, value in values)
 
-    def given(self) -> dict[str, Any]:
+    def as_written(self) -> dict[str, Any]:
         """The stage file as nested tables: the keys that the user gave, with the values as written."""
-        texts = super().given()
-        return {key: item.given() if isinstance(item, Section) else item for key, item in texts.items()}
+        texts = super().as_written()
+        return {key: item.as_written() if isinstance(item, Section) else item for key, item in texts.items()}
 
     def flat(self, swept: Mapping[str, Any] | None = None) -> dict[str, Any]:
         """Dotted keys to SI floats, texts and booleans; defaults filled in, absent optional keys absent, and so are
@@ -174,7 +174,7 @@ class Stage(Section):
 
     def replace(self, changes: Mapping[str, Any]) -> "Stage":
         """The stage with dotted keys set, or removed by None; checked like a file. Raises StageError."""
-        tables = self.given()
+        tables = self.as_written()
         for key, value in changes.items():
             _put(tables, key, getattr(value, "text", value))
         return Stage(**tables)
@@ -199,7 +199,7 @@ class Stage(Section):
 
     def to_toml(self) -> str:
         """The text of a stage file that gives this stage again."""
-        texts = self.given()
+        texts = self.as_written()
         lines = [f"{key} = {as_toml(text)}" for key, text in texts.items() if isinstance(text, str)]
         for name, table in texts.items():
             if isinstance(table, dict):

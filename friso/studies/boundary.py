@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from friso.engine.kernel import Wanted, kernels
+from friso.engine.kernel import KernelRequest, kernels
 from friso.engine.tolerance import checked_rtol
 from friso.errors import InputError
 from friso.hunting.boundary import Diagram, KeyRange, Plane, Space, diagram, plane
@@ -55,7 +55,7 @@ def boundary(
         raise InputError("rtol", f"{rtol:g}", f"at most {LOOSEST:g}, since multipliers are derivatives", "1e-9")
     space = Space(ranges, lambda values: flat_cells(stage, followers, values))
     _refuse_impossible(space)
-    kernels([Wanted(space.form, variational) for variational in (False, True)])
+    kernels([KernelRequest(space.form, variational) for variational in (False, True)])
     return diagram(space, rtol) if len(ranges) == 1 else plane(space, rtol)
 
 

@@ -203,4 +203,4 @@ def lost_places(result: Plane) -> np.ndarray:
 
 def _verdicts(result: Diagram | Plane) -> list[str]:
     """The verdicts of stages by what simulations of them end in."""
-    return np.select([result.attracts, ~result.known], [ATTRACTS, UNKNOWN], REPELS).tolist()
+    return np.select([result.attracts, ~result.decided], [ATTRACTS, UNKNOWN], REPELS).tolist()

@@ -264,7 +264,7 @@ class _Table:
         word = np.full(count, NOTHING, dtype=object)
         measures = {name: np.full(count, np.nan) for name in CYCLE_UNITS}
         if survey is not None:
-            word[~survey.known] = UNKNOWN
+            word[~survey.decided] = UNKNOWN
             for motion in sorted(survey.motions, key=lambda motion: motion.amplitude):  # the largest last
                 k, orbit = motion.stage, motion.cycles
                 word[k] = SWING if orbit is None else CYCLE

@@ -90,6 +90,6 @@ def _refuse_strangers(client: Any) -> None:
             raise _stranger(f"the worker {address}", version_there)
 
 
-def _stranger(who: str, version: str) -> InputError:
-    text = f"{who} has friso {version}"
+def _stranger(place: str, version: str) -> InputError:
+    text = f"{place} has friso {version}"
     return InputError("--scheduler", text, f"friso {equations_version()}, as here, on every worker")

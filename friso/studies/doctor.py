@@ -121,10 +121,10 @@ def _kept_code(full_paths: bool) -> str:
 def _compiling() -> str:
     """Compile the kernel of the template's stage into a folder that is deleted."""
     from friso.engine.build import build
-    from friso.engine.kernel import Wanted
+    from friso.engine.kernel import KernelRequest
     from friso.equations.structure import structure
 
-    request = Wanted(structure(_stage().flat()))
+    request = KernelRequest(structure(_stage().flat()))
     with tempfile.TemporaryDirectory(prefix="friso-doctor-") as folder:
         begin = time.perf_counter()
         build(Path(folder), pickle.dumps(((), pickle.dumps(request))))

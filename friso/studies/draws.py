@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import mannwhitneyu
 
-from friso.engine.kernel import Wanted, kernels
+from friso.engine.kernel import KernelRequest, kernels
 from friso.equations.structure import shared_structure
 from friso.hunting.criteria import ATTRACTED, VERDICTS
 from friso.hunting.cycle.hunting import why_not
@@ -62,7 +62,7 @@ def fates(stage: Stage, sample: Sample, rtol: float, progress: Progress = silent
     """The fates of the drawn stages as given and, with a joint, locked and free."""
     variants = different(stage)
     structures = [shared_structure(laid_over(variant, sample.keys)) for variant in variants.values()]
-    kernels([Wanted(form, variational) for form in structures for variational in (False, not why_not(form))])
+    kernels([KernelRequest(form, variational) for form in structures for variational in (False, not why_not(form))])
     tally = Tally(progress, sample.count * len(variants))
     by_variant = {name: _fates(variant, sample, rtol, tally) for name, variant in variants.items()}
     return {

@@ -84,7 +84,7 @@ def harmonic_balance(
 def _symmetric(stages: Ensemble, rtol: float) -> Cycles:
     """The cycle of every stage that is its own mirror image. Raises InputError where one has none."""
     cycles = hunting_cycles(stages, rtol)
-    if cycles.sign >= 0 or not cycles.found.all():
+    if cycles.sign >= 0 or not cycles.closed.all():
         why = "; ".join({str(reason) for reason in cycles.reasons if reason}) or "a cycle that is not symmetric"
         raise InputError("crossovers", why, "a stage with a symmetric hunting cycle at each", "4 Hz")
     return cycles

@@ -44,9 +44,9 @@ def checked_metadata(path: Path) -> dict[str, Any]:
         raise StoreError("", "a file; nothing was overwritten", expected, "--out study.zarr", str(path))
     try:
         document = json.loads((path / _FILE).read_bytes())
-        own, metadata = document.get(_OWN), document["metadata"]
+        checked, metadata = document.get(_OWN), document["metadata"]
         attributes = dict(metadata[_ATTRIBUTES])
-        whole = isinstance(own, dict) and own.get("sha256") == _digest(metadata)
+        intact = isinstance(checked, dict) and checked.get("sha256") == _digest(metadata)
     except FileNotFoundError:
         if is_store(path):
             raise _damaged(path, "is missing") from None
@@ -54,12 +54,12 @@ def checked_metadata(path: Path) -> dict[str, Any]:
         raise StoreError("", actual, expected, "--out study.zarr", str(path)) from None
     except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
         raise _damaged(path, "is damaged") from None
-    if isinstance(own, dict) and isinstance(number := own.get("format"), int) and number > FORMAT:
+    if isinstance(checked, dict) and isinstance(number := checked.get("format"), int) and number > FORMAT:
         actual = f"a store of a newer friso ({attributes.get('friso', 'unknown')})"
         raise StoreError("", actual, "a store of this friso, or that one to read it", origin=str(path))
-    if whole:
+    if intact:
         return attributes
-    if isinstance(own, dict):
+    if isinstance(checked, dict):
         raise _damaged(path, "is damaged")
     if "equations" in attributes:
         actual, expected = "a store of an earlier friso, without checksums", "to run the study again under a new name"

@@ -1,7 +1,7 @@
 """Adaptive sampling: what runs do over a grid four times finer per axis, for a fifth of its runs.
 
 A lattice of every second cell of the given grid is run first. Wherever neighbouring cells differ, both have to be run,
-until every change of outcome (or of verdict, if that is asked for) has been seen from both sides; so a boundary that
+until every change of outcome (or of verdict, if that is computed) has been seen from both sides; so a boundary that
 was met once is followed to its end.
 The runs that are left are spent where the next surprise is likely: far from any run, near boundaries, and where runs
 settle late.
@@ -68,12 +68,12 @@ def _finer(axis: SweptAxis) -> SweptAxis:
 
 
 def refine(study: Study, ask: Ask) -> Columns:
-    """The measures of a fine study, each of shape (cells,), from the cells asked for.
+    """The measures of a fine study, each of shape (cells,), from the cells computed.
 
-    A cell that was not asked for has the outcome (and the verdict) of the nearest one that was, a status that says so,
+    A cell that was not computed has the outcome (and the verdict) of the nearest one that was, a status that says so,
     and no numbers.
     """
-    grid = _Known(study)
+    grid = _Grid(study)
     grid.learn(_lattice(study.shape), ask)
     while (left := grid.budget - grid.runs) > 0:
         cells = grid.unseen_changes()
@@ -92,7 +92,7 @@ def _lattice(shape: tuple[int, ...]) -> np.ndarray:
     return np.ravel_multi_index(np.meshgrid(*lines, indexing="ij"), shape).ravel()
 
 
-class _Known:
+class _Grid:
     """What is known of the cells of a study."""
 
     def __init__(self, study: Study) -> None:
@@ -101,26 +101,28 @@ class _Known:
         self.budget = max(int(SHARE * study.cells), min(3 * coarse // 2, study.cells))
         self.columns: Columns = {}
         self.words = tuple(name for name in ("outcome", "verdict") if name in study.metrics)
-        self.asked = np.zeros(study.shape, bool)
+        self.computed = np.zeros(study.shape, bool)
         self.runs = 0
 
     def learn(self, cells: np.ndarray, ask: Ask) -> None:
         """Ask for cells; those that no stage may have cost no run."""
         columns = ask(cells)
         for name in columns:
-            empty = np.full(self.asked.size, np.nan) if name in UNITS else np.full(self.asked.size, "", dtype=object)
+            empty = (
+                np.full(self.computed.size, np.nan) if name in UNITS else np.full(self.computed.size, "", dtype=object)
+            )
             self.columns.setdefault(name, empty)[cells] = columns[name]
-        self.asked.flat[cells] = True
+        self.computed.flat[cells] = True
         self.runs += int(np.sum(columns["outcome"] != "invalid"))
 
     def _nearest(self) -> tuple[np.ndarray, np.ndarray]:
-        """Distance to the nearest cell asked for, and its number, both of the study's shape."""
-        transform: Any = distance_transform_edt(~self.asked, return_indices=True)
+        """Distance to the nearest cell computed, and its number, both of the study's shape."""
+        transform: Any = distance_transform_edt(~self.computed, return_indices=True)
         distance, places = transform
         return distance, np.asarray(np.ravel_multi_index(tuple(places), self.shape))
 
     def _changes(self, nearest: np.ndarray) -> np.ndarray:
-        """Which cells have a neighbour with other words, where each has those of the nearest cell asked for."""
+        """Which cells have a neighbour with other words, where each has those of the nearest cell computed."""
         both = np.sum([self.columns[name] + " " for name in self.words], axis=0).astype(str)
         words = np.unique(both, return_inverse=True)[1].ravel()[nearest]
         changes = np.zeros(self.shape, bool)
@@ -132,9 +134,9 @@ class _Known:
         return changes
 
     def unseen_changes(self) -> np.ndarray:
-        """Numbers of the cells at a change of words that were not yet asked for."""
+        """Numbers of the cells at a change of words that were not yet computed."""
         _, nearest = self._nearest()
-        return np.flatnonzero(self._changes(nearest) & ~self.asked)
+        return np.flatnonzero(self._changes(nearest) & ~self.computed)
 
     def likely_surprises(self, count: int) -> np.ndarray:
         """Numbers of up to `count` cells that are most worth a run."""
@@ -143,14 +145,14 @@ class _Known:
         from_change: Any = distance_transform_edt(~changes) if changes.any() else np.ones(self.shape)
         settling = np.nan_to_num(self.columns["settling_time_10um"], nan=LATE)
         late = np.where(self.columns["outcome"] == SWINGS, 1.0, np.minimum(settling / LATE, 1.0))
-        worth = np.where(self.asked, 0.0, distance * late[nearest] / np.cbrt(np.maximum(from_change, 1.0)))
+        worth = np.where(self.computed, 0.0, distance * late[nearest] / np.cbrt(np.maximum(from_change, 1.0)))
         best = np.argsort(-worth, axis=None, kind="stable")[: max(count, 0)]
         return best[worth.flat[best] > 0]
 
     def filled(self) -> Columns:
-        """The measures of all cells, those not asked for inferred."""
+        """The measures of all cells, those not computed inferred."""
         _, nearest = self._nearest()
-        guessed = ~self.asked.ravel()
+        guessed = ~self.computed.ravel()
         words = {name: self.columns[name][nearest.ravel()] for name in self.words}
         status = np.where(guessed, f"{INFERRED} from the nearest cell that was run", self.columns["status"])
         return self.columns | words | {"status": status}

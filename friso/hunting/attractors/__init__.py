@@ -23,7 +23,7 @@ PATIENT = 3.0
 BESIDE = np.array([0.9, 0.97, 0.99, 1.0, 1.01, 1.03, 1.1])
 """Distances from which a motion that was observed is tried again, in units of its own."""
 
-SEEN = 6.0
+WAITED = 6.0
 """Periods, however long, that are waited for at least."""
 
 
@@ -44,14 +44,14 @@ class Target:
 
 @dataclass(frozen=True)
 class Attractors:
-    """Of stages: the motions that attract, of each stage those that were looked for (see `attractors`); whether what
-    attracts is `known`, shape (count,) (not where a simulation that had to decide failed); a `typical` period of
+    """Of stages: the motions that attract, of each stage those that were looked for (see `attractors`); whether that is
+    `decided`, shape (count,) (not where a simulation that had to decide failed); a `typical` period of
     hunting [s], shape (count,); and of a thorough survey the cycles that the return map suggests, attracting or not:
     `families`, the symmetric ones first (of stages that are not symmetric, those of a whole period); and of which
     stages simulations at different tolerances tell different things, `flips`, shape (count,): the tighter hold."""
 
     motions: tuple[Swinging, ...]
-    known: np.ndarray
+    decided: np.ndarray
     typical: np.ndarray
     families: tuple[Cycles, ...]
     flips: np.ndarray
@@ -59,20 +59,20 @@ class Attractors:
     @property
     def attracts(self) -> np.ndarray:
         """Which stages something attracts, shape (count,)."""
-        some = np.zeros(len(self.known), bool)
+        some = np.zeros(len(self.decided), bool)
         some[[motion.stage for motion in self.motions]] = True
         return some
 
     @property
     def target(self) -> Target:
         """What the stages' motions end in, arrays of shape (count,): NaN where nothing attracts."""
-        amplitude, period, lasting = (np.full(len(self.known), np.nan) for _ in range(3))
+        amplitude, period, lasting = (np.full(len(self.decided), np.nan) for _ in range(3))
         for motion in self.motions:
             k, unit = motion.stage, min(motion.period, PATIENT * self.typical[motion.stage])
             amplitude[k] = np.fmin(amplitude[k], motion.amplitude)
             period[k] = np.fmax(period[k], motion.period)
             periods = np.clip(np.nan_to_num(CONSTANTS * motion.time_constant / unit), *PERIODS)
-            lasting[k] = np.fmax(lasting[k], max(periods * unit, SEEN * motion.period))
+            lasting[k] = np.fmax(lasting[k], max(periods * unit, WAITED * motion.period))
         return Target(amplitude, period, lasting)
 
     def take(self, numbers: np.ndarray) -> Attractors:
@@ -82,7 +82,7 @@ class Attractors:
             of.setdefault(motion.stage, []).append(motion)
         motions = (replace(motion, stage=k) for k, n in enumerate(numbers.tolist()) for motion in of.get(n, ()))
         suggested = tuple(cycles.take(numbers) for cycles in self.families)
-        return Attractors(tuple(motions), self.known[numbers], self.typical[numbers], suggested, self.flips[numbers])
+        return Attractors(tuple(motions), self.decided[numbers], self.typical[numbers], suggested, self.flips[numbers])
 
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
@@ -101,17 +101,17 @@ def attractors(
     for family in suggested:
         survey.slow_down(every, family)
         starts.beside(family)
-        if (drawn := np.flatnonzero(family.attracting)).size:
-            survey.confirm(starts.on(family, drawn), drawn, family.take(drawn))
+        if (numbers := np.flatnonzero(family.attracting)).size:
+            survey.confirm(starts.on(family, numbers), numbers, family.take(numbers))
     if tried is not None:
         starts.stuck_at(tried)
     for runs, of in starts.waves(thorough):
         survey.follow(runs, of)
     if cycles and not thorough:
         _try_cycles(starts, survey, rtol)
-    known = survey.attracted | ~survey.unknown
+    decided = survey.attracted | ~survey.unknown
     nothing, typical = np.zeros(stages.count, bool), typical_period(stages)
-    surveyed = Attractors(tuple(survey.attracting), known, typical, suggested, nothing)
+    surveyed = Attractors(tuple(survey.attracting), decided, typical, suggested, nothing)
     return _tried_again(stages, surveyed, rtol) if thorough else surveyed
 
 
@@ -125,8 +125,8 @@ def _try_cycles(begun: Starts, survey: Survey, rtol: float) -> None:
     for cycles in families(starts.stages, rtol):
         survey.slow_down(left, cycles)
         starts.beside(cycles)
-        if (drawn := np.flatnonzero(cycles.attracting)).size:
-            survey.confirm(starts.on(cycles, drawn), left[drawn], cycles.take(drawn))
+        if (numbers := np.flatnonzero(cycles.attracting)).size:
+            survey.confirm(starts.on(cycles, numbers), left[numbers], cycles.take(numbers))
     for runs, of in starts.waves(thorough=True):
         survey.follow(runs, left[of])
 
@@ -142,8 +142,8 @@ def _tried_again(stages: Ensemble, first: Attractors, rtol: float) -> Attractors
     survey.attracting += [motion for motion in first.motions if motion.stage in proved]
     starts = Starts(stages, TIGHT)
     starts.spread(thorough=False)
-    seen = [motion for motion in first.motions if motion.stage not in proved]
-    for motion in seen:
+    observed = [motion for motion in first.motions if motion.stage not in proved]
+    for motion in observed:
         tried = np.full((stages.count, len(BESIDE)), np.nan)
         tried[motion.stage] = BESIDE * motion.distance
         starts.stuck_at(tried)
@@ -153,6 +153,6 @@ def _tried_again(stages: Ensemble, first: Attractors, rtol: float) -> Attractors
         survey.follow(runs, of)
     flips = first.attracts != survey.attracted
     again = [motion for motion in survey.attracting if flips[motion.stage] or motion.stage in proved]
-    kept = [motion for motion in seen if not flips[motion.stage]]
-    known = first.known & (survey.attracted | ~survey.unknown) & ~flips
-    return replace(first, motions=(*again, *kept), known=known, flips=flips)
+    confirmed = [motion for motion in observed if not flips[motion.stage]]
+    decided = first.decided & (survey.attracted | ~survey.unknown) & ~flips
+    return replace(first, motions=(*again, *confirmed), decided=decided, flips=flips)

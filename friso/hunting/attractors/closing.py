@@ -24,18 +24,18 @@ def closed(
 ) -> list[tuple[np.ndarray, Cycles]]:
     """The cycles beside runs that repeat themselves after numbers of swings and times [s], with sizes from peak to peak
     [m], each of shape (runs,): in groups of as many swings, the numbers of the runs and their cycles, which are not
-    `found` where no orbit like the run could be closed."""
+    `closed` where no orbit like the run could be closed."""
     states = _where_they_stick(runs, times)
     parts = []
     for n in np.unique(swings):
-        own = np.flatnonzero(swings == n)
+        group = np.flatnonzero(swings == n)
         sign = -1.0 if n % 2 else 1.0
-        stages, starts = runs.stages.take(own), states[own]
+        stages, starts = runs.stages.take(group), states[group]
         if sign < 0:
             starts = starts * np.sign(starts[:, stages.sticking])[:, None]
-        cycles = described(stages, close(stages, starts, times[own], sign, rtol, int(n)), rtol)
-        cycles.found[~(np.abs(2 * cycles.amplitude / sizes[own] - 1) < NEAR)] = False
-        parts.append((own, cycles))
+        cycles = described(stages, close(stages, starts, times[group], sign, rtol, int(n)), rtol)
+        cycles.closed[~(np.abs(2 * cycles.amplitude / sizes[group] - 1) < NEAR)] = False
+        parts.append((group, cycles))
     return parts
 
 
@@ -46,10 +46,10 @@ def _where_they_stick(some: Pending, times: np.ndarray) -> np.ndarray:
     every, balance = np.arange(stages.count), relaxed(stages)
     ahead = np.zeros(stages.count)
     octave = np.round(np.log2(times))  # runs of about the same length are sampled together
-    for own in (every[octave == n] for n in np.unique(octave)):
-        runs, step = some.take(own), float(times[own].min()) / SAMPLES
-        paths = runs.stages.run(runs.states, 2 * times[own], some.rtol, interval=step, least_swing=np.inf).samples
-        for k, path in zip(own, paths, strict=True):
+    for group in (every[octave == n] for n in np.unique(octave)):
+        runs, step = some.take(group), float(times[group].min()) / SAMPLES
+        paths = runs.stages.run(runs.states, 2 * times[group], some.rtol, interval=step, least_swing=np.inf).samples
+        for k, path in zip(group, paths, strict=True):
             crossed = _balanced(
                 path[:, stages.integral] - balance[k] * path[:, stages.sticking], path[:, stages.sticking]
             )

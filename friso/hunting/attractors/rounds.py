@@ -84,8 +84,8 @@ class Ends:
     def take(self, numbers: np.ndarray) -> Ends:
         """Those of the runs with these numbers."""
         arrays = (self.values[numbers], self.times[numbers])
-        told = (self.completed[numbers], self.rest[numbers], self.steps[numbers])
-        return Ends(*told, self.repeats.take(numbers), *arrays)
+        flags = (self.completed[numbers], self.rest[numbers], self.steps[numbers])
+        return Ends(*flags, self.repeats.take(numbers), *arrays)
 
 
 def typical_period(stages: Ensemble) -> np.ndarray:

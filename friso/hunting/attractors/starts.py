@@ -65,7 +65,7 @@ class Starts:
 
     def beside(self, cycles: Cycles) -> None:
         """Beside cycles that repel."""
-        which = np.flatnonzero(cycles.found & ~cycles.attracting & np.isfinite(cycles.direction).all(axis=1))
+        which = np.flatnonzero(cycles.closed & ~cycles.attracting & np.isfinite(cycles.direction).all(axis=1))
         of, away = np.repeat(which, len(ASIDE)), np.tile(ASIDE, which.size)
         size = np.abs(cycles.states[of, self.stages.sticking])
         self._add(of, cycles.states[of] + (away * size)[:, None] * cycles.direction[of])
@@ -101,5 +101,5 @@ class Starts:
 
     def _begun(self, of: np.ndarray, states: np.ndarray) -> Pending:
         stages, mirrored = self.stages.take(of), self.stages.symmetric[of]
-        kept = stages.kernel.with_modes(states, np.zeros(3), stages.values)
-        return Pending(stages, kept, PERIODS * self.period[of], self.loose[of], mirrored, self.rtol)
+        begins = stages.kernel.with_modes(states, np.zeros(3), stages.values)
+        return Pending(stages, begins, PERIODS * self.period[of], self.loose[of], mirrored, self.rtol)

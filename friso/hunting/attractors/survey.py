@@ -90,11 +90,11 @@ _Kind = tuple[int, float, float]
 
 def _like(kinds: list[_Kind], of: np.ndarray, ends: Ends) -> np.ndarray:
     """Which runs, of the stages with the numbers `of`, repeat themselves like one of some kinds of motion."""
-    own: dict[int, list[tuple[float, float]]] = {}
+    motions_of: dict[int, list[tuple[float, float]]] = {}
     for stage, size, time in kinds:
-        own.setdefault(stage, []).append((size, time))
+        motions_of.setdefault(stage, []).append((size, time))
     like = np.zeros(len(of), bool)
-    for stage, motions in own.items():
+    for stage, motions in motions_of.items():
         which = np.flatnonzero(of == stage)
         for size, time in motions:
             same = np.abs(ends.repeats.size[which] / size - 1) < ALIKE
@@ -132,7 +132,7 @@ class Survey:
     unknown: np.ndarray = field(init=False)
     slowest: np.ndarray = field(init=False)
     left: np.ndarray = field(init=False)
-    _drawn: list[_Kind] = field(default_factory=list)
+    _attracting_kinds: list[_Kind] = field(default_factory=list)
     _closed: list[_Kind] = field(default_factory=list)
     _others: list[_Kind] = field(default_factory=list)
 
@@ -152,11 +152,11 @@ class Survey:
         for motion in motions:
             if not (self.thorough and any(motion.like(other) for other in self.attracting)):
                 self.attracting.append(motion)
-                self._drawn.append((motion.stage, 2 * motion.amplitude, motion.time))
+                self._attracting_kinds.append((motion.stage, 2 * motion.amplitude, motion.time))
 
     def slow_down(self, numbers: np.ndarray, cycles: Cycles) -> None:
         """Take notice of the cycles that repel, of the stages with some numbers: runs take long to leave these."""
-        repel = np.flatnonzero(cycles.found & ~cycles.attracting)
+        repel = np.flatnonzero(cycles.closed & ~cycles.attracting)
         for k in repel:
             size, time = 2 * float(cycles.amplitude[k]), float(cycles.orbits.times[k])
             self._closed += [(int(numbers[k]), size, time), (int(numbers[k]), size, 2 * time)]
@@ -211,9 +211,9 @@ class Survey:
     def _kinds(self, of: np.ndarray, ends: Ends, most: int) -> np.ndarray:
         """The numbers of runs that are followed on for all of their kind; of stages with more kinds than may be it is
         unknown what the others come to."""
-        kept, left = _kinds(of, ends, most)
-        self.unknown[of[left]] = True
-        return kept
+        chosen, others = _kinds(of, ends, most)
+        self.unknown[of[others]] = True
+        return chosen
 
     def _repels(self, of: np.ndarray, ends: Ends) -> np.ndarray:
         """Which runs repeat themselves like a cycle that repels, or like what no orbit that attracts could be closed
@@ -224,7 +224,7 @@ class Survey:
         """Which runs repeat themselves like a motion that is known already to attract their stage."""
         if not self.thorough:
             return self.attracted[of]
-        return _like(self._drawn, of, ends)
+        return _like(self._attracting_kinds, of, ends)
 
     def _close(self, runs: Pending, of: np.ndarray, ends: Ends, which: np.ndarray) -> None:
         """Close orbits from one of each kind of runs, of those with some numbers."""
@@ -233,11 +233,14 @@ class Survey:
         for swings, times in ((repeats.swings, repeats.time), (repeats.better, repeats.better_time)):
             if not kinds.size:
                 break
-            for own, cycles in closed(runs.take(kinds), swings[kinds], times[kinds], repeats.size[kinds], self.rtol):
-                numbers = kinds[own]
+            for group, cycles in closed(runs.take(kinds), swings[kinds], times[kinds], repeats.size[kinds], self.rtol):
+                numbers = kinds[group]
                 self.add(of_cycles(of[numbers], cycles, runs.stages.sticking))
                 self.slow_down(of[numbers], cycles)
-                for kinds_of, which in ((self._drawn, cycles.attracting), (self._others, ~cycles.attracting)):
+                for kinds_of, which in (
+                    (self._attracting_kinds, cycles.attracting),
+                    (self._others, ~cycles.attracting),
+                ):
                     columns = (column[numbers[which]].tolist() for column in (of, repeats.size, repeats.time))
                     kinds_of += zip(*columns, strict=True)  # the runs are not as exact as their orbits
             kinds = kinds[(repeats.better > repeats.swings)[kinds] & ~self._alike(of, ends)[kinds]]
@@ -301,8 +304,8 @@ class Survey:
 def _kinds(of: np.ndarray, ends: Ends, most: int) -> tuple[np.ndarray, np.ndarray]:
     """The numbers of runs that stand for all, no two of a stage that are alike and not more than `most` of each, and of
     those that are like none of these. Runs that do not repeat themselves are on their way, and soon apart."""
-    kept: dict[int, list[int]] = {}
-    left: list[int] = []
+    chosen: dict[int, list[int]] = {}
+    others: list[int] = []
     repeats = ends.repeats.swings > 0
     sizes, times = ends.repeats.size, np.nan_to_num(ends.repeats.time)
     near = np.where(repeats, ALIKE, CLOSE)
@@ -312,8 +315,8 @@ def _kinds(of: np.ndarray, ends: Ends, most: int) -> tuple[np.ndarray, np.ndarra
         return bool(same and repeats[k] == repeats[j])
 
     for k in np.argsort(ends.repeats.swings, kind="stable").tolist():
-        own = kept.setdefault(int(of[k]), [])
-        if not any(alike(k, j) for j in own):
-            (own if len(own) < most else left).append(k)
-    stand = [k for own in kept.values() for k in own]
-    return np.array(stand, dtype=np.int64), np.array(left, dtype=np.int64)
+        same_stage = chosen.setdefault(int(of[k]), [])
+        if not any(alike(k, j) for j in same_stage):
+            (same_stage if len(same_stage) < most else others).append(k)
+    stand = [k for numbers in chosen.values() for k in numbers]
+    return np.array(stand, dtype=np.int64), np.array(others, dtype=np.int64)

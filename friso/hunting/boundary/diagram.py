@@ -35,7 +35,7 @@ class Diagram:
     places: np.ndarray
     cycles: Cycles
     attracts: np.ndarray
-    known: np.ndarray
+    decided: np.ndarray
 
     def value(self, place: float) -> float:
         """The value of the key [SI] at a place."""
@@ -68,7 +68,7 @@ def diagram(space: Space, rtol: float = RTOL, seeds: int = SEEDS) -> Diagram:
         return True
 
     for cycles in sought:
-        for k in np.flatnonzero(cycles.found).tolist():
+        for k in np.flatnonzero(cycles.closed).tolist():
             follow(k, cycles.take(np.array([k])))
     others = 0
     for motion in surveyed.motions:
@@ -76,7 +76,7 @@ def diagram(space: Space, rtol: float = RTOL, seeds: int = SEEDS) -> Diagram:
             others += follow(motion.stage, motion.cycles.take(np.array([motion.number])))
     attracts = surveyed.attracts | sought[0].attracting
     return Diagram(
-        space, tuple(branches), tuple(special), places, sought[0], attracts, surveyed.known | sought[0].attracting
+        space, tuple(branches), tuple(special), places, sought[0], attracts, surveyed.decided | sought[0].attracting
     )
 
 

@@ -58,20 +58,20 @@ def _complex(point: Point) -> bool:
 def located(tracer: Tracer, first: Point, second: Point, kind: Kind) -> LocatedPoint | None:
     """The point between two neighbours on a branch at which it happens, with its error; None if it is not reached."""
     direction = _towards(first, second)
-    met = _enclosed(tracer, first, second, kind, PRECISE)
-    if met is None:
+    points = _enclosed(tracer, first, second, kind, PRECISE)
+    if points is None:
         return None
-    along = min(met, key=lambda place: abs(distance_to(kind, met[place])))
-    return _special_point(tracer, kind, met[along], direction, _slope(kind, met))
+    along = min(points, key=lambda place: abs(distance_to(kind, points[place])))
+    return _special_point(tracer, kind, points[along], direction, _slope(kind, points))
 
 
 def last_inside(tracer: Tracer, first: Point, second: Point, kind: Kind, precise: float) -> Point | None:
     """Of the points between two neighbours on a branch that still attract, the one nearest to where it happens, to so
     much along the branch; None if one of them cannot be reached."""
-    met = _enclosed(tracer, first, second, kind, precise)
-    if met is None:
+    points = _enclosed(tracer, first, second, kind, precise)
+    if points is None:
         return None
-    return met[max(place for place, point in met.items() if abs(point.multiplier) < 1)]
+    return points[max(place for place, point in points.items() if abs(point.multiplier) < 1)]
 
 
 def _towards(first: Point, second: Point) -> np.ndarray:
@@ -83,32 +83,32 @@ def _enclosed(tracer: Tracer, first: Point, second: Point, kind: Kind, precise: 
     """The points between two neighbours that the search for where it happens has met, by their places along the branch;
     None if one of them cannot be reached."""
     direction, length = _towards(first, second), float(np.linalg.norm(second.vector - first.vector))
-    met: dict[float, Point] = {0.0: first, length: second}
+    points: dict[float, Point] = {0.0: first, length: second}
 
     def off(along: float) -> float:
-        if along not in met:
-            nearest = min(met, key=lambda place: abs(place - along))
-            point = tracer.solve(met[nearest], first.vector + along * direction, direction)
+        if along not in points:
+            nearest = min(points, key=lambda place: abs(place - along))
+            point = tracer.solve(points[nearest], first.vector + along * direction, direction)
             if point is None:
                 raise Unreached
-            met[along] = point
-        return distance_to(kind, met[along])
+            points[along] = point
+        return distance_to(kind, points[along])
 
     try:
         along = float(brentq(off, 0.0, length, xtol=precise, maxiter=TRIES))  # type: ignore[arg-type]
         off(along)
     except (Unreached, RuntimeError):
         return None
-    return met
+    return points
 
 
 class Unreached(Exception):
     """No cycle is found where one is looked for."""
 
 
-def _slope(kind: Kind, met: dict[float, Point]) -> float:
+def _slope(kind: Kind, points: dict[float, Point]) -> float:
     """Change of the distance along the branch, from the two points nearest to where it is zero."""
-    (a, first), (b, second) = sorted(met.items(), key=lambda item: abs(distance_to(kind, item[1])))[:2]
+    (a, first), (b, second) = sorted(points.items(), key=lambda item: abs(distance_to(kind, item[1])))[:2]
     return (distance_to(kind, second) - distance_to(kind, first)) / (b - a)
 
 
@@ -126,25 +126,25 @@ def corrected(
 ) -> LocatedPoint | None:
     """The point at which it happens, by the secant method along a direction from an origin (place, log distance, log
     time), not farther from it than `reach`, from a cycle near it; None if there is none."""
-    met: dict[float, Point] = {}
+    points: dict[float, Point] = {}
     along, other = 0.0, ASIDE
     for place in (along, other):
         point = tracer.solve(near, origin + place * direction, direction)
         if point is None:
             return None
-        met[place] = point
+        points[place] = point
     for _ in range(TRIES):
-        slope = (distance_to(kind, met[along]) - distance_to(kind, met[other])) / (along - other)
-        step = -distance_to(kind, met[along]) / slope if slope else np.inf
+        slope = (distance_to(kind, points[along]) - distance_to(kind, points[other])) / (along - other)
+        step = -distance_to(kind, points[along]) / slope if slope else np.inf
         if not abs(along + step) <= reach:
             return None
         if abs(step) < PRECISE:
-            return _special_point(tracer, kind, met[along], direction, slope)
+            return _special_point(tracer, kind, points[along], direction, slope)
         other, along = along, along + step
-        point = tracer.solve(met[other], origin + along * direction, direction)
+        point = tracer.solve(points[other], origin + along * direction, direction)
         if point is None:
             return None
-        met[along] = point
+        points[along] = point
     return None
 
 

@@ -35,7 +35,7 @@ class Plane:
     allowed: np.ndarray
     cycles: Cycles
     attracts: np.ndarray
-    known: np.ndarray
+    decided: np.ndarray
     lost: tuple[np.ndarray, ...]
 
 
@@ -64,18 +64,18 @@ def plane(space: Space, rtol: float = RTOL, nodes: int = NODES) -> Plane:
             else:
                 lost.append((points[a] + points[b]) / 2)
         curves += new_curves
-    attracts, known = hunting.attracting.copy(), hunting.attracting.copy()
+    attracts, decided = hunting.attracting.copy(), hunting.attracting.copy()
     others = np.flatnonzero(~attracts)  # beside a cycle that attracts there is no need of simulations
     if others.size:
         surveyed = attractors(stages.take(others), rtol=rtol)
-        attracts[others], known[others] = surveyed.attracts, surveyed.known
-    sides = (_on_grid(allowed[known & which], nodes) for which in (attracts, ~attracts))
+        attracts[others], decided[others] = surveyed.attracts, surveyed.decided
+    sides = (_on_grid(allowed[decided & which], nodes) for which in (attracts, ~attracts))
     for a, b in _changes(*sides):  # of what attracts, whatever it is
         middle = (points[a] + points[b]) / 2
         known_lost = any(np.array_equal(middle, at) for at in lost)
         if not known_lost and not any(_crossed(curve, points[a], points[b]) for curve in curves):
             lost.append(middle)
-    return Plane(space, tuple(curves), nodes, allowed, hunting, attracts, known, tuple(lost))
+    return Plane(space, tuple(curves), nodes, allowed, hunting, attracts, decided, tuple(lost))
 
 
 def _searches(stages: Ensemble, rtol: float) -> tuple[Cycles, list[tuple[Cycles, np.ndarray, np.ndarray]]]:
@@ -86,7 +86,7 @@ def _searches(stages: Ensemble, rtol: float) -> tuple[Cycles, list[tuple[Cycles,
     searches = [(hunting, np.flatnonzero(hunting.attracting), np.flatnonzero(outside))]
     for pair in pairs:
         beside = hunting.attracting & ~pair.uncertain
-        searches.append((pair, np.flatnonzero(beside & pair.found), np.flatnonzero(beside & ~pair.found)))
+        searches.append((pair, np.flatnonzero(beside & pair.closed), np.flatnonzero(beside & ~pair.closed)))
     return hunting, searches
 
 

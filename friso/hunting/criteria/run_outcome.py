@@ -86,8 +86,8 @@ def end_of_traces(time: np.ndarray, deviation: np.ndarray, band: float, complete
     late = time >= HALF * time[-1]
     values = np.ascontiguousarray(deviation[:, late])
     ended = np.full(runs, time[-1])
-    whole = np.full(runs, values.shape[1])
-    turns = scan(np.tile(time[late], (runs, 1)), values, whole, np.nan_to_num(swing), ended)
+    samples = np.full(runs, values.shape[1])
+    turns = scan(np.tile(time[late], (runs, 1)), values, samples, np.nan_to_num(swing), ended)
     done = np.ones(runs, bool) if completed is None else completed
     return End(done, swing, earlier, turns.period, turns.turned, last_outside(time, deviation, band), ended)
 

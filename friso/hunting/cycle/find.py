@@ -58,17 +58,17 @@ def time_constant(returned: np.ndarray, multiplier: np.ndarray) -> np.ndarray:
 class Cycles:
     """One cycle per stage, or none.
 
-    `found` (count,); `reasons` (count,), why there is none; `sign`, -1 for cycles that are their own mirror image after
-    half a period, over which everything is taken then, and 1 for others; `swings`, those in that time; `states` (count,
-    states) on the cycle, in the middle of the sticking; `period` [s], `amplitude` [m], half of peak to peak, `middle`
-    [m] between the peaks, `gap` (see `Orbits`), the `local` multipliers (count, states - 1), the largest first, their
-    `direction` (count, states), the macroscopic `slope` (where a limiter may chatter) and the `multiplier`, that of the
-    two which decides, each of shape (count,); NaN where there is none.
+    `closed` (count,), whether there is one; `reasons` (count,), why there is none; `sign`, -1 for cycles that are their
+    own mirror image after half a period, over which everything is taken then, and 1 for others; `swings`, those in that
+    time; `states` (count, states) on the cycle, in the middle of the sticking; `period` [s], `amplitude` [m], half of
+    peak to peak, `middle` [m] between the peaks, `gap` (see `Orbits`), the `local` multipliers (count, states - 1), the
+    largest first, their `direction` (count, states), the macroscopic `slope` (where a limiter may chatter) and the
+    `multiplier`, that of the two which decides, each of shape (count,); NaN where there is none.
     """
 
     sign: float
     swings: int
-    found: np.ndarray
+    closed: np.ndarray
     reasons: np.ndarray
     states: np.ndarray
     period: np.ndarray
@@ -83,7 +83,7 @@ class Cycles:
     @property
     def attracting(self) -> np.ndarray:
         """Which of them attract, shape (count,)."""
-        return self.found & (np.abs(self.multiplier) < 1)
+        return self.closed & (np.abs(self.multiplier) < 1)
 
     @property
     def time_constant(self) -> np.ndarray:
@@ -99,7 +99,7 @@ class Cycles:
     def orbits(self) -> Orbits:
         """The cycles as closed orbits."""
         times = self.period * (0.5 if self.sign < 0 else 1.0)
-        return Orbits(self.states, times, self.sign, self.gap, self.found, self.swings)
+        return Orbits(self.states, times, self.sign, self.gap, self.closed, self.swings)
 
     @property
     def arrays(self) -> dict[str, np.ndarray]:
@@ -112,10 +112,10 @@ class Cycles:
 
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
-def symmetric_cycles(stages: Ensemble, rtol: float = RTOL, taken: ReturnMap | None = None) -> Cycles:
+def symmetric_cycles(stages: Ensemble, rtol: float = RTOL, positive: ReturnMap | None = None) -> Cycles:
     """The cycle of every stage that is its own mirror image, of stages whose equations are."""
-    taken = taken or return_map(stages, ROUGH)
-    return _closed(stages, symmetric_guess(stages, taken, ROUGH), -1.0, rtol)
+    positive = positive or return_map(stages, ROUGH)
+    return _closed(stages, symmetric_guess(stages, positive, ROUGH), -1.0, rtol)
 
 
 def hunting_cycles(stages: Ensemble, rtol: float = RTOL) -> Cycles:
@@ -139,28 +139,28 @@ def joined(parts: Sequence[tuple[np.ndarray, Cycles]]) -> Cycles:
 def families(stages: Ensemble, rtol: float = RTOL) -> tuple[Cycles, ...]:
     """The cycles that the return maps suggest: the symmetric one and one of an asymmetric pair, or the one over a whole
     period where some of the stages are not symmetric."""
-    there = return_map(stages, ROUGH)
+    positive = return_map(stages, ROUGH)
     if stages.symmetric.all():
-        return symmetric_cycles(stages, rtol, there), asymmetric_cycles(stages, there, rtol)
-    return (whole_cycles(stages, rtol, there),)
+        return symmetric_cycles(stages, rtol, positive), asymmetric_cycles(stages, positive, rtol)
+    return (whole_cycles(stages, rtol, positive),)
 
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
-def asymmetric_cycles(stages: Ensemble, taken: ReturnMap, rtol: float = RTOL) -> Cycles:
+def asymmetric_cycles(stages: Ensemble, positive: ReturnMap, rtol: float = RTOL) -> Cycles:
     """One of the pair of cycles, mirror images of each other, that a symmetric stage may have beside its symmetric
     cycle; from its return map."""
-    cycles = _closed(stages, whole_guess(stages, taken, taken, APART), 1.0, rtol)
+    cycles = _closed(stages, whole_guess(stages, positive, positive, APART), 1.0, rtol)
     same = np.abs(cycles.middle) < LEANING * cycles.amplitude
-    cycles.found[same], cycles.reasons[same] = False, NO_PAIR
+    cycles.closed[same], cycles.reasons[same] = False, NO_PAIR
     return cycles
 
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
-def whole_cycles(stages: Ensemble, rtol: float = RTOL, there: ReturnMap | None = None) -> Cycles:
-    """The cycle of every stage, followed over a whole period, of stages that need not be symmetric; `there` is the
+def whole_cycles(stages: Ensemble, rtol: float = RTOL, positive: ReturnMap | None = None) -> Cycles:
+    """The cycle of every stage, followed over a whole period, of stages that need not be symmetric; `positive` is the
     return map of stages that stick on the positive side."""
-    there = there or return_map(stages, ROUGH)
-    return _closed(stages, whole_guess(stages, there, return_map(stages, ROUGH, -1.0)), 1.0, rtol)
+    positive = positive or return_map(stages, ROUGH)
+    return _closed(stages, whole_guess(stages, positive, return_map(stages, ROUGH, -1.0)), 1.0, rtol)
 
 
 def _closed(stages: Ensemble, guess: Guess, sign: float, rtol: float) -> Cycles:
@@ -175,7 +175,7 @@ def _closed(stages: Ensemble, guess: Guess, sign: float, rtol: float) -> Cycles:
         simplest(sign),
     )
     for distance, time in TRIES:
-        missing = guess.there[~orbits.closed[guess.there]]
+        missing = guess.numbers[~orbits.closed[guess.numbers]]
         if not missing.size:
             break
         some, distances = stages.take(missing), guess.distances[missing] * distance
@@ -197,21 +197,21 @@ def _accept(stages: Ensemble, orbits: Orbits, which: np.ndarray, tried: Orbits, 
 
 def _close_simulated(stages: Ensemble, guess: Guess, orbits: Orbits, rtol: float) -> None:
     """Close orbits from where a long simulation ends, as far as it repeats itself."""
-    missing = guess.there[~orbits.closed[guess.there]]
+    missing = guess.numbers[~orbits.closed[guess.numbers]]
     if not missing.size:
         return
     some, sign = stages.take(missing), orbits.sign
     starts = stuck(some, guess.distances[missing])
-    seen = swings(some, starts, REPEATED * guess.times[missing], 4 * REPEATED, ROUGH)
+    extrema = swings(some, starts, REPEATED * guess.times[missing], 4 * REPEATED, ROUGH)
     every, step = np.arange(some.count), 1 if sign < 0 else 2
-    last = np.maximum(np.isfinite(seen.values).sum(axis=1) - 2, step)
-    last -= (sign > 0) & (seen.values[every, last] < 0)  # on the side that it is followed from
-    heights = np.abs(np.stack([seen.values[every, last], seen.values[every, last - step]]))
-    times = seen.times[every, last] - seen.times[every, last - step]
+    last = np.maximum(np.isfinite(extrema.values).sum(axis=1) - 2, step)
+    last -= (sign > 0) & (extrema.values[every, last] < 0)  # on the side that it is followed from
+    heights = np.abs(np.stack([extrema.values[every, last], extrema.values[every, last - step]]))
+    times = extrema.times[every, last] - extrema.times[every, last - step]
     fine = np.flatnonzero((last > REPEATED // 2) & (np.abs(heights[0] / heights[1] - 1) < STEADY))
     if not fine.size:
         return
-    ends_at = seen.times[every, last] + UNWINDING * wait(some, heights[0])
+    ends_at = extrema.times[every, last] + UNWINDING * wait(some, heights[0])
     ends = some.take(fine).run(starts[fine], ends_at[fine], ROUGH).ends
     if sign < 0:
         ends *= np.sign(ends[:, stages.sticking])[:, None]
@@ -228,7 +228,7 @@ def described(stages: Ensemble, orbits: Orbits, rtol: float, reasons: np.ndarray
     cycles = Cycles(
         sign=orbits.sign,
         swings=orbits.swings,
-        found=orbits.closed.copy(),
+        closed=orbits.closed.copy(),
         reasons=np.where(orbits.closed, "", reasons).astype(object),
         states=orbits.states,
         local=np.full((count, size - 1), np.nan, complex),
@@ -256,7 +256,7 @@ def described(stages: Ensemble, orbits: Orbits, rtol: float, reasons: np.ndarray
     for name, value in values.items():
         getattr(cycles, name)[which] = value
     elsewhere = which[~some.same_modes(shut.states, round_trip.ends)]
-    cycles.found[elsewhere], cycles.reasons[elsewhere] = False, NOT_CLOSED
-    unknown = cycles.found & ~(np.isfinite(cycles.multiplier) & np.isfinite(cycles.amplitude))
-    cycles.found[unknown], cycles.reasons[unknown] = False, NO_MULTIPLIER
+    cycles.closed[elsewhere], cycles.reasons[elsewhere] = False, NOT_CLOSED
+    unknown = cycles.closed & ~(np.isfinite(cycles.multiplier) & np.isfinite(cycles.amplitude))
+    cycles.closed[unknown], cycles.reasons[unknown] = False, NO_MULTIPLIER
     return cycles

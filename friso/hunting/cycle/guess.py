@@ -30,40 +30,42 @@ class Guess:
     times: np.ndarray
 
     @property
-    def there(self) -> np.ndarray:
+    def numbers(self) -> np.ndarray:
         """The numbers of the stages that have one."""
         return np.flatnonzero(np.isfinite(self.times))
 
 
-def symmetric_guess(stages: Ensemble, taken: ReturnMap, rtol: float) -> Guess:
+def symmetric_guess(stages: Ensemble, positive: ReturnMap, rtol: float) -> Guess:
     """The largest distance from which a stage lands as far on the other side, the map falling through the diagonal."""
-    low, high = _falling(taken.distances, taken.returns - taken.distances)
-    there = np.flatnonzero(np.isfinite(low))
+    low, high = _falling(positive.distances, positive.returns - positive.distances)
+    numbers = np.flatnonzero(np.isfinite(low))
     distances, times = np.full(stages.count, np.nan), np.full(stages.count, np.nan)
-    if there.size:
-        some = stages.take(there)
-        between = np.linspace(low[there], high[there], REFINED, axis=1)
+    if numbers.size:
+        some = stages.take(numbers)
+        between = np.linspace(low[numbers], high[numbers], REFINED, axis=1)
         finer = follow(some, between, rtol, 1.0)
-        distances[there] = root = _crossing(finer.distances, finer.returns - finer.distances)
-        times[there] = _interpolated(root, finer.distances, finer.times) + UNWINDING * wait(some, root)
+        distances[numbers] = root = _crossing(finer.distances, finer.returns - finer.distances)
+        times[numbers] = _interpolated(root, finer.distances, finer.times) + UNWINDING * wait(some, root)
     return Guess(distances, times)
 
 
-def whole_guess(stages: Ensemble, there: ReturnMap, back: ReturnMap, apart: float = 0.0) -> Guess:
+def whole_guess(stages: Ensemble, positive: ReturnMap, negative: ReturnMap, apart: float = 0.0) -> Guess:
     """The distance from which a stage comes back to where it was, by way of one that differs by a share of at least
     `apart`. Of several it is that for which the two differ least if apart is 0, else that for which they differ most.
 
-    `there` and `back` are the maps of the stages that stick on the positive and on the negative side.
+    `positive` and `negative` are the maps of the stages that stick on the positive and on the negative side.
     """
     guess = Guess(np.full(stages.count, np.nan), np.full(stages.count, np.nan))
     for k in range(stages.count):
-        start, far = there.distances[k], there.returns[k]
-        end = np.interp(far, back.distances[k], back.returns[k], left=0.0)
+        start, far = positive.distances[k], positive.returns[k]
+        end = np.interp(far, negative.distances[k], negative.returns[k], left=0.0)
         goes = np.flatnonzero((np.abs(far - start) > apart * start) & (far > 0) & (end > 0))
         at = _comes_back(start, far, end, goes, apart)
         if at is not None:
             middle = np.interp(at, start, far)
-            flights = np.interp(at, start, there.times[k]) + np.interp(middle, back.distances[k], back.times[k])
+            flights = np.interp(at, start, positive.times[k]) + np.interp(
+                middle, negative.distances[k], negative.times[k]
+            )
             waits = wait(stages.take(np.array([k, k])), np.array([at, middle]))
             guess.distances[k], guess.times[k] = at, flights + UNWINDING * waits.sum()
     return guess

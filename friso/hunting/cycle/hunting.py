@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from friso.engine.kernel import Wanted, kernels
+from friso.engine.kernel import KernelRequest, kernels
 from friso.engine.simulate import output_variables, time_axis
 from friso.engine.tolerance import checked_rtol
 from friso.equations.structure import Structure, structure
@@ -149,25 +149,25 @@ def hunting(stage: Stage, rtol: float = RTOL) -> Hunting:
     if reason := cannot_hunt(stage):
         return Hunting((), reason, True, None)
     flat = stage.flat()
-    kernels([Wanted(structure(flat), variational) for variational in (False, True)])
+    kernels([KernelRequest(structure(flat), variational) for variational in (False, True)])
     stages = Ensemble.held(flat, 1)
-    known = attractors(stages, thorough=True, rtol=rtol)
-    closed = [m.cycles.take(np.array([m.number])) for m in known.motions if m.cycles is not None]
-    repelling = [family for family in known.families if family.found[0] and not family.attracting[0]]
-    beyond = "" if known.motions else _beyond_the_search(stages)
-    certain = bool(known.known[0]) and not beyond
-    doubt = beyond or (FLIPS if known.flips[0] else UNDECIDED)
-    reason = known.families[0].reasons[0] if certain else doubt
+    survey = attractors(stages, thorough=True, rtol=rtol)
+    closed = [m.cycles.take(np.array([m.number])) for m in survey.motions if m.cycles is not None]
+    repelling = [family for family in survey.families if family.closed[0] and not family.attracting[0]]
+    beyond = "" if survey.motions else _beyond_the_search(stages)
+    certain = bool(survey.decided[0]) and not beyond
+    doubt = beyond or (FLIPS if survey.flips[0] else UNDECIDED)
+    reason = survey.families[0].reasons[0] if certain else doubt
     return Hunting(
         cycles=tuple(_cycle(stages, cycle, rtol) for cycle in (*closed, *repelling)),
         reason=reason if not certain or not (closed or repelling) else "",
         certain=certain,
         returns=return_map(stages, ROUGH),
         observed=tuple(
-            Swing(m.amplitude, m.period, bool(m.time == m.time), m.swings) for m in known.motions if not m.cycles
+            Swing(m.amplitude, m.period, bool(m.time == m.time), m.swings) for m in survey.motions if not m.cycles
         ),
-        target=known.target.of(0) if known.motions else None,
-        surveyed=known,
+        target=survey.target.of(0) if survey.motions else None,
+        surveyed=survey,
     )
 
 

@@ -87,7 +87,7 @@ def returns_of(
     starts = orbits.states[:, None, :] + (away * np.abs(distance)[:, None])[:, :, None] * direction[:, None, :]
     starts = starts.reshape(count * points, -1)
     several = stages.take(np.repeat(np.arange(count), points))
-    each = orbits.swings
+    per_return = orbits.swings
     durations = (returns + 0.5) * np.repeat(orbits.times, points)
-    extrema = swings(several, starts, durations, each * returns, rtol)
-    return np.abs(extrema.values[:, each - 1 :: each]).reshape(count, points, returns)
+    extrema = swings(several, starts, durations, per_return * returns, rtol)
+    return np.abs(extrema.values[:, per_return - 1 :: per_return]).reshape(count, points, returns)

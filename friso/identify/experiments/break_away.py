@@ -115,11 +115,13 @@ def _answer(table: np.ndarray, bristle_rate: float, threshold: float, notes: lis
             else replace(estimate, reason=" ".join([f"{estimate.reason}.", *notes]).rstrip("."))
         )
 
-    one, other = (static(mask) for _, mask in ways(directions))
+    forward, backward = (static(mask) for _, mask in ways(directions))
     every = static(np.ones(len(forces), dtype=bool))
-    if one.determined and other.determined and (one.low > other.high or other.low > one.high):
-        notes.append(f"The directions differ: {one.value:.3g} N forward, {other.value:.3g} N backward.")
-    return BreakAway(every, one, other, times, places, directions, forces, rates, unsure, threshold, tuple(notes))
+    if forward.determined and backward.determined and (forward.low > backward.high or backward.low > forward.high):
+        notes.append(f"The directions differ: {forward.value:.3g} N forward, {backward.value:.3g} N backward.")
+    return BreakAway(
+        every, forward, backward, times, places, directions, forces, rates, unsure, threshold, tuple(notes)
+    )
 
 
 def _analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> BreakAway:

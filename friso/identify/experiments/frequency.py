@@ -76,8 +76,8 @@ def _of_stage_alone(mass: float, stage: Stage) -> bool:
     flat = stage.flat()
     if stage.joint is None or flat["joint.locked"]:
         return False
-    alone, whole = flat["masses.stage"], flat["masses.cart"] + flat["masses.stage"]
-    return bool(abs(np.log(mass / alone)) < abs(np.log(mass / whole)))
+    stage_mass, moving_mass = flat["masses.stage"], flat["masses.cart"] + flat["masses.stage"]
+    return bool(abs(np.log(mass / stage_mass)) < abs(np.log(mass / moving_mass)))
 
 
 def _parasitic(model: TwoMass, stage: Stage) -> float | None:

@@ -219,8 +219,10 @@ def _fitted(equation: _Equation, starts: list[np.ndarray]) -> np.ndarray:
         return equation.derivatives(p) / scale
 
     derived: Any = derivatives
-    whole = [np.clip(np.append(start, np.zeros(len(low) - len(start))), low, high) for start in starts]
-    fits: Any = [least_squares(off, start, jac=derived, bounds=(low, high), ftol=CLOSE, xtol=CLOSE) for start in whole]
+    complete = [np.clip(np.append(start, np.zeros(len(low) - len(start))), low, high) for start in starts]
+    fits: Any = [
+        least_squares(off, start, jac=derived, bounds=(low, high), ftol=CLOSE, xtol=CLOSE) for start in complete
+    ]
     return min(fits, key=lambda fit: fit.cost).x
 
 

@@ -232,14 +232,18 @@ def _answer(
 
     masks = dict(ways(directions))
     means = {name: _mean(f"break-away force, {name}", forces[m], relative_error, why) for name, m in masks.items()}
-    one, other = (static(mask, f" {words}") for words, mask in masks.items())
-    every = _both(one, other) if one.determined or other.determined else static(np.ones(len(forces), dtype=bool), "")
+    forward, backward = (static(mask, f" {words}") for words, mask in masks.items())
+    every = (
+        _both(forward, backward)
+        if forward.determined or backward.determined
+        else static(np.ones(len(forces), dtype=bool), "")
+    )
     low, high = np.percentile(forces, [5, 95]) if len(forces) else (np.nan, np.nan)
     offset = _offset(means["forward"], means["backward"])
     return StickSlip(
         every,
-        one,
-        other,
+        forward,
+        backward,
         means["forward"],
         means["backward"],
         (float(low), float(high)),
@@ -281,31 +285,35 @@ def _mean(name: str, forces: np.ndarray, relative_error: float, why: str) -> Est
     )
 
 
-def _both(one: Estimate, other: Estimate) -> Estimate:
+def _both(forward: Estimate, backward: Estimate) -> Estimate:
     """The mean of both directions, in which a common offset drops out; that of the only one in which the cart slips.
     What one direction shows and the other bounds is a bound: the offset is not known."""
-    if not (one.determined and other.determined):
-        seen, unseen = (one, other) if one.determined else (other, one)
+    if not (forward.determined and backward.determined):
+        seen, unseen = (forward, backward) if forward.determined else (backward, forward)
         if not unseen.low > 0:  # no slips at all
             return seen
-        low = (one.low + other.low) / 2
+        low = (forward.low + backward.low) / 2
         return Estimate.unknown(KEY, "N", seen.method, f"one direction alone shows it: {unseen.reason}", low)
-    middle = [(one.low + other.low) / 2, (one.value + other.value) / 2, (one.high + other.high) / 2]
-    systematic = (one.systematic + other.systematic) / 2
-    method = f"mean of both directions: {one.method}"
+    middle = [
+        (forward.low + backward.low) / 2,
+        (forward.value + backward.value) / 2,
+        (forward.high + backward.high) / 2,
+    ]
+    systematic = (forward.systematic + backward.systematic) / 2
+    method = f"mean of both directions: {forward.method}"
     return Estimate(KEY, "N", middle[1], middle[0], middle[2], method, systematic=systematic)
 
 
-def _offset(one: Estimate, other: Estimate) -> Estimate:
+def _offset(forward: Estimate, backward: Estimate) -> Estimate:
     """Half of what the forward break-away exceeds the backward one by."""
     name, method = (
         "offset of the force on the cart",
         "half the difference of the break-away forces forward and backward",
     )
-    if not (one.determined and other.determined):
+    if not (forward.determined and backward.determined):
         return Estimate.unknown(name, "N", method, "slips in one direction only")
-    half = float(np.hypot(one.half_width, other.half_width)) / 2
-    middle = (one.value - other.value) / 2
+    half = float(np.hypot(forward.half_width, backward.half_width)) / 2
+    middle = (forward.value - backward.value) / 2
     return Estimate(name, "N", middle, middle - half, middle + half, method)
 
 

@@ -58,13 +58,13 @@ def fitted_lag(effect: np.ndarray, causes: np.ndarray) -> float:
     """By how many samples the causes, of shape (n, p), come after what they sum up to by least squares: the lag with
     the largest share explained, to a fraction of a sample; NaN where that share is below 0.5 or at the border."""
     middle = effect[MOST:-MOST] - effect[MOST:-MOST].mean()
-    whole = middle @ middle
+    energy = middle @ middle
     shares = []
     for k in range(-MOST, MOST + 1):
         shifted = causes[MOST + k : effect.size - MOST + k]
         shifted = shifted / np.maximum(np.abs(shifted).max(axis=0), np.finfo(float).tiny)
         fit = np.linalg.lstsq(shifted.T @ shifted, shifted.T @ middle, rcond=None)[0]
-        shares.append(float(fit @ (shifted.T @ middle)) / whole if whole > 0 else 0.0)
+        shares.append(float(fit @ (shifted.T @ middle)) / energy if energy > 0 else 0.0)
     return _peak(np.array(shares), 0.5)
 
 

@@ -115,11 +115,11 @@ def propose(table: ChannelTable, assigned: Names[str, str], origin: str = "") ->
         role: AssignedRole(role, find(table, name, role, origin), "as specified", True)
         for role, name in assigned.items()
     }
-    taken = {id(choice.channel) for choice in chosen.values()}
+    by_user = {id(choice.channel) for choice in chosen.values()}
     candidates: dict[str, list[tuple[Channel, str]]] = {}
     for channel in table.channels:
         role = role_of(channel.name)
-        if role is not None and role[0] not in assigned and id(channel) not in taken:
+        if role is not None and role[0] not in assigned and id(channel) not in by_user:
             candidates.setdefault(role[0], []).append((channel, role[1]))
     rivals = {}
     for role, matches in candidates.items():

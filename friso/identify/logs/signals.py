@@ -72,8 +72,8 @@ def signal(choice: AssignedRole, reading: Reading, notes: Notes) -> np.ndarray:
     scale = reading.mapping.scales.get(role)
     unit = channel.unit
     if scale is not None:
-        value, taken = _scaled(role, scale, unit, reading.origin)
-        line = f"{scale}" + ("" if unit else f", its values taken to be in {taken} as the scale implies")
+        value, implied = _scaled(role, scale, unit, reading.origin)
+        line = f"{scale}" + ("" if unit else f", its values taken to be in {implied} as the scale implies")
     elif _taken_as_si(choice, reading):
         value, line = 1.0, f"no unit in the file: assumed to be in {ROLES[role]}"
         notes.warnings.append(

@@ -180,8 +180,8 @@ def _stamped(path: Path, texts: Any, there: Any, form: TextLayout) -> np.ndarray
             stamps = pd.to_datetime(texts.where(there), format="ISO8601", utc=True)
             seconds = (stamps - stamps[there].iloc[0]).dt.total_seconds().to_numpy(dtype=float)
         else:
-            whole = texts.where(texts.str.count(":") == 2, texts + ":00").where(there)
-            stamps = pd.to_timedelta(whole)
+            durations = texts.where(texts.str.count(":") == 2, texts + ":00").where(there)
+            stamps = pd.to_timedelta(durations)
             seconds = stamps.dt.total_seconds().to_numpy(dtype=float)
             seconds = seconds + 86400.0 * np.cumsum(np.r_[0.0, np.nan_to_num(np.diff(seconds)) < -43200.0])
     except ValueError as error:

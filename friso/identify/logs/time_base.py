@@ -136,14 +136,14 @@ def together(tracks: Mapping[str, Track]) -> tuple[Track, dict[str, np.ndarray]]
         parts.append(slice(start, start + run.stop - run.start))
         start = parts[-1].stop
     pick = np.concatenate([np.arange(run.start, run.stop) for run in segments])
-    whole = Track(base.time[pick], base.values[pick], base.period, parts, read, warnings)
-    return whole, {name: value[pick] for name, value in values.items()}
+    track = Track(base.time[pick], base.values[pick], base.period, parts, read, warnings)
+    return track, {name: value[pick] for name, value in values.items()}
 
 
-def _same_instants(one: Track, other: Track) -> bool:
+def _same_instants(first: Track, second: Track) -> bool:
     """Whether two tracks have the same instants, to a hundredth of a sample time."""
-    same = one.time.size == other.time.size and one.segments == other.segments
-    return same and bool(np.all(np.abs(one.time - other.time) <= EVEN * other.period))
+    same = first.time.size == second.time.size and first.segments == second.segments
+    return same and bool(np.all(np.abs(first.time - second.time) <= EVEN * second.period))
 
 
 def _coincident(base: Track, other: Track) -> bool:

@@ -163,9 +163,9 @@ def read_scale(role: str, text: str, channel_unit: str) -> tuple[float, str]:
     raise LogError("scale", actual, f"a scale from {unit} to {role_unit}", f'--scale {role}="1.5 {role_unit}/{unit}"')
 
 
-def _scale_part(text: str, role_unit: str, whole: str, example: str) -> float:
+def _scale_part(text: str, role_unit: str, scale: str, example: str) -> float:
     """The SI value above the stroke. Raises LogError."""
     try:
         return float(Quantity(role_unit, any_sign, "").read(text))
     except InputError:
-        raise LogError("scale", quoted(whole), f"number and unit, {role_unit} over a unit", example) from None
+        raise LogError("scale", quoted(scale), f"number and unit, {role_unit} over a unit", example) from None

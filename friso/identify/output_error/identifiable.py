@@ -39,19 +39,19 @@ def fit_identifiable(
     parameters = follows.parameters
     names = [parameter.name for parameter in parameters]
     core = {parameter.name for parameter in parameters if parameter.core}
-    asked = {*names} - core
+    optional = {*names} - core
     plain = fit(follows, _numbers(names, core), first_values(parameters)[None])
-    hopeful = {name for name in asked if _may_show(name, covered, follows)}
+    hopeful = {name for name in optional if _may_show(name, covered, follows)}
     identifiable: set[str] = set()
     best = plain
     if hopeful:
         every = _numbers(names, core | hopeful)
-        whole = fit(follows, every, everywhere(follows, every, plain.inner))
-        identifiable = _complete({name for name in hopeful if _shows(whole, names.index(name), covered)}, asked)
-        fitted = hopeful if _pays(whole, plain) else identifiable
+        full = fit(follows, every, everywhere(follows, every, plain.inner))
+        identifiable = _complete({name for name in hopeful if _shows(full, names.index(name), covered)}, optional)
+        fitted = hopeful if _pays(full, plain) else identifiable
         free = _numbers(names, core | fitted)
-        neutral = np.where(np.isin(np.arange(len(names)), free), whole.inner, plain.inner)
-        best = whole if fitted == hopeful else fit(follows, free, neutral[None]) if identifiable else plain
+        neutral = np.where(np.isin(np.arange(len(names)), free), full.inner, plain.inner)
+        best = full if fitted == hopeful else fit(follows, free, neutral[None]) if identifiable else plain
     if loop is not None:
         starts = nearby(best)
         if set(best.free) - set(_numbers(names, core)):
@@ -62,10 +62,10 @@ def fit_identifiable(
     return best, profiles, identifiable
 
 
-def _pays(whole: OutputErrorFit, plain: OutputErrorFit) -> bool:
+def _pays(full: OutputErrorFit, plain: OutputErrorFit) -> bool:
     """Whether a fit with more parameters is better by more than chance would make it, with a probability of 99 %."""
-    more = len(whole.free) - len(plain.free)
-    return bool(plain.cost > whole.cost * (1 + chi2.ppf(SURE, more) / whole.independent))
+    more = len(full.free) - len(plain.free)
+    return bool(plain.cost > full.cost * (1 + chi2.ppf(SURE, more) / full.independent))
 
 
 def _in_step(looped: OutputErrorFit, direct: OutputErrorFit, bandwidth: float) -> bool:
@@ -80,9 +80,9 @@ def _numbers(names: Sequence[str], chosen: set[str]) -> tuple[int, ...]:
     return tuple(i for i, name in enumerate(names) if name in chosen)
 
 
-def _complete(identifiable: set[str], asked: set[str]) -> set[str]:
+def _complete(identifiable: set[str], optional: set[str]) -> set[str]:
     """Without either of the Stribeck effect's parameters, the other one means nothing."""
-    effect = set(STRIBECK) & asked
+    effect = set(STRIBECK) & optional
     return identifiable if effect <= identifiable else identifiable - effect
 
 
@@ -102,16 +102,18 @@ def _may_show(name: str, covered: Coverage, problem: Problem) -> bool:
     return parameter.unit != "" or name == SHARE
 
 
-def _shows(whole: OutputErrorFit, number: int, covered: Coverage) -> bool:
+def _shows(full: OutputErrorFit, number: int, covered: Coverage) -> bool:
     """Whether a parameter has a sharp, closed interval, and the motion covers where it acts."""
-    parameter = whole.problem.parameters[number]
-    others = tuple(i for i in whole.free if i != number)
-    seen = profile(whole, number, others, whole.cost)
-    sharp = not (seen.open_low or seen.open_high) and (not parameter.logarithmic or seen.high < SHARP * seen.low)
+    parameter = full.problem.parameters[number]
+    others = tuple(i for i in full.free if i != number)
+    interval = profile(full, number, others, full.cost)
+    sharp = not (interval.open_low or interval.open_high) and (
+        not parameter.logarithmic or interval.high < SHARP * interval.low
+    )
     if parameter.name in STRIBECK:
-        return sharp and covered.shows_speed(whole.value("friction.stribeck_velocity"))
+        return sharp and covered.shows_speed(full.value("friction.stribeck_velocity"))
     if parameter.name in BRISTLES:
-        length = whole.value("friction.coulomb") / whole.value("friction.bristle_stiffness")
+        length = full.value("friction.coulomb") / full.value("friction.bristle_stiffness")
         return sharp and covered.shows_length(length)
     return sharp
 

@@ -73,8 +73,7 @@ class Problem:
 
     def beginning(self, count: int) -> Problem:
         """The same with the first so many samples alone."""
-        whole = self.inputs
-        inputs = replace(whole, reference=whole.reference[:count], force=whole.force[:count])
+        inputs = replace(self.inputs, reference=self.inputs.reference[:count], force=self.inputs.force[:count])
         return replace(self, inputs=inputs, target=self.target[:count])
 
     def simulated(self, inner: np.ndarray) -> Iterator[tuple[np.ndarray, Simulated]]:
@@ -86,8 +85,8 @@ class Problem:
 
     def record(self, inner: np.ndarray) -> Simulated:
         """The record of one run, each of shape (n,)."""
-        ((_, one),) = self.simulated(inner[None])
-        return Simulated(one.position[0], one.velocity[0], one.force[0])
+        ((_, record),) = self.simulated(inner[None])
+        return Simulated(record.position[0], record.velocity[0], record.force[0])
 
     def residuals(self, inner: np.ndarray) -> np.ndarray:
         """Wanted minus simulated force [N], shape (runs, n); infinite for runs that failed."""
@@ -119,8 +118,8 @@ class Problem:
         position, velocity = self.start
         speed = np.gradient(self.inputs.reference[:3], self.inputs.sample_time)[0]
         beginning = Steady(self.inputs.reference[0] - position, position, velocity, speed, self.target[0])
-        whole = {**flat, "motion.size": np.nan, "motion.duration": np.inf}
-        starts = self.kernel.settled(whole, beginning, runs)
+        reached = {**flat, "motion.size": np.nan, "motion.duration": np.inf}
+        starts = self.kernel.settled(reached, beginning, runs)
         if bristles := self.kernel.having(Role.BRISTLE):
             pull = self.target[0] + self.inputs.force[0] + flat.get("bias.cart", 0.0) + flat.get("bias.stage", 0.0)
             held = flat.get("friction.static", flat["friction.coulomb"])

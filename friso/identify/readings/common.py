@@ -192,9 +192,9 @@ def jackknife(columns: np.ndarray, target: np.ndarray) -> np.ndarray:
 def correlation_of(covariance: np.ndarray, shifts: np.ndarray, even: np.ndarray) -> np.ndarray:
     """Correlation, shape (p, p), of quantities of that covariance, which systematic `shifts`, shape (m, p), move
     together, and doubts of half-width `even`, shape (p,), each by itself."""
-    whole = covariance + (shifts.T @ shifts + np.diag(even**2)) / COVERAGE**2
-    size = np.sqrt(np.maximum(np.diag(whole), np.finfo(float).tiny))
-    return whole / np.outer(size, size)
+    total = covariance + (shifts.T @ shifts + np.diag(even**2)) / COVERAGE**2
+    size = np.sqrt(np.maximum(np.diag(total), np.finfo(float).tiny))
+    return total / np.outer(size, size)
 
 
 def deflections(moves: np.ndarray, ends: np.ndarray, start: float = 0.0) -> np.ndarray:

@@ -182,12 +182,12 @@ def _pairs(maps: tuple[PassMap, ...]) -> tuple[tuple[int, int, float], ...]:
     """Correlation of the maps, detrended, of all pairs that share at least half of the shorter one's places; passes in
     opposite directions by the friction against the motion."""
     pairs = []
-    for (i, one), (j, other) in combinations(enumerate(maps), 2):
-        common = np.isfinite(one.force) & np.isfinite(other.force)
-        shorter = min(np.isfinite(one.force).sum(), np.isfinite(other.force).sum())
+    for (i, first), (j, second) in combinations(enumerate(maps), 2):
+        common = np.isfinite(first.force) & np.isfinite(second.force)
+        shorter = min(np.isfinite(first.force).sum(), np.isfinite(second.force).sum())
         if common.sum() >= max(0.5 * shorter, 20):
             x = np.arange(common.sum())
-            rows = [np.sign(m.velocity) * m.force[common] for m in (one, other)]
+            rows = [np.sign(m.velocity) * m.force[common] for m in (first, second)]
             rows = [r - np.polyval(np.polyfit(x, r, 1), x) for r in rows]
             sizes = float(np.sqrt(np.sum(rows[0] ** 2) * np.sum(rows[1] ** 2)))
             pairs.append((i, j, float(rows[0] @ rows[1]) / sizes if sizes > 0 else 0.0))

@@ -95,8 +95,8 @@ class FrequencyResponse:
     def at(self, chosen: np.ndarray) -> FrequencyResponse:
         """The lines chosen by a mask or by numbers."""
         names = ("frequency", "response", "deviation", "noise", "distortion", "degrees")
-        taken = {name: getattr(self, name)[chosen] for name in names}
-        return replace(self, coherence=None if self.coherence is None else self.coherence[chosen], **taken)
+        lines = {name: getattr(self, name)[chosen] for name in names}
+        return replace(self, coherence=None if self.coherence is None else self.coherence[chosen], **lines)
 
     def between(self, low: float, high: float) -> FrequencyResponse:
         """The lines from `low` to `high` [Hz], both included. Raises InputError where there are none."""

@@ -119,8 +119,8 @@ class LoopRobustness:
 def linear_loops(stage: Stage, flat: Mapping[str, Any], count: int) -> LoopRobustness:
     """The loops of machines, given as flat keys to SI numbers or arrays; the limit cases are those of the stage."""
     drive, stable, margin = DriveTiming.of(flat), np.ones(count, bool), np.full(count, np.inf)
-    for one in limit_cases(stage.flat()).values():
-        machines = one.repeated(count)
+    for limit_case in limit_cases(stage.flat()).values():
+        machines = limit_case.repeated(count)
         loop_poles, looked = poles(flat, machines, drive), stability_by_poles(flat, machines)
         size = np.abs(loop_poles.continuous)
         low, high = SLOWEST * float(np.median(size.min(axis=1))), drive.highest

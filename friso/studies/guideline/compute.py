@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from friso.engine.kernel import Wanted, kernels
+from friso.engine.kernel import KernelRequest, kernels
 from friso.errors import InputError
 from friso.hunting.cycle.ensemble import shared_structure
 from friso.progress import Progress, Tally, silent
@@ -69,19 +69,19 @@ class Fit:
     checked: Checked
 
     @property
-    def whole(self) -> Sweep:
+    def sweep(self) -> Sweep:
         """Samples of fit and test."""
         return together(self.fit, self.test)
 
     @property
     def kinds(self) -> Mapping[str, int]:
         """How many samples of fit and test have an edge of which kind, or none for which reason."""
-        return Counter(self.whole.edges.kind.astype(str))
+        return Counter(self.sweep.edges.kind.astype(str))
 
     @property
     def again(self) -> int:
         """Samples of fit and test in which a cycle attracts again above a crossover at which none does."""
-        return int(np.count_nonzero(self.whole.edges.windows > 1))
+        return int(np.count_nonzero(self.sweep.edges.windows > 1))
 
 
 @dataclass(frozen=True)
@@ -210,7 +210,7 @@ def _steps(sizes: Mapping[str, int]) -> int:
 def _compile() -> None:
     """Compile all equations that are needed, side by side."""
     flats = (plain(), plain("joint"), thesis_rig().flat(), thesis_rig().flat() | {"joint.locked": True})
-    kernels([Wanted(shared_structure(flat), variational) for flat in flats for variational in (False, True)])
+    kernels([KernelRequest(shared_structure(flat), variational) for flat in flats for variational in (False, True)])
 
 
 def _locked(fit: Sweep, test: Sweep, few: int) -> Fit:

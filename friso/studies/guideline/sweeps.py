@@ -88,7 +88,7 @@ class Sweep:
     @property
     def usable(self) -> Sweep:
         """Those with an edge in the range."""
-        return self.take(self.edges.known)
+        return self.take(self.edges.located)
 
 
 def together(*sweeps: Sweep) -> Sweep:
@@ -164,7 +164,7 @@ def free_sweep(count: int, seed: int, keep: Keep, tally: Tally) -> tuple[Sweep, 
     rigid = {name: drawn_values[name] for name in LOCKED_BOX}
     grid = np.broadcast_to(LOCKED_GRID, (count, len(LOCKED_GRID)))
     locked = _in_parts(f"locked beside free {seed} {count}", rigid, grid, keep, tally, LOCKED)
-    has = np.flatnonzero(locked.known)
+    has = np.flatnonzero(locked.located)
     values = {name: value[has] for name, value in drawn_values.items() if name != "ratio"}
     at = locked.crossover[has]
     values["joint"] = (drawn_values["ratio"][has] * at) ** 2

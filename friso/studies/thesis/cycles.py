@@ -71,7 +71,7 @@ def _comparison(runs: xr.Dataset) -> PeaksAgainstCycles:
     attracts, decided = np.zeros(study.cells, bool), np.zeros(study.cells, bool)
     parts = by_words(study.stage, study.links, study.columns(np.arange(study.cells)))
     for _, cells, survey in cell_attractors(parts, valid):
-        attracts[cells], decided[cells] = (False, True) if survey is None else (survey.attracts, survey.known)
+        attracts[cells], decided[cells] = (False, True) if survey is None else (survey.attracts, survey.decided)
     peaks = coarse["keeps_moving"].values.ravel()
     decided &= valid
     return PeaksAgainstCycles(

@@ -182,10 +182,10 @@ def _joint(cases: list[ShownCase]) -> Figure:
         limits = (Limit((-stroke, stroke), "limiter touches"),)
         time = samples(trace_of(item), "time")
         axis = Axis("Joint deflection", "m")
-        whole = Series(time, deflection, item.label, item.colour)
+        trace = Series(time, deflection, item.label, item.colour)
         after = Series(*_cut(item, deflection, start, end), item.label, item.colour)
         panels += [
-            Panel("Whole run", _TIME, axis, (whole,), limits=limits),
+            Panel("Whole run", _TIME, axis, (trace,), limits=limits),
             Panel(f"From {start:g} s on", Axis("Time", "s", (start, end)), axis, (after,), limits=limits),
         ]
     caption = "Deflection of the stage against the cart. Beyond the dashed lines the stroke limiter carries load."

@@ -69,9 +69,9 @@ def _edge(case: Case) -> str:
     edge = case.judgement.margin
     if edge is None:
         return NOTHING
-    own = edge.crossover / edge.factor if edge.crossover else None
+    crossover = edge.crossover / edge.factor if edge.crossover else None
     ends = [edge.factor] if edge.certain else [edge.factor, edge.quiet]
-    texts = [f"{end:.3g} × as fast" if own is None else with_unit(own * end, "Hz", 4) for end in ends]
+    texts = [f"{end:.3g} × as fast" if crossover is None else with_unit(crossover * end, "Hz", 4) for end in ends]
     return texts[0] if edge.certain else f"between {' and '.join(texts)} (not certain)"
 
 

@@ -149,9 +149,9 @@ def _below(case: Case, edge: Margin) -> str:
 def _bandwidth(case: Case, factor: float, up: bool = True) -> str:
     """A bandwidth that is a factor of that of the case."""
     edge = case.judgement.margin
-    own = edge.crossover / edge.factor if edge and edge.crossover else bandwidth(case.stage.flat())
-    value = (rounded_up if up else rounded_down)(factor * (own or 1.0))
-    return f"{value:.3g} times this bandwidth" if own is None else with_unit(value, "Hz")
+    crossover = edge.crossover / edge.factor if edge and edge.crossover else bandwidth(case.stage.flat())
+    value = (rounded_up if up else rounded_down)(factor * (crossover or 1.0))
+    return f"{value:.3g} times this bandwidth" if crossover is None else with_unit(value, "Hz")
 
 
 def _windows(case: Case) -> list[str]:
@@ -190,9 +190,9 @@ def _faster(case: Case, edge: Margin) -> str:
     controller = case.stage.controller
     doubt = "" if edge.certain else f" (not certain: hunting was found up to {_bandwidth(case, edge.factor, up=False)})"
     if edge.crossover is not None:
-        own = edge.crossover / edge.factor
-        to = rounded_up(own * edge.quiet)
-        by = rounded_up(to - own)
+        crossover = edge.crossover / edge.factor
+        to = rounded_up(crossover * edge.quiet)
+        by = rounded_up(to - crossover)
         return f"raise the {controller.bandwidth_name} by {with_unit(by, 'Hz')} (to {with_unit(to, 'Hz')}){doubt}"
     factor = rounded_up(edge.quiet)
     powers = controller.speeds_up.items()

@@ -225,7 +225,7 @@ def _legend(drawing: PaperDrawing) -> list[str]:
 
 def _title_block(drawing: PaperDrawing, title: str, material: str) -> list[str]:
     mechanism, top, split = drawing.mechanism, drawing.height - FOOT - 5, 138.0
-    stuff = f"E {mechanism.young / 1e9:.4g} GPa, ν {mechanism.poisson:g}, {mechanism.density:.4g} kg/m³"
+    material_line = f"E {mechanism.young / 1e9:.4g} GPa, ν {mechanism.poisson:g}, {mechanism.density:.4g} kg/m³"
     strength = f"yield {mechanism.yield_strength / 1e6:.4g} MPa"
     if math.isfinite(mechanism.fatigue):
         strength += f", fatigue {mechanism.fatigue / 1e6:.4g} MPa"
@@ -233,7 +233,7 @@ def _title_block(drawing: PaperDrawing, title: str, material: str) -> list[str]:
     lines = [
         f"{mechanism.leaves:g} leaf springs {size}, length between the clamps",
         f"Material: {material or 'as follows'}",
-        f"{stuff}, {strength}",
+        f"{material_line}, {strength}",
     ]
     room = split - 9
     parts = [box((5, top), (WIDTH - 5, top + FOOT)), path([(split, top), (split, top + FOOT)])]

@@ -120,13 +120,13 @@ def _stroke(guideline: Guideline) -> Figure:
 def _against(guideline: Guideline) -> Figure:
     """Edges by the laws against computed ones, samples of the fit and samples held out."""
     locked, free = guideline.locked, guideline.free
-    whole = [
+    predicted = [
         free.law.edge(sweep.values, locked.law.edge(sweep.values)) for sweep in (free.fit.usable, free.test.usable)
     ]
     rigid = [locked.law.edge(sweep.values) for sweep in (locked.fit.usable, locked.test.usable)]
     panels = (
         _scatter("Joint locked", rigid, [locked.fit.usable.edge, locked.test.usable.edge]),
-        _scatter("Joint free, locked edge by its law", whole, [free.fit.usable.edge, free.test.usable.edge]),
+        _scatter("Joint free, locked edge by its law", predicted, [free.fit.usable.edge, free.test.usable.edge]),
     )
     caption = "Edges in units of sqrt(sigma_0/m); dotted: 20 % off."
     return Figure("guideline_errors", "Laws against computed edges", caption, panels, 2)
@@ -191,7 +191,7 @@ def _by_end(x: Array, y: Array, sweep: Sweep) -> Cloud:
 
 def _both(fit: Fit, which: object) -> Sweep:
     """The samples of fit and test together that have an edge and for which `which` is true of their groups."""
-    return fit.whole.usable.take(which(fit.whole.usable.values))  # type: ignore[operator]
+    return fit.sweep.usable.take(which(fit.sweep.usable.values))  # type: ignore[operator]
 
 
 def _log(quantity: str, x: Array) -> Axis:

@@ -125,7 +125,7 @@ def _one_window(sweep: Sweep) -> np.ndarray:
 def _worst(guideline: Guideline) -> dict[str, Any] | None:
     """Of the samples, fitted and held out, whose locked edge is off the law by more than a factor: how many, the ends
     of their gap and stribeck groups, and how many of which kind; None without any."""
-    used = guideline.locked.whole.usable
+    used = guideline.locked.sweep.usable
     off = np.abs(np.log(used.edge / guideline.locked.law.edge(used.values)))
     far = used.take(off > np.log(FAR))
     if not len(far.edge):
@@ -143,9 +143,9 @@ def _between(low: float, high: float) -> str:
 def group_rows(guideline: Guideline) -> list[dict[str, Any]]:
     """One row per group: how it is written, what it means, its range in the sweeps, and its value for the rig."""
     ranges = dict(LOCKED_BOX) | {name: ends for name, ends in JOINT_BOX.items() if name in GROUPS}
-    used = guideline.free.whole.usable
+    used = guideline.free.sweep.usable
     ranges["joint"] = _span(used.values["joint"])
-    edges = (guideline.locked.whole.usable.edge, used.edge)
+    edges = (guideline.locked.sweep.usable.edge, used.edge)
     ranges["crossover"] = _span(np.concatenate(edges))
     rig_values = values_of(plain("joint"))
     return [

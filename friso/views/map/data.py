@@ -119,8 +119,8 @@ def _coloured(runs: xr.Dataset, name: str, cells: _Cells) -> dict[str, Any]:
 def _text(runs: xr.Dataset, name: str, cells: _Cells) -> dict[str, Any]:
     """A variable of texts: each text once, and their numbers."""
     codes, words = words_of(runs, name)
-    taken = cells.take(runs[name].copy(data=codes)).astype("<u4")
-    return {"name": name, "label": variable(name), "words": words, "codes": _base64(taken)}
+    numbers = cells.take(runs[name].copy(data=codes)).astype("<u4")
+    return {"name": name, "label": variable(name), "words": words, "codes": _base64(numbers)}
 
 
 def _kind(kind: Kind) -> dict[str, str]:

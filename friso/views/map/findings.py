@@ -153,9 +153,9 @@ def _range(axis: CellAxis, box: np.ndarray) -> str:
     return f"{name} from {low}" if inside.max() == axis.positions.max() else f"{name} from {low} to {high}"
 
 
-def _percent(part: int, whole: int) -> str:
+def _percent(part: int, total: int) -> str:
     """A share, which looks like 0 or 100 % only where it is."""
-    share = 100 * part / whole
+    share = 100 * part / total
     if 1 <= share <= 99:
         return f"{share:.0f} %"
     return f"{share:.2g} %" if share < 1 else f"{np.floor(share * 10) / 10:g} %"

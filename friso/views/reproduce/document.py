@@ -19,8 +19,8 @@ def conclusion(reproduction: Reproduction) -> str:
     """How many claims of the thesis hold."""
     counts = Counter(verdict.judgement for verdict in reproduction.verdicts)
     parts = [
-        f"{counts[judgement]} {one if counts[judgement] == 1 else several}"
-        for judgement, one, several in _VERBS
+        f"{counts[judgement]} {singular if counts[judgement] == 1 else plural}"
+        for judgement, singular, plural in _VERBS
         if counts[judgement]
     ]
     return f"Of {len(reproduction.verdicts)} claims of the thesis {listed(parts, 'and')}."

@@ -24,4 +24,4 @@ def rig_document(outcome: Outcome) -> dict[str, Any]:
         "seed": outcome.seed,
         "logs": logs,
     }
-    return plain_json({**head, "found": view.numbers(outcome), "notes": [*outcome.notes]})
+    return plain_json({**head, "results": view.numbers(outcome), "notes": [*outcome.notes]})

@@ -31,12 +31,12 @@ def log_files(log: RigLog, stage: Stage) -> dict[str, Content]:
 
 def _setup(machine: Stage, stage: Stage) -> dict[str, str]:
     """What of joint and controller was set otherwise for a log than in the stage file, as texts with units."""
-    was, now = stage.given(), machine.given()
+    before, after = stage.as_written(), machine.as_written()
     return {
         f"{table}.{key}": text
         for table in ("joint", "controller")
-        for key, text in now.get(table, {}).items()
-        if isinstance(text, str) and text != was.get(table, {}).get(key)
+        for key, text in after.get(table, {}).items()
+        if isinstance(text, str) and text != before.get(table, {}).get(key)
     }
 
 

@@ -57,8 +57,8 @@ def _slow_place(sliding: Slow) -> str:
         for estimate in sliding.result.estimates
     ]
     texts = [
-        f"{name} {text} (true: {with_unit(float(one), unit)})"
-        for name, text, one, unit in zip(names, estimates, true, ("N", "N", "m/s"), strict=True)
+        f"{name} {text} (true: {with_unit(float(value), unit)})"
+        for name, text, value, unit in zip(names, estimates, true, ("N", "N", "m/s"), strict=True)
     ]
     return f"From {_start(sliding.log)} on: {'; '.join(texts)}."
 
@@ -82,7 +82,8 @@ def _place(number: int, place: PlaceOnRail) -> str:
     named += (("static friction", both.static), ("the Stribeck velocity", both.stribeck_velocity))
     certain = [f"{words} {with_interval(estimate)}" for words, estimate in named if estimate.determined]
     hidden = {
-        estimate.reason: [words for words, one in named if one.reason == estimate.reason] for _, estimate in named
+        estimate.reason: [words for words, named_estimate in named if named_estimate.reason == estimate.reason]
+        for _, estimate in named
     }
     unknown = [f"not shown: {listed(words, 'and')} ({reason})" for reason, words in hidden.items() if reason]
     ends = [with_unit(float(end(reached)), "m/s") for end in (np.min, np.max) if len(reached)]
@@ -144,10 +145,10 @@ def _over_velocity(outcome: Outcome) -> Figure:
 
 def _lines(passes: Passes, speeds: tuple[float, ...]) -> list[Series]:
     """The forward passes."""
-    forward = [one for one in passes.place.passes if one.velocity > 0]
+    forward = [record for record in passes.place.passes if record.velocity > 0]
     return [
-        Series(one.places, one.force, with_unit(speed, "m/s"), colour)
-        for one, speed, colour in zip(forward, speeds, (BLUE, VERMILLION), strict=False)
+        Series(record.places, record.force, with_unit(speed, "m/s"), colour)
+        for record, speed, colour in zip(forward, speeds, (BLUE, VERMILLION), strict=False)
     ]
 
 
@@ -193,8 +194,8 @@ def _numbers(passes: Passes) -> dict[str, Any]:
         "verdict": passes.place.verdict,
         "repeatability": passes.place.repeatability.value,
         "passes": [
-            {"velocity_m_per_s": one.velocity, "mean_force_n": one.mean.value, "deviation_n": one.spread}
-            for one in passes.place.passes
+            {"velocity_m_per_s": record.velocity, "mean_force_n": record.mean.value, "deviation_n": record.spread}
+            for record in passes.place.passes
         ],
         "coulomb_n": coulomb.value,
         "coulomb_reason": coulomb.reason,
