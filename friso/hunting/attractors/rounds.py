@@ -36,7 +36,7 @@ BUDGET = 2_000_000
 LEG = 0.25
 """Legs of a swing are at least this share of peak to peak."""
 
-RESOLVED = 0.004
+RESOLVED = 0.0004
 """Least swing that is looked at, in units of the deflection of the loop by the break-away force."""
 
 CREEPS = np.geomspace(0.001, 1.0, 31)
@@ -48,6 +48,10 @@ ACROSS = 0.05
 WOUND = 4.0
 """For how many waits a stage has to stand still within half of the distance from which it would break away, until it
 surely rests: the integrator has passed from one limit to the other twice by then."""
+
+SHOWN = 24.0
+"""For how many of the longest waits a stage is followed that has not swung in a round: swings that are nearly as slow
+repeat themselves in the second half of that, and creeping home is over."""
 
 
 @dataclass(frozen=True)
@@ -141,6 +145,6 @@ def _stands_still(
 
 def lengthened(runs: Pending, swing: np.ndarray) -> Pending:
     """The same, with a longer round before them: of those that do not `swing`, shape (runs,), long enough to show that
-    they rest."""
-    least = np.where(swing, 0.0, 2.1 * WOUND * wait(runs.stages, runs.loose))
+    they rest, or swing slowly."""
+    least = np.where(swing, 0.0, SHOWN * wait(runs.stages, runs.loose))
     return replace(runs, durations=np.maximum(LONGER * runs.durations, least))

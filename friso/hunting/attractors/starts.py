@@ -11,11 +11,11 @@ from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.find import Cycles
 from friso.hunting.cycle.rest import pushed, stuck
 
-MANY = np.geomspace(0.01, 3.0, 96), np.geomspace(4.0, 300.0, 16)
-"""Distances at which a stage sticks at first, in units of the deflection of the loop by the break-away force: nearer
-than that it creeps home, farther off it does not stick."""
+MANY = np.geomspace(0.001, 0.009, 12), np.geomspace(0.01, 3.0, 96), np.geomspace(4.0, 300.0, 16)
+"""Distances at which a stage sticks at first, in units of the deflection of the loop by the break-away force: from the
+nearest most creep home, farther off they do not stick."""
 
-FEW = np.geomspace(0.01, 3.0, 48), np.geomspace(5.0, 300.0, 6)
+FEW = np.geomspace(0.001, 0.007, 4), np.geomspace(0.01, 3.0, 48), np.geomspace(5.0, 300.0, 6)
 """The same for many stages at once."""
 
 LIMITED = np.geomspace(500.0, 30000.0, 8)
@@ -48,9 +48,9 @@ class Starts:
 
     def spread(self, thorough: bool) -> None:
         """Stuck at distances on both sides (on one of symmetric stages), and pushed."""
-        near, far = MANY if thorough else FEW
+        spread = MANY if thorough else FEW
         limited = (controller := self.stages.structure.controller) is not None and controller.anti_windup is not None
-        units = np.concatenate([near, far, *([LIMITED] if limited else [])])
+        units = np.concatenate([*spread, *([LIMITED] if limited else [])])
         for side in (1.0, -1.0):
             which = np.arange(self.stages.count) if side > 0 else np.flatnonzero(~self.stages.symmetric)
             if which.size:

@@ -28,11 +28,11 @@ followed for; and up to which share a deviation counts as small."""
 UNDECIDED = "simulations that had to decide failed, or had not settled when they were stopped"
 """Why it is not certain whether anything attracts a stage."""
 
-SMALL_GAP = 0.02
+SMALL_GAP = 0.002
 """Share of the static friction by which it exceeds Coulomb friction: the smallest for which cycles are of a size that
 is looked for."""
 
-SMALL_SWING, FED = 0.01, (2.0, 6.0)
+SMALL_SWING, FED = 0.001, (2.0, 6.0)
 """The smallest amplitude that is looked for with certainty, as a share of the deflection by the break-away force; and
 how much larger than the amplitude of a cycle the fall of friction over its speeds is, as a share of the static one, at
 least and at most."""
