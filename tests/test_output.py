@@ -28,6 +28,7 @@ NEEDS: dict[str, tuple[object, ...]] = {
     "boundary": (RIG, "--x", "controller.crossover=4 Hz..8 Hz"),
     "flexure": (LEAVES,),
     "design": (RIG, EXAMPLES / "specs" / "thesis.toml"),
+    "logs": (RIG,),
     "identify": (RIG,),
     "rig": ("stiffness", DRIVE),
     "compare": (DRIVE,),

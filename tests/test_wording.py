@@ -29,6 +29,7 @@ MISTAKES = {
     "boundary": (RIG, "--x", "controller.crossover=4 Hz"),
     "flexure": (RIG,),
     "design": (RIG, RIG),
+    "logs": ("nowhere.csv",),
     "identify": ("nowhere.csv",),
     "rig": ("stifness", DRIVE),
     "compare": (DRIVE, "--machines", "19"),

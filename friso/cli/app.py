@@ -26,6 +26,7 @@ from friso.cli.flexure import flexure
 from friso.cli.guideline import guideline
 from friso.cli.identify import identify, listed_kinds
 from friso.cli.init import init
+from friso.cli.logs import logs
 from friso.cli.map import map_cells
 from friso.cli.reproduce import reproduce
 from friso.cli.rig import listed_experiments, rig
@@ -70,6 +71,7 @@ for name, command in (
     ("boundary", boundary),
     ("flexure", flexure),
     ("design", design),
+    ("logs", logs),
     ("identify", identify),
     ("rig", rig),
     ("compare", compare),

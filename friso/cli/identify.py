@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from friso.cli.common import AsJson, Overrides, print_wrapped, with_overrides
+from friso.cli.log_options import Logs, Maps, SampleTime, Scales, Units
 from friso.cli.output import DefaultFolder, OutputFolder, Overwrite, print_document, write
 from friso.cli.progress import ProgressBar
 from friso.errors import InputError
@@ -26,12 +27,11 @@ if TYPE_CHECKING:
 
 STAGE = "identified.toml"
 
-Many = list[str] | None
 _HERTZ, _SECONDS = Quantity("Hz", positive, "20 Hz"), Quantity("s", positive, "5 s")
 
 
 def identify(
-    logs: Annotated[list[Path], typer.Argument(metavar="LOG...", help="CSV, TwinCAT, MAT, TDMS, UFF58 or LVM files.")],
+    logs: Logs,
     stage: Annotated[
         Path | None,
         typer.Option("--stage", metavar="STAGE.toml", help="What is known beforehand: structure, controller, drive."),
@@ -45,12 +45,10 @@ def identify(
             help="Kind of experiment, one of those below; moves and frequency responses tell it themselves.",
         ),
     ] = None,
-    maps: Annotated[Many, typer.Option("--map", metavar="ROLE=CHANNEL", help='position="Axis1.ActPos"')] = None,
-    units: Annotated[Many, typer.Option("--unit", metavar="CHANNEL=UNIT", help='Axis1.ActPos="mm"')] = None,
-    scales: Annotated[Many, typer.Option("--scale", metavar="ROLE=SCALE", help='force="35.15 N/V"')] = None,
-    dt: Annotated[
-        str | None, typer.Option("--dt", metavar="TIME", help="Sample time, if the file does not contain it.")
-    ] = None,
+    maps: Maps = None,
+    units: Units = None,
+    scales: Scales = None,
+    dt: SampleTime = None,
     predict: Annotated[
         list[Path] | None,
         typer.Option("--predict", metavar="LOG", help="Another log, simulated with the identified stage."),

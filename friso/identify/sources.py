@@ -102,14 +102,14 @@ def _read(path: Path, options: Mapping, folder: Path) -> LogFile:
     mapping = options.over(stored)
     if mapping.experiment is not None:
         KINDS.checked(mapping.experiment, "--as", "--as {}")
-        log = _log(path, mapping, mapping.experiment)
+        log = named(path, mapping, mapping.experiment)
         before = "" if stored.experiment in (None, mapping.experiment) else f", in place of {stored.experiment} as kept"
         return LogFile(path, log, mapping.experiment, f"as specified{before}", mapping)
-    log, kind, reason = _unnamed(path, mapping)
+    log, kind, reason = unnamed(path, mapping)
     return LogFile(path, log, kind, reason, mapping)
 
 
-def _unnamed(path: Path, mapping: Mapping) -> tuple[Log, str, str]:
+def unnamed(path: Path, mapping: Mapping) -> tuple[Log, str, str]:
     """A log of which nobody said what it is, its kind of experiment, and why. Raises GapsError for all that is open,
     the units included that most kinds need."""
     gaps: list[LogError] = []
@@ -118,17 +118,16 @@ def _unnamed(path: Path, mapping: Mapping) -> tuple[Log, str, str]:
         log = read_log(path, mapping, strict=False, needed=MOVED)
     except GapsError as error:
         gaps += error.gaps
-        log = _without_clock(path, mapping)
+        log = _without_clock(path, replace(mapping, roles={**mapping.roles, **error.proposed}))
     try:
         kind, reason = recognised(log, path) if log is not None else ("", "")
     except LogError as error:
         gaps.append(error)
-    if kind and not gaps and not KINDS[kind].si and log is not None:
-        return log, kind, reason
-    try:
-        log = _log(path, mapping, kind) if kind else read_log(path, mapping, needed=MOVED)
-    except GapsError as error:
-        gaps += [gap for gap in error.gaps if gap.example not in [other.example for other in gaps]]
+    if not (kind and not KINDS[kind].si):
+        try:
+            log = named(path, mapping, kind) if kind else read_log(path, mapping, needed=MOVED)
+        except GapsError as error:
+            gaps += [gap for gap in error.gaps if gap.example not in [other.example for other in gaps]]
     if gaps or log is None:
         raise GapsError(gaps)
     return log, kind, reason
@@ -147,7 +146,7 @@ def kept_at(path: Path, mapping: Mapping, folder: Path) -> Path | None:
     return None if mapping == Mapping() else place_for(path, folder)
 
 
-def _log(path: Path, mapping: Mapping, kind: str) -> Log:
+def named(path: Path, mapping: Mapping, kind: str) -> Log:
     """The log with the signals that the kind of experiment needs."""
     return read_log(path, mapping, strict=KINDS[kind].si, needed=KINDS[kind].needed(mapping.roles))
 

@@ -10,7 +10,7 @@ import numpy as np
 from friso.errors import InputError, LogError
 from friso.identify.logs import checks, delays
 from friso.identify.logs.format import FORMATS
-from friso.identify.logs.gaps import GapsError, gaps_of
+from friso.identify.logs.gaps import check_gaps
 from friso.identify.logs.log import ROLES, Log
 from friso.identify.logs.mapping import Mapping, option
 from friso.identify.logs.read import file_format
@@ -36,9 +36,7 @@ def read_log(
     table = with_user_units(form.read(path), mapping, form.times, str(path))
     reading = Reading(table, mapping, strict, not form.units, str(path))
     proposal = propose(table, mapping.roles, str(path))
-    gaps = gaps_of(reading, proposal, needed)
-    if gaps:
-        raise GapsError(gaps)
+    check_gaps(reading, proposal, needed)
     chosen = proposal.chosen
     unused(mapping, chosen, str(path))
     notes = Notes(list(table.read), _undecided(proposal))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
@@ -24,10 +24,10 @@ _INITIALS = {"reference": "rs", "position": "xyqps", "velocity": "v", "force": "
 
 class GapsError(LogError):
     """What logs do not tell: the errors of which any one would stop the reading, each with the option that mends it as
-    its example."""
+    its example; and the channels `proposed` for roles, by role."""
 
-    def __init__(self, gaps: Sequence[LogError]) -> None:
-        self.gaps = tuple(gaps)
+    def __init__(self, gaps: Sequence[LogError], proposed: Mapping[str, str] | None = None) -> None:
+        self.gaps, self.proposed = tuple(gaps), dict(proposed or {})
         (first, *more) = self.gaps
         if not more:
             super().__init__(first.key, first.actual, first.expected, first.example, first.origin)
@@ -49,8 +49,8 @@ class GapsError(LogError):
         return tuple(dict.fromkeys(gap.example for gap in self.gaps if gap.example))
 
 
-def gaps_of(reading: Reading, proposal: Proposal, needed: Sequence[str]) -> list[LogError]:
-    """What has to be told before a log can be read as one with the roles that are `needed`."""
+def check_gaps(reading: Reading, proposal: Proposal, needed: Sequence[str]) -> None:
+    """Raises GapsError for all that has to be told before a log can be read as one with the roles that are `needed`."""
     table, origin = reading.table, reading.origin
     chosen = {role: choice for role, choice in proposal.chosen.items() if role in (*needed, "force")}
     found: list[LogError] = []
@@ -73,7 +73,10 @@ def gaps_of(reading: Reading, proposal: Proposal, needed: Sequence[str]) -> list
     reference = proposal.chosen.get("reference")
     if units.get("position") and reference is not None and not reference.channel.unit and "reference" not in units:
         units["reference"] = unit_gap(reference, reading)
-    return found + [gap for gap in units.values() if gap is not None]
+    found += [gap for gap in units.values() if gap is not None]
+    if found:
+        proposed = {role: choice.channel.name for role, choice in chosen.items() if role not in proposal.chosen}
+        raise GapsError(found, proposed)
 
 
 def likeliest(role: str, table: ChannelTable, taken: Iterable[Channel]) -> Channel | None:

@@ -131,8 +131,10 @@ def _wrong_unit(choice: AssignedRole, unit: str, si: str, reading: Reading) -> L
             expected += f", or a scale such as {option('--scale', role, '35 N/V')}"
         return LogError(role, actual, expected, option("--unit", name, usual), reading.origin)
     number = "35.1507" if role in ("force", "disturbance") else "1.5"
-    example = f'--scale {role}="{number} {ROLES[role]}/{si}"'
-    return LogError(role, f"{quoted(name)} in {unit}", f"a scale to {ROLES[role]}", example, reading.origin)
+    scale = f"{ROLES[role]}/{si}"
+    expected = f'a scale to {ROLES[role]}, such as --scale {role}="{number} {scale}"'
+    example = f'--scale {role}="NUMBER {scale}"'  # nobody should copy one that is made up
+    return LogError(role, f"{quoted(name)} in {unit}", expected, example, reading.origin)
 
 
 def _likely_length(place: Channel) -> str:

@@ -1,0 +1,1 @@
+"""What `friso logs` shows of files of logs."""

@@ -1,0 +1,36 @@
+"""The channels of files of logs over time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from friso.identify.contents import ChannelContent, LogContent
+from friso.views.drawing.figure import BLUE, Axis, Figure, Panel, Series
+from friso.views.logs.words import title
+
+MOST = 12
+"""Channels of a file that are drawn."""
+
+
+def logs_figures(contents: Sequence[LogContent]) -> list[Figure]:
+    """A figure for each file of channels, those with a role first."""
+    return [_figure(content, number) for number, content in enumerate(contents, 1) if content.channels]
+
+
+def _figure(content: LogContent, number: int) -> Figure:
+    drawn = sorted((c for c in content.channels if c.role != "time"), key=lambda channel: not channel.role)[:MOST]
+    left = len(content.channels) - len(drawn)
+    caption = "As they stand in the file, in its own units." + (f" {left} channels are not drawn." if left else "")
+    panels = tuple(_panel(channel) for channel in drawn)
+    return Figure(f"logs_{number}", title(content), caption, panels, columns=2 if len(panels) > 1 else 1)
+
+
+def _panel(channel: ChannelContent) -> Panel:
+    timed = channel.time is not None and channel.time.size == channel.values.size
+    x = channel.time if timed and channel.time is not None else np.arange(channel.values.size, dtype=float)
+    values = np.where(np.isfinite(channel.values), channel.values, np.nan)
+    words = f"{channel.name}: {channel.role.replace('_', ' ')}" if channel.role else channel.name
+    across = Axis("Time", "s", prefixed=False) if timed else Axis("Sample", "", prefixed=False)
+    return Panel(words, across, Axis("", channel.unit, prefixed=False), (Series(x, values, "", BLUE, width=1.0),))

@@ -1,0 +1,108 @@
+"""`friso logs` as a user runs it: what it shows of files of any kind, and that it identifies nothing."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import log_files
+import numpy as np
+import pytest
+from inside import friso_inside
+
+from friso.identify.contents import content_of
+from friso.identify.logs.mapping import Mapping, from_options
+from friso.views.logs.words import next_command, sparkline
+
+TIME = 1e-3 * np.arange(1200)
+FORCE = 30 * np.sin(2 * np.pi * 3 * TIME) * np.exp(-2 * TIME)  # nothing repeats: a log of moves
+M = {"time": TIME, "force": FORCE, "position": np.cumsum(np.cumsum(FORCE / 2)) * 1e-6}
+
+
+@pytest.fixture
+def bare(tmp_path: Path) -> Path:
+    """A log without units whose force is called by a letter."""
+    return log_files.write_text(tmp_path / "bare.csv", ["t", "x", "u"], [M["time"], M["position"] * 1e3, M["force"]])
+
+
+def test_channels_ranges_rates_and_roles(tmp_path: Path) -> None:
+    names = ["time [s]", "position [mm]", "force [N]", "temp"]
+    force = np.where(np.arange(1200) == 5, np.nan, M["force"])
+    path = log_files.write_text(tmp_path / "a.csv", names, [M["time"], M["position"] * 1e3, force, np.full(1200, 21.5)])
+    content = content_of(path, Mapping())
+    by_name = {channel.name: channel for channel in content.channels}
+    assert content.kind == "moves"
+    assert not content.gaps
+    assert by_name["position"].role == "position"
+    assert by_name["position"].range == pytest.approx((1e3 * M["position"].min(), 1e3 * M["position"].max()))
+    assert by_name["position"].sample_rate == pytest.approx(1000)
+    assert by_name["force"].missing == 1
+    assert by_name["temp"].role == ""
+    assert next_command(content) == f"friso identify {path}"
+
+
+def test_the_course_of_a_channel(tmp_path: Path) -> None:
+    ramp = np.arange(1200.0)
+    path = log_files.write_text(tmp_path / "a.csv", ["time [s]", "position [mm]"], [M["time"], ramp])
+    course = content_of(path, Mapping()).channels[1].course(12)
+    assert course == pytest.approx(100 * np.arange(12) + 49.5)
+    assert sparkline(course)[0] == "▁"
+    assert sparkline(course)[-1] == "█"
+    assert sparkline(np.array([1.0, np.nan, 1.0])) == "▁ ▁"
+
+
+def test_what_is_open_and_the_command_for_it(bare: Path) -> None:
+    content = content_of(bare, Mapping())
+    assert {gap.key for gap in content.gaps} == {"position", "force", "time"}
+    command = next_command(content)
+    for option in ("--map position=x", "--map force=u", "--unit t=s", "--unit x=mm", "--unit u=N"):
+        assert option in command
+    options = from_options(["position=x", "force=u"], ["t=s", "x=mm", "u=N"])
+    assert content_of(bare, options).kind == "moves"
+
+
+def test_a_multisine_in_volts_needs_no_newtons(tmp_path: Path) -> None:
+    """The kind is recognised from the channels that are proposed, and no scale is asked for."""
+    rng, count = np.random.default_rng(1), 500
+    lines = np.zeros(count // 2 + 1, dtype=complex)
+    lines[1:40] = np.exp(2j * np.pi * rng.random(39))
+    volts = np.tile(np.fft.irfft(lines, count), 8)
+    place = np.tile(np.fft.irfft(lines / np.maximum(np.arange(lines.size), 1) ** 2, count), 8)
+    path = log_files.write_text(
+        tmp_path / "a.csv", ["time [s]", "pos [mm]", "input [V]"], [1e-3 * np.arange(8 * count), place, volts]
+    )
+    content = content_of(path, Mapping())
+    assert [gap.example for gap in content.gaps] == ["--map force=input"]
+    assert content_of(path, from_options(["force=input"])).kind == "frequency"
+
+
+def test_a_frequency_response(tmp_path: Path) -> None:
+    hertz = np.arange(1.0, 101.0)
+    path = log_files.write_text(
+        tmp_path / "frf.csv", ["f [Hz]", "mag [m/N]", "phase [deg]"], [hertz, hertz**-2, np.full(100, -180.0)]
+    )
+    content = content_of(path, Mapping())
+    assert content.kind == "frequency"
+    assert content.response is not None
+    assert content.response.frequency.size == 100
+
+
+def test_the_command(bare: Path, tmp_path: Path) -> None:
+    done = friso_inside(tmp_path, "logs", "bare.csv", "--out", "out")
+    assert done.returncode == 0
+    assert "▁" in done.stdout
+    assert "--map force=u" in done.stdout
+    assert {file.name for file in (tmp_path / "out").iterdir()} >= {"logs.html", "logs_1.png"}
+    assert not (tmp_path / "bare.csv.friso.toml").exists()
+    document = json.loads(friso_inside(tmp_path, "logs", "bare.csv", "--json").stdout)
+    (log,) = document["logs"]
+    assert [channel["name"] for channel in log["channels"]] == ["t", "x", "u"]
+    assert {gap["about"] for gap in log["open"]} == {"position", "force", "time"}
+
+
+def test_one_bad_file_does_not_hide_the_others(bare: Path, tmp_path: Path) -> None:
+    (tmp_path / "empty.csv").write_text("")
+    done = friso_inside(tmp_path, "logs", "empty.csv", "bare.csv")
+    assert done.returncode == 2
+    assert "bare.csv" in done.stdout
+    assert "empty.csv" in done.stderr
