@@ -16,7 +16,7 @@ from friso.views.logs.words import next_command, sparkline
 
 TIME = 1e-3 * np.arange(1200)
 FORCE = 30 * np.sin(2 * np.pi * 3 * TIME) * np.exp(-2 * TIME)  # nothing repeats: a log of moves
-M = {"time": TIME, "force": FORCE, "position": np.cumsum(np.cumsum(FORCE / 2)) * 1e-6}
+M = {"time": TIME, "force": FORCE, "position": np.cumsum(np.cumsum(FORCE / 20)) * 1e-6}
 
 
 @pytest.fixture
