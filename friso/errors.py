@@ -1,33 +1,57 @@
 """What is wrong with an input: one clear message, whoever reads it."""
 
+from collections.abc import Iterable
 from typing import Self
 
 
 class InputError(ValueError):
-    """A wrong input: which key, what was given, what was expected, a correct example, and which file."""
+    """A wrong input: which key, what was given, what was expected, a correct example, and which file; and what `also`
+    is wrong in the same file, as pairs of key and what was given."""
 
-    def __init__(self, key: str, actual: str, expected: str, example: str = "", origin: str = "") -> None:
-        super().__init__(key, actual, expected, example, origin)
+    def __init__(
+        self,
+        key: str,
+        actual: str,
+        expected: str,
+        example: str = "",
+        origin: str = "",
+        also: tuple[tuple[str, str], ...] = (),
+    ) -> None:
+        super().__init__(key, actual, expected, example, origin, also)
         self.key, self.actual, self.expected, self.example, self.origin = key, actual, expected, example, origin
+        self.also = also
 
     def __str__(self) -> str:
         head = ": ".join(part for part in (self.origin, self.key) if part)
         rows = {"given:": self.actual, "expected:": self.expected, "example:": self.example}
-        return "\n".join([head, *(f"  {name:<9} {text}" for name, text in rows.items() if text)]).lstrip("\n")
+        lines = [f"  {name:<9} {text}" for name, text in rows.items() if text]
+        lines += [f"  {'also:':<9} {key}: {actual}" for key, actual in self.also]
+        return "\n".join([head, *lines]).lstrip("\n")
 
     @classmethod
     def of(cls, error: "InputError") -> Self:
         """The same error as one of this kind."""
-        return cls(error.key, error.actual, error.expected, error.example, error.origin)
+        return cls(error.key, error.actual, error.expected, error.example, error.origin, error.also)
 
     def under(self, table: str) -> Self:
-        """The same error, its key seen from one level further out."""
-        key = ".".join(part for part in (table, self.key) if part)
-        return type(self)(key, self.actual, self.expected, self.example, self.origin)
+        """The same error, its keys seen from one level further out."""
+        also = tuple((_joined(table, key), actual) for key, actual in self.also)
+        return type(self)(_joined(table, self.key), self.actual, self.expected, self.example, self.origin, also)
 
     def found_in(self, origin: str) -> Self:
         """The same error, saying which file or option it comes from."""
-        return type(self)(self.key, self.actual, self.expected, self.example, origin)
+        return type(self)(self.key, self.actual, self.expected, self.example, origin, self.also)
+
+    def together(self, others: "Iterable[InputError]") -> Self:
+        """The same error, which says what else is wrong."""
+        also = (pair for error in others for pair in ((error.key, error.actual), *error.also))
+        return type(self)(
+            self.key, self.actual, self.expected, self.example, self.origin, tuple(dict.fromkeys((*self.also, *also)))
+        )
+
+
+def _joined(table: str, key: str) -> str:
+    return ".".join(part for part in (table, key) if part)
 
 
 class StageError(InputError):

@@ -549,6 +549,46 @@ def test_a_file_that_never_ends_is_an_error_of_its_own(
         read_table(tmp_path / "a.mat")
 
 
+def cells_in_cells_as_mat(path: Path, levels: int) -> None:
+    """A small MAT file of cells within cells, compressed."""
+    above = ((6, 8, 1, 0), (5, 8, 1, 1), (1, 0))
+    parts = [(14, 48 * (levels + 1)), *above] * levels
+    number = struct.pack("<14id", 14, 56, 6, 8, 6, 0, 5, 8, 1, 1, 1, 0, 9, 8, 1.0)
+    data = zlib.compress(b"".join(struct.pack(f"<{len(part)}i", *part) for part in parts) + number, 9)
+    head = b"MATLAB 5.0 MAT-file".ljust(116) + bytes(8) + struct.pack("<H", 0x0100) + b"IM"
+    path.write_bytes(head + struct.pack("<ii", 15, len(data)) + data)
+
+
+def test_cells_nested_so_deeply_that_the_library_crashes(tmp_path: Path, refused: Refused) -> None:
+    """By a signal: its reader calls itself for each level."""
+    cells_in_cells_as_mat(tmp_path / "a.mat", 200_000)
+    assert (tmp_path / "a.mat").stat().st_size < 30_000
+    with refused("log"):
+        read_table(tmp_path / "a.mat")
+
+
+@pytest.mark.skipif(not LIMITS_MEMORY, reason="this system does not hold a process to an amount of memory")
+def test_an_array_that_no_disk_holds(tmp_path: Path, refused: Refused) -> None:
+    """Two gigabytes that were never written take two kilobytes."""
+    import h5py
+
+    with h5py.File(tmp_path / "a.mat", "w") as file:
+        file.create_dataset("x", (1 << 28,), "f8", chunks=(1 << 20,), compression="gzip")
+    assert (tmp_path / "a.mat").stat().st_size < 7_000
+    with refused("log"):
+        read_table(tmp_path / "a.mat")
+
+
+def test_a_group_that_contains_itself(tmp_path: Path, refused: Refused) -> None:
+    import h5py
+
+    with h5py.File(tmp_path / "a.mat", "w") as file:
+        group = file.create_group("g")
+        group["g"] = group
+    with refused("log"):
+        read_table(tmp_path / "a.mat")
+
+
 def test_a_library_that_crashes_is_an_error_of_the_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, refused: Refused
 ) -> None:

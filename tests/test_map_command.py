@@ -15,7 +15,7 @@ import xarray as xr
 from inside import friso_inside
 from refusals import Refused
 
-from friso.cli.output import MARKER
+from friso.studies.cells import USUAL
 
 RIG = Path(__file__).parent.parent / "examples" / "thesis_rig.toml"
 SMALL = ("--x", "controller.crossover=4 Hz..12 Hz:5", "--y", "joint.stroke=0 m..1 mm:4")
@@ -211,18 +211,22 @@ def test_a_store_is_checked(mapped: tuple[Path, dict], tmp_path: Path) -> None:
     done = friso_inside(tmp_path, "map", "a.zarr", "--check", "--json")
     assert done.returncode == 1
     assert json.loads(done.stdout)["damaged"] == [chunk.name]
+    (tmp_path / "a.zarr" / "peaks" / ".zarray").write_text("{}")
+    done = friso_inside(tmp_path, "map", "a.zarr", "--check")
+    assert done.returncode == 1
+    assert "damaged: 0.0, peaks/.zarray" in done.stdout
 
 
 def test_a_figure_beside_a_store_that_it_has_not_made_stays(mapped: tuple[Path, dict], tmp_path: Path) -> None:
     shutil.copytree(mapped[0] / "a.zarr", tmp_path / "a.zarr")
-    (tmp_path / "a.zarr" / MARKER).unlink()
-    (tmp_path / "a.png").write_text("precious")
-    done = friso_inside(tmp_path, "map", "a.zarr")
+    (tmp_path / "a.zarr").rename(tmp_path / "b.zarr")
+    (tmp_path / "b.png").write_text("precious")
+    done = friso_inside(tmp_path, "map", "b.zarr")
     assert done.returncode == 2
     assert "--overwrite" in done.stderr
-    assert (tmp_path / "a.png").read_text() == "precious"
-    assert friso_inside(tmp_path, "map", "a.zarr", "--overwrite").returncode == 0
-    assert friso_inside(tmp_path, "map", "a.zarr").returncode == 0  # they are its own from then on
+    assert (tmp_path / "b.png").read_text() == "precious"
+    assert friso_inside(tmp_path, "map", "b.zarr", "--overwrite").returncode == 0
+    assert friso_inside(tmp_path, "map", "b.zarr").returncode == 0  # they are its own from then on
 
 
 def test_a_store_of_another_study_is_replaced_when_told(mapped: tuple[Path, dict], tmp_path: Path) -> None:
@@ -232,3 +236,35 @@ def test_a_store_of_another_study_is_replaced_when_told(mapped: tuple[Path, dict
     assert friso_inside(tmp_path, *other, "--overwrite").returncode == 0
     with xr.open_zarr(tmp_path / "a.zarr") as found:
         assert found.outcome.shape == (2,)
+
+
+def test_a_map_is_drawn_again_as_what_it_was_made_for(mapped: tuple[Path, dict], tmp_path: Path) -> None:
+    made = ("map", RIG, "--x", "controller.crossover=4 Hz, 5 Hz", "--metric", "peaks", "--out", "a.zarr")
+    assert friso_inside(tmp_path, *made).returncode == 0
+    first = (tmp_path / "a.svg").read_bytes()
+    for again in (("map", "a.zarr"), made):
+        (tmp_path / "a.svg").unlink()
+        assert friso_inside(tmp_path, *again).returncode == 0
+        assert (tmp_path / "a.svg").read_bytes() == first
+    assert friso_inside(tmp_path, "map", "a.zarr", "--metric", "outcome").returncode == 0
+    assert (tmp_path / "a.svg").read_bytes() != first
+
+
+def test_what_a_store_holds_is_drawn_and_what_it_lacks_is_named(
+    mapped: tuple[Path, dict], tmp_path: Path, refused: Refused
+) -> None:
+    """Asked of the stage or of the store."""
+    shutil.copytree(mapped[0] / "a.zarr", tmp_path / "a.zarr")
+    for arguments in (("map", "a.zarr"), ("map", RIG, *SMALL, "--out", "a.zarr")):
+        done = friso_inside(tmp_path, *arguments, "--metric", "amplitude")
+        assert done.returncode == 2
+        refused.says(done.stderr)
+        assert "('" not in done.stderr
+    more = tmp_path / "b.zarr"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("friso.cli.map_study.USUAL", (*USUAL, "verdict"))
+        small = ("--x", "controller.crossover=4 Hz, 5 Hz", "--out", more, "--verify", "0")
+        assert friso_inside(tmp_path, "map", RIG, *small).returncode == 0
+    done = friso_inside(tmp_path, "map", RIG, *small, "--metric", "peaks")
+    assert done.returncode == 0, done.stderr
+    assert "verdict" in xr.open_zarr(more)

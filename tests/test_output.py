@@ -1,5 +1,6 @@
 """Files of a command: all of them or none, in a folder that is the command's to write into."""
 
+import errno
 import os
 import signal
 from collections.abc import Callable
@@ -92,7 +93,9 @@ def test_a_place_may_be_new_empty_or_its_own(tmp_path: Path) -> None:
     place(empty).write({"page.html": ""})
 
 
-def test_a_file_that_friso_has_not_written_stays(tmp_path: Path, refused: Refused) -> None:
+def test_a_file_that_friso_has_not_written_stays(
+    tmp_path: Path, refused: Refused, capsys: pytest.CaptureFixture[str]
+) -> None:
     """Not even in a folder of its own, unless told."""
     place(tmp_path / "out").write({"page.html": ""})
     (tmp_path / "out" / "figure.png").write_text("mine")
@@ -100,6 +103,7 @@ def test_a_file_that_friso_has_not_written_stays(tmp_path: Path, refused: Refuse
         place(tmp_path / "out").write({"page.html": "", "figure.png": ""})
     assert (tmp_path / "out" / "figure.png").read_text() == "mine"
     place(tmp_path / "out", overwrite=True).write({"figure.png": "friso's"})
+    assert "replaced, as told by --overwrite: figure.png" in capsys.readouterr().err
     assert (tmp_path / "out" / "figure.png").read_text() == "friso's"
 
 
@@ -168,23 +172,35 @@ def failing(real: Callable[..., Any], after: int, error: BaseException) -> Calla
     return call
 
 
-@pytest.mark.parametrize("method", ["rename", "mkdir"])
-@pytest.mark.parametrize("after", range(1, 7))
+@pytest.mark.parametrize(("method", "after"), [*(("replace", k) for k in (1, 2, 3)), ("mkdir", 1), ("mkdir", 2)])
 def test_an_error_while_files_get_their_names_is_undone(
     folder: Path, method: str, after: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Two renames for each file that is there, one for each that is not; two folders to make."""
+    """Three files that get a name, two folders to make."""
     before = tree(folder)
-    steps = {"rename": 6, "mkdir": 2}[method]
-    files = contents(folder, a=None)
     with monkeypatch.context() as patch:
         patch.setattr(Path, method, failing(getattr(Path, method), after, OSError("no")))
-        if after <= steps - (method == "rename"):
-            with pytest.raises(OSError, match="no"):
-                write(files)
-    assert not [name for name in tree(folder) if DRAFTS in name]
-    if after <= steps - (method == "rename"):
-        assert tree(folder) == before
+        with pytest.raises(OSError, match="no"):
+            write(contents(folder, a=None))
+    assert tree(folder) == before
+
+
+def test_a_name_always_has_a_file(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whenever the process is killed: the earlier file or the new one. On a disk without links, too."""
+    real, seen = Path.replace, []
+
+    def replace(path: Path, target: Path) -> Path:
+        seen.append([(folder / name).read_text() for name in ("b.txt", "sub/c.txt")])
+        return real(path, target)
+
+    def no_links(*arguments: object, **named: object) -> None:
+        raise OSError(errno.EOPNOTSUPP, "no links")
+
+    monkeypatch.setattr(Path, "replace", replace)
+    write(contents(folder))
+    assert seen == [["old", "old"], ["old", "old"], ["new", "old"], ["new", "new"]]
+    monkeypatch.setattr(os, "link", no_links)
+    assert write(contents(folder)) == [folder / name for name in NAMES]
 
 
 def test_drafts_that_a_killed_process_left_are_removed(folder: Path) -> None:
@@ -204,13 +220,13 @@ def test_a_signal_while_files_get_their_names_waits(
 ) -> None:
     """All files are there when it arrives."""
     seen: list[int] = []
-    real = Path.rename
+    real = Path.replace
 
-    def rename(path: Path, target: Path) -> Path:
+    def replace(path: Path, target: Path) -> Path:
         os.kill(os.getpid(), number)
         return real(path, target)
 
-    monkeypatch.setattr(Path, "rename", rename)
+    monkeypatch.setattr(Path, "replace", replace)
     before = signal.signal(number, lambda number, frame: seen.append(number))
     try:
         write(contents(folder))

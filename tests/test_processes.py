@@ -6,7 +6,9 @@ import subprocess
 import sys
 import textwrap
 import threading
+from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
 import psutil
 import pytest
@@ -14,6 +16,7 @@ import xarray as xr
 
 import friso
 from friso.stage import Stage
+from friso.studies import execute
 from friso.studies.processes import processes
 from friso.studies.request import Request
 from friso.studies.store import Store
@@ -64,6 +67,48 @@ with processes(1) as crew:
     print(*crew.executor._processes, flush=True)
     time.sleep(60)
 """
+
+
+def test_the_loss_of_a_worker_is_not_waited_for(rig: Stage, monkeypatch: pytest.MonkeyPatch) -> None:
+    """And the other workers end with it."""
+    waited: list[object] = []
+    real = execute.wait
+
+    def wait(*arguments: Any, **named: Any) -> Any:
+        waited.append(named.get("timeout"))
+        return real(*arguments, **named)
+
+    monkeypatch.setattr(execute, "wait", wait)
+    study = Request(rig, AXES).study(rtol=1e-12)
+    with processes(2) as crew:
+        workers = [*crew.executor._processes.values()]  # pyright: ignore[reportAttributeAccessIssue]
+        workers[0].kill()
+        with pytest.raises(RuntimeError, match="lost a block"):
+            list(crew.compute(crew.jobs([study])))
+    assert execute.PATIENCE not in waited
+    for worker in workers:
+        worker.join(30)
+        assert not worker.is_alive()
+
+
+@pytest.mark.skipif(os.name != "posix", reason="permissions as POSIX has them")
+@pytest.mark.parametrize("kill", [False, True])
+def test_a_temporary_cache_is_shared_and_removed(tmp_path: Path, kill: bool) -> None:
+    """Also by workers whose parent was killed."""
+    (tmp_path / "open").mkdir()
+    (tmp_path / "open").chmod(0o777)
+    (tmp_path / "parent.py").write_text(f"if __name__ == '__main__':\n{textwrap.indent(PARENT, '    ')}")
+    environ = {**os.environ, "FRISO_CACHE_DIR": str(tmp_path / "open"), "TMPDIR": str(tmp_path)}
+    with subprocess.Popen(
+        [sys.executable, tmp_path / "parent.py"], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env=environ
+    ) as parent:
+        assert parent.stdout is not None
+        worker = psutil.Process(int(parent.stdout.readline()))
+        assert len([*tmp_path.glob("friso-kernels-*")]) == 1
+        parent.send_signal(signal.SIGKILL if kill else signal.SIGINT)
+    with suppress(psutil.NoSuchProcess):
+        worker.wait(30)
+    assert not [*tmp_path.glob("friso-kernels-*")]
 
 
 def test_workers_end_with_who_started_them(tmp_path: Path) -> None:

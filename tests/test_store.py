@@ -24,10 +24,10 @@ from friso.stage import Stage
 from friso.studies import refine
 from friso.studies import store as storing
 from friso.studies.execute import local_crew
-from friso.studies.metadata import LOCK
 from friso.studies.request import Request
 from friso.studies.samples import Samples
-from friso.studies.store import Store, read_store
+from friso.studies.store import Store, check_store, read_store
+from friso.studies.store_folder import LOCK, make
 from friso.studies.sweep import run_in_store
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
@@ -257,7 +257,7 @@ HOLD = """
 import sys, time
 from pathlib import Path
 import friso
-from friso.studies.metadata import LOCK
+from friso.studies.store_folder import LOCK
 from friso.studies.request import Request
 from friso.studies.store import Store
 
@@ -357,9 +357,9 @@ def flip(file: Path, place: float) -> None:
 
 def test_a_store_says_whether_it_is_whole(stored: Path, rig: Stage) -> None:
     with Store.opened(stored, Request(rig, AXES).study()) as store:
-        assert store.damaged() == []
+        assert store.state().damaged == []
         flip(stored / "period" / "1.0", 0.6)
-        assert store.damaged() == ["1.0"]
+        assert store.state().damaged == ["1.0"]
 
 
 @pytest.mark.parametrize("name", ["peaks", "period", "status", "outcome"])
@@ -444,3 +444,120 @@ def test_leftovers_of_a_killed_run_are_removed(rig: Stage, tmp_path: Path) -> No
     with FileLock(being_made / LOCK), Store.opened(tmp_path / "a.zarr", study):
         assert not left.exists()
         assert being_made.exists()
+
+
+def exchange(first: Path, second: Path) -> None:
+    """Give two files each other's names."""
+    spare = first.with_name("spare")
+    first.rename(spare)
+    second.rename(first)
+    spare.rename(second)
+
+
+@pytest.mark.parametrize("names", [["peaks"], ["outcome"], ["peaks", ".blocks"], None])
+def test_exchanged_chunks_are_run_again(
+    stored: Path, finished: Path, rig: Stage, names: list[str] | None, caplog: pytest.LogCaptureFixture
+) -> None:
+    """Whole as they are, they are those of other cells; even with all that belongs to them (None)."""
+    for name in names or [*read_store(stored).data_vars, ".blocks"]:
+        exchange(stored / str(name) / "0.0", stored / str(name) / "1.0")
+    assert check_store(stored).damaged == ["0.0", "1.0"]
+    friso.sweep(rig, AXES, store=stored, verify=0.3)
+    assert "block 0.0 is damaged and is run again" in caplog.text
+    xr.testing.assert_identical(read_store(stored).load(), read_store(finished).load())
+
+
+def test_exchanged_axes_are_refused(rig: Stage, tmp_path: Path, refused: Refused) -> None:
+    axes = {"friction.static": "2 N..3 N:5", "friction.stribeck_velocity": "1 mm/s..2 mm/s:5"}
+    with Store.opened(tmp_path / "a.zarr", Request(rig, axes).study()):
+        pass
+    exchange(*(tmp_path / "a.zarr" / axis / "0" for axis in axes))
+    with refused(kind=StoreError):
+        read_store(tmp_path / "a.zarr")
+
+
+def test_blocks_of_another_study_are_run_again(stored: Path, finished: Path, rig: Stage, tmp_path: Path) -> None:
+    """Of the same form, at another tolerance."""
+    other = friso.sweep(rig, AXES, store=tmp_path / "b.zarr", rtol=1e-4)
+    for name in [*other.data_vars, ".blocks"]:
+        exchange(tmp_path / "b.zarr" / str(name) / "1.0", stored / str(name) / "1.0")
+    assert check_store(stored).damaged == ["1.0"]
+
+
+def metadata_files(path: Path) -> list[str]:
+    return sorted(str(f.relative_to(path)) for f in path.rglob(".z*") if f.is_file() and f.name != ".zmetadata")
+
+
+def test_every_file_of_metadata_is_checked_and_written_anew(stored: Path, finished: Path, rig: Stage) -> None:
+    files = metadata_files(stored)
+    assert {".zattrs", ".zgroup", "peaks/.zarray", "peaks/.zattrs", "joint.stroke/.zarray"} <= {*files}
+    for name in files:
+        flip(stored / name, 0.5)
+    (stored / ".zattrs").unlink()
+    assert sorted(check_store(stored).files) == files
+    with Store.opened(stored, Request(rig, AXES).study()):
+        pass
+    assert check_store(stored).files == check_store(stored).damaged == []
+    assert [json.loads((stored / name).read_text()) for name in files] == [
+        json.loads((finished / name).read_text()) for name in files
+    ]
+
+
+@pytest.mark.skipif(os.name != "posix", reason="permissions as POSIX has them")
+def test_a_store_is_open_to_whom_the_user_lets_read_files(rig: Stage, tmp_path: Path) -> None:
+    before = os.umask(0o027)
+    try:
+        friso.sweep(rig, {"controller.crossover": "2 Hz, 3 Hz"}, store=tmp_path / "a.zarr", verify=0.5)
+    finally:
+        os.umask(before)
+    modes = {file.stat().st_mode & 0o777 for file in (tmp_path / "a.zarr").rglob("*") if file.name != LOCK}
+    assert modes == {0o640, 0o750}
+
+
+def test_files_that_were_being_written_go_but_no_others(stored: Path, rig: Stage) -> None:
+    left = [stored / "peaks" / f"1.{'a' * 32}.partial", stored / f".zmetadata.{'b' * 32}.partial"]
+    for file in (*left, stored / "notes.partial"):
+        file.write_text("half")
+    with Store.opened(stored, Request(rig, AXES).study()):
+        assert not any(file.exists() for file in left)
+    assert (stored / "notes.partial").exists()
+
+
+def test_a_store_stays_where_the_one_in_its_place_cannot_be_made(
+    stored: Path, finished: Path, rig: Stage, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nor where the process is killed between the two renames: the next puts it back."""
+    other = Request(rig, {"controller.crossover": "2 Hz..3 Hz:2"}).study()
+
+    def full(*arguments: object, **named: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    with monkeypatch.context() as patch:
+        patch.setattr(xr.Dataset, "to_zarr", full)
+        with pytest.raises(StoreError, match="No space left"), Store.opened(stored, other, overwrite=True):
+            pass
+    xr.testing.assert_identical(read_store(stored).load(), read_store(finished).load())
+    stored.rename(stored.with_name(f".a.zarr.{'c' * 32}.old"))
+    with pytest.raises(StoreError, match="another study"), Store.opened(stored, other):
+        pass
+    xr.testing.assert_identical(read_store(stored).load(), read_store(finished).load())
+    assert [path.name for path in stored.parent.iterdir()] == ["a.zarr"]
+
+
+def test_ctrl_c_while_a_store_is_made_leaves_nothing(tmp_path: Path) -> None:
+    def slow(folder: Path) -> None:
+        folder.mkdir()
+        os.kill(os.getpid(), signal.SIGINT)
+        for number in range(20):
+            time.sleep(0.01)
+            (folder / str(number)).write_text("")
+
+    with pytest.raises(KeyboardInterrupt):
+        make(tmp_path / "a.zarr", slow)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_where_what_attracts_is_surveyed_blocks_are_small(rig: Stage, tmp_path: Path) -> None:
+    axes = {"controller.crossover": "4 Hz..16 Hz:41", "joint.stroke": "0 m..1 mm:41"}
+    store = Store(tmp_path / "a.zarr", Request(rig, axes).study(["verdict"]))
+    assert np.prod(store.blocks) <= storing.SURVEYED_BLOCK

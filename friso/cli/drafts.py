@@ -8,7 +8,7 @@ import signal
 import tempfile
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
 from itertools import count
 from pathlib import Path
@@ -60,7 +60,8 @@ class Drafts:
         self.drafts.append((draft, path))
 
     def put_in_place(self) -> None:
-        """Give all drafts their names. An error on the way, and all is as it was before; Ctrl-C waits until the end."""
+        """Give all drafts their names. An error on the way, and all is as it was before; Ctrl-C waits until the end. A
+        name always has a file, the earlier one or the new."""
         undo: list[Callable[[], object]] = []
         with _signals_held():
             try:
@@ -68,14 +69,18 @@ class Drafts:
                     undo += [folder.rmdir for folder in made(path.parent)]
                     if os.path.lexists(path):
                         spare = self._spare(path)
-                        path.rename(spare)
-                        undo.append(partial(spare.rename, path))
-                    if draft is not None:
-                        draft.rename(path)
+                        _duplicate(path, spare)
+                        undo.append(partial(spare.replace, path))
+                    elif draft is not None:
                         undo.append(path.unlink)
+                    if draft is not None:
+                        draft.replace(path)
+                    elif os.path.lexists(path):
+                        path.unlink()
             except BaseException:
                 for step in reversed(undo):
-                    step()
+                    with suppress(OSError):  # the rest is undone all the same
+                        step()
                 raise
 
     def _spare(self, path: Path) -> Path:
@@ -86,6 +91,14 @@ class Drafts:
             folder = self.folders[root] = Path(tempfile.mkdtemp(prefix=DRAFTS, dir=root))
             self.locks.enter_context(FileLock(folder / _LOCK))  # locked, it is no leftover
         return self.folders[root] / f"{next(self.numbers)}{path.suffix}"
+
+
+def _duplicate(path: Path, spare: Path) -> None:
+    """Keep a file under another name too, a symbolic link as such."""
+    try:
+        os.link(path, spare, follow_symlinks=False)
+    except (OSError, NotImplementedError):  # a disk without links
+        shutil.copy2(path, spare, follow_symlinks=False)
 
 
 def _remove_leftovers(root: Path) -> None:

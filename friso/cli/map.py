@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -49,13 +49,13 @@ def map_cells(
     ] = False,
     overrides: Overrides = None,
     metric: Annotated[
-        str,
+        str | None,
         typer.Option(
             metavar="NAME",
-            help="Quantity that colours the map; of runs: outcome (what they do at their end), peaks, ...; "
-            "of what attracts the stage: verdict, multiplier, amplitude, period.",
+            help="Quantity that colours the map; of runs: outcome (what they do at their end, the default), peaks, "
+            "...; of what attracts the stage: verdict, multiplier, amplitude, period.",
         ),
-    ] = "outcome",
+    ] = None,
     rtol: Annotated[
         str | None,
         typer.Option(metavar="NUMBER|auto", help="Relative tolerance, default 1e-6; auto: the loosest safe one."),
@@ -90,7 +90,7 @@ def map_cells(
     Example: friso map rig.toml --x controller.crossover="1 Hz..16 Hz:41" --y joint.stroke="0 m..1 mm:41"
     A study that was interrupted goes on: friso map thesis_rig_map.zarr
     """
-    from friso.cli.map_study import Varied, claim_views, coloured_by, refuse_overwriting, stored_study
+    from friso.cli.map_study import Varied, as_stored, coloured_by, own_views, refuse_overwriting, stored_study
     from friso.studies.store import in_memory
     from friso.studies.verify import checked_share
 
@@ -102,13 +102,13 @@ def map_cells(
         if source.is_dir():
             if varied != Varied() or overrides or rtol or refine or out:
                 raise _another_study(source)
-            store, study = source, stored_study(source, metric)
+            store, (study, metric) = source, stored_study(source, metric)
         else:
-            store = out or Path(f"{source.stem}_map.zarr")
+            store, metric = out or Path(f"{source.stem}_map.zarr"), metric or "outcome"
             study = _new_study(read_stage(source, overrides), varied, metric, refine, yes, rtol or "1e-6", crew)
+            study = as_stored(study, store, metric, overwrite)
         refuse_overwriting(store, exports, overwrite)
-        runs = _run(study, store, crew, share, overwrite)
-    claim_views(store)
+        runs = _run(study, store, crew, share, overwrite, {"metric": metric, "views": own_views(store)})
     runs, colouring = in_memory(runs) if study.cells <= LARGE else runs, coloured_by(study, metric)
     files = _write(runs, study, store, exports, colouring)
     _report(runs, study, store, colouring, files, as_json)
@@ -186,18 +186,22 @@ def _check(store: Path, as_json: bool) -> None:
     from friso.studies.store import check_store
 
     state = check_store(store)
+    damaged = [*state.damaged, *state.files]
     if as_json:
-        print_document({"store": str(store), "blocks": state.blocks, "done": state.done, "damaged": state.damaged})
+        counts = {"blocks": state.blocks, "done": state.done}
+        print_document({"store": str(store), **counts, "damaged": state.damaged, "damaged_files": state.files})
     else:
-        damage = f"damaged: {', '.join(state.damaged)} (friso map {store} runs what is damaged again)"
-        print(f"{store}: blocks done: {state.done} of {state.blocks}; {damage if state.damaged else 'none is damaged'}")
-    if state.damaged:
+        damage = f"damaged: {', '.join(damaged)} (friso map {store} makes what is damaged again)"
+        print(f"{store}: blocks done: {state.done} of {state.blocks}; {damage if damaged else 'nothing is damaged'}")
+    if damaged:
         raise typer.Exit(1)
 
 
-def _run(study: Study, store: Path, crew: Crew, share: float, overwrite: bool) -> xr.Dataset:
-    """Run what the store lacks. Whatever ends it early, the message says where the rest is."""
-    from friso.studies.sweep import run_in_store
+def _run(study: Study, store: Path, crew: Crew, share: float, overwrite: bool, notes: Mapping[str, Any]) -> xr.Dataset:
+    """Run what the store lacks, and note there what is drawn of it. Whatever ends it early, the message says where the
+    rest is."""
+    from friso.studies.store import Store
+    from friso.studies.sweep import fill
 
     stored = 0
     with ProgressBar(store.name) as bar:
@@ -208,7 +212,11 @@ def _run(study: Study, store: Path, crew: Crew, share: float, overwrite: bool) -
             bar(done, total, store.name)
 
         try:
-            return run_in_store(study, store, crew, share, progress, overwrite)
+            with Store.opened(store, study, overwrite) as opened:
+                opened.note(metric=opened.notes.get("metric", notes["metric"]))
+                runs = fill(opened, crew, share, progress)
+                opened.note(views=notes["views"])
+                return runs
         except (KeyboardInterrupt, OSError, RuntimeError):
             if store.exists():
                 say(f"{stored} of {study.cells} cells are stored; to resume: friso map {store}")

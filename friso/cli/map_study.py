@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from friso.cli.common import key_values
-from friso.cli.output import MARKER, marked, marker, write
-from friso.errors import InputError
+from friso.errors import InputError, StoreError
 from friso.stage import Stage
 from friso.studies.cells import BY_ATTRACTORS, CYCLE_UNITS, METRICS, USUAL
 from friso.studies.execute import Crew
@@ -80,14 +79,40 @@ def study_for(stage: Stage, varied: Varied, metric: str, refine: bool, most: int
     return finer(study) if refine else study
 
 
-def stored_study(store: Path, metric: str) -> Study:
-    """The study of a store that is gone on with. Raises InputError."""
+def stored_study(store: Path, metric: str | None) -> tuple[Study, str]:
+    """The study of a store that is gone on with, and what colours its map: the `metric`, or what the store was made
+    for. Raises InputError."""
+    from friso.studies.metadata import checked_metadata
     from friso.studies.store import read_store
 
     with read_store(store) as runs:
         study = study_of(runs)
+    metric = metric or str(checked_metadata(store).notes.get("metric", "outcome"))
+    if metric in METRICS and metric not in study.metrics:
+        actual, expected = f"{metric}, which {store} does not hold", "one that it holds, or a map of its own"
+        example = f"friso map STAGE.toml ... --metric {metric} --out {store.stem}-{metric}.zarr"
+        raise InputError("--metric", actual, expected, example)
     _check_metric(metric, study.metrics)
-    return study
+    return study, metric
+
+
+def as_stored(study: Study, store: Path, metric: str, overwrite: bool) -> Study:
+    """The study with all that the store holds, where that is the same but for measures beyond those asked for. Raises
+    InputError where the store lacks just some of them and is not to be replaced."""
+    from friso.studies.store import read_store
+
+    try:
+        with read_store(store) as runs:
+            stored, equations = study_of(runs), runs.attrs["equations"]
+    except StoreError:  # there is none, or it will be refused
+        return study
+    if replace(study, metrics=stored.metrics).differences(stored, equations):
+        return study
+    lacking = [name for name in study.metrics if name not in stored.metrics]
+    if lacking and not overwrite:
+        actual = f"{store}, which holds no {metric if metric in lacking else ', '.join(lacking)}"
+        raise InputError("--out", actual, "another --out, or --overwrite", f"--out {store.stem}-{metric}.zarr")
+    return study if lacking else stored
 
 
 def _check_metric(metric: str, possible: Sequence[str]) -> None:
@@ -132,21 +157,29 @@ def export_files(runs: xr.Dataset, paths: list[Path]) -> dict[Path, Content]:
 
 def refuse_overwriting(store: Path, exports: list[Path], overwrite: bool) -> None:
     """Refuse to write over files that are no earlier result of this study. Raises InputError."""
-    from friso.views.map.page import FORMS
-
-    mine = marked(store)[1]
-    views = [path for form in FORMS if (path := _beside(store, form)).name not in mine]
+    views = [store.parent / name for name in own_views(store) if name not in _claimed(store)]
     for path in [*views, *exports]:
         if path == store or (path.exists() and not overwrite):
             expected = "another name, or --overwrite; nothing was overwritten"
             raise InputError("--out", f"{path} already exists", expected, "--out new.zarr")
 
 
-def claim_views(store: Path) -> None:
-    """Note in the store that figure and page beside it are its own, which the next run may replace."""
+def own_views(store: Path) -> list[str]:
+    """The names of figure and page beside a store, which it notes as its own once they are about to be written: the
+    next run may replace them."""
     from friso.views.map.page import FORMS
 
-    write({store / MARKER: marker("map", [_beside(store, form).name for form in FORMS])})
+    return [_beside(store, form).name for form in FORMS]
+
+
+def _claimed(store: Path) -> list[str]:
+    """The files beside a store that are its own; none where that is not known."""
+    from friso.studies.metadata import checked_metadata
+
+    try:
+        return list(checked_metadata(store).notes.get("views", []))
+    except StoreError:
+        return []
 
 
 def _beside(store: Path, form: str) -> Path:

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from friso.cli.common import say
 from friso.cli.drafts import DRAFTS, Drafts, made
 from friso.errors import InputError
 from friso.escapes import one_line
@@ -48,8 +49,9 @@ class OutputFolder:
         maker, self.files = marked(folder)
         self.is_own = maker == command or not _entries(folder)
         if not (self.is_own or overwrite):
-            holds = f"made by friso {maker}" if maker else f"with {_entries(folder)[0]} in it"
-            expected = f"a new or empty folder, one that friso {command} made, or --overwrite"
+            holds = f"made by friso {maker}" if maker else f"with {_listed(_entries(folder))} in it"
+            replaced = "which replaces those that have the name of a file it writes"
+            expected = f"a new or empty folder, one that friso {command} made, or --overwrite, {replaced}"
             raise InputError("--out", f"{folder}, {holds}", expected, f"--out {folder}-2")
         self.check(name for name in self.files if self.is_own)
 
@@ -60,16 +62,15 @@ class OutputFolder:
 
     def check(self, names: Iterable[str]) -> None:
         """Raises InputError where a file of such a name may not be written."""
-        for name in names:
-            path = self.folder / name
-            if not path.exists():
-                continue
-            if any(file.exists() and path.samefile(file) for file in self.inputs):
+        there = [name for name in names if (self.folder / name).exists()]
+        for name in there:
+            if any(file.exists() and (self.folder / name).samefile(file) for file in self.inputs):
                 actual = f"{self.folder}, where {name} is read"
                 raise InputError("--out", actual, "another folder", f"--out {self.folder}-2")
-            if name not in self.files and not self.overwrite:
-                actual = f"{self.folder}, with a {name} that friso {self.command} has not written"
-                raise InputError("--out", actual, "another folder, or --overwrite", f"--out {self.folder}-2")
+        foreign = [name for name in there if name not in self.files]
+        if foreign and not self.overwrite:
+            actual = f"{self.folder}, with {_listed(foreign)}, which friso {self.command} has not written"
+            raise InputError("--out", actual, "another folder, or --overwrite", f"--out {self.folder}-2")
 
     def write(
         self, files: Files, progress: Progress = silent, beside: Mapping[Path, Content] | None = None
@@ -79,9 +80,12 @@ class OutputFolder:
         Raises InputError where one may not be written, OSError where one cannot.
         """
         self.check(files)
+        foreign = [name for name in files if name not in self.files and (self.folder / name).exists()]
         contents = {self.folder / name: content for name, content in files.items()}
         marker = {self.folder / MARKER: self._marker(files)} if self.is_own else {}
         write({**contents, **(beside or {}), **marker}, progress)
+        if foreign:
+            say(f"replaced, as told by --overwrite: {', '.join(foreign)}")
         return [path for path, content in contents.items() if content is not None]
 
     def _marker(self, files: Files) -> str:
@@ -141,6 +145,15 @@ def _entries(folder: Path) -> list[str]:
     """What is in a folder, but for what friso keeps there of runs that have not ended."""
     names = sorted(path.name for path in folder.iterdir()) if folder.is_dir() else []
     return [name for name in names if name != UNFINISHED and not name.startswith(DRAFTS)]
+
+
+def _listed(names: Sequence[str]) -> str:
+    """The first of some names, and how many there are more."""
+    more = len(names) - _LISTED
+    return ", ".join(names[:_LISTED]) + (f" and {more} more" if more > 0 else "")
+
+
+_LISTED = 8
 
 
 def _check_writable(folder: Path) -> None:

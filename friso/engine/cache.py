@@ -66,9 +66,20 @@ def cache_folder() -> Path:
             error,
             FOLDER_VARIABLE,
         )
-        passing = Path(tempfile.mkdtemp(prefix="friso-kernels-"))
-        atexit.register(shutil.rmtree, passing, ignore_errors=True)
-        return passing
+        folder = Path(tempfile.mkdtemp(prefix=_PASSING)) / "kernels"
+        folder.mkdir(mode=0o700)
+        atexit.register(remove_if_passing, folder)
+        return folder
+
+
+_PASSING = "friso-kernels-"
+"""How the name of a temporary folder begins in which there is a cache."""
+
+
+def remove_if_passing(folder: Path) -> None:
+    """Remove a cache that is in a temporary folder."""
+    if folder.parent.name.startswith(_PASSING):
+        shutil.rmtree(folder.parent, ignore_errors=True)
 
 
 @cache

@@ -47,7 +47,7 @@ class Section(BaseModel):
         try:
             super().__init__(**data)
         except ValidationError as error:
-            raise self.refusal.of(_first_problem(type(self), error)) from None
+            raise self.refusal.of(_problems(type(self), error)) from None
 
     def as_written(self) -> dict[str, Any]:
         """The keys that the user gave, with the values as written."""
@@ -178,10 +178,23 @@ def unknown_key(key: str, names: Iterable[str], example: str = "") -> InputError
     return InputError(key, hint, f"one of {', '.join(names)}", example)
 
 
-def _first_problem(cls: type[Section], error: ValidationError) -> InputError:
-    """One InputError from pydantic's list: an unknown key first, since it often explains a missing one."""
-    problems = sorted(error.errors(include_url=False), key=lambda problem: problem["type"] != "extra_forbidden")
-    problem = problems[0]
+def _problems(cls: type[Section], error: ValidationError) -> InputError:
+    """One InputError from pydantic's list: an unknown key first, since it often explains a missing one, and what else
+    is wrong below it."""
+    order = sorted(error.errors(include_url=False), key=lambda problem: problem["type"] != "extra_forbidden")
+    meant = {nearest(problem["loc"][-1], cls.model_fields) for problem in order if problem["type"] == "extra_forbidden"}
+    missing = [problem for problem in order if problem["type"] == "missing" and problem["loc"][0] not in meant]
+    others = [problem for problem in order if problem["type"] != "missing"]
+    problems = [_problem(cls, problem) for problem in others]
+    if missing:
+        keys = [".".join(map(str, problem["loc"])) for problem in missing]
+        actual = f"nothing; nor {', '.join(keys[1:])}" if keys[1:] else "nothing"
+        problems.append(InputError(keys[0], actual, *_described(cls, keys[0])))
+    return problems[0].together(problems[1:])
+
+
+def _problem(cls: type[Section], problem: Any) -> InputError:
+    """The error for one entry of pydantic's list."""
     key = ".".join(map(str, problem["loc"]))
     cause = problem.get("ctx", {}).get("error")
     if isinstance(cause, InputError):
@@ -189,18 +202,14 @@ def _first_problem(cls: type[Section], error: ValidationError) -> InputError:
     if problem["type"] == "extra_forbidden":
         near = nearest(key, cls.model_fields) or next(iter(cls.model_fields))
         return unknown_key(key, cls.model_fields, _described(cls, near)[1])
-    if problem["type"] != "missing":
-        return InputError(key, quoted(problem["input"]), *_described(cls, key))
-    missing = [".".join(map(str, other["loc"])) for other in problems if other["type"] == "missing"]
-    others = f"nothing; nor {', '.join(missing[1:])}" if len(missing) > 1 else "nothing"
-    return InputError(key, others, *_described(cls, key))
+    return InputError(key, quoted(problem["input"]), *_described(cls, key))
 
 
 def _complete(error: InputError, key: str) -> InputError:
     """The error seen from the table: below `key`, which also goes before an example that is a mere value."""
     is_value = not error.key and error.example and "=" not in error.example
     example = f"{key} = {error.example}" if is_value else error.example
-    return InputError(error.key, error.actual, error.expected, example).under(key)
+    return InputError(error.key, error.actual, error.expected, example, also=error.also).under(key)
 
 
 def _described(cls: type[Section], key: str) -> tuple[str, str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import uuid
 import zipfile
 import zlib
 from itertools import count
@@ -12,10 +13,8 @@ from typing import Any
 import numpy as np
 
 from friso.studies.cells import WORDS, Columns
+from friso.studies.metadata import PARTIAL
 from friso.studies.refine import Ask
-
-PARTIAL = ".partial"
-"""How the names of files end that are being written, Zarr's and these."""
 
 
 class Answers:
@@ -34,7 +33,7 @@ class Answers:
             if (stored := _answer(file, cells)) is not None:
                 return stored
             columns = ask(cells)
-            draft = file.with_suffix(PARTIAL)
+            draft = file.with_name(f"{file.name}.{uuid.uuid4().hex}{PARTIAL}")
             with draft.open("wb") as stream:
                 arrays: dict[str, Any] = {name: columns[name].astype(WORDS.get(name, "f8")) for name in columns}
                 np.savez_compressed(stream, cells=cells, **arrays)

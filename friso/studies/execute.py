@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, ThreadPoolExecutor, wait
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any, Self
@@ -35,6 +35,8 @@ class Crew:
     arguments: dict[str, Any] = field(default_factory=dict)
     cancel: np.ndarray = field(default_factory=lambda: np.zeros(1, np.int64))
     failures: tuple[type[BaseException], ...] = ()
+    broken: bool = False
+    """Whether the executor has given up: it ends what is in flight itself, and nothing more comes of it."""
 
     def __enter__(self) -> Self:
         return self
@@ -60,11 +62,11 @@ class Crew:
                 for future in wait(flying, return_when=FIRST_COMPLETED).done:
                     yield *flying.pop(future), self._result(future)
         finally:
-            for future in flying:
-                future.cancel()
-            if flying:
-                self.cancel[0] = 1
-                wait(flying, timeout=PATIENCE)  # what a broken pool was given may never end
+            self.cancel[0] = 1
+            if not self.broken:  # cancelled meanwhile, futures would have it stumble and leave processes behind
+                for future in flying:
+                    future.cancel()
+                wait(flying, timeout=PATIENCE)
 
     def jobs(self, studies: Sequence[Study]) -> Iterator[tuple[Study, Block]]:
         """The blocks of studies, as large as memory allows, but enough of them for the whole crew."""
@@ -83,6 +85,7 @@ class Crew:
         try:
             yield
         except self.failures as error:
+            self.broken = isinstance(error, BrokenExecutor)
             raise RuntimeError(f"the workers lost a block: {error or type(error).__name__}") from error
 
     def _submit(self, study: Study, block: Block) -> Future[Columns]:

@@ -1,20 +1,24 @@
 """The metadata of a store: one file (.zmetadata), written at once, with the digest of what it says.
 
-Zarr's readers take everything but the numbers from it; what stands beside the arrays is for other programs.
+Zarr's readers take everything but the numbers from it; the files beside the arrays say the same to other programs, and
+are written anew from it where they do not. What friso notes for itself stands there too: the digests of the axes, and
+for what the figures beside the store are coloured by.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+import os
+import uuid
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from friso.engine.private import write_private
 from friso.errors import StoreError
 
-FORMAT = 1
+FORMAT = 2
 """Version of what friso writes into a store."""
 
 _FILE, _OWN, _ATTRIBUTES = ".zmetadata", "friso", ".zattrs"
@@ -23,20 +27,72 @@ _FILE, _OWN, _ATTRIBUTES = ".zmetadata", "friso", ".zattrs"
 _EXAMPLE = "friso map STAGE.toml ... --out study.zarr"
 
 
-def seal_metadata(path: Path, attributes: Mapping[str, Any] | None = None) -> None:
-    """Write the digest of the metadata as they stand there, with further attributes."""
+@dataclass(frozen=True)
+class Metadata:
+    """What the metadata of a store say: what stands in each file of Zarr's beside the arrays; friso's digest of the
+    study as it was made, the SHA-256 of each file of the axes, and its notes."""
+
+    document: Mapping[str, Any]
+    study: str
+    axes: Mapping[str, str]
+    notes: Mapping[str, Any]
+
+    @property
+    def files(self) -> dict[str, Any]:
+        """What stands in the files of Zarr's, by their paths in the store."""
+        return self.document["metadata"]
+
+    @property
+    def attributes(self) -> dict[str, Any]:
+        """The attributes of the study."""
+        return dict(self.files[_ATTRIBUTES])
+
+    def damaged_files(self, path: Path) -> list[str]:
+        """The files beside the arrays of the store at `path` that do not say the same."""
+        return [name for name, content in self.files.items() if _content(path / name) != content]
+
+    def damaged_axes(self, path: Path) -> list[str]:
+        """The files of the axes that are not what was written."""
+        return [name for name, digest in self.axes.items() if digest_of(path / name) != digest]
+
+    def mend(self, path: Path) -> None:
+        """Write the files beside the arrays anew that do not say the same. Raises OSError."""
+        for name in self.damaged_files(path):
+            put(path / name, json.dumps(self.files[name], indent=1).encode())
+
+
+def seal_metadata(path: Path, axes: Iterable[str]) -> None:
+    """Seal the metadata of a store that is new, with the digests of its `axes`, by name. Raises OSError."""
     document = json.loads((path / _FILE).read_bytes())
-    metadata = document["metadata"]
-    metadata[_ATTRIBUTES] |= dict(attributes or {})
-    if attributes:  # also for other readers; first, so that a kill in between has it all done again
-        write_private(path / _ATTRIBUTES, json.dumps(metadata[_ATTRIBUTES], indent=1).encode())
-    sealed = {**document, _OWN: {"format": FORMAT, "sha256": _digest(metadata)}}
-    write_private(path / _FILE, json.dumps(sealed, indent=1, sort_keys=True).encode())
+    files = [
+        f"{name}/{file.name}" for name in axes for file in (path / name).iterdir() if not file.name.startswith(".")
+    ]
+    digests = {name: digest_of(path / name) or "" for name in sorted(files)}
+    study = _digest([document["metadata"], digests])
+    _write(path, Metadata(document, study, digests, {}))
 
 
-def checked_metadata(path: Path) -> dict[str, Any]:
-    """The attributes of the study in the store at `path`. Raises StoreError where there is no store, or it is damaged
-    or of another version."""
+def annotate_metadata(
+    path: Path, attributes: Mapping[str, Any] | None = None, notes: Mapping[str, Any] | None = None
+) -> None:
+    """Add attributes of the study, and notes of friso's own. Raises StoreError, OSError."""
+    metadata = checked_metadata(path)
+    if attributes:
+        files = {**metadata.files, _ATTRIBUTES: {**metadata.attributes, **attributes}}
+        metadata = replace(metadata, document={**metadata.document, "metadata": files})
+    _write(path, replace(metadata, notes={**metadata.notes, **(notes or {})}))
+    metadata.mend(path)
+
+
+def _write(path: Path, metadata: Metadata) -> None:
+    own = {"format": FORMAT, "study": metadata.study, "axes": dict(metadata.axes), "notes": dict(metadata.notes)}
+    own["sha256"] = _digest([metadata.files, own])
+    put(path / _FILE, json.dumps({**metadata.document, _OWN: own}, indent=1, sort_keys=True).encode())
+
+
+def checked_metadata(path: Path) -> Metadata:
+    """What the metadata of the store at `path` say. Raises StoreError where there is no store, or it is damaged or of
+    another version."""
     expected = "a store made by friso map, or a new name"
     if not path.exists():
         raise StoreError("", "nothing there", expected, _EXAMPLE, str(path))
@@ -44,9 +100,10 @@ def checked_metadata(path: Path) -> dict[str, Any]:
         raise StoreError("", "a file; nothing was overwritten", expected, "--out study.zarr", str(path))
     try:
         document = json.loads((path / _FILE).read_bytes())
-        checked, metadata = document.get(_OWN), document["metadata"]
+        own, metadata = document.get(_OWN), document["metadata"]
         attributes = dict(metadata[_ATTRIBUTES])
-        intact = isinstance(checked, dict) and checked.get("sha256") == _digest(metadata)
+        digest = _digest([metadata, {key: value for key, value in own.items() if key != "sha256"}]) if own else ""
+        number = own.get("format") if own else None
     except FileNotFoundError:
         if is_store(path):
             raise _damaged(path, "is missing") from None
@@ -54,30 +111,66 @@ def checked_metadata(path: Path) -> dict[str, Any]:
         raise StoreError("", actual, expected, "--out study.zarr", str(path)) from None
     except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
         raise _damaged(path, "is damaged") from None
-    if isinstance(checked, dict) and isinstance(number := checked.get("format"), int) and number > FORMAT:
+    if isinstance(number, int) and number > FORMAT:
         actual = f"a store of a newer friso ({attributes.get('friso', 'unknown')})"
         raise StoreError("", actual, "a store of this friso, or that one to read it", origin=str(path))
-    if intact:
-        return attributes
-    if isinstance(checked, dict):
+    if own and own.get("sha256") == digest:
+        return Metadata(document, own["study"], own["axes"], own["notes"])
+    if number == FORMAT:
         raise _damaged(path, "is damaged")
     if "equations" in attributes:
-        actual, expected = "a store of an earlier friso, without checksums", "to run the study again under a new name"
+        actual, expected = "a store of an earlier friso, or a damaged one", "to run the study again under a new name"
         raise StoreError("", actual, expected, _EXAMPLE, str(path))
     actual = "a Zarr store that friso map has not made; nothing was overwritten"
     raise StoreError("", actual, expected, "--out study.zarr", str(path))
 
 
 def is_store(path: Path) -> bool:
-    """Whether friso made the folder, as far as what stands beside the arrays tells."""
+    """Whether friso made the folder, as far as its metadata tell, damaged or not."""
+    return any(b'"equations"' in _bytes(path / name) for name in (_FILE, _ATTRIBUTES))
+
+
+def put(file: Path, content: bytes) -> None:
+    """Write a file of a store, whole or not at all, for whom the user lets read files. Raises OSError."""
+    draft = file.with_name(f"{file.name}.{uuid.uuid4().hex}{PARTIAL}")
     try:
-        return (path / ".zgroup").is_file() and b'"equations"' in (path / _ATTRIBUTES).read_bytes()
+        with draft.open("wb") as stream:
+            stream.write(content)
+            stream.flush()
+            os.fsync(stream.fileno())
+        draft.replace(file)
+    except BaseException:
+        draft.unlink(missing_ok=True)
+        raise
+
+
+PARTIAL = ".partial"
+"""How the names of files end that are being written, these and Zarr's, after 32 digits."""
+
+
+def digest_of(file: Path) -> str | None:
+    """The SHA-256 of a file; None where it cannot be read."""
+    try:
+        with file.open("rb") as stream:
+            return hashlib.file_digest(stream, "sha256").hexdigest()
     except OSError:
-        return False
+        return None
 
 
-LOCK = ".friso.lock"
-"""The file that is locked while a store is written to."""
+def _bytes(file: Path) -> bytes:
+    """What is in a file; nothing where it cannot be read."""
+    try:
+        return file.read_bytes()
+    except OSError:
+        return b""
+
+
+def _content(file: Path) -> Any:
+    """What a file of JSON says; None where it cannot be read."""
+    try:
+        return json.loads(_bytes(file))
+    except (ValueError, RecursionError):
+        return None
 
 
 def _damaged(path: Path, how: str) -> StoreError:
@@ -85,5 +178,5 @@ def _damaged(path: Path, how: str) -> StoreError:
     return StoreError("", f"a store whose {_FILE} {how}", expected, _EXAMPLE, str(path))
 
 
-def _digest(metadata: Any) -> str:
-    return hashlib.sha256(json.dumps(metadata, sort_keys=True).encode()).hexdigest()
+def _digest(content: Any) -> str:
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()

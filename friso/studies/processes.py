@@ -11,10 +11,12 @@ from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from multiprocessing import get_context, parent_process
 from multiprocessing.connection import wait
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from friso.engine.cache import FOLDER_VARIABLE, cache_folder, remove_if_passing
 from friso.studies.cells import Columns, run_cells
 from friso.studies.execute import Crew
 from friso.system import interrupts_held
@@ -29,7 +31,7 @@ def processes(workers: int) -> Iterator[Crew]:
     with this process, however it ends."""
     context = get_context("spawn")
     shared: Any = context.RawArray("q", 1)
-    pool = ProcessPoolExecutor(workers, context, _prepare, (shared,))
+    pool = ProcessPoolExecutor(workers, context, _prepare, (shared, cache_folder()))
     with interrupts_held():
         for _ in range(workers):  # each starts one
             pool.submit(os.getpid)
@@ -43,16 +45,19 @@ def run_block(*arguments: Any) -> Columns:
     return run_cells(*arguments, cancel=_cancel)
 
 
-def _prepare(shared: Any) -> None:
-    """Make a process a worker: Ctrl-C is for the process that started it, with which it ends."""
+def _prepare(shared: Any, cache: Path) -> None:
+    """Make a process a worker: Ctrl-C is for the process that started it, with which it ends and whose cache of kernels
+    it uses, a temporary one too."""
     global _cancel
     _cancel = np.frombuffer(shared, np.int64)
+    os.environ[FOLDER_VARIABLE] = str(cache.parent)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_end_with_parent, daemon=True).start()
+    threading.Thread(target=_end_with_parent, args=(cache,), daemon=True).start()
 
 
-def _end_with_parent() -> None:
+def _end_with_parent(cache: Path) -> None:
     parent = parent_process()
     assert parent is not None
     wait([parent.sentinel])
+    remove_if_passing(cache)  # which it was killed before it could
     os._exit(1)

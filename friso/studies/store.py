@@ -1,17 +1,14 @@
 """A study on disk: a Zarr store that is written block by block and resumed where it was left.
 
-The store is made whole, without results, under another name and then moved into place; a block's outcomes are
-written after its other variables, and Zarr moves each file into place. So a block whose outcomes are there is done,
-whenever the process was killed. Every chunk holds a checksum: blocks that are damaged are run again.
+The store is made whole, without results, aside and then moved into place. A block is done once its digests are entered
+(`friso.studies.ledger`), after its chunks were written, each of which is moved into place by Zarr; one whose chunks are
+others than were entered is run again.
 """
 
 from __future__ import annotations
 
 import logging
 import os
-import shutil
-import uuid
-import warnings
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -19,22 +16,27 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from filelock import FileLock, Timeout
 
 from friso.engine.cache import machine
 from friso.errors import StoreError
-from friso.studies.answers import PARTIAL, Answers
+from friso.studies.answers import Answers
 from friso.studies.cells import UNITS, WORDS, attributes_of
-from friso.studies.metadata import LOCK, checked_metadata, is_store, seal_metadata
+from friso.studies.ledger import Ledger
+from friso.studies.metadata import annotate_metadata, checked_metadata, is_store, seal_metadata
+from friso.studies.store_folder import exchange, locked, make, remove_leftovers, remove_partial_files
 from friso.studies.study import Block, Study, study_of
 
 if TYPE_CHECKING:
     import xarray as xr
 
-LEAST_BLOCKS, BLOCK, BLOCKS, LARGEST_BLOCK = 8, 1024, 250, 16384
-"""A study has at least `LEAST_BLOCKS` blocks, so that an interruption loses a part of it only; `BLOCK` cells in each,
-more from `BLOCKS` blocks on, so that writing does not hold up the workers, and `LARGEST_BLOCK` at most. A store has
-the same blocks on every machine."""
+LEAST_BLOCKS, BLOCKS, LARGEST_BLOCK = 8, 250, 16384
+"""A study has at least `LEAST_BLOCKS` blocks, so that an interruption loses a part of it only, and up to
+`LARGEST_BLOCK` cells in each from `BLOCKS` blocks on, so that writing does not hold up the workers. A store has the
+same blocks on every machine."""
+
+BLOCK, SURVEYED_BLOCK = 1024, 32
+"""Cells of a block of a study that has no more than `BLOCKS` of them; fewer where what attracts is surveyed, which
+takes a hundred runs of a cell, so that an interruption costs seconds there too."""
 
 logger = logging.getLogger("friso")
 
@@ -47,8 +49,8 @@ class Store:
 
     def __init__(self, path: Path, study: Study) -> None:
         self.path, self.study = path, study
-        large = min(LARGEST_BLOCK, study.cells // BLOCKS)
-        self.blocks = study.block_shape(max(16, min(BLOCK, study.cells // LEAST_BLOCKS), large))
+        usual = min(SURVEYED_BLOCK if study.cycles else BLOCK, study.cells // LEAST_BLOCKS)
+        self.blocks = study.block_shape(max(16, usual, min(LARGEST_BLOCK, study.cells // BLOCKS)))
 
     @classmethod
     @contextmanager
@@ -59,29 +61,30 @@ class Store:
         Raises StoreError if the folder holds anything else, another study, or is in use by another process.
         """
         store = cls(path, study)
-        if overwrite and path.is_dir() and is_store(path):
-            store._replace()
-        if not path.exists() or (path.is_dir() and not any(path.iterdir())):
-            store._make()
-        checked_metadata(path)
-        with _locked(path):
+        remove_leftovers(path)
+        with _refused(path):
+            if not path.exists() or (path.is_dir() and not any(path.iterdir())):
+                make(path, store._fill)
+            elif overwrite and path.is_dir() and is_store(path):
+                store._replace()
+        metadata = checked_metadata(path)
+        with locked(path):
             _refuse_other(path, study)
             _warn_of_another_machine(path)
-            for leftover in path.rglob(f"*{PARTIAL}"):  # of a file that was being written when its process was killed
-                leftover.unlink(missing_ok=True)
+            remove_partial_files(path)
+            metadata.mend(path)
             yield store
 
     def _replace(self) -> None:
-        """Delete the store that is there, unless it is that of this study."""
-        with _locked(self.path):
+        """Put this study in place of the store that is there, unless it is that of this study already."""
+        with locked(self.path):
             try:
                 _refuse_other(self.path, self.study)
             except StoreError:
-                gone = _beside(self.path)
-                self.path.rename(gone)
-                shutil.rmtree(gone, ignore_errors=True)
+                exchange(self.path, self._fill)
 
-    def _make(self) -> None:
+    def _fill(self, folder: Path) -> None:
+        """Write the store without results into a folder that is not there yet."""
         import dask.array as da
         import xarray as xr
         from numcodecs import CRC32
@@ -94,7 +97,7 @@ class Store:
             for name, kind in kinds.items()
         }
         variables = {name: (study.names, array, attributes_of(name)) for name, array in empty.items()}
-        checked = {"filters": [CRC32()]}
+        checked = {"filters": [CRC32()]}  # for whoever reads a part of it
         encoding: dict[str, dict[str, Any]] = {name: {"chunks": self.blocks, **checked} for name in study.metrics}
         coordinates = study.coordinates()
         encoding |= dict.fromkeys(coordinates, checked)
@@ -102,69 +105,48 @@ class Store:
             if name in encoding:
                 encoding[name]["_FillValue"] = np.nan
         template = xr.Dataset(variables, coords=coordinates, attrs=study.attributes())
-        _remove_leftovers(self.path)
-        draft = _beside(self.path)
-        try:
-            draft.mkdir(parents=True)
-            with FileLock(draft / LOCK), warnings.catch_warnings():  # locked, it is no leftover
-                warnings.filterwarnings("ignore", "Object at", UserWarning)  # the lock is no part of the hierarchy
-                template.to_zarr(draft, "a", compute=False, encoding=encoding, zarr_format=_FORMAT, consolidated=True)
-                seal_metadata(draft)
-            draft.rename(self.path)
-        except OSError as error:
-            if self.path.exists():
-                return  # another process was quicker; whose study it is will be seen
-            expected = f"a folder that can be written ({error.strerror or error})"
-            raise StoreError("--out", str(self.path), expected, "--out study.zarr") from None
-        finally:
-            shutil.rmtree(draft, ignore_errors=True)
+        template.to_zarr(folder, "w", compute=False, encoding=encoding, zarr_format=_FORMAT, consolidated=True)
+        seal_metadata(folder, coordinates)
+
+    @property
+    def ledger(self) -> Ledger:
+        """What was written of each block."""
+        return Ledger(self.path, checked_metadata(self.path).study, self.study.metrics)
 
     def missing(self) -> Iterator[Block]:
         """The blocks not yet done, and those that are damaged, which is logged."""
-        runs = self.read()
+        ledger = self.ledger
         for block in self.study.blocks(self.blocks):
-            if not self.is_there(block):
+            number = self._number(block)
+            if not ledger.has(number):
                 yield block
-            elif not self._is_whole(block, runs):
-                logger.warning("%s: block %s is damaged and is run again", self.path, self._number(block))
+            elif not ledger.is_whole(number):
+                logger.warning("%s: block %s is damaged and is run again", self.path, number)
                 yield block
 
-    def damaged(self) -> list[str]:
-        """The numbers of the blocks that are there, but are not what was written."""
-        runs = self.read()
-        there = [block for block in self.study.blocks(self.blocks) if self.is_there(block)]
-        return [self._number(block) for block in there if not self._is_whole(block, runs)]
+    def state(self) -> StoreState:
+        """How far the study is, and what is damaged."""
+        ledger, metadata = self.ledger, checked_metadata(self.path)
+        numbers = [self._number(block) for block in self.study.blocks(self.blocks)]
+        done = [number for number in numbers if ledger.has(number)]
+        damaged = [number for number in done if not ledger.is_whole(number)]
+        return StoreState(len(numbers), len(done), damaged, metadata.damaged_files(self.path))
 
     def _number(self, block: Block) -> str:
         """The name of the files of a block."""
         return ".".join(str(part.start // size) for part, size in zip(block, self.blocks, strict=True))
 
-    def is_there(self, block: Block) -> bool:
-        """Whether the outcomes of a block were written, which are the last of it."""
-        return (self.path / "outcome" / self._number(block)).exists()
-
-    def _is_whole(self, block: Block, runs: xr.Dataset) -> bool:
-        """Whether all of a block agrees with its checksums; a missing file would be read as empty cells."""
-        number = self._number(block)
-        if not all((self.path / name / number).exists() for name in self.study.metrics):
-            return False
-        try:
-            columns = {name: runs[name][block].values for name in self.study.metrics}
-        except Exception:  # whatever a codec makes of what it cannot read
-            return False
-        return not np.any(columns["outcome"] == "")
-
     def write(self, block: Block, columns: Mapping[str, np.ndarray]) -> None:
-        """Write the measures of a block, its outcomes last. Raises OSError where the disk is full."""
+        """Write the measures of a block and enter it. Raises OSError where the disk is full."""
         import zarr
 
         shape = tuple(part.stop - part.start for part in block)
-        names = [*(name for name in self.study.metrics if name != "outcome"), "outcome"]
-        # an empty chunk is written too: its presence marks the block as done
+        # an empty chunk is written too: that it is there is entered like any other
         with zarr.config.set({"array.write_empty_chunks": True}):
             group: Any = zarr.open_group(self.path, mode="r+", zarr_format=_FORMAT, use_consolidated=True)
-            for name in names:
+            for name in self.study.metrics:
                 group[name][block] = columns[name].astype(WORDS.get(name, "f8")).reshape(shape)
+        self.ledger.enter(self._number(block))
 
     @property
     def answers(self) -> Answers:
@@ -172,8 +154,17 @@ class Store:
         return Answers(self.path / ".answers")
 
     def annotate(self, attributes: Mapping[str, Any]) -> None:
-        """Add attributes to the store."""
-        seal_metadata(self.path, attributes)
+        """Add attributes to the study."""
+        annotate_metadata(self.path, attributes)
+
+    @property
+    def notes(self) -> Mapping[str, Any]:
+        """What friso noted of the store for itself."""
+        return checked_metadata(self.path).notes
+
+    def note(self, **notes: Any) -> None:
+        """Note something of the store that is no part of the study."""
+        annotate_metadata(self.path, notes=notes)
 
     def read(self) -> xr.Dataset:
         """The store as a dataset whose values are read when they are looked at."""
@@ -188,10 +179,12 @@ def read_store(path: str | os.PathLike[str]) -> xr.Dataset:
     """
     import xarray as xr
 
-    attributes = checked_metadata(Path(path))
+    metadata = checked_metadata(Path(path))
     try:
+        if metadata.damaged_axes(Path(path)):
+            raise ValueError("other axes than were written")
         runs = xr.open_zarr(path, chunks=None, zarr_format=_FORMAT)
-        runs.attrs = attributes
+        runs.attrs = metadata.attributes
         return runs.assign_coords({name: axis.load() for name, axis in runs.coords.items()})
     except Exception:  # whatever a codec makes of what it cannot read
         expected = "a copy of the store, or the study run again under a new name, or with --overwrite"
@@ -201,20 +194,19 @@ def read_store(path: str | os.PathLike[str]) -> xr.Dataset:
 
 @dataclass(frozen=True)
 class StoreState:
-    """How many blocks a study has, how many of them are done, and the numbers of those that are damaged."""
+    """How many blocks a study has, how many of them are done, the numbers of those that are damaged, and the files of
+    metadata that are, which the next run writes anew."""
 
     blocks: int
     done: int
     damaged: list[str]
+    files: list[str]
 
 
 def check_store(path: Path) -> StoreState:
-    """Read all of the store at `path` and compare it with its checksums. Raises StoreError where its metadata or axes
+    """Read all of the store at `path` and compare it with its digests. Raises StoreError where its metadata or axes
     are damaged, or there is none."""
-    study = study_of(read_store(path))
-    store = Store(path, study)
-    blocks = list(study.blocks(store.blocks))
-    return StoreState(len(blocks), sum(map(store.is_there, blocks)), store.damaged())
+    return Store(path, study_of(read_store(path))).state()
 
 
 def in_memory(runs: xr.Dataset) -> xr.Dataset:
@@ -238,21 +230,6 @@ def _shared(texts: xr.DataArray) -> np.ndarray:
     return decoded
 
 
-def _beside(path: Path) -> Path:
-    """A name that is free, for a store that is not there yet, or no more."""
-    return path.with_name(f".{path.name}.{uuid.uuid4().hex}")
-
-
-def _remove_leftovers(path: Path) -> None:
-    """Remove drafts of this store that killed processes left: nobody holds their lock."""
-    for draft in path.parent.glob(f".{path.name}.{'[0-9a-f]' * 32}"):
-        try:
-            with FileLock(draft / LOCK, blocking=False):
-                shutil.rmtree(draft, ignore_errors=True)
-        except (OSError, Timeout):  # it is being made
-            continue
-
-
 def _refuse_other(path: Path, study: Study) -> None:
     """Raises StoreError if the store holds another study than this."""
     with read_store(path) as dataset:
@@ -271,19 +248,10 @@ def _warn_of_another_machine(path: Path) -> None:
 
 
 @contextmanager
-def _locked(path: Path) -> Iterator[None]:
-    """Keep other processes out. Raises StoreError if one is in."""
-    lock = FileLock(path / LOCK)
-    try:
-        lock.acquire(timeout=0)
-    except Timeout:
-        raise StoreError(
-            "", "a store that another friso is writing to", "to wait, or another --out", origin=str(path)
-        ) from None
-    except OSError as error:
-        expected = f"a store that can be written to ({error.strerror})"
-        raise StoreError("", "a store that cannot be written to", expected, origin=str(path)) from None
+def _refused(path: Path) -> Iterator[None]:
+    """Raises StoreError where a store cannot be written."""
     try:
         yield
-    finally:
-        lock.release()
+    except OSError as error:
+        expected = f"a folder that can be written ({error.strerror or error})"
+        raise StoreError("--out", str(path), expected, "--out study.zarr") from None

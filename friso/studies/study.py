@@ -166,10 +166,15 @@ class Study:
                 if _described(mine) != _described(its)
             ]
         if list(self.links.items()) != list(other.links.items()):  # in order: a link sees those before it
-            differences.append(f"links: {dict(other.links)} there, {dict(self.links)} here")
-        for what in ("metrics", "rtol", "refined"):
-            if getattr(self, what) != getattr(other, what):
-                differences.append(f"{what}: {getattr(other, what)} there, {getattr(self, what)} here")
+            differences.append(f"links: {_links(other)} there, {_links(self)} here")
+        if lacking := [name for name in self.metrics if name not in other.metrics]:
+            differences.append(f"measures: none of {', '.join(lacking)} there")
+        if more := [name for name in other.metrics if name not in self.metrics]:
+            differences.append(f"measures: {', '.join(more)} only there")
+        if self.rtol != other.rtol:
+            differences.append(f"rtol: {other.rtol:g} there, {self.rtol:g} here")
+        if self.refined != other.refined:
+            differences.append("refined there, not here" if other.refined else "refined here, not there")
         return differences
 
 
@@ -214,6 +219,11 @@ def _described(axis: SweptAxis) -> str:
     first, last = axis.values[0], axis.values[-1]
     ends = f"{first:g}..{last:g} {axis.unit}" if axis.numeric else f"{first}..{last}"
     return f"{ends} in {len(axis.values)} ({digest})"
+
+
+def _links(study: Study) -> str:
+    """The links as they were given."""
+    return ", ".join(f"{key}={expression}" for key, expression in study.links.items()) or "none"
 
 
 def _stage_differences(mine: Stage, its: Stage) -> list[str]:

@@ -102,33 +102,31 @@ def _room(study: Study) -> Columns:
     }
 
 
-def run_in_store(
-    study: Study,
-    path: Path,
-    crew: Crew,
-    verify: float = 0.0,
-    progress: Progress = silent,
-    overwrite: bool = False,
-) -> xr.Dataset:
-    """Run what a store lacks of its study, block by block, and verify a share; the opened store. With `overwrite` the
-    store of another study is replaced. Raises InputError."""
-    with Store.opened(path, study, overwrite) as store:
-        missing = list(store.missing())
-        tally = Tally(progress, study.cells)
-        tally.add(study.cells - sum(map(cells_of, missing)), CELLS)
-        if missing and study.refined:
-            columns = _refined(study, crew, tally, store.answers.keeping)
-            for block in missing:
-                store.write(block, {name: columns[name][block] for name in study.metrics})
-            store.answers.forget()
-            missing = []
-        for _, block, measures in crew.compute((study, block) for block in missing):
-            store.write(block, measures)
-            tally.add(len(measures["outcome"]), CELLS)
-        runs = store.read()
-        if verify and runs.attrs.get("verified_share") != verify:
-            store.annotate(verified(study, runs, crew, verify))
-        return store.read()
+def run_in_store(study: Study, path: Path, crew: Crew, verify: float = 0.0, progress: Progress = silent) -> xr.Dataset:
+    """Run what a store lacks of its study, made if it is not there, and verify a share; the opened store. Raises
+    InputError."""
+    with Store.opened(path, study) as store:
+        return fill(store, crew, verify, progress)
+
+
+def fill(store: Store, crew: Crew, verify: float = 0.0, progress: Progress = silent) -> xr.Dataset:
+    """Run what an opened store lacks, block by block, and verify a share; its dataset."""
+    study, missing = store.study, list(store.missing())
+    tally = Tally(progress, study.cells)
+    tally.add(study.cells - sum(map(cells_of, missing)), CELLS)
+    if missing and study.refined:
+        columns = _refined(study, crew, tally, store.answers.keeping)
+        for block in missing:
+            store.write(block, {name: columns[name][block] for name in study.metrics})
+        store.answers.forget()
+        missing = []
+    for _, block, measures in crew.compute((study, block) for block in missing):
+        store.write(block, measures)
+        tally.add(len(measures["outcome"]), CELLS)
+    runs = store.read()
+    if verify and runs.attrs.get("verified_share") != verify:
+        store.annotate(verified(study, runs, crew, verify))
+    return store.read()
 
 
 def _refined(study: Study, crew: Crew, tally: Tally, keeping: Callable[[Ask], Ask] = lambda ask: ask) -> Columns:

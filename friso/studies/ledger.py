@@ -1,0 +1,45 @@
+"""What was written of each block: the digests of its chunks, kept under the name of the block in a file of its own.
+
+The digests say of which study, which block and which variable a chunk is: exchanged chunks are noticed, which checksums
+within them are not. The file is written last: a block that has one is done.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+from friso.studies.metadata import digest_of, put
+
+
+@dataclass(frozen=True)
+class Ledger:
+    """The digests of the blocks of the store at `path`, of the study with such a digest and these metrics."""
+
+    path: Path
+    study: str
+    metrics: tuple[str, ...]
+
+    def has(self, number: str) -> bool:
+        """Whether the block with this number was written."""
+        return self._file(number).exists()
+
+    def enter(self, number: str) -> None:
+        """Enter a block whose chunks were written. Raises OSError."""
+        self._file(number).parent.mkdir(exist_ok=True)
+        put(self._file(number), self._entry(number))
+
+    def is_whole(self, number: str) -> bool:
+        """Whether all chunks of a block are what was written."""
+        try:
+            return self._file(number).read_bytes() == self._entry(number)
+        except OSError:
+            return False
+
+    def _entry(self, number: str) -> bytes:
+        digests = {name: digest_of(self.path / name / number) for name in self.metrics}
+        return json.dumps({"study": self.study, "block": number, "sha256": digests}, indent=1).encode()
+
+    def _file(self, number: str) -> Path:
+        return self.path / ".blocks" / number

@@ -1,0 +1,134 @@
+"""The folder of a store: made aside and moved into place, exchanged for another, locked by one process at a time; what
+killed processes left of that is set right by the next.
+
+Beside a store `a.zarr`, `.a.zarr.<32 digits>` is one that is being made, in a folder with its lock, and the same with
+`.old` at its end one that is being replaced.
+"""
+
+from __future__ import annotations
+
+import re
+import shutil
+import uuid
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from pathlib import Path
+
+from filelock import FileLock, Timeout
+
+from friso.errors import StoreError
+from friso.studies.metadata import PARTIAL
+
+LOCK = ".friso.lock"
+"""The file that is locked while a store is written to."""
+
+_OLD = ".old"
+
+_DIGITS = "[0-9a-f]" * 32
+
+
+def make(path: Path, fill: Callable[[Path], object]) -> None:
+    """Have `fill` write what is new into a folder aside, which is then moved to `path`, if nothing is there by then.
+    Raises OSError, with nothing left."""
+    remove_leftovers(path)
+    with _made_aside(path, fill) as new:
+        try:
+            new.rename(path)
+        except OSError:
+            if not path.exists():
+                raise  # else another process was quicker; whose study that is will be seen
+
+
+def exchange(path: Path, fill: Callable[[Path], object]) -> None:
+    """Put what `fill` writes in place of the store at `path`, which is deleted once that stands there. Raises OSError,
+    with the store as it was."""
+    with _made_aside(path, fill) as new:
+        old = _beside(path, _OLD)
+        path.rename(old)
+        try:
+            new.rename(path)
+        except BaseException:
+            old.rename(path)
+            raise
+    shutil.rmtree(old, ignore_errors=True)
+
+
+def remove_leftovers(path: Path) -> None:
+    """Remove what killed processes left beside the store at `path`, or put it back where it was being replaced:
+    nobody holds their lock."""
+    for old in path.parent.glob(f".{path.name}.{_DIGITS}{_OLD}"):
+        with _unless_locked(old) as free:
+            if free and not path.exists():
+                old.rename(path)
+            elif free:
+                shutil.rmtree(old, ignore_errors=True)
+    for draft in path.parent.glob(f".{path.name}.{_DIGITS}"):
+        with _unless_locked(draft) as free:
+            if free:
+                shutil.rmtree(draft, ignore_errors=True)
+
+
+def remove_partial_files(path: Path) -> None:
+    """Remove files that were being written when their process was killed, from a store that is locked: whoever writes
+    into it holds the lock."""
+    for file in path.rglob(f"*{PARTIAL}"):
+        if _PARTIAL.fullmatch(file.name):
+            file.unlink(missing_ok=True)
+
+
+_PARTIAL = re.compile(rf".*\.[0-9a-f]{{32}}{re.escape(PARTIAL)}")
+
+
+@contextmanager
+def locked(path: Path) -> Iterator[None]:
+    """Keep other processes out of a store. Raises StoreError if one is in."""
+    lock = FileLock(path / LOCK)
+    try:
+        lock.acquire(timeout=0)
+    except Timeout:
+        expected = "to wait, or another --out"
+        raise StoreError("", "a store that another friso is writing to", expected, origin=str(path)) from None
+    except OSError as error:
+        expected = f"a store that can be written to ({error.strerror})"
+        raise StoreError("", "a store that cannot be written to", expected, origin=str(path)) from None
+    try:
+        yield
+    finally:
+        lock.release()
+
+
+@contextmanager
+def _made_aside(path: Path, fill: Callable[[Path], object]) -> Iterator[Path]:
+    """What `fill` has written, to be moved away. It runs in a thread of its own, so that Ctrl-C waits for its end: else
+    the threads of Zarr would go on writing into what is deleted here."""
+    draft = _beside(path)
+    try:
+        draft.mkdir(parents=True)
+        with FileLock(draft / LOCK):  # locked, it is no leftover
+            new = draft / "store"
+            with ThreadPoolExecutor(1) as thread:
+                thread.submit(fill, new).result()
+            yield new
+    finally:
+        shutil.rmtree(draft, ignore_errors=True)
+
+
+@contextmanager
+def _unless_locked(folder: Path) -> Iterator[bool]:
+    """Whether nobody else held the lock of a folder, which is held within."""
+    lock = FileLock(folder / LOCK)
+    try:
+        lock.acquire(timeout=0)
+    except (OSError, Timeout):
+        yield False
+        return
+    try:
+        yield True
+    finally:
+        lock.release()
+
+
+def _beside(path: Path, suffix: str = "") -> Path:
+    """A name that is free."""
+    return path.with_name(f".{path.name}.{uuid.uuid4().hex}{suffix}")
