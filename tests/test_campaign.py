@@ -5,27 +5,24 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.trust.campaign import failure, failures, reading
-from benchmarks.trust.commands import interrupted, short_of_disk
+from benchmarks.trust import campaign
+from benchmarks.trust.campaign import failure, run_part
 from benchmarks.trust.damage import damaged
 from benchmarks.trust.readers import READERS
+from benchmarks.trust.writing import WRITING
 
-CASES = {"binary-logs": 6, "logs": 40}
-
-
-@pytest.mark.parametrize("name", READERS)
-def test_damaged_files_are_read_or_refused(name: str) -> None:
-    assert [*failures(name, reading(name), 3, range(CASES.get(name, 100)))] == []
+CASES = {"binary-logs": 20, "logs": 40, "stores": 20, "store-faults": 8, "store-exchanges": 10, "store-versions": 20}
 
 
-@pytest.mark.parametrize("number", range(2))
-def test_an_interrupted_command_leaves_files_whole_or_none(number: int) -> None:
-    assert failure("interrupted", interrupted, 3, number) is None
+@pytest.mark.parametrize("name", [*READERS, *WRITING])
+def test_light_cases_pass(name: str) -> None:
+    assert run_part(name, 3, range(CASES.get(name, 100))).failures == []
 
 
 @pytest.mark.parametrize("number", range(2))
-def test_a_command_without_room_leaves_files_whole_or_none(number: int) -> None:
-    assert failure("short-of-disk", short_of_disk, 3, number) is None
+@pytest.mark.parametrize("name", ["interrupted", "short-of-disk"])
+def test_a_command_leaves_files_whole_or_none(name: str, number: int) -> None:
+    assert run_part(name, 3, range(number, number + 1)).failures == []
 
 
 def test_the_same_case_is_the_same_damage() -> None:
@@ -35,9 +32,10 @@ def test_the_same_case_is_the_same_damage() -> None:
     assert other != once
 
 
-def test_a_crash_is_a_failure() -> None:
+def test_a_crash_is_a_failure(monkeypatch: pytest.MonkeyPatch) -> None:
     def crash(rng: random.Random, folder: Path) -> None:
         raise ZeroDivisionError("of case")
 
     assert failure("crash", crash, 1, 1) == "ZeroDivisionError: of case"
-    assert [number for number, _ in failures("crash", crash, 1, range(3))] == [0, 1, 2]
+    monkeypatch.setitem(WRITING, "crash", crash)
+    assert [number for number, _ in campaign.run_part("crash", 1, range(3)).failures] == [0, 1, 2]

@@ -108,6 +108,23 @@ def test_missing_keys_of_a_table_are_named_together() -> None:
         loads(text)
 
 
+def test_what_is_wrong_in_several_tables_is_told_at_once() -> None:
+    """Missing keys, misspelled ones, values; a key that a misspelled one explains is not said to be missing."""
+    text = RIG.replace('static = "3 N"\n', "").replace("crossover =", "crosover =").replace('"1.2 kg"', '"1.2 kq"')
+    text = text.replace("\n[motion]", "\nbeta2 = 3\n[motoin]").replace('stroke = "1 mm"\n', "")
+    with pytest.raises(InputError) as caught:
+        loads(text)
+    wrong = {caught.value.key: caught.value.actual, **dict(caught.value.also)}
+    assert {key: actual.split(";")[0] for key, actual in wrong.items()} == {
+        "motoin": "an unknown key",
+        "masses.cart": '"1.2 kq" ("kq" is not a known unit)',
+        "friction.static": "nothing",
+        "joint.stroke": "nothing",
+        "controller.crosover": "an unknown key",
+        "controller.beta2": "an unknown key",
+    }
+
+
 @pytest.mark.parametrize(
     "text",
     [

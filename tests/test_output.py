@@ -14,7 +14,7 @@ from inside import friso_inside
 from refusals import Refused
 
 from friso.cli.app import app
-from friso.cli.drafts import DRAFTS
+from friso.cli.drafts import DRAFTS, Drafts
 from friso.cli.output import MARKER, UNFINISHED, OutputFolder, write
 from friso.errors import InputError
 from friso.views.files import Content
@@ -178,11 +178,23 @@ def test_an_error_while_files_get_their_names_is_undone(
 ) -> None:
     """Three files that get a name, two folders to make."""
     before = tree(folder)
-    with monkeypatch.context() as patch:
-        patch.setattr(Path, method, failing(getattr(Path, method), after, OSError("no")))
+    with Drafts() as drafts:
+        for path, content in contents(folder, a=None).items():
+            drafts.add(path, content)
+        monkeypatch.setattr(Path, method, failing(getattr(Path, method), after, OSError("no")))
         with pytest.raises(OSError, match="no"):
-            write(contents(folder, a=None))
+            drafts.put_in_place()
     assert tree(folder) == before
+
+
+def test_drafts_left_where_there_was_no_folder_yet_are_removed(tmp_path: Path) -> None:
+    """By the next that writes, when there is one."""
+    left = tmp_path / f"{DRAFTS}left"
+    left.mkdir()
+    write({tmp_path / "out" / "page.html": ""})
+    left.mkdir()
+    write({tmp_path / "out" / "page.html": ""})
+    assert not left.exists()
 
 
 def test_a_name_always_has_a_file(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:

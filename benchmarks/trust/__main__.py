@@ -1,70 +1,82 @@
 """Damaged files, kills, interrupts, full disks: `python -m benchmarks.trust [CAMPAIGN ...]`.
 
 Every failure is printed with what runs it again alone: the campaign, its seed, and the number of the case. Bounded in
-count (`--cases` of each campaign of files, a thousandth of it of those of commands) and time (`--minutes` in all).
+count (`--cases` of each campaign of light cases, a share of it of heavier ones) and time (`--minutes` in all).
 """
 
 from __future__ import annotations
 
 import argparse
-import random
 import sys
 import time
-from pathlib import Path
+from collections.abc import Iterator
+from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
 
 from benchmarks.report import print_table
-from benchmarks.trust.campaign import Case, failures, reading
-from benchmarks.trust.commands import COMMANDS
-from benchmarks.trust.readers import READERS
+from benchmarks.trust.campaign import COMMANDS, HEAVY, NAMES, Part, run_part
 
-SLOW = {"binary-logs": 50, **dict.fromkeys(COMMANDS, 1000)}
-"""By how much fewer the cases of a campaign are that starts processes."""
+PART = {name: 1 if name in COMMANDS else 10 for name in HEAVY}
+"""How many cases are run in one go; of light ones 100."""
 
 
 def main() -> int:
     """Run the campaigns; 1 where a case failed."""
     arguments = _arguments()
-    names = arguments.campaigns or [*READERS, *COMMANDS]
+    names = arguments.campaigns or [*NAMES]
     end = time.monotonic() + 60 * arguments.minutes
     rows, failed = [], 0
     for k, name in enumerate(names):
-        case: Case = COMMANDS[name] if name in COMMANDS else reading(name)
-        numbers = range(max(1, arguments.cases // SLOW.get(name, 1)))
-        if arguments.number is not None:
-            numbers = range(arguments.number, arguments.number + 1)
-        start, wrong = time.monotonic(), 0
-        share = (end - start) / (len(names) - k)
-        counted = _Counted(case)
-        for number, why in failures(name, counted, arguments.seed, numbers, share):
-            wrong += 1
-            print(f"FAILED {name} {number}: {why}")
-            print(f"  again: python -m benchmarks.trust {name} --seed {arguments.seed} --number {number}", flush=True)
+        start, wrong, count = time.monotonic(), 0, 0
+        cases = max(2, arguments.cases // HEAVY.get(name, 1))
+        numbers = range(cases) if arguments.number is None else range(arguments.number, arguments.number + 1)
+        for part in _parts(name, arguments.seed, numbers, arguments.jobs, start + (end - start) / (len(names) - k)):
+            count += part.count
+            wrong += len(part.failures)
+            for number, why in part.failures:
+                print(f"FAILED {name} {number}: {why}")
+                print(
+                    f"  again: python -m benchmarks.trust {name} --seed {arguments.seed} --number {number}", flush=True
+                )
         failed += wrong
-        rows.append((name, str(counted.count), str(wrong), f"{time.monotonic() - start:.0f}"))
-    print_table(("campaign", "cases", "failed", "time [s]"), rows)
+        seconds = time.monotonic() - start
+        rows.append((name, str(count), str(wrong), f"{seconds:.0f}", f"{count / seconds:.3g}"))
+        print(f"{name}: {count} cases, {wrong} failed, {seconds:.0f} s", flush=True)
+    print_table(("campaign", "cases", "failed", "time [s]", "cases per s"), rows)
+    print(f"seed {arguments.seed}, {sum(int(row[1]) for row in rows)} cases, {failed} failed")
     return 1 if failed else 0
 
 
-class _Counted:
-    """A case that counts how often it was run."""
-
-    def __init__(self, case: Case) -> None:
-        self.case, self.count = case, 0
-
-    def __call__(self, rng: random.Random, folder: Path) -> None:
-        self.count += 1
-        self.case(rng, folder)
+def _parts(name: str, seed: int, numbers: range, jobs: int, end: float) -> Iterator[Part]:
+    """The cases in parts, side by side in processes, until the time is over."""
+    size = PART.get(name, 100)
+    upcoming = iter([numbers[k : k + size] for k in range(0, len(numbers), size)])
+    with ProcessPoolExecutor(jobs) as pool:
+        flying = {}
+        while True:
+            while len(flying) < jobs and time.monotonic() < end and (part := next(upcoming, None)):
+                flying[pool.submit(run_part, name, seed, part, end)] = part
+            if not flying:
+                return
+            for future in wait(flying, return_when=FIRST_COMPLETED).done:
+                part = flying.pop(future)
+                try:
+                    yield future.result()
+                except BrokenProcessPool:
+                    yield Part(len(part), [(part[0], f"a case from here to {part[-1]} ended the process")])
+                    return
 
 
 def _arguments() -> argparse.Namespace:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.trust", description=__doc__)
-    parser.add_argument("campaigns", nargs="*", metavar="CAMPAIGN", help=f"of {', '.join([*READERS, *COMMANDS])}")
+    parser.add_argument("campaigns", nargs="*", metavar="CAMPAIGN", help=f"of {', '.join(NAMES)}")
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--cases", type=int, default=16_000, help="of each campaign of files")
+    parser.add_argument("--cases", type=int, default=16_000, help="of each campaign of light cases")
     parser.add_argument("--minutes", type=float, default=10.0, help="in all")
+    parser.add_argument("--jobs", type=int, default=2, help="processes side by side")
     parser.add_argument("--number", type=int, help="this case alone")
     arguments = parser.parse_args()
-    if strange := {*arguments.campaigns} - {*READERS, *COMMANDS}:
+    if strange := {*arguments.campaigns} - {*NAMES}:
         parser.error(f"no such campaign: {', '.join(strange)}")
     return arguments
 

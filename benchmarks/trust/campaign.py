@@ -2,19 +2,25 @@
 
 from __future__ import annotations
 
+import io
+import logging
 import random
 import signal
 import tempfile
 import time
 import warnings
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stderr
+from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 
+from benchmarks.trust.commands import COMMANDS
 from benchmarks.trust.damage import damaged
 from benchmarks.trust.readers import READERS
+from benchmarks.trust.writing import WRITING
 from friso.errors import InputError
 
 PATIENCE = 30
@@ -24,27 +30,60 @@ Case = Callable[[random.Random, Path], None]
 """One case, which raises what it finds wrong: with its random numbers, in a folder of its own."""
 
 
+NAMES = (*READERS, *WRITING, *COMMANDS)
+"""The campaigns."""
+
+HEAVY = {"binary-logs": 8, "stores": 16, "store-faults": 32, "store-exchanges": 32, "store-versions": 8,
+         **dict.fromkeys(COMMANDS, 500)}  # fmt: skip
+"""By how much fewer the cases of a campaign are whose cases take long."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """How many cases were run, and the numbers of those that failed, and why."""
+
+    count: int
+    failures: list[tuple[int, str]]
+
+
+def run_part(name: str, seed: int, numbers: range, end: float = float("inf")) -> Part:
+    """Run cases of a campaign, until a time of the monotonic clock [s]."""
+    case, count, wrong = case_of(name), 0, []
+    for number in numbers:
+        if count and time.monotonic() > end:
+            break
+        count += 1
+        if (why := failure(name, case, seed, number)) is not None:
+            wrong.append((number, why))
+    return Part(count, wrong)
+
+
+@cache
+def case_of(name: str) -> Case:
+    """The case of a campaign."""
+    return WRITING.get(name) or COMMANDS.get(name) or reading(name)
+
+
 def failure(campaign: str, case: Case, seed: int, number: int) -> str | None:
     """What went wrong in a case, None for nothing."""
     rng = random.Random(f"{seed} {campaign} {number}")
     with tempfile.TemporaryDirectory(prefix="friso-trust-") as folder:
         try:
-            case(rng, Path(folder))
+            with redirect_stderr(io.StringIO()), _silent_log():
+                case(rng, Path(folder))
         except Exception as error:
             return f"{type(error).__name__}: {str(error)[:300]}"
     return None
 
 
-def failures(
-    campaign: str, case: Case, seed: int, numbers: range, seconds: float = float("inf")
-) -> Iterator[tuple[int, str]]:
-    """The numbers of the cases that fail, and why, until the time [s] is over."""
-    end = time.monotonic() + seconds
-    for number in numbers:
-        if time.monotonic() > end:
-            return
-        if (why := failure(campaign, case, seed, number)) is not None:
-            yield number, why
+@contextmanager
+def _silent_log() -> Iterator[None]:
+    """What friso says of damage is not printed."""
+    logging.disable(logging.CRITICAL)
+    try:
+        yield
+    finally:
+        logging.disable(logging.NOTSET)
 
 
 def reading(name: str) -> Case:

@@ -1,4 +1,4 @@
-"""Commands that write, killed, interrupted, short of disk, and two at a time."""
+"""Commands that write, as processes: killed, interrupted, short of disk, two at once, without their workers."""
 
 from __future__ import annotations
 
@@ -10,41 +10,68 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from tempfile import mkdtemp
 
-from benchmarks.trust.readers import RIG
+import psutil
+
+from friso.cli.drafts import DRAFTS
+from friso.cli.output import MARKER, UNFINISHED, write
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+RIG, DRIVE, LEAVES = (str(EXAMPLES / f"thesis_{name}.toml") for name in ("rig", "drive", "leaves"))
 
 FRISO = [sys.executable, "-m", "friso.cli"]
-MAP = ["map", str(RIG), "--x", "controller.crossover=2 Hz..16 Hz:24", "--y", "joint.stroke=0.1 mm..1 mm:24",
+MAP = ["map", RIG, "--x", "controller.crossover=2 Hz..16 Hz:24", "--y", "joint.stroke=0.1 mm..1 mm:24",
        "--rtol", "1e-8", "--out", "a.zarr"]  # fmt: skip
-WRITING = {
-    "bode": ["bode", str(RIG), "--out", "out"],
-    "simulate": ["simulate", str(RIG), "--out", "out"],
+QUICK: dict[str, list[str]] = {
+    "bode": ["bode", RIG, "--out", "out"],
+    "simulate": ["simulate", RIG, "--out", "out"],
+    "flexure": ["flexure", LEAVES, "--out", "out"],
     "init": ["init", "stage.toml"],
     "map": MAP,
 }
-"""Commands that write, by name."""
+"""Commands that write, by name, which end within seconds."""
+
+WRITING: dict[str, list[str]] = {
+    **QUICK,
+    "check": ["check", RIG, "--out", "out"],
+    "boundary": ["boundary", RIG, "--x", "controller.crossover=4 Hz..8 Hz", "--out", "out"],
+    "design": ["design", RIG, str(EXAMPLES / "specs" / "thesis.toml"), "--out", "out"],
+    "identify": ["identify", "log.csv", "--out", "out"],
+    "rig": ["rig", "stiffness", DRIVE, "--out", "out"],
+    "compare": ["compare", DRIVE, "--machines", "20", "--out", "out"],
+    "reproduce": ["reproduce", "--points", "3", "--out", "out"],
+    "guideline": ["guideline", "--samples", "64", "--out", "out"],
+}
+"""All commands that write."""
 
 LONGEST = 8.0
 """How long [s] after its start a command is killed or interrupted, at most."""
 
+PATIENCE = 120
+"""How long [s] a command may take to end on a busy machine, once it is told to."""
+
 
 def killed(rng: random.Random, folder: Path) -> None:
-    """A map killed up to three times and resumed holds what one does that never was: bytes of figure, page and numbers,
-    and nothing else is left."""
+    """A command killed up to three times: no file is there in part, and what is left goes with the next that writes
+    there; one that ends quickly, run again, leaves what it does undisturbed: the same bytes, and nothing else."""
+    name = rng.choice([*WRITING, "map", "map", "map"])
+    _prepare(name, folder)
     for _ in range(rng.randrange(1, 4)):
-        with _started(folder, MAP) as process:
-            time.sleep(rng.uniform(0.2, LONGEST))
+        with _started(folder, WRITING[name]) as process:
+            _moment(rng, folder, process)
             process.kill()
-    done = _finished(folder, MAP)
-    assert done.returncode == 0, done.stderr
-    expected = _undisturbed()
-    names = {path.name for path in folder.iterdir()}
-    assert names == {path.name for path in expected.iterdir()}, f"left behind or lost: {names}"
-    different = [name for name, content in _tree(expected).items() if _tree(folder).get(name) != content]
-    assert not different, f"other than undisturbed: {different}"
+    if name in QUICK:
+        done = _finished(folder, WRITING[name])
+        assert done.returncode in (0, 2 if name == "init" else 0), f"{name}: {done.stderr[-300:]}"
+        _assert_as(_undisturbed(name), folder, name)
+    else:
+        write({folder / "out" / "next.txt": "", folder / "next.txt": ""})
+        _whole_or_nothing(name, folder, False)
 
 
 def interrupted(rng: random.Random, folder: Path) -> None:
@@ -52,27 +79,44 @@ def interrupted(rng: random.Random, folder: Path) -> None:
     files whole or not at all."""
     name = rng.choice([*WRITING])
     number = rng.choice([signal.SIGINT, signal.SIGTERM])
+    _prepare(name, folder)
     with _started(folder, WRITING[name]) as process:
-        time.sleep(rng.uniform(0.5, LONGEST))
+        _moment(rng, folder, process, 0.5)
         process.send_signal(number)
-        err = process.communicate(timeout=120)[1]
+        err = process.communicate(timeout=PATIENCE)[1]
     assert process.returncode in (0, 128 + number), f"{name}: status {process.returncode}: {err[-300:]}"
     assert "Traceback" not in err, f"{name}: {err[-300:]}"
+    assert "Warning" not in err, f"{name}: {err[-300:]}"
     _whole_or_nothing(name, folder, process.returncode == 0)
 
 
 def short_of_disk(rng: random.Random, folder: Path) -> None:
     """No file may become larger than some size: one message, status 1, and the files whole or not at all."""
-    name = rng.choice([*WRITING])
+    name = rng.choice([*QUICK])
     most = int(10 ** rng.uniform(1, 6.5))
 
     def limit() -> None:
         resource.setrlimit(resource.RLIMIT_FSIZE, (most, most))
 
     done = subprocess.run([*FRISO, *WRITING[name]], cwd=folder, capture_output=True, text=True, preexec_fn=limit)
-    assert done.returncode in (0, 1, 2), f"{name}, {most} bytes: status {done.returncode}: {done.stderr[-300:]}"
-    assert "Traceback" not in done.stderr, f"{name}, {most} bytes: {done.stderr[-600:]}"
+    _assert_told(f"{name}, {most} bytes", done)
     _whole_or_nothing(name, folder, done.returncode == 0)
+
+
+def small_disk(rng: random.Random, folder: Path) -> None:
+    """The same on a disk of its own that is nearly full, where this user may mount one."""
+    name, size = rng.choice([*QUICK]), rng.choice((16, 64, 256, 1024, 4096))
+    disk = folder / "disk"
+    disk.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", f"size={size}k", "tmpfs", str(disk)]
+    if shutil.which("mount") is None or subprocess.run(mount, capture_output=True).returncode:
+        return
+    try:
+        done = _finished(disk, WRITING[name])
+        _assert_told(f"{name} on {size} kB", done)
+        _whole_or_nothing(name, disk, done.returncode == 0)
+    finally:
+        subprocess.run(["umount", str(disk)], check=True)
 
 
 def two_at_once(rng: random.Random, folder: Path) -> None:
@@ -86,34 +130,58 @@ def two_at_once(rng: random.Random, folder: Path) -> None:
     assert codes in ([0, 0], [0, 2]), f"{codes}: {said}"
     assert "Traceback" not in "".join(said), said
     shutil.rmtree(folder / "cache")
-    different = [name for name, content in _tree(_undisturbed()).items() if _tree(folder).get(name) != content]
-    assert not different, f"other than alone: {different}"
+    _assert_as(_undisturbed("map"), folder, "map")
 
 
-def damaged_store(rng: random.Random, folder: Path) -> None:
-    """A store some bytes of which are others is mended by the next run, or refused: never are other numbers shown."""
-    shutil.copytree(_undisturbed() / "a.zarr", folder / "a.zarr")
-    files = sorted(path for path in (folder / "a.zarr").rglob("*") if path.is_file() and path.stat().st_size)
-    file = rng.choice(files)
-    content = bytearray(file.read_bytes())
-    for _ in range(rng.choice((1, 1, 3))):
-        content[rng.randrange(len(content))] ^= 1 << rng.randrange(8)
-    file.write_bytes(content[: rng.choice((len(content), len(content), rng.randrange(len(content))))])
-    done = _finished(folder, ["map", "a.zarr", "--json"])
-    assert done.returncode in (0, 2), f"{file.name}: {done.returncode}: {done.stderr[-300:]}"
-    assert "Traceback" not in done.stderr, done.stderr[-600:]
-    if done.returncode == 0:
-        for form in ("svg", "png"):
-            same = (folder / f"a.{form}").read_bytes() == (_undisturbed() / f"a.{form}").read_bytes()
-            assert same, f"another figure after damage to {file}"
+def without_workers(rng: random.Random, folder: Path) -> None:
+    """A worker is killed: the map ends in one sentence, at once, and goes on where it was."""
+    with _started(folder, [*MAP, "--workers", str(min(2, os.cpu_count() or 1))]) as process:
+        time.sleep(rng.uniform(1.0, LONGEST))
+        with suppress(psutil.NoSuchProcess, IndexError):
+            rng.choice([p for p in psutil.Process(process.pid).children() if "spawn_main" in str(p.cmdline())]).kill()
+        err = process.communicate(timeout=PATIENCE)[1]
+    assert process.returncode in (0, 1), f"{process.returncode}: {err[-300:]}"
+    assert "Traceback" not in err, err[-600:]
+    _assert_goes_on(folder)
 
 
-COMMANDS = {
-    "damaged-stores": damaged_store,
+def without_scheduler(rng: random.Random, folder: Path) -> None:
+    """The scheduler goes while a map is run on it: one sentence, and it goes on without."""
+    place = folder / "scheduler.json"
+    with subprocess.Popen([sys.executable, "-c", SCHEDULER, str(place)], stderr=subprocess.DEVNULL) as scheduler:
+        while not place.exists() and scheduler.poll() is None:
+            time.sleep(0.1)
+        address = place.read_text()
+        with _started(folder, [*MAP, "--scheduler", address]) as process:
+            time.sleep(rng.uniform(1.0, LONGEST))
+            _kill_all(scheduler.pid)
+            err = process.communicate(timeout=PATIENCE)[1]
+    place.unlink()
+    assert process.returncode in (0, 1, 2), f"{process.returncode}: {err[-300:]}"
+    assert "Traceback" not in err, err[-600:]
+    _assert_goes_on(folder)
+
+
+SCHEDULER = """
+import os, sys, time
+from distributed import LocalCluster
+
+if __name__ == "__main__":
+    with LocalCluster(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None) as cluster:
+        with open(sys.argv[1] + ".new", "w") as file:
+            file.write(cluster.scheduler_address)
+        os.replace(sys.argv[1] + ".new", sys.argv[1])
+        time.sleep(600)
+"""
+
+COMMANDS: dict[str, Callable[[random.Random, Path], None]] = {
     "killed": killed,
     "interrupted": interrupted,
     "short-of-disk": short_of_disk,
+    "small-disk": small_disk,
     "two-at-once": two_at_once,
+    "without-workers": without_workers,
+    "without-scheduler": without_scheduler,
 }
 """The campaigns by name."""
 
@@ -127,13 +195,64 @@ def _finished(folder: Path, arguments: list[str]) -> subprocess.CompletedProcess
     return subprocess.run([*FRISO, *arguments], cwd=folder, capture_output=True, text=True)
 
 
+def _moment(rng: random.Random, folder: Path, process: subprocess.Popen[str], earliest: float = 0.2) -> None:
+    """Wait for a moment at random: after the start, or once something is written."""
+    at_writing = rng.random() < 0.5
+    end, after = time.monotonic() + (LONGEST if at_writing else rng.uniform(earliest, LONGEST)), rng.expovariate(5.0)
+    time.sleep(earliest)
+    while time.monotonic() < end and process.poll() is None:
+        if at_writing and any(folder.glob(f"**/{DRAFTS}*")):
+            time.sleep(after)
+            return
+        time.sleep(0.01)
+
+
+def _prepare(name: str, folder: Path) -> None:
+    """Put what a command reads into its folder."""
+    if name == "identify":
+        shutil.copyfile(_undisturbed("simulate") / "out" / "log.csv", folder / "log.csv")
+
+
 @cache
-def _undisturbed() -> Path:
-    """A folder with the map that nothing happened to."""
-    folder = Path(mkdtemp(prefix="friso-trust-map-"))
-    done = _finished(folder, MAP)
+def _undisturbed(name: str) -> Path:
+    """A folder with what a command writes that nothing happened to."""
+    folder = Path(mkdtemp(prefix="friso-trust-"))
+    done = _finished(folder, WRITING[name])
     assert done.returncode == 0, done.stderr
+    if name == "simulate":
+        (log,) = (folder / "out").glob("*.csv")
+        log.rename(folder / "out" / "log.csv")
     return folder
+
+
+def _assert_as(expected: Path, folder: Path, name: str) -> None:
+    """Raises AssertionError where a folder holds other files than expected, or others in content."""
+    there, here = _tree(expected), _tree(folder)
+    if name == "simulate":
+        there = {key: value for key, value in there.items() if not key.endswith(".csv")}
+        here = {key: value for key, value in here.items() if not key.endswith(".csv")}
+    assert {*there} == {*here}, f"{name}: left behind or lost: {sorted({*there} ^ {*here})}"
+    different = [key for key, content in there.items() if here[key] != content]
+    assert not different, f"{name}: other than undisturbed: {different}"
+
+
+def _assert_goes_on(folder: Path) -> None:
+    done = _finished(folder, MAP)
+    assert done.returncode == 0, done.stderr[-300:]
+    _assert_as(_undisturbed("map"), folder, "map")
+
+
+def _assert_told(what: str, done: subprocess.CompletedProcess[str]) -> None:
+    assert done.returncode in (0, 1, 2), f"{what}: status {done.returncode}: {done.stderr[-300:]}"
+    assert "Traceback" not in done.stderr, f"{what}: {done.stderr[-600:]}"
+
+
+def _kill_all(number: int) -> None:
+    """Kill a process and those that it started."""
+    parent = psutil.Process(number)
+    for process in (*parent.children(recursive=True), parent):
+        with suppress(psutil.NoSuchProcess):
+            process.kill()
 
 
 def _tree(folder: Path) -> dict[str, bytes]:
@@ -143,14 +262,16 @@ def _tree(folder: Path) -> dict[str, bytes]:
 
 
 def _whole_or_nothing(name: str, folder: Path, done: bool) -> None:
-    """Raises AssertionError where files of a command are there in part. A map keeps its store."""
-    left = [path.name for path in folder.rglob("*") if path.name.startswith(".friso-draft")]
+    """Raises AssertionError where files of a command are there in part. A map keeps its store, and what is done of long
+    work is kept in a folder of its own."""
+    left = [path.name for path in folder.rglob("*") if path.name.startswith(DRAFTS)]
     assert not left, f"{name} left {left}"
     if name == "map":
-        views = sorted(path.suffix for path in folder.iterdir() if path.is_file())
-        assert len(views) in ((0,) if not views else (4,)), f"map wrote {views} alone"
+        views = sorted(path.suffix for path in folder.iterdir() if path.is_file() and path.name != "next.txt")
+        assert len(views) in (0, 4), f"map wrote {views} alone"
     elif name != "init":
-        marker = (folder / "out" / ".friso-output").exists()
-        written = [path for path in folder.rglob("*") if path.is_file()]
-        assert marker or not written, f"{name} wrote {written} alone"
-        assert marker or not done, f"{name} is done without its files"
+        out = folder / "out"
+        written = [path for path in out.rglob("*") if path.is_file() and path.name != "next.txt"]
+        written = [path for path in written if UNFINISHED not in path.parts]
+        assert (out / MARKER).exists() or not written, f"{name} wrote {written} alone"
+        assert (out / MARKER).exists() or not done, f"{name} is done without its files"

@@ -3,17 +3,25 @@ InputError and must do nothing else."""
 
 from __future__ import annotations
 
+import os
+import signal
+import subprocess
+import sys
+import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
+from unittest import mock
 
 import numpy as np
+import psutil
 
 import friso
 from friso.design.spec import load_spec
-from friso.identify.logs import mapping
+from friso.identify.logs import binary, confined, mapping
 from friso.identify.logs.assemble import read_log
 from friso.identify.logs.read import is_frequency_response, read_frequency_response
 from friso.stage import Stage
@@ -21,6 +29,9 @@ from friso.stage.correlations import read_correlations
 from friso.studies.request import Request
 
 ROOT = Path(__file__).parents[2]
+sys.path.insert(0, str(ROOT / "tests"))
+import log_files  # noqa: E402
+
 RIG = ROOT / "examples" / "thesis_rig.toml"
 
 
@@ -58,6 +69,33 @@ def _log(path: Path) -> None:
         read_log(path, mapping.Mapping(), strict=False, needed=("position", "force"))
 
 
+def _binary_log(path: Path) -> None:
+    """As it is read, but for the start of Python: what reads is a copy of this process."""
+    with mock.patch.object(confined.subprocess, "run", _forked):
+        _log(path)
+
+
+def _forked(command: list[str], **_: Any) -> SimpleNamespace:
+    """Run the program that reads a binary log, within its bounds of memory and time."""
+    kind, file, memory = command[-3:]
+    with tempfile.TemporaryFile() as out:
+        child = os.fork()
+        if not child:
+            try:
+                sys.stdout = open(out.fileno(), "w", closefd=False)  # noqa: SIM115
+                signal.alarm(int(confined.SECONDS))
+                used = psutil.Process().memory_info().vms
+                binary.main(kind, Path(file), int(memory) + used if int(memory) else 0)
+                sys.stdout.flush()
+            finally:
+                os._exit(0)
+        _, status = os.waitpid(child, 0)
+        if os.WIFSIGNALED(status) and os.WTERMSIG(status) == signal.SIGALRM:
+            raise subprocess.TimeoutExpired(command, confined.SECONDS)
+        out.seek(0)
+        return SimpleNamespace(stdout=out.read(), stderr=b"")
+
+
 def _texts() -> list[bytes]:
     time = np.arange(200) * 1e-3
     rows = list(zip(time, np.sin(time * 9) * 1e-3, np.cos(time * 7), strict=True))
@@ -75,22 +113,22 @@ def _texts() -> list[bytes]:
 
 
 def _binaries() -> list[bytes]:
-    """MAT files of versions 5 and 7.3, and TDMS."""
-    import tempfile
-
-    import h5py
-    import nptdms
-    from scipy.io import savemat
-
-    values = {"time": np.arange(300) * 1e-3, "position": np.sin(np.arange(300.0)), "force": np.cos(np.arange(300.0))}
+    """What the programs of measurement write, as the tests make it: MAT files of three kinds, TDMS, UFF and LVM."""
+    motion = log_files.motion(200)
+    time, names = motion["time"], ("position", "force")
+    plain = {name: motion[name] for name in names}
+    named = {f"{name} [{unit}]": motion[name] for name, unit in zip(names, ("m", "N"), strict=True)}
+    units = {name: (unit, motion[name]) for name, unit in zip(names, ("m", "N"), strict=True)}
     with tempfile.TemporaryDirectory() as folder:
-        paths = [Path(folder) / name for name in ("a.mat", "b.mat", "c.tdms")]
-        savemat(paths[0], values)
-        with h5py.File(paths[1], "w", userblock_size=512) as file:
-            for name, value in values.items():
-                file[name] = value.reshape(-1, 1)
-        with nptdms.TdmsWriter(paths[2]) as writer:
-            writer.write_segment([nptdms.ChannelObject("log", name, value) for name, value in values.items()])
+        paths = [
+            log_files.write_dspace(Path(folder, "a.mat"), named, time),
+            log_files.write_structure_with_time(Path(folder, "b.mat"), named, time),
+            log_files.write_mat73(Path(folder, "c.mat"), {"time": time, **plain}),
+            log_files.write_mat73(Path(folder, "d.mat"), {}, named),
+            log_files.write_tdms(Path(folder, "e.tdms"), units),
+            log_files.write_uff(Path(folder, "f.uff"), time, units),
+            log_files.write_lvm(Path(folder, "g.lvm"), units),
+        ]
         return [path.read_bytes() for path in paths]
 
 
@@ -126,6 +164,6 @@ READERS = {
     ),
     "axes": Reader("axis.txt", lambda: AXES, _axis),
     "logs": Reader("log.csv", _texts, _log),
-    "binary-logs": Reader("log.mat", _binaries, _log),
+    "binary-logs": Reader("log.bin", _binaries, _binary_log),
 }
 """The kinds by the name of their campaign."""

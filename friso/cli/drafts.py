@@ -87,7 +87,8 @@ class Drafts:
         """A path that is free, on the disk of `path`, with its suffix."""
         root = next(folder for folder in path.absolute().parents if folder.exists())
         if root not in self.folders:
-            _remove_leftovers(root)
+            for above in (root, *root.parents[:2]):  # where there was no folder yet, they were left further up
+                _remove_leftovers(above)
             folder = self.folders[root] = Path(tempfile.mkdtemp(prefix=DRAFTS, dir=root))
             self.locks.enter_context(FileLock(folder / _LOCK))  # locked, it is no leftover
         return self.folders[root] / f"{next(self.numbers)}{path.suffix}"

@@ -103,7 +103,7 @@ def as_stored(study: Study, store: Path, metric: str, overwrite: bool) -> Study:
 
     try:
         with read_store(store) as runs:
-            stored, equations = study_of(runs), runs.attrs["equations"]
+            stored, equations = study_of(runs), str(runs.attrs.get("equations"))
     except StoreError:  # there is none, or it will be refused
         return study
     if replace(study, metrics=stored.metrics).differences(stored, equations):

@@ -53,7 +53,7 @@ class Metadata:
 
     def damaged_axes(self, path: Path) -> list[str]:
         """The files of the axes that are not what was written."""
-        return [name for name, digest in self.axes.items() if digest_of(path / name) != digest]
+        return [name for name, written in self.axes.items() if digest_of(path / name) != written]
 
     def mend(self, path: Path) -> None:
         """Write the files beside the arrays anew that do not say the same. Raises OSError."""
@@ -68,7 +68,7 @@ def seal_metadata(path: Path, axes: Iterable[str]) -> None:
         f"{name}/{file.name}" for name in axes for file in (path / name).iterdir() if not file.name.startswith(".")
     ]
     digests = {name: digest_of(path / name) or "" for name in sorted(files)}
-    study = _digest([document["metadata"], digests])
+    study = digest([document["metadata"], digests])
     _write(path, Metadata(document, study, digests, {}))
 
 
@@ -86,7 +86,7 @@ def annotate_metadata(
 
 def _write(path: Path, metadata: Metadata) -> None:
     own = {"format": FORMAT, "study": metadata.study, "axes": dict(metadata.axes), "notes": dict(metadata.notes)}
-    own["sha256"] = _digest([metadata.files, own])
+    own["sha256"] = digest([metadata.files, own])
     put(path / _FILE, json.dumps({**metadata.document, _OWN: own}, indent=1, sort_keys=True).encode())
 
 
@@ -102,8 +102,9 @@ def checked_metadata(path: Path) -> Metadata:
         document = json.loads((path / _FILE).read_bytes())
         own, metadata = document.get(_OWN), document["metadata"]
         attributes = dict(metadata[_ATTRIBUTES])
-        digest = _digest([metadata, {key: value for key, value in own.items() if key != "sha256"}]) if own else ""
+        sealed = digest([metadata, {key: value for key, value in own.items() if key != "sha256"}]) if own else ""
         number = own.get("format") if own else None
+        number = number if type(number) is int else None
     except FileNotFoundError:
         if is_store(path):
             raise _damaged(path, "is missing") from None
@@ -111,10 +112,10 @@ def checked_metadata(path: Path) -> Metadata:
         raise StoreError("", actual, expected, "--out study.zarr", str(path)) from None
     except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError):
         raise _damaged(path, "is damaged") from None
-    if isinstance(number, int) and number > FORMAT:
+    if number is not None and number > FORMAT:
         actual = f"a store of a newer friso ({attributes.get('friso', 'unknown')})"
         raise StoreError("", actual, "a store of this friso, or that one to read it", origin=str(path))
-    if own and own.get("sha256") == digest:
+    if number == FORMAT and own["sha256"] == sealed:
         return Metadata(document, own["study"], own["axes"], own["notes"])
     if number == FORMAT:
         raise _damaged(path, "is damaged")
@@ -178,5 +179,6 @@ def _damaged(path: Path, how: str) -> StoreError:
     return StoreError("", f"a store whose {_FILE} {how}", expected, _EXAMPLE, str(path))
 
 
-def _digest(content: Any) -> str:
+def digest(content: Any) -> str:
+    """The SHA-256 of what JSON holds."""
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()

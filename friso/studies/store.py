@@ -185,10 +185,12 @@ def read_store(path: str | os.PathLike[str]) -> xr.Dataset:
             raise ValueError("other axes than were written")
         runs = xr.open_zarr(path, chunks=None, zarr_format=_FORMAT)
         runs.attrs = metadata.attributes
-        return runs.assign_coords({name: axis.load() for name, axis in runs.coords.items()})
-    except Exception:  # whatever a codec makes of what it cannot read
+        runs = runs.assign_coords({name: axis.load() for name, axis in runs.coords.items()})
+        study_of(runs)
+        return runs
+    except Exception:  # whatever a codec, or a study, makes of what it cannot read
         expected = "a copy of the store, or the study run again under a new name, or with --overwrite"
-        actual = "a store whose axes are damaged"
+        actual = "a store whose axes are damaged, or whose study this friso cannot read"
         raise StoreError("", actual, expected, "friso map STAGE.toml ... --out study.zarr", str(path)) from None
 
 
@@ -233,7 +235,7 @@ def _shared(texts: xr.DataArray) -> np.ndarray:
 def _refuse_other(path: Path, study: Study) -> None:
     """Raises StoreError if the store holds another study than this."""
     with read_store(path) as dataset:
-        differences = study.differences(study_of(dataset), dataset.attrs["equations"])
+        differences = study.differences(study_of(dataset), str(dataset.attrs.get("equations")))
     if differences:
         text = "a store of another study:\n            " + "\n            ".join(differences)
         expected = "the same study to go on with, or another --out; nothing was overwritten"
@@ -242,7 +244,7 @@ def _refuse_other(path: Path, study: Study) -> None:
 
 def _warn_of_another_machine(path: Path) -> None:
     with read_store(path) as dataset:
-        there = dataset.attrs["machine"]
+        there = dataset.attrs.get("machine")
     if there != machine():
         logger.warning("the store was begun on %s, here is %s: cells may differ in their last bits", there, machine())
 

@@ -1,0 +1,119 @@
+"""Faults at a chosen operation on files: a full disk, Ctrl-C, a kill. Python tells of each operation before it does it
+(`sys.addaudithook`)."""
+
+from __future__ import annotations
+
+import errno
+import os
+import random
+import signal
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+_MAKES = {"os.rename": 1, "os.link": 1, "os.mkdir": 0}
+"""Operations that make something, and which of their arguments names it."""
+
+
+@dataclass
+class Fault:
+    """What happens at the operation number `left` in a folder, and (a disk that stays full) at all after it that need
+    room."""
+
+    folder: str
+    left: int
+    strike: Callable[[], None]
+    lasting: bool
+
+    def operation(self, path: object, needs_room: bool) -> None:
+        """Count an operation on a file, and strike."""
+        try:
+            name = os.path.abspath(os.fsdecode(path))  # type: ignore[arg-type]  # ty: a descriptor, for one
+        except TypeError:
+            return
+        if not name.startswith(self.folder):
+            return
+        self.left -= 1
+        if self.left == 0 or (self.left < 0 and self.lasting and needs_room):
+            self.strike()
+
+
+_fault: Fault | None = None
+
+
+def _hook(event: str, arguments: tuple[Any, ...]) -> None:
+    if _fault is None:
+        return
+    if event in _MAKES:
+        _fault.operation(arguments[_MAKES[event]], event != "os.rename")
+    elif event == "open" and (arguments[2] or 0) & (os.O_WRONLY | os.O_RDWR | os.O_CREAT):
+        _fault.operation(arguments[0], True)
+
+
+@contextmanager
+def fault(folder: Path, number: int, strike: Callable[[], None], lasting: bool = False) -> Iterator[None]:
+    """`strike` is called before the operation with this number, from 1, that makes something in a folder."""
+    global _fault
+    _install()
+    _fault = Fault(str(folder.resolve()), number, strike, lasting)
+    try:
+        yield
+    finally:
+        _fault = None
+
+
+_installed: list[bool] = []
+
+
+def _install() -> None:
+    if not _installed:
+        sys.addaudithook(_hook)
+        _installed.append(True)
+
+
+def no_room() -> None:
+    """A full disk."""
+    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+def no_answer() -> None:
+    """A disk that fails."""
+    raise OSError(errno.EIO, os.strerror(errno.EIO))
+
+
+def ctrl_c() -> None:
+    """Ctrl-C, as the terminal sends it."""
+    os.kill(os.getpid(), signal.SIGINT)
+
+
+def struck(work: Callable[[], object], folder: Path, rng: random.Random, operations: int) -> str:
+    """Do some work of about so many operations on files under a fault drawn at random; which that was."""
+    kind = rng.choice(("none", "room", "room", "disk", "ctrl-c", "ctrl-c", "kill", "kill"))
+    number = rng.randrange(1, operations + 1)
+    if kind == "kill":
+        _killed(work, folder, number)
+        return f"{kind} at {number}"
+    strike = {"none": lambda: None, "room": no_room, "disk": no_answer, "ctrl-c": ctrl_c}[kind]
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with suppress(OSError, KeyboardInterrupt, ValueError), fault(folder, number, strike, kind == "room"):
+            work()
+    finally:
+        signal.signal(signal.SIGINT, before)
+    return f"{kind} at {number}"
+
+
+def _killed(work: Callable[[], object], folder: Path, number: int) -> None:
+    """Do some work in a child that is killed before an operation."""
+    child = os.fork()
+    if child:
+        os.waitpid(child, 0)
+        return
+    try:
+        with fault(folder, number, lambda: os.kill(os.getpid(), signal.SIGKILL)):
+            work()
+    finally:
+        os._exit(0)

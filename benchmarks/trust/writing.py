@@ -1,0 +1,201 @@
+"""What friso writes, in this process and under faults at every operation on files: the files of a command, and stores.
+
+No command is started and nothing simulated: a case takes milliseconds.
+"""
+
+from __future__ import annotations
+
+import json
+import random
+import shutil
+import tempfile
+import warnings
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+import friso
+from benchmarks.trust.damage import damaged
+from benchmarks.trust.faults import struck
+from friso.cli.output import MARKER, OutputFolder
+from friso.errors import InputError
+from friso.studies import metadata
+from friso.studies.request import Request
+from friso.studies.store import Store, check_store, read_store
+from friso.studies.study import Study
+
+RIG = Path(__file__).parents[2] / "examples" / "thesis_rig.toml"
+AXES = {"controller.crossover": "2 Hz..16 Hz:8", "joint.stroke": "0.1 mm..1 mm:8"}
+
+
+def files(rng: random.Random, folder: Path) -> None:
+    """The files of a command, where there may be earlier ones: all of them or none, each whole; what a kill leaves is
+    removed by the next."""
+    out, names = folder / "out", [rng.choice(("a.txt", "b.txt", "c/d.txt", "c/e/f.txt")) for _ in range(4)]
+    if rng.random() < 0.6:
+        OutputFolder("check", out, False).write({name: f"old {name}" for name in rng.sample(names, 2)})
+    before = _contents(folder)
+    new = {name: None if rng.random() < 0.2 else f"new {name}" * rng.randrange(1, 3000) for name in names}
+    fault = struck(lambda: OutputFolder("check", out, False).write(new), folder, rng, 20)
+    after = _contents(folder)
+    changed = {f"out/{name}": content for name, content in new.items()}
+    whole = {name: content for name, content in ({**before, **changed}).items() if content is not None}
+    if not fault.startswith("kill"):
+        marker = f"out/{MARKER}"
+        same = {k: v for k, v in after.items() if k != marker} == {k: v for k, v in whole.items() if k != marker}
+        assert after == before or (same and marker in after), f"{fault}: neither all nor none: {sorted(after)}"
+        return
+    strange = {name for name, content in after.items() if ".friso-draft" not in name and MARKER not in name
+               and content not in (before.get(name), whole.get(name))}  # fmt: skip
+    assert not strange, f"{fault}: neither as before nor as after: {strange}"
+    lost = {name for name in before if name in whole} - {*after}
+    assert not lost, f"{fault}: lost {lost}"
+    OutputFolder("check", out, True).write(new)
+    left = [name for name in _contents(folder) if ".friso-draft" in name]
+    assert not left, f"{fault}: left {left}"
+
+
+def stores(rng: random.Random, folder: Path) -> None:
+    """A store that is damaged says so, and is mended by the next run or refused; never are other numbers shown."""
+    path = Path(shutil.copytree(_undisturbed(), folder / "a.zarr"))
+    what = _damage(path, rng)
+    try:
+        state = check_store(path)
+    except InputError:
+        return
+    if not (state.damaged or state.files or state.done < state.blocks):
+        _assert_same(path, f"{what}: not noticed")
+        return
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        _write_missing(path)
+    _assert_same(path, f"{what}: not mended")
+
+
+def store_faults(rng: random.Random, folder: Path) -> None:
+    """A store that is made and written under up to three faults is in the end as if there had been none."""
+    path, said = folder / "a.zarr", []
+    for _ in range(rng.randrange(1, 4)):
+        said.append(struck(lambda: _write_missing(path), folder, rng, 60))
+    _write_missing(path)
+    names = [item.name for item in folder.iterdir()]
+    assert names == ["a.zarr"], f"{said}: left {names}"
+    _assert_same(path, f"{said}: another store")
+    state = check_store(path)
+    assert (state.damaged, state.files, state.done) == ([], [], state.blocks), f"{said}: {state}"
+
+
+def store_exchanges(rng: random.Random, folder: Path) -> None:
+    """A store in whose place another is to come under a fault: one of the two is there, whole."""
+    path, said = Path(shutil.copytree(_undisturbed(), folder / "a.zarr")), []
+    study = Request(friso.load(RIG), {"controller.crossover": "2 Hz, 3 Hz"}).study(["peaks"])
+
+    def replace() -> None:
+        with Store.opened(path, study, overwrite=True):
+            pass
+
+    said.append(struck(replace, folder, rng, 20))
+    try:  # what a kill left is set right by whoever opens it next
+        _write_missing(path)
+        _assert_same(path, f"{said}: another store")
+    except InputError:
+        assert read_store(path)["outcome"].shape == (2,), f"{said}: neither store"
+    names = [item.name for item in folder.iterdir()]
+    assert names == ["a.zarr"], f"{said}: left {names}"
+
+
+def store_versions(rng: random.Random, folder: Path) -> None:
+    """A store of another version, whole as it is, is refused or read as what it says, and not changed."""
+    path = Path(shutil.copytree(_undisturbed(), folder / "a.zarr"))
+    document = json.loads((path / ".zmetadata").read_bytes())
+    own, attributes = document["friso"], document["metadata"][".zattrs"]
+    own["format"] = rng.choice((0, 1, 2, 3, 99, -1, "2", None, [], 2.5, 10**30))
+    attributes["equations"] = rng.choice((attributes["equations"], "9.9.9 (000000000000)", 3, ""))
+    for name in rng.sample(("axes", "links", "rtol", "refined", "stage", "machine", "friso"), rng.randrange(3)):
+        attributes[name] = rng.choice((None, "", "{", 3, [], "NaN", "1e999", attributes[name]))
+    if rng.random() < 0.5:
+        del attributes[rng.choice([*attributes])]
+    if rng.random() < 0.8:  # as a friso would have sealed it
+        own["sha256"] = metadata.digest([document["metadata"], {k: own[k] for k in own if k != "sha256"}])
+    (path / ".zmetadata").write_text(json.dumps(document))
+    before = _contents(path)
+    for use in (check_store, _write_missing):
+        try:
+            use(path)
+        except InputError:
+            assert _contents(path) == before, "refused, but changed"
+
+
+def _damage(path: Path, rng: random.Random) -> str:
+    """Damage a store; what was done to which file."""
+    every = sorted(item for item in path.rglob("*") if item.is_file() and item.name != ".friso.lock")
+    first, second = rng.choice(every), rng.choice(every)
+    kind = rng.choice(("bytes", "bytes", "exchange", "exchange alike", "gone", "empty", "copy"))
+    if kind == "bytes":
+        content = first.read_bytes()
+        first.write_bytes(damaged(content, rng))
+    elif kind == "gone":
+        first.unlink()
+    elif kind == "empty":
+        first.write_bytes(b"")
+    else:
+        if kind == "exchange alike":
+            second = rng.choice([item for item in every if item.parent == first.parent])
+        one, other = first.read_bytes(), second.read_bytes()
+        first.write_bytes(other)
+        if kind != "copy":
+            second.write_bytes(one)
+    return f"{kind} {first.relative_to(path)} {second.relative_to(path)}"
+
+
+def _study() -> Study:
+    return Request(friso.load(RIG), AXES).study(["peaks"])
+
+
+@cache
+def _undisturbed() -> Path:
+    """The store that nothing happened to."""
+    path = Path(tempfile.mkdtemp(prefix="friso-trust-store-")) / "a.zarr"
+    friso.sweep(friso.load(RIG), AXES, metrics=["peaks"], store=path)
+    return path
+
+
+@cache
+def _columns() -> dict[str, np.ndarray]:
+    runs = read_store(_undisturbed())
+    return {str(name): runs[name].values for name in runs.data_vars}
+
+
+def _write_missing(path: Path) -> None:
+    """Do what a run of the study does, but for the simulations."""
+    columns = _columns()
+    with Store.opened(path, _study()) as store:
+        for block in list(store.missing()):
+            store.write(block, {name: values[block] for name, values in columns.items()})
+        store.annotate({"verified_share": 0.5})
+
+
+def _assert_same(path: Path, what: str) -> None:
+    runs = read_store(path)
+    for name, values in _columns().items():
+        assert np.array_equal(runs[name].values, values, equal_nan=values.dtype.kind == "f"), f"{what}: {name}"
+    whole = read_store(_undisturbed())
+    for name in whole.coords:
+        assert np.array_equal(runs[name].values, whole[name].values), f"{what}: {name}"
+
+
+def _contents(folder: Path) -> dict[str, str]:
+    """What is in the files of a folder, but for locks."""
+    every = (item for item in folder.rglob("*") if item.is_file() and item.name not in (".friso.lock", "lock"))
+    return {str(item.relative_to(folder)): item.read_bytes().decode("latin-1") for item in every}
+
+
+WRITING = {
+    "files": files,
+    "stores": stores,
+    "store-faults": store_faults,
+    "store-exchanges": store_exchanges,
+    "store-versions": store_versions,
+}
+"""The campaigns by name."""
