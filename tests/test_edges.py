@@ -12,7 +12,7 @@ import friso
 from friso.errors import InputError
 from friso.identify.logs import mapping
 from friso.identify.logs.read import read_frequency_response
-from friso.stage import Stage, loads, numeric_keys
+from friso.stage import Stage, loads, numeric_keys, parse_set
 from friso.stage.plausible import doubts
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
@@ -66,6 +66,17 @@ def test_sizes_that_no_float_holds(changes: dict[str, str], refused: Refused) ->
 def test_what_is_too_long_or_too_deep(text: str, refused: Refused) -> None:
     with refused():
         loads(text)
+
+
+def test_a_value_nested_too_deeply_on_the_command_line() -> None:
+    key, value = parse_set(f"masses.cart={{{'.'.join(['a'] * 10_000)} = 1}}")
+    with pytest.raises(InputError, match=r"masses\.cart"):
+        loads(RIG).replace({key: value})
+    deep: dict[str, object] = {}
+    for _ in range(5000):
+        deep = {"a": deep}
+    with pytest.raises(InputError, match="a table"):
+        loads(RIG).replace({"name": deep})
 
 
 @pytest.mark.parametrize(("unit", "meant"), [("hz", "Hz"), ("KHZ", "kHz"), ("RPM", "rpm")])

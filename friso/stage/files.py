@@ -73,6 +73,8 @@ def parse_set(text: str) -> tuple[str, Any]:
 
 def _value(text: str) -> Any:
     """A TOML value, or the text itself; an inline table holds neither comments nor a second line."""
+    if _MANY_PARTS.search(text):
+        return text
     try:
         document = tomllib.loads(f"line = {{ value = {text} }}")
     except (ValueError, RecursionError):
