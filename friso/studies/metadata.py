@@ -85,9 +85,9 @@ def annotate_metadata(
 
 
 def _write(path: Path, metadata: Metadata) -> None:
-    own = {"format": FORMAT, "study": metadata.study, "axes": dict(metadata.axes), "notes": dict(metadata.notes)}
-    own["sha256"] = digest([metadata.files, own])
-    put(path / _FILE, json.dumps({**metadata.document, _OWN: own}, indent=1, sort_keys=True).encode())
+    entry = {"format": FORMAT, "study": metadata.study, "axes": dict(metadata.axes), "notes": dict(metadata.notes)}
+    entry["sha256"] = digest([metadata.files, entry])
+    put(path / _FILE, json.dumps({**metadata.document, _OWN: entry}, indent=1, sort_keys=True).encode())
 
 
 def checked_metadata(path: Path) -> Metadata:
@@ -100,10 +100,10 @@ def checked_metadata(path: Path) -> Metadata:
         raise StoreError("", "a file; nothing was overwritten", expected, "--out study.zarr", str(path))
     try:
         document = json.loads((path / _FILE).read_bytes())
-        own, metadata = document.get(_OWN), document["metadata"]
+        entry, metadata = document.get(_OWN), document["metadata"]
         attributes = dict(metadata[_ATTRIBUTES])
-        sealed = digest([metadata, {key: value for key, value in own.items() if key != "sha256"}]) if own else ""
-        number = own.get("format") if own else None
+        sealed = digest([metadata, {key: value for key, value in entry.items() if key != "sha256"}]) if entry else ""
+        number = entry.get("format") if entry else None
         number = number if type(number) is int else None
     except FileNotFoundError:
         if is_store(path):
@@ -115,8 +115,8 @@ def checked_metadata(path: Path) -> Metadata:
     if number is not None and number > FORMAT:
         actual = f"a store of a newer friso ({attributes.get('friso', 'unknown')})"
         raise StoreError("", actual, "a store of this friso, or that one to read it", origin=str(path))
-    if number == FORMAT and own["sha256"] == sealed:
-        return Metadata(document, own["study"], own["axes"], own["notes"])
+    if number == FORMAT and entry["sha256"] == sealed:
+        return Metadata(document, entry["study"], entry["axes"], entry["notes"])
     if number == FORMAT:
         raise _damaged(path, "is damaged")
     if "equations" in attributes:
