@@ -13,6 +13,7 @@ import uuid
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from glob import escape
 from pathlib import Path
 
 from filelock import FileLock, Timeout
@@ -57,13 +58,13 @@ def exchange(path: Path, fill: Callable[[Path], object]) -> None:
 def remove_leftovers(path: Path) -> None:
     """Remove what killed processes left beside the store at `path`, or put it back where it was being replaced:
     nobody holds their lock."""
-    for old in path.parent.glob(f".{path.name}.{_DIGITS}{_OLD}"):
+    for old in path.parent.glob(f".{escape(path.name)}.{_DIGITS}{_OLD}"):
         with _unless_locked(old) as free:
             if free and not path.exists():
                 old.rename(path)
             elif free:
                 shutil.rmtree(old, ignore_errors=True)
-    for draft in path.parent.glob(f".{path.name}.{_DIGITS}"):
+    for draft in path.parent.glob(f".{escape(path.name)}.{_DIGITS}"):
         with _unless_locked(draft) as free:
             if free:
                 shutil.rmtree(draft, ignore_errors=True)
