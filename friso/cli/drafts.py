@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import signal
+import stat
 import tempfile
 import threading
 from collections.abc import Callable, Iterator
@@ -18,6 +19,7 @@ from typing import TYPE_CHECKING
 from filelock import FileLock, Timeout
 
 from friso.interrupts import SIGNALS
+from friso.system import foreign_writers
 
 if TYPE_CHECKING:
     from friso.views.files import Content
@@ -27,6 +29,9 @@ DRAFTS = ".friso-draft-"
 
 _LOCK = "lock"
 
+_LEVELS = 4
+"""How many folders up from a file leftovers are looked for: no command writes deeper below what it is told."""
+
 
 class Drafts:
     """Drafts of files on the disk where they are to be, gone at the end of the `with` block unless put in place."""
@@ -35,6 +40,7 @@ class Drafts:
         self.folders: dict[Path, Path] = {}
         self.locks = ExitStack()
         self.drafts: list[tuple[Path | None, Path]] = []
+        self.tidied: set[Path] = set()
         self.numbers = count()
 
     def __enter__(self) -> Drafts:
@@ -49,6 +55,7 @@ class Drafts:
         """The draft of a file; None: an earlier one is deleted in the end."""
         if path.is_dir():
             raise IsADirectoryError(f"{path} is a folder")
+        self._tidy(path)
         if content is None:
             self.drafts.append((None, path))
             return
@@ -83,12 +90,17 @@ class Drafts:
                         step()
                 raise
 
+    def _tidy(self, path: Path) -> None:
+        """Remove what killed processes left of drafts, near `path`: where there was no folder yet, further up."""
+        for folder in {*path.absolute().parents[:_LEVELS]} - self.tidied:
+            self.tidied.add(folder)
+            if folder.is_dir():
+                _remove_leftovers(folder)
+
     def _spare(self, path: Path) -> Path:
         """A path that is free, on the disk of `path`, with its suffix."""
         root = next(folder for folder in path.absolute().parents if folder.exists())
         if root not in self.folders:
-            for above in (root, *root.parents[:2]):  # where there was no folder yet, they were left further up
-                _remove_leftovers(above)
             folder = self.folders[root] = Path(tempfile.mkdtemp(prefix=DRAFTS, dir=root))
             self.locks.enter_context(FileLock(folder / _LOCK))  # locked, it is no leftover
         return self.folders[root] / f"{next(self.numbers)}{path.suffix}"
@@ -103,9 +115,12 @@ def _duplicate(path: Path, spare: Path) -> None:
 
 
 def _remove_leftovers(root: Path) -> None:
-    """Remove what killed processes left of their drafts: nobody holds their lock."""
+    """Remove what killed processes of this user left of their drafts: nobody holds their lock."""
     for folder in root.glob(f"{DRAFTS}*"):
         try:
+            status = folder.lstat()
+            if not stat.S_ISDIR(status.st_mode) or foreign_writers(status):
+                continue  # put there by others, to have a lock made in a folder of this user
             with FileLock(folder / _LOCK, blocking=False):
                 shutil.rmtree(folder, ignore_errors=True)
         except (OSError, Timeout):  # it is written to, or nobody may delete it

@@ -117,9 +117,11 @@ def _made_aside(path: Path, fill: Callable[[Path], object]) -> Iterator[Path]:
 
 @contextmanager
 def _unless_locked(folder: Path) -> Iterator[bool]:
-    """Whether nobody else held the lock of a folder, which is held within."""
+    """Whether nobody else held the lock of a folder (no link to one), which is held within."""
     lock = FileLock(folder / LOCK)
     try:
+        if folder.is_symlink():
+            raise NotADirectoryError(folder)
         lock.acquire(timeout=0)
     except (OSError, Timeout):
         yield False
