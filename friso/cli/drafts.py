@@ -4,12 +4,10 @@ from __future__ import annotations
 
 import os
 import shutil
-import signal
 import stat
 import tempfile
-import threading
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager, suppress
+from collections.abc import Callable
+from contextlib import ExitStack, suppress
 from functools import partial
 from itertools import count
 from pathlib import Path
@@ -18,7 +16,7 @@ from typing import TYPE_CHECKING
 
 from filelock import FileLock, Timeout
 
-from friso.interrupts import SIGNALS
+from friso.interrupts import held
 from friso.system import foreign_writers
 
 if TYPE_CHECKING:
@@ -70,7 +68,7 @@ class Drafts:
         """Give all drafts their names. An error on the way, and all is as it was before; Ctrl-C waits until the end. A
         name always has a file, the earlier one or the new."""
         undo: list[Callable[[], object]] = []
-        with _signals_held():
+        with held():
             try:
                 for draft, path in self.drafts:
                     undo += [folder.rmdir for folder in made(path.parent)]
@@ -143,20 +141,3 @@ def made(folder: Path) -> list[Path]:
             path.rmdir()
         raise
     return done
-
-
-@contextmanager
-def _signals_held() -> Iterator[None]:
-    """Ctrl-C and a termination wait for the end of the block."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    came: list[int] = []
-    before = {number: signal.signal(number, lambda number, frame: came.append(number)) for number in SIGNALS}
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
-        if came:
-            signal.raise_signal(came[0])

@@ -11,7 +11,6 @@ import re
 import shutil
 import uuid
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from glob import escape
 from pathlib import Path
@@ -19,6 +18,7 @@ from pathlib import Path
 from filelock import FileLock, Timeout
 
 from friso.errors import StoreError
+from friso.interrupts import held
 from friso.studies.metadata import PARTIAL
 
 LOCK = ".friso.lock"
@@ -101,15 +101,15 @@ def locked(path: Path) -> Iterator[None]:
 
 @contextmanager
 def _made_aside(path: Path, fill: Callable[[Path], object]) -> Iterator[Path]:
-    """What `fill` has written, to be moved away. It runs in a thread of its own, so that Ctrl-C waits for its end: else
-    the threads of Zarr would go on writing into what is deleted here."""
+    """What `fill` has written, to be moved away. Ctrl-C waits for its end: else the threads of Zarr would go on writing
+    into what is deleted here."""
     draft = _beside(path)
     try:
         draft.mkdir(parents=True)
         with FileLock(draft / LOCK):  # locked, it is no leftover
             new = draft / "store"
-            with ThreadPoolExecutor(1) as thread:
-                thread.submit(fill, new).result()
+            with held():
+                fill(new)
             yield new
     finally:
         shutil.rmtree(draft, ignore_errors=True)
