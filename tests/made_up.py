@@ -98,6 +98,8 @@ class FakeCase:
     largest_force: float = 179.4
     solver: Any = field(default_factory=lambda: fake_solver("done"))
     unstable: tuple[str, ...] = ()
+    breakaway: float = 3.0
+    unmoved: bool = False
 
     @property
     def verdict(self) -> str:

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from variants import VARIANTS
 
 import friso
 from friso.hunting.measures import measured_run
@@ -170,3 +171,12 @@ def test_a_sweep_over_the_duration_leaves_its_cells_alone(rig: Stage) -> None:
     alone = measured_run(rig, 1e-6)
     assert runs.settling_time.values[1] == alone.settling_time[0][0]
     assert runs.steps.values[1] == alone.steps[0]
+
+
+def test_a_motion_with_less_force_than_breaks_the_stage_away_leaves_it_unmoved() -> None:
+    """Released at 1 um the stage creeps home, at 2 mm it breaks away."""
+    settled = VARIANTS["rigid"].replace({"controller.crossover": "12 Hz"})
+    cases = {d: friso.check(settled.replace({"motion.displacement": d}))["given"] for d in ("1 um", "2 mm")}
+    assert [case.unmoved for case in cases.values()] == [True, False]
+    assert cases["1 um"].breakaway == pytest.approx(3.0)
+    assert np.ptp(friso.simulate(cases["1 um"].stage).position.values) < 2e-6

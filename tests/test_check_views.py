@@ -30,6 +30,7 @@ from snapshots import Snapshots
 
 from friso.hunting import Judgement, Kick, Margin
 from friso.hunting.margin import BandwidthWindow
+from friso.hunting.outward import AttractionEnd
 from friso.version import VERSION
 from friso.views.check.cases import COLOURS, ShownCase, shown_cases
 from friso.views.check.figures import check_figures, response_figure
@@ -310,8 +311,8 @@ def test_sentences(snapshots: Snapshots) -> None:
         ("hunts", ["±0.52 mm", "1.63 s", "1.80 Hz", "9.80 Hz"]),
         ("hunts, gains", ["1.23 times", "kp × 1.51", "ki × 1.86", "kd × 1.23"]),
         ("bistable", ["1.72 mm", "23.1 mm/s", "87 %", "±0.52 mm", "1.80 Hz"]),
-        ("transient", ["690 µm", "1.33 s", "73.1 s", "190 s", "9.75 Hz"]),
-        ("settles", ["1 µm in 823 ms", "below 5.60 Hz"]),
+        ("transient", ["690 µm", "1.33 s", "73.1 s", "190 s", "9.750 Hz"]),
+        ("settles", ["1 µm in 823 ms", "below 5.598 Hz"]),
         ("settles, coarsely", ["10 µm in 1.50 s"]),
     ],
 )
@@ -368,7 +369,7 @@ def test_rows_of_other_cycles():
     whole = hunts(hunting=fake_hunting(replace(pair, multiplier=-0.93, growth=np.nan)))
     assert row("Multiplier taken over", whole) == "a whole period (slope of the returns)"
     assert row("Hunting multiplier", whole) == "-0.9300"
-    assert row("Edge of hunting", hunts(margin=Margin(1.22, None, True, 1.227))) == "1.22 × as fast"
+    assert row("Edge of hunting", hunts(margin=Margin(1.22, None, True, 1.227))) == "1.22 times this bandwidth"
 
 
 @pytest.mark.parametrize(
@@ -422,21 +423,39 @@ def test_an_uncertain_edge_is_told_as_an_interval_and_advice_lies_beyond_it() ->
     """8 Hz: something attracts at 9.7496 Hz, nothing at 9.7984 Hz, which is rounded upward."""
     sure, unsure = (Margin(1.2187, 9.7496, certain, 1.2248) for certain in (True, False))
     for edge in (sure, unsure):
-        assert "(to 9.80 Hz)" in sentence(hunts(margin=edge))
+        assert "to 9.80 Hz" in sentence(hunts(margin=edge))
     assert "not certain" in sentence(hunts(margin=unsure))
-    assert row("Edge of hunting", hunts(margin=unsure)) == "between 9.750 Hz and 9.798 Hz (not certain)"
+    assert row("Edge of hunting", hunts(margin=unsure)) == "somewhere between 9.749 Hz and 9.799 Hz (not certain)"
     below = sentence(settles(margin=replace(unsure, factor=0.91234, crossover=7.29872, quiet=0.92)))
-    assert "7.29 Hz" in below
-    assert "7.36 Hz" in below
+    assert "7.298 Hz" in below
+    assert "7.360 Hz" in below
     near = sentence(hunts(margin=Margin(1.00001, 8.00008, True, 1.00002)))
     assert "0.00016 Hz" not in near
     assert "by 0 Hz" not in near
 
 
 def test_windows_are_told_beside_the_edge() -> None:
-    """From 8 Hz: again above 40 Hz, rounded downward."""
-    assert "above 40.0 Hz" in sentence(hunts(windows=(BandwidthWindow(5.0049, None),)))
-    assert "lower the bandwidth to 4.00 Hz" in sentence(hunts(lower=0.5004))
+    """From 8 Hz: again above 40.04 Hz, and not below 4.04 Hz, where 4 Hz settles; both rounded downward."""
+    window, lower = AttractionEnd(5.0049, 4.96, True), AttractionEnd(0.505, 0.5004, True)
+    assert "above 40.04 Hz" in sentence(hunts(windows=(BandwidthWindow(window, None),)))
+    assert "lower the bandwidth to 4.00 Hz" in sentence(hunts(lower=lower))
+    unsure = sentence(hunts(windows=(BandwidthWindow(replace(window, certain=False), None),)))
+    assert "39.68 Hz" in unsure
+    assert "40.04 Hz" in unsure
+
+
+def test_an_edge_is_told_with_the_digits_that_hold() -> None:
+    """One that is known to 0.3 % is about 5.60 Hz, in the sentence and in the table."""
+    rough = Margin(0.6998, 5.598, True, 0.7068, 0.0028)
+    assert "about 5.60 Hz (± 0.3 %)" in sentence(settles(margin=rough))
+    assert row("Edge of hunting", settles(margin=rough)) == "about 5.60 Hz (± 0.3 %)"
+
+
+def test_a_motion_that_does_not_move_the_stage_says_so() -> None:
+    judgements = settles(), hunts(verdict="bistable")
+    unmoved = [sentence(judgement, unmoved=True, largest_force=2.44) for judgement in judgements]
+    assert all("does not move the stage" in said and "2.44 N" in said for said in unmoved)
+    assert not any("does not move" in sentence(judgement) for judgement in judgements)
 
 
 def test_an_uncertain_verdict_is_not_tabled_as_sure() -> None:

@@ -34,7 +34,7 @@ Seed = Annotated[
 def check(
     stage_file: StageFile,
     overrides: Overrides = None,
-    rtol: Tolerance = "1e-6",
+    rtol: Tolerance = "1e-9",
     count: Count = None,
     seed: Seed = 0,
     out: OutFolder = None,
@@ -48,11 +48,12 @@ def check(
     stage, tolerance = read_stage(stage_file, overrides, uncertain_too=count is not None), read_tolerance(rtol)
     sample = None if count is None else _sample(stage, stage_file, count, seed)
     target = output_folder("check", out, overwrite, [stage_file])
-    from friso.hunting import check as check_stage
+    from friso.hunting.check import LONG
+    from friso.hunting.check import check as check_stage
 
     with ProgressBar("what attracts the stage") as progress:
         cases = check_stage(stage, rtol=tolerance, traces=target is not None, progress=progress)
-    draws = None if sample is None else _draws(stage, sample, seed, tolerance)
+    draws = None if sample is None else _draws(stage, sample, seed, max(tolerance, LONG))
     files = []
     if target is not None:
         from friso.views.check.page import report_html

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from friso.engine.arrays import Status
 from friso.engine.batch import run_chunks
 from friso.engine.kernel import KernelRequest, kernel, kernels
-from friso.engine.simulate import simulate
+from friso.engine.simulate import RTOL, simulate
 from friso.engine.tolerance import checked_rtol
 from friso.equations.structure import structure
 from friso.hunting.criteria import Verdict
+from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.hunting import cannot_hunt
 from friso.hunting.loop import LoopState, unstable
 from friso.hunting.measures import BANDS, measure, options
@@ -46,8 +48,10 @@ class Case:
     `judgement` holds the verdict and what it rests on; `peaks` counts the thesis's peaks, at `peak_times` [s] and of
     `peak_heights` [m] above the reference; `peak_to_peak` [m] and `period` [s] (None: no cycle) are of the last
     quarter; `settling_time` maps each band [m] to the time after the last corner of the reference [s] (None: never);
-    `largest_force` [N] is the actuator's; `unstable` tells in which of its states the loop is not stable, whatever the
-    friction does (see `friso.hunting.loop`). `trace` holds the time response if asked for.
+    `largest_force` [N] is the actuator's, `breakaway` [N] the least force of it that may move what sticks, constant
+    forces taken off; a motion that exerts less leaves a stage without a free joint `unmoved`; `unstable` tells in which
+    of its states the loop is not stable, whatever the friction does (see `friso.hunting.loop`). `trace` holds the time
+    response if asked for.
     """
 
     stage: Stage
@@ -60,6 +64,7 @@ class Case:
     settling_time: dict[float, float | None]
     largest_force: float
     solver: Solver
+    breakaway: float = 0.0
     unstable: tuple[LoopState, ...] = ()
     trace: xr.Dataset | None = None
 
@@ -68,8 +73,18 @@ class Case:
         """ "hunts", "bistable", "transient", "settles" or "failed" (see `Judgement`)."""
         return self.judgement.verdict
 
+    @property
+    def unmoved(self) -> bool:
+        """Whether the motion exerts too little force to move the stage."""
+        joint = self.stage.joint
+        return self.largest_force < self.breakaway and (joint is None or joint.locked)
 
-def check(stage: Stage, rtol: float = 1e-6, traces: bool = False, progress: Progress = silent) -> dict[str, Case]:
+
+LONG = 1e-6
+"""Relative tolerance of runs that only tell what becomes of a motion; that of which times are told is finer."""
+
+
+def check(stage: Stage, rtol: float = RTOL, traces: bool = False, progress: Progress = silent) -> dict[str, Case]:
     """The cases "given" and, for a stage with a joint, "locked" and "free" (if the file tells its stiffness).
 
     With `traces`, each case has its time response; `progress` is called as work is done. Raises ValueError for an
@@ -100,7 +115,7 @@ def _case(stage: Stage, rtol: float, traces: bool, work: Tally) -> Case:
     measures = measure(flat, runs)
     room = measures.turns.shape[1]
     status = Status(int(measures.status[0]))
-    judgement = judge(stage, measures, rtol, lambda what: work.add(int(what != WORK[0]), what))
+    judgement = judge(stage, measures, max(rtol, LONG), lambda what: work.add(int(what != WORK[0]), what))
     work.add(begun + len(WORK) - work.done, WORK[-1])  # the last, too, where nothing attracts
     return Case(
         stage=stage,
@@ -113,9 +128,20 @@ def _case(stage: Stage, rtol: float, traces: bool, work: Tally) -> Case:
         settling_time={band: _finite(time[0]) for band, time in zip(BANDS, measures.settling_time, strict=True)},
         largest_force=float(measures.largest_force[0]),
         solver=Solver(status.text, int(measures.steps[0]), int(measures.rejected[0]), rtol),
+        breakaway=_breakaway(flat),
         unstable=unstable(stage),
         trace=simulate(stage, rtol) if traces else None,
     )
+
+
+def _breakaway(flat: Mapping[str, Any]) -> float:
+    """The least force of the actuator [N] that may move what sticks: constant forces may help it, and friction may be
+    smaller to one side. 0 without friction."""
+    if structure(flat).friction == "none":
+        return 0.0
+    uneven = abs(flat.get("friction.asymmetry") or 0.0)
+    least = float(Ensemble.held(flat, 1).number("breakaway")[0]) * (1 - uneven) / (1 + uneven)
+    return max(least - sum(abs(value) for key, value in flat.items() if key.startswith("bias.") and value), 0.0)
 
 
 def _finite(value: float) -> float | None:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -10,7 +12,7 @@ from friso.equations.bandwidth import bandwidth
 from friso.hunting.attractors import Attractors, attractors
 from friso.hunting.attractors.survey import Swinging
 from friso.hunting.cycle.ensemble import Ensemble
-from friso.hunting.outward import AttractionEnd, Beyond, Outward
+from friso.hunting.outward import PRECISE, AttractionEnd, Beyond, Outward
 from friso.stage import Stage
 
 FARTHEST = 10.0
@@ -29,34 +31,40 @@ class Margin:
     `factor` is the bandwidth at the edge over that of the stage, `crossover` [Hz] the crossover there (None for a
     controller given by its gains, all of whose poles and zeros the factor scales). At `quiet`, a factor just above,
     simulations settle from everywhere that was tried. The edge is `certain` where a closed orbit was followed to its
-    end there, and all simulations beyond it that had to decide were completed; else it lies between the two.
+    end there, and all simulations beyond it that had to decide were completed; else it lies between the two. It is
+    known up to a share of it, the `reserve`: with a limiter that chatters multipliers scatter.
     """
 
     factor: float
     crossover: float | None
     certain: bool
     quiet: float
+    reserve: float = PRECISE
+
+    @property
+    def end(self) -> AttractionEnd:
+        """The end of what attracts, in factors of the bandwidth."""
+        return AttractionEnd(self.factor, self.quiet, self.certain, self.reserve)
 
 
 @dataclass(frozen=True)
 class BandwidthWindow:
-    """Bandwidths, as factors of that of a stage, outside of which nothing attracts next to them: something does at some
-    in between. None: as far as the search goes."""
+    """Bandwidths at which something attracts: its ends, in factors of that of a stage. None: as far as the search
+    goes."""
 
-    low: float | None
-    high: float | None
+    low: AttractionEnd | None
+    high: AttractionEnd | None
 
 
 @dataclass(frozen=True)
 class Searched:
     """What a search through the bandwidths showed: the `margin` (None: no such edge); the other `windows` in which
-    something attracts, to the step of the search; of a stage that something attracts the next factor below at which
-    nothing does, `lower` (None: there is none); and whether the search `contradicts` that nothing attracts the stage
-    itself, to which an orbit was followed."""
+    something attracts; of a stage that something attracts the end below it of what does, `lower` (None: there is none);
+    and whether the search `contradicts` that nothing attracts the stage itself, to which an orbit was followed."""
 
     margin: Margin | None
     windows: tuple[BandwidthWindow, ...]
-    lower: float | None = None
+    lower: AttractionEnd | None = None
     contradicts: bool = False
 
 
@@ -77,32 +85,31 @@ def searched(stage: Stage, attracting: bool, survey: Attractors | None = None) -
     here, above = (COARSE, STEPS) if attracting else (STEPS, COARSE)
     below = np.geomspace(1 / FARTHEST, 1.0, here, endpoint=False)
     factors = np.concatenate([below, np.geomspace(1.0, FARTHEST, above + 1)])
-    grid = _Grid(Outward(flat, FARTHEST), factors)
+    grid = _Grid(flat, factors)
     grid.know(here, survey or attractors(Ensemble.held(flat, 1), thorough=True))
     edge = grid.last_edge(here, attracting)
+    lower = grid.lower_end(here) if attracting else None
     contradicts = bool(grid.attracts[here]) and not attracting
-    own_window = next((window for window in grid.windows() if _holds(window, 1.0)), BandwidthWindow(None, None))
-    lower = grid.quiet_below(here) if attracting else None
     if edge is None:
-        others = tuple(window for window in grid.windows() if window != own_window)
-        return Searched(None, others, lower, contradicts)
+        return Searched(None, grid.windows(here), lower, contradicts)
     at, end, certain = edge
     sure = certain and not contradicts
-    outermost = Margin(end.inside, None if crossover is None else crossover * end.inside, sure, end.outside)
-    others = tuple(window for window in grid.windows() if not _holds(window, factors[at]))
-    return Searched(outermost, others, lower, contradicts)
+    inside = None if crossover is None else crossover * end.inside
+    outermost = Margin(end.inside, inside, sure, end.outside, end.reserve)
+    return Searched(outermost, grid.windows(at), lower, contradicts)
 
 
 class _Grid:
     """Factors, ascending, at which it is known whether something attracts."""
 
-    def __init__(self, outward: Outward, factors: np.ndarray) -> None:
-        self.outward, self.factors = outward, factors
-        survey = outward.surveyed(factors, cycles=False)
+    def __init__(self, flat: Mapping[str, Any], factors: np.ndarray) -> None:
+        self.flat, self.factors = flat, factors
+        survey = Outward(flat, FARTHEST).surveyed(factors, cycles=False)
         self.attracts, self.decided = survey.attracts, survey.decided
         self.motions: list[list[Swinging]] = [[] for _ in factors]
         for motion in survey.motions:
             self.motions[motion.stage].append(motion)
+        self.ends: dict[tuple[int, int], AttractionEnd] = {}
 
     def know(self, here: int, survey: Attractors) -> None:
         """Take over what a thorough survey of one of the stages shows."""
@@ -119,44 +126,63 @@ class _Grid:
             if not falls.size:
                 return None
             at = int(falls[-1])
-            try:
-                end = self.outward.end(float(self.factors[at]), tuple(self.motions[at]), float(self.factors[at + 1]))
-            except Beyond:
-                self.attracts[at + 1 :] = True
+            end = self.end(at, 1)
+            if end is None:
                 continue
-            passed = (self.factors > self.factors[at]) & (self.factors <= end.inside)
-            self.attracts |= passed
             quiet = np.flatnonzero(self.factors > end.inside)
-            if end.outside <= end.inside:  # the search was given up beyond it
-                settled = quiet[~self.attracts[quiet]]
-                if not settled.size:
-                    return None
-                end = replace(end, outside=float(self.factors[settled[0]]))
             hunts = quiet[self.attracts[quiet]]
             upper = quiet[quiet < hunts[0]] if hunts.size else quiet
             return at, end, bool(end.certain and self.decided[upper].all())
 
-    def quiet_below(self, here: int) -> float | None:
-        """The next factor below a number at which nothing attracts, nor at the one below that, if both are known."""
-        quiet = np.flatnonzero(~self.attracts[:here])
-        if not quiet.size:
+    def end(self, at: int, ahead: int) -> AttractionEnd | None:
+        """The end of what attracts at a factor, by number, while nothing does at the next one, above (`ahead` 1) or
+        below (-1). None if it attracts as far as the search goes: then it is known to do so everywhere up to there."""
+        if (at, ahead) in self.ends:
+            return self.ends[at, ahead]
+        outward = Outward(self.flat, FARTHEST**ahead)
+        try:
+            end = outward.end(float(self.factors[at]), tuple(self.motions[at]), float(self.factors[at + ahead]))
+        except Beyond:
+            self.attracts[at + 1 if ahead > 0 else 0 : None if ahead > 0 else at] = True
             return None
-        both = slice(max(int(quiet[-1]) - 1, 0), int(quiet[-1]) + 1)
-        sure = not self.attracts[both].any() and bool(self.decided[both].all())
-        return float(self.factors[quiet[-1]]) if sure else None
+        beyond = ahead * np.log(self.factors / end.inside)
+        self.attracts |= (ahead * (np.arange(len(self.factors)) - at) > 0) & (beyond <= 0)
+        if ahead * (end.outside - end.inside) <= 0:  # the search was given up beyond it
+            settled = np.flatnonzero((beyond > 0) & ~self.attracts)[::ahead]
+            if not settled.size:
+                self.attracts |= beyond > 0
+                return None
+            end = replace(end, outside=float(self.factors[settled[0]]), certain=False)
+        last = int(np.flatnonzero(beyond <= 0)[-1 if ahead > 0 else 0])
+        self.ends[at, ahead] = self.ends[last, ahead] = end
+        return end
 
-    def windows(self) -> list[BandwidthWindow]:
-        """All windows of factors in which something attracts."""
+    def lower_end(self, here: int) -> AttractionEnd | None:
+        """The end below of what attracts at a number; None if it attracts as far as the search goes, or if it is not
+        known that nothing does below."""
+        while self.attracts[here] and not self.attracts[:here].all():
+            first = int(np.flatnonzero(~self.attracts[:here])[-1]) + 1
+            end = self.end(first, -1)
+            if end is None:
+                continue
+            quiet = np.flatnonzero(self.factors < end.inside)[-2:]
+            return end if quiet.size and self.decided[quiet].all() and not self.attracts[quiet].any() else None
+        return None
+
+    def windows(self, besides: int) -> tuple[BandwidthWindow, ...]:
+        """The windows of factors in which something attracts, besides that of the factor with a number."""
+        while True:
+            before = self.attracts.copy()
+            windows = tuple(self._window(a, b) for a, b in self._spans() if not a <= besides <= b)
+            if np.array_equal(before, self.attracts):
+                return windows
+
+    def _window(self, first: int, last: int) -> BandwidthWindow:
+        return BandwidthWindow(
+            self.end(first, -1) if first else None, self.end(last, 1) if last + 1 < len(self.factors) else None
+        )
+
+    def _spans(self) -> list[tuple[int, int]]:
+        """The first and last of neighbouring factors, by number, at which something attracts."""
         ends = np.flatnonzero(np.diff(self.attracts.astype(int), prepend=0, append=0))
-        last = len(self.factors) - 1
-        return [
-            BandwidthWindow(
-                None if first == 0 else float(self.factors[first - 1]),
-                None if after > last else float(self.factors[after]),
-            )
-            for first, after in zip(ends[::2], ends[1::2], strict=True)
-        ]
-
-
-def _holds(window: BandwidthWindow, factor: float) -> bool:
-    return (window.low or 0.0) < factor < (window.high or np.inf)
+        return [(int(first), int(after) - 1) for first, after in zip(ends[::2], ends[1::2], strict=True)]

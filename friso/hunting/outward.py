@@ -51,11 +51,13 @@ FINER = 4
 @dataclass(frozen=True)
 class AttractionEnd:
     """Two factors of the bandwidth: something attracts at `inside`, nothing does at `outside`. It is `certain` where an
-    orbit was followed to its end at `inside`, and simulations at `outside` all settled."""
+    orbit was followed to its end at `inside`, and simulations at `outside` all settled. That end is known up to a share
+    of it, the `reserve`."""
 
     inside: float
     outside: float
     certain: bool
+    reserve: float = PRECISE
 
 
 class Beyond(Exception):
@@ -83,13 +85,16 @@ class Outward:
                     break
                 continue
             flip = self._flip(at, outside) if chatters and _is_simple(orbit) else None
-            at, distance, ended = (flip, orbit.distance, True) if flip else self._followed(at, orbit)
-            next_to = at * beyond ** self._ahead(at)
+            if flip:
+                (at, reserve), distance, ended = flip, orbit.distance, True
+            else:
+                (at, distance, ended), reserve = self._followed(at, orbit), PRECISE
+            next_to = at * max(beyond, 1 + 2 * reserve) ** self._ahead(at)
             if self._ahead(at) * (next_to - self.farthest) > 0:
                 raise Beyond
             survey = self.surveyed(np.array([next_to]), ALONG * distance)
             if not survey.attracts[0]:
-                return AttractionEnd(at, next_to, ended and bool(survey.decided[0]))
+                return AttractionEnd(at, next_to, ended and bool(survey.decided[0]), reserve)
             at, motions = next_to, survey.motions
         return self._quiet_from(at, motions)
 
@@ -150,10 +155,12 @@ class Outward:
         return float(at * np.exp(ahead * SCALE * farthest.place)), orbit_distance(farthest, orbit), ended
 
     @np.errstate(all="ignore")
-    def _flip(self, at: float, outside: float) -> float | None:
-        """The factor between two at which the simplest cycle begins to repel, from a curve through its multipliers in
-        between: each of them is rough where a limiter chatters. None if it does not, or too few are known."""
-        flip: float | None = None
+    def _flip(self, at: float, outside: float) -> tuple[float, float] | None:
+        """The factor between two at which the simplest cycle begins to repel, and up to what share of it that is known,
+        from a curve through its multipliers in between: each of them is rough where a limiter chatters. The curve is
+        laid twice, the second time over less; what both differ by, and twice what the multipliers scatter about the
+        second one in terms of the factor, is the reserve. None if it does not, or too few are known."""
+        flip: tuple[float, float] | None = None
         for _ in range(2):
             factors = np.geomspace(at, outside, SPREAD)
             cycles = hunting_cycles(self._stages(factors))
@@ -161,13 +168,19 @@ class Outward:
             if closed.size < ENOUGH or not np.ptp(np.sign(np.abs(cycles.multiplier[closed]) - 1)):
                 break
             places, off = np.linspace(0, 1, SPREAD)[closed], np.abs(cycles.multiplier[closed]) - 1
-            roots = np.roots(np.polyfit(places, off, 3))
+            curve = np.polyfit(places, off, 3)
+            roots = np.roots(curve)
             real = roots.real[np.abs(roots.imag) < 1e-9]
             inside = real[(real >= 0) & (real <= places[-1])]
             if not inside.size:
                 break
-            flip = float(at * (outside / at) ** inside.max())
-            at, outside = flip / NEAR, flip * NEAR  # a curve over less is closer
+            place = float(inside.max())
+            scatter = float(np.sqrt(np.sum((off - np.polyval(curve, places)) ** 2) / max(len(places) - 4, 1)))
+            slope = abs(float(np.polyval(np.polyder(curve), place)))
+            rough = 2 * scatter / slope * abs(float(np.log(outside / at)))
+            before, now = flip, float(at * (outside / at) ** place)
+            flip = now, rough if before is None else max(rough, abs(now / before[0] - 1))
+            at, outside = now / NEAR, now * NEAR  # a curve over less is closer
         return flip
 
     def _simulated(

@@ -25,6 +25,7 @@ from friso.hunting.cycle.hunting import REACHED, Cycle, Hunting, Swing, cannot_h
 from friso.hunting.cycle.rest import wait
 from friso.hunting.margin import NOT_SOUGHT, BandwidthWindow, Margin, searched
 from friso.hunting.measures import Measures, measure, options
+from friso.hunting.outward import AttractionEnd
 from friso.stage import Stage
 
 LONG, SWINGS = 1000.0, 120.0
@@ -43,8 +44,8 @@ class Judgement:
     """The verdict (see `friso.hunting.criteria.stage_verdict`) and what it rests on.
 
     `displacement`, `push` and `moves` tell what starts hunting, where there is a cycle that attracts; `margin` the edge
-    of hunting in bandwidth, `windows` where else something attracts, and `lower` the next factor of the bandwidth below
-    1 at which nothing attracts a stage that hunts (None: none was found); `settled_after` the time [s] after the last
+    of hunting in bandwidth, `windows` where else something attracts, and `lower` the end below the bandwidth of what
+    attracts a stage that hunts (None: none was found); `settled_after` the time [s] after the last
     corner of the reference from which on this motion stays within 10 um, up to the time for which it was `followed` [s]
     (None: no longer than its own end). `observed`: what attracts was observed in long simulations, no orbit that
     attracts could be closed. `lasting` [m], peak to peak, is where this motion alone was seen to swing on, at the end
@@ -58,7 +59,7 @@ class Judgement:
     moves: MoveShare | None = None
     margin: Margin | None = None
     windows: tuple[BandwidthWindow, ...] = ()
-    lower: float | None = None
+    lower: AttractionEnd | None = None
     settled_after: float | None = None
     followed: float | None = None
     observed: bool = False

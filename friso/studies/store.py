@@ -7,7 +7,6 @@ others than were entered is run again.
 
 from __future__ import annotations
 
-import asyncio
 import logging
 import os
 from collections.abc import Iterator, Mapping
@@ -106,11 +105,7 @@ class Store:
             if name in encoding:
                 encoding[name]["_FillValue"] = np.nan
         template = xr.Dataset(variables, coords=coordinates, attrs=study.attributes())
-        try:
-            template.to_zarr(folder, "w", compute=False, encoding=encoding, zarr_format=_FORMAT, consolidated=True)
-        except OSError:
-            _let_zarr_finish()
-            raise
+        template.to_zarr(folder, "w", compute=False, encoding=encoding, zarr_format=_FORMAT, consolidated=True)
         seal_metadata(folder, coordinates)
 
     @property
@@ -235,17 +230,6 @@ def _shared(texts: xr.DataArray) -> np.ndarray:
         once = np.array([words_once.setdefault(str(word), str(word)) for word in words], dtype=object)
         decoded[first : first + rows] = once[codes].reshape(decoded[first : first + rows].shape)
     return decoded
-
-
-def _let_zarr_finish() -> None:
-    """Wait for what Zarr is still writing after one of its writes has failed."""
-    from zarr.core.sync import sync
-
-    async def others() -> None:
-        tasks = asyncio.all_tasks() - {asyncio.current_task()}
-        await asyncio.gather(*tasks, return_exceptions=True)
-
-    sync(others())
 
 
 def _refuse_other(path: Path, study: Study) -> None:

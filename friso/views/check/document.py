@@ -10,6 +10,7 @@ from friso.views.documents import plain_json
 
 if TYPE_CHECKING:
     from friso.hunting import Case, Cycle, Judgement, Margin, Swing
+    from friso.hunting.outward import AttractionEnd
     from friso.studies.draws import Draws
     from friso.studies.shares import Share
 
@@ -34,13 +35,15 @@ def _case(case: Case) -> dict[str, Any]:
         "settling_time_s": into_1um,
         "settling_time_10um_s": into_10um,
         "largest_force_n": case.largest_force,
+        "breakaway_force_n": case.breakaway,
+        "unmoved": case.unmoved,
         "cycle": _cycle(judgement.cycle) if judgement.cycle else None,
         "cycles": len(judgement.hunting.cycles),
         "reason": judgement.hunting.reason or None,
         "settled_after_s": judgement.settled_after,
         "margin": _margin(judgement.margin) if judgement.margin else None,
-        "windows": [{"low_factor": window.low, "high_factor": window.high} for window in judgement.windows],
-        "settles_below_factor": judgement.lower,
+        "windows": [{"low": _end(window.low), "high": _end(window.high)} for window in judgement.windows],
+        "settles_below": _end(judgement.lower),
         "kick": _kick(judgement),
         "moves": {"drawn": judgement.moves.count, "hunting": judgement.moves.hunting} if judgement.moves else None,
         "observed": judgement.observed,
@@ -88,7 +91,19 @@ def _kick(judgement: Judgement) -> dict[str, Any] | None:
 
 def _margin(edge: Margin) -> dict[str, Any]:
     crossover = {"factor": edge.factor, "crossover_hz": edge.crossover, "certain": edge.certain}
-    return {**crossover, "settles_at_factor": edge.quiet}
+    return {**crossover, "settles_at_factor": edge.quiet, "reserve": edge.reserve}
+
+
+def _end(end: AttractionEnd | None) -> dict[str, Any] | None:
+    """One end of the bandwidths at which something attracts."""
+    if end is None:
+        return None
+    return {
+        "factor": end.inside,
+        "settles_at_factor": end.outside,
+        "certain": end.certain,
+        "reserve": end.reserve,
+    }
 
 
 def draws_document(draws: Draws, case: str) -> dict[str, Any]:

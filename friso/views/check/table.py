@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from friso.hunting import COUNTED_ABOVE, COUNTED_AFTER
 from friso.views.check.cases import BANDS, ShownCase
-from friso.views.check.words import at_the_end
+from friso.views.check.words import at_the_end, edge_text
 from friso.views.drawing.prefixes import NOTHING, plus_minus, range_with_unit, window_with_unit, with_unit
 
 if TYPE_CHECKING:
@@ -69,10 +69,7 @@ def _edge(case: Case) -> str:
     edge = case.judgement.margin
     if edge is None:
         return NOTHING
-    crossover = edge.crossover / edge.factor if edge.crossover else None
-    ends = [edge.factor] if edge.certain else [edge.factor, edge.quiet]
-    texts = [f"{end:.3g} × as fast" if crossover is None else with_unit(crossover * end, "Hz", 4) for end in ends]
-    return texts[0] if edge.certain else f"between {' and '.join(texts)} (not certain)"
+    return f"{edge_text(case, edge.end)}{'' if edge.certain else ' (not certain)'}"
 
 
 def _kicks(kick: Kick | None, unit: str) -> str:
@@ -113,6 +110,8 @@ def _peaks(case: Case) -> str:
 def _settled_within(band: float) -> Callable[[Case], str]:
     def text(case: Case) -> str:
         time = case.settling_time.get(band)
+        if case.unmoved:
+            return "not moved"
         if time is not None:
             return with_unit(time, "s")
         return "never" if case.verdict == "hunts" else "not in this run"

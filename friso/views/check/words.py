@@ -7,14 +7,18 @@ from typing import TYPE_CHECKING
 
 from friso.equations.bandwidth import bandwidth
 from friso.hunting.basin import SHARES
-from friso.hunting.margin import COARSE, FARTHEST, STEPS
+from friso.hunting.margin import FARTHEST
 from friso.views.check.cases import BANDS, ShownCase, shown_cases
 from friso.views.drawing.prefixes import listed, plus_minus, rounded_down, rounded_up, with_unit
 
 if TYPE_CHECKING:
     from friso.hunting import Case, Kick, Margin
+    from friso.hunting.outward import AttractionEnd
 
 _MICRON, _TEN_MICRON = BANDS
+
+ROUGH = 5e-4
+"""Reserve of an edge, as a share of it, from which on it is told: the digits that are shown do not hold."""
 
 
 def verdict_sentence(item: ShownCase, cases: Mapping[str, Case]) -> str:
@@ -77,10 +81,11 @@ def _bistable(case: Case) -> str:
     if (moves := case.judgement.moves) and moves.hunting:
         like = f"like this one, {SHARES[0]:g} to {SHARES[1]:g} times its acceleration and time"
         starts.append(f"{100 * moves.fraction:.0f} % of the moves tried ({like})")
+    first = _unmoved(case) if case.unmoved else "settles after this move"
     if not starts:
-        return f"settles after this move, and none of the kicks and moves tried starts hunting ({_swing(case)})."
+        return f"{first}, and none of the kicks and moves tried starts hunting ({_swing(case)})."
     seen = " (observed in simulations; no orbit that attracts could be closed)" if case.judgement.observed else ""
-    return f"settles after this move, but {listed(starts, 'or')} can start hunting, {_swing(case)}{seen}."
+    return f"{first}, but {listed(starts, 'or')} can start hunting, {_swing(case)}{seen}."
 
 
 def _kick(name: str, kick: Kick, unit: str) -> str:
@@ -107,16 +112,24 @@ def _transient(case: Case) -> str:
 
 
 def _settling(case: Case) -> str:
+    hunting = case.judgement.hunting
+    says = f"settles: {_unmoved(case)}." if case.unmoved else _settled(case)
+    return says if hunting.possible else f"{says} It cannot hunt, because {hunting.reason}."
+
+
+def _unmoved(case: Case) -> str:
+    force, least = with_unit(case.largest_force, "N"), with_unit(case.breakaway, "N")
+    return f"this motion does not move the stage ({force} at most, and it breaks away from {least} on)"
+
+
+def _settled(case: Case) -> str:
     fine, coarse = case.settling_time.get(_MICRON), case.settling_time.get(_TEN_MICRON)
     if fine is not None:
-        says = f"settles to within {BANDS[_MICRON]} in {with_unit(fine, 's')}."
-    elif coarse is not None:
+        return f"settles to within {BANDS[_MICRON]} in {with_unit(fine, 's')}."
+    if coarse is not None:
         within = f"settles to within {BANDS[_TEN_MICRON]} in {with_unit(coarse, 's')}"
-        says = f"{within}, but does not stay within {BANDS[_MICRON]}."
-    else:
-        says = f"settles, but not to within {BANDS[_TEN_MICRON]} ({_end(case)})."
-    hunting = case.judgement.hunting
-    return says if hunting.possible else f"{says} It cannot hunt, because {hunting.reason}."
+        return f"{within}, but does not stay within {BANDS[_MICRON]}."
+    return f"settles, but not to within {BANDS[_TEN_MICRON]} ({_end(case)})."
 
 
 def _doubts(case: Case) -> list[str]:
@@ -139,43 +152,49 @@ def _outlook(case: Case) -> list[str]:
 
 
 def _below(case: Case, edge: Margin) -> str:
-    """Up to where hunting is possible, rounded upward."""
-    inside, quiet = _bandwidth(case, edge.factor), _bandwidth(case, edge.quiet)
-    if edge.certain:
-        return f"below {inside}"
-    return f"up to somewhere between {_bandwidth(case, edge.factor, up=False)}, where it was found, and {quiet}"
+    """Up to where hunting is possible."""
+    return f"below {edge_text(case, edge.end)}" if edge.certain else f"up to {edge_text(case, edge.end)}"
 
 
-def _bandwidth(case: Case, factor: float, up: bool = True) -> str:
-    """A bandwidth that is a factor of that of the case."""
+def edge_text(case: Case, end: AttractionEnd) -> str:
+    """A bandwidth at which hunting ends; of one that is not certain, where hunting was found and where it was not."""
+    if not end.certain:
+        ends = sorted((end.inside, end.outside))
+        low, high = _bandwidth(case, ends[0], up=False, digits=4), _bandwidth(case, ends[1], digits=4)
+        return f"somewhere between {low} and {high}"
+    if end.reserve < ROUGH:
+        return _bandwidth(case, end.inside, up=None, digits=4)
+    return f"about {_bandwidth(case, end.inside, up=None)} (± {100 * rounded_up(end.reserve, 1):.1g} %)"
+
+
+def _bandwidth(case: Case, factor: float, up: bool | None = True, digits: int = 3) -> str:
+    """A bandwidth that is a factor of that of the case, rounded upward, downward or (None) to the nearest."""
     edge = case.judgement.margin
     crossover = edge.crossover / edge.factor if edge and edge.crossover else bandwidth(case.stage.flat())
-    value = (rounded_up if up else rounded_down)(factor * (crossover or 1.0))
-    return f"{value:.3g} times this bandwidth" if crossover is None else with_unit(value, "Hz")
+    value = factor * (crossover or 1.0)
+    if up is not None:
+        value = (rounded_up if up else rounded_down)(value, digits)
+    return f"{value:.{digits}g} times this bandwidth" if crossover is None else with_unit(value, "Hz", digits)
 
 
 def _windows(case: Case) -> list[str]:
     """Where else in bandwidth something attracts."""
     places = []
     for window in case.judgement.windows:
-        low = None if window.low is None else _bandwidth(case, window.low, up=False)
-        high = None if window.high is None else _bandwidth(case, window.high)
+        low = None if window.low is None else edge_text(case, window.low)
+        high = None if window.high is None else edge_text(case, window.high)
         if low and high:
-            places.append(f"between {low} and {high}")
+            places.append(f"from {low} to {high}")
         elif low or high:
             places.append(f"above {low}" if low else f"below {high}")
-    if not places:
-        return []
-    finest, coarsest = (100 * (FARTHEST ** (1 / steps) - 1) for steps in (STEPS, COARSE))
-    steps = f"tried in steps of {finest:.0f} %, on the other side of this bandwidth of {coarsest:.0f} %"
-    return [f"Hunting is possible again {listed(places, 'and')} ({steps})."]
+    return [f"Hunting is possible again {listed(places, 'and')}."] if places else []
 
 
 def _remedy(item: ShownCase, cases: Mapping[str, Case]) -> list[str]:
     """What keeps a case from hunting."""
     judgement = item.case.judgement
     ways = [_faster(item.case, judgement.margin)] if judgement.margin else []
-    ways += [f"lower the bandwidth to {_bandwidth(item.case, judgement.lower, up=False)}"] if judgement.lower else []
+    ways += [_slower(item.case, judgement.lower)] if judgement.lower else []
     ways += ["free the joint"] if _freeing_helps(item, cases) else []
     says = [f"{ways[0][0].upper()}{listed(ways, 'or')[1:]}."] if ways else []
     if judgement.margin:
@@ -185,15 +204,22 @@ def _remedy(item: ShownCase, cases: Mapping[str, Case]) -> list[str]:
     return [f"Hunting is still possible at {FARTHEST:g} times this bandwidth.", *says]
 
 
+def _slower(case: Case, end: AttractionEnd) -> str:
+    """To which lower bandwidth the stage settles."""
+    doubt = "" if end.certain else f" (not certain: hunting was found down to {_bandwidth(case, end.inside, digits=4)})"
+    return f"lower the bandwidth to {_bandwidth(case, end.outside, up=False)}{doubt}"
+
+
 def _faster(case: Case, edge: Margin) -> str:
     """What to do to the controller so that the stage settles: to a bandwidth at which it was found to."""
-    controller = case.stage.controller
-    doubt = "" if edge.certain else f" (not certain: hunting was found up to {_bandwidth(case, edge.factor, up=False)})"
+    controller, highest = case.stage.controller, _bandwidth(case, edge.factor, up=False, digits=4)
+    doubt = "" if edge.certain else f" (not certain: hunting was found up to {highest})"
     if edge.crossover is not None:
         crossover = edge.crossover / edge.factor
         to = rounded_up(crossover * edge.quiet)
         by = rounded_up(to - crossover)
-        return f"raise the {controller.bandwidth_name} by {with_unit(by, 'Hz')} (to {with_unit(to, 'Hz')}){doubt}"
+        where = f" (to {with_unit(to, 'Hz')})" if edge.certain else f", to {with_unit(to, 'Hz')}"
+        return f"raise the {controller.bandwidth_name} by {with_unit(by, 'Hz')}{where}{doubt}"
     factor = rounded_up(edge.quiet)
     powers = controller.speeds_up.items()
     gains = [f"{name} × {factor**power:.3g}" for name, power in powers if getattr(controller, name)]
