@@ -53,6 +53,25 @@ def raising() -> Iterator[None]:
                 signal.signal(number, handler)
 
 
+@contextmanager
+def held() -> Iterator[None]:
+    """Ctrl-C and a termination wait for the end of the block. In another thread than the main one, which they do not
+    reach, nothing is done."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    arrived: list[int] = []
+    before = {number: signal.signal(number, lambda number, frame: arrived.append(number)) for number in SIGNALS}
+    try:
+        yield
+    finally:
+        for number, handler in before.items():
+            if handler is not None:  # not Python's
+                signal.signal(number, handler)
+        if arrived:
+            signal.raise_signal(arrived[0])
+
+
 def _install() -> dict[int, Any]:
     """Take the signals, but those that are ignored (nohup); what was done with them before."""
     before = {number: signal.getsignal(number) for number in SIGNALS}

@@ -189,12 +189,26 @@ def test_an_error_while_files_get_their_names_is_undone(
 
 def test_drafts_left_where_there_was_no_folder_yet_are_removed(tmp_path: Path) -> None:
     """By the next that writes, when there is one."""
-    left = tmp_path / f"{DRAFTS}left"
-    left.mkdir()
-    write({tmp_path / "out" / "page.html": ""})
-    left.mkdir()
-    write({tmp_path / "out" / "page.html": ""})
-    assert not left.exists()
+    write({tmp_path / "out" / "a" / "page.html": ""})
+    left = [folder / f"{DRAFTS}left" for folder in (tmp_path, tmp_path / "out", tmp_path / "out" / "a")]
+    for draft in left:
+        draft.mkdir(mode=0o700)
+    write({tmp_path / "out" / "a" / "page.html": None})
+    assert not any(draft.exists() for draft in left)
+
+
+@pytest.mark.skipif(os.name != "posix", reason="links and permissions as POSIX has them")
+def test_what_others_may_have_put_there_is_no_draft(tmp_path: Path) -> None:
+    """A link would have a lock made, and what was in it lost, in a folder of this user."""
+    mine = tmp_path / "mine"
+    mine.mkdir(mode=0o700)
+    (mine / "lock").write_text("precious")
+    (tmp_path / f"{DRAFTS}link").symlink_to(mine)
+    (tmp_path / f"{DRAFTS}open").mkdir()
+    (tmp_path / f"{DRAFTS}open").chmod(0o777)
+    write({tmp_path / "page.html": ""})
+    assert (mine / "lock").read_text() == "precious"
+    assert [*(tmp_path / f"{DRAFTS}open").iterdir()] == []
 
 
 def test_a_name_always_has_a_file(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -219,7 +233,7 @@ def test_drafts_that_a_killed_process_left_are_removed(folder: Path) -> None:
     """Those of one that is alive stay."""
     left, alive = (folder / f"{DRAFTS}{name}" for name in ("left", "alive"))
     for draft in (left, alive):
-        draft.mkdir()
+        draft.mkdir(mode=0o700)
         (draft / "0.txt").write_text("half")
     with FileLock(alive / "lock"):
         write(contents(folder))

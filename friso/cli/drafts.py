@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import os
 import shutil
-import signal
+import stat
 import tempfile
-import threading
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager, suppress
+from collections.abc import Callable
+from contextlib import ExitStack, suppress
 from functools import partial
 from itertools import count
 from pathlib import Path
@@ -17,7 +16,8 @@ from typing import TYPE_CHECKING
 
 from filelock import FileLock, Timeout
 
-from friso.interrupts import SIGNALS
+from friso.interrupts import held
+from friso.system import foreign_writers
 
 if TYPE_CHECKING:
     from friso.views.files import Content
@@ -27,6 +27,9 @@ DRAFTS = ".friso-draft-"
 
 _LOCK = "lock"
 
+_LEVELS = 4
+"""How many folders up from a file leftovers are looked for: no command writes deeper below what it is told."""
+
 
 class Drafts:
     """Drafts of files on the disk where they are to be, gone at the end of the `with` block unless put in place."""
@@ -35,6 +38,7 @@ class Drafts:
         self.folders: dict[Path, Path] = {}
         self.locks = ExitStack()
         self.drafts: list[tuple[Path | None, Path]] = []
+        self.tidied: set[Path] = set()
         self.numbers = count()
 
     def __enter__(self) -> Drafts:
@@ -49,6 +53,7 @@ class Drafts:
         """The draft of a file; None: an earlier one is deleted in the end."""
         if path.is_dir():
             raise IsADirectoryError(f"{path} is a folder")
+        self._tidy(path)
         if content is None:
             self.drafts.append((None, path))
             return
@@ -63,7 +68,7 @@ class Drafts:
         """Give all drafts their names. An error on the way, and all is as it was before; Ctrl-C waits until the end. A
         name always has a file, the earlier one or the new."""
         undo: list[Callable[[], object]] = []
-        with _signals_held():
+        with held():
             try:
                 for draft, path in self.drafts:
                     undo += [folder.rmdir for folder in made(path.parent)]
@@ -83,12 +88,17 @@ class Drafts:
                         step()
                 raise
 
+    def _tidy(self, path: Path) -> None:
+        """Remove what killed processes left of drafts, near `path`: where there was no folder yet, further up."""
+        for folder in {*path.absolute().parents[:_LEVELS]} - self.tidied:
+            self.tidied.add(folder)
+            if folder.is_dir():
+                _remove_leftovers(folder)
+
     def _spare(self, path: Path) -> Path:
         """A path that is free, on the disk of `path`, with its suffix."""
         root = next(folder for folder in path.absolute().parents if folder.exists())
         if root not in self.folders:
-            for above in (root, *root.parents[:2]):  # where there was no folder yet, they were left further up
-                _remove_leftovers(above)
             folder = self.folders[root] = Path(tempfile.mkdtemp(prefix=DRAFTS, dir=root))
             self.locks.enter_context(FileLock(folder / _LOCK))  # locked, it is no leftover
         return self.folders[root] / f"{next(self.numbers)}{path.suffix}"
@@ -103,9 +113,12 @@ def _duplicate(path: Path, spare: Path) -> None:
 
 
 def _remove_leftovers(root: Path) -> None:
-    """Remove what killed processes left of their drafts: nobody holds their lock."""
+    """Remove what killed processes of this user left of their drafts: nobody holds their lock."""
     for folder in root.glob(f"{DRAFTS}*"):
         try:
+            status = folder.lstat()
+            if not stat.S_ISDIR(status.st_mode) or foreign_writers(status):
+                continue  # put there by others, to have a lock made in a folder of this user
             with FileLock(folder / _LOCK, blocking=False):
                 shutil.rmtree(folder, ignore_errors=True)
         except (OSError, Timeout):  # it is written to, or nobody may delete it
@@ -128,20 +141,3 @@ def made(folder: Path) -> list[Path]:
             path.rmdir()
         raise
     return done
-
-
-@contextmanager
-def _signals_held() -> Iterator[None]:
-    """Ctrl-C and a termination wait for the end of the block."""
-    if threading.current_thread() is not threading.main_thread():
-        yield
-        return
-    came: list[int] = []
-    before = {number: signal.signal(number, lambda number, frame: came.append(number)) for number in SIGNALS}
-    try:
-        yield
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
-        if came:
-            signal.raise_signal(came[0])

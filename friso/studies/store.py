@@ -7,6 +7,7 @@ others than were entered is run again.
 
 from __future__ import annotations
 
+import asyncio
 import logging
 import os
 from collections.abc import Iterator, Mapping
@@ -105,7 +106,11 @@ class Store:
             if name in encoding:
                 encoding[name]["_FillValue"] = np.nan
         template = xr.Dataset(variables, coords=coordinates, attrs=study.attributes())
-        template.to_zarr(folder, "w", compute=False, encoding=encoding, zarr_format=_FORMAT, consolidated=True)
+        try:
+            template.to_zarr(folder, "w", compute=False, encoding=encoding, zarr_format=_FORMAT, consolidated=True)
+        except OSError:
+            _let_zarr_finish()
+            raise
         seal_metadata(folder, coordinates)
 
     @property
@@ -230,6 +235,17 @@ def _shared(texts: xr.DataArray) -> np.ndarray:
         once = np.array([words_once.setdefault(str(word), str(word)) for word in words], dtype=object)
         decoded[first : first + rows] = once[codes].reshape(decoded[first : first + rows].shape)
     return decoded
+
+
+def _let_zarr_finish() -> None:
+    """Wait for what Zarr is still writing after one of its writes has failed."""
+    from zarr.core.sync import sync
+
+    async def others() -> None:
+        tasks = asyncio.all_tasks() - {asyncio.current_task()}
+        await asyncio.gather(*tasks, return_exceptions=True)
+
+    sync(others())
 
 
 def _refuse_other(path: Path, study: Study) -> None:

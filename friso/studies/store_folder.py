@@ -11,13 +11,14 @@ import re
 import shutil
 import uuid
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from glob import escape
 from pathlib import Path
 
 from filelock import FileLock, Timeout
 
 from friso.errors import StoreError
+from friso.interrupts import held
 from friso.studies.metadata import PARTIAL
 
 LOCK = ".friso.lock"
@@ -57,13 +58,13 @@ def exchange(path: Path, fill: Callable[[Path], object]) -> None:
 def remove_leftovers(path: Path) -> None:
     """Remove what killed processes left beside the store at `path`, or put it back where it was being replaced:
     nobody holds their lock."""
-    for old in path.parent.glob(f".{path.name}.{_DIGITS}{_OLD}"):
+    for old in path.parent.glob(f".{escape(path.name)}.{_DIGITS}{_OLD}"):
         with _unless_locked(old) as free:
             if free and not path.exists():
                 old.rename(path)
             elif free:
                 shutil.rmtree(old, ignore_errors=True)
-    for draft in path.parent.glob(f".{path.name}.{_DIGITS}"):
+    for draft in path.parent.glob(f".{escape(path.name)}.{_DIGITS}"):
         with _unless_locked(draft) as free:
             if free:
                 shutil.rmtree(draft, ignore_errors=True)
@@ -100,15 +101,15 @@ def locked(path: Path) -> Iterator[None]:
 
 @contextmanager
 def _made_aside(path: Path, fill: Callable[[Path], object]) -> Iterator[Path]:
-    """What `fill` has written, to be moved away. It runs in a thread of its own, so that Ctrl-C waits for its end: else
-    the threads of Zarr would go on writing into what is deleted here."""
+    """What `fill` has written, to be moved away. Ctrl-C waits for its end: else the threads of Zarr would go on writing
+    into what is deleted here."""
     draft = _beside(path)
     try:
         draft.mkdir(parents=True)
         with FileLock(draft / LOCK):  # locked, it is no leftover
             new = draft / "store"
-            with ThreadPoolExecutor(1) as thread:
-                thread.submit(fill, new).result()
+            with held():
+                fill(new)
             yield new
     finally:
         shutil.rmtree(draft, ignore_errors=True)
@@ -116,9 +117,11 @@ def _made_aside(path: Path, fill: Callable[[Path], object]) -> Iterator[Path]:
 
 @contextmanager
 def _unless_locked(folder: Path) -> Iterator[bool]:
-    """Whether nobody else held the lock of a folder, which is held within."""
+    """Whether nobody else held the lock of a folder (no link to one), which is held within."""
     lock = FileLock(folder / LOCK)
     try:
+        if folder.is_symlink():
+            raise NotADirectoryError(folder)
         lock.acquire(timeout=0)
     except (OSError, Timeout):
         yield False
