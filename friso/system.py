@@ -6,6 +6,7 @@ import stat
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 if sys.platform == "win32":
 
@@ -17,6 +18,14 @@ if sys.platform == "win32":
     def foreign_writers(status: os.stat_result) -> str:
         """Nobody: what is below a user's profile is the user's own by its access lists, which a mode does not tell."""
         return ""
+
+    def is_open_to_others(status: os.stat_result) -> bool:
+        """No: see `foreign_writers`."""
+        return False
+
+    def closed_to_others(folder: Path) -> os.stat_result:
+        """The status of a folder, as it is: see `foreign_writers`."""
+        return folder.lstat()
 
 else:
 
@@ -38,6 +47,19 @@ else:
         if status.st_mode & (stat.S_IWGRP | stat.S_IWOTH) and not sticky:
             return "can be written by other users"
         return ""
+
+    def is_open_to_others(status: os.stat_result) -> bool:
+        """Whether others than this user may read a file, or write to it."""
+        return bool(status.st_mode & 0o077)
+
+    def closed_to_others(folder: Path) -> os.stat_result:
+        """The status of a folder, once nobody else may look into it if it is the user's own; another's is left as it
+        is."""
+        status = folder.lstat()
+        if status.st_uid == os.geteuid() and stat.S_IMODE(status.st_mode) != 0o700:
+            folder.chmod(0o700)
+            return folder.lstat()
+        return status
 
 
 if sys.platform == "linux":

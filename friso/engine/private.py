@@ -12,7 +12,7 @@ import tempfile
 from contextlib import suppress
 from pathlib import Path
 
-from friso.system import foreign_writers
+from friso.system import closed_to_others, foreign_writers
 
 
 def make_private(folder: Path) -> None:
@@ -34,17 +34,9 @@ def make_private(folder: Path) -> None:
         if not stat.S_ISDIR(status.st_mode):
             raise NotADirectoryError(20, "Not a directory", str(path))
         if path == folder:
-            status = _closed(path, status)
+            status = closed_to_others(path)
         if why := foreign_writers(status):
             raise PermissionError(f"{path} {why}")
-
-
-def _closed(folder: Path, status: os.stat_result) -> os.stat_result:
-    """The status of the user's own folder once nobody else may look into it; another's is left as it is."""
-    if os.name == "posix" and status.st_uid == os.geteuid() and stat.S_IMODE(status.st_mode) != 0o700:
-        folder.chmod(0o700)
-        return folder.lstat()
-    return status
 
 
 def read_private(path: Path) -> bytes:

@@ -11,6 +11,7 @@ from pathlib import Path
 from filelock import FileLock
 
 from friso.engine.private import read_private, write_private
+from friso.system import is_open_to_others
 
 SECRET, LENGTH = "secret", 32
 """The file with the secret, and the length [bytes] of it and of an authenticator."""
@@ -50,7 +51,7 @@ def _secret(folder: Path) -> bytes:
 def _stored(file: Path) -> bytes | None:
     try:
         secret = read_private(file)
-        closed = os.name != "posix" or not file.lstat().st_mode & 0o077
+        closed = not is_open_to_others(file.lstat())
     except OSError:
         return None
     return secret if closed and len(secret) == LENGTH else None

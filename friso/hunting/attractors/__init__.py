@@ -98,11 +98,7 @@ def attractors(
     suggested = families(stages, rtol) if thorough else ()
     starts = Starts(stages)
     starts.spread(thorough)
-    for family in suggested:
-        survey.slow_down(every, family)
-        starts.beside(family)
-        if (numbers := np.flatnonzero(family.attracting)).size:
-            survey.confirm(starts.on(family, numbers), numbers, family.take(numbers))
+    _take_notice(starts, survey, every, suggested)
     if tried is not None:
         starts.stuck_at(tried)
     for runs, of in starts.waves(thorough):
@@ -115,6 +111,15 @@ def attractors(
     return _tried_again(stages, surveyed, rtol) if thorough else surveyed
 
 
+def _take_notice(starts: Starts, survey: Survey, numbers: np.ndarray, suggested: tuple[Cycles, ...]) -> None:
+    """Confirm the suggested cycles that attract the stages with some numbers, and begin beside those that repel."""
+    for cycles in suggested:
+        survey.slow_down(numbers, cycles)
+        starts.beside(cycles)
+        if (attracting := np.flatnonzero(cycles.attracting)).size:
+            survey.confirm(starts.on(cycles, attracting), numbers[attracting], cycles.take(attracting))
+
+
 def _try_cycles(begun: Starts, survey: Survey, rtol: float) -> None:
     """Follow stages that nothing attracts so far from the cycles that the return map suggests: near a fold these
     attract from less far than starts are apart."""
@@ -122,11 +127,7 @@ def _try_cycles(begun: Starts, survey: Survey, rtol: float) -> None:
     if not left.size:
         return
     starts = begun.take(left)
-    for cycles in families(starts.stages, rtol):
-        survey.slow_down(left, cycles)
-        starts.beside(cycles)
-        if (numbers := np.flatnonzero(cycles.attracting)).size:
-            survey.confirm(starts.on(cycles, numbers), left[numbers], cycles.take(numbers))
+    _take_notice(starts, survey, left, families(starts.stages, rtol))
     for runs, of in starts.waves(thorough=True):
         survey.follow(runs, left[of])
 
