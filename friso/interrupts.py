@@ -16,6 +16,8 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import Any
 
+from friso.system import signal_later
+
 SIGNALS = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
 """The signals that end a command."""
 
@@ -85,9 +87,8 @@ def _arrived(number: int, frame: FrameType | None) -> None:
         _came.append(number)
     if not _raising:
         return
-    if sys.platform != "win32" and _imports(frame):
-        signal.signal(signal.SIGALRM, _arrived)
-        signal.setitimer(signal.ITIMER_REAL, _AGAIN)
+    if _imports(frame):
+        signal_later(_AGAIN, _arrived)
         return
     raise KeyboardInterrupt
 

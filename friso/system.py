@@ -1,19 +1,59 @@
 """What differs between operating systems: Linux, macOS and Windows."""
 
+import math
 import os
 import signal
 import stat
 import sys
-from collections.abc import Iterator
+import threading
+import time
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from types import FrameType
 
 if sys.platform == "win32":
+    import _thread
+    import ctypes
+
+    PATIENCE = 2.0
+    """How long [s] a file that another program holds open is waited for: virus scanners and indexers look at every
+    file that appears."""
+
+    _DEVICES = {"CON", "PRN", "AUX", "NUL", *(f"{port}{number}" for port in ("COM", "LPT") for number in range(1, 10))}
 
     @contextmanager
     def interrupts_held() -> Iterator[None]:
-        """Nothing: a process does not pass on that Ctrl-C is held back."""
-        yield
+        """Ctrl-C is ignored; processes started meanwhile ignore it for good."""
+        console = ctypes.WinDLL("kernel32")
+        console.SetConsoleCtrlHandler(None, True)
+        try:
+            yield
+        finally:
+            console.SetConsoleCtrlHandler(None, False)
+
+    def signal_later(seconds: float, handler: Callable[[int, FrameType | None], object]) -> None:
+        """Have a handler of SIGINT called in the main thread after some time."""
+        timer = threading.Timer(seconds, _thread.interrupt_main, (signal.SIGINT,))
+        timer.daemon = True
+        timer.start()
+
+    def replace(draft: Path, path: Path) -> None:
+        """Give a file another's name and place. Raises OSError; one that another program holds open for longer than
+        `PATIENCE` is a PermissionError that says so."""
+        end = time.monotonic() + PATIENCE
+        while True:
+            try:
+                draft.replace(path)
+                return
+            except PermissionError as error:
+                if time.monotonic() > end:
+                    raise PermissionError(error.errno, "it may be open in another program", str(path)) from error
+                time.sleep(0.05)
+
+    def device_in(path: Path) -> str:
+        """The part of a path that Windows takes for a device; "" where there is none."""
+        return next((part for part in path.parts if part.split(".")[0].rstrip().upper() in _DEVICES), "")
 
     def foreign_writers(status: os.stat_result) -> str:
         """Nobody: what is below a user's profile is the user's own by its access lists, which a mode does not tell."""
@@ -37,6 +77,19 @@ else:
             yield
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+    def signal_later(seconds: float, handler: Callable[[int, FrameType | None], object]) -> None:
+        """Have a handler called in the main thread after some time, as for SIGALRM."""
+        signal.signal(signal.SIGALRM, handler)
+        signal.setitimer(signal.ITIMER_REAL, seconds)
+
+    def replace(draft: Path, path: Path) -> None:
+        """Give a file another's name and place. Raises OSError."""
+        draft.replace(path)
+
+    def device_in(path: Path) -> str:
+        """ "": a device is a file like others."""
+        return ""
 
     def foreign_writers(status: os.stat_result) -> str:
         """Who else than this user and root may write to a file, or exchange what this user has in a folder, in words;
@@ -65,8 +118,25 @@ else:
 if sys.platform == "linux":
 
     def usable_cores() -> int:
-        """Number of processor cores that this process may use."""
-        return len(os.sched_getaffinity(0))
+        """Number of processor cores that this process may use: those it is confined to, and no more than a container's
+        share of time."""
+        return max(1, math.ceil(min(len(os.sched_getaffinity(0)), _share_of_time())))
+
+    def _share_of_time(proc: Path = Path("/proc/self/cgroup"), root: Path = Path("/sys/fs/cgroup")) -> float:
+        """How many cores' time the control groups of this process (cgroup v2) leave it; infinite without a limit."""
+        try:
+            own = next(line[3:] for line in proc.read_text(encoding="utf-8").splitlines() if line.startswith("0::"))
+        except (OSError, StopIteration):
+            return math.inf
+        group = root / own.strip("/")
+        return min(_quota(folder) for folder in (group, *group.parents) if folder.is_relative_to(root))
+
+    def _quota(group: Path) -> float:
+        try:
+            quota, period = (group / "cpu.max").read_text(encoding="ascii").split()
+            return float(quota) / float(period)
+        except (OSError, ValueError):  # no limit ("max"), or no such file
+            return math.inf
 
 else:
 

@@ -12,7 +12,8 @@ from variants import VARIANTS
 from friso.engine import roots, simd_math, vector_code
 from friso.engine.kernel import kernel
 from friso.engine.layout import LANES
-from friso.engine.machine_code import optimised, target_machine
+from friso.engine.machine_code import optimised
+from friso.engine.processor import processor
 from friso.equations.structure import structure
 
 FEATURES = llvm.get_host_cpu_features()
@@ -96,7 +97,8 @@ def test_compiled_functions_are_those_of_plain_python(function: Callable[..., No
 def test_steps_are_vectorised() -> None:
     """The step of a kernel works on whole registers; hardly anything is done lane by lane."""
     written = vector_code.written({"step": kernel(structure(VARIANTS["rigid"].flat())).module.step}, LANES)
-    assembly = target_machine().emit_assembly(optimised(written))
+    machine = processor().target_machine()
+    assembly = machine.emit_assembly(optimised(written, machine))
     scalar = len(re.findall(r"\bv(?:f[n]?m(?:add|sub)\d+|mul|add|sub|div)sd\b", assembly))
     assert packed(assembly) > 500
     assert scalar < packed(assembly) / 10

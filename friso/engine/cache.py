@@ -32,12 +32,12 @@ from pathlib import Path
 from types import CodeType, ModuleType
 
 import llvmlite
-import llvmlite.binding as llvm
 import numpy as np
 from filelock import FileLock
 from platformdirs import user_cache_dir
 
 from friso.engine.private import make_private
+from friso.engine.processor import processor
 from friso.engine.seal import read_sealed, write_sealed
 from friso.version import VERSION
 
@@ -96,14 +96,13 @@ def code_digest(*parts: str) -> str:
 @cache
 def machine() -> str:
     """What decides on the last bits of a run besides friso's code: processor and compiler."""
-    return f"{llvm.get_host_cpu_name()}, llvmlite {llvmlite.__version__}, numpy {np.__version__}"
+    return f"{processor().name}, llvmlite {llvmlite.__version__}, numpy {np.__version__}"
 
 
 @cache
 def environment() -> str:
     """What machine code depends on besides its source: the compilers and the processor."""
-    processor = (llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten())
-    return repr((sys.version, np.__version__, llvmlite.__version__, processor))
+    return repr((sys.version, np.__version__, llvmlite.__version__, processor()))
 
 
 @dataclass(frozen=True)
@@ -205,7 +204,17 @@ def _compiled_with() -> str:
     return _digest(*(_without_words(file.read_text(encoding="utf-8")) for file in files))
 
 
-_INCLUDED = ("arrays", "kinds", "layout", "machine_code", "roots", "scalar_code", "simd_math", "vector_code")
+_INCLUDED = (
+    "arrays",
+    "kinds",
+    "layout",
+    "machine_code",
+    "processor",
+    "roots",
+    "scalar_code",
+    "simd_math",
+    "vector_code",
+)
 
 
 def _file_name(name: str) -> str:

@@ -6,8 +6,10 @@ from collections import namedtuple
 from dataclasses import dataclass
 from itertools import accumulate
 
-LANES = 8
-"""Runs side by side: one 512-bit register of float64, or two of 256 bits."""
+from friso.engine.processor import processor
+
+LANES = processor().lanes
+"""Runs side by side: one register of float64."""
 
 SCALARS = (
     "time",

@@ -12,33 +12,25 @@ import llvmlite.binding as llvm
 from llvmlite import ir
 
 from friso.engine.kinds import Kind, packed
+from friso.engine.processor import processor
 
 
 def object_code(module: ir.Module) -> bytes:
     """The object file of a module, optimised for this processor."""
-    return target_machine().emit_object(optimised(module))
+    machine = processor().target_machine()
+    return machine.emit_object(optimised(module, machine))
 
 
-def optimised(module: ir.Module) -> llvm.ModuleRef:
-    """A module as LLVM has rewritten it for this processor."""
-    machine = target_machine()
+def optimised(module: ir.Module, machine: llvm.TargetMachine) -> llvm.ModuleRef:
+    """A module as LLVM has rewritten it for a processor."""
     parsed = llvm.parse_assembly(str(module))
-    parsed.triple, parsed.data_layout = llvm.get_process_triple(), str(machine.target_data)
+    parsed.triple, parsed.data_layout = machine.triple, str(machine.target_data)
     parsed.verify()
     options = llvm.create_pipeline_tuning_options(speed_level=2)
     options.slp_vectorization = options.loop_vectorization = False
     passes = llvm.create_pass_builder(machine, options)
     passes.getModulePassManager().run(parsed, passes)
     return parsed
-
-
-def target_machine() -> llvm.TargetMachine:
-    """What writes code for this processor."""
-    llvm.initialize_native_target()
-    llvm.initialize_native_asmprinter()
-    target = llvm.Target.from_triple(llvm.get_process_triple())
-    features = llvm.get_host_cpu_features().flatten()
-    return target.create_target_machine(llvm.get_host_cpu_name(), features, opt=3, reloc="pic", codemodel="small")
 
 
 def load(code: bytes, functions: Iterable[str]) -> Mapping[str, int]:
@@ -59,7 +51,7 @@ _libraries: list[llvm.ResourceTracker] = []
 
 @cache
 def _linker() -> llvm.LLJIT:
-    return llvm.create_lljit_compiler(target_machine())
+    return llvm.create_lljit_compiler(processor().target_machine())
 
 
 class Loops:

@@ -15,6 +15,7 @@ import numpy as np
 from friso.studies.cells import WORDS, Columns
 from friso.studies.metadata import PARTIAL
 from friso.studies.refine import Ask
+from friso.system import replace
 
 
 class Answers:
@@ -37,7 +38,7 @@ class Answers:
             with draft.open("wb") as stream:
                 arrays: dict[str, Any] = {name: columns[name].astype(WORDS.get(name, "f8")) for name in columns}
                 np.savez_compressed(stream, cells=cells, **arrays)
-            draft.replace(file)
+            replace(draft, file)
             return columns
 
         return answer

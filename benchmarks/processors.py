@@ -1,0 +1,77 @@
+"""What lesser processors cost: `python -m benchmarks.processors`.
+
+The two maps of the prototype, on one core, with code for each processor that this machine can pretend to be, in turns;
+times as ratios to this machine's own, and the share of runs that come to the same outcome.
+"""
+
+from __future__ import annotations
+
+import argparse
+import base64
+import json
+import os
+import subprocess
+import sys
+import time
+
+import numpy as np
+
+from benchmarks.report import print_table
+from benchmarks.rigs import rig
+from benchmarks.two_maps import both_maps, friso_map
+from friso.engine.processor import PROCESSOR_VARIABLE, processor
+
+LEVELS = {"": "this machine", "x86-64-v4": "AVX-512", "x86-64-v3": "AVX2", "x86-64-v2": "SSE4.2", "x86-64": "SSE2"}
+"""Processors by LLVM's name, most able first, and what they are known for."""
+
+
+def measure(rtol: float, repetitions: int) -> dict[str, list[float | str]]:
+    """Least time [s] of each map on one core, and which of its runs swing, packed; in this process."""
+    maps: dict[str, list[float | str]] = {}
+    for case in both_maps(rig(True), rig(False)):
+        times = []
+        for _ in range(repetitions + 1):  # the first one warms up
+            start = time.process_time()
+            peaks, _ = friso_map(case, rtol)
+            times.append(time.process_time() - start)
+        swings = np.packbits(peaks > 0).tobytes()
+        maps[case.name] = [min(times[1:]), base64.b64encode(swings).decode("ascii")]
+    return maps
+
+
+def measured_on(name: str, rtol: float, repetitions: int) -> dict[str, tuple[float, np.ndarray]]:
+    """The same in a process of its own, with code for the named processor."""
+    command = [sys.executable, "-m", "benchmarks.processors", "--child", str(rtol), str(repetitions)]
+    done = subprocess.run(command, env={**os.environ, PROCESSOR_VARIABLE: name}, stdout=subprocess.PIPE, check=True)
+    maps = json.loads(done.stdout)
+    return {case: (seconds, _unpacked(bits)) for case, (seconds, bits) in maps.items()}
+
+
+def _unpacked(bits: str) -> np.ndarray:
+    return np.unpackbits(np.frombuffer(base64.b64decode(bits), np.uint8))
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--rtol", type=float, default=1e-6)
+    parser.add_argument("--repetitions", type=int, default=3)
+    parser.add_argument("--child", nargs=2, help=argparse.SUPPRESS)
+    options = parser.parse_args()
+    if options.child:
+        print(json.dumps(measure(float(options.child[0]), int(options.child[1]))))
+        return
+    measured = {name: measured_on(name, options.rtol, options.repetitions) for name in LEVELS}
+    own = measured[""]
+    rows = []
+    for name, known_for in LEVELS.items():
+        for case, (seconds, swings) in measured[name].items():
+            ratio, agreement = seconds / own[case][0], np.mean(swings == own[case][1])
+            called = f"{known_for} ({name or processor().name})"
+            rows.append([called, case, f"{seconds:.2f}", f"{ratio:.2f}", f"{100 * agreement:.2f} %"])
+    print(f"\n41 x 41 runs of 20 s, one core, rtol {options.rtol:g}")
+    print_table(("processor", "map", "CPU time [s]", "ratio", "same outcome"), rows)
+
+
+if __name__ == "__main__":
+    main()

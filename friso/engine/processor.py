@@ -1,0 +1,54 @@
+"""The processor that code is compiled for."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from functools import cache
+
+import llvmlite.binding as llvm
+
+PROCESSOR_VARIABLE = "FRISO_PROCESSOR"
+"""Names a lesser processor of the same family to compile for, as LLVM calls it: x86-64-v3, say, has AVX2 but not
+AVX-512. For `python -m benchmarks.processors`, and for a cache that different machines share."""
+
+
+@dataclass(frozen=True)
+class Processor:
+    """A processor as LLVM knows it: the platform's triple, a name, and the features beyond those that the name implies
+    ("+avx2,-fma")."""
+
+    triple: str
+    name: str
+    features: str = ""
+
+    @property
+    def lanes(self) -> int:
+        """Numbers of float64 that a register holds: 8 with AVX-512, 4 with AVX, 2 with SSE2 and NEON. More of them side
+        by side are no faster, and take longer to compile (docs/platforms.md)."""
+        features = self.features.split(",")
+        if "+avx512f" in features or self.name == "x86-64-v4":
+            return 8
+        return 4 if "+avx" in features or self.name == "x86-64-v3" else 2
+
+    def target_machine(self) -> llvm.TargetMachine:
+        """What writes code for it. Raises RuntimeError for a triple that LLVM does not know."""
+        target = llvm.Target.from_triple(self.triple)
+        return target.create_target_machine(self.name, self.features, opt=3, reloc="pic", codemodel="small")
+
+
+@cache
+def processor() -> Processor:
+    """This machine's processor, or the lesser one that the environment names."""
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+    triple = loadable(llvm.get_process_triple())
+    if name := os.environ.get(PROCESSOR_VARIABLE):
+        return Processor(triple, name)
+    return Processor(triple, llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten())
+
+
+def loadable(triple: str) -> str:
+    """The triple of a platform whose object files LLVM can load: on Windows those of Linux (ELF), since it fails to
+    place the constants of Windows' own (COFF); Numba does the same."""
+    return f"{triple}-elf" if "windows" in triple else triple

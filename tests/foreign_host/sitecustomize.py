@@ -1,0 +1,153 @@
+"""Makes this interpreter look to friso like one on another system, which FRISO_FOREIGN_HOST names like `sys.platform`.
+
+Python imports it at its start, in children too, where its folder is in PYTHONPATH. friso's modules get `os`, `signal`,
+`sys` and `ctypes` without the names that the other system lacks; other packages have versions of their own for it, and
+are left alone. For Windows, also: what is open cannot be renamed, replaced or deleted; text files are cp1252 with CRLF
+unless they are opened otherwise.
+"""
+
+import builtins
+import ctypes
+import io
+import locale
+import multiprocessing
+import os
+import signal
+import sys
+from types import ModuleType
+
+HOST = os.environ["FRISO_FOREIGN_HOST"]
+
+LINUX = "sched_getaffinity sched_setaffinity memfd_create eventfd posix_fadvise splice O_DIRECT O_TMPFILE getrandom"
+POSIX = (
+    "geteuid getuid getegid getgid getgroups fork forkpty killpg setsid getpgid getpgrp mkfifo chown fchown fchmod "
+    "statvfs sysconf uname wait3 wait4 getloadavg nice O_NOFOLLOW O_NONBLOCK O_DIRECTORY O_CLOEXEC"
+)
+SIGNALS = (
+    "SIGKILL SIGHUP SIGALRM SIGUSR1 SIGUSR2 SIGCHLD SIGPIPE SIGQUIT SIGXFSZ pthread_sigmask pthread_kill setitimer "
+    "ITIMER_REAL alarm sigwait SIG_BLOCK SIG_SETMASK"
+)
+MODULES = {"win32": {"fcntl", "resource", "pwd", "grp", "termios", "syslog"}, "darwin": set()}[HOST]
+
+
+class Foreign(ModuleType):
+    """A module without some of its names, and with others in their place."""
+
+    def __init__(self, module, absent="", **others):
+        super().__init__(module.__name__)
+        vars(self).update(_module=module, _absent=frozenset(absent.split()), **others)
+
+    def __getattr__(self, name):
+        if name in self._absent:
+            raise AttributeError(f"module {self.__name__!r} has no attribute {name!r} on {HOST}")
+        return getattr(self._module, name)
+
+    def __setattr__(self, name, value):
+        setattr(self._module, name, value)
+
+    def __dir__(self):
+        return [name for name in dir(self._module) if name not in self._absent]
+
+
+class Console:
+    """The part of Windows' kernel32 that friso calls."""
+
+    def __init__(self, name):
+        assert name == "kernel32"
+
+    def SetConsoleCtrlHandler(self, handler, ignored):
+        assert handler is None
+        signal.signal(signal.SIGINT, signal.SIG_IGN if ignored else signal.default_int_handler)
+        return 1
+
+
+FOREIGN = {
+    "win32": {
+        "os": Foreign(os, f"{LINUX} {POSIX}", name="nt"),
+        "signal": Foreign(signal, SIGNALS),
+        "sys": Foreign(sys, platform="win32"),
+        "ctypes": Foreign(ctypes, WinDLL=Console),
+    },
+    "darwin": {"os": Foreign(os, LINUX), "signal": signal, "sys": Foreign(sys, platform="darwin")},
+}[HOST]
+
+_import = builtins.__import__
+
+
+def _foreign_import(name, globals=None, locals=None, fromlist=(), level=0):
+    importer = (globals or {}).get("__name__", "")
+    if importer.partition(".")[0] == "friso" and level == 0:
+        if name in MODULES:
+            raise ModuleNotFoundError(f"No module named {name!r} on {HOST}", name=name)
+        if name in FOREIGN:
+            return FOREIGN[name]
+    return _import(name, globals, locals, fromlist, level)
+
+
+builtins.__import__ = _foreign_import
+multiprocessing.set_start_method("spawn")
+
+
+# Windows' files
+
+
+def _opened_by():
+    """All files that processes have open, and the folders above them that cannot be renamed for that."""
+    for process in filter(str.isdigit, os.listdir("/proc")):
+        try:
+            numbers = os.listdir(f"/proc/{process}/fd")
+        except OSError:
+            continue
+        for number in numbers:
+            try:
+                yield os.readlink(f"/proc/{process}/fd/{number}")
+            except OSError:
+                continue
+
+
+def _refuse_open(path, folder=None, below=False):
+    where = os.readlink(f"/proc/self/fd/{folder}") if folder is not None else ""
+    path = os.path.join(where, os.fsdecode(path))
+    real = os.path.join(os.path.realpath(os.path.dirname(path)), os.path.basename(path))
+    if real.startswith("/dev/shm/"):  # multiprocessing's own, which on Windows has no name in a folder
+        return
+    for file in _opened_by():
+        if (file == real and not os.path.isdir(real)) or (below and file.startswith(real + os.sep)):
+            raise PermissionError(13, "The process cannot access the file: it is open", path)
+
+
+def _renaming(real):
+    def rename(source, target, *, src_dir_fd=None, dst_dir_fd=None):
+        if real is _rename and os.path.lexists(target):
+            raise FileExistsError(17, "Cannot create a file when that file already exists", os.fsdecode(target))
+        _refuse_open(source, src_dir_fd, below=True)
+        _refuse_open(target, dst_dir_fd)
+        real(source, target, src_dir_fd=src_dir_fd, dst_dir_fd=dst_dir_fd)
+
+    return rename
+
+
+def _deleting(real):
+    def delete(path, *, dir_fd=None):
+        _refuse_open(path, dir_fd)
+        real(path, dir_fd=dir_fd)
+
+    return delete
+
+
+def _windows_open(real):
+    def opened(file, mode="r", buffering=-1, encoding=None, errors=None, newline=None, *more, **others):
+        if "b" not in mode:
+            encoding = "cp1252" if encoding in (None, "locale") else encoding
+            newline = "\r\n" if newline is None and not set(mode) & {"r", "+"} else newline
+        return real(file, mode, buffering, encoding, errors, newline, *more, **others)
+
+    return opened
+
+
+if HOST == "win32":
+    _rename = os.rename
+    os.rename, os.replace = _renaming(os.rename), _renaming(os.replace)
+    os.unlink = os.remove = _deleting(os.unlink)
+    builtins.open = io.open = _windows_open(io.open)
+    locale.getpreferredencoding = lambda do_setlocale=True: "cp1252"
