@@ -38,7 +38,7 @@ if sys.platform == "win32":
         timer.daemon = True
         timer.start()
 
-    def replace(draft: Path, path: Path) -> None:
+    def replace_file(draft: Path, path: Path) -> None:
         """Give a file another's name and place. Raises OSError; one that another program holds open for longer than
         `PATIENCE` is a PermissionError that says so."""
         end = time.monotonic() + PATIENCE
@@ -83,7 +83,7 @@ else:
         signal.signal(signal.SIGALRM, handler)
         signal.setitimer(signal.ITIMER_REAL, seconds)
 
-    def replace(draft: Path, path: Path) -> None:
+    def replace_file(draft: Path, path: Path) -> None:
         """Give a file another's name and place. Raises OSError."""
         draft.replace(path)
 

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 from filelock import FileLock, Timeout
 
 from friso.interrupts import held
-from friso.system import foreign_writers, replace
+from friso.system import foreign_writers, replace_file
 
 if TYPE_CHECKING:
     from friso.views.files import Content
@@ -75,11 +75,11 @@ class Drafts:
                     if os.path.lexists(path):
                         spare = self._spare(path)
                         _duplicate(path, spare)
-                        undo.append(partial(replace, spare, path))
+                        undo.append(partial(replace_file, spare, path))
                     elif draft is not None:
                         undo.append(path.unlink)
                     if draft is not None:
-                        replace(draft, path)
+                        replace_file(draft, path)
                     elif os.path.lexists(path):
                         path.unlink()
             except BaseException:

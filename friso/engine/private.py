@@ -12,7 +12,7 @@ import tempfile
 from contextlib import suppress
 from pathlib import Path
 
-from friso.system import closed_to_others, foreign_writers, replace
+from friso.system import closed_to_others, foreign_writers, replace_file
 
 
 def make_private(folder: Path) -> None:
@@ -59,7 +59,7 @@ def write_private(path: Path, content: bytes) -> None:
     try:
         with open(descriptor, "wb") as file:
             file.write(content)
-        replace(draft, path)
+        replace_file(draft, path)
     except BaseException:
         draft.unlink(missing_ok=True)
         raise

@@ -11,7 +11,7 @@ from friso.errors import InputError, StageError
 from friso.escapes import one_line
 from friso.quantities import quoted
 from friso.stage.stage import Stage
-from friso.system import replace
+from friso.system import replace_file
 
 _EXPECTED = "a stage file; friso init writes one to start from"
 _EXAMPLE = '[masses] and, on the next line, cart = "1.2 kg"'
@@ -57,7 +57,7 @@ def write_whole(text: str, path: Path, overwrite: bool) -> None:
     draft = path.with_name(f".{path.name}.{os.getpid()}")
     try:
         draft.write_text(text, encoding="utf-8", newline="\n")
-        replace(draft, path)
+        replace_file(draft, path)
     except OSError as error:
         raise InputError("", _reason(error), "a writable location", origin=str(path)) from error
     finally:

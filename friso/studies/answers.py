@@ -15,7 +15,7 @@ import numpy as np
 from friso.studies.cells import WORDS, Columns
 from friso.studies.metadata import PARTIAL
 from friso.studies.refine import Ask
-from friso.system import replace
+from friso.system import replace_file
 
 
 class Answers:
@@ -38,7 +38,7 @@ class Answers:
             with draft.open("wb") as stream:
                 arrays: dict[str, Any] = {name: columns[name].astype(WORDS.get(name, "f8")) for name in columns}
                 np.savez_compressed(stream, cells=cells, **arrays)
-            replace(draft, file)
+            replace_file(draft, file)
             return columns
 
         return answer

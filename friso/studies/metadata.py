@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from friso.errors import StoreError
+from friso.system import replace_file
 
 FORMAT = 2
 """Version of what friso writes into a store."""
@@ -139,7 +140,7 @@ def put(file: Path, content: bytes) -> None:
             stream.write(content)
             stream.flush()
             os.fsync(stream.fileno())
-        draft.replace(file)
+        replace_file(draft, file)
     except BaseException:
         draft.unlink(missing_ok=True)
         raise

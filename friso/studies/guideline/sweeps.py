@@ -20,7 +20,7 @@ from friso.hunting.edges import ROUNDS, Edges, find_edges, joined
 from friso.progress import Tally
 from friso.studies.guideline import groups
 from friso.studies.guideline.groups import flat_of
-from friso.system import replace
+from friso.system import replace_file
 from friso.version import VERSION
 
 LOCKED, FREE = "edges of rigid masses", "edges with a free joint"
@@ -130,7 +130,7 @@ class Keep:
         with half.open("wb") as file:
             words = {"kind": made.kind.astype(str)}
             np.savez(file, allow_pickle=False, **(vars(made) | words))
-        replace(half, path)  # whole, or not there
+        replace_file(half, path)  # whole, or not there
         return made
 
 
