@@ -1,4 +1,5 @@
-"""A kind of experiment and a format of logs that are each declared in one place, here, go all the way through friso."""
+"""A kind of experiment, an experiment of the rig, a format of logs and a page that are each declared in one place, here,
+go all the way through friso."""
 
 from __future__ import annotations
 
@@ -19,9 +20,13 @@ from friso.identify.logs.channel import Channel, ChannelTable
 from friso.identify.logs.format import FORMATS, LogFormat
 from friso.identify.logs.log import Log
 from friso.identify.logs.read import file_format, read_table
+from friso.progress import Progress
+from friso.stage import Stage
 from friso.studies.rig.experiments import RIG_EXPERIMENTS
+from friso.studies.rig.outcome import Outcome, RigLog
 from friso.views.drawing.figure import Axis, Figure, Panel, Series
 from friso.views.identify.kind_view import VIEWS, KindView
+from friso.views.pages import Report
 from friso.views.rig.outcome_view import OUTCOME_VIEWS
 
 ROOT = Path(__file__).parents[1]
@@ -34,7 +39,6 @@ class Hold:
     least: Estimate
     time: np.ndarray
     force: np.ndarray
-    warnings: tuple[str, ...] = ()
 
 
 def analyse(logs: Sequence[Source], prior: Prior, settings: AnalysisSettings) -> Hold:
@@ -56,7 +60,14 @@ VIEW = KindView[Hold](
     lambda hold: (("Held", f"{hold.least.low:.3g} N"),),
     lambda hold: {"held_n": hold.least.low},
     figures,
+    warnings=lambda hold: (),
 )
+
+
+def push(stage: Stage, seed: int, progress: Progress) -> Outcome:
+    """An experiment of the rig: nothing moves."""
+    logged = {"position": np.zeros(100), "force": np.full(100, float(seed))}
+    return Outcome("push", stage, seed, (RigLog("pushed", "hold", 1e-3, logged, logged, stage, seed),), None)
 
 
 def read_pairs(path: Path) -> ChannelTable:
@@ -73,7 +84,7 @@ FORMAT = LogFormat("Pairs", lambda head: head.start.startswith(b"PAIR"), read_pa
 @pytest.fixture
 def extended(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(KINDS.added, "hold", (KIND, "Forces that the stage bears without moving"))
-    monkeypatch.setitem(VIEWS.added, "hold", (VIEW, ""))
+    monkeypatch.setitem(RIG_EXPERIMENTS.added, "push", (push, "Push without moving"))
     monkeypatch.setitem(FORMATS.added, "pairs", (FORMAT, "Pairs of doubles"))
 
 
@@ -85,9 +96,9 @@ def log(tmp_path: Path) -> Path:
     return path
 
 
-def run(*arguments: object) -> int:
+def run(*arguments: object, command: str = "identify") -> int:
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(sys, "argv", ["friso", "identify", *map(str, arguments)])
+        patch.setattr(sys, "argv", ["friso", command, *map(str, arguments)])
         with pytest.raises(SystemExit) as left:
             main()
     return int(left.value.code or 0)
@@ -106,14 +117,46 @@ def test_a_kind_of_its_own_is_identified_and_shown(
     answer = json.loads(capsys.readouterr().out)
     (experiment,) = answer["experiments"]
     assert experiment["kind"] == "hold"
-    assert experiment["held_n"] == pytest.approx(2, rel=1e-3)
+    assert experiment["estimates"][0]["low"] == pytest.approx(2, rel=1e-3)
     assert answer["estimates"][0]["key"] == "friction.static"
     assert answer["estimates"][0]["low"] == pytest.approx(2, rel=1e-3)
-    page = (out / "identify.html").read_text(encoding="utf-8")
-    assert "Held force: held" in page
-    assert (out / "identify_hold_force.png").stat().st_size > 0
+    assert "Hold: held" in (out / "identify.html").read_text(encoding="utf-8")
+    assert (out / "identify_hold_1.png").stat().st_size > 0
     assert run(log, "--stage", stage, "--out", out) == 0  # as kept beside the log
-    assert "Held force: held" in capsys.readouterr().out
+    assert "Hold: held" in capsys.readouterr().out
+
+
+def test_a_kind_may_have_a_view_of_its_own(
+    extended: None, log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(VIEWS.added, "hold", (VIEW, ""))
+    stage, out = ROOT / "examples" / "emps_axis.toml", tmp_path / "out"
+    assert run(log, "--as", "hold", "--stage", stage, "--json", "--out", out) == 0
+    (experiment,) = json.loads(capsys.readouterr().out)["experiments"]
+    assert experiment["held_n"] == pytest.approx(2, rel=1e-3)
+    assert "Held force: held" in (out / "identify.html").read_text(encoding="utf-8")
+    assert (out / "identify_hold_force.png").stat().st_size > 0
+
+
+def test_an_experiment_of_the_rig_of_its_own_is_run_and_shown(
+    extended: None, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    stage, out = ROOT / "examples" / "thesis_drive.toml", tmp_path / "out"
+    assert run("push", stage, "--seed", 3, "--json", "--out", out, command="rig") == 0
+    answer = json.loads(capsys.readouterr().out)
+    assert (answer["experiment"], answer["logs"][0]["name"]) == ("push", "pushed")
+    assert "pushed" in (out / "rig.html").read_text(encoding="utf-8")
+    assert (out / "rig_pushed.png").stat().st_size > 0
+    assert run("--help", command="rig") == 0
+    assert "push Push without moving" in " ".join(capsys.readouterr().out.split())
+
+
+def test_a_page_of_its_own_needs_no_template() -> None:
+    figure = figures(Hold(Estimate.unknown("a", "N", "", "", 1.0), np.arange(3.0), np.ones(3)), (), "held")[0]
+    values = {"sentences": ["It <holds>."], "columns": ["Force"], "rows": [("Held", ["2 N"])], "computed": ", by hand"}
+    page = Report("hold", "A stage", [figure], values=values).html()
+    assert "<title>A stage: friso hold</title>" in page
+    assert all(text in page for text in ("It &lt;holds&gt;.", "<td>2 N</td>", "Forces held", ", by hand."))
 
 
 def test_what_is_registered_is_in_the_help(extended: None, capsys: pytest.CaptureFixture[str]) -> None:
@@ -129,9 +172,9 @@ def test_what_uses_others_is_analysed_after_them(extended: None) -> None:
     assert all(order.index(earlier) < order.index(name) for name in KINDS for earlier in KINDS[name].after)
 
 
-def test_what_is_declared_on_one_floor_is_on_the_others() -> None:
-    assert list(VIEWS) == list(KINDS)
-    assert list(OUTCOME_VIEWS) == list(RIG_EXPERIMENTS)
+def test_views_are_of_what_is_declared_below() -> None:
+    assert {*VIEWS} <= {*KINDS}
+    assert {*OUTCOME_VIEWS} <= {*RIG_EXPERIMENTS}
     predicting = [name for name in KINDS if KINDS[name].predictor is not None]
     assert [name for name in VIEWS if VIEWS[name].prediction is not None] == predicting
 

@@ -1,10 +1,11 @@
-"""Every page that friso writes: one skeleton, the answer first, whose blocks the template of a command fills."""
+"""Every page that friso writes: one skeleton, the answer first, which a template of a command may change."""
 
 from __future__ import annotations
 
 import base64
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
@@ -26,16 +27,24 @@ def made_with() -> str:
     return " with ".join([VERSION, *filter(None, [listed(foreign(), "and")])])
 
 
+CONTENTS: Mapping[str, Any] = MappingProxyType(
+    {"verdicts": (), "sentences": (), "notes": (), "columns": (), "rows": (), "computed": ""}
+)
+"""What every page shows of its values, where it has them: sentences with a colour, and others; notes below them; a
+table, whose columns are texts or have a label and a colour, and whose rows are a text and a list of texts; and how it
+was `computed`, after the version of friso, without the full stop."""
+
+
 @dataclass(frozen=True)
 class Report:
-    """A page: the name at its head, its figures, the stage file and its source, and what else the command's `template`
-    names, `values`.
+    """The page of a `command`: the name at its head, its figures, the stage file and its source, and its contents by
+    name, `values`: those of `CONTENTS`, and what else its template names.
 
-    Templates extend `page.html` and fill its blocks: answer, table, figures, footer. `scripted` pages load plotly
-    without figures of their own kind.
+    A template of the command's name, if there is one, extends `page.html`, and changes its blocks: answer, table,
+    figures, footer. `scripted` pages load plotly without figures of their own kind.
     """
 
-    template: str
+    command: str
     name: str
     figures: Sequence[Figure] = ()
     stage_file: str = ""
@@ -46,21 +55,20 @@ class Report:
 
     @classmethod
     def of_stage(
-        cls, template: str, stage: Stage | None, figures: Sequence[Figure], name: str = "Unnamed stage", **values: Any
+        cls, command: str, stage: Stage | None, figures: Sequence[Figure], name: str = "Unnamed stage", **values: Any
     ) -> Report:
         """The page about a stage, or about none; `name` stands at the head where the stage has none."""
         if stage is None:
-            return cls(template, name, figures, values=values)
-        return cls(template, stage.name or name, figures, stage.to_toml(), stage.source, values=values)
+            return cls(command, name, figures, values=values)
+        return cls(command, stage.name or name, figures, stage.to_toml(), stage.source, values=values)
 
     def html(self) -> str:
         """The page: it opens offline, prints, and is the same bytes on every run."""
         figures = [(figure, Markup(plotly_renderer.fragment(figure)), print_image(figure)) for figure in self.figures]
         scripts = Markup(plotly_renderer.script()) if figures or self.scripted else None
-        common = {name: getattr(self, name) for name in ("name", "stage_file", "source", "version")}
-        return (
-            environment().get_template(self.template).render(figures=figures, plotly=scripts, **common, **self.values)
-        )
+        common = {name: getattr(self, name) for name in ("command", "name", "stage_file", "source", "version")}
+        template = environment().select_template([f"{self.command}.html", "page.html"])
+        return template.render(figures=figures, plotly=scripts, **common, **{**CONTENTS, **self.values})
 
 
 def environment() -> Environment:

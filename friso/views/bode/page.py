@@ -15,6 +15,12 @@ from friso.views.files import Content, pictures
 from friso.views.pages import Report
 
 
+DEFINITIONS = (
+    "Margins follow their definitions: how much gain, phase or delay takes the loop to the edge of stability; phase "
+    "margins count both lag and lead"
+)
+
+
 def bode_files(bode: Bode) -> dict[str, Content]:
     """The page, and every figure in all formats."""
     figures = bode_figures(bode)
@@ -26,15 +32,15 @@ def bode_html(bode: Bode, figures: Sequence[Figure]) -> str:
     states = shown_states(bode)
     verdict, *further = stability(bode)
     return Report.of_stage(
-        "bode.html",
+        "bode",
         bode.stage,
         figures,
-        verdict=(GREEN if bode.settled[1].stable else VERMILLION, verdict),
-        further=further,
+        verdicts=[(GREEN if bode.settled[1].stable else VERMILLION, verdict)],
+        sentences=further,
         heading=crossover_heading(bode),
         crossovers=[(COLOURS[name], sentence) for name, sentence in crossovers(bode).items()],
         caveats=caveats(bode),
-        shown=states,
+        columns=states,
         rows=rows(states),
-        states=len(bode.scan.members),
+        computed=f" from the equations of the simulation, linearised in {len(bode.scan.members)} states. {DEFINITIONS}",
     ).html()

@@ -17,19 +17,24 @@ if TYPE_CHECKING:
     from friso.hunting import Case
 
 
+BASIS = (
+    "The verdict is by everything that attracts the stage; peaks are also counted, as in the thesis (Fix, Univ. of "
+    "Twente, Sec. 3.2.2). Settling times count from the last corner of the reference"
+)
+
+
 def report_html(cases: Mapping[str, Case], draws: Draws | None = None) -> str:
     """The whole page for the cases "given" and, with a joint, "locked" and "free"; traces may be missing. `draws`
     adds what stages drawn from an uncertain one do."""
     in_order = shown_cases(cases)
     stage = in_order[0].case.stage if "given" not in cases else cases["given"].stage
     return Report.of_stage(
-        "check.html",
+        "check",
         stage,
         (*check_figures(cases), *([draws_figure(draws)] if draws else [])),
-        shown=in_order,
-        sentences=[(item, verdict_sentence(item, cases)) for item in in_order],
-        conclusion=conclusion(cases),
+        verdicts=[(item.colour, f"{item.label}: {verdict_sentence(item, cases)}") for item in in_order],
+        sentences=[*filter(None, [conclusion(cases)]), *(draws_sentences(draws) if draws else [])],
+        columns=in_order,
         rows=rows(in_order),
-        draws=draws_sentences(draws) if draws else [],
-        rtol=", ".join(sorted({f"{item.case.solver.rtol:g}" for item in in_order})),
+        computed=f", relative tolerance {', '.join(sorted({f'{item.case.solver.rtol:g}' for item in in_order}))}. {BASIS}",
     ).html()

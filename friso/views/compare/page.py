@@ -31,21 +31,22 @@ def compare_files(comparison: Comparison) -> dict[str, Content]:
 def page(comparison: Comparison, figures: Sequence[Figure]) -> str:
     """The page with its figures."""
     return Report.of_stage(
-        "compare.html",
+        "compare",
         comparison.stage,
         figures,
-        answer=answer(comparison),
+        sentences=answer(comparison),
         details=details(comparison),
         population=population(comparison),
-        notes=comparison.notes,
+        remarks=comparison.notes,
         options=options_rows(comparison),
         columns=COLUMNS,
         rows=table_rows(comparison),
         paired_columns=PAIRED,
         paired=paired_rows(comparison),
-        seed=comparison.seed,
-        deadband=DEADBAND,
-        model_error=100 * MODEL_ERROR,
+        computed=(
+            f" on a drive as built, seed {comparison.seed}; deadband {DEADBAND:g} tolerances, model error "
+            f"{100 * MODEL_ERROR:g} %"
+        ),
         longer=LONGER,
         shaken=comparison.shaken,
     ).html()

@@ -37,7 +37,7 @@ def design_files(design: Design) -> dict[str, Content]:
 def design_html(design: Design, figures: Sequence[Figure]) -> str:
     """The whole page of a design and its figures."""
     return Report.of_stage(
-        "design.html",
+        "design",
         design.stage,
         figures,
         spec=design.spec,

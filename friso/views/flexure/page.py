@@ -25,6 +25,14 @@ class Column(NamedTuple):
     colour: str
 
 
+BASIS = (
+    "geometrically exact beams, corrected for what clamps do to a wide leaf, and closed forms (Soemers, Design "
+    "Principles for Precision Mechanisms; Awtar, Slocum and Sevincer, doi:10.1115/1.2717231). Modes with the cart held "
+    "and the leaves straight; a mode interferes with control where actuator and sensor both see it. The drawing is no "
+    "substitute for one with tolerances"
+)
+
+
 def flexure_files(flexure: BothModels) -> dict[str, Content]:
     """The page, the drawing, and every figure in all formats."""
     figures = flexure_figures(flexure)
@@ -39,14 +47,15 @@ def flexure_html(flexure: BothModels, figures: Sequence[Figure]) -> str:
     """The whole page of a mechanism and its figures."""
     joint, *further = findings(flexure)
     return Report.of_stage(
-        "flexure.html",
+        "flexure",
         flexure.stage,
         figures,
         verdicts=[(GREEN, joint), *((VERMILLION, warning) for warning in warnings(flexure))],
-        further=[*further, *assumptions(flexure.stage)],
+        sentences=[*further, *assumptions(flexure.stage)],
         drawing=Markup(drawing(flexure)),
-        shown=[Column(name, COLOURS[name]) for name in flexure.models],
+        columns=[Column(name, COLOURS[name]) for name in flexure.models],
         rows=rows(flexure),
+        computed=f": {BASIS}",
     ).html()
 
 

@@ -11,7 +11,7 @@ from friso.identify.method import Experiment, Identification, Prediction
 from friso.identify.sources import LogFile
 from friso.views.documents import plain_json
 from friso.views.identify.estimates import key_document
-from friso.views.identify.kind_view import VIEWS
+from friso.views.identify.kind_view import view_of
 from friso.views.identify.words import headline, prediction_view
 
 
@@ -59,7 +59,7 @@ def _experiment(experiment: Experiment) -> dict[str, Any]:
     return {
         "kind": experiment.kind,
         "logs": [log.name for log in experiment.logs],
-        **VIEWS[experiment.kind].numbers(experiment.result),
+        **view_of(experiment.kind).numbers(experiment.result),
         "estimates": [key_document(estimate) for estimate in experiment.estimates],
     }
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from friso.identify.method import Identification, Prediction
 from friso.views.drawing.figure import BLUE, ORANGE, Axis, Figure, Markers, Panel, Series, Symbol
-from friso.views.identify.kind_view import VIEWS
+from friso.views.identify.kind_view import view_of
 from friso.views.identify.words import labels, ordered, prediction_view
 
 SHORT = {
@@ -32,7 +32,7 @@ def identify_figures(identification: Identification, predictions: Sequence[Predi
     """All figures, in the order in which they are read."""
     figures, subject = _intervals(identification), identification.stage.name if identification.stage else ""
     for experiment, label in zip(identification.experiments, labels(identification), strict=True):
-        figures += VIEWS[experiment.kind].figures(experiment.result, experiment.logs, f"identify_{label}")
+        figures += view_of(experiment.kind).figures(experiment.result, experiment.logs, f"identify_{label}")
     for number, prediction in enumerate(predictions, 1):
         figures += prediction_view(prediction).figures(prediction.log, prediction.result, number)
     return [replace(figure, subject=subject) for figure in figures]

@@ -1,4 +1,4 @@
-"""What a kind of experiment declares of how it is shown, the registry of these, and what their figures share."""
+"""How kinds of experiment are shown: what a kind may declare of it, the registry of these, what their figures share."""
 
 from __future__ import annotations
 
@@ -8,9 +8,11 @@ from types import MappingProxyType
 from typing import Any, Generic, TypeVar
 
 from friso.identify.kind import Source
+from friso.identify.kinds import KINDS
 from friso.identify.logs.log import Log
 from friso.registry import Registry
-from friso.views.drawing.figure import BLUE, ORANGE, Axis, Figure
+from friso.views.drawing.figure import BLUE, INK, ORANGE, Axis, Figure, Panel, Series
+from friso.views.identify.numbers import name_of, with_interval
 
 Facts = tuple[tuple[str, str], ...]
 """Numbers in words, by name."""
@@ -56,3 +58,35 @@ class KindView(Generic[Result]):
 
 VIEWS: Registry[KindView[Any]] = Registry("friso.views.identify.kinds", "VIEW")
 """Every module of `friso/views/identify/kinds/` declares one, under the name of its kind of experiment."""
+
+
+def view_of(kind: str) -> KindView[Any]:
+    """How results of a kind of experiment are shown: as its view declares, or else by its estimates and its logs."""
+    return VIEWS[kind] if kind in VIEWS else _by_estimates(kind)
+
+
+def _by_estimates(kind: str) -> KindView[Any]:
+    def facts(result: Any) -> Facts:
+        return tuple(
+            (name_of(estimate.name), with_interval(estimate)) for estimate in KINDS[kind].estimates(result, None)
+        )
+
+    def figures(result: Any, logs: Sequence[Source], name: str) -> list[Figure]:
+        records = [log for log in logs if isinstance(log, Log)]
+        return [log_figure(log, KINDS[kind].needed(log.signals), f"{name}_{i}") for i, log in enumerate(records, 1)]
+
+    def warnings(result: Any) -> tuple[str, ...]:
+        return getattr(result, "warnings", ())
+
+    return KindView(kind.replace("-", " ").capitalize(), facts, lambda result: {}, figures, warnings=warnings)
+
+
+def log_figure(log: Log, roles: Sequence[str], name: str) -> Figure:
+    """Some signals of a log, by role, over time."""
+    panels = tuple(
+        Panel(
+            "", TIME, Axis(role.replace("_", " ").capitalize(), log.unit(role)), (Series(log.time, log[role], "", INK),)
+        )
+        for role in roles
+    )
+    return Figure(name, log.name, "As logged.", panels)

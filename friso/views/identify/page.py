@@ -19,7 +19,7 @@ def identify_html(
 ) -> str:
     """The whole page of an identification and its figures."""
     return Report.of_stage(
-        "identify.html",
+        "identify",
         identification.stage,
         figures,
         ", ".join(file.path.name for file in files),

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from friso.identify.logs.log import Log
 from friso.views.drawing.figure import GREEN, ORANGE, VERMILLION
-from friso.views.identify.kind_view import VIEWS, Facts, PredictionView
+from friso.views.identify.kind_view import Facts, PredictionView, view_of
 from friso.views.identify.numbers import interval_text, name_of, value_text, with_interval, within
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ def headline(identification: Identification) -> list[tuple[str, str]]:
     """What is identified, and what is not and why; each sentence with its colour."""
     estimates = ordered(identification.estimates)
     visible = [estimate for estimate in estimates if estimate.determined]
-    headlines = [VIEWS[experiment.kind].headline(experiment.result) for experiment in identification.experiments]
+    headlines = [view_of(experiment.kind).headline(experiment.result) for experiment in identification.experiments]
     headlines = [sentence for sentence in headlines if sentence]
     lines = []
     if visible:
@@ -83,7 +83,7 @@ def missing(estimates: Sequence[Estimate]) -> str:
 
 def prediction_view(prediction: Prediction) -> PredictionView[Any]:
     """How the kind of experiment that predicts shows it."""
-    view = VIEWS[prediction.kind].prediction
+    view = view_of(prediction.kind).prediction
     assert view is not None, f"{prediction.kind} predicts logs, and its view does not show it"
     return view
 
@@ -122,7 +122,7 @@ def summaries(identification: Identification) -> list[ExperimentSummary]:
 
 
 def _summary(experiment: Experiment, label: str) -> ExperimentSummary:
-    view, result = VIEWS[experiment.kind], experiment.result
+    view, result = view_of(experiment.kind), experiment.result
     return ExperimentSummary(
         label,
         f"{view.title}: {', '.join(log.name for log in experiment.logs)}",

@@ -46,7 +46,7 @@ def map_html(runs: xr.Dataset, metric: str, rerun: str) -> str:
         )
     figure = map_figure(runs, metric)
     return Report(
-        "map.html",
+        "map",
         runs.attrs.get("name") or "Unnamed stage",
         stage_file=runs.attrs.get("stage", ""),
         version=runs.attrs.get("friso", ""),

@@ -51,7 +51,7 @@ def reproduction_html(reproduction: Reproduction) -> str:
     parts = sections(reproduction_figures(reproduction), reproduction.verdicts)
     figures = [section.figure for section in parts if section.figure]
     return Report(
-        "reproduction.html",
+        "reproduce",
         "Reproduction of the thesis",
         stage_file=thesis_rig().to_toml(),
         source=thesis_rig().source,

@@ -6,7 +6,7 @@ from typing import Any
 
 from friso.studies.rig.outcome import Outcome
 from friso.views.documents import plain_json
-from friso.views.rig.outcome_view import OUTCOME_VIEWS
+from friso.views.rig.outcome_view import view_of
 from friso.views.rig.page import sentences
 
 
@@ -16,7 +16,7 @@ def rig_document(outcome: Outcome) -> dict[str, Any]:
         {"name": log.name, "seed": log.seed, "interval_s": log.interval, "failure": log.failure or None}
         for log in outcome.logs
     ]
-    view = OUTCOME_VIEWS[outcome.experiment]
+    view = view_of(outcome.experiment)
     head = {
         "conclusion": sentences(outcome)[0],
         "experiment": outcome.experiment,

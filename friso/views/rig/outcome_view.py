@@ -1,4 +1,4 @@
-"""What an experiment of the rig declares of how its outcome is shown, and the registry of these."""
+"""How outcomes of the rig's experiments are shown: what an experiment may declare of it, and the registry of these."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ from typing import Any
 from friso.registry import Registry
 from friso.studies.rig.outcome import Outcome
 from friso.views.drawing.figure import Figure
+from friso.views.drawing.prefixes import with_unit
+from friso.views.identify.kind_view import log_figure
 
 
 @dataclass(frozen=True)
@@ -23,3 +25,17 @@ class OutcomeView:
 
 OUTCOME_VIEWS: Registry[OutcomeView] = Registry("friso.views.rig.experiments", "VIEW")
 """Every module of `friso/views/rig/experiments/` declares one, under the name of its experiment."""
+
+
+def view_of(experiment: str) -> OutcomeView:
+    """How outcomes of an experiment are shown: as its view declares, or else by its logs."""
+    return OUTCOME_VIEWS[experiment] if experiment in OUTCOME_VIEWS else OutcomeView(_lengths, _records, lambda _: {})
+
+
+def _lengths(outcome: Outcome) -> list[str]:
+    logs = [f"{log.name}, {with_unit(len(log.log.time) * log.interval, 's')}" for log in outcome.logs]
+    return [f"Logs of {outcome.experiment}: {'; '.join(logs)}."]
+
+
+def _records(outcome: Outcome) -> list[Figure]:
+    return [log_figure(log.log, [*log.logged], f"rig_{log.name}") for log in outcome.logs]

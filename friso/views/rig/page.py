@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from friso.studies.rig.outcome import Outcome
+from friso.studies.rig.outcome import Outcome, RigLog
 from friso.views.drawing.figure import Figure
 from friso.views.files import Content, pictures
 from friso.views.pages import Report
 from friso.views.rig.log_files import log_files, stage_text
-from friso.views.rig.outcome_view import OUTCOME_VIEWS
+from friso.views.rig.outcome_view import view_of
 
 
 def sentences(outcome: Outcome) -> list[str]:
     """The results, the answer first, for the engineer who has to decide with them; before it, what failed."""
-    return [*_failures(outcome), *OUTCOME_VIEWS[outcome.experiment].sentences(outcome)]
+    return [*_failures(outcome), *view_of(outcome.experiment).sentences(outcome)]
 
 
 def _failures(outcome: Outcome) -> list[str]:
@@ -32,7 +32,7 @@ def _failures(outcome: Outcome) -> list[str]:
 
 def figures(outcome: Outcome) -> list[Figure]:
     """The figures, in the arrangement of the thesis."""
-    return OUTCOME_VIEWS[outcome.experiment].figures(outcome)
+    return view_of(outcome.experiment).figures(outcome)
 
 
 def rig_files(outcome: Outcome) -> dict[str, Content]:
@@ -51,12 +51,16 @@ def rig_files(outcome: Outcome) -> dict[str, Content]:
 def page(outcome: Outcome, figures: Sequence[Figure]) -> str:
     """The page with its figures."""
     return Report.of_stage(
-        "rig.html",
+        f"rig {outcome.experiment}",
         outcome.stage,
         figures,
-        experiment=outcome.experiment,
-        seed=outcome.seed,
         sentences=sentences(outcome),
         notes=outcome.notes,
-        logs=outcome.logs,
+        columns=("Kind", "Seed", "Sample time", "Ended"),
+        rows=[(log.name, _log_row(log)) for log in outcome.logs],
+        computed=f" on a drive as built, seed {outcome.seed}; logs: {len(outcome.logs)}",
     ).html()
+
+
+def _log_row(log: RigLog) -> list[str]:
+    return [log.kind or "", str(log.seed), f"{log.interval * 1e3:.3g} ms", log.failure or "as planned"]
