@@ -1,5 +1,5 @@
-"""A kind of experiment, an experiment of the rig, a format of logs and a page that are each declared in one place, here,
-go all the way through friso."""
+"""Kinds of experiment, experiments of the rig, formats of logs and pages that are each declared in one place, here, go
+all the way through friso."""
 
 from __future__ import annotations
 

@@ -14,7 +14,6 @@ from friso.views.drawing.figure import GREEN, VERMILLION, Figure
 from friso.views.files import Content, pictures
 from friso.views.pages import Report
 
-
 DEFINITIONS = (
     "Margins follow their definitions: how much gain, phase or delay takes the loop to the edge of stability; phase "
     "margins count both lag and lead"

@@ -28,6 +28,7 @@ def report_html(cases: Mapping[str, Case], draws: Draws | None = None) -> str:
     adds what stages drawn from an uncertain one do."""
     in_order = shown_cases(cases)
     stage = in_order[0].case.stage if "given" not in cases else cases["given"].stage
+    tolerances = sorted({f"{item.case.solver.rtol:g}" for item in in_order})
     return Report.of_stage(
         "check",
         stage,
@@ -36,5 +37,5 @@ def report_html(cases: Mapping[str, Case], draws: Draws | None = None) -> str:
         sentences=[*filter(None, [conclusion(cases)]), *(draws_sentences(draws) if draws else [])],
         columns=in_order,
         rows=rows(in_order),
-        computed=f", relative tolerance {', '.join(sorted({f'{item.case.solver.rtol:g}' for item in in_order}))}. {BASIS}",
+        computed=f", relative tolerance {', '.join(tolerances)}. {BASIS}",
     ).html()
