@@ -58,7 +58,7 @@ def page(outcome: Outcome, figures: Sequence[Figure]) -> str:
         notes=outcome.notes,
         columns=("Kind", "Seed", "Sample time", "Ended"),
         rows=[(log.name, _log_row(log)) for log in outcome.logs],
-        computed=f" on a drive as built, seed {outcome.seed}; logs: {len(outcome.logs)}",
+        computed=f" on a drive as built, seed {outcome.seed}; {len(outcome.logs)} log{'s' * (len(outcome.logs) != 1)}",
     ).html()
 
 
