@@ -17,6 +17,7 @@ import pytest
 import xarray as xr
 from matplotlib.colors import to_hex
 from pages import Page
+from snapshots import Snapshots
 
 from friso.views.drawing import matplotlib_renderer, plotly_renderer
 from friso.views.drawing.colours import painted, ramp, scale
@@ -37,6 +38,11 @@ CROSSOVER, STROKE, DAMPING, LOCKED = (
 )
 UNITS = {CROSSOVER: "Hz", STROKE: "m", DAMPING: "N*s/m", LOCKED: ""}
 RERUN = "friso simulate --cell map.zarr {indices}"
+
+
+def numbers(text: str) -> list[float]:
+    """The numbers in a text."""
+    return [float(number) for number in re.findall(r"\d+(?:\.\d+)?(?:e-?\d+)?", text)]
 
 
 def made_up(axes: dict[str, Any], log: tuple[str, ...] = (), **attrs: Any) -> xr.Dataset:
@@ -105,31 +111,26 @@ def test_axes_are_written_in_the_words_of_an_engineer():
     ]
 
 
-def test_the_verification_stands_on_the_figure():
+def test_the_verification_stands_on_the_figure(snapshots: Snapshots):
     figure = map_figure(plain(verified_cells=84, verified_surviving=81, verified_rtol=1e-6), "peaks")
     share, z = 81 / 84, 1.959963984540054
     middle = (share + z**2 / 168) / (1 + z**2 / 84)
     half = z * math.sqrt(share * (1 - share) / 84 + z**2 / (4 * 84**2)) / (1 + z**2 / 84)  # Wilson (1927)
-    said = (
-        "96.4 % of 84 outcomes are the same at rtol 1e-06 "
-        f"(95 % confidence: {100 * (middle - half):.1f} to {100 * (middle + half):.1f} %)."
-    )
-    assert figure.note.splitlines() == [
-        "Peaks are counted in 75 % of the map, over the whole range of every axis.",
-        said,
-        "20 runs at rtol 0.0001: 15 swing, 5 rest.",
-    ]
+    first, said, runs = figure.note.splitlines()
+    ends = [round(100 * (middle + sign * half), 1) for sign in (-1, 1)]
+    assert numbers(said) == [round(100 * share, 1), 84, 1e-6, 95, *ends]
+    assert (numbers(first), numbers(runs)) == ([75], [20, 1e-4, 15, 5])
     on_paper = " ".join(text.get_text() for text in matplotlib_renderer.render(figure).texts)
     assert said in on_paper
     assert said in plotly_renderer.render(figure).layout.annotations[0].text
-    assert verification(plain()) == "Not verified: no outcome was checked at a tighter tolerance."
+    assert numbers(verification(plain())) == []
+    snapshots.check("map", "note", f"{figure.note}\n{verification(plain())}")
 
 
-def test_runs_that_were_not_made_are_not_counted():
-    assert statement(troubled(), "outcome").splitlines()[2] == (
-        "16 runs at rtol 0.0001, 2 cells inferred from their neighbours: "
-        "13 swing, 4 rest, 1 failed, 1 invalid, 1 not run."
-    )
+def test_runs_that_were_not_made_are_not_counted(snapshots: Snapshots):
+    counted = statement(troubled(), "outcome").splitlines()[2]
+    assert numbers(counted) == [16, 1e-4, 2, 13, 4, 1, 1, 1]
+    snapshots.check("map", "troubled runs", counted)
 
 
 # ---------------------------------------------------------------- cells
@@ -192,7 +193,7 @@ def test_amplitudes_over_many_decades_are_logarithmic_and_end_above_the_noise():
     assert not only_map(map_figure(plain(), "peak_to_peak")).log
 
 
-def test_cells_without_a_measure_of_what_attracts_say_why():
+def test_cells_without_a_measure_of_what_attracts_say_why(snapshots: Snapshots):
     runs = plain()
     words = np.full(runs["peaks"].shape, "cycle", dtype=object)
     words[0, :3] = "nothing", "unknown", "swing"
@@ -200,17 +201,18 @@ def test_cells_without_a_measure_of_what_attracts_say_why():
     runs["multiplier"] = (runs["peaks"].dims, np.where(words == "cycle", -0.5, np.nan))
     shown = kinds_shown(only_map(map_figure(runs, "multiplier")))
     labels = {kind.label for row in shown for kind in row if kind}
-    assert labels == {"nothing attracts", "not certain what attracts", "attracts, but not closed as an orbit"}
-    said = statement(runs, "multiplier")
-    assert said.startswith(f"Something attracts the stage that swings in {round(100 * 18 / 19)} % of the map")
-    assert "In 1 of the cells it is not certain" in said
+    assert len(labels) == 3
+    first, unsure = statement(runs, "multiplier").split(". ")[:2]
+    assert numbers(first)[0] == round(100 * 18 / 19)
+    assert numbers(unsure)[0] == 1
+    snapshots.check("map", "what attracts", "\n".join([*sorted(labels), statement(runs, "multiplier")]))
 
 
 def test_variables_may_be_missing():
     runs = plain()[["peak_to_peak"]]
     runs["peak_to_peak"][1, 1] = np.nan
     assert kinds_shown(only_map(map_figure(runs, "peak_to_peak")))[1][1].label == "no value"
-    assert "20 runs" in statement(runs, "peaks")
+    assert 20 in numbers(statement(runs, "peaks"))
     by_status = troubled().drop_vars("outcome")
     assert kinds_shown(only_map(map_figure(by_status, "peaks")))[1][0] is FAILED
     with pytest.raises(ValueError, match=r"metric: got 'peaks', expected one of peak_to_peak"):
@@ -576,33 +578,27 @@ def swinging(where: np.ndarray) -> xr.Dataset:
 
 
 @pytest.mark.parametrize(
-    ("rows", "columns", "said"),
+    ("name", "rows", "columns", "told"),
     [
-        (slice(0, 2), slice(None), "The run swings at its end in 50 % of the map: at crossover up to 6 Hz"),
-        (slice(2, 4), slice(None), "The run swings at its end in 50 % of the map: at crossover from 11 Hz"),
-        (
-            slice(1, 2),
-            slice(0, 2),
-            "10 % of the map: at crossover 6 Hz and joint stroke up to 250 µm (everywhere there)",
-        ),
-        (
-            slice(1, 3),
-            slice(1, 3),
-            "crossover from 6 Hz to 11 Hz and joint stroke from 250 µm to 500 µm (everywhere there).",
-        ),
-        (slice(0, 0), slice(None), "The run swings at its end nowhere in the map."),
-        (slice(None), slice(None), "The run swings at its end everywhere in the map."),
+        ("low", slice(0, 2), slice(None), [50, 6]),
+        ("high", slice(2, 4), slice(None), [50, 11]),
+        ("corner", slice(1, 2), slice(0, 2), [10, 6, 250]),
+        ("middle", slice(1, 3), slice(1, 3), [20, 6, 11, 250, 500]),
+        ("nowhere", slice(0, 0), slice(None), []),
+        ("everywhere", slice(None), slice(None), []),
     ],
 )
-def test_a_map_says_first_where_runs_swing(rows: slice, columns: slice, said: str) -> None:
+def test_a_map_says_first_where_runs_swing(
+    name: str, rows: slice, columns: slice, told: list[float], snapshots: Snapshots
+) -> None:
+    """The share of the map [%], and the ranges in Hz and um."""
     where = np.zeros((4, 5), bool)
     where[rows, columns] = True
     runs = swinging(where)
-    assert said in headline(runs, "outcome")
+    assert numbers(headline(runs, "outcome")) == told
+    snapshots.check("map", f"swings, {name}", headline(runs, "outcome"))
     assert headline(runs, "period") == headline(runs, "outcome")
-    assert headline(runs, "peaks") == headline(runs, "outcome").replace(
-        "The run swings at its end", "Peaks are counted"
-    )
+    assert numbers(headline(runs, "peaks")) == told
     assert map_figure(runs).note.splitlines()[0] == headline(runs, "outcome")
     backwards = runs.isel({CROSSOVER: slice(None, None, -1)})
     assert headline(backwards, "outcome") == headline(runs, "outcome")
@@ -613,28 +609,30 @@ def test_where_runs_swing_holds_for_every_cell() -> None:
     rng = np.random.default_rng(2)
     where = rng.random((4, 5)) < 0.4
     where[3], where[:, 4] = False, False
-    text = headline(swinging(where), "outcome")
-    strokes = "" if where[:, 3].any() else "?"
-    assert "crossover up to 11 Hz" in text
-    assert strokes or "joint stroke up to 750 µm" in text
-    assert f"{100 * where.sum() / 12:.0f} % of the cells there" in text
+    share, crossover, stroke, inside = numbers(headline(swinging(where), "outcome"))
+    assert where[:, 3].any()
+    assert (crossover, stroke) == (11, 750)
+    assert (share, inside) == (round(100 * where.sum() / 20), round(100 * where.sum() / 12))
     spread = np.zeros((4, 5), bool)
     spread[0, 0] = spread[3, 4] = True
-    assert headline(swinging(spread), "outcome").endswith("10 % of the map, over the whole range of every axis.")
+    assert numbers(headline(swinging(spread), "outcome")) == [10]
 
 
-def test_words_samples_and_verdicts_have_their_sentence() -> None:
+def test_words_samples_and_verdicts_have_their_sentence(snapshots: Snapshots) -> None:
     runs = made_up({LOCKED: [True, False], CROSSOVER: np.linspace(1, 16, 4)})
     runs["outcome"] = (runs.outcome.dims, [["swings"] * 4, ["rests"] * 4])
-    assert headline(runs, "outcome").endswith("50 % of the map: at joint locked (everywhere there).")
+    said = [headline(runs, "outcome")]
+    assert numbers(said[0]) == [50]
     runs["verdict"] = (runs.outcome.dims, [["settles"] * 4, ["settles", "bistable", "hunts", "settles"]])
-    assert "The stage hunts in 12 % of the map: at joint free and crossover 11 Hz" in headline(runs, "verdict")
-    assert "bistable" in headline(runs, "verdict")
-    assert "in 12 % of the map: at joint free and crossover 6 Hz" in headline(runs, "verdict")
-    assert "1 hunts, 1 bistable, 6 settle" in statement(runs, "verdict")
+    said += [headline(runs, "verdict"), statement(runs, "verdict").splitlines()[-1]]
+    assert numbers(said[1]) == [12, 11, 12, 6]
+    assert numbers(said[2])[-3:] == [1, 1, 6]
     drawn = sampled()
     drawn["outcome"] = (drawn.outcome.dims, np.where(drawn["mass"] < drawn["mass"].median(), "swings", "creeps"))
-    assert "The run swings at its end in 50 % of the map: at mass" in headline(drawn, "outcome")
+    said.append(headline(drawn, "outcome"))
+    assert numbers(said[-1])[0] == 50
     nothing = troubled()
     nothing["outcome"][:] = "invalid"
-    assert headline(nothing, "outcome") == "The run swings at its end nowhere: no cell of the map has a result."
+    said.append(headline(nothing, "outcome"))
+    assert numbers(said[-1]) == []
+    snapshots.check("map", "headlines", "\n".join(said))
