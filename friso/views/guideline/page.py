@@ -70,7 +70,7 @@ def guideline_page(guideline: Guideline) -> str:
     """The page in Markdown; its charts and the table stand beside it."""
     template = environment().overlay(autoescape=False).get_template("guideline.md.j2")
     return template.render(
-        found=guideline,
+        guideline=guideline,
         locked=guideline.locked,
         free=guideline.free,
         steps=guideline.worked,
@@ -86,6 +86,7 @@ def guideline_page(guideline: Guideline) -> str:
         kinds=KINDS,
         errors_of=_errors(guideline),
         number=number,
+        span=_span_text,
         percent=percent,
         studied=STUDIED,
         rows=_rows,
@@ -163,6 +164,12 @@ def group_rows(guideline: Guideline) -> list[dict[str, Any]]:
 
 def _span(x: np.ndarray) -> tuple[float, float]:
     return float(x.min()), float(x.max())
+
+
+def _span_text(ends: tuple[float, float]) -> str:
+    """The ends of a range, or the number that it is."""
+    low, high = (number(end) for end in ends)
+    return low if low == high else f"{low} to {high}"
 
 
 def _rows(name: str, cases: tuple[RigCase, ...]) -> list[tuple[float, float, float]]:
