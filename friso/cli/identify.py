@@ -82,7 +82,7 @@ def identify(
         sources = [(file.source, file.kind) for file in inputs[: len(logs)]]
         identified = identification(sources, assumed, settings, progress)
         predictions = _predictions(identified, inputs[len(logs) :], settings)
-        from friso.views.identify.files import identify_files
+        from friso.views.identify.page import identify_files
 
         files = target.write(identify_files(identified, inputs, predictions), progress)
     _answer(identified, inputs, predictions, files, as_json)

@@ -7,11 +7,32 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
 import typer
 
 from friso.cli.common import AsJson, Overrides, read_stage, read_tolerance, say
+from friso.cli.map_options import (
+    Axes,
+    CheckStore,
+    Confirmed,
+    Exports,
+    Latin,
+    Links,
+    Logarithmic,
+    MapTolerance,
+    Metric,
+    Refine,
+    ReplaceStore,
+    Samples,
+    Scheduler,
+    Source,
+    StoreFolder,
+    Verify,
+    Workers,
+    X,
+    Y,
+)
 from friso.cli.output import print_document, print_written, write
 from friso.cli.progress import ProgressBar
 from friso.errors import InputError
@@ -28,61 +49,28 @@ if TYPE_CHECKING:
 LARGE = 10_000_000
 """Cells from which on a study has to be confirmed: minutes of computation and a gigabyte."""
 
-AXIS = 'KEY="FIRST..LAST:POINTS"'
-
 
 def map_cells(
-    source: Annotated[Path, typer.Argument(metavar="STAGE.toml|STORE", help="A stage file, or a study to resume.")],
-    x: Annotated[str | None, typer.Option(metavar=AXIS, help='Horizontal axis; also a list: KEY="4 Hz, 8 Hz".')] = None,
-    y: Annotated[str | None, typer.Option(metavar=AXIS, help="Vertical axis.")] = None,
-    axis: Annotated[list[str] | None, typer.Option(metavar=AXIS, help="A further axis; may be repeated.")] = None,
-    link: Annotated[
-        list[str] | None, typer.Option(metavar="KEY=EXPRESSION", help='A key tied to others: masses.cart="0.7 * mass".')
-    ] = None,
-    samples: Annotated[
-        int | None,
-        typer.Option(metavar="NUMBER", help="Number of Sobol points over the ranges FIRST..LAST, instead of a grid."),
-    ] = None,
-    latin: Annotated[bool, typer.Option("--latin", help="Latin hypercube samples.")] = False,
-    log: Annotated[
-        bool, typer.Option("--log", help="Make all ranges logarithmic; for a single one, append :log.")
-    ] = False,
+    source: Source,
+    x: X = None,
+    y: Y = None,
+    axis: Axes = None,
+    link: Links = None,
+    samples: Samples = None,
+    latin: Latin = False,
+    log: Logarithmic = False,
     overrides: Overrides = None,
-    metric: Annotated[
-        str | None,
-        typer.Option(
-            metavar="NAME",
-            help="Quantity that colours the map; of runs: outcome (what they do at their end, the default), peaks, "
-            "...; of what attracts the stage: verdict, multiplier, amplitude, period.",
-        ),
-    ] = None,
-    rtol: Annotated[
-        str | None,
-        typer.Option(metavar="NUMBER|auto", help="Relative tolerance, default 1e-6; auto: the loosest safe one."),
-    ] = None,
-    verify: Annotated[float, typer.Option(metavar="SHARE", help="Share of the cells run again at rtol/100.")] = 0.05,
-    refine: Annotated[
-        bool, typer.Option("--refine", help="A grid 4 times finer, run only along its boundaries.")
-    ] = False,
-    workers: Annotated[int | None, typer.Option(metavar="N", help="Run in N processes of this machine.")] = None,
-    scheduler: Annotated[
-        str | None,
-        typer.Option(
-            metavar="ADDRESS",
-            help="Run on the workers of a Dask scheduler. Whoever reaches the address can run code there and here, but "
-            "for tls://, with the certificates of Dask's configuration.",
-        ),
-    ] = None,
-    export: Annotated[list[Path] | None, typer.Option(metavar="FILE", help="Also write a .nc or .csv file.")] = None,
-    out: Annotated[
-        Path | None, typer.Option(metavar="STORE", help="Folder of the results, resumed if it exists.")
-    ] = None,
-    overwrite: Annotated[
-        bool,
-        typer.Option("--overwrite", help="Replace a store of another study, and figures and tables of the same names."),
-    ] = False,
-    check: Annotated[bool, typer.Option("--check", help="Run nothing, but tell whether a STORE is whole.")] = False,
-    yes: Annotated[bool, typer.Option("--yes", help="Confirm a study of more than ten million cells.")] = False,
+    metric: Metric = None,
+    rtol: MapTolerance = None,
+    verify: Verify = 0.05,
+    refine: Refine = False,
+    workers: Workers = None,
+    scheduler: Scheduler = None,
+    export: Exports = None,
+    out: StoreFolder = None,
+    overwrite: ReplaceStore = False,
+    check: CheckStore = False,
+    yes: Confirmed = False,
     as_json: AsJson = False,
 ) -> None:
     """Sweep two (or more) keys: results in a Zarr store, a figure, and a page whose cells can be clicked.
