@@ -26,14 +26,18 @@ __all__ = [
     "CRITERION",
     "DISTINCT",
     "DISTINCT_CRITERION",
+    "RULE",
     "counted_peaks",
     "distinct_peaks",
     "peaks_in_traces",
 ]
 
-CRITERION = "peak count of the thesis: maxima after 10 s, higher than 0.1 mm, 0.5 s apart, the tallest kept first"
+RULE = f"after {COUNTED_AFTER:g} s, higher than {1e3 * COUNTED_ABOVE:g} mm, {APART:g} s apart"
+"""Which maxima count."""
 
-DISTINCT_CRITERION = f"{CRITERION}; of maxima with valleys of 1 um or more on both sides"
+CRITERION = f"peak count of the thesis: maxima {RULE}, the tallest kept first"
+
+DISTINCT_CRITERION = f"{CRITERION}; of maxima with valleys of {1e6 * DISTINCT:g} um or more on both sides"
 
 
 def counted_peaks(times: np.ndarray, values: np.ndarray, counts: np.ndarray) -> np.ndarray:

@@ -150,14 +150,15 @@ def machines(laws: Laws) -> tuple[WorkedMachine, ...]:
     locked, free = (float(edge(flat)[0]) for edge in (laws.locked_edge, laws.free_edge))
     stage = thesis_rig()
     rigid = stage.model_copy(update={"joint": None, "parasitic": None})
+    mode = f"parasitic mode at {stage.flat()['parasitic.frequency']:g} Hz"
     return (
-        WorkedMachine("one rigid mass of 1.7 kg", locked, direct(rigid)),
+        WorkedMachine(f"one rigid mass of {flat['masses.cart'] + flat['masses.stage']:g} kg", locked, direct(rigid)),
         WorkedMachine(
-            "joint locked by its fixtures, parasitic mode at 300 Hz",
+            f"joint locked by its fixtures, {mode}",
             locked,
             direct(stage.replace({"joint.locked": True})),
         ),
-        WorkedMachine("joint free, parasitic mode at 300 Hz", free, direct(stage.replace({CROSSOVER: "5 Hz"}))),
+        WorkedMachine(f"joint free, {mode}", free, direct(stage.replace({CROSSOVER: "5 Hz"}))),
     )
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from friso.hunting import COUNTED_ABOVE, COUNTED_AFTER
+from friso.hunting.criteria.peak_count import RULE
 from friso.views.check.cases import BANDS, ShownCase, shown_cases
 from friso.views.check.cycle_figures import cycle_figures
 from friso.views.check.traces import common_range, samples, subject, trace_of
@@ -94,7 +95,7 @@ def _settled(cases: list[ShownCase]) -> Figure:
     )
     caption = (
         "Hunting appears as a deviation that keeps coming back; so does a long transient, for a while. Peaks are "
-        "counted as in the thesis (Sec. 3.2.2): after 10 s, higher than 0.1 mm, 0.5 s apart. Below: the size of the "
+        f"counted as in the thesis (Sec. 3.2.2): {RULE}. Below: the size of the "
         "deviation over the whole run, on a logarithmic scale that ends at 1 nm; a stage that hunts never stays under "
         "the lines."
     )

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from friso.hunting.criteria.run_outcome import CREEPS, RESTS, SWINGS
+from friso.hunting.criteria.run_outcome import BAND, CREEPS, LASTING, RESTS, SWINGS
 from friso.studies.cells import CYCLE, CYCLE_UNITS, SWING, UNKNOWN
 from friso.views.drawing.prefixes import listed
 from friso.views.map.cells import SAMPLE, CellAxis, axes_of
@@ -31,10 +31,11 @@ if TYPE_CHECKING:
 
 MEANINGS = {
     "outcome": {
-        SWINGS: "the run still swings at its end: periodically, more than 20 µm peak to peak in the last quarter, by "
-        "at least half as much as in the last half",
-        CREEPS: "the run ends more than 10 µm off its reference without swinging: it drifts, sticks or decays",
-        RESTS: "the run comes to rest within 10 µm of its reference",
+        SWINGS: f"the run still swings at its end: periodically, more than {2e6 * BAND:g} µm peak to peak in the last "
+        f"quarter, by at least {100 * LASTING:g} % of what it swings in the last half",
+        CREEPS: f"the run ends more than {1e6 * BAND:g} µm off its reference without swinging: it drifts, sticks or "
+        "decays",
+        RESTS: f"the run comes to rest within {1e6 * BAND:g} µm of its reference",
     },
     "verdict": {
         "hunts": "a cycle of the stage attracts, and the motion of the stage file ends in it",

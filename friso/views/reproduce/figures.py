@@ -10,6 +10,7 @@ import numpy as np
 
 from friso.hunting import COUNTED_ABOVE, COUNTED_AFTER
 from friso.hunting.criteria import distinct_peaks
+from friso.hunting.criteria.peak_count import RULE
 from friso.studies.thesis.judges.shares import NARROW, WIDE
 from friso.studies.thesis.studies import STUDIES, ThesisStudy
 from friso.views.check.figures import SHARES
@@ -110,7 +111,7 @@ def _response(reproduction: Reproduction) -> Figure:
         markers,
         (Limit((COUNTED_ABOVE,), "peaks count above", GREY, "dotted"),),
     )
-    caption = f"The rig with its joint locked. Peaks count after {COUNTED_AFTER:g} s, above 0.1 mm and 0.5 s apart."
+    caption = f"The rig with its joint locked. Peaks count {RULE}."
     return Figure("figure-5", "Figure 5: position of the locked rig after the return move", caption, (panel,))
 
 
