@@ -127,8 +127,8 @@ def uncertain_value(text: str, of: Quantity | Number) -> UncertainValue:
     """
     try:
         centre, interval = _read(text, of)
-        asked = (interval.low, centre, interval.high) if interval.form == "range" else (centre,)
-        if not all(of.bound.holds(value) for value in asked):
+        values = (interval.low, centre, interval.high) if interval.form == "range" else (centre,)
+        if not all(of.bound.holds(value) for value in values):
             raise _Refused(_reach(interval, of))
         if interval.low < interval.high and not any(
             of.bound.holds(interval.at(0.5 + side)) for side in (-_BESIDE, _BESIDE)

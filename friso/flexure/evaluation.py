@@ -113,11 +113,11 @@ class Evaluation:
     @property
     def named_modes(self) -> dict[str, Mode]:
         """The modes by name, in their order; namesakes beyond the first are counted."""
-        seen: Counter[str] = Counter()
+        counts: Counter[str] = Counter()
         named = {}
         for mode in self.modes:
-            seen[mode.name] += 1
-            named[mode.name if seen[mode.name] == 1 else f"{mode.name} ({seen[mode.name]})"] = mode
+            counts[mode.name] += 1
+            named[mode.name if counts[mode.name] == 1 else f"{mode.name} ({counts[mode.name]})"] = mode
         return named
 
 

@@ -72,8 +72,8 @@ class VisibleModes:
 
 def first_interfering(mechanism: Mechanism) -> Any:
     """Frequency [Hz] of the lowest mode other than the drive mode that actuator and sensor see; infinite if none."""
-    seen = VisibleModes.of(mechanism)
-    return seen.at(np.argmin(np.where(seen.visible, seen.frequency, np.inf), axis=-1))[0]
+    visible = VisibleModes.of(mechanism)
+    return visible.at(np.argmin(np.where(visible.visible, visible.frequency, np.inf), axis=-1))[0]
 
 
 def parasitic_mode(mechanism: Mechanism) -> tuple[Any, Any]:
@@ -83,8 +83,8 @@ def parasitic_mode(mechanism: Mechanism) -> tuple[Any, Any]:
     The model of the equations, a part m_p of the stage's mass m on a spring, has the residue m_p/(m (m - m_p)); it
     knows none below 0, of modes in which actuator and sensor move against each other, of which the size counts here.
     """
-    seen = VisibleModes.of(mechanism)
-    height = np.where(seen.visible, np.abs(seen.residue), 0.0) / np.maximum(seen.frequency, 1e-9) ** 2
-    frequency, residue = seen.at(np.argmax(height, axis=-1))
+    visible = VisibleModes.of(mechanism)
+    height = np.where(visible.visible, np.abs(visible.residue), 0.0) / np.maximum(visible.frequency, 1e-9) ** 2
+    frequency, residue = visible.at(np.argmax(height, axis=-1))
     leaves = closed_forms.leaf_bending(mechanism)
     return np.where(np.isfinite(frequency), frequency, leaves)[()], np.maximum(np.abs(residue), LEAST)[()]

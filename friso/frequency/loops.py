@@ -34,18 +34,18 @@ def closed_loop(flat: Mapping[str, Any], members: Members) -> System:
     the sensor to all that the plant shows and the actuator force."""
     machine, control = plant(flat, members), compensator(flat, len(members))
     n, k = len(machine.states), len(control.states)
-    seen = machine.take((FORCE, DISTURBANCE), (STAGE, VELOCITY))
+    channels = machine.take((FORCE, DISTURBANCE), (STAGE, VELOCITY))
     push = machine.b[:, :, [machine.inputs.index(FORCE)]]
     measured, commanded = control.take((STAGE, VELOCITY), (FORCE,)), control.take((REFERENCE, STAGE), (FORCE,))
     a = np.zeros((len(members), n + k, n + k))
-    a[:, :n, :n] = machine.a + push @ measured.d @ seen.c
+    a[:, :n, :n] = machine.a + push @ measured.d @ channels.c
     a[:, :n, n:] = push @ control.c
-    a[:, n:, :n], a[:, n:, n:] = measured.b @ seen.c, control.a
+    a[:, n:, :n], a[:, n:, n:] = measured.b @ channels.c, control.a
     outside = np.zeros((len(members), n + k, 2))
     outside[:, :n] = machine.b
     inside = np.concatenate([push @ commanded.d, commanded.b], axis=1)
     outputs = np.concatenate([machine.c, np.zeros((len(members), machine.c.shape[1], k))], axis=2)
-    force = np.concatenate([measured.d @ seen.c, control.c], axis=2)
+    force = np.concatenate([measured.d @ channels.c, control.c], axis=2)
     d = np.zeros((len(members), outputs.shape[1] + 1, 4))
     d[:, -1:, 2:] = commanded.d
     system = System(

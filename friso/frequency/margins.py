@@ -154,9 +154,9 @@ def _roots(function: Callable[[float], float], omega: np.ndarray, values: np.nda
     return np.array(sorted({*crossings, *omega[values == 0].tolist()}))
 
 
-def _gains(response: Response, omega: np.ndarray, seen: Complex, ends: Complex) -> np.ndarray:
+def _gains(response: Response, omega: np.ndarray, gains: Complex, ends: Complex) -> np.ndarray:
     """Factors by which the gain takes the loop through -1: where L is real and negative."""
-    clear = np.where(np.abs(seen.imag) > REAL * np.abs(seen.real), seen.imag, np.nan)  # not rounding
+    clear = np.where(np.abs(gains.imag) > REAL * np.abs(gains.real), gains.imag, np.nan)  # not rounding
     real = _roots(lambda w: response(np.array([w]))[0].imag, omega, clear)
     at = np.concatenate([response(real) if real.size else np.empty(0), ends])
     return -1 / at.real[at.real < 0]

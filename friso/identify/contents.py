@@ -57,8 +57,8 @@ class ChannelContent:
     def course(self, bins: int = BINS) -> np.ndarray:
         """The means over parts of the channel one after the other, at most so many, NaN where there is no number."""
         parts = np.array_split(self.values, min(bins, max(self.values.size, 1)))
-        kept = [part[np.isfinite(part)] for part in parts]
-        return np.array([part.mean() if part.size else np.nan for part in kept])
+        finite = [part[np.isfinite(part)] for part in parts]
+        return np.array([part.mean() if part.size else np.nan for part in finite])
 
 
 @dataclass(frozen=True)

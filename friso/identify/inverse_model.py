@@ -99,11 +99,11 @@ def bandwidth_of(position: np.ndarray, sample_time: float) -> float:
     frequency, power = welch(position, 1 / sample_time, nperseg=pieces, detrend="linear")
     noise = np.median(power[3 * len(power) // 4 :])
     below = np.flatnonzero(power < ABOVE_NOISE * noise)
-    seen = slice(0, below[0] if below.size else len(power))
-    share = np.cumsum((power - noise)[seen] * frequency[seen] ** 4)
+    passband = slice(0, below[0] if below.size else len(power))
+    share = np.cumsum((power - noise)[passband] * frequency[passband] ** 4)
     if not share.size or not share[-1] > 0:
         raise InputError("position", "nothing but noise", "a motion that stands out of it", "a larger or faster move")
-    return float(frequency[seen][np.searchsorted(share, ENERGY * share[-1])])
+    return float(frequency[passband][np.searchsorted(share, ENERGY * share[-1])])
 
 
 def directions(position: np.ndarray) -> tuple[bool, bool]:

@@ -155,8 +155,8 @@ def recognised(log: Log, path: Path) -> tuple[str, str]:
     """The only kind of experiment that a log of which nobody said what it is may be of, and why. Raises InputError
     where none claims it, or several do."""
     course = Course(log)
-    asked = {name: claims for name in KINDS if (claims := KINDS[name].claims) is not None}
-    reasons = {name: reason for name, claims in asked.items() if (reason := claims(course)) is not None}
+    claims_of = {name: claims for name in KINDS if (claims := KINDS[name].claims) is not None}
+    reasons = {name: reason for name, claims in claims_of.items() if (reason := claims(course)) is not None}
     if len(reasons) == 1:
         return next(iter(reasons.items()))
     names = sorted(reasons or KINDS, key=lambda name: name != "moves")

@@ -164,12 +164,12 @@ def draw(stage: Stage, correlations: Correlations, count: int, seed: int) -> Sam
         keys = _values(stage, matrix, sampler.random(size))
         within, why = _allowed(stage, keys, size)
         enough = np.flatnonzero(np.cumsum(within) == count - accepted)[:1]
-        seen = slice(0, int(enough[0]) + 1 if enough.size else size)
-        reasons = why[seen][~within[seen]]
+        leading = slice(0, int(enough[0]) + 1 if enough.size else size)
+        reasons = why[leading][~within[leading]]
         beyond += int(np.count_nonzero(reasons == ""))
         broken.update(reasons[reasons != ""].tolist())
-        parts.append({key: values[seen][within[seen]] for key, values in keys.items()})
-        accepted += int(within[seen].sum())
+        parts.append({key: values[leading][within[leading]] for key, values in keys.items()})
+        accepted += int(within[leading].sum())
         if accepted == count:
             joined = {key: np.concatenate([part[key] for part in parts]) for key in intervals}
             return Sample(joined, count, beyond, broken)

@@ -182,8 +182,10 @@ def _problems(cls: type[Section], error: ValidationError) -> InputError:
     """One InputError from pydantic's list: an unknown key first, since it often explains a missing one, and what else
     is wrong below it."""
     order = sorted(error.errors(include_url=False), key=lambda problem: problem["type"] != "extra_forbidden")
-    meant = {nearest(problem["loc"][-1], cls.model_fields) for problem in order if problem["type"] == "extra_forbidden"}
-    missing = [problem for problem in order if problem["type"] == "missing" and problem["loc"][0] not in meant]
+    nearest_keys = {
+        nearest(problem["loc"][-1], cls.model_fields) for problem in order if problem["type"] == "extra_forbidden"
+    }
+    missing = [problem for problem in order if problem["type"] == "missing" and problem["loc"][0] not in nearest_keys]
     others = [problem for problem in order if problem["type"] != "missing"]
     problems = [_problem(cls, problem) for problem in others]
     if missing:

@@ -110,9 +110,9 @@ class DrivenPlant:
         points = int(np.max(last.max(axis=0) - first.min(axis=0))) + 1
         numbers = first.min(axis=0)[:, None] + np.arange(points)
         amplitudes = 10.0 ** (numbers / PER_DECADE)
-        asked = numbers <= last.max(axis=0)[:, None]
+        pending = numbers <= last.max(axis=0)[:, None]
         reached = np.full(amplitudes.shape, np.nan)
-        reached[asked], _, _ = self.answer(amplitudes[asked], np.nonzero(asked)[0])
+        reached[pending], _, _ = self.answer(amplitudes[pending], np.nonzero(pending)[0])
         cells = numbers[None, :, :-1]
         return amplitudes, reached, (cells >= first[:, :, None]) & (cells < last[:, :, None])
 

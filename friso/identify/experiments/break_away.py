@@ -97,8 +97,8 @@ def static_from_ramps(
 
 def _half(push: np.ndarray) -> int:
     """The sample, of shape (n,), at which a push has last risen through half of its way, seen without noise."""
-    seen = smoothed(push, len(push) / BROAD)
-    return int(np.flatnonzero(seen <= (seen[0] + seen[-1]) / 2)[-1])
+    smooth = smoothed(push, len(push) / BROAD)
+    return int(np.flatnonzero(smooth <= (smooth[0] + smooth[-1]) / 2)[-1])
 
 
 def _answer(table: np.ndarray, bristle_rate: float, threshold: float, notes: list[str]) -> BreakAway:

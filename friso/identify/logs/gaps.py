@@ -53,30 +53,30 @@ def check_gaps(reading: Reading, proposal: Proposal, needed: Sequence[str]) -> N
     """Raises GapsError for all that has to be told before a log can be read as one with the roles that are `needed`."""
     table, origin = reading.table, reading.origin
     chosen = {role: choice for role, choice in proposal.chosen.items() if role in (*needed, "force")}
-    found: list[LogError] = []
+    gaps: list[LogError] = []
     for role, channels in proposal.rivals.items():
         if role in OPTIONAL and role not in needed:
             continue
         names = " and ".join(quoted(channel.name) for channel in channels)
         example = option("--map", role, channels[0].name)
-        found.append(LogError(role, f"{len(channels)} candidates: {names}", "one channel", example, origin))
+        gaps.append(LogError(role, f"{len(channels)} candidates: {names}", "one channel", example, origin))
         if role in needed:
             chosen[role] = AssignedRole(role, channels[0], "", True)
     for role in [role for role in needed if role not in chosen]:
         likely = likeliest(role, table, [choice.channel for choice in (*proposal.chosen.values(), *chosen.values())])
         example = option("--map", role, likely.name) if likely else ""
-        found.append(LogError(role, "no channel whose name suggests it", listing(table), example, origin))
+        gaps.append(LogError(role, "no channel whose name suggests it", listing(table), example, origin))
         if likely:
             chosen[role] = AssignedRole(role, likely, "", True)
-    found += _of_time(reading, proposal, [chosen[role] for role in needed if role in chosen])
+    gaps += _of_time(reading, proposal, [chosen[role] for role in needed if role in chosen])
     units = {role: unit_gap(choice, reading) for role, choice in chosen.items()}
     reference = proposal.chosen.get("reference")
     if units.get("position") and reference is not None and not reference.channel.unit and "reference" not in units:
         units["reference"] = unit_gap(reference, reading)
-    found += [gap for gap in units.values() if gap is not None]
-    if found:
+    gaps += [gap for gap in units.values() if gap is not None]
+    if gaps:
         proposed = {role: choice.channel.name for role, choice in chosen.items() if role not in proposal.chosen}
-        raise GapsError(found, proposed)
+        raise GapsError(gaps, proposed)
 
 
 def likeliest(role: str, table: ChannelTable, taken: Iterable[Channel]) -> Channel | None:

@@ -133,11 +133,11 @@ def _has_comma(path: Path, form: TextLayout) -> bool:
 
 def unique(names: list[str]) -> list[str]:
     """Names, with a number where they are the same."""
-    seen: dict[str, int] = {}
+    counts: dict[str, int] = {}
     out = []
     for name in names:
-        seen[name] = seen.get(name, 0) + 1
-        out.append(name if seen[name] == 1 or not name else f"{name} #{seen[name]}")
+        counts[name] = counts.get(name, 0) + 1
+        out.append(name if counts[name] == 1 or not name else f"{name} #{counts[name]}")
     return out
 
 

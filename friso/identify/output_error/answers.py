@@ -77,9 +77,9 @@ def _no_narrower(fit: OutputErrorFit, profiles: Mapping[str, Profile]) -> np.nda
     factors = np.ones(len(fit.free))
     for i, number in enumerate(fit.free):
         parameter = fit.problem.parameters[number]
-        seen = profiles[parameter.name]
-        half = float(parameter.inner(seen.high) - parameter.inner(seen.low)) / 2
-        if spread[i] > 0 and not (seen.open_low or seen.open_high):
+        interval = profiles[parameter.name]
+        half = float(parameter.inner(interval.high) - parameter.inner(interval.low)) / 2
+        if spread[i] > 0 and not (interval.open_low or interval.open_high):
             factors[i] = max(1.0, half / (COVERAGE * spread[i]))
     return fit.covariance * np.outer(factors, factors)
 

@@ -51,8 +51,8 @@ class Coverage:
 
     def shows_length(self, length: float) -> bool:
         """Whether bristles are seen bending by a length [m], again and again."""
-        seen = [np.sum((distance > RESOLVED * self.resolution) & (distance < length)) for distance in self.starts]
-        return bool(sum(count >= SAMPLES for count in seen) >= EPISODES)
+        passes = [np.sum((distance > RESOLVED * self.resolution) & (distance < length)) for distance in self.starts]
+        return bool(sum(count >= SAMPLES for count in passes) >= EPISODES)
 
 
 def coverage(position: np.ndarray, moved: FilteredMotion, mass: float, coulomb: float, sample_time: float) -> Coverage:

@@ -22,7 +22,7 @@ STEADY, QUICK = 0.3, 0.02
 second holds for swings quicker than the cutoff that stand clear of noise, and is so small since a swing above half the
 sampling rate looks slower than it is: one of 940 Hz, sampled at 1 kHz, like one of a seventeenth of its velocity."""
 
-ROUNDING, WHOLE = 1e-6, 0.1
+ROUNDING, NEAR_INTEGER = 1e-6, 0.1
 """Share of the largest step of a position up to which steps are rounding of numbers, and how far those in digits may
 be from whole numbers."""
 
@@ -155,7 +155,7 @@ def _digit(position: np.ndarray) -> float:
     if not len(steps):
         return 0.0
     digits = steps / steps.min()
-    return float(steps.min()) if np.abs(digits - np.rint(digits)).max() < WHOLE else 0.0
+    return float(steps.min()) if np.abs(digits - np.rint(digits)).max() < NEAR_INTEGER else 0.0
 
 
 def _quick_swing(position: np.ndarray, sample_time: float, cutoff: float, digit: float) -> float:

@@ -124,14 +124,14 @@ class Keep:
         if path.exists():
             with np.load(path, allow_pickle=False) as stored:
                 return Edges(**{field.name: stored[field.name] for field in fields(Edges)})
-        made = make()
+        edges = make()
         self.folder.mkdir(parents=True, exist_ok=True)
         half = path.with_suffix(".part")
         with half.open("wb") as file:
-            words = {"kind": made.kind.astype(str)}
-            np.savez(file, allow_pickle=False, **(vars(made) | words))
+            words = {"kind": edges.kind.astype(str)}
+            np.savez(file, allow_pickle=False, **(vars(edges) | words))
         replace_file(half, path)  # whole, or not there
-        return made
+        return edges
 
 
 @cache

@@ -177,8 +177,8 @@ def _family(bode: Bode, stable: bool, name: str, shade: str) -> list[Series]:
     picked = numbers[np.linspace(0, len(numbers) - 1, min(DRAWN[stable], len(numbers))).round().astype(int)]
     lines = []
     for k, loop in enumerate(bode.loops[picked]):
-        seen = (np.abs(loop) > KEPT[0]) & (np.abs(loop) < KEPT[1])
-        visible = np.where(seen, loop, np.nan)[np.convolve(seen, np.ones(3), "same") > 0]
+        near = (np.abs(loop) > KEPT[0]) & (np.abs(loop) < KEPT[1])
+        visible = np.where(near, loop, np.nan)[np.convolve(near, np.ones(3), "same") > 0]
         lines.append(Series(np.real(visible), np.imag(visible), "" if k else name, shade, width=0.9))
     return lines
 

@@ -31,12 +31,12 @@ def stability(bode: Bode) -> list[str]:
         margins = bode.settled[1]
         how = f"stable, {_margin(margins)}" if margins.stable else f"not stable: a deviation {growth(margins)}"
         return [f"The loop is {how}."]
-    says = [_settled(bode)]
+    sentences = [_settled(bode)]
     if bode.stable:
         worst, margins = bode.worst
         where = f"{place(worst, bode)}, {_margin(margins)}"
-        return [*says, f"It is stable in every state: {_states_checked(bode)}. Worst: {where}."]
-    return [*says, f"It is not stable in every state. Unstable: {'; '.join(_where(bode))}.", *_why(bode)]
+        return [*sentences, f"It is stable in every state: {_states_checked(bode)}. Worst: {where}."]
+    return [*sentences, f"It is not stable in every state. Unstable: {'; '.join(_where(bode))}.", *_why(bode)]
 
 
 def _settled(bode: Bode) -> str:

@@ -16,7 +16,7 @@ COLOURS = {"hunts": VERMILLION, "bistable": ORANGE, "transient": SKY, "settles":
 BINS = 24
 """Bars of the figure."""
 
-TOLD = 4
+MOST_LISTED = 4
 """Most keys whose influence on the verdict the table lists."""
 
 
@@ -33,7 +33,7 @@ def draws_rows(draws: Draws) -> list[tuple[str, list[str]]]:
         key: max((abs(separation[key]) for separation in separations if separation), default=0.0)
         for key in draws.sample.keys
     }
-    strongest = sorted(strength, key=lambda key: -strength[key])[:TOLD]
+    strongest = sorted(strength, key=lambda key: -strength[key])[:MOST_LISTED]
     rows += [
         (f"Decided by {key}", [f"{separation[key]:+.2f}" if separation else NOTHING for separation in separations])
         for key in strongest
@@ -44,26 +44,26 @@ def draws_rows(draws: Draws) -> list[tuple[str, list[str]]]:
 def draws_sentences(draws: Draws) -> list[str]:
     """What the draws say, a sentence per case, and what was left out."""
     sample = draws.sample
-    says = [f"{label}: {_sentence(draws.fates[name], draws)}" for name, label in case_labels(draws.stage).items()]
+    sentences = [f"{label}: {_sentence(draws.fates[name], draws)}" for name, label in case_labels(draws.stage).items()]
     if sample.left_out:
         reasons = [f"{count}: {why}" for why, count in sample.broken.items()]
         beyond = [f"{sample.beyond}: a key beyond its bounds"] if sample.beyond else []
-        says.append(f"{sample.left_out} invalid draws were left out ({'; '.join([*beyond, *reasons])}).")
-    return says
+        sentences.append(f"{sample.left_out} invalid draws were left out ({'; '.join([*beyond, *reasons])}).")
+    return sentences
 
 
 def _sentence(fates: Fates, draws: Draws) -> str:
     failed, keys = fates.counts["failed"], fates.separations(draws.sample.keys)
-    says = [
+    sentences = [
         f"of {draws.sample.count} draws, hunts with a probability of {_percent(fates.share(('hunts',)))}, "
         f"has a cycle that attracts with {_percent(fates.share(ATTRACTED))}."
     ]
     if failed:
-        says.append(f"{failed} draws failed; the intervals cover both outcomes for them.")
+        sentences.append(f"{failed} draws failed; the intervals cover both outcomes for them.")
     if keys:
         key, how = next(iter(keys.items()))
-        says.append(f"{key} matters most ({how:+.2f}): {'larger' if how > 0 else 'smaller'} values hunt.")
-    return " ".join(says)
+        sentences.append(f"{key} matters most ({how:+.2f}): {'larger' if how > 0 else 'smaller'} values hunt.")
+    return " ".join(sentences)
 
 
 def _percent(share: Share) -> str:

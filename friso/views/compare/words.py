@@ -238,14 +238,14 @@ def _recommendation(comparison: Comparison) -> list[str]:
 def _performance(comparison: Comparison) -> list[str]:
     """How fast the options that bring the machines to rest do so, how still these are then, and how sure that is."""
     resting, some = _resting(comparison), min(FOLLOWED, comparison.machines.count)
-    says = [
+    lines = [
         f"{label(result)}: in position in {with_unit(result.settling.value, 's')} (median)"
         f"{_still(result, comparison)}; at least {_percent(result.settled.low)} % of such machines come to rest (95 % "
         "confidence)."
         for result in resting
     ]
     longer = f"Of {some} machines followed {LONGER} times as long, {100 * ENOUGH:g} % or more stay at rest with "
-    return [*says, f"{longer}{listed([result.letter for result in resting], 'and')}."] if says else []
+    return [*lines, f"{longer}{listed([result.letter for result in resting], 'and')}."] if lines else []
 
 
 def _still(result: Result, comparison: Comparison) -> str:
@@ -287,15 +287,15 @@ def _resting(comparison: Comparison) -> list[Result]:
 def population(comparison: Comparison) -> list[str]:
     """How the machines were drawn."""
     machines = comparison.machines
-    says = [
+    lines = [
         f"{machines.count} machines were drawn with seed {comparison.seed}; each has the same parameters, rail and "
         "noise in all options."
     ]
     if machines.from_file:
-        says.append(f"Uncertain as in the stage file: {', '.join(machines.from_file)}.")
+        lines.append(f"Uncertain as in the stage file: {', '.join(machines.from_file)}.")
     if machines.spreads:
         spreads = ", ".join(f"{key} ±{spread:g} %" for key, spread in machines.spreads.items())
-        says.append(f"Default spreads (95 % of the machines), as the stage file gives none: {spreads}.")
+        lines.append(f"Default spreads (95 % of the machines), as the stage file gives none: {spreads}.")
     if "rail.seed" in machines.keys:
-        says.append("Every machine has a rail of its own.")
-    return says
+        lines.append("Every machine has a rail of its own.")
+    return lines

@@ -66,11 +66,11 @@ def _bars(ranges: list[Range], visible: Range, row: int, label: str, colour: str
 
 def _named_once(bands: list[Band]) -> tuple[Band, ...]:
     """Only the first of several bars with a name stands in the legend."""
-    seen: set[str] = set()
+    labels: set[str] = set()
     named = []
     for band in bands:
-        named.append(Band(band.x, band.low, band.high, "" if band.label in seen else band.label, band.colour))
-        seen.add(band.label)
+        named.append(Band(band.x, band.low, band.high, "" if band.label in labels else band.label, band.colour))
+        labels.add(band.label)
     return tuple(named)
 
 

@@ -58,7 +58,7 @@ def modes_figure(evaluation: Evaluation) -> Figure:
     return Figure("flexure_modes", "Modes", caption, panels, columns=2)
 
 
-def _panel(mechanism: Mechanism, mode: Mode, seen: bool) -> Panel:
+def _panel(mechanism: Mechanism, mode: Mode, visible: bool) -> Panel:
     view = best_view(mechanism, mode)
     axes = VIEWS[view]
     shapes = [*_leaves(mechanism, mode, axes), _block(mechanism, mode, axes)]
@@ -67,7 +67,7 @@ def _panel(mechanism: Mechanism, mode: Mode, seen: bool) -> Panel:
     largest = max(float(np.abs(shape.moved[:, axes]).max()) for shape in shapes)
     size = float(np.max(high - low))
     gain = LARGE * size / largest
-    colour, label = (VERMILLION, "seen by actuator and sensor") if seen else (BLUE, "not seen by both")
+    colour, label = (VERMILLION, "seen by actuator and sensor") if visible else (BLUE, "not seen by both")
     rest = _joined([shape.rest[:, axes] for shape in shapes])
     moved = _joined([(shape.rest + gain * shape.moved)[:, axes] for shape in shapes])
     lines = (Series(*rest, f"at rest, {view}", LIGHT, width=1.6), Series(*moved, label, colour, width=1.6))
@@ -80,8 +80,8 @@ def best_view(mechanism: Mechanism, mode: Mode) -> str:
     """The first view in which nearly all motion takes place, or the one with most of it."""
     everything = np.concatenate([mode.leaves.reshape(-1, 3), _corners_moved(mechanism, mode)])
     shares = np.sum(everything**2, axis=0) / max(float(np.sum(everything**2)), np.finfo(float).tiny)
-    seen = {view: float(sum(shares[axis] for axis in axes)) for view, axes in VIEWS.items()}
-    return next((view for view, share in seen.items() if share > ENOUGH), max(seen, key=seen.__getitem__))
+    spans = {view: float(sum(shares[axis] for axis in axes)) for view, axes in VIEWS.items()}
+    return next((view for view, share in spans.items() if share > ENOUGH), max(spans, key=spans.__getitem__))
 
 
 def drawable_share(mechanism: Mechanism, mode: Mode) -> float:

@@ -81,8 +81,8 @@ def _column(bench: Bench, response: FrequencyResponse, driven: bool) -> tuple[Pa
         Series(fine, values, "", colour, dash, 1.5)
         for (_, colour, dash, _), values in zip(curves, aligned, strict=True)
     )
-    seen = np.clip(half, 0, 60)
-    shade = Band(hertz, angle - seen, angle + seen, "", AREA)
+    bounded = np.clip(half, 0, 60)
+    shade = Band(hertz, angle - bounded, angle + bounded, "", AREA)
     below = Panel("", frequency, Axis("Phase", "°", step=90.0), (phase, *fits), bands=(shade,))
     return above, below
 

@@ -20,10 +20,10 @@ def logs_figures(contents: Sequence[LogContent]) -> list[Figure]:
 
 
 def _figure(content: LogContent, number: int) -> Figure:
-    drawn = sorted((c for c in content.channels if c.role != "time"), key=lambda channel: not channel.role)[:MOST]
-    left = len(content.channels) - len(drawn)
+    channels = sorted((c for c in content.channels if c.role != "time"), key=lambda channel: not channel.role)[:MOST]
+    left = len(content.channels) - len(channels)
     caption = "As they stand in the file, in its own units." + (f" {left} channels are not drawn." if left else "")
-    panels = tuple(_panel(channel) for channel in drawn)
+    panels = tuple(_panel(channel) for channel in channels)
     return Figure(f"logs_{number}", title(content), caption, panels, columns=2 if len(panels) > 1 else 1)
 
 

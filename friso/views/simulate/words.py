@@ -12,7 +12,7 @@ from friso.views.drawing.prefixes import plus_minus, with_unit
 
 def conclusion(name: str, measures: Measures, final: float) -> str:
     """What the run of the stage of that name does, with its deviation [m] at the `final` sample."""
-    says = {
+    clauses = {
         SWINGS: lambda: (
             f"swings {plus_minus(_value(measures.peak_to_peak) / 2, 'm')} every "
             f"{with_unit(_value(measures.period), 's')} at the end of the run"
@@ -23,9 +23,9 @@ def conclusion(name: str, measures: Measures, final: float) -> str:
         RESTS: lambda: f"rests {_settled(measures)}",
     }
     outcome = str(measures.outcome[0])
-    if outcome not in says:
+    if outcome not in clauses:
         return f"{name}: the run was not completed ({Status(int(measures.status[0])).text})."
-    return f"{name}: {says[outcome]()}."
+    return f"{name}: {clauses[outcome]()}."
 
 
 def _settled(measures: Measures) -> str:

@@ -88,7 +88,7 @@ def the_leaf_springs(evidence: Evidence) -> Finding:
 def _parasitic(evaluations: tuple[Evaluation, ...]) -> Part:
     """The first mode other than the drive mode, over the parameters left open."""
     modes = [min(evaluation.modes[1:], key=lambda mode: mode.frequency) for evaluation in evaluations]
-    seen = np.array(
+    visible = np.array(
         [evaluation.interfering.frequency if evaluation.interfering else np.nan for evaluation in evaluations]
     )
     frequencies = np.array([mode.frequency for mode in modes])
@@ -98,7 +98,7 @@ def _parasitic(evaluations: tuple[Evaluation, ...]) -> Part:
         "to 90 mm and height of the centre of mass of 0 to 60 mm above the leaf ends",
         bool(np.all((frequencies >= _PARASITIC / ABOUT) & (frequencies <= _PARASITIC * ABOUT))),
         f"{_range(frequencies)} Hz: {' or '.join(names)}; the first that actuator and sensor, underneath the leaves, "
-        f"see: {_range(seen)} Hz",
+        f"see: {_range(visible)} Hz",
         why="the sideways mode of the stage falls with its height, which the thesis leaves open",
     )
 

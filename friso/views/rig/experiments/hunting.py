@@ -111,8 +111,8 @@ def _started(moves: HuntingResult) -> list[str]:
 def figures(outcome: Outcome) -> list[Figure]:
     """Fig. 24, Fig. 25, a start by release, and the share of rails over the crossover."""
     moves: HuntingResult = outcome.result
-    made = [_locked_and_free(moves), _crossovers(moves), _shares(moves)]
-    return [*made, _startable(moves)] if moves.startable is not None else made
+    figures = [_locked_and_free(moves), _crossovers(moves), _shares(moves)]
+    return [*figures, _startable(moves)] if moves.startable is not None else figures
 
 
 def _locked_and_free(moves: HuntingResult) -> Figure:
