@@ -131,7 +131,8 @@ def _static_above(
     if STATIC not in flat or not estimates.keys() & {STATIC, COULOMB}:
         return {}
     centre = {
-        key: float(_centre(estimates[key], fields[key]) if key in estimates else flat[key]) for key in (STATIC, COULOMB)
+        key: float(uncertain_value(written(estimates[key]), fields[key]) if key in estimates else flat[key])
+        for key in (STATIC, COULOMB)
     }
     if centre[STATIC] >= centre[COULOMB]:
         return {}
@@ -149,10 +150,6 @@ def _static_above(
     why = f"Coulomb friction would be above static friction otherwise{lost}"
     notes.append(f"{follows}: moved along with {leads} to {written(estimates[follows])}, since {why}")
     return {follows: leads}
-
-
-def _centre(estimate: Estimate, field: Quantity | Number) -> float:
-    return uncertain_value(written(estimate), field)
 
 
 def _together(stage: Stage, estimates: dict[str, Estimate], notes: list[str]) -> tuple[Estimate, ...]:

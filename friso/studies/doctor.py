@@ -43,7 +43,9 @@ class DoctorCheck:
 def checks(full_paths: bool = False) -> Iterator[DoctorCheck]:
     """All that is looked at, one by one; folders below the user's own begin with ~ unless `full_paths`."""
     yield DoctorCheck("friso", VERSION)
-    yield DoctorCheck("Python", f"{platform.python_implementation()} {platform.python_version()}, {_bits()} bit")
+    yield DoctorCheck(
+        "Python", f"{platform.python_implementation()} {platform.python_version()}, {8 * struct.calcsize('P')} bit"
+    )
     yield DoctorCheck("system", f"{platform.system()} {platform.release()}, {platform.machine()}")
     yield from _packages()
     steps: tuple[tuple[str, Callable[[], str], str], ...] = (
@@ -58,10 +60,6 @@ def checks(full_paths: bool = False) -> Iterator[DoctorCheck]:
             yield DoctorCheck(subject, look())
         except Exception as error:  # whatever is wrong is what was asked for
             yield DoctorCheck(subject, _without_home(f"{type(error).__name__}: {error}", full_paths), False, remedy)
-
-
-def _bits() -> int:
-    return 8 * struct.calcsize("P")
 
 
 def _packages() -> Iterator[DoctorCheck]:

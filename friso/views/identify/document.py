@@ -25,7 +25,10 @@ def identify_document(
         "logs": [_log(file) for file in files],
         "estimates": [key_document(estimate) for estimate in identification.estimates],
         "experiments": [_experiment(experiment) for experiment in identification.experiments],
-        "predictions": [_prediction(prediction) for prediction in predictions],
+        "predictions": [
+            {"log": prediction.log.name, **prediction_view(prediction).numbers(prediction.result)}
+            for prediction in predictions
+        ],
         "warnings": list(identification.warnings),
     }
     return plain_json(document)
@@ -62,7 +65,3 @@ def _experiment(experiment: Experiment) -> dict[str, Any]:
         **view_of(experiment.kind).numbers(experiment.result),
         "estimates": [key_document(estimate) for estimate in experiment.estimates],
     }
-
-
-def _prediction(prediction: Prediction) -> dict[str, Any]:
-    return {"log": prediction.log.name, **prediction_view(prediction).numbers(prediction.result)}

@@ -153,19 +153,13 @@ def labels(identification: Identification) -> list[str]:
 
 def read_rows(files: Sequence[LogFile]) -> list[tuple[str, tuple[str, ...], tuple[str, ...]]]:
     """For every file: what it counts as and why, what was read, and what to know before believing it."""
-    return [(_counts_as(file), (*file.source.read, *_mapping_kept(file)), _warned(file)) for file in files]
-
-
-def _counts_as(file: LogFile) -> str:
-    return f"{file.path.name}: {file.kind} ({file.reason})"
-
-
-def _mapping_kept(file: LogFile) -> tuple[str, ...]:
-    return () if file.mapping_file is None else (f"mapping kept in {file.mapping_file.name}",)
-
-
-def _warned(file: LogFile) -> tuple[str, ...]:
-    return getattr(file.source, "warnings", ())
+    rows = []
+    for file in files:
+        read = file.source.read
+        if file.mapping_file is not None:
+            read = (*read, f"mapping kept in {file.mapping_file.name}")
+        rows.append((f"{file.path.name}: {file.kind} ({file.reason})", read, getattr(file.source, "warnings", ())))
+    return rows
 
 
 def answer(identification: Identification, files: Sequence[LogFile], predictions: Sequence[Prediction]) -> list[str]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from friso.views.drawing.colours import scale
 from friso.views.drawing.drawable import colour_prefix
-from friso.views.drawing.figure import Array, Cloud, Kind
+from friso.views.drawing.figure import Array, Cloud
 from friso.views.drawing.prefixes import choose
 from friso.views.map.cells import SAMPLE, CellAxis, axes_of, look, metrics, pick, plane_first
 from friso.views.map.words import KINDS, variable, words_of
@@ -99,7 +99,7 @@ def _coloured(runs: xr.Dataset, name: str, cells: _Cells) -> dict[str, Any]:
     )
     codes = cells.take(colouring.codes)
     stored = colouring.numbers if name in KINDS else runs[name]
-    kinds = [_kind(kind) for kind in colouring.kinds]
+    kinds = [{"label": kind.label, "colour": kind.colour} for kind in colouring.kinds]
     return {
         "name": name,
         "label": colouring.quantity,
@@ -121,10 +121,6 @@ def _text(runs: xr.Dataset, name: str, cells: _Cells) -> dict[str, Any]:
     codes, words = words_of(runs, name)
     numbers = cells.take(runs[name].copy(data=codes)).astype("<u4")
     return {"name": name, "label": variable(name), "words": words, "codes": _base64(numbers)}
-
-
-def _kind(kind: Kind) -> dict[str, str]:
-    return {"label": kind.label, "colour": kind.colour}
 
 
 def _short(values: Array) -> np.ndarray:
