@@ -37,9 +37,9 @@ AFTER_KINK = 0.25
 """Share of the proposed step that is tried after a kink, behind which the motion may be much quicker."""
 
 
-WIDE, LATE = 3.0, 0.9
-"""A step that begins so many times farther from a kink than a peak about it is narrow, and crosses it before this share
-of the step, is taken again as far as the kink: within it every stage may lie beyond the peak."""
+WIDE = 3.0
+"""A step that begins so many times farther from a kink than a peak about it is narrow, crosses it, and ends beyond the
+peak, or on this side again, is taken again as far as the kink: within it every stage may lie beyond the peak."""
 
 ROUNDING = 2e-15
 """The hysteresis is no less than this share of the terms of a surface, nine units in their last place."""
@@ -421,7 +421,8 @@ class StepWriter:
         for k, kink in enumerate(self.model.kinks):
             if kink.narrow != 0:
                 far = f"(guess{k} <= earliest) & (near{k} > {WIDE!r} * narrow{k}__s)"
-                lines.append(f"passed_over = passed_over | ({far} & (fraction < {LATE!r}))")
+                within = f"(last{k} >= -narrow{k}__s) & (last{k} <= 0.0)"
+                lines.append(f"passed_over = passed_over | ({far} & (not ({within})))")
         return lines
 
     def _jump(self) -> list[str]:
