@@ -114,7 +114,7 @@ class Outward:
         """What attracts at some factors, tried from distances [m] as well. Without `cycles` simulations alone tell:
         orbits that attract from a narrow range show where they are followed from wider ones."""
         tried = None if distances is None else np.tile(distances, (len(factors), 1))
-        return attractors(self._stages(factors), tried=tried, cycles=cycles)
+        return attractors(self._stages(factors), tried=tried, cycles=cycles, at_once=cycles and len(factors) == 1)
 
     def _stages(self, factors: np.ndarray) -> Ensemble:
         return Ensemble.held(faster(self.flat, factors), len(factors))

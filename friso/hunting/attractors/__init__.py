@@ -87,23 +87,30 @@ class Attractors:
 
 @np.errstate(all="ignore")  # runs that fail on the way leave infinities behind
 def attractors(
-    stages: Ensemble, thorough: bool = False, rtol: float = RTOL, tried: np.ndarray | None = None, cycles: bool = True
+    stages: Ensemble,
+    thorough: bool = False,
+    rtol: float = RTOL,
+    tried: np.ndarray | None = None,
+    cycles: bool = True,
+    at_once: bool = False,
 ) -> Attractors:
     """What attracts: everything that simulations from many starts end in, and the cycles that the return map suggests.
     Of many stages at once one motion that attracts is enough; a `thorough` survey looks for all of them, and where
     simulations alone tell what it finds, it tries them at a hundredth of the tolerance. Orbits are closed to the
     relative tolerance. Motions begin from the distances `tried` [m], (count, n), too, where they are finite. Without
-    `cycles` many stages are surveyed by simulations alone."""
+    `cycles` many stages are surveyed by simulations alone. Starts are tried `at_once`, and beside the cycles, by a
+    thorough survey and where nothing is thought to attract: one run alone takes as long as eight together."""
     survey, every = Survey(stages.count, thorough, rtol), np.arange(stages.count)
-    suggested = families(stages, rtol) if thorough else ()
+    at_once = thorough or at_once
+    suggested = families(stages, rtol) if at_once and cycles else ()
     starts = Starts(stages)
     starts.spread(thorough)
     _take_notice(starts, survey, every, suggested)
     if tried is not None:
         starts.stuck_at(tried)
-    for runs, of in starts.waves(thorough):
+    for runs, of in starts.waves(at_once):
         survey.follow(runs, of)
-    if cycles and not thorough:
+    if cycles and not at_once:
         _try_cycles(starts, survey, rtol)
     decided = survey.attracted | ~survey.unknown
     nothing, typical = np.zeros(stages.count, bool), typical_period(stages)
@@ -128,7 +135,7 @@ def _try_cycles(begun: Starts, survey: Survey, rtol: float) -> None:
         return
     starts = begun.take(left)
     _take_notice(starts, survey, left, families(starts.stages, rtol))
-    for runs, of in starts.waves(thorough=True):
+    for runs, of in starts.waves(at_once=True):
         survey.follow(runs, left[of])
 
 
@@ -150,7 +157,7 @@ def _tried_again(stages: Ensemble, first: Attractors, rtol: float) -> Attractors
         starts.stuck_at(tried)
     for cycles in first.families:
         survey.slow_down(np.arange(stages.count), cycles)
-    for runs, of in starts.waves(thorough=True):
+    for runs, of in starts.waves(at_once=True):
         survey.follow(runs, of)
     flips = first.attracts != survey.attracted
     again = [motion for motion in survey.attracting if flips[motion.stage] or motion.stage in proved]

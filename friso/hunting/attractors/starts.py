@@ -80,9 +80,9 @@ class Starts:
         self.of.append(of)
         self.states.append(states)
 
-    def waves(self, thorough: bool) -> Iterator[tuple[Pending, np.ndarray]]:
-        """The runs before their first round, and the numbers of their stages: of a `thorough` survey all at once, else
-        a few first, from which most stages that hunt do."""
+    def waves(self, at_once: bool) -> Iterator[tuple[Pending, np.ndarray]]:
+        """The runs before their first round, and the numbers of their stages: all `at_once`, or a few first, from which
+        most stages that hunt do."""
         if not self.of:
             return
         of, states = np.concatenate(self.of), np.concatenate(self.states)
@@ -90,7 +90,7 @@ class Starts:
         rank = np.empty(len(of), np.int64)
         rank[order] = np.arange(len(of)) - np.searchsorted(of[order], of[order])
         left = np.ones(len(of), bool)
-        for every in EVERY[-1:] if thorough else EVERY:
+        for every in EVERY[-1:] if at_once else EVERY:
             if (which := np.flatnonzero(left & (rank % every == every // 2))).size:
                 yield self._begun(of[which], states[which]), of[which]
             left[which] = False

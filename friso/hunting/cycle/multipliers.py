@@ -16,6 +16,9 @@ RANGE, POINTS, ENOUGH = 0.01, 41, 30
 """Range of the macroscopic slope, as a share of the distance at which the stage sticks, runs across it, and how many
 of them have to come back."""
 
+ROUGHER = 100.0
+"""Tolerance of these runs in units of that of the orbits: their range is wide."""
+
 NEAR = 0.25
 """How far off the others, as a share of the range, a return may lie that counts."""
 
@@ -60,7 +63,7 @@ def slopes(stages: Ensemble, orbits: Orbits, direction: np.ndarray, rtol: float)
     """Slope of the straight line through the returns from a small range about the orbits along a direction (count,
     states), shape (count,)."""
     away = np.linspace(-RANGE / 2, RANGE / 2, POINTS)[None, :]
-    heights = returns_of(stages, orbits, direction, away, 2, rtol)
+    heights = returns_of(stages, orbits, direction, away, 2, ROUGHER * rtol)
     return np.array([_straight(pairs[np.isfinite(pairs).all(axis=1)]) for pairs in heights])
 
 

@@ -27,8 +27,8 @@ STRIDE = 0.3
 CLOSED, CLOSED_CHATTERING = 1e-8, 1e-4
 """Gap up to which an orbit counts as closed, and that for a limiter that may chatter."""
 
-FINEST = 1e-11
-"""Gap that is as good as none."""
+FINEST, FINEST_CHATTERING = 1e-11, 1e-8
+"""Gap that is as good as none, and that for a limiter that may chatter, where gaps below it are rounding's."""
 
 NUDGE = 1e-5
 """Change of a place over which the derivative by it is taken."""
@@ -65,14 +65,24 @@ class Orbits:
 
 
 def shoot(stages: Ensemble, states: np.ndarray, times: np.ndarray, sign: float, rtol: float) -> Shot:
-    """Follow orbits from states (count, states) over times [s] (count,), with a small deviation along every state."""
+    """Follow orbits from states (count, states) over times [s] (count,), with a small deviation along every state.
+
+    That along the integrator's follows from the others: the flow carries the rates at the start, which near a stage
+    that sticks are almost the integrator's alone, to those at the end.
+    """
     count, size = states.shape
-    every = np.repeat(np.arange(count), size)
-    starts = np.hstack([states[every], np.tile(np.eye(size), (count, 1))])
+    others = np.delete(np.arange(size), stages.integral)
+    every = np.repeat(np.arange(count), size - 1)
+    starts = np.hstack([states[every], np.tile(np.eye(size)[others], (count, 1))])
     results = stages.take(every).run(starts, times[every], rtol, variational=True)
-    ends = results.ends.reshape(count, size, 2 * size)
-    flows = sign * np.swapaxes(ends[:, :, size:], 1, 2)
-    return Shot(sign * ends[:, 0, :size], flows, np.all(done(results).reshape(count, size), axis=1))
+    both = results.ends.reshape(count, size - 1, 2 * size)
+    ends, flows = both[:, 0, :size], np.empty((count, size, size))
+    flows[:, :, others] = np.swapaxes(both[:, :, size:], 1, 2)
+    before, after = stages.rates(states), stages.rates(ends)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        left = after - (flows[:, :, others] @ before[:, others, None])[:, :, 0]
+        flows[:, :, stages.integral] = left / before[:, stages.integral, None]
+    return Shot(sign * ends, sign * flows, np.all(done(results).reshape(count, size - 1), axis=1))
 
 
 def simplest(sign: float) -> int:
@@ -151,10 +161,11 @@ class _Shooting:
         self.inverses: list[np.ndarray] = [np.empty(0)] * count
         self.active = np.ones(count, bool)
         self.chatters = family(np.arange(count), self.places).chatters
+        self.finest = FINEST_CHATTERING if self.chatters else FINEST
 
     def advance(self) -> bool:
         """One step of the orbits still on their way; whether any is on its way still."""
-        far = self.gaps > (RENEWED if self.chatters else FINEST)
+        far = self.gaps > (RENEWED if self.chatters else self.finest)
         for which in (np.flatnonzero(self.active & far), np.flatnonzero(self.active & ~far)):
             if which.size:
                 self._advance(which, renew=bool(far[which[0]]))
@@ -202,7 +213,7 @@ class _Shooting:
         self.best_places[better] = self.places[better]
         self.gaps[which] = np.minimum(self.gaps[which], gaps)
         moving = self.idle[which] < np.where(self.gaps[which] > RENEWED, *STALLED)
-        self.active[which] = (gaps > FINEST) & np.isfinite(gaps) & moving
+        self.active[which] = (gaps > self.finest) & np.isfinite(gaps) & moving
 
     def _step(self, k: int, step: np.ndarray, sticking: int) -> None:
         """Take a step of one orbit, shortened to the stride."""
