@@ -6,7 +6,6 @@ import numpy as np
 
 from friso.hunting.attractors.rounds import Pending
 from friso.hunting.cycle.find import Cycles, described
-from friso.hunting.cycle.rest import relaxed
 from friso.hunting.cycle.shooting import close
 
 SAMPLES = 400
@@ -43,7 +42,7 @@ def _where_they_stick(some: Pending, times: np.ndarray) -> np.ndarray:
     """States (runs, states) that runs pass within the next times [s], (runs,), where the integrator is such that the
     actuator exerts no force on a stage at rest: of several that before which the stage has stood still for longest."""
     stages, size = some.stages, len(some.stages.kernel.states)
-    every, balance = np.arange(stages.count), relaxed(stages)
+    every, balance = np.arange(stages.count), stages.relaxed
     ahead = np.zeros(stages.count)
     octave = np.round(np.log2(times))  # runs of about the same length are sampled together
     for group in (every[octave == n] for n in np.unique(octave)):

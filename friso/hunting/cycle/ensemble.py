@@ -18,6 +18,9 @@ from friso.equations.structure import Structure, shared_structure
 WITHOUT_FRICTION = 1e-6
 """Size of the motion [m] from which magnitudes follow where no friction deflects the loop: such a stage is linear."""
 
+PER_STAGE = ("symmetric", "length", "scales", "relaxed")
+"""Properties of the stages one by one, which are kept with them."""
+
 
 @dataclass(frozen=True)
 class Ensemble:
@@ -40,8 +43,11 @@ class Ensemble:
 
     def take(self, numbers: np.ndarray) -> Ensemble:
         """The stages with these numbers, any of them as often as wanted."""
-        flat = {key: value[numbers] if np.ndim(value) else value for key, value in self.flat.items()}
-        return replace(self, flat=flat, count=len(numbers))
+        flat = {key: value[numbers] if getattr(value, "ndim", 0) else value for key, value in self.flat.items()}
+        taken = replace(self, flat=flat, count=len(numbers))
+        computed = {name: value[numbers] for name, value in vars(self).items() if name in PER_STAGE}
+        vars(taken).update(computed)  # what has been computed of the stages already
+        return taken
 
     @cached_property
     def structure(self) -> Structure:
@@ -99,7 +105,25 @@ class Ensemble:
 
     def settled(self, steady: Steady) -> np.ndarray:
         """States in a steady motion that has lasted, shape (count, states)."""
-        return self.kernel.settled({**self.flat, "motion.size": np.nan, "motion.duration": np.inf}, steady, self.count)
+        states = np.empty((self.count, self.kernel.initial_size))
+        for i, row in enumerate(self.kernel.module.settled(steady, self.values)):
+            states[:, i] = row
+        return states
+
+    def displaced(self, displacement: np.ndarray) -> np.ndarray:
+        """States of stages at rest that are displaced [m], the controller's filters having followed, all else zero."""
+        states = self.settled(Steady(-displacement, displacement))
+        states[:, self.kernel.having(Role.INTEGRAL)] = 0.0
+        return states
+
+    @cached_property
+    def relaxed(self) -> np.ndarray:
+        """State of the integrator per displacement [s] at which the actuator exerts no force on a stage at rest, shape
+        (count,)."""
+        states = self.displaced(np.ones(self.count))
+        free = self.force(states)
+        states[:, self.integral] = 1.0
+        return -free / (self.force(states) - free)
 
     def rates(self, states: np.ndarray) -> np.ndarray:
         """The time derivative of the states, both of shape (count, states)."""

@@ -7,8 +7,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from friso.engine.arrays import STATISTICS
-from friso.hunting.cycle.ensemble import Ensemble, done
+from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.guess import UNWINDING, Guess, symmetric_guess, whole_guess
 from friso.hunting.cycle.multipliers import multipliers
 from friso.hunting.cycle.rest import stuck, wait
@@ -238,15 +237,16 @@ def described(stages: Ensemble, orbits: Orbits, rtol: float, reasons: np.ndarray
     if not which.size:
         return cycles
     floquet = multipliers(some, shut, rtol)
-    round_trip = some.run(shut.states, periods, rtol, with_modes=True, window=0.0)
-    extremes = round_trip.statistics[:, [STATISTICS.index("deviation_max"), STATISTICS.index("deviation_min")]]
+    high, low = floquet.high, floquet.low
+    if shut.sign < 0:
+        high, low = np.maximum(high, -low), np.minimum(low, -high)
     first = floquet.local[:, 0]
     complex_pair = np.abs(np.imag(first)) > 1e-6 * np.abs(first)
     decisive = floquet.slope if some.chatters else np.where(complex_pair, np.abs(first), np.real(first))
     values = {
         "period": periods,
-        "amplitude": np.where(done(round_trip), (extremes[:, 0] - extremes[:, 1]) / 2, np.nan),
-        "middle": np.where(done(round_trip), (extremes[:, 0] + extremes[:, 1]) / 2, np.nan),
+        "amplitude": (high - low) / 2,
+        "middle": (high + low) / 2,
         "gap": shut.gaps,
         "local": floquet.local,
         "direction": floquet.direction,
@@ -255,8 +255,9 @@ def described(stages: Ensemble, orbits: Orbits, rtol: float, reasons: np.ndarray
     }
     for name, value in values.items():
         getattr(cycles, name)[which] = value
-    elsewhere = which[~some.same_modes(shut.states, round_trip.ends)]
-    cycles.closed[elsewhere], cycles.reasons[elsewhere] = False, NOT_CLOSED
+    if some.kernel.switches:
+        elsewhere = which[~some.same_modes(shut.states, some.run(shut.states, periods, rtol, with_modes=True).ends)]
+        cycles.closed[elsewhere], cycles.reasons[elsewhere] = False, NOT_CLOSED
     unknown = cycles.closed & ~(np.isfinite(cycles.multiplier) & np.isfinite(cycles.amplitude))
     cycles.closed[unknown], cycles.reasons[unknown] = False, NO_MULTIPLIER
     return cycles

@@ -6,7 +6,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import theilslopes
 
 from friso.hunting.cycle.ensemble import Ensemble
 from friso.hunting.cycle.shooting import Orbits, shoot
@@ -27,11 +26,14 @@ NEAR = 0.25
 class Multipliers:
     """Of each orbit: its Floquet multipliers but the one that every cycle has along itself, the largest first
     (count, states - 1), the direction that belongs to the first, with a position of 1 (count, states), and the
-    macroscopic slope of the return map along it (count,), NaN where no limiter chatters: it decides nothing there."""
+    macroscopic slope of the return map along it (count,), NaN where no limiter chatters: it decides nothing there; and
+    the extremes of the position on the way that they were taken on, `high` and `low` [m] (count,)."""
 
     local: np.ndarray
     direction: np.ndarray
     slope: np.ndarray
+    high: np.ndarray
+    low: np.ndarray
 
 
 def multipliers(stages: Ensemble, orbits: Orbits, rtol: float) -> Multipliers:
@@ -39,8 +41,9 @@ def multipliers(stages: Ensemble, orbits: Orbits, rtol: float) -> Multipliers:
     shot = shoot(stages, orbits.states, orbits.times, orbits.sign, rtol)
     flows = np.where(shot.done[:, None, None], shot.flows, np.nan)
     local, direction = _floquet(stages, flows, stages.rates(shot.ends))
-    nothing = np.full(stages.count, np.nan)
-    return Multipliers(local, direction, slopes(stages, orbits, direction, rtol) if stages.chatters else nothing)
+    slope = slopes(stages, orbits, direction, rtol) if stages.chatters else np.full(stages.count, np.nan)
+    high, low = (np.where(shot.done, extreme, np.nan) for extreme in (shot.high, shot.low))
+    return Multipliers(local, direction, slope, high, low)
 
 
 def _floquet(stages: Ensemble, flows: np.ndarray, rates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -73,7 +76,8 @@ def _straight(pairs: np.ndarray) -> float:
     if len(pairs) < ENOUGH:
         return np.nan
     first, second = (pairs - np.median(pairs, axis=0)).T
-    rough = theilslopes(second, first)[0]
+    earlier, later = np.triu_indices(len(first), 1)
+    rough = np.nanmedian((second[later] - second[earlier]) / (first[later] - first[earlier]))  # that of Theil and Sen
     near = np.abs(second - rough * first) < NEAR * np.ptp(first)
     if np.count_nonzero(near) < ENOUGH:
         return np.nan

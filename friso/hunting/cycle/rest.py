@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from friso.equations.roles import Role, Steady
+from friso.equations.roles import Role
 from friso.hunting.cycle.ensemble import Ensemble
 
 
@@ -16,23 +16,8 @@ def stuck(stages: Ensemble, displacement: np.ndarray) -> np.ndarray:
     states are a line through all hunting cycles with sticking, and the distance to the reference alone tells what
     follows.
     """
-    states = displaced(stages, displacement)
-    states[:, stages.integral] = relaxed(stages) * displacement
-    return states
-
-
-def relaxed(stages: Ensemble) -> np.ndarray:
-    """State of the integrator per displacement [s] at which the actuator exerts no force on a stage at rest."""
-    states = displaced(stages, np.ones(stages.count))
-    free = stages.force(states)
-    states[:, stages.integral] = 1.0
-    return -free / (stages.force(states) - free)
-
-
-def displaced(stages: Ensemble, displacement: np.ndarray) -> np.ndarray:
-    """States of stages at rest that are displaced [m], the controller's filters having followed, all else zero."""
-    states = stages.settled(Steady(-displacement, displacement))
-    states[:, stages.kernel.having(Role.INTEGRAL)] = 0.0
+    states = stages.displaced(displacement)
+    states[:, stages.integral] = stages.relaxed * displacement
     return states
 
 

@@ -8,8 +8,8 @@ from typing import TypeVar
 
 import numpy as np
 
+from friso.engine.arrays import STATISTICS
 from friso.hunting.cycle.ensemble import Ensemble, done
-from friso.hunting.cycle.rest import relaxed
 
 STEPS = 40
 """Steps at most."""
@@ -37,10 +37,13 @@ NUDGE = 1e-5
 @dataclass(frozen=True)
 class Shot:
     """Where orbits from states (count, states) are after times [s] (count,): `ends`, mirrored after half a period,
-    and their derivative by the starts, `flows` (count, states, states)."""
+    and their derivative by the starts, `flows` (count, states, states); the extremes of the position on the way, `high`
+    and `low` [m] (count,); and which of them are `done`."""
 
     ends: np.ndarray
     flows: np.ndarray
+    high: np.ndarray
+    low: np.ndarray
     done: np.ndarray
 
 
@@ -74,7 +77,7 @@ def shoot(stages: Ensemble, states: np.ndarray, times: np.ndarray, sign: float, 
     others = np.delete(np.arange(size), stages.integral)
     every = np.repeat(np.arange(count), size - 1)
     starts = np.hstack([states[every], np.tile(np.eye(size)[others], (count, 1))])
-    results = stages.take(every).run(starts, times[every], rtol, variational=True)
+    results = stages.take(every).run(starts, times[every], rtol, variational=True, window=0.0)
     both = results.ends.reshape(count, size - 1, 2 * size)
     ends, flows = both[:, 0, :size], np.empty((count, size, size))
     flows[:, :, others] = np.swapaxes(both[:, :, size:], 1, 2)
@@ -82,7 +85,9 @@ def shoot(stages: Ensemble, states: np.ndarray, times: np.ndarray, sign: float, 
     with np.errstate(divide="ignore", invalid="ignore"):
         left = after - (flows[:, :, others] @ before[:, others, None])[:, :, 0]
         flows[:, :, stages.integral] = left / before[:, stages.integral, None]
-    return Shot(sign * ends, sign * flows, np.all(done(results).reshape(count, size - 1), axis=1))
+    extremes = (STATISTICS.index(name) for name in ("deviation_max", "deviation_min"))
+    high, low = (results.statistics[:: size - 1, column] for column in extremes)
+    return Shot(sign * ends, sign * flows, high, low, np.all(done(results).reshape(count, size - 1), axis=1))
 
 
 def simplest(sign: float) -> int:
@@ -196,13 +201,13 @@ class _Shooting:
         jacobians[:, :size, :size] = shot.flows - np.eye(size)
         jacobians[:, :size, size] = stages.rates(shot.ends)
         jacobians[:, size, stages.integral] = 1.0
-        jacobians[:, size, stages.sticking] = -relaxed(stages)
+        jacobians[:, size, stages.sticking] = -stages.relaxed
         return jacobians
 
     def _off(self, which: np.ndarray, stages: Ensemble) -> np.ndarray:
         """By how much the phase is off, shape (orbits, 1): the integrator's state that exerts no force is wanted."""
         states = self.states[which]
-        return (states[:, stages.integral] - relaxed(stages) * states[:, stages.sticking])[:, None]
+        return (states[:, stages.integral] - stages.relaxed * states[:, stages.sticking])[:, None]
 
     def _keep_best(self, which: np.ndarray, gaps: np.ndarray) -> None:
         """Keep what is closer than before; what is closed, fails or gets no closer rests."""
