@@ -25,7 +25,7 @@ CLOSE = 0.01
 SAME = 1e-3
 """The same of two orbits that are the same."""
 
-KINDS = 16
+KINDS = 32
 """Kinds of runs of a stage that are followed after the second round."""
 
 ENOUGH = 3
