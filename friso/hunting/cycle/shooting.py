@@ -17,9 +17,9 @@ STEPS = 40
 RENEWED = 1e-5
 """Gap, as a share of the states' magnitudes, above which every step has a Jacobian of its own."""
 
-STALLED = (3, 8)
-"""Steps after which an orbit whose gap has not halved gets no closer: while steps have Jacobians of their own, and
-after that."""
+STALLED = (3, 8, 1)
+"""Steps after which an orbit whose gap has not halved gets no closer: while it is above `RENEWED`, below that, and once
+the orbit is closed: what is left then is rounding, and halves by chance."""
 
 STRIDE = 0.3
 """Largest change in one step of the distance at which the stage sticks, and of the time, as a share of it."""
@@ -217,7 +217,9 @@ class _Shooting:
             best[better] = now[better]
         self.best_places[better] = self.places[better]
         self.gaps[which] = np.minimum(self.gaps[which], gaps)
-        moving = self.idle[which] < np.where(self.gaps[which] > RENEWED, *STALLED)
+        far, near, closed = STALLED
+        patience = np.where(self.gaps[which] > RENEWED, far, np.where(self.gaps[which] > CLOSED, near, closed))
+        moving = self.idle[which] < patience
         self.active[which] = (gaps > self.finest) & np.isfinite(gaps) & moving
 
     def _step(self, k: int, step: np.ndarray, sticking: int) -> None:
