@@ -47,8 +47,8 @@ def fake_cycle(symmetric: bool = True, multiplier: float = -0.9312, apart: float
     position = 5.2e-4 * np.tanh(8 * np.cos(2 * np.pi * time / 1.6277)) + apart / 2
     arrays = {"position": position, "cart_position": 0.9 * position, "velocity": np.gradient(position, time)}
     variables = {name: ("time", array) for name, array in (arrays | {"force": 3 * np.sin(time)}).items()}
-    trace = xr.Dataset(variables, coords={"time": time})
-    return Cycle(symmetric, 5.2e-4, 0.0, 1.6277, multiplier, np.array([multiplier]), -0.93, -0.9311, 1e-12, trace)
+    signals = {**variables, "time": ("time", time)}
+    return Cycle(symmetric, 5.2e-4, 0.0, 1.6277, multiplier, np.array([multiplier]), -0.93, -0.9311, 1e-12, signals)
 
 
 def fake_hunting(*cycles: Cycle, reason: str = "", certain: bool = True) -> Hunting:

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.stats import binomtest, qmc
 
 from friso.engine.arrays import Status
 from friso.engine.batch import RunOptions, run_chunks
@@ -72,6 +71,8 @@ class MoveShare:
     @property
     def interval(self) -> tuple[float, float]:
         """The range that holds the true share with a probability of 95 % (Wilson)."""
+        from scipy.stats import binomtest
+
         ends = binomtest(self.hunting, self.count).proportion_ci(0.95, method="wilson")
         return float(ends.low), float(ends.high)
 
@@ -140,6 +141,8 @@ def _kick(hunts: Callable[[np.ndarray], np.ndarray], unit: float) -> Kick:
 
 def moves(stage: Stage, target: Target) -> MoveShare | None:
     """The share of moves that end in hunting; None for motions that have no acceleration, or if every run fails."""
+    from scipy.stats import qmc
+
     flat = stage.flat()
     if flat["motion.kind"] != "there_and_back" or not flat["motion.acceleration"] * flat["motion.acceleration_time"]:
         return None

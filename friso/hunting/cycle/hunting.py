@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -59,7 +61,7 @@ class Cycle:
     come back), and `multiplier` that of the two which decides: the slope with a stroke limiter, which may chatter, else
     the largest Floquet multiplier (its modulus if it is complex). `growth` is the multiplier as a simulation beside the
     cycle shows it, by an independent route (NaN where it leaves too fast). `residual` is the gap at which the orbit
-    closes, as a share of the magnitudes of its states; `trace` one period in time, from where the stage sticks.
+    closes, as a share of the magnitudes of its states; `signals` are one period in time, from where the stage sticks.
     """
 
     symmetric: bool
@@ -71,8 +73,15 @@ class Cycle:
     slope: float
     growth: float
     residual: float
-    trace: xr.Dataset
+    signals: Mapping[str, Any]
     swings: int = 2
+
+    @cached_property
+    def trace(self) -> xr.Dataset:
+        """The signals as a dataset over the time [s]."""
+        import xarray as xr
+
+        return xr.Dataset(dict(self.signals))
 
     @property
     def attracts(self) -> bool:
@@ -209,7 +218,7 @@ def _cycle(stages: Ensemble, cycles: Cycles, rtol: float) -> Cycle:
         slope=float(slope[0]),
         growth=_growth(stages, cycles),
         residual=float(cycles.gap[0]),
-        trace=_trace(stages, cycles),
+        signals=_signals(stages, cycles),
         swings=cycles.swings * (2 if cycles.sign < 0 else 1),
     )
 
@@ -226,11 +235,9 @@ def _growth(stages: Ensemble, cycles: Cycles) -> float:
     return float(before[small] @ after[small] / (before[small] @ before[small]))
 
 
-def _trace(stages: Ensemble, cycles: Cycles) -> xr.Dataset:
-    import xarray as xr
-
+def _signals(stages: Ensemble, cycles: Cycles) -> dict[str, Any]:
     period = float(cycles.period[0])
     results = stages.run(cycles.states, cycles.period, ROUGH / 100, interval=period / SAMPLES)
     time = np.arange(results.samples.shape[1]) * (period / SAMPLES)
     flat = {**stages.flat, "motion.displacement": float(stages.length[0]), "motion.duration": period}
-    return xr.Dataset(output_variables(stages.kernel, flat, results.samples[0].T, time), coords=time_axis(time))
+    return {**output_variables(stages.kernel, flat, results.samples[0].T, time), **time_axis(time)}
