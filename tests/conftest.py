@@ -13,6 +13,7 @@ from refusals import Refused
 from snapshots import Snapshots
 
 import friso
+from friso.hunting.margin import NOT_SOUGHT
 from friso.stage import Stage
 
 FOLDER = "FRISO_CACHE_DIR"
@@ -54,6 +55,13 @@ def pytest_unconfigure(config: pytest.Config) -> None:
 def rig() -> Stage:
     """The thesis rig, its joint free."""
     return friso.load(Path(__file__).parent.parent / "examples" / "thesis_rig.toml")
+
+
+@pytest.fixture
+def own_bandwidth(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Checks search no other bandwidths than a stage's own, which takes most of their time: what they say of the stage
+    itself does not depend on it."""
+    monkeypatch.setattr("friso.hunting.verdict.searched", lambda *how: NOT_SOUGHT)
 
 
 @pytest.fixture(scope="session")

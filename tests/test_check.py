@@ -36,6 +36,7 @@ def test_the_thesis_rig_hunts_locked_and_settles_free(rig: Stage, rtol: float) -
     assert cases["given"].solver == free.solver
 
 
+@pytest.mark.usefixtures("own_bandwidth")
 def test_measures_agree_with_the_trace(rig: Stage) -> None:
     """The statistics gathered in the kernel against the samples of the dense output."""
     for case in friso.check(rig, traces=True).values():
@@ -59,6 +60,7 @@ def test_without_a_joint_there_is_one_case() -> None:
     assert list(cases) == ["given"]
 
 
+@pytest.mark.usefixtures("own_bandwidth")
 def test_locked_without_stiffness_has_no_free_case(rig: Stage) -> None:
     held = {"joint.locked": True, "joint.stiffness": None, "joint.damping": None, "joint.stroke": None}
     assert list(friso.check(rig.replace(held))) == ["given", "locked"]

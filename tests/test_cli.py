@@ -62,6 +62,7 @@ def test_check_json_has_the_cycle_and_what_starts_it(checked: dict[str, Any]) ->
     assert free["settled_after_s"] == free["settling_time_10um_s"]
 
 
+@pytest.mark.usefixtures("own_bandwidth")
 def test_set_overrides_any_key() -> None:
     document = json.loads(
         run("check", RIG, "--set", "joint.locked=true", "--set", "controller.crossover=30 Hz", "--json").stdout

@@ -75,6 +75,7 @@ def test_verdicts_of_a_batch_are_those_of_each(several: list[tuple[bool, bool, b
     assert together.tolist() == [verdicts(*columns[:, [k]])[0] for k in range(len(several))]
 
 
+@pytest.mark.usefixtures("own_bandwidth")
 @pytest.mark.xdist_group("rig")
 def test_check_is_the_batch_of_one(rig: Stage) -> None:
     """Four verdicts of stages alone, and the same stages in one batch."""

@@ -58,6 +58,7 @@ def test_all_stages_far_from_the_edge_share_their_fate(rig: Stage, crossover: st
     assert found.separations(drawn.keys) == {}
 
 
+@pytest.mark.usefixtures("own_bandwidth")
 def test_verdicts_are_those_of_single_stages(rig: Stage) -> None:
     """The slow twin: friso check on each of the stages that were drawn."""
     stage = locked(rig, "6 Hz .. 14 Hz").replace({"friction.static": "2.5 N +/- 0.5 N"})

@@ -129,6 +129,7 @@ def test_the_stage_file_has_uncertain_keys_that_hold_the_truth(
     assert len(correlations.keys) >= 3
 
 
+@pytest.mark.usefixtures("own_bandwidth")
 def test_friso_check_runs_on_what_was_identified(
     done: tuple[Path, dict[str, Any]], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -55,6 +55,7 @@ def test_files_and_document(mapped: tuple[Path, dict]) -> None:
     assert document["axes"]["joint.stroke"] == {"points": 4, "unit": "m", "first": 0.0, "last": 1e-3}
 
 
+@pytest.mark.usefixtures("own_bandwidth")
 def test_a_cell_is_run_again_alone(mapped: tuple[Path, dict]) -> None:
     folder, _ = mapped
     done = friso_inside(folder, "simulate", "--cell", "a.zarr", 2, 1, "--json")

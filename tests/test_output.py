@@ -17,10 +17,12 @@ from friso.cli.app import app
 from friso.cli.drafts import DRAFTS, Drafts
 from friso.cli.output import MARKER, UNFINISHED, OutputFolder, write
 from friso.errors import InputError
+from friso.views.drawing import matplotlib_renderer
 from friso.views.files import Content
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 RIG, DRIVE, LEAVES = (EXAMPLES / f"thesis_{name}.toml" for name in ("rig", "drive", "leaves"))
+STICK_SLIP = EXAMPLES / "lugre_stick_slip.toml"
 
 NEEDS: dict[str, tuple[object, ...]] = {
     "check": (RIG,),
@@ -276,12 +278,13 @@ def test_a_folder_in_the_way_is_not_moved(folder: Path) -> None:
     assert tree(folder) == before
 
 
-@pytest.mark.parametrize("command", ["check", "bode"])
+@pytest.mark.parametrize(("command", "stage"), [("check", STICK_SLIP), ("bode", RIG)])
 def test_a_command_that_fails_while_writing_leaves_nothing(
-    command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    command: str, stage: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("friso.cli.drafts.Drafts.put_in_place", failing(lambda self: None, 1, OSError("disk full")))
-    done = friso_inside(tmp_path, command, RIG, "--out", "out")
+    monkeypatch.setattr(matplotlib_renderer, "image", lambda figure, form: b"")
+    done = friso_inside(tmp_path, command, stage, "--out", "out")
     assert done.returncode == 1
     assert "could not be completed: disk full" in done.stderr
     assert tree(tmp_path) == {}

@@ -38,6 +38,7 @@ def judged(stage: Stage, found: Measures) -> str:
     return judge(stage, found, 1e-6).verdict
 
 
+@pytest.mark.usefixtures("own_bandwidth")
 def test_cells_equal_runs_alone(rig: Stage) -> None:
     """Any cell, run alone as a stage of its own, gives the same numbers bit for bit, and the verdict of a check."""
     runs = friso.sweep(
@@ -62,6 +63,7 @@ def test_cells_equal_runs_alone(rig: Stage) -> None:
             assert cell.steps.item() == case.steps[0]
 
 
+@pytest.mark.usefixtures("own_bandwidth")
 def test_a_defaulted_tuned_mass_follows_a_swept_mass(rig: Stage) -> None:
     light = rig.replace({"joint.locked": True, "controller.tuned_mass": None})
     swept = friso.sweep(light, {"masses.cart": ["1.2 kg", "2.4 kg"]})
@@ -84,6 +86,7 @@ def test_impossible_cells_are_marked_and_the_others_run(rig: Stage) -> None:
     assert below.outcome.values.tolist() == ["swings", "invalid"]
 
 
+@pytest.mark.usefixtures("own_bandwidth")
 def test_a_link_moves_the_keys_that_follow(rig: Stage) -> None:
     """Total mass at a fixed ratio, and F_s = max(F_s, F_c), which leaves no cell invalid."""
     free = rig.replace({"joint.locked": True, "controller.tuned_mass": None})
@@ -100,6 +103,7 @@ def test_a_link_moves_the_keys_that_follow(rig: Stage) -> None:
     assert study_of(runs).cell_stage((0, 1)).friction.static == 3.0
 
 
+@pytest.mark.usefixtures("own_bandwidth")
 def test_samples_vary_several_keys_at_once(rig: Stage) -> None:
     ranges = {"controller.crossover": "2 Hz..16 Hz", "joint.stroke": "10 um..1 mm:log"}
     runs = friso.sweep(rig, {"joint.locked": [True, False]}, Samples(ranges, 16))
@@ -250,6 +254,7 @@ def test_an_unknown_metric_is_refused(rig: Stage, refused: Refused) -> None:
         friso.sweep(rig, {"controller.crossover": ["8 Hz"]}, metrics=["loudness"])
 
 
+@pytest.mark.usefixtures("own_bandwidth")
 def test_measures_of_what_attracts_are_those_of_the_stage_alone(rig: Stage) -> None:
     """Asked for by name; the motion plays no part, and a cell that nothing attracts has no number."""
     locked = rig.replace({"joint.locked": True})
