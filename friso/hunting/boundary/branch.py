@@ -85,11 +85,14 @@ class Tracer:
     ) -> None:
         self.family, self.sign, self.rtol, self.farthest, self.swings = family, sign, rtol, farthest, swings
 
-    def solve(self, near: Point, target: np.ndarray, normal: np.ndarray) -> Point | None:
+    def solve(
+        self, near: Point, target: np.ndarray, normal: np.ndarray, states: np.ndarray | None = None
+    ) -> Point | None:
         """The cycle on the plane through a target (place, log distance, log time) with this normal, found from a cycle
-        near it; None if none is found."""
+        near it, or from about its own states (1, states); None if none is found."""
         border = Border(normal[None, :], np.array([normal @ target]))
-        states = near.cycle.states * np.exp(target[1] - near.distance)
+        if states is None:
+            states = near.cycle.states * np.exp(target[1] - near.distance)
         times = near.cycle.orbits.times * np.exp(target[2] - near.time)
         orbits, places = close_along(self.family, states, times, target[:1], border, self.sign, self.rtol, self.swings)
         if not orbits.closed[0]:
@@ -106,7 +109,8 @@ class Tracer:
         points, direction, step = [start], np.array([ahead, 0.0, 0.0]), FIRST
         while len(points) <= MOST:
             last = points[-1]
-            point = self.solve(last, last.vector + step * direction, direction)
+            states = _straight_on(points[-2], last, step) if len(points) > 1 else None
+            point = self.solve(last, last.vector + step * direction, direction, states)
             moved = np.zeros(3) if point is None else point.vector - last.vector
             length = float(np.linalg.norm(moved))
             near = point is not None and 0 < length < (2 * step if len(points) > 1 else LONGEST)
@@ -160,3 +164,9 @@ class Tracer:
         """The whole branch through a point."""
         (after, last), (before, first) = self.walk(start, 1.0), self.walk(start, -1.0)
         return Branch(self.sign, (*before[::-1], start, *after), (first, last))
+
+
+def _straight_on(before: Point, last: Point, step: float) -> np.ndarray:
+    """States (1, states) of the cycle a step beyond two others, on the straight line through them."""
+    share = step / float(np.linalg.norm(last.vector - before.vector))
+    return last.cycle.states + share * (last.cycle.states - before.cycle.states)

@@ -70,21 +70,24 @@ class Orbits:
 def shoot(stages: Ensemble, states: np.ndarray, times: np.ndarray, sign: float, rtol: float) -> Shot:
     """Follow orbits from states (count, states) over times [s] (count,), with a small deviation along every state.
 
-    That along the integrator's follows from the others: the flow carries the rates at the start, which near a stage
-    that sticks are almost the integrator's alone, to those at the end.
+    That along one of them, whose rate is the largest, follows from the others: the flow carries the rates at the start
+    to those at the end.
     """
     count, size = states.shape
-    others = np.delete(np.arange(size), stages.integral)
-    every = np.repeat(np.arange(count), size - 1)
-    starts = np.hstack([states[every], np.tile(np.eye(size)[others], (count, 1))])
-    results = stages.take(every).run(starts, times[every], rtol, variational=True, window=0.0)
+    every, before = np.arange(count)[:, None], stages.rates(states)
+    last = np.argmax(np.abs(before) / stages.scales, axis=1)
+    order = np.argsort(np.arange(size) == last[:, None], axis=1, kind="stable")
+    others = order[:, :-1]
+    runs = np.repeat(np.arange(count), size - 1)
+    starts = np.hstack([states[runs], np.eye(size)[others].reshape(-1, size)])
+    results = stages.take(runs).run(starts, times[runs], rtol, variational=True, window=0.0)
     both = results.ends.reshape(count, size - 1, 2 * size)
-    ends, flows = both[:, 0, :size], np.empty((count, size, size))
-    flows[:, :, others] = np.swapaxes(both[:, :, size:], 1, 2)
-    before, after = stages.rates(states), stages.rates(ends)
+    ends, columns = both[:, 0, :size], both[:, :, size:]
+    flows = np.empty((count, size, size))
+    flows[every, :, others] = columns
     with np.errstate(divide="ignore", invalid="ignore"):
-        left = after - (flows[:, :, others] @ before[:, others, None])[:, :, 0]
-        flows[:, :, stages.integral] = left / before[:, stages.integral, None]
+        left = stages.rates(ends) - np.einsum("kj,kji->ki", before[every, others], columns)
+        flows[every[:, 0], :, last] = left / before[every[:, 0], last, None]
     extremes = (STATISTICS.index(name) for name in ("deviation_max", "deviation_min"))
     high, low = (results.statistics[:: size - 1, column] for column in extremes)
     return Shot(sign * ends, sign * flows, high, low, np.all(done(results).reshape(count, size - 1), axis=1))
