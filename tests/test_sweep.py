@@ -67,7 +67,7 @@ def test_cells_equal_runs_alone(rig: Stage) -> None:
 def test_a_defaulted_tuned_mass_follows_a_swept_mass(rig: Stage) -> None:
     light = rig.replace({"joint.locked": True, "controller.tuned_mass": None})
     swept = friso.sweep(light, {"masses.cart": ["1.2 kg", "2.4 kg"]})
-    alone = friso.check(light.replace({"masses.cart": "2.4 kg"}))["given"]
+    alone = friso.check(light.replace({"masses.cart": "2.4 kg"}), rtol=study_of(swept).rtol)["given"]
     assert swept.largest_force.values[1] == alone.largest_force
     assert swept.largest_force.values[1] > 1.5 * swept.largest_force.values[0]
 
@@ -92,7 +92,7 @@ def test_a_link_moves_the_keys_that_follow(rig: Stage) -> None:
     free = rig.replace({"joint.locked": True, "controller.tuned_mass": None})
     runs = friso.sweep(free, {"mass": (np.array([1.0, 3.0]), "kg")}, links=MASS)
     assert runs["mass"].attrs["units"] == "kg"
-    alone = friso.check(study_of(runs).cell_stage((1,)))["given"]
+    alone = friso.check(study_of(runs).cell_stage((1,)), rtol=study_of(runs).rtol)["given"]
     assert alone.stage.masses.cart == pytest.approx(2.1)
     assert alone.stage.masses.stage == pytest.approx(0.9)
     assert alone.largest_force == runs.largest_force.values[1]
@@ -111,7 +111,7 @@ def test_samples_vary_several_keys_at_once(rig: Stage) -> None:
     assert runs["joint.stroke"].dims == ("sample",)
     assert (runs["joint.stroke"] < 1e-4).sum() == 8  # even in the logarithm
     index = (1, 5)
-    case = friso.check(study_of(runs).cell_stage(index))["given"]
+    case = friso.check(study_of(runs).cell_stage(index), rtol=study_of(runs).rtol)["given"]
     assert case.largest_force == runs.largest_force.values[index]
     again = Request(rig, {}, Samples(ranges, 16)).study()
     assert np.array_equal(again.axes[0].values, runs["controller.crossover"].values)
