@@ -1,6 +1,11 @@
 """A page as its tests read it."""
 
+import base64
+import gzip
+import json
+import re
 from html.parser import HTMLParser
+from typing import Any
 
 from friso.views.drawing import plotly_renderer
 
@@ -33,3 +38,9 @@ class Page(HTMLParser):
         """The same without blank lines and white space about others."""
         rows = (" ".join(row.split()) for row in self.text.splitlines())
         return "\n".join(row for row in rows if row)
+
+
+def packed_values(page: str) -> list[Any]:
+    """The values that a page carries packed as JSON, in its order: what plotly draws, or the data of a map."""
+    texts = re.findall(r'<script type="application/gzip" (?:class="figure"|id="data")>(.*?)</script>', page)
+    return [json.loads(gzip.decompress(base64.b64decode(text))) for text in texts]

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from browser import browsed, needs_browser
 from made_up import (
     NO_RETURN,
     both_joints,
@@ -25,7 +26,7 @@ from made_up import (
     same,
     settles,
 )
-from pages import Page
+from pages import Page, packed_values
 from snapshots import Snapshots
 
 from friso.hunting import Judgement, Kick, Margin
@@ -229,11 +230,18 @@ def test_report_opens_offline_and_holds_plotly_once(page):
     parsed = Page(page)
     assert all(address.startswith("data:image/svg+xml;base64,") for address in parsed.loads)
     assert page.count(plotly_renderer.script()) == 1
-    assert page.count("Plotly.newPlot(") - plotly_renderer.script().count("Plotly.newPlot(") == 7
+    assert [set(figure) for figure in packed_values(page)] == 7 * [{"data", "layout", "config"}]
     assert "default-src 'none'" in page
     own = page.replace(plotly_renderer.script(), "")
     assert not re.findall(r"https?://[^\"'<> ]*", own)
     assert "sendChartToCloud" not in own
+
+
+@needs_browser
+def test_a_browser_draws_all_figures(page, tmp_path):
+    elements = browsed(page, tmp_path)
+    assert len(re.findall(r'<div id="figure-[^>]*class="js-plotly-plot"', elements)) == 7
+    assert '<html lang="en">' in elements  # else it would stand still
 
 
 def test_report_holds_a_print_of_every_figure(page):

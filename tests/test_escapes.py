@@ -1,6 +1,7 @@
 r"""Texts of files that are shown: nothing of theirs steers a terminal, a reader or a spreadsheet."""
 
 import io
+import json
 import re
 import sys
 import unicodedata
@@ -13,6 +14,7 @@ import xarray as xr
 from hypothesis import given
 from hypothesis import strategies as st
 from inside import friso_inside
+from pages import packed_values
 
 from friso.cli.terminal import Escaping, console
 from friso.escapes import escaped, one_line, table_cell
@@ -76,7 +78,8 @@ def test_a_picture_shows_what_a_text_is() -> None:
     line = Series(np.arange(3.0), np.arange(3.0), HOSTILE, "#000000")
     figure = Figure("name", HOSTILE, HOSTILE, (Panel(HOSTILE, Axis(HOSTILE, "m"), Axis("y", "m"), (line,)),))
     ET.fromstring(matplotlib_renderer.image(figure, "svg"))  # what a control character would break
-    assert not steers(plotly_renderer.fragment(figure))
+    page = plotly_renderer.fragment(figure)
+    assert not steers(page + json.dumps(packed_values(page), ensure_ascii=False))
 
 
 def test_a_table_for_a_spreadsheet_has_no_formulas(tmp_path: Path) -> None:

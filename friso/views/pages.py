@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from importlib import resources
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
@@ -65,10 +66,16 @@ class Report:
     def html(self) -> str:
         """The page: it opens offline, prints, and is the same bytes on every run."""
         figures = [(figure, Markup(plotly_renderer.fragment(figure)), print_image(figure)) for figure in self.figures]
-        scripts = Markup(plotly_renderer.script()) if figures or self.scripted else None
-        common = {name: getattr(self, name) for name in ("command", "name", "stage_file", "source", "version")}
+        scripts = plotly_renderer.script() if figures or self.scripted else None
+        values: dict[str, Any] = {"figures": figures, "plotly": scripts, "drawing": script("page")}
+        values |= {name: getattr(self, name) for name in ("command", "name", "stage_file", "source", "version")}
         template = environment().select_template([f"{self.command}.html", "page.html"])
-        return template.render(figures=figures, plotly=scripts, **common, **{**CONTENTS, **self.values})
+        return template.render(**{**values, **CONTENTS, **self.values})
+
+
+def script(name: str) -> Markup:
+    """A script of friso/views/templates, to stand in a page."""
+    return Markup((resources.files("friso.views") / "templates" / f"{name}.js").read_text(encoding="utf-8"))
 
 
 def environment() -> Environment:

@@ -1,4 +1,4 @@
-"""What a map page knows of its runs: axes, variables and colours, packed for the page's script."""
+"""What a map page knows of its runs: axes, variables and colours, as the page's script reads them."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ MOST = 250_000  # cells in a page: more would take a browser seconds to open and
 NONE = 255  # in bytes of codes: no kind, the number counts
 
 
-def packed(runs: xr.Dataset, metric: str, rerun: str) -> dict[str, Any]:
+def page_data(runs: xr.Dataset, metric: str, rerun: str) -> dict[str, Any]:
     """Everything the page's script reads, ready for JSON; arrays are base64 of little-endian numbers, cell by cell in
     the order of the axes, the last one fastest. Raises ValueError as `look` and `axes_of` do."""
     axes = axes_of(runs)

@@ -5,19 +5,17 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from functools import partial
-from importlib import resources
 from typing import TYPE_CHECKING
 
-from markupsafe import Markup
-
 from friso.views.drawing import matplotlib_renderer
+from friso.views.drawing.packing import packed_json
 from friso.views.files import Content
 from friso.views.map.cells import SAMPLE, axes_of
-from friso.views.map.data import packed, picked
+from friso.views.map.data import page_data, picked
 from friso.views.map.figures import map_figure
 from friso.views.map.findings import caveats, failures, headline, meanings, verification
 from friso.views.map.words import KINDS, grouped, tally, variable
-from friso.views.pages import Report, print_image
+from friso.views.pages import Report, print_image, script
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -56,10 +54,10 @@ def map_html(runs: xr.Dataset, metric: str, rerun: str) -> str:
             "verification": verification(runs),
             "facts": _facts(runs, metric),
             "thinned": _thinned(runs),
-            "data": _json(packed(runs, metric, rerun)),
+            "data": packed_json(page_data(runs, metric, rerun)),
             "figure": figure,
             "printed": print_image(replace(figure, note="")),
-            "script": Markup((resources.files("friso.views") / "templates" / "map.js").read_text(encoding="utf-8")),
+            "script": script("map"),
             "rtol": f"{float(runs.attrs['rtol']):g}",
         },
     ).html()
@@ -96,9 +94,3 @@ def _thinned(runs: xr.Dataset) -> str:
     return (
         f"In this page: {' and '.join(parts)}, evenly picked; the files of the map hold all of them." if parts else ""
     )
-
-
-def _json(data: object) -> Markup:
-    """JSON that can stand in a script element whatever texts it holds."""
-    text = json.dumps(data, separators=(",", ":"), allow_nan=False, ensure_ascii=True)
-    return Markup(text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026"))

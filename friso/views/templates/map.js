@@ -1,6 +1,6 @@
 "use strict";
-(() => {
-  const data = JSON.parse(document.getElementById("data").textContent);
+(async () => {
+  const data = JSON.parse(await unpacked(document.getElementById("data")));
   const NONE = 255; // no kind: the number counts
   const GREY = "#767676", INK = "#222222";
   const plot = document.getElementById("plot");
@@ -284,6 +284,7 @@
     }
   }
 
+  await plotly;
   addControls();
   draw();
   plot.on("plotly_click", clicked);
