@@ -20,6 +20,7 @@ from friso.stage import Stage, load
 
 if TYPE_CHECKING:
     from friso.identify.kind import AnalysisSettings
+    from friso.identify.logs.log import Log
     from friso.identify.logs.mapping import Mapping
     from friso.identify.method import Identification, Prediction
     from friso.identify.sources import LogFile
@@ -71,17 +72,21 @@ def identify(
     Example: friso identify log.csv --stage stage.toml --map position=ActPos --scale force="35.15 N/V" --out identified
     """
     from friso.identify.logs.mapping import from_options
+    from friso.identify.method import check_predictions
     from friso.identify.method import identify as identification
+    from friso.identify.method import predict as predict_log
 
     assumed, settings = _stage(stage, overrides), _settings(bandwidth, band, period)
     mapping = from_options(maps or (), units or (), scales or (), dt, kind)
     target = OutputFolder("identify", out, overwrite, [*logs, *(predict or []), *([stage] if stage else [])])
     target.check([STAGE])
     inputs = _read([*logs, *(predict or [])], mapping, target)
+    sources = [(file.source, file.kind) for file in inputs[: len(logs)]]
+    others = _others(inputs[len(logs) :])
+    check_predictions(sources, others, assumed)
     with ProgressBar() as progress:
-        sources = [(file.source, file.kind) for file in inputs[: len(logs)]]
         identified = identification(sources, assumed, settings, progress)
-        predictions = _predictions(identified, inputs[len(logs) :], settings)
+        predictions = [predict_log(identified, log, settings, assumed) for log in others]
         from friso.views.identify.page import identify_files
 
         files = target.write(identify_files(identified, inputs, predictions), progress)
@@ -151,15 +156,14 @@ def _settings(bandwidth: str | None, band: str | None, period: str | None) -> An
     return AnalysisSettings(values[0], None if limits is None else (limits.low, limits.high), values[1])
 
 
-def _predictions(identified: Identification, inputs: Sequence[LogFile], settings: AnalysisSettings) -> list[Prediction]:
-    """The other logs, predicted. Raises InputError."""
+def _others(inputs: Sequence[LogFile]) -> list[Log]:
+    """The logs to be predicted. Raises InputError."""
     from friso.identify.logs.log import Log
-    from friso.identify.method import predict
 
     logs = [item.source for item in inputs if isinstance(item.source, Log)]
     if len(logs) < len(inputs):
         raise InputError("--predict", "a measured frequency response", "a log over time", "--predict other.mat")
-    return [predict(identified, log, settings) for log in logs]
+    return logs
 
 
 def _answer(

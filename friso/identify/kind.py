@@ -11,15 +11,20 @@ import numpy as np
 from friso.errors import InputError
 from friso.identify.combine import Correlated
 from friso.identify.estimate import Estimate
+from friso.identify.logs.joined import together
 from friso.identify.logs.log import Log
 from friso.identify.logs.measured_response import MeasuredResponse
 from friso.identify.readings.course import Course
-from friso.stage import Stage
+from friso.stage import Stage, parse_set
+from friso.stage.controllers import CONTROLLER
 
 Source = Log | MeasuredResponse
 """What a file may hold: signals over time, or a frequency response as somebody measured it."""
 
 Result = TypeVar("Result")
+
+OF_ANY_FORM = ("kind", "force_limit", "anti_windup")
+"""Keys of a controller that stay where a log was taken with one of another form."""
 
 
 @dataclass(frozen=True)
@@ -59,13 +64,24 @@ class Prior:
 
 
 def as_set_up(stage: Stage, log: Log) -> dict[str, Any]:
-    """The flat keys of the stage as it was set up for a log; what the stage does not have is left out. Raises
-    InputError."""
-    keys = stage.flat()
+    """The flat keys of the stage as it was set up for a log; what the stage does not have is left out (`left_out`),
+    but for a controller of another form, which replaces the stage's. Raises InputError."""
+    setup = {key: text for key, text in log.setup.items() if key not in left_out(stage, log)}
+    changes: dict[str, Any] = dict(parse_set(f"{key}={text}") for key, text in setup.items())
     try:
-        return stage.replace({key: text for key, text in log.setup.items() if key in keys}).flat()
+        return stage.replace(changes).flat()
     except InputError as error:
-        raise error.found_in(f"{log.name}, [setup]") from None
+        reason = error
+    own = {f"{CONTROLLER}.{name}" for name in stage.as_written()[CONTROLLER] if name not in OF_ANY_FORM}
+    try:
+        return stage.replace({**dict.fromkeys(own - changes.keys()), **changes}).flat()
+    except InputError:
+        raise reason.found_in(f"{log.name}, [setup]") from None
+
+
+def left_out(stage: Stage, log: Log) -> list[str]:
+    """The keys in the set-up of a log that the stage does not have."""
+    return [key for key in log.setup if key not in stage.flat() and not key.startswith(f"{CONTROLLER}.")]
 
 
 def independent(result: Any, estimates: Sequence[Estimate]) -> Correlated:
@@ -81,11 +97,13 @@ def with_interval(estimates: Sequence[Estimate]) -> list[Estimate]:
 
 @dataclass(frozen=True)
 class Predictor(Generic[Result]):
-    """How a result predicts another log: the prediction, or None for a log of which it can tell nothing; and `needs`,
-    what there has to be, in words."""
+    """How a result predicts another log, with what is known of the machine: the prediction, or None for a log of which
+    it can tell nothing. `needs` is what there has to be, in words; `check` raises InputError where logs, to which
+    nothing has been fitted yet, will not be able to."""
 
     needs: str
-    predict: Callable[[Result, Log, AnalysisSettings], Any]
+    predict: Callable[[Result, Log, Prior, AnalysisSettings], Any]
+    check: Callable[[Sequence[Source], Log, Prior], None] = lambda logs, other, prior: None
 
 
 @dataclass(frozen=True)
@@ -95,11 +113,12 @@ class ExperimentKind(Generic[Result]):
     `analyse` gives the result of a group of logs, whose class is the kind's own affair; `estimates` what this says
     about keys of the stage file, and `correlated` how these hang together. `after` names the kinds whose results it
     uses. `roles` are the channels that a log needs; of several separated by | the first one that is mapped, or the
-    last. `si`: they have to be in SI units. `together`: all its logs are realisations of one experiment; `responses`:
-    it takes frequency responses as somebody measured them, too. `claims` answers why a log of which nobody said what it
-    is may be of this kind, or None; `around` makes up a stage around a log where none is given. `notes` are what the
-    engineer should know of all its results, the stage being given or not. Functions raise InputError for logs that
-    cannot be used."""
+    last. `si`: they have to be in SI units. `partial`: whether a log shows too little for a result of its own, such as
+    one event; logs like that count as one log with gaps. `together`: all its logs are realisations of one experiment;
+    `responses`: it takes frequency responses as somebody measured them, too. `claims` answers why a log of which nobody
+    said what it is may be of this kind, or None; `around` makes up a stage around a log where none is given. `notes`
+    are what the engineer should know of all its results, the stage being given or not. Functions raise InputError for
+    logs that cannot be used."""
 
     analyse: Callable[[Sequence[Source], Prior, AnalysisSettings], Result]
     estimates: Callable[[Result, Stage | None], tuple[Estimate, ...]]
@@ -107,6 +126,7 @@ class ExperimentKind(Generic[Result]):
     after: tuple[str, ...] = ()
     roles: tuple[str, ...] = ("position", "force")
     si: bool = True
+    partial: Callable[[Log], bool] = lambda log: False
     together: bool = False
     responses: bool = False
     claims: Callable[[Course], str | None] | None = None
@@ -123,4 +143,8 @@ class ExperimentKind(Generic[Result]):
         """The logs of this kind, by experiment."""
         times = tuple(source for source in sources if isinstance(source, Log))
         responses = [(source,) for source in sources if not isinstance(source, Log)] if self.responses else []
-        return [*([times] if self.together and times else [(log,) for log in times]), *responses]
+        if self.together:
+            return [*([times] if times else []), *responses]
+        partial = [log for log in times if len(times) > 1 and self.partial(log)]
+        whole = [log for log in times if log not in partial]
+        return [*((log,) for log in (*whole, *together(partial))), *responses]

@@ -11,7 +11,7 @@ import numpy as np
 from friso.errors import InputError
 from friso.identify.combine import combined, correlations
 from friso.identify.estimate import Estimate
-from friso.identify.kind import NOTHING_CHOSEN, AnalysisSettings, Prior, Source
+from friso.identify.kind import NOTHING_CHOSEN, AnalysisSettings, Prior, Source, left_out
 from friso.identify.kinds import KINDS, in_order
 from friso.identify.logs.log import Log
 from friso.identify.stage_file import identified
@@ -76,7 +76,7 @@ def identify(
     estimates, warnings = combined(_every_estimate(experiments))
     if stage is None:
         return Identification(None, Correlations(), tuple(experiments), tuple(estimates), tuple(warnings))
-    warnings += _notes(experiments, base)
+    warnings += [*_notes(experiments, base), *_set_up([log for log, _ in logs], stage)]
     fits = fitting(stage, estimates)
     fitted = identified(stage, fits.estimates, [log.name for log, _ in logs])
     return Identification(
@@ -88,18 +88,55 @@ def identify(
     )
 
 
-def predict(identification: Identification, log: Log, settings: AnalysisSettings) -> Prediction:
+def check_predictions(logs: Sequence[tuple[Source, str]], others: Sequence[Log], base: Stage | None) -> None:
+    """Raises InputError for another log that none of the logs, each with its kind, will be able to predict: before
+    anything is fitted to these."""
+    prior = Prior(base, base is not None)
+    predictors = {kind: predictor for _, kind in logs if (predictor := KINDS[kind].predictor) is not None}
+    for other in others:
+        reasons: list[InputError] = []
+        for kind, predictor in predictors.items():
+            try:
+                predictor.check([log for log, name in logs if name == kind], other, prior)
+            except InputError as error:
+                reasons.append(error)
+        if not predictors:
+            raise _unpredictable(other)
+        if len(reasons) == len(predictors):
+            raise reasons[0]
+
+
+def predict(
+    identification: Identification, log: Log, settings: AnalysisSettings, base: Stage | None = None
+) -> Prediction:
     """Another log of the same machine, predicted by the first experiment that can, kinds that rest on others first: the
-    stage as its log alone shows it, not as combined, so that the errors are those of one record on another. Raises
-    InputError where none can."""
+    stage as its log alone shows it, not as combined, so that the errors are those of one record on another. The
+    controller is that of `base`, or of the log's own set-up. Raises InputError where none can."""
+    prior = Prior(base, base is not None)
     predictors = {name: predictor for name in reversed(in_order()) if (predictor := KINDS[name].predictor)}
     for kind, predictor in predictors.items():
         for experiment in identification.experiments:
-            result = predictor.predict(experiment.result, log, settings) if experiment.kind == kind else None
+            result = predictor.predict(experiment.result, log, prior, settings) if experiment.kind == kind else None
             if result is not None:
                 return Prediction(log, kind, result)
-    expected = ", or ".join(predictor.needs for predictor in predictors.values())
-    raise InputError("--predict", f"a log with {', '.join(log.signals)}", expected, "--map reference=SetPos", log.name)
+    raise _unpredictable(log)
+
+
+def _unpredictable(log: Log) -> InputError:
+    """The error for a log that no kind of experiment at hand predicts."""
+    needs = [predictor.needs for name in reversed(in_order()) if (predictor := KINDS[name].predictor)]
+    expected = ", or ".join(needs)
+    return InputError("--predict", f"a log with {', '.join(log.signals)}", expected, "--map reference=SetPos", log.name)
+
+
+def _set_up(logs: Sequence[Source], stage: Stage) -> list[str]:
+    """A sentence for each log whose set-up has keys that the stage does not have."""
+    several = {log.name: left_out(stage, log) for log in logs if isinstance(log, Log)}
+    return [
+        f"{name}: [setup] has {', '.join(keys)}, which the stage does not have: left out"
+        for name, keys in several.items()
+        if keys
+    ]
 
 
 def _groups(logs: Sequence[tuple[Source, str]]) -> list[tuple[str, tuple[Source, ...]]]:

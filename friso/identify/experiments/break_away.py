@@ -35,6 +35,14 @@ LEAST = 20
 """Samples of a segment that may hold a ramp."""
 
 
+FROM = 0.5
+"""Share of its force at the break-away from below which a ramp rises: our choice. A body that stops within a ramp and
+goes on has its bristles bent already."""
+
+FEW = 3
+"""Ramps that a log shows for static friction of its own."""
+
+
 @dataclass(frozen=True)
 class BreakAway:
     """Static friction [N] in all and per direction, of break-away forces at rate 0. Per ramp, shape (n,): time [s],
@@ -65,7 +73,7 @@ def static_from_ramps(
     """
     force, body = channel(log, "force"), on_bearing(log)
     rows: list[tuple[float, ...]] = []
-    threshold, quick = 0.0, 0
+    threshold, quick, stops = 0.0, 0, 0
     for part in log.segments:
         if part.stop - part.start < LEAST:
             continue
@@ -74,7 +82,11 @@ def static_from_ramps(
         pushed = low_pass(force[part], log.sample_time, cutoff)
         marks = zip(breaks.onsets, breaks.starts, breaks.rests, breaks.directions, strict=True)
         for onset, start, rest, direction in marks:
-            begin = rest + _half(direction * force[part][rest : start + 1])
+            push = direction * force[part][rest : start + 1]
+            if _lowest(push) > FROM * float(direction * pushed[start]) > 0:
+                stops += 1
+                continue
+            begin = rest + _half(push)
             if start - begin < max(SMEARED / (cutoff * log.sample_time), SAMPLES):
                 quick += 1
                 continue
@@ -90,9 +102,16 @@ def static_from_ramps(
     notes = []
     if quick:
         notes.append(f"{quick} ramps rise too fast for a low-pass at {cutoff:g} Hz (or the sampling) and are left out.")
+    if stops:
+        notes.append(f"{stops} motions went on after a stop within a ramp and are left out: they began from no rest.")
     if len(rows) > table.shape[1]:
         notes.append(f"{len(rows) - table.shape[1]} motions did not begin under a rising force and are left out.")
     return _answer(table, bristle_rate, threshold, notes)
+
+
+def _lowest(push: np.ndarray) -> float:
+    """The least value of a push, shape (n,), over the rest before a motion, seen without noise."""
+    return float(smoothed(push, len(push) / BROAD).min())
 
 
 def _half(push: np.ndarray) -> int:
@@ -134,4 +153,5 @@ KIND = ExperimentKind[BreakAway](
     analyse=_analyse,
     estimates=lambda result, stage: (replace(result.static, name="friction.static"),),
     after=("frequency", "moves"),
+    partial=lambda log: len(static_from_ramps(log).times) < FEW,
 )

@@ -13,7 +13,8 @@ from friso.identify.estimate import Estimate
 from friso.identify.kind import AnalysisSettings, ExperimentKind, Prior, Source, independent
 from friso.identify.logs.log import Log
 from friso.identify.readings.friction_position import FrictionPosition, friction_position
-from friso.identify.readings.friction_velocity import FrictionVelocity, friction_velocity
+from friso.identify.readings.friction_velocity import STRAIGHT, FrictionVelocity, distinct, friction_velocity
+from friso.identify.readings.passes import passes
 from friso.stage import Stage
 
 
@@ -51,4 +52,12 @@ def _correlated(result: FrictionAtSpeeds, estimates: Sequence[Estimate]) -> Corr
     return [estimates[row] for row in rows], (covariance / np.outer(size, size))[np.ix_(rows, rows)]
 
 
-KIND = ExperimentKind[FrictionAtSpeeds](_analyse, _estimates, _correlated, after=("frequency", "moves"))
+def _partial(log: Log) -> bool:
+    """Whether a log holds too few speeds for a curve of friction over speed."""
+    steady = [abs(stretch.velocity) for stretch in passes(log) if stretch.steady]
+    return not steady or distinct(np.array(steady)) < STRAIGHT
+
+
+KIND = ExperimentKind[FrictionAtSpeeds](
+    _analyse, _estimates, _correlated, after=("frequency", "moves"), partial=_partial
+)

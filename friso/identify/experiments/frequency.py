@@ -100,7 +100,7 @@ def _correlated(result: Bench, estimates: Sequence[Estimate]) -> Correlated:
     return independent(result, estimates)
 
 
-def _predict(result: Bench, log: Log, settings: AnalysisSettings) -> tuple[float, ...]:
+def _predict(result: Bench, log: Log, prior: Prior, settings: AnalysisSettings) -> tuple[float, ...]:
     """The relative errors of the outputs over the band, the driven mass's first."""
     return predicted(result, log, settings.period)
 

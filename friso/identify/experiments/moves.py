@@ -28,6 +28,7 @@ from friso.identify.output_error.profile import Profile
 from friso.identify.readings.course import Course
 from friso.identify.stage_file import made_up
 from friso.stage import Stage
+from friso.stage.controllers import CONTROLLER
 
 
 @dataclass(frozen=True)
@@ -110,8 +111,9 @@ class SimulatedLog:
     errors: SimulationErrors
 
 
-def simulated_log(moves: IdentifiedMoves, log: Log) -> SimulatedLog:
-    """Another log of the same axis simulated with the estimates.
+def simulated_log(moves: IdentifiedMoves, log: Log, known: Mapping[str, Any] | None = None) -> SimulatedLog:
+    """Another log of the same axis simulated with the estimates; `known` are the flat keys of the stage as it was set
+    up for that log, whose controller and changed keys count.
 
     Raises InputError where the machine's own loop is not known.
     """
@@ -119,15 +121,20 @@ def simulated_log(moves: IdentifiedMoves, log: Log) -> SimulatedLog:
         expected = "the machine's own controller, with which another record can be simulated"
         raise InputError("--predict", "no stage file", expected, "--stage examples/emps_axis.toml", log.name)
     part = log.longest
-    problem = _same_kind(moves.loop, log, part)
+    problem = _same_kind(moves.loop, log, part, known, {*log.setup, *moves.log.setup})
     simulated = problem.record(moves.fit.inner)
     return SimulatedLog(part, simulated, errors_of(log, part, simulated, moves.inverse.bandwidth))
 
 
-def _same_kind(problem: Problem, log: Log, part: slice) -> Problem:
-    """The same stage and parameters on another log."""
+def _same_kind(problem: Problem, log: Log, part: slice, known: Mapping[str, Any] | None, changed: set[str]) -> Problem:
+    """The same stage and parameters on another log, with the controller and the `changed` keys that are `known` of
+    it."""
     _has(log, ("position", "force", "reference"))
-    return closed_loop(problem.flat, log, part, problem.parameters)
+    flat = dict(problem.flat)
+    if known is not None:
+        flat = {key: value for key, value in flat.items() if not key.startswith(f"{CONTROLLER}.")}
+        flat |= {key: value for key, value in known.items() if key.startswith(f"{CONTROLLER}.") or key in changed}
+    return closed_loop(flat, log, part, problem.parameters)
 
 
 def _has(log: Log, roles: Sequence[str]) -> None:
@@ -235,8 +242,23 @@ def _notes(results: Sequence[IdentifiedMoves], stage: Stage | None) -> list[str]
     ]
 
 
-def _predict(result: IdentifiedMoves, log: Log, settings: AnalysisSettings) -> SimulatedLog | None:
-    return simulated_log(result, log) if "reference" in log else None
+def _predict(result: IdentifiedMoves, log: Log, prior: Prior, settings: AnalysisSettings) -> SimulatedLog | None:
+    if "reference" not in log or result.loop is None:
+        return None
+    return simulated_log(result, log, prior.flat(log) or None)
+
+
+def _check_prediction(logs: Sequence[Source], other: Log, prior: Prior) -> None:
+    """Raises InputError where none of the logs will be simulated in the machine's own loop, or the other cannot be."""
+    _has(other, ("position", "force", "reference"))
+    prior.flat(other)
+    if not prior.from_user:
+        expected = "the machine's own controller, with which another record can be simulated"
+        raise InputError("--predict", "no stage file", expected, "--stage examples/emps_axis.toml", other.name)
+    if not any(isinstance(log, Log) and "reference" in log for log in logs):
+        actual = f"{', '.join(log.name for log in logs)}, without a reference"
+        expected = "a log of moves with its reference, in whose loop the machine is identified"
+        raise InputError("--predict", actual, expected, "--map reference=SetPos", other.name)
 
 
 KIND = ExperimentKind[IdentifiedMoves](
@@ -247,5 +269,5 @@ KIND = ExperimentKind[IdentifiedMoves](
     claims=_claims,
     around=lambda log: made_up(log, inverse_model(log)),
     notes=_notes,
-    predictor=Predictor("a log with a reference beside moves", _predict),
+    predictor=Predictor("a log with a reference beside moves", _predict, _check_prediction),
 )

@@ -157,7 +157,9 @@ def _parsed(place: Path) -> Mapping:
 
 
 def _texts(table: dict[str, Any], key: str, place: Path) -> dict[str, str]:
-    """A table of texts. Raises LogError."""
+    """A table of texts; the set-up may have plain numbers and truths as well. Raises LogError."""
+    if key == "setup":
+        table = {name: as_toml(value) if isinstance(value, int | float) else value for name, value in table.items()}
     for name, value in table.items():
         if not isinstance(value, str):
             raise LogError(f"{key}.{name}", quoted(value), "a text", "", str(place))

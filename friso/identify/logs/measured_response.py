@@ -78,7 +78,9 @@ def response_of(table: ChannelTable, path: Path) -> MeasuredResponse:
         response, scale, unit, quantities = _polar(columns["magnitude"], columns["phase"], path)
     coherence = columns["coherence"].values if "coherence" in columns else None
     read = (*table.read, quantities, f"{frequency.size} frequencies, {frequency.min():g} Hz to {frequency.max():g} Hz")
-    return checked(MeasuredResponse(frequency, response * scale, coherence, path.stem, read, unit), path)
+    with np.errstate(all="ignore"):  # what is no number is told below
+        response = response * scale
+    return checked(MeasuredResponse(frequency, response, coherence, path.stem, read, unit), path)
 
 
 def _frequency(column: Channel, path: Path) -> np.ndarray:

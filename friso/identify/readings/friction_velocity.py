@@ -165,7 +165,7 @@ def _direction(speeds: np.ndarray, friction: np.ndarray, errors: np.ndarray, wor
     names = (("friction.coulomb", "N"), ("friction.viscous", "N s/m"))
     coulomb, viscous = (_fitted(*name, i, solution, covariance, freedom, method) for i, name in enumerate(names))
     low, high = speeds.min() * 1e3, speeds.max() * 1e3
-    if _distinct(speeds) < STRAIGHT:
+    if distinct(speeds) < STRAIGHT:
         reason = f"two speeds, {low:.3g} and {high:.3g} mm/s, do not show whether friction still falls there"
         return _still_falling(coulomb, viscous, reason)
     curved = _stribeck(speeds, friction, errors, solution, freedom)
@@ -195,7 +195,7 @@ def _one_speed(speeds: np.ndarray, friction: np.ndarray, method: str, spent: int
     )
 
 
-def _distinct(speeds: np.ndarray) -> int:
+def distinct(speeds: np.ndarray) -> int:
     """How many speeds there are."""
     return 1 + int((np.diff(np.log(np.sort(speeds))) > np.log(DISTINCT)).sum())
 
@@ -223,7 +223,7 @@ def _stribeck(
     speeds: np.ndarray, friction: np.ndarray, errors: np.ndarray, line: np.ndarray, freedom: int
 ) -> tuple[np.ndarray, np.ndarray, int] | None:
     """The fit of F_c, F_v, F_s, v_s, covariance and degrees of freedom; None where a straight line does as well."""
-    if freedom < 3 or _distinct(speeds) < SPEEDS:
+    if freedom < 3 or distinct(speeds) < SPEEDS:
         return None
     deviations, scale = _deviations(friction, errors), float(np.abs(friction).max())
     plain = float(np.sum(((friction - line[0] - line[1] * speeds) / deviations) ** 2))

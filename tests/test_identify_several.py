@@ -1,0 +1,131 @@
+"""Several logs: one event each, a controller of their own, and predictions refused before anything is fitted."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from refusals import Refused
+from test_identify_experiments import DT, FLAT, LUGRE, ramps, travels
+
+import friso
+from friso.errors import InputError
+from friso.identify.experiments.break_away import static_from_ramps
+from friso.identify.kind import as_set_up
+from friso.identify.kinds import KINDS
+from friso.identify.logs.joined import joined
+from friso.identify.logs.log import Log
+from friso.identify.method import check_predictions, identify
+from friso.identify.readings.common import record
+from friso.identify.readings.friction_velocity import friction_velocity
+from friso.stage import Stage
+
+
+def piece(log: Log, part: slice, name: str) -> Log:
+    """One segment of a log as a log of its own."""
+    signals = {role: values[part] for role, values in log.signals.items()}
+    return record(name, log.sample_time, **signals)
+
+
+def test_ramps_of_one_break_away_each_are_one_experiment() -> None:
+    whole = ramps(LUGRE, [1.0, 1.0, 5.0, 5.0], 1.0, np.random.default_rng(3))
+    single = [piece(whole, part, f"ramp {i}") for i, part in enumerate(whole.segments)]
+    assert not any(static_from_ramps(log).static.determined for log in single)
+    result = identify([(log, "break-away") for log in single])
+    (experiment,) = result.experiments
+    (estimate,) = result.estimates
+    assert len(experiment.result.times) == 4
+    assert estimate.value == pytest.approx(static_from_ramps(whole).static.value, rel=1e-3)
+    assert estimate.holds(LUGRE[0])
+
+
+def test_a_log_that_says_enough_alone_stays_alone() -> None:
+    logs = [ramps(LUGRE, [1.0, 1.0, 5.0, 5.0], 1.0, np.random.default_rng(seed)) for seed in (1, 2)]
+    single = piece(logs[0], logs[0].segments[0], "single")
+    assert [len(group) for group in KINDS["break-away"].groups([*logs, single])] == [1, 1, 1]
+
+
+def test_logs_of_one_speed_each_are_one_curve_of_friction() -> None:
+    friction = np.array([1.5, 1.0, 1e-3, 1e5, 316.2, 4.0])
+    speeds = (0.02, 0.05, 0.1)
+    single = [
+        replace(travels([speed], FLAT, np.random.default_rng(i), friction=friction), name=f"{speed:g} m/s")
+        for i, speed in enumerate(speeds)
+    ]
+    assert not any(friction_velocity(log).both.coulomb.determined for log in single)
+    (group,) = KINDS["constant-speed"].groups(single)
+    curve = friction_velocity(group[0], 1.0)
+    assert len(curve.velocities) == 6
+    assert curve.both.coulomb.holds(1.0)
+    assert curve.both.viscous.holds(4.0)
+
+
+def test_logs_that_are_not_alike_are_not_joined() -> None:
+    """At another rate, or of a stage set up differently."""
+    whole = ramps(LUGRE, [1.0, 1.0, 1.0], 1.0, np.random.default_rng(3))
+    one, two, three = (piece(whole, part, f"{i}") for i, part in enumerate(whole.segments))
+    other = replace(three, setup={"joint.stroke": "8 mm"})
+    groups = KINDS["break-away"].groups([one, two, other])
+    assert [group[0].name for group in groups] == ["0, 1", "2"]
+    slow = replace(two, sample_time=2 * DT, time=2 * two.time)
+    assert len(KINDS["break-away"].groups([one, slow])) == 2
+
+
+def test_a_joined_log_has_a_gap_between_its_parts() -> None:
+    log = record("a", 0.1, position=np.arange(5.0))
+    both = joined([log, replace(log, name="b")])
+    assert both.segments == (slice(0, 5), slice(5, 10))
+    assert np.diff(both.time).max() > 2 * 0.1
+    assert both["position"] == pytest.approx(np.tile(np.arange(5.0), 2))
+
+
+def test_stops_within_a_ramp_are_no_break_aways() -> None:
+    """A body that moves off at 1.5 N, is stopped, and goes on at a higher force of the same ramp."""
+    time = np.arange(0, 6.0, DT)
+    push = 0.5 * time
+    place = np.zeros_like(time)
+    for begin, end in ((3.0, 3.4), (4.0, 4.4), (5.0, 5.4)):
+        moving = (time >= begin) & (time < end)
+        place += np.cumsum(moving * np.sin(np.pi * (time - begin) / (end - begin)) ** 2) * 5e-3 * DT
+    rng = np.random.default_rng(1)
+    log = record("ramp", DT, position=place + 1e-8 * rng.standard_normal(len(time)), force=push)
+    result = static_from_ramps(log)
+    assert result.forces == pytest.approx([1.5], rel=0.05)
+    assert any("2 motions" in line for line in result.warnings) or "2 motions" in result.static.reason
+
+
+@pytest.fixture
+def axis() -> Stage:
+    return friso.load("examples/emps_axis.toml")
+
+
+def test_a_controller_of_its_own(axis: Stage, refused: Refused) -> None:
+    """Another gain takes its place among the others; a controller of another form replaces the stage's whole."""
+    log = record("moves", 1e-3, position=np.arange(100.0), force=np.arange(100.0))
+    gain = as_set_up(axis, replace(log, setup={"controller.kp": "1e6 N/m"}))
+    assert gain["controller.kp"] == 1e6
+    assert gain["controller.kd"] == axis.flat()["controller.kd"]
+    form = {"controller.crossover": "20 Hz", "controller.alpha": "0.1", "controller.beta": "2"}
+    other = as_set_up(axis, replace(log, setup=form))
+    assert other["controller.crossover"] == 20
+    assert "controller.kp" not in other
+    with refused("controller.kpp"):
+        as_set_up(axis, replace(log, setup={"controller.kpp": "1e6 N/m"}))
+
+
+def test_predictions_that_cannot_be_made_are_refused_before_the_fit(axis: Stage, refused: Refused) -> None:
+    signals = {"position": np.arange(100.0), "force": np.arange(100.0)}
+    bare, moved = record("bare", 1e-3, **signals), record("moved", 1e-3, reference=np.arange(100.0), **signals)
+    check_predictions([(moved, "moves")], [moved], axis)
+    check_predictions([(bare, "moves"), (moved, "moves")], [moved], axis)
+    with refused("--predict"):
+        check_predictions([(moved, "moves")], [moved], None)
+    with refused("reference"):
+        check_predictions([(moved, "moves")], [bare], axis)
+    with refused("--predict"):
+        check_predictions([(bare, "moves")], [moved], axis)
+    with refused("--predict"):
+        check_predictions([(moved, "break-away")], [moved], axis)
+    with pytest.raises(InputError, match="kpp"):
+        check_predictions([(moved, "moves")], [replace(moved, setup={"controller.kpp": "1 N/m"})], axis)
